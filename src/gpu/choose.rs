@@ -1,0 +1,205 @@
+//! Device choice: hardware Vulkan/Metal/DX12, then hardware GL, then software Vulkan, then software GL.
+//!
+//! `WGPU_BACKEND` and `WGPU_ADAPTER_NAME` are obeyed; explicit options win over them. Every request is answered by
+//! an adapter or by a [`GpuError`] that lists what was found and how to get one.
+
+use thiserror::Error;
+
+/// Backends by the names of the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Backend {
+    /// Whatever ranks first.
+    #[default]
+    Auto,
+    /// Vulkan.
+    Vulkan,
+    /// OpenGL ES through EGL, WGL or ANGLE.
+    Gl,
+    /// Metal.
+    Metal,
+    /// Direct3D 12.
+    Dx12,
+}
+
+impl Backend {
+    fn mask(self) -> wgpu::Backends {
+        match self {
+            Backend::Auto => wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12 | wgpu::Backends::GL,
+            Backend::Vulkan => wgpu::Backends::VULKAN,
+            Backend::Gl => wgpu::Backends::GL,
+            Backend::Metal => wgpu::Backends::METAL,
+            Backend::Dx12 => wgpu::Backends::DX12,
+        }
+    }
+}
+
+/// What the caller asks of the device.
+#[derive(Debug, Clone, Default)]
+pub struct GpuOptions {
+    /// Backend; [`Backend::Auto`] also lets `WGPU_BACKEND` decide.
+    pub backend: Backend,
+    /// Part of the adapter's name (any case), or `cpu` for a software adapter; `None` lets `WGPU_ADAPTER_NAME` decide.
+    pub adapter: Option<String>,
+}
+
+/// Why there is no device.
+#[derive(Debug, Error)]
+pub enum GpuError {
+    /// No adapter at all.
+    #[error("no usable GPU adapter was found ({searched}).\n{}", fix())]
+    NoAdapter {
+        /// Backends that were searched.
+        searched: String,
+    },
+    /// Adapters exist, but none has the wanted name.
+    #[error("no adapter matches `{wanted}`; there are: {found}")]
+    NoSuchAdapter {
+        /// What was asked for.
+        wanted: String,
+        /// Names that exist.
+        found: String,
+    },
+    /// `WGPU_BACKEND` holds a word that is no backend.
+    #[error("WGPU_BACKEND is `{0}`, which names no backend; use vulkan, gl, metal or dx12")]
+    UnknownBackend(String),
+    /// The adapter refused to make a device.
+    #[error("adapter {adapter} refused a device: {message}")]
+    Device {
+        /// The adapter's name.
+        adapter: String,
+        /// The driver's reason.
+        message: String,
+    },
+}
+
+/// The commands that give this system an adapter.
+pub fn fix() -> &'static str {
+    if cfg!(target_os = "linux") {
+        "Install a Vulkan driver. On Debian or Ubuntu without a GPU: apt-get install mesa-vulkan-drivers"
+    } else if cfg!(target_os = "windows") {
+        "Install the graphics driver of your card's maker; Direct3D 12 comes with Windows 10 and later."
+    } else {
+        "Update the operating system; Metal comes with macOS 10.15 and later."
+    }
+}
+
+/// A device with what is known about it. Hosts that embed the passes bring their own device and never need this.
+pub struct Gpu {
+    /// The adapter.
+    pub adapter: wgpu::Adapter,
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+    /// Name, driver, backend, kind.
+    pub info: wgpu::AdapterInfo,
+}
+
+impl Gpu {
+    /// Opens the best device that fits `options`.
+    pub fn open(options: &GpuOptions) -> Result<Self, GpuError> {
+        let (searched, adapters) = candidates(options)?;
+        let wanted = options.adapter.clone().or_else(|| std::env::var("WGPU_ADAPTER_NAME").ok());
+        let wanted = wanted.filter(|w| !w.is_empty());
+        let names = adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
+        if adapters.is_empty() {
+            return Err(GpuError::NoAdapter { searched });
+        }
+        let adapter = match &wanted {
+            None => adapters.into_iter().next(),
+            Some(w) => adapters.into_iter().find(|a| matches(&a.get_info(), w)),
+        };
+        let adapter =
+            adapter.ok_or_else(|| GpuError::NoSuchAdapter { wanted: wanted.unwrap_or_default(), found: names })?;
+        Self::from_adapter(adapter)
+    }
+
+    /// Opens a device on `adapter` with WebGPU's default limits (or the adapter's own where they are lower)
+    /// and timestamps where the adapter has them.
+    pub fn from_adapter(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
+        let info = adapter.get_info();
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("bouncelight"),
+            required_features: adapter.features() & wanted_features(),
+            required_limits: wgpu::Limits::default().or_worse_values_from(&adapter.limits()),
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| GpuError::Device { adapter: info.name.clone(), message: e.to_string() })?;
+        Ok(Self { adapter, device, queue, info })
+    }
+
+    /// True for an adapter that runs on the CPU.
+    pub fn is_software(&self) -> bool {
+        is_software(&self.info)
+    }
+
+    /// One plain sentence: which adapter, which driver, and that it is software when it is.
+    pub fn sentence(&self) -> String {
+        let i = &self.info;
+        let driver = [i.driver.as_str(), i.driver_info.as_str()].join(" ");
+        let soft = if self.is_software() {
+            " This is software rendering on the CPU: pictures are right, timings say nothing about a GPU."
+        } else {
+            ""
+        };
+        format!("{} ({:?}, {}).{soft}", i.name, i.backend, driver.trim())
+    }
+}
+
+/// Optional features that are used when present: timestamps for the timing tables.
+pub fn wanted_features() -> wgpu::Features {
+    wgpu::Features::TIMESTAMP_QUERY
+}
+
+/// All adapters that fit the backend choice, best first, with the words for what was searched.
+pub fn candidates(options: &GpuOptions) -> Result<(String, Vec<wgpu::Adapter>), GpuError> {
+    let mask = match (options.backend, std::env::var("WGPU_BACKEND")) {
+        (Backend::Auto, Ok(text)) if !text.is_empty() => {
+            let mask = wgpu::Backends::from_comma_list(&text);
+            if mask.is_empty() {
+                return Err(GpuError::UnknownBackend(text));
+            }
+            mask
+        }
+        (backend, _) => backend.mask(),
+    };
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = mask;
+    descriptor.flags = descriptor.flags.with_env();
+    let instance = wgpu::Instance::new(descriptor);
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(mask));
+    adapters.retain(is_usable);
+    adapters.sort_by_key(|a| rank(&a.get_info()));
+    Ok((format!("searched: {mask:?}").replace("Backends", ""), adapters))
+}
+
+/// The passes are compute shaders with storage buffers; an adapter without them is of no use.
+fn is_usable(adapter: &wgpu::Adapter) -> bool {
+    adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+}
+
+fn is_software(info: &wgpu::AdapterInfo) -> bool {
+    // Mesa's GL drivers do not report their kind, so the name has to tell.
+    let name = info.name.to_lowercase();
+    info.device_type == wgpu::DeviceType::Cpu
+        || ["llvmpipe", "softpipe", "swiftshader", "swrast", "microsoft basic render"].iter().any(|s| name.contains(s))
+}
+
+fn rank(info: &wgpu::AdapterInfo) -> (bool, bool, u8) {
+    let kind = match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    };
+    (is_software(info), info.backend == wgpu::Backend::Gl, kind)
+}
+
+fn matches(info: &wgpu::AdapterInfo, wanted: &str) -> bool {
+    if wanted.eq_ignore_ascii_case("cpu") {
+        return is_software(info);
+    }
+    info.name.to_lowercase().contains(&wanted.to_lowercase())
+}

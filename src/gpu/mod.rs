@@ -1,0 +1,8 @@
+//! The GPU as the rest of the house sees it: a chosen device, shader sources, readback, timing.
+
+mod choose;
+pub mod readback;
+pub mod shaders;
+pub mod timing;
+
+pub use choose::{Backend, Gpu, GpuError, GpuOptions, candidates};

@@ -1,0 +1,59 @@
+//! The one table of shaders: each is a list of plain WGSL files joined in order.
+//!
+//! Numbers come in as `override` constants or as a generated prelude of `const` lines ([`module_with`]), never by
+//! templates inside a body.
+
+/// One shader module: its name (`room.stage`) and the files that make it up, libraries first.
+#[derive(Debug, Clone, Copy)]
+pub struct Shader {
+    /// `room.stage`, also the wgpu label.
+    pub name: &'static str,
+    /// File name and contents in joining order.
+    pub files: &'static [(&'static str, &'static str)],
+}
+
+/// Names a file under `shaders/` and embeds it.
+macro_rules! wgsl {
+    ($($path:literal),+ $(,)?) => { &[$(($path, include_str!(concat!("../../shaders/", $path)))),+] };
+}
+
+/// Shaders of `render/`.
+pub const RENDER: &[Shader] = &[];
+
+/// Shaders of `gi/`.
+pub const GI: &[Shader] = &[];
+
+/// Shaders of `net/`.
+pub const NET: &[Shader] = &[];
+
+/// Every shader there is.
+pub fn all() -> impl Iterator<Item = &'static Shader> {
+    RENDER.iter().chain(GI).chain(NET)
+}
+
+/// The WGSL text of shader `name` with `prelude` (lines of `const`) in front.
+///
+/// # Panics
+/// If no row of the table has that name, which is a mistake in the code that asks.
+pub fn source(name: &str, prelude: &str) -> String {
+    let shader = all().find(|s| s.name == name).unwrap_or_else(|| panic!("no shader named {name}"));
+    let mut text = String::from(prelude);
+    for (_, body) in shader.files {
+        text.push_str(body);
+        text.push('\n');
+    }
+    text
+}
+
+/// Compiles shader `name`.
+pub fn module(device: &wgpu::Device, name: &str) -> wgpu::ShaderModule {
+    module_with(device, name, "")
+}
+
+/// Compiles shader `name` behind a generated prelude of `const` lines.
+pub fn module_with(device: &wgpu::Device, name: &str, prelude: &str) -> wgpu::ShaderModule {
+    device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(name),
+        source: wgpu::ShaderSource::Wgsl(source(name, prelude).into()),
+    })
+}

@@ -1,0 +1,1 @@
+//! PNG and multi-layer EXR, written whole or not at all.

@@ -1,0 +1,37 @@
+//! bouncelight draws a scene with a deferred rasteriser on wgpu and adds global illumination with a
+//! small U-Net that runs in compute shaders on the same GPU.
+//!
+//! ```text
+//!  file or name        GPU, one command encoder a frame (render/frame.rs tells it in order)
+//!  ───────────         ─────────────────────────────────────────────────────────────────────
+//!  scene::load ──► scene::upload ──► shadow ──► gbuffer ──► direct ──► gi ──► composite ──► tonemap
+//!                                                  │           │        ▲                     │
+//!                                                  └───────────┴► pack ─┤                     ▼
+//!  net::format ──► net::graph ──► net::plan ──► net::gpu ── U-Net ──────┘            image_io, viewer
+//! ```
+//!
+//! Module map, in the direction of the data:
+//! - [`scene`]: what is drawn, without any wgpu type except in `scene::upload`.
+//! - [`gpu`]: device choice, shader sources, readback, pass timing.
+//! - [`render`]: the rasteriser, one file a pass.
+//! - [`net`]: weights file, graph, plan, the slow CPU twin and the WGSL kernels' host side.
+//! - [`gi`]: global-illumination methods, cheapest first; `gi::pass` is the embeddable pass.
+//! - [`metrics`]: image metrics, no wgpu.
+//! - [`study`]: what is measured over methods and scenes.
+//!
+//! Conventions (units, spaces, encodings) stand in `docs/architecture.md`.
+
+pub mod gi;
+pub mod gpu;
+#[cfg(feature = "io")]
+pub mod image_io;
+pub mod metrics;
+pub mod net;
+pub mod render;
+pub mod scene;
+pub mod study;
+
+#[cfg(feature = "cli")]
+pub mod cli;
+
+pub use wgpu;

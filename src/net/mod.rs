@@ -1,0 +1,1 @@
+//! Networks: weights format, graph, plan, CPU twin, GPU kernels.

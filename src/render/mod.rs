@@ -1,0 +1,1 @@
+//! The rasteriser: one pass, one file; `frame` tells the order.

@@ -1,0 +1,279 @@
+//! What is drawn, as plain data: meshes, instances, materials, images, lights, cameras, environment.
+//!
+//! Scene space is glTF's: right-handed, +Y up, metres; cameras look down −Z. Colours are linear Rec.709.
+//! Light is radiometric (W/m², W/sr, W/(m²·sr)); photometric file units are divided by 683 lm/W at the border.
+//! Nothing here knows wgpu except [`upload`](crate::scene), which turns a [`Scene`] into GPU buffers.
+
+/// A whole scene, ready to be uploaded.
+#[derive(Debug, Clone, Default)]
+pub struct Scene {
+    /// File stem or bundled name; for messages and metadata.
+    pub name: String,
+    /// Triangle meshes; one [`Mesh`] is one glTF primitive.
+    pub meshes: Vec<Mesh>,
+    /// Placements of meshes.
+    pub instances: Vec<Instance>,
+    /// Materials; never empty when there is a mesh.
+    pub materials: Vec<Material>,
+    /// Decoded texture images.
+    pub images: Vec<Image>,
+    /// Lights; a loader adds a default one where the file has none.
+    pub lights: Vec<Light>,
+    /// Cameras; a loader adds a framing one where the file has none, so index 0 exists.
+    pub cameras: Vec<Camera>,
+    /// What rays see that hit nothing.
+    pub environment: Environment,
+    /// What was mended or left out while loading, one plain sentence each, naming the file and place.
+    pub warnings: Vec<String>,
+}
+
+/// Triangles with per-vertex attributes. All vertex arrays have the length of `positions` or are empty.
+#[derive(Debug, Clone, Default)]
+pub struct Mesh {
+    /// Name in the file, for messages.
+    pub name: String,
+    /// Object space, metres.
+    pub positions: Vec<[f32; 3]>,
+    /// Unit normals, object space; always present.
+    pub normals: Vec<[f32; 3]>,
+    /// Unit tangent and handedness (±1) as in glTF; empty when no normal map needs it.
+    pub tangents: Vec<[f32; 4]>,
+    /// First texture coordinate set, origin at the top left; empty when absent.
+    pub uv0: Vec<[f32; 2]>,
+    /// Second texture coordinate set; empty when absent.
+    pub uv1: Vec<[f32; 2]>,
+    /// Linear vertex colour that multiplies the base colour; empty when absent.
+    pub colors: Vec<[f32; 4]>,
+    /// Three per triangle, counter-clockwise seen from the front.
+    pub indices: Vec<u32>,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+}
+
+/// One placement of a mesh.
+#[derive(Debug, Clone)]
+pub struct Instance {
+    /// Node name in the file.
+    pub name: String,
+    /// Index into [`Scene::meshes`].
+    pub mesh: usize,
+    /// Column-major world-from-object matrix.
+    pub transform: [[f32; 4]; 4],
+}
+
+/// How a material's alpha is used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    Opaque,
+    /// Fragments below the cutoff are discarded.
+    Mask {
+        /// Alpha threshold in [0, 1].
+        cutoff: f32,
+    },
+    /// Drawn by stochastic coverage: a fragment survives with probability alpha, so `--samples N` converges to blending.
+    Blend,
+}
+
+/// glTF metallic-roughness material.
+#[derive(Debug, Clone)]
+pub struct Material {
+    /// Name in the file, for messages.
+    pub name: String,
+    /// Linear base colour and alpha.
+    pub base_color: [f32; 4],
+    /// Multiplies `base_color` (sRGB image).
+    pub base_color_texture: Option<TextureRef>,
+    /// 0 dielectric to 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness; GGX α is its square.
+    pub roughness: f32,
+    /// Green multiplies roughness, blue multiplies metallic (linear image).
+    pub metallic_roughness_texture: Option<TextureRef>,
+    /// Tangent-space normal map (linear image).
+    pub normal_texture: Option<TextureRef>,
+    /// Scale of the normal map's x and y.
+    pub normal_scale: f32,
+    /// Red is ambient occlusion (linear image).
+    pub occlusion_texture: Option<TextureRef>,
+    /// Strength of the occlusion map in [0, 1].
+    pub occlusion_strength: f32,
+    /// Emitted radiance, W/(m²·sr); the KHR_materials_emissive_strength factor is multiplied in.
+    pub emissive: [f32; 3],
+    /// Multiplies `emissive` (sRGB image).
+    pub emissive_texture: Option<TextureRef>,
+    /// Alpha handling.
+    pub alpha_mode: AlphaMode,
+    /// Back faces are drawn with flipped normals; otherwise they are culled.
+    pub double_sided: bool,
+    /// KHR_materials_unlit: base colour is shown as it is and takes no light.
+    pub unlit: bool,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color: [1.0; 4],
+            base_color_texture: None,
+            metallic: 1.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            occlusion_texture: None,
+            occlusion_strength: 1.0,
+            emissive: [0.0; 3],
+            emissive_texture: None,
+            alpha_mode: AlphaMode::Opaque,
+            double_sided: false,
+            unlit: false,
+        }
+    }
+}
+
+/// A use of an image by a material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TextureRef {
+    /// Index into [`Scene::images`].
+    pub image: usize,
+    /// Filtering and wrapping.
+    pub sampler: Sampler,
+    /// 0 reads `uv0`, 1 reads `uv1`.
+    pub uv_set: u8,
+    /// KHR_texture_transform as rows of a 2×3 affine matrix: `uv' = [m[0]·(u,v,1), m[1]·(u,v,1)]`.
+    pub transform: [[f32; 3]; 2],
+}
+
+/// Filtering and wrapping of a texture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Sampler {
+    /// Linear (true) or nearest magnification.
+    pub mag_linear: bool,
+    /// Linear (true) or nearest minification.
+    pub min_linear: bool,
+    /// Wrapping in u and v.
+    pub wrap: [Wrap; 2],
+}
+
+impl Default for Sampler {
+    fn default() -> Self {
+        Self { mag_linear: true, min_linear: true, wrap: [Wrap::Repeat; 2] }
+    }
+}
+
+/// What lies outside [0, 1] of a texture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Wrap {
+    /// Tiles.
+    Repeat,
+    /// Tiles mirrored.
+    MirroredRepeat,
+    /// Extends the edge.
+    ClampToEdge,
+}
+
+/// How the bytes of an [`Image`] are to be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ColorSpace {
+    /// sRGB transfer function on red, green and blue.
+    Srgb,
+    /// Bytes divided by 255.
+    Linear,
+}
+
+/// A decoded texture image: 8-bit RGBA, rows from the top.
+#[derive(Debug, Clone)]
+pub struct Image {
+    /// Name or path in the file, for messages.
+    pub name: String,
+    /// Width in pixels, at least 1.
+    pub width: u32,
+    /// Height in pixels, at least 1.
+    pub height: u32,
+    /// `4 · width · height` bytes.
+    pub rgba: Vec<u8>,
+    /// Transfer function of the bytes.
+    pub color_space: ColorSpace,
+}
+
+/// A light. `color` is a linear tint that multiplies the kind's strength.
+#[derive(Debug, Clone)]
+pub struct Light {
+    /// Name in the file.
+    pub name: String,
+    /// Linear Rec.709 tint.
+    pub color: [f32; 3],
+    /// Where it is and how strong.
+    pub kind: LightKind,
+}
+
+/// Kinds of analytic light, in world space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LightKind {
+    /// The sun: parallel light with an angular size.
+    Directional {
+        /// Unit vector along which light travels.
+        direction: [f32; 3],
+        /// Irradiance on a surface that faces it, W/m².
+        irradiance: f32,
+        /// Angular diameter, radians.
+        angle: f32,
+    },
+    /// A small sphere that shines in all directions.
+    Point {
+        /// Centre, metres.
+        position: [f32; 3],
+        /// Radiant intensity, W/sr.
+        intensity: f32,
+        /// Radius of the sphere, metres; sets the softness of shadows.
+        radius: f32,
+        /// Distance beyond which it is cut off (KHR_lights_punctual), if any.
+        range: Option<f32>,
+    },
+    /// A small disc or sphere that shines into a cone.
+    Spot {
+        /// Centre, metres.
+        position: [f32; 3],
+        /// Unit vector along the cone's axis, away from the light.
+        direction: [f32; 3],
+        /// Radiant intensity on the axis, W/sr.
+        intensity: f32,
+        /// Radius of the source, metres.
+        radius: f32,
+        /// Cut-off distance, if any.
+        range: Option<f32>,
+        /// Half angle inside which intensity is full, radians.
+        inner_angle: f32,
+        /// Half angle outside which there is no light, radians, at most π/2.
+        outer_angle: f32,
+    },
+}
+
+/// A perspective camera that looks down its own −Z.
+#[derive(Debug, Clone)]
+pub struct Camera {
+    /// Name in the file.
+    pub name: String,
+    /// Column-major world-from-camera matrix without scale.
+    pub transform: [[f32; 4]; 4],
+    /// Vertical field of view, radians.
+    pub yfov: f32,
+    /// Near plane, metres, above 0.
+    pub near: f32,
+    /// Far plane, metres; `f32::INFINITY` where the file gives none. Used to fit shadows, never to clip.
+    pub far: f32,
+}
+
+/// Light from beyond the scene. Constant for now; an image later.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Environment {
+    /// Radiance from every direction, W/(m²·sr).
+    pub radiance: [f32; 3],
+}
+
+/// Lumens per watt by which glTF's photometric light units are divided.
+pub const LUMENS_PER_WATT: f32 = 683.0;
+
+/// Angular diameter that a directional light gets when its file gives none: the real sun's, radians.
+pub const SUN_ANGLE: f32 = 0.00918;

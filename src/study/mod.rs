@@ -1,0 +1,1 @@
+//! What is measured over methods and scenes.
