@@ -163,4 +163,5 @@ def main():
             print(f"room {index} view {view}: {time.time() - start:.1f} s", file=sys.stderr, flush=True)
 
 
-main()
+if __name__ == "__main__":
+    main()
