@@ -49,10 +49,7 @@ def main():
     scene.world = bpy.data.worlds.new("world")
     scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs[0].default_value = (*a.world, 1)
-    paper_rooms.configure(scene, a.size, a.spp, 12)
-    scene.cycles.use_denoising = bool(a.denoise)
-    if a.denoise:
-        scene.cycles.denoiser = "OPENIMAGEDENOISE"
+    paper_rooms.configure(scene, a.size, a.spp, 12, bool(a.denoise))
     scene.render.filepath = os.path.abspath(a.out) + ".part.exr"
     bpy.ops.render.render(write_still=True)
     os.replace(scene.render.filepath, a.out)
