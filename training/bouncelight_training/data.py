@@ -23,6 +23,7 @@ import json
 import os
 import re
 import sys
+import zipfile
 
 import numpy as np
 import OpenEXR
@@ -193,7 +194,7 @@ class Split:
         try:
             with np.load(path) as file:
                 arrays = {name: file[name] for name in file.files}
-        except (OSError, ValueError, EOFError) as error:
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
             raise TrainingError(f"{path}: not a readable split: {error}; make it with python -m bouncelight_training.data") from error
         missing = {"features", "target", "mask", "scale", "room", "view", "report"} - set(arrays)
         if missing:

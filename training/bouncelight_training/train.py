@@ -13,7 +13,9 @@ import dataclasses
 import json
 import math
 import os
+import platform
 import signal
+import subprocess
 import sys
 import time
 
@@ -24,7 +26,7 @@ from . import augment, losses, pictures
 from .data import Split, check_apart
 from .errors import TrainingError, reported
 from .features import SLICES
-from .model import CompactUNet, flops, light, parameter_count
+from .model import compact_unet, flops, light, parameter_count
 
 FIELDS = ["epoch", "step", "samples", "seconds", "learning_rate", "train_loss", "validation_loss", "validation_error"]
 
@@ -57,6 +59,37 @@ class Config:
 FREE = {"minutes", "threads", "device", "checkpoint_seconds", "train", "validation"}
 
 
+def command_of(config, folder):
+    """The command that makes this run; of paths the last part only."""
+    words = ["python -m bouncelight_training.train", "--run", os.path.basename(os.path.normpath(folder))]
+    for field in dataclasses.fields(Config):
+        value = getattr(config, field.name)
+        if value != field.default:
+            text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+            words += ["--" + field.name.replace("_", "-"), os.path.basename(text)]
+    return " ".join(words)
+
+
+def machine_of(device):
+    """In words, what the network is trained on."""
+    if device.type == "cuda":
+        return f"{torch.cuda.get_device_name(device)}, torch {torch.__version__}"
+    return f"CPU ({platform.machine()}, {torch.get_num_threads()} threads), torch {torch.__version__}"
+
+
+def commit():
+    """The repository's commit, with a mark when tracked files differ from it."""
+    here = os.path.dirname(os.path.abspath(__file__))
+
+    def git(*arguments):
+        return subprocess.run(["git", "-C", here, *arguments], capture_output=True, text=True, check=True).stdout.strip()
+
+    try:
+        return git("rev-parse", "HEAD") + (" with local changes" if git("status", "--porcelain", "--untracked-files=no") else "")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
 class Stop(Exception):
     """Somebody asked the run to end; its state is saved first."""
 
@@ -87,8 +120,8 @@ class Run:
         torch.manual_seed(config.seed)
         if config.threads:
             torch.set_num_threads(config.threads)
-        self.device = torch.device(config.device)
-        self.model = CompactUNet(config.widths, bias=head_bias(train)).to(self.device, memory_format=torch.channels_last)
+        self.device, self.commit = torch.device(config.device), commit()
+        self.model = compact_unet(config.widths, bias=head_bias(train)).to(self.device, memory_format=torch.channels_last)
         self.average = {name: p.detach().clone() for name, p in self.model.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step, self.elapsed, self.rows, self.sums = 0, 0.0, [], [0.0, 0]
@@ -106,7 +139,7 @@ class Run:
         """Writes checkpoint.pt whole: a kill leaves the old one or the new one."""
         state = {"config": dataclasses.asdict(self.config), "model": self.model.state_dict(), "average": self.average,
                  "optimiser": self.optimiser.state_dict(), "step": self.step, "elapsed": self.elapsed, "rows": self.rows, "sums": self.sums,
-                 "samples": self.samples(), "train_report": self.train.report, "validation_report": self.validation.report}
+                 "samples": self.samples(), "command": command_of(self.config, self.folder), "commit": self.commit, "machine": machine_of(self.device), "train_report": self.train.report, "validation_report": self.validation.report}
         torch.save(state, self.checkpoint_path + ".part")
         os.replace(self.checkpoint_path + ".part", self.checkpoint_path)
 
@@ -183,7 +216,7 @@ class Run:
 
     def averaged(self):
         """The model with averaged weights."""
-        model = CompactUNet(self.config.widths).to(self.device, memory_format=torch.channels_last)
+        model = compact_unet(self.config.widths).to(self.device, memory_format=torch.channels_last)
         model.load_state_dict(self.average)
         return model.eval()
 
@@ -251,9 +284,8 @@ def train(config, folder, stop_after=None):
     with open(os.path.join(folder, "config.json"), "w") as file:
         json.dump(dataclasses.asdict(config), file, indent=1)
     h, w = train_split.mask.shape[1:]
-    print(f"{parameter_count(run.model)} parameters, {flops(run.model.cpu(), h, w) / 1e9:.2f} GFLOP at {w}x{h} cells; {len(train_split)} training and "
+    print(f"{parameter_count(run.model)} parameters, {flops(run.model, h, w) / 1e9:.2f} GFLOP at {w}x{h} cells; {len(train_split)} training and "
           f"{len(validation)} validation views, {train_split.report['kept']:.0%} and {validation.report['kept']:.0%} of the cells kept", file=sys.stderr, flush=True)
-    run.model.to(run.device)
     saved, begun, drawn = time.monotonic(), run.step, 0.0
     while run.progress() < 1:
         run.train_step()
