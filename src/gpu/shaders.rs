@@ -21,7 +21,12 @@ macro_rules! wgsl {
 pub const RENDER: &[Shader] = &[];
 
 /// Shaders of `gi/`.
-pub const GI: &[Shader] = &[];
+pub const GI: &[Shader] = &[
+    Shader { name: "gi.exposure", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/exposure.wgsl"] },
+    Shader { name: "gi.ambient", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/ambient.wgsl"] },
+    Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
+    Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },
+];
 
 /// Shaders of `net/`.
 pub const NET: &[Shader] = &[];
