@@ -1,1 +1,12 @@
-//! Networks: weights format, graph, plan, CPU twin, GPU kernels.
+//! Networks, from file to GPU.
+//!
+//! - [`format`]: the weights file: a safetensors file whose metadata holds the graph. `weights-format/` specifies it.
+//! - [`graph`] and [`op`]: topology, shape inference, parameter and FLOP counts.
+//! - [`plan`]: which dispatches run and where each tensor lives in one arena.
+//! - [`cpu`]: the slow, obvious twin; every kernel is tested against it and against PyTorch.
+//! - [`gpu`]: the WGSL kernels' host side. The only file here that knows wgpu.
+
+pub mod format;
+pub mod graph;
+mod header;
+pub mod op;

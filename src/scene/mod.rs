@@ -6,6 +6,32 @@
 
 pub mod upload;
 
+pub mod bounds;
+#[cfg(feature = "io")]
+pub mod bundled;
+mod camera;
+pub mod defaults;
+#[cfg(feature = "io")]
+mod error;
+#[cfg(feature = "io")]
+mod geometry;
+#[cfg(feature = "io")]
+pub mod gltf;
+#[cfg(feature = "io")]
+mod load;
+#[cfg(feature = "io")]
+pub mod obj;
+#[cfg(feature = "io")]
+pub mod paper_room;
+pub mod shapes;
+#[cfg(feature = "io")]
+mod texture;
+
+#[cfg(feature = "io")]
+pub use error::SceneError;
+#[cfg(feature = "io")]
+pub use load::load;
+
 /// A whole scene, ready to be uploaded.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {

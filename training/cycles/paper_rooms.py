@@ -5,7 +5,7 @@
 
 Room INDEX is scene INDEX of the stream that the paper's authors seeded with 0 (what `bouncelight` calls
 `paper-room:INDEX`); view V turns the camera by V * 360/views degrees about the vertical. Each view becomes
-OUT/roomIIII_viewV.exr (half floats, lossless, Blender's pass names, nothing denoised) with the light's diffuse
+OUT/roomIIII_viewV.exr (half floats, lossless, Blender's pass names, nothing denoised unless --denoise) with the light's diffuse
 layers. A file that exists is kept, so a killed run goes on where it stopped. Rooms kept for judging are refused
 unless --judge says that this is what they are rendered for.
 
@@ -105,13 +105,15 @@ def build(room, sky, light):
     return scene, camera_object, yaw
 
 
-def configure(scene, size, spp, bounces):
+def configure(scene, size, spp, bounces, denoise=False):
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.render.use_persistent_data = True
     cycles = scene.cycles
-    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling = spp, False, False
+    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling = spp, denoise, False
+    if denoise:
+        cycles.denoiser = "OPENIMAGEDENOISE"
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = min(bounces, 12), min(bounces, 4), min(bounces, 4)
     cycles.sample_clamp_indirect = 10
     layer = scene.view_layers[0]
@@ -139,6 +141,7 @@ def main():
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--sky", type=float, default=SKY_RADIANCE, help="world radiance")
     parser.add_argument("--bounces", type=int, default=12, help="0 leaves direct light only")
+    parser.add_argument("--denoise", action="store_true", help="denoise the Combined layer (no other)")
     parser.add_argument("--judge", action="store_true", help="allow the rooms kept for judging")
     a = parser.parse_args()
     kept = [i for i in a.rooms if i in JUDGED or i >= 2200]
@@ -152,7 +155,7 @@ def main():
         if not todo:
             continue
         scene, camera, yaw = build(room, a.sky, 1.0)
-        configure(scene, a.size, a.spp, a.bounces)
+        configure(scene, a.size, a.spp, a.bounces, a.denoise)
         scene.cycles.seed = index
         for view in todo:
             start = time.time()
@@ -163,4 +166,5 @@ def main():
             print(f"room {index} view {view}: {time.time() - start:.1f} s", file=sys.stderr, flush=True)
 
 
-main()
+if __name__ == "__main__":
+    main()

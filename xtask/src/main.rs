@@ -1,1 +1,105 @@
-fn main() {}
+//! `cargo xtask demo | test | ci`: set-up and checks; no product code.
+//!
+//! Every command first sees to a wgpu adapter: it asks `bouncelight doctor`, and on Debian or Ubuntu without any adapter
+//! it installs Mesa's CPU driver, saying so before it does.
+
+use std::process::{Command, ExitCode};
+
+const USAGE: &str = "\
+usage: cargo xtask COMMAND
+
+  demo   draw the bundled interior with the shipped weights: out/demo.png and a timing table
+  test   every test (an adapter is seen to first; REQUIRE_GPU=1 makes a missing one an error)
+  ci     what continuous integration runs (.ci/run)";
+
+/// Exit code with which `bouncelight doctor` says that there is no usable adapter.
+const NO_ADAPTER: i32 = 3;
+
+fn main() -> ExitCode {
+    let command = std::env::args().nth(1).unwrap_or_default();
+    let done = match command.as_str() {
+        "demo" => demo(),
+        "test" => test(),
+        "ci" => ci(),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("xtask {command}: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn demo() -> Result<(), String> {
+    cargo(&["build", "--release", "--bin", "bouncelight", "--example", "demo"])?;
+    see_to_adapter(&["--release"])?;
+    cargo(&["run", "--quiet", "--release", "--example", "demo"])
+}
+
+fn test() -> Result<(), String> {
+    see_to_adapter(&[])?;
+    cargo(&["test", "--workspace"])
+}
+
+fn ci() -> Result<(), String> {
+    run(&mut command("bash", &[".ci/run"]))
+}
+
+/// Makes sure that an adapter answers; installs Mesa's CPU driver where that is a matter of one package.
+fn see_to_adapter(profile: &[&str]) -> Result<(), String> {
+    if doctor(profile)? {
+        return Ok(());
+    }
+    if !std::path::Path::new("/etc/debian_version").exists() {
+        return Err("no usable GPU adapter; `bouncelight doctor` says what to install".into());
+    }
+    eprintln!("xtask: no GPU adapter answers; installing mesa-vulkan-drivers (Vulkan on the CPU) with apt-get");
+    apt(&["update", "-q"])?;
+    apt(&["install", "-y", "-q", "--no-install-recommends", "mesa-vulkan-drivers"])?;
+    if doctor(profile)? { Ok(()) } else { Err("still no adapter after installing mesa-vulkan-drivers".into()) }
+}
+
+/// True when `bouncelight doctor` finds an adapter.
+fn doctor(profile: &[&str]) -> Result<bool, String> {
+    let mut args = vec!["run", "--quiet", "--bin", "bouncelight"];
+    args.extend(profile);
+    args.extend(["--", "doctor"]);
+    let status = command("cargo", &args).status().map_err(|e| format!("cargo: {e}"))?;
+    match status.code() {
+        Some(0) => Ok(true),
+        Some(NO_ADAPTER) => Ok(false),
+        code => Err(format!("`bouncelight doctor` ended with {code:?}")),
+    }
+}
+
+fn apt(args: &[&str]) -> Result<(), String> {
+    // Containers run as root and often have no sudo.
+    let root = Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout.trim_ascii() == b"0");
+    let (program, prefix): (&str, &[&str]) = if root { ("apt-get", &[]) } else { ("sudo", &["apt-get"]) };
+    let all: Vec<&str> = prefix.iter().chain(args).copied().collect();
+    run(command(program, &all).env("DEBIAN_FRONTEND", "noninteractive"))
+}
+
+fn cargo(args: &[&str]) -> Result<(), String> {
+    run(&mut command("cargo", args))
+}
+
+fn command(program: &str, args: &[&str]) -> Command {
+    let mut command = Command::new(program);
+    command.args(args).current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    command
+}
+
+fn run(command: &mut Command) -> Result<(), String> {
+    let shown = format!("{command:?}").replace('"', "");
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(format!("`{shown}` ended with {status}")),
+        Err(e) => Err(format!("`{shown}`: {e}")),
+    }
+}

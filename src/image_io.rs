@@ -1,1 +1,0 @@
-//! PNG and multi-layer EXR, written whole or not at all.

@@ -1,0 +1,153 @@
+//! Primitives to [`Mesh`]es.
+
+use gltf::Semantic;
+use gltf::mesh::Mode;
+
+use super::Loader;
+use super::accessor::{Integers, Reader};
+use crate::scene::geometry::{self, Topology};
+use crate::scene::{Mesh, SceneError};
+
+impl<'a> Loader<'a> {
+    /// Scene meshes of a glTF mesh's primitives; read once, shared by all nodes that place it.
+    pub(super) fn mesh(&mut self, mesh: &gltf::Mesh<'a>) -> Result<Vec<usize>, SceneError> {
+        if let Some(known) = self.meshes.get(&mesh.index()) {
+            return Ok(known.clone());
+        }
+        let mut made = Vec::new();
+        for primitive in mesh.primitives() {
+            if let Some(built) = self.primitive(mesh, &primitive)? {
+                made.push(self.scene.meshes.len());
+                self.scene.meshes.push(built);
+            }
+        }
+        self.meshes.insert(mesh.index(), made.clone());
+        Ok(made)
+    }
+
+    /// One primitive; `None` with a warning where there is nothing to draw.
+    fn primitive(
+        &mut self,
+        mesh: &gltf::Mesh<'a>,
+        primitive: &gltf::Primitive<'a>,
+    ) -> Result<Option<Mesh>, SceneError> {
+        let name = mesh.name().map_or_else(|| format!("meshes[{}]", mesh.index()), str::to_owned);
+        let place = format!("meshes[{}].primitives[{}] '{name}'", mesh.index(), primitive.index());
+        let topology = match primitive.mode() {
+            Mode::Triangles => Topology::List,
+            Mode::TriangleStrip => Topology::Strip,
+            Mode::TriangleFan => Topology::Fan,
+            other => {
+                self.warn(&place, &format!("{other:?} are left out; only triangles are drawn"));
+                return Ok(None);
+            }
+        };
+        let Some(positions) = primitive.get(&Semantic::Positions) else {
+            self.warn(&place, "has no POSITION and is left out");
+            return Ok(None);
+        };
+        let read = Reader { path: self.path, source: self.source };
+        let mut out = Mesh { name, ..Mesh::default() };
+        out.positions = read.floats(&positions, Integers::AsFlagged, None)?;
+        let count = out.positions.len();
+        let flagged = Integers::AsFlagged;
+        if let Some(accessor) = primitive.get(&Semantic::Normals) {
+            out.normals = read.floats(&accessor, flagged, None)?;
+        }
+        if let Some(accessor) = primitive.get(&Semantic::Tangents) {
+            out.tangents = read.floats(&accessor, flagged, None)?;
+        }
+        if let Some(accessor) = primitive.get(&Semantic::TexCoords(0)) {
+            out.uv0 = read.floats(&accessor, flagged, None)?;
+        }
+        if let Some(accessor) = primitive.get(&Semantic::TexCoords(1)) {
+            out.uv1 = read.floats(&accessor, flagged, None)?;
+        }
+        if let Some(accessor) = primitive.get(&Semantic::Colors(0)) {
+            out.colors = read.floats(&accessor, Integers::Normalized, Some(1.0))?;
+        }
+        for (attribute, length) in [
+            ("NORMAL", out.normals.len()),
+            ("TANGENT", out.tangents.len()),
+            ("TEXCOORD_0", out.uv0.len()),
+            ("TEXCOORD_1", out.uv1.len()),
+            ("COLOR_0", out.colors.len()),
+        ] {
+            if length != 0 && length != count {
+                return Err(self.broken(place, format!("{attribute} has {length} elements, POSITION {count}")));
+            }
+        }
+        let indices = match primitive.indices() {
+            Some(accessor) => read.indices(&accessor)?,
+            None => (0..count as u32).collect(),
+        };
+        if let Some(bad) = indices.iter().find(|&&i| i as usize >= count) {
+            return Err(self.broken(place, format!("index {bad} is not below the {count} vertices")));
+        }
+        self.check_finite(&place, &out)?;
+        out.indices = geometry::triangle_list(&indices, topology);
+        if out.indices.is_empty() {
+            self.warn(&place, "has no triangle and is left out");
+            return Ok(None);
+        }
+        if primitive.morph_targets().next().is_some() {
+            self.warn(&place, "its morph targets are ignored");
+        }
+        out.material = self.material(&primitive.material());
+        self.finish(&place, &mut out);
+        Ok(Some(out))
+    }
+
+    fn check_finite(&self, place: &str, mesh: &Mesh) -> Result<(), SceneError> {
+        fn first_bad<const N: usize>(values: &[[f32; N]]) -> Option<usize> {
+            values.iter().position(|v| v.iter().any(|c| !c.is_finite()))
+        }
+        let found = [
+            ("POSITION", first_bad(&mesh.positions)),
+            ("NORMAL", first_bad(&mesh.normals)),
+            ("TANGENT", first_bad(&mesh.tangents)),
+            ("TEXCOORD_0", first_bad(&mesh.uv0)),
+            ("TEXCOORD_1", first_bad(&mesh.uv1)),
+            ("COLOR_0", first_bad(&mesh.colors)),
+        ];
+        match found.iter().find_map(|(name, at)| at.map(|at| (name, at))) {
+            Some((name, at)) => Err(self.broken(place, format!("{name} of vertex {at} is not a finite number"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Normals and tangents where they are missing; texture coordinates that a material wants and the mesh lacks.
+    fn finish(&mut self, place: &str, mesh: &mut Mesh) {
+        if mesh.normals.is_empty() {
+            geometry::make_flat_normals(mesh);
+        } else {
+            let bad = geometry::normalize_normals(&mut mesh.normals);
+            if bad > 0 {
+                self.warn(place, &format!("{bad} normals have no length and were replaced by +Y"));
+            }
+        }
+        let material = &self.scene.materials[mesh.material];
+        let normal_map = material.normal_texture;
+        let wanted = [
+            material.base_color_texture,
+            material.metallic_roughness_texture,
+            normal_map,
+            material.occlusion_texture,
+            material.emissive_texture,
+        ];
+        let lacks = |set: u8| wanted.iter().flatten().any(|t| t.uv_set == set);
+        let missing: Vec<u8> = [(0, mesh.uv0.is_empty()), (1, mesh.uv1.is_empty())]
+            .iter()
+            .filter(|(s, e)| *e && lacks(*s))
+            .map(|p| p.0)
+            .collect();
+        for set in missing {
+            self.warn(place, &format!("its material reads TEXCOORD_{set}, which it lacks; (0, 0) is used"));
+        }
+        match normal_map {
+            Some(map) if mesh.tangents.is_empty() => geometry::make_tangents(mesh, map.uv_set, map.transform),
+            Some(_) => {}
+            None => mesh.tangents.clear(),
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! glTF 2.0: `.gltf` with external or embedded buffers, and `.glb`.
+//!
+//! The `gltf` crate parses the JSON and types it; container, buffers and accessors are read here, because the crate's
+//! readers panic or give up wholesale on the broken files that people have. What cannot be used for a reason that
+//! leaves a picture (a missing texture, a line primitive, a skin) becomes a warning; the rest is a [`SceneError`].
+
+mod accessor;
+mod light;
+mod material;
+mod mesh;
+mod source;
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::Mat4;
+use gltf::json::validation::{Error as Invalid, Validate};
+
+use super::{Camera, Environment, Instance, Scene, SceneError, defaults, error};
+use source::Source;
+
+/// Extensions whose absence from this loader would make a file wrong, and which it has.
+const SUPPORTED: [&str; 8] = [
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_unlit",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "KHR_materials_variants",
+];
+
+/// Loads the file's default scene (else its first, else every root node) and fills in what is missing, as
+/// [`super::defaults`] says. What was mended or left out stands in [`Scene::warnings`].
+///
+/// # Errors
+/// [`SceneError`] naming the file and the place in it, never a panic.
+pub fn load(path: &Path) -> Result<Scene, SceneError> {
+    let bytes = error::read_file(path)?;
+    let (json, blob) = source::split(path, &bytes)?;
+    let root: gltf::json::Root =
+        gltf::json::deserialize::from_slice(json).map_err(|e| SceneError::broken(path, "JSON", e.to_string()))?;
+    if let Some(extension) = root.extensions_required.iter().find(|e| !SUPPORTED.contains(&e.as_str())) {
+        return Err(SceneError::RequiresExtension { path: path.to_owned(), extension: extension.clone() });
+    }
+    validate(path, &root)?;
+    let document = gltf::Document::from_json_without_validation(root);
+    let source = Source::open(path, &document, blob)?;
+    let mut loader = Loader::new(path, &source, &document);
+    loader.walk()?;
+    let mut scene = loader.scene;
+    defaults::complete(&mut scene);
+    Ok(scene)
+}
+
+/// Runs the crate's own validation, which later code relies on not to panic, but forgives what this loader can handle.
+fn validate(path: &Path, root: &gltf::json::Root) -> Result<(), SceneError> {
+    let mut first = None;
+    root.validate(root, gltf::json::Path::new, &mut |place, error| {
+        let place = place().to_string();
+        let forgiven = match error {
+            // The crate knows fewer extensions than this loader; its list was checked before.
+            Invalid::Unsupported => place.starts_with("extensionsRequired"),
+            // A texture without image is legal (an extension may have one) and gets a stand-in.
+            Invalid::Missing => place.starts_with("textures[") && place.ends_with("source"),
+            // A dangling image index as well; textures are not worth refusing a file.
+            Invalid::IndexOutOfBounds => {
+                (place.starts_with("textures[") && place.ends_with("source"))
+                    || place.starts_with("animations[")
+                    || place.starts_with("skins[")
+            }
+            _ => place.starts_with("animations["),
+        };
+        if !forgiven && first.is_none() {
+            let problem = match error {
+                Invalid::IndexOutOfBounds => "refers to something that the file does not have",
+                Invalid::Invalid => "has an invalid value",
+                Invalid::Missing => "is missing",
+                Invalid::Oversize => "is larger than this machine can address",
+                Invalid::Unsupported => "is not supported",
+            };
+            first = Some(SceneError::broken(path, place, problem));
+        }
+    });
+    first.map_or(Ok(()), Err)
+}
+
+/// State of one load.
+pub(super) struct Loader<'a> {
+    path: &'a Path,
+    source: &'a Source<'a>,
+    document: &'a gltf::Document,
+    scene: Scene,
+    /// glTF mesh index → scene meshes of its primitives.
+    meshes: HashMap<usize, Vec<usize>>,
+    /// glTF material index (`None` is the default material) → scene material.
+    materials: HashMap<Option<usize>, usize>,
+    /// glTF image index and use → scene image.
+    images: HashMap<(usize, super::texture::Use), usize>,
+}
+
+impl<'a> Loader<'a> {
+    fn new(path: &'a Path, source: &'a Source<'a>, document: &'a gltf::Document) -> Self {
+        let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let scene = Scene { name, ..Scene::default() };
+        Self {
+            path,
+            source,
+            document,
+            scene,
+            meshes: HashMap::new(),
+            materials: HashMap::new(),
+            images: HashMap::new(),
+        }
+    }
+
+    fn broken(&self, place: impl Into<String>, problem: impl Into<String>) -> SceneError {
+        SceneError::broken(self.path, place, problem)
+    }
+
+    /// Adds a warning "file: place: what", once.
+    fn warn(&mut self, place: &str, what: &str) {
+        let sentence = format!("{}: {place}: {what}", self.path.display());
+        if !self.scene.warnings.contains(&sentence) {
+            tracing::debug!("{sentence}");
+            self.scene.warnings.push(sentence);
+        }
+    }
+
+    /// Visits every node of the scene once, without recursion.
+    fn walk(&mut self) -> Result<(), SceneError> {
+        let document = self.document;
+        let chosen = document.default_scene().or_else(|| document.scenes().next());
+        let roots: Vec<gltf::Node> = match chosen {
+            Some(scene) => {
+                self.environment(&scene);
+                scene.nodes().collect()
+            }
+            None => {
+                let mut is_child = vec![false; document.nodes().len()];
+                document.nodes().flat_map(|n| n.children()).for_each(|c| is_child[c.index()] = true);
+                document.nodes().filter(|n| !is_child[n.index()]).collect()
+            }
+        };
+        let mut seen = vec![false; document.nodes().len()];
+        let mut stack: Vec<(gltf::Node, Mat4)> = roots.into_iter().rev().map(|n| (n, Mat4::IDENTITY)).collect();
+        while let Some((node, parent)) = stack.pop() {
+            if std::mem::replace(&mut seen[node.index()], true) {
+                let place = format!("nodes[{}]", node.index());
+                return Err(self.broken(place, "is reached twice; nodes must form trees, not cycles"));
+            }
+            let world = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
+            if !world.is_finite() {
+                return Err(self.broken(format!("nodes[{}]", node.index()), "has a transform that is not finite"));
+            }
+            self.node(&node, world)?;
+            let children: Vec<_> = node.children().map(|child| (child, world)).collect();
+            stack.extend(children.into_iter().rev());
+        }
+        if !document.as_json().animations.is_empty() {
+            self.warn("animations", "are not played; the scene stands in its rest pose");
+        }
+        Ok(())
+    }
+
+    fn node(&mut self, node: &gltf::Node<'a>, world: Mat4) -> Result<(), SceneError> {
+        let place = format!("nodes[{}]", node.index());
+        let name = node.name().map_or_else(|| place.clone(), str::to_owned);
+        if let Some(mesh) = node.mesh() {
+            if node.skin().is_some() {
+                self.warn(&format!("{place} '{name}'"), "its skin is ignored; the mesh stands in its bind pose");
+            }
+            for mesh in self.mesh(&mesh)? {
+                let transform = world.to_cols_array_2d();
+                self.scene.instances.push(Instance { name: name.clone(), mesh, transform });
+            }
+        }
+        if let Some(camera) = node.camera() {
+            self.camera(&camera, &name, world);
+        }
+        if let Some(light) = node.light() {
+            self.light(&light, &name, world);
+        }
+        Ok(())
+    }
+
+    fn camera(&mut self, camera: &gltf::Camera, node: &str, world: Mat4) {
+        let place = format!("cameras[{}] '{node}'", camera.index());
+        let gltf::camera::Projection::Perspective(lens) = camera.projection() else {
+            return self.warn(&place, "is orthographic and left out; only perspective cameras are drawn");
+        };
+        let (yfov, near) = (lens.yfov(), lens.znear());
+        let usable = yfov > 0.0 && yfov < std::f32::consts::PI && near > 0.0 && near.is_finite();
+        // Scale and shear of the node do not belong to a camera.
+        let (_, rotation, position) = world.to_scale_rotation_translation();
+        if !usable || !rotation.is_finite() || rotation.length_squared() < 0.5 {
+            return self.warn(&place, "has an impossible lens or transform and is left out");
+        }
+        let transform = Mat4::from_rotation_translation(rotation.normalize(), position).to_cols_array_2d();
+        let far = lens.zfar().filter(|&far| far > near).unwrap_or(f32::INFINITY);
+        self.scene.cameras.push(Camera { name: node.to_owned(), transform, yfov, near, far });
+    }
+
+    /// Reads the sky that [`super::export`] writes into the scene's extras; other files have none.
+    fn environment(&mut self, scene: &gltf::Scene) {
+        #[derive(serde::Deserialize)]
+        struct Ours {
+            environment: [f32; 3],
+        }
+        #[derive(serde::Deserialize)]
+        struct Extras {
+            bouncelight: Ours,
+        }
+        let extras = scene.extras().as_ref().and_then(|raw| serde_json::from_str::<Extras>(raw.get()).ok());
+        if let Some(radiance) = extras.map(|e| e.bouncelight.environment)
+            && radiance.iter().all(|r| r.is_finite() && *r >= 0.0)
+        {
+            self.scene.environment = Environment { radiance };
+        }
+    }
+}

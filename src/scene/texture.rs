@@ -1,0 +1,65 @@
+//! Decoding of texture images, and what is shown in place of one that cannot be read.
+
+use std::io::Cursor;
+
+use super::{ColorSpace, Image};
+
+/// What a texture is used for; decides how its bytes are read and what stands in for it when it is broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) enum Use {
+    /// Base colour and emission: sRGB.
+    Color,
+    /// Metallic-roughness and occlusion: linear.
+    Data,
+    /// Normal map: linear.
+    Normal,
+}
+
+impl Use {
+    fn color_space(self) -> ColorSpace {
+        if self == Use::Color { ColorSpace::Srgb } else { ColorSpace::Linear }
+    }
+}
+
+/// No side of a texture may be longer; WebGPU grants 8192 by default and larger ones are scaled at upload or refused.
+const MAX_SIDE: u32 = 16_384;
+
+/// Decodes PNG, JPEG, WebP, BMP, TGA or HDR bytes (told apart by content, then by the name's ending).
+///
+/// # Errors
+/// A sentence without subject, such as "the file is empty (0 bytes)".
+pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<Image, String> {
+    if bytes.is_empty() {
+        return Err("the file is empty (0 bytes)".to_owned());
+    }
+    let mut reader = image::ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|e| format!("cannot be read: {e}"))?;
+    if reader.format().is_none()
+        && let Ok(format) = image::ImageFormat::from_path(name)
+    {
+        reader.set_format(format);
+    }
+    let mut limits = image::Limits::default();
+    (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
+    reader.limits(limits);
+    let decoded = reader.decode().map_err(|e| format!("cannot be decoded: {e}"))?;
+    let rgba = decoded.into_rgba8();
+    let (width, height) = rgba.dimensions();
+    if width == 0 || height == 0 {
+        return Err(format!("has no pixels ({width}x{height})"));
+    }
+    Ok(Image { name: name.to_owned(), width, height, rgba: rgba.into_raw(), color_space: usage.color_space() })
+}
+
+/// An 8×8 checker that nobody overlooks: magenta and black for colours, smooth and rough for data, tilted to the left
+/// and to the right for normals.
+pub(crate) fn stand_in(name: &str, usage: Use) -> Image {
+    let tiles: [[u8; 4]; 2] = match usage {
+        Use::Color => [[255, 0, 255, 255], [0, 0, 0, 255]],
+        Use::Data => [[255, 40, 255, 255], [255, 255, 255, 255]],
+        Use::Normal => [[64, 128, 238, 255], [192, 128, 238, 255]],
+    };
+    let rgba = (0..64).flat_map(|i| tiles[(i % 8 + i / 8) % 2]).collect();
+    Image { name: format!("{name} (stand-in)"), width: 8, height: 8, rgba, color_space: usage.color_space() }
+}

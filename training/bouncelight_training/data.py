@@ -1,0 +1,245 @@
+"""Pairs rasterised features with light that Cycles traced, and keeps the pairs of one split in one .npz.
+
+    python -m bouncelight_training.data --features DIR --cycles DIR --out train.npz [--rooms 6-9,13]
+
+FEATURES/roomIIII_viewV.safetensors is what `bouncelight dataset` writes; CYCLES/roomIIII_viewV.exr what cycles/paper_rooms.py
+writes. The target is the light that a GI method must add, as E/pi: Cycles' DiffDir (which holds the sky's light) + DiffInd
+minus our own direct light, so whatever our direct light gets wrong is not charged to the network twice.
+
+The raster has one sample point a cell; Cycles' pixel is a filtered mean over about the cell. Where the two cannot be the
+same thing, the cell is left out of the loss, for the first of these reasons that holds:
+
+    background  nothing was hit at the sample point
+    spread      depth varies by more than 5 % inside the cell: a silhouette
+    normal      the sample's normal and Cycles' filtered one differ by more than 10 degrees, or the latter is shorter than 0.95
+    depth       the depths differ by more than 10 % (Cycles' depth is one random point of the pixel)
+    albedo      the albedos differ by more than 0.05: a border between materials on one plane
+    shadow      our direct light varies in the 3x3 neighbourhood (of cells that pass so far) by more than 10 % of its maximum
+    negative    the target is below -(2 % of s + 5 % of direct light): shadows disagree. Smaller negatives stay in: they
+                are noise, and cutting noise off on one side would make the network too bright.
+"""
+import argparse
+import json
+import os
+import re
+import sys
+import zipfile
+
+import numpy as np
+import OpenEXR
+from safetensors.numpy import load_file
+
+from .errors import TrainingError, reported
+from .features import CHANNELS, LUMINANCE, SLICES
+
+JUDGED = {0, 1, 10, 11, 12, 14, 27, 33, 37, 47}
+FIRST_JUDGED = 2200
+REASONS = ["background", "spread", "normal", "depth", "albedo", "shadow", "negative"]
+MAX_SPREAD, MIN_COSINE, MIN_LENGTH = 0.05, float(np.cos(np.radians(10))), 0.95
+MAX_DEPTH_RATIO, MAX_ALBEDO, MAX_VARIATION = 1.1, 0.05, 0.10
+NAME = re.compile(r"room(\d{4,})_view(\d+)\.(safetensors|exr)$")
+
+
+def refuse_judged(rooms):
+    """Raises TrainingError when a room is one that is kept for judging."""
+    kept = sorted(r for r in set(map(int, rooms)) if r in JUDGED or r >= FIRST_JUDGED)
+    if kept:
+        raise TrainingError(f"rooms {kept} are kept for judging and must not be trained or tuned on; remove them from the folder or pass --rooms")
+
+
+def read_cycles(path):
+    """Layers of a Cycles EXR with Y up: diff_dir, diff_ind, diff_col, normal [3,h,w], depth [h,w]; float32."""
+    try:
+        with OpenEXR.File(path, separate_channels=True) as file:
+            pixels = {name: channel.pixels.astype(np.float32) for name, channel in file.channels().items()}
+    except (OSError, RuntimeError, ValueError) as error:
+        raise TrainingError(f"{path}: not a readable EXR: {error}") from error
+
+    def layer(name, channels):
+        missing = [f"ViewLayer.{name}.{c}" for c in channels if f"ViewLayer.{name}.{c}" not in pixels]
+        if missing:
+            raise TrainingError(f"{path}: no layer {missing[0]}; render it with cycles/paper_rooms.py")
+        return np.stack([pixels[f"ViewLayer.{name}.{c}"] for c in channels])
+
+    x, y, z = layer("Normal", "XYZ")
+    out = {"diff_dir": layer("DiffDir", "RGB"), "diff_ind": layer("DiffInd", "RGB"), "diff_col": layer("DiffCol", "RGB"),
+           "normal": np.stack([x, z, -y]), "depth": layer("Depth", "Z")[0]}
+    for name, values in out.items():
+        if not np.isfinite(values).all():
+            raise TrainingError(f"{path}: {name} holds {np.count_nonzero(~np.isfinite(values))} values that are not finite; render the view again")
+    return out
+
+
+def read_features(path):
+    """Tensors of a feature file, float32; shapes and finiteness checked."""
+    try:
+        tensors = {name: values.astype(np.float32) for name, values in load_file(path).items()}
+    except Exception as error:  # safetensors raises its own type for every defect
+        raise TrainingError(f"{path}: not a readable safetensors file: {error}") from error
+    h, w = tensors["features"].shape[-2:] if "features" in tensors and tensors["features"].ndim == 3 else (0, 0)
+    expected = {"features": (CHANNELS, h, w), "scale": (1,), "direct": (3, h, w), "albedo": (3, h, w), "normal": (3, h, w), "depth": (h, w)}
+    for name, shape in expected.items():
+        if name not in tensors:
+            raise TrainingError(f"{path}: no tensor {name}; write it again with `bouncelight dataset`")
+        if tensors[name].shape != shape:
+            raise TrainingError(f"{path}: tensor {name} has shape {tensors[name].shape}, expected {shape}")
+        if not np.isfinite(tensors[name]).all():
+            raise TrainingError(f"{path}: tensor {name} holds {np.count_nonzero(~np.isfinite(tensors[name]))} values that are not finite")
+    if tensors["scale"][0] <= 0:
+        raise TrainingError(f"{path}: scale is {tensors['scale'][0]}; a picture without any light teaches nothing, leave it out")
+    return tensors
+
+
+def neighbourhood(a, reduce, padding):
+    """`reduce` (np.maximum or np.minimum) over the 3x3 neighbourhood of [h,w]."""
+    padded = np.pad(a, 1, constant_values=padding)
+    h, w = a.shape
+    out = a
+    for dy in range(3):
+        for dx in range(3):
+            out = reduce(out, padded[dy:dy + h, dx:dx + w])
+    return out
+
+
+def pair(raster, cycles):
+    """The target E/pi in units of s [3,h,w], the mask [h,w] and how many cells each reason took."""
+    s = float(raster["scale"][0])
+    target = cycles["diff_dir"] + cycles["diff_ind"] - raster["direct"]
+    hit = (raster["features"][SLICES["hit"]][0] > 0.5) & (raster["depth"] > 0)
+    length = np.linalg.norm(cycles["normal"], axis=0)
+    cosine = (cycles["normal"] * raster["normal"]).sum(0) / np.maximum(length, 1e-6)
+    ratio = np.abs(np.log(np.maximum(raster["depth"], 1e-6) / np.maximum(cycles["depth"], 1e-6)))
+    rejected = [
+        ~hit,
+        raster["features"][SLICES["spread"]][0] > MAX_SPREAD,
+        (cosine < MIN_COSINE) | (length < MIN_LENGTH),
+        ratio > np.log(MAX_DEPTH_RATIO),
+        np.abs(cycles["diff_col"] - raster["albedo"]).max(0) > MAX_ALBEDO,
+    ]
+    inside = ~np.any(rejected, axis=0)
+    direct = np.tensordot(LUMINANCE, raster["direct"], 1)
+    highest = neighbourhood(np.where(inside, direct, 0), np.maximum, 0)
+    lowest = neighbourhood(np.where(inside, direct, np.inf), np.minimum, np.inf)
+    rejected.append(inside & (highest - lowest > MAX_VARIATION * highest) & (highest > 0.01 * s))
+    rejected.append((target < -(0.02 * s + 0.05 * direct)).any(0))
+    mask = np.ones_like(hit)
+    counts = {}
+    for reason, cells in zip(REASONS, rejected):
+        counts[reason] = int((mask & cells).sum())
+        mask &= ~cells
+    return target / s, mask, counts
+
+
+def pairs_of(features_dir, cycles_dir, rooms):
+    """The views that both folders hold: list of (room, view, feature path, EXR path)."""
+    found = {}
+    for folder, extension in ((features_dir, "safetensors"), (cycles_dir, "exr")):
+        if not os.path.isdir(folder):
+            raise TrainingError(f"{folder}: no such folder")
+        for name in os.listdir(folder):
+            match = NAME.fullmatch(name)
+            if match and match[3] == extension and (rooms is None or int(match[1]) in rooms):
+                found.setdefault((int(match[1]), int(match[2])), {})[extension] = os.path.join(folder, name)
+    pairs = [(room, view, paths["safetensors"], paths["exr"]) for (room, view), paths in sorted(found.items()) if len(paths) == 2]
+    if not pairs:
+        raise TrainingError(f"{features_dir} and {cycles_dir} share no view roomIIII_viewV")
+    alone = len(found) - len(pairs)
+    if alone:
+        print(f"{alone} views are in one of the folders only and are left out", file=sys.stderr)
+    refuse_judged(room for room, *_ in pairs)
+    return pairs
+
+
+def build(features_dir, cycles_dir, out, rooms=None):
+    """Writes the split's cache and returns the mask report. Arrays: features f16 [n,21,h,w], target f16 [n,3,h,w] in units
+    of s, mask bool [n,h,w], scale f32 [n], room and view i32 [n], report (JSON text)."""
+    pairs = pairs_of(features_dir, cycles_dir, rooms)
+    columns = {key: [] for key in ("features", "target", "mask", "scale", "room", "view")}
+    totals = dict.fromkeys(REASONS, 0)
+    for room, view, feature_path, exr_path in pairs:
+        raster, cycles = read_features(feature_path), read_cycles(exr_path)
+        if raster["depth"].shape != cycles["depth"].shape:
+            raise TrainingError(f"{feature_path} has {raster['depth'].shape} cells, {exr_path} {cycles['depth'].shape} pixels; both must be the same")
+        target, mask, counts = pair(raster, cycles)
+        if mask.mean() < 0.1:
+            print(f"warning: {feature_path}: only {mask.mean():.1%} of the cells can be trusted; {counts}", file=sys.stderr)
+        for reason in REASONS:
+            totals[reason] += counts[reason]
+        values = (raster["features"].astype(np.float16), target.astype(np.float16), mask, raster["scale"][0], room, view)
+        for key, value in zip(columns, values):
+            columns[key].append(value)
+    kinds = {"scale": np.float32, "room": np.int32, "view": np.int32}
+    arrays = {key: np.asarray(value, kinds.get(key)) for key, value in columns.items()}
+    report = summarise(arrays, totals)
+    with open(out + ".part", "wb") as file:
+        np.savez(file, report=json.dumps(report), **arrays)
+    os.replace(out + ".part", out)
+    return report
+
+
+def summarise(arrays, totals):
+    """What a log and a weights file say about a split."""
+    cells = arrays["mask"].size
+    mask = arrays["mask"]
+    lit = np.moveaxis(arrays["target"], 1, -1)[mask].astype(np.float32)
+    return {"views": len(mask), "rooms": sorted(map(int, set(arrays["room"]))), "cells": cells, "kept": float(mask.mean()),
+            "rejected": {reason: n / cells for reason, n in totals.items()},
+            "target_over_s_mean": lit.mean(0).tolist(), "target_negative": float((lit < 0).mean())}
+
+
+class Split:
+    """A split in memory: the arrays of `build`, and the report as a dictionary."""
+
+    def __init__(self, path):
+        try:
+            with np.load(path) as file:
+                arrays = {name: file[name] for name in file.files}
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            raise TrainingError(f"{path}: not a readable split: {error}; make it with python -m bouncelight_training.data") from error
+        missing = {"features", "target", "mask", "scale", "room", "view", "report"} - set(arrays)
+        if missing:
+            raise TrainingError(f"{path}: no array {sorted(missing)}; make it again with python -m bouncelight_training.data")
+        self.path, self.report = path, json.loads(str(arrays.pop("report")))
+        self.features, self.target, self.mask = arrays["features"], arrays["target"], arrays["mask"]
+        self.scale, self.room, self.view = arrays["scale"], arrays["room"], arrays["view"]
+        refuse_judged(self.room)
+        for name in ("features", "target", "scale"):
+            for i, values in enumerate(arrays[name]):
+                if not np.isfinite(values).all():
+                    raise TrainingError(f"{path}: {name} of room {self.room[i]} view {self.view[i]} holds values that are not finite")
+
+    def __len__(self):
+        return len(self.mask)
+
+
+def check_apart(train, validation):
+    """Raises TrainingError when a room is in both splits."""
+    both = sorted(set(map(int, train.room)) & set(map(int, validation.room)))
+    if both:
+        raise TrainingError(f"rooms {both} are in {train.path} and in {validation.path}; split by room")
+
+
+def indices(text):
+    """Room numbers of "6-9,13"."""
+    out = set()
+    for part in text.split(","):
+        low, _, high = part.partition("-")
+        out |= set(range(int(low), int(high or low) + 1))
+    return out
+
+
+@reported
+def main(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--features", required=True, help="folder of `bouncelight dataset`")
+    parser.add_argument("--cycles", required=True, help="folder of cycles/paper_rooms.py")
+    parser.add_argument("--out", required=True, help="the .npz to write")
+    parser.add_argument("--rooms", type=indices, help="take these rooms only")
+    a = parser.parse_args(arguments)
+    if a.rooms:
+        refuse_judged(a.rooms)
+    print(json.dumps(build(a.features, a.cycles, a.out, a.rooms), indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,108 @@
+"""Writes a run's averaged weights as a weights file that bouncelight loads, and proves that it says the same.
+
+    python -m bouncelight_training.export --run runs/NAME --out NAME.safetensors [--validation val.npz] [--name TEXT] [--half]
+
+The file is read back, its own graph is run on validation views and on odd sizes, and the outputs are compared with the
+network in the checkpoint. Provenance stands in the file and, for people, beside it as NAME.json.
+"""
+import argparse
+import datetime
+import json
+import os
+
+import numpy as np
+import torch
+
+from .data import Split
+from .errors import TrainingError, reported
+from .model import compact_unet, flops, parameter_count
+from .train import read_checkpoint, validate
+from .weights import GraphNet, WeightsError, document, read, write
+
+ODD_SIZES = [(37, 21), (5, 3), (1, 1)]
+# Sums in another order differ by about 1e-6 in y; half floats move y by a few thousandths.
+TOLERANCE, TOLERANCE_HALF = 1e-4, 2e-2
+
+
+def network_of(state):
+    """The network of a checkpoint with its averaged weights."""
+    model = compact_unet(state["config"]["widths"])
+    model.load_state_dict(state["average"])
+    return model.eval()
+
+
+def provenance(state, error):
+    """Where the numbers come from; paths are reduced to file names."""
+    config = dict(state["config"])
+    for name in ("train", "validation"):
+        config[name] = os.path.basename(config[name])
+    last = state["rows"][-10:]
+    return {
+        "command": state["command"], "commit": state["commit"], "date": datetime.date.today().isoformat(),
+        "device": state["machine"], "seed": config["seed"], "config": config, "samples_seen": state["samples"],
+        "training_minutes": round(state["elapsed"] / 60, 1),
+        "data": {"targets": "Cycles 4.5 (32 samples a pixel, 256x128): DiffDir + DiffInd minus our direct light, as E/pi",
+                 "train": state["train_report"], "validation": state["validation_report"]},
+        "validation_error": {"measure": "mean |dE| / mean E after 4x4 pooling", "value": round(error, 5)},
+        "last_epochs": [{k: (round(v, 6) if isinstance(v, float) else v) for k, v in row.items()} for row in last],
+    }
+
+
+def verify(path, model, tolerance, split=None):
+    """Reads `path` back and runs its graph beside `model`. Returns the largest |difference| of y, or raises TrainingError."""
+    try:
+        tensors, doc = read(path)
+    except WeightsError as error:
+        raise TrainingError(str(error)) from error
+    again = GraphNet(doc["graph"], doc["output"]["tensor"])
+    again.load_state_dict({name: torch.from_numpy(values.astype(np.float32)) for name, values in tensors.items()})
+    again.eval()
+    generator = torch.Generator().manual_seed(1)
+    channels = sum(feature["channels"] for feature in doc["inputs"])
+    inputs = [torch.rand(1, channels, h, w, generator=generator) for w, h in ODD_SIZES]
+    if split is not None:
+        inputs += [torch.from_numpy(split.features[:1].astype(np.float32))]
+    worst = 0.0
+    with torch.no_grad():
+        for x in inputs:
+            worst = max(worst, (again(x) - model(x)).abs().max().item())
+    if not worst <= tolerance:
+        raise TrainingError(f"{path}: read back it gives y that differ by {worst:.2e}, allowed {tolerance:.0e}; the file is not what was trained")
+    return worst, again
+
+
+def export(run, out, validation=None, name="", half=False):
+    """Writes the file and its provenance; returns a summary."""
+    state = read_checkpoint(os.path.join(run, "checkpoint.pt"))
+    model = network_of(state)
+    split = Split(validation or state["config"]["validation"])
+    error = validate(model, split, state["config"]["epsilon"])[0]["validation_error"]
+    about = provenance(state, error)
+    tensors = {k: (v.half() if half else v).contiguous() for k, v in model.state_dict().items()}
+    try:
+        write(out, tensors, document(model.graph, model.output, name=name or os.path.basename(os.path.normpath(run)), provenance=about))
+    except (WeightsError, OSError) as problem:
+        raise TrainingError(str(problem)) from problem
+    worst, again = verify(out, model, TOLERANCE_HALF if half else TOLERANCE, split)
+    reread = validate(again, split, state["config"]["epsilon"])[0]["validation_error"]
+    with open(os.path.splitext(out)[0] + ".json", "w") as file:
+        json.dump(about, file, indent=1)
+        file.write("\n")
+    return {"file": out, "bytes": os.path.getsize(out), "parameters": parameter_count(model), "gflop": flops(model, 128, 256) / 1e9,
+            "largest_difference": worst, "validation_error": error, "validation_error_of_file": reread}
+
+
+@reported
+def main(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--run", required=True)
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--validation", help="default: the one the run used")
+    parser.add_argument("--name", default="", help="a few words; default: the run's name")
+    parser.add_argument("--half", action="store_true", help="store half floats")
+    a = parser.parse_args(arguments)
+    print(json.dumps(export(a.run, a.out, a.validation, a.name, a.half), indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,31 @@
+"""The feature table that the rasteriser writes and the network reads, and the colours hidden in it.
+
+All radiance enters as ln(1 + L/s) with s the picture's exposure, so multiplying every light by one number changes neither
+the network's input nor its output: E = s * exp(y) is linear in light by construction.
+"""
+import numpy as np
+
+TABLE = [("direct", 3), ("outgoing", 3), ("albedo", 3), ("normal", 3), ("position", 3), ("depth", 1), ("spread", 1), ("hit", 1), ("sky", 3)]
+CHANNELS = sum(n for _, n in TABLE)
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+Y_MIN, Y_MAX = -10.0, 6.0
+
+_offset = 0
+SLICES = {}
+for _name, _n in TABLE:
+    SLICES[_name] = slice(_offset, _offset + _n)
+    _offset += _n
+
+
+def light_of(features, name):
+    """A light feature ("direct", "outgoing" or "sky") in units of s: float32 [3,h,w]."""
+    return np.expm1(features[SLICES[name]].astype(np.float32))
+
+
+def channel_means(features):
+    """What the exposure is the luminance of: the mean over cells of direct + emitted + environment, units of s: [3]."""
+    direct, sky = light_of(features, "direct"), light_of(features, "sky")
+    emitted = light_of(features, "outgoing") - features[SLICES["albedo"]].astype(np.float32) * direct
+    # Float16 leaves noise of either sign where nothing glows.
+    emitted = np.where(emitted > 0.01, emitted, 0.0)
+    return (direct + emitted + sky).mean((1, 2))

@@ -1,0 +1,347 @@
+"""Trains the compact U-Net on the CPU (or a GPU, with --device cuda).
+
+    python -m bouncelight_training.train --train train.npz --validation val.npz --run runs/NAME [--minutes 25]
+
+Everything lands in the run's folder: config.json, checkpoint.pt, log.csv, loss.png, validation.png. The same command goes
+on where a killed run stopped; the order of pictures and their augmentation depend on the seed and the step alone, so without
+--minutes the result is the same as without the interruption. With --minutes the learning rate follows the time used
+instead of the steps done. Weights are averaged over steps (EMA); validation and export use the average.
+"""
+import argparse
+import csv
+import dataclasses
+import json
+import math
+import os
+import platform
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import torch
+
+from . import augment, losses, pictures
+from .data import Split, check_apart
+from .errors import TrainingError, reported
+from .features import SLICES
+from .model import compact_unet, flops, light, parameter_count
+
+FIELDS = ["epoch", "step", "samples", "seconds", "learning_rate", "train_loss", "validation_loss", "validation_error"]
+
+
+@dataclasses.dataclass
+class Config:
+    """What a run is made of. A run's config.json holds these; --config reads such a file."""
+
+    train: str = ""
+    validation: str = ""
+    widths: tuple = (16, 24, 32, 48)
+    epochs: int = 60
+    minutes: float = 0.0  # 0: as many epochs as above; else until this much training time is used
+    batch: int = 8
+    learning_rate: float = 2e-3
+    final_learning_rate: float = 2e-5
+    warmup_steps: int = 50
+    weight_decay: float = 1e-4
+    clip: float = 1.0  # largest gradient norm
+    ema: float = 0.998
+    epsilon: float = 0.05  # of the relative square, units of s
+    composite_l1: float = 0.0  # weight of L1 on the tone-mapped composite in the last third; clean targets only
+    seed: int = 1
+    threads: int = 0  # 0: torch's choice
+    device: str = "cpu"
+    checkpoint_seconds: float = 120.0
+
+
+# What may differ between a run's first command and the one that continues it.
+FREE = {"minutes", "threads", "device", "checkpoint_seconds", "train", "validation"}
+
+
+def command_of(config, folder):
+    """The command that makes this run; of paths the last part only."""
+    words = ["python -m bouncelight_training.train", "--run", os.path.basename(os.path.normpath(folder))]
+    for field in dataclasses.fields(Config):
+        value = getattr(config, field.name)
+        if value != field.default:
+            text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+            words += ["--" + field.name.replace("_", "-"), os.path.basename(text)]
+    return " ".join(words)
+
+
+def machine_of(device):
+    """In words, what the network is trained on."""
+    if device.type == "cuda":
+        return f"{torch.cuda.get_device_name(device)}, torch {torch.__version__}"
+    return f"CPU ({platform.machine()}, {torch.get_num_threads()} threads), torch {torch.__version__}"
+
+
+def commit():
+    """The repository's commit, with a mark when tracked files differ from it."""
+    here = os.path.dirname(os.path.abspath(__file__))
+
+    def git(*arguments):
+        return subprocess.run(["git", "-C", here, *arguments], capture_output=True, text=True, check=True).stdout.strip()
+
+    try:
+        return git("rev-parse", "HEAD") + (" with local changes" if git("status", "--porcelain", "--untracked-files=no") else "")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
+class Stop(Exception):
+    """Somebody asked the run to end; its state is saved first."""
+
+
+def head_bias(split):
+    """log of the mean target in units of s: the untrained network is this constant."""
+    total = np.zeros(3)
+    for target, mask in zip(split.target, split.mask):
+        total += target.astype(np.float64)[:, mask].sum(1)
+    mean = total / max(int(split.mask.sum()), 1)
+    if not (mean > 0).all():
+        raise TrainingError(f"{split.path}: the mean target is {mean.tolist()}; direct light is brighter than all light, check units")
+    return np.log(mean)
+
+
+def batch_of(split, indices, rng, device):
+    """Augmented pictures as tensors: features, target, mask."""
+    made = [augment.augmented(split.features[i], split.target[i], split.mask[i], rng) for i in indices]
+    features, target, mask = (torch.from_numpy(np.stack([np.ascontiguousarray(m[k]) for m in made])) for k in range(3))
+    return features.to(device, memory_format=torch.channels_last), target.to(device), mask.to(device)
+
+
+class Run:
+    """Model, optimiser, average and progress of one training run, and how they are kept on disk."""
+
+    def __init__(self, config, folder, train, validation):
+        self.config, self.folder, self.train, self.validation = config, folder, train, validation
+        torch.manual_seed(config.seed)
+        if config.threads:
+            torch.set_num_threads(config.threads)
+        self.device, self.commit = torch.device(config.device), commit()
+        self.model = compact_unet(config.widths, bias=head_bias(train)).to(self.device, memory_format=torch.channels_last)
+        self.average = {name: p.detach().clone() for name, p in self.model.state_dict().items()}
+        self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
+        self.step, self.elapsed, self.rows, self.sums = 0, 0.0, [], [0.0, 0]
+        self.steps_per_epoch = math.ceil(len(train) / config.batch)
+
+    @property
+    def checkpoint_path(self):
+        return os.path.join(self.folder, "checkpoint.pt")
+
+    @property
+    def epoch(self):
+        return self.step // self.steps_per_epoch
+
+    def save(self):
+        """Writes checkpoint.pt whole: a kill leaves the old one or the new one."""
+        state = {"config": dataclasses.asdict(self.config), "model": self.model.state_dict(), "average": self.average,
+                 "optimiser": self.optimiser.state_dict(), "step": self.step, "elapsed": self.elapsed, "rows": self.rows, "sums": self.sums,
+                 "samples": self.samples(), "command": command_of(self.config, self.folder), "commit": self.commit, "machine": machine_of(self.device), "train_report": self.train.report, "validation_report": self.validation.report}
+        torch.save(state, self.checkpoint_path + ".part")
+        os.replace(self.checkpoint_path + ".part", self.checkpoint_path)
+
+    def load(self):
+        """Continues from checkpoint.pt if there is one."""
+        if not os.path.exists(self.checkpoint_path):
+            return
+        state = read_checkpoint(self.checkpoint_path)
+        ours = json.loads(json.dumps(dataclasses.asdict(self.config)))
+        theirs = json.loads(json.dumps(state["config"]))
+        differ = [k for k in ours if k not in FREE and ours[k] != theirs.get(k)]
+        if differ:
+            raise TrainingError(f"{self.checkpoint_path} was made with another {differ[0]} ({theirs.get(differ[0])}, now {ours[differ[0]]}); use another --run")
+        if state["train_report"] != self.train.report:
+            raise TrainingError(f"{self.checkpoint_path} was trained on other data than {self.train.path}; use another --run")
+        self.model.load_state_dict(state["model"])
+        self.average = {name: p.to(self.device) for name, p in state["average"].items()}
+        self.optimiser.load_state_dict(state["optimiser"])
+        self.step, self.elapsed, self.rows, self.sums = state["step"], state["elapsed"], state["rows"], state["sums"]
+        print(f"continues at step {self.step} (epoch {self.epoch}, {self.elapsed / 60:.1f} min used)", file=sys.stderr)
+
+    def samples(self):
+        """Pictures seen so far."""
+        done, rest = divmod(self.step, self.steps_per_epoch)
+        return done * len(self.train) + min(rest * self.config.batch, len(self.train))
+
+    def progress(self):
+        """0 at the start, 1 at the end."""
+        if self.config.minutes:
+            return min(self.elapsed / (60 * self.config.minutes), 1.0)
+        return min(self.step / (self.config.epochs * self.steps_per_epoch), 1.0)
+
+    def learning_rate(self):
+        """Linear warm-up, then half a cosine."""
+        c = self.config
+        warm = min((self.step + 1) / max(c.warmup_steps, 1), 1.0)
+        return warm * (c.final_learning_rate + 0.5 * (c.learning_rate - c.final_learning_rate) * (1 + math.cos(math.pi * self.progress())))
+
+    def loss(self, prediction, features, target, mask):
+        loss = losses.relative_square(prediction, target, mask, self.config.epsilon)
+        if self.config.composite_l1 and self.progress() > 2 / 3:
+            direct = torch.expm1(features[:, SLICES["direct"]])
+            loss = loss + self.config.composite_l1 * losses.tonemapped_difference(prediction, target, mask, features[:, SLICES["albedo"]], direct)
+        return loss
+
+    def train_step(self):
+        """One batch; which one follows from seed and step alone."""
+        begun = time.monotonic()
+        place = self.step % self.steps_per_epoch
+        order = np.random.default_rng((self.config.seed, self.epoch)).permutation(len(self.train))
+        chosen = order[place * self.config.batch:(place + 1) * self.config.batch]
+        features, target, mask = batch_of(self.train, chosen, np.random.default_rng((self.config.seed, 1 << 20, self.step)), self.device)
+        for group in self.optimiser.param_groups:
+            group["lr"] = self.learning_rate()
+        self.model.train()
+        loss = self.loss(light(self.model(features)), features, target, mask)
+        value = loss.item()
+        views = ", ".join(f"room {self.train.room[i]} view {self.train.view[i]}" for i in chosen)
+        if not math.isfinite(value):
+            raise TrainingError(f"the loss is {value} at step {self.step} ({views}); the last checkpoint is kept; lower the learning rate or look at these views")
+        self.optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        norm = torch.nn.utils.clip_grad_norm_(self.model.parameters(), self.config.clip)
+        if not torch.isfinite(norm):
+            raise TrainingError(f"the gradient is {norm.item()} at step {self.step} ({views}); the last checkpoint is kept")
+        self.optimiser.step()
+        decay = min(self.config.ema, (1 + self.step) / (10 + self.step))
+        with torch.no_grad():
+            for name, p in self.model.state_dict().items():
+                self.average[name].lerp_(p, 1 - decay)
+        self.step += 1
+        self.sums = [self.sums[0] + value, self.sums[1] + 1]
+        self.elapsed += time.monotonic() - begun
+
+    def averaged(self):
+        """The model with averaged weights."""
+        model = compact_unet(self.config.widths).to(self.device, memory_format=torch.channels_last)
+        model.load_state_dict(self.average)
+        return model.eval()
+
+    def finish_epoch(self, draw):
+        """Validates, logs and saves."""
+        scores, predicted = validate(self.averaged(), self.validation, self.config.epsilon, self.device)
+        row = {"epoch": self.epoch, "step": self.step, "samples": self.samples(), "seconds": round(self.elapsed, 1), "learning_rate": self.learning_rate(),
+               "train_loss": self.sums[0] / max(self.sums[1], 1), **scores}
+        self.rows.append(row)
+        self.sums = [0.0, 0]
+        self.save()
+        write_log(self.rows, os.path.join(self.folder, "log.csv"))
+        pictures.loss_curve(self.rows, os.path.join(self.folder, "loss.png"))
+        if draw:
+            title = f"epoch {row['epoch']}, {row['samples']} samples seen, error {row['validation_error']:.1%}"
+            pictures.validation_views(self.validation, predicted, os.path.join(self.folder, "validation.png"), title)
+        print(f"epoch {row['epoch']:4}  {row['seconds'] / 60:6.1f} min  train {row['train_loss']:.4f}  validation {row['validation_loss']:.4f}"
+              f"  error {row['validation_error']:.2%}", file=sys.stderr, flush=True)
+
+
+def validate(model, split, epsilon, device="cpu", draw=4):
+    """Loss and pooled error over a split, and the predictions of the views that are drawn (one a room first)."""
+    loss = above = below = 0.0
+    first = {}
+    for i, room in enumerate(split.room):
+        first.setdefault(int(room), i)
+    drawn, predicted = list(first.values())[:draw], {}
+    with torch.no_grad():
+        for i in range(len(split)):
+            features, target, mask = (torch.from_numpy(a[i:i + 1]) for a in (split.features, split.target, split.mask))
+            prediction = light(model(features.float().to(device, memory_format=torch.channels_last))).cpu().contiguous()
+            target = target.float()
+            loss += losses.relative_square(prediction, target, mask, epsilon).item() / len(split)
+            # Back to E/pi: pictures are weighed by their light, as on a screen.
+            difference, light_sum = losses.pooled_error(prediction * float(split.scale[i]), target * float(split.scale[i]), mask)
+            above, below = above + difference, below + light_sum
+            if i in drawn:
+                predicted[i] = prediction[0].numpy()
+    return {"validation_loss": loss, "validation_error": above / max(below, 1e-20)}, predicted
+
+
+def read_checkpoint(path):
+    """A checkpoint's dictionary (plain tensors and numbers only)."""
+    try:
+        return torch.load(path, map_location="cpu", weights_only=True)
+    except Exception as error:  # torch raises many types for a damaged file
+        raise TrainingError(f"{path}: not a readable checkpoint: {error}") from error
+
+
+def write_log(rows, path):
+    with open(path + ".part", "w", newline="") as file:
+        writer = csv.DictWriter(file, FIELDS)
+        writer.writeheader()
+        writer.writerows(rows)
+    os.replace(path + ".part", path)
+
+
+def train(config, folder, stop_after=None):
+    """Runs to the end (or for `stop_after` steps, for tests) and returns the Run."""
+    train_split, validation = Split(config.train), Split(config.validation)
+    check_apart(train_split, validation)
+    os.makedirs(folder, exist_ok=True)
+    run = Run(config, folder, train_split, validation)
+    run.load()
+    with open(os.path.join(folder, "config.json"), "w") as file:
+        json.dump(dataclasses.asdict(config), file, indent=1)
+    h, w = train_split.mask.shape[1:]
+    print(f"{parameter_count(run.model)} parameters, {flops(run.model, h, w) / 1e9:.2f} GFLOP at {w}x{h} cells; {len(train_split)} training and "
+          f"{len(validation)} validation views, {train_split.report['kept']:.0%} and {validation.report['kept']:.0%} of the cells kept", file=sys.stderr, flush=True)
+    saved, begun, drawn = time.monotonic(), run.step, 0.0
+    while run.progress() < 1:
+        run.train_step()
+        last = run.progress() >= 1
+        if run.step % run.steps_per_epoch == 0 or last:
+            draw = last or time.monotonic() - drawn > 60
+            run.finish_epoch(draw)
+            saved, drawn = time.monotonic(), time.monotonic() if draw else drawn
+        elif time.monotonic() - saved > config.checkpoint_seconds:
+            run.save()
+            saved = time.monotonic()
+        if stop_after is not None and run.step - begun >= stop_after:
+            break
+        if STOPPING:
+            run.save()
+            raise Stop
+    return run
+
+
+STOPPING = []
+
+
+@reported
+def main(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--run", required=True, help="folder of the run; continued if it has a checkpoint")
+    parser.add_argument("--config", help="JSON with any of the settings below; flags win over it")
+    for field in dataclasses.fields(Config):
+        kind = (lambda t: tuple(int(n) for n in t.split(","))) if field.name == "widths" else type(field.default)
+        parser.add_argument("--" + field.name.replace("_", "-"), type=kind, default=None, help=f"default {field.default}")
+    a = vars(parser.parse_args(arguments))
+    folder, file = a.pop("run"), a.pop("config")
+    settings = {}
+    if file:
+        try:
+            with open(file) as f:
+                settings = json.load(f)
+        except (OSError, ValueError) as error:
+            raise TrainingError(f"{file}: {error}") from error
+        unknown = set(settings) - {f.name for f in dataclasses.fields(Config)}
+        if unknown:
+            raise TrainingError(f"{file}: no such setting: {sorted(unknown)[0]}")
+    settings |= {k: v for k, v in a.items() if v is not None}
+    config = Config(**settings)
+    config.widths = tuple(config.widths)
+    for name in ("train", "validation"):
+        if not getattr(config, name):
+            raise TrainingError(f"--{name} is missing: the .npz of the split, made by python -m bouncelight_training.data")
+    for s in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(s, lambda *_: STOPPING.append(True))
+    try:
+        train(config, folder)
+    except Stop:
+        print(f"stopped; the same command continues (state in {folder})", file=sys.stderr)
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()
