@@ -18,7 +18,41 @@ macro_rules! wgsl {
 }
 
 /// Shaders of `render/`.
-pub const RENDER: &[Shader] = &[];
+pub const RENDER: &[Shader] = &[
+    Shader { name: "render.shadow", files: wgsl!["lib/hash.wgsl", "lib/material.wgsl", "render/shadow.wgsl"] },
+    Shader {
+        name: "render.gbuffer",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/hash.wgsl",
+            "lib/frame.wgsl",
+            "lib/brdf.wgsl",
+            "lib/material.wgsl",
+            "render/gbuffer.wgsl"
+        ],
+    },
+    Shader {
+        name: "render.direct",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/hash.wgsl",
+            "lib/frame.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "lib/shadow_maps.wgsl",
+            "render/direct.wgsl"
+        ],
+    },
+    Shader {
+        name: "render.composite",
+        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "render/composite.wgsl"],
+    },
+    Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
+    Shader {
+        name: "render.layers",
+        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "render/layers.wgsl"],
+    },
+];
 
 /// Shaders of `gi/`.
 pub const GI: &[Shader] = &[

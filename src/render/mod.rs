@@ -1,3 +1,55 @@
-//! The rasteriser: one pass, one file; `frame` tells the order.
+//! The rasteriser: one pass, one file; [`frame`] tells the order.
 
+pub mod capture;
+pub mod composite;
+pub mod direct;
+pub mod frame;
+pub mod gbuffer;
+pub mod sampling;
+pub mod shadow;
+mod shadow_local;
+mod shadow_sun;
+pub mod targets;
+pub mod tonemap;
 pub mod tonemap_curve;
+mod tool;
+pub mod view;
+
+pub use frame::{Renderer, RendererOptions};
+pub use targets::Targets;
+pub use view::View;
+
+use thiserror::Error;
+
+/// Why the rasteriser cannot do what it was asked.
+#[derive(Debug, Error)]
+pub enum RenderError {
+    /// A picture that the device cannot hold.
+    #[error("a picture of {width}×{height} pixels: {reason}")]
+    Size {
+        /// Width asked for, pixels.
+        width: u32,
+        /// Height asked for, pixels.
+        height: u32,
+        /// Which limit it breaks.
+        reason: String,
+    },
+    /// Reading a result back failed.
+    #[error(transparent)]
+    Readback(#[from] crate::gpu::readback::ReadbackError),
+    /// A picture with pixels that are no numbers.
+    #[error("layer {layer} has {count} pixels that are not finite, the first at {x},{y}")]
+    NotFinite {
+        /// The layer's name.
+        layer: String,
+        /// How many pixels.
+        count: usize,
+        /// Column of the first.
+        x: usize,
+        /// Row of the first.
+        y: usize,
+    },
+    /// Capture without a sample.
+    #[error("a capture needs at least one sample")]
+    NoSamples,
+}

@@ -2,7 +2,9 @@
 //!
 //! Scene space is glTF's: right-handed, +Y up, metres; cameras look down −Z. Colours are linear Rec.709.
 //! Light is radiometric (W/m², W/sr, W/(m²·sr)); photometric file units are divided by 683 lm/W at the border.
-//! Nothing here knows wgpu except [`upload`](crate::scene), which turns a [`Scene`] into GPU buffers.
+//! Nothing here knows wgpu except [`upload`], which turns a [`Scene`] into GPU buffers.
+
+pub mod upload;
 
 pub mod bounds;
 #[cfg(feature = "io")]

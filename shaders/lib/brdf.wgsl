@@ -1,0 +1,49 @@
+// glTF's metallic-roughness BRDF: Lambert + GGX with height-correlated Smith visibility and Schlick's Fresnel.
+
+const PI: f32 = 3.14159265358979;
+
+// Light that leaves through the specular lobe when it comes evenly from everywhere: F0 * x + y (split sum).
+// Fitted to numerical integrals of GGX with the Fresnel term of a dielectric of index 1.5 and the energy that single
+// scattering loses given back, as Cycles' Principled has it; error below 0.012 for n.v > 0.2, 0.023 at grazing angles.
+fn split_sum(roughness: f32, n_dot_v: f32) -> vec2f {
+    let r = clamp(roughness, 0.0, 1.0);
+    let x = 1.0 - clamp(n_dot_v, 0.0, 1.0);
+    let exponent = (6.0393 + 26.2500 * r * r) * exp(-3.1851 * r);
+    let rim = 1.2024 + r * (-3.4406 + r * (3.4447 - r * 1.1744));
+    let bias = pow(max(x, 1e-6), exponent) * rim + 0.01503 * r * (1.0 - r);
+    let s = max(r, 0.1);
+    let r1 = vec4f(1.0, s, s * s, s * s * s);
+    let scale = dot(vec4f(0.9051, 0.9982, -2.4025, 0.7910), r1)
+        + x * (dot(vec4f(0.3306, -3.0833, 5.2607, -2.3697), r1)
+        + x * (dot(vec4f(-2.2334, 20.9684, -41.1089, 23.1553), r1)
+        + x * (dot(vec4f(6.3627, -54.4488, 103.1189, -56.3863), r1)
+        + x * dot(vec4f(-5.7047, 38.8754, -67.3500, 35.1796), r1))));
+    let b = clamp(bias, 0.0, 1.0);
+    return vec2f(clamp(scale, 0.0, 1.0 - b), b);
+}
+
+// Directional albedo of the specular lobe: how much of an even environment it shows. 0 for F0 = 0, which marks unlit.
+fn env_brdf(f0: vec3f, roughness: f32, n_dot_v: f32) -> vec3f {
+    let ab = split_sum(roughness, n_dot_v);
+    let f90 = saturate(50.0 * max(f0.x, max(f0.y, f0.z)));
+    return f0 * ab.x + ab.y * f90;
+}
+
+// GGX: D * V * F, in 1/sr; multiply by n.l and the light.
+fn ggx(n: vec3f, v: vec3f, l: vec3f, f0: vec3f, roughness: f32) -> vec3f {
+    let h = normalize(v + l);
+    let n_l = saturate(dot(n, l));
+    let n_v = max(dot(n, v), 1e-4);
+    let n_h = saturate(dot(n, h));
+    let v_h = saturate(dot(v, h));
+    let alpha = max(roughness * roughness, 1e-3);
+    let a2 = alpha * alpha;
+    // 1 - n_h^2 from the cross product: the plain form loses all digits near the peak of a smooth surface.
+    let c = cross(n, h);
+    let d_root = a2 * n_h * n_h + dot(c, c);
+    let d = a2 / (PI * d_root * d_root);
+    let vis = 0.5 / max(n_l * sqrt(n_v * n_v * (1.0 - a2) + a2) + n_v * sqrt(n_l * n_l * (1.0 - a2) + a2), 1e-6);
+    let f90 = saturate(50.0 * max(f0.x, max(f0.y, f0.z)));
+    let f = f0 + (f90 - f0) * pow(1.0 - v_h, 5.0);
+    return d * vis * f;
+}

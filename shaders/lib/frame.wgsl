@@ -1,0 +1,41 @@
+// What every pass knows about the frame; the Rust twin is `render::view::FrameUniform`.
+
+struct Frame {
+    view_from_world: mat4x4f,
+    world_from_view: mat4x4f,
+    // Jitter included.
+    clip_from_world: mat4x4f,
+    clip_from_world_unjittered: mat4x4f,
+    // The previous frame's, without jitter.
+    previous_clip_from_world: mat4x4f,
+    // View-space half extents of the image plane at unit distance.
+    tan_half: vec2f,
+    // Where in the pixel it is sampled: offset from its centre, pixels, y down.
+    jitter: vec2f,
+    size: vec2u,
+    near: f32,
+    seed: u32,
+    environment: vec3f,
+    light_count: u32,
+}
+
+// Direction in view space of the ray through the sample point of `pixel`, scaled to z = -1.
+fn view_ray(frame: Frame, pixel: vec2u) -> vec3f {
+    let uv = (vec2f(pixel) + 0.5 + frame.jitter) / vec2f(frame.size);
+    return vec3f((uv * 2.0 - 1.0) * vec2f(1.0, -1.0) * frame.tan_half, -1.0);
+}
+
+// Distance along the view axis; only for depth > 0.
+fn linear_depth(frame: Frame, depth: f32) -> f32 {
+    return frame.near / depth;
+}
+
+fn world_position(frame: Frame, pixel: vec2u, depth: f32) -> vec3f {
+    let view = view_ray(frame, pixel) * linear_depth(frame, depth);
+    return (frame.world_from_view * vec4f(view, 1.0)).xyz;
+}
+
+// Unit vector from the surface towards the eye.
+fn to_eye(frame: Frame, pixel: vec2u) -> vec3f {
+    return normalize(-(frame.world_from_view * vec4f(view_ray(frame, pixel), 0.0)).xyz);
+}

@@ -1,0 +1,35 @@
+// Puts light and surface together: hdr = albedo (direct + indirect) + specular + gloss colour * indirect + emissive.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var depth_texture: texture_depth_2d;
+@group(0) @binding(2) var normal_texture: texture_2d<f32>;
+@group(0) @binding(3) var albedo_texture: texture_2d<f32>;
+@group(0) @binding(4) var specular_texture: texture_2d<f32>;
+@group(0) @binding(5) var emissive_texture: texture_2d<f32>;
+@group(0) @binding(6) var direct_diffuse: texture_2d<f32>;
+@group(0) @binding(7) var direct_specular: texture_2d<f32>;
+@group(0) @binding(8) var indirect: texture_2d<f32>;
+@group(0) @binding(9) var hdr: texture_storage_2d<rgba16float, write>;
+
+// The largest finite half: brighter radiance is held there instead of becoming infinite.
+const HALF_MAX: f32 = 65504.0;
+
+@compute @workgroup_size(8, 8)
+fn composite(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    var radiance = frame.environment;
+    let depth = textureLoad(depth_texture, id.xy, 0);
+    if depth > 0.0 {
+        let n = oct_decode(textureLoad(normal_texture, id.xy, 0).xy);
+        let albedo = textureLoad(albedo_texture, id.xy, 0);
+        let specular = textureLoad(specular_texture, id.xy, 0);
+        // Occlusion maps darken what comes from all around, not the analytic lights (glTF 2.0, 3.9.3).
+        let around = textureLoad(indirect, id.xy, 0).rgb * albedo.a;
+        let gloss = env_brdf(specular.rgb, specular.a, dot(n, to_eye(frame, id.xy)));
+        radiance = albedo.rgb * (textureLoad(direct_diffuse, id.xy, 0).rgb + around)
+            + textureLoad(direct_specular, id.xy, 0).rgb
+            + gloss * around
+            + textureLoad(emissive_texture, id.xy, 0).rgb;
+    }
+    textureStore(hdr, id.xy, vec4f(min(radiance, vec3f(HALF_MAX)), 1.0));
+}

@@ -1,0 +1,111 @@
+// One geometry pass: depth, normal, diffuse albedo, specular, emissive, motion. `render/gbuffer.rs` documents each field.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+struct Vertex {
+    @location(0) position: vec3f,
+    @location(1) normal: vec2f,
+    @location(2) tangent: vec4f,
+    @location(3) uv0: vec2f,
+    @location(4) uv1: vec2f,
+    @location(5) color: vec4f,
+    // Rows of the world-from-object matrix.
+    @location(6) row0: vec4f,
+    @location(7) row1: vec4f,
+    @location(8) row2: vec4f,
+}
+
+struct Varying {
+    @builtin(position) position: vec4f,
+    @location(0) normal: vec3f,
+    @location(1) tangent: vec4f,
+    @location(2) uv: vec4f,
+    @location(3) color: vec4f,
+    @location(4) world: vec3f,
+    // Sign of the transform's determinant: a mirrored object turns its front faces round.
+    @location(5) @interpolate(flat) mirror: f32,
+}
+
+@vertex
+fn vertex(v: Vertex) -> Varying {
+    let p = vec4f(v.position, 1.0);
+    let world = vec3f(dot(v.row0, p), dot(v.row1, p), dot(v.row2, p));
+    // The cofactor matrix is the inverse transpose times the determinant: right for normals, never singular.
+    let c0 = cross(v.row1.xyz, v.row2.xyz);
+    let c1 = cross(v.row2.xyz, v.row0.xyz);
+    let c2 = cross(v.row0.xyz, v.row1.xyz);
+    let mirror = select(1.0, -1.0, dot(v.row0.xyz, c0) < 0.0);
+    let n = oct_decode(v.normal);
+    let t = select(vec3f(0.0), oct_decode(v.tangent.xy), v.tangent.z != 0.0);
+    var out: Varying;
+    out.position = frame.clip_from_world * vec4f(world, 1.0);
+    out.normal = normalize(vec3f(dot(c0, n), dot(c1, n), dot(c2, n))) * mirror;
+    out.tangent = vec4f(dot(v.row0.xyz, t), dot(v.row1.xyz, t), dot(v.row2.xyz, t), v.tangent.z * mirror);
+    out.uv = vec4f(v.uv0, v.uv1);
+    out.color = v.color;
+    out.world = world;
+    out.mirror = mirror;
+    return out;
+}
+
+struct Fields {
+    @location(0) normal: vec2f,
+    @location(1) albedo: vec4f,
+    @location(2) specular: vec4f,
+    @location(3) emissive: vec4f,
+    @location(4) motion: vec2f,
+}
+
+@fragment
+fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
+    let base = material.base_color * in.color
+        * textureSample(base_texture, base_sampler, coordinates(material.base_use, in.uv));
+    let rough_metal = textureSample(rough_texture, rough_sampler, coordinates(material.rough_use, in.uv));
+    let bump = textureSample(normal_texture, normal_sampler, coordinates(material.normal_use, in.uv)).xyz;
+    let occlusion = textureSample(occlusion_texture, occlusion_sampler, coordinates(material.occlusion_use, in.uv)).r;
+    let glow = textureSample(emissive_texture, emissive_sampler, coordinates(material.emissive_use, in.uv)).rgb;
+    if ALPHA {
+        let q = vec2u(in.position.xy);
+        // The depth in the seed makes layers of one pixel independent, so that coverages multiply.
+        if base.a < cutoff(hash01(q.x, q.y, frame.seed, bitcast<u32>(in.position.z))) {
+            discard;
+        }
+    }
+
+    let front = facing == (in.mirror > 0.0);
+    var n = normalize(in.normal);
+    if in.tangent.w != 0.0 && material.normal_use.row1.w > 0.5 {
+        let t = in.tangent.xyz;
+        let b = cross(n, t) * in.tangent.w;
+        let m = (bump * 2.0 - 1.0) * vec3f(material.normal_scale, material.normal_scale, 1.0);
+        n = normalize(normalize(t) * m.x + normalize(b) * m.y + n * m.z);
+    }
+    n = select(-n, n, front);
+
+    let metallic = saturate(material.metallic * rough_metal.b);
+    let roughness = saturate(material.roughness * rough_metal.g);
+    let color = saturate(base.rgb);
+    let v = -(frame.world_from_view * vec4f(view_ray_at(in.position.xy), 0.0)).xyz;
+    let n_v = dot(n, normalize(v));
+    let share = env_brdf(vec3f(0.04), roughness, max(n_v, 0.0)).x;
+    let previous = frame.previous_clip_from_world * vec4f(in.world, 1.0);
+    let current = frame.clip_from_world_unjittered * vec4f(in.world, 1.0);
+
+    var out: Fields;
+    out.normal = oct_encode(n);
+    out.albedo = vec4f(color * (1.0 - metallic) * (1.0 - share), mix(1.0, occlusion, material.occlusion_strength));
+    out.specular = vec4f(mix(vec3f(0.04), color, metallic), roughness);
+    out.emissive = vec4f(material.emissive * glow, 1.0);
+    if material.unlit != 0u {
+        out.albedo = vec4f(0.0, 0.0, 0.0, 1.0);
+        out.specular = vec4f(0.0, 0.0, 0.0, 1.0);
+        out.emissive = vec4f(max(base.rgb, vec3f(0.0)), 1.0);
+    }
+    out.motion = (previous.xy / previous.w - current.xy / current.w) * vec2f(0.5, -0.5);
+    return out;
+}
+
+// As `view_ray`, from the fragment's position: pixel centres in pixels.
+fn view_ray_at(position: vec2f) -> vec3f {
+    let uv = (position + frame.jitter) / vec2f(frame.size);
+    return vec3f((uv * 2.0 - 1.0) * vec2f(1.0, -1.0) * frame.tan_half, -1.0);
+}

@@ -1,0 +1,60 @@
+// Decodes one layer of the G-buffer for a band of rows into linear floats, for capture. Which layer: `options.layer`,
+// numbered as `render::capture::Layer`. Light layers leave as products with the surface colour; the division, which
+// Blender makes after filtering, happens on the CPU.
+
+struct Options {
+    layer: u32,
+    first_row: u32,
+    rows: u32,
+    pad: u32,
+}
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var depth_texture: texture_depth_2d;
+@group(0) @binding(2) var normal_texture: texture_2d<f32>;
+@group(0) @binding(3) var albedo_texture: texture_2d<f32>;
+@group(0) @binding(4) var specular_texture: texture_2d<f32>;
+@group(0) @binding(5) var emissive_texture: texture_2d<f32>;
+@group(0) @binding(6) var motion_texture: texture_2d<f32>;
+@group(0) @binding(7) var direct_diffuse: texture_2d<f32>;
+@group(0) @binding(8) var direct_specular: texture_2d<f32>;
+@group(0) @binding(9) var indirect: texture_2d<f32>;
+@group(0) @binding(10) var hdr: texture_2d<f32>;
+@group(1) @binding(0) var<uniform> options: Options;
+@group(1) @binding(1) var<storage, read_write> out: array<vec4f>;
+
+@compute @workgroup_size(8, 8)
+fn layers(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= frame.size.x || id.y >= options.rows { return; }
+    let pixel = vec2u(id.x, id.y + options.first_row);
+    out[id.y * frame.size.x + id.x] = decode(pixel);
+}
+
+fn decode(pixel: vec2u) -> vec4f {
+    if options.layer == 0u {
+        return vec4f(textureLoad(hdr, pixel, 0).rgb, 1.0);
+    }
+    let depth = textureLoad(depth_texture, pixel, 0);
+    if depth <= 0.0 {
+        // Blender's background: no surface, depth 1e10.
+        return select(vec4f(0.0), vec4f(1e10, 0.0, 0.0, 0.0), options.layer == 9u);
+    }
+    let n = oct_decode(textureLoad(normal_texture, pixel, 0).xy);
+    let albedo = textureLoad(albedo_texture, pixel, 0);
+    let specular = textureLoad(specular_texture, pixel, 0);
+    let around = textureLoad(indirect, pixel, 0).rgb * albedo.a;
+    let gloss = env_brdf(specular.rgb, specular.a, dot(n, to_eye(frame, pixel)));
+    switch options.layer {
+        case 1u: { return vec4f(albedo.rgb * textureLoad(direct_diffuse, pixel, 0).rgb, 1.0); }
+        case 2u: { return vec4f(albedo.rgb * around, 1.0); }
+        case 3u: { return vec4f(albedo.rgb, 1.0); }
+        case 4u: { return vec4f(textureLoad(direct_specular, pixel, 0).rgb, 1.0); }
+        case 5u: { return vec4f(gloss * around, 1.0); }
+        case 6u: { return vec4f(gloss, 1.0); }
+        case 7u: { return vec4f(textureLoad(emissive_texture, pixel, 0).rgb, 1.0); }
+        case 8u: { return vec4f(n, 1.0); }
+        case 9u: { return vec4f(linear_depth(frame, depth), 0.0, 0.0, 1.0); }
+        case 10u: { return vec4f(world_position(frame, pixel, depth), 1.0); }
+        default: { return vec4f(textureLoad(motion_texture, pixel, 0).xy, 0.0, 1.0); }
+    }
+}

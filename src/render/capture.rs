@@ -1,0 +1,302 @@
+//! A finished picture in memory: N jittered frames averaged, with the layers that Blender's passes would hold.
+
+use super::view::View;
+use super::{RenderError, Renderer, sampling, tool};
+use crate::gpu::{Gpu, readback, timing::Recorder};
+use crate::scene::Camera;
+use crate::scene::upload::SceneGpu;
+
+/// Layers beside the picture. Names and meanings are those of Blender's passes:
+/// picture = DiffCol · (DiffDir + DiffInd) + GlossCol · (GlossDir + GlossInd) + Emit + background.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Layer {
+    /// Direct diffuse light, E/π. Without the sky, which Cycles counts in.
+    DiffDir = 1,
+    /// Indirect diffuse light (sky and bounces), E/π.
+    DiffInd = 2,
+    /// Diffuse reflectance.
+    DiffCol = 3,
+    /// Direct specular radiance divided by GlossCol.
+    GlossDir = 4,
+    /// Indirect specular radiance divided by GlossCol.
+    GlossInd = 5,
+    /// Directional albedo of the specular lobe.
+    GlossCol = 6,
+    /// Emitted radiance.
+    Emit = 7,
+    /// World-space shading normal (Y up).
+    Normal = 8,
+    /// Distance along the view axis, metres, of the sample at the pixel's centre; 1e10 where nothing was hit.
+    Depth = 9,
+    /// World position of the sample at the pixel's centre, metres (Y up).
+    Position = 10,
+    /// Texture coordinates in the previous frame minus in this one, of the sample at the pixel's centre.
+    Motion = 11,
+}
+
+impl Layer {
+    /// All of them.
+    pub const ALL: [Layer; 11] = [
+        Layer::DiffDir,
+        Layer::DiffInd,
+        Layer::DiffCol,
+        Layer::GlossDir,
+        Layer::GlossInd,
+        Layer::GlossCol,
+        Layer::Emit,
+        Layer::Normal,
+        Layer::Depth,
+        Layer::Position,
+        Layer::Motion,
+    ];
+
+    /// Blender's pass name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Layer::DiffDir => "DiffDir",
+            Layer::DiffInd => "DiffInd",
+            Layer::DiffCol => "DiffCol",
+            Layer::GlossDir => "GlossDir",
+            Layer::GlossInd => "GlossInd",
+            Layer::GlossCol => "GlossCol",
+            Layer::Emit => "Emit",
+            Layer::Normal => "Normal",
+            Layer::Depth => "Depth",
+            Layer::Position => "Position",
+            Layer::Motion => "Motion",
+        }
+    }
+
+    /// Names of its channels.
+    pub fn channels(self) -> &'static [&'static str] {
+        match self {
+            Layer::Normal | Layer::Position => &["X", "Y", "Z"],
+            Layer::Depth => &["Z"],
+            Layer::Motion => &["X", "Y"],
+            _ => &["R", "G", "B"],
+        }
+    }
+
+    /// The layer by Blender's name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|l| l.name() == name)
+    }
+
+    /// Averages over an edge would name points and depths that are nowhere, so these take the centre's sample.
+    fn is_unfiltered(self) -> bool {
+        matches!(self, Layer::Depth | Layer::Position | Layer::Motion)
+    }
+
+    /// The colour that is divided out after filtering, as Blender does it.
+    fn divisor(self) -> Option<Layer> {
+        match self {
+            Layer::DiffDir | Layer::DiffInd => Some(Layer::DiffCol),
+            Layer::GlossDir | Layer::GlossInd => Some(Layer::GlossCol),
+            _ => None,
+        }
+    }
+}
+
+/// What to capture.
+#[derive(Debug, Clone, Copy)]
+pub struct CaptureOptions<'a> {
+    /// Jittered frames to average, at least 1.
+    pub samples: u32,
+    /// Seed of offsets and stochastic patterns.
+    pub seed: u32,
+    /// Layers beside the picture.
+    pub layers: &'a [Layer],
+}
+
+impl Default for CaptureOptions<'_> {
+    fn default() -> Self {
+        Self { samples: 1, seed: 0, layers: &[] }
+    }
+}
+
+/// A picture of floats: rows from the top, channels interleaved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Width, pixels.
+    pub width: usize,
+    /// Height, pixels.
+    pub height: usize,
+    /// Values a pixel.
+    pub channels: usize,
+    /// `width · height · channels` values.
+    pub data: Vec<f32>,
+}
+
+impl Picture {
+    /// The values of pixel (x, y).
+    pub fn at(&self, x: usize, y: usize) -> &[f32] {
+        let i = (y * self.width + x) * self.channels;
+        &self.data[i..i + self.channels]
+    }
+}
+
+/// What [`capture`] returns.
+#[derive(Debug, Clone)]
+pub struct CapturedFrame {
+    /// Scene-linear radiance, RGBA; alpha is 1.
+    pub beauty: Picture,
+    /// The layers asked for, in that order.
+    pub layers: Vec<(Layer, Picture)>,
+}
+
+impl CapturedFrame {
+    /// The layer, if it was asked for.
+    pub fn layer(&self, layer: Layer) -> Option<&Picture> {
+        self.layers.iter().find(|(l, _)| *l == layer).map(|(_, p)| p)
+    }
+}
+
+/// Draws `scene` as `camera` sees it at the renderer's size: sample 0 through the pixels' centres, the others spread by
+/// the filter, all with equal weight. Blocks until the picture is in memory.
+pub fn capture(
+    gpu: &Gpu,
+    renderer: &mut Renderer,
+    scene: &SceneGpu,
+    camera: &Camera,
+    options: CaptureOptions<'_>,
+) -> Result<CapturedFrame, RenderError> {
+    if options.samples == 0 {
+        return Err(RenderError::NoSamples);
+    }
+    let size = renderer.targets().size;
+    let mut needed: Vec<Layer> = options.layers.to_vec();
+    needed.extend(options.layers.iter().filter_map(|l| l.divisor()));
+    needed.sort_by_key(|&l| l as u32);
+    needed.dedup();
+    let pixels = size[0] as usize * size[1] as usize;
+    let mut beauty = vec![0.0; 4 * pixels];
+    let mut sums: Vec<(Layer, Vec<f32>)> =
+        needed.iter().map(|&l| (l, vec![0.0; l.channels().len() * pixels])).collect();
+    let decoder = Decoder::new(&gpu.device, renderer);
+    for i in 0..options.samples {
+        let seed = options.seed.wrapping_mul(0x9e37_79b9).wrapping_add(i);
+        let view = View::new(camera, size, sampling::offset(i, options.seed)).with_seed(seed);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, i == 0);
+        gpu.queue.submit([encoder.finish()]);
+        decoder.add(gpu, size, 0, &mut beauty, 4)?;
+        for (layer, sum) in &mut sums {
+            if i == 0 || !layer.is_unfiltered() {
+                decoder.add(gpu, size, *layer as u32, sum, layer.channels().len())?;
+            }
+        }
+    }
+    let scale = 1.0 / options.samples as f32;
+    beauty.iter_mut().for_each(|v| *v *= scale);
+    for (layer, sum) in &mut sums {
+        if !layer.is_unfiltered() {
+            sum.iter_mut().for_each(|v| *v *= scale);
+        }
+    }
+    let find = |layer: Layer| &sums.iter().find(|(l, _)| *l == layer).expect("every needed layer was summed").1;
+    let picture = |channels, data| Picture { width: size[0] as usize, height: size[1] as usize, channels, data };
+    let beauty = checked("the picture", picture(4, beauty))?;
+    let mut layers = Vec::with_capacity(options.layers.len());
+    for &layer in options.layers {
+        let mut data = find(layer).clone();
+        if let Some(divisor) = layer.divisor() {
+            for (v, &d) in data.iter_mut().zip(find(divisor)) {
+                *v = if d > 0.0 { *v / d } else { 0.0 };
+            }
+        }
+        layers.push((layer, checked(layer.name(), picture(layer.channels().len(), data))?));
+    }
+    Ok(CapturedFrame { beauty, layers })
+}
+
+fn checked(name: &str, picture: Picture) -> Result<Picture, RenderError> {
+    let mut bad =
+        picture.data.chunks_exact(picture.channels).enumerate().filter(|(_, p)| !p.iter().all(|v| v.is_finite()));
+    let Some((first, _)) = bad.next() else { return Ok(picture) };
+    let count = 1 + bad.count();
+    let (x, y) = (first % picture.width, first / picture.width);
+    Err(RenderError::NotFinite { layer: name.to_string(), count, x, y })
+}
+
+/// Largest band of rows that is decoded at once, bytes.
+const BAND: u64 = 64 << 20;
+
+/// Turns G-buffer texels into floats on the GPU and reads them back in bands of rows.
+struct Decoder {
+    pipeline: wgpu::ComputePipeline,
+    picture: wgpu::BindGroup,
+    output: wgpu::BindGroup,
+    options: wgpu::Buffer,
+    buffer: wgpu::Buffer,
+    rows: u32,
+}
+
+impl Decoder {
+    fn new(device: &wgpu::Device, renderer: &Renderer) -> Self {
+        use tool::*;
+        let t = renderer.targets();
+        let stage = wgpu::ShaderStages::COMPUTE;
+        let mut types = vec![UNIFORM, DEPTH];
+        types.extend([COLOR; 9]);
+        let picture_layout = layout(device, "render.layers", stage, &types);
+        let output_layout = layout(device, "render.layers", stage, &[UNIFORM, READ_WRITE]);
+        let pipeline = compute(device, "render.layers", "layers", &[&picture_layout, &output_layout]);
+        let views = [
+            &t.depth,
+            &t.normal,
+            &t.albedo,
+            &t.specular,
+            &t.emissive,
+            &t.motion,
+            &t.direct_diffuse,
+            &t.direct_specular,
+            &t.indirect,
+            &t.hdr,
+        ];
+        let mut resources = vec![renderer.frame().as_entire_binding()];
+        resources.extend(views.map(view));
+        let picture = group(device, "render.layers", &picture_layout, &resources);
+        let row = 16 * u64::from(t.size[0]);
+        let rows = (BAND / row).clamp(1, u64::from(t.size[1])) as u32;
+        let make = |size, usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("render.layers"),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let options = make(16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
+        let buffer = make(row * u64::from(rows), wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
+        let resources = [options.as_entire_binding(), buffer.as_entire_binding()];
+        let output = group(device, "render.layers", &output_layout, &resources);
+        Self { pipeline, picture, output, options, buffer, rows }
+    }
+
+    /// Adds layer number `layer` of the frame just drawn to `sum`, which has `channels` values a pixel.
+    fn add(&self, gpu: &Gpu, size: [u32; 2], layer: u32, sum: &mut [f32], channels: usize) -> Result<(), RenderError> {
+        let band = self.rows as usize * size[0] as usize * channels;
+        for (i, sum) in sum.chunks_mut(band).enumerate() {
+            let first = i as u32 * self.rows;
+            let rows = self.rows.min(size[1] - first);
+            gpu.queue.write_buffer(&self.options, 0, bytemuck::cast_slice(&[layer, first, rows, 0]));
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            Recorder::new(&mut encoder).compute("layers", |pass| {
+                pass.set_pipeline(&self.pipeline);
+                pass.set_bind_group(0, &self.picture, &[]);
+                pass.set_bind_group(1, &self.output, &[]);
+                tool::dispatch(pass, [size[0], rows]);
+            });
+            gpu.queue.submit([encoder.finish()]);
+            let bytes = u64::from(rows) * u64::from(size[0]) * 16;
+            let read = readback::buffer(&gpu.device, &gpu.queue, &self.buffer, 0, bytes)?;
+            for (sum, value) in sum.chunks_exact_mut(channels).zip(read.chunks_exact(16)) {
+                for (s, v) in sum.iter_mut().zip(value.chunks_exact(4)) {
+                    *s += f32::from_ne_bytes([v[0], v[1], v[2], v[3]]);
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,53 @@
+//! Puts light and surface together into `hdr` (compute).
+
+use super::targets::Targets;
+use super::tool;
+use crate::gpu::timing::Recorder;
+
+/// hdr = albedo · (direct + indirect) + specular + gloss colour · indirect + emissive; background = environment.
+pub struct CompositePass {
+    pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+}
+
+impl CompositePass {
+    /// Builds the pipeline.
+    pub fn new(device: &wgpu::Device) -> Self {
+        use tool::*;
+        let types = [UNIFORM, DEPTH, COLOR, COLOR, COLOR, COLOR, COLOR, COLOR, COLOR, STORE_HALF];
+        let layout = layout(device, "render.composite", wgpu::ShaderStages::COMPUTE, &types);
+        let pipeline = compute(device, "render.composite", "composite", &[&layout]);
+        Self { pipeline, layout }
+    }
+
+    /// Binds the targets; rebuilt on resize.
+    pub fn picture(&self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets) -> wgpu::BindGroup {
+        let t = targets;
+        tool::group(
+            device,
+            "render.composite",
+            &self.layout,
+            &[
+                frame.as_entire_binding(),
+                tool::view(&t.depth),
+                tool::view(&t.normal),
+                tool::view(&t.albedo),
+                tool::view(&t.specular),
+                tool::view(&t.emissive),
+                tool::view(&t.direct_diffuse),
+                tool::view(&t.direct_specular),
+                tool::view(&t.indirect),
+                tool::view(&t.hdr),
+            ],
+        )
+    }
+
+    /// Fills `hdr`.
+    pub fn record(&self, recorder: &mut Recorder<'_>, picture: &wgpu::BindGroup, size: [u32; 2]) {
+        recorder.compute("composite", |pass| {
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, picture, &[]);
+            tool::dispatch(pass, size);
+        });
+    }
+}

@@ -1,0 +1,165 @@
+//! The frame, told in order: shadow → gbuffer → direct → indirect → composite. A display adds `tonemap` after it.
+
+use super::RenderError;
+use super::composite::CompositePass;
+use super::direct::{DirectInputs, DirectPass};
+use super::gbuffer::GbufferPass;
+use super::shadow::{ShadowMaps, ShadowOptions, ShadowPass};
+use super::targets::Targets;
+use super::view::{FrameUniform, View};
+use crate::gpu::timing::Recorder;
+use crate::scene::upload::SceneGpu;
+
+/// How a [`Renderer`] is made.
+#[derive(Debug, Clone, Default)]
+pub struct RendererOptions {
+    /// Sizes of shadow maps.
+    pub shadow: ShadowOptions,
+}
+
+/// What fills `indirect`.
+enum Indirect {
+    /// Nothing: direct light alone.
+    Direct,
+}
+
+/// What is bound as long as the targets stay.
+struct Picture {
+    direct: wgpu::BindGroup,
+    composite: wgpu::BindGroup,
+}
+
+/// What is bound as long as the scene stays.
+struct Lighting {
+    scene: u64,
+    maps: ShadowMaps,
+    group: wgpu::BindGroup,
+}
+
+/// The rasteriser. The host owns device, queue and encoder; a steady frame allocates nothing on the GPU.
+pub struct Renderer {
+    device: wgpu::Device,
+    frame: wgpu::Buffer,
+    targets: Targets,
+    picture: Picture,
+    lighting: Option<Lighting>,
+    indirect: Indirect,
+    shadow: ShadowPass,
+    gbuffer: GbufferPass,
+    direct: DirectPass,
+    composite: CompositePass,
+}
+
+impl Renderer {
+    /// Pipelines, and targets of `size` pixels.
+    pub fn new(
+        device: &wgpu::Device,
+        _queue: &wgpu::Queue,
+        size: [u32; 2],
+        options: RendererOptions,
+    ) -> Result<Self, RenderError> {
+        let targets = Targets::new(device, size)?;
+        let frame = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("render.frame"),
+            size: size_of::<FrameUniform>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let shadow = ShadowPass::new(device, options.shadow);
+        let gbuffer = GbufferPass::new(device, &frame);
+        let direct = DirectPass::new(device);
+        let composite = CompositePass::new(device);
+        let picture = bind(device, &frame, &targets, &direct, &composite);
+        let device = device.clone();
+        let indirect = Indirect::Direct;
+        Ok(Self { device, frame, targets, picture, lighting: None, indirect, shadow, gbuffer, direct, composite })
+    }
+
+    /// New targets of `size` pixels; the views of the old ones are of no use any more.
+    pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
+        if size != self.targets.size {
+            self.targets = Targets::new(&self.device, size)?;
+            self.picture = bind(&self.device, &self.frame, &self.targets, &self.direct, &self.composite);
+        }
+        Ok(())
+    }
+
+    /// The textures that [`Renderer::record`] fills.
+    pub fn targets(&self) -> &Targets {
+        &self.targets
+    }
+
+    /// The frame's uniform buffer, for passes that read the same G-buffer.
+    pub fn frame(&self) -> &wgpu::Buffer {
+        &self.frame
+    }
+
+    /// Name and bytes of every target and, once a scene was drawn, its shadow maps.
+    pub fn bytes(&self) -> Vec<(&'static str, u64)> {
+        let mut rows = self.targets.bytes();
+        rows.extend(self.lighting.iter().flat_map(|l| l.maps.bytes()));
+        rows
+    }
+
+    /// Records one frame of `scene` as `view` sees it into [`Renderer::targets`]. `view.size` is the targets' size.
+    pub fn record(&mut self, recorder: &mut Recorder<'_>, queue: &wgpu::Queue, scene: &SceneGpu, view: &View) {
+        self.record_frame(recorder, queue, scene, view, true);
+    }
+
+    /// As [`Renderer::record`]; without `shadows` the maps stay as the previous frame left them, which is right for
+    /// further samples of one picture.
+    pub(crate) fn record_frame(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        scene: &SceneGpu,
+        view: &View,
+        shadows: bool,
+    ) {
+        let size = self.targets.size;
+        let known = self.lighting.take().filter(|l| l.scene == scene.id);
+        let fresh = known.is_none();
+        let mut lighting = known.unwrap_or_else(|| self.lighting(queue, scene));
+        let uniform = view.uniform(&scene.environment, scene.lights.len() as u32);
+        queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
+
+        if shadows || fresh {
+            self.shadow.record(recorder, queue, scene, view, &mut lighting.maps);
+        }
+        self.gbuffer.record(recorder, scene, &self.targets);
+        let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
+        self.direct.record(recorder, inputs);
+        match self.indirect {
+            Indirect::Direct => clear(recorder, &self.targets),
+        }
+        self.composite.record(recorder, &self.picture.composite, size);
+        self.lighting = Some(lighting);
+    }
+
+    fn lighting(&self, queue: &wgpu::Queue, scene: &SceneGpu) -> Lighting {
+        let maps = self.shadow.maps(&self.device, queue, scene);
+        let group = self.direct.lights(&self.device, scene, &maps);
+        Lighting { scene: scene.id, maps, group }
+    }
+}
+
+fn bind(
+    device: &wgpu::Device,
+    frame: &wgpu::Buffer,
+    targets: &Targets,
+    direct: &DirectPass,
+    composite: &CompositePass,
+) -> Picture {
+    Picture { direct: direct.picture(device, frame, targets), composite: composite.picture(device, frame, targets) }
+}
+
+/// No indirect light.
+fn clear(recorder: &mut Recorder<'_>, targets: &Targets) {
+    let attachment = wgpu::RenderPassColorAttachment {
+        view: &targets.indirect.view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store },
+    };
+    recorder.render("indirect", &[Some(attachment)], None, |_| {});
+}

@@ -1,0 +1,140 @@
+//! The geometry pass, and what the G-buffer's texels mean.
+//!
+//! | field | format | holds | where nothing was hit |
+//! |---|---|---|---|
+//! | `depth` | `Depth32Float` | near / distance along the view axis (metres), reversed: 1 at the near plane | 0 |
+//! | `normal` | `Rg16Float` | unit shading normal in world space, octahedral, turned to the side that is seen | 0, 0 |
+//! | `albedo` | `Rgba8UnormSrgb` | rgb: diffuse reflectance in [0, 1], the specular share taken out; a: occlusion map | 0 |
+//! | `specular` | `Rgba8UnormSrgb` | rgb: F0, 0.04 for dielectrics to the base colour for metals; a: perceptual roughness | 0 |
+//! | `emissive` | `Rgba16Float` | rgb: emitted radiance, W/(m²·sr); a: 1 | 0 |
+//! | `motion` | `Rg16Float` | texture coordinates in the previous frame minus in this one, free of jitter; y down | 0 |
+//!
+//! and what later passes add:
+//!
+//! | field | format | holds | where nothing was hit |
+//! |---|---|---|---|
+//! | `direct_diffuse` | `Rgba16Float` | E/π of the analytic lights, W/(m²·sr), albedo not multiplied in | 0 |
+//! | `direct_specular` | `Rgba16Float` | radiance of the specular lobe under the analytic lights, W/(m²·sr) | 0 |
+//! | `indirect` | `Rgba16Float` | E/π of sky and bounces, from a GI method | 0 |
+//! | `hdr` | `Rgba16Float` | the picture: radiance, W/(m²·sr); a: 1 | the environment |
+//!
+//! The five colour attachments take exactly the 32 bytes a sample that WebGPU grants by default. Unlit materials have
+//! albedo and F0 of 0 and their colour in `emissive`. Objects do not move, so motion vectors come from the camera.
+
+use super::targets::Targets;
+use super::tool;
+use crate::gpu::{shaders, timing::Recorder};
+use crate::scene::upload::{Draw, SceneGpu, attribute_layouts, material_layout};
+
+/// Draws a scene into the G-buffer.
+pub struct GbufferPass {
+    pipelines: Vec<wgpu::RenderPipeline>,
+    frame: wgpu::BindGroup,
+}
+
+impl GbufferPass {
+    /// Builds the pipelines; `frame` is the frame's uniform buffer.
+    pub fn new(device: &wgpu::Device, frame: &wgpu::Buffer) -> Self {
+        let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
+        let layout = tool::layout(device, "render.gbuffer", stages, &[tool::UNIFORM]);
+        let frame = tool::group(device, "render.gbuffer", &layout, &[frame.as_entire_binding()]);
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("render.gbuffer"),
+            bind_group_layouts: &[Some(&layout), Some(&material_layout(device))],
+            immediate_size: 0,
+        });
+        let module = shaders::module(device, "render.gbuffer");
+        let pipelines = (0..6).map(|i| pipeline(device, &pipeline_layout, &module, i)).collect();
+        Self { pipelines, frame }
+    }
+
+    /// Clears the G-buffer and draws `scene` into it.
+    pub fn record(&self, recorder: &mut Recorder<'_>, scene: &SceneGpu, targets: &Targets) {
+        let colors =
+            [&targets.normal, &targets.albedo, &targets.specular, &targets.emissive, &targets.motion].map(|t| {
+                Some(wgpu::RenderPassColorAttachment {
+                    view: &t.view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })
+            });
+        let depth = wgpu::RenderPassDepthStencilAttachment {
+            view: &targets.depth.view,
+            depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+            stencil_ops: None,
+        };
+        recorder.render("gbuffer", &colors, Some(depth), |pass| {
+            pass.set_bind_group(0, &self.frame, &[]);
+            pass.set_vertex_buffer(0, scene.positions.slice(..));
+            pass.set_vertex_buffer(1, scene.instances.slice(..));
+            pass.set_vertex_buffer(2, scene.attributes.slice(..));
+            pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
+            let (mut pipeline, mut material) = (usize::MAX, usize::MAX);
+            for draw in &scene.draws {
+                if pipeline != variant(draw) {
+                    pipeline = variant(draw);
+                    pass.set_pipeline(&self.pipelines[pipeline]);
+                }
+                if material != draw.material {
+                    material = draw.material;
+                    pass.set_bind_group(1, &scene.material_groups[material], &[]);
+                }
+                pass.draw_indexed(draw.indices.clone(), draw.base_vertex, draw.instances.clone());
+            }
+        });
+    }
+}
+
+/// Which pipeline a draw needs: culling (back, front for mirrored, none) × coverage.
+fn variant(draw: &Draw) -> usize {
+    let cull = if draw.double_sided { 2 } else { usize::from(draw.mirrored) };
+    cull + 3 * usize::from(draw.covered)
+}
+
+fn pipeline(
+    device: &wgpu::Device,
+    layout: &wgpu::PipelineLayout,
+    module: &wgpu::ShaderModule,
+    variant: usize,
+) -> wgpu::RenderPipeline {
+    use wgpu::TextureFormat as F;
+    let targets = [F::Rg16Float, F::Rgba8UnormSrgb, F::Rgba8UnormSrgb, F::Rgba16Float, F::Rg16Float]
+        .map(|format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL }));
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("render.gbuffer"),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: &attribute_layouts(),
+        },
+        primitive: wgpu::PrimitiveState {
+            cull_mode: [Some(wgpu::Face::Back), Some(wgpu::Face::Front), None][variant % 3],
+            ..Default::default()
+        },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: F::Depth32Float,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Greater),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some("fragment"),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &[("ALPHA", if variant >= 3 { 1.0 } else { 0.0 })],
+                ..Default::default()
+            },
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

@@ -1,0 +1,46 @@
+//! Perspective shadow views of spot lights (one map) and of point lights and wide spots (six faces of a cube).
+
+use super::shadow::ShadowViewGpu;
+use glam::{Mat4, Vec3, Vec4};
+
+/// What faces and cones show beyond their edge, in tangent units, so that filters never reach outside.
+/// `LOCAL_SEARCH` in `shaders/lib/shadow_maps.wgsl` stays below it.
+const MARGIN: f32 = 0.15;
+
+/// A spot whose half angle is above this gets a cube: a flat map would waste its texels on the rim.
+pub(super) const WIDEST_SPOT: f32 = 60.0 * std::f32::consts::PI / 180.0;
+
+/// The view of a spot light along `direction` with half angle `outer` (radians).
+pub(super) fn spot(position: Vec3, direction: Vec3, outer: f32, radius: f32, size: u32, layer: u32) -> ShadowViewGpu {
+    let forward = direction.normalize_or(Vec3::NEG_Y);
+    let (right, up) = forward.any_orthonormal_pair();
+    perspective(position, [right, up, forward], outer.tan(), radius, size, layer)
+}
+
+/// Views along +X, −X, +Y, −Y, +Z, −Z in this order.
+pub(super) fn cube(position: Vec3, radius: f32, size: u32, first_layer: u32) -> [ShadowViewGpu; 6] {
+    let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+    std::array::from_fn(|i| {
+        let (right, up) = axes[i].any_orthonormal_pair();
+        perspective(position, [right, up, axes[i]], 1.0, radius, size, first_layer + i as u32)
+    })
+}
+
+fn perspective(p: Vec3, axes: [Vec3; 3], tangent: f32, radius: f32, size: u32, layer: u32) -> ShadowViewGpu {
+    let focal = 1.0 / (tangent + MARGIN);
+    // What is inside the lamp itself casts no shadow.
+    let near = (0.5 * radius).max(0.01);
+    let row = |axis: Vec3, scale: f32| (axis * scale).extend(-axis.dot(p) * scale);
+    let clip_from_world =
+        Mat4::from_cols(row(axes[0], focal), row(axes[1], focal), Vec4::new(0.0, 0.0, 0.0, near), row(axes[2], 1.0))
+            .transpose();
+    ShadowViewGpu {
+        clip_from_world: clip_from_world.to_cols_array_2d(),
+        texel: 2.0 / (focal * size as f32),
+        range: near,
+        scale: 0.5 * focal,
+        layer,
+        size: size as f32,
+        pad: [0.0; 3],
+    }
+}

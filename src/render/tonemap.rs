@@ -1,0 +1,111 @@
+//! From scene-linear radiance to a display target.
+
+use super::tool;
+use super::tonemap_curve::Tonemap;
+use crate::gpu::{shaders, timing::Recorder};
+use bytemuck::{Pod, Zeroable};
+
+/// Exposure and curve.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TonemapOptions {
+    /// Exposure value: radiance is multiplied by 2^ev.
+    pub ev: f32,
+    /// Curve.
+    pub tonemap: Tonemap,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Uniform {
+    exposure: f32,
+    kind: u32,
+    linear_target: u32,
+    pad: u32,
+}
+
+/// Draws `hdr` through a curve into a colour target of one format.
+pub struct TonemapPass {
+    device: wgpu::Device,
+    pipeline: wgpu::RenderPipeline,
+    layout: wgpu::BindGroupLayout,
+    uniform: wgpu::Buffer,
+    linear_target: bool,
+    bound: Option<(wgpu::TextureView, wgpu::BindGroup)>,
+}
+
+impl TonemapPass {
+    /// For targets of `format`; sRGB formats encode by themselves and are given linear light.
+    pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
+        let stages = wgpu::ShaderStages::FRAGMENT;
+        let layout = tool::layout(device, "render.tonemap", stages, &[tool::UNIFORM, tool::COLOR]);
+        let module = shaders::module(device, "render.tonemap");
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("render.tonemap"),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("render.tonemap"),
+            layout: Some(&pipeline_layout),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("vertex"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: None,
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("fragment"),
+                compilation_options: Default::default(),
+                targets: &[Some(format.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("render.tonemap"),
+            size: size_of::<Uniform>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Self { device: device.clone(), pipeline, layout, uniform, linear_target: format.is_srgb(), bound: None }
+    }
+
+    /// Draws `hdr` (same size as the target) into `target`.
+    pub fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        options: TonemapOptions,
+        hdr: &wgpu::TextureView,
+        target: &wgpu::TextureView,
+    ) {
+        let uniform = Uniform {
+            exposure: options.ev.exp2(),
+            kind: options.tonemap.kind(),
+            linear_target: u32::from(self.linear_target),
+            pad: 0,
+        };
+        queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
+        if self.bound.as_ref().is_none_or(|(view, _)| view != hdr) {
+            let resources = [self.uniform.as_entire_binding(), wgpu::BindingResource::TextureView(hdr)];
+            let group = tool::group(&self.device, "render.tonemap", &self.layout, &resources);
+            self.bound = Some((hdr.clone(), group));
+        }
+        let Some((_, group)) = &self.bound else { return };
+        let attachment = wgpu::RenderPassColorAttachment {
+            view: target,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store: wgpu::StoreOp::Store },
+        };
+        recorder.render("tonemap", &[Some(attachment)], None, |pass| {
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, group, &[]);
+            pass.draw(0..3, 0..1);
+        });
+    }
+}

@@ -1,0 +1,100 @@
+//! Short forms for what every pass says to wgpu.
+
+/// A bind group layout entry for one stage set, numbered by the list it stands in.
+pub(crate) fn layout(
+    device: &wgpu::Device,
+    label: &str,
+    visibility: wgpu::ShaderStages,
+    types: &[wgpu::BindingType],
+) -> wgpu::BindGroupLayout {
+    let entries: Vec<_> = (0u32..)
+        .zip(types)
+        .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None })
+        .collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+}
+
+/// A bind group whose bindings are numbered by the list.
+pub(crate) fn group(
+    device: &wgpu::Device,
+    label: &str,
+    layout: &wgpu::BindGroupLayout,
+    resources: &[wgpu::BindingResource<'_>],
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = (0u32..)
+        .zip(resources)
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
+        .collect();
+    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+}
+
+/// A target as something to bind.
+pub(crate) fn view(target: &super::targets::Target) -> wgpu::BindingResource<'_> {
+    wgpu::BindingResource::TextureView(&target.view)
+}
+
+pub(crate) const UNIFORM: wgpu::BindingType = wgpu::BindingType::Buffer {
+    ty: wgpu::BufferBindingType::Uniform,
+    has_dynamic_offset: false,
+    min_binding_size: None,
+};
+
+pub(crate) const READ: wgpu::BindingType = storage(true);
+pub(crate) const READ_WRITE: wgpu::BindingType = storage(false);
+
+const fn storage(read_only: bool) -> wgpu::BindingType {
+    wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Storage { read_only },
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    }
+}
+
+/// A colour texture read with `textureLoad`.
+pub(crate) const COLOR: wgpu::BindingType = wgpu::BindingType::Texture {
+    sample_type: wgpu::TextureSampleType::Float { filterable: false },
+    view_dimension: wgpu::TextureViewDimension::D2,
+    multisampled: false,
+};
+
+pub(crate) const DEPTH: wgpu::BindingType = depth(wgpu::TextureViewDimension::D2);
+pub(crate) const DEPTH_ARRAY: wgpu::BindingType = depth(wgpu::TextureViewDimension::D2Array);
+
+const fn depth(view_dimension: wgpu::TextureViewDimension) -> wgpu::BindingType {
+    wgpu::BindingType::Texture { sample_type: wgpu::TextureSampleType::Depth, view_dimension, multisampled: false }
+}
+
+/// An `Rgba16Float` texture written by a compute shader.
+pub(crate) const STORE_HALF: wgpu::BindingType = wgpu::BindingType::StorageTexture {
+    access: wgpu::StorageTextureAccess::WriteOnly,
+    format: wgpu::TextureFormat::Rgba16Float,
+    view_dimension: wgpu::TextureViewDimension::D2,
+};
+
+/// A compute pipeline of shader `name` whose entry point is `entry`.
+pub(crate) fn compute(
+    device: &wgpu::Device,
+    name: &str,
+    entry: &str,
+    layouts: &[&wgpu::BindGroupLayout],
+) -> wgpu::ComputePipeline {
+    let layouts: Vec<_> = layouts.iter().map(|&l| Some(l)).collect();
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(name),
+        bind_group_layouts: &layouts,
+        immediate_size: 0,
+    });
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(name),
+        layout: Some(&layout),
+        module: &crate::gpu::shaders::module(device, name),
+        entry_point: Some(entry),
+        compilation_options: Default::default(),
+        cache: None,
+    })
+}
+
+/// Dispatches enough 8×8 workgroups for `size`.
+pub(crate) fn dispatch(pass: &mut wgpu::ComputePass<'_>, size: [u32; 2]) {
+    pass.dispatch_workgroups(size[0].div_ceil(8), size[1].div_ceil(8), 1);
+}

@@ -1,0 +1,218 @@
+//! A [`Scene`] on the GPU: vertex and index buffers, materials with their textures, lights, and the list of draws.
+//!
+//! A vertex takes 48 bytes: 12 in the position stream, which is all that opaque shadow casters read, and 36 in the
+//! attribute stream (normal 4, tangent 8, two texture coordinate sets 16, colour 8). An instance takes 48 bytes (three
+//! rows of the world-from-object matrix), a light 64, a material 256.
+
+mod material;
+mod mesh;
+mod texture;
+
+pub use material::{MaterialGpu, TextureUse, material_layout};
+pub use mesh::{AttributeVertex, Draw, attribute_layouts, position_layouts};
+
+use super::{AlphaMode, Environment, Light, LightKind, Scene};
+use bytemuck::{Pod, Zeroable};
+use std::sync::atomic::{AtomicU64, Ordering};
+use thiserror::Error;
+
+/// Why a scene does not fit on the device or in itself.
+#[derive(Debug, Error)]
+pub enum UploadError {
+    /// Vertices or indices exceed the device's largest buffer.
+    #[error("mesh `{mesh}` does not fit: {what} need {bytes} bytes in all, the device's largest buffer has {limit}")]
+    TooLarge {
+        /// The mesh that crosses the limit.
+        mesh: String,
+        /// Which data.
+        what: &'static str,
+        /// Bytes needed up to and including this mesh.
+        bytes: u64,
+        /// The device's limit.
+        limit: u64,
+    },
+    /// A mesh whose arrays disagree.
+    #[error("mesh `{mesh}`: {reason}")]
+    Mesh {
+        /// The mesh's name.
+        mesh: String,
+        /// What disagrees.
+        reason: String,
+    },
+    /// An image whose bytes do not fit its size.
+    #[error("image `{image}`: {reason}")]
+    Image {
+        /// The image's name.
+        image: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A material that names an image which is not there.
+    #[error("material `{material}` refers to image {image}, but the scene has {count}")]
+    MissingImage {
+        /// The material's name.
+        material: String,
+        /// The index.
+        image: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// An instance that names a mesh which is not there.
+    #[error("instance `{instance}` refers to mesh {mesh}, but the scene has {count}")]
+    MissingMesh {
+        /// The instance's name.
+        instance: String,
+        /// The index.
+        mesh: usize,
+        /// How many there are.
+        count: usize,
+    },
+}
+
+/// A light as `shaders/lib/lights.wgsl` reads it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct LightGpu {
+    /// World position (point, spot).
+    pub position: [f32; 3],
+    /// 0 sun, 1 point, 2 spot.
+    pub kind: u32,
+    /// Unit vector along which light travels (sun, spot).
+    pub direction: [f32; 3],
+    /// Cut-off distance, metres; 0 for none.
+    pub range: f32,
+    /// Irradiance in W/m² (sun) or radiant intensity in W/sr (point, spot), tint multiplied in.
+    pub color: [f32; 3],
+    /// Metres (point, spot), or the tangent of half the angular diameter (sun).
+    pub radius: f32,
+    /// Scale of the cone's ramp.
+    pub cone_scale: f32,
+    /// Offset of the cone's ramp.
+    pub cone_offset: f32,
+    /// Unused.
+    pub pad: [u32; 2],
+}
+
+impl LightGpu {
+    /// The shader's form of `light`.
+    pub fn new(light: &Light) -> Self {
+        let tint = |strength: f32| light.color.map(|c| c * strength);
+        let unit = |v: [f32; 3]| glam::Vec3::from(v).try_normalize().unwrap_or(glam::Vec3::NEG_Y).to_array();
+        let zero = Self::zeroed();
+        match light.kind {
+            LightKind::Directional { direction, irradiance, angle } => Self {
+                direction: unit(direction),
+                color: tint(irradiance),
+                radius: (angle.clamp(0.0, 3.0) * 0.5).tan(),
+                ..zero
+            },
+            LightKind::Point { position, intensity, radius, range } => {
+                Self { position, kind: 1, range: range.unwrap_or(0.0), color: tint(intensity), radius, ..zero }
+            }
+            LightKind::Spot { position, direction, intensity, radius, range, inner_angle, outer_angle } => {
+                let (inner, outer) = (inner_angle.cos(), outer_angle.cos());
+                let cone_scale = 1.0 / (inner - outer).max(1e-3);
+                Self {
+                    position,
+                    kind: 2,
+                    direction: unit(direction),
+                    range: range.unwrap_or(0.0),
+                    color: tint(intensity),
+                    radius,
+                    cone_scale,
+                    cone_offset: -outer * cone_scale,
+                    ..zero
+                }
+            }
+        }
+    }
+}
+
+/// A scene on the GPU. Immutable; upload again after a change.
+pub struct SceneGpu {
+    /// Tells uploads apart, so that bind groups can be kept as long as the scene stays.
+    pub id: u64,
+    /// Object-space positions, three floats a vertex.
+    pub positions: wgpu::Buffer,
+    /// The other attributes ([`AttributeVertex`]).
+    pub attributes: wgpu::Buffer,
+    /// 32-bit indices, relative to each mesh's first vertex.
+    pub indices: wgpu::Buffer,
+    /// Rows of the world-from-object matrices, grouped by draw.
+    pub instances: wgpu::Buffer,
+    /// What to draw, sorted by material.
+    pub draws: Vec<Draw>,
+    /// One bind group a material, of [`material_layout`].
+    pub material_groups: Vec<wgpu::BindGroup>,
+    /// [`LightGpu`] for each light; at least one entry, so that it can be bound.
+    pub light_buffer: wgpu::Buffer,
+    /// The lights, for shadow fitting.
+    pub lights: Vec<Light>,
+    /// What rays see that hit nothing.
+    pub environment: Environment,
+    /// World-space bounds of all instances; `None` for a scene without triangles.
+    pub bounds: Option<([f32; 3], [f32; 3])>,
+    /// What was mended on the way, one sentence each.
+    pub warnings: Vec<String>,
+    bytes: u64,
+}
+
+impl SceneGpu {
+    /// Uploads `scene`. Images larger than the device allows are halved until they fit, with a warning.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Self, UploadError> {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        let mut warnings = Vec::new();
+        let geometry = mesh::upload(device, queue, scene)?;
+        let textures = texture::upload(device, queue, &scene.images, &mut warnings)?;
+        let materials = material::upload(device, queue, scene, &textures)?;
+        let lights: Vec<LightGpu> = scene.lights.iter().map(LightGpu::new).collect();
+        let light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &lights);
+        let bytes = geometry.bytes + textures.bytes + materials.bytes + light_buffer.size();
+        for warning in &warnings {
+            tracing::warn!("{warning}");
+        }
+        Ok(Self {
+            id: NEXT.fetch_add(1, Ordering::Relaxed),
+            positions: geometry.positions,
+            attributes: geometry.attributes,
+            indices: geometry.indices,
+            instances: geometry.instances,
+            draws: geometry.draws,
+            material_groups: materials.groups,
+            light_buffer,
+            lights: scene.lights.clone(),
+            environment: scene.environment,
+            bounds: geometry.bounds,
+            warnings,
+            bytes,
+        })
+    }
+
+    /// Bytes of all buffers and textures.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+}
+
+/// True where alpha decides about coverage, so that the pass needs a fragment stage that can discard.
+fn is_covered(mode: AlphaMode) -> bool {
+    mode != AlphaMode::Opaque
+}
+
+/// A buffer with `data` in it, never empty.
+fn filled<T: Pod>(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    label: &str,
+    usage: wgpu::BufferUsages,
+    data: &[T],
+) -> wgpu::Buffer {
+    let size = (std::mem::size_of_val(data).max(64) as u64).next_multiple_of(4);
+    let usage = usage | wgpu::BufferUsages::COPY_DST;
+    let buffer =
+        device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
+    if !data.is_empty() {
+        queue.write_buffer(&buffer, 0, bytemuck::cast_slice(data));
+    }
+    buffer
+}

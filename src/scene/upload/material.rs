@@ -1,0 +1,178 @@
+//! Materials as uniforms and bind groups.
+
+use super::texture::Textures;
+use super::{UploadError, filled};
+use crate::scene::{AlphaMode, Material, Sampler, Scene, TextureRef, Wrap};
+use bytemuck::{Pod, Zeroable};
+use std::collections::HashMap;
+
+/// How a texture is addressed, as `shaders/lib/material.wgsl` reads it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct TextureUse {
+    /// First row of the coordinate transform; w is the coordinate set.
+    pub row0: [f32; 4],
+    /// Second row; w is 1 where a texture is bound.
+    pub row1: [f32; 4],
+}
+
+/// A material as `shaders/lib/material.wgsl` reads it, padded to the alignment of uniform offsets.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct MaterialGpu {
+    /// Linear base colour and alpha.
+    pub base_color: [f32; 4],
+    /// Emitted radiance, W/(m²·sr).
+    pub emissive: [f32; 3],
+    /// 1 for unlit.
+    pub unlit: u32,
+    /// 0 dielectric to 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness.
+    pub roughness: f32,
+    /// Scale of the normal map's x and y.
+    pub normal_scale: f32,
+    /// Strength of the occlusion map.
+    pub occlusion_strength: f32,
+    /// 0 opaque, the mask's cutoff, or 2 for stochastic coverage.
+    pub alpha_cutoff: f32,
+    /// Unused.
+    pub pad: [f32; 3],
+    /// Base colour, metallic-roughness, normal, occlusion, emissive.
+    pub uses: [TextureUse; 5],
+    /// To 256 bytes.
+    pub tail: [f32; 8],
+}
+
+pub(super) struct Materials {
+    pub groups: Vec<wgpu::BindGroup>,
+    pub bytes: u64,
+}
+
+pub(super) fn upload(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    scene: &Scene,
+    textures: &Textures,
+) -> Result<Materials, UploadError> {
+    let layout = material_layout(device);
+    let uniforms: Vec<MaterialGpu> = scene.materials.iter().map(uniform).collect();
+    let buffer = filled(device, queue, "scene.materials", wgpu::BufferUsages::UNIFORM, &uniforms);
+    let mut samplers = HashMap::new();
+    for material in &scene.materials {
+        for use_ in references(material).into_iter().flatten() {
+            samplers.entry(use_.sampler).or_insert_with(|| sampler(device, use_.sampler));
+        }
+    }
+    let plain = sampler(device, Sampler::default());
+    let mut groups = Vec::with_capacity(scene.materials.len());
+    for (i, material) in scene.materials.iter().enumerate() {
+        let size = wgpu::BufferSize::new(size_of::<MaterialGpu>() as u64);
+        let offset = (i * size_of::<MaterialGpu>()) as u64;
+        let uniform = wgpu::BufferBinding { buffer: &buffer, offset, size };
+        let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(uniform) }];
+        for (slot, use_) in references(material).into_iter().enumerate() {
+            let (view, sampler) = match use_ {
+                Some(r) => {
+                    let view = textures.views.get(r.image).ok_or_else(|| UploadError::MissingImage {
+                        material: material.name.clone(),
+                        image: r.image,
+                        count: scene.images.len(),
+                    })?;
+                    (view, &samplers[&r.sampler])
+                }
+                None if slot == 2 => (&textures.flat, &plain),
+                None => (&textures.white, &plain),
+            };
+            let slot = slot as u32;
+            entries
+                .push(wgpu::BindGroupEntry { binding: 1 + slot, resource: wgpu::BindingResource::TextureView(view) });
+            entries.push(wgpu::BindGroupEntry { binding: 6 + slot, resource: wgpu::BindingResource::Sampler(sampler) });
+        }
+        groups.push(device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(&material.name),
+            layout: &layout,
+            entries: &entries,
+        }));
+    }
+    Ok(Materials { groups, bytes: buffer.size() })
+}
+
+/// In the order of the bindings.
+fn references(m: &Material) -> [Option<TextureRef>; 5] {
+    [m.base_color_texture, m.metallic_roughness_texture, m.normal_texture, m.occlusion_texture, m.emissive_texture]
+}
+
+fn uniform(m: &Material) -> MaterialGpu {
+    let uses = references(m).map(|r| match r {
+        None => TextureUse { row0: [1.0, 0.0, 0.0, 0.0], row1: [0.0, 1.0, 0.0, 0.0] },
+        Some(r) => {
+            let [a, b] = r.transform;
+            TextureUse { row0: [a[0], a[1], a[2], f32::from(r.uv_set)], row1: [b[0], b[1], b[2], 1.0] }
+        }
+    });
+    MaterialGpu {
+        base_color: m.base_color,
+        emissive: m.emissive,
+        unlit: u32::from(m.unlit),
+        metallic: m.metallic,
+        roughness: m.roughness,
+        normal_scale: m.normal_scale,
+        occlusion_strength: m.occlusion_strength,
+        alpha_cutoff: match m.alpha_mode {
+            AlphaMode::Opaque => 0.0,
+            AlphaMode::Mask { cutoff } => cutoff.min(1.0),
+            AlphaMode::Blend => 2.0,
+        },
+        pad: [0.0; 3],
+        uses,
+        tail: [0.0; 8],
+    }
+}
+
+/// Layout of the materials' bind groups (group 1 of the geometry passes): uniform, five textures, five samplers.
+/// wgpu holds layouts with equal entries for the same, so pipelines can be made before any scene is there.
+pub fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let stages = wgpu::ShaderStages::FRAGMENT;
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: stages, ty, count: None };
+    let mut entries = vec![entry(
+        0,
+        wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+    )];
+    for i in 0..5 {
+        entries.push(entry(
+            1 + i,
+            wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Float { filterable: true },
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
+        ));
+        entries.push(entry(6 + i, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)));
+    }
+    entries.sort_by_key(|e| e.binding);
+    device
+        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("scene.material"), entries: &entries })
+}
+
+fn sampler(device: &wgpu::Device, s: Sampler) -> wgpu::Sampler {
+    let wrap = |w| match w {
+        Wrap::Repeat => wgpu::AddressMode::Repeat,
+        Wrap::MirroredRepeat => wgpu::AddressMode::MirrorRepeat,
+        Wrap::ClampToEdge => wgpu::AddressMode::ClampToEdge,
+    };
+    let filter = |linear| if linear { wgpu::FilterMode::Linear } else { wgpu::FilterMode::Nearest };
+    device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some("scene.sampler"),
+        address_mode_u: wrap(s.wrap[0]),
+        address_mode_v: wrap(s.wrap[1]),
+        mag_filter: filter(s.mag_linear),
+        min_filter: filter(s.min_linear),
+        mipmap_filter: if s.min_linear { wgpu::MipmapFilterMode::Linear } else { wgpu::MipmapFilterMode::Nearest },
+        ..Default::default()
+    })
+}

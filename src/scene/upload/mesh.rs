@@ -1,0 +1,221 @@
+//! Meshes and instances: compact vertices, one set of buffers for the whole scene, draws grouped by material.
+
+use super::{UploadError, filled, is_covered};
+use crate::scene::{Mesh, Scene};
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Vec3};
+use half::f16;
+use std::ops::Range;
+
+/// Everything of a vertex but its position; 36 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct AttributeVertex {
+    /// Octahedral object-space normal, signed normalised.
+    pub normal: [i16; 2],
+    /// Octahedral tangent (x, y), handedness (z; 0 without tangent), unused (w); signed normalised.
+    pub tangent: [i16; 4],
+    /// First texture coordinates.
+    pub uv0: [f32; 2],
+    /// Second texture coordinates.
+    pub uv1: [f32; 2],
+    /// Linear colour and alpha; halves, because files may hold colours above 1.
+    pub color: [f16; 4],
+}
+
+/// All instances of one mesh that share a winding.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Draw {
+    /// Index of the material's bind group.
+    pub material: usize,
+    /// Range in the index buffer.
+    pub indices: Range<u32>,
+    /// Added to every index.
+    pub base_vertex: i32,
+    /// Range in the instance buffer.
+    pub instances: Range<u32>,
+    /// The transforms mirror, so front faces wind clockwise.
+    pub mirrored: bool,
+    /// Both faces are drawn.
+    pub double_sided: bool,
+    /// Masked or blended: needs the permutation that discards.
+    pub covered: bool,
+    /// World-space bounds of all its instances.
+    pub bounds: ([f32; 3], [f32; 3]),
+}
+
+const POSITION: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32x3];
+const ATTRIBUTES: [wgpu::VertexAttribute; 5] =
+    wgpu::vertex_attr_array![1 => Snorm16x2, 2 => Snorm16x4, 3 => Float32x2, 4 => Float32x2, 5 => Float16x4];
+const ROWS: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![6 => Float32x4, 7 => Float32x4, 8 => Float32x4];
+
+fn layout(
+    array_stride: u64,
+    step_mode: wgpu::VertexStepMode,
+    attributes: &'static [wgpu::VertexAttribute],
+) -> Option<wgpu::VertexBufferLayout<'static>> {
+    Some(wgpu::VertexBufferLayout { array_stride, step_mode, attributes })
+}
+
+/// Vertex buffers of passes that read positions and instances only: slots 0 and 1.
+pub fn position_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 2] {
+    [layout(12, wgpu::VertexStepMode::Vertex, &POSITION), layout(48, wgpu::VertexStepMode::Instance, &ROWS)]
+}
+
+/// Vertex buffers of passes that read everything: positions, instances, attributes in slots 0, 1, 2.
+pub fn attribute_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 3] {
+    let [positions, instances] = position_layouts();
+    [positions, instances, layout(36, wgpu::VertexStepMode::Vertex, &ATTRIBUTES)]
+}
+
+pub(super) struct Geometry {
+    pub positions: wgpu::Buffer,
+    pub attributes: wgpu::Buffer,
+    pub indices: wgpu::Buffer,
+    pub instances: wgpu::Buffer,
+    pub draws: Vec<Draw>,
+    pub bounds: Option<([f32; 3], [f32; 3])>,
+    pub bytes: u64,
+}
+
+pub(super) fn upload(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Geometry, UploadError> {
+    let limit = device.limits().max_buffer_size;
+    let (mut positions, mut attributes, mut indices) = (Vec::new(), Vec::new(), Vec::<u32>::new());
+    let mut ranges = Vec::with_capacity(scene.meshes.len());
+    for mesh in &scene.meshes {
+        check(mesh, scene.materials.len())?;
+        let too_large = |what, bytes| UploadError::TooLarge { mesh: mesh.name.clone(), what, bytes, limit };
+        let vertex_bytes = 36 * (positions.len() + mesh.positions.len()) as u64;
+        let index_bytes = 4 * (indices.len() + mesh.indices.len()) as u64;
+        if vertex_bytes > limit {
+            return Err(too_large("vertices", vertex_bytes));
+        }
+        if index_bytes > limit {
+            return Err(too_large("indices", index_bytes));
+        }
+        ranges.push((positions.len() as i32, indices.len() as u32..(indices.len() + mesh.indices.len()) as u32));
+        positions.extend_from_slice(&mesh.positions);
+        attributes.extend((0..mesh.positions.len()).map(|i| attribute(mesh, i)));
+        indices.extend_from_slice(&mesh.indices);
+    }
+
+    // Grouped by material, then by mesh and winding, so that instances of one mesh become one draw.
+    let mut order = Vec::with_capacity(scene.instances.len());
+    for instance in &scene.instances {
+        let mesh = scene.meshes.get(instance.mesh).ok_or_else(|| UploadError::MissingMesh {
+            instance: instance.name.clone(),
+            mesh: instance.mesh,
+            count: scene.meshes.len(),
+        })?;
+        if !mesh.indices.is_empty() {
+            let transform = Mat4::from_cols_array_2d(&instance.transform);
+            order.push((mesh.material, instance.mesh, transform.determinant() < 0.0, transform));
+        }
+    }
+    order.sort_by_key(|o| (o.0, o.1, o.2));
+    let mut rows = Vec::with_capacity(order.len());
+    let mut draws: Vec<Draw> = Vec::new();
+    let mut last = None;
+    for (material, mesh, mirrored, transform) in order {
+        let at = rows.len() as u32;
+        rows.push([transform.row(0).to_array(), transform.row(1).to_array(), transform.row(2).to_array()]);
+        let bounds = world_bounds(&scene.meshes[mesh], &transform);
+        if last == Some((mesh, mirrored)) {
+            let draw = draws.last_mut().expect("the previous instance made a draw");
+            draw.instances.end = at + 1;
+            draw.bounds = union(draw.bounds, bounds);
+            continue;
+        }
+        last = Some((mesh, mirrored));
+        let (base_vertex, range) = ranges[mesh].clone();
+        let m = &scene.materials[material];
+        draws.push(Draw {
+            material,
+            indices: range,
+            base_vertex,
+            instances: at..at + 1,
+            mirrored,
+            double_sided: m.double_sided,
+            covered: is_covered(m.alpha_mode),
+            bounds,
+        });
+    }
+    let bounds = draws.iter().map(|d| d.bounds).reduce(union);
+    let vertex = wgpu::BufferUsages::VERTEX;
+    let positions = filled(device, queue, "scene.positions", vertex, &positions);
+    let attributes = filled(device, queue, "scene.attributes", vertex, &attributes);
+    let indices = filled(device, queue, "scene.indices", wgpu::BufferUsages::INDEX, &indices);
+    let instances = filled(device, queue, "scene.instances", vertex, &rows);
+    let bytes = positions.size() + attributes.size() + indices.size() + instances.size();
+    Ok(Geometry { positions, attributes, indices, instances, draws, bounds, bytes })
+}
+
+fn check(mesh: &Mesh, materials: usize) -> Result<(), UploadError> {
+    let wrong = |reason: String| Err(UploadError::Mesh { mesh: mesh.name.clone(), reason });
+    let n = mesh.positions.len();
+    let arrays = [
+        ("normals", mesh.normals.len(), false),
+        ("tangents", mesh.tangents.len(), true),
+        ("uv0", mesh.uv0.len(), true),
+        ("uv1", mesh.uv1.len(), true),
+        ("colors", mesh.colors.len(), true),
+    ];
+    for (name, len, optional) in arrays {
+        if len != n && !(optional && len == 0) {
+            return wrong(format!("{len} {name} for {n} positions"));
+        }
+    }
+    if !mesh.indices.len().is_multiple_of(3) {
+        return wrong(format!("{} indices are no whole number of triangles", mesh.indices.len()));
+    }
+    if let Some(i) = mesh.indices.iter().find(|&&i| i as usize >= n) {
+        return wrong(format!("index {i} with {n} vertices"));
+    }
+    if mesh.material >= materials {
+        return wrong(format!("material {} of {materials}", mesh.material));
+    }
+    Ok(())
+}
+
+fn attribute(mesh: &Mesh, i: usize) -> AttributeVertex {
+    let tangent = mesh.tangents.get(i).map_or([0; 4], |t| {
+        let [x, y] = octahedral([t[0], t[1], t[2]]);
+        [x, y, if t[3] < 0.0 { -i16::MAX } else { i16::MAX }, 0]
+    });
+    AttributeVertex {
+        normal: octahedral(mesh.normals[i]),
+        tangent,
+        uv0: mesh.uv0.get(i).copied().unwrap_or_default(),
+        uv1: mesh.uv1.get(i).copied().unwrap_or_default(),
+        color: mesh.colors.get(i).copied().unwrap_or([1.0; 4]).map(f16::from_f32),
+    }
+}
+
+/// The twin of `oct_encode` in `shaders/lib/octahedral.wgsl`, signed normalised.
+fn octahedral(v: [f32; 3]) -> [i16; 2] {
+    let sum = v.iter().map(|c| c.abs()).sum::<f32>();
+    let v = if sum > 0.0 && sum.is_finite() { v.map(|c| c / sum) } else { [0.0, 0.0, 1.0] };
+    let (mut x, mut y) = (v[0], v[1]);
+    if v[2] < 0.0 {
+        (x, y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
+    }
+    [x, y].map(|c| (c * f32::from(i16::MAX)).round() as i16)
+}
+
+fn world_bounds(mesh: &Mesh, transform: &Mat4) -> ([f32; 3], [f32; 3]) {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for &p in &mesh.positions {
+        let p = transform.transform_point3(p.into());
+        if p.is_finite() {
+            (low, high) = (low.min(p), high.max(p));
+        }
+    }
+    if low.x > high.x {
+        (low, high) = (Vec3::ZERO, Vec3::ZERO);
+    }
+    (low.to_array(), high.to_array())
+}
+
+fn union(a: ([f32; 3], [f32; 3]), b: ([f32; 3], [f32; 3])) -> ([f32; 3], [f32; 3]) {
+    (Vec3::from(a.0).min(b.0.into()).to_array(), Vec3::from(a.1).max(b.1.into()).to_array())
+}

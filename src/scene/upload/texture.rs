@@ -1,0 +1,154 @@
+//! Images as textures with box-filtered mip levels.
+
+use super::UploadError;
+use crate::scene::{ColorSpace, Image};
+use std::borrow::Cow;
+
+pub(super) struct Textures {
+    /// One view an image.
+    pub views: Vec<wgpu::TextureView>,
+    /// 1×1 white: the neutral value of factors.
+    pub white: wgpu::TextureView,
+    /// 1×1 normal map that leaves the normal as it is.
+    pub flat: wgpu::TextureView,
+    pub bytes: u64,
+}
+
+pub(super) fn upload(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    images: &[Image],
+    warnings: &mut Vec<String>,
+) -> Result<Textures, UploadError> {
+    let limit = device.limits().max_texture_dimension_2d;
+    let mut bytes = 0;
+    let mut views = Vec::with_capacity(images.len());
+    for image in images {
+        let expected = u64::from(image.width) * u64::from(image.height) * 4;
+        if expected == 0 || image.rgba.len() as u64 != expected {
+            let reason = format!("{} bytes for {}×{} pixels", image.rgba.len(), image.width, image.height);
+            return Err(UploadError::Image { image: image.name.clone(), reason });
+        }
+        let mut level = Level { width: image.width, height: image.height, rgba: Cow::Borrowed(&image.rgba) };
+        while level.width > limit || level.height > limit {
+            level = level.halved(image.color_space);
+        }
+        if level.width != image.width {
+            warnings.push(format!(
+                "image `{}` is {}×{}, more than the device's {limit}: shown at {}×{}",
+                image.name, image.width, image.height, level.width, level.height
+            ));
+        }
+        views.push(texture(device, queue, &image.name, level, image.color_space, &mut bytes));
+    }
+    let mut pixel = |name, rgba: [u8; 4]| {
+        let level = Level { width: 1, height: 1, rgba: Cow::Owned(rgba.to_vec()) };
+        texture(device, queue, name, level, ColorSpace::Linear, &mut bytes)
+    };
+    let white = pixel("white", [255; 4]);
+    // 127.5 would be exact; materials without a map skip the normal map altogether.
+    let flat = pixel("flat normal", [128, 128, 255, 255]);
+    Ok(Textures { views, white, flat, bytes })
+}
+
+fn texture(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    name: &str,
+    mut level: Level<'_>,
+    space: ColorSpace,
+    bytes: &mut u64,
+) -> wgpu::TextureView {
+    let mip_level_count = level.width.max(level.height).ilog2() + 1;
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(name),
+        size: wgpu::Extent3d { width: level.width, height: level.height, depth_or_array_layers: 1 },
+        mip_level_count,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: match space {
+            ColorSpace::Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
+            ColorSpace::Linear => wgpu::TextureFormat::Rgba8Unorm,
+        },
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    for mip_level in 0..mip_level_count {
+        if mip_level > 0 {
+            level = level.halved(space);
+        }
+        *bytes += level.rgba.len() as u64;
+        queue.write_texture(
+            wgpu::TexelCopyTextureInfo { mip_level, ..texture.as_image_copy() },
+            &level.rgba,
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * level.width), rows_per_image: None },
+            wgpu::Extent3d { width: level.width, height: level.height, depth_or_array_layers: 1 },
+        );
+    }
+    texture.create_view(&Default::default())
+}
+
+struct Level<'a> {
+    width: u32,
+    height: u32,
+    rgba: Cow<'a, [u8]>,
+}
+
+impl Level<'_> {
+    /// The next mip level: averages of 2×2 pixels in linear light, the last row or column dropped when odd.
+    fn halved(&self, space: ColorSpace) -> Level<'static> {
+        let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
+        let decode: Vec<f32> = (0..=255u8).map(|b| decode(b, space)).collect();
+        let at = |x: u32, y: u32, c: usize| {
+            let (x, y) = (x.min(self.width - 1), y.min(self.height - 1));
+            self.rgba[(y as usize * self.width as usize + x as usize) * 4 + c]
+        };
+        let mut rgba = Vec::with_capacity(width as usize * height as usize * 4);
+        for y in 0..height {
+            for x in 0..width {
+                for c in 0..4 {
+                    let taps = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| at(2 * x + i, 2 * y + j, c));
+                    rgba.push(if c == 3 {
+                        (taps.iter().map(|&t| u32::from(t)).sum::<u32>() as f32 / 4.0).round() as u8
+                    } else {
+                        encode(taps.iter().map(|&t| decode[usize::from(t)]).sum::<f32>() / 4.0, space)
+                    });
+                }
+            }
+        }
+        Level { width, height, rgba: Cow::Owned(rgba) }
+    }
+}
+
+fn decode(byte: u8, space: ColorSpace) -> f32 {
+    let x = f32::from(byte) / 255.0;
+    match space {
+        ColorSpace::Linear => x,
+        ColorSpace::Srgb if x <= 0.04045 => x / 12.92,
+        ColorSpace::Srgb => ((x + 0.055) / 1.055).powf(2.4),
+    }
+}
+
+fn encode(x: f32, space: ColorSpace) -> u8 {
+    let y = match space {
+        ColorSpace::Linear => x,
+        ColorSpace::Srgb if x <= 0.003_130_8 => x * 12.92,
+        ColorSpace::Srgb => 1.055 * x.powf(1.0 / 2.4) - 0.055,
+    };
+    (y * 255.0).round().clamp(0.0, 255.0) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mips_average_light_not_codes() {
+        let rgba = [0, 0, 0, 255, 255, 255, 255, 255].repeat(2);
+        let level = Level { width: 2, height: 2, rgba: Cow::Owned(rgba) };
+        assert_eq!(level.halved(ColorSpace::Srgb).rgba[0], 188);
+        assert_eq!(level.halved(ColorSpace::Linear).rgba[0], 128);
+        let odd = Level { width: 5, height: 1, rgba: Cow::Owned(vec![7; 20]) }.halved(ColorSpace::Srgb);
+        assert_eq!((odd.width, odd.height, odd.rgba.len()), (2, 1, 8));
+    }
+}
