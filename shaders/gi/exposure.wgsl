@@ -45,7 +45,7 @@ fn group_count() -> u32 {
 
 fn read_cell(index: u32) -> Partial {
     let pixel = sample_pixel(vec2i(vec2u(index % params.cells.x, index / params.cells.x)));
-    let raw = vec3f(textureLoad(normal_map, pixel, 0).rg, textureLoad(depth_map, pixel, 0));
+    let raw = vec3f(textureLoad(normal_map, pixel, 0).rg, textureLoad(depth_map, pixel, 0).r);
     let sound = is_finite3(raw) && is_finite3(textureLoad(direct_map, pixel, 0).rgb)
         && is_finite3(textureLoad(emissive_map, pixel, 0).rgb);
     let bad = select(1u, 0u, sound);

@@ -25,7 +25,8 @@ struct Exposure {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var depth_map: texture_depth_2d;
+// Not texture_depth_2d: GLSL has no plain load from those, so the GL backends would refuse it.
+@group(0) @binding(1) var depth_map: texture_2d<f32>;
 @group(0) @binding(2) var normal_map: texture_2d<f32>;
 @group(0) @binding(3) var albedo_map: texture_2d<f32>;
 @group(0) @binding(4) var emissive_map: texture_2d<f32>;
@@ -68,7 +69,7 @@ fn emissive_at(pixel: vec2i) -> vec3f {
 
 // Metres along the view axis; 0 on the background.
 fn distance_at(pixel: vec2i) -> f32 {
-    let texel = finite(textureLoad(depth_map, pixel, 0));
+    let texel = finite(textureLoad(depth_map, pixel, 0).r);
     return select(0.0, clamp(params.depth.x / (texel + params.depth.y), 1e-9, 1e9), texel > 0.0);
 }
 

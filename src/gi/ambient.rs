@@ -28,6 +28,7 @@ pub struct AmbientGi {
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
     outputs: ViewCache<1>,
+    size: [u32; 2],
 }
 
 impl AmbientGi {
@@ -41,7 +42,7 @@ impl AmbientGi {
         });
         let module = shaders::module_with(device, "gi.ambient", &prelude());
         let pipeline = exposure::pipeline(device, "gi.ambient", &module, "ambient", &inputs, &layout);
-        Self { device: device.clone(), inputs, exposure, pipeline, layout, outputs: ViewCache::new() }
+        Self { device: device.clone(), inputs, exposure, pipeline, layout, outputs: ViewCache::new(), size: [0; 2] }
     }
 
     /// Records `gi.exposure` and `gi.ambient`: `output` (`Rgba16Float`, storage, full size) becomes E/π; 0 on the
@@ -57,6 +58,10 @@ impl AmbientGi {
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
         check_output(output, inputs.size)?;
+        if inputs.size != self.size {
+            self.forget();
+            self.size = inputs.size;
+        }
         let bound = self.inputs.bind(queue, inputs)?;
         let group = self.outputs.get([output], || {
             Ok::<_, GiError>(self.device.create_bind_group(&wgpu::BindGroupDescriptor {

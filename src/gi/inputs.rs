@@ -140,16 +140,15 @@ impl InputGroup {
             },
             count: None,
         };
-        let float = wgpu::TextureSampleType::Float { filterable: false };
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("gi.inputs"),
             entries: &[
                 uniform,
-                texture_entry(1, wgpu::TextureSampleType::Depth),
-                texture_entry(2, float),
-                texture_entry(3, float),
-                texture_entry(4, float),
-                texture_entry(5, float),
+                texture_entry(1),
+                texture_entry(2),
+                texture_entry(3),
+                texture_entry(4),
+                texture_entry(5),
             ],
         });
         let ring = device.create_buffer(&wgpu::BufferDescriptor {
@@ -214,12 +213,13 @@ impl InputGroup {
     }
 }
 
-fn texture_entry(binding: u32, sample_type: wgpu::TextureSampleType) -> wgpu::BindGroupLayoutEntry {
+/// A texture that is read by `textureLoad`; depth textures bind as unfilterable float, too.
+fn texture_entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::COMPUTE,
         ty: wgpu::BindingType::Texture {
-            sample_type,
+            sample_type: wgpu::TextureSampleType::Float { filterable: false },
             view_dimension: wgpu::TextureViewDimension::D2,
             multisampled: false,
         },

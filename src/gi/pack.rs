@@ -20,7 +20,7 @@ impl PackPass {
         inputs: &InputGroup,
         exposure: &ExposurePass,
         features: &FeatureSet,
-        target: wgpu::BufferBinding<'_>,
+        target: wgpu::BindingResource<'_>,
     ) -> Self {
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("gi.pack"),
@@ -32,7 +32,7 @@ impl PackPass {
             layout: &layout,
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(target) },
+                wgpu::BindGroupEntry { binding: 1, resource: target },
             ],
         });
         Self { pipeline: pipeline(device, "gi.pack", &module, "pack", inputs, &layout), group }
@@ -87,8 +87,7 @@ pub fn read_features(
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     });
-    let binding = wgpu::BufferBinding { buffer: &target, offset: 0, size: None };
-    let pack = PackPass::new(device, &group, &exposure, features, binding);
+    let pack = PackPass::new(device, &group, &exposure, features, target.as_entire_binding());
     let mut encoder = device.create_command_encoder(&Default::default());
     let mut recorder = Recorder::new(&mut encoder);
     exposure.record(&mut recorder, &bound);

@@ -127,7 +127,7 @@ impl NeuralGi {
         self.exposure.record(recorder, &bound);
         self.rebuilt.pack.record(recorder, &bound);
         self.rebuilt.network.record(recorder);
-        self.reconstruct.record(recorder, &bound, &self.exposure, self.rebuilt.network.output(), output)
+        self.reconstruct.record(recorder, &bound, &self.exposure, self.rebuilt.network.output().resource(), output)
     }
 
     fn resize(&mut self, size: [u32; 2]) -> Result<(), GiError> {
@@ -188,7 +188,7 @@ impl Rebuilt {
         let cells = cells_of(size);
         let network =
             Network::new(device, queue, weights, cells).map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
-        let pack = PackPass::new(device, inputs, exposure, features, network.input());
+        let pack = PackPass::new(device, inputs, exposure, features, network.input().resource());
         Ok(Self { size, network, pack })
     }
 }

@@ -71,7 +71,7 @@ impl ReconstructPass {
         recorder: &mut Recorder<'_>,
         inputs: &BoundInputs,
         exposure: &ExposurePass,
-        answers: wgpu::BufferBinding<'_>,
+        answers: wgpu::BindingResource<'_>,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
         ambient::check_output(output, inputs.size)?;
@@ -81,7 +81,7 @@ impl ReconstructPass {
                 layout: &self.layout,
                 entries: &[
                     wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
-                    wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(answers) },
+                    wgpu::BindGroupEntry { binding: 1, resource: answers },
                     wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(output) },
                 ],
             }))

@@ -2,8 +2,11 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod edges;
 mod shot;
 mod stages;
+mod weights;
+mod whole;
 
 use bouncelight::gpu::Gpu;
 
