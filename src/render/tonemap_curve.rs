@@ -46,8 +46,8 @@ impl Tonemap {
 
     /// Display-encoded sRGB in [0, 1] of linear Rec.709 light.
     pub fn apply(self, rgb: [f32; 3]) -> [f32; 3] {
-        // f32::max drops NaN; infinity minus infinity further down would make a new one.
-        let light = rgb.map(|v| v.max(0.0).min(LIGHT_MAX));
+        // Infinity minus infinity further down would make a new NaN.
+        let light = rgb.map(|v| if v.is_nan() { 0.0 } else { v.clamp(0.0, LIGHT_MAX) });
         match self {
             Tonemap::Filmic => filmic(light),
             Tonemap::Agx => agx(light),
@@ -110,7 +110,7 @@ fn filmic(light: [f32; 3]) -> [f32; 3] {
 /// Rec.709 to Rec.2020 with AgX's inset primaries, rows.
 const AGX_INTO: [[f32; 3]; 3] = [
     [0.544_814_76, 0.373_787_36, 0.081_397_89],
-    [0.140_416_95, 0.754_137_55, 0.105_445_5],
+    [0.140_416_95, 0.754_137_6, 0.105_445_5],
     [0.088_810_39, 0.178_871_75, 0.732_317_87],
 ];
 
