@@ -1,7 +1,9 @@
 //! From scene light to display values: the CPU form of `shaders/lib/tonemap.wgsl`, same names, same constants.
 //!
-//! Filmic and AgX stand near Blender's views of these names (look None, display sRGB). `tests/fixtures/tonemap/make.py`
-//! fitted the constants to colours sent through Blender 4.5's own transform and measures what is left, in parts of 255:
+//! Filmic and AgX stand near Blender's views of these names (look None, display sRGB). Filmic's constants are fitted to
+//! greys and bright colours sent through Blender 4.5's own transform. AgX is not fitted: its steps and matrices are the
+//! published ones (inset as in Blender's configuration), Neutral is Khronos' specification.
+//! `tests/fixtures/tonemap/make.py` fits, and measures against Blender what is left, in parts of 255:
 //!
 //! | | rendered references: mean, worst 99.9th percentile | all colours to 2⁶: mean, 99.9th percentile |
 //! |---|---|---|
