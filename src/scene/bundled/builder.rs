@@ -146,7 +146,10 @@ impl Part {
         }
         for i in 0..pairs.len() as u32 - 1 {
             let a = first + 2 * i;
-            self.mesh.indices.extend([a, a + 1, a + 2, a + 2, a + 1, a + 3]);
+            self.mesh.indices.extend([a, a + 1, a + 2]);
+            if pairs[i as usize + 1][0] != pairs[i as usize + 1][1] {
+                self.mesh.indices.extend([a + 2, a + 1, a + 3]);
+            }
         }
     }
 

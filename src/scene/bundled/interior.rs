@@ -62,12 +62,12 @@ pub(super) fn scene() -> Scene {
         name: "sun".to_owned(),
         color: [1.0, 0.90, 0.74],
         kind: LightKind::Directional {
-            direction: vec3(0.74, -0.60, -0.16).normalize().into(),
-            irradiance: 22.0,
+            direction: vec3(0.70, -0.56, -0.30).normalize().into(),
+            irradiance: 30.0,
             angle: SUN_ANGLE,
         },
     });
-    let camera = Camera::look_at([1.15, 1.42, 2.12], [-0.32, 1.02, -1.2], 50f32.to_radians());
+    let camera = Camera::look_at([1.0, 1.50, 2.15], [-0.16, 0.88, -1.2], 52f32.to_radians());
     scene.cameras.push(Camera { name: "room".to_owned(), near: 0.05, ..camera });
     scene
 }
@@ -82,7 +82,7 @@ fn shell(b: &mut Builder) {
     };
     let floor = b.material(floor);
     let (plaster, relief) = (b.texture(textures::plaster_color()), b.texture(textures::plaster_normal()));
-    let mut wall = |b: &mut Builder, name: &str, color: [f32; 3]| {
+    let wall = |b: &mut Builder, name: &str, color: [f32; 3]| {
         b.material(Material {
             base_color_texture: Some(plaster),
             normal_texture: Some(relief),
@@ -340,8 +340,8 @@ fn decoration(b: &mut Builder, palette: &Palette) {
 
 fn lamp(b: &mut Builder, palette: &Palette) {
     let warm = [1.0, 0.62, 0.30];
-    // The bulb shows about the radiance that its light would have if it were the bulb.
-    let glow = b.material(Material { emissive: warm.map(|c| c * 90.0), ..dielectric("bulb", [0.8; 3], 0.5) });
+    // Bright enough to look like a lamp, and little light (a tenth) next to the point light that stands for it.
+    let glow = b.material(Material { emissive: warm.map(|c| c * 20.0), ..dielectric("bulb", [0.8; 3], 0.5) });
     let shade = b.material(Material { double_sided: true, ..dielectric("enamel", [0.82, 0.80, 0.74], 0.3) });
     b.part("bulb", glow, 1.0, |p| p.ball(BULB, 0.045, 24));
     b.part("lamp shade", shade, 1.0, |p| {

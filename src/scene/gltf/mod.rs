@@ -56,10 +56,23 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 
 /// Runs the crate's own validation, which later code relies on not to panic, but forgives what this loader can handle.
 fn validate(path: &Path, root: &gltf::json::Root) -> Result<(), SceneError> {
+    // The crate's validation looks at the accessor of POSITION before it asks whether there is one.
+    for (m, mesh) in root.meshes.iter().enumerate() {
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            if let Some(bad) = primitive.attributes.values().find(|a| a.value() >= root.accessors.len()) {
+                let place = format!("meshes[{m}].primitives[{p}].attributes");
+                let problem = format!("accessor {} does not exist; the file has {}", bad.value(), root.accessors.len());
+                return Err(SceneError::broken(path, place, problem));
+            }
+        }
+    }
     let mut first = None;
     root.validate(root, gltf::json::Path::new, &mut |place, error| {
         let place = place().to_string();
+        let position = place.contains(".attributes[\"POSITION\"]");
         let forgiven = match error {
+            // Bounds are computed from the vertices, and a primitive without any is a warning.
+            Invalid::Missing | Invalid::Invalid if position => true,
             // The crate knows fewer extensions than this loader; its list was checked before.
             Invalid::Unsupported => place.starts_with("extensionsRequired"),
             // A texture without image is legal (an extension may have one) and gets a stand-in.
