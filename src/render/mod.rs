@@ -11,6 +11,7 @@ mod shadow_local;
 mod shadow_sun;
 pub mod targets;
 pub mod tonemap;
+pub mod tonemap_curve;
 mod tool;
 pub mod view;
 

@@ -1,23 +1,9 @@
 //! From scene-linear radiance to a display target.
 
 use super::tool;
+pub use super::tonemap_curve::Tonemap;
 use crate::gpu::{shaders, timing::Recorder};
 use bytemuck::{Pod, Zeroable};
-
-/// Display transforms; the numbers are those of `tonemap` in `shaders/lib/tonemap.wgsl`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[repr(u32)]
-pub enum Tonemap {
-    /// Blender's Filmic view.
-    #[default]
-    Filmic = 0,
-    /// AgX.
-    Agx = 1,
-    /// Khronos PBR Neutral.
-    Neutral = 2,
-    /// sRGB encoding alone.
-    None = 3,
-}
 
 /// Exposure and curve.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -99,7 +85,7 @@ impl TonemapPass {
     ) {
         let uniform = Uniform {
             exposure: options.ev.exp2(),
-            kind: options.tonemap as u32,
+            kind: options.tonemap.kind(),
             linear_target: u32::from(self.linear_target),
             pad: 0,
         };
