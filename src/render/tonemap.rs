@@ -1,7 +1,7 @@
 //! From scene-linear radiance to a display target.
 
-use super::tool;
 pub use super::tonemap_curve::Tonemap;
+use super::tool;
 use crate::gpu::{shaders, timing::Recorder};
 use bytemuck::{Pod, Zeroable};
 
