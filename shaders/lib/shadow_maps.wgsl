@@ -24,7 +24,7 @@ const FILTER_TAPS: u32 = 24u;
 // The receiver is lifted along its normal by so many texels: the reach of a bilinear comparison, with some spare.
 const NORMAL_OFFSET: f32 = 1.6;
 // Largest search radius: a share of the sun's map; the margin (in tangent units) that cube faces and spot maps have.
-const SUN_SEARCH: f32 = 0.08;
+const SUN_SEARCH: f32 = 0.25;
 const LOCAL_SEARCH: f32 = 0.14;
 // Beyond this slope against the light the receiver's plane is not extrapolated.
 const MIN_COSINE: f32 = 0.05;
@@ -57,21 +57,24 @@ fn sun_visibility(first: u32, count: u32, p: vec3f, n: vec3f, l: vec3f, tan_radi
         let view = shadow_views[i];
         let c = (view.clip_from_world * vec4f(p + n * (NORMAL_OFFSET * view.texel * sine), 1.0)).xyz;
         let uv = c.xy * vec2f(0.5, -0.5) + 0.5;
-        // The first cascade that holds the point and the filter's usual reach.
-        if all(abs(uv - 0.5) < vec2f(0.5 - 4.0 / view.size)) && c.z < 1.0 {
-            return sun_disc(view, c.z, uv, n, max(n_l, MIN_COSINE), tan_radius, pattern);
+        // How far off a blocker can stand and still cover a part of the disc: as far as the highest caster allows.
+        let search = clamp((1.0 - c.z) * view.range * tan_radius, 1.5 * view.texel, SUN_SEARCH / view.scale);
+        // The first cascade that holds the point and that reach; the last one has to do.
+        let reach = select(search * view.scale, 0.0, i + 1u == first + count);
+        if all(abs(uv - 0.5) < vec2f(0.5 - max(reach, 4.0 / view.size))) && c.z < 1.0 {
+            return sun_disc(view, c.z, uv, n, max(n_l, MIN_COSINE), tan_radius, search, pattern);
         }
     }
     return 1.0;
 }
 
-fn sun_disc(view: ShadowView, z: f32, uv: vec2f, n: vec3f, n_l: f32, tan_radius: f32, pattern: Pattern) -> f32 {
+fn sun_disc(
+    view: ShadowView, z: f32, uv: vec2f, n: vec3f, n_l: f32, tan_radius: f32, search: f32, pattern: Pattern,
+) -> f32 {
     // Height of the receiver's plane towards the light, per metre along the map's axes.
     let slope = -vec2f(dot(n, normalize(row_of(view.clip_from_world, 0u))), dot(n, normalize(row_of(view.clip_from_world, 1u)))) / n_l;
     let to_uv = vec2f(view.scale, -view.scale);
     let bias = 0.5 * view.texel;
-    let tallest = (1.0 - z) * view.range;
-    let search = clamp(tallest * tan_radius, 1.5 * view.texel, SUN_SEARCH / view.scale);
     var blocked = 0u;
     var height = 0.0;
     var weight = 0.0;

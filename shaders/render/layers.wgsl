@@ -44,9 +44,11 @@ fn decode(pixel: vec2u) -> vec4f {
     let specular = textureLoad(specular_texture, pixel, 0);
     let around = textureLoad(indirect, pixel, 0).rgb * albedo.a;
     let gloss = env_brdf(specular.rgb, specular.a, dot(n, to_eye(frame, pixel)));
+    // A channel that eight bits round to 0 still tells what light falls on it; on metal no channel does.
+    let weight = select(vec3f(0.0), max(albedo.rgb, vec3f(1.0 / 4096.0)), any(albedo.rgb > vec3f(0.0)));
     switch options.layer {
-        case 1u: { return vec4f(albedo.rgb * textureLoad(direct_diffuse, pixel, 0).rgb, 1.0); }
-        case 2u: { return vec4f(albedo.rgb * around, 1.0); }
+        case 1u: { return vec4f(weight * textureLoad(direct_diffuse, pixel, 0).rgb, 1.0); }
+        case 2u: { return vec4f(weight * around, 1.0); }
         case 3u: { return vec4f(albedo.rgb, 1.0); }
         case 4u: { return vec4f(textureLoad(direct_specular, pixel, 0).rgb, 1.0); }
         case 5u: { return vec4f(gloss * around, 1.0); }
@@ -55,6 +57,7 @@ fn decode(pixel: vec2u) -> vec4f {
         case 8u: { return vec4f(n, 1.0); }
         case 9u: { return vec4f(linear_depth(frame, depth), 0.0, 0.0, 1.0); }
         case 10u: { return vec4f(world_position(frame, pixel, depth), 1.0); }
+        case 12u: { return vec4f(weight, 1.0); }
         default: { return vec4f(textureLoad(motion_texture, pixel, 0).xy, 0.0, 1.0); }
     }
 }

@@ -89,12 +89,29 @@ impl Layer {
     }
 
     /// The colour that is divided out after filtering, as Blender does it.
-    fn divisor(self) -> Option<Layer> {
+    fn divisor(self) -> Option<Sum> {
         match self {
-            Layer::DiffDir | Layer::DiffInd => Some(Layer::DiffCol),
-            Layer::GlossDir | Layer::GlossInd => Some(Layer::GlossCol),
+            Layer::DiffDir | Layer::DiffInd => Some(Sum { number: WEIGHT, ..Sum::of(Layer::DiffCol) }),
+            Layer::GlossDir | Layer::GlossInd => Some(Sum::of(Layer::GlossCol)),
             _ => None,
         }
+    }
+}
+
+/// The shader's number for DiffCol kept away from 0, by which diffuse light is weighted.
+const WEIGHT: u32 = 12;
+
+/// Something that is summed over the samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Sum {
+    number: u32,
+    channels: usize,
+    filtered: bool,
+}
+
+impl Sum {
+    fn of(layer: Layer) -> Self {
+        Self { number: layer as u32, channels: layer.channels().len(), filtered: !layer.is_unfiltered() }
     }
 }
 
@@ -178,14 +195,13 @@ pub fn capture_with(
         return Err(RenderError::NoSamples);
     }
     let size = renderer.targets().size;
-    let mut needed: Vec<Layer> = options.layers.to_vec();
+    let mut needed: Vec<Sum> = options.layers.iter().map(|&l| Sum::of(l)).collect();
     needed.extend(options.layers.iter().filter_map(|l| l.divisor()));
-    needed.sort_by_key(|&l| l as u32);
+    needed.sort_by_key(|s| s.number);
     needed.dedup();
     let pixels = size[0] as usize * size[1] as usize;
     let mut beauty = vec![0.0; 4 * pixels];
-    let mut sums: Vec<(Layer, Vec<f32>)> =
-        needed.iter().map(|&l| (l, vec![0.0; l.channels().len() * pixels])).collect();
+    let mut sums: Vec<(Sum, Vec<f32>)> = needed.iter().map(|&s| (s, vec![0.0; s.channels * pixels])).collect();
     let decoder = Decoder::new(&gpu.device, renderer);
     for i in 0..options.samples {
         let seed = options.seed.wrapping_mul(0x9e37_79b9).wrapping_add(i);
@@ -194,9 +210,9 @@ pub fn capture_with(
         renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, i == 0)?;
         gpu.queue.submit([encoder.finish()]);
         decoder.add(gpu, size, 0, &mut beauty, 4)?;
-        for (layer, sum) in &mut sums {
-            if i == 0 || !layer.is_unfiltered() {
-                decoder.add(gpu, size, *layer as u32, sum, layer.channels().len())?;
+        for (sum, data) in &mut sums {
+            if i == 0 || sum.filtered {
+                decoder.add(gpu, size, sum.number, data, sum.channels)?;
             }
         }
         if !go_on() {
@@ -205,17 +221,15 @@ pub fn capture_with(
     }
     let scale = 1.0 / options.samples as f32;
     beauty.iter_mut().for_each(|v| *v *= scale);
-    for (layer, sum) in &mut sums {
-        if !layer.is_unfiltered() {
-            sum.iter_mut().for_each(|v| *v *= scale);
-        }
+    for (_, data) in sums.iter_mut().filter(|(sum, _)| sum.filtered) {
+        data.iter_mut().for_each(|v| *v *= scale);
     }
-    let find = |layer: Layer| &sums.iter().find(|(l, _)| *l == layer).expect("every needed layer was summed").1;
+    let find = |wanted: Sum| &sums.iter().find(|(s, _)| *s == wanted).expect("every needed layer was summed").1;
     let picture = |channels, data| Picture { width: size[0] as usize, height: size[1] as usize, channels, data };
     let beauty = checked("the picture", picture(4, beauty))?;
     let mut layers = Vec::with_capacity(options.layers.len());
     for &layer in options.layers {
-        let mut data = find(layer).clone();
+        let mut data = find(Sum::of(layer)).clone();
         if let Some(divisor) = layer.divisor() {
             for (v, &d) in data.iter_mut().zip(find(divisor)) {
                 *v = if d > 0.0 { *v / d } else { 0.0 };
