@@ -310,7 +310,7 @@ fn motion_points_to_the_previous_frame() {
     let before = View::new(&look_at([0.3, 4.0, 9.0], [0.2, 1.0, 0.0], 0.8), size, [0.0; 2]);
     let view = View::new(&look_at([0.0, 4.0, 10.0], [0.0, 1.0, 0.0], 0.8), size, [0.3, -0.2]).after(&before);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, &uploaded, &view);
+    renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, &uploaded, &view).expect("the frame is drawn");
     gpu.queue.submit([encoder.finish()]);
     let read = |t| bouncelight::gpu::readback::texture(&gpu.device, &gpu.queue, t).unwrap();
     let motion = read(&renderer.targets().motion.texture);
