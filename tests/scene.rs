@@ -5,6 +5,8 @@
 mod bad_input;
 #[path = "scene/bundled.rs"]
 mod bundled;
+#[path = "scene/defaults.rs"]
+mod defaults;
 #[path = "scene/glb.rs"]
 mod glb;
 #[path = "scene/gltf_features.rs"]

@@ -170,6 +170,46 @@ fn nodes() {
 }
 
 #[test]
+fn references() {
+    let punctual = |light: serde_json::Value| json!({"KHR_lights_punctual": {"lights": [light]}});
+    let uses = |i: u32| json!({"KHR_lights_punctual": {"light": i}});
+    let mut glb = Glb::triangle();
+    glb.json["extensions"] = punctual(json!({"type": "point"}));
+    glb.json["nodes"] = json!([{"extensions": uses(9)}]);
+    refused(glb.load(), &["nodes[0]", "light"]);
+    glb.json["nodes"] = json!([{"extensions": uses(0)}]);
+    assert!(glb.load().is_ok());
+    glb.json["extensions"] = punctual(json!({"type": "spot"}));
+    refused(glb.load(), &["lights[0]", "spot"]);
+    glb.json["extensions"] = punctual(json!({"type": "laser"}));
+    refused(glb.load(), &["lights[0]", "type"]);
+    let mut glb = Glb::triangle();
+    glb.json["nodes"] = json!([{"camera": 0}]);
+    refused(glb.load(), &["nodes[0].camera"]);
+    for camera in [json!({"type": "perspective"}), json!({"type": "orthographic"}), json!({"type": "fisheye"})] {
+        glb.json["cameras"] = json!([camera]);
+        refused(glb.load(), &["cameras[0]"]);
+    }
+    glb.json["cameras"] = json!([{"type": "perspective", "perspective": {"yfov": -1.0, "znear": 0.0}}]);
+    let scene = glb.load().expect("an impossible lens is left out");
+    assert!(scene.warnings.iter().any(|w| w.contains("lens")) && scene.cameras[0].name == "framing");
+    let mut glb = Glb::triangle();
+    glb.json["nodes"] = json!([{"mesh": 0, "skin": 4}]);
+    refused(glb.load(), &["nodes[0].skin"]);
+    let mut glb = Glb::triangle();
+    glb.json["meshes"][0]["primitives"][0]["material"] = json!(4);
+    refused(glb.load(), &["material"]);
+    glb.json["materials"] = json!([{}, {}, {}, {}, {"pbrMetallicRoughness": {"baseColorTexture": {"index": 2}}}]);
+    refused(glb.load(), &["materials[4]", "baseColorTexture"]);
+    glb.json["materials"][4] = json!({"normalTexture": {"index": 2}});
+    refused(glb.load(), &["materials[4]", "normalTexture"]);
+    glb.json["materials"][4] = json!({"emissiveFactor": [1e30, -5.0, 0.0], "alphaMode": "MASK", "alphaCutoff": -3.0});
+    let scene = glb.load().expect("clamped");
+    assert!(scene.warnings.iter().any(|w| w.contains("out of range")), "{:?}", scene.warnings);
+    assert!(scene.materials[0].emissive.iter().all(|e| (0.0..=1e9).contains(e)));
+}
+
+#[test]
 fn required_extensions() {
     let mut glb = Glb::triangle();
     glb.json["extensionsRequired"] = json!(["KHR_mesh_quantization", "KHR_texture_transform"]);

@@ -129,6 +129,9 @@ fn differences(a: &Scene, b: &Scene) -> Vec<String> {
     out
 }
 
+/// What a change is noticed as, and the change.
+type Change = (&'static str, fn(&mut Scene));
+
 #[test]
 fn scenes_survive_being_written_and_read() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -148,7 +151,7 @@ fn scenes_survive_being_written_and_read() {
         assert_eq!(differences(scene, &again), Vec::<String>::new(), "{}", scene.name);
         assert_eq!(bounds::world_bounds(scene), bounds::world_bounds(&again));
         // Negative controls: small changes are noticed.
-        let changes: [(&str, fn(&mut Scene)); 5] = [
+        let changes: [Change; 5] = [
             ("positions", |s| s.meshes[0].positions[0][1] += 1e-4),
             ("base colour", |s| s.materials[s.meshes[0].material].base_color[0] *= 0.99),
             ("instance", |s| s.instances[0].transform[3][0] += 1e-4),
