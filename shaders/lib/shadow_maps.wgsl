@@ -92,7 +92,10 @@ fn sun_disc(
             weight += w;
         }
     }
-    if blocked == 0u { return 1.0; }
+    if blocked == 0u {
+        // Blockers thinner than the taps' spacing still show at the middle.
+        return textureSampleCompareLevel(sun_maps, shadow_compare, uv, view.layer, z + bias / view.range);
+    }
     if blocked == SEARCH_TAPS { return 0.0; }
     let radius = clamp(height / weight * tan_radius, view.texel, search);
     var lit = 0.0;
@@ -150,7 +153,10 @@ fn local_visibility(first: u32, count: u32, p: vec3f, n: vec3f, center: vec3f, r
             weight += w;
         }
     }
-    if blocked == 0u { return 1.0; }
+    if blocked == 0u {
+        let reference = view.range / max(distance - bias, view.range);
+        return textureSampleCompareLevel(local_maps, shadow_compare, uv, view.layer, reference);
+    }
     if blocked == SEARCH_TAPS { return 0.0; }
     let h = height / weight;
     let reach = clamp(radius * h / (distance * max(distance - h, 1e-4)), view.texel, search);
