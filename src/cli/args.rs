@@ -71,6 +71,11 @@ impl Global {
     /// Opens the device and says on standard error which one it is.
     pub fn open_gpu(&self) -> Result<Gpu> {
         let gpu = Gpu::open(&self.gpu_options())?;
+        // Whatever the driver refuses later is no fault of the user's, but it deserves a sentence, not a stack trace.
+        gpu.device.on_uncaptured_error(std::sync::Arc::new(|e| {
+            eprintln!("error: the GPU driver refused a command; `bouncelight doctor` lists other adapters\n{e}");
+            std::process::exit(super::error::RUNTIME.into());
+        }));
         if !self.quiet {
             eprintln!("{}", gpu.sentence());
         }
@@ -92,15 +97,6 @@ pub enum MethodName {
 impl MethodName {
     /// All methods, cheapest first.
     pub const ALL: [MethodName; 3] = [MethodName::Direct, MethodName::Ambient, MethodName::Neural];
-
-    /// The word on the command line.
-    pub fn word(self) -> &'static str {
-        match self {
-            MethodName::Direct => "direct",
-            MethodName::Ambient => "ambient",
-            MethodName::Neural => "neural",
-        }
-    }
 
     /// The method with its weights: `weights`, or the shipped ones.
     pub fn method(self, weights: Option<&PathBuf>) -> Result<Method> {
