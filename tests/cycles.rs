@@ -154,6 +154,7 @@ fn compare(gpu: &Gpu, name: &str, scene: &Scene, reference: &Reference, sky: f32
     show(&format!("{name}_theirs"), &picture(&reference.diff_dir), 2.0);
     show(&format!("{name}_beauty"), &frame.beauty, 3.0);
     assert!(within(&n, if size[0] < 512 { 0.9 } else { 0.95 }), "{name}: {n:?}");
+    assert!(n.everywhere <= 0.05, "{name}: shadow edges differ: {n:?}");
     assert!(n.counted > 0.2, "{name}: only {} of the pixels are away from edges", n.counted);
 
     // The same checks must notice a wrong camera and a wrong light.

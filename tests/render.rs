@@ -431,7 +431,7 @@ fn all_lights_in_one_picture() {
         color: [0.3, 0.3, 1.0],
         kind: LightKind::Spot {
             position: [-10.0, 8.0, 10.0],
-            direction: [0.7071, -0.7071, 0.0],
+            direction: [0.6, -0.8, 0.0],
             intensity: 60.0,
             radius: 0.2,
             range: None,

@@ -22,7 +22,11 @@ struct ShadowView {
 const SEARCH_TAPS: u32 = 16u;
 const FILTER_TAPS: u32 = 24u;
 // The receiver is lifted along its normal by so many texels: the reach of a bilinear comparison, with some spare.
-const NORMAL_OFFSET: f32 = 1.6;
+const NORMAL_OFFSET: f32 = 2.0;
+// What the lift leaves over on surfaces that face the light squarely, texels: rounding of the stored depth.
+const BIAS: f32 = 0.4;
+// Least filter radius, texels; the bilinear comparison smooths by one more.
+const LEAST: f32 = 0.6;
 // Largest search radius: a share of the sun's map; the margin (in tangent units) that cube faces and spot maps have.
 const SUN_SEARCH: f32 = 0.25;
 const LOCAL_SEARCH: f32 = 0.14;
@@ -74,7 +78,7 @@ fn sun_disc(
     // Height of the receiver's plane towards the light, per metre along the map's axes.
     let slope = -vec2f(dot(n, normalize(row_of(view.clip_from_world, 0u))), dot(n, normalize(row_of(view.clip_from_world, 1u)))) / n_l;
     let to_uv = vec2f(view.scale, -view.scale);
-    let bias = 0.5 * view.texel;
+    let bias = BIAS * view.texel;
     var blocked = 0u;
     var height = 0.0;
     var weight = 0.0;
@@ -97,7 +101,7 @@ fn sun_disc(
         return textureSampleCompareLevel(sun_maps, shadow_compare, uv, view.layer, z + bias / view.range);
     }
     if blocked == SEARCH_TAPS { return 0.0; }
-    let radius = clamp(height / weight * tan_radius, view.texel, search);
+    let radius = clamp(height / weight * tan_radius, LEAST * view.texel, search);
     var lit = 0.0;
     for (var i = 0u; i < FILTER_TAPS; i++) {
         let offset = radius * tap(i, FILTER_TAPS, pattern);
@@ -133,7 +137,7 @@ fn local_visibility(first: u32, count: u32, p: vec3f, n: vec3f, center: vec3f, r
     let slope = normal.xy / facing / distance;
 
     let to_uv = vec2f(view.scale, -view.scale);
-    let bias = 0.5 * view.texel * distance;
+    let bias = BIAS * view.texel * distance;
     let nearest = max(view.range, 0.1 * distance);
     let search = clamp(radius * (distance - nearest) / (distance * nearest), 1.5 * view.texel, LOCAL_SEARCH);
     var blocked = 0u;
@@ -159,7 +163,7 @@ fn local_visibility(first: u32, count: u32, p: vec3f, n: vec3f, center: vec3f, r
     }
     if blocked == SEARCH_TAPS { return 0.0; }
     let h = height / weight;
-    let reach = clamp(radius * h / (distance * max(distance - h, 1e-4)), view.texel, search);
+    let reach = clamp(radius * h / (distance * max(distance - h, 1e-4)), LEAST * view.texel, search);
     var lit = 0.0;
     for (var i = 0u; i < FILTER_TAPS; i++) {
         let offset = reach * tap(i, FILTER_TAPS, pattern);
