@@ -6,7 +6,7 @@ mod common;
 
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
-use bouncelight::render::{RenderError, Renderer, RendererOptions, View};
+use bouncelight::render::{RenderError, Renderer, View};
 use bouncelight::scene::upload::{SceneGpu, UploadError};
 use bouncelight::scene::{AlphaMode, Environment, Light, Scene};
 use build::*;
@@ -40,7 +40,7 @@ fn odd_sizes_and_an_empty_scene_work() {
         let frame = render(&gpu, &empty, &camera, size, 1);
         assert!(frame.beauty.data.chunks_exact(4).all(|p| p == [0.5, 0.5, 0.5, 1.0]));
     }
-    let new = |size| Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions::default());
+    let new = |size| Renderer::new(&gpu.device, &gpu.queue, size, direct_only());
     for size in [[0, 5], [5, 0], [100_000, 1]] {
         assert!(matches!(new(size), Err(RenderError::Size { .. })), "{size:?}");
     }
@@ -57,7 +57,7 @@ fn resizing_and_changing_scenes_gives_what_a_new_renderer_gives() {
     let upload = |s: &Scene| SceneGpu::new(&gpu.device, &gpu.queue, s).unwrap();
     let first = upload(&corner(vec![point([3.0, 4.0, 2.0], 20.0, 0.2), sun([0.0, -1.0, 0.3], 1.0, 0.01)]));
     let second = upload(&corner(vec![sun([0.3, -1.0, -0.2], 1.0, 0.02)]));
-    let new = |size| Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions::default()).unwrap();
+    let new = |size| Renderer::new(&gpu.device, &gpu.queue, size, direct_only()).unwrap();
     let mut used = new([64, 48]);
     let shoot = |r: &mut Renderer, s| capture(&gpu, r, s, &camera, CaptureOptions::default()).unwrap().beauty;
     shoot(&mut used, &first);
@@ -93,11 +93,11 @@ fn motion_points_to_the_previous_frame() {
     let s = corner(vec![]);
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &s).unwrap();
     let size = [64, 40];
-    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions::default()).unwrap();
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, direct_only()).unwrap();
     let before = View::new(&look_at([0.3, 4.0, 9.0], [0.2, 1.0, 0.0], 0.8), size, [0.0; 2]);
     let view = View::new(&look_at([0.0, 4.0, 10.0], [0.0, 1.0, 0.0], 0.8), size, [0.3, -0.2]).after(&before);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, &uploaded, &view);
+    renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, &uploaded, &view).unwrap();
     gpu.queue.submit([encoder.finish()]);
     let read = |t| bouncelight::gpu::readback::texture(&gpu.device, &gpu.queue, t).unwrap();
     let motion = read(&renderer.targets().motion.texture);

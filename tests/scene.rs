@@ -1,6 +1,18 @@
 //! Scenes: the paper's stream, glTF and OBJ with everything that can be wrong in them, bundled scenes, round trips.
 #![cfg(feature = "io")]
 
+#[path = "scene/bad_input.rs"]
+mod bad_input;
+#[path = "scene/bundled.rs"]
+mod bundled;
+#[path = "scene/defaults.rs"]
+mod defaults;
+#[path = "scene/glb.rs"]
+mod glb;
+#[path = "scene/gltf_features.rs"]
+mod gltf_features;
+#[path = "scene/obj.rs"]
+mod obj;
 #[path = "scene/paper_room.rs"]
 mod paper_room;
 #[path = "scene/real_files.rs"]

@@ -7,7 +7,7 @@ mod common;
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::render::capture::Layer;
 use bouncelight::render::tonemap::{Tonemap, TonemapOptions, TonemapPass};
-use bouncelight::render::{Renderer, RendererOptions, View};
+use bouncelight::render::{Renderer, View};
 use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{ColorSpace, Image, Sampler, Scene, TextureRef};
 use bouncelight::wgpu;
@@ -78,7 +78,7 @@ fn the_display_pass_is_the_curve_on_the_cpu() {
     s.materials[0].base_color = [0.9, 0.5, 0.1, 1.0];
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &s).unwrap();
     let size = [32, 16];
-    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions::default()).unwrap();
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, direct_only()).unwrap();
     let view = View::new(&camera(), size, [0.0; 2]);
     for format in [wgpu::TextureFormat::Rgba8Unorm, wgpu::TextureFormat::Rgba8UnormSrgb] {
         let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -96,7 +96,7 @@ fn the_display_pass_is_the_curve_on_the_cpu() {
             let options = TonemapOptions { ev: 1.0, tonemap };
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let mut recorder = Recorder::new(&mut encoder);
-            renderer.record(&mut recorder, &gpu.queue, &uploaded, &view);
+            renderer.record(&mut recorder, &gpu.queue, &uploaded, &view).unwrap();
             let view = target.create_view(&Default::default());
             pass.record(&mut recorder, &gpu.queue, options, &renderer.targets().hdr.view, &view);
             gpu.queue.submit([encoder.finish()]);

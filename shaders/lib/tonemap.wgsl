@@ -33,7 +33,7 @@ fn tonemap_agx(light: vec3f) -> vec3f {
     // Columns here, rows in the CPU form.
     let into = mat3x3f(
         vec3f(0.54481476, 0.14041695, 0.08881039),
-        vec3f(0.37378736, 0.75413755, 0.17887175),
+        vec3f(0.37378736, 0.7541376, 0.17887175),
         vec3f(0.08139789, 0.1054455, 0.73231787),
     );
     let back = mat3x3f(

@@ -1,8 +1,86 @@
-//! The command line: one file a subcommand, thin; exit codes in one place.
+//! The command line: one file a subcommand, thin; exit codes in [`error`].
+//!
+//! Results go to standard output, logs and progress to standard error.
 
+mod args;
+mod bench;
+mod compare;
+mod dataset;
+mod doctor;
+pub mod error;
+mod interrupt;
+mod progress;
+mod render;
+mod weights;
+
+use clap::{Parser, Subcommand};
 use std::process::ExitCode;
+
+/// A deferred rasteriser whose G-buffers feed a small in-GPU U-Net that adds global illumination.
+#[derive(Debug, Parser)]
+#[command(name = "bouncelight", version, propagate_version = true)]
+struct Cli {
+    #[command(flatten)]
+    global: args::Global,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Draw a scene into a PNG or multi-layer EXR.
+    Render(render::Args),
+    /// Measure GPU time per pass, wall-clock time per frame and memory.
+    Bench(bench::Args),
+    /// Compare two pictures with the paper's metrics and the usual ones.
+    Compare(compare::Args),
+    /// Write network inputs of the paper's rooms, for training.
+    Dataset(dataset::Args),
+    /// Look into a weights file.
+    Weights(weights::Args),
+    /// Say which adapter is used, what it can do, and what to install when there is none.
+    Doctor(doctor::Args),
+}
 
 /// Runs the program and returns its exit code.
 pub fn main() -> ExitCode {
-    ExitCode::SUCCESS
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => {
+            // Help and version are results; everything else is a usage error, which clap also exits with 2 for.
+            let _ = e.print();
+            return ExitCode::from(if e.use_stderr() { error::USAGE } else { 0 });
+        }
+    };
+    init_logging(&cli.global);
+    let done = match cli.command {
+        Command::Render(a) => render::run(&cli.global, a),
+        Command::Bench(a) => bench::run(&cli.global, a),
+        Command::Compare(a) => compare::run(a),
+        Command::Dataset(a) => dataset::run(&cli.global, a),
+        Command::Weights(a) => weights::run(a),
+        Command::Doctor(a) => doctor::run(&cli.global, a),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("error: {e:#}");
+            ExitCode::from(error::exit_code(&e))
+        }
+    }
+}
+
+fn init_logging(global: &args::Global) {
+    let level = match (global.quiet, global.verbose) {
+        (true, _) => tracing::Level::ERROR,
+        (_, 0) => tracing::Level::WARN,
+        (_, 1) => tracing::Level::INFO,
+        _ => tracing::Level::DEBUG,
+    };
+    tracing_subscriber::fmt()
+        .with_max_level(level)
+        .with_writer(std::io::stderr)
+        .with_target(global.verbose > 1)
+        .without_time()
+        .init();
 }

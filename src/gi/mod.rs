@@ -1,5 +1,36 @@
 //! Global-illumination methods, cheapest first. Each turns the G-buffer and the analytic lights' direct light into
 //! one full-resolution texture: the diffuse light that direct lighting misses (sky and every bounce), as E/π.
+//!
+//! # What each method does, and what it cannot do
+//!
+//! [`ambient`] gives every surface the same light: the picture's mean light (direct, emission, sky) times one constant
+//! fitted to the training scenes, times the textures' ambient occlusion. It costs one reduction and one write a pixel.
+//! It cannot say where light is: no corner darkens, no wall bleeds its colour, a sealed box glows, and two views of one
+//! room disagree because each has its own mean.
+//!
+//! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]) go through a U-Net, and its answer comes back
+//! to full resolution guided by depth and normal ([`reconstruct`]). It learns what direct light, albedo and shape in
+//! the picture imply. It cannot know what is outside the picture or hidden in it: light from behind the camera is a
+//! guess by the training set's mean, light enters and leaves with what is in view, nothing finer than a cell (4
+//! pixels) gets light of its own, and there is no specular light beyond what `composite` derives from E.
+//!
+//! Both scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
+//! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
+
+pub mod ambient;
+mod cache;
+pub mod exposure;
+pub mod features;
+pub mod inputs;
+pub mod pack;
+pub mod pass;
+pub mod reconstruct;
+pub mod twin;
+
+pub use exposure::ExposurePass;
+
+use crate::gpu::readback::ReadbackError;
+use thiserror::Error;
 
 /// The camera's part of a method's inputs, column-major as in WGSL.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,4 +60,75 @@ pub struct Inputs<'a> {
     pub camera: CameraMatrices,
     /// Radiance of the constant environment, W/(m²·sr).
     pub environment: [f32; 3],
+}
+
+/// Which method fills the `indirect` texture of a frame.
+#[derive(Debug, Clone, Default)]
+pub enum Method {
+    /// None: `indirect` is 0. Shows what direct light alone gives.
+    Direct,
+    /// One constant, see [`ambient`].
+    #[default]
+    Ambient,
+    /// The network of these weights, see [`pass`].
+    Neural(Box<crate::net::format::Weights>),
+}
+
+impl Method {
+    /// The method's name on the command line.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Method::Direct => "direct",
+            Method::Ambient => "ambient",
+            Method::Neural(_) => "neural",
+        }
+    }
+}
+
+/// Why a method could not be made or recorded.
+#[derive(Debug, Error)]
+pub enum GiError {
+    /// A width or height of 0, or more pixels than the device's textures hold.
+    #[error("a picture of {}x{} pixels cannot be lit: {reason}", size[0], size[1])]
+    Size {
+        /// Width and height, pixels.
+        size: [u32; 2],
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The camera is not a finite reversed-Z perspective camera.
+    #[error("the camera cannot be used: {0}")]
+    Camera(&'static str),
+    /// A texture view has another format, size or usage than [`Inputs`] says.
+    #[error("texture `{name}` has {found}, but needs {expected}")]
+    Texture {
+        /// Field of [`Inputs`], or `output`.
+        name: &'static str,
+        /// What is needed.
+        expected: String,
+        /// What it has.
+        found: String,
+    },
+    /// The weights name an input feature that this program does not have, or in another shape or order.
+    #[error("the weights' input feature `{name}` {reason}")]
+    Feature {
+        /// The feature's name in the weights file.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The weights' output is not three channels of light.
+    #[error("the weights' output is {0}; this program needs 3 channels of light")]
+    Output(String),
+    /// The network could not be built.
+    #[error("the network could not be built for {}x{} cells: {source}", cells[0], cells[1])]
+    Network {
+        /// Low resolution, cells.
+        cells: [u32; 2],
+        /// The network's own reason.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// Reading back failed.
+    #[error(transparent)]
+    Readback(#[from] ReadbackError),
 }

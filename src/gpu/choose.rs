@@ -152,7 +152,8 @@ pub fn wanted_features() -> wgpu::Features {
     wgpu::Features::TIMESTAMP_QUERY
 }
 
-/// All adapters that fit the backend choice, best first, with the words for what was searched.
+/// All adapters that fit the backend choice, best first, with the words for what was searched. GL is only asked when
+/// nothing else is hardware: opening it looks for window systems, which costs time and may print.
 pub fn candidates(options: &GpuOptions) -> Result<(String, Vec<wgpu::Adapter>), GpuError> {
     let mask = match (options.backend, std::env::var("WGPU_BACKEND")) {
         (Backend::Auto, Ok(text)) if !text.is_empty() => {
@@ -164,14 +165,25 @@ pub fn candidates(options: &GpuOptions) -> Result<(String, Vec<wgpu::Adapter>), 
         }
         (backend, _) => backend.mask(),
     };
+    let mut adapters = enumerate(mask - wgpu::Backends::GL);
+    if adapters.iter().all(|a| is_software(&a.get_info())) {
+        adapters.extend(enumerate(mask & wgpu::Backends::GL));
+    }
+    adapters.sort_by_key(|a| rank(&a.get_info()));
+    let names = mask.iter_names().map(|(name, _)| name.to_lowercase()).collect::<Vec<_>>();
+    Ok((format!("searched: {}", names.join(", ")), adapters))
+}
+
+fn enumerate(mask: wgpu::Backends) -> Vec<wgpu::Adapter> {
+    if mask.is_empty() {
+        return Vec::new();
+    }
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = mask;
     descriptor.flags = descriptor.flags.with_env();
-    let instance = wgpu::Instance::new(descriptor);
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(mask));
+    let mut adapters = pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(mask));
     adapters.retain(is_usable);
-    adapters.sort_by_key(|a| rank(&a.get_info()));
-    Ok((format!("searched: {mask:?}").replace("Backends", ""), adapters))
+    adapters
 }
 
 /// The passes are compute shaders with storage buffers; an adapter without them is of no use.

@@ -5,4 +5,4 @@ pub mod readback;
 pub mod shaders;
 pub mod timing;
 
-pub use choose::{Backend, Gpu, GpuError, GpuOptions, candidates};
+pub use choose::{Backend, Gpu, GpuError, GpuOptions, candidates, wanted_features};

@@ -59,9 +59,11 @@ pub fn write_exr(
         })
     });
     let size = Vec2(width as usize, height as usize);
-    let mut attributes = LayerAttributes::default();
-    attributes.software_name = Some(text(concat!("bouncelight ", env!("CARGO_PKG_VERSION"))));
-    attributes.other = metadata.iter().map(|(k, v)| (text(k), AttributeValue::Text(text(v)))).collect();
+    let attributes = LayerAttributes {
+        software_name: Some(text(concat!("bouncelight ", env!("CARGO_PKG_VERSION")))),
+        other: metadata.iter().map(|(k, v)| (text(k), AttributeValue::Text(text(v)))).collect(),
+        ..LayerAttributes::default()
+    };
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let layer = ::exr::prelude::Layer::new(size, attributes, encoding, AnyChannels::sort(channels.collect()));

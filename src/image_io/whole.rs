@@ -48,6 +48,21 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     Ok(())
 }
 
+/// Whether a file could be written to `path`, told without touching it, so that long work can fail before it starts.
+///
+/// # Errors
+/// The path is a folder, or its folder does not exist.
+pub fn check_writable(path: &Path) -> Result<(), ImageError> {
+    if path.is_dir() {
+        return Err(ImageError::IsFolder { path: path.into() });
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if path.as_os_str() != "-" && !folder.is_dir() {
+        return Err(ImageError::NoFolder { path: path.into(), folder: folder.into() });
+    }
+    Ok(())
+}
+
 /// The bytes of `path`.
 ///
 /// # Errors

@@ -178,6 +178,19 @@ pub fn capture(
     camera: &Camera,
     options: CaptureOptions<'_>,
 ) -> Result<CapturedFrame, RenderError> {
+    let frame = capture_with(gpu, renderer, scene, camera, options, &mut || true)?;
+    Ok(frame.expect("nobody asked to stop"))
+}
+
+/// As [`capture`], calling `go_on` after every sample; `None` when it said false.
+pub fn capture_with(
+    gpu: &Gpu,
+    renderer: &mut Renderer,
+    scene: &SceneGpu,
+    camera: &Camera,
+    options: CaptureOptions<'_>,
+    go_on: &mut dyn FnMut() -> bool,
+) -> Result<Option<CapturedFrame>, RenderError> {
     if options.samples == 0 {
         return Err(RenderError::NoSamples);
     }
@@ -194,13 +207,16 @@ pub fn capture(
         let seed = options.seed.wrapping_mul(0x9e37_79b9).wrapping_add(i);
         let view = View::new(camera, size, sampling::offset(i, options.seed)).with_seed(seed);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, i == 0);
+        renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, i == 0)?;
         gpu.queue.submit([encoder.finish()]);
         decoder.add(gpu, size, 0, &mut beauty, 4)?;
         for (sum, data) in &mut sums {
             if i == 0 || sum.filtered {
                 decoder.add(gpu, size, sum.number, data, sum.channels)?;
             }
+        }
+        if !go_on() {
+            return Ok(None);
         }
     }
     let scale = 1.0 / options.samples as f32;
@@ -221,7 +237,7 @@ pub fn capture(
         }
         layers.push((layer, checked(layer.name(), picture(layer.channels().len(), data))?));
     }
-    Ok(CapturedFrame { beauty, layers })
+    Ok(Some(CapturedFrame { beauty, layers }))
 }
 
 fn checked(name: &str, picture: Picture) -> Result<Picture, RenderError> {

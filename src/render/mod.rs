@@ -37,6 +37,9 @@ pub enum RenderError {
     /// Reading a result back failed.
     #[error(transparent)]
     Readback(#[from] crate::gpu::readback::ReadbackError),
+    /// The GI method failed.
+    #[error(transparent)]
+    Gi(#[from] crate::gi::GiError),
     /// A picture with pixels that are no numbers.
     #[error("layer {layer} has {count} pixels that are not finite, the first at {x},{y}")]
     NotFinite {

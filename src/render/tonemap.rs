@@ -1,6 +1,6 @@
 //! From scene-linear radiance to a display target.
 
-pub use super::tonemap_curve::Tonemap;
+use super::tonemap_curve::Tonemap;
 use super::tool;
 use crate::gpu::{shaders, timing::Recorder};
 use bytemuck::{Pod, Zeroable};

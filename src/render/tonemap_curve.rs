@@ -1,7 +1,9 @@
 //! From scene light to display values: the CPU form of `shaders/lib/tonemap.wgsl`, same names, same constants.
 //!
-//! Filmic and AgX stand near Blender's views of these names (look None, display sRGB). `tests/fixtures/tonemap/make.py`
-//! fitted the constants to colours sent through Blender 4.5's own transform and measures what is left, in parts of 255:
+//! Filmic and AgX stand near Blender's views of these names (look None, display sRGB). Filmic's constants are fitted to
+//! greys and bright colours sent through Blender 4.5's own transform. AgX is not fitted: its steps and matrices are the
+//! published ones (inset as in Blender's configuration), Neutral is Khronos' specification.
+//! `tests/fixtures/tonemap/make.py` fits, and measures against Blender what is left, in parts of 255:
 //!
 //! | | rendered references: mean, worst 99.9th percentile | all colours to 2⁶: mean, 99.9th percentile |
 //! |---|---|---|
@@ -9,7 +11,7 @@
 //! | AgX | 0.3, 12 | 0.5, 11 |
 //! | Neutral | 0.2, 3 | 0.8, 7 |
 //!
-//! What is left of AgX is mostly the interpolation in Blender's own table: at its nodes the formula agrees to 0.09 in
+//! What is left of AgX is mostly the interpolation in Blender's own table: at its nodes the formula agrees to 0.1 in
 //! the mean; between nodes the darkest channel of saturated colours goes astray there. Blender's Neutral is a table, too.
 //! Negative components count as zero (Blender bends them into the gamut), NaN as zero, light above 65504 as 65504.
 
@@ -46,8 +48,8 @@ impl Tonemap {
 
     /// Display-encoded sRGB in [0, 1] of linear Rec.709 light.
     pub fn apply(self, rgb: [f32; 3]) -> [f32; 3] {
-        // f32::max drops NaN; infinity minus infinity further down would make a new one.
-        let light = rgb.map(|v| v.max(0.0).min(LIGHT_MAX));
+        // Infinity minus infinity further down would make a new NaN.
+        let light = rgb.map(|v| if v.is_nan() { 0.0 } else { v.clamp(0.0, LIGHT_MAX) });
         match self {
             Tonemap::Filmic => filmic(light),
             Tonemap::Agx => agx(light),
@@ -110,7 +112,7 @@ fn filmic(light: [f32; 3]) -> [f32; 3] {
 /// Rec.709 to Rec.2020 with AgX's inset primaries, rows.
 const AGX_INTO: [[f32; 3]; 3] = [
     [0.544_814_76, 0.373_787_36, 0.081_397_89],
-    [0.140_416_95, 0.754_137_55, 0.105_445_5],
+    [0.140_416_95, 0.754_137_6, 0.105_445_5],
     [0.088_810_39, 0.178_871_75, 0.732_317_87],
 ];
 

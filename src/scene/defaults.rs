@@ -36,7 +36,7 @@ pub fn complete(scene: &mut Scene) {
     if !proxies.is_empty() {
         let n = proxies.len();
         scene.warnings.push(format!(
-            "{}: has no lights, but glowing surfaces; {n} of them, the strongest, are lit by lights that stand in for them",
+            "'{}' has no lights, but glowing surfaces; lights stand in for the {n} strongest of them",
             scene.name
         ));
         scene.lights = proxies;
@@ -44,7 +44,7 @@ pub fn complete(scene: &mut Scene) {
         scene.lights.push(default_sun(&scene.cameras[0]));
         scene.environment = Environment { radiance: [DEFAULT_SKY; 3] };
         scene.warnings.push(format!(
-            "{}: has no light; a sun of {DEFAULT_SUN} W/m² and a grey sky of {DEFAULT_SKY} W/(m²·sr) were added",
+            "'{}' has no light; a sun of {DEFAULT_SUN} W/m² and a grey sky of {DEFAULT_SKY} W/(m²·sr) were added",
             scene.name
         ));
     }

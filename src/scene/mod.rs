@@ -14,6 +14,8 @@ pub mod defaults;
 #[cfg(feature = "io")]
 mod error;
 #[cfg(feature = "io")]
+pub mod export;
+#[cfg(feature = "io")]
 mod geometry;
 #[cfg(feature = "io")]
 pub mod gltf;

@@ -89,6 +89,9 @@ fn check(path: &Path, text: &str) -> Result<(), SceneError> {
         let mut words = line.split_whitespace();
         let broken = |problem: String| Err(SceneError::broken(path, format!("line {}", i + 1), problem));
         let (kind, needed) = match words.next() {
+            Some(word @ ("usemtl" | "mtllib")) if words.next().is_none() => {
+                return broken(format!("`{word}` names nothing"));
+            }
             Some("v") => (0, 3),
             Some("vt") => (1, 1),
             Some("vn") => (2, 3),

@@ -1,1 +1,5 @@
 //! What is measured over methods and scenes.
+
+pub mod bench;
+pub mod dataset;
+pub mod views;

@@ -82,11 +82,15 @@ pub fn corner(lights: Vec<Light>) -> Scene {
     s
 }
 
+/// Analytic lights alone.
+pub fn direct_only() -> RendererOptions {
+    RendererOptions { method: bouncelight::gi::Method::Direct, ..Default::default() }
+}
+
 /// Captures all layers of `scene`.
 pub fn render(gpu: &Gpu, scene: &Scene, camera: &Camera, size: [u32; 2], samples: u32) -> CapturedFrame {
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the test's scene uploads");
-    let mut renderer =
-        Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions::default()).expect("the test's size is fine");
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, direct_only()).expect("the test's size is fine");
     let options = CaptureOptions { samples, seed: 0, layers: &Layer::ALL };
     capture(gpu, &mut renderer, &uploaded, camera, options).expect("capture works")
 }

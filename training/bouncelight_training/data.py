@@ -3,7 +3,7 @@
     python -m bouncelight_training.data --features DIR --cycles DIR --out train.npz [--rooms 6-9,13]
 
 FEATURES/roomIIII_viewV.safetensors is what `bouncelight dataset` writes; CYCLES/roomIIII_viewV.exr what cycles/paper_rooms.py
-writes. The target is the light that a GI method must add, as E/pi: Cycles' DiffDir (which holds the sky's light) + DiffInd
+writes. Views of the bundled scenes (interior_viewV, cornell_viewV) come from recipe `scene` and cycles/scene_file.py. The target is the light that a GI method must add, as E/pi: Cycles' DiffDir (which holds the sky's light) + DiffInd
 minus our own direct light, so whatever our direct light gets wrong is not charged to the network twice.
 
 The raster has one sample point a cell; Cycles' pixel is a filtered mean over about the cell. Where the two cannot be the
@@ -37,7 +37,9 @@ FIRST_JUDGED = 2200
 REASONS = ["background", "spread", "normal", "depth", "albedo", "shadow", "negative"]
 MAX_SPREAD, MIN_COSINE, MIN_LENGTH = 0.05, float(np.cos(np.radians(10))), 0.95
 MAX_DEPTH_RATIO, MAX_ALBEDO, MAX_VARIATION = 1.1, 0.05, 0.10
-NAME = re.compile(r"room(\d{4,})_view(\d+)\.(safetensors|exr)$")
+NAME = re.compile(r"(?:room(\d{4,})|(interior|cornell))_view(\d+)\.(safetensors|exr)$")
+# Scenes that are no rooms of the stream get numbers below zero, so that splits by room hold for them too.
+SCENES = {"interior": -1, "cornell": -2}
 
 
 def refuse_judged(rooms):
@@ -138,11 +140,14 @@ def pairs_of(features_dir, cycles_dir, rooms):
             raise TrainingError(f"{folder}: no such folder")
         for name in os.listdir(folder):
             match = NAME.fullmatch(name)
-            if match and match[3] == extension and (rooms is None or int(match[1]) in rooms):
-                found.setdefault((int(match[1]), int(match[2])), {})[extension] = os.path.join(folder, name)
+            if not match or match[4] != extension:
+                continue
+            room = int(match[1]) if match[1] else SCENES[match[2]]
+            if rooms is None or room in rooms:
+                found.setdefault((room, int(match[3])), {})[extension] = os.path.join(folder, name)
     pairs = [(room, view, paths["safetensors"], paths["exr"]) for (room, view), paths in sorted(found.items()) if len(paths) == 2]
     if not pairs:
-        raise TrainingError(f"{features_dir} and {cycles_dir} share no view roomIIII_viewV")
+        raise TrainingError(f"{features_dir} and {cycles_dir} share no view roomIIII_viewV or SCENE_viewV")
     alone = len(found) - len(pairs)
     if alone:
         print(f"{alone} views are in one of the folders only and are left out", file=sys.stderr)

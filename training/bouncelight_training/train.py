@@ -40,7 +40,7 @@ class Config:
     widths: tuple = (16, 24, 32, 48)
     epochs: int = 60
     minutes: float = 0.0  # 0: as many epochs as above; else until this much training time is used
-    batch: int = 8
+    batch: int = 4
     learning_rate: float = 2e-3
     final_learning_rate: float = 2e-5
     warmup_steps: int = 50

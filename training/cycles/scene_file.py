@@ -8,10 +8,12 @@ glTF has no field for the sky, a sun's angle or a lamp's radius, so they come as
 The light settings are those of paper_rooms.py: 12 bounces, 4 diffuse, 4 glossy, indirect clamp 10. Only Combined is denoised.
 """
 import argparse
+import json
 import os
 import sys
 
 import bpy
+import mathutils
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import paper_rooms  # noqa: E402
@@ -22,10 +24,33 @@ def numbers(text):
     return values * 3 if len(values) == 1 else values
 
 
+def place(scene, view):
+    """Sets the scene's camera to one of the views of a views.json."""
+    camera = scene.camera.data
+    camera.sensor_fit, camera.angle_y = "VERTICAL", view["yfov"]
+    columns = view["world_from_camera"]
+    y_up = mathutils.Matrix([[columns[c][r] for c in range(4)] for r in range(4)])
+    # Blender's Z is up; a camera looks down its own -Z in both.
+    scene.camera.parent = None
+    scene.camera.matrix_world = mathutils.Matrix(((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))) @ y_up
+
+
+def light_sizes(lights, radius, angle, record):
+    """Sun angles and lamp radii: from the record, by name, else from the flags."""
+    sizes = {l["name"]: l.get("radius", l.get("angle")) for l in (record or {}).get("lights", [])}
+    for light in lights:
+        size = sizes.get(light.name.split(".")[0], sizes.get(light.data.name.split(".")[0]))
+        if light.data.type == "SUN":
+            light.data.angle = angle if size is None else size
+        else:
+            light.data.shadow_soft_size = radius if size is None else size
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene")
-    parser.add_argument("out", help="multi-layer EXR")
+    parser.add_argument("out", help="multi-layer EXR, or a folder with --views")
+    parser.add_argument("--views", help="views.json of `bouncelight dataset --recipe scene`: one EXR a view, light sizes and sky taken from it")
     parser.add_argument("--size", default="1024x512", type=lambda t: tuple(map(int, t.split("x"))))
     parser.add_argument("--spp", type=int, default=256)
     parser.add_argument("--camera", type=int, default=0)
@@ -34,6 +59,11 @@ def main():
     parser.add_argument("--sun-angle", type=float, default=0.00918)
     parser.add_argument("--denoise", type=int, default=1, help="denoise the Combined layer")
     a = parser.parse_args()
+    record = None
+    if a.views:
+        with open(a.views) as f:
+            record = json.load(f)
+        a.world = record["environment"]
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.gltf(filepath=a.scene)
     scene = bpy.context.scene
@@ -41,18 +71,28 @@ def main():
     if a.camera >= len(cameras):
         sys.exit(f"{a.scene}: {len(cameras)} cameras")
     scene.camera = cameras[a.camera]
-    for light in (o.data for o in scene.objects if o.type == "LIGHT"):
-        if light.type == "SUN":
-            light.angle = a.sun_angle
-        else:
-            light.shadow_soft_size = a.light_radius
+    light_sizes([o for o in scene.objects if o.type == "LIGHT"], a.light_radius, a.sun_angle, record)
     scene.world = bpy.data.worlds.new("world")
     scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs[0].default_value = (*a.world, 1)
     paper_rooms.configure(scene, a.size, a.spp, 12, bool(a.denoise))
-    scene.render.filepath = os.path.abspath(a.out) + ".part.exr"
-    bpy.ops.render.render(write_still=True)
-    os.replace(scene.render.filepath, a.out)
+
+    def draw(path):
+        scene.render.filepath = os.path.abspath(path) + ".part.exr"
+        bpy.ops.render.render(write_still=True)
+        os.replace(scene.render.filepath, path)
+
+    if not record:
+        draw(a.out)
+        return
+    os.makedirs(a.out, exist_ok=True)
+    stem = os.path.basename(a.views).removesuffix("_views.json")
+    for i, view in enumerate(record["views"]):
+        path = os.path.join(a.out, f"{stem}_view{i}.exr")
+        if not os.path.exists(path):
+            place(scene, view)
+            scene.cycles.seed = i
+            draw(path)
 
 
 main()

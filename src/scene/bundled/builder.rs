@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, Vec2, Vec3};
 
-use crate::scene::{Instance, Material, Mesh, Scene};
+use crate::scene::{Image, Instance, Material, Mesh, Sampler, Scene, TextureRef, geometry};
 
 /// Grows a scene part by part. Each call of [`Builder::part`] makes one mesh and its instance.
 pub(super) struct Builder {
@@ -27,11 +27,21 @@ impl Builder {
         self.scene.materials.len() - 1
     }
 
+    /// Adds an image and returns a plain reference to it.
+    pub(super) fn texture(&mut self, image: Image) -> TextureRef {
+        self.scene.images.push(image);
+        let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        TextureRef { image: self.scene.images.len() - 1, sampler: Sampler::default(), uv_set: 0, transform }
+    }
+
     /// Adds one mesh of `material`, filled by `fill`. `density` is how often textures repeat per metre.
     pub(super) fn part(&mut self, name: &str, material: usize, density: f32, fill: impl FnOnce(&mut Part)) {
         let mesh = Mesh { name: name.to_owned(), material, ..Mesh::default() };
         let mut part = Part { mesh, density };
         fill(&mut part);
+        if let Some(map) = self.scene.materials[material].normal_texture {
+            geometry::make_tangents(&mut part.mesh, map.uv_set, map.transform);
+        }
         let transform = glam::Mat4::IDENTITY.to_cols_array_2d();
         self.scene.instances.push(Instance { name: name.to_owned(), mesh: self.scene.meshes.len(), transform });
         self.scene.meshes.push(part.mesh);
@@ -69,7 +79,7 @@ impl Part {
     /// A body of revolution about the vertical through `base`: `profile` lists (radius, height) from the bottom up.
     /// Normals are smooth along the profile except at repeated points, where there is an edge.
     pub(super) fn lathe(&mut self, base: Vec3, profile: &[[f32; 2]], segments: u32) {
-        let runs = profile.split_inclusive_edges();
+        let runs = profile.cut_at_edges();
         for run in runs {
             let first = self.mesh.positions.len() as u32;
             let n = run.len() as u32;
@@ -88,7 +98,13 @@ impl Part {
                 for i in 0..n - 1 {
                     let a = first + s * n + i;
                     let b = a + n;
-                    self.mesh.indices.extend([a, a + 1, b, b, a + 1, b + 1]);
+                    // On the axis one of the two triangles has no area.
+                    if run[i as usize][0] > 0.0 {
+                        self.mesh.indices.extend([a, a + 1, b]);
+                    }
+                    if run[i as usize + 1][0] > 0.0 {
+                        self.mesh.indices.extend([b, a + 1, b + 1]);
+                    }
                 }
             }
         }
@@ -100,10 +116,41 @@ impl Part {
         let profile: Vec<[f32; 2]> = (0..=rings)
             .map(|i| {
                 let (sin, cos) = (std::f32::consts::PI * i as f32 / rings as f32).sin_cos();
-                [radius * sin, -radius * cos]
+                [if i % rings == 0 { 0.0 } else { radius * sin }, -radius * cos]
             })
             .collect();
         self.lathe(center, &profile, segments);
+    }
+
+    /// A quad between two corners of a plane whose texture covers it exactly once, whatever the density.
+    pub(super) fn picture(&mut self, origin: Vec3, u: Vec3, v: Vec3) {
+        let first = self.mesh.uv0.len();
+        self.quad(origin, u, v);
+        for (uv, fit) in self.mesh.uv0[first..].iter_mut().zip([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]) {
+            *uv = fit;
+        }
+    }
+
+    /// A bent strip through pairs of points, smooth along its length; to be drawn double-sided.
+    pub(super) fn ribbon(&mut self, pairs: &[[Vec3; 2]]) {
+        let first = self.mesh.positions.len() as u32;
+        for (i, &[left, right]) in pairs.iter().enumerate() {
+            let (before, after) = (pairs[i.saturating_sub(1)], pairs[(i + 1).min(pairs.len() - 1)]);
+            let along = after[0] + after[1] - before[0] - before[1];
+            // At a tip both points coincide; the side of the first pair serves there.
+            let side = (right - left).try_normalize().unwrap_or(pairs[0][1] - pairs[0][0]);
+            let normal = side.cross(along).normalize_or(Vec3::Y);
+            let v = i as f32 / (pairs.len() - 1) as f32;
+            self.vertex(left, normal, Vec2::new(0.0, v));
+            self.vertex(right, normal, Vec2::new(1.0, v));
+        }
+        for i in 0..pairs.len() as u32 - 1 {
+            let a = first + 2 * i;
+            self.mesh.indices.extend([a, a + 1, a + 2]);
+            if pairs[i as usize + 1][0] != pairs[i as usize + 1][1] {
+                self.mesh.indices.extend([a + 2, a + 1, a + 3]);
+            }
+        }
     }
 
     fn vertex(&mut self, position: Vec3, normal: Vec3, uv: Vec2) {
@@ -115,11 +162,11 @@ impl Part {
 
 trait Edges {
     /// Cuts a profile where a point is repeated.
-    fn split_inclusive_edges(&self) -> Vec<Vec<[f32; 2]>>;
+    fn cut_at_edges(&self) -> Vec<Vec<[f32; 2]>>;
 }
 
 impl Edges for [[f32; 2]] {
-    fn split_inclusive_edges(&self) -> Vec<Vec<[f32; 2]>> {
+    fn cut_at_edges(&self) -> Vec<Vec<[f32; 2]>> {
         let mut runs: Vec<Vec<[f32; 2]>> = Vec::new();
         for (i, &point) in self.iter().enumerate() {
             match runs.last_mut() {

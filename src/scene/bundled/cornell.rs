@@ -15,7 +15,7 @@ const SIZE: f32 = 2.0;
 /// Edges of the glowing panel, metres.
 const PANEL: [f32; 2] = [0.5, 0.4];
 /// Radiance of the panel, W/(m²·sr).
-const RADIANCE: [f32; 3] = [17.0, 12.5, 7.5];
+const RADIANCE: [f32; 3] = [27.0, 20.0, 12.5];
 
 fn matte(name: &str, [r, g, b]: [f32; 3]) -> Material {
     Material { name: name.to_owned(), base_color: [r, g, b, 1.0], metallic: 0.0, roughness: 1.0, ..Material::default() }

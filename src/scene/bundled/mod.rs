@@ -2,17 +2,20 @@
 
 mod builder;
 mod cornell;
+mod interior;
+mod textures;
 
 use super::Scene;
 
 /// Names that [`scene`] knows.
-pub const NAMES: &[&str] = &["cornell"];
+pub const NAMES: &[&str] = &["cornell", "interior"];
 
 /// The bundled scene called `name`: `cornell`, a box after Cornell University's with a glowing panel, or `interior`,
 /// a small furnished room with textures.
 pub fn scene(name: &str) -> Option<Scene> {
     match name {
         "cornell" => Some(cornell::scene()),
+        "interior" => Some(interior::scene()),
         _ => None,
     }
 }

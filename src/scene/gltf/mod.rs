@@ -19,17 +19,17 @@ use gltf::json::validation::{Error as Invalid, Validate};
 use super::{Camera, Environment, Instance, Scene, SceneError, defaults, error};
 use source::Source;
 
-/// Extensions whose absence from this loader would make a file wrong, and which it has.
-const SUPPORTED: [&str; 8] = [
+/// Extensions that this loader has.
+const SUPPORTED: [&str; 5] = [
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_specular",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
-    "KHR_materials_variants",
 ];
+
+/// Extensions without which a file still looks much as it should, even where it says that it requires them.
+const IGNORED: [&str; 3] = ["KHR_materials_ior", "KHR_materials_specular", "KHR_materials_variants"];
 
 /// Loads the file's default scene (else its first, else every root node) and fills in what is missing, as
 /// [`super::defaults`] says. What was mended or left out stands in [`Scene::warnings`].
@@ -41,25 +41,45 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
     let (json, blob) = source::split(path, &bytes)?;
     let root: gltf::json::Root =
         gltf::json::deserialize::from_slice(json).map_err(|e| SceneError::broken(path, "JSON", e.to_string()))?;
-    if let Some(extension) = root.extensions_required.iter().find(|e| !SUPPORTED.contains(&e.as_str())) {
+    if let Some(extension) = root.extensions_required.iter().find(|e| !has(&SUPPORTED, e) && !has(&IGNORED, e)) {
         return Err(SceneError::RequiresExtension { path: path.to_owned(), extension: extension.clone() });
     }
     validate(path, &root)?;
     let document = gltf::Document::from_json_without_validation(root);
     let source = Source::open(path, &document, blob)?;
     let mut loader = Loader::new(path, &source, &document);
+    for extension in document.extensions_used().filter(|e| !has(&SUPPORTED, e)) {
+        loader.warn("extensionsUsed", &format!("{extension} is not supported; the file is shown without it"));
+    }
     loader.walk()?;
     let mut scene = loader.scene;
     defaults::complete(&mut scene);
     Ok(scene)
 }
 
+fn has(list: &[&str], extension: &str) -> bool {
+    list.contains(&extension)
+}
+
 /// Runs the crate's own validation, which later code relies on not to panic, but forgives what this loader can handle.
 fn validate(path: &Path, root: &gltf::json::Root) -> Result<(), SceneError> {
+    // The crate's validation looks at the accessor of POSITION before it asks whether there is one.
+    for (m, mesh) in root.meshes.iter().enumerate() {
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            if let Some(bad) = primitive.attributes.values().find(|a| a.value() >= root.accessors.len()) {
+                let place = format!("meshes[{m}].primitives[{p}].attributes");
+                let problem = format!("accessor {} does not exist; the file has {}", bad.value(), root.accessors.len());
+                return Err(SceneError::broken(path, place, problem));
+            }
+        }
+    }
     let mut first = None;
     root.validate(root, gltf::json::Path::new, &mut |place, error| {
         let place = place().to_string();
+        let position = place.contains(".attributes[\"POSITION\"]");
         let forgiven = match error {
+            // Bounds are computed from the vertices, and a primitive without any is a warning.
+            Invalid::Missing | Invalid::Invalid if position => true,
             // The crate knows fewer extensions than this loader; its list was checked before.
             Invalid::Unsupported => place.starts_with("extensionsRequired"),
             // A texture without image is legal (an extension may have one) and gets a stand-in.

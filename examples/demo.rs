@@ -1,0 +1,72 @@
+//! What `cargo xtask demo` runs: the bundled interior as raster | neural | reference in out/demo.png, then the timing table.
+//!
+//! It is also the shortest tour of the library: load a scene, open a device, draw with two methods, write a picture.
+
+use bouncelight::{
+    gi::Method,
+    gpu::{Gpu, GpuOptions},
+    image_io,
+    net::format::Weights,
+    render::{
+        Renderer, RendererOptions,
+        capture::{CaptureOptions, capture},
+        tonemap_curve::Tonemap,
+    },
+    scene::{self, upload::SceneGpu},
+    study::bench::{BenchOptions, measure},
+};
+use std::path::Path;
+
+/// Size of each of the three pictures.
+const SIZE: [u32; 2] = [640, 320];
+/// Size of the frames that are timed.
+const TIMED_SIZE: [u32; 2] = [1024, 512];
+/// White columns between the pictures.
+const GAP: usize = 4;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let gpu = Gpu::open(&GpuOptions::default())?;
+    println!("{}", gpu.sentence());
+    let scene = scene::load("interior")?;
+    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
+    let neural = || Weights::shipped().map(|w| Method::Neural(Box::new(w)));
+
+    let mut pictures = Vec::new();
+    for method in [Method::Direct, neural()?] {
+        let options = RendererOptions { method, ..Default::default() };
+        let mut renderer = Renderer::new(&gpu.device, &gpu.queue, SIZE, options)?;
+        let options = CaptureOptions { samples: 8, ..Default::default() };
+        let frame = capture(&gpu, &mut renderer, &uploaded, &scene.cameras[0], options)?;
+        let rgb: Vec<f32> = frame.beauty.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+        pictures.push(Tonemap::Filmic.apply_to_bytes(&rgb));
+    }
+    // Cycles' picture of the same scene at the same size; docs/accuracy.md says how it was made.
+    let reference = image_io::read_png(&root.join("assets/reference/interior.png"))?;
+    assert_eq!([reference.width, reference.height], SIZE, "the reference picture has the demo's size");
+    pictures.push(reference.to_rgb().iter().map(|v| (v * 255.0).round() as u8).collect());
+
+    let row = SIZE[0] as usize * 3;
+    let gap = [255; GAP * 3];
+    let rows = (0..SIZE[1] as usize).flat_map(|y| {
+        let rows: Vec<&[u8]> = pictures.iter().map(|p| &p[y * row..(y + 1) * row]).collect();
+        rows.join(&gap[..])
+    });
+    let strip: Vec<u8> = rows.collect();
+    let out = root.join("out/demo.png");
+    std::fs::create_dir_all(root.join("out"))?;
+    image_io::write_png(&out, SIZE[0] * 3 + 2 * GAP as u32, SIZE[1], &strip, &[("Adapter".into(), gpu.sentence())])?;
+    println!("raster | neural | reference: {}\n", out.display());
+
+    println!("interior at {}x{}, one frame:", TIMED_SIZE[0], TIMED_SIZE[1]);
+    for method in [Method::Direct, Method::Ambient, neural()?] {
+        let options = RendererOptions { method, ..Default::default() };
+        let mut renderer = Renderer::new(&gpu.device, &gpu.queue, TIMED_SIZE, options)?;
+        let options = BenchOptions { frames: 5, warmup: 2 };
+        let m = measure(&gpu, &mut renderer, &uploaded, &scene.cameras[0], options)?;
+        let gpu_ms = m.gpu_ms.map_or("no timestamps".into(), |t| format!("{:.2} ms GPU", t.median));
+        let mib = m.total_bytes() as f64 / (1 << 20) as f64;
+        println!("  {:<8} {gpu_ms:>14} {:>9.2} ms wall clock {mib:>7.1} MiB of GPU memory", m.method, m.wall_ms.median);
+    }
+    Ok(())
+}

@@ -1,0 +1,18 @@
+// The simplest method: every surface receives the picture's mean light times one constant (AMBIENT, from the prelude).
+
+@group(1) @binding(0) var<storage, read> exposure: Exposure;
+@group(1) @binding(1) var output: texture_storage_2d<rgba16float, write>;
+
+@compute @workgroup_size(8, 8)
+fn ambient(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= params.size) {
+        return;
+    }
+    let pixel = vec2i(id.xy);
+    var light = vec3f(0.0);
+    if distance_at(pixel) > 0.0 {
+        let occlusion = finite(textureLoad(albedo_map, pixel, 0).a);
+        light = min(AMBIENT * (exposure.s * occlusion), vec3f(LARGEST));
+    }
+    textureStore(output, pixel, vec4f(light, 1.0));
+}

@@ -1,0 +1,88 @@
+// What every stage of gi/ reads: the G-buffer, the direct light and the camera (group 0), and how texels become
+// numbers. Everything that leaves this file is finite, whatever the textures hold.
+
+// `gi::inputs::Params` is the Rust side.
+struct Params {
+    size: vec2u,                  // pixels
+    cells: vec2u,                 // ceil(size / 4)
+    unproject: vec4f,             // 1/p00, 1/p11, p02, p12 of the projection
+    depth: vec4f,                 // distance = depth.x / (texel + depth.y)
+    environment: vec4f,           // radiance, finite and not negative
+    gravity_from_view: mat3x3f,
+    gravity_from_world: mat3x3f,
+}
+
+// `gi::exposure::Exposure` is the Rust side and documents the fields.
+struct Exposure {
+    s: f32,
+    inv_s: f32,
+    ln_m: f32,
+    hit_fraction: f32,
+    nonfinite: u32,
+    pad0: u32,
+    pad1: u32,
+    pad2: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+// Not texture_depth_2d: GLSL has no plain load from those, so the GL backends would refuse it.
+@group(0) @binding(1) var depth_map: texture_2d<f32>;
+@group(0) @binding(2) var normal_map: texture_2d<f32>;
+@group(0) @binding(3) var albedo_map: texture_2d<f32>;
+@group(0) @binding(4) var emissive_map: texture_2d<f32>;
+@group(0) @binding(5) var direct_map: texture_2d<f32>;
+
+const CELL = 4;
+const EXPONENT = 0x7f800000u;
+// Half floats end at 65504; a rounded-up store would become infinite.
+const LARGEST = 65000.0;
+
+// By bits: comparisons with NaN may be optimised away.
+fn is_finite3(v: vec3f) -> bool {
+    return all((bitcast<vec3u>(v) & vec3u(EXPONENT)) != vec3u(EXPONENT));
+}
+
+fn finite(x: f32) -> f32 {
+    return select(0.0, x, (bitcast<u32>(x) & EXPONENT) != EXPONENT);
+}
+
+fn finite3(v: vec3f) -> vec3f {
+    return select(vec3f(0.0), v, (bitcast<vec3u>(v) & vec3u(EXPONENT)) != vec3u(EXPONENT));
+}
+
+fn luminance(c: vec3f) -> f32 {
+    return dot(c, vec3f(0.2126, 0.7152, 0.0722));
+}
+
+// The pixel that stands for a cell. One real pixel, never an average over an edge.
+fn sample_pixel(cell: vec2i) -> vec2i {
+    return min(CELL * cell + CELL / 2, vec2i(params.size) - 1);
+}
+
+fn light_at(pixel: vec2i) -> vec3f {
+    return max(finite3(textureLoad(direct_map, pixel, 0).rgb), vec3f(0.0));
+}
+
+fn emissive_at(pixel: vec2i) -> vec3f {
+    return max(finite3(textureLoad(emissive_map, pixel, 0).rgb), vec3f(0.0));
+}
+
+// Metres along the view axis; 0 on the background.
+fn distance_at(pixel: vec2i) -> f32 {
+    let texel = finite(textureLoad(depth_map, pixel, 0).r);
+    return select(0.0, clamp(params.depth.x / (texel + params.depth.y), 1e-9, 1e9), texel > 0.0);
+}
+
+// Metres from the eye in the gravity frame.
+fn position_at(pixel: vec2i, distance: f32) -> vec3f {
+    let uv = (vec2f(pixel) + 0.5) / vec2f(params.size);
+    let ndc = vec2f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y);
+    let ray = vec3f((ndc + params.unproject.zw) * params.unproject.xy, -1.0);
+    return params.gravity_from_view * (ray * distance);
+}
+
+// Unit normal in the gravity frame.
+fn normal_at(pixel: vec2i) -> vec3f {
+    let texel = finite3(vec3f(textureLoad(normal_map, pixel, 0).rg, 0.0));
+    return params.gravity_from_world * oct_decode(texel.xy);
+}

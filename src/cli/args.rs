@@ -1,0 +1,237 @@
+//! Flags that several subcommands share, and how they turn into a device, a scene, a camera and a method.
+
+use super::error::CliError;
+use crate::{
+    gi::Method,
+    gpu::{Backend, Gpu, GpuOptions},
+    net::format::Weights,
+    scene::{self, Camera, LightKind, Scene},
+};
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// Flags every subcommand takes.
+#[derive(Debug, Args)]
+pub struct Global {
+    /// Part of the adapter's name, or `cpu` for a software adapter.
+    #[arg(long, global = true, value_name = "NAME")]
+    pub adapter: Option<String>,
+    /// Graphics API.
+    #[arg(long, global = true, value_enum, default_value = "auto")]
+    pub backend: BackendName,
+    /// Only errors.
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// More log lines; twice for yet more.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// How progress is shown on standard error.
+    #[arg(long, global = true, value_enum, default_value = "auto")]
+    pub progress: ProgressKind,
+}
+
+/// Names of the graphics APIs.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+#[allow(missing_docs, reason = "the variants are their own words on the command line")]
+pub enum BackendName {
+    Auto,
+    Vulkan,
+    Gl,
+    Metal,
+    Dx12,
+}
+
+/// How progress is shown.
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+pub enum ProgressKind {
+    /// A bar on a terminal, else plain lines.
+    Auto,
+    /// A bar.
+    Bar,
+    /// A plain line every few seconds.
+    Plain,
+    /// Nothing.
+    None,
+}
+
+impl Global {
+    /// What is asked of the device.
+    pub fn gpu_options(&self) -> GpuOptions {
+        let backend = match self.backend {
+            BackendName::Auto => Backend::Auto,
+            BackendName::Vulkan => Backend::Vulkan,
+            BackendName::Gl => Backend::Gl,
+            BackendName::Metal => Backend::Metal,
+            BackendName::Dx12 => Backend::Dx12,
+        };
+        GpuOptions { backend, adapter: self.adapter.clone() }
+    }
+
+    /// Opens the device and says on standard error which one it is.
+    pub fn open_gpu(&self) -> Result<Gpu> {
+        let gpu = Gpu::open(&self.gpu_options())?;
+        // Whatever the driver refuses later is no fault of the user's, but it deserves a sentence, not a stack trace.
+        gpu.device.on_uncaptured_error(std::sync::Arc::new(|e| {
+            eprintln!("error: the GPU driver refused a command; `bouncelight doctor` lists other adapters\n{e}");
+            std::process::exit(super::error::RUNTIME.into());
+        }));
+        if !self.quiet {
+            eprintln!("{}", gpu.sentence());
+        }
+        Ok(gpu)
+    }
+}
+
+/// Names of the GI methods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodName {
+    /// Analytic lights only.
+    Direct,
+    /// One constant times the frame's exposure.
+    Ambient,
+    /// The network.
+    Neural,
+}
+
+impl MethodName {
+    /// All methods, cheapest first.
+    pub const ALL: [MethodName; 3] = [MethodName::Direct, MethodName::Ambient, MethodName::Neural];
+
+    /// The method with its weights: `weights`, or the shipped ones.
+    pub fn method(self, weights: Option<&PathBuf>) -> Result<Method> {
+        Ok(match self {
+            MethodName::Direct => Method::Direct,
+            MethodName::Ambient => Method::Ambient,
+            MethodName::Neural => Method::Neural(Box::new(load_weights(weights)?)),
+        })
+    }
+}
+
+/// The weights in `path`, or the shipped ones.
+pub fn load_weights(path: Option<&PathBuf>) -> Result<Weights> {
+    Ok(match path {
+        Some(path) => Weights::load(path)?,
+        None => Weights::shipped()?,
+    })
+}
+
+/// Which scene, how it is lit, and from where it is seen.
+#[derive(Debug, Args)]
+pub struct SceneArgs {
+    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, or a bundled scene (interior, cornell).
+    pub scene: String,
+    /// Width and height in pixels.
+    #[arg(long, default_value = "1024x512", value_parser = parse_size, value_name = "WxH")]
+    pub size: [u32; 2],
+    /// Camera of the file, from 0.
+    #[arg(long, default_value_t = 0, conflicts_with_all = ["eye", "look_at"], value_name = "N")]
+    pub camera: usize,
+    /// Where the camera stands.
+    #[arg(long, value_parser = parse_vec3, requires = "look_at", allow_hyphen_values = true, value_name = "X,Y,Z")]
+    pub eye: Option<[f32; 3]>,
+    /// What it looks at.
+    #[arg(long, value_parser = parse_vec3, requires = "eye", allow_hyphen_values = true, value_name = "X,Y,Z")]
+    pub look_at: Option<[f32; 3]>,
+    /// Vertical field of view in degrees.
+    #[arg(long, value_name = "D")]
+    pub fov: Option<f32>,
+    /// Radiance of the surroundings: `R,G,B` or one number for grey.
+    #[arg(long, value_parser = parse_radiance, value_name = "R,G,B")]
+    pub environment: Option<[f32; 3]>,
+    /// Radius of point and spot lights, metres.
+    #[arg(long, value_name = "M")]
+    pub light_radius: Option<f32>,
+    /// Angular diameter of directional lights, radians.
+    #[arg(long, value_name = "RAD")]
+    pub sun_angle: Option<f32>,
+}
+
+impl SceneArgs {
+    /// Loads the scene, tells its warnings, and applies the flags about light.
+    pub fn load(&self, quiet: bool) -> Result<Scene> {
+        let mut scene = scene::load(&self.scene)?;
+        if !quiet {
+            for warning in &scene.warnings {
+                eprintln!("warning: {warning}");
+            }
+        }
+        if let Some(radiance) = self.environment {
+            scene.environment.radiance = radiance;
+        }
+        for light in &mut scene.lights {
+            match &mut light.kind {
+                LightKind::Directional { angle, .. } => *angle = positive("--sun-angle", self.sun_angle, *angle)?,
+                LightKind::Point { radius, .. } | LightKind::Spot { radius, .. } => {
+                    *radius = positive("--light-radius", self.light_radius, *radius)?;
+                }
+            }
+        }
+        Ok(scene)
+    }
+
+    /// The camera that the flags ask for.
+    pub fn camera(&self, scene: &Scene) -> Result<Camera> {
+        let fov = match self.fov {
+            Some(d) if !(d > 0.0 && d < 180.0) => return Err(usage(format!("--fov {d} is not between 0 and 180"))),
+            d => d.map(f32::to_radians),
+        };
+        if let (Some(eye), Some(target)) = (self.eye, self.look_at) {
+            if eye == target {
+                return Err(usage("--eye and --look-at are the same point".into()));
+            }
+            return Ok(Camera::look_at(eye, target, fov.unwrap_or(45f32.to_radians())));
+        }
+        let mut camera = scene
+            .cameras
+            .get(self.camera)
+            .cloned()
+            .with_context(|| format!("--camera {}: the scene has {} cameras", self.camera, scene.cameras.len()))
+            .map_err(|e| usage(format!("{e:#}")))?;
+        camera.yfov = fov.unwrap_or(camera.yfov);
+        Ok(camera)
+    }
+}
+
+/// A usage error (exit code 2).
+pub fn usage(message: String) -> anyhow::Error {
+    CliError::Usage(message).into()
+}
+
+fn positive(flag: &str, given: Option<f32>, otherwise: f32) -> Result<f32> {
+    match given {
+        None => Ok(otherwise),
+        Some(v) if v.is_finite() && v >= 0.0 => Ok(v),
+        Some(v) => Err(usage(format!("{flag} {v} is not a length or angle"))),
+    }
+}
+
+pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let (w, h) = text.split_once(['x', 'X']).ok_or("write it as WIDTHxHEIGHT, such as 1024x512")?;
+    let side = |t: &str| t.parse::<u32>().map_err(|e| format!("{t}: {e}"));
+    match [side(w)?, side(h)?] {
+        [0, _] | [_, 0] => Err("width and height must be at least 1".into()),
+        size => Ok(size),
+    }
+}
+
+fn parse_floats(text: &str) -> Result<Vec<f32>, String> {
+    text.split(',')
+        .map(|t| t.trim().parse::<f32>().map_err(|e| format!("{t}: {e}")))
+        .map(|v| v.and_then(|v| if v.is_finite() { Ok(v) } else { Err(format!("{v} is not a finite number")) }))
+        .collect()
+}
+
+fn parse_vec3(text: &str) -> Result<[f32; 3], String> {
+    parse_floats(text)?.try_into().map_err(|_| "write three numbers, such as 1,2,3".into())
+}
+
+fn parse_radiance(text: &str) -> Result<[f32; 3], String> {
+    let values = parse_floats(text)?;
+    let rgb = match values.as_slice() {
+        [grey] => [*grey; 3],
+        [r, g, b] => [*r, *g, *b],
+        _ => return Err("write one number or three, such as 0.05 or 0.1,0.2,0.3".into()),
+    };
+    if rgb.iter().any(|v| *v < 0.0) { Err("radiance cannot be negative".into()) } else { Ok(rgb) }
+}

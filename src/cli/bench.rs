@@ -1,0 +1,172 @@
+//! `bouncelight bench`: GPU time per pass, wall clock per frame, resident bytes; against a saved base if asked.
+
+use super::{
+    args::{Global, MethodName, SceneArgs, usage},
+    error::CliError,
+};
+use crate::{
+    gpu::Gpu,
+    render::{Renderer, RendererOptions},
+    scene::upload::SceneGpu,
+    study::bench::{BenchOptions, Measurement, measure},
+};
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Method to measure, or `all`.
+    #[arg(long, default_value = "all", value_parser = parse_methods)]
+    method: Methods,
+    /// Weights of `neural`; the shipped ones when absent.
+    #[arg(long)]
+    weights: Option<PathBuf>,
+    /// Frames that count.
+    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: u32,
+    /// Frames before them.
+    #[arg(long, default_value_t = 30)]
+    warmup: u32,
+    /// One row per network layer instead of one for the network.
+    #[arg(long)]
+    layers: bool,
+    /// Write the record to this file.
+    #[arg(long, value_name = "F")]
+    json: Option<PathBuf>,
+    /// A record written earlier, on this device, to compare with.
+    #[arg(long, value_name = "BASE", requires = "fail_over")]
+    compare: Option<PathBuf>,
+    /// How much slower than the base is still allowed, such as 5%.
+    #[arg(long, value_parser = parse_percent, value_name = "P%")]
+    fail_over: Option<f64>,
+}
+
+#[derive(Debug, Clone)]
+struct Methods(Vec<MethodName>);
+
+fn parse_methods(text: &str) -> Result<Methods, String> {
+    match text {
+        "all" => Ok(Methods(MethodName::ALL.to_vec())),
+        one => <MethodName as clap::ValueEnum>::from_str(one, false).map(|m| Methods(vec![m])),
+    }
+}
+
+fn parse_percent(text: &str) -> Result<f64, String> {
+    let number = text.trim_end_matches('%').parse::<f64>().map_err(|e| format!("{text}: {e}"))?;
+    if number.is_finite() && number >= 0.0 { Ok(number / 100.0) } else { Err(format!("{text} is not a percentage")) }
+}
+
+/// What `--json` writes and `--compare` reads.
+#[derive(Debug, Serialize, Deserialize)]
+struct Record {
+    schema: u32,
+    version: String,
+    scene: String,
+    size: [u32; 2],
+    adapter: String,
+    backend: String,
+    driver: String,
+    software: bool,
+    frames: u32,
+    warmup: u32,
+    methods: Vec<Measurement>,
+}
+
+pub fn run(global: &Global, args: Args) -> Result<()> {
+    let base = args.compare.as_ref().map(read_record).transpose()?;
+    let scene = args.scene.load(global.quiet)?;
+    let camera = args.scene.camera(&scene)?;
+    let gpu = global.open_gpu()?;
+    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
+    let options = BenchOptions { frames: args.frames, warmup: args.warmup };
+    let mut methods = Vec::new();
+    for name in &args.method.0 {
+        let method = name.method(args.weights.as_ref())?;
+        let mut renderer =
+            Renderer::new(&gpu.device, &gpu.queue, args.scene.size, RendererOptions { method, ..Default::default() })?;
+        methods.push(measure(&gpu, &mut renderer, &uploaded, &camera, options)?);
+    }
+    let record = Record {
+        schema: 1,
+        version: env!("CARGO_PKG_VERSION").into(),
+        scene: args.scene.scene.clone(),
+        size: args.scene.size,
+        adapter: gpu.info.name.clone(),
+        backend: format!("{:?}", gpu.info.backend).to_lowercase(),
+        driver: format!("{} {}", gpu.info.driver, gpu.info.driver_info),
+        software: gpu.is_software(),
+        frames: args.frames,
+        warmup: args.warmup,
+        methods,
+    };
+    print(&record, &gpu, args.layers);
+    if let Some(path) = &args.json {
+        crate::image_io::write_whole(path, format!("{}\n", serde_json::to_string_pretty(&record)?).as_bytes())?;
+    }
+    match (base, args.fail_over) {
+        (Some(base), Some(allowed)) => compare(&base, &record, allowed),
+        _ => Ok(()),
+    }
+}
+
+fn print(record: &Record, gpu: &Gpu, layers: bool) {
+    println!("{} at {}x{} on {}", record.scene, record.size[0], record.size[1], gpu.sentence());
+    for m in &record.methods {
+        println!("\n{:<28}{:>10}{:>10}", m.method, "median ms", "p95 ms");
+        for (pass, median, p95) in rows(m, layers) {
+            println!("  {pass:<26}{median:>10.3}{p95:>10.3}");
+        }
+        match m.gpu_ms {
+            Some(t) => println!("  {:<26}{:>10.3}{:>10.3}", "GPU, all passes", t.median, t.p95),
+            None => println!("  no GPU timestamps on this adapter: wall clock only"),
+        }
+        println!("  {:<26}{:>10.3}{:>10.3}", "wall clock, synchronised", m.wall_ms.median, m.wall_ms.p95);
+        let mib = |b: u64| b as f64 / (1 << 20) as f64;
+        let parts = m.bytes.iter().filter(|(_, b)| *b > 0).map(|(n, b)| format!("{n} {:.1}", mib(*b)));
+        println!("  {:.1} MiB of GPU memory: {}", mib(m.total_bytes()), parts.collect::<Vec<_>>().join(", "));
+    }
+}
+
+/// Rows of the table; without `layers` the network's layers are one row (whose p95 is a sum of p95s, an upper bound).
+fn rows(m: &Measurement, layers: bool) -> Vec<(String, f64, f64)> {
+    let mut rows: Vec<(String, f64, f64)> = Vec::new();
+    for p in &m.passes {
+        let name = if !layers && p.pass.starts_with("net.") { "net (all layers)".into() } else { p.pass.clone() };
+        match rows.last_mut() {
+            Some(last) if last.0 == name => {
+                last.1 += p.ms.median;
+                last.2 += p.ms.p95;
+            }
+            _ => rows.push((name, p.ms.median, p.ms.p95)),
+        }
+    }
+    rows
+}
+
+fn read_record(path: &PathBuf) -> Result<Record> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let record: Record =
+        serde_json::from_str(&text).with_context(|| format!("{} is no bench record", path.display()))?;
+    if record.schema != 1 {
+        return Err(usage(format!("{}: schema {} is not known", path.display(), record.schema)));
+    }
+    Ok(record)
+}
+
+fn compare(base: &Record, now: &Record, allowed: f64) -> Result<()> {
+    if (&base.adapter, &base.backend, base.size) != (&now.adapter, &now.backend, now.size) {
+        return Err(usage("the base record is of another adapter, backend or size: times cannot be compared".into()));
+    }
+    let time = |m: &Measurement| m.gpu_ms.unwrap_or(m.wall_ms).median;
+    let slower: Vec<String> = now
+        .methods
+        .iter()
+        .filter_map(|m| base.methods.iter().find(|b| b.method == m.method).map(|b| (m, time(m) / time(b) - 1.0)))
+        .filter(|(_, excess)| *excess > allowed)
+        .map(|(m, excess)| format!("{} is {:.1}% slower than the base", m.method, excess * 100.0))
+        .collect();
+    if slower.is_empty() { Ok(()) } else { Err(CliError::TooSlow(slower.join("; ")).into()) }
+}

@@ -1,0 +1,68 @@
+//! Exit codes: every error that reaches `main` is sorted here, once.
+
+use crate::{gi::GiError, gpu::GpuError, net::format::WeightsError, scene::SceneError, scene::upload::UploadError};
+use thiserror::Error;
+
+/// Something went wrong while running.
+pub const RUNTIME: u8 = 1;
+/// The command line asks for what cannot be.
+pub const USAGE: u8 = 2;
+/// There is no usable adapter.
+pub const NO_ADAPTER: u8 = 3;
+/// The scene or the weights are invalid.
+pub const INVALID_INPUT: u8 = 4;
+/// The picture differs from its reference by more than the threshold.
+pub const ABOVE_THRESHOLD: u8 = 5;
+/// Slower than allowed.
+pub const TOO_SLOW: u8 = 6;
+/// Interrupted by Ctrl-C or SIGTERM.
+pub const INTERRUPTED: u8 = 130;
+
+/// Failures that are the command line's own.
+#[derive(Debug, Error)]
+pub enum CliError {
+    /// Flags that contradict each other or name what does not exist.
+    #[error("{0}")]
+    Usage(String),
+    /// A comparison against a reference failed.
+    #[error("{metric} is {value:.6}, on the wrong side of the threshold {threshold}")]
+    AboveThreshold {
+        /// Name of the metric.
+        metric: String,
+        /// Its value.
+        value: f64,
+        /// What was allowed.
+        threshold: f64,
+    },
+    /// A benchmark came out slower than its base by more than allowed.
+    #[error("{0}")]
+    TooSlow(String),
+    /// The user interrupted; nothing half-written stays.
+    #[error("interrupted; nothing was written")]
+    Interrupted,
+}
+
+/// The exit code for `error`, found from the innermost typed cause.
+pub fn exit_code(error: &anyhow::Error) -> u8 {
+    for cause in error.chain() {
+        if let Some(e) = cause.downcast_ref::<CliError>() {
+            return match e {
+                CliError::Usage(_) => USAGE,
+                CliError::AboveThreshold { .. } => ABOVE_THRESHOLD,
+                CliError::TooSlow(_) => TOO_SLOW,
+                CliError::Interrupted => INTERRUPTED,
+            };
+        }
+        if cause.is::<GpuError>() {
+            return NO_ADAPTER;
+        }
+        // Sound weights that speak of something else than light.
+        if let Some(GiError::Feature { .. } | GiError::Output(_)) = cause.downcast_ref::<GiError>() {
+            return INVALID_INPUT;
+        }
+        if cause.is::<SceneError>() || cause.is::<UploadError>() || cause.is::<WeightsError>() {
+            return INVALID_INPUT;
+        }
+    }
+    RUNTIME
+}

@@ -1,0 +1,58 @@
+//! Progress on standard error: a bar on a terminal, a plain line every few seconds elsewhere.
+
+use super::args::{Global, ProgressKind};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::{
+    io::IsTerminal,
+    time::{Duration, Instant},
+};
+
+/// How often a plain line appears.
+const PLAIN_INTERVAL: Duration = Duration::from_secs(5);
+
+/// Counts steps towards a known total.
+pub struct Progress {
+    what: &'static str,
+    kind: ProgressKind,
+    bar: ProgressBar,
+    started: Instant,
+    last_line: Instant,
+}
+
+impl Progress {
+    /// Starts counting `total` steps of `what` ("samples", "views").
+    pub fn new(global: &Global, what: &'static str, total: u64) -> Self {
+        let kind = match global.progress {
+            _ if global.quiet => ProgressKind::None,
+            ProgressKind::Auto if std::io::stderr().is_terminal() => ProgressKind::Bar,
+            ProgressKind::Auto => ProgressKind::Plain,
+            kind => kind,
+        };
+        let bar = ProgressBar::with_draw_target(
+            Some(total),
+            if kind == ProgressKind::Bar { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() },
+        );
+        let template = "{bar:30} {pos}/{len} {msg} ({elapsed} gone, {eta} left)";
+        bar.set_style(
+            ProgressStyle::with_template(template).expect("the template is a constant").progress_chars("█▌ "),
+        );
+        bar.set_message(what);
+        Self { what, kind, bar, started: Instant::now(), last_line: Instant::now() }
+    }
+
+    /// One more step is done.
+    pub fn step(&mut self) {
+        self.bar.inc(1);
+        if self.kind == ProgressKind::Plain && self.last_line.elapsed() >= PLAIN_INTERVAL {
+            self.last_line = Instant::now();
+            let (done, total) = (self.bar.position(), self.bar.length().unwrap_or(0));
+            let left = self.started.elapsed().as_secs_f64() / done as f64 * total.saturating_sub(done) as f64;
+            eprintln!("{done}/{total} {}, about {left:.0} s left", self.what);
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(self) {
+        self.bar.finish_and_clear();
+    }
+}

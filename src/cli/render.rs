@@ -1,0 +1,202 @@
+//! `bouncelight render`: one picture of a scene, as PNG through a view transform or as EXR with layers.
+
+use super::{
+    args::{Global, MethodName, SceneArgs, usage},
+    compare::{Shown, shown_bytes},
+    error::CliError,
+    interrupt,
+    progress::Progress,
+};
+use crate::{
+    gi::Method,
+    gpu::Gpu,
+    image_io::{self, Metadata},
+    metrics,
+    render::{
+        Renderer, RendererOptions,
+        capture::{CaptureOptions, CapturedFrame, Layer, capture_with},
+        tonemap_curve::Tonemap,
+    },
+    scene::upload::SceneGpu,
+};
+use anyhow::Result;
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Where the picture goes: .png, .exr, or `-` for a PNG on standard output.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// How indirect light is found.
+    #[arg(long, value_enum, default_value = "neural")]
+    method: MethodName,
+    /// Weights of `neural`; the shipped ones when absent.
+    #[arg(long)]
+    weights: Option<PathBuf>,
+    /// Jittered frames that are averaged through Cycles' pixel filter; 1 is the raw frame.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    samples: u32,
+    /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
+    #[arg(long, value_parser = parse_layers, value_name = "LAYERS")]
+    aov: Option<Layers>,
+    /// Stops by which a PNG is brighter.
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true, value_name = "EV")]
+    exposure: f32,
+    /// View transform of a PNG.
+    #[arg(long, default_value = "filmic")]
+    tonemap: Tonemap,
+    /// Seed of jitter and soft-shadow patterns.
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
+    /// A picture to compare with: EXR (both go through the view transform) or PNG.
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+    /// Metric of the comparison.
+    #[arg(long, default_value = "mae", requires = "reference", value_parser = metrics::NAMES.map(|(n, _)| n))]
+    metric: String,
+    /// On the wrong side of it (above; below for psnr and the ssims) the exit code is 5.
+    #[arg(long, requires = "reference", value_name = "T")]
+    threshold: Option<f64>,
+    /// Picture of where they differ.
+    #[arg(long, requires = "reference", value_name = "PNG")]
+    diff: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone)]
+struct Layers(Vec<Layer>);
+
+fn parse_layers(text: &str) -> Result<Layers, String> {
+    if text == "all" {
+        return Ok(Layers(Layer::ALL.to_vec()));
+    }
+    let layer = |name: &str| {
+        let known = || Layer::ALL.map(Layer::name).join(", ");
+        Layer::from_name(name).ok_or_else(|| format!("`{name}` is no layer; there are: {}", known()))
+    };
+    text.split(',').map(layer).collect::<Result<_, _>>().map(Layers)
+}
+
+/// What the output's name asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Format {
+    Png,
+    Exr,
+}
+
+pub fn run(global: &Global, args: Args) -> Result<()> {
+    let format = check(&args)?;
+    let method = args.method.method(args.weights.as_ref())?;
+    let weights = match &method {
+        Method::Neural(weights) => weights.hash_text(),
+        _ => "none".into(),
+    };
+    let reference = args.reference.as_ref().map(|path| Shown::read(path, args.tonemap)).transpose()?;
+    let scene = args.scene.load(global.quiet)?;
+    let camera = args.scene.camera(&scene)?;
+    interrupt::install()?;
+    let gpu = global.open_gpu()?;
+    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
+    let options = RendererOptions { method, ..Default::default() };
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options)?;
+    let layers = args.aov.as_ref().map_or(&[][..], |l| &l.0);
+    let options = CaptureOptions { samples: args.samples, seed: args.seed, layers };
+    let mut progress = Progress::new(global, "samples", args.samples.into());
+    let frame = capture_with(&gpu, &mut renderer, &uploaded, &camera, options, &mut || {
+        progress.step();
+        !interrupt::requested()
+    })?;
+    progress.finish();
+    interrupt::check()?;
+    let frame = frame.ok_or(CliError::Interrupted)?;
+    write(&args, format, &frame, &metadata(&gpu, weights))?;
+    match reference {
+        Some(reference) => judge(&args, &frame, &reference),
+        None => Ok(()),
+    }
+}
+
+/// Faults that can be told before anything is drawn.
+fn check(args: &Args) -> Result<Format> {
+    let path = &args.output;
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let format = match extension.as_str() {
+        "png" => Format::Png,
+        "exr" => Format::Exr,
+        _ if path.as_os_str() == "-" => Format::Png,
+        _ => return Err(usage(format!("{}: the picture's name must end in .png or .exr", path.display()))),
+    };
+    if args.aov.is_some() && format == Format::Png {
+        return Err(usage("--aov needs an .exr: a PNG holds one picture".into()));
+    }
+    if !args.exposure.is_finite() {
+        return Err(usage(format!("--exposure {} is not a finite number of stops", args.exposure)));
+    }
+    image_io::check_writable(path)?;
+    if let Some(diff) = &args.diff {
+        image_io::check_writable(diff)?;
+    }
+    Ok(format)
+}
+
+fn metadata(gpu: &Gpu, weights: String) -> Metadata {
+    let command: Vec<String> = std::env::args().skip(1).collect();
+    let driver = format!("{} {}", gpu.info.driver, gpu.info.driver_info);
+    let software = format!("bouncelight {}", env!("CARGO_PKG_VERSION"));
+    [
+        ("Software", software),
+        ("Command", format!("bouncelight {}", command.join(" "))),
+        ("Adapter", gpu.info.name.clone()),
+        ("Backend", format!("{:?}", gpu.info.backend).to_lowercase()),
+        ("Driver", driver.trim().into()),
+        ("Weights", weights),
+    ]
+    .map(|(k, v)| (k.to_string(), v))
+    .to_vec()
+}
+
+fn write(args: &Args, format: Format, frame: &CapturedFrame, metadata: &Metadata) -> Result<()> {
+    let [width, height] = args.scene.size;
+    match format {
+        Format::Png => {
+            let rgb = shown_bytes(&rgb(frame), args.exposure, args.tonemap);
+            image_io::write_png(&args.output, width, height, &rgb, metadata)?;
+        }
+        Format::Exr => {
+            let mut layers = vec![image_io::Layer::new("", "RGBA", &frame.beauty.data)];
+            layers.extend(
+                frame.layers.iter().map(|(layer, picture)| {
+                    image_io::Layer::new(layer.name(), &layer.channels().concat(), &picture.data)
+                }),
+            );
+            image_io::write_exr(&args.output, width, height, &layers, metadata)?;
+        }
+    }
+    Ok(())
+}
+
+fn rgb(frame: &CapturedFrame) -> Vec<f32> {
+    frame.beauty.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
+}
+
+/// Prints the metric and fails when it is on the wrong side of the threshold.
+fn judge(args: &Args, frame: &CapturedFrame, reference: &Shown) -> Result<()> {
+    let name = args.output.display().to_string();
+    let ours = Shown::linear(name, args.scene.size.map(|n| n as usize), rgb(frame), args.exposure, args.tonemap);
+    let comparison = ours.against(reference)?;
+    if let Some(path) = &args.diff {
+        ours.write_heat_map(reference, path)?;
+    }
+    let Some(value) = comparison.value(&args.metric) else {
+        return Err(usage(format!("{} needs a linear reference (EXR)", args.metric)));
+    };
+    // The picture itself may be on standard output.
+    eprintln!("{} {value:.6}", args.metric);
+    match args.threshold {
+        Some(threshold) if comparison.passes(&args.metric, threshold) == Some(false) => {
+            Err(CliError::AboveThreshold { metric: args.metric.clone(), value, threshold }.into())
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,209 @@
+//! [`NeuralGi`]: G-buffer in, indirect light out, as one pass that any wgpu renderer can embed. It records; it never
+//! submits, never waits and never creates a device.
+//!
+//! ```text
+//!  depth ───────┬──────────────┬──────────────────────────────────┐
+//!  normal ──────┼──────────────┼──────────────────────────────┐   │
+//!  albedo ──────┼──────────────┤                              │   │
+//!  emissive ────┼─► exposure ─┬┴► pack ─► U-Net (net.*) ─► reconstruct ─► E/π
+//!  direct ──────┘      s      └──────────────────────────────►┘
+//! ```
+//!
+//! What the method cannot do: see [`crate::gi`].
+
+use super::exposure::ExposurePass;
+use super::features::FeatureSet;
+use super::inputs::{CELL, InputGroup, cells_of};
+use super::pack::{self, NetworkInputs, PackPass};
+use super::reconstruct::ReconstructPass;
+use super::{GiError, Inputs};
+use crate::gpu::timing::Recorder;
+use crate::net::format::Weights;
+use crate::net::gpu::Network;
+
+/// What the host chooses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// Width and height of the pictures to come, pixels. A recording of another size rebuilds the buffers.
+    pub size: [u32; 2],
+}
+
+/// The meaning of the output that reconstruction undoes: y = ln(E/π / s).
+const MEANING: &str = "log_irradiance_over_exposure";
+
+/// The embeddable pass. Keeps clones of device and queue (both are handles) to rebuild on a change of size and to
+/// write its parameters; parameters become visible to the GPU with the host's next submission, and up to
+/// [`SLOTS`](super::inputs::SLOTS) recordings may go into one submission.
+pub struct NeuralGi {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    weights: Weights,
+    features: FeatureSet,
+    inputs: InputGroup,
+    exposure: ExposurePass,
+    reconstruct: ReconstructPass,
+    rebuilt: Rebuilt,
+    rebuilds: u64,
+}
+
+/// What depends on the size of the picture.
+struct Rebuilt {
+    size: [u32; 2],
+    network: Network,
+    pack: PackPass,
+}
+
+impl NeuralGi {
+    /// Features that would be used where the adapter has them: timestamps, and those only by hosts that time passes.
+    /// None is needed.
+    pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
+        adapter.features() & wgpu::Features::TIMESTAMP_QUERY
+    }
+
+    /// Limits that the device must have: WebGPU's defaults.
+    pub fn required_limits() -> wgpu::Limits {
+        wgpu::Limits::default()
+    }
+
+    /// Compiles all pipelines, uploads the weights and makes the buffers for `options.size`.
+    ///
+    /// # Errors
+    /// [`GiError::Feature`] or [`GiError::Output`] when the weights speak of something else than light on this
+    /// program's features, [`GiError::Size`] and [`GiError::Network`] when the size does not fit the device.
+    pub fn new(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        weights: &Weights,
+        options: Options,
+    ) -> Result<Self, GiError> {
+        let features = check_weights(weights)?;
+        let inputs = InputGroup::new(device);
+        let exposure = ExposurePass::new(device, &inputs);
+        let reconstruct = ReconstructPass::new(device, &inputs);
+        let rebuilt = Rebuilt::new(device, queue, weights, &features, &inputs, &exposure, options.size)?;
+        Ok(Self {
+            device: device.clone(),
+            queue: queue.clone(),
+            weights: weights.clone(),
+            features,
+            inputs,
+            exposure,
+            reconstruct,
+            rebuilt,
+            rebuilds: 0,
+        })
+    }
+
+    /// Records all stages: `output` (`Rgba16Float`, usage STORAGE_BINDING, the inputs' size) becomes the light that
+    /// direct lighting misses, as E/π; 0 on the background. Allocates only when the size or the views are new.
+    ///
+    /// # Errors
+    /// [`GiError`] when inputs or output do not fit; then nothing was recorded.
+    pub fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        inputs: &Inputs<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError> {
+        self.record_stages(&mut Recorder::new(encoder), inputs, output)
+    }
+
+    /// Like [`record`](Self::record), for a frame that times each stage: `gi.exposure`, `gi.pack`, `net.*`,
+    /// `gi.reconstruct`.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    pub fn record_stages(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        inputs: &Inputs<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError> {
+        super::ambient::check_output(output, inputs.size)?;
+        if inputs.size != self.rebuilt.size {
+            self.resize(inputs.size)?;
+        }
+        let bound = self.inputs.bind(&self.queue, inputs)?;
+        self.exposure.record(recorder, &bound);
+        self.rebuilt.pack.record(recorder, &bound);
+        self.rebuilt.network.record(recorder);
+        self.reconstruct.record(recorder, &bound, &self.exposure, self.rebuilt.network.output().resource(), output)
+    }
+
+    fn resize(&mut self, size: [u32; 2]) -> Result<(), GiError> {
+        self.rebuilt =
+            Rebuilt::new(&self.device, &self.queue, &self.weights, &self.features, &self.inputs, &self.exposure, size)?;
+        self.rebuilds += 1;
+        self.forget();
+        Ok(())
+    }
+
+    /// What the network is given for `inputs`, read back. Makes its own buffers, submits and waits: for tools, not
+    /// for frames. [`pack::read_features`] does the same without weights.
+    ///
+    /// # Errors
+    /// [`GiError`] when the inputs do not fit or reading back fails.
+    pub fn read_inputs(&self, inputs: &Inputs<'_>) -> Result<NetworkInputs, GiError> {
+        pack::read_features(&self.device, &self.queue, &self.features, inputs)
+    }
+
+    /// Lets go of the remembered texture views, and so of the textures; call it when targets are rebuilt.
+    pub fn forget(&mut self) {
+        self.inputs.forget();
+        self.reconstruct.forget();
+    }
+
+    /// The exposure of the last recording, see [`super::exposure::read`].
+    pub fn exposure_buffer(&self) -> &wgpu::Buffer {
+        self.exposure.buffer()
+    }
+
+    /// The features that the weights use.
+    pub fn features(&self) -> &FeatureSet {
+        &self.features
+    }
+
+    /// GPU memory of all buffers and weights, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.inputs.bytes() + self.exposure.bytes() + self.rebuilt.network.bytes()
+    }
+
+    /// Bind groups and rebuilds since the start; stands still in steady frames.
+    pub fn allocations(&self) -> u64 {
+        self.inputs.made() + self.reconstruct.made() + self.rebuilds
+    }
+}
+
+impl Rebuilt {
+    fn new(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        weights: &Weights,
+        features: &FeatureSet,
+        inputs: &InputGroup,
+        exposure: &ExposurePass,
+        size: [u32; 2],
+    ) -> Result<Self, GiError> {
+        pack::feature_bytes(device, features, size)?;
+        let cells = cells_of(size);
+        let network =
+            Network::new(device, queue, weights, cells).map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
+        let pack = PackPass::new(device, inputs, exposure, features, network.input().resource());
+        Ok(Self { size, network, pack })
+    }
+}
+
+/// The feature set of weights that this pass can run.
+fn check_weights(weights: &Weights) -> Result<FeatureSet, GiError> {
+    let table = &weights.table;
+    if (table.name.as_str(), table.version, weights.cell) != ("screen", 1, CELL) {
+        let found = format!("table {} version {}, {} pixels a cell", table.name, table.version, weights.cell);
+        let reason = format!("list is made for {found}; this program makes screen version 1, {CELL} pixels a cell");
+        return Err(GiError::Feature { name: "(all)".into(), reason });
+    }
+    if weights.output.meaning != MEANING || weights.output.channels != 3 {
+        let found = format!("{} channels of `{}`", weights.output.channels, weights.output.meaning);
+        return Err(GiError::Output(found));
+    }
+    FeatureSet::new(weights.inputs.iter().map(|f| (f.name.as_str(), f.channels)))
+}

@@ -1,0 +1,107 @@
+//! From one answer per 4×4 cell to light at every pixel: a joint bilateral upsampling in f32.
+//!
+//! The four cells around a pixel are weighted bilinearly times how much their sample lies on the pixel's own surface:
+//! distance from the pixel's plane relative to the pixel's depth, and agreement of normals. Where those four mostly
+//! disagree (an edge, something thin) the 4×4 cells around are asked, then 8×8; where even those show only background
+//! the ambient constant answers. Background pixels get 0. Cells whose sample is background never give light.
+
+use super::exposure::{ExposurePass, output_entry, pipeline, storage_entry};
+use super::inputs::{BoundInputs, InputGroup};
+use super::{GiError, ambient, cache::ViewCache};
+use crate::gpu::shaders;
+use crate::gpu::timing::Recorder;
+
+/// Distance from the pixel's plane, relative to the view distance, at which a tap's weight has fallen to a quarter.
+/// About half a cell's footprint at 1024×512 and 60°: nothing closer can be told apart at this resolution anyway.
+pub const PLANE_TOLERANCE: f32 = 0.004;
+/// Power of the cosine between normals: 10° keeps 78 %, 30° keeps 10 %, 60° nothing.
+pub const NORMAL_POWER: f32 = 16.0;
+/// Least factor by normals, so that a wrong normal in the right plane still beats a wrong plane.
+pub const NORMAL_FLOOR: f32 = 1e-5;
+/// Least weight, so that no sum over hit cells is 0.
+pub const WEIGHT_FLOOR: f32 = 1e-15;
+/// Sum of the four weights below which more cells are asked.
+pub const TRUST: f32 = 0.1;
+/// Sum over the 4×4 cells below which 8×8 are asked.
+pub const LOST: f32 = 1e-3;
+
+/// The constants as WGSL.
+pub fn prelude() -> String {
+    let mut text = ambient::prelude();
+    for (name, value) in [
+        ("PLANE_TOLERANCE", PLANE_TOLERANCE),
+        ("NORMAL_POWER", NORMAL_POWER),
+        ("NORMAL_FLOOR", NORMAL_FLOOR),
+        ("WEIGHT_FLOOR", WEIGHT_FLOOR),
+        ("TRUST", TRUST),
+        ("LOST", LOST),
+    ] {
+        text.push_str(&format!("const {name} = f32({value:?});\n"));
+    }
+    text
+}
+
+/// The reconstruction stage.
+pub struct ReconstructPass {
+    device: wgpu::Device,
+    pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+    outputs: ViewCache<1>,
+}
+
+impl ReconstructPass {
+    /// Compiles the shader.
+    pub fn new(device: &wgpu::Device, inputs: &InputGroup) -> Self {
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("gi.reconstruct"),
+            entries: &[storage_entry(0, true), storage_entry(1, true), output_entry(2)],
+        });
+        let module = shaders::module_with(device, "gi.reconstruct", &prelude());
+        let pipeline = pipeline(device, "gi.reconstruct", &module, "reconstruct", inputs, &layout);
+        Self { device: device.clone(), pipeline, layout, outputs: ViewCache::new() }
+    }
+
+    /// Records pass `gi.reconstruct`. `answers` holds y, NHWC with 3 channels padded to 4, and must be the same buffer
+    /// until [`forget`](Self::forget); `output` (`Rgba16Float`, storage, full size) becomes E/π = s·exp(y).
+    ///
+    /// # Errors
+    /// [`GiError::Texture`] when `output` does not fit.
+    pub fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        inputs: &BoundInputs,
+        exposure: &ExposurePass,
+        answers: wgpu::BindingResource<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError> {
+        ambient::check_output(output, inputs.size)?;
+        let group = self.outputs.get([output], || {
+            Ok::<_, GiError>(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("gi.reconstruct"),
+                layout: &self.layout,
+                entries: &[
+                    wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
+                    wgpu::BindGroupEntry { binding: 1, resource: answers },
+                    wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(output) },
+                ],
+            }))
+        })?;
+        recorder.compute("gi.reconstruct", |pass| {
+            inputs.set(pass);
+            pass.set_bind_group(1, &group, &[]);
+            pass.set_pipeline(&self.pipeline);
+            pass.dispatch_workgroups(inputs.size[0].div_ceil(8), inputs.size[1].div_ceil(8), 1);
+        });
+        Ok(())
+    }
+
+    /// Lets go of output views and of the answers' buffer.
+    pub fn forget(&mut self) {
+        self.outputs.clear();
+    }
+
+    /// Bind groups made so far.
+    pub fn made(&self) -> u64 {
+        self.outputs.made()
+    }
+}

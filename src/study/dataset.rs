@@ -1,0 +1,142 @@
+//! One training sample: what the network is fed for a view, with the raw G-buffer values at the same sample points.
+
+use crate::{
+    gi::{
+        features::FeatureSet,
+        inputs::sample_pixel,
+        pack::{NetworkInputs, read_features},
+    },
+    gpu::{Gpu, readback, timing::Recorder},
+    render::{RenderError, Renderer, View},
+    scene::{Camera, upload::SceneGpu},
+};
+use half::f16;
+use safetensors::{Dtype, tensor::TensorView};
+use thiserror::Error;
+
+/// Why a sample could not be made.
+#[derive(Debug, Error)]
+pub enum DatasetError {
+    /// The frame could not be drawn.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// The GPU did not give the data.
+    #[error(transparent)]
+    Readback(#[from] readback::ReadbackError),
+    /// The GI pass did not give its inputs.
+    #[error(transparent)]
+    Gi(#[from] crate::gi::GiError),
+    /// Serialisation failed.
+    #[error("cannot serialise the sample: {0}")]
+    Serialize(String),
+}
+
+/// What belongs to one view, at the network's resolution. Planes are `[channel][row][column]`.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    /// The network's inputs and the exposure scalar.
+    pub inputs: NetworkInputs,
+    /// Direct diffuse light as E/π, three planes.
+    pub direct: Vec<f32>,
+    /// Diffuse reflectance, three planes.
+    pub albedo: Vec<f32>,
+    /// World normal, three planes; zero on background.
+    pub normal: Vec<f32>,
+    /// Distance along the view axis, metres, one plane; 0 on background.
+    pub depth: Vec<f32>,
+}
+
+/// Draws `camera`'s view once, unjittered, and reads what training needs of it; any method will do, the network's
+/// inputs do not depend on it. Blocks.
+pub fn sample(gpu: &Gpu, renderer: &mut Renderer, scene: &SceneGpu, camera: &Camera) -> Result<Sample, DatasetError> {
+    let view = View::new(camera, renderer.size(), [0.0; 2]);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view)?;
+    gpu.queue.submit([encoder.finish()]);
+    let gi_inputs = renderer.gi_inputs(&view, scene.environment.radiance);
+    let inputs = read_features(&gpu.device, &gpu.queue, &FeatureSet::all(), &gi_inputs)?;
+    let cells = Cells { size: renderer.size(), low: inputs.cells };
+    let targets = renderer.targets();
+    let read = |texture: &wgpu::Texture| readback::texture(&gpu.device, &gpu.queue, texture);
+    let depth = cells.pick(&read(&targets.depth.texture)?, |b: [u8; 4]| [f32::from_le_bytes(b)]);
+    let half = |b: &[u8]| f16::from_le_bytes([b[0], b[1]]).to_f32();
+    Ok(Sample {
+        direct: cells
+            .pick(&read(&targets.direct_diffuse.texture)?, |b: [u8; 8]| [half(&b), half(&b[2..]), half(&b[4..])]),
+        albedo: cells.pick(&read(&targets.albedo.texture)?, |b: [u8; 4]| [srgb(b[0]), srgb(b[1]), srgb(b[2])]),
+        normal: cells.pick(&read(&targets.normal.texture)?, |b: [u8; 4]| octahedral(half(&b), half(&b[2..]))),
+        depth: depth.into_iter().map(|d| if d > 0.0 { camera.near / d } else { 0.0 }).collect(),
+        inputs,
+    })
+}
+
+impl Sample {
+    /// Share of the cells on surfaces nearer than `distance`, metres.
+    pub fn closer_than(&self, distance: f32) -> f32 {
+        let near = self.depth.iter().filter(|d| **d > 0.0 && **d < distance).count();
+        near as f32 / self.depth.len().max(1) as f32
+    }
+
+    /// The sample as a safetensors file: `features` [channels, h, w], `scale` [1] (the exposure s), `direct`, `albedo` and
+    /// `normal` [3, h, w], `depth` [h, w], all f32.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, DatasetError> {
+        let [w, h] = self.inputs.cells.map(|n| n as usize);
+        let channels = self.inputs.features.len() / (w * h);
+        let scale = [self.inputs.exposure.s];
+        let tensors: [(&str, Vec<usize>, &[f32]); 6] = [
+            ("features", vec![channels, h, w], &self.inputs.features),
+            ("scale", vec![1], &scale),
+            ("direct", vec![3, h, w], &self.direct),
+            ("albedo", vec![3, h, w], &self.albedo),
+            ("normal", vec![3, h, w], &self.normal),
+            ("depth", vec![h, w], &self.depth),
+        ];
+        let failed = |e: safetensors::SafeTensorError| DatasetError::Serialize(e.to_string());
+        let views = tensors
+            .iter()
+            .map(|(name, shape, values)| {
+                TensorView::new(Dtype::F32, shape.clone(), bytemuck::cast_slice(values)).map(|view| (*name, view))
+            })
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(failed)?;
+        safetensors::serialize(views, None).map_err(failed)
+    }
+}
+
+/// Which pixel stands for which cell.
+struct Cells {
+    size: [u32; 2],
+    low: [u32; 2],
+}
+
+impl Cells {
+    /// Decodes the sample point of every cell from tightly packed texels of `T` bytes into `N` planes.
+    fn pick<const T: usize, const N: usize>(&self, texels: &[u8], decode: impl Fn([u8; T]) -> [f32; N]) -> Vec<f32> {
+        let mut planes: [Vec<f32>; N] = std::array::from_fn(|_| Vec::new());
+        for j in 0..self.low[1] {
+            for i in 0..self.low[0] {
+                let [x, y] = sample_pixel([i, j], self.size);
+                let at = (y * self.size[0] + x) as usize * T;
+                let texel: [u8; T] = texels[at..at + T].try_into().expect("a slice of T bytes");
+                for (plane, value) in planes.iter_mut().zip(decode(texel)) {
+                    plane.push(value);
+                }
+            }
+        }
+        planes.concat()
+    }
+}
+
+/// Linear value of an sRGB byte (IEC 61966-2-1).
+fn srgb(byte: u8) -> f32 {
+    let v = f32::from(byte) / 255.0;
+    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Unit vector from octahedral coordinates, as `oct_decode` in shaders/lib/octahedral.wgsl.
+fn octahedral(x: f32, y: f32) -> [f32; 3] {
+    let z = 1.0 - x.abs() - y.abs();
+    let t = (-z).max(0.0);
+    let fold = |v: f32| if v >= 0.0 { v - t } else { v + t };
+    glam::Vec3::new(fold(x), fold(y), z).normalize().into()
+}

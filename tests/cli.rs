@@ -1,0 +1,230 @@
+//! The program as a user meets it: exit codes, messages, files that appear or do not.
+
+mod common;
+
+use assert_cmd::Command;
+use std::path::Path;
+
+fn bouncelight(args: &[&str]) -> std::process::Output {
+    Command::new(env!("CARGO_BIN_EXE_bouncelight")).args(args).output().expect("the program starts")
+}
+
+/// Runs and checks the exit code and that standard error holds every one of `words`; never a panic message.
+#[track_caller]
+fn fails(args: &[&str], code: i32, words: &[&str]) {
+    let out = bouncelight(args);
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(code), "{args:?}: {text}");
+    assert!(!text.contains("panicked"), "{args:?}: {text}");
+    for word in words {
+        assert!(text.contains(word), "{args:?}: `{word}` is missing in: {text}");
+    }
+}
+
+fn path(dir: &tempfile::TempDir, name: &str) -> String {
+    dir.path().join(name).to_str().expect("a temporary path is text").into()
+}
+
+fn is_empty(dir: &Path) -> bool {
+    std::fs::read_dir(dir).expect("the folder exists").next().is_none()
+}
+
+#[test]
+fn usage_errors_exit_with_2() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = path(&dir, "x.png");
+    fails(&["render", "interior", "-o", &out, "--size", "0x0"], 2, &["--size", "at least 1"]);
+    fails(&["render", "interior", "-o", &out, "--size", "12"], 2, &["1024x512"]);
+    fails(&["render", "interior", "-o", &out, "--eye", "1,2,3"], 2, &["--look-at"]);
+    fails(&["render", "interior", "-o", &out, "--eye", "1,2,3", "--look-at", "1,2,3"], 2, &["same point"]);
+    fails(&["render", "interior", "-o", &out, "--camera", "99"], 2, &["--camera 99"]);
+    fails(&["render", "interior", "-o", &out, "--fov", "180"], 2, &["--fov"]);
+    fails(&["render", "interior", "-o", &out, "--aov", "Bogus"], 2, &["Bogus", "DiffInd"]);
+    fails(&["render", "interior", "-o", &out, "--environment", "nan"], 2, &["finite"]);
+    fails(&["render", "interior", "-o", &path(&dir, "x.bmp")], 2, &[".png", ".exr"]);
+    fails(&["render", "interior"], 2, &["--output"]);
+    fails(&["paint"], 2, &["paint"]);
+    fails(&["dataset", "--rooms", "5-47", "--out", &path(&dir, "d")], 2, &["judging", "47"]);
+    assert!(is_empty(dir.path()), "a usage error leaves nothing behind");
+}
+
+#[test]
+fn invalid_scenes_exit_with_4_and_name_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = path(&dir, "out.png");
+    let (cut, empty, stray) = (path(&dir, "cut.glb"), path(&dir, "empty.glb"), path(&dir, "scene.txt"));
+    std::fs::write(&cut, b"glTF\x02\0\0\0\xff\0\0\0").unwrap();
+    std::fs::write(&empty, b"").unwrap();
+    std::fs::write(&stray, b"hello").unwrap();
+    fails(&["render", &cut, "-o", &out], 4, &["cut.glb"]);
+    fails(&["render", &empty, "-o", &out], 4, &["empty.glb"]);
+    fails(&["render", &stray, "-o", &out], 4, &["scene.txt", ".glb"]);
+    fails(&["render", dir.path().to_str().unwrap(), "-o", &out], 4, &["folder"]);
+    fails(&["render", &path(&dir, "none.gltf"), "-o", &out], 4, &["none.gltf"]);
+    fails(&["render", "no-such-scene", "-o", &out], 4, &["no-such-scene", "interior"]);
+    fails(&["render", "paper-room:-1", "-o", &out], 4, &["paper-room:-1"]);
+    assert!(!Path::new(&out).exists());
+}
+
+#[test]
+fn invalid_weights_exit_with_4_and_name_the_tensor() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = path(&dir, "out.png");
+    let shipped =
+        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/weights/compact.safetensors")).unwrap();
+    let text = path(&dir, "text.safetensors");
+    std::fs::write(&text, b"these are no weights").unwrap();
+    fails(&["render", "interior", "-o", &out, "--weights", &text], 4, &["text.safetensors"]);
+    let cut = path(&dir, "cut.safetensors");
+    std::fs::write(&cut, &shipped[..shipped.len() - 64]).unwrap();
+    fails(&["render", "interior", "-o", &out, "--weights", &cut], 4, &["cut.safetensors"]);
+    // The last four bytes belong to the last tensor's last number.
+    let nan = path(&dir, "nan.safetensors");
+    let mut bytes = shipped.clone();
+    let end = bytes.len();
+    bytes[end - 4..].copy_from_slice(&f32::NAN.to_le_bytes());
+    std::fs::write(&nan, &bytes).unwrap();
+    fails(&["render", "interior", "-o", &out, "--weights", &nan], 4, &["nan.safetensors", "weight"]);
+    // Renaming a tensor in the header makes one missing and one unexpected; both are reported.
+    let missing = path(&dir, "missing.safetensors");
+    std::fs::write(&missing, replaced(&shipped, b"\"head.weight\"", b"\"HEAD.weight\"")).unwrap();
+    fails(&["render", "interior", "-o", &out, "--weights", &missing], 4, &["head.weight", "HEAD.weight"]);
+    fails(&["weights", "verify", &missing], 4, &["head.weight"]);
+    // Another shape with as many bytes.
+    let misshaped = path(&dir, "misshaped.safetensors");
+    std::fs::write(&misshaped, replaced(&shipped, b"[3,16,3,3]", b"[16,3,3,3]")).unwrap();
+    fails(&["render", "interior", "-o", &out, "--weights", &misshaped], 4, &["head.weight"]);
+    fails(&["weights", "info", dir.path().to_str().unwrap()], 4, &["folder"]);
+    assert!(!Path::new(&out).exists());
+}
+
+/// `bytes` with the one occurrence of `from` replaced by `to` of the same length.
+fn replaced(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
+    assert_eq!(from.len(), to.len());
+    let at: Vec<usize> = (0..bytes.len() - from.len()).filter(|&i| bytes[i..].starts_with(from)).collect();
+    assert_eq!(at.len(), 1, "{} occurs once", String::from_utf8_lossy(from));
+    let mut out = bytes.to_vec();
+    out[at[0]..at[0] + to.len()].copy_from_slice(to);
+    out
+}
+
+#[test]
+fn unwritable_outputs_exit_with_1_before_anything_is_drawn() {
+    let dir = tempfile::tempdir().unwrap();
+    fails(&["render", "interior", "-o", &path(&dir, "no/such/folder/x.png")], 1, &["no/such/folder"]);
+    let folder = path(&dir, "folder.png");
+    std::fs::create_dir(&folder).unwrap();
+    fails(&["render", "interior", "-o", &folder], 1, &["folder.png"]);
+    assert!(is_empty(Path::new(&folder)), "nothing half-written stays");
+}
+
+#[test]
+fn no_adapter_exits_with_3_and_says_what_to_install() {
+    fails(&["doctor", "--adapter", "no such card"], 3, &["no such card"]);
+    // A Vulkan loader that is pointed at no driver finds none.
+    let out = Command::new(env!("CARGO_BIN_EXE_bouncelight"))
+        .args(["doctor", "--backend", "vulkan"])
+        .env("VK_DRIVER_FILES", "/dev/null")
+        .env("VK_ICD_FILENAMES", "/dev/null")
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(3), "{text}");
+    assert!(!cfg!(target_os = "linux") || text.contains("mesa-vulkan-drivers"), "{text}");
+}
+
+#[test]
+fn a_wrong_backend_variable_is_named() {
+    let out =
+        Command::new(env!("CARGO_BIN_EXE_bouncelight")).arg("doctor").env("WGPU_BACKEND", "glide").output().unwrap();
+    assert_eq!(out.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&out.stderr).contains("glide"));
+}
+
+#[test]
+fn render_writes_a_whole_picture_with_provenance() {
+    let Some(gpu) = common::gpu() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let png = path(&dir, "cornell.png");
+    let out = bouncelight(&["render", "cornell", "-o", &png, "--size", "160x80"]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let (image, metadata) = bouncelight::image_io::read_png_with_metadata(Path::new(&png)).unwrap();
+    assert_eq!((image.width, image.height), (160, 80));
+    let text = |key: &str| metadata.iter().find(|(k, _)| k == key).map(|(_, v)| v.clone()).unwrap_or_default();
+    assert!(text("Adapter").contains(&gpu.info.name));
+    assert!(text("Command").contains("render cornell"));
+    assert!(text("Weights").len() >= 8);
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file stays");
+}
+
+#[test]
+fn the_same_command_gives_the_same_picture_and_layers_add_up() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let layers = |name: &str, seed: &str| {
+        let file = path(&dir, name);
+        let args =
+            ["render", "interior", "-o", &file, "--size", "96x48", "--aov", "all", "--samples", "2", "--seed", seed];
+        let out = bouncelight(&args);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        bouncelight::image_io::read_exr(Path::new(&file)).unwrap()
+    };
+    let (a, b, c) = (layers("a.exr", "1"), layers("b.exr", "1"), layers("c.exr", "2"));
+    let beauty = a.image("Combined").unwrap().to_rgb();
+    assert_eq!(beauty, b.image("Combined").unwrap().to_rgb());
+    assert_ne!(beauty, c.image("Combined").unwrap().to_rgb(), "another seed is another picture");
+    for name in ["DiffDir", "DiffInd", "DiffCol", "Emit", "Normal", "Depth", "Position", "Motion"] {
+        a.layer(name).unwrap();
+    }
+}
+
+#[test]
+fn a_reference_above_the_threshold_exits_with_5() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let (bright, diff) = (path(&dir, "bright.png"), path(&dir, "diff.png"));
+    let base = ["render", "cornell", "--size", "96x48", "-o"];
+    let with = |extra: &[&str]| bouncelight(&[&base[..], extra].concat());
+    assert!(with(&[&bright, "--exposure", "1"]).status.success());
+    let again = path(&dir, "again.png");
+    let same = with(&[&again, "--exposure", "1", "--reference", &bright, "--metric", "psnr", "--threshold", "60"]);
+    assert!(same.status.success(), "{}", String::from_utf8_lossy(&same.stderr));
+    let dark = with(&[&again, "--reference", &bright, "--metric", "psnr", "--threshold", "60", "--diff", &diff]);
+    assert_eq!(dark.status.code(), Some(5), "{}", String::from_utf8_lossy(&dark.stderr));
+    assert!(Path::new(&diff).exists() && Path::new(&again).exists(), "the pictures are kept for a look");
+}
+
+#[test]
+fn bench_prints_passes_and_writes_a_record_that_it_can_compare_with() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let json = path(&dir, "bench.json");
+    let base = ["bench", "cornell", "--size", "128x64", "--frames", "3", "--warmup", "1", "--layers"];
+    let out = bouncelight(&[&base[..], &["--json", &json]].concat());
+    let text = String::from_utf8_lossy(&out.stdout);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    for word in ["render.gbuffer", "render.direct", "net.", "gi.reconstruct", "wall clock", "MiB of GPU memory"] {
+        assert!(text.contains(word), "`{word}` is missing in: {text}");
+    }
+    let record: serde_json::Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+    assert_eq!(record["schema"], 1);
+    assert_eq!(record["methods"].as_array().unwrap().len(), 3);
+    // Against a base that was a thousand times faster, it is too slow.
+    let mut fast = record.clone();
+    for m in fast["methods"].as_array_mut().unwrap() {
+        for key in ["gpu_ms", "wall_ms"] {
+            if let Some(v) = m[key]["median"].as_f64() {
+                m[key]["median"] = (v / 1000.0).into();
+            }
+        }
+    }
+    std::fs::write(&json, fast.to_string()).unwrap();
+    let slow = bouncelight(&[&base[..], &["--compare", &json, "--fail-over", "5%"]].concat());
+    assert_eq!(slow.status.code(), Some(6), "{}", String::from_utf8_lossy(&slow.stderr));
+}

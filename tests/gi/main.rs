@@ -1,0 +1,18 @@
+//! `gi/` against its CPU twin, against arithmetic and against the laws it promises, on hand-made G-buffers.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod edges;
+mod shot;
+mod stages;
+mod weights;
+mod whole;
+
+use bouncelight::gpu::Gpu;
+
+/// Reads a Rgba16Float texture as rgb.
+pub fn read_light(gpu: &Gpu, texture: &wgpu::Texture) -> Vec<[f32; 3]> {
+    let bytes = bouncelight::gpu::readback::texture(&gpu.device, &gpu.queue, texture).expect("readable");
+    let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
+    halves.chunks_exact(4).map(|c| [c[0], c[1], c[2]].map(half::f16::to_f32)).collect()
+}

@@ -1,0 +1,46 @@
+//! A tiny weights file in memory: a 1×1 and a 3×3 convolution on all features.
+
+use bouncelight::gi::features::FEATURES;
+use safetensors::tensor::{Dtype, TensorView};
+
+use crate::shot::Random;
+
+/// The bytes of the file. `replace` changes one word of its document, for files that must be refused.
+pub fn bytes(replace: Option<(&str, &str)>) -> Vec<u8> {
+    let inputs: Vec<String> =
+        FEATURES.iter().map(|f| format!(r#"{{"name": "{}", "channels": {}}}"#, f.name, f.channels)).collect();
+    let mut document = format!(
+        r#"{{"version": 1, "licence": "CC0-1.0", "table": {{"name": "screen", "version": 1}}, "inputs": [{}],
+            "cell": 4, "output": {{"tensor": "y", "meaning": "log_irradiance_over_exposure", "channels": 3}},
+            "graph": [
+                {{"op": "conv2d", "name": "a", "input": "input", "output": "x", "in_channels": 21, "out_channels": 8,
+                  "kernel": [1, 1], "activation": "relu"}},
+                {{"op": "conv2d", "name": "b", "input": "x", "output": "y", "in_channels": 8, "out_channels": 3,
+                  "kernel": [3, 3], "padding": 1}}]}}"#,
+        inputs.join(", ")
+    );
+    if let Some((from, to)) = replace {
+        assert!(document.contains(from), "the document has `{from}`");
+        document = document.replace(from, to);
+    }
+    let mut random = Random(42);
+    let mut floats = |n: usize, scale: f32| -> Vec<u8> {
+        (0..n).flat_map(|_| (scale * (random.unit() - 0.5)).to_le_bytes()).collect()
+    };
+    let tensors = [
+        ("a.weight", vec![8, 21, 1, 1], floats(8 * 21, 0.8)),
+        ("a.bias", vec![8], floats(8, 0.5)),
+        ("b.weight", vec![3, 8, 3, 3], floats(3 * 8 * 9, 0.5)),
+        ("b.bias", vec![3], floats(3, 0.5)),
+    ];
+    let views = tensors
+        .iter()
+        .map(|(name, shape, data)| (*name, TensorView::new(Dtype::F32, shape.clone(), data).expect("sizes agree")));
+    let metadata = std::collections::HashMap::from([("bouncelight".to_string(), document)]);
+    safetensors::serialize(views, Some(metadata)).expect("serialises")
+}
+
+/// The loaded file.
+pub fn weights() -> bouncelight::net::format::Weights {
+    bouncelight::net::format::Weights::from_bytes(&bytes(None)).expect("a sound file")
+}
