@@ -222,19 +222,19 @@ fn layers_agree_with_the_reference_renders() {
 fn a_paper_room_fits_into_120_megabytes() {
     let Some(gpu) = common::gpu() else { return };
     use bouncelight::gpu::timing::{Recorder, milliseconds};
-    use bouncelight::render::{Renderer, RendererOptions, View};
+    use bouncelight::render::{Renderer, View};
     use bouncelight::scene::upload::SceneGpu;
     use wgpu_profiler::{GpuProfiler, GpuProfilerSettings};
     let scene = scene::paper_room::scene(2);
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene).unwrap();
     let size = [1024, 512];
-    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions::default()).unwrap();
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, direct_only()).unwrap();
     let mut profiler = GpuProfiler::new(&gpu.device, GpuProfilerSettings::default()).unwrap();
     for frame in 0..4 {
         let view = View::new(&scene.cameras[0], size, [0.0; 2]).with_seed(frame);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let start = std::time::Instant::now();
-        renderer.record(&mut Recorder::timed(&mut encoder, &profiler), &gpu.queue, &uploaded, &view);
+        renderer.record(&mut Recorder::timed(&mut encoder, &profiler), &gpu.queue, &uploaded, &view).unwrap();
         profiler.resolve_queries(&mut encoder);
         gpu.queue.submit([encoder.finish()]);
         profiler.end_frame().unwrap();

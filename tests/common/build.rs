@@ -58,6 +58,12 @@ pub fn point(position: [f32; 3], intensity: f32, radius: f32) -> Light {
     Light { name: "point".into(), color: [1.0; 3], kind: LightKind::Point { position, intensity, radius, range: None } }
 }
 
+pub fn spot(position: [f32; 3], direction: [f32; 3], inner_angle: f32, outer_angle: f32, radius: f32) -> Light {
+    let direction = glam::Vec3::from(direction).normalize().to_array();
+    let kind = LightKind::Spot { position, direction, intensity: 60.0, radius, range: None, inner_angle, outer_angle };
+    Light { name: "spot".into(), color: [1.0; 3], kind }
+}
+
 /// A camera at `eye` that looks at `target`.
 pub fn look_at(eye: [f32; 3], target: [f32; 3], yfov: f32) -> Camera {
     let (e, t) = (glam::Vec3::from(eye), glam::Vec3::from(target));
@@ -69,11 +75,22 @@ pub fn look_at(eye: [f32; 3], target: [f32; 3], yfov: f32) -> Camera {
     Camera { name: "test".into(), transform: transform.to_cols_array_2d(), yfov, near: 0.1, far: f32::INFINITY }
 }
 
+pub fn corner(lights: Vec<Light>) -> Scene {
+    let wall = quad([-8.0, 0.0, -4.0], [16.0, 0.0, 0.0], [0.0, 8.0, 0.0]);
+    let mut s = scene(vec![floor(20.0, 0.0), wall, quad([-1.0, 2.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, -2.0])], lights);
+    s.materials[0].base_color = [0.8, 0.5, 0.2, 1.0];
+    s
+}
+
+/// Analytic lights alone.
+pub fn direct_only() -> RendererOptions {
+    RendererOptions { method: bouncelight::gi::Method::Direct, ..Default::default() }
+}
+
 /// Captures all layers of `scene`.
 pub fn render(gpu: &Gpu, scene: &Scene, camera: &Camera, size: [u32; 2], samples: u32) -> CapturedFrame {
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the test's scene uploads");
-    let mut renderer =
-        Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions::default()).expect("the test's size is fine");
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, direct_only()).expect("the test's size is fine");
     let options = CaptureOptions { samples, seed: 0, layers: &Layer::ALL };
     capture(gpu, &mut renderer, &uploaded, camera, options).expect("capture works")
 }
