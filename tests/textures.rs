@@ -6,7 +6,8 @@ mod common;
 
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::render::capture::Layer;
-use bouncelight::render::tonemap::{Tonemap, TonemapOptions, TonemapPass};
+use bouncelight::render::tonemap::{TonemapOptions, TonemapPass};
+use bouncelight::render::tonemap_curve::Tonemap;
 use bouncelight::render::{Renderer, View};
 use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{ColorSpace, Image, Sampler, Scene, TextureRef};

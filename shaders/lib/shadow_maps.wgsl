@@ -1,6 +1,6 @@
 // Soft shadows from depth maps (percentage-closer soft shadows, Fernando 2005): find what stands between the point and
 // the light, take the penumbra that the light's size casts from there, filter over it. The pattern of taps is rotated
-// per pixel and frame, so that averaging frames converges. Expects `shadow_views`, `sun_maps`, `local_maps` and
+// per pixel and frame, so that averaging frames converges. Expects `shadow_views`, `sun_maps`, `local_maps`, `sun_depths`, `local_depths` and
 // `shadow_compare` in the module.
 
 struct ShadowView {
@@ -86,7 +86,7 @@ fn sun_disc(
         // Denser in the middle, where low blockers matter.
         let t = tap(i, SEARCH_TAPS, pattern);
         let offset = search * t * sqrt(length(t));
-        let stored = textureLoad(sun_maps, texel_of(uv + offset * to_uv, view.size), view.layer, 0);
+        let stored = textureLoad(sun_depths, texel_of(uv + offset * to_uv, view.size), view.layer, 0).x;
         let h = (stored - z) * view.range;
         if h > max(dot(slope, offset), 0.0) + bias {
             // Blockers inside the cone to the light count; the others only where there is none inside.
@@ -146,7 +146,7 @@ fn local_visibility(first: u32, count: u32, p: vec3f, n: vec3f, center: vec3f, r
     for (var i = 0u; i < SEARCH_TAPS; i++) {
         let t = tap(i, SEARCH_TAPS, pattern);
         let offset = search * t * sqrt(length(t));
-        let stored = textureLoad(local_maps, texel_of(uv + offset * to_uv, view.size), view.layer, 0);
+        let stored = textureLoad(local_depths, texel_of(uv + offset * to_uv, view.size), view.layer, 0).x;
         let plane = 1.0 / (1.0 / distance + max(dot(slope, offset), 0.0));
         let d = view.range / max(stored, 1e-9);
         if d < plane - bias {

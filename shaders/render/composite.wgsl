@@ -1,7 +1,8 @@
 // Puts light and surface together: hdr = albedo (direct + indirect) + specular + gloss colour * indirect + emissive.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var depth_texture: texture_depth_2d;
+// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL backends would refuse one.
+@group(0) @binding(1) var depth_texture: texture_2d<f32>;
 @group(0) @binding(2) var normal_texture: texture_2d<f32>;
 @group(0) @binding(3) var albedo_texture: texture_2d<f32>;
 @group(0) @binding(4) var specular_texture: texture_2d<f32>;
@@ -18,7 +19,7 @@ const HALF_MAX: f32 = 65504.0;
 fn composite(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     var radiance = frame.environment;
-    let depth = textureLoad(depth_texture, id.xy, 0);
+    let depth = textureLoad(depth_texture, id.xy, 0).x;
     if depth > 0.0 {
         let n = oct_decode(textureLoad(normal_texture, id.xy, 0).xy);
         let albedo = textureLoad(albedo_texture, id.xy, 0);

@@ -1,7 +1,8 @@
 // Direct light of the analytic lights: E/π without albedo, and the radiance of the specular lobe.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var depth_texture: texture_depth_2d;
+// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL backends would refuse one.
+@group(0) @binding(1) var depth_texture: texture_2d<f32>;
 @group(0) @binding(2) var normal_texture: texture_2d<f32>;
 @group(0) @binding(3) var specular_texture: texture_2d<f32>;
 @group(0) @binding(4) var direct_diffuse: texture_storage_2d<rgba16float, write>;
@@ -13,6 +14,9 @@
 @group(1) @binding(3) var sun_maps: texture_depth_2d_array;
 @group(1) @binding(4) var local_maps: texture_depth_2d_array;
 @group(1) @binding(5) var shadow_compare: sampler_comparison;
+// The same maps once more, for plain loads.
+@group(1) @binding(6) var sun_depths: texture_2d_array<f32>;
+@group(1) @binding(7) var local_depths: texture_2d_array<f32>;
 
 // The largest finite half: brighter light is held there instead of becoming infinite.
 const HALF_MAX: f32 = 65504.0;
@@ -22,7 +26,7 @@ fn direct(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     var diffuse = vec3f(0.0);
     var specular = vec3f(0.0);
-    let depth = textureLoad(depth_texture, id.xy, 0);
+    let depth = textureLoad(depth_texture, id.xy, 0).x;
     if depth > 0.0 {
         let n = oct_decode(textureLoad(normal_texture, id.xy, 0).xy);
         let surface = textureLoad(specular_texture, id.xy, 0);

@@ -10,7 +10,8 @@ struct Options {
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var depth_texture: texture_depth_2d;
+// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL backends would refuse one.
+@group(0) @binding(1) var depth_texture: texture_2d<f32>;
 @group(0) @binding(2) var normal_texture: texture_2d<f32>;
 @group(0) @binding(3) var albedo_texture: texture_2d<f32>;
 @group(0) @binding(4) var specular_texture: texture_2d<f32>;
@@ -34,7 +35,7 @@ fn decode(pixel: vec2u) -> vec4f {
     if options.layer == 0u {
         return vec4f(textureLoad(hdr, pixel, 0).rgb, 1.0);
     }
-    let depth = textureLoad(depth_texture, pixel, 0);
+    let depth = textureLoad(depth_texture, pixel, 0).x;
     if depth <= 0.0 {
         // Blender's background: no surface, depth 1e10.
         return select(vec4f(0.0), vec4f(1e10, 0.0, 0.0, 0.0), options.layer == 9u);

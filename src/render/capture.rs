@@ -267,8 +267,8 @@ impl Decoder {
         use tool::*;
         let t = renderer.targets();
         let stage = wgpu::ShaderStages::COMPUTE;
-        let mut types = vec![UNIFORM, DEPTH];
-        types.extend([COLOR; 9]);
+        let mut types = vec![UNIFORM, LOAD];
+        types.extend([LOAD; 9]);
         let picture_layout = layout(device, "render.layers", stage, &types);
         let output_layout = layout(device, "render.layers", stage, &[UNIFORM, READ_WRITE]);
         let pipeline = compute(device, "render.layers", "layers", &[&picture_layout, &output_layout]);

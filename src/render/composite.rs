@@ -14,7 +14,7 @@ impl CompositePass {
     /// Builds the pipeline.
     pub fn new(device: &wgpu::Device) -> Self {
         use tool::*;
-        let types = [UNIFORM, DEPTH, COLOR, COLOR, COLOR, COLOR, COLOR, COLOR, COLOR, STORE_HALF];
+        let types = [UNIFORM, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, STORE_HALF];
         let layout = layout(device, "render.composite", wgpu::ShaderStages::COMPUTE, &types);
         let pipeline = compute(device, "render.composite", "composite", &[&layout]);
         Self { pipeline, layout }

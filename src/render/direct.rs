@@ -31,9 +31,13 @@ impl DirectPass {
         let stage = wgpu::ShaderStages::COMPUTE;
         let comparison = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
         let picture_layout =
-            layout(device, "render.direct", stage, &[UNIFORM, DEPTH, COLOR, COLOR, STORE_HALF, STORE_HALF]);
-        let light_layout =
-            layout(device, "render.direct", stage, &[READ, READ, READ, DEPTH_ARRAY, DEPTH_ARRAY, comparison]);
+            layout(device, "render.direct", stage, &[UNIFORM, LOAD, LOAD, LOAD, STORE_HALF, STORE_HALF]);
+        let light_layout = layout(
+            device,
+            "render.direct",
+            stage,
+            &[READ, READ, READ, COMPARE_ARRAY, COMPARE_ARRAY, comparison, LOAD_ARRAY, LOAD_ARRAY],
+        );
         let pipeline = compute(device, "render.direct", "direct", &[&picture_layout, &light_layout]);
         let compare = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("render.direct"),
@@ -76,6 +80,8 @@ impl DirectPass {
                 wgpu::BindingResource::TextureView(&maps.sun_view),
                 wgpu::BindingResource::TextureView(&maps.local_view),
                 wgpu::BindingResource::Sampler(&self.compare),
+                wgpu::BindingResource::TextureView(&maps.sun_view),
+                wgpu::BindingResource::TextureView(&maps.local_view),
             ],
         )
     }

@@ -37,7 +37,7 @@ impl TonemapPass {
     /// For targets of `format`; sRGB formats encode by themselves and are given linear light.
     pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
         let stages = wgpu::ShaderStages::FRAGMENT;
-        let layout = tool::layout(device, "render.tonemap", stages, &[tool::UNIFORM, tool::COLOR]);
+        let layout = tool::layout(device, "render.tonemap", stages, &[tool::UNIFORM, tool::LOAD]);
         let module = shaders::module(device, "render.tonemap");
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("render.tonemap"),

@@ -50,18 +50,22 @@ const fn storage(read_only: bool) -> wgpu::BindingType {
     }
 }
 
-/// A colour texture read with `textureLoad`.
-pub(crate) const COLOR: wgpu::BindingType = wgpu::BindingType::Texture {
-    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-    view_dimension: wgpu::TextureViewDimension::D2,
-    multisampled: false,
-};
+/// A colour or depth texture read with `textureLoad`.
+pub(crate) const LOAD: wgpu::BindingType = texture(LOADED, wgpu::TextureViewDimension::D2);
+/// Layers of depth read with `textureLoad`.
+pub(crate) const LOAD_ARRAY: wgpu::BindingType = texture(LOADED, wgpu::TextureViewDimension::D2Array);
+/// Layers of depth read through a comparison sampler.
+pub(crate) const COMPARE_ARRAY: wgpu::BindingType =
+    texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2Array);
 
-pub(crate) const DEPTH: wgpu::BindingType = depth(wgpu::TextureViewDimension::D2);
-pub(crate) const DEPTH_ARRAY: wgpu::BindingType = depth(wgpu::TextureViewDimension::D2Array);
+// Depth, too: GLSL has no plain load from a depth texture, so the GL backends would refuse `Depth` here.
+const LOADED: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
 
-const fn depth(view_dimension: wgpu::TextureViewDimension) -> wgpu::BindingType {
-    wgpu::BindingType::Texture { sample_type: wgpu::TextureSampleType::Depth, view_dimension, multisampled: false }
+const fn texture(
+    sample_type: wgpu::TextureSampleType,
+    view_dimension: wgpu::TextureViewDimension,
+) -> wgpu::BindingType {
+    wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false }
 }
 
 /// An `Rgba16Float` texture written by a compute shader.
