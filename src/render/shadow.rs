@@ -208,7 +208,7 @@ impl ShadowPass {
             let size = if layers == 0 { 1 } else { size };
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
-                size: wgpu::Extent3d { width: size, height: size, depth_or_array_layers: layers.max(1) },
+                size: wgpu::Extent3d { width: size, height: size, depth_or_array_layers: array_layers(layers) },
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
@@ -357,4 +357,11 @@ fn fit(scene: &SceneGpu, view: &View, maps: &mut ShadowMaps, cascades: u32) {
             }
         }
     }
+}
+
+/// Layers to allocate for `used` ones. wgpu's GL backend guesses what an array is from its shape: one layer becomes a
+/// plain texture and a square multiple of six a cube map, neither of which binds as the array that the shader reads.
+fn array_layers(used: u32) -> u32 {
+    let layers = used.max(2);
+    if layers.is_multiple_of(6) { layers + 1 } else { layers }
 }
