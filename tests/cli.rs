@@ -228,3 +228,35 @@ fn bench_prints_passes_and_writes_a_record_that_it_can_compare_with() {
     let slow = bouncelight(&[&base[..], &["--compare", &json, "--fail-over", "5%"]].concat());
     assert_eq!(slow.status.code(), Some(6), "{}", String::from_utf8_lossy(&slow.stderr));
 }
+
+#[test]
+fn gl_draws_the_same_picture_as_vulkan() {
+    let dir = tempfile::tempdir().unwrap();
+    // The Cornell box has six local shadow maps, the room four cascades: shapes that GL could mistake for a cube map.
+    for scene in ["cornell", "paper-room:2"] {
+        let mut files = Vec::new();
+        for backend in ["vulkan", "gl"] {
+            let file = path(&dir, &format!("{backend}.png"));
+            let out = bouncelight(&["render", scene, "-o", &file, "--size", "128x64", "--backend", backend]);
+            if out.status.code() == Some(i32::from(bouncelight::cli::error::NO_ADAPTER)) {
+                println!("SKIP: no {backend} adapter");
+                return;
+            }
+            assert!(out.status.success(), "{scene} on {backend}: {}", String::from_utf8_lossy(&out.stderr));
+            files.push(file);
+        }
+        let psnr = |a: &str, b: &str| {
+            let out = bouncelight(&["compare", a, b, "--metric", "psnr"]);
+            let text = String::from_utf8_lossy(&out.stdout).into_owned();
+            text.split_whitespace().last().and_then(|v| v.parse::<f64>().ok()).expect("compare prints a number")
+        };
+        let value = psnr(&files[0], &files[1]);
+        assert!(value > 50.0, "{scene}: {value} dB between Vulkan and GL");
+        // Negative control: a tenth of a stop is told apart.
+        let brighter = path(&dir, "brighter.png");
+        let args = ["render", scene, "-o", &brighter, "--size", "128x64", "--backend", "gl", "--exposure", "0.1"];
+        assert!(bouncelight(&args).status.success());
+        let control = psnr(&files[0], &brighter);
+        assert!(control < 50.0, "{scene}: {control} dB for another exposure");
+    }
+}
