@@ -104,7 +104,9 @@ fn every_kernel_agrees_with_pytorch_and_with_the_cpu_twin() {
         let mut worst = 0f32;
         for name in NAMES {
             let weights = Weights::load(&fixture(&format!("{name}.safetensors"))).unwrap();
-            for (input, reference) in cases(name) {
+            // Every network compiles its own pipelines; the other variants need the whole net at one size only.
+            let few = name == "unet" && variant != Variant::Blocked;
+            for (input, reference) in cases(name).into_iter().take(if few { 1 } else { usize::MAX }) {
                 let found = run_gpu(&gpu, &weights, &input, variant);
                 let twin = cpu::run(&weights, &input).unwrap();
                 let e = error(&found, &reference).max(error(&found, &twin));
@@ -115,21 +117,22 @@ fn every_kernel_agrees_with_pytorch_and_with_the_cpu_twin() {
         }
         println!("{variant:?}: worst relative error {worst:.1e}");
     }
-    assert_eq!(seen, 120);
+    assert_eq!(seen, 116);
 }
 
-/// Negative control: one weight changed by a tenth of the largest must show, on the CPU and on the GPU.
+/// Negative control: one weight with its sign turned must show, on the CPU and on the GPU.
 #[test]
 fn a_perturbed_weight_is_noticed() {
     let gpu = common::gpu();
-    for name in ["conv3x3", "conv1x1", "unet"] {
+    for (name, tensor) in [("conv3x3", "c.weight"), ("conv1x1", "c.weight"), ("unet", "head.weight")] {
         let mut bytes = std::fs::read(fixture(&format!("{name}.safetensors"))).unwrap();
-        let half = name == "unet";
-        let header = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize + 8;
-        // A value amid the data: sign and exponent change, the value stays finite.
-        let at = header + (bytes.len() - header) / 4 * 2 + if half { 1 } else { 3 };
-        let at = if half { at } else { header + (at - header) / 4 * 4 + 3 };
-        bytes[at] ^= 0x81;
+        let file = SafeTensors::deserialize(&bytes).unwrap();
+        let view = file.tensor(tensor).unwrap();
+        let place = view.data().as_ptr() as usize - bytes.as_ptr() as usize;
+        let each = view.data().len() / view.shape().iter().product::<usize>();
+        // The kernel's centre, first channels: the tap that every pixel meets. The sign is in the value's last byte.
+        let centre = view.shape()[2] * view.shape()[3] / 2;
+        bytes[place + (centre + 1) * each - 1] ^= 0x80;
         let weights = Weights::from_bytes(&bytes).unwrap();
         let (input, reference) = cases(name).into_iter().max_by_key(|c| c.0.data.len()).unwrap();
         assert!(error(&cpu::run(&weights, &input).unwrap(), &reference) > TOLERANCE, "{name} on the CPU");

@@ -4,6 +4,7 @@
 mod common;
 
 use bouncelight::gpu::timing::Recorder;
+use bouncelight::net::cpu;
 use bouncelight::net::format::Weights;
 use bouncelight::net::gpu::{Network, Variant};
 use std::time::Instant;
@@ -31,6 +32,10 @@ fn compact_network_at_256x128() {
         }
     }
     let plan = networks[0].plan();
+    let input = cpu::Tensor::zeros(plan.tensors[0].shape);
+    let start = Instant::now();
+    cpu::run(&weights, &input).unwrap();
+    println!("CPU twin: {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
     println!(
         "{:.1} MFLOP, arena {} bytes, traffic {} bytes",
         plan.flops() as f64 / 1e6,

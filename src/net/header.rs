@@ -4,7 +4,7 @@
 //! stops at the first fault; this one reports every fault. Nothing is allocated from a number in the file before the
 //! number has been held against the file's size.
 
-use super::format::{Problem, WeightsError};
+use super::problem::{Problem, WeightsError};
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
 use std::collections::{BTreeMap, btree_map::Entry};
 use std::path::Path;
@@ -107,10 +107,10 @@ pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8], problems: &mut Vec<Problem
     let mut tensors = BTreeMap::new();
     for (name, info) in raw.tensors {
         match tensors.entry(name) {
-            Entry::Vacant(entry) => {
-                entry.insert(info);
+            Entry::Occupied(e) => problems.push(Problem::Duplicate { tensor: e.key().clone() }),
+            Entry::Vacant(e) => {
+                e.insert(info);
             }
-            Entry::Occupied(entry) => problems.push(Problem::Duplicate { tensor: entry.key().clone() }),
         }
     }
     tensors.retain(|name, info| match size_fault(info) {

@@ -13,3 +13,4 @@ pub mod graph;
 mod header;
 pub mod op;
 pub mod plan;
+mod problem;
