@@ -28,8 +28,28 @@ pub const GI: &[Shader] = &[
     Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },
 ];
 
-/// Shaders of `net/`.
-pub const NET: &[Shader] = &[];
+/// Shaders of `net/`. They need a prelude; `net::gpu::example_preludes` gives one of each kind.
+pub const NET: &[Shader] = &[
+    Shader {
+        name: "net.conv_plain",
+        files: wgsl!["net/common.wgsl", "net/weights_storage.wgsl", "net/conv_plain.wgsl"],
+    },
+    Shader { name: "net.conv3x3", files: wgsl!["net/common.wgsl", "net/weights_uniform.wgsl", "net/conv3x3.wgsl"] },
+    Shader {
+        name: "net.conv3x3_wide",
+        files: wgsl!["net/common.wgsl", "net/weights_storage.wgsl", "net/conv3x3.wgsl"],
+    },
+    Shader {
+        name: "net.conv_block",
+        files: wgsl!["net/common.wgsl", "net/weights_uniform.wgsl", "net/conv_block.wgsl"],
+    },
+    Shader {
+        name: "net.conv_block_wide",
+        files: wgsl!["net/common.wgsl", "net/weights_storage.wgsl", "net/conv_block.wgsl"],
+    },
+    Shader { name: "net.upsample", files: wgsl!["net/common.wgsl", "net/upsample.wgsl"] },
+    Shader { name: "net.add", files: wgsl!["net/common.wgsl", "net/add.wgsl"] },
+];
 
 /// Every shader there is.
 pub fn all() -> impl Iterator<Item = &'static Shader> {

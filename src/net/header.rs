@@ -4,9 +4,9 @@
 //! stops at the first fault; this one reports every fault. Nothing is allocated from a number in the file before the
 //! number has been held against the file's size.
 
-use super::format::{Problem, WeightsError};
+use super::problem::{Problem, WeightsError};
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, btree_map::Entry};
 use std::path::Path;
 
 /// The safetensors specification's own limit.
@@ -106,10 +106,11 @@ pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8], problems: &mut Vec<Problem
     layout(&raw.tensors, data.len() as u64, problems);
     let mut tensors = BTreeMap::new();
     for (name, info) in raw.tensors {
-        if tensors.contains_key(&name) {
-            problems.push(Problem::Duplicate { tensor: name });
-        } else {
-            tensors.insert(name, info);
+        match tensors.entry(name) {
+            Entry::Occupied(e) => problems.push(Problem::Duplicate { tensor: e.key().clone() }),
+            Entry::Vacant(e) => {
+                e.insert(info);
+            }
         }
     }
     tensors.retain(|name, info| match size_fault(info) {

@@ -6,7 +6,11 @@
 //! - [`cpu`]: the slow, obvious twin; every kernel is tested against it and against PyTorch.
 //! - [`gpu`]: the WGSL kernels' host side. The only file here that knows wgpu.
 
+pub mod cpu;
 pub mod format;
+pub mod gpu;
 pub mod graph;
 mod header;
 pub mod op;
+pub mod plan;
+mod problem;

@@ -1,0 +1,106 @@
+// 3×3 convolution, stride 1, padding 1: eight pixels of a column and eight output channels a thread. The ten rows that the
+// three vertical taps share are read once. Weights come tap column by tap column (see kernels.rs), as six matrices an input vector.
+// From the prelude: IN_VECTORS, OUT_VECTORS.
+
+// Index of the first vector of pixel (x, y), or of the arena's zeros outside the picture.
+fn tap(x: i32, y: i32) -> u32 {
+    let inside = x >= 0 && y >= 0 && x < i32(step.in_size.x) && y < i32(step.in_size.y);
+    return select(0u, step.input + (u32(y) * step.in_size.x + u32(x)) * IN_VECTORS, inside);
+}
+
+@compute @workgroup_size(16, 4)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let y = id.y * 8u;
+    if id.x >= step.out_size.x || y >= step.out_size.y { return; }
+    var w = id.z * (1u + 18u * IN_VECTORS);
+    let bias = weights[w];
+    w += 1u;
+    var p0 = bias[0]; var q0 = bias[1];
+    var p1 = bias[0]; var q1 = bias[1];
+    var p2 = bias[0]; var q2 = bias[1];
+    var p3 = bias[0]; var q3 = bias[1];
+    var p4 = bias[0]; var q4 = bias[1];
+    var p5 = bias[0]; var q5 = bias[1];
+    var p6 = bias[0]; var q6 = bias[1];
+    var p7 = bias[0]; var q7 = bias[1];
+    for (var kx = 0; kx < 3; kx++) {
+        let x = i32(id.x) + kx - 1;
+        let top = i32(y) - 1;
+        let t0 = tap(x, top);
+        let t1 = tap(x, top + 1);
+        let t2 = tap(x, top + 2);
+        let t3 = tap(x, top + 3);
+        let t4 = tap(x, top + 4);
+        let t5 = tap(x, top + 5);
+        let t6 = tap(x, top + 6);
+        let t7 = tap(x, top + 7);
+        let t8 = tap(x, top + 8);
+        let t9 = tap(x, top + 9);
+        for (var c = 0u; c < IN_VECTORS; c++) {
+            var m: mat4x4f;
+            let a0 = arena[t0 + c];
+            let a1 = arena[t1 + c];
+            let a2 = arena[t2 + c];
+            let a3 = arena[t3 + c];
+            let a4 = arena[t4 + c];
+            let a5 = arena[t5 + c];
+            let a6 = arena[t6 + c];
+            let a7 = arena[t7 + c];
+            let a8 = arena[t8 + c];
+            let a9 = arena[t9 + c];
+            m = weights[w];
+            p0 += m * a0; p1 += m * a1; p2 += m * a2; p3 += m * a3;
+            p4 += m * a4; p5 += m * a5; p6 += m * a6; p7 += m * a7;
+            m = weights[w + 1u];
+            q0 += m * a0; q1 += m * a1; q2 += m * a2; q3 += m * a3;
+            q4 += m * a4; q5 += m * a5; q6 += m * a6; q7 += m * a7;
+            m = weights[w + 2u];
+            p0 += m * a1; p1 += m * a2; p2 += m * a3; p3 += m * a4;
+            p4 += m * a5; p5 += m * a6; p6 += m * a7; p7 += m * a8;
+            m = weights[w + 3u];
+            q0 += m * a1; q1 += m * a2; q2 += m * a3; q3 += m * a4;
+            q4 += m * a5; q5 += m * a6; q6 += m * a7; q7 += m * a8;
+            m = weights[w + 4u];
+            p0 += m * a2; p1 += m * a3; p2 += m * a4; p3 += m * a5;
+            p4 += m * a6; p5 += m * a7; p6 += m * a8; p7 += m * a9;
+            m = weights[w + 5u];
+            q0 += m * a2; q1 += m * a3; q2 += m * a4; q3 += m * a5;
+            q4 += m * a6; q5 += m * a7; q6 += m * a8; q7 += m * a9;
+            w += 6u;
+        }
+    }
+    let vector = (step.first_block + id.z) * 2u;
+    let pair = vector + 1u < OUT_VECTORS;
+    var at = (y * step.out_size.x + id.x) * OUT_VECTORS + vector;
+    let row = step.out_size.x * OUT_VECTORS;
+    finish(p0, at);
+    if pair { finish(q0, at + 1u); }
+    if y + 1u >= step.out_size.y { return; }
+    at += row;
+    finish(p1, at);
+    if pair { finish(q1, at + 1u); }
+    if y + 2u >= step.out_size.y { return; }
+    at += row;
+    finish(p2, at);
+    if pair { finish(q2, at + 1u); }
+    if y + 3u >= step.out_size.y { return; }
+    at += row;
+    finish(p3, at);
+    if pair { finish(q3, at + 1u); }
+    if y + 4u >= step.out_size.y { return; }
+    at += row;
+    finish(p4, at);
+    if pair { finish(q4, at + 1u); }
+    if y + 5u >= step.out_size.y { return; }
+    at += row;
+    finish(p5, at);
+    if pair { finish(q5, at + 1u); }
+    if y + 6u >= step.out_size.y { return; }
+    at += row;
+    finish(p6, at);
+    if pair { finish(q6, at + 1u); }
+    if y + 7u >= step.out_size.y { return; }
+    at += row;
+    finish(p7, at);
+    if pair { finish(q7, at + 1u); }
+}
