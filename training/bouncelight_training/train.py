@@ -48,7 +48,7 @@ class Config:
     clip: float = 1.0  # largest gradient norm
     ema: float = 0.998
     epsilon: float = 0.05  # of the relative square, units of s
-    composite_l1: float = 0.0  # weight of L1 on the tone-mapped composite in the last third; clean targets only
+    picture_l1: float = 0.0  # weight in the last third of the L1 on the pooled picture (losses.picture_difference)
     seed: int = 1
     threads: int = 0  # 0: torch's choice
     device: str = "cpu"
@@ -180,9 +180,9 @@ class Run:
 
     def loss(self, prediction, features, target, mask):
         loss = losses.relative_square(prediction, target, mask, self.config.epsilon)
-        if self.config.composite_l1 and self.progress() > 2 / 3:
+        if self.config.picture_l1 and self.progress() > 2 / 3:
             direct = torch.expm1(features[:, SLICES["direct"]])
-            loss = loss + self.config.composite_l1 * losses.tonemapped_difference(prediction, target, mask, features[:, SLICES["albedo"]], direct)
+            loss = loss + self.config.picture_l1 * losses.picture_difference(prediction, target, mask, features[:, SLICES["albedo"]], direct)
         return loss
 
     def train_step(self):
