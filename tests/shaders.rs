@@ -2,36 +2,63 @@
 
 use bouncelight::gpu::shaders;
 
-/// `const` lines that a module expects from the code that compiles it.
-fn prelude(name: &str) -> &'static str {
-    // (shader, lines): rooms whose shaders need numbers add a row.
-    const PRELUDES: &[(&str, &str)] = &[];
-    PRELUDES.iter().find(|p| p.0 == name).map_or("", |p| p.1)
+/// Every permutation of every shader: (shader, its prelude of `const` lines). Shaders without numbers from outside have one.
+fn permutations() -> Vec<(&'static str, String)> {
+    let mut all = bouncelight::gi::features::example_preludes();
+    all.extend(bouncelight::net::gpu::example_preludes());
+    let plain = shaders::all().map(|s| s.name).filter(|name| !all.iter().any(|(n, _)| n == name)).collect::<Vec<_>>();
+    all.extend(plain.into_iter().map(|name| (name, String::new())));
+    all
 }
 
-fn parse(name: &str) -> (naga::Module, String) {
-    let text = shaders::source(name, prelude(name));
+fn parse(name: &str, prelude: &str) -> (naga::Module, String) {
+    let text = shaders::source(name, prelude);
     let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
     (module, text)
 }
 
+/// Validates against WebGPU without any optional feature.
+fn validate(module: &naga::Module) -> Result<naga::valid::ModuleInfo, naga::WithSpan<naga::valid::ValidationError>> {
+    naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty())
+        .validate(module)
+}
+
 #[test]
-fn every_shader_validates() {
-    let mut seen = 0;
-    for shader in shaders::all() {
-        let (module, text) = parse(shader.name);
-        naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty())
-            .validate(&module)
-            .unwrap_or_else(|e| panic!("{}: {}", shader.name, e.emit_to_string(&text)));
-        seen += 1;
+fn every_shader_validates_in_every_permutation() {
+    let permutations = permutations();
+    for (name, prelude) in &permutations {
+        let (module, text) = parse(name, prelude);
+        validate(&module).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
     }
-    assert_eq!(shaders::RENDER.len(), 6);
-    assert_eq!(seen, shaders::RENDER.len() + shaders::GI.len() + shaders::NET.len());
+    let seen: std::collections::BTreeSet<_> = permutations.iter().map(|p| p.0).collect();
+    assert_eq!(seen.len(), shaders::all().count(), "every row of the table was seen");
+    assert_eq!((shaders::RENDER.len(), shaders::GI.len(), shaders::NET.len()), (6, 4, 7));
+    assert_eq!(permutations.len(), 107);
+}
+
+#[test]
+fn the_network_kernels_uniform_lies_as_its_rust_twin() {
+    for (name, prelude) in bouncelight::net::gpu::example_preludes() {
+        let (module, _) = parse(name, &prelude);
+        let span = module.types.iter().find_map(|(_, t)| match t.inner {
+            naga::TypeInner::Struct { span, .. } if t.name.as_deref() == Some("Step") => Some(span as usize),
+            _ => None,
+        });
+        assert_eq!(span, Some(size_of::<bouncelight::net::gpu::StepUniform>()), "{name}: size of Step");
+    }
+}
+
+/// Negative control: a shader that uses what it does not have is refused.
+#[test]
+fn a_shader_without_its_numbers_is_refused() {
+    assert!(naga::front::wgsl::parse_str(&shaders::source("gi.pack", "")).is_err());
+    let half = naga::front::wgsl::parse_str("enable f16;\n@compute @workgroup_size(1) fn main() { _ = 1.0h; }");
+    assert!(half.is_err() || validate(&half.unwrap()).is_err(), "16-bit arithmetic needs a feature");
 }
 
 /// Offset of each member and size of struct `name` in shader `shader`.
 fn members(shader: &str, name: &str) -> (Vec<(String, u32)>, u32) {
-    let (module, _) = parse(shader);
+    let (module, _) = parse(shader, "");
     let found = module.types.iter().find_map(|(_, t)| match &t.inner {
         naga::TypeInner::Struct { members, span } if t.name.as_deref() == Some(name) => {
             Some((members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect(), *span))
