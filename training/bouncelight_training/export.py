@@ -22,6 +22,7 @@ from .weights import GraphNet, WeightsError, document, read, write
 ODD_SIZES = [(37, 21), (5, 3), (1, 1)]
 # Sums in another order differ by about 1e-6 in y; half floats move y by a few thousandths.
 TOLERANCE, TOLERANCE_HALF = 1e-4, 2e-2
+TARGETS = "Cycles 4.5, 256x128, 32 samples a pixel"
 
 
 def network_of(state):
@@ -31,8 +32,8 @@ def network_of(state):
     return model.eval()
 
 
-def provenance(state, error):
-    """Where the numbers come from; paths are reduced to file names."""
+def provenance(state, error, targets):
+    """Where the numbers come from; paths are reduced to file names. `targets` says in words how the light was path-traced."""
     config = dict(state["config"])
     for name in ("train", "validation"):
         config[name] = os.path.basename(config[name])
@@ -41,7 +42,7 @@ def provenance(state, error):
         "command": state["command"], "commit": state["commit"], "date": datetime.date.today().isoformat(),
         "device": state["machine"], "seed": config["seed"], "config": config, "samples_seen": state["samples"],
         "training_minutes": round(state["elapsed"] / 60, 1),
-        "data": {"targets": "Cycles 4.5 (32 samples a pixel, 256x128): DiffDir + DiffInd minus our direct light, as E/pi",
+        "data": {"targets": f"{targets}: DiffDir + DiffInd minus our direct light, as E/pi",
                  "train": state["train_report"], "validation": state["validation_report"]},
         "validation_error": {"measure": "mean |dE| / mean E after 4x4 pooling", "value": round(error, 5)},
         "last_epochs": [{k: (round(v, 6) if isinstance(v, float) else v) for k, v in row.items()} for row in last],
@@ -71,13 +72,13 @@ def verify(path, model, tolerance, split=None):
     return worst, again
 
 
-def export(run, out, validation=None, name="", half=False):
+def export(run, out, validation=None, name="", half=False, targets=TARGETS):
     """Writes the file and its provenance; returns a summary."""
     state = read_checkpoint(os.path.join(run, "checkpoint.pt"))
     model = network_of(state)
     split = Split(validation or state["config"]["validation"])
     error = validate(model, split, state["config"]["epsilon"])[0]["validation_error"]
-    about = provenance(state, error)
+    about = provenance(state, error, targets)
     tensors = {k: (v.half() if half else v).contiguous() for k, v in model.state_dict().items()}
     try:
         write(out, tensors, document(model.graph, model.output, name=name or os.path.basename(os.path.normpath(run)), provenance=about))
@@ -99,9 +100,10 @@ def main(arguments=None):
     parser.add_argument("--out", required=True)
     parser.add_argument("--validation", help="default: the one the run used")
     parser.add_argument("--name", default="", help="a few words; default: the run's name")
+    parser.add_argument("--targets", default=TARGETS, help="how the light was path-traced, in words, for the provenance")
     parser.add_argument("--half", action="store_true", help="store half floats")
     a = parser.parse_args(arguments)
-    print(json.dumps(export(a.run, a.out, a.validation, a.name, a.half), indent=1))
+    print(json.dumps(export(a.run, a.out, a.validation, a.name, a.half, a.targets), indent=1))
 
 
 if __name__ == "__main__":
