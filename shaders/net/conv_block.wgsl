@@ -1,12 +1,6 @@
 // Any convolution: eight pixels of a column and eight output channels a thread. For 1×1 and strided kernels, whose taps
 // share little. From the prelude: KERNEL_W, KERNEL_H, STRIDE, PADDING, IN_VECTORS, OUT_VECTORS.
 
-// Index of the first vector of pixel (x, y), or of the arena's zeros outside the picture.
-fn tap(x: i32, y: i32) -> u32 {
-    let inside = x >= 0 && y >= 0 && x < i32(step.in_size.x) && y < i32(step.in_size.y);
-    return select(0u, step.input + (u32(y) * step.in_size.x + u32(x)) * IN_VECTORS, inside);
-}
-
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let y = id.y * 8u;
@@ -55,38 +49,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             }
         }
     }
-    let vector = (step.first_block + id.z) * 2u;
-    let pair = vector + 1u < OUT_VECTORS;
-    var at = (y * step.out_size.x + id.x) * OUT_VECTORS + vector;
-    let row = step.out_size.x * OUT_VECTORS;
-    finish(p0, at);
-    if pair { finish(q0, at + 1u); }
-    if y + 1u >= step.out_size.y { return; }
-    at += row;
-    finish(p1, at);
-    if pair { finish(q1, at + 1u); }
-    if y + 2u >= step.out_size.y { return; }
-    at += row;
-    finish(p2, at);
-    if pair { finish(q2, at + 1u); }
-    if y + 3u >= step.out_size.y { return; }
-    at += row;
-    finish(p3, at);
-    if pair { finish(q3, at + 1u); }
-    if y + 4u >= step.out_size.y { return; }
-    at += row;
-    finish(p4, at);
-    if pair { finish(q4, at + 1u); }
-    if y + 5u >= step.out_size.y { return; }
-    at += row;
-    finish(p5, at);
-    if pair { finish(q5, at + 1u); }
-    if y + 6u >= step.out_size.y { return; }
-    at += row;
-    finish(p6, at);
-    if pair { finish(q6, at + 1u); }
-    if y + 7u >= step.out_size.y { return; }
-    at += row;
-    finish(p7, at);
-    if pair { finish(q7, at + 1u); }
+    finish_column(id, array(p0, p1, p2, p3, p4, p5, p6, p7), array(q0, q1, q2, q3, q4, q5, q6, q7));
 }

@@ -68,18 +68,21 @@ pub const NET: &[Shader] = &[
         name: "net.conv_plain",
         files: wgsl!["net/common.wgsl", "net/weights_storage.wgsl", "net/conv_plain.wgsl"],
     },
-    Shader { name: "net.conv3x3", files: wgsl!["net/common.wgsl", "net/weights_uniform.wgsl", "net/conv3x3.wgsl"] },
+    Shader {
+        name: "net.conv3x3",
+        files: wgsl!["net/common.wgsl", "net/weights_uniform.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"],
+    },
     Shader {
         name: "net.conv3x3_wide",
-        files: wgsl!["net/common.wgsl", "net/weights_storage.wgsl", "net/conv3x3.wgsl"],
+        files: wgsl!["net/common.wgsl", "net/weights_storage.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"],
     },
     Shader {
         name: "net.conv_block",
-        files: wgsl!["net/common.wgsl", "net/weights_uniform.wgsl", "net/conv_block.wgsl"],
+        files: wgsl!["net/common.wgsl", "net/weights_uniform.wgsl", "net/column.wgsl", "net/conv_block.wgsl"],
     },
     Shader {
         name: "net.conv_block_wide",
-        files: wgsl!["net/common.wgsl", "net/weights_storage.wgsl", "net/conv_block.wgsl"],
+        files: wgsl!["net/common.wgsl", "net/weights_storage.wgsl", "net/column.wgsl", "net/conv_block.wgsl"],
     },
     Shader { name: "net.upsample", files: wgsl!["net/common.wgsl", "net/upsample.wgsl"] },
     Shader { name: "net.add", files: wgsl!["net/common.wgsl", "net/add.wgsl"] },
