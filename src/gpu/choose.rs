@@ -153,7 +153,7 @@ pub fn wanted_features() -> wgpu::Features {
 }
 
 /// All adapters that fit the backend choice, best first, with the words for what was searched. GL is only asked when
-/// nothing else is hardware: opening it looks for window systems, which costs time and may print.
+/// nothing else is hardware and GL might be: opening it looks for window systems, which takes time and prints.
 pub fn candidates(options: &GpuOptions) -> Result<(String, Vec<wgpu::Adapter>), GpuError> {
     let mask = match (options.backend, std::env::var("WGPU_BACKEND")) {
         (Backend::Auto, Ok(text)) if !text.is_empty() => {
@@ -166,12 +166,18 @@ pub fn candidates(options: &GpuOptions) -> Result<(String, Vec<wgpu::Adapter>), 
         (backend, _) => backend.mask(),
     };
     let mut adapters = enumerate(mask - wgpu::Backends::GL);
-    if adapters.iter().all(|a| is_software(&a.get_info())) {
+    let software = adapters.iter().all(|a| is_software(&a.get_info()));
+    if adapters.is_empty() || (software && has_graphics_device()) {
         adapters.extend(enumerate(mask & wgpu::Backends::GL));
     }
     adapters.sort_by_key(|a| rank(&a.get_info()));
     let names = mask.iter_names().map(|(name, _)| name.to_lowercase()).collect::<Vec<_>>();
     Ok((format!("searched: {}", names.join(", ")), adapters))
+}
+
+/// False where no driver could be more than software: Linux without any graphics device.
+fn has_graphics_device() -> bool {
+    !cfg!(target_os = "linux") || ["/dev/dri", "/dev/nvidiactl"].iter().any(|d| std::path::Path::new(d).exists())
 }
 
 fn enumerate(mask: wgpu::Backends) -> Vec<wgpu::Adapter> {
