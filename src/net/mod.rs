@@ -14,3 +14,4 @@ mod header;
 pub mod op;
 pub mod plan;
 mod problem;
+mod shipped;
