@@ -124,6 +124,9 @@ fn print(record: &Record, gpu: &Gpu, layers: bool) {
             None => println!("  no GPU timestamps on this adapter: wall clock only"),
         }
         println!("  {:<26}{:>10.3}{:>10.3}", "wall clock, synchronised", m.wall_ms.median, m.wall_ms.p95);
+        if let Some(apart) = m.disagreement() {
+            println!("  GPU time and wall clock are {:.0}% apart: trust the wall clock on this adapter", apart * 100.0);
+        }
         let mib = |b: u64| b as f64 / (1 << 20) as f64;
         let parts = m.bytes.iter().filter(|(_, b)| *b > 0).map(|(n, b)| format!("{n} {:.1}", mib(*b)));
         println!("  {:.1} MiB of GPU memory: {}", mib(m.total_bytes()), parts.collect::<Vec<_>>().join(", "));

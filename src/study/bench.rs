@@ -56,11 +56,21 @@ pub struct Measurement {
 }
 
 impl Measurement {
+    /// How far GPU time and wall clock are apart, as a share of the wall clock, when it is more than [`AGREEMENT`].
+    /// A driver that lets passes run on past their timestamps shows itself here.
+    pub fn disagreement(&self) -> Option<f64> {
+        let apart = (self.wall_ms.median - self.gpu_ms?.median).abs() / self.wall_ms.median;
+        (apart > AGREEMENT).then_some(apart)
+    }
+
     /// Resident GPU bytes in all.
     pub fn total_bytes(&self) -> u64 {
         self.bytes.iter().map(|(_, b)| b).sum()
     }
 }
+
+/// Timestamps and synchronised wall clock should agree within this share, or one of them is not to be trusted.
+pub const AGREEMENT: f64 = 0.1;
 
 /// Why a measurement failed.
 #[derive(Debug, Error)]
