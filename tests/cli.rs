@@ -67,6 +67,35 @@ fn invalid_scenes_exit_with_4_and_name_the_file() {
 }
 
 #[test]
+fn a_zero_byte_texture_is_a_warning_that_names_it_and_the_scene_still_draws() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let (scene, out) = (path(&dir, "triangle.gltf"), path(&dir, "out.png"));
+    std::fs::write(path(&dir, "empty.png"), b"").unwrap();
+    // Three positions and three texture coordinates.
+    let data = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/";
+    let text = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"TEXCOORD_0":1}},"material":0}}]}}],
+        "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
+        "textures":[{{"source":0}}],"images":[{{"uri":"empty.png"}}],
+        "buffers":[{{"byteLength":60,"uri":"data:application/octet-stream;base64,{data}"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":24}}],
+        "accessors":[
+          {{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}},
+          {{"bufferView":1,"componentType":5126,"count":3,"type":"VEC2"}}]}}"#
+    );
+    std::fs::write(&scene, text).unwrap();
+    let run = bouncelight(&["render", &scene, "-o", &out, "--size", "64x32"]);
+    let told = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{told}");
+    assert!(told.contains("warning") && told.contains("empty.png"), "{told}");
+    assert!(Path::new(&out).exists());
+}
+
+#[test]
 fn invalid_weights_exit_with_4_and_name_the_tensor() {
     let dir = tempfile::tempdir().unwrap();
     let out = path(&dir, "out.png");
