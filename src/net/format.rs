@@ -134,7 +134,7 @@ impl Weights {
         Self::parse(Path::new("(memory)"), bytes)
     }
 
-    /// Weight [O, I, kh, kw] and bias [O] of a convolution of this graph.
+    /// Weight [O, I, kh, kw] and bias `[O]` of a convolution of this graph.
     pub fn conv(&self, conv: &Conv2d) -> (&[f32], &[f32]) {
         let data = |name: String| self.tensors.get(&name).map_or(&[][..], |t| &t.data);
         (data(format!("{}.weight", conv.name)), data(format!("{}.bias", conv.name)))

@@ -1,6 +1,6 @@
 //! Networks, from file to GPU.
 //!
-//! - [`format`]: the weights file: a safetensors file whose metadata holds the graph. `weights-format/` specifies it.
+//! - [`mod@format`]: the weights file: a safetensors file whose metadata holds the graph. `weights-format/` specifies it.
 //! - [`graph`] and [`op`]: topology, shape inference, parameter and FLOP counts.
 //! - [`plan`]: which dispatches run and where each tensor lives in one arena.
 //! - [`cpu`]: the slow, obvious twin; every kernel is tested against it and against PyTorch.

@@ -38,7 +38,7 @@ pub enum AddAt {
 #[derive(Debug, Clone, PartialEq, Eq, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Conv2d {
-    /// Module name; its tensors are `NAME.weight` [O, I, kh, kw] and `NAME.bias` [O].
+    /// Module name; its tensors are `NAME.weight` [O, I, kh, kw] and `NAME.bias` (O values).
     pub name: String,
     /// Tensor read.
     pub input: String,

@@ -77,7 +77,7 @@ impl Sample {
         near as f32 / self.depth.len().max(1) as f32
     }
 
-    /// The sample as a safetensors file: `features` [channels, h, w], `scale` [1] (the exposure s), `direct`, `albedo` and
+    /// The sample as a safetensors file: `features` [channels, h, w], `scale` (the exposure s, one value), `direct`, `albedo` and
     /// `normal` [3, h, w], `depth` [h, w], all f32.
     pub fn to_bytes(&self) -> Result<Vec<u8>, DatasetError> {
         let [w, h] = self.inputs.cells.map(|n| n as usize);

@@ -116,7 +116,7 @@ impl Kernel {
         self.matrices * MATRIX * u64::from(self.blocks_per_dispatch)
     }
 
-    /// Packs a layer: `weight` [O, I, kh, kw] and `bias` [O] to the matrices of each dispatch, one vector a dispatch.
+    /// Packs a layer: `weight` [O, I, kh, kw] and `bias` (O values) to the matrices of each dispatch, one vector a dispatch.
     pub fn pack(&self, weight: &[f32], bias: &[f32], in_channels: usize, [kh, kw]: [usize; 2]) -> Vec<Vec<f32>> {
         let in_vectors = in_channels.div_ceil(4);
         let at = |o: usize, i: usize, ky: usize, kx: usize| {
