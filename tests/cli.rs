@@ -187,7 +187,7 @@ fn render_writes_a_whole_picture_with_provenance() {
 }
 
 #[test]
-fn the_same_command_gives_the_same_picture_and_layers_add_up() {
+fn the_same_command_gives_the_same_picture_and_all_layers() {
     if common::gpu().is_none() {
         return;
     }
@@ -206,6 +206,38 @@ fn the_same_command_gives_the_same_picture_and_layers_add_up() {
     assert_ne!(beauty, c.image("Combined").unwrap().to_rgb(), "another seed is another picture");
     for name in ["DiffDir", "DiffInd", "DiffCol", "Emit", "Normal", "Depth", "Position", "Motion"] {
         a.layer(name).unwrap();
+    }
+}
+
+#[test]
+fn layers_add_up_to_the_picture_as_blenders_do() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    for method in ["ambient", "neural"] {
+        let file = path(&dir, &format!("{method}.exr"));
+        let out =
+            bouncelight(&["render", "interior", "-o", &file, "--size", "96x48", "--aov", "all", "--method", method]);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let layers = bouncelight::image_io::read_exr(Path::new(&file)).unwrap();
+        let of = |name: &str| layers.image(name).unwrap().to_rgb();
+        let [beauty, col, dir, ind] = ["Combined", "DiffCol", "DiffDir", "DiffInd"].map(of);
+        let [gloss, gloss_dir, gloss_ind, emit] = ["GlossCol", "GlossDir", "GlossInd", "Emit"].map(of);
+        let depth = layers.image("Depth").unwrap().pixels;
+        let error = |indirect: f32| {
+            let (mut sum, mut all) = (0.0, 0.0);
+            for i in (0..beauty.len()).filter(|i| depth[i / 3] < 1e9) {
+                let diffuse = col[i] * (dir[i] + indirect * ind[i]);
+                let added = diffuse + gloss[i] * (gloss_dir[i] + indirect * gloss_ind[i]) + emit[i];
+                sum += f64::from((added - beauty[i]).abs());
+                all += f64::from(beauty[i]);
+            }
+            sum / all
+        };
+        assert!(error(1.0) < 2e-3, "{method}: {}", error(1.0));
+        // Negative control: without indirect light the sum is another picture.
+        assert!(error(0.0) > 0.1, "{method}: {}", error(0.0));
     }
 }
 

@@ -11,8 +11,8 @@ fn ambient(@builtin(global_invocation_id) id: vec3u) {
     let pixel = vec2i(id.xy);
     var light = vec3f(0.0);
     if distance_at(pixel) > 0.0 {
-        let occlusion = finite(textureLoad(albedo_map, pixel, 0).a);
-        light = min(AMBIENT * (exposure.s * occlusion), vec3f(LARGEST));
+        // Occlusion maps are not applied here: composite applies them to every method's light, once.
+        light = min(AMBIENT * exposure.s, vec3f(LARGEST));
     }
     textureStore(output, pixel, vec4f(light, 1.0));
 }

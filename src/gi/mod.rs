@@ -4,7 +4,7 @@
 //! # What each method does, and what it cannot do
 //!
 //! [`ambient`] gives every surface the same light: the picture's mean light (direct, emission, sky) times one constant
-//! fitted to the training scenes, times the textures' ambient occlusion. It costs one reduction and one write a pixel.
+//! fitted to the training scenes. It costs one reduction and one write a pixel.
 //! It cannot say where light is: no corner darkens, no wall bleeds its colour, a sealed box glows, and two views of one
 //! room disagree because each has its own mean.
 //!
@@ -50,7 +50,8 @@ pub struct Inputs<'a> {
     pub depth: &'a wgpu::TextureView,
     /// World normal, octahedral, `Rg16Float`.
     pub normal: &'a wgpu::TextureView,
-    /// Diffuse reflectance in [0, 1] (rgb) and ambient occlusion from textures (a), `Rgba8UnormSrgb`.
+    /// Diffuse reflectance in [0, 1] (rgb), `Rgba8UnormSrgb`. Alpha is not read: whoever multiplies the light with albedo
+    /// applies the textures' ambient occlusion, too.
     pub albedo: &'a wgpu::TextureView,
     /// Emitted radiance, `Rgba16Float`.
     pub emissive: &'a wgpu::TextureView,

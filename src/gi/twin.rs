@@ -159,8 +159,7 @@ impl<'a> Picture<'a> {
             if self.distance_at(pixel) <= 0.0 {
                 return [0.0; 3];
             }
-            let occlusion = self.buffers.albedo[self.index(pixel)][3];
-            AMBIENT.map(|a| (a * exposure.s * occlusion).min(LARGEST))
+            AMBIENT.map(|a| (a * exposure.s).min(LARGEST))
         };
         self.all_pixels().map(light).collect()
     }
