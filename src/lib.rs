@@ -16,6 +16,7 @@
 //! - [`render`]: the rasteriser, one file a pass.
 //! - [`net`]: weights file, graph, plan, the slow CPU twin and the WGSL kernels' host side.
 //! - [`gi`]: global-illumination methods, cheapest first; `gi::pass` is the embeddable pass.
+//! - `reference` (feature `reference`): the path tracer that everything else is measured against.
 //! - [`metrics`]: image metrics, no wgpu.
 //! - [`study`]: what is measured over methods and scenes.
 //!
@@ -27,6 +28,8 @@ pub mod gpu;
 pub mod image_io;
 pub mod metrics;
 pub mod net;
+#[cfg(feature = "reference")]
+pub mod reference;
 pub mod render;
 pub mod scene;
 pub mod study;

@@ -88,9 +88,12 @@ pub const NET: &[Shader] = &[
     Shader { name: "net.add", files: wgsl!["net/common.wgsl", "net/add.wgsl"] },
 ];
 
+/// Shaders of `reference/`.
+pub const REFERENCE: &[Shader] = &[];
+
 /// Every shader there is.
 pub fn all() -> impl Iterator<Item = &'static Shader> {
-    RENDER.iter().chain(GI).chain(NET)
+    RENDER.iter().chain(GI).chain(NET).chain(REFERENCE)
 }
 
 /// The WGSL text of shader `name` with `prelude` (lines of `const`) in front.

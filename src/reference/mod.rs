@@ -1,0 +1,1 @@
+//! The path tracer: the same scene, camera and materials as the rasteriser, converging to the truth on the same GPU.
