@@ -89,7 +89,8 @@ pub const NET: &[Shader] = &[
 ];
 
 /// Shaders of `reference/`.
-pub const REFERENCE: &[Shader] = &[];
+pub const REFERENCE: &[Shader] =
+    &[Shader { name: "reference.rays", files: wgsl!["reference/traverse.wgsl", "reference/rays.wgsl"] }];
 
 /// Every shader there is.
 pub fn all() -> impl Iterator<Item = &'static Shader> {
