@@ -11,8 +11,8 @@ use glam::{Mat4, Quat, Vec3};
 use serde_json::{Value, json};
 
 use super::{
-    AlphaMode, Camera, Image, LUMENS_PER_WATT, Light, LightKind, Material, Mesh, Sampler, Scene, SceneError,
-    TextureRef, Wrap,
+    AlphaMode, Camera, DIELECTRIC_F0, Image, LUMENS_PER_WATT, Light, LightKind, Material, Mesh, Sampler, Scene,
+    SceneError, TextureRef, Wrap,
 };
 
 /// Writes `scene` to `path`, whole or not at all: a temporary file beside it is renamed at the end.
@@ -65,7 +65,8 @@ pub fn to_glb(scene: &Scene) -> Result<Vec<u8>, String> {
             "extras": {"bouncelight": {"environment": scene.environment.radiance}},
         }],
     });
-    let mut used = vec!["KHR_materials_emissive_strength", "KHR_materials_unlit", "KHR_texture_transform"];
+    let mut used =
+        vec!["KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_unlit", "KHR_texture_transform"];
     if !lights.is_empty() {
         used.push("KHR_lights_punctual");
         root["extensions"] = json!({"KHR_lights_punctual": {"lights": lights}});
@@ -249,6 +250,10 @@ impl Writer {
             AlphaMode::Blend => out["alphaMode"] = json!("BLEND"),
         }
         let mut extensions = serde_json::Map::new();
+        if m.f0 != DIELECTRIC_F0 {
+            let root = m.f0.clamp(0.0, 0.99).sqrt();
+            extensions.insert("KHR_materials_ior".to_owned(), json!({"ior": (1.0 + root) / (1.0 - root)}));
+        }
         if strength > 1.0 {
             extensions.insert("KHR_materials_emissive_strength".to_owned(), json!({"emissiveStrength": strength}));
         }
