@@ -92,18 +92,21 @@ pub enum MethodName {
     Ambient,
     /// The network.
     Neural,
+    /// The path tracer, which converges to the truth.
+    Reference,
 }
 
 impl MethodName {
-    /// All methods, cheapest first.
-    pub const ALL: [MethodName; 3] = [MethodName::Direct, MethodName::Ambient, MethodName::Neural];
+    /// All real-time methods, cheapest first.
+    pub const REAL_TIME: [MethodName; 3] = [MethodName::Direct, MethodName::Ambient, MethodName::Neural];
 
-    /// The method with its weights: `weights`, or the shipped ones.
+    /// The real-time method with its weights: `weights`, or the shipped ones.
     pub fn method(self, weights: Option<&PathBuf>) -> Result<Method> {
         Ok(match self {
             MethodName::Direct => Method::Direct,
             MethodName::Ambient => Method::Ambient,
             MethodName::Neural => Method::Neural(Box::new(load_weights(weights)?)),
+            MethodName::Reference => return Err(usage("`reference` is no real-time method".into())),
         })
     }
 }

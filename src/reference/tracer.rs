@@ -104,6 +104,8 @@ pub struct Tracer {
     schedule: Schedule,
     /// Samples at which the band is done or looked at.
     goal: u32,
+    /// Samples that will probably be enough.
+    expected: u32,
     finished: bool,
     /// Of the bands before this one.
     before: Gathered,
@@ -168,6 +170,7 @@ impl Tracer {
             most,
             schedule: Schedule::new(most, options.dispatch.as_secs_f64()),
             goal: first_goal(&options, most),
+            expected: first_goal(&options, most),
             finished: false,
             before: Gathered::default(),
             traced,
@@ -223,12 +226,17 @@ impl Tracer {
         self.traced.traced
     }
 
-    /// How much is done, 0 to 1, as if every band took all samples that it may.
+    /// How many samples a point will probably get: those asked for, or as many as the error bound seems to need.
+    pub fn expected_samples(&self) -> u64 {
+        self.expected.into()
+    }
+
+    /// How much is done, 0 to 1; with an error bound it is a guess, which may fall.
     pub fn progress(&self) -> f64 {
         if self.finished {
             return 1.0;
         }
-        let band = f64::from(self.schedule.samples()) / f64::from(self.options.samples);
+        let band = f64::from(self.schedule.samples()) / f64::from(self.expected);
         (f64::from(self.band.0) + f64::from(self.band.1) * band) / f64::from(self.points)
     }
 
@@ -268,6 +276,8 @@ impl Tracer {
             let noise = gathered.noise()[JUDGED.iter().position(|l| *l == layer).unwrap_or(0)];
             if noise.pixel_at_most > bound {
                 self.goal = noise::next_check(samples, &noise, bound).min(self.options.samples);
+                let needed = f64::from(samples) * (noise.pixel_at_most / bound).powi(2);
+                self.expected = (needed as u32).clamp(self.goal, self.options.samples);
                 return Ok(());
             }
         }
