@@ -1,7 +1,7 @@
 //! Writes a whole [`Scene`] as one GLB: meshes, materials, textures as PNG, lights, cameras.
 //!
 //! Light goes out in glTF's photometric units (times 683). What glTF has no field for, a light's radius, the sun's
-//! angle and the sky, stands in `extras.bouncelight`, where [`super::gltf`] finds it again and others ignore it.
+//! angle, the sky and that a light only stands in for a glowing surface, is in `extras.bouncelight`, where [`super::gltf`] finds it again and others ignore it.
 //! A texture transform that is no scale, rotation and offset (sheared) is written as the nearest that is.
 
 use std::io::Cursor;
@@ -292,7 +292,7 @@ fn camera(c: &Camera) -> Value {
 
 fn light(l: &Light) -> Value {
     let mut out = json!({"name": l.name, "color": l.color});
-    let (kind, strength, range, extras) = match l.kind {
+    let (kind, strength, range, mut extras) = match l.kind {
         LightKind::Directional { irradiance, angle, .. } => ("directional", irradiance, None, json!({"angle": angle})),
         LightKind::Point { intensity, radius, range, .. } => ("point", intensity, range, json!({"radius": radius})),
         LightKind::Spot { intensity, radius, range, inner_angle, outer_angle, .. } => {
@@ -302,6 +302,9 @@ fn light(l: &Light) -> Value {
     };
     out["type"] = json!(kind);
     out["intensity"] = json!(strength * LUMENS_PER_WATT);
+    if l.stands_in {
+        extras["stands_in"] = json!(true);
+    }
     out["extras"] = json!({"bouncelight": extras});
     if let Some(range) = range {
         out["range"] = json!(range);

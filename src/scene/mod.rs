@@ -240,6 +240,9 @@ pub struct Light {
     pub color: [f32; 3],
     /// Where it is and how strong.
     pub kind: LightKind,
+    /// It only stands in for a glowing surface of the scene. The rasteriser, which knows no such light, uses it; the path
+    /// tracer leaves it out and lets the surface shine.
+    pub stands_in: bool,
 }
 
 /// Kinds of analytic light, in world space.
