@@ -1,0 +1,32 @@
+//! Why the path tracer cannot do what it was asked.
+
+use thiserror::Error;
+
+/// Errors of [`Tracer`](super::Tracer).
+#[derive(Debug, Error)]
+pub enum TracerError {
+    /// A picture without pixels, or more points than the device can hold.
+    #[error("{points} points of a {width}×{height} picture: {reason}")]
+    Points {
+        /// How many points were asked for.
+        points: u64,
+        /// Width of the picture, pixels.
+        width: u32,
+        /// Height of the picture, pixels.
+        height: u32,
+        /// What is wrong with that.
+        reason: String,
+    },
+    /// A point or a camera with coordinates that are no numbers.
+    #[error("{0} is not finite")]
+    NotFinite(String),
+    /// No sample was asked for, or an error bound that nothing can reach.
+    #[error("{0}")]
+    Option(String),
+    /// Reading the film failed.
+    #[error(transparent)]
+    Readback(#[from] crate::gpu::readback::ReadbackError),
+    /// The device was lost or did not answer.
+    #[error("waiting for the GPU failed while tracing: {0}")]
+    Wait(String),
+}
