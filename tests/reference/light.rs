@@ -1,7 +1,7 @@
 //! Light sources against closed forms: rectangles, suns, lamps; and the laws that hold for any scene: light adds up,
 //! and the way back is the way there.
 
-use crate::harness::{Options, Strategy, Sums, Traced, trace};
+use crate::harness::{Lab, Options, Strategy, Sums, Traced, lab};
 use crate::scenes::*;
 use crate::stats::{Mean, SIGMAS};
 use bouncelight::scene::{Camera, Environment, Instance, Light, Material, Mesh, Scene};
@@ -27,17 +27,17 @@ fn floor_light(points: &[[f32; 2]], e: impl Fn(DVec3) -> f64) -> f64 {
     points.iter().map(|p| f64::from(FLOOR) / PI * e(place(p))).sum::<f64>() / points.len() as f64
 }
 
-fn lit_floor(gpu: &bouncelight::gpu::Gpu, lights: Vec<Light>, panel: Option<Mesh>, options: &Options) -> Traced {
+fn lit_floor(lab: &Lab, lights: Vec<Light>, panel: Option<Mesh>, options: &Options) -> Traced {
     let mut parts = vec![floor()];
     // A black panel, so that it sends no light back that it got from the floor.
     parts.extend(panel.map(|mesh| (mesh, glowing(0.0, 5.0))));
-    trace(gpu, &scene(parts, lights), &above(), SIZE, &grid(SIZE, 16), options)
+    lab.trace(&scene(parts, lights), &above(), SIZE, &grid(SIZE, 16), options)
 }
 
 /// Panels of radiance 5, seen from below or from the side, and the polygon formula.
 #[test]
 fn a_panel_lights_the_floor_by_lamberts_formula() {
-    let Some(gpu) = crate::common::gpu() else { return };
+    let Some(lab) = lab() else { return };
     let points = grid(SIZE, 16);
     let corners = |m: &Mesh| m.positions.iter().map(|&p| glam::Vec3::from(p).as_dvec3()).collect::<Vec<_>>();
     let panels = [
@@ -50,7 +50,7 @@ fn a_panel_lights_the_floor_by_lamberts_formula() {
         let polygon = corners(&panel);
         let expected = floor_light(&points, |p| 5.0 * polygon_irradiance(p, DVec3::Y, &polygon));
         let options = Options { samples: 64, seed: seed as u32, ..Default::default() };
-        let t = lit_floor(&gpu, vec![], Some(panel.clone()), &options);
+        let t = lit_floor(lab, vec![], Some(panel.clone()), &options);
         t.mean(|s| s.diff_dir[0]).assert_is(&format!("{name} panel"), expected);
         // The black panel sends nothing back.
         assert_eq!(t.mean(|s| s.diff_ind[0]).value, 0.0);
@@ -58,10 +58,10 @@ fn a_panel_lights_the_floor_by_lamberts_formula() {
         // Sampling lights alone, hitting them alone and both together are three ways to one answer.
         for strategy in [Strategy::LightsOnly, Strategy::HitsOnly] {
             let options = Options { samples: 512, strategy, ..options };
-            let t = lit_floor(&gpu, vec![], Some(panel.clone()), &options);
+            let t = lit_floor(lab, vec![], Some(panel.clone()), &options);
             t.mean(|s| s.diff_dir[0]).assert_is(&format!("… {strategy:?}"), expected);
         }
-        let t = lit_floor(&gpu, vec![], Some(panel), &Options { strategy: Strategy::CountTwice, ..options });
+        let t = lit_floor(lab, vec![], Some(panel), &Options { strategy: Strategy::CountTwice, ..options });
         let twice = t.mean(|s| s.diff_dir[0]);
         assert!((twice.value / expected - 2.0).abs() < 0.1, "counting both in full gives {twice:?}");
     }
@@ -70,12 +70,12 @@ fn a_panel_lights_the_floor_by_lamberts_formula() {
 /// The sun is a disc; its irradiance on a tilted surface is that on one that faces it, times the cosine, whatever its size.
 #[test]
 fn sunlight_goes_with_the_cosine() {
-    let Some(gpu) = crate::common::gpu() else { return };
+    let Some(lab) = lab() else { return };
     for (seed, angle) in [0.00918f32, 0.3].into_iter().enumerate() {
         let direction = DVec3::new(0.5, -1.0, 0.3);
         let light = sun(direction.as_vec3().into(), 2.0, angle);
         let options = Options { samples: 32, seed: seed as u32, ..Default::default() };
-        let t = lit_floor(&gpu, vec![light], None, &options);
+        let t = lit_floor(lab, vec![light], None, &options);
         let expected = f64::from(FLOOR) / PI * 2.0 * -direction.normalize().y;
         let found = t.mean(|s| s.diff_dir[0]);
         println!("sun of {angle} rad: {found:?}, expected {expected}");
@@ -88,7 +88,7 @@ fn sunlight_goes_with_the_cosine() {
 /// I·cos/(d² + r²) where all of it is above the horizon.
 #[test]
 fn lamps_go_with_the_inverse_square() {
-    let Some(gpu) = crate::common::gpu() else { return };
+    let Some(lab) = lab() else { return };
     let points = grid(SIZE, 16);
     let at = DVec3::new(-0.8, 2.0, -0.5);
     for (seed, radius) in [0.0f64, 0.3].into_iter().enumerate() {
@@ -98,7 +98,7 @@ fn lamps_go_with_the_inverse_square() {
         };
         let light = point(at.as_vec3().into(), 50.0, radius as f32);
         let options = Options { samples: 32, seed: seed as u32, ..Default::default() };
-        let t = lit_floor(&gpu, vec![light], None, &options);
+        let t = lit_floor(lab, vec![light], None, &options);
         t.mean(|s| s.diff_dir[0]).assert_is(&format!("lamp of radius {radius}"), floor_light(&points, e));
     }
 }
@@ -106,7 +106,7 @@ fn lamps_go_with_the_inverse_square() {
 /// glTF's cone: the square of a ramp that is linear in the cosine.
 #[test]
 fn a_spot_fades_by_gltfs_ramp() {
-    let Some(gpu) = crate::common::gpu() else { return };
+    let Some(lab) = lab() else { return };
     let points = grid(SIZE, 16);
     let (at, axis) = (DVec3::new(0.5, 3.0, 0.2), DVec3::new(-0.2, -1.0, 0.0).normalize());
     let (inner, outer) = (0.15f64, 0.5f64);
@@ -116,7 +116,7 @@ fn a_spot_fades_by_gltfs_ramp() {
         40.0 * ramp.clamp(0.0, 1.0).powi(2) * to.normalize().y / to.length_squared()
     };
     let light = spot(at.as_vec3().into(), axis.as_vec3().into(), 40.0, inner as f32, outer as f32);
-    let t = lit_floor(&gpu, vec![light], None, &Options { samples: 16, ..Default::default() });
+    let t = lit_floor(lab, vec![light], None, &Options { samples: 16, ..Default::default() });
     t.mean(|s| s.diff_dir[0]).assert_is("spot", floor_light(&points, e));
 }
 
@@ -134,15 +134,15 @@ fn furnished(lights: Vec<Light>, panel: f32, sky: f32) -> Scene {
     scene
 }
 
-fn seen(gpu: &bouncelight::gpu::Gpu, scene: &Scene, seed: u32) -> Traced {
+fn seen(lab: &Lab, scene: &Scene, seed: u32) -> Traced {
     let eye = camera([1.5, 1.2, 1.7], [-0.5, -0.8, -0.5], 1.0);
-    trace(gpu, scene, &eye, SIZE, &grid(SIZE, 16), &Options { samples: 64, seed, ..Default::default() })
+    lab.trace(scene, &eye, SIZE, &grid(SIZE, 16), &Options { samples: 64, seed, ..Default::default() })
 }
 
 /// Each light alone, summed, is all of them together; twice the light is twice the picture; none is none.
 #[test]
 fn light_adds_up() {
-    let Some(gpu) = crate::common::gpu() else { return };
+    let Some(lab) = lab() else { return };
     let lamp = point([0.8, 1.5, 0.5], 3.0, 0.1);
     let shine = sun([0.3, -1.0, 0.2], 0.8, 0.01);
     let alone = [
@@ -151,8 +151,8 @@ fn light_adds_up() {
         furnished(vec![], 2.0, 0.0),
         furnished(vec![], 0.0, 0.3),
     ];
-    let parts: Vec<Mean> = alone.iter().zip(10..).map(|(s, seed)| seen(&gpu, s, seed).mean(Sums::radiance)).collect();
-    let together = seen(&gpu, &furnished(vec![lamp.clone(), shine.clone()], 2.0, 0.3), 1);
+    let parts: Vec<Mean> = alone.iter().zip(10..).map(|(s, seed)| seen(lab, s, seed).mean(Sums::radiance)).collect();
+    let together = seen(lab, &furnished(vec![lamp.clone(), shine.clone()], 2.0, 0.3), 1);
     let all = together.mean(Sums::radiance);
     println!("alone: {parts:?}\ntogether: {all:?}");
     let sum = parts.iter().fold(Mean { value: 0.0, error: 0.0 }, |a, &b| a + b);
@@ -163,12 +163,12 @@ fn light_adds_up() {
     assert!(SIGMAS * off.error < 0.02 * all.value, "{off:?} is too coarse");
 
     let twice = |l: &Light| Light { color: [2.0; 3], ..l.clone() };
-    let doubled = seen(&gpu, &furnished(vec![twice(&lamp), twice(&shine)], 4.0, 0.6), 1);
+    let doubled = seen(lab, &furnished(vec![twice(&lamp), twice(&shine)], 4.0, 0.6), 1);
     for (once, two) in together.halves().iter().flatten().zip(doubled.halves().iter().flatten()) {
         let (once, two) = (once.radiance(), two.radiance());
         assert!((two - 2.0 * once).abs() <= 1e-5 * two.abs(), "{two} is not twice {once}");
     }
-    let dark = seen(&gpu, &furnished(vec![], 0.0, 0.0), 1);
+    let dark = seen(lab, &furnished(vec![], 0.0, 0.0), 1);
     assert!(dark.halves().iter().flatten().all(|s| s.radiance() == 0.0), "light without any source");
 }
 
@@ -205,7 +205,7 @@ impl Patch {
 /// B glowing likewise (Helmholtz).
 #[test]
 fn the_way_back_is_the_way_there() {
-    let Some(gpu) = crate::common::gpu() else { return };
+    let Some(lab) = lab() else { return };
     // A is upright, B lies half hidden behind the block from much of A.
     let patches = [
         Patch { center: [-1.8, -1.0, 0.0], half: [0.1, 0.25, 0.4], face: 1 },
@@ -223,7 +223,7 @@ fn the_way_back_is_the_way_there() {
         let ([width, height], eye) = patches[watch].squarely();
         let picture = [(320.0 * width) as u32, (320.0 * height) as u32];
         let options = Options { samples: 256, seed, ..Default::default() };
-        let t = trace(&gpu, &scene, &eye, picture, &grid(picture, 16), &options);
+        let t = lab.trace(&scene, &eye, picture, &grid(picture, 16), &options);
         // Irradiance from outgoing diffuse light, times the area.
         t.mean(|s| s.diff_dir[0] + s.diff_ind[0]) * (PI / f64::from(albedo) * f64::from(width * height))
     };

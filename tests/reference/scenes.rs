@@ -94,13 +94,12 @@ pub fn point(position: [f32; 3], intensity: f32, radius: f32) -> Light {
 
 pub fn spot(position: [f32; 3], direction: [f32; 3], intensity: f32, inner_angle: f32, outer_angle: f32) -> Light {
     let direction = Vec3::from(direction).normalize().to_array();
-    let kind =
-        LightKind::Spot { position, direction, intensity, radius: 0.0, range: None, inner_angle, outer_angle };
+    let kind = LightKind::Spot { position, direction, intensity, radius: 0.0, range: None, inner_angle, outer_angle };
     light("spot", kind)
 }
 
 fn light(name: &str, kind: LightKind) -> Light {
-    Light { name: name.into(), color: [1.0; 3], kind }
+    Light { name: name.into(), color: [1.0; 3], kind, stands_in: false }
 }
 
 /// A camera at `eye` that looks at `target`.
