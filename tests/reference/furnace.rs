@@ -16,7 +16,7 @@ fn a_closed_sphere_glows_with_one_over_one_minus_albedo() {
     for (seed, albedo) in [0.2f64, 0.5, 0.8].into_iter().enumerate() {
         let scene = scene(vec![(body(Shape::IcoSphere, 2.0, true), glowing(albedo as f32, 1.0))], vec![]);
         let eye = camera([0.3, -0.4, 0.5], [1.0, 0.2, 0.0], 1.2);
-        let options = Options { samples: 64, seed: seed as u32, ..Default::default() };
+        let options = Options { samples: 64, seed: seed as u32, lambert: true, ..Default::default() };
         let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &options);
         t.mean(Sums::radiance).assert_is(&format!("sphere of albedo {albedo}"), 1.0 / (1.0 - albedo));
         t.mean(|s| s.emit[0]).assert_is("… seen at once", 1.0);
@@ -32,7 +32,8 @@ fn a_wrong_albedo_is_noticed() {
     let Some(lab) = lab() else { return };
     let scene = scene(vec![(body(Shape::IcoSphere, 2.0, true), glowing(0.51, 1.0))], vec![]);
     let eye = camera([0.3, -0.4, 0.5], [1.0, 0.2, 0.0], 1.2);
-    let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &Options { samples: 64, ..Default::default() });
+    let t =
+        lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &Options { samples: 64, lambert: true, ..Default::default() });
     let light = t.mean(Sums::radiance);
     assert!(light.sigmas(2.0) > SIGMAS, "{light:?} passes for 2");
 }
@@ -43,9 +44,9 @@ fn white_bodies_vanish_in_white_surroundings() {
     let Some(lab) = lab() else { return };
     for (seed, shape) in [Shape::IcoSphere, Shape::Torus].into_iter().enumerate() {
         let mut scene = scene(vec![(body(shape, 1.0, false), lambert(1.0))], vec![]);
-        scene.environment = Environment { radiance: [1.0; 3] };
+        scene.environment = Environment { radiance: [1.0; 3], ..scene.environment };
         let eye = camera([1.5, 2.0, 1.2], [0.0; 3], 0.5);
-        let options = Options { samples: 64, seed: seed as u32, ..Default::default() };
+        let options = Options { samples: 64, seed: seed as u32, lambert: true, ..Default::default() };
         let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &options);
         assert!(t.mean(|s| s.alpha).value > 0.2, "{shape:?} is hardly seen");
         t.mean(Sums::radiance).assert_is(&format!("white {shape:?}"), 1.0);
@@ -64,7 +65,7 @@ fn white_metal_and_white_plastic_lose_no_light() {
             ("plastic", bouncelight::scene::Material { f0: 0.04, roughness, ..lambert(1.0) }, 0.01),
         ] {
             let mut scene = scene(vec![(body(Shape::UvSphere, 1.0, false), material)], vec![]);
-            scene.environment = Environment { radiance: [1.0; 3] };
+            scene.environment = Environment { radiance: [1.0; 3], ..scene.environment };
             // Close enough that every point is on the sphere.
             let eye = camera([1.2, 1.6, 0.0], [0.0; 3], 0.5);
             let options = Options { samples: 64, seed: seed as u32, ..Default::default() };
@@ -101,7 +102,7 @@ fn a_closed_room_swallows_what_its_ceiling_emits() {
             target[face / 2] = if face % 2 == 0 { -1.0 } else { 1.0 };
             // A right angle of view from the middle shows just one face, every part of it at the same scale.
             let eye = camera([0.0; 3], target, std::f32::consts::FRAC_PI_2);
-            let options = Options { samples: 32, seed: face as u32, bounces, ..Default::default() };
+            let options = Options { samples: 32, seed: face as u32, bounces, lambert: true, ..Default::default() };
             let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 12), &options);
             let rho = f64::from(albedo[face]);
             // The face sends back ρ of what falls on it, evenly: π times its radiance.

@@ -49,7 +49,7 @@ fn a_panel_lights_the_floor_by_lamberts_formula() {
     for (seed, (name, panel)) in panels.into_iter().enumerate() {
         let polygon = corners(&panel);
         let expected = floor_light(&points, |p| 5.0 * polygon_irradiance(p, DVec3::Y, &polygon));
-        let options = Options { samples: 64, seed: seed as u32, ..Default::default() };
+        let options = Options { samples: 64, seed: seed as u32, lambert: true, ..Default::default() };
         let t = lit_floor(lab, vec![], Some(panel.clone()), &options);
         t.mean(|s| s.diff_dir[0]).assert_is(&format!("{name} panel"), expected);
         // The black panel sends nothing back.
@@ -74,7 +74,7 @@ fn sunlight_goes_with_the_cosine() {
     for (seed, angle) in [0.00918f32, 0.3].into_iter().enumerate() {
         let direction = DVec3::new(0.5, -1.0, 0.3);
         let light = sun(direction.as_vec3().into(), 2.0, angle);
-        let options = Options { samples: 32, seed: seed as u32, ..Default::default() };
+        let options = Options { samples: 32, seed: seed as u32, lambert: true, ..Default::default() };
         let t = lit_floor(lab, vec![light], None, &options);
         let expected = f64::from(FLOOR) / PI * 2.0 * -direction.normalize().y;
         let found = t.mean(|s| s.diff_dir[0]);
@@ -97,7 +97,7 @@ fn lamps_go_with_the_inverse_square() {
             50.0 * to.normalize().y / (to.length_squared() + radius * radius)
         };
         let light = point(at.as_vec3().into(), 50.0, radius as f32);
-        let options = Options { samples: 32, seed: seed as u32, ..Default::default() };
+        let options = Options { samples: 32, seed: seed as u32, lambert: true, ..Default::default() };
         let t = lit_floor(lab, vec![light], None, &options);
         t.mean(|s| s.diff_dir[0]).assert_is(&format!("lamp of radius {radius}"), floor_light(&points, e));
     }
@@ -116,7 +116,7 @@ fn a_spot_fades_by_gltfs_ramp() {
         40.0 * ramp.clamp(0.0, 1.0).powi(2) * to.normalize().y / to.length_squared()
     };
     let light = spot(at.as_vec3().into(), axis.as_vec3().into(), 40.0, inner as f32, outer as f32);
-    let t = lit_floor(lab, vec![light], None, &Options { samples: 16, ..Default::default() });
+    let t = lit_floor(lab, vec![light], None, &Options { samples: 16, lambert: true, ..Default::default() });
     t.mean(|s| s.diff_dir[0]).assert_is("spot", floor_light(&points, e));
 }
 
@@ -130,7 +130,7 @@ fn furnished(lights: Vec<Light>, panel: f32, sky: f32) -> Scene {
     parts.push((body(bouncelight::scene::shapes::Shape::Cube, 0.6, false), lambert(0.5)));
     parts.push((quad([-1.99, -1.0, -0.5], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]), glowing(0.3, panel)));
     let mut scene = scene(parts, lights);
-    scene.environment = Environment { radiance: [sky; 3] };
+    scene.environment = Environment { radiance: [sky; 3], ..scene.environment };
     scene
 }
 
@@ -222,7 +222,7 @@ fn the_way_back_is_the_way_there() {
         }
         let ([width, height], eye) = patches[watch].squarely();
         let picture = [(320.0 * width) as u32, (320.0 * height) as u32];
-        let options = Options { samples: 256, seed, ..Default::default() };
+        let options = Options { samples: 256, seed, lambert: true, ..Default::default() };
         let t = lab.trace(&scene, &eye, picture, &grid(picture, 16), &options);
         // Irradiance from outgoing diffuse light, times the area.
         t.mean(|s| s.diff_dir[0] + s.diff_ind[0]) * (PI / f64::from(albedo) * f64::from(width * height))

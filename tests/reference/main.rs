@@ -12,6 +12,7 @@ mod common;
 mod build;
 
 mod agreement;
+mod bad_input;
 mod cycles;
 mod furnace;
 mod harness;
