@@ -89,7 +89,42 @@ pub const NET: &[Shader] = &[
 ];
 
 /// Shaders of `reference/`.
-pub const REFERENCE: &[Shader] = &[];
+pub const REFERENCE: &[Shader] = &[
+    Shader {
+        name: "reference.path",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "reference/types.wgsl",
+            "reference/traverse_stub.wgsl",
+            "reference/random.wgsl",
+            "reference/surface.wgsl",
+            "reference/camera.wgsl",
+            "reference/bsdf.wgsl",
+            "reference/lights.wgsl",
+            "reference/environment.wgsl",
+            "reference/rasterised.wgsl",
+            "reference/film.wgsl",
+            "reference/sums.wgsl",
+            "reference/path.wgsl",
+        ],
+    },
+    Shader {
+        name: "reference.first_hit",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "reference/types.wgsl",
+            "reference/traverse_stub.wgsl",
+            "reference/random.wgsl",
+            "reference/surface.wgsl",
+            "reference/camera.wgsl",
+            "reference/first_hit.wgsl",
+        ],
+    },
+];
 
 /// Every shader there is.
 pub fn all() -> impl Iterator<Item = &'static Shader> {

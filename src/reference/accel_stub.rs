@@ -19,6 +19,13 @@ impl Accel {
     }
 }
 
+impl Accel {
+    /// Bytes on the GPU.
+    pub fn bytes(&self) -> u64 {
+        16 * self.0.len() as u64
+    }
+}
+
 /// The triangles on the GPU.
 pub struct AccelGpu(wgpu::Buffer);
 
@@ -38,22 +45,22 @@ impl AccelGpu {
         Ok(Self(buffer))
     }
 
-    /// Types of bindings 1 and 2.
-    pub fn binding_types() -> [wgpu::BindingType; 2] {
-        [wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Storage { read_only: true },
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        }; 2]
+    /// Layout entries of bindings 1 and 2.
+    pub fn layout_entries() -> [wgpu::BindGroupLayoutEntry; 2] {
+        [1, 2].map(|binding| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Storage { read_only: true },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        })
     }
 
     /// Bindings 1 and 2.
-    pub fn resources(&self) -> [wgpu::BindingResource<'_>; 2] {
-        [self.0.as_entire_binding(), self.0.as_entire_binding()]
-    }
-
-    /// Bytes on the GPU.
-    pub fn bytes(&self) -> u64 {
-        self.0.size()
+    pub fn entries(&self) -> [wgpu::BindGroupEntry<'_>; 2] {
+        [1, 2].map(|binding| wgpu::BindGroupEntry { binding, resource: self.0.as_entire_binding() })
     }
 }

@@ -113,7 +113,8 @@ impl ReferenceScene {
         let (items, words) = materials::pack(scene, &limits)?;
         let lights = lights::pack(scene, &flat);
         limits.check("lights and glowing triangles", 16 * lights.vectors.len() as u64)?;
-        let accel = AccelGpu::new(device, queue, &Accel::build(&flat.positions)?)?;
+        let structure = Accel::build(&flat.positions)?;
+        let accel = AccelGpu::new(device, queue, &structure)?;
 
         let records = flat.records(&lights.densities);
         let mut store = tables::header();
@@ -131,8 +132,8 @@ impl ReferenceScene {
             make("reference.lights", usage, bytemuck::cast_slice(&lights.vectors)),
             make("reference.texels", usage, bytemuck::cast_slice(&words)),
         ];
-        let bytes = buffers.iter().map(wgpu::Buffer::size).sum::<u64>() + accel.bytes();
-        let [a, b] = accel.resources();
+        let bytes = buffers.iter().map(wgpu::Buffer::size).sum::<u64>() + structure.bytes();
+        let [a, b] = accel.entries();
         let [info, triangles, materials, light_data, texels] = &buffers;
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -140,8 +141,8 @@ impl ReferenceScene {
             layout: &Self::layout(device),
             entries: &[
                 entry(0, info.as_entire_binding()),
-                entry(1, a),
-                entry(2, b),
+                a,
+                b,
                 entry(3, triangles.as_entire_binding()),
                 entry(4, materials.as_entire_binding()),
                 entry(5, light_data.as_entire_binding()),
@@ -162,13 +163,13 @@ impl ReferenceScene {
         };
         let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
         let read = buffer(wgpu::BufferBindingType::Storage { read_only: true });
-        let [a, b] = AccelGpu::binding_types();
+        let [a, b] = AccelGpu::layout_entries();
         device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("reference.scene"),
             entries: &[
                 entry(0, buffer(wgpu::BufferBindingType::Uniform)),
-                entry(1, a),
-                entry(2, b),
+                a,
+                b,
                 entry(3, read),
                 entry(4, read),
                 entry(5, read),
