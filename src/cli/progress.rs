@@ -42,11 +42,16 @@ impl Progress {
 
     /// One more step is done.
     pub fn step(&mut self) {
-        self.bar.inc(1);
+        self.at(self.bar.position() + 1, self.bar.length().unwrap_or(0));
+    }
+
+    /// `done` of `total` steps are done; the total may have become another.
+    pub fn at(&mut self, done: u64, total: u64) {
+        self.bar.set_length(total);
+        self.bar.set_position(done);
         if self.kind == ProgressKind::Plain && self.last_line.elapsed() >= PLAIN_INTERVAL {
             self.last_line = Instant::now();
-            let (done, total) = (self.bar.position(), self.bar.length().unwrap_or(0));
-            let left = self.started.elapsed().as_secs_f64() / done as f64 * total.saturating_sub(done) as f64;
+            let left = self.started.elapsed().as_secs_f64() / done.max(1) as f64 * total.saturating_sub(done) as f64;
             eprintln!("{done}/{total} {}, about {left:.0} s left", self.what);
         }
     }

@@ -5,7 +5,7 @@ use thiserror::Error;
 /// Errors of [`Tracer`](super::Tracer).
 #[derive(Debug, Error)]
 pub enum TracerError {
-    /// A picture without pixels, or more points than the device can hold.
+    /// A picture without pixels, or more points than fit.
     #[error("{points} points of a {width}×{height} picture: {reason}")]
     Points {
         /// How many points were asked for.
@@ -19,10 +19,20 @@ pub enum TracerError {
     },
     /// A point or a camera with coordinates that are no numbers.
     #[error("{0} is not finite")]
-    NotFinite(String),
-    /// No sample was asked for, or an error bound that nothing can reach.
+    Input(String),
+    /// Options that cannot be met, such as no samples.
     #[error("{0}")]
     Option(String),
+    /// A layer with values that are no numbers, in spite of all care.
+    #[error("layer {layer} has {count} points that are not finite, the first is number {first}")]
+    NotFinite {
+        /// The layer's name.
+        layer: &'static str,
+        /// How many points.
+        count: usize,
+        /// The first of them.
+        first: usize,
+    },
     /// Reading the film failed.
     #[error(transparent)]
     Readback(#[from] crate::gpu::readback::ReadbackError),

@@ -133,7 +133,7 @@ impl Film {
         let mut offset = 0;
         while offset < all {
             let size = PIECE.min(all - offset);
-            let mut read = |half: &wgpu::Buffer| readback::buffer(device, queue, half, offset, size);
+            let read = |half: &wgpu::Buffer| readback::buffer(device, queue, half, offset, size);
             let bytes = [read(&self.halves[0])?, read(&self.halves[1])?];
             let first = (offset / POINT_BYTES) as u32;
             let halves = bytes.each_ref().map(|b| b.chunks_exact(POINT_BYTES as usize));

@@ -42,7 +42,7 @@ pub fn complete(scene: &mut Scene) {
         scene.lights = proxies;
     } else if scene.environment == Environment::default() {
         scene.lights.push(default_sun(&scene.cameras[0]));
-        scene.environment = Environment { radiance: [DEFAULT_SKY; 3] };
+        scene.environment = Environment::constant([DEFAULT_SKY; 3]);
         scene.warnings.push(format!(
             "'{}' has no light; a sun of {DEFAULT_SUN} W/m² and a grey sky of {DEFAULT_SKY} W/(m²·sr) were added",
             scene.name

@@ -11,6 +11,7 @@ pub mod bounds;
 pub mod bundled;
 mod camera;
 pub mod defaults;
+pub mod environment;
 #[cfg(feature = "io")]
 mod error;
 #[cfg(feature = "io")]
@@ -29,6 +30,7 @@ pub mod shapes;
 #[cfg(feature = "io")]
 mod texture;
 
+pub use environment::Environment;
 #[cfg(feature = "io")]
 pub use error::SceneError;
 #[cfg(feature = "io")]
@@ -300,13 +302,6 @@ pub struct Camera {
     pub near: f32,
     /// Far plane, metres; `f32::INFINITY` where the file gives none. Used to fit shadows, never to clip.
     pub far: f32,
-}
-
-/// Light from beyond the scene. Constant for now; an image later.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Environment {
-    /// Radiance from every direction, W/(m²·sr).
-    pub radiance: [f32; 3],
 }
 
 /// Reflectance at normal incidence of a dielectric of index 1.5, which is what glTF materials have by default.

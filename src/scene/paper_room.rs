@@ -117,7 +117,7 @@ pub fn scene(index: u32) -> Scene {
     let shapes = Shape::ALL.map(shapes::flat);
     let mut scene = Scene {
         name: format!("paper-room:{index}"),
-        environment: Environment { radiance: [SKY_RADIANCE; 3] },
+        environment: Environment::constant([SKY_RADIANCE; 3]),
         ..Scene::default()
     };
     let from_y_up = Y_UP.transpose();

@@ -98,7 +98,7 @@ pub fn render(gpu: &Gpu, scene: &Scene, camera: &Camera, size: [u32; 2], samples
 }
 
 pub fn environment(radiance: f32) -> Environment {
-    Environment { radiance: [radiance; 3] }
+    Environment::constant([radiance; 3])
 }
 
 /// Mean of channel 0 over the centre's `n`² pixels.

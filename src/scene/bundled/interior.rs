@@ -57,7 +57,7 @@ pub(super) fn scene() -> Scene {
     lamp(&mut b, &palette);
 
     let mut scene = b.scene;
-    scene.environment = Environment { radiance: [0.55, 0.72, 1.0] };
+    scene.environment = Environment::constant([0.55, 0.72, 1.0]);
     scene.lights.push(Light {
         name: "sun".to_owned(),
         color: [1.0, 0.90, 0.74],

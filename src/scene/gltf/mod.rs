@@ -237,7 +237,7 @@ impl<'a> Loader<'a> {
         if let Some(radiance) = extras.map(|e| e.bouncelight.environment)
             && radiance.iter().all(|r| r.is_finite() && *r >= 0.0)
         {
-            self.scene.environment = Environment { radiance };
+            self.scene.environment = Environment::constant(radiance);
         }
     }
 }
