@@ -58,6 +58,11 @@ fn invalid_scenes_exit_with_4_and_name_the_file() {
     std::fs::write(&stray, b"hello").unwrap();
     fails(&["render", &cut, "-o", &out], 4, &["cut.glb"]);
     fails(&["render", &empty, "-o", &out], 4, &["empty.glb"]);
+    let sky = path(&dir, "sky.hdr");
+    std::fs::write(&sky, b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n\x02\x02").unwrap();
+    fails(&["render", "interior", "-o", &out, "--environment", &sky], 4, &["sky.hdr", "truncated"]);
+    std::fs::remove_file(&sky).unwrap();
+    fails(&["render", "interior", "-o", &out, "--environment", &sky], 4, &["sky.hdr", "cannot be read"]);
     fails(&["render", &stray, "-o", &out], 4, &["scene.txt", ".glb"]);
     fails(&["render", dir.path().to_str().unwrap(), "-o", &out], 4, &["folder"]);
     fails(&["render", &path(&dir, "none.gltf"), "-o", &out], 4, &["none.gltf"]);

@@ -106,7 +106,7 @@ fn structs_lie_in_memory_as_their_rust_twins() {
     // The Rust struct ends with padding to the alignment of uniform offsets.
     same_layout!("render.gbuffer", "Material", MaterialGpu, size std::mem::offset_of!(MaterialGpu, tail), [
         base_color, emissive, unlit, metallic, roughness, normal_scale, occlusion_strength, alpha_cutoff,
-        uses as "base_use",
+        f0, uses as "base_use",
     ]);
     assert_eq!(size_of::<MaterialGpu>(), 256);
 }

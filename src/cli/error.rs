@@ -1,6 +1,9 @@
 //! Exit codes: every error that reaches `main` is sorted here, once.
 
-use crate::{gi::GiError, gpu::GpuError, net::format::WeightsError, scene::SceneError, scene::upload::UploadError};
+use crate::{
+    gi::GiError, gpu::GpuError, net::format::WeightsError, scene::SceneError, scene::environment::EnvironmentError,
+    scene::upload::UploadError,
+};
 use thiserror::Error;
 
 /// Something went wrong while running.
@@ -60,7 +63,11 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
         if let Some(GiError::Feature { .. } | GiError::Output(_)) = cause.downcast_ref::<GiError>() {
             return INVALID_INPUT;
         }
-        if cause.is::<SceneError>() || cause.is::<UploadError>() || cause.is::<WeightsError>() {
+        if cause.is::<SceneError>()
+            || cause.is::<UploadError>()
+            || cause.is::<WeightsError>()
+            || cause.is::<EnvironmentError>()
+        {
             return INVALID_INPUT;
         }
     }

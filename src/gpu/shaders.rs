@@ -45,7 +45,13 @@ pub const RENDER: &[Shader] = &[
     },
     Shader {
         name: "render.composite",
-        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "render/composite.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/frame.wgsl",
+            "lib/brdf.wgsl",
+            "lib/environment.wgsl",
+            "render/composite.wgsl"
+        ],
     },
     Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
     Shader {

@@ -5,7 +5,7 @@
 
 use super::graph::{Graph, GraphError};
 use super::header;
-use super::op::{Conv2d, Op};
+use super::op::Op;
 pub use super::problem::{Problem, WeightsError};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -134,10 +134,9 @@ impl Weights {
         Self::parse(Path::new("(memory)"), bytes)
     }
 
-    /// Weight [O, I, kh, kw] and bias `[O]` of a convolution of this graph.
-    pub fn conv(&self, conv: &Conv2d) -> (&[f32], &[f32]) {
-        let data = |name: String| self.tensors.get(&name).map_or(&[][..], |t| &t.data);
-        (data(format!("{}.weight", conv.name)), data(format!("{}.bias", conv.name)))
+    /// Values of tensor `NAME.LEAF`; empty where the graph has none, as the bias of a convolution without.
+    pub fn values(&self, name: &str, leaf: &str) -> &[f32] {
+        self.tensors.get(&format!("{name}.{leaf}")).map_or(&[], |t| &t.data)
     }
 
     /// Every tensor by its PyTorch name.
@@ -304,27 +303,15 @@ fn operator(index: usize, value: &serde_json::Value, problems: &mut Vec<Problem>
     if let Some(map) = fields.as_object_mut() {
         map.remove("op");
     }
-    let parsed = match op {
-        "conv2d" => serde_json::from_value(fields).map(Op::Conv2d),
-        "upsample_bilinear" => serde_json::from_value(fields).map(Op::UpsampleBilinear),
-        "add" => serde_json::from_value(fields).map(Op::Add),
-        _ => {
-            problems.push(Problem::UnknownOperator { index, name, op: op.into() });
-            return None;
-        }
+    let Some(parsed) = Op::parse(op, fields) else {
+        problems.push(Problem::UnknownOperator { index, name, op: op.into() });
+        return None;
     };
     parsed.map_err(|e| problems.push(Problem::Operator { index, name, reason: e.to_string() })).ok()
 }
 
 fn check_tensors(header: &header::Header<'_>, graph: &Graph, problems: &mut Vec<Problem>) {
-    let mut wanted: BTreeMap<String, Vec<u64>> = BTreeMap::new();
-    for op in &graph.ops {
-        if let Op::Conv2d(o) = op {
-            let [o_, i, h, w] = [o.out_channels, o.in_channels, o.kernel[0], o.kernel[1]].map(u64::from);
-            wanted.insert(format!("{}.weight", o.name), vec![o_, i, h, w]);
-            wanted.insert(format!("{}.bias", o.name), vec![o_]);
-        }
-    }
+    let wanted: BTreeMap<String, Vec<u64>> = graph.ops.iter().flat_map(Op::tensors).collect();
     // A tensor whose place was wrong has been reported already and is not missing as well.
     let reported: BTreeSet<String> = problems
         .iter()
