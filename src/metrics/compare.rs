@@ -86,6 +86,33 @@ pub struct HdrFlip {
     pub exposures: Exposures,
 }
 
+/// Metrics of one layer of two files; serialises to the record that `compare --layer --json` writes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LayerComparison {
+    /// Version of this record.
+    pub schema: u32,
+    /// Name of the compared picture.
+    pub a: String,
+    /// Name of the reference.
+    pub b: String,
+    /// Pixels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// The layer.
+    pub layer: String,
+    /// Over all its pixels and channels.
+    pub linear: LinearMetrics,
+}
+
+impl LayerComparison {
+    /// `a` and `b` hold as many values, in the same order, finite.
+    pub(crate) fn new(names: [&str; 2], size: [usize; 2], layer: &str, a: &[f32], b: &[f32]) -> Self {
+        let ([first, second], [width, height]) = (names.map(String::from), size);
+        Self { schema: 1, a: first, b: second, width, height, layer: layer.into(), linear: LinearMetrics::of(a, b) }
+    }
+}
+
 /// What takes long and may be left out, and how FLIP looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
@@ -128,6 +155,9 @@ pub const NAMES: [(&str, bool); 12] = [
     ("bias", false),
     ("hdrflip", false),
 ];
+
+/// The names of metrics of radiance; the others are for display values.
+pub const NEEDS_RADIANCE: [&str; 4] = ["relmse", "mre", "bias", "hdrflip"];
 
 impl Comparison {
     /// The metric called `name` (one of [`NAMES`]); `None` for other names, for what was not asked for, and for metrics of

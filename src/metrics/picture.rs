@@ -67,6 +67,14 @@ pub enum MetricError {
     },
 }
 
+impl MetricError {
+    /// [`Self::Sizes`] of name, width and height.
+    pub(crate) fn sizes(a: (&str, usize, usize), b: (&str, usize, usize)) -> Self {
+        let ((a, a_width, a_height), (b, b_width, b_height)) = (a, b);
+        Self::Sizes { a: a.into(), a_width, a_height, b: b.into(), b_width, b_height }
+    }
+}
+
 /// RGB pixels, interleaved, rows from the top; finite by construction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Picture<'a> {
@@ -127,13 +135,6 @@ impl<'a> Picture<'a> {
         if (self.width, self.height) == (other.width, other.height) {
             return Ok(());
         }
-        Err(MetricError::Sizes {
-            a: self.name.into(),
-            a_width: self.width,
-            a_height: self.height,
-            b: other.name.into(),
-            b_width: other.width,
-            b_height: other.height,
-        })
+        Err(MetricError::sizes((self.name, self.width, self.height), (other.name, other.width, other.height)))
     }
 }
