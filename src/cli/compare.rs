@@ -165,7 +165,7 @@ fn compare_layer(args: &Args, layer: &str) -> Result<()> {
     }
     let [a_name, b_name] = [&args.a, &args.b].map(|p| p.display().to_string());
     let size = [a.width as usize, a.height as usize];
-    let record = LayerComparison::new([&a_name, &b_name], size, layer, &a_values, &b_values);
+    let record = LayerComparison::new([&a_name, &b_name], size, layer, &a_values, &b_values)?;
     let linear = &record.linear;
     let all = [
         ("relmse", linear.rel_mse),

@@ -106,10 +106,28 @@ pub struct LayerComparison {
 }
 
 impl LayerComparison {
-    /// `a` and `b` hold as many values, in the same order, finite.
-    pub(crate) fn new(names: [&str; 2], size: [usize; 2], layer: &str, a: &[f32], b: &[f32]) -> Self {
-        let ([first, second], [width, height]) = (names.map(String::from), size);
-        Self { schema: 1, a: first, b: second, width, height, layer: layer.into(), linear: LinearMetrics::of(a, b) }
+    /// `a` and `b` hold the same channels of every pixel in the same order, finite.
+    ///
+    /// # Errors
+    /// [`MetricError::Shape`] where they cannot.
+    pub fn new(
+        names: [&str; 2],
+        [width, height]: [usize; 2],
+        layer: &str,
+        a: &[f32],
+        b: &[f32],
+    ) -> Result<Self, MetricError> {
+        let fits = |values: &[f32]| {
+            !values.is_empty() && values.len() == a.len() && values.len().is_multiple_of(width * height)
+        };
+        for (name, values) in names.into_iter().zip([a, b]) {
+            if width == 0 || height == 0 || !fits(values) {
+                return Err(MetricError::Shape { picture: name.into(), width, height, values: values.len() });
+            }
+        }
+        let [first, second] = names.map(String::from);
+        let linear = LinearMetrics::of(a, b);
+        Ok(Self { schema: 1, a: first, b: second, width, height, layer: layer.into(), linear })
     }
 }
 
