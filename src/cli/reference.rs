@@ -141,7 +141,7 @@ impl Task {
         let mut progress = Progress::new(global, "samples", tracer.expected_samples());
         while tracer.step()? {
             let expected = tracer.expected_samples();
-            progress.at((tracer.progress() * expected as f64) as u64, expected);
+            progress.at(tracer.progress() * expected as f64, expected);
             if interrupt::requested() {
                 return Err(CliError::Interrupted.into());
             }

@@ -96,6 +96,7 @@ pub const NET: &[Shader] = &[
 
 /// Shaders of `reference/`.
 pub const REFERENCE: &[Shader] = &[
+    Shader { name: "reference.rays", files: wgsl!["reference/traverse.wgsl", "reference/rays.wgsl"] },
     Shader {
         name: "reference.path",
         files: wgsl![
@@ -103,7 +104,7 @@ pub const REFERENCE: &[Shader] = &[
             "lib/brdf.wgsl",
             "lib/lights.wgsl",
             "reference/types.wgsl",
-            "reference/traverse_stub.wgsl",
+            "reference/traverse.wgsl",
             "reference/random.wgsl",
             "reference/surface.wgsl",
             "reference/camera.wgsl",
@@ -123,7 +124,7 @@ pub const REFERENCE: &[Shader] = &[
             "lib/brdf.wgsl",
             "lib/lights.wgsl",
             "reference/types.wgsl",
-            "reference/traverse_stub.wgsl",
+            "reference/traverse.wgsl",
             "reference/random.wgsl",
             "reference/surface.wgsl",
             "reference/camera.wgsl",

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 /// Why two pictures cannot be compared.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Error)]
 pub enum MetricError {
     /// The number of values is not `3 · width · height`, or there is no pixel.
     #[error("picture `{picture}` has {values} values, which is not {width}×{height} RGB pixels")]
@@ -58,6 +58,12 @@ pub enum MetricError {
         width: usize,
         /// Height there is.
         height: usize,
+    },
+    /// FLIP was asked for a viewing distance that nobody has.
+    #[error("{given} pixels per degree; FLIP takes more than 0 and at most {most}", most = super::flip::MAX_PIXELS_PER_DEGREE)]
+    PixelsPerDegree {
+        /// What was asked for.
+        given: f32,
     },
 }
 

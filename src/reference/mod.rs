@@ -1,6 +1,6 @@
 //! The path tracer: the same scene, camera and materials as the rasteriser, converging to the truth on the same GPU.
 
-mod accel_stub;
+pub mod accel;
 pub mod error;
 pub mod film;
 pub mod job;
@@ -11,8 +11,6 @@ pub mod scene;
 pub mod schedule;
 mod traced;
 mod tracer;
-
-use accel_stub as accel;
 
 pub use error::TracerError;
 pub use job::Job;
