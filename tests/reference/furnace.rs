@@ -115,3 +115,23 @@ fn a_closed_room_swallows_what_its_ceiling_emits() {
     let short = absorbed(Some(3));
     assert!(short.sigmas(emitted) > SIGMAS, "{short:?} passes although light was cut off after three bounces");
 }
+
+#[test]
+#[ignore = "scratch"]
+fn scratch() {
+    use crate::harness::Strategy;
+    let Some(lab) = lab() else { return };
+    for shape in [Shape::IcoSphere, Shape::Cube] {
+        for scale in [2.0, 0.125] {
+            let scene = scene(vec![(body(shape, scale, true), glowing(0.2, 1.0))], vec![]);
+            let eye = camera([0.15 * scale, -0.2 * scale, 0.25 * scale], [1.0 * scale, 0.2, 0.0], 1.2);
+            for flags in [0, bouncelight::reference::job::PLAIN_RANDOM] {
+                let options = Options { samples: 256, flags, strategy: Strategy::LightsOnly, lambert: true, ..Default::default() };
+                let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &options);
+                let d = t.mean(|s| s.diff_dir[0]);
+                let i = t.mean(|s| s.diff_ind[0]);
+                println!("{shape:?} {scale} {flags} dir {:.5} ± {:.5}  ind {:.5} ± {:.5}", d.value, d.error, i.value, i.error);
+            }
+        }
+    }
+}

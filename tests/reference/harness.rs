@@ -76,7 +76,7 @@ impl Lab {
                 entries: &[entry(0, &uniform), entry(1, &list), entry(2, &film)],
             });
             // Dispatches of about a million samples, so that no watchdog minds.
-            let step = ((1 << 20) / points.len() as u32).clamp(1, options.samples);
+            let step = ((1 << 20) / points.len() as u32).clamp(1, options.samples.min(16));
             for first_sample in (0..options.samples).step_by(step as usize) {
                 let job = Job {
                     half,
@@ -137,6 +137,8 @@ pub struct Options {
     pub like_cycles: bool,
     /// Purely diffuse surfaces of their base colour.
     pub lambert: bool,
+    /// More mode flags.
+    pub flags: u32,
     /// The analytic lights alone, as the rasteriser has them.
     pub analytic_only: bool,
 }
@@ -157,6 +159,7 @@ impl Options {
             seed: self.seed,
             filter_width: self.filter,
             flags: job::POINTS
+                | self.flags
                 | strategy
                 | if self.lambert { job::LAMBERT } else { 0 }
                 | if self.analytic_only { job::ANALYTIC_ONLY } else { 0 },
