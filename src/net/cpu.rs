@@ -2,7 +2,7 @@
 //! graph as it stands in the file, so that it also judges the planner's fusion and sharing of memory.
 
 use super::format::Weights;
-use super::graph::{AddAt, GraphError, INPUT, Op, Shape, UpsampleBilinear};
+use super::graph::{AddAt, GraphError, INPUT, Op, Shape};
 use super::op::Conv2d;
 use std::collections::HashMap;
 use thiserror::Error;
@@ -90,13 +90,14 @@ pub fn run(weights: &Weights, input: &Tensor) -> Result<Tensor, RunError> {
                 }
                 out
             }
-            Op::UpsampleBilinear(UpsampleBilinear { input, .. }) => upsample(&tensors[input.as_str()], shape),
+            Op::UpsampleBilinear(o) => upsample(&tensors[o.input.as_str()], shape),
             Op::Add(o) => {
                 let mut out = tensors[o.inputs[0].as_str()].clone();
                 add(&mut out, &tensors[o.inputs[1].as_str()]);
                 out.data.iter_mut().for_each(|v| *v = o.activation.apply(*v));
                 out
             }
+            _ => unimplemented!(),
         };
         tensors.insert(op.output(), result);
     }
@@ -109,11 +110,11 @@ fn add(to: &mut Tensor, from: &Tensor) {
 
 /// Convolution and bias: one weight at a time, added to a whole row.
 fn conv2d(weights: &Weights, o: &Conv2d, input: &Tensor, shape: Shape) -> Tensor {
-    let (weight, bias) = weights.conv(o);
+    let (weight, bias) = (weights.values(&o.name, "weight"), weights.values(&o.name, "bias"));
     let [kernel_h, kernel_w] = o.kernel.map(|k| k as usize);
     let (in_w, in_h) = (input.shape.width as usize, input.shape.height as usize);
     let (out_w, out_h) = (shape.width as usize, shape.height as usize);
-    let (stride, padding, in_channels) = (o.stride as usize, o.padding as usize, o.in_channels as usize);
+    let (stride, padding, in_channels) = (o.stride as usize, o.padding.left as usize, o.in_channels as usize);
     let mut out = Tensor::zeros(shape);
     for (oc, plane) in out.data.chunks_exact_mut(out_w * out_h).enumerate() {
         plane.fill(bias[oc]);

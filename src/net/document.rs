@@ -134,7 +134,7 @@ pub(super) fn parse<'a>(
         return Some((document, graph));
     }
     // Operators of sound dimensions still say which tensors there should be.
-    let sized = !errors.iter().any(|e| matches!(e, GraphError::Range { .. }));
+    let sized = !errors.iter().any(|e| matches!(e, GraphError::Range { .. } | GraphError::Divide { .. }));
     problems.extend(errors.into_iter().map(Problem::Graph));
     sized.then_some((document, graph))
 }
@@ -209,10 +209,9 @@ fn check_inputs(document: &mut Document<'_>, problems: &mut Vec<Problem>) {
     }
 }
 
-/// Sizes are judged at odd probe sizes too, because a mistake in the levels of a U-Net shows only there; networks that
-/// want whole multiples of their deepest level are judged at such a size.
+/// Sizes are judged at an odd probe size, because a mistake in the levels of a U-Net shows only there.
 fn check_output(output: &Output, graph: &Graph, problems: &mut Vec<Problem>) {
-    match graph.shapes(253, 131).or_else(|_| graph.shapes(1024, 1024)) {
+    match graph.inner_size(253, 131).and_then(|[w, h]| graph.shapes(w, h)) {
         Err(e) => problems.push(Problem::Graph(e)),
         Ok(shapes) => {
             let index = graph.ops.iter().position(|op| op.output() == graph.output);

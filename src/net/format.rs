@@ -7,7 +7,6 @@ use super::document::{self, Document};
 pub use super::document::{Feature, Output, Provenance, Table};
 use super::graph::Graph;
 use super::header;
-use super::op::Conv2d;
 pub use super::problem::{Problem, WeightsError};
 use super::stored;
 pub use super::stored::{Dtype, MAX_SCALE, SCALE_SUFFIX, WeightTensor};
@@ -127,10 +126,9 @@ impl Weights {
         Self::parse(Path::new("(memory)"), bytes)
     }
 
-    /// Weight [O, I, kh, kw] and bias `[O]` of a convolution of this graph.
-    pub fn conv(&self, conv: &Conv2d) -> (&[f32], &[f32]) {
-        let data = |name: String| self.tensors.get(&name).map_or(&[][..], |t| &t.data);
-        (data(format!("{}.weight", conv.name)), data(format!("{}.bias", conv.name)))
+    /// Values of tensor `NAME.LEAF`; empty where the graph has none, as the bias of a convolution without.
+    pub fn values(&self, name: &str, leaf: &str) -> &[f32] {
+        self.tensors.get(&format!("{name}.{leaf}")).map_or(&[], |t| &t.data)
     }
 
     /// Every tensor by its PyTorch name.

@@ -281,7 +281,7 @@ fn upload_weights(
     for (step, kernel) in plan.steps.iter().zip(kernels) {
         let mut own = Vec::new();
         if let Op::Conv2d(o) = &weights.graph.ops[step.op] {
-            let (weight, bias) = weights.conv(o);
+            let (weight, bias) = (weights.values(&o.name, "weight"), weights.values(&o.name, "bias"));
             for part in kernel.pack(weight, bias, o.in_channels as usize, o.kernel.map(|k| k as usize)) {
                 own.push(data.len() as u64 * 4);
                 data.extend(part);

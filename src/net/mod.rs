@@ -6,12 +6,20 @@
 //! - [`cpu`]: the slow, obvious twin; every kernel is tested against it and against PyTorch.
 //! - [`gpu`]: the WGSL kernels' host side. The only file here that knows wgpu.
 
+pub mod activation;
+mod check;
 pub mod cpu;
+mod document;
+pub mod dropout;
 pub mod format;
 pub mod gpu;
 pub mod graph;
+mod graph_error;
 mod header;
 pub mod op;
+pub mod op_facts;
 pub mod plan;
 mod problem;
+mod shape;
 mod shipped;
+mod stored;

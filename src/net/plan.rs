@@ -76,7 +76,7 @@ pub enum Kind {
 }
 
 /// One dispatch: `kind`, then the skip and the activation in the order of `add_at`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     /// Name of the operator that does the work; the label is `net.NAME`.
     pub name: String,
@@ -124,7 +124,7 @@ pub struct Row {
 }
 
 /// Dispatches and memory for one input size.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Input width.
     pub width: u32,
@@ -318,15 +318,16 @@ fn step(
     let work = &graph.ops[op];
     let (kind, input, skip, add_at, activation) = match work {
         Op::Conv2d(o) => {
-            let kind = Kind::Conv { kernel: o.kernel, stride: o.stride, padding: o.padding };
+            let kind = Kind::Conv { kernel: o.kernel, stride: o.stride, padding: o.padding.left };
             (kind, &o.input, o.add.as_ref(), o.add_at, o.activation)
         }
         Op::UpsampleBilinear(o) => (Kind::Upsample, &o.input, None, AddAt::default(), Activation::None),
         Op::Add(o) => (Kind::Copy, &o.inputs[0], Some(&o.inputs[1]), AddAt::BeforeActivation, o.activation),
+        _ => unimplemented!(),
     };
     let (skip, add_at, activation) =
         fusion.map_or((skip, add_at, activation), |f| (Some(&f.skip), f.add_at, f.activation));
-    let sum = if fusion.is_some() { graph.ops[i].flops(shapes[i]) } else { 0 };
+    let sum = if fusion.is_some() { graph.ops[i].flops(shapes[i], shapes[i]) } else { 0 };
     Step {
         name: work.name().into(),
         op,
@@ -336,7 +337,7 @@ fn step(
         add_at,
         activation,
         output,
-        flops: work.flops(shapes[op]) + sum,
+        flops: work.flops(shapes[op], shapes[op]) + sum,
         traffic: 0,
         parameters: work.parameters(),
     }

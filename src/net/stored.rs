@@ -4,7 +4,7 @@
 
 use super::graph::Graph;
 use super::header::{Header, TensorInfo};
-use super::op::{Op, Parameter};
+use super::op::Op;
 use super::problem::Problem;
 use std::collections::{BTreeMap, BTreeSet};
 
