@@ -104,12 +104,17 @@ pub struct Weights {
     pub provenance: Provenance,
     /// 64-bit FNV-1a of the file's bytes: identifies the file in a picture's metadata, protects against nothing.
     pub content_hash: u64,
-    tensors: BTreeMap<String, WeightTensor>,
+    pub(super) tensors: BTreeMap<String, WeightTensor>,
 }
 
 impl Weights {
     /// Reads and checks a file.
     pub fn load(path: &Path) -> Result<Self, WeightsError> {
+        Self::parse(path, &Self::read_bytes(path)?)
+    }
+
+    /// The bytes of a file that may be one of weights: an ordinary file of at most [`MAX_FILE`] bytes.
+    pub fn read_bytes(path: &Path) -> Result<Vec<u8>, WeightsError> {
         let io = |source| WeightsError::Io { path: path.into(), source };
         let meta = std::fs::metadata(path).map_err(io)?;
         if !meta.is_file() {
@@ -118,7 +123,7 @@ impl Weights {
         if meta.len() > MAX_FILE {
             return Err(WeightsError::TooLarge { path: path.into(), bytes: meta.len() });
         }
-        Self::parse(path, &std::fs::read(path).map_err(io)?)
+        std::fs::read(path).map_err(io)
     }
 
     /// Checks a file that is in memory already.
@@ -134,6 +139,14 @@ impl Weights {
     /// Every tensor by its PyTorch name.
     pub fn tensors(&self) -> &BTreeMap<String, WeightTensor> {
         &self.tensors
+    }
+
+    /// The same network with the weights of its convolutions to be stored as `dtype`; vectors become F32.
+    pub fn stored_as(mut self, dtype: Dtype) -> Self {
+        for tensor in self.tensors.values_mut() {
+            tensor.stored = if tensor.shape.len() == 4 { dtype } else { Dtype::F32 };
+        }
+        self
     }
 
     /// The content hash as it is printed.

@@ -58,7 +58,8 @@ pub enum WeightsError {
     },
 }
 
-fn list(problems: &[Problem]) -> String {
+/// Faults as lines, the first forty of them.
+pub(super) fn list(problems: &[Problem]) -> String {
     const SHOWN: usize = 40;
     let mut text: String = problems.iter().take(SHOWN).map(|p| format!("\n  {p}")).collect();
     if problems.len() > SHOWN {
@@ -150,6 +151,26 @@ pub enum Problem {
         /// Its type.
         dtype: String,
     },
+    /// A state dict's tensor of another kind of number.
+    #[error("tensor `{tensor}` holds {dtype}; F32, F16, BF16 and F64 are converted")]
+    FloatDtype {
+        /// Tensor.
+        tensor: String,
+        /// Its type.
+        dtype: String,
+    },
+    /// Values that halves cannot hold.
+    #[error(
+        "tensor `{tensor}` holds {count} values beyond the ±65504 of F16, the first at index {index}; store it as f32"
+    )]
+    Overflow {
+        /// Tensor.
+        tensor: String,
+        /// How many.
+        count: usize,
+        /// First flat index.
+        index: usize,
+    },
     /// Scales that are no singles.
     #[error("tensor `{tensor}` holds {dtype}; scales are F32")]
     ScaleDtype {
@@ -216,7 +237,8 @@ impl Problem {
             Problem::Unexpected { .. } => "unexpected",
             Problem::Duplicate { .. } => "duplicate",
             Problem::Shape { .. } => "shape",
-            Problem::Dtype { .. } | Problem::ScaleDtype { .. } => "dtype",
+            Problem::Dtype { .. } | Problem::ScaleDtype { .. } | Problem::FloatDtype { .. } => "dtype",
+            Problem::Overflow { .. } => "overflow",
             Problem::Scale { .. } => "scale",
             Problem::Negative { .. } => "negative",
             Problem::Size { .. } => "size",
@@ -239,6 +261,8 @@ impl Problem {
             | Problem::Shape { tensor, .. }
             | Problem::Dtype { tensor, .. }
             | Problem::ScaleDtype { tensor, .. }
+            | Problem::FloatDtype { tensor, .. }
+            | Problem::Overflow { tensor, .. }
             | Problem::Scale { tensor, .. }
             | Problem::Negative { tensor, .. }
             | Problem::Size { tensor, .. }
