@@ -100,7 +100,7 @@ def check(doc):
 def _operator(index, op):
     name = op["name"] if isinstance(op, dict) and _text(op.get("name")) else "?"
     if not isinstance(op, dict) or not _text(op.get("op")):
-        return [Problem("operator", name, f"graph[{index}] `{name}`: field `op` is missing or no string")]
+        return [Problem("operator", name, f"graph[{index}] `{name}`: field `op` is missing or no string, or a field stands twice")]
     if op["op"] not in OPERATORS:
         return [Problem("unknown-operator", name, f"graph[{index}] `{name}`: operator `{op['op']}` is unknown; a newer program may run it")]
     wrong = graphs.field_fault(op)
