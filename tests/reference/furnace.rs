@@ -126,11 +126,20 @@ fn scratch() {
             let scene = scene(vec![(body(shape, scale, true), glowing(0.2, 1.0))], vec![]);
             let eye = camera([0.15 * scale, -0.2 * scale, 0.25 * scale], [1.0 * scale, 0.2, 0.0], 1.2);
             for flags in [0, bouncelight::reference::job::PLAIN_RANDOM] {
-                let options = Options { samples: 256, flags, strategy: Strategy::LightsOnly, lambert: true, ..Default::default() };
+                let options = Options {
+                    samples: 256,
+                    flags,
+                    strategy: Strategy::LightsOnly,
+                    lambert: true,
+                    ..Default::default()
+                };
                 let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &options);
                 let d = t.mean(|s| s.diff_dir[0]);
                 let i = t.mean(|s| s.diff_ind[0]);
-                println!("{shape:?} {scale} {flags} dir {:.5} ± {:.5}  ind {:.5} ± {:.5}", d.value, d.error, i.value, i.error);
+                println!(
+                    "{shape:?} {scale} {flags} dir {:.5} ± {:.5}  ind {:.5} ± {:.5}",
+                    d.value, d.error, i.value, i.error
+                );
             }
         }
     }
