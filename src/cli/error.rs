@@ -1,6 +1,11 @@
 //! Exit codes: every error that reaches `main` is sorted here, once.
 
-use crate::{gi::GiError, gpu::GpuError, net::format::WeightsError, scene::SceneError, scene::upload::UploadError};
+use crate::{
+    gi::GiError,
+    gpu::GpuError,
+    net::{convert::ConvertError, format::WeightsError, pictures::PicturesError},
+    scene::{SceneError, environment::EnvironmentError, upload::UploadError},
+};
 use thiserror::Error;
 
 /// Something went wrong while running.
@@ -60,7 +65,17 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
         if let Some(GiError::Feature { .. } | GiError::Output(_)) = cause.downcast_ref::<GiError>() {
             return INVALID_INPUT;
         }
-        if cause.is::<SceneError>() || cause.is::<UploadError>() || cause.is::<WeightsError>() {
+        if let Some(ConvertError::NoSuchVariant) = cause.downcast_ref::<ConvertError>() {
+            return USAGE;
+        }
+        if cause.is::<ConvertError>() || cause.is::<PicturesError>() {
+            return INVALID_INPUT;
+        }
+        if cause.is::<SceneError>()
+            || cause.is::<UploadError>()
+            || cause.is::<WeightsError>()
+            || cause.is::<EnvironmentError>()
+        {
             return INVALID_INPUT;
         }
     }

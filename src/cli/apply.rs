@@ -1,0 +1,91 @@
+//! `bouncelight apply`: a network on G-buffer pictures from elsewhere.
+
+use super::args::{Global, usage};
+use crate::{
+    image_io::{self, Image},
+    net::{cpu, format::Weights, pictures},
+};
+use anyhow::Result;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Direct light, PNG.
+    #[arg(long, value_name = "PNG")]
+    direct: PathBuf,
+    /// Depth, PNG.
+    #[arg(long, value_name = "PNG")]
+    depth: PathBuf,
+    /// Normals, PNG.
+    #[arg(long, value_name = "PNG")]
+    normal: PathBuf,
+    /// Albedo, PNG.
+    #[arg(long, value_name = "PNG")]
+    diffuse: PathBuf,
+    /// Weights of a network on pictures, as `weights convert` makes them.
+    #[arg(long, value_name = "W")]
+    weights: PathBuf,
+    /// PNG to write; `-` is standard output.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Keep dropout on, with this seed: how the published programs run their networks.
+    #[arg(long, value_name = "SEED")]
+    dropout: Option<u32>,
+}
+
+pub fn run(_global: &Global, args: Args) -> Result<()> {
+    let name = args.output.display().to_string();
+    if name != "-" && !name.to_ascii_lowercase().ends_with(".png") {
+        return Err(usage(format!("{name}: the picture's name must end in .png")));
+    }
+    image_io::check_writable(&args.output)?;
+    let weights = Weights::load(&args.weights)?;
+    pictures::check(&weights)?;
+    let [depth, direct, diffuse, normal] = [&args.depth, &args.direct, &args.diffuse, &args.normal].map(|p| rgb(p));
+    let (depth, direct, diffuse, normal) = (depth?, direct?, diffuse?, normal?);
+    let size = [direct.width, direct.height];
+    for (image, path) in [(&depth, &args.depth), (&diffuse, &args.diffuse), (&normal, &args.normal)] {
+        if [image.width, image.height] != size {
+            let sizes = format!(
+                "{}x{} pixels, {} has {}x{}",
+                image.width,
+                image.height,
+                args.direct.display(),
+                size[0],
+                size[1]
+            );
+            return Err(usage(format!("{} has {sizes}; all four pictures need one size", path.display())));
+        }
+    }
+    let input = pictures::input(
+        &weights,
+        &pictures::Pictures {
+            size,
+            depth: &depth.pixels,
+            direct: &direct.pixels,
+            diffuse: &diffuse.pixels,
+            normal: &normal.pixels,
+        },
+    )?;
+    let output = cpu::run(&weights, &input)?;
+    let shown = pictures::picture(&output);
+    let bytes: Vec<u8> = shown.iter().map(|v| (v * 255.0).round() as u8).collect();
+    let command: Vec<String> = std::env::args().skip(1).collect();
+    let metadata = [
+        ("Software", format!("bouncelight {}", env!("CARGO_PKG_VERSION"))),
+        ("Command", format!("bouncelight {}", command.join(" "))),
+        ("Weights", weights.hash_text()),
+    ];
+    let metadata: image_io::Metadata = metadata.map(|(k, v)| (k.to_string(), v)).into();
+    image_io::write_png(&args.output, output.shape.width, output.shape.height, &bytes, &metadata)?;
+    Ok(())
+}
+
+/// A picture without transparency; an alpha channel that is 1 everywhere is left out.
+fn rgb(path: &Path) -> Result<Image> {
+    let image = image_io::read_png(path)?;
+    if image.channels == 4 && image.pixels.chunks_exact(4).any(|p| p[3] < 1.0) {
+        return Err(usage(format!("{} is transparent in places; save it without an alpha channel", path.display())));
+    }
+    Ok(Image { channels: 3, pixels: image.to_rgb(), ..image })
+}
