@@ -310,23 +310,56 @@ fn any_hit_agrees_with_the_nearest() {
     assert!(blocked > 200 && blocked < 4800, "{blocked} of 5000 blocked");
 }
 
-/// Barycentric weights give the point that the distance gives.
+/// Barycentric weights give the point that the distance gives, for single triangles and for those that share a leaf.
 #[test]
 fn weights_and_distance_name_the_same_point() {
-    let Some(bench) = Bench::new() else { return };
-    let triangles = soup(500, 0.4, 21);
-    let rays = random_rays(3000, 1.2, 22);
-    let mut seen = 0;
-    for (ray, hit) in rays.iter().zip(bench.trace(&Accel::build(&triangles).unwrap(), &rays)) {
-        let Some([a, b, c]) = triangles.get(hit.triangle as usize) else { continue };
-        let [v, w] = hit.uv;
-        for k in 0..3 {
-            let (p, q) = (a[k] * (1.0 - v - w) + b[k] * v + c[k] * w, ray.origin[k] + hit.t * ray.direction[k]);
-            assert!((p - q).abs() < 2e-5, "{ray:?} {hit:?}: {p} is not {q}");
+    let bench = Bench::new();
+    for triangles in [soup(500, 0.4, 21), sphere(24)] {
+        let accel = Accel::build(&triangles).unwrap();
+        let rays = random_rays(3000, 1.2, 22);
+        let mut all = on_cpu(&accel, &rays);
+        all.extend(bench.iter().flat_map(|b| b.trace(&accel, &rays)));
+        let mut seen = 0;
+        for (ray, hit) in rays.iter().cycle().zip(&all) {
+            let Some([a, b, c]) = triangles.get(hit.triangle as usize) else { continue };
+            let [v, w] = hit.uv;
+            for k in 0..3 {
+                let p = a[k] * (1.0 - v - w) + b[k] * v + c[k] * w;
+                let q = ray.origin[k] + hit.t * ray.direction[k];
+                assert!((p - q).abs() < 2e-5, "{ray:?} {hit:?}: {p} is not {q}");
+            }
+            seen += 1;
         }
-        seen += 1;
+        assert!(seen > all.len() / 6, "{seen} hits of {}", all.len());
     }
-    assert!(seen > 500, "{seen} hits");
+}
+
+/// Negative control: a tree with one plane of one box in the wrong place is noticed.
+#[test]
+fn a_damaged_tree_is_noticed() {
+    let triangles = soup(300, 0.3, 9);
+    let mut accel = Accel::build(&triangles).unwrap();
+    let rays = random_rays(2000, 1.2, 10);
+    assert_eq!(disagreements(&triangles, &rays, &on_cpu(&accel, &rays), 1.0), 0);
+    // The root's first four high planes along y become low ones.
+    accel.words_mut()[10] = 0;
+    assert!(disagreements(&triangles, &rays, &on_cpu(&accel, &rays), 1.0) > 0);
+    let Some(bench) = Bench::new() else { return };
+    assert!(disagreements(&triangles, &rays, &bench.trace(&accel, &rays), 1.0) > 0);
+}
+
+/// Blocks visited grow by about as much from 1,000 to 10,000 triangles as from there to 100,000.
+#[test]
+fn visits_grow_like_a_logarithm() {
+    let visits = [16usize, 50, 158].map(|n| {
+        let accel = Accel::build(&sphere(n)).unwrap();
+        let rays = random_rays(2000, 0.9, 33);
+        let sum: usize = rays.iter().map(|r| accel.visits(r.origin, r.direction, r.t_max)).sum();
+        (accel.triangle_count(), sum as f64 / rays.len() as f64)
+    });
+    println!("{visits:?}");
+    let [a, b, c] = visits.map(|v| v.1);
+    assert!(b - a > 0.5 && c - b < 1.6 * (b - a) && c < 2.0 * a, "{visits:?}");
 }
 
 #[test]

@@ -105,8 +105,10 @@ impl Accel {
     pub fn depth(&self) -> usize {
         wide::depth(&self.blocks)
     }
+
+    /// The blocks' words, sixteen each: for tests that damage them.
     #[doc(hidden)]
-    pub fn words(&self) -> [&[u32]; 2] {
-        [bytemuck::cast_slice(&self.blocks), &[0; 4]]
+    pub fn words_mut(&mut self) -> &mut [u32] {
+        bytemuck::cast_slice_mut(&mut self.blocks)
     }
 }
