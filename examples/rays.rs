@@ -297,15 +297,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         counts.iter().map(|n| measure(&gpu, &caster, repeat, &format!("spheres {n}"), spheres(*n))).collect();
     let svg = chart(&rows, &gpu.info.name);
     if let Some(path) = value("--csv") {
-        let mut csv = String::from(
-            "triangles,bytes,build_s,primary_ns,shadow_ns,diffuse_ns,primary_visits,shadow_visits,diffuse_visits\n",
-        );
+        let mut csv =
+            String::from("triangles,bytes,build_s,primary_ns,shadow_ns,diffuse_ns,primary_visits,diffuse_visits\n");
         for r in &rows {
             let [a, b, c] = r.cost;
-            let [u, v, w] = r.visits;
+            let [u, _, w] = r.visits;
             writeln!(
                 csv,
-                "{},{:.0},{:.3},{a:.1},{b:.1},{c:.1},{u:.2},{v:.2},{w:.2}",
+                "{},{:.0},{:.3},{a:.1},{b:.1},{c:.1},{u:.2},{w:.2}",
                 r.triangles,
                 r.mebibytes * 1_048_576.0,
                 r.build
