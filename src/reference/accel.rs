@@ -18,7 +18,7 @@ pub use gpu::AccelGpu;
 
 use thiserror::Error;
 
-/// The most triangles a structure takes: building needs about 500 bytes for each, so 4 GB here.
+/// The most triangles a structure takes: building needs 250 to 500 bytes for each, so 2 to 4 GB here.
 pub const MAX_TRIANGLES: u64 = 1 << 23;
 
 /// Coordinates farther from the origin than this (metres) are left out like non-finite ones: their products overflow.
