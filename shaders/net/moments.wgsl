@@ -6,14 +6,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= IN_VECTORS || id.y >= step.tiles { return; }
     let first = id.y * 256u;
     let count = min(256u, step.in_size.x * step.in_size.y - first);
-    let from = step.input + first * IN_PITCH + id.x;
+    let start = step.input + first * IN_PITCH + id.x;
     var sum = vec4f(0.0);
-    for (var i = 0u; i < count; i++) { sum += load(from + i * IN_PITCH); }
+    for (var i = 0u; i < count; i++) { sum += load(start + i * IN_PITCH); }
     let guess = sum / f32(count);
     var rest = vec4f(0.0);
     var squares = vec4f(0.0);
     for (var i = 0u; i < count; i++) {
-        let d = load(from + i * IN_PITCH) - guess;
+        let d = load(start + i * IN_PITCH) - guess;
         rest += d;
         squares += d * d;
     }

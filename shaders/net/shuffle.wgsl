@@ -8,13 +8,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var lane = 0u; lane < 4u; lane++) {
         let c = id.z * 4u + lane;
         if c < OUT_CHANNELS {
-            var from = id.xy / FACTOR;
+            var place = id.xy / FACTOR;
             var channel = (c * FACTOR + id.y % FACTOR) * FACTOR + id.x % FACTOR;
             if DOWN == 1u {
-                from = id.xy * FACTOR + vec2u(c % FACTOR, c / FACTOR % FACTOR);
+                place = id.xy * FACTOR + vec2u(c % FACTOR, c / FACTOR % FACTOR);
                 channel = c / (FACTOR * FACTOR);
             }
-            v[lane] = load(step.input + (from.y * step.in_size.x + from.x) * IN_PITCH + channel / 4u)[channel % 4u];
+            v[lane] = load(step.input + (place.y * step.in_size.x + place.x) * IN_PITCH + channel / 4u)[channel % 4u];
         }
     }
     finish(v, id.y * step.out_size.x + id.x, id.z);

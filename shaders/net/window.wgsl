@@ -14,12 +14,12 @@ fn source(pixel: u32, vector: u32) -> vec4f {
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= step.out_size) { return; }
     let to = (id.y * step.out_size.x + id.x) * OUT_PITCH + step.channel / 4u + id.z;
-    var from = vec2i(id.xy) - step.pad;
-    let inside = all(from >= vec2i(0)) && all(from < vec2i(step.in_size));
+    var place = vec2i(id.xy) - step.pad;
+    let inside = all(place >= vec2i(0)) && all(place < vec2i(step.in_size));
     var v = vec4f(0.0);
     if inside || CLAMP == 1u {
-        from = clamp(from, vec2i(0), vec2i(step.in_size) - 1);
-        let pixel = u32(from.y) * step.in_size.x + u32(from.x);
+        place = clamp(place, vec2i(0), vec2i(step.in_size) - 1);
+        let pixel = u32(place.y) * step.in_size.x + u32(place.x);
         v = source(pixel, id.z);
         if LANE > 0u {
             // Lanes LANE and after come from this vector, those before from the end of the last one.
