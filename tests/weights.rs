@@ -214,7 +214,6 @@ fn version_2_writes_its_encodings() {
     one(&["`hit`", "encoding `signed`", "known: flag"], second(|d| d["inputs"][1]["encoding"] = json!("signed")));
     one(&["`direct`", "came with version 2"], |f| f.document["inputs"][0]["encoding"] = json!("log1p_over_exposure"));
     one(&["licence is empty"], second(|d| d["licence"] = json!(" ")));
-    one(&["no such feature"], second(|d| d["table"]["name"] = json!("images")));
 }
 
 #[test]

@@ -130,7 +130,8 @@ fn the_program_converts_tells_and_applies() {
         assert!(program(&args).status.success());
         image_io::read_png(Path::new(&path("out.png"))).unwrap().pixels
     };
-    assert!(dropped("1") == dropped("1") && dropped("1") != dropped("2") && dropped("1") != picture.pixels);
+    let first = dropped("1");
+    assert!(first == dropped("1") && first != dropped("2") && first != picture.pixels);
 }
 
 #[test]

@@ -39,9 +39,9 @@ fn the_papers_generator_has_its_size() {
     assert_eq!(graph.check(), []);
     // 54.41 M in convolutions, the rest in norms.
     assert_eq!(graph.parameters(), 54_413_315 + 9_856);
-    // 98.4 GFLOP of convolutions, as the transposed ones' cut taps count; the norms add a little.
+    // By hand, convolutions at 1024×512: 34.69 GFLOP down, 62.88 up, 6.44 in the last one; norms and the like add 0.2.
     let flops = graph.flops(1024, 512).unwrap() as f64 / 1e9;
-    assert!((98.0..100.0).contains(&flops), "{flops} GFLOP");
+    assert!((104.0..104.4).contains(&flops), "{flops} GFLOP");
     let wide = generator(Arch::DeepIllumination, Norm::Batch, 128);
     assert_eq!(wide.check(), []);
     let shapes = wide.shapes(256, 256).unwrap();
