@@ -5,7 +5,7 @@ use crate::image_io;
 use crate::net::convert::{Arch, Norm, Recipe, convert};
 use crate::net::{
     format::{Dtype, Provenance, Weights},
-    plan::Plan,
+    plan::{Options, Plan},
 };
 use anyhow::{Context, Result};
 use clap::ValueEnum;
@@ -135,8 +135,9 @@ fn convert_file(args: &ConvertArgs) -> Result<()> {
 
 fn info(weights: &Weights, size: [u32; 2]) -> Result<()> {
     let cells = size.map(|n| n.div_ceil(weights.cell));
-    let [width, height] = weights.graph.inner_size(cells[0], cells[1])?;
-    let plan = Plan::new(&weights.graph, width, height)?;
+    // Whatever the size, it can be told what it takes.
+    let plan = Plan::with(&weights.graph, cells[0], cells[1], &Options { limit: u64::MAX, ..Default::default() })?;
+    let [width, height] = plan.inner;
     let features: Vec<_> =
         weights.inputs.iter().map(|f| format!("{} {} ({})", f.name, f.channels, f.encoding)).collect();
     println!("name       {}", weights.name);
