@@ -42,7 +42,9 @@ fn graph(input_channels: u32, ops: Vec<Op>) -> Graph {
 /// `whole` is a concatenation of which `part` is a part.
 fn is_part(graph: &Graph, part: &str, whole: &str) -> bool {
     graph.ops.iter().any(|op| match op {
-        Op::Concat(o) if o.output == whole => o.inputs.iter().any(|i| i == part.trim_end_matches(".fitted") || is_part(graph, part, i)),
+        Op::Concat(o) if o.output == whole => {
+            o.inputs.iter().any(|i| i == part.trim_end_matches(".fitted") || is_part(graph, part, i))
+        }
         _ => false,
     })
 }
