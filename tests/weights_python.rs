@@ -1,5 +1,10 @@
 //! The Python package and this reader: each reads what the other writes, and both find the same faults.
 
+#[path = "weights_fuzz/corpus.rs"]
+mod corpus;
+#[path = "weights_fuzz/mutate.rs"]
+mod mutate;
+
 use bouncelight::net::format::{Dtype, Weights};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -42,6 +47,35 @@ fn bad_files_have_the_faults_that_are_expected() {
         let found: BTreeSet<_> = found.into_iter().map(|(code, subject)| (code.to_string(), subject)).collect();
         assert_eq!(found, wanted, "{name}");
     }
+}
+
+/// Both readers on hostile files. Known to differ: a half surrogate in a text of an operator, which spoils the document for
+/// the package and the operator for us; no file of this seed has one.
+#[test]
+fn hostile_files_have_the_same_faults() {
+    if !python() {
+        return;
+    }
+    let (made, files) = (tempfile::tempdir().unwrap(), corpus::weights());
+    let mut wanted = Vec::new();
+    for case in 0..600 {
+        let bytes = mutate::case(&files, &mut mutate::Random::new(5, case));
+        std::fs::write(made.path().join(format!("{case}.safetensors")), &bytes).unwrap();
+        let faults = Weights::from_bytes(&bytes).err().map_or(Vec::new(), |e| e.faults());
+        wanted.push(faults.into_iter().map(|(code, subject)| [code.to_string(), subject]).collect::<BTreeSet<_>>());
+    }
+    let script = "
+import json, sys
+import bouncelight_weights as bw
+found = ([[p.code, p.subject] for p in bw.verify(f'{sys.argv[1]}/{i}.safetensors')] for i in range(600))
+print(json.dumps(list(found)))
+";
+    let text = run(&["-c", script, made.path().to_str().expect("a temporary path is text")]);
+    let found: Vec<BTreeSet<[String; 2]>> = serde_json::from_str(&text).unwrap();
+    for (case, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
+        assert_eq!(found, wanted, "case {case}");
+    }
+    assert!(wanted.iter().filter(|w| w.is_empty()).count() > 20 && wanted.iter().filter(|w| w.len() > 1).count() > 50);
 }
 
 #[test]

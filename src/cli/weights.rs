@@ -156,20 +156,19 @@ fn info(weights: &Weights, size: [u32; 2]) -> Result<()> {
         plan.traffic() as f64 / 1e6,
         plan.arena_bytes as f64 / 1e6
     );
+    let rows = plan.rows();
+    let wide = rows.iter().map(|row| row.name.len()).max().unwrap_or(0).max("layer".len()) + 2;
+    let head = ["result", "parameters", "MFLOP", "bytes", "offset"];
     println!(
-        "{:<16}{:<28}{:>16}{:>12}{:>10}{:>12}{:>12}",
-        "layer", "kind", "result", "parameters", "MFLOP", "bytes", "offset"
+        "{:<wide$}{:<28}{:>16}{:>12}{:>10}{:>12}{:>12}",
+        "layer", "kind", head[0], head[1], head[2], head[3], head[4]
     );
-    for row in plan.rows() {
+    for row in rows {
         let shape = format!("{}x{}x{}", row.shape.channels, row.shape.height, row.shape.width);
+        let mflop = row.flops as f64 / 1e6;
         println!(
-            "{:<16}{:<28}{shape:>16}{:>12}{:>10.1}{:>12}{:>12}",
-            row.name,
-            row.kind,
-            row.parameters,
-            row.flops as f64 / 1e6,
-            row.bytes,
-            row.offset
+            "{:<wide$}{:<28}{shape:>16}{:>12}{mflop:>10.1}{:>12}{:>12}",
+            row.name, row.kind, row.parameters, row.bytes, row.offset
         );
     }
     if !weights.provenance.is_empty() {

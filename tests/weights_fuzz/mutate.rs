@@ -163,7 +163,7 @@ fn spoil_entries(entries: &mut Vec<(String, Value)>, random: &mut Random) {
         6 => {
             let side = random.below(2);
             let offset = entries[at].1["data_offsets"][side].as_u64().unwrap_or(0);
-            let moves = [offset.wrapping_sub(1), offset + 1, offset + 4, 0, u64::MAX, 1 << 40];
+            let moves = [offset.wrapping_sub(1), offset.wrapping_add(1), offset.wrapping_add(4), 0, u64::MAX, 1 << 40];
             entries[at].1["data_offsets"][side] = json!(*random.pick(&moves));
         }
         _ => spoil_value(&mut entries[at].1, random, 0),
