@@ -1,7 +1,11 @@
 //! Conformance of networks: PyTorch's fixtures ↔ the CPU twin ↔ the WGSL kernels, per operator and whole, at odd sizes
 //! and with padded channels. Relative error is max |Δ| / max |reference|.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod hashed;
+mod operators;
+mod whole;
 
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
 use bouncelight::net::cpu::{self, Tensor};
