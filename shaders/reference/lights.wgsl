@@ -112,15 +112,16 @@ fn sample_triangle(triangle: u32, p: vec3f, u: vec2f) -> TrueLight {
     let w = weights(uv);
     let q = corners.a * w.x + corners.b * w.y + corners.c * w.z;
     let normal = front_normal(corners);
-    let to = q - p;
+    // The ray aims at a point off the surface, like all rays begin. Aiming at q and stopping short by as much would not do:
+    // the offset is not along the normal, and can lie farther away than q.
+    let to = off_surface(q, select(normal, -normal, dot(normal, q - p) > 0.0)) - p;
     let d2 = dot(to, to);
     if d2 <= 0.0 { return NO_LIGHT; }
-    let l = to / sqrt(d2);
+    let reach = sqrt(d2);
+    let l = to / reach;
     let facing = dot(normal, l);
     let m = triangles[4u * triangle + 3u].x;
     if facing == 0.0 || (facing > 0.0 && (materials.items[m].flags & MATERIAL_DOUBLE_SIDED) == 0u) { return NO_LIGHT; }
-    // The ray ends in front of the triangle, off its surface like all rays begin.
-    let reach = distance(off_surface(q, select(normal, -normal, facing > 0.0)), p);
     let pdf = bitcast<f32>(triangles[4u * triangle + 3u].z) * (1.0 - environment_share()) * d2 / abs(facing);
     return TrueLight(l, reach, emission_at(triangle, uv) * coverage_at(triangle, uv) / pdf, pdf, NONE, 1.0);
 }
