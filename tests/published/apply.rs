@@ -171,6 +171,10 @@ fn what_cannot_be_applied() {
     check("--weights", compact.to_str().unwrap(), 4, &["albedo", "screen", "four pictures", "exposure"]);
     let free = root("weights-format/fixtures/add.safetensors");
     check("--weights", free.to_str().unwrap(), 4, &["free", "nothing says what they are"]);
+    if common::gpu().is_some() {
+        let (net, out) = (path("net.safetensors"), path("out.png"));
+        fails(&["render", "interior", "--size", "16x8", "--weights", &net, "-o", &out], 4, &["images", "screen"]);
+    }
     // A faulty state is refused as a whole.
     let mut faulty = state("pix2pix", "batch", 1);
     faulty.remove("final.2.bias");
