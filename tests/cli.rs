@@ -58,6 +58,11 @@ fn invalid_scenes_exit_with_4_and_name_the_file() {
     std::fs::write(&stray, b"hello").unwrap();
     fails(&["render", &cut, "-o", &out], 4, &["cut.glb"]);
     fails(&["render", &empty, "-o", &out], 4, &["empty.glb"]);
+    let sky = path(&dir, "sky.hdr");
+    std::fs::write(&sky, b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n\x02\x02").unwrap();
+    fails(&["render", "interior", "-o", &out, "--environment", &sky], 4, &["sky.hdr", "truncated"]);
+    std::fs::remove_file(&sky).unwrap();
+    fails(&["render", "interior", "-o", &out, "--environment", &sky], 4, &["sky.hdr", "cannot be read"]);
     fails(&["render", &stray, "-o", &out], 4, &["scene.txt", ".glb"]);
     fails(&["render", dir.path().to_str().unwrap(), "-o", &out], 4, &["folder"]);
     fails(&["render", &path(&dir, "none.gltf"), "-o", &out], 4, &["none.gltf"]);
@@ -257,6 +262,25 @@ fn a_reference_above_the_threshold_exits_with_5() {
     let dark = with(&[&again, "--reference", &bright, "--metric", "psnr", "--threshold", "60", "--diff", &diff]);
     assert_eq!(dark.status.code(), Some(5), "{}", String::from_utf8_lossy(&dark.stderr));
     assert!(Path::new(&diff).exists() && Path::new(&again).exists(), "the pictures are kept for a look");
+
+    // Against its own radiance any exposure is right; FLIP tells another light, and so does its map.
+    let (linear, lit) = (path(&dir, "linear.exr"), path(&dir, "lit.png"));
+    assert!(with(&[&linear]).status.success());
+    let flip = ["--reference", &linear, "--metric", "flip", "--threshold", "0.01", "--diff", &diff];
+    let own = with(&[&[&again[..], "--exposure", "1"], &flip[..]].concat());
+    assert!(own.status.success(), "{}", String::from_utf8_lossy(&own.stderr));
+    let other = with(&[&[&lit[..], "--environment", "0.5"], &flip[..]].concat());
+    assert_eq!(other.status.code(), Some(5), "{}", String::from_utf8_lossy(&other.stderr));
+    let hot = bouncelight::image_io::read_png(Path::new(&diff)).unwrap();
+    assert!(hot.pixels.iter().copied().fold(0.0, f32::max) > 0.3);
+
+    // What cannot be judged is told before anything is drawn.
+    let fresh = path(&dir, "fresh.png");
+    let light = [&base[..], &[&fresh, "--reference", &bright, "--metric", "hdrflip"]].concat();
+    fails(&light, 2, &["hdrflip", "bright.png", "EXR"]);
+    let size = ["render", "cornell", "--size", "64x48", "-o", &fresh, "--reference", &bright];
+    fails(&size, 1, &["64×48", "96×48", "bright.png"]);
+    assert!(!Path::new(&fresh).exists());
 }
 
 #[test]

@@ -91,7 +91,7 @@ fn light_scales_through_the_whole_frame_and_darkness_is_dark() {
     assert!(dark.beauty.data.chunks_exact(4).all(|p| p[..3] == [0.0; 3]), "no light, no picture");
     // Negative control: the sky alone is not darkness.
     let mut sky = dimmed(&scene, 0.0);
-    sky.environment = scene.environment;
+    sky.environment = scene.environment.clone();
     assert!(mean(&indirect(&draw(&gpu, &sky, size))) > 1e-3);
 }
 

@@ -7,6 +7,7 @@ mod common;
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{RenderError, Renderer, View};
+use bouncelight::scene::environment::EnvironmentImage;
 use bouncelight::scene::upload::{SceneGpu, UploadError};
 use bouncelight::scene::{AlphaMode, Environment, Light, Scene};
 use build::*;
@@ -17,7 +18,7 @@ use std::f32::consts::PI;
 fn the_background_is_the_environment() {
     let Some(gpu) = common::gpu() else { return };
     let mut s = scene(vec![floor(1.0, -5.0)], vec![sun([0.0, -1.0, 0.0], 1.0, 0.0)]);
-    s.environment = Environment { radiance: [0.0508761, 0.25, 3.0] };
+    s.environment = Environment::constant([0.0508761, 0.25, 3.0]);
     let frame = render(&gpu, &s, &look_at([0.0, 0.0, 5.0], [0.0; 3], 0.6), [33, 21], 3);
     let expected = s.environment.radiance.map(|v| half::f16::from_f32(v).to_f32());
     for (i, v) in frame.beauty.at(16, 2).iter().take(3).enumerate() {
@@ -25,6 +26,39 @@ fn the_background_is_the_environment() {
     }
     assert_eq!(frame.layer(Layer::Depth).unwrap().at(16, 2), [1e10]);
     assert_eq!(frame.layer(Layer::DiffCol).unwrap().at(16, 2), [0.0; 3]);
+}
+
+#[test]
+fn a_picture_of_the_surroundings_is_seen_where_it_lies() {
+    let Some(gpu) = common::gpu() else { return };
+    let (width, height) = (16, 8);
+    let rgb = (0..width * height).flat_map(|i| [(i % width) as f32, (i / width) as f32 * 0.5, 0.25]).collect();
+    let image = EnvironmentImage { name: "ramp".into(), width, height, rgb };
+    let s = Scene { environment: Environment::from_image(image.clone()).unwrap(), ..Default::default() };
+    let size = [31, 17];
+    for target in [[0.0, 0.3, -1.0], [1.0, -0.2, 0.1], [-1.0, 0.0, 0.02], [0.1, 0.9, 0.5]] {
+        let camera = look_at([0.0; 3], target, 1.2);
+        let frame = render(&gpu, &s, &camera, size, 1);
+        let tan = (0.5 * camera.yfov).tan();
+        let world = Mat4::from_cols_array_2d(&camera.transform);
+        let seen = |x: usize, y: usize, mirror: f32| {
+            let aspect = size[0] as f32 / size[1] as f32;
+            let ndc = |i: usize, n: u32| (2.0 * i as f32 + 1.0) / n as f32 - 1.0;
+            let view = Vec3::new(mirror * ndc(x, size[0]) * tan * aspect, -ndc(y, size[1]) * tan, -1.0);
+            image.radiance(world.transform_vector3(view).normalize().into())
+        };
+        let worst = |mirror: f32| {
+            let pixels = (0..17).flat_map(|y| (0..31).map(move |x| (x, y)));
+            let off = pixels.map(|(x, y)| {
+                let (a, b) = (frame.beauty.at(x, y), seen(x, y, mirror));
+                (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max)
+            });
+            off.fold(0.0, f32::max)
+        };
+        // Half floats near 16 are 0.008 apart.
+        assert!(worst(1.0) < 0.02, "{target:?}: {}", worst(1.0));
+        assert!(worst(-1.0) > 0.2, "a mirrored sky must be noticed");
+    }
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Metrics against scikit-image and SciPy on committed pictures (fixtures/metrics/make.py), and against plain reason.
 
 use bouncelight::metrics::{
-    self, Comparison, MetricError, NAMES, Picture, Views, compare, heat_color, heat_map, paper, psnr,
+    self, Comparison, FlipMaps, LayerComparison, MetricError, NAMES, Options, Picture, Views, compare, compare_with,
+    heat_color, heat_map, paper, psnr,
 };
 
 fn picture(pixels: &[f32], width: usize) -> Picture<'_> {
@@ -130,6 +131,21 @@ fn values_known_by_hand() {
     assert!((psnr(picture(&a, 8), picture(&b, 8)).expect("comparable") - 20.0).abs() < 1e-5);
     let rel = metrics::rel_mse(picture(&a, 8), picture(&b, 8)).expect("comparable");
     assert!((rel - 0.01 / 0.37).abs() < 1e-6);
+    // A tenth too dark everywhere; only the sign tells from a tenth too bright.
+    let relative = |x: &[f32], y: &[f32]| {
+        let (x, y) = (picture(x, 8), picture(y, 8));
+        [metrics::mean_relative_error(x, y).expect("comparable"), metrics::bias(x, y).expect("comparable")]
+    };
+    let dim = b.map(|v| v * 0.9);
+    let [mre, bias] = relative(&dim, &b);
+    assert!((mre - 0.1).abs() < 1e-6 && (bias + 0.1).abs() < 1e-6, "{mre} {bias}");
+    // Half a tenth too dark, half as much too bright: an error without a bias.
+    let mut mixed = dim;
+    mixed[..96].fill(0.66);
+    let [mre, bias] = relative(&mixed, &b);
+    assert!((mre - 0.1).abs() < 1e-6 && bias.abs() < 1e-6, "{mre} {bias}");
+    assert_eq!(relative(&[0.0; 192], &[0.0; 192]), [0.0, 0.0]);
+    assert_eq!(relative(&a, &[0.0; 192]), [f64::INFINITY; 2]);
     // A flat channel stretches to 0 and not to NaN.
     let flat = compare_both(&a, &b, 8);
     assert_eq!((flat.paper.l1, flat.paper.fid), (0.0, 0.0));
@@ -158,6 +174,13 @@ fn what_cannot_be_compared_is_refused() {
         assert!(matches!(Picture::new("p", w, h, &good), Err(MetricError::Shape { .. })), "{w}×{h}");
     }
     assert!(Picture::new("p", 0, 0, &[]).is_err());
+    let layer =
+        |size, a: &[f32], b: &[f32]| LayerComparison::new(["a", "b"], size, "Depth", a, b).map(|l| l.linear.bias);
+    assert_eq!(layer([2, 1], &[3.0, 5.0], &[2.0, 6.0]), Ok(0.0));
+    for (size, a, b) in [([2, 1], 2, 4), ([2, 1], 3, 3), ([0, 1], 2, 2), ([0, 0], 0, 0)] {
+        let wrong = layer(size, &good[..a], &good[..b]);
+        assert!(matches!(wrong, Err(MetricError::Shape { .. })), "{size:?} {a} {b}");
+    }
 
     let (wide, tall) = (noise(8 * 16 * 3, 5), noise(8 * 16 * 3, 5));
     let (a, b) = (picture(&wide, 16), picture(&tall, 8));
@@ -170,6 +193,8 @@ fn what_cannot_be_compared_is_refused() {
         metrics::ssim(a, b, 1.0).err(),
         metrics::mean_absolute_error(a, b).err(),
         metrics::rel_mse(a, b).err(),
+        metrics::mean_relative_error(a, b).err(),
+        metrics::bias(a, b).err(),
         heat_map(a, b, 1.0).err(),
         compare(Views { display: a, linear: None }, Views { display: b, linear: None }).err(),
     ];
@@ -187,13 +212,21 @@ fn what_cannot_be_compared_is_refused() {
 #[test]
 fn record_is_json_with_schema() {
     let (a, b) = (noise(8 * 8 * 3, 7), noise(8 * 8 * 3, 8));
+    let views = |p| Views { display: picture(p, 8), linear: Some(picture(p, 8)) };
+    let cheap = Options { flip: false, hdr_flip: false, ..Options::default() };
+    let (quick, maps) = compare_with(views(&a), views(&b), cheap).expect("comparable");
+    assert_eq!((maps, quick.value("flip"), quick.value("hdrflip")), (FlipMaps::default(), None, None));
+    let json = serde_json::to_value(&quick).expect("serialises");
+    assert!(json["flip"].is_null() && json["hdr_flip"].is_null());
     let c = compare_both(&a, &b, 8);
     let json = serde_json::to_value(&c).expect("serialises");
     assert_eq!(json["schema"], 1);
     assert_eq!(json["width"], 8);
     assert!(json["paper"]["l1"].is_f64() && json["display"]["psnr"].is_f64() && json["linear"]["rel_mse"].is_f64());
+    assert!(json["flip"].is_f64() && json["hdr_flip"]["mean"].is_f64() && json["linear"]["bias"].is_f64());
+    assert!(json["hdr_flip"]["exposures"]["count"].is_u64() && json["pixels_per_degree"].is_f64());
     for (name, more_is_better) in NAMES {
-        let value = c.value(name).expect("every listed name");
+        let value = c.value(name).expect("every listed name").abs();
         assert_eq!(c.passes(name, value), Some(true));
         assert_eq!(c.passes(name, value - 0.5), Some(more_is_better), "{name}");
     }

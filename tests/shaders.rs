@@ -33,8 +33,8 @@ fn every_shader_validates_in_every_permutation() {
     }
     let seen: std::collections::BTreeSet<_> = permutations.iter().map(|p| p.0).collect();
     assert_eq!(seen.len(), shaders::all().count(), "every row of the table was seen");
-    assert_eq!((shaders::RENDER.len(), shaders::GI.len(), shaders::NET.len()), (6, 4, 26));
-    assert_eq!(permutations.len(), 237);
+    assert_eq!((shaders::RENDER.len(), shaders::GI.len(), shaders::NET.len(), shaders::REFERENCE.len()), (6, 4, 26, 3));
+    assert_eq!(permutations.len(), 240);
 }
 
 #[test]
@@ -107,9 +107,29 @@ fn structs_lie_in_memory_as_their_rust_twins() {
     // The Rust struct ends with padding to the alignment of uniform offsets.
     same_layout!("render.gbuffer", "Material", MaterialGpu, size std::mem::offset_of!(MaterialGpu, tail), [
         base_color, emissive, unlit, metallic, roughness, normal_scale, occlusion_strength, alpha_cutoff,
-        uses as "base_use",
+        f0, uses as "base_use",
     ]);
     assert_eq!(size_of::<MaterialGpu>(), 256);
+}
+
+#[test]
+#[cfg(feature = "reference")]
+fn the_path_tracers_structs_lie_in_memory_as_their_rust_twins() {
+    use bouncelight::reference::Job;
+    use bouncelight::reference::scene::{ImageUse, RefMaterial, SceneInfo};
+    same_layout!("reference.path", "SceneInfo", SceneInfo, size size_of::<SceneInfo>(), [
+        environment, flags, light_count, truth_table, truth_count, analytic_table, environment_share,
+        environment_share_alone, environment_texels, environment_table, environment_size,
+    ]);
+    same_layout!("reference.path", "Job", Job, size size_of::<Job>(), [
+        world_from_view, tan_half, size, first_point, point_count, film_first, first_sample, sample_count, seed, half,
+        flags, filter_width, near, clamp, bounces, diffuse_bounces, glossy_bounces, filter_glossy,
+    ]);
+    same_layout!("reference.path", "ImageUse", ImageUse, size size_of::<ImageUse>(), [row0, texel, row1, bits, size]);
+    same_layout!("reference.path", "RefMaterial", RefMaterial, size size_of::<RefMaterial>(), [
+        base_color, emissive, flags, metallic, roughness, normal_scale, alpha_cutoff, base_use, rough_use, normal_use,
+        emissive_use,
+    ]);
 }
 
 #[test]

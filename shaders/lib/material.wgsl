@@ -16,7 +16,8 @@ struct Material {
     occlusion_strength: f32,
     // Alpha below it is discarded; 0 for opaque; above 1 marks stochastic coverage.
     alpha_cutoff: f32,
-    pad0: f32,
+    // Reflectance of a dielectric at normal incidence.
+    f0: f32,
     pad1: f32,
     pad2: f32,
     base_use: TextureUse,

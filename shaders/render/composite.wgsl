@@ -11,6 +11,7 @@
 @group(0) @binding(7) var direct_specular: texture_2d<f32>;
 @group(0) @binding(8) var indirect: texture_2d<f32>;
 @group(0) @binding(9) var hdr: texture_storage_2d<rgba16float, write>;
+@group(1) @binding(0) var environment_picture: texture_2d<f32>;
 
 // The largest finite half: brighter radiance is held there instead of becoming infinite.
 const HALF_MAX: f32 = 65504.0;
@@ -18,8 +19,8 @@ const HALF_MAX: f32 = 65504.0;
 @compute @workgroup_size(8, 8)
 fn composite(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
-    var radiance = frame.environment;
     let depth = textureLoad(depth_texture, id.xy, 0).x;
+    var radiance = vec3f(0.0);
     if depth > 0.0 {
         let n = oct_decode(textureLoad(normal_texture, id.xy, 0).xy);
         let albedo = textureLoad(albedo_texture, id.xy, 0);
@@ -31,6 +32,8 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
             + textureLoad(direct_specular, id.xy, 0).rgb
             + gloss * around
             + textureLoad(emissive_texture, id.xy, 0).rgb;
+    } else {
+        radiance = environment_radiance(-to_eye(frame, id.xy));
     }
     textureStore(hdr, id.xy, vec4f(min(radiance, vec3f(HALF_MAX)), 1.0));
 }

@@ -86,14 +86,14 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     let color = saturate(base.rgb);
     let v = -(frame.world_from_view * vec4f(view_ray_at(in.position.xy), 0.0)).xyz;
     let n_v = dot(n, normalize(v));
-    let share = env_brdf(vec3f(0.04), roughness, max(n_v, 0.0)).x;
+    let share = env_brdf(vec3f(material.f0), roughness, max(n_v, 0.0)).x;
     let previous = frame.previous_clip_from_world * vec4f(in.world, 1.0);
     let current = frame.clip_from_world_unjittered * vec4f(in.world, 1.0);
 
     var out: Fields;
     out.normal = oct_encode(n);
     out.albedo = vec4f(color * (1.0 - metallic) * (1.0 - share), mix(1.0, occlusion, material.occlusion_strength));
-    out.specular = vec4f(mix(vec3f(0.04), color, metallic), roughness);
+    out.specular = vec4f(mix(vec3f(material.f0), color, metallic), roughness);
     out.emissive = vec4f(material.emissive * glow, 1.0);
     if material.unlit != 0u {
         out.albedo = vec4f(0.0, 0.0, 0.0, 1.0);

@@ -5,7 +5,7 @@ use crate::{
     gi::Method,
     gpu::{Backend, Gpu, GpuOptions},
     net::format::Weights,
-    scene::{self, Camera, LightKind, Scene},
+    scene::{self, Camera, Environment, LightKind, Scene},
 };
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
@@ -92,18 +92,21 @@ pub enum MethodName {
     Ambient,
     /// The network.
     Neural,
+    /// The path tracer, which converges to the truth.
+    Reference,
 }
 
 impl MethodName {
-    /// All methods, cheapest first.
-    pub const ALL: [MethodName; 3] = [MethodName::Direct, MethodName::Ambient, MethodName::Neural];
+    /// All real-time methods, cheapest first.
+    pub const REAL_TIME: [MethodName; 3] = [MethodName::Direct, MethodName::Ambient, MethodName::Neural];
 
-    /// The method with its weights: `weights`, or the shipped ones.
+    /// The real-time method with its weights: `weights`, or the shipped ones.
     pub fn method(self, weights: Option<&PathBuf>) -> Result<Method> {
         Ok(match self {
             MethodName::Direct => Method::Direct,
             MethodName::Ambient => Method::Ambient,
             MethodName::Neural => Method::Neural(Box::new(load_weights(weights)?)),
+            MethodName::Reference => return Err(usage("`reference` is no real-time method".into())),
         })
     }
 }
@@ -136,9 +139,9 @@ pub struct SceneArgs {
     /// Vertical field of view in degrees.
     #[arg(long, value_name = "D")]
     pub fov: Option<f32>,
-    /// Radiance of the surroundings: `R,G,B` or one number for grey.
-    #[arg(long, value_parser = parse_radiance, value_name = "R,G,B")]
-    pub environment: Option<[f32; 3]>,
+    /// The surroundings: radiance as `R,G,B` or one number for grey, or a lat-long picture (.hdr, .exr).
+    #[arg(long, value_parser = parse_surroundings, value_name = "R,G,B|FILE")]
+    pub environment: Option<Surroundings>,
     /// Radius of point and spot lights, metres.
     #[arg(long, value_name = "M")]
     pub light_radius: Option<f32>,
@@ -156,8 +159,10 @@ impl SceneArgs {
                 eprintln!("warning: {warning}");
             }
         }
-        if let Some(radiance) = self.environment {
-            scene.environment.radiance = radiance;
+        match &self.environment {
+            Some(Surroundings::Constant(radiance)) => scene.environment = Environment::constant(*radiance),
+            Some(Surroundings::Picture(path)) => scene.environment = Environment::load(path)?,
+            None => {}
         }
         for light in &mut scene.lights {
             match &mut light.kind {
@@ -224,6 +229,23 @@ fn parse_floats(text: &str) -> Result<Vec<f32>, String> {
 
 fn parse_vec3(text: &str) -> Result<[f32; 3], String> {
     parse_floats(text)?.try_into().map_err(|_| "write three numbers, such as 1,2,3".into())
+}
+
+/// What `--environment` names.
+#[derive(Debug, Clone)]
+pub enum Surroundings {
+    /// One radiance, W/(m²·sr).
+    Constant([f32; 3]),
+    /// A lat-long picture.
+    Picture(PathBuf),
+}
+
+fn parse_surroundings(text: &str) -> Result<Surroundings, String> {
+    let lower = text.to_ascii_lowercase();
+    if [".hdr", ".exr"].iter().any(|e| lower.ends_with(e)) {
+        return Ok(Surroundings::Picture(text.into()));
+    }
+    parse_radiance(text).map(Surroundings::Constant).map_err(|e| format!("{e}; or the name of an .hdr or .exr picture"))
 }
 
 fn parse_radiance(text: &str) -> Result<[f32; 3], String> {

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Method to measure, or `all`.
+    /// Real-time method to measure, or `all` of them. (`render --method reference` tells its own samples per second.)
     #[arg(long, default_value = "all", value_parser = parse_methods)]
     method: Methods,
     /// Weights of `neural`; the shipped ones when absent.
@@ -49,7 +49,10 @@ struct Methods(Vec<MethodName>);
 
 fn parse_methods(text: &str) -> Result<Methods, String> {
     match text {
-        "all" => Ok(Methods(MethodName::ALL.to_vec())),
+        "all" => Ok(Methods(MethodName::REAL_TIME.to_vec())),
+        "reference" => {
+            Err("bench measures frames of real-time methods; `render --method reference` tells its speed".into())
+        }
         one => <MethodName as clap::ValueEnum>::from_str(one, false).map(|m| Methods(vec![m])),
     }
 }

@@ -5,7 +5,7 @@ use crate::{
     gpu::GpuError,
     net::{convert::ConvertError, format::WeightsError, pictures::PicturesError},
     render::RenderError,
-    scene::{SceneError, upload::UploadError},
+    scene::{SceneError, environment::EnvironmentError, upload::UploadError},
 };
 use thiserror::Error;
 
@@ -77,7 +77,11 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
         if cause.is::<ConvertError>() || cause.is::<PicturesError>() {
             return INVALID_INPUT;
         }
-        if cause.is::<SceneError>() || cause.is::<UploadError>() || cause.is::<WeightsError>() {
+        if cause.is::<SceneError>()
+            || cause.is::<UploadError>()
+            || cause.is::<WeightsError>()
+            || cause.is::<EnvironmentError>()
+        {
             return INVALID_INPUT;
         }
     }

@@ -11,6 +11,7 @@ mod doctor;
 pub mod error;
 mod interrupt;
 mod progress;
+mod reference;
 mod render;
 mod weights;
 

@@ -42,12 +42,19 @@ impl Progress {
 
     /// One more step is done.
     pub fn step(&mut self) {
-        self.bar.inc(1);
+        let (done, total) = (self.bar.position() + 1, self.bar.length().unwrap_or(0));
+        self.at(done as f64, total);
+    }
+
+    /// `done` of `total` steps are done; the total may have become another.
+    pub fn at(&mut self, done: f64, total: u64) {
+        self.bar.set_length(total);
+        self.bar.set_position(done as u64);
         if self.kind == ProgressKind::Plain && self.last_line.elapsed() >= PLAIN_INTERVAL {
             self.last_line = Instant::now();
-            let (done, total) = (self.bar.position(), self.bar.length().unwrap_or(0));
-            let left = self.started.elapsed().as_secs_f64() / done as f64 * total.saturating_sub(done) as f64;
-            eprintln!("{done}/{total} {}, about {left:.0} s left", self.what);
+            let left = self.started.elapsed().as_secs_f64() / done * (total as f64 - done).max(0.0);
+            let left = if done > 0.0 { format!("about {left:.0} s left") } else { "no guess yet".into() };
+            eprintln!("{done:.0}/{total} {}, {left}", self.what);
         }
     }
 

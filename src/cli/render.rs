@@ -2,10 +2,11 @@
 
 use super::{
     args::{Global, MethodName, SceneArgs, usage},
-    compare::{Shown, shown_bytes},
+    compare::{Heat, Shown, shown_bytes},
     error::CliError,
     interrupt,
     progress::Progress,
+    reference,
 };
 use crate::{
     gi::Method,
@@ -14,12 +15,13 @@ use crate::{
     metrics,
     render::{
         Renderer, RendererOptions,
-        capture::{CaptureOptions, CapturedFrame, Layer, capture_with},
+        capture::{CaptureOptions, CapturedFrame, Layer, Picture, capture_with},
         tonemap_curve::Tonemap,
     },
-    scene::upload::SceneGpu,
+    scene::{Camera, Scene, upload::SceneGpu},
 };
 use anyhow::Result;
+use clap::ValueEnum;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -29,53 +31,60 @@ pub struct Args {
     /// Where the picture goes: .png, .exr, or `-` for a PNG on standard output.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How indirect light is found.
+    /// How indirect light is found; `reference` traces paths until the light is right.
     #[arg(long, value_enum, default_value = "neural")]
     method: MethodName,
+    #[command(flatten)]
+    tracing: reference::Flags,
     /// Weights of `neural`; the shipped ones when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
-    /// Jittered frames that are averaged through Cycles' pixel filter; 1 is the raw frame.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    samples: u32,
+    /// Jittered frames that are averaged through Cycles' pixel filter; 1 (the default) is the raw frame.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    samples: Option<u32>,
     /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
-    #[arg(long, value_parser = parse_layers, value_name = "LAYERS")]
-    aov: Option<Layers>,
+    #[arg(long, value_name = "LAYERS")]
+    aov: Option<String>,
     /// Stops by which a PNG is brighter.
     #[arg(long, default_value_t = 0.0, allow_hyphen_values = true, value_name = "EV")]
     exposure: f32,
     /// View transform of a PNG.
     #[arg(long, default_value = "filmic")]
     tonemap: Tonemap,
-    /// Seed of jitter and soft-shadow patterns.
+    /// Seed of jitter and soft-shadow patterns, or of the paths.
     #[arg(long, default_value_t = 0)]
     seed: u32,
-    /// A picture to compare with: EXR (both go through the view transform) or PNG.
+    /// A picture to compare with: EXR (both go through the view transform and --exposure) or PNG.
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     /// Metric of the comparison.
     #[arg(long, default_value = "mae", requires = "reference", value_parser = metrics::NAMES.map(|(n, _)| n))]
     metric: String,
-    /// On the wrong side of it (above; below for psnr and the ssims) the exit code is 5.
+    /// On the wrong side of it (above; below for psnr and the ssims; bias by its size) the exit code is 5.
     #[arg(long, requires = "reference", value_name = "T")]
     threshold: Option<f64>,
-    /// Picture of where they differ.
+    /// Picture of where they differ: FLIP's map for flip and hdrflip, else the mean difference up to a quarter.
     #[arg(long, requires = "reference", value_name = "PNG")]
     diff: Option<PathBuf>,
 }
 
-#[derive(Debug, Clone)]
-struct Layers(Vec<Layer>);
-
-fn parse_layers(text: &str) -> Result<Layers, String> {
+/// Layers by name: `all`, or a list, whose words `find` knows.
+pub(super) fn parse_layers<L: Copy>(text: &str, all: &[L], name: impl Fn(L) -> &'static str) -> Result<Vec<L>> {
     if text == "all" {
-        return Ok(Layers(Layer::ALL.to_vec()));
+        return Ok(all.to_vec());
     }
-    let layer = |name: &str| {
-        let known = || Layer::ALL.map(Layer::name).join(", ");
-        Layer::from_name(name).ok_or_else(|| format!("`{name}` is no layer; there are: {}", known()))
-    };
-    text.split(',').map(layer).collect::<Result<_, _>>().map(Layers)
+    let mut layers = Vec::new();
+    for word in text.split(',') {
+        let Some(i) = all.iter().position(|&l| name(l) == word) else {
+            let known = all.iter().map(|&l| name(l)).collect::<Vec<_>>().join(", ");
+            return Err(usage(format!("--aov: `{word}` is no layer of this method; there are: {known}")));
+        };
+        if layers.contains(&i) {
+            return Err(usage(format!("--aov: `{word}` is asked for twice")));
+        }
+        layers.push(i);
+    }
+    Ok(layers.into_iter().map(|i| all[i]).collect())
 }
 
 /// What the output's name asks for.
@@ -85,36 +94,82 @@ enum Format {
     Exr,
 }
 
-pub fn run(global: &Global, args: Args) -> Result<()> {
+/// A picture ready to be written and judged.
+pub(super) struct Drawn {
+    /// The picture; its layers are in `layers`.
+    pub frame: CapturedFrame,
+    /// Layers of an EXR beside the picture.
+    pub layers: Vec<image_io::Layer>,
+    /// What is worth knowing of how it was made.
+    pub facts: Metadata,
+}
+
+pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let format = check(&args)?;
-    let method = args.method.method(args.weights.as_ref())?;
-    let weights = match &method {
-        Method::Neural(weights) => weights.hash_text(),
-        _ => "none".into(),
+    let task = match args.method {
+        MethodName::Reference => Task::Trace(args.tracing.task(args.scene.size, args.seed, args.aov.as_deref())?),
+        method => {
+            let layers = args.aov.as_deref().map(|text| parse_layers(text, &Layer::ALL, Layer::name)).transpose()?;
+            Task::Rasterise(method.method(args.weights.as_ref())?, layers.unwrap_or_default())
+        }
     };
-    let reference = args.reference.as_ref().map(|path| Shown::read(path, args.tonemap)).transpose()?;
+    if let Task::Trace(task) = &task {
+        // From here on the size is that of the picture that is written.
+        args.scene.size = task.size();
+    }
+    let judged = |path| Shown::reference(path, args.tonemap, args.exposure, args.scene.size, &args.metric);
+    let reference = args.reference.as_deref().map(judged).transpose()?;
     let scene = args.scene.load(global.quiet)?;
     let camera = args.scene.camera(&scene)?;
     interrupt::install()?;
     let gpu = global.open_gpu()?;
-    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
+    let drawn = match task {
+        Task::Trace(task) => task.run(global, &gpu, &scene, &camera)?,
+        Task::Rasterise(method, layers) => rasterise(global, &args, &gpu, (&scene, &camera), method, &layers)?,
+    };
+    write(&args, format, &drawn, &metadata(&gpu, &drawn))?;
+    match reference {
+        Some(reference) => judge(&args, &drawn.frame, &reference),
+        None => Ok(()),
+    }
+}
+
+/// What is to be done, with everything that only flags decide.
+enum Task {
+    Rasterise(Method, Vec<Layer>),
+    Trace(reference::Task),
+}
+
+fn rasterise(
+    global: &Global,
+    args: &Args,
+    gpu: &Gpu,
+    (scene, camera): (&Scene, &Camera),
+    method: Method,
+    layers: &[Layer],
+) -> Result<Drawn> {
+    let weights = match &method {
+        Method::Neural(weights) => weights.hash_text(),
+        _ => "none".into(),
+    };
+    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
     let options = RendererOptions { method, ..Default::default() };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options)?;
-    let layers = args.aov.as_ref().map_or(&[][..], |l| &l.0);
-    let options = CaptureOptions { samples: args.samples, seed: args.seed, layers };
-    let mut progress = Progress::new(global, "samples", args.samples.into());
-    let frame = capture_with(&gpu, &mut renderer, &uploaded, &camera, options, &mut || {
+    let samples = args.samples.unwrap_or(1);
+    let options = CaptureOptions { samples, seed: args.seed, layers };
+    let mut progress = Progress::new(global, "samples", samples.into());
+    let frame = capture_with(gpu, &mut renderer, &uploaded, camera, options, &mut || {
         progress.step();
         !interrupt::requested()
     })?;
     progress.finish();
     interrupt::check()?;
     let frame = frame.ok_or(CliError::Interrupted)?;
-    write(&args, format, &frame, &metadata(&gpu, weights))?;
-    match reference {
-        Some(reference) => judge(&args, &frame, &reference),
-        None => Ok(()),
-    }
+    let layer = |(layer, picture): &(Layer, Picture)| {
+        image_io::Layer::new(layer.name(), &layer.channels().concat(), &picture.data)
+    };
+    let layers = frame.layers.iter().map(layer).collect();
+    Ok(Drawn { frame, layers, facts: vec![("Weights".into(), weights)] })
 }
 
 /// Faults that can be told before anything is drawn.
@@ -133,6 +188,17 @@ fn check(args: &Args) -> Result<Format> {
     if !args.exposure.is_finite() {
         return Err(usage(format!("--exposure {} is not a finite number of stops", args.exposure)));
     }
+    let name = args.method.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default();
+    if args.method == MethodName::Reference {
+        if args.samples.is_some() {
+            return Err(usage("--samples averages frames of the rasteriser; --method reference takes --spp".into()));
+        }
+        if args.weights.is_some() {
+            return Err(usage("--weights are a network's; --method reference traces paths and has none".into()));
+        }
+    } else if let Some(flag) = args.tracing.given() {
+        return Err(usage(format!("{flag} belongs to --method reference; `{name}` traces no paths")));
+    }
     image_io::check_writable(path)?;
     if let Some(diff) = &args.diff {
         image_io::check_writable(diff)?;
@@ -140,7 +206,7 @@ fn check(args: &Args) -> Result<Format> {
     Ok(format)
 }
 
-fn metadata(gpu: &Gpu, weights: String) -> Metadata {
+fn metadata(gpu: &Gpu, drawn: &Drawn) -> Metadata {
     let command: Vec<String> = std::env::args().skip(1).collect();
     let driver = format!("{} {}", gpu.info.driver, gpu.info.driver_info);
     let software = format!("bouncelight {}", env!("CARGO_PKG_VERSION"));
@@ -150,26 +216,23 @@ fn metadata(gpu: &Gpu, weights: String) -> Metadata {
         ("Adapter", gpu.info.name.clone()),
         ("Backend", format!("{:?}", gpu.info.backend).to_lowercase()),
         ("Driver", driver.trim().into()),
-        ("Weights", weights),
     ]
     .map(|(k, v)| (k.to_string(), v))
-    .to_vec()
+    .into_iter()
+    .chain(drawn.facts.clone())
+    .collect()
 }
 
-fn write(args: &Args, format: Format, frame: &CapturedFrame, metadata: &Metadata) -> Result<()> {
+fn write(args: &Args, format: Format, drawn: &Drawn, metadata: &Metadata) -> Result<()> {
     let [width, height] = args.scene.size;
     match format {
         Format::Png => {
-            let rgb = shown_bytes(&rgb(frame), args.exposure, args.tonemap);
+            let rgb = shown_bytes(&rgb(&drawn.frame), args.exposure, args.tonemap);
             image_io::write_png(&args.output, width, height, &rgb, metadata)?;
         }
         Format::Exr => {
-            let mut layers = vec![image_io::Layer::new("", "RGBA", &frame.beauty.data)];
-            layers.extend(
-                frame.layers.iter().map(|(layer, picture)| {
-                    image_io::Layer::new(layer.name(), &layer.channels().concat(), &picture.data)
-                }),
-            );
+            let mut layers = vec![image_io::Layer::new("", "RGBA", &drawn.frame.beauty.data)];
+            layers.extend(drawn.layers.iter().cloned());
             image_io::write_exr(&args.output, width, height, &layers, metadata)?;
         }
     }
@@ -184,13 +247,17 @@ fn rgb(frame: &CapturedFrame) -> Vec<f32> {
 fn judge(args: &Args, frame: &CapturedFrame, reference: &Shown) -> Result<()> {
     let name = args.output.display().to_string();
     let ours = Shown::linear(name, args.scene.size.map(|n| n as usize), rgb(frame), args.exposure, args.tonemap);
-    let comparison = ours.against(reference)?;
-    if let Some(path) = &args.diff {
-        ours.write_heat_map(reference, path)?;
-    }
+    let heat = Heat::of_metric(&args.metric);
+    let options =
+        metrics::Options { flip: heat == Heat::Flip, hdr_flip: heat == Heat::Hdrflip, ..metrics::Options::default() };
+    let (comparison, maps) = ours.against(reference, options)?;
     let Some(value) = comparison.value(&args.metric) else {
         return Err(usage(format!("{} needs a linear reference (EXR)", args.metric)));
     };
+    if let (Some(path), Some(rgb)) = (&args.diff, ours.heat_map(reference, heat, &maps)?) {
+        let [width, height] = args.scene.size;
+        image_io::write_png(path, width, height, &rgb, &[])?;
+    }
     // The picture itself may be on standard output.
     eprintln!("{} {value:.6}", args.metric);
     match args.threshold {

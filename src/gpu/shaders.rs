@@ -45,7 +45,13 @@ pub const RENDER: &[Shader] = &[
     },
     Shader {
         name: "render.composite",
-        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "render/composite.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/frame.wgsl",
+            "lib/brdf.wgsl",
+            "lib/environment.wgsl",
+            "render/composite.wgsl"
+        ],
     },
     Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
     Shader {
@@ -103,7 +109,43 @@ pub const NET: &[Shader] = net![
 ];
 
 /// Shaders of `reference/`.
-pub const REFERENCE: &[Shader] = &[];
+pub const REFERENCE: &[Shader] = &[
+    Shader { name: "reference.rays", files: wgsl!["reference/traverse.wgsl", "reference/rays.wgsl"] },
+    Shader {
+        name: "reference.path",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "reference/types.wgsl",
+            "reference/traverse.wgsl",
+            "reference/random.wgsl",
+            "reference/surface.wgsl",
+            "reference/camera.wgsl",
+            "reference/bsdf.wgsl",
+            "reference/lights.wgsl",
+            "reference/environment.wgsl",
+            "reference/rasterised.wgsl",
+            "reference/film.wgsl",
+            "reference/sums.wgsl",
+            "reference/path.wgsl",
+        ],
+    },
+    Shader {
+        name: "reference.first_hit",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "reference/types.wgsl",
+            "reference/traverse.wgsl",
+            "reference/random.wgsl",
+            "reference/surface.wgsl",
+            "reference/camera.wgsl",
+            "reference/first_hit.wgsl",
+        ],
+    },
+];
 
 /// Every shader there is.
 pub fn all() -> impl Iterator<Item = &'static Shader> {

@@ -3,10 +3,10 @@
 use thiserror::Error;
 
 /// Why two pictures cannot be compared.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Error)]
 pub enum MetricError {
-    /// The number of values is not `3 · width · height`, or there is no pixel.
-    #[error("picture `{picture}` has {values} values, which is not {width}×{height} RGB pixels")]
+    /// The number of values is not `3 · width · height` (of a layer: a multiple of its pixels), or there is no pixel.
+    #[error("picture `{picture}` has {values} values, which do not make {width}×{height} pixels")]
     Shape {
         /// Name given by the caller.
         picture: String,
@@ -59,6 +59,20 @@ pub enum MetricError {
         /// Height there is.
         height: usize,
     },
+    /// FLIP was asked for a viewing distance that nobody has.
+    #[error("{given} pixels per degree; FLIP takes more than 0 and at most {most}", most = super::flip::MAX_PIXELS_PER_DEGREE)]
+    PixelsPerDegree {
+        /// What was asked for.
+        given: f32,
+    },
+}
+
+impl MetricError {
+    /// [`Self::Sizes`] of name, width and height.
+    pub(crate) fn sizes(a: (&str, usize, usize), b: (&str, usize, usize)) -> Self {
+        let ((a, a_width, a_height), (b, b_width, b_height)) = (a, b);
+        Self::Sizes { a: a.into(), a_width, a_height, b: b.into(), b_width, b_height }
+    }
 }
 
 /// RGB pixels, interleaved, rows from the top; finite by construction.
@@ -121,13 +135,6 @@ impl<'a> Picture<'a> {
         if (self.width, self.height) == (other.width, other.height) {
             return Ok(());
         }
-        Err(MetricError::Sizes {
-            a: self.name.into(),
-            a_width: self.width,
-            a_height: self.height,
-            b: other.name.into(),
-            b_width: other.width,
-            b_height: other.height,
-        })
+        Err(MetricError::sizes((self.name, self.width, self.height), (other.name, other.width, other.height)))
     }
 }

@@ -8,6 +8,7 @@ use crate::gpu::timing::Recorder;
 pub struct CompositePass {
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
+    sky_layout: wgpu::BindGroupLayout,
 }
 
 impl CompositePass {
@@ -16,8 +17,9 @@ impl CompositePass {
         use tool::*;
         let types = [UNIFORM, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, STORE_HALF];
         let layout = layout(device, "render.composite", wgpu::ShaderStages::COMPUTE, &types);
-        let pipeline = compute(device, "render.composite", "composite", &[&layout]);
-        Self { pipeline, layout }
+        let sky_layout = tool::layout(device, "render.composite", wgpu::ShaderStages::COMPUTE, &[LOAD]);
+        let pipeline = compute(device, "render.composite", "composite", &[&layout, &sky_layout]);
+        Self { pipeline, layout, sky_layout }
     }
 
     /// Binds the targets; rebuilt on resize.
@@ -42,11 +44,24 @@ impl CompositePass {
         )
     }
 
+    /// Binds the environment; rebuilt when the scene changes.
+    pub fn sky(&self, device: &wgpu::Device, environment: &wgpu::TextureView) -> wgpu::BindGroup {
+        let resources = [wgpu::BindingResource::TextureView(environment)];
+        tool::group(device, "render.composite", &self.sky_layout, &resources)
+    }
+
     /// Fills `hdr`.
-    pub fn record(&self, recorder: &mut Recorder<'_>, picture: &wgpu::BindGroup, size: [u32; 2]) {
+    pub fn record(
+        &self,
+        recorder: &mut Recorder<'_>,
+        picture: &wgpu::BindGroup,
+        sky: &wgpu::BindGroup,
+        size: [u32; 2],
+    ) {
         recorder.compute("composite", |pass| {
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, picture, &[]);
+            pass.set_bind_group(1, sky, &[]);
             tool::dispatch(pass, size);
         });
     }

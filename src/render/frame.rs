@@ -98,6 +98,7 @@ struct Lighting {
     scene: u64,
     maps: ShadowMaps,
     group: wgpu::BindGroup,
+    sky: wgpu::BindGroup,
 }
 
 /// The rasteriser. The host owns device, queue and encoder; a steady frame allocates nothing on the GPU.
@@ -227,7 +228,7 @@ impl Renderer {
         self.direct.record(recorder, inputs);
         let inputs = gi_inputs(&self.targets, view, scene.environment.radiance);
         self.indirect.record(recorder, queue, &inputs, &self.targets)?;
-        self.composite.record(recorder, &self.picture.composite, size);
+        self.composite.record(recorder, &self.picture.composite, &lighting.sky, size);
         self.lighting = Some(lighting);
         Ok(())
     }
@@ -235,7 +236,8 @@ impl Renderer {
     fn lighting(&self, queue: &wgpu::Queue, scene: &SceneGpu) -> Lighting {
         let maps = self.shadow.maps(&self.device, queue, scene);
         let group = self.direct.lights(&self.device, scene, &maps);
-        Lighting { scene: scene.id, maps, group }
+        let sky = self.composite.sky(&self.device, &scene.environment_view);
+        Lighting { scene: scene.id, maps, group, sky }
     }
 }
 

@@ -29,7 +29,7 @@ fn window(x: f32) -> f32 {
 }
 
 /// Position below which a share `u` of the window's integral lies.
-fn inverse(u: f32) -> f32 {
+pub(crate) fn inverse(u: f32) -> f32 {
     static TABLE: std::sync::OnceLock<Vec<f32>> = std::sync::OnceLock::new();
     let table = TABLE.get_or_init(|| {
         let at = |i: usize| FILTER_WIDTH * (2.0 * i as f32 / STEPS as f32 - 1.0);

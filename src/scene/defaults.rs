@@ -42,7 +42,7 @@ pub fn complete(scene: &mut Scene) {
         scene.lights = proxies;
     } else if scene.environment == Environment::default() {
         scene.lights.push(default_sun(&scene.cameras[0]));
-        scene.environment = Environment { radiance: [DEFAULT_SKY; 3] };
+        scene.environment = Environment::constant([DEFAULT_SKY; 3]);
         scene.warnings.push(format!(
             "'{}' has no light; a sun of {DEFAULT_SUN} W/m² and a grey sky of {DEFAULT_SKY} W/(m²·sr) were added",
             scene.name
@@ -154,6 +154,7 @@ fn default_sun(camera: &Camera) -> Light {
         name: "default sun".to_owned(),
         color: [1.0; 3],
         kind: LightKind::Directional { direction, irradiance: DEFAULT_SUN, angle: SUN_ANGLE },
+        stands_in: false,
     }
 }
 
@@ -223,7 +224,7 @@ fn emitter(scene: &Scene, instance: &Instance) -> Option<Emitter> {
 }
 
 /// Mean of the emission texture, linear; 1 where there is none.
-fn mean_emission(scene: &Scene, material: &Material) -> Vec3 {
+pub(crate) fn mean_emission(scene: &Scene, material: &Material) -> Vec3 {
     let Some(image) = material.emissive_texture.and_then(|t| scene.images.get(t.image)) else { return Vec3::ONE };
     let decode = |byte: u8| {
         let v = f32::from(byte) / 255.0;
@@ -264,6 +265,6 @@ impl Emitter {
             let position = if radius > size { center } else { self.centroid };
             LightKind::Point { position: position.into(), intensity: strongest * self.area * 0.25, radius, range: None }
         };
-        Light { name, color, kind }
+        Light { name, color, kind, stands_in: true }
     }
 }

@@ -1,7 +1,7 @@
 //! Writes a whole [`Scene`] as one GLB: meshes, materials, textures as PNG, lights, cameras.
 //!
 //! Light goes out in glTF's photometric units (times 683). What glTF has no field for, a light's radius, the sun's
-//! angle and the sky, stands in `extras.bouncelight`, where [`super::gltf`] finds it again and others ignore it.
+//! angle, the sky and that a light only stands in for a glowing surface, is in `extras.bouncelight`, where [`super::gltf`] finds it again and others ignore it.
 //! A texture transform that is no scale, rotation and offset (sheared) is written as the nearest that is.
 
 use std::io::Cursor;
@@ -11,8 +11,8 @@ use glam::{Mat4, Quat, Vec3};
 use serde_json::{Value, json};
 
 use super::{
-    AlphaMode, Camera, Image, LUMENS_PER_WATT, Light, LightKind, Material, Mesh, Sampler, Scene, SceneError,
-    TextureRef, Wrap,
+    AlphaMode, Camera, DIELECTRIC_F0, Image, LUMENS_PER_WATT, Light, LightKind, Material, Mesh, Sampler, Scene,
+    SceneError, TextureRef, Wrap,
 };
 
 /// Writes `scene` to `path`, whole or not at all: a temporary file beside it is renamed at the end.
@@ -65,7 +65,8 @@ pub fn to_glb(scene: &Scene) -> Result<Vec<u8>, String> {
             "extras": {"bouncelight": {"environment": scene.environment.radiance}},
         }],
     });
-    let mut used = vec!["KHR_materials_emissive_strength", "KHR_materials_unlit", "KHR_texture_transform"];
+    let mut used =
+        vec!["KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_unlit", "KHR_texture_transform"];
     if !lights.is_empty() {
         used.push("KHR_lights_punctual");
         root["extensions"] = json!({"KHR_lights_punctual": {"lights": lights}});
@@ -249,6 +250,10 @@ impl Writer {
             AlphaMode::Blend => out["alphaMode"] = json!("BLEND"),
         }
         let mut extensions = serde_json::Map::new();
+        if m.f0 != DIELECTRIC_F0 {
+            let root = m.f0.clamp(0.0, 0.99).sqrt();
+            extensions.insert("KHR_materials_ior".to_owned(), json!({"ior": (1.0 + root) / (1.0 - root)}));
+        }
         if strength > 1.0 {
             extensions.insert("KHR_materials_emissive_strength".to_owned(), json!({"emissiveStrength": strength}));
         }
@@ -287,7 +292,7 @@ fn camera(c: &Camera) -> Value {
 
 fn light(l: &Light) -> Value {
     let mut out = json!({"name": l.name, "color": l.color});
-    let (kind, strength, range, extras) = match l.kind {
+    let (kind, strength, range, mut extras) = match l.kind {
         LightKind::Directional { irradiance, angle, .. } => ("directional", irradiance, None, json!({"angle": angle})),
         LightKind::Point { intensity, radius, range, .. } => ("point", intensity, range, json!({"radius": radius})),
         LightKind::Spot { intensity, radius, range, inner_angle, outer_angle, .. } => {
@@ -297,6 +302,9 @@ fn light(l: &Light) -> Value {
     };
     out["type"] = json!(kind);
     out["intensity"] = json!(strength * LUMENS_PER_WATT);
+    if l.stands_in {
+        extras["stands_in"] = json!(true);
+    }
     out["extras"] = json!({"bouncelight": extras});
     if let Some(range) = range {
         out["range"] = json!(range);

@@ -11,6 +11,7 @@ pub mod bounds;
 pub mod bundled;
 mod camera;
 pub mod defaults;
+pub mod environment;
 #[cfg(feature = "io")]
 mod error;
 #[cfg(feature = "io")]
@@ -29,6 +30,7 @@ pub mod shapes;
 #[cfg(feature = "io")]
 mod texture;
 
+pub use environment::Environment;
 #[cfg(feature = "io")]
 pub use error::SceneError;
 #[cfg(feature = "io")]
@@ -118,6 +120,9 @@ pub struct Material {
     pub metallic: f32,
     /// Perceptual roughness; GGX α is its square.
     pub roughness: f32,
+    /// Reflectance of a dielectric at normal incidence: 0.04 for index 1.5; 0 leaves a purely diffuse surface
+    /// (KHR_materials_ior). Metals take their base colour instead.
+    pub f0: f32,
     /// Green multiplies roughness, blue multiplies metallic (linear image).
     pub metallic_roughness_texture: Option<TextureRef>,
     /// Tangent-space normal map (linear image).
@@ -148,6 +153,7 @@ impl Default for Material {
             base_color_texture: None,
             metallic: 1.0,
             roughness: 1.0,
+            f0: DIELECTRIC_F0,
             metallic_roughness_texture: None,
             normal_texture: None,
             normal_scale: 1.0,
@@ -236,6 +242,9 @@ pub struct Light {
     pub color: [f32; 3],
     /// Where it is and how strong.
     pub kind: LightKind,
+    /// It only stands in for a glowing surface of the scene. The rasteriser, which knows no such light, uses it; the path
+    /// tracer leaves it out and lets the surface shine.
+    pub stands_in: bool,
 }
 
 /// Kinds of analytic light, in world space.
@@ -295,12 +304,8 @@ pub struct Camera {
     pub far: f32,
 }
 
-/// Light from beyond the scene. Constant for now; an image later.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Environment {
-    /// Radiance from every direction, W/(m²·sr).
-    pub radiance: [f32; 3],
-}
+/// Reflectance at normal incidence of a dielectric of index 1.5, which is what glTF materials have by default.
+pub const DIELECTRIC_F0: f32 = 0.04;
 
 /// Lumens per watt by which glTF's photometric light units are divided.
 pub const LUMENS_PER_WATT: f32 = 683.0;

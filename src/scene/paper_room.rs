@@ -117,7 +117,7 @@ pub fn scene(index: u32) -> Scene {
     let shapes = Shape::ALL.map(shapes::flat);
     let mut scene = Scene {
         name: format!("paper-room:{index}"),
-        environment: Environment { radiance: [SKY_RADIANCE; 3] },
+        environment: Environment::constant([SKY_RADIANCE; 3]),
         ..Scene::default()
     };
     let from_y_up = Y_UP.transpose();
@@ -156,6 +156,7 @@ pub fn scene(index: u32) -> Scene {
         name: "sun".to_owned(),
         color: [1.0; 3],
         kind: LightKind::Directional { direction: direction.as_vec3().into(), irradiance: 1.0, angle: SUN_ANGLE },
+        stands_in: false,
     });
     let camera = DMat4::from_translation(DVec3::new(0.0, 0.0, 10.0)) * euler_xyz([room.pitch, 0.0, room.yaw]);
     scene.cameras.push(Camera {

@@ -4,6 +4,7 @@
 //! attribute stream (normal 4, tangent 8, two texture coordinate sets 16, colour 8). An instance takes 48 bytes (three
 //! rows of the world-from-object matrix), a light 64, a material 256.
 
+mod environment;
 mod material;
 mod mesh;
 mod texture;
@@ -150,6 +151,8 @@ pub struct SceneGpu {
     pub lights: Vec<Light>,
     /// What rays see that hit nothing.
     pub environment: Environment,
+    /// The same as a lat-long `Rgba32Float` picture; one texel for a constant.
+    pub environment_view: wgpu::TextureView,
     /// World-space bounds of all instances; `None` for a scene without triangles.
     pub bounds: Option<([f32; 3], [f32; 3])>,
     /// What was mended on the way, one sentence each.
@@ -167,7 +170,8 @@ impl SceneGpu {
         let materials = material::upload(device, queue, scene, &textures)?;
         let lights: Vec<LightGpu> = scene.lights.iter().map(LightGpu::new).collect();
         let light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &lights);
-        let bytes = geometry.bytes + textures.bytes + materials.bytes + light_buffer.size();
+        let (environment_view, sky_bytes) = environment::upload(device, queue, &scene.environment, &mut warnings)?;
+        let bytes = sky_bytes + geometry.bytes + textures.bytes + materials.bytes + light_buffer.size();
         for warning in &warnings {
             tracing::warn!("{warning}");
         }
@@ -181,7 +185,8 @@ impl SceneGpu {
             material_groups: materials.groups,
             light_buffer,
             lights: scene.lights.clone(),
-            environment: scene.environment,
+            environment: scene.environment.clone(),
+            environment_view,
             bounds: geometry.bounds,
             warnings,
             bytes,

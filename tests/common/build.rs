@@ -51,17 +51,19 @@ pub fn scene(meshes: Vec<Mesh>, lights: Vec<Light>) -> Scene {
 
 pub fn sun(direction: [f32; 3], irradiance: f32, angle: f32) -> Light {
     let direction = glam::Vec3::from(direction).normalize().to_array();
-    Light { name: "sun".into(), color: [1.0; 3], kind: LightKind::Directional { direction, irradiance, angle } }
+    let kind = LightKind::Directional { direction, irradiance, angle };
+    Light { name: "sun".into(), color: [1.0; 3], kind, stands_in: false }
 }
 
 pub fn point(position: [f32; 3], intensity: f32, radius: f32) -> Light {
-    Light { name: "point".into(), color: [1.0; 3], kind: LightKind::Point { position, intensity, radius, range: None } }
+    let kind = LightKind::Point { position, intensity, radius, range: None };
+    Light { name: "point".into(), color: [1.0; 3], kind, stands_in: false }
 }
 
 pub fn spot(position: [f32; 3], direction: [f32; 3], inner_angle: f32, outer_angle: f32, radius: f32) -> Light {
     let direction = glam::Vec3::from(direction).normalize().to_array();
     let kind = LightKind::Spot { position, direction, intensity: 60.0, radius, range: None, inner_angle, outer_angle };
-    Light { name: "spot".into(), color: [1.0; 3], kind }
+    Light { name: "spot".into(), color: [1.0; 3], kind, stands_in: false }
 }
 
 /// A camera at `eye` that looks at `target`.
@@ -96,7 +98,7 @@ pub fn render(gpu: &Gpu, scene: &Scene, camera: &Camera, size: [u32; 2], samples
 }
 
 pub fn environment(radiance: f32) -> Environment {
-    Environment { radiance: [radiance; 3] }
+    Environment::constant([radiance; 3])
 }
 
 /// Mean of channel 0 over the centre's `n`² pixels.

@@ -1,6 +1,6 @@
 //! What the glTF loader must understand, each on a file made for it.
 
-use bouncelight::scene::{AlphaMode, LightKind, Scene, Wrap};
+use bouncelight::scene::{AlphaMode, LightKind, Material, Scene, Wrap};
 use glam::{Mat4, Vec3};
 use serde_json::json;
 
@@ -151,13 +151,14 @@ fn materials() {
         "normalTexture": {"index": 0, "scale": 0.7, "extensions": turned},
         "occlusionTexture": {"index": 0, "strength": 0.8},
         "emissiveTexture": {"index": 0}, "emissiveFactor": [1.0, 0.5, 0.0],
-        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8.0}},
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8.0}, "KHR_materials_ior": {"ior": 1.0}},
     }]);
     let scene = load(&glb);
     let m = &scene.materials[0];
     assert_eq!((m.base_color, m.metallic, m.roughness), ([0.1, 0.2, 0.3, 0.4], 0.5, 0.6));
     assert_eq!((m.alpha_mode, m.double_sided, m.unlit), (AlphaMode::Mask { cutoff: 0.25 }, true, false));
     assert_eq!((m.emissive, m.normal_scale, m.occlusion_strength), ([8.0, 4.0, 0.0], 0.7, 0.8));
+    assert_eq!((m.f0, Material::default().f0), (0.0, 0.04), "an index of refraction of 1 reflects nothing");
     let base = m.base_color_texture.expect("a base colour texture");
     assert_eq!(base.sampler.wrap, [Wrap::ClampToEdge, Wrap::MirroredRepeat]);
     assert!(!base.sampler.mag_linear && !base.sampler.min_linear);

@@ -58,6 +58,7 @@ def main():
     parser.add_argument("--light-radius", type=float, default=0.0)
     parser.add_argument("--sun-angle", type=float, default=0.00918)
     parser.add_argument("--denoise", type=int, default=1, help="denoise the Combined layer")
+    parser.add_argument("--seed", type=int, default=0, help="of Cycles' random numbers")
     a = parser.parse_args()
     record = None
     if a.views:
@@ -76,6 +77,7 @@ def main():
     scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs[0].default_value = (*a.world, 1)
     paper_rooms.configure(scene, a.size, a.spp, 12, bool(a.denoise))
+    scene.cycles.seed = a.seed
 
     def draw(path):
         scene.render.filepath = os.path.abspath(path) + ".part.exr"

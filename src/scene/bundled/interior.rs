@@ -57,7 +57,7 @@ pub(super) fn scene() -> Scene {
     lamp(&mut b, &palette);
 
     let mut scene = b.scene;
-    scene.environment = Environment { radiance: [0.55, 0.72, 1.0] };
+    scene.environment = Environment::constant([0.55, 0.72, 1.0]);
     scene.lights.push(Light {
         name: "sun".to_owned(),
         color: [1.0, 0.90, 0.74],
@@ -66,6 +66,7 @@ pub(super) fn scene() -> Scene {
             irradiance: 30.0,
             angle: SUN_ANGLE,
         },
+        stands_in: false,
     });
     let camera = Camera::look_at([1.0, 1.50, 2.15], [-0.16, 0.88, -1.2], 52f32.to_radians());
     scene.cameras.push(Camera { name: "room".to_owned(), near: 0.05, ..camera });
@@ -340,7 +341,8 @@ fn decoration(b: &mut Builder, palette: &Palette) {
 
 fn lamp(b: &mut Builder, palette: &Palette) {
     let warm = [1.0, 0.62, 0.30];
-    // Bright enough to look like a lamp, and little light (a tenth) next to the point light that stands for it.
+    // Bright enough to look like a lamp, and little light (a tenth) next to the point light, which is the room's true lamp:
+    // the path tracer counts both.
     let glow = b.material(Material { emissive: warm.map(|c| c * 20.0), ..dielectric("bulb", [0.8; 3], 0.5) });
     let shade = b.material(Material { double_sided: true, ..dielectric("enamel", [0.82, 0.80, 0.74], 0.3) });
     b.part("bulb", glow, 1.0, |p| p.ball(BULB, 0.045, 24));
@@ -367,5 +369,6 @@ fn lamp(b: &mut Builder, palette: &Palette) {
             radius: 0.045,
             range: None,
         },
+        stands_in: false,
     });
 }

@@ -12,6 +12,7 @@ use crate::scene::{LUMENS_PER_WATT, Light, LightKind, SUN_ANGLE};
 struct Extent {
     radius: Option<f32>,
     angle: Option<f32>,
+    stands_in: bool,
 }
 
 #[derive(serde::Deserialize)]
@@ -49,6 +50,6 @@ impl Loader<'_> {
                 LightKind::Spot { position, direction, intensity: strength, radius, range, inner_angle, outer_angle }
             }
         };
-        self.scene.lights.push(Light { name: node.to_owned(), color, kind });
+        self.scene.lights.push(Light { name: node.to_owned(), color, kind, stands_in: extent.stands_in });
     }
 }

@@ -6,7 +6,7 @@ use gltf::texture::{MagFilter, MinFilter, WrappingMode};
 use super::Loader;
 use super::source::shorten;
 use crate::scene::texture::{self, Use};
-use crate::scene::{AlphaMode, Material, Sampler, TextureRef, Wrap};
+use crate::scene::{AlphaMode, DIELECTRIC_F0, Material, Sampler, TextureRef, Wrap};
 
 /// The parts of glTF's three kinds of texture reference that they share.
 struct Reference {
@@ -43,6 +43,7 @@ impl<'a> Loader<'a> {
             base_color: pbr.base_color_factor(),
             metallic: pbr.metallic_factor(),
             roughness: pbr.roughness_factor(),
+            f0: material.ior().map_or(DIELECTRIC_F0, |ior| ((ior - 1.0) / (ior + 1.0)).powi(2)),
             emissive: material.emissive_factor().map(|e| e * strength),
             double_sided: material.double_sided(),
             unlit: material.unlit(),
@@ -97,6 +98,7 @@ impl<'a> Loader<'a> {
         material.emissive.iter_mut().for_each(|v| fit(v, 1e9));
         fit(&mut material.metallic, 1.0);
         fit(&mut material.roughness, 1.0);
+        fit(&mut material.f0, 1.0);
         if let AlphaMode::Mask { cutoff } = &mut material.alpha_mode {
             // A cutoff above 1 legally hides everything.
             fit(cutoff, 2.0);

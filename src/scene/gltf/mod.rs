@@ -20,16 +20,17 @@ use super::{Camera, Environment, Instance, Scene, SceneError, defaults, error};
 use source::Source;
 
 /// Extensions that this loader has.
-const SUPPORTED: [&str; 5] = [
+const SUPPORTED: [&str; 6] = [
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];
 
 /// Extensions without which a file still looks much as it should, even where it says that it requires them.
-const IGNORED: [&str; 3] = ["KHR_materials_ior", "KHR_materials_specular", "KHR_materials_variants"];
+const IGNORED: [&str; 2] = ["KHR_materials_specular", "KHR_materials_variants"];
 
 /// Loads the file's default scene (else its first, else every root node) and fills in what is missing, as
 /// [`super::defaults`] says. What was mended or left out stands in [`Scene::warnings`].
@@ -236,7 +237,7 @@ impl<'a> Loader<'a> {
         if let Some(radiance) = extras.map(|e| e.bouncelight.environment)
             && radiance.iter().all(|r| r.is_finite() && *r >= 0.0)
         {
-            self.scene.environment = Environment { radiance };
+            self.scene.environment = Environment::constant(radiance);
         }
     }
 }

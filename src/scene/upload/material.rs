@@ -36,8 +36,10 @@ pub struct MaterialGpu {
     pub occlusion_strength: f32,
     /// 0 opaque, the mask's cutoff, or 2 for stochastic coverage.
     pub alpha_cutoff: f32,
+    /// Reflectance of a dielectric at normal incidence.
+    pub f0: f32,
     /// Unused.
-    pub pad: [f32; 3],
+    pub pad: [f32; 2],
     /// Base colour, metallic-roughness, normal, occlusion, emissive.
     pub uses: [TextureUse; 5],
     /// To 256 bytes.
@@ -124,7 +126,8 @@ fn uniform(m: &Material) -> MaterialGpu {
             AlphaMode::Mask { cutoff } => cutoff.min(1.0),
             AlphaMode::Blend => 2.0,
         },
-        pad: [0.0; 3],
+        f0: m.f0,
+        pad: [0.0; 2],
         uses,
         tail: [0.0; 8],
     }

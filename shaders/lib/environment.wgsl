@@ -1,0 +1,20 @@
+// Radiance from beyond the scene by direction: a lat-long picture, one texel for a constant sky. The Rust twin is
+// `scene::environment`. Expects `environment_picture` in the module.
+
+// `direction`: unit vector away from the eye, world space.
+fn environment_radiance(direction: vec3f) -> vec3f {
+    let size = vec2i(textureDimensions(environment_picture));
+    if all(size == vec2i(1)) { return textureLoad(environment_picture, vec2i(0), 0).rgb; }
+    let uv = vec2f(atan2(direction.z, direction.x) / (2.0 * PI) + 0.5, acos(clamp(direction.y, -1.0, 1.0)) / PI);
+    let p = uv * vec2f(size) - 0.5;
+    let t = p - floor(p);
+    let low = vec2i(floor(p));
+    var sum = vec3f(0.0);
+    for (var i = 0; i < 4; i++) {
+        let step = vec2i(i & 1, i >> 1);
+        let at = vec2i((low.x + step.x + size.x) % size.x, clamp(low.y + step.y, 0, size.y - 1));
+        let w = select(1.0 - t, t, step == vec2i(1));
+        sum += w.x * w.y * textureLoad(environment_picture, at, 0).rgb;
+    }
+    return sum;
+}

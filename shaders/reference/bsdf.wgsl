@@ -1,0 +1,93 @@
+// The specular lobe: GGX with the light that single scattering loses given back (Kulla and Conty 2017 as in Cycles'
+// Principled): white metal keeps all light at every roughness. Its dielectric part has the true Fresnel curve of index
+// 1.5, as Cycles has it and as `env_brdf` was fitted to; the rasteriser's `ggx` has Schlick's curve, which is up to a
+// fifth darker between 45° and 65°. Metal has Schlick's.
+
+const INDEX: f32 = 1.5;
+// Mean of the Fresnel curve of index 1.5 over the cosine-weighted hemisphere.
+const INDEX_MEAN: f32 = 0.0918;
+
+fn fresnel_dielectric(c: f32) -> f32 {
+    let g = sqrt(INDEX * INDEX - 1.0 + c * c);
+    let a = (g - c) / (g + c);
+    let b = (c * (g + c) - 1.0) / (c * (g - c) + 1.0);
+    return 0.5 * a * a * (1.0 + b * b);
+}
+
+// Fresnel term with the factor for the lost light.
+fn fresnel(s: Surface, v_h: f32) -> vec3f {
+    let mean_metal = s.base + (1.0 - s.base) / 21.0;
+    let again_metal = mean_metal * s.mean / (1.0 - mean_metal * (1.0 - s.mean));
+    let again = INDEX_MEAN * s.mean / (1.0 - INDEX_MEAN * (1.0 - s.mean));
+    let q = 1.0 - v_h;
+    let q2 = q * q;
+    let metal = s.base + (1.0 - s.base) * (q2 * q2 * q);
+    return mix(
+        vec3f(fresnel_dielectric(v_h) * (1.0 + again * s.missing)), metal * (1.0 + again_metal * s.missing), s.metallic
+    );
+}
+
+struct Lobe {
+    // Value times n.l.
+    value: vec3f,
+    // Chance density of `sample_gloss`, 1/sr.
+    pdf: f32,
+}
+
+// The lobe towards l, which lies above the shading normal's horizon.
+fn gloss_lobe(s: Surface, l: vec3f) -> Lobe {
+    let sum = s.v + l;
+    let h = normalize(sum);
+    let n_l = saturate(dot(s.n, l));
+    let n_h = saturate(dot(s.n, h));
+    let alpha = s.alpha;
+    let a2 = alpha * alpha;
+    let c = cross(s.n, h);
+    let root = a2 * n_h * n_h + dot(c, c);
+    let d = a2 / (PI * root * root);
+    let g_v = sqrt(s.n_v * s.n_v * (1.0 - a2) + a2);
+    let g_l = sqrt(n_l * n_l * (1.0 - a2) + a2);
+    let visible = 0.5 / (n_l * g_v + s.n_v * g_l);
+    return Lobe(fresnel(s, saturate(dot(s.v, h))) * (d * visible * n_l), d * 0.5 / (s.n_v + g_v));
+}
+
+// A normal of the microsurface that v (local, z up) sees (Dupuy and Benyoub 2023, spherical caps).
+fn sample_visible_normal(v: vec3f, alpha: f32, u: vec2f) -> vec3f {
+    let w = normalize(vec3f(v.xy * alpha, v.z));
+    let phi = 2.0 * PI * u.x;
+    let z = (1.0 - u.y) * (1.0 + w.z) - w.z;
+    let r = sqrt(saturate(1.0 - z * z));
+    let c = vec3f(r * cos(phi), r * sin(phi), z) + w;
+    return normalize(vec3f(c.xy * alpha, c.z));
+}
+
+struct Scatter {
+    l: vec3f,
+    // Value times n.l over the density.
+    weight: vec3f,
+    // 1/sr; 0 where nothing is sent.
+    pdf: f32,
+}
+
+fn sample_gloss(s: Surface, u: vec2f) -> Scatter {
+    let frame = frame_around(s.n);
+    let alpha = s.alpha;
+    let v = s.v * frame;
+    let h = sample_visible_normal(vec3f(v.xy, max(v.z, 1e-4)), alpha, u);
+    let l = reflect(-v, h);
+    if l.z <= 0.0 { return Scatter(s.n, vec3f(0.0), 0.0); }
+    let a2 = alpha * alpha;
+    let g_v = sqrt(s.n_v * s.n_v * (1.0 - a2) + a2);
+    let g_l = sqrt(l.z * l.z * (1.0 - a2) + a2);
+    // G2 / G1 of height-correlated Smith.
+    let kept = l.z * (s.n_v + g_v) / (l.z * g_v + s.n_v * g_l);
+    let root = a2 * h.z * h.z + dot(h.xy, h.xy);
+    let d = a2 / (PI * root * root);
+    return Scatter(frame * l, fresnel(s, saturate(dot(v, h))) * kept, d * 0.5 / (s.n_v + g_v));
+}
+
+fn sample_diffuse(s: Surface, u: vec2f) -> Scatter {
+    let p = in_disc(u);
+    let z = sqrt(max(1.0 - dot(p, p), 0.0));
+    return Scatter(frame_around(s.n) * vec3f(p, z), s.albedo, z / PI);
+}

@@ -1,0 +1,171 @@
+// What a ray hits: walk of the eight-wide tree that src/reference/accel builds; wide.rs there has the table of a block's words.
+
+@group(0) @binding(1) var accel_blocks: texture_2d<u32>;
+
+const STACK_SIZE = 24u;
+const NO_TRIANGLE = 0xffffffffu;
+// Components of a direction closer to zero than this are moved away from it, so that their inverse is finite.
+const TINY = 1e-18;
+// Units in the last place by which a box's far end is moved away, against rounding.
+const SLACK = 8;
+
+struct Hit {
+    // Distance in lengths of the direction.
+    t: f32,
+    // Index in the order in which triangles were given, NO_TRIANGLE where nothing was hit.
+    triangle: u32,
+    // Barycentric weights of the second and third corner.
+    uv: vec2f,
+}
+
+// What is the same for all boxes and triangles that a ray meets.
+struct TraceRay {
+    origin: vec3f,
+    inverse: vec3f,
+    // The ray's frame: two directions across it, and one along it that measures t.
+    across: vec3f,
+    up: vec3f,
+    along: vec3f,
+    // 7 for a ray towards +x, +y, +z: flips a child's place into its rank; the highest rank is visited first.
+    octant: u32,
+}
+
+fn trace_ray(origin: vec3f, direction: vec3f) -> TraceRay {
+    let negative = direction < vec3f(0.0);
+    let safe = select(direction, select(vec3f(TINY), vec3f(-TINY), negative), abs(direction) < vec3f(TINY));
+    let octant = dot(select(vec3u(4u, 2u, 1u), vec3u(0u), negative), vec3u(1u));
+    // Duff et al., "Building an Orthonormal Basis, Revisited" (2017).
+    let unit = normalize(direction);
+    let s = select(1.0, -1.0, unit.z < 0.0);
+    let a = -1.0 / (s + unit.z);
+    let b = unit.x * unit.y * a;
+    let across = vec3f(1.0 + s * unit.x * unit.x * a, s * b, -s * unit.x);
+    let up = vec3f(b, s + unit.y * unit.y * a, -unit.y);
+    return TraceRay(origin, 1.0 / safe, across, up, direction / dot(direction, direction), octant);
+}
+
+// The four bytes of a word as planes: distances along the ray, as integers, which are in the same order where they are positive.
+fn planes(word: u32, scale: f32, offset: f32) -> vec4i {
+    let bytes = vec4f(vec4i((vec4u(word) >> vec4u(0u, 8u, 16u, 24u)) & vec4u(255u)));
+    return bitcast<vec4i>(fma(bytes, vec4f(scale), vec4f(offset)));
+}
+
+// Which of four children's boxes the ray meets before `nearest`. `near` and `far` hold the planes that it reaches first and last.
+fn boxes_met(near: vec3u, far: vec3u, scale: vec3f, offset: vec3f, nearest: i32) -> vec4<bool> {
+    let near_x = planes(near.x, scale.x, offset.x);
+    let near_y = planes(near.y, scale.y, offset.y);
+    let near_z = planes(near.z, scale.z, offset.z);
+    let far_x = planes(far.x, scale.x, offset.x);
+    let far_y = planes(far.y, scale.y, offset.y);
+    let far_z = planes(far.z, scale.z, offset.z);
+    // A negative distance is a negative integer, whatever its size: as the far end it fails, as the near end it loses to 0.
+    let enter = max(max(near_x, near_y), max(near_z, vec4i(0)));
+    let leave = min(min(far_x, far_y), min(far_z, vec4i(nearest)));
+    return enter <= leave + vec4i(SLACK);
+}
+
+fn or_all(x: vec4u) -> u32 {
+    return (x.x | x.y) | (x.z | x.w);
+}
+
+// The first hit found (`any`) or the nearest one (otherwise) with 0 < t < t_max. Both sides of triangles are hit.
+fn trace(origin: vec3f, direction: vec3f, t_max: f32, any: bool) -> Hit {
+    let ray = trace_ray(origin, direction);
+    // Bits of the ranks of children 0 to 3, within their half.
+    let rank_bits = vec4u(1u) << (vec4u(0u, 1u, 2u, 3u) ^ vec4u(ray.octant & 3u));
+    let low_half = select(0u, 4u, (ray.octant & 4u) != 0u);
+    var t = t_max;
+    // Number and place of the triangle hit, and the weights of its corners as they lie in the block.
+    var found = NO_TRIANGLE;
+    var weights = vec2f(0.0);
+    var stack: array<u32, STACK_SIZE>;
+    var depth = 0u;
+    // Children that were met and wait: block of the first one in the high 24 bits, their ranks in the low 8.
+    var group = 1u << ray.octant;
+    loop {
+        // The highest bit, by way of a float's exponent: cheaper than firstLeadingBit on CPUs.
+        let rank = (bitcast<u32>(f32(i32(group & 255u))) >> 23u) - 127u;
+        let block = (group >> 8u) + (rank ^ ray.octant);
+        group &= ~(1u << rank);
+        let at = vec2u((block & 2047u) << 2u, block >> 11u);
+        let head = textureLoad(accel_blocks, at, 0);
+        let x = textureLoad(accel_blocks, at + vec2u(1u, 0u), 0);
+        let y = textureLoad(accel_blocks, at + vec2u(2u, 0u), 0);
+        let z = textureLoad(accel_blocks, at + vec2u(3u, 0u), 0);
+        if head.w != 0u {
+            let step = bitcast<vec3f>((head.xyz & vec3u(255u)) << vec3u(23u));
+            let corner = vec3f(bitcast<vec3i>(head.xyz) >> vec3u(8u)) * step;
+            let scale = step * ray.inverse;
+            let offset = (corner - ray.origin) * ray.inverse;
+            let near_x = select(x.zw, x.xy, (ray.octant & 4u) != 0u);
+            let far_x = select(x.xy, x.zw, (ray.octant & 4u) != 0u);
+            let near_y = select(y.zw, y.xy, (ray.octant & 2u) != 0u);
+            let far_y = select(y.xy, y.zw, (ray.octant & 2u) != 0u);
+            let near_z = select(z.zw, z.xy, (ray.octant & 1u) != 0u);
+            let far_z = select(z.xy, z.zw, (ray.octant & 1u) != 0u);
+            let nearest = bitcast<i32>(t);
+            let low = boxes_met(vec3u(near_x.x, near_y.x, near_z.x), vec3u(far_x.x, far_y.x, far_z.x), scale, offset, nearest);
+            let high = boxes_met(vec3u(near_x.y, near_y.y, near_z.y), vec3u(far_x.y, far_y.y, far_z.y), scale, offset, nearest);
+            let met = (or_all(select(vec4u(0u), rank_bits, low)) << low_half)
+                | (or_all(select(vec4u(0u), rank_bits, high)) << (4u - low_half));
+            if met != 0u {
+                if (group & 255u) != 0u {
+                    stack[depth] = group;
+                    depth += 1u;
+                }
+                group = (head.w << 8u) | met;
+            }
+        } else {
+            let p = bitcast<vec3f>(head.xyz) - ray.origin;
+            let q = bitcast<vec3f>(x.xyz) - ray.origin;
+            let r = bitcast<vec3f>(y.xyz) - ray.origin;
+            let s = bitcast<vec3f>(z.xyz) - ray.origin;
+            // Corners in the ray's frame. Edges shared by two triangles give both the same products, so no ray passes
+            // between them (after Woop, Benthin and Wald 2013).
+            let a = vec2f(dot(p, ray.across), dot(p, ray.up));
+            let b = vec2f(dot(q, ray.across), dot(q, ray.up));
+            let c = vec2f(dot(r, ray.across), dot(r, ray.up));
+            let d = vec2f(dot(s, ray.across), dot(s, ray.up));
+            let depths = vec4f(dot(p, ray.along), dot(q, ray.along), dot(r, ray.along), dot(s, ray.along));
+            let bc = c.x * b.y - c.y * b.x;
+            let ca = a.x * c.y - a.y * c.x;
+            let ab = b.x * a.y - b.y * a.x;
+            let cd = d.x * c.y - d.y * c.x;
+            let da = a.x * d.y - a.y * d.x;
+            let sum1 = bc + ca + ab;
+            let t1 = (bc * depths.x + ca * depths.y + ab * depths.z) / sum1;
+            let inside1 = (bc >= 0.0 && ca >= 0.0 && ab >= 0.0) || (bc <= 0.0 && ca <= 0.0 && ab <= 0.0);
+            if inside1 && t1 > 0.0 && t1 < t {
+                t = t1;
+                found = x.w;
+                weights = vec2f(ca, ab) / sum1;
+            }
+            let sum2 = cd + da - ca;
+            let t2 = (cd * depths.x + da * depths.z - ca * depths.w) / sum2;
+            let inside2 = (cd >= 0.0 && da >= 0.0 && ca <= 0.0) || (cd <= 0.0 && da <= 0.0 && ca >= 0.0);
+            if inside2 && t2 > 0.0 && t2 < t {
+                t = t2;
+                found = y.w;
+                weights = vec2f(da, -ca) / sum2;
+            }
+            if any && found != NO_TRIANGLE {
+                break;
+            }
+        }
+        if (group & 255u) == 0u {
+            if depth == 0u {
+                break;
+            }
+            depth -= 1u;
+            group = stack[depth];
+        }
+    }
+    if found == NO_TRIANGLE {
+        return Hit(t, NO_TRIANGLE, vec2f(0.0));
+    }
+    // Back to the triangle's own order of corners.
+    let place = found >> 24u;
+    let first = 1.0 - weights.x - weights.y;
+    let uv = select(select(weights, vec2f(weights.y, first), place == 1u), vec2f(first, weights.x), place == 2u);
+    return Hit(t, found & 0x00ffffffu, uv);
+}

@@ -1,0 +1,114 @@
+//! The walk of `traverse.wgsl` on the CPU, for tests and tools.
+
+use glam::Vec3;
+
+use super::Accel;
+use super::wide::{Block, NODE};
+
+/// Where a ray meets a triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AccelHit {
+    /// Distance in lengths of the ray's direction.
+    pub t: f32,
+    /// Index of the triangle in the order given to [`Accel::build`].
+    pub triangle: u32,
+    /// Barycentric weights of the triangle's second and third corner.
+    pub uv: [f32; 2],
+}
+
+/// Components of a direction closer to zero than this are moved away from it, so that their inverse is finite.
+const TINY: f32 = 1e-18;
+
+/// Relative enlargement of a slab's far end, against rounding.
+const SLACK: f32 = 1.000_000_5;
+
+/// What is the same for all boxes and triangles that a ray meets.
+struct Ray {
+    origin: Vec3,
+    inverse: Vec3,
+    rows: [Vec3; 3],
+}
+
+impl Ray {
+    fn new(origin: Vec3, direction: Vec3) -> Self {
+        let safe = direction.map(|d| if d.abs() < TINY { TINY.copysign(d) } else { d });
+        let unit = direction.normalize();
+        // A frame around the ray (Duff et al., "Building an Orthonormal Basis, Revisited", 2017).
+        let sign = 1.0f32.copysign(unit.z);
+        let a = -1.0 / (sign + unit.z);
+        let b = unit.x * unit.y * a;
+        let first = Vec3::new(1.0 + sign * unit.x * unit.x * a, sign * b, -sign * unit.x);
+        let second = Vec3::new(b, sign + unit.y * unit.y * a, -unit.y);
+        Self { origin, inverse: 1.0 / safe, rows: [first, second, direction / direction.length_squared()] }
+    }
+
+    /// The nearest hit of a leaf's two triangles before `nearest`.
+    fn leaf(&self, block: &Block, nearest: f32) -> Option<AccelHit> {
+        let corner = |i: usize| {
+            let p = Vec3::from_array(std::array::from_fn(|k| f32::from_bits(block[4 * i + k]))) - self.origin;
+            Vec3::from_array(self.rows.map(|row| row.dot(p)))
+        };
+        let corners: [Vec3; 4] = std::array::from_fn(corner);
+        let first = triangle([corners[0], corners[1], corners[2]], block[7], nearest);
+        let second = triangle([corners[0], corners[2], corners[3]], block[11], first.map_or(nearest, |h| h.t));
+        second.or(first)
+    }
+
+    /// Bits of the children whose boxes the ray meets before `nearest`.
+    fn children(&self, block: &Block, nearest: f32) -> u8 {
+        let step = Vec3::from_array(std::array::from_fn(|axis| f32::from_bits((block[axis] & 255) << 23)));
+        let corner = Vec3::from_array(std::array::from_fn(|axis| (block[axis] as i32 >> 8) as f32)) * step;
+        let (scale, offset) = (step * self.inverse, (corner - self.origin) * self.inverse);
+        let plane = |child: usize, side: usize| {
+            let byte = |axis: usize| block[4 + 4 * axis + 2 * side + child / 4] >> (8 * (child % 4)) & 255;
+            Vec3::from_array(std::array::from_fn(|axis| byte(axis) as f32)) * scale + offset
+        };
+        let inside_out = |child: usize| {
+            block[4 + child / 4] >> (8 * (child % 4)) & 255 > block[6 + child / 4] >> (8 * (child % 4)) & 255
+        };
+        let mut bits = 0;
+        for child in (0..8).filter(|child| !inside_out(*child)) {
+            let (a, b) = (plane(child, 0), plane(child, 1));
+            let enter = a.min(b).max_element().max(0.0);
+            let leave = a.max(b).min_element().min(nearest);
+            if enter <= leave * SLACK {
+                bits |= 1 << child;
+            }
+        }
+        bits
+    }
+}
+
+/// A triangle in the ray's frame, where the ray is the third axis and t its coordinate. Edges shared by two triangles give
+/// both the same products, so no ray passes between them (after Woop, Benthin and Wald 2013).
+fn triangle([a, b, c]: [Vec3; 3], word: u32, nearest: f32) -> Option<AccelHit> {
+    let edge = |p: Vec3, q: Vec3| q.x * p.y - q.y * p.x;
+    let weights = [edge(b, c), edge(c, a), edge(a, b)];
+    let [u, v, w] = weights;
+    let sum = u + v + w;
+    let t = (u * a.z + v * b.z + w * c.z) / sum;
+    let inside = u.min(v).min(w) >= 0.0 || u.max(v).max(w) <= 0.0;
+    let own = |corner: usize| weights[(corner + (word >> 24) as usize) % 3] / sum;
+    (inside && t > 0.0 && t < nearest).then(|| AccelHit { t, triangle: word & 0x00ff_ffff, uv: [own(1), own(2)] })
+}
+
+impl Accel {
+    /// The nearest hit of the ray with 0 < t < `t_max`, t counted in lengths of `direction`. Both sides of triangles are hit.
+    pub fn closest(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32) -> Option<AccelHit> {
+        let ray = Ray::new(origin.into(), direction.into());
+        let mut best = None;
+        let mut nearest = t_max;
+        let mut open = vec![0u32];
+        while let Some(index) = open.pop() {
+            let block = &self.blocks[index as usize];
+            if block[3] & NODE != 0 {
+                let met = ray.children(block, nearest);
+                open.extend((0..8).filter(|child| met & (1 << child) != 0).map(|child| (block[3] & !NODE) + child));
+            } else if let Some(hit) = ray.leaf(block, nearest) {
+                nearest = hit.t;
+                best = Some(hit);
+            }
+        }
+        best
+    }
+}

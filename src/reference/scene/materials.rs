@@ -1,0 +1,126 @@
+//! Materials and their images as the path tracer reads them.
+
+use super::{Limits, PackError};
+use crate::scene::{AlphaMode, ColorSpace, Material, Scene, TextureRef, Wrap};
+use bytemuck::{Pod, Zeroable};
+
+/// A use of an image; the twin of `ImageUse` in `shaders/reference/types.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct ImageUse {
+    /// First row of the coordinate transform.
+    pub row0: [f32; 3],
+    /// Index of the first texel; `u32::MAX` for no image.
+    pub texel: u32,
+    /// Second row.
+    pub row1: [f32; 3],
+    /// Wrapping, coordinate set, transfer function and filter, see the shader.
+    pub bits: u32,
+    /// Width and height, texels.
+    pub size: [u32; 2],
+    /// Unused.
+    pub pad: [u32; 2],
+}
+
+/// A material; the twin of `RefMaterial` in `shaders/reference/types.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct RefMaterial {
+    /// Linear base colour and alpha.
+    pub base_color: [f32; 4],
+    /// Emitted radiance, W/(m²·sr).
+    pub emissive: [f32; 3],
+    /// 1 unlit, 2 double-sided.
+    pub flags: u32,
+    /// 0 dielectric to 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness.
+    pub roughness: f32,
+    /// Scale of the normal map's x and y.
+    pub normal_scale: f32,
+    /// 0 opaque, the mask's cutoff, or 2 for stochastic coverage.
+    pub alpha_cutoff: f32,
+    /// Base colour.
+    pub base_use: ImageUse,
+    /// Roughness (green) and metallic (blue).
+    pub rough_use: ImageUse,
+    /// Normal map.
+    pub normal_use: ImageUse,
+    /// Emission.
+    pub emissive_use: ImageUse,
+}
+
+/// The scene's materials, and the texels of all images that they use (RGBA, 8 bits each, red lowest).
+pub(super) fn pack(scene: &Scene, limits: &Limits) -> Result<(Vec<RefMaterial>, Vec<u32>), PackError> {
+    let mut first = vec![None; scene.images.len()];
+    let mut total = 0u64;
+    for use_ in scene.materials.iter().flat_map(uses).flatten() {
+        let image = scene.images.get(use_.image).ok_or_else(|| PackError::Image {
+            image: use_.image,
+            name: String::new(),
+            reason: format!("is used by a material, but the scene has {}", scene.images.len()),
+        })?;
+        let pixels = u64::from(image.width) * u64::from(image.height);
+        if pixels == 0 || image.rgba.len() as u64 != 4 * pixels {
+            let reason = format!("{} bytes for {}×{} pixels", image.rgba.len(), image.width, image.height);
+            return Err(PackError::Image { image: use_.image, name: image.name.clone(), reason });
+        }
+        if first[use_.image].is_none() {
+            first[use_.image] = Some(total);
+            total += pixels;
+        }
+    }
+    limits.check("the texels of all images", 4 * total)?;
+    let mut texels = vec![0u32; total as usize];
+    for (image, at) in scene.images.iter().zip(&first) {
+        if let Some(at) = at {
+            let out = &mut texels[*at as usize..][..image.rgba.len() / 4];
+            for (word, p) in out.iter_mut().zip(image.rgba.chunks_exact(4)) {
+                *word = u32::from_le_bytes([p[0], p[1], p[2], p[3]]);
+            }
+        }
+    }
+    let image_use = |r: Option<TextureRef>| {
+        let Some(r) = r else { return ImageUse { texel: u32::MAX, ..ImageUse::zeroed() } };
+        let image = &scene.images[r.image];
+        let wrap = |w| match w {
+            Wrap::Repeat => 0,
+            Wrap::MirroredRepeat => 1,
+            Wrap::ClampToEdge => 2,
+        };
+        let bits = wrap(r.sampler.wrap[0])
+            | wrap(r.sampler.wrap[1]) << 2
+            | u32::from(r.uv_set.min(1)) << 4
+            | u32::from(image.color_space == ColorSpace::Srgb) << 5
+            | u32::from(!r.sampler.mag_linear) << 6;
+        let [row0, row1] = r.transform;
+        let texel = first[r.image].unwrap_or_default() as u32;
+        ImageUse { row0, texel, row1, bits, size: [image.width, image.height], pad: [0; 2] }
+    };
+    let items = scene.materials.iter().map(|m| {
+        let [base_use, rough_use, normal_use, emissive_use] = uses(m).map(image_use);
+        RefMaterial {
+            base_color: m.base_color,
+            emissive: m.emissive,
+            flags: u32::from(m.unlit) | u32::from(m.double_sided) << 1,
+            metallic: m.metallic,
+            roughness: m.roughness,
+            normal_scale: m.normal_scale,
+            alpha_cutoff: match m.alpha_mode {
+                AlphaMode::Opaque => 0.0,
+                AlphaMode::Mask { cutoff } => cutoff.min(1.0),
+                AlphaMode::Blend => 2.0,
+            },
+            base_use,
+            rough_use,
+            normal_use,
+            emissive_use,
+        }
+    });
+    Ok((items.collect(), texels))
+}
+
+/// In the order of [`RefMaterial`].
+fn uses(m: &Material) -> [Option<TextureRef>; 4] {
+    [m.base_color_texture, m.metallic_roughness_texture, m.normal_texture, m.emissive_texture]
+}

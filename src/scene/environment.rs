@@ -1,0 +1,202 @@
+//! Light from beyond the scene: one radiance from everywhere, or a picture of the whole sphere of directions.
+//!
+//! Pictures are lat-long (equirectangular), as panorama cameras and sky libraries deliver them. The row tells the angle
+//! from +Y, the column the turn about it; the middle column looks along +X and columns to its right turn towards +Z.
+//! Blender (whose +X is the same axis) and three.js read such pictures in the same way.
+
+use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
+use thiserror::Error;
+
+/// What rays see that hit nothing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Environment {
+    /// Radiance from every direction, W/(m²·sr); with an image, its mean over the sphere of directions, which is what
+    /// methods use that know no directions.
+    pub radiance: [f32; 3],
+    /// Radiance by direction.
+    pub image: Option<Arc<EnvironmentImage>>,
+}
+
+/// Radiance by direction as a lat-long picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnvironmentImage {
+    /// File name, for messages.
+    pub name: String,
+    /// Columns, at least 1.
+    pub width: u32,
+    /// Rows, at least 1; the first one is up (+Y).
+    pub height: u32,
+    /// `3 · width · height` radiances, W/(m²·sr), finite and not negative.
+    pub rgb: Vec<f32>,
+}
+
+/// Why a picture cannot be an environment.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum EnvironmentError {
+    /// The numbers do not fill the picture.
+    #[error("{name}: {found} numbers for {width}×{height} pixels of three")]
+    Shape { name: String, width: u32, height: u32, found: usize },
+    /// A radiance that no light can have.
+    #[error("{name}: the radiance at column {x}, row {y} is {value}; it must be finite and not negative")]
+    Radiance { name: String, x: usize, y: usize, value: f32 },
+    /// The file is not an HDR or EXR picture, or cannot be read.
+    #[error("{path}: {reason}")]
+    File { path: String, reason: String },
+}
+
+impl Environment {
+    /// The same radiance from every direction, W/(m²·sr).
+    pub fn constant(radiance: [f32; 3]) -> Self {
+        Self { radiance, image: None }
+    }
+
+    /// Radiance by direction.
+    pub fn from_image(image: EnvironmentImage) -> Result<Self, EnvironmentError> {
+        let EnvironmentImage { name, width, height, rgb } = &image;
+        let (width, height) = (*width, *height);
+        if rgb.is_empty() || rgb.len() as u64 != 3 * u64::from(width) * u64::from(height) {
+            return Err(EnvironmentError::Shape { name: name.clone(), width, height, found: rgb.len() });
+        }
+        if let Some(i) = rgb.iter().position(|v| !(v.is_finite() && *v >= 0.0)) {
+            let (x, y) = (i / 3 % width as usize, i / 3 / width as usize);
+            return Err(EnvironmentError::Radiance { name: name.clone(), x, y, value: rgb[i] });
+        }
+        Ok(Self { radiance: image.mean(), image: Some(Arc::new(image)) })
+    }
+
+    /// Reads a Radiance HDR or an EXR picture.
+    ///
+    /// # Errors
+    /// [`EnvironmentError`]: not such a file, or a radiance that is negative or not finite.
+    #[cfg(feature = "io")]
+    pub fn load(path: &std::path::Path) -> Result<Self, EnvironmentError> {
+        let shown = path.display().to_string();
+        let file = |reason: String| EnvironmentError::File { path: shown.clone(), reason };
+        if path.is_dir() {
+            return Err(file("is a folder; name an .hdr or .exr picture".into()));
+        }
+        let bytes = std::fs::read(path).map_err(|e| file(format!("cannot be read: {e}")))?;
+        let (width, height, rgb) = if bytes.starts_with(b"#?") {
+            let reader = image::ImageReader::with_format(std::io::Cursor::new(&bytes), image::ImageFormat::Hdr);
+            let picture = reader.decode().map_err(|e| file(format!("damaged or truncated HDR picture: {e}")))?;
+            let picture = picture.into_rgb32f();
+            (picture.width(), picture.height(), picture.into_raw())
+        } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+            let layers = crate::image_io::read_exr(path).map_err(|e| EnvironmentError::File {
+                path: shown.clone(),
+                // The picture's own words start with the path, too.
+                reason: e.to_string().trim_start_matches(&format!("{shown}: ")).into(),
+            })?;
+            let picture = layers.image("").map_err(|e| file(e.to_string()))?;
+            (picture.width, picture.height, picture.to_rgb())
+        } else {
+            return Err(file("neither a Radiance HDR nor an EXR picture (its first bytes say otherwise)".into()));
+        };
+        Self::from_image(EnvironmentImage { name: shown, width, height, rgb })
+    }
+}
+
+impl EnvironmentImage {
+    /// Mean over the sphere of directions: rows weighted with the solid angle they cover.
+    pub fn mean(&self) -> [f32; 3] {
+        let mut sum = [0.0f64; 3];
+        for (y, row) in self.rgb.chunks_exact(3 * self.width as usize).enumerate() {
+            let edge = |y: usize| (std::f64::consts::PI * y as f64 / f64::from(self.height)).cos();
+            let weight = 0.5 * (edge(y) - edge(y + 1)) / f64::from(self.width);
+            for pixel in row.chunks_exact(3) {
+                for (s, v) in sum.iter_mut().zip(pixel) {
+                    *s += weight * f64::from(*v);
+                }
+            }
+        }
+        sum.map(|s| s as f32)
+    }
+
+    /// Radiance from `direction` (unit vector, away from the eye), bilinear, wrapping around and held at the poles;
+    /// `shaders/lib/environment.wgsl` says the same.
+    pub fn radiance(&self, direction: [f32; 3]) -> [f32; 3] {
+        let [u, v] = coordinates(direction);
+        let (x, y) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);
+        let (tx, ty) = (x - x.floor(), y - y.floor());
+        let at = |dx: f32, dy: f32| -> [f32; 3] {
+            let column = (x.floor() + dx).rem_euclid(self.width as f32) as usize % self.width as usize;
+            let row = (y.floor() + dy).clamp(0.0, self.height as f32 - 1.0) as usize;
+            let i = 3 * (row * self.width as usize + column);
+            [self.rgb[i], self.rgb[i + 1], self.rgb[i + 2]]
+        };
+        let corners = [at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0), at(1.0, 1.0)];
+        let weights = [(1.0 - tx) * (1.0 - ty), tx * (1.0 - ty), (1.0 - tx) * ty, tx * ty];
+        std::array::from_fn(|c| corners.iter().zip(weights).map(|(p, w)| p[c] * w).sum())
+    }
+}
+
+/// Texture coordinates of a unit direction, origin at the top left.
+pub fn coordinates([x, y, z]: [f32; 3]) -> [f32; 2] {
+    [z.atan2(x) / TAU + 0.5, y.clamp(-1.0, 1.0).acos() / PI]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(width: u32, height: u32, at: impl Fn(u32, u32) -> [f32; 3]) -> EnvironmentImage {
+        let rgb = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| at(x, y)).collect();
+        EnvironmentImage { name: "test".into(), width, height, rgb }
+    }
+
+    #[test]
+    fn directions_fall_where_blender_has_them() {
+        let close = |d: [f32; 3], uv: [f32; 2]| {
+            let [u, v] = coordinates(d);
+            assert!((u - uv[0]).abs() < 1e-6 && (v - uv[1]).abs() < 1e-6, "{d:?}: {u} {v}");
+        };
+        close([1.0, 0.0, 0.0], [0.5, 0.5]);
+        close([0.0, 0.0, 1.0], [0.75, 0.5]);
+        close([0.0, 0.0, -1.0], [0.25, 0.5]);
+        assert!(coordinates([0.0, 1.0, 0.0])[1] < 1e-6 && coordinates([0.0, -1.0, 0.0])[1] > 1.0 - 1e-6);
+    }
+
+    #[test]
+    fn the_mean_weighs_rows_by_solid_angle() {
+        // y² over the sphere has the mean 1/3.
+        let squares = image(8, 256, |_, y| {
+            let c = (std::f32::consts::PI * (y as f32 + 0.5) / 256.0).cos();
+            [c * c, 1.0, 0.0]
+        });
+        let [r, g, b] = squares.mean();
+        assert!((r - 1.0 / 3.0).abs() < 1e-4 && (g - 1.0).abs() < 1e-6 && b == 0.0, "{r} {g} {b}");
+        // Negative control: the plain mean of the pixels is 1/2.
+        let plain = squares.rgb.iter().step_by(3).sum::<f32>() / (8.0 * 256.0);
+        assert!((plain - 0.5).abs() < 1e-3);
+    }
+
+    #[test]
+    fn looking_up_wraps_around_and_meets_pixel_centres() {
+        let i = image(4, 2, |x, y| [x as f32, y as f32, 1.0]);
+        let direction = |u: f32, v: f32| {
+            let (phi, theta) = ((u - 0.5) * TAU, v * PI);
+            [theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()]
+        };
+        for (x, y) in [(0, 0), (3, 1), (2, 0)] {
+            let [r, g, b] = i.radiance(direction((x as f32 + 0.5) / 4.0, (y as f32 + 0.5) / 2.0));
+            assert!((r - x as f32).abs() < 1e-5 && (g - y as f32).abs() < 1e-5 && (b - 1.0).abs() < 1e-6);
+        }
+        // Between the last column and the first.
+        let [r, ..] = i.radiance(direction(0.0, 0.25));
+        assert!((r - 1.5).abs() < 1e-4, "{r}");
+    }
+
+    #[test]
+    fn impossible_pictures_are_refused() {
+        let mut bad = image(4, 2, |_, _| [1.0; 3]);
+        bad.rgb[3 * 5 + 1] = f32::NAN;
+        let message = Environment::from_image(bad).unwrap_err().to_string();
+        assert!(message.contains("column 1, row 1"), "{message}");
+        let mut short = image(4, 2, |_, _| [1.0; 3]);
+        short.rgb.pop();
+        assert!(Environment::from_image(short).is_err());
+        assert!(Environment::from_image(image(1, 1, |_, _| [-1.0; 3])).is_err());
+    }
+}
