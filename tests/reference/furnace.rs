@@ -102,8 +102,8 @@ fn a_closed_room_swallows_what_its_ceiling_emits() {
             target[face / 2] = if face % 2 == 0 { -1.0 } else { 1.0 };
             // A right angle of view from the middle shows just one face, every part of it at the same scale.
             let eye = camera([0.0; 3], target, std::f32::consts::FRAC_PI_2);
-            let options = Options { samples: 32, seed: face as u32, bounces, lambert: true, ..Default::default() };
-            let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 12), &options);
+            let options = Options { samples: 64, seed: face as u32, bounces, lambert: true, ..Default::default() };
+            let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &options);
             let rho = f64::from(albedo[face]);
             // The face sends back ρ of what falls on it, evenly: π times its radiance.
             let reflected = t.mean(|s| s.radiance() - s.emit[0]) * std::f64::consts::PI * area;
@@ -121,16 +121,18 @@ fn a_closed_room_swallows_what_its_ceiling_emits() {
 fn scratch() {
     use crate::harness::Strategy;
     let Some(lab) = lab() else { return };
-    for shape in [Shape::IcoSphere, Shape::Cube] {
-        for scale in [2.0, 0.125] {
-            let scene = scene(vec![(body(shape, scale, true), glowing(0.2, 1.0))], vec![]);
-            let eye = camera([0.15 * scale, -0.2 * scale, 0.25 * scale], [1.0 * scale, 0.2, 0.0], 1.2);
-            for flags in [0, bouncelight::reference::job::PLAIN_RANDOM] {
-                let options = Options { samples: 256, flags, strategy: Strategy::LightsOnly, lambert: true, ..Default::default() };
+    let floor = (quad([-20.0, 0.0, 20.0], [40.0, 0.0, 0.0], [0.0, 0.0, -40.0]), lambert(0.6));
+    let d = glam::Vec3::new(0.5, -1.0, 0.3);
+    let scene = scene(vec![floor], vec![sun(d.into(), 2.0, 0.3)]);
+    let eye = camera([0.0, 6.0, 3.0], [0.0, 0.0, 0.0], 0.5);
+    let expected = 0.6 / std::f64::consts::PI * 2.0 * -f64::from(d.normalize().y);
+    for strategy in [Strategy::Both, Strategy::LightsOnly, Strategy::HitsOnly] {
+        for flags in [0, bouncelight::reference::job::PLAIN_RANDOM] {
+            for samples in [32, 33, 256] {
+                let options = Options { samples, flags, strategy, lambert: true, ..Default::default() };
                 let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &options);
-                let d = t.mean(|s| s.diff_dir[0]);
-                let i = t.mean(|s| s.diff_ind[0]);
-                println!("{shape:?} {scale} {flags} dir {:.5} ± {:.5}  ind {:.5} ± {:.5}", d.value, d.error, i.value, i.error);
+                let m = t.mean(|s| s.diff_dir[0]);
+                println!("{strategy:?} {flags} {samples} dir {:.6} ± {:.6} {:.2} σ", m.value, m.error, (m.value - expected) / m.error);
             }
         }
     }

@@ -57,7 +57,7 @@ fn a_panel_lights_the_floor_by_lamberts_formula() {
 
         // Sampling lights alone, hitting them alone and both together are three ways to one answer.
         for strategy in [Strategy::LightsOnly, Strategy::HitsOnly] {
-            let options = Options { samples: 512, strategy, ..options };
+            let options = Options { samples: 2048, strategy, ..options };
             let t = lit_floor(lab, vec![], Some(panel.clone()), &options);
             t.mean(|s| s.diff_dir[0]).assert_is(&format!("… {strategy:?}"), expected);
         }
