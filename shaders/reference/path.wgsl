@@ -37,6 +37,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
     var vertex: u32;
     var beta: vec3f;
     var pdf: f32;
+    var least_pdf: f32;
     var n_l: f32;
     var glossy: bool;
     var bounces: vec2u;
@@ -68,6 +69,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
             vertex = 0u;
             beta = vec3f(1.0);
             glossy = false;
+            least_pdf = FAR;
             bounces = vec2u(0u);
             last = false;
             sums = Sums();
@@ -139,7 +141,11 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
             if last || rays > MOST_RAYS {
                 done = 1u;
             } else {
-                let s = surface_at(hit, direction);
+                var s = surface_at(hit, direction);
+                // Cycles' "Filter Glossy".
+                if least_pdf < job.filter_glossy {
+                    s.alpha = max(s.alpha, 0.5 * sqrt(1.0 - least_pdf / job.filter_glossy));
+                }
                 if vertex == 0u {
                     sums.alpha = 1.0;
                     sums.normal = s.n;
@@ -196,6 +202,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                     pdf = next.pdf * chance;
                     next_l = next.l;
                     n_l = dot(s.n, next.l);
+                    least_pdf = min(least_pdf, pdf + select(0.0, (1.0 - gloss_chance) * n_l / PI, is_gloss));
                     goes_on = next.pdf > 0.0 && dot(s.side, next.l) > 0.0;
                     // Russian roulette on what is left; long paths always run a risk.
                     if vertex > 0u && goes_on {

@@ -109,6 +109,8 @@ struct Surface {
     // What the single-scattering lobe loses over what it keeps, and the mean of what it keeps over directions.
     missing: f32,
     mean: f32,
+    // Width of the lobe.
+    alpha: f32,
 }
 
 fn energy(roughness: f32, n_v: f32) -> f32 {
@@ -185,6 +187,7 @@ fn surface_at(hit: Hit, direction: vec3f) -> Surface {
     }
     s.albedo = s.base * (1.0 - s.metallic) * (1.0 - env_brdf(vec3f(0.04), s.roughness, max(n_v, 0.0)).x);
     s.gloss = env_brdf(mix(vec3f(0.04), s.base, s.metallic), s.roughness, max(n_v, 0.0));
+    s.alpha = max(s.roughness * s.roughness, 1e-3);
     let kept = energy(s.roughness, s.n_v);
     s.missing = (1.0 - kept) / kept;
     s.mean = energy_mean(s.roughness);
