@@ -132,7 +132,12 @@ fn scratch() {
                 let options = Options { samples, flags, strategy, lambert: true, ..Default::default() };
                 let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &options);
                 let m = t.mean(|s| s.diff_dir[0]);
-                println!("{strategy:?} {flags} {samples} dir {:.6} ± {:.6} {:.2} σ", m.value, m.error, (m.value - expected) / m.error);
+                println!(
+                    "{strategy:?} {flags} {samples} dir {:.6} ± {:.6} {:.2} σ",
+                    m.value,
+                    m.error,
+                    (m.value - expected) / m.error
+                );
             }
         }
     }
