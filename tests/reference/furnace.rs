@@ -121,24 +121,14 @@ fn a_closed_room_swallows_what_its_ceiling_emits() {
 fn scratch() {
     use crate::harness::Strategy;
     let Some(lab) = lab() else { return };
-    let floor = (quad([-20.0, 0.0, 20.0], [40.0, 0.0, 0.0], [0.0, 0.0, -40.0]), lambert(0.6));
-    let d = glam::Vec3::new(0.5, -1.0, 0.3);
-    let scene = scene(vec![floor], vec![sun(d.into(), 2.0, 0.3)]);
-    let eye = camera([0.0, 6.0, 3.0], [0.0, 0.0, 0.0], 0.5);
-    let expected = 0.6 / std::f64::consts::PI * 2.0 * -f64::from(d.normalize().y);
-    for strategy in [Strategy::Both, Strategy::LightsOnly, Strategy::HitsOnly] {
-        for flags in [0, bouncelight::reference::job::PLAIN_RANDOM] {
-            for samples in [32, 33, 256] {
-                let options = Options { samples, flags, strategy, lambert: true, ..Default::default() };
-                let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &options);
-                let m = t.mean(|s| s.diff_dir[0]);
-                println!(
-                    "{strategy:?} {flags} {samples} dir {:.6} ± {:.6} {:.2} σ",
-                    m.value,
-                    m.error,
-                    (m.value - expected) / m.error
-                );
-            }
-        }
+    let scene = scene(vec![(body(Shape::IcoSphere, 2.0, true), glowing(0.5, 1.0))], vec![]);
+    let eye = camera([0.3, -0.4, 0.5], [1.0, 0.2, 0.0], 1.2);
+    for (strategy, flags, samples) in [(Strategy::HitsOnly, 0, 1024), (Strategy::HitsOnly, 64, 1024), (Strategy::Both, 0, 1024), (Strategy::Both, 64, 1024)] {
+        let options = Options { samples, flags, strategy, lambert: true, ..Default::default() };
+        let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &options);
+        let m = t.mean(|s| s.diff_ind[0]);
+        println!("{strategy:?} {flags} {samples} ind {:.6} ± {:.6} {:.2} σ", m.value, m.error, (m.value - 0.5) / m.error);
+        let m = t.mean(|s| s.diff_dir[0]);
+        println!("{strategy:?} {flags} {samples} dir {:.6} ± {:.6} {:.2} σ", m.value, m.error, (m.value - 0.5) / m.error);
     }
 }

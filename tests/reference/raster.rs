@@ -84,6 +84,11 @@ fn measure(lab: &Lab, name: &str, scene: &Scene, factor: f32) -> Numbers {
             (off, noise, total, n) = (off + o, noise + e, total + t, n + 1);
         }
     }
+    if std::env::var_os("DUMP").is_some() {
+        for (x, y) in [(128, 100), (128, 118), (90, 118), (128, 50), (128, 80), (75, 60), (180, 60)] {
+            println!("{x},{y}: raster {:?} traced {:?}", direct.at(x, y), [0, 1, 2].map(|c| theirs(y * w + x, c)[2]));
+        }
+    }
     crate::build::show(&format!("{name}_raster"), direct, 1.0 / mean as f32 / 3.0);
     let traced = (0..w * h).flat_map(|i| [0, 1, 2].map(|c| theirs(i, c)[2] as f32)).collect();
     let traced = Picture { width: w, height: h, channels: 3, data: traced };
