@@ -115,20 +115,3 @@ fn a_closed_room_swallows_what_its_ceiling_emits() {
     let short = absorbed(Some(3));
     assert!(short.sigmas(emitted) > SIGMAS, "{short:?} passes although light was cut off after three bounces");
 }
-
-#[test]
-#[ignore = "scratch"]
-fn scratch() {
-    use crate::harness::Strategy;
-    let Some(lab) = lab() else { return };
-    let scene = scene(vec![(body(Shape::IcoSphere, 2.0, true), glowing(0.5, 1.0))], vec![]);
-    let eye = camera([0.3, -0.4, 0.5], [1.0, 0.2, 0.0], 1.2);
-    for (strategy, flags, samples) in [(Strategy::HitsOnly, 0, 1024), (Strategy::HitsOnly, 64, 1024), (Strategy::Both, 0, 1024), (Strategy::Both, 64, 1024)] {
-        let options = Options { samples, flags, strategy, lambert: true, ..Default::default() };
-        let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &options);
-        let m = t.mean(|s| s.diff_ind[0]);
-        println!("{strategy:?} {flags} {samples} ind {:.6} ± {:.6} {:.2} σ", m.value, m.error, (m.value - 0.5) / m.error);
-        let m = t.mean(|s| s.diff_dir[0]);
-        println!("{strategy:?} {flags} {samples} dir {:.6} ± {:.6} {:.2} σ", m.value, m.error, (m.value - 0.5) / m.error);
-    }
-}
