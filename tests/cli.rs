@@ -262,6 +262,25 @@ fn a_reference_above_the_threshold_exits_with_5() {
     let dark = with(&[&again, "--reference", &bright, "--metric", "psnr", "--threshold", "60", "--diff", &diff]);
     assert_eq!(dark.status.code(), Some(5), "{}", String::from_utf8_lossy(&dark.stderr));
     assert!(Path::new(&diff).exists() && Path::new(&again).exists(), "the pictures are kept for a look");
+
+    // Against its own radiance any exposure is right; FLIP tells another light, and so does its map.
+    let (linear, lit) = (path(&dir, "linear.exr"), path(&dir, "lit.png"));
+    assert!(with(&[&linear]).status.success());
+    let flip = ["--reference", &linear, "--metric", "flip", "--threshold", "0.01", "--diff", &diff];
+    let own = with(&[&[&again[..], "--exposure", "1"], &flip[..]].concat());
+    assert!(own.status.success(), "{}", String::from_utf8_lossy(&own.stderr));
+    let other = with(&[&[&lit[..], "--environment", "0.5"], &flip[..]].concat());
+    assert_eq!(other.status.code(), Some(5), "{}", String::from_utf8_lossy(&other.stderr));
+    let hot = bouncelight::image_io::read_png(Path::new(&diff)).unwrap();
+    assert!(hot.pixels.iter().copied().fold(0.0, f32::max) > 0.3);
+
+    // What cannot be judged is told before anything is drawn.
+    let fresh = path(&dir, "fresh.png");
+    let light = [&base[..], &[&fresh, "--reference", &bright, "--metric", "hdrflip"]].concat();
+    fails(&light, 2, &["hdrflip", "bright.png", "EXR"]);
+    let size = ["render", "cornell", "--size", "64x48", "-o", &fresh, "--reference", &bright];
+    fails(&size, 1, &["64×48", "96×48", "bright.png"]);
+    assert!(!Path::new(&fresh).exists());
 }
 
 #[test]

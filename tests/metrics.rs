@@ -1,8 +1,8 @@
 //! Metrics against scikit-image and SciPy on committed pictures (fixtures/metrics/make.py), and against plain reason.
 
 use bouncelight::metrics::{
-    self, Comparison, FlipMaps, MetricError, NAMES, Options, Picture, Views, compare, compare_with, heat_color,
-    heat_map, paper, psnr,
+    self, Comparison, FlipMaps, LayerComparison, MetricError, NAMES, Options, Picture, Views, compare, compare_with,
+    heat_color, heat_map, paper, psnr,
 };
 
 fn picture(pixels: &[f32], width: usize) -> Picture<'_> {
@@ -174,6 +174,13 @@ fn what_cannot_be_compared_is_refused() {
         assert!(matches!(Picture::new("p", w, h, &good), Err(MetricError::Shape { .. })), "{w}×{h}");
     }
     assert!(Picture::new("p", 0, 0, &[]).is_err());
+    let layer =
+        |size, a: &[f32], b: &[f32]| LayerComparison::new(["a", "b"], size, "Depth", a, b).map(|l| l.linear.bias);
+    assert_eq!(layer([2, 1], &[3.0, 5.0], &[2.0, 6.0]), Ok(0.0));
+    for (size, a, b) in [([2, 1], 2, 4), ([2, 1], 3, 3), ([0, 1], 2, 2), ([0, 0], 0, 0)] {
+        let wrong = layer(size, &good[..a], &good[..b]);
+        assert!(matches!(wrong, Err(MetricError::Shape { .. })), "{size:?} {a} {b}");
+    }
 
     let (wide, tall) = (noise(8 * 16 * 3, 5), noise(8 * 16 * 3, 5));
     let (a, b) = (picture(&wide, 16), picture(&tall, 8));

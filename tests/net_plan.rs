@@ -1,8 +1,10 @@
 //! The planner: totals against counts by hand, fusion, and memory that no two living tensors share.
 
 use bouncelight::net::format::Weights;
-use bouncelight::net::graph::{Activation, Add, AddAt, Conv2d, Graph, GraphError, Op, UpsampleBilinear};
-use bouncelight::net::plan::{ALIGN, Kind, Plan, PlanError};
+use bouncelight::net::graph::{
+    Activation, Add, AddAt, Concat, Conv2d, Graph, GraphError, Op, Padding, Shape, Upsample,
+};
+use bouncelight::net::plan::{ALIGN, Kind, Options, Plan, PlanError, Precision, Tensor};
 use proptest::prelude::*;
 
 fn conv(name: &str, input: &str, output: &str, [i, o]: [u32; 2], edge: u32, stride: u32) -> Op {
@@ -14,7 +16,9 @@ fn conv(name: &str, input: &str, output: &str, [i, o]: [u32; 2], edge: u32, stri
         out_channels: o,
         kernel: [edge, edge],
         stride,
-        padding: edge / 2,
+        padding: Padding::all(edge / 2),
+        groups: 1,
+        bias: true,
         activation: Activation::Relu,
         add: None,
         add_at: AddAt::default(),
@@ -22,8 +26,8 @@ fn conv(name: &str, input: &str, output: &str, [i, o]: [u32; 2], edge: u32, stri
 }
 
 fn up(name: &str, input: &str, size_as: &str) -> Op {
-    let [input, size_as] = [input, size_as].map(String::from);
-    Op::UpsampleBilinear(UpsampleBilinear { name: name.into(), input, size_as, output: name.into() })
+    let (input, size_as) = (input.into(), Some(size_as.into()));
+    Op::UpsampleBilinear(Upsample { name: name.into(), input, size_as, scale: None, output: name.into() })
 }
 
 fn add(name: &str, a: &str, b: &str, activation: Activation) -> Op {
@@ -35,24 +39,59 @@ fn graph(input_channels: u32, ops: Vec<Op>) -> Graph {
     Graph { input_channels, ops, output }
 }
 
-/// No two tensors that live at one time share bytes, except a sum that overwrites its skip in place.
-fn check_memory(plan: &Plan) {
+/// `whole` is a concatenation of which `part` is a part.
+fn is_part(graph: &Graph, part: &str, whole: &str) -> bool {
+    graph.ops.iter().any(|op| match op {
+        Op::Concat(o) if o.output == whole => {
+            o.inputs.iter().any(|i| i == part.trim_end_matches(".fitted") || is_part(graph, part, i))
+        }
+        _ => false,
+    })
+}
+
+/// Bytes of a tensor from its first to its last value, and which vectors of a pixel are its own.
+fn extent(plan: &Plan, t: &Tensor) -> (u64, u64) {
+    let pixels = t.shape.pixels();
+    let vectors = (pixels - 1) * u64::from(t.pitch) + u64::from(t.shape.vectors());
+    let root = &plan.tensors[t.root];
+    assert_eq!(t.offset, root.offset + u64::from(t.slice) * t.vector_bytes());
+    assert!(t.slice + t.shape.vectors() <= root.shape.vectors() && t.pitch == root.shape.vectors());
+    (t.offset, t.offset + vectors * t.vector_bytes())
+}
+
+/// No two tensors that live at one time share bytes, except a step that overwrites what it reads, and a part of a
+/// concatenation.
+fn check_memory(graph: &Graph, plan: &Plan) {
     for (i, a) in plan.tensors.iter().enumerate() {
-        assert_eq!(a.offset % ALIGN, 0);
-        assert!(a.offset >= plan.zero_bytes && a.offset + a.shape.padded_bytes() <= plan.arena_bytes);
+        assert_eq!(plan.tensors[a.root].offset % ALIGN, 0);
+        let [from, to] = <[u64; 2]>::from(extent(plan, a));
+        assert!(from >= plan.zero_bytes && to <= plan.arena_bytes);
         for (j, b) in plan.tensors.iter().enumerate().skip(i + 1) {
-            let apart = a.offset + a.shape.padded_bytes() <= b.offset || b.offset + b.shape.padded_bytes() <= a.offset;
-            let in_place = plan.steps.iter().any(|s| {
-                s.output == j && s.skip == Some(i) && s.input != i && a.last == b.first && a.offset == b.offset
+            let [other_from, other_to] = <[u64; 2]>::from(extent(plan, b));
+            let beside =
+                a.root == b.root && (a.slice + a.shape.vectors() <= b.slice || b.slice + b.shape.vectors() <= a.slice);
+            let apart = to <= other_from || other_to <= from || beside;
+            let in_place = plan.steps.iter().enumerate().any(|(time, s)| {
+                let elementwise = matches!(s.kind, Kind::Copy | Kind::Scale { .. });
+                let skip = s.skip == Some(i) && (s.input != i || elementwise);
+                let read = skip || s.input == i && elementwise;
+                s.output == j && read && a.last == time + 1 && b.first == time + 1 && a.offset == b.offset
             });
+            let handed_over = a.root == b.root && (a.last <= b.first || b.last <= a.first);
+            let part = is_part(graph, &a.name, &b.name) || is_part(graph, &b.name, &a.name);
             let alive_together = a.first <= b.last && b.first <= a.last;
-            assert!(apart || in_place || !alive_together, "{} and {} share memory while both live", a.name, b.name);
+            assert!(
+                apart || in_place || handed_over || part || !alive_together,
+                "{} and {} share memory while both live",
+                a.name,
+                b.name
+            );
         }
     }
-    let sum: u64 = plan.tensors.iter().map(|t| t.shape.padded_bytes().next_multiple_of(ALIGN)).sum();
+    let sum: u64 = plan.tensors.iter().map(|t| t.bytes().next_multiple_of(ALIGN)).sum();
     assert!(plan.arena_bytes <= plan.zero_bytes + sum);
     for (time, step) in plan.steps.iter().enumerate().map(|(i, s)| (i + 1, s)) {
-        for read in std::iter::once(step.input).chain(step.skip) {
+        for read in step.reads() {
             assert!(plan.tensors[read].first < time && plan.tensors[read].last >= time);
         }
     }
@@ -81,7 +120,7 @@ fn the_compact_network_counted_by_hand() {
     // Three skips are fused into the upsampling before them.
     assert_eq!((graph.ops.len(), plan.steps.len()), (22, 19));
     assert_eq!(plan.steps.iter().filter(|s| s.kind == Kind::Upsample && s.skip.is_some()).count(), 3);
-    check_memory(&plan);
+    check_memory(&graph, &plan);
     let sum: u64 = plan.tensors.iter().map(|t| t.shape.padded_bytes()).sum();
     println!("arena {} bytes of {sum} without sharing", plan.arena_bytes);
     // Input and first layer live together, so this is the least there can be (but for the zeros).
@@ -93,21 +132,24 @@ fn sums_fuse_where_they_may() {
     let body = |activation| {
         vec![conv("a", "input", "a", [4, 4], 3, 1), conv("b", "a", "b", [4, 4], 3, 1), add("s", "a", "b", activation)]
     };
-    let plan = Plan::new(&graph(4, body(Activation::None)), 9, 5).unwrap();
+    let sums = graph(4, body(Activation::None));
+    let plan = Plan::new(&sums, 9, 5).unwrap();
     assert_eq!(plan.steps.len(), 2);
     assert_eq!((plan.steps[1].add_at, plan.steps[1].activation), (AddAt::AfterActivation, Activation::Relu));
-    check_memory(&plan);
+    check_memory(&sums, &plan);
     // ReLU inside and outside: the epilogue has one activation, so the sum stays a step.
-    let plan = Plan::new(&graph(4, body(Activation::Relu)), 9, 5).unwrap();
+    let sums = graph(4, body(Activation::Relu));
+    let plan = Plan::new(&sums, 9, 5).unwrap();
     assert_eq!((plan.steps.len(), plan.steps[2].kind), (3, Kind::Copy));
-    check_memory(&plan);
+    check_memory(&sums, &plan);
     // Both summands are read again later.
     let mut ops = body(Activation::None);
     ops.push(add("t", "b", "s", Activation::None));
     ops.push(add("u", "a", "t", Activation::None));
-    let plan = Plan::new(&graph(4, ops), 9, 5).unwrap();
+    let sums = graph(4, ops);
+    let plan = Plan::new(&sums, 9, 5).unwrap();
     assert_eq!(plan.steps.len(), 5);
-    check_memory(&plan);
+    check_memory(&sums, &plan);
 }
 
 #[test]
@@ -121,46 +163,77 @@ fn errors_name_the_operator() {
     assert!(matches!(error, PlanError::TooLarge { .. }), "{error}");
 }
 
-/// A random graph: each operator reads tensors made before it; sums only where shapes agree.
-fn random_graph(choices: &[(u8, u8, u8)]) -> Graph {
-    let mut ops: Vec<Op> = Vec::new();
-    // Name, channels, level of halving.
-    let mut made = vec![("input".to_string(), 3u32, 0u32)];
+/// A random graph: each operator reads tensors made before it; sums and concatenations only where sizes agree.
+fn random_graph(choices: &[(u8, u8, u8)], [width, height]: [u32; 2]) -> Graph {
+    let mut graph = Graph { input_channels: 3, ops: Vec::new(), output: String::new() };
+    let mut made = vec![("input".to_string(), Shape { channels: 3, height, width })];
     for (i, (kind, a, b)) in choices.iter().enumerate() {
         let name = format!("t{i}");
-        let (from, channels, level) = made[*a as usize % made.len()].clone();
-        let partner = made.iter().filter(|m| m.1 == channels && m.2 == level).nth(*b as usize % 3).cloned();
-        let (op, channels, level) = match (kind % 5, partner) {
-            (0, _) => {
-                (conv(&name, &from, &name, [channels, 1 + u32::from(*b) % 9], 3, 1), 1 + u32::from(*b) % 9, level)
-            }
-            (1, _) if level < 3 => (conv(&name, &from, &name, [channels, channels], 3, 2), channels, level + 1),
-            (2, _) => {
-                let target = made[*b as usize % made.len()].clone();
-                (up(&name, &from, &target.0), channels, target.2)
-            }
-            (_, Some(other)) => {
-                let activation = if b % 2 == 0 { Activation::None } else { Activation::Relu };
-                (add(&name, &from, &other.0, activation), channels, level)
-            }
-            _ => (conv(&name, &from, &name, [channels, 5], 1, 1), 5, level),
+        let (from, shape) = made[*a as usize % made.len()].clone();
+        let channels = shape.channels;
+        let of_size = |m: &&(String, Shape)| (m.1.width, m.1.height) == (shape.width, shape.height);
+        let beside = made.iter().filter(of_size).nth(*b as usize % 3).cloned();
+        let partner = made.iter().filter(|m| m.1 == shape).nth(*b as usize % 3).cloned();
+        let activation =
+            [Activation::None, Activation::Relu, Activation::LeakyRelu(0.2), Activation::Exp][*b as usize % 4];
+        let json = |rest: serde_json::Value| {
+            let mut fields = serde_json::json!({"name": name, "input": from, "output": name});
+            fields.as_object_mut().unwrap().extend(rest.as_object().unwrap().clone());
+            let op = fields.as_object_mut().unwrap().remove("op").unwrap();
+            Op::parse(op.as_str().unwrap(), fields).unwrap().unwrap()
         };
-        ops.push(op);
-        made.push((name, channels, level));
+        let even = channels % 2 == 0;
+        let op = match (kind % 16, partner, beside) {
+            (0 | 1, ..) => conv(&name, &from, &name, [channels, 1 + u32::from(*b) % 12], 3, 1),
+            (2, ..) => conv(&name, &from, &name, [channels, channels], 3, 2),
+            (3, ..) => up(&name, &from, &made[*b as usize % made.len()].0),
+            (4 | 5, Some(other), _) => add(&name, &from, &other.0, activation),
+            (6 | 7, _, Some(other)) => {
+                Op::Concat(Concat { name: name.clone(), inputs: vec![from, other.0], output: name.clone() })
+            }
+            (8, ..) => json(
+                serde_json::json!({"op": "group_norm", "channels": channels, "groups": if even { 2 } else { 1 }, "activation": activation}),
+            ),
+            (9, ..) => json(serde_json::json!({"op": "batch_norm", "channels": channels})),
+            (10, ..) => json(serde_json::json!({"op": "activation", "activation": activation})),
+            (11, ..) => json(serde_json::json!({"op": "dropout", "p": 0.5})),
+            (12, ..) if shape.width.max(shape.height) < 100 => {
+                json(serde_json::json!({"op": "upsample_nearest", "scale": 2}))
+            }
+            (13, ..) => json(serde_json::json!({"op": "pad", "padding": [1, 0, b % 3, 2]})),
+            (14, ..) if shape.width.max(shape.height) < 100 => json(
+                serde_json::json!({"op": "conv_transpose2d", "in_channels": channels, "out_channels": 8, "kernel": [4, 4], "stride": 2, "padding": 1, "bias": false}),
+            ),
+            (15, ..) if channels % 4 == 0 => json(serde_json::json!({"op": "pixel_shuffle", "factor": 2})),
+            _ => conv(&name, &from, &name, [channels, 5], 1, 1),
+        };
+        graph.ops.push(op);
+        graph.output = name.clone();
+        match graph.shapes(width, height) {
+            Ok(shapes) => made.push((name, *shapes.last().unwrap())),
+            // More channels than there may be.
+            Err(_) => drop(graph.ops.pop()),
+        }
     }
-    graph(3, ops)
+    graph.output = made.last().unwrap().0.clone();
+    graph
 }
 
 proptest! {
     #[test]
     fn living_tensors_never_overlap(
         choices in prop::collection::vec(any::<(u8, u8, u8)>(), 1..24), width in 1u32..70, height in 1u32..70,
+        fuse in any::<bool>(), half in any::<bool>(), dropout in any::<bool>(),
     ) {
-        let graph = random_graph(&choices);
-        let plan = Plan::new(&graph, width, height).unwrap();
-        check_memory(&plan);
+        let graph = random_graph(&choices, [width, height]);
+        prop_assume!(!graph.ops.is_empty());
+        let precision = if half { Precision::F16 } else { Precision::F32 };
+        let options = Options { fuse, precision, dropout, ..Options::default() };
+        let Ok(plan) = Plan::with(&graph, width, height, &options) else { return Ok(()) };
+        check_memory(&graph, &plan);
         prop_assert_eq!(plan.flops(), graph.flops(width, height).unwrap());
-        prop_assert!(plan.steps.len() <= graph.ops.len());
-        prop_assert_eq!(&plan.tensors[plan.output].name, &graph.output);
+        let output = &plan.tensors[plan.output];
+        prop_assert!(output.full && output.root == plan.output);
+        prop_assert_eq!(output.shape, *graph.shapes(width, height).unwrap().iter().zip(&graph.ops).find(|(_, op)| op.output() == graph.output).unwrap().0);
     }
 }

@@ -352,7 +352,7 @@ fn bad_triangles_are_left_out_and_counted() {
 #[test]
 fn nothing_is_hit_where_nothing_is() {
     let empty = Accel::build(&[]).unwrap();
-    assert_eq!((empty.triangle_count(), empty.node_count()), (0, 1));
+    assert_eq!((empty.triangle_count(), empty.block_count()), (0, 1));
     let rays = random_rays(100, 1.0, 2);
     assert!(on_cpu(&empty, &rays).iter().all(|h| h.triangle == NONE));
     let Some(bench) = Bench::new() else { return };

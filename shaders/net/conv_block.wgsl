@@ -1,12 +1,12 @@
 // Any convolution: eight pixels of a column and eight output channels a thread. For 1×1 and strided kernels, whose taps
-// share little. From the prelude: KERNEL_W, KERNEL_H, STRIDE, PADDING, IN_VECTORS, OUT_VECTORS.
+// share little, and for each phase of a transposed one. From the prelude: KERNEL_W, KERNEL_H, STRIDE, IN_VECTORS.
 
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let y = id.y * 8u;
-    if id.x >= step.out_size.x || y >= step.out_size.y { return; }
+    if any(vec2u(id.x, y) >= made()) { return; }
     let first = id.z * (1u + KERNEL_W * KERNEL_H * IN_VECTORS * 2u);
-    let bias = weights[first];
+    let bias = weight(first);
     var p0 = bias[0]; var q0 = bias[1];
     var p1 = bias[0]; var q1 = bias[1];
     var p2 = bias[0]; var q2 = bias[1];
@@ -17,8 +17,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var p7 = bias[0]; var q7 = bias[1];
     for (var kx = 0u; kx < KERNEL_W; kx++) {
         for (var ky = 0u; ky < KERNEL_H; ky++) {
-            let x = i32(id.x * STRIDE + kx) - i32(PADDING);
-            let top = i32(y * STRIDE + ky) - i32(PADDING);
+            let x = i32(id.x * STRIDE + kx) - step.pad.x;
+            let top = i32(y * STRIDE + ky) - step.pad.y;
             let s = i32(STRIDE);
             let t0 = tap(x, top);
             let t1 = tap(x, top + 1 * s);
@@ -31,18 +31,18 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             var w = first + 1u + (kx * IN_VECTORS * KERNEL_H + ky) * 2u;
             for (var c = 0u; c < IN_VECTORS; c++) {
                 var m: mat4x4f;
-                let a0 = arena[t0 + c];
-                let a1 = arena[t1 + c];
-                let a2 = arena[t2 + c];
-                let a3 = arena[t3 + c];
-                let a4 = arena[t4 + c];
-                let a5 = arena[t5 + c];
-                let a6 = arena[t6 + c];
-                let a7 = arena[t7 + c];
-                m = weights[w];
+                let a0 = load(t0 + c);
+                let a1 = load(t1 + c);
+                let a2 = load(t2 + c);
+                let a3 = load(t3 + c);
+                let a4 = load(t4 + c);
+                let a5 = load(t5 + c);
+                let a6 = load(t6 + c);
+                let a7 = load(t7 + c);
+                m = weight(w);
                 p0 += m * a0; p1 += m * a1; p2 += m * a2; p3 += m * a3;
                 p4 += m * a4; p5 += m * a5; p6 += m * a6; p7 += m * a7;
-                m = weights[w + 1u];
+                m = weight(w + 1u);
                 q0 += m * a0; q1 += m * a1; q2 += m * a2; q3 += m * a3;
                 q4 += m * a4; q5 += m * a5; q6 += m * a6; q7 += m * a7;
                 w += KERNEL_H * 2u;

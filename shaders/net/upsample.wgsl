@@ -1,8 +1,8 @@
 // Bilinear resampling to the output's size, half-pixel centres, edges clamped (PyTorch's align_corners=False).
-// From the prelude: OUT_VECTORS.
+// From the prelude: IN_PITCH.
 
 fn texel(x: u32, y: u32, c: u32) -> vec4f {
-    return arena[step.input + (y * step.in_size.x + x) * OUT_VECTORS + c];
+    return load(step.input + (y * step.in_size.x + x) * IN_PITCH + c);
 }
 
 @compute @workgroup_size(16, 4)
@@ -15,5 +15,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let f = place - vec2f(low);
     let top = mix(texel(low.x, low.y, id.z), texel(high.x, low.y, id.z), f.x);
     let bottom = mix(texel(low.x, high.y, id.z), texel(high.x, high.y, id.z), f.x);
-    finish(mix(top, bottom, f.y), (id.y * step.out_size.x + id.x) * OUT_VECTORS + id.z);
+    finish(mix(top, bottom, f.y), id.y * step.out_size.x + id.x, id.z);
 }

@@ -27,13 +27,16 @@ fn coordinates_at(extra: u32, w: vec3f) -> vec4f {
     return vec4f(a.xy * w.x + a.zw * w.y + b.xy * w.z, b.zw * w.x + c.xy * w.y + c.zw * w.z);
 }
 
+// Four half floats, not negative, from two words. Not every device has `unpack2x16float`.
+fn halves(words: vec2u) -> vec4f {
+    let bits = vec4u(words.x, words.x >> 16u, words.y, words.y >> 16u) & vec4u(0x7fffu);
+    return bitcast<vec4f>(bits << vec4u(13u)) * 5.192297e33;
+}
+
 fn color_at(extra: u32, w: vec3f) -> vec4f {
     if extra == NONE { return vec4f(1.0); }
     let a = triangles[extra + 4u];
-    let b = triangles[extra + 5u].xy;
-    return vec4f(unpack2x16float(a.x), unpack2x16float(a.y)) * w.x
-        + vec4f(unpack2x16float(a.z), unpack2x16float(a.w)) * w.y
-        + vec4f(unpack2x16float(b.x), unpack2x16float(b.y)) * w.z;
+    return halves(a.xy) * w.x + halves(a.zw) * w.y + halves(triangles[extra + 5u].xy) * w.z;
 }
 
 fn wrapped(i: i32, side: i32, mode: u32) -> i32 {

@@ -1,8 +1,10 @@
 //! Exit codes: every error that reaches `main` is sorted here, once.
 
 use crate::{
-    gi::GiError, gpu::GpuError, net::format::WeightsError, scene::SceneError, scene::environment::EnvironmentError,
-    scene::upload::UploadError,
+    gi::GiError,
+    gpu::GpuError,
+    net::{convert::ConvertError, format::WeightsError, pictures::PicturesError},
+    scene::{SceneError, environment::EnvironmentError, upload::UploadError},
 };
 use thiserror::Error;
 
@@ -61,6 +63,12 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
         }
         // Sound weights that speak of something else than light.
         if let Some(GiError::Feature { .. } | GiError::Output(_)) = cause.downcast_ref::<GiError>() {
+            return INVALID_INPUT;
+        }
+        if let Some(ConvertError::NoSuchVariant) = cause.downcast_ref::<ConvertError>() {
+            return USAGE;
+        }
+        if cause.is::<ConvertError>() || cause.is::<PicturesError>() {
             return INVALID_INPUT;
         }
         if cause.is::<SceneError>()

@@ -2,6 +2,7 @@
 //!
 //! Results go to standard output, logs and progress to standard error.
 
+mod apply;
 mod args;
 mod bench;
 mod compare;
@@ -37,7 +38,9 @@ enum Command {
     Compare(compare::Args),
     /// Write network inputs of the paper's rooms, for training.
     Dataset(dataset::Args),
-    /// Look into a weights file.
+    /// Run a network on G-buffer pictures from elsewhere.
+    Apply(apply::Args),
+    /// Look into a weights file, check it, or make one from a published generator's state.
     Weights(weights::Args),
     /// Say which adapter is used, what it can do, and what to install when there is none.
     Doctor(doctor::Args),
@@ -59,6 +62,7 @@ pub fn main() -> ExitCode {
         Command::Bench(a) => bench::run(&cli.global, a),
         Command::Compare(a) => compare::run(a),
         Command::Dataset(a) => dataset::run(&cli.global, a),
+        Command::Apply(a) => apply::run(&cli.global, a),
         Command::Weights(a) => weights::run(a),
         Command::Doctor(a) => doctor::run(&cli.global, a),
     };

@@ -2,7 +2,7 @@
 
 use super::{
     args::{Global, MethodName, SceneArgs, usage},
-    compare::{Shown, shown_bytes},
+    compare::{Heat, Shown, shown_bytes},
     error::CliError,
     interrupt,
     progress::Progress,
@@ -54,16 +54,16 @@ pub struct Args {
     /// Seed of jitter and soft-shadow patterns, or of the paths.
     #[arg(long, default_value_t = 0)]
     seed: u32,
-    /// A picture to compare with: EXR (both go through the view transform) or PNG.
+    /// A picture to compare with: EXR (both go through the view transform and --exposure) or PNG.
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     /// Metric of the comparison.
     #[arg(long, default_value = "mae", requires = "reference", value_parser = metrics::NAMES.map(|(n, _)| n))]
     metric: String,
-    /// On the wrong side of it (above; below for psnr and the ssims) the exit code is 5.
+    /// On the wrong side of it (above; below for psnr and the ssims; bias by its size) the exit code is 5.
     #[arg(long, requires = "reference", value_name = "T")]
     threshold: Option<f64>,
-    /// Picture of where they differ.
+    /// Picture of where they differ: FLIP's map for flip and hdrflip, else the mean difference up to a quarter.
     #[arg(long, requires = "reference", value_name = "PNG")]
     diff: Option<PathBuf>,
 }
@@ -117,7 +117,8 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
         // From here on the size is that of the picture that is written.
         args.scene.size = task.size();
     }
-    let reference = args.reference.as_ref().map(|path| Shown::read(path, args.tonemap)).transpose()?;
+    let judged = |path| Shown::reference(path, args.tonemap, args.exposure, args.scene.size, &args.metric);
+    let reference = args.reference.as_deref().map(judged).transpose()?;
     let scene = args.scene.load(global.quiet)?;
     let camera = args.scene.camera(&scene)?;
     interrupt::install()?;
@@ -246,13 +247,17 @@ fn rgb(frame: &CapturedFrame) -> Vec<f32> {
 fn judge(args: &Args, frame: &CapturedFrame, reference: &Shown) -> Result<()> {
     let name = args.output.display().to_string();
     let ours = Shown::linear(name, args.scene.size.map(|n| n as usize), rgb(frame), args.exposure, args.tonemap);
-    let comparison = ours.against(reference)?;
-    if let Some(path) = &args.diff {
-        ours.write_heat_map(reference, path)?;
-    }
+    let heat = Heat::of_metric(&args.metric);
+    let options =
+        metrics::Options { flip: heat == Heat::Flip, hdr_flip: heat == Heat::Hdrflip, ..metrics::Options::default() };
+    let (comparison, maps) = ours.against(reference, options)?;
     let Some(value) = comparison.value(&args.metric) else {
         return Err(usage(format!("{} needs a linear reference (EXR)", args.metric)));
     };
+    if let (Some(path), Some(rgb)) = (&args.diff, ours.heat_map(reference, heat, &maps)?) {
+        let [width, height] = args.scene.size;
+        image_io::write_png(path, width, height, &rgb, &[])?;
+    }
     // The picture itself may be on standard output.
     eprintln!("{} {value:.6}", args.metric);
     match args.threshold {

@@ -68,30 +68,44 @@ pub const GI: &[Shader] = &[
     Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },
 ];
 
-/// Shaders of `net/`. They need a prelude; `net::gpu::example_preludes` gives one of each kind.
-pub const NET: &[Shader] = &[
-    Shader {
-        name: "net.conv_plain",
-        files: wgsl!["net/common.wgsl", "net/weights_storage.wgsl", "net/conv_plain.wgsl"],
-    },
-    Shader {
-        name: "net.conv3x3",
-        files: wgsl!["net/common.wgsl", "net/weights_uniform.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"],
-    },
-    Shader {
-        name: "net.conv3x3_wide",
-        files: wgsl!["net/common.wgsl", "net/weights_storage.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"],
-    },
-    Shader {
-        name: "net.conv_block",
-        files: wgsl!["net/common.wgsl", "net/weights_uniform.wgsl", "net/column.wgsl", "net/conv_block.wgsl"],
-    },
-    Shader {
-        name: "net.conv_block_wide",
-        files: wgsl!["net/common.wgsl", "net/weights_storage.wgsl", "net/column.wgsl", "net/conv_block.wgsl"],
-    },
-    Shader { name: "net.upsample", files: wgsl!["net/common.wgsl", "net/upsample.wgsl"] },
-    Shader { name: "net.add", files: wgsl!["net/common.wgsl", "net/add.wgsl"] },
+/// The rows of `net/`: name, the files of its arena, and the body's files.
+macro_rules! net {
+    ($($name:literal, $arena:literal, [$($path:literal),+];)+) => { &[$(Shader {
+        name: concat!("net.", $name),
+        files: wgsl!["net/common.wgsl", $arena, $($path),+],
+    }),+] };
+}
+
+/// Shaders of `net/`. They need a prelude; `net::gpu::example_preludes` gives one of each kind. `_wide` has its weights in a
+/// storage buffer, `_half` arena and weights in 16 bits.
+#[rustfmt::skip]
+pub const NET: &[Shader] = net![
+    "conv_plain", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/conv_plain.wgsl"];
+    "conv_plain_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/conv_plain.wgsl"];
+    "conv3x3", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_wide", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"];
+    "conv_block", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/column.wgsl", "net/conv_block.wgsl"];
+    "conv_block_wide", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/column.wgsl", "net/conv_block.wgsl"];
+    "conv_block_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/column.wgsl", "net/conv_block.wgsl"];
+    "upsample", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/upsample.wgsl"];
+    "upsample_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/upsample.wgsl"];
+    "nearest", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/nearest.wgsl"];
+    "nearest_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/nearest.wgsl"];
+    "add", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/add.wgsl"];
+    "add_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/add.wgsl"];
+    "window", "net/arena_full.wgsl", ["net/window.wgsl"];
+    "window_half", "net/arena_half.wgsl", ["net/window.wgsl"];
+    "moments", "net/arena_full.wgsl", ["net/moments.wgsl"];
+    "moments_half", "net/arena_half.wgsl", ["net/moments.wgsl"];
+    "merge", "net/arena_full.wgsl", ["net/merge.wgsl"];
+    "merge_half", "net/arena_half.wgsl", ["net/merge.wgsl"];
+    "norm", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/scale_measured.wgsl", "net/scale.wgsl"];
+    "norm_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/scale_measured.wgsl", "net/scale.wgsl"];
+    "batch_norm", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/scale_fixed.wgsl", "net/scale.wgsl"];
+    "batch_norm_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/scale_fixed.wgsl", "net/scale.wgsl"];
+    "shuffle", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/shuffle.wgsl"];
+    "shuffle_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/shuffle.wgsl"];
 ];
 
 /// Shaders of `reference/`.

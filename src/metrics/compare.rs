@@ -86,6 +86,51 @@ pub struct HdrFlip {
     pub exposures: Exposures,
 }
 
+/// Metrics of one layer of two files; serialises to the record that `compare --layer --json` writes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LayerComparison {
+    /// Version of this record.
+    pub schema: u32,
+    /// Name of the compared picture.
+    pub a: String,
+    /// Name of the reference.
+    pub b: String,
+    /// Pixels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// The layer.
+    pub layer: String,
+    /// Over all its pixels and channels.
+    pub linear: LinearMetrics,
+}
+
+impl LayerComparison {
+    /// `a` and `b` hold the same channels of every pixel in the same order, finite.
+    ///
+    /// # Errors
+    /// [`MetricError::Shape`] where they cannot.
+    pub fn new(
+        names: [&str; 2],
+        [width, height]: [usize; 2],
+        layer: &str,
+        a: &[f32],
+        b: &[f32],
+    ) -> Result<Self, MetricError> {
+        let fits = |values: &[f32]| {
+            !values.is_empty() && values.len() == a.len() && values.len().is_multiple_of(width * height)
+        };
+        for (name, values) in names.into_iter().zip([a, b]) {
+            if width == 0 || height == 0 || !fits(values) {
+                return Err(MetricError::Shape { picture: name.into(), width, height, values: values.len() });
+            }
+        }
+        let [first, second] = names.map(String::from);
+        let linear = LinearMetrics::of(a, b);
+        Ok(Self { schema: 1, a: first, b: second, width, height, layer: layer.into(), linear })
+    }
+}
+
 /// What takes long and may be left out, and how FLIP looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
@@ -128,6 +173,9 @@ pub const NAMES: [(&str, bool); 12] = [
     ("bias", false),
     ("hdrflip", false),
 ];
+
+/// The names of metrics of radiance; the others are for display values.
+pub const NEEDS_RADIANCE: [&str; 4] = ["relmse", "mre", "bias", "hdrflip"];
 
 impl Comparison {
     /// The metric called `name` (one of [`NAMES`]); `None` for other names, for what was not asked for, and for metrics of

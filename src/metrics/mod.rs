@@ -15,8 +15,8 @@ mod ssim;
 
 pub use basic::{bias, mean_absolute_error, mean_relative_error, psnr, rel_mse};
 pub use compare::{
-    Comparison, DisplayMetrics, FlipMaps, HdrFlip, LinearMetrics, NAMES, Options, PaperMetrics, Views, compare,
-    compare_with,
+    Comparison, DisplayMetrics, FlipMaps, HdrFlip, LayerComparison, LinearMetrics, NAMES, NEEDS_RADIANCE, Options,
+    PaperMetrics, Views, compare, compare_with,
 };
 pub use heat::{heat_color, heat_map};
 pub use picture::{MetricError, Picture};

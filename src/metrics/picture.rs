@@ -5,8 +5,8 @@ use thiserror::Error;
 /// Why two pictures cannot be compared.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum MetricError {
-    /// The number of values is not `3 · width · height`, or there is no pixel.
-    #[error("picture `{picture}` has {values} values, which is not {width}×{height} RGB pixels")]
+    /// The number of values is not `3 · width · height` (of a layer: a multiple of its pixels), or there is no pixel.
+    #[error("picture `{picture}` has {values} values, which do not make {width}×{height} pixels")]
     Shape {
         /// Name given by the caller.
         picture: String,
@@ -65,6 +65,14 @@ pub enum MetricError {
         /// What was asked for.
         given: f32,
     },
+}
+
+impl MetricError {
+    /// [`Self::Sizes`] of name, width and height.
+    pub(crate) fn sizes(a: (&str, usize, usize), b: (&str, usize, usize)) -> Self {
+        let ((a, a_width, a_height), (b, b_width, b_height)) = (a, b);
+        Self::Sizes { a: a.into(), a_width, a_height, b: b.into(), b_width, b_height }
+    }
 }
 
 /// RGB pixels, interleaved, rows from the top; finite by construction.
@@ -127,13 +135,6 @@ impl<'a> Picture<'a> {
         if (self.width, self.height) == (other.width, other.height) {
             return Ok(());
         }
-        Err(MetricError::Sizes {
-            a: self.name.into(),
-            a_width: self.width,
-            a_height: self.height,
-            b: other.name.into(),
-            b_width: other.width,
-            b_height: other.height,
-        })
+        Err(MetricError::sizes((self.name, self.width, self.height), (other.name, other.width, other.height)))
     }
 }

@@ -1,9 +1,12 @@
 //! The slow, obvious twin: every operator as plain loops over CHW f32. The test oracle for the kernels; it runs the
 //! graph as it stands in the file, so that it also judges the planner's fusion and sharing of memory.
 
+mod conv;
+mod plain;
+
 use super::format::Weights;
-use super::graph::{AddAt, GraphError, INPUT, Op, Shape};
-use super::op::Conv2d;
+use super::graph::{AddAt, Graph, GraphError, INPUT, Op, Shape};
+use super::{dropout, op::Activation};
 use std::collections::HashMap;
 use thiserror::Error;
 
@@ -66,104 +69,93 @@ impl Tensor {
     }
 }
 
-/// Runs the network on `input` (shape: the network's channels, any size).
+/// Runs the network on `input` (shape: the network's channels, any size), without dropout.
 pub fn run(weights: &Weights, input: &Tensor) -> Result<Tensor, RunError> {
+    run_with(weights, input, None)
+}
+
+/// As [`run`], with dropout when there is a seed. The picture is padded and the output cropped as
+/// [`Graph::inner_size`] says.
+pub fn run_with(weights: &Weights, input: &Tensor, seed: Option<u32>) -> Result<Tensor, RunError> {
     let graph = &weights.graph;
     let shape = input.shape;
     let values = input.data.len();
     if shape.channels != graph.input_channels || values as u64 != shape.pixels() * u64::from(shape.channels) {
         return Err(RunError::Input { wanted: graph.input_channels, found: shape, values });
     }
-    let shapes = graph.shapes(shape.width, shape.height)?;
-    let mut tensors: HashMap<&str, Tensor> = HashMap::from([(INPUT, input.clone())]);
-    for (op, shape) in graph.ops.iter().zip(shapes) {
-        let result = match op {
-            Op::Conv2d(o) => {
-                let mut out = conv2d(weights, o, &tensors[o.input.as_str()], shape);
-                let skip = o.add.as_ref().map(|s| (&tensors[s.as_str()], o.add_at));
-                if let Some((skip, AddAt::BeforeActivation)) = skip {
-                    add(&mut out, skip);
-                }
-                out.data.iter_mut().for_each(|v| *v = o.activation.apply(*v));
-                if let Some((skip, AddAt::AfterActivation)) = skip {
-                    add(&mut out, skip);
-                }
-                out
-            }
-            Op::UpsampleBilinear(o) => upsample(&tensors[o.input.as_str()], shape),
-            Op::Add(o) => {
-                let mut out = tensors[o.inputs[0].as_str()].clone();
-                add(&mut out, &tensors[o.inputs[1].as_str()]);
-                out.data.iter_mut().for_each(|v| *v = o.activation.apply(*v));
-                out
-            }
-            _ => unimplemented!(),
-        };
+    let [width, height] = graph.inner_size(shape.width, shape.height)?;
+    let shapes = graph.shapes(width, height)?;
+    let inner = plain::window(input, Shape { width, height, ..shape });
+    let mut tensors: HashMap<&str, Tensor> = HashMap::from([(INPUT, inner)]);
+    for (i, (op, shape)) in graph.ops.iter().zip(shapes).enumerate() {
+        let result = apply(weights, op, &tensors, shape, seed.map(|seed| dropout::stream(seed, i)));
         tensors.insert(op.output(), result);
     }
-    Ok(tensors.remove(graph.output.as_str()).expect("shapes() has checked that an operator writes the output"))
+    let out = tensors.remove(graph.output.as_str()).expect("shapes() has checked that an operator writes the output");
+    let kept = Shape {
+        width: Graph::cropped(out.shape.width, shape.width, width),
+        height: Graph::cropped(out.shape.height, shape.height, height),
+        ..out.shape
+    };
+    Ok(plain::window(&out, kept))
+}
+
+/// One operator; `stream` is for dropout alone.
+fn apply(weights: &Weights, op: &Op, tensors: &HashMap<&str, Tensor>, shape: Shape, stream: Option<u32>) -> Tensor {
+    let read = |name: &String| &tensors[name.as_str()];
+    match op {
+        Op::Conv2d(o) => {
+            let mut out = conv::conv2d(weights, o, read(&o.input), shape);
+            let skip = o.add.as_ref().map(|s| (read(s), o.add_at));
+            if let Some((skip, AddAt::BeforeActivation)) = skip {
+                add(&mut out, skip);
+            }
+            activate(&mut out, o.activation);
+            if let Some((skip, AddAt::AfterActivation)) = skip {
+                add(&mut out, skip);
+            }
+            out
+        }
+        Op::ConvTranspose2d(o) => activated(conv::transposed(weights, o, read(&o.input), shape), o.activation),
+        Op::UpsampleBilinear(o) => plain::bilinear(read(&o.input), shape),
+        Op::UpsampleNearest(o) => plain::nearest(read(&o.input), shape),
+        Op::Pad(o) => plain::pad(read(&o.input), o.padding, shape),
+        Op::Concat(o) => Tensor { shape, data: o.inputs.iter().flat_map(|t| read(t).data.iter().copied()).collect() },
+        Op::Add(o) => {
+            let mut out = read(&o.inputs[0]).clone();
+            add(&mut out, read(&o.inputs[1]));
+            activated(out, o.activation)
+        }
+        Op::BatchNorm(o) => {
+            let [mean, variance] = ["running_mean", "running_var"].map(|leaf| weights.values(&o.name, leaf));
+            let moments = |c: usize| (f64::from(mean[c]), f64::from(variance[c]));
+            activated(plain::normalised(weights, &o.name, read(&o.input), o.eps, moments), o.activation)
+        }
+        Op::InstanceNorm(o) => {
+            activated(plain::group_norm(weights, &o.name, read(&o.input), o.channels, o.eps), o.activation)
+        }
+        Op::GroupNorm(o) => {
+            activated(plain::group_norm(weights, &o.name, read(&o.input), o.groups, o.eps), o.activation)
+        }
+        Op::Activation(o) => activated(read(&o.input).clone(), o.activation),
+        Op::PixelShuffle(o) => plain::shuffle(read(&o.input), o.factor, shape),
+        Op::PixelUnshuffle(o) => plain::unshuffle(read(&o.input), o.factor, shape),
+        Op::Dropout(o) => match stream {
+            Some(stream) => plain::dropout(read(&o.input), stream, o.p),
+            None => read(&o.input).clone(),
+        },
+    }
 }
 
 fn add(to: &mut Tensor, from: &Tensor) {
     to.data.iter_mut().zip(&from.data).for_each(|(a, b)| *a += b);
 }
 
-/// Convolution and bias: one weight at a time, added to a whole row.
-fn conv2d(weights: &Weights, o: &Conv2d, input: &Tensor, shape: Shape) -> Tensor {
-    let (weight, bias) = (weights.values(&o.name, "weight"), weights.values(&o.name, "bias"));
-    let [kernel_h, kernel_w] = o.kernel.map(|k| k as usize);
-    let (in_w, in_h) = (input.shape.width as usize, input.shape.height as usize);
-    let (out_w, out_h) = (shape.width as usize, shape.height as usize);
-    let (stride, padding, in_channels) = (o.stride as usize, o.padding.left as usize, o.in_channels as usize);
-    let mut out = Tensor::zeros(shape);
-    for (oc, plane) in out.data.chunks_exact_mut(out_w * out_h).enumerate() {
-        plane.fill(bias[oc]);
-        for ic in 0..in_channels {
-            let source = input.plane(ic);
-            for ky in 0..kernel_h {
-                for kx in 0..kernel_w {
-                    let w = weight[((oc * in_channels + ic) * kernel_h + ky) * kernel_w + kx];
-                    // Columns whose tap lies inside: 0 <= x·stride + kx − padding < in_w.
-                    let first = padding.saturating_sub(kx).div_ceil(stride);
-                    let end = (in_w + padding).saturating_sub(kx).div_ceil(stride).min(out_w);
-                    for (y, row) in plane.chunks_exact_mut(out_w).enumerate() {
-                        let tap = y * stride + ky;
-                        if tap < padding || tap - padding >= in_h || first >= end {
-                            continue;
-                        }
-                        let from = (tap - padding) * in_w + first * stride + kx - padding;
-                        let taps = source[from..].iter().step_by(stride);
-                        row[first..end].iter_mut().zip(taps).for_each(|(sum, v)| *sum += w * v);
-                    }
-                }
-            }
-        }
-    }
-    out
+fn activate(tensor: &mut Tensor, activation: Activation) {
+    tensor.data.iter_mut().for_each(|v| *v = activation.apply(*v));
 }
 
-/// Bilinear resampling, half-pixel centres, edges clamped: PyTorch's `align_corners=False`.
-fn upsample(input: &Tensor, shape: Shape) -> Tensor {
-    let mut out = Tensor::zeros(shape);
-    let (in_w, width, height) = (input.shape.width as usize, shape.width as usize, shape.height as usize);
-    for (c, plane) in out.data.chunks_exact_mut(width * height).enumerate() {
-        let source = input.plane(c);
-        for y in 0..height {
-            let (y0, y1, fy) = taps(y, height, input.shape.height as usize);
-            for x in 0..width {
-                let (x0, x1, fx) = taps(x, width, in_w);
-                let top = source[y0 * in_w + x0] * (1.0 - fx) + source[y0 * in_w + x1] * fx;
-                let bottom = source[y1 * in_w + x0] * (1.0 - fx) + source[y1 * in_w + x1] * fx;
-                plane[y * width + x] = top * (1.0 - fy) + bottom * fy;
-            }
-        }
-    }
-    out
-}
-
-/// The two source positions of `at` and the weight of the second.
-fn taps(at: usize, size: usize, source: usize) -> (usize, usize, f32) {
-    let place = ((at as f32 + 0.5) * (source as f32 / size as f32) - 0.5).max(0.0);
-    let low = (place as usize).min(source - 1);
-    (low, (low + 1).min(source - 1), place - low as f32)
+fn activated(mut tensor: Tensor, activation: Activation) -> Tensor {
+    activate(&mut tensor, activation);
+    tensor
 }

@@ -1,16 +1,21 @@
-//! Host side of the network's kernels: one arena, pipelines and bind groups built once, one compute pass a layer.
+//! Host side of the network's kernels: one arena, pipelines and bind groups built once, one compute pass a step.
 //!
 //! The caller fills [`Network::input`] (all channels, padding included, as zeros), records, and reads
 //! [`Network::output`]. Recording allocates nothing. The input's memory is reused by later layers.
 
+mod build;
+mod examples;
 mod kernels;
+mod pack;
 
 use super::format::Weights;
-use super::graph::Op;
-use super::plan::{Plan, PlanError, Step};
-use crate::gpu::{shaders, timing::Recorder};
-pub use kernels::{Kernel, Variant, example_preludes};
-use std::collections::HashMap;
+use super::graph::Graph;
+use super::plan::{Plan, PlanError, Precision};
+use crate::gpu::timing::Recorder;
+pub use build::StepUniform;
+use build::{Layer, Pipelines};
+pub use examples::example_preludes;
+pub use kernels::{Bound, Filter, Kernel, Part, Variant};
 use thiserror::Error;
 
 /// Why a network cannot run on this device.
@@ -31,6 +36,28 @@ pub enum NetError {
         /// What is needed.
         needed: u64,
     },
+    /// Other weights must be for the same graph.
+    #[error("the new weights are for another graph than the network's; build a network for them")]
+    OtherGraph,
+}
+
+/// How a network runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Options {
+    /// Convolution kernels.
+    pub variant: Variant,
+    /// Storage of weights and tensors. With [`Precision::F16`] input and output stay in 32 bits.
+    pub precision: Precision,
+    /// Seed of dropout; off without one.
+    pub dropout: Option<u32>,
+    /// Operators are fused; off for tests that compare.
+    pub fuse: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { variant: Variant::default(), precision: Precision::default(), dropout: None, fuse: true }
+    }
 }
 
 /// One tensor on the GPU: NHWC f32, channels padded to a multiple of four.
@@ -52,95 +79,111 @@ impl<'a> Binding<'a> {
     }
 }
 
-/// The uniform that a kernel reads; `Step` in `shaders/net/common.wgsl`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct StepUniform {
-    in_size: [u32; 2],
-    out_size: [u32; 2],
-    input: u32,
-    output: u32,
-    skip: u32,
-    first_block: u32,
-}
-
-struct Dispatch {
-    bind_group: wgpu::BindGroup,
-    workgroups: [u32; 3],
-}
-
-struct Layer {
-    label: String,
-    pipeline: wgpu::ComputePipeline,
-    dispatches: Vec<Dispatch>,
-}
-
 /// A network ready to run at one input size.
 pub struct Network {
+    graph: Graph,
     plan: Plan,
+    options: Options,
     arena: wgpu::Buffer,
+    steps: wgpu::Buffer,
     layers: Vec<Layer>,
-    bytes: u64,
+    pipelines: Pipelines,
 }
 
 impl Network {
     /// Builds pipelines, uploads weights, allocates the arena for an input of `size` (width, height).
+    ///
+    /// # Errors
+    /// [`NetError`] when the graph does not take the size, or the device grants too little.
     pub fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         weights: &Weights,
         size: [u32; 2],
     ) -> Result<Self, NetError> {
-        Self::with_variant(device, queue, weights, size, Variant::default())
+        Self::with_options(device, queue, weights, size, Options::default())
     }
 
-    /// As [`Network::new`] with a given family of kernels, for comparisons.
-    pub fn with_variant(
+    /// As [`Network::new`], told how.
+    ///
+    /// # Errors
+    /// As [`Network::new`].
+    pub fn with_options(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         weights: &Weights,
         size: [u32; 2],
-        variant: Variant,
+        options: Options,
     ) -> Result<Self, NetError> {
-        let plan = Plan::new(&weights.graph, size[0], size[1])?;
-        let kernels: Vec<Kernel> = plan.steps.iter().map(|s| Kernel::choose(&plan, s, variant)).collect();
-        check_limits(device, &plan, &kernels)?;
+        Self::build(device, queue, weights, size, options, Pipelines::default())
+    }
+
+    fn build(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        weights: &Weights,
+        size: [u32; 2],
+        options: Options,
+        mut pipelines: Pipelines,
+    ) -> Result<Self, NetError> {
+        let plan = build::plan(device, &weights.graph, size, options)?;
+        let kernels: Vec<Kernel> = plan.steps.iter().map(|s| Kernel::choose(&plan, s, options.variant)).collect();
+        build::check_limits(device, &plan, &kernels)?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         // wgpu clears new buffers; the kernels count on the zeros at the beginning.
-        let arena = buffer(device, "net.arena", plan.arena_bytes, usage);
-        let steps = upload_steps(device, queue, &plan, &kernels);
-        let (packed, places) = upload_weights(device, queue, weights, &plan, &kernels);
-        let mut pipelines = Pipelines { device, made: HashMap::new() };
-        let mut layers = Vec::with_capacity(plan.steps.len());
-        let mut slot = 0;
-        for (i, (step, kernel)) in plan.steps.iter().zip(&kernels).enumerate() {
-            let (pipeline, layout) = pipelines.get(kernel);
-            let mut dispatches = Vec::new();
-            for (d, (_, blocks)) in kernel.dispatches().into_iter().enumerate() {
-                let whole = |buffer, offset, size| {
-                    let size = wgpu::BufferSize::new(size);
-                    wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size })
-                };
-                let mut resources = vec![
-                    whole(&steps, slot * SLOT, size_of::<StepUniform>() as u64),
-                    whole(&arena, 0, plan.arena_bytes),
-                ];
-                if kernel.blocks > 0 {
-                    resources.push(whole(&packed, places[i][d], kernel.bound_bytes()));
-                }
-                let numbered = (0..).zip(resources);
-                let entries: Vec<_> =
-                    numbered.map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
-                let descriptor =
-                    wgpu::BindGroupDescriptor { label: Some(&step.name), layout: &layout, entries: &entries };
-                let bind_group = device.create_bind_group(&descriptor);
-                dispatches.push(Dispatch { bind_group, workgroups: kernel.workgroups(blocks) });
-                slot += 1;
-            }
-            layers.push(Layer { label: format!("net.{}", step.name), pipeline, dispatches });
+        let arena = build::buffer(device, "net.arena", plan.arena_bytes, usage);
+        let steps = build::steps_buffer(device, &kernels);
+        queue.write_buffer(&steps, 0, &build::uniforms(&plan, &kernels, options.dropout));
+        let layers = build::layers(device, &plan, kernels, &mut pipelines, &arena, &steps);
+        let network = Self { graph: weights.graph.clone(), plan, options, arena, steps, layers, pipelines };
+        network.upload(queue, weights);
+        Ok(network)
+    }
+
+    /// The same network for another size and other weights, whose graph may be another. Pipelines that serve again are kept.
+    ///
+    /// # Errors
+    /// As [`Network::new`]; then the old network is gone.
+    pub fn rebuilt(
+        self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        weights: &Weights,
+        size: [u32; 2],
+    ) -> Result<Self, NetError> {
+        let Self { options, pipelines, .. } = self;
+        Self::build(device, queue, weights, size, options, pipelines)
+    }
+
+    /// Replaces the trained numbers from the queue's next submission on. Allocates nothing on the GPU.
+    ///
+    /// # Errors
+    /// [`NetError::OtherGraph`] when the weights are for another graph.
+    pub fn set_weights(&self, queue: &wgpu::Queue, weights: &Weights) -> Result<(), NetError> {
+        if weights.graph != self.graph {
+            return Err(NetError::OtherGraph);
         }
-        let bytes = arena.size() + steps.size() + packed.size();
-        Ok(Self { plan, arena, layers, bytes })
+        self.upload(queue, weights);
+        Ok(())
+    }
+
+    /// Another seed for dropout, from the queue's next submission on; nothing happens to a network without dropout.
+    pub fn set_seed(&mut self, queue: &wgpu::Queue, seed: u32) {
+        if self.options.dropout.is_some() {
+            self.options.dropout = Some(seed);
+            let kernels = self.layers.iter().map(|l| &l.kernel);
+            queue.write_buffer(&self.steps, 0, &build::uniforms(&self.plan, kernels, self.options.dropout));
+        }
+    }
+
+    fn upload(&self, queue: &wgpu::Queue, weights: &Weights) {
+        for (layer, step) in self.layers.iter().zip(&self.plan.steps) {
+            if let Some(buffer) = &layer.weights {
+                for (bytes, offset) in pack::pack(weights, step, &layer.kernel).iter().zip(layer.offsets()) {
+                    queue.write_buffer(buffer, offset, bytes);
+                }
+            }
+        }
     }
 
     /// Where the caller puts the input.
@@ -153,14 +196,14 @@ impl Network {
         self.tensor(self.plan.output)
     }
 
-    /// Records one compute pass a layer, labelled `net.NAME`.
+    /// Records one compute pass a step, labelled `net.NAME`.
     pub fn record(&self, recorder: &mut Recorder<'_>) {
         for layer in &self.layers {
             recorder.compute(&layer.label, |pass| {
                 pass.set_pipeline(&layer.pipeline);
-                for dispatch in &layer.dispatches {
-                    let [x, y, z] = dispatch.workgroups;
-                    pass.set_bind_group(0, &dispatch.bind_group, &[]);
+                for (bind_group, part) in layer.bind_groups.iter().zip(&layer.kernel.parts) {
+                    let [x, y, z] = layer.kernel.workgroups(part.blocks);
+                    pass.set_bind_group(0, bind_group, &[]);
                     pass.dispatch_workgroups(x, y, z);
                 }
             });
@@ -169,7 +212,8 @@ impl Network {
 
     /// GPU memory of tensors, weights and uniforms, bytes.
     pub fn bytes(&self) -> u64 {
-        self.bytes
+        let weights = self.layers.iter().filter_map(|l| l.weights.as_ref()).map(wgpu::Buffer::size);
+        self.arena.size() + self.steps.size() + weights.sum::<u64>()
     }
 
     /// Dispatches, memory, FLOPs.
@@ -177,123 +221,13 @@ impl Network {
         &self.plan
     }
 
+    /// How it runs.
+    pub fn options(&self) -> Options {
+        self.options
+    }
+
     fn tensor(&self, index: usize) -> Binding<'_> {
         let tensor = &self.plan.tensors[index];
-        Binding { buffer: &self.arena, offset: tensor.offset, size: tensor.shape.padded_bytes() }
+        Binding { buffer: &self.arena, offset: tensor.offset, size: tensor.bytes() }
     }
-}
-
-/// Distance of uniforms in their buffer: WebGPU's default alignment of uniform bindings.
-const SLOT: u64 = 256;
-
-struct Pipelines<'a> {
-    device: &'a wgpu::Device,
-    made: HashMap<(&'static str, String), (wgpu::ComputePipeline, wgpu::BindGroupLayout)>,
-}
-
-impl Pipelines<'_> {
-    /// Steps with the same shader and prelude share a pipeline.
-    fn get(&mut self, kernel: &Kernel) -> (wgpu::ComputePipeline, wgpu::BindGroupLayout) {
-        let device = self.device;
-        let make = || {
-            let module = shaders::module_with(device, kernel.shader, &kernel.prelude);
-            let descriptor = wgpu::ComputePipelineDescriptor {
-                label: Some(kernel.shader),
-                layout: None,
-                module: &module,
-                entry_point: Some("main"),
-                compilation_options: Default::default(),
-                cache: None,
-            };
-            let pipeline = device.create_compute_pipeline(&descriptor);
-            let layout = pipeline.get_bind_group_layout(0);
-            (pipeline, layout)
-        };
-        self.made.entry((kernel.shader, kernel.prelude.clone())).or_insert_with(make).clone()
-    }
-}
-
-fn buffer(device: &wgpu::Device, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
-    device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
-}
-
-fn check_limits(device: &wgpu::Device, plan: &Plan, kernels: &[Kernel]) -> Result<(), NetError> {
-    let limits = device.limits();
-    let check = |pass: &str, limit, granted: u64, needed: u64| {
-        let error = NetError::Limit { pass: pass.into(), limit, granted, needed };
-        if needed > granted { Err(error) } else { Ok(()) }
-    };
-    let binding = limits.max_storage_buffer_binding_size;
-    check("net", "max_storage_buffer_binding_size", binding, plan.arena_bytes)?;
-    for (kernel, step) in kernels.iter().zip(&plan.steps) {
-        let (limit, granted) = if kernel.uniform {
-            ("max_uniform_buffer_binding_size", limits.max_uniform_buffer_binding_size)
-        } else {
-            ("max_storage_buffer_binding_size", binding)
-        };
-        check(&step.name, limit, granted, kernel.bound_bytes())?;
-        let groups = kernel.workgroups(kernel.blocks_per_dispatch);
-        let most = groups.into_iter().max().unwrap_or(0);
-        let granted = limits.max_compute_workgroups_per_dimension;
-        check(&step.name, "max_compute_workgroups_per_dimension", granted.into(), most.into())?;
-    }
-    Ok(())
-}
-
-fn upload_steps(device: &wgpu::Device, queue: &wgpu::Queue, plan: &Plan, kernels: &[Kernel]) -> wgpu::Buffer {
-    let mut data = Vec::new();
-    for (step, kernel) in plan.steps.iter().zip(kernels) {
-        for (first_block, _) in kernel.dispatches() {
-            data.extend_from_slice(bytemuck::bytes_of(&uniform(plan, step, first_block)));
-            data.resize(data.len().next_multiple_of(SLOT as usize), 0);
-        }
-    }
-    let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-    let steps = buffer(device, "net.steps", data.len() as u64, usage);
-    queue.write_buffer(&steps, 0, &data);
-    steps
-}
-
-fn uniform(plan: &Plan, step: &Step, first_block: u32) -> StepUniform {
-    let (input, output) = (&plan.tensors[step.input], &plan.tensors[step.output]);
-    // The arena holds at most 128 MiB, so a place counted in vectors fits.
-    let place = |offset: u64| (offset / 16) as u32;
-    StepUniform {
-        in_size: [input.shape.width, input.shape.height],
-        out_size: [output.shape.width, output.shape.height],
-        input: place(input.offset),
-        output: place(output.offset),
-        skip: step.skip.map_or(0, |s| place(plan.tensors[s].offset)),
-        first_block,
-    }
-}
-
-/// All layers' packed weights in one buffer, with the byte offset of each dispatch's part.
-fn upload_weights(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    weights: &Weights,
-    plan: &Plan,
-    kernels: &[Kernel],
-) -> (wgpu::Buffer, Vec<Vec<u64>>) {
-    let mut data: Vec<f32> = Vec::new();
-    let mut places = Vec::new();
-    for (step, kernel) in plan.steps.iter().zip(kernels) {
-        let mut own = Vec::new();
-        if let Op::Conv2d(o) = &weights.graph.ops[step.op] {
-            let (weight, bias) = (weights.values(&o.name, "weight"), weights.values(&o.name, "bias"));
-            for part in kernel.pack(weight, bias, o.in_channels as usize, o.kernel.map(|k| k as usize)) {
-                own.push(data.len() as u64 * 4);
-                data.extend(part);
-                data.resize(data.len().next_multiple_of(64), 0.0);
-            }
-        }
-        places.push(own);
-    }
-    // A graph of sums alone has no weights, and a buffer must not be empty.
-    data.resize(data.len().max(64), 0.0);
-    let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-    let packed = buffer(device, "net.weights", data.len() as u64 * 4, usage);
-    queue.write_buffer(&packed, 0, bytemuck::cast_slice(&data));
-    (packed, places)
 }

@@ -114,3 +114,23 @@ pub enum GraphError {
         op: String,
     },
 }
+
+impl GraphError {
+    /// The operator that it is about; `input` for the input's own size, the output's tensor where nothing writes it.
+    pub fn op(&self) -> &str {
+        match self {
+            GraphError::Empty => "",
+            GraphError::NoOutput { tensor } => tensor,
+            GraphError::DuplicateOperator { op }
+            | GraphError::DuplicateTensor { op, .. }
+            | GraphError::UnknownTensor { op, .. }
+            | GraphError::Channels { op, .. }
+            | GraphError::Sizes { op, .. }
+            | GraphError::Range { op, .. }
+            | GraphError::TooSmall { op, .. }
+            | GraphError::Number { op, .. }
+            | GraphError::Divide { op, .. }
+            | GraphError::SizeOrScale { op } => op,
+        }
+    }
+}

@@ -9,8 +9,11 @@ use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
 use std::collections::{BTreeMap, btree_map::Entry};
 use std::path::Path;
 
-/// The safetensors specification's own limit.
-const MAX_HEADER: u64 = 100_000_000;
+/// Longest header, bytes. The largest network's takes under a hundredth; safetensors itself allows 100 MB, which a
+/// hostile file could turn into gigabytes of small objects.
+pub(super) const MAX_HEADER: u64 = 8 << 20;
+/// Most tensors.
+pub(super) const MAX_TENSORS: usize = 8192;
 
 /// Where one tensor lies.
 #[derive(Debug, serde::Deserialize)]
@@ -26,6 +29,14 @@ pub(super) struct Header<'a> {
     pub tensors: BTreeMap<String, TensorInfo>,
     /// The bytes that offsets count from.
     pub data: &'a [u8],
+}
+
+impl<'a> Header<'a> {
+    /// The bytes of one of its tensors.
+    pub fn bytes(&self, info: &TensorInfo) -> &'a [u8] {
+        let [from, to] = info.data_offsets.map(|o| o as usize);
+        &self.data[from..to]
+    }
 }
 
 /// Header as written: duplicates kept.
@@ -93,6 +104,9 @@ pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8], problems: &mut Vec<Problem
     let (header, data) = rest.split_at(length as usize);
     let text = std::str::from_utf8(header).map_err(|e| not(format!("the header is not UTF-8: {e}")))?;
     let raw: Raw = serde_json::from_str(text).map_err(|e| not(format!("the header is not as specified: {e}")))?;
+    if raw.tensors.len() > MAX_TENSORS {
+        return Err(not(format!("it has {} tensors, more than the {MAX_TENSORS} allowed", raw.tensors.len())));
+    }
     let end = raw.tensors.iter().map(|(_, t)| t.data_offsets[1]).max().unwrap_or(0);
     if end > data.len() as u64 {
         let needed = end.saturating_add(length + 8);

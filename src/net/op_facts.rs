@@ -1,7 +1,7 @@
 //! What follows from an operator's fields: how it is spelt and parsed, what it reads, its trained tensors, its counts.
 
 use super::graph::Shape;
-use super::op::Op;
+use super::op::{Activation, Op};
 
 /// Every operator, as the file spells it.
 pub const KINDS: [&str; 14] = [
@@ -121,7 +121,7 @@ impl Op {
 
     /// Floating-point operations from `input` to `output`: two a multiply-add of a convolution (bias and activation not
     /// counted; of a transposed one, taps that are cut off count), eight a value of a bilinear resampling, two a value of
-    /// a batch norm, eight of a norm that measures the picture, one a value of a sum, a function or dropout.
+    /// a batch norm, eight of a norm that measures the picture, one a value of a sum or a function.
     pub fn flops(&self, input: Shape, output: Shape) -> u64 {
         let values = |s: Shape| s.pixels() * u64::from(s.channels);
         let taps = |kernel: [u32; 2]| u64::from(kernel[0]) * u64::from(kernel[1]);
@@ -132,10 +132,22 @@ impl Op {
             }
             Op::ConvTranspose2d(o) => 2 * taps(o.kernel) * u64::from(o.out_channels) * values(input),
             Op::UpsampleBilinear(_) => 8 * values(output),
-            Op::Add(_) | Op::Activation(_) | Op::Dropout(_) => values(output),
+            Op::Add(_) => values(output),
+            Op::Activation(o) => {
+                if o.activation == Activation::None {
+                    0
+                } else {
+                    values(output)
+                }
+            }
             Op::BatchNorm(_) => 2 * values(output),
             Op::InstanceNorm(_) | Op::GroupNorm(_) => 8 * values(output),
-            Op::UpsampleNearest(_) | Op::Pad(_) | Op::Concat(_) | Op::PixelShuffle(_) | Op::PixelUnshuffle(_) => 0,
+            Op::UpsampleNearest(_)
+            | Op::Pad(_)
+            | Op::Concat(_)
+            | Op::Dropout(_)
+            | Op::PixelShuffle(_)
+            | Op::PixelUnshuffle(_) => 0,
         }
     }
 }

@@ -1,16 +1,24 @@
 //! From a graph to what the GPU does: the list of dispatches and each tensor's place in one arena. Pure.
 //!
-//! Sums are fused into the operator that makes one of their summands, as bias and activation are, so a skip costs one
-//! read and no dispatch. Tensors whose lifetimes do not meet share memory; a fused sum overwrites its skip in place when
-//! nobody reads the skip afterwards, which is safe because each thread reads just the element that it then writes.
+//! Bias, activation, dropout, sums, batch norms, zero padding and enlarging by a whole factor run inside the operator
+//! before or after them where its kernel has room (`fuse`). A concatenation is one tensor whose makers each write a slice
+//! of its channels, if these are multiples of four. Tensors whose lives do not meet share memory, and a step may overwrite
+//! what it reads for the last time, if each thread reads just the element that it then writes (`place`).
 
-use super::graph::{Activation, AddAt, Graph, GraphError, INPUT, Op, Shape};
+mod fuse;
+mod place;
+mod types;
+
+use super::graph::{Activation, AddAt, Graph, GraphError, INPUT, Shape};
+use fuse::{Node, Work};
+use place::Inside;
 use std::collections::HashMap;
 use thiserror::Error;
+pub use types::{Kind, Options, Precision, Row, Step, TILE, Tensor};
 
-/// Offsets in the arena are multiples of this: WebGPU's default alignment of storage bindings.
+/// Offsets of whole tensors in the arena are multiples of this: WebGPU's default alignment of storage bindings.
 pub const ALIGN: u64 = 256;
-/// Largest arena: WebGPU's default limit of one storage binding.
+/// Largest arena on a device of WebGPU's default limits: one storage binding.
 pub const MAX_ARENA: u64 = 128 << 20;
 
 /// Why there is no plan.
@@ -42,87 +50,6 @@ pub enum PlanError {
     },
 }
 
-/// A tensor's place and life. Step `i` happens at time `i + 1`; the input exists from time 0, the output to the end.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Tensor {
-    /// Name in the graph.
-    pub name: String,
-    /// Shape; in memory NHWC f32 with channels padded to a multiple of four.
-    pub shape: Shape,
-    /// Byte offset in the arena.
-    pub offset: u64,
-    /// Time of writing.
-    pub first: usize,
-    /// Time of the last reading.
-    pub last: usize,
-}
-
-/// What a step computes before its epilogue.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// Convolution with bias.
-    Conv {
-        /// Kernel height and width.
-        kernel: [u32; 2],
-        /// Stride.
-        stride: u32,
-        /// Padding.
-        padding: u32,
-    },
-    /// Bilinear resampling.
-    Upsample,
-    /// The input itself: a sum that could not be fused.
-    Copy,
-}
-
-/// One dispatch: `kind`, then the skip and the activation in the order of `add_at`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Step {
-    /// Name of the operator that does the work; the label is `net.NAME`.
-    pub name: String,
-    /// Its position in the graph.
-    pub op: usize,
-    /// What is computed.
-    pub kind: Kind,
-    /// Index of the tensor read.
-    pub input: usize,
-    /// Index of the tensor added.
-    pub skip: Option<usize>,
-    /// Where it joins.
-    pub add_at: AddAt,
-    /// Activation.
-    pub activation: Activation,
-    /// Index of the tensor written.
-    pub output: usize,
-    /// Floating-point operations, fused sums included.
-    pub flops: u64,
-    /// Bytes moved at least once: input, skip, weights and output.
-    pub traffic: u64,
-    /// Trained numbers.
-    pub parameters: u64,
-}
-
-/// One line of `weights info`.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Row {
-    /// Operator's name.
-    pub name: String,
-    /// `conv 3×3 /2`, `upsample + skip` …
-    pub kind: String,
-    /// Shape of the result.
-    pub shape: Shape,
-    /// Trained numbers.
-    pub parameters: u64,
-    /// Floating-point operations.
-    pub flops: u64,
-    /// Bytes moved.
-    pub traffic: u64,
-    /// Bytes of the result.
-    pub bytes: u64,
-    /// Its byte offset in the arena.
-    pub offset: u64,
-}
-
 /// Dispatches and memory for one input size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
@@ -130,6 +57,10 @@ pub struct Plan {
     pub width: u32,
     /// Input height.
     pub height: u32,
+    /// Width and height at which the graph runs, see [`Graph::inner_size`].
+    pub inner: [u32; 2],
+    /// How numbers lie.
+    pub precision: Precision,
     /// Tensors that exist in memory; `input` is the first.
     pub tensors: Vec<Tensor>,
     /// Dispatches in order.
@@ -143,94 +74,44 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Plans `graph` for an input of `width`×`height`.
+    /// Plans `graph` for an input of `width`×`height` with default [`Options`].
     pub fn new(graph: &Graph, width: u32, height: u32) -> Result<Self, PlanError> {
-        let shapes = graph.shapes(width, height).map_err(|source| PlanError::Graph { width, height, source })?;
-        let fused = fusions(graph);
-        let input = Shape { channels: graph.input_channels, width, height };
-        let mut plan = Plan {
+        Self::with(graph, width, height, &Options::default())
+    }
+
+    /// Plans `graph` for an input of `width`×`height`.
+    pub fn with(graph: &Graph, width: u32, height: u32, options: &Options) -> Result<Self, PlanError> {
+        let wrong = |source| PlanError::Graph { width, height, source };
+        let inner = graph.inner_size(width, height).map_err(wrong)?;
+        let shapes = graph.shapes(inner[0], inner[1]).map_err(wrong)?;
+        let plan = Plan {
             width,
             height,
-            tensors: vec![Tensor { name: INPUT.into(), shape: input, offset: 0, first: 0, last: 0 }],
+            inner,
+            precision: options.precision,
+            tensors: Vec::new(),
             steps: Vec::new(),
             output: 0,
             zero_bytes: 0,
             arena_bytes: 0,
         };
-        let mut index: HashMap<&str, usize> = HashMap::from([(INPUT, 0)]);
-        for (i, op) in graph.ops.iter().enumerate() {
-            if fused.iter().flatten().any(|f| f.producer == i) {
-                continue;
-            }
-            let output = plan.tensors.len();
-            let step = step(graph, &shapes, &index, i, fused[i].as_ref(), output);
-            let time = plan.steps.len() + 1;
-            for read in std::iter::once(step.input).chain(step.skip) {
-                plan.tensors[read].last = time;
-            }
-            plan.tensors.push(Tensor {
-                name: op.output().into(),
-                shape: shapes[i],
-                offset: 0,
-                first: time,
-                last: time,
-            });
-            index.insert(op.output(), output);
-            plan.steps.push(Step { traffic: traffic(&plan.tensors, &step), ..step });
+        let mut builder = Builder { graph, shapes: &shapes, plan, index: HashMap::new(), inside: Vec::new() };
+        builder.begin();
+        let nodes = fuse::nodes(graph, &shapes, options);
+        for node in &nodes {
+            builder.add(node);
         }
-        // The planner's invariant: `check` has seen that an operator writes the output, and `fusions` keeps it.
-        plan.output = index[graph.output.as_str()];
-        let end = plan.steps.len() + 1;
-        plan.tensors[plan.output].last = end;
-        plan.place();
-        if plan.arena_bytes > MAX_ARENA {
-            return Err(PlanError::TooLarge { width, height, bytes: plan.arena_bytes, limit: MAX_ARENA });
+        builder.end();
+        if options.fuse {
+            builder.slice(&nodes);
+        }
+        place::overwrite(&builder.plan, &mut builder.inside);
+        let Builder { mut plan, inside, .. } = builder;
+        place::place(&mut plan, &inside);
+        if plan.arena_bytes > options.limit {
+            return Err(PlanError::TooLarge { width, height, bytes: plan.arena_bytes, limit: options.limit });
         }
         Ok(plan)
-    }
-
-    /// Greedy by size: the largest tensor first, each at the lowest offset that is free during its life.
-    fn place(&mut self) {
-        let widest = self.tensors.iter().map(|t| t.shape.channels.div_ceil(4)).max().unwrap_or(1);
-        self.zero_bytes = (u64::from(widest) * 16).next_multiple_of(ALIGN);
-        // A group is a chain of tensors that overwrite each other in place.
-        let mut group: Vec<usize> = (0..self.tensors.len()).collect();
-        for (i, step) in self.steps.iter().enumerate() {
-            if let Some(skip) = step.skip
-                && skip != step.input
-                && self.tensors[skip].last == i + 1
-                && skip != self.output
-            {
-                group[step.output] = group[skip];
-            }
-        }
-        let mut lives: HashMap<usize, (u64, usize, usize)> = HashMap::new();
-        for (t, g) in self.tensors.iter().zip(&group) {
-            let life = lives.entry(*g).or_insert((t.shape.padded_bytes().next_multiple_of(ALIGN), t.first, t.last));
-            life.1 = life.1.min(t.first);
-            life.2 = life.2.max(t.last);
-        }
-        let mut order: Vec<(usize, (u64, usize, usize))> = lives.into_iter().collect();
-        order.sort_by_key(|(g, (bytes, ..))| (std::cmp::Reverse(*bytes), *g));
-        let mut placed: Vec<(u64, u64, usize, usize, usize)> = Vec::new();
-        for (g, (bytes, first, last)) in order {
-            let mut busy: Vec<_> = placed.iter().filter(|p| p.2 <= last && first <= p.3).map(|p| (p.0, p.1)).collect();
-            busy.sort_unstable();
-            let mut offset = self.zero_bytes;
-            for (from, to) in busy {
-                if offset + bytes <= from {
-                    break;
-                }
-                offset = offset.max(to);
-            }
-            placed.push((offset, offset + bytes, first, last, g));
-        }
-        self.arena_bytes = placed.iter().map(|p| p.1).max().unwrap_or(self.zero_bytes);
-        for (from, _, _, _, g) in placed {
-            for (tensor, _) in self.tensors.iter_mut().zip(&group).filter(|(_, other)| **other == g) {
-                tensor.offset = from;
-            }
-        }
     }
 
     /// Floating-point operations of all steps.
@@ -245,105 +126,214 @@ impl Plan {
 
     /// One row a step, for `weights info`.
     pub fn rows(&self) -> Vec<Row> {
-        let row = |s: &Step| {
-            let tensor = &self.tensors[s.output];
-            let mut kind = match s.kind {
-                Kind::Conv { kernel: [h, w], stride: 1, .. } => format!("conv {h}×{w}"),
-                Kind::Conv { kernel: [h, w], stride, .. } => format!("conv {h}×{w} /{stride}"),
-                Kind::Upsample => "upsample".into(),
-                Kind::Copy => "add".into(),
-            };
-            if s.skip.is_some() && s.kind != Kind::Copy {
-                kind.push_str(" + skip");
-            }
-            if s.activation == Activation::Relu {
-                kind.push_str(", relu");
-            }
-            let (shape, offset) = (tensor.shape, tensor.offset);
-            let Step { name, parameters, flops, traffic, .. } = s.clone();
-            Row { name, kind, shape, parameters, flops, traffic, bytes: shape.padded_bytes(), offset }
-        };
-        self.steps.iter().map(row).collect()
+        self.steps.iter().map(|s| Row::new(s, &self.tensors[s.output])).collect()
     }
 }
 
-/// A sum that runs in the epilogue of the operator that makes one of its summands.
-struct Fusion {
-    producer: usize,
-    skip: String,
-    add_at: AddAt,
-    activation: Activation,
+struct Builder<'a> {
+    graph: &'a Graph,
+    shapes: &'a [Shape],
+    plan: Plan,
+    /// Tensors by name.
+    index: HashMap<&'a str, usize>,
+    inside: Vec<Option<Inside>>,
 }
 
-/// For each operator that is a fusible sum, how. A summand can be produced in place of the sum when nothing else reads it.
-fn fusions(graph: &Graph) -> Vec<Option<Fusion>> {
-    let mut readers: HashMap<&str, usize> = HashMap::new();
-    for tensor in graph.ops.iter().flat_map(Op::inputs).chain([graph.output.as_str()]) {
-        *readers.entry(tensor).or_default() += 1;
+impl<'a> Builder<'a> {
+    fn tensor(&mut self, name: &str, shape: Shape, full: bool) -> usize {
+        let time = self.plan.steps.len() + 1;
+        let full = full || self.plan.precision == Precision::F32;
+        let root = self.plan.tensors.len();
+        let tensor =
+            Tensor { name: name.into(), shape, full, offset: 0, pitch: 0, root, slice: 0, first: time, last: time };
+        self.plan.tensors.push(tensor);
+        self.inside.push(None);
+        root
     }
-    let mut taken = vec![false; graph.ops.len()];
-    let mut fuse = |op: &Op| {
-        let Op::Add(sum) = op else { return None };
-        [(0, 1), (1, 0)].into_iter().find_map(|(own, other)| {
-            let name = sum.inputs[own].as_str();
-            let producer = graph.ops.iter().position(|p| p.output() == name)?;
-            let inner = match &graph.ops[producer] {
-                Op::Conv2d(o) if o.add.is_none() => o.activation,
-                Op::UpsampleBilinear(_) => Activation::None,
-                _ => return None,
-            };
-            let (add_at, activation) = match (inner, sum.activation) {
-                (Activation::None, outer) => (AddAt::BeforeActivation, outer),
-                (inner, Activation::None) => (AddAt::AfterActivation, inner),
-                _ => return None,
-            };
-            if readers[name] != 1 || std::mem::replace(&mut taken[producer], true) {
-                return None;
-            }
-            Some(Fusion { producer, skip: sum.inputs[other].clone(), add_at, activation })
-        })
-    };
-    graph.ops.iter().map(&mut fuse).collect()
-}
 
-fn step(
-    graph: &Graph,
-    shapes: &[Shape],
-    index: &HashMap<&str, usize>,
-    i: usize,
-    fusion: Option<&Fusion>,
-    output: usize,
-) -> Step {
-    let op = fusion.map_or(i, |f| f.producer);
-    let work = &graph.ops[op];
-    let (kind, input, skip, add_at, activation) = match work {
-        Op::Conv2d(o) => {
-            let kind = Kind::Conv { kernel: o.kernel, stride: o.stride, padding: o.padding.left };
-            (kind, &o.input, o.add.as_ref(), o.add_at, o.activation)
+    /// A step that only reads and writes; callers add the rest.
+    fn step(&self, name: &str, op: Option<usize>, kind: Kind, input: usize, output: usize) -> Step {
+        Step {
+            name: name.into(),
+            op,
+            kind,
+            input,
+            second: None,
+            skip: None,
+            add_at: AddAt::default(),
+            activation: Activation::None,
+            dropout: None,
+            fold: None,
+            output,
+            flops: 0,
+            traffic: 0,
+            parameters: 0,
         }
-        Op::UpsampleBilinear(o) => (Kind::Upsample, &o.input, None, AddAt::default(), Activation::None),
-        Op::Add(o) => (Kind::Copy, &o.inputs[0], Some(&o.inputs[1]), AddAt::BeforeActivation, o.activation),
-        _ => unimplemented!(),
-    };
-    let (skip, add_at, activation) =
-        fusion.map_or((skip, add_at, activation), |f| (Some(&f.skip), f.add_at, f.activation));
-    let sum = if fusion.is_some() { graph.ops[i].flops(shapes[i], shapes[i]) } else { 0 };
-    Step {
-        name: work.name().into(),
-        op,
-        kind,
-        input: index[input.as_str()],
-        skip: skip.map(|s| index[s.as_str()]),
-        add_at,
-        activation,
-        output,
-        flops: work.flops(shapes[op], shapes[op]) + sum,
-        traffic: 0,
-        parameters: work.parameters(),
+    }
+
+    fn push(&mut self, mut step: Step) {
+        let bytes = if self.plan.precision == Precision::F16 { 2 } else { 4 };
+        let moved = step.reads().chain([step.output]).map(|t| self.plan.tensors[t].bytes());
+        step.traffic = moved.sum::<u64>() + bytes * step.parameters;
+        let time = self.plan.steps.len() + 1;
+        for read in step.reads() {
+            self.plan.tensors[read].last = time;
+        }
+        let first = &mut self.plan.tensors[step.output].first;
+        *first = time.min(*first);
+        self.plan.steps.push(step);
+    }
+
+    /// The input, and the picture fitted to the size and the precision at which the graph runs.
+    fn begin(&mut self) {
+        let Plan { width, height, inner, precision, .. } = self.plan;
+        let shape = Shape { channels: self.graph.input_channels, width, height };
+        let mut at = self.tensor(INPUT, shape, true);
+        (self.plan.tensors[at].first, self.plan.tensors[at].last) = (0, 0);
+        if inner != [width, height] || precision == Precision::F16 {
+            let fitted = self.tensor("input.fitted", Shape { width: inner[0], height: inner[1], ..shape }, false);
+            self.push(self.step("fit", None, WINDOW, at, fitted));
+            at = fitted;
+        }
+        self.index.insert(INPUT, at);
+    }
+
+    /// The output, cropped and in f32.
+    fn end(&mut self) {
+        let Plan { width, height, inner, precision, .. } = self.plan;
+        // `check` has seen that an operator writes the output, and fusion keeps it.
+        let mut at = self.index[self.graph.output.as_str()];
+        if inner != [width, height] || precision == Precision::F16 {
+            let shape = self.plan.tensors[at].shape;
+            let kept = Shape {
+                width: Graph::cropped(shape.width, width, inner[0]),
+                height: Graph::cropped(shape.height, height, inner[1]),
+                ..shape
+            };
+            let output = self.tensor("output.fitted", kept, true);
+            self.push(self.step("crop", None, WINDOW, at, output));
+            at = output;
+        }
+        self.plan.output = at;
+        self.plan.tensors[at].last = self.plan.steps.len() + 1;
+    }
+
+    fn add(&mut self, node: &Node) {
+        let ops = &self.graph.ops;
+        let name = ops[node.op].name();
+        let last = node.merged.iter().copied().max().unwrap_or(node.op);
+        let shape = self.shapes[last];
+        let inputs: Vec<usize> = node.inputs.iter().map(|t| self.index[t.as_str()]).collect();
+        let flops =
+            node.merged.iter().map(|i| ops[*i].flops(self.shape_of(ops[*i].inputs()[0]), self.shapes[*i])).sum();
+        let kind = match node.work {
+            Work::Conv { kernel, stride, padding, nearest } => Kind::Conv { kernel, stride, padding, nearest },
+            Work::Transposed { kernel, stride, padding } => Kind::Transposed { kernel, stride, padding },
+            Work::Bilinear => Kind::Upsample,
+            Work::Nearest => Kind::Nearest,
+            Work::Pad(p) => Kind::Window { left: p.left, top: p.top, clamp: false, channel: 0 },
+            Work::Copy => Kind::Copy,
+            Work::Affine => Kind::Scale { fixed: true },
+            Work::Shuffle(f) => Kind::Shuffle(f),
+            Work::Unshuffle(f) => Kind::Unshuffle(f),
+            Work::Concat => return self.concat(node, &inputs, shape),
+            Work::Norm { .. } => Kind::Scale { fixed: false },
+        };
+        let measured = match node.work {
+            Work::Norm { groups, eps } => Some(self.measure(node, inputs[0], groups, eps)),
+            _ => None,
+        };
+        let output = self.output(last, shape);
+        let step = self.step(name, Some(node.op), kind, inputs[0], output);
+        self.push(Step {
+            second: measured,
+            skip: node.skip.as_ref().map(|t| self.index[t.as_str()]),
+            add_at: node.add_at,
+            activation: node.activation,
+            dropout: node.dropout,
+            fold: node.fold,
+            flops,
+            parameters: node.merged.iter().map(|i| ops[*i].parameters()).sum(),
+            ..step
+        });
+    }
+
+    fn shape_of(&self, tensor: &str) -> Shape {
+        let made = self.graph.ops.iter().position(|op| op.output() == tensor).map(|i| self.shapes[i]);
+        made.unwrap_or(Shape {
+            channels: self.graph.input_channels,
+            width: self.plan.inner[0],
+            height: self.plan.inner[1],
+        })
+    }
+
+    fn output(&mut self, op: usize, shape: Shape) -> usize {
+        let name = self.graph.ops[op].output();
+        let output = self.tensor(name, shape, false);
+        self.index.insert(name, output);
+        output
+    }
+
+    /// The two steps that lead to each channel's scale and shift.
+    fn measure(&mut self, node: &Node, input: usize, groups: u32, eps: f32) -> usize {
+        let name = self.graph.ops[node.op].name();
+        let shape = self.plan.tensors[input].shape;
+        let tiles = shape.pixels().div_ceil(TILE.into()) as u32;
+        let pair = Shape { channels: shape.vectors() * 8, height: 1, width: tiles };
+        let moments = self.tensor(&format!("{name}.moments"), pair, true);
+        self.push(self.step(&format!("{name}.moments"), Some(node.op), Kind::Moments, input, moments));
+        let scale = self.tensor(&format!("{name}.scale"), Shape { width: 1, ..pair }, true);
+        let step = self.step(&format!("{name}.scale"), Some(node.op), Kind::Merge { groups, eps }, moments, scale);
+        self.push(Step { second: Some(input), ..step });
+        scale
+    }
+
+    /// One copy for each input. [`Builder::slice`] takes away those that their makers can write in place.
+    fn concat(&mut self, node: &Node, inputs: &[usize], shape: Shape) {
+        let output = self.output(node.op, shape);
+        let name = self.graph.ops[node.op].name();
+        let mut channel = 0;
+        for input in inputs {
+            let kind = Kind::Window { left: 0, top: 0, clamp: false, channel };
+            self.push(self.step(name, Some(node.op), kind, *input, output));
+            channel += self.plan.tensors[*input].shape.channels;
+        }
+    }
+
+    /// Moves inputs of concatenations into them where that is possible, and takes away the copies.
+    fn slice(&mut self, nodes: &[Node]) {
+        let mut gone = vec![false; self.plan.steps.len()];
+        for (i, step) in self.plan.steps.iter().enumerate() {
+            let joins = step.op.is_some_and(|op| nodes.iter().any(|n| n.op == op && n.work == Work::Concat));
+            let Kind::Window { channel, .. } = step.kind else { continue };
+            let channels = self.plan.tensors[step.input].shape.channels;
+            let end = channel + channels;
+            let whole = channel % 4 == 0 && (end % 4 == 0 || end == self.plan.tensors[step.output].shape.channels);
+            // The caller reads and writes input and output densely.
+            if joins && whole && step.input != 0 && step.input != self.plan.output && self.inside[step.input].is_none()
+            {
+                self.inside[step.input] = Some(Inside { tensor: step.output, slice: channel / 4 });
+                gone[i] = true;
+            }
+        }
+        // Times count steps, so they move together.
+        let kept: Vec<usize> = std::iter::once(0)
+            .chain(gone.iter().scan(0, |n, g| {
+                *n += usize::from(!g);
+                Some(*n)
+            }))
+            .collect();
+        let end = gone.len() + 1;
+        let new_end = kept[gone.len()] + 1;
+        for tensor in &mut self.plan.tensors {
+            for time in [&mut tensor.first, &mut tensor.last] {
+                *time = if *time == end { new_end } else { kept[*time] };
+            }
+        }
+        let mut gone = gone.into_iter();
+        self.plan.steps.retain(|_| !gone.next().unwrap_or(false));
     }
 }
 
-fn traffic(tensors: &[Tensor], step: &Step) -> u64 {
-    let reads = std::iter::once(step.input).chain(step.skip).chain([step.output]);
-    reads.map(|t| tensors[t].shape.padded_bytes()).sum::<u64>() + 4 * step.parameters
-}
+/// A window from the left top corner that repeats the edges.
+const WINDOW: Kind = Kind::Window { left: 0, top: 0, clamp: true, channel: 0 };

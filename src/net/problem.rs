@@ -1,6 +1,6 @@
 //! What can be wrong with a weights file, in sentences that name file, tensor or operator.
 
-use super::format::{KEY, MAX_FILE};
+use super::format::{KEY, MAX_FILE, MAX_SCALE};
 use super::graph::GraphError;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -58,7 +58,8 @@ pub enum WeightsError {
     },
 }
 
-fn list(problems: &[Problem]) -> String {
+/// Faults as lines, the first forty of them.
+pub(super) fn list(problems: &[Problem]) -> String {
     const SHOWN: usize = 40;
     let mut text: String = problems.iter().take(SHOWN).map(|p| format!("\n  {p}")).collect();
     if problems.len() > SHOWN {
@@ -74,7 +75,7 @@ pub enum Problem {
     #[error("metadata `{KEY}`: {0}")]
     Document(String),
     /// A version that this program does not know.
-    #[error("{what} has version {found}; this program reads version {known}")]
+    #[error("{what} has version {found}; this program reads up to version {known}, so a newer one is needed")]
     Version {
         /// What carries the version.
         what: String,
@@ -143,12 +144,58 @@ pub enum Problem {
         wanted: Vec<u64>,
     },
     /// A number type that is not read.
-    #[error("tensor `{tensor}` holds {dtype}; F32 and F16 are read")]
+    #[error("tensor `{tensor}` holds {dtype}; F32 and F16 are read, and I8 for the weights of convolutions")]
     Dtype {
         /// Tensor.
         tensor: String,
         /// Its type.
         dtype: String,
+    },
+    /// A state dict's tensor of another kind of number.
+    #[error("tensor `{tensor}` holds {dtype}; F32, F16, BF16 and F64 are converted")]
+    FloatDtype {
+        /// Tensor.
+        tensor: String,
+        /// Its type.
+        dtype: String,
+    },
+    /// Values that halves cannot hold.
+    #[error(
+        "tensor `{tensor}` holds {count} values beyond the ±65504 of F16, the first at index {index}; store it as f32"
+    )]
+    Overflow {
+        /// Tensor.
+        tensor: String,
+        /// How many.
+        count: usize,
+        /// First flat index.
+        index: usize,
+    },
+    /// Scales that are no singles.
+    #[error("tensor `{tensor}` holds {dtype}; scales are F32")]
+    ScaleDtype {
+        /// Tensor.
+        tensor: String,
+        /// Its type.
+        dtype: String,
+    },
+    /// A scale that bytes cannot be multiplied with.
+    #[error("tensor `{tensor}`: the scale at index {index} is not a number above 0 and up to {MAX_SCALE:e}")]
+    Scale {
+        /// Tensor.
+        tensor: String,
+        /// First index.
+        index: usize,
+    },
+    /// Values below zero where they make no sense.
+    #[error("tensor `{tensor}` holds {count} values below 0, the first at index {index}; a variance has none")]
+    Negative {
+        /// Tensor.
+        tensor: String,
+        /// How many.
+        count: usize,
+        /// First flat index.
+        index: usize,
     },
     /// A tensor's place in the file is wrong.
     #[error("tensor `{tensor}` {what}")]
@@ -174,4 +221,69 @@ pub enum Problem {
         /// First flat index.
         index: usize,
     },
+}
+
+impl Problem {
+    /// The kind of fault in one word; the Python package has the same ones.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Problem::Document(_) => "document",
+            Problem::Version { .. } => "version",
+            Problem::UnknownOperator { .. } => "unknown-operator",
+            Problem::Operator { .. } => "operator",
+            Problem::Graph(_) => "graph",
+            Problem::Feature { .. } => "feature",
+            Problem::Missing { .. } => "missing",
+            Problem::Unexpected { .. } => "unexpected",
+            Problem::Duplicate { .. } => "duplicate",
+            Problem::Shape { .. } => "shape",
+            Problem::Dtype { .. } | Problem::ScaleDtype { .. } | Problem::FloatDtype { .. } => "dtype",
+            Problem::Overflow { .. } => "overflow",
+            Problem::Scale { .. } => "scale",
+            Problem::Negative { .. } => "negative",
+            Problem::Size { .. } => "size",
+            Problem::Trailing { .. } => "trailing",
+            Problem::NotFinite { .. } => "not-finite",
+        }
+    }
+
+    /// Tensor, operator or feature that it is about; empty where it is about the whole file.
+    pub fn subject(&self) -> &str {
+        match self {
+            Problem::Document(_) | Problem::Trailing { .. } => "",
+            Problem::Version { what, .. } => what,
+            Problem::UnknownOperator { name, .. } | Problem::Operator { name, .. } => name,
+            Problem::Graph(error) => error.op(),
+            Problem::Feature { feature, .. } => feature,
+            Problem::Missing { tensor }
+            | Problem::Unexpected { tensor }
+            | Problem::Duplicate { tensor }
+            | Problem::Shape { tensor, .. }
+            | Problem::Dtype { tensor, .. }
+            | Problem::ScaleDtype { tensor, .. }
+            | Problem::FloatDtype { tensor, .. }
+            | Problem::Overflow { tensor, .. }
+            | Problem::Scale { tensor, .. }
+            | Problem::Negative { tensor, .. }
+            | Problem::Size { tensor, .. }
+            | Problem::NotFinite { tensor, .. } => tensor,
+        }
+    }
+}
+
+impl WeightsError {
+    /// Every fault as code and subject. A file that cannot be read as a container has one, without a subject.
+    pub fn faults(&self) -> Vec<(&'static str, String)> {
+        let one = |code| vec![(code, String::new())];
+        match self {
+            WeightsError::Io { .. } => one("io"),
+            WeightsError::NotAFile { .. } => one("not-a-file"),
+            WeightsError::TooLarge { .. } => one("too-large"),
+            WeightsError::NotSafetensors { .. } => one("not-safetensors"),
+            WeightsError::Truncated { .. } => one("truncated"),
+            WeightsError::Invalid { problems, .. } => {
+                problems.iter().map(|p| (p.code(), p.subject().to_string())).collect()
+            }
+        }
+    }
 }

@@ -1,14 +1,16 @@
 //! The acceleration structure of the path tracer: built on the CPU, traversed in `shaders/reference/traverse.wgsl`.
 //!
-//! An eight-wide BVH with quantised child boxes (CWBVH: Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on
-//! GPUs Through Compressed Wide BVHs", HPG 2017), built by obvhs from a PLOC hierarchy. Nodes and triangles lie in two
-//! textures, because the drivers that matter read textures at scattered places faster than storage buffers
-//! (`docs/performance.md`). [`Accel::closest`] is the same walk on the CPU.
+//! An eight-wide tree with quantised child boxes, after Ylitie, Karras and Laine ("Efficient Incoherent Ray Traversal on
+//! GPUs Through Compressed Wide BVHs", HPG 2017), collapsed from a binary one by obvhs (PLOC and reinsertion). Nodes and
+//! leaves are blocks of 64 bytes in one texture; a leaf is a pair of triangles that share an edge. What was tried
+//! and measured stands in `docs/performance.md`. [`Accel::closest`] is the same walk on the CPU.
 
 mod build;
 mod caster;
 mod cpu;
 mod gpu;
+mod pairs;
+mod wide;
 
 pub use caster::{HitGpu, RayBatch, RayCaster, RayGpu};
 pub use cpu::AccelHit;
@@ -25,12 +27,6 @@ pub const MAX_COORDINATE: f32 = 1e12;
 /// Entries of the traversal stack, one a level; `STACK_SIZE` in `traverse.wgsl`.
 pub const STACK_SIZE: usize = 24;
 
-/// Words (u32) of a node: five texels.
-pub(crate) const NODE_WORDS: usize = 20;
-
-/// Words (u32) of a triangle: three texels, each a vertex; the first one's fourth word is the triangle's number.
-pub(crate) const TRIANGLE_WORDS: usize = 12;
-
 /// Why there is no acceleration structure.
 #[derive(Debug, Error)]
 pub enum AccelError {
@@ -44,14 +40,12 @@ pub enum AccelError {
     },
     /// The device's textures are too small.
     #[error(
-        "the acceleration structure ({what}) needs {texels} texels, but this device's textures hold {limit} (its largest side is {side}); use a simpler scene"
+        "the scene's rays need {blocks} blocks of 64 bytes, but this device's textures hold {limit} (its largest side is {side}); use a simpler scene"
     )]
     TooLarge {
-        /// `nodes` or `triangles`.
-        what: &'static str,
-        /// Texels of 16 bytes that are needed.
-        texels: u64,
-        /// Texels that fit.
+        /// Blocks that are needed.
+        blocks: u64,
+        /// Blocks that fit.
         limit: u64,
         /// `max_texture_dimension_2d` of the device.
         side: u32,
@@ -59,7 +53,7 @@ pub enum AccelError {
     /// The device has not enough memory.
     #[error("the device has no memory for the acceleration structure of {bytes} bytes: {message}")]
     OutOfMemory {
-        /// Bytes of both textures.
+        /// Bytes of the blocks.
         bytes: u64,
         /// The driver's words.
         message: String,
@@ -69,8 +63,8 @@ pub enum AccelError {
 /// Triangles in an order and with boxes around them that let a ray find what it hits in logarithmic time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Accel {
-    nodes: Vec<[u32; NODE_WORDS]>,
-    triangles: Vec<[u32; TRIANGLE_WORDS]>,
+    blocks: Vec<wide::Block>,
+    triangles: usize,
     /// Triangles left out because a coordinate was not finite or beyond [`MAX_COORDINATE`].
     pub dropped_not_finite: usize,
     /// Triangles left out because they have no area; no ray can hit them.
@@ -92,23 +86,27 @@ impl Accel {
         Ok(build::build(triangles))
     }
 
-    /// Nodes of the tree; an empty scene has one.
-    pub fn node_count(&self) -> usize {
-        self.nodes.len()
+    /// Blocks (nodes, leaves and places left free), at least 1.
+    pub fn block_count(&self) -> usize {
+        self.blocks.len()
     }
 
     /// Triangles that can be hit.
     pub fn triangle_count(&self) -> usize {
-        self.triangles.len()
+        self.triangles
     }
 
-    /// Bytes of nodes and triangles, as they also lie on the GPU (there rounded up to whole texture rows).
+    /// Bytes of the blocks. On the GPU they are rounded up to whole texture rows of 128 KiB.
     pub fn bytes(&self) -> u64 {
-        (std::mem::size_of_val(&self.nodes[..]) + std::mem::size_of_val(&self.triangles[..])) as u64
+        std::mem::size_of_val(&self.blocks[..]) as u64
     }
 
     /// Levels of the tree, at most [`STACK_SIZE`].
     pub fn depth(&self) -> usize {
-        build::depth(&self.nodes)
+        wide::depth(&self.blocks)
+    }
+    #[doc(hidden)]
+    pub fn words(&self) -> [&[u32]; 2] {
+        [bytemuck::cast_slice(&self.blocks), &[0; 4]]
     }
 }

@@ -133,7 +133,6 @@ impl ReferenceScene {
             make("reference.texels", usage, bytemuck::cast_slice(&words)),
         ];
         let bytes = buffers.iter().map(wgpu::Buffer::size).sum::<u64>() + structure.bytes();
-        let [a, b] = accel.entries();
         let [info, triangles, materials, light_data, texels] = &buffers;
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -141,8 +140,7 @@ impl ReferenceScene {
             layout: &Self::layout(device),
             entries: &[
                 entry(0, info.as_entire_binding()),
-                a,
-                b,
+                accel.entry(),
                 entry(3, triangles.as_entire_binding()),
                 entry(4, materials.as_entire_binding()),
                 entry(5, light_data.as_entire_binding()),
@@ -163,13 +161,11 @@ impl ReferenceScene {
         };
         let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
         let read = buffer(wgpu::BufferBindingType::Storage { read_only: true });
-        let [a, b] = AccelGpu::layout_entries();
         device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("reference.scene"),
             entries: &[
                 entry(0, buffer(wgpu::BufferBindingType::Uniform)),
-                a,
-                b,
+                AccelGpu::layout_entry(),
                 entry(3, read),
                 entry(4, read),
                 entry(5, read),

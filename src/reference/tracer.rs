@@ -205,6 +205,7 @@ impl Tracer {
         let started = Instant::now();
         self.dispatch(Entry::Path, &job)?;
         let seconds = started.elapsed().as_secs_f64();
+        tracing::debug!("{} points, {} samples: {:.1} ms", chunk.count, chunk.samples, seconds * 1e3);
         self.schedule.took(chunk, seconds);
         self.traced.seconds += seconds;
         self.traced.traced += u64::from(chunk.count) * u64::from(chunk.samples);

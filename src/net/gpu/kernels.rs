@@ -1,13 +1,10 @@
-//! Which kernel runs a step, its prelude, how its weights are packed, and how many workgroups it takes. Pure.
-//!
-//! Packed weights: output channels in blocks of eight. A block is one matrix with the bias in its first two columns, then for
-//! each tap column kx, input vector c, tap row ky, and half h of the block one 4×4 matrix, which takes four input channels to
-//! four output channels. Channels that only pad are zero.
+//! Which kernel runs a step, its prelude, and how many workgroups it takes. Pure.
 
-use super::super::graph::{Activation, AddAt};
-use super::super::plan::{Kind, Plan, Step};
+use super::super::graph::{AddAt, Padding};
+use super::super::plan::{Kind, Plan, Precision, Step};
+use crate::net::graph::Shape;
 
-/// Bytes of one matrix.
+/// Bytes of one matrix of weights in 32 bits.
 const MATRIX: u64 = 64;
 /// WebGPU's default limit of one uniform binding.
 const MAX_UNIFORM: u64 = 64 << 10;
@@ -26,84 +23,217 @@ pub enum Variant {
     Plain,
 }
 
+/// What a step binds besides the arena.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bound {
+    /// Nothing.
+    None,
+    /// Matrices in a uniform buffer.
+    Uniform,
+    /// Matrices in a storage buffer.
+    Storage,
+    /// Matrices in a storage buffer, 16 bits.
+    Half,
+    /// Vectors for each four channels in a storage buffer: how many of them.
+    Vectors(u32),
+}
+
+/// The convolution kernel's view of a layer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Filter {
+    /// Taps, height and width; of one phase, for a transposed convolution.
+    pub taps: [u32; 2],
+    /// Distance of input pixels.
+    pub stride: u32,
+    /// Distance of output pixels: the stride of a transposed convolution.
+    pub spread: u32,
+    /// Factor by which the input is enlarged.
+    pub nearest: u32,
+    /// Four-channel vectors read.
+    pub in_vectors: u32,
+}
+
+impl Filter {
+    /// Matrices of one block of eight output channels.
+    pub fn matrices(self) -> u64 {
+        1 + u64::from(self.taps[0]) * u64::from(self.taps[1]) * u64::from(self.in_vectors) * 2
+    }
+}
+
+/// One dispatch of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// Column and row of the first output pixel, for a transposed convolution.
+    pub phase: [u32; 2],
+    /// Padding at the left and the top.
+    pub pad: [i32; 2],
+    /// First block of eight output channels.
+    pub first_block: u32,
+    /// How many.
+    pub blocks: u32,
+}
+
 /// How one step runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Kernel {
     /// Name in `gpu::shaders::NET`.
-    pub shader: &'static str,
+    pub shader: String,
     /// Generated `const` lines.
     pub prelude: String,
-    /// Weights are bound as a uniform buffer.
-    pub uniform: bool,
-    /// Blocks of eight output channels of the whole layer; 0 without weights.
-    pub blocks: u32,
-    /// Blocks that one dispatch takes.
-    pub blocks_per_dispatch: u32,
+    /// What else is bound.
+    pub bound: Bound,
+    /// For convolutions.
+    pub filter: Option<Filter>,
+    /// Dispatches.
+    pub parts: Vec<Part>,
     /// Workgroups in x and y, and in z for each block (convolutions) or in all.
     pub groups: [u32; 3],
-    /// Matrices of one block.
-    matrices: u64,
+    blocks_per_part: u32,
 }
 
 impl Kernel {
     /// Chooses for `step`.
     pub fn choose(plan: &Plan, step: &Step, variant: Variant) -> Self {
-        let out = plan.tensors[step.output].shape;
-        let in_vectors = plan.tensors[step.input].shape.channels.div_ceil(4);
-        let out_vectors = out.channels.div_ceil(4);
-        let add = match (step.skip, step.add_at) {
-            (None, _) => 0,
-            (Some(_), AddAt::BeforeActivation) => 1,
-            (Some(_), AddAt::AfterActivation) => 2,
-        };
-        let activation = u32::from(step.activation == Activation::Relu);
-        let mut consts = vec![("ACTIVATION", activation), ("ADD", add), ("OUT_VECTORS", out_vectors)];
-        let mut kernel = Kernel {
-            shader: if step.kind == Kind::Upsample { "net.upsample" } else { "net.add" },
-            prelude: String::new(),
-            uniform: false,
-            blocks: 0,
-            blocks_per_dispatch: 0,
-            groups: [out.width.div_ceil(GROUP[0]), out.height.div_ceil(GROUP[1]), out_vectors],
-            matrices: 0,
-        };
-        if let Kind::Conv { kernel: [h, w], stride, padding } = step.kind {
-            let shape = [("KERNEL_H", h), ("KERNEL_W", w), ("STRIDE", stride), ("PADDING", padding)];
-            consts.extend(shape);
-            consts.push(("IN_VECTORS", in_vectors));
-            kernel.matrices = 1 + u64::from(w) * u64::from(h) * u64::from(in_vectors) * 2;
-            kernel.blocks = out.channels.div_ceil(8);
-            let fit = (MAX_UNIFORM / (kernel.matrices * MATRIX)) as u32;
-            kernel.uniform = variant == Variant::Blocked && fit > 0;
-            let dispatches = if kernel.uniform { kernel.blocks.div_ceil(fit) } else { 1 };
-            kernel.blocks_per_dispatch = kernel.blocks.div_ceil(dispatches);
-            let row = ([h, w], stride, padding) == ([3, 3], 1, 1);
-            kernel.shader = match (variant, row, kernel.uniform) {
-                (Variant::Plain, ..) => "net.conv_plain",
-                (_, true, true) => "net.conv3x3",
-                (_, true, false) => "net.conv3x3_wide",
-                (_, false, true) => "net.conv_block",
-                (_, false, false) => "net.conv_block_wide",
+        let half = plan.precision == Precision::F16;
+        let (input, output) = (&plan.tensors[step.input], &plan.tensors[step.output]);
+        let out = output.shape;
+        let mut prelude = Prelude::default();
+        prelude.add("OUT_CHANNELS", out.channels);
+        prelude.add("OUT_VECTORS", out.vectors());
+        prelude.add("OUT_PITCH", output.pitch);
+        prelude.add("IN_VECTORS", input.shape.vectors());
+        prelude.add("IN_PITCH", input.pitch);
+        if !matches!(step.kind, Kind::Window { .. } | Kind::Moments | Kind::Merge { .. }) {
+            let add = match (step.skip, step.add_at) {
+                (None, _) => 0,
+                (Some(_), AddAt::BeforeActivation) => 1,
+                (Some(_), AddAt::AfterActivation) => 2,
             };
-            if kernel.uniform {
-                consts.push(("MATRICES", (kernel.matrices * u64::from(kernel.blocks_per_dispatch)) as u32));
-            }
-            kernel.groups = match variant {
-                Variant::Plain => [kernel.groups[0], kernel.groups[1], 2],
-                _ => [kernel.groups[0], out.height.div_ceil(GROUP[1] * 8), 1],
-            };
+            prelude.add("ACTIVATION", step.activation.code());
+            prelude.add("ADD", add);
+            prelude.add("DROPOUT", step.dropout.is_some().into());
+            prelude.add("SKIP_PITCH", step.skip.map_or(0, |s| plan.tensors[s].pitch));
         }
-        kernel.prelude = consts.iter().map(|(name, value)| format!("const {name} = {value}u;\n")).collect();
+        let mut kernel = Kernel {
+            shader: String::new(),
+            prelude: String::new(),
+            bound: Bound::None,
+            filter: None,
+            parts: vec![Part { phase: [0, 0], pad: [0, 0], first_block: 0, blocks: 0 }],
+            groups: [out.width.div_ceil(GROUP[0]), out.height.div_ceil(GROUP[1]), out.vectors()],
+            blocks_per_part: 0,
+        };
+        let shader = match step.kind {
+            Kind::Conv { kernel: [h, w], stride, padding, nearest } => {
+                let pad = [padding.left as i32, padding.top as i32];
+                let filter = Filter { taps: [h, w], stride, spread: 1, nearest, in_vectors: input.shape.vectors() };
+                let row = ([h, w], stride, padding) == ([3, 3], 1, Padding::all(1));
+                let family = Family { variant, half, row };
+                kernel.convolution(&mut prelude, filter, &[([0, 0], pad)], out, family)
+            }
+            Kind::Transposed { kernel: edges, stride, padding } => {
+                let taps = edges.map(|k| k.div_ceil(stride));
+                let filter = Filter { taps, stride: 1, spread: stride, nearest: 1, in_vectors: input.shape.vectors() };
+                let pad = |phase: u32, taps: u32| taps as i32 - 1 - ((phase + padding) / stride) as i32;
+                let phases: Vec<_> = (0..stride * stride)
+                    .map(|i| [i % stride, i / stride])
+                    .map(|[x, y]| ([x, y], [pad(x, taps[1]), pad(y, taps[0])]))
+                    .collect();
+                kernel.convolution(&mut prelude, filter, &phases, out, Family { variant, half, row: false })
+            }
+            Kind::Upsample => "net.upsample",
+            Kind::Nearest => "net.nearest",
+            Kind::Copy => "net.add",
+            Kind::Window { left, top, clamp, channel } => {
+                kernel.parts[0].pad = [left as i32, top as i32];
+                let lane = channel % 4;
+                prelude.add("IN_CHANNELS", input.shape.channels);
+                prelude.add("CLAMP", clamp.into());
+                prelude.add("LANE", lane);
+                prelude.add("IN_FULL", input.full.into());
+                prelude.add("OUT_FULL", output.full.into());
+                kernel.groups[2] = (lane + input.shape.channels).div_ceil(4);
+                "net.window"
+            }
+            Kind::Moments => {
+                let tiles = output.shape.width;
+                kernel.groups = [input.shape.vectors().div_ceil(GROUP[0]), tiles.div_ceil(GROUP[1]), 1];
+                "net.moments"
+            }
+            Kind::Merge { groups, .. } => {
+                // The moments' picture says how many channels there are.
+                let picture = step.second.map_or(input.shape, |s| plan.tensors[s].shape);
+                prelude.set("IN_VECTORS", picture.vectors());
+                prelude.add("CHANNELS", picture.channels);
+                prelude.add("PER_GROUP", picture.channels / groups.max(1));
+                kernel.groups = [groups, 1, 1];
+                kernel.bound = Bound::Vectors(2 * picture.vectors());
+                "net.merge"
+            }
+            Kind::Scale { fixed: false } => "net.norm",
+            Kind::Scale { fixed: true } => {
+                kernel.bound = Bound::Vectors(3 * out.vectors());
+                "net.batch_norm"
+            }
+            Kind::Shuffle(factor) | Kind::Unshuffle(factor) => {
+                prelude.add("FACTOR", factor);
+                prelude.add("DOWN", matches!(step.kind, Kind::Unshuffle(_)).into());
+                "net.shuffle"
+            }
+        };
+        kernel.shader = if half && !shader.ends_with("_half") { format!("{shader}_half") } else { shader.into() };
+        kernel.prelude = prelude.text();
         kernel
     }
 
-    /// First block of each dispatch with the number of its blocks; one entry (0, 0) for a step without weights.
-    pub fn dispatches(&self) -> Vec<(u32, u32)> {
-        if self.blocks == 0 {
-            return vec![(0, 0)];
+    /// Fills in what a convolution needs and names its shader. `phases`: first output pixel and padding of each.
+    fn convolution(
+        &mut self,
+        prelude: &mut Prelude,
+        filter: Filter,
+        phases: &[([u32; 2], [i32; 2])],
+        out: Shape,
+        Family { variant, half, row }: Family,
+    ) -> &'static str {
+        prelude.add("KERNEL_H", filter.taps[0]);
+        prelude.add("KERNEL_W", filter.taps[1]);
+        prelude.add("STRIDE", filter.stride);
+        prelude.add("SPREAD", filter.spread);
+        prelude.add("NEAREST", filter.nearest);
+        self.filter = Some(filter);
+        let blocks = out.channels.div_ceil(8);
+        let fit = (MAX_UNIFORM / (filter.matrices() * MATRIX)) as u32;
+        self.bound = match variant {
+            _ if half => Bound::Half,
+            Variant::Blocked if fit > 0 => Bound::Uniform,
+            _ => Bound::Storage,
+        };
+        let uniform = self.bound == Bound::Uniform;
+        let dispatches = if uniform { blocks.div_ceil(fit) } else { 1 };
+        self.blocks_per_part = blocks.div_ceil(dispatches);
+        let part = |(phase, pad): ([u32; 2], [i32; 2])| {
+            let each = self.blocks_per_part;
+            (0..blocks).step_by(each as usize).map(move |first_block| {
+                let blocks = each.min(blocks - first_block);
+                Part { phase, pad, first_block, blocks }
+            })
+        };
+        self.parts = phases.iter().copied().flat_map(part).collect();
+        if uniform {
+            prelude.add("MATRICES", (filter.matrices() * u64::from(self.blocks_per_part)) as u32);
         }
-        let step = self.blocks_per_dispatch;
-        (0..self.blocks).step_by(step as usize).map(|first| (first, step.min(self.blocks - first))).collect()
+        let [columns, rows] = [out.width, out.height].map(|edge| edge.div_ceil(filter.spread));
+        let [rows_each, z] = if variant == Variant::Plain { [1, 2] } else { [8, 1] };
+        self.groups = [columns.div_ceil(GROUP[0]), rows.div_ceil(GROUP[1] * rows_each), z];
+        match (variant, row, self.bound) {
+            (Variant::Plain, ..) => "net.conv_plain",
+            (_, true, Bound::Uniform) => "net.conv3x3",
+            (_, true, Bound::Half) => "net.conv3x3_half",
+            (_, true, _) => "net.conv3x3_wide",
+            (_, false, Bound::Uniform) => "net.conv_block",
+            (_, false, Bound::Half) => "net.conv_block_half",
+            (_, false, _) => "net.conv_block_wide",
+        }
     }
 
     /// Workgroups of a dispatch of `blocks` blocks.
@@ -111,65 +241,41 @@ impl Kernel {
         [self.groups[0], self.groups[1], self.groups[2] * blocks.max(1)]
     }
 
-    /// Bytes of the weights that one dispatch binds.
+    /// Bytes of weights that one dispatch binds.
     pub fn bound_bytes(&self) -> u64 {
-        self.matrices * MATRIX * u64::from(self.blocks_per_dispatch)
-    }
-
-    /// Packs a layer: `weight` [O, I, kh, kw] and `bias` (O values) to the matrices of each dispatch, one vector a dispatch.
-    pub fn pack(&self, weight: &[f32], bias: &[f32], in_channels: usize, [kh, kw]: [usize; 2]) -> Vec<Vec<f32>> {
-        let in_vectors = in_channels.div_ceil(4);
-        let at = |o: usize, i: usize, ky: usize, kx: usize| {
-            let inside = o < bias.len() && i < in_channels;
-            if inside { weight[((o * in_channels + i) * kh + ky) * kw + kx] } else { 0.0 }
-        };
-        let block = |b: usize| {
-            let mut m: Vec<f32> =
-                (0..16).map(|i| if i < 8 { bias.get(b * 8 + i).copied().unwrap_or(0.0) } else { 0.0 }).collect();
-            for kx in 0..kw {
-                for c in 0..in_vectors {
-                    for ky in 0..kh {
-                        for half in 0..2 {
-                            // Column-major: column k takes input channel k to the four outputs.
-                            m.extend((0..16).map(|k| at(b * 8 + half * 4 + k % 4, c * 4 + k / 4, ky, kx)));
-                        }
-                    }
-                }
-            }
-            m
-        };
-        let pack = |(first, count): (u32, u32)| {
-            let mut packed: Vec<f32> = (first..first + count).flat_map(|b| block(b as usize)).collect();
-            packed.resize(self.bound_bytes() as usize / 4, 0.0);
-            packed
-        };
-        self.dispatches().into_iter().map(pack).collect()
+        let matrices = self.filter.map_or(0, Filter::matrices) * u64::from(self.blocks_per_part);
+        match self.bound {
+            Bound::None => 0,
+            Bound::Uniform | Bound::Storage => matrices * MATRIX,
+            Bound::Half => matrices * MATRIX / 2,
+            Bound::Vectors(n) => u64::from(n) * 16,
+        }
     }
 }
 
-/// One prelude of each kind with the shader it belongs to, so that a test can validate every permutation without a GPU.
-pub fn example_preludes() -> Vec<(&'static str, String)> {
-    let mut examples = Vec::new();
-    let shaders = crate::gpu::shaders::NET.iter().map(|s| s.name);
-    for shader in shaders {
-        for (activation, add) in [(0, 0), (1, 0), (0, 1), (1, 1), (0, 2), (1, 2)] {
-            for (edge, stride) in [(3, 1), (3, 2), (1, 1), (5, 3)] {
-                let mut prelude =
-                    format!("const ACTIVATION = {activation}u;\nconst ADD = {add}u;\nconst OUT_VECTORS = 4u;\n");
-                if shader.contains("conv") {
-                    prelude.push_str(&format!(
-                        "const KERNEL_H = {edge}u;\nconst KERNEL_W = {edge}u;\nconst STRIDE = {stride}u;\n"
-                    ));
-                    prelude.push_str(&format!("const PADDING = {}u;\nconst IN_VECTORS = 6u;\n", edge / 2));
-                    prelude.push_str("const MATRICES = 218u;\n");
-                }
-                if !examples.contains(&(shader, prelude.clone()))
-                    && (edge == 3 && stride == 1 || !shader.contains("conv3x3"))
-                {
-                    examples.push((shader, prelude));
-                }
-            }
-        }
+/// Which convolution kernel is wanted.
+struct Family {
+    variant: Variant,
+    half: bool,
+    /// 3×3, stride 1, padding 1.
+    row: bool,
+}
+
+/// Lines of `const`.
+#[derive(Default)]
+struct Prelude(Vec<(&'static str, u32)>);
+
+impl Prelude {
+    fn add(&mut self, name: &'static str, value: u32) {
+        self.0.push((name, value));
     }
-    examples
+
+    fn set(&mut self, name: &'static str, value: u32) {
+        self.0.retain(|(n, _)| *n != name);
+        self.add(name, value);
+    }
+
+    fn text(&self) -> String {
+        self.0.iter().map(|(name, value)| format!("const {name} = {value}u;\n")).collect()
+    }
 }

@@ -63,10 +63,9 @@ impl RayCaster {
             },
             count: None,
         };
-        let [nodes, triangles] = AccelGpu::layout_entries();
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("reference.rays"),
-            entries: &[storage(0, true), nodes, triangles, storage(3, false)],
+            entries: &[storage(0, true), AccelGpu::layout_entry(), storage(3, false)],
         });
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("reference.rays"),
@@ -97,14 +96,12 @@ impl RayCaster {
             usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
-        let [nodes, triangles] = accel.entries();
         let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("reference.rays"),
             layout: &self.layout,
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() },
-                nodes,
-                triangles,
+                accel.entry(),
                 wgpu::BindGroupEntry { binding: 3, resource: hits.as_entire_binding() },
             ],
         });

@@ -1,9 +1,9 @@
 //! The walk of `traverse.wgsl` on the CPU, for tests and tools.
 
 use glam::Vec3;
-use obvhs::cwbvh::node::CwBvhNode;
 
 use super::Accel;
+use super::wide::{Block, NODE};
 
 /// Where a ray meets a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +22,7 @@ const TINY: f32 = 1e-18;
 /// Relative enlargement of a slab's far end, against rounding.
 const SLACK: f32 = 1.000_000_5;
 
-/// What is the same for all triangles and boxes that a ray meets.
+/// What is the same for all boxes and triangles that a ray meets.
 struct Ray {
     origin: Vec3,
     inverse: Vec3,
@@ -42,50 +42,54 @@ impl Ray {
         Self { origin, inverse: 1.0 / safe, rows: [first, second, direction / direction.length_squared()] }
     }
 
-    /// Corners in the ray's frame, where the ray is the third axis and t its coordinate; edges shared by two triangles
-    /// give both the same three products, so no ray passes between them (after Woop, Benthin and Wald 2013).
-    fn triangle(&self, words: &[u32; super::TRIANGLE_WORDS], nearest: f32) -> Option<AccelHit> {
+    /// The nearest hit of a leaf's two triangles before `nearest`.
+    fn leaf(&self, block: &Block, nearest: f32) -> Option<AccelHit> {
         let corner = |i: usize| {
-            let p = Vec3::from_array(std::array::from_fn(|k| f32::from_bits(words[4 * i + k]))) - self.origin;
-            Vec3::new(self.rows[0].dot(p), self.rows[1].dot(p), self.rows[2].dot(p))
+            let p = Vec3::from_array(std::array::from_fn(|k| f32::from_bits(block[4 * i + k]))) - self.origin;
+            Vec3::from_array(self.rows.map(|row| row.dot(p)))
         };
-        let [a, b, c] = [corner(0), corner(1), corner(2)];
-        let u = c.x * b.y - c.y * b.x;
-        let v = a.x * c.y - a.y * c.x;
-        let w = b.x * a.y - b.y * a.x;
-        let sum = u + v + w;
-        let t = (u * a.z + v * b.z + w * c.z) / sum;
-        let inside = u.min(v).min(w) >= 0.0 || u.max(v).max(w) <= 0.0;
-        let hit = inside && t > 0.0 && t < nearest;
-        hit.then(|| AccelHit { t, triangle: words[3], uv: [v / sum, w / sum] })
+        let corners: [Vec3; 4] = std::array::from_fn(corner);
+        let first = triangle([corners[0], corners[1], corners[2]], block[7], nearest);
+        let second = triangle([corners[0], corners[2], corners[3]], block[11], first.map_or(nearest, |h| h.t));
+        second.or(first)
     }
 
     /// Bits of the children whose boxes the ray meets before `nearest`.
-    fn children(&self, node: &CwBvhNode, nearest: f32) -> u8 {
-        let step = Vec3::from_array(node.e.map(|e| f32::from_bits(u32::from(e) << 23)));
-        let scale = step * self.inverse;
-        let offset = (node.p - self.origin) * self.inverse;
+    fn children(&self, block: &Block, nearest: f32) -> u8 {
+        let step = Vec3::from_array(std::array::from_fn(|axis| f32::from_bits((block[axis] & 255) << 23)));
+        let corner = Vec3::from_array(std::array::from_fn(|axis| (block[axis] as i32 >> 8) as f32)) * step;
+        let (scale, offset) = (step * self.inverse, (corner - self.origin) * self.inverse);
+        let plane = |child: usize, side: usize| {
+            let byte = |axis: usize| block[4 + 4 * axis + 2 * side + child / 4] >> (8 * (child % 4)) & 255;
+            Vec3::from_array(std::array::from_fn(|axis| byte(axis) as f32)) * scale + offset
+        };
+        let inside_out = |child: usize| {
+            block[4 + child / 4] >> (8 * (child % 4)) & 255 > block[6 + child / 4] >> (8 * (child % 4)) & 255
+        };
         let mut bits = 0;
-        for child in 0..8 {
-            let low = Vec3::new(
-                node.child_min_x[child].into(),
-                node.child_min_y[child].into(),
-                node.child_min_z[child].into(),
-            );
-            let high = Vec3::new(
-                node.child_max_x[child].into(),
-                node.child_max_y[child].into(),
-                node.child_max_z[child].into(),
-            );
-            let (a, b) = (low * scale + offset, high * scale + offset);
+        for child in (0..8).filter(|child| !inside_out(*child)) {
+            let (a, b) = (plane(child, 0), plane(child, 1));
             let enter = a.min(b).max_element().max(0.0);
             let leave = a.max(b).min_element().min(nearest);
-            if !node.is_child_empty(child) && enter <= leave * SLACK {
+            if enter <= leave * SLACK {
                 bits |= 1 << child;
             }
         }
         bits
     }
+}
+
+/// A triangle in the ray's frame, where the ray is the third axis and t its coordinate. Edges shared by two triangles give
+/// both the same products, so no ray passes between them (after Woop, Benthin and Wald 2013).
+fn triangle([a, b, c]: [Vec3; 3], word: u32, nearest: f32) -> Option<AccelHit> {
+    let edge = |p: Vec3, q: Vec3| q.x * p.y - q.y * p.x;
+    let weights = [edge(b, c), edge(c, a), edge(a, b)];
+    let [u, v, w] = weights;
+    let sum = u + v + w;
+    let t = (u * a.z + v * b.z + w * c.z) / sum;
+    let inside = u.min(v).min(w) >= 0.0 || u.max(v).max(w) <= 0.0;
+    let own = |corner: usize| weights[(corner + (word >> 24) as usize) % 3] / sum;
+    (inside && t > 0.0 && t < nearest).then(|| AccelHit { t, triangle: word & 0x00ff_ffff, uv: [own(1), own(2)] })
 }
 
 impl Accel {
@@ -94,22 +98,15 @@ impl Accel {
         let ray = Ray::new(origin.into(), direction.into());
         let mut best = None;
         let mut nearest = t_max;
-        let mut stack = vec![0u32];
-        while let Some(index) = stack.pop() {
-            let node: CwBvhNode = bytemuck::cast(self.nodes[index as usize]);
-            let met = ray.children(&node, nearest);
-            for child in (0..8).filter(|c| met & (1 << c) != 0) {
-                if !node.is_leaf(child) {
-                    stack.push(node.child_node_index(child));
-                    continue;
-                }
-                let (first, count) = node.child_primitives(child);
-                for words in &self.triangles[first as usize..(first + count) as usize] {
-                    if let Some(hit) = ray.triangle(words, nearest) {
-                        nearest = hit.t;
-                        best = Some(hit);
-                    }
-                }
+        let mut open = vec![0u32];
+        while let Some(index) = open.pop() {
+            let block = &self.blocks[index as usize];
+            if block[3] & NODE != 0 {
+                let met = ray.children(block, nearest);
+                open.extend((0..8).filter(|child| met & (1 << child) != 0).map(|child| (block[3] & !NODE) + child));
+            } else if let Some(hit) = ray.leaf(block, nearest) {
+                nearest = hit.t;
+                best = Some(hit);
             }
         }
         best

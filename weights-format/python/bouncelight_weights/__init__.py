@@ -1,4 +1,4 @@
-"""Write, read and verify bouncelight weights files (numpy and safetensors only).
+"""Write, read and verify bouncelight weights files, with numpy alone.
 
 The specification is ../../README.md. `torch_graph` in this package (optional, needs PyTorch) builds the module that a graph
 describes, so that the topology stands in one place: the list of operators.
@@ -13,30 +13,16 @@ import os
 import tempfile
 
 import numpy as np
-from safetensors import safe_open
-from safetensors.numpy import save
 
-VERSION = 1
-KEY = "bouncelight"
-SCREEN_V1 = (
-    ("direct", 3), ("outgoing", 3), ("albedo", 3), ("normal", 3), ("position", 3),
-    ("depth", 1), ("spread", 1), ("hit", 1), ("sky", 3),
-)
-MEANINGS = ("log_irradiance_over_exposure", "plain")
-_FIELDS = {
-    "conv2d": ({"name", "input", "output", "in_channels", "out_channels", "kernel"},
-               {"stride", "padding", "activation", "add", "add_at"}),
-    "upsample_bilinear": ({"name", "input", "size_as", "output"}, set()),
-    "add": ({"name", "inputs", "output"}, {"activation"}),
-}
+from . import container
+from .document import IMAGES_V1, KEY, MEANINGS, SCALE_SUFFIX, SCREEN_V1, TABLES, VERSION, check_tensors, schema
+from .document import check as check_document
+from .graph import complete
+from .operators import OPERATORS, scaled_axis, tensors
+from .problems import NotReadable, Problem, WeightsError
 
-
-class WeightsError(ValueError):
-    """A weights file, or what should become one, is wrong; `problems` lists every fault."""
-
-    def __init__(self, path, problems):
-        super().__init__(f"{path}:" + "".join(f"\n  {p}" for p in problems))
-        self.problems = problems
+__all__ = ["IMAGES_V1", "KEY", "OPERATORS", "SCREEN_V1", "VERSION", "Problem", "WeightsError", "check", "conv2d", "document",
+           "quantised", "read", "schema", "unet", "verify", "write"]
 
 
 def conv2d(name, input, output, in_channels, out_channels, kernel=3, stride=1, padding=None, activation="none", **rest):
@@ -74,91 +60,59 @@ def unet(in_channels=21, widths=(16, 24, 32, 48), out_channels=3):
     return graph, "y"
 
 
-def document(graph, output_tensor, *, inputs=SCREEN_V1, table=("screen", 1), cell=4, meaning=MEANINGS[0], output_channels=3,
+def document(graph, output_tensor, *, inputs=None, table=("screen", 1), cell=4, meaning=MEANINGS[0], output_channels=3,
              licence="MIT OR Apache-2.0", name="", provenance=None):
-    """The JSON document of a file. `inputs`: pairs of feature name and channels, in table order."""
+    """The JSON document of a file. `inputs`: (feature, channels) or (feature, channels, encoding), by default the whole table in its
+    order; without an encoding it is the table's first, `plain` in table `free`."""
+    rows = TABLES.get(table[0], ({}, False))[0]
+    inputs = [(n, channels) for n, (channels, _) in rows.items()] if inputs is None else inputs
+
+    def feature(name, channels, encoding=None):
+        return {"name": name, "channels": channels, "encoding": encoding or (rows[name][1][0] if name in rows else "plain")}
+
     return {
         "version": VERSION, "name": name, "licence": licence,
         "table": {"name": table[0], "version": table[1]},
-        "inputs": [{"name": n, "channels": c} for n, c in inputs],
+        "inputs": [feature(*i) for i in inputs],
         "cell": cell,
         "output": {"tensor": output_tensor, "meaning": meaning, "channels": output_channels},
         "graph": graph, "provenance": provenance or {},
     }
 
 
-def check(tensors, doc):
-    """Every fault of `doc` (dict) with `tensors` (name to array) as a list of sentences; empty when sound."""
-    problems = []
-    if doc.get("version") != VERSION:
-        return [f"document version {doc.get('version')!r}; known: {VERSION}"]
-    missing = {"licence", "table", "inputs", "cell", "output", "graph"} - doc.keys()
-    if missing:
-        return [f"document lacks {sorted(missing)}"]
-    if doc["table"].get("version") != 1 or doc["table"].get("name") not in ("screen", "free"):
-        problems.append(f"feature table {doc['table']} is unknown")
-    elif doc["table"]["name"] == "screen":
-        order = [n for n, _ in SCREEN_V1]
-        used = [f["name"] for f in doc["inputs"]]
-        problems += [f"input feature {f}: not in table screen" for f in doc["inputs"] if (f["name"], f["channels"]) not in SCREEN_V1]
-        if used != [n for n in order if n in used]:
-            problems.append("input features are not in the table's order, or one stands twice")
-    if doc["output"].get("meaning") not in MEANINGS:
-        problems.append(f"output meaning {doc['output'].get('meaning')!r} is unknown")
-    channels = {"input": sum(f["channels"] for f in doc["inputs"])}
-    wanted, names = {}, set()
-    for i, op in enumerate(doc["graph"]):
-        kind, where = op.get("op"), f"graph[{i}] `{op.get('name', '?')}`"
-        if kind not in _FIELDS:
-            problems.append(f"{where}: operator `{kind}` is unknown")
-            continue
-        need, may = _FIELDS[kind]
-        fields = set(op) - {"op"}
-        if need - fields or fields - need - may:
-            problems.append(f"{where}: missing fields {sorted(need - fields)}, unknown fields {sorted(fields - need - may)}")
-            continue
-        if op["name"] in names:
-            problems.append(f"{where}: name occurs twice")
-        names.add(op["name"])
-        reads = op["inputs"] if kind == "add" else [op["input"]] + [op[k] for k in ("size_as", "add") if op.get(k)]
-        problems += [f"{where}: reads `{t}`, which nothing before it writes" for t in reads if t not in channels]
-        if op["output"] in channels:
-            problems.append(f"{where}: tensor `{op['output']}` exists already")
-        out = channels.get(reads[0], 0)
-        if kind == "conv2d":
-            if channels.get(op["input"], op["in_channels"]) != op["in_channels"]:
-                problems.append(f"{where}: `{op['input']}` has {channels[op['input']]} channels, not {op['in_channels']}")
-            out = op["out_channels"]
-            wanted[f"{op['name']}.weight"] = (out, op["in_channels"], *op["kernel"])
-            wanted[f"{op['name']}.bias"] = (out,)
-        others = reads[1:] if kind == "add" else [op["add"]] if op.get("add") else []
-        problems += [f"{where}: `{t}` has {channels[t]} channels, not {out}" for t in others if channels.get(t, out) != out]
-        channels[op["output"]] = out
-    tensor = doc["output"].get("tensor")
-    if channels.get(tensor) != doc["output"].get("channels") or tensor == "input":
-        problems.append(f"output tensor `{tensor}` is not written with {doc['output'].get('channels')} channels")
-    for t, shape in wanted.items():
-        if t not in tensors:
-            problems.append(f"tensor `{t}` is missing")
-            continue
-        value = np.asarray(tensors[t])
-        if value.shape != shape:
-            problems.append(f"tensor `{t}` has shape {value.shape}, the graph needs {shape}")
-        if value.dtype not in (np.float32, np.float16):
-            problems.append(f"tensor `{t}` holds {value.dtype}; float32 and float16 are read")
-        elif not np.isfinite(value).all():
-            problems.append(f"tensor `{t}` holds values that are not finite")
-    problems += [f"tensor `{t}` is used by no operator" for t in tensors if t not in wanted]
+def check(arrays, doc):
+    """Every fault of `doc` (dict) with `arrays` (name to array) as a list of `Problem`s; empty when sound."""
+    problems, graph = check_document(doc)
+    if graph is not None:
+        kinds = {dtype: name for name, dtype in container.DTYPES.items()}
+        info = {n: (kinds.get(np.dtype(a.dtype).newbyteorder("<"), str(a.dtype)), a.shape) for n, a in arrays.items()}
+        problems += check_tensors(graph, info, arrays.__getitem__, set())
     return problems
 
 
+def quantised(arrays, graph):
+    """`arrays` with the weights of convolutions as bytes and their scales: value = byte · scale of its output channel."""
+    arrays = dict(arrays)
+    for op in complete(graph):
+        name, axis = f"{op['name']}.weight", scaled_axis(op)
+        if axis is None or name not in arrays:
+            continue
+        weight = np.asarray(arrays[name], np.float32)
+        others = tuple(i for i in range(weight.ndim) if i != axis)
+        scale = np.maximum(np.abs(weight).max(axis=others) / np.float32(127), np.finfo(np.float32).tiny)
+        arrays[name] = np.rint(weight / np.expand_dims(scale, others)).astype(np.int8)
+        arrays[name + SCALE_SUFFIX] = scale.astype(np.float32)
+    return arrays
+
+
 def write(path, tensors, doc):
-    """Checks and writes one file whole or not at all. `tensors`: name to array (or PyTorch tensor), as in a state dict."""
-    arrays = {k: np.ascontiguousarray(v.detach().cpu().numpy() if hasattr(v, "detach") else v) for k, v in tensors.items()}
+    """Checks and writes one file whole or not at all. `tensors`: name to array (or PyTorch tensor), as in a state dict; float32,
+    float16, or int8 with scales (`quantised`)."""
+    arrays = {k: np.asarray(v.detach().cpu().numpy() if hasattr(v, "detach") else v) for k, v in tensors.items()}
     problems = check(arrays, doc)
     if problems:
         raise WeightsError(path, problems)
-    data = save(arrays, metadata={KEY: json.dumps(doc, sort_keys=True, separators=(",", ":"))})
+    data = container.build(arrays, {KEY: json.dumps(doc, sort_keys=True, separators=(",", ":"))})
     folder = os.path.dirname(os.path.abspath(path))
     handle, temporary = tempfile.mkstemp(dir=folder, suffix=".part")
     try:
@@ -171,26 +125,90 @@ def write(path, tensors, doc):
         raise
 
 
+def _plain(value, strict=True):
+    """`Pairs` as dicts. Raises ValueError where a key stands twice; not `strict`: the last one counts."""
+    if isinstance(value, container.Pairs):
+        found = {k: _plain(v, strict) for k, v in value}
+        if strict and len(found) != len(value):
+            raise ValueError("a field stands twice")
+        return found
+    return [_plain(v, strict) for v in value] if isinstance(value, list) else value
+
+
+def _operator(pairs):
+    """One operator; where a key stands twice, what is left says nothing but its name, which `check` refuses."""
+    try:
+        return _plain(pairs)
+    except ValueError:
+        return {"name": dict(pairs).get("name"), "op": None}
+
+
+def _document(text, problems):
+    """The document as dicts, or None and a problem."""
+    try:
+        loose = container.load_json(text)
+        if not isinstance(loose, container.Pairs) or len(dict(loose)) != len(loose):
+            raise ValueError("no object, or a field stands twice")
+        fields = dict(loose)
+        # Provenance is anybody's.
+        own = {"provenance": _plain(fields.pop("provenance"), strict=False)} if "provenance" in fields else {}
+        graph = fields.get("graph")
+        if isinstance(graph, list) and not isinstance(graph, container.Pairs):
+            own["graph"] = [_operator(op) for op in fields.pop("graph")]
+        return {**_plain(container.Pairs(fields.items())), **own}
+    except (ValueError, RecursionError) as error:
+        problems.append(Problem("document", "", f"metadata `{KEY}`: {error}"))
+        return None
+
+
+def _parse(data):
+    """(problems, tensors as stored, document) of a file's bytes."""
+    problems = []
+    try:
+        metadata, info, rest = container.parse(data, problems)
+    except NotReadable as error:
+        return [error.problem], {}, None
+    if KEY not in metadata:
+        return problems + [Problem("document", "", f"metadata `{KEY}`: the key is missing, so this file holds no bouncelight network")], {}, None
+    reported = {p.subject for p in problems if p.code == "size"}
+    doc = _document(metadata[KEY], problems)
+    graph = None
+    if doc is not None:
+        faults, graph = check_document(doc)
+        problems += faults
+    if graph is not None:
+        problems += check_tensors(graph, info, lambda name: container.values(info, rest, name), reported)
+    if problems:
+        return problems, {}, doc
+    return [], {name: container.values(info, rest, name).copy() for name in info}, doc
+
+
+def _widened(arrays, graph):
+    """Bytes multiplied by their scales, everything else as it is."""
+    arrays = dict(arrays)
+    for op in complete(graph):
+        name, axis = f"{op['name']}.weight", scaled_axis(op)
+        if axis is not None and arrays[name].dtype == np.int8:
+            others = tuple(i for i in range(arrays[name].ndim) if i != axis)
+            arrays[name] = arrays[name].astype(np.float32) * np.expand_dims(arrays.pop(name + SCALE_SUFFIX), others)
+    return arrays
+
+
 def read(path):
-    """(tensors, document) of a file; raises WeightsError when it is not sound."""
-    with safe_open(path, framework="np") as file:
-        text = (file.metadata() or {}).get(KEY)
-        if text is None:
-            raise WeightsError(path, [f"metadata key `{KEY}` is missing"])
-        tensors = {k: file.get_tensor(k) for k in file.keys()}
-    doc = json.loads(text)
-    problems = check(tensors, doc)
+    """(tensors, document) of a file; bytes with scales come as float32. Raises WeightsError when it is not sound."""
+    with open(path, "rb") as file:
+        problems, arrays, doc = _parse(file.read(container.MAX_FILE + 1))
     if problems:
         raise WeightsError(path, problems)
-    return tensors, doc
+    return _widened(arrays, doc["graph"]), doc
 
 
 def verify(path):
     """List of faults of the file at `path`; empty when it is sound."""
     try:
-        read(path)
-    except WeightsError as error:
-        return error.problems
-    except Exception as error:  # The container's own reader raises several kinds.
-        return [f"not a readable safetensors file: {error}"]
-    return []
+        if os.path.getsize(path) > container.MAX_FILE:
+            return [Problem("too-large", "", f"more than the {container.MAX_FILE} bytes allowed")]
+        with open(path, "rb") as file:
+            return _parse(file.read())[0]
+    except OSError as error:
+        return [Problem("io", "", f"cannot be read: {error}")]

@@ -1,12 +1,16 @@
 //! Conformance of networks: PyTorch's fixtures ↔ the CPU twin ↔ the WGSL kernels, per operator and whole, at odd sizes
 //! and with padded channels. Relative error is max |Δ| / max |reference|.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod hashed;
+mod operators;
+mod whole;
 
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
 use bouncelight::net::cpu::{self, Tensor};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{Network, Variant};
+use bouncelight::net::gpu::{Network, Options, Variant};
 use bouncelight::net::graph::Shape;
 use safetensors::SafeTensors;
 use std::path::PathBuf;
@@ -59,9 +63,9 @@ fn error(found: &Tensor, reference: &Tensor) -> f32 {
     delta / reference.data.iter().map(|v| v.abs()).fold(f32::MIN_POSITIVE, f32::max)
 }
 
-fn run_gpu(gpu: &Gpu, weights: &Weights, input: &Tensor, variant: Variant) -> Tensor {
+fn run_gpu(gpu: &Gpu, weights: &Weights, input: &Tensor, options: Options) -> Tensor {
     let size = [input.shape.width, input.shape.height];
-    let network = Network::with_variant(&gpu.device, &gpu.queue, weights, size, variant).unwrap();
+    let network = Network::with_options(&gpu.device, &gpu.queue, weights, size, options).unwrap();
     // Garbage everywhere but in the zeros at the beginning: nothing may depend on a fresh arena.
     let arena = network.input().buffer;
     let zeros = network.plan().zero_bytes;
@@ -107,7 +111,7 @@ fn every_kernel_agrees_with_pytorch_and_with_the_cpu_twin() {
             // Every network compiles its own pipelines; the other variants need the whole net at one size only.
             let few = name == "unet" && variant != Variant::Blocked;
             for (input, reference) in cases(name).into_iter().take(if few { 1 } else { usize::MAX }) {
-                let found = run_gpu(&gpu, &weights, &input, variant);
+                let found = run_gpu(&gpu, &weights, &input, Options { variant, ..Options::default() });
                 let twin = cpu::run(&weights, &input).unwrap();
                 let e = error(&found, &reference).max(error(&found, &twin));
                 assert!(e <= TOLERANCE, "{variant:?} {name} {}: relative error {e}", input.shape);
@@ -137,7 +141,7 @@ fn a_perturbed_weight_is_noticed() {
         let (input, reference) = cases(name).into_iter().max_by_key(|c| c.0.data.len()).unwrap();
         assert!(error(&cpu::run(&weights, &input).unwrap(), &reference) > TOLERANCE, "{name} on the CPU");
         if let Some(gpu) = &gpu {
-            let found = run_gpu(gpu, &weights, &input, Variant::Blocked);
+            let found = run_gpu(gpu, &weights, &input, Options::default());
             assert!(error(&found, &reference) > TOLERANCE, "{name} on the GPU");
         }
     }

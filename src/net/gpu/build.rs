@@ -1,0 +1,225 @@
+//! Buffers, pipelines and bind groups of a network.
+
+use super::kernels::{Bound, Kernel, Part};
+use super::{NetError, Options};
+use crate::gpu::shaders;
+use crate::net::dropout;
+use crate::net::graph::Graph;
+use crate::net::plan::{self, Kind, Plan, Precision, Step};
+use std::collections::HashMap;
+
+/// The uniform that a kernel reads; `Step` in `shaders/net/common.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct StepUniform {
+    in_size: [u32; 2],
+    out_size: [u32; 2],
+    input: u32,
+    output: u32,
+    skip: u32,
+    second: u32,
+    pad: [i32; 2],
+    phase: [u32; 2],
+    first_block: u32,
+    stream: u32,
+    threshold: u32,
+    keep: f32,
+    slope: f32,
+    epsilon: f32,
+    channel: u32,
+    tiles: u32,
+}
+
+/// Distance of uniforms in their buffer, and alignment of weights: WebGPU's default alignment of bindings.
+const SLOT: u64 = 256;
+
+/// One step ready to record.
+pub(super) struct Layer {
+    pub label: String,
+    pub kernel: Kernel,
+    pub pipeline: wgpu::ComputePipeline,
+    pub weights: Option<wgpu::Buffer>,
+    /// One for each part of the kernel.
+    pub bind_groups: Vec<wgpu::BindGroup>,
+}
+
+impl Layer {
+    /// Byte offset of each part's weights.
+    pub fn offsets(&self) -> impl Iterator<Item = u64> {
+        offsets(&self.kernel)
+    }
+}
+
+fn offsets(kernel: &Kernel) -> impl Iterator<Item = u64> + use<> {
+    let each = kernel.bound_bytes().next_multiple_of(SLOT);
+    (0..kernel.parts.len() as u64).map(move |i| i * each)
+}
+
+/// Compiled shaders. Steps with the same shader and prelude share a pipeline.
+#[derive(Default)]
+pub(super) struct Pipelines(HashMap<(String, String), (wgpu::ComputePipeline, wgpu::BindGroupLayout)>);
+
+impl Pipelines {
+    fn get(&mut self, device: &wgpu::Device, kernel: &Kernel) -> (wgpu::ComputePipeline, wgpu::BindGroupLayout) {
+        let make = || {
+            let module = shaders::module_with(device, &kernel.shader, &kernel.prelude);
+            let descriptor = wgpu::ComputePipelineDescriptor {
+                label: Some(&kernel.shader),
+                layout: None,
+                module: &module,
+                entry_point: Some("main"),
+                compilation_options: Default::default(),
+                cache: None,
+            };
+            let pipeline = device.create_compute_pipeline(&descriptor);
+            let layout = pipeline.get_bind_group_layout(0);
+            (pipeline, layout)
+        };
+        self.0.entry((kernel.shader.clone(), kernel.prelude.clone())).or_insert_with(make).clone()
+    }
+}
+
+pub(super) fn buffer(device: &wgpu::Device, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+}
+
+/// The plan within this device's limits.
+pub(super) fn plan(device: &wgpu::Device, graph: &Graph, size: [u32; 2], options: Options) -> Result<Plan, NetError> {
+    let limits = device.limits();
+    let options = plan::Options {
+        precision: options.precision,
+        dropout: options.dropout.is_some(),
+        fuse: options.fuse,
+        limit: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
+    };
+    Ok(Plan::with(graph, size[0], size[1], &options)?)
+}
+
+pub(super) fn check_limits(device: &wgpu::Device, plan: &Plan, kernels: &[Kernel]) -> Result<(), NetError> {
+    let limits = device.limits();
+    for (kernel, step) in kernels.iter().zip(&plan.steps) {
+        let check = |limit, granted: u64, needed: u64| {
+            let error = NetError::Limit { pass: step.name.clone(), limit, granted, needed };
+            if needed > granted { Err(error) } else { Ok(()) }
+        };
+        let bytes = kernel.bound_bytes();
+        if kernel.bound == Bound::Uniform {
+            check("max_uniform_buffer_binding_size", limits.max_uniform_buffer_binding_size, bytes)?;
+        } else {
+            check("max_storage_buffer_binding_size", limits.max_storage_buffer_binding_size, bytes)?;
+        }
+        let all = bytes.next_multiple_of(SLOT) * kernel.parts.len() as u64;
+        check("max_buffer_size", limits.max_buffer_size, all)?;
+        let blocks = kernel.parts.iter().map(|p| p.blocks).max().unwrap_or(0);
+        let most = kernel.workgroups(blocks).into_iter().max().unwrap_or(0);
+        let granted = limits.max_compute_workgroups_per_dimension;
+        check("max_compute_workgroups_per_dimension", granted.into(), most.into())?;
+    }
+    Ok(())
+}
+
+/// Room for the uniforms of all dispatches.
+pub(super) fn steps_buffer(device: &wgpu::Device, kernels: &[Kernel]) -> wgpu::Buffer {
+    let parts: usize = kernels.iter().map(|k| k.parts.len()).sum();
+    let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+    buffer(device, "net.steps", (parts.max(1) as u64) * SLOT, usage)
+}
+
+/// The uniforms of all dispatches.
+pub(super) fn uniforms<'a>(plan: &Plan, kernels: impl IntoIterator<Item = &'a Kernel>, seed: Option<u32>) -> Vec<u8> {
+    let mut data = Vec::new();
+    for (step, kernel) in plan.steps.iter().zip(kernels) {
+        for part in &kernel.parts {
+            data.extend_from_slice(bytemuck::bytes_of(&uniform(plan, step, part, seed)));
+            data.resize(data.len().next_multiple_of(SLOT as usize), 0);
+        }
+    }
+    data
+}
+
+fn uniform(plan: &Plan, step: &Step, part: &Part, seed: Option<u32>) -> StepUniform {
+    let (input, output) = (&plan.tensors[step.input], &plan.tensors[step.output]);
+    let element = if plan.precision == Precision::F16 { 8 } else { 16 };
+    // An arena is one binding, so a place counted in its elements fits.
+    let place = |t: usize| (plan.tensors[t].offset / element) as u32;
+    let mut in_size = [input.shape.width, input.shape.height];
+    let (mut epsilon, mut channel, mut tiles) = (0.0, 0, output.shape.width);
+    match step.kind {
+        Kind::Merge { eps, .. } => {
+            // The moments' picture, and how many tiles it was cut into.
+            tiles = input.shape.width;
+            let picture = step.second.map_or(input.shape, |s| plan.tensors[s].shape);
+            in_size = [picture.width, picture.height];
+            epsilon = eps;
+        }
+        Kind::Window { channel: first, .. } => channel = first,
+        _ => {}
+    }
+    let (stream, p) = match (seed, step.dropout) {
+        (Some(seed), Some((op, p))) => (dropout::stream(seed, op), p),
+        _ => (0, 0.0),
+    };
+    StepUniform {
+        in_size,
+        out_size: [output.shape.width, output.shape.height],
+        input: place(step.input),
+        output: place(step.output),
+        skip: step.skip.map_or(0, place),
+        second: step.second.map_or(0, place),
+        pad: part.pad,
+        phase: part.phase,
+        first_block: part.first_block,
+        stream,
+        threshold: dropout::threshold(p),
+        keep: 1.0 / (1.0 - p),
+        slope: step.activation.slope(),
+        epsilon,
+        channel,
+        tiles,
+    }
+}
+
+/// Pipelines, bind groups and buffers for weights (not yet filled) of every step.
+pub(super) fn layers(
+    device: &wgpu::Device,
+    plan: &Plan,
+    kernels: Vec<Kernel>,
+    pipelines: &mut Pipelines,
+    arena: &wgpu::Buffer,
+    steps: &wgpu::Buffer,
+) -> Vec<Layer> {
+    let mut slot = 0;
+    let layer = |(step, kernel): (&Step, Kernel)| {
+        let (pipeline, layout) = pipelines.get(device, &kernel);
+        let label = format!("net.{}", step.name);
+        let each = kernel.bound_bytes();
+        let weights = (each > 0).then(|| {
+            let kind = match kernel.bound {
+                Bound::Uniform => wgpu::BufferUsages::UNIFORM,
+                _ => wgpu::BufferUsages::STORAGE,
+            };
+            let size = each.next_multiple_of(SLOT) * kernel.parts.len() as u64;
+            buffer(device, &label, size, kind | wgpu::BufferUsages::COPY_DST)
+        });
+        let bind_group = |offset: u64| {
+            let whole = |buffer, offset, size| {
+                let size = wgpu::BufferSize::new(size);
+                wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size })
+            };
+            let mut resources =
+                vec![whole(steps, slot * SLOT, size_of::<StepUniform>() as u64), whole(arena, 0, plan.arena_bytes)];
+            resources.extend(weights.iter().map(|w| whole(w, offset, each)));
+            slot += 1;
+            let entries: Vec<_> =
+                (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some(&step.name),
+                layout: &layout,
+                entries: &entries,
+            })
+        };
+        let bind_groups = offsets(&kernel).map(bind_group).collect();
+        Layer { label, kernel, pipeline, weights, bind_groups }
+    };
+    plan.steps.iter().zip(kernels).map(layer).collect()
+}

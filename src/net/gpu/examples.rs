@@ -1,0 +1,51 @@
+//! Preludes for tests.
+
+/// One prelude of each kind with the shader it belongs to, so that a test can validate every permutation without a GPU.
+pub fn example_preludes() -> Vec<(&'static str, String)> {
+    let mut examples = Vec::new();
+    let lines =
+        |pairs: &[(&str, u32)]| -> String { pairs.iter().map(|(n, v)| format!("const {n} = {v}u;\n")).collect() };
+    let common = lines(&[
+        ("OUT_CHANNELS", 14),
+        ("OUT_VECTORS", 4),
+        ("OUT_PITCH", 8),
+        ("IN_VECTORS", 6),
+        ("IN_PITCH", 6),
+        ("SKIP_PITCH", 4),
+        ("MATRICES", 218),
+        ("IN_CHANNELS", 22),
+        ("CHANNELS", 22),
+        ("PER_GROUP", 11),
+    ]);
+    for shader in crate::gpu::shaders::NET.iter().map(|s| s.name) {
+        let convolution = shader.contains("conv");
+        let epilogues: &[[u32; 3]] = match shader {
+            _ if shader.contains("window") || shader.contains("moments") || shader.contains("merge") => &[[0, 0, 0]],
+            _ if shader.contains("_half") => &[[0, 0, 0], [1, 1, 0], [6, 2, 1]],
+            _ => &[[0, 0, 0], [1, 1, 0], [2, 2, 0], [3, 0, 1], [4, 1, 1], [5, 2, 0], [6, 0, 0], [7, 0, 0]],
+        };
+        for [activation, add, dropout] in epilogues {
+            let epilogue = lines(&[("ACTIVATION", *activation), ("ADD", *add), ("DROPOUT", *dropout)]);
+            let kinds: Vec<String> = if shader.contains("conv3x3") {
+                vec![kernel([3, 1, 1, 1])]
+            } else if convolution {
+                [[3, 2, 1, 1], [1, 1, 1, 1], [4, 1, 1, 2], [2, 1, 2, 1]].map(kernel).to_vec()
+            } else if shader.contains("window") {
+                let kinds = [[0, 0, 0], [1, 1, 1], [0, 3, 0]];
+                kinds.map(|[c, l, f]| lines(&[("CLAMP", c), ("LANE", l), ("IN_FULL", f), ("OUT_FULL", f)])).to_vec()
+            } else if shader.contains("shuffle") {
+                [0, 1].map(|down| lines(&[("FACTOR", 2), ("DOWN", down)])).to_vec()
+            } else {
+                vec![String::new()]
+            };
+            examples.extend(kinds.iter().map(|kind| (shader, format!("{common}{epilogue}{kind}"))));
+        }
+    }
+    examples
+}
+
+fn kernel([edge, stride, spread, nearest]: [u32; 4]) -> String {
+    format!(
+        "const KERNEL_H = {edge}u;\nconst KERNEL_W = {edge}u;\nconst STRIDE = {stride}u;\nconst SPREAD = {spread}u;\nconst NEAREST = {nearest}u;\n"
+    )
+}

@@ -1,0 +1,152 @@
+//! Trained numbers as the kernels read them. Pure.
+//!
+//! Convolutions: output channels in blocks of eight. A block is one matrix with the bias in its first two columns, then for
+//! each tap column kx, input vector c, tap row ky, and half h of the block one 4×4 matrix, which takes four input channels to
+//! four output channels. Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
+//! of stride s is s² ordinary ones, each of which makes every s-th pixel (its phase) in both directions.
+
+use super::kernels::{Bound, Filter, Kernel, Part};
+use crate::net::format::Weights;
+use crate::net::graph::Op;
+use crate::net::plan::{Kind, Step};
+
+/// The bytes of each dispatch's weights; empty for a step without.
+pub(super) fn pack(weights: &Weights, step: &Step, kernel: &Kernel) -> Vec<Vec<u8>> {
+    let Some(op) = step.op.map(|i| &weights.graph.ops[i]) else { return Vec::new() };
+    if let Some(filter) = kernel.filter {
+        let layer = Layer::new(weights, op, step.fold.map(|i| &weights.graph.ops[i]), filter);
+        return kernel.parts.iter().map(|part| layer.part(part, kernel)).collect();
+    }
+    let vectors = match step.kind {
+        Kind::Merge { .. } => affine(weights, op).to_vec(),
+        Kind::Scale { fixed: true } => fixed(weights, op),
+        _ => return Vec::new(),
+    };
+    let padded = vectors.into_iter().flat_map(|mut channels| {
+        channels.resize(channels.len().next_multiple_of(4), 0.0);
+        channels
+    });
+    vec![padded.flat_map(f32::to_le_bytes).collect()]
+}
+
+/// Weight and bias of each channel of a norm; 1 and 0 where it has none.
+fn affine(weights: &Weights, op: &Op) -> [Vec<f32>; 2] {
+    let channels = match op {
+        Op::BatchNorm(o) => o.channels,
+        Op::InstanceNorm(o) => o.channels,
+        Op::GroupNorm(o) => o.channels,
+        _ => 0,
+    };
+    [("weight", 1.0), ("bias", 0.0)].map(|(leaf, default)| {
+        let found = weights.values(op.name(), leaf);
+        if found.is_empty() { vec![default; channels as usize] } else { found.to_vec() }
+    })
+}
+
+/// Mean, scale and shift of each channel of a batch norm.
+fn fixed(weights: &Weights, op: &Op) -> Vec<Vec<f32>> {
+    let [weight, bias] = affine(weights, op);
+    let eps = if let Op::BatchNorm(o) = op { f64::from(o.eps) } else { 0.0 };
+    let variance = weights.values(op.name(), "running_var");
+    let scale = weight.iter().zip(variance).map(|(w, v)| (f64::from(*w) / (f64::from(*v) + eps).sqrt()) as f32);
+    vec![weights.values(op.name(), "running_mean").to_vec(), scale.collect(), bias]
+}
+
+/// A convolution's numbers, a folded batch norm multiplied in.
+struct Layer<'a> {
+    weight: &'a [f32],
+    /// Of each output channel.
+    bias: Vec<f32>,
+    /// Of each output channel.
+    scale: Vec<f32>,
+    in_channels: usize,
+    /// Input and output channels of a group.
+    group: [usize; 2],
+    kernel: [usize; 2],
+    /// Padding of a transposed convolution.
+    transposed: Option<u32>,
+    filter: Filter,
+}
+
+impl<'a> Layer<'a> {
+    fn new(weights: &'a Weights, op: &Op, fold: Option<&Op>, filter: Filter) -> Self {
+        let (in_channels, out_channels, kernel, groups, transposed) = match op {
+            Op::Conv2d(o) => (o.in_channels, o.out_channels, o.kernel, o.groups, None),
+            Op::ConvTranspose2d(o) => (o.in_channels, o.out_channels, o.kernel, 1, Some(o.padding)),
+            _ => (0, 0, [0, 0], 1, None),
+        };
+        let mut bias = weights.values(op.name(), "bias").to_vec();
+        bias.resize(out_channels as usize, 0.0);
+        let mut scale = vec![1.0; bias.len()];
+        if let Some(norm) = fold {
+            let norm = fixed(weights, norm);
+            for (o, b) in bias.iter_mut().enumerate() {
+                scale[o] = norm[1][o];
+                *b = (f64::from(*b - norm[0][o]) * f64::from(norm[1][o]) + f64::from(norm[2][o])) as f32;
+            }
+        }
+        Self {
+            weight: weights.values(op.name(), "weight"),
+            bias,
+            scale,
+            in_channels: in_channels as usize,
+            group: [in_channels, out_channels].map(|n| (n / groups) as usize),
+            kernel: kernel.map(|k| k as usize),
+            transposed,
+            filter,
+        }
+    }
+
+    /// The weight that takes input channel `i` under tap (ky, kx) of `part`'s kernel to output channel `o`.
+    fn at(&self, part: &Part, o: usize, i: usize, ky: usize, kx: usize) -> f32 {
+        let [kh, kw] = self.kernel;
+        if o >= self.bias.len() || i >= self.in_channels {
+            return 0.0;
+        }
+        let Some(padding) = self.transposed else {
+            let [inputs, outputs] = self.group;
+            if i / inputs != o / outputs {
+                return 0.0;
+            }
+            return self.scale[o] * self.weight[((o * inputs + i % inputs) * kh + ky) * kw + kx];
+        };
+        // Output pixel stride·j + phase hears input pixel j − pad + k through the real tap
+        // (phase + padding) mod stride + stride · (taps − 1 − k).
+        let real = |phase: u32, taps: u32, k: usize| {
+            let stride = self.filter.spread;
+            ((phase + padding) % stride) as usize + stride as usize * (taps as usize - 1 - k)
+        };
+        let (ky, kx) = (real(part.phase[1], self.filter.taps[0], ky), real(part.phase[0], self.filter.taps[1], kx));
+        if ky >= kh || kx >= kw {
+            return 0.0;
+        }
+        self.scale[o] * self.weight[((i * self.bias.len() + o) * kh + ky) * kw + kx]
+    }
+
+    fn part(&self, part: &Part, kernel: &Kernel) -> Vec<u8> {
+        let half = kernel.bound == Bound::Half;
+        let mut bytes = Vec::with_capacity(kernel.bound_bytes() as usize);
+        let mut put = |value: f32| {
+            if half {
+                bytes.extend(half::f16::from_f32(value.clamp(-65504.0, 65504.0)).to_le_bytes());
+            } else {
+                bytes.extend(value.to_le_bytes());
+            }
+        };
+        for block in part.first_block as usize..(part.first_block + part.blocks) as usize {
+            (0..16).for_each(|i| put(if i < 8 { self.bias.get(block * 8 + i).copied().unwrap_or(0.0) } else { 0.0 }));
+            for kx in 0..self.filter.taps[1] as usize {
+                for c in 0..self.filter.in_vectors as usize {
+                    for ky in 0..self.filter.taps[0] as usize {
+                        // Column-major: column k takes input channel k to the four outputs.
+                        for k in 0..32 {
+                            put(self.at(part, block * 8 + k / 16 * 4 + k % 4, c * 4 + k % 16 / 4, ky, kx));
+                        }
+                    }
+                }
+            }
+        }
+        bytes.resize(kernel.bound_bytes() as usize, 0);
+        bytes
+    }
+}
