@@ -6,7 +6,7 @@ use bouncelight::render::capture::{CapturedFrame, Layer, Picture};
 use bouncelight::scene::{self, Scene};
 use glam::Vec3;
 
-const SIZE: [u32; 2] = [256, 128];
+const SIZE: [u32; 2] = [192, 96];
 
 /// What is measured, relative to the mean of the path tracer's.
 #[derive(Debug)]
@@ -53,7 +53,7 @@ fn draw(lab: &Lab, scene: &Scene) -> (CapturedFrame, Traced) {
     let frame = crate::build::render(&lab.gpu, scene, camera, SIZE, 16);
     let [w, h] = SIZE.map(|s| s as usize);
     let points: Vec<[f32; 2]> = (0..w * h).map(|i| [(i % w) as f32 + 0.5, (i / w) as f32 + 0.5]).collect();
-    let options = Options { samples: 16, filter: 1.5, analytic_only: true, ..Default::default() };
+    let options = Options { samples: 8, filter: 1.5, analytic_only: true, ..Default::default() };
     (frame, lab.trace(scene, camera, SIZE, &points, &options))
 }
 
