@@ -148,7 +148,8 @@ impl Schedule {
         self.largest = self.largest.max(work);
         self.last_cost = seconds / work as f64;
         if self.lifted && seconds < 2.0 * self.target {
-            self.floor *= 2;
+            // No further than what was tried: a short list of points lifts every dispatch.
+            self.floor = (2 * self.floor).min(2 * self.largest);
         } else if self.lifted && seconds > 4.0 * self.target {
             self.floor = (self.floor / 2).max(GROUP.into());
         }
