@@ -13,8 +13,9 @@ const PLACES: usize = 16;
 /// Points times samples of the first dispatch: a few milliseconds on the slowest device.
 const FIRST_WORK: u64 = 1024;
 
-/// Most samples that one dispatch gives a point.
-const MOST_SAMPLES: u32 = 4096;
+/// Most samples that one dispatch gives a point. Mesa's CPU driver silently ends all loops of an invocation after 65,535
+/// turns in all (`LP_MAX_TGSI_LOOP_ITERATIONS`), those of the traversal included: about 1,000 rays.
+const MOST_SAMPLES: u32 = 16;
 
 /// Most samples that a dispatch gives a point where that means fewer points at once.
 const DEEPEST: u32 = 16;
