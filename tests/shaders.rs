@@ -113,6 +113,26 @@ fn structs_lie_in_memory_as_their_rust_twins() {
 }
 
 #[test]
+#[cfg(feature = "reference")]
+fn the_path_tracers_structs_lie_in_memory_as_their_rust_twins() {
+    use bouncelight::reference::Job;
+    use bouncelight::reference::scene::{ImageUse, RefMaterial, SceneInfo};
+    same_layout!("reference.path", "SceneInfo", SceneInfo, size size_of::<SceneInfo>(), [
+        environment, flags, light_count, truth_table, truth_count, analytic_table, environment_share,
+        environment_share_alone, environment_texels, environment_table, environment_size,
+    ]);
+    same_layout!("reference.path", "Job", Job, size size_of::<Job>(), [
+        world_from_view, tan_half, size, first_point, point_count, film_first, first_sample, sample_count, seed, half,
+        flags, filter_width, near, clamp, bounces, diffuse_bounces, glossy_bounces, filter_glossy,
+    ]);
+    same_layout!("reference.path", "ImageUse", ImageUse, size size_of::<ImageUse>(), [row0, texel, row1, bits, size]);
+    same_layout!("reference.path", "RefMaterial", RefMaterial, size size_of::<RefMaterial>(), [
+        base_color, emissive, flags, metallic, roughness, normal_scale, alpha_cutoff, base_use, rough_use, normal_use,
+        emissive_use,
+    ]);
+}
+
+#[test]
 fn a_wrong_offset_is_noticed() {
     let (members, _) = members("render.direct", "Light");
     let range = members.iter().find(|m| m.0 == "range").expect("Light has a range");

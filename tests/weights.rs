@@ -1,6 +1,6 @@
 //! The weights reader against every kind of bad file, and against mutated ones: an error that names the fault, never a panic.
 
-use bouncelight::net::format::{KEY, Problem, Weights, WeightsError};
+use bouncelight::net::format::{Dtype, KEY, Problem, Weights, WeightsError};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -157,7 +157,7 @@ fn places_in_the_file() {
 fn documents() {
     let set =
         |pointer: &'static str, value: Value| move |f: &mut File| *f.document.pointer_mut(pointer).unwrap() = value;
-    one(&["version 2", "reads version 1"], set("/version", json!(2)));
+    one(&["version 3", "up to version 2"], set("/version", json!(3)));
     one(&["table `screen`", "version 7"], set("/table/version", json!(7)));
     one(&["table `probe` is unknown"], set("/table/name", json!("probe")));
     one(&["`glow`", "no such feature"], set("/inputs/0/name", json!("glow")));
@@ -194,6 +194,132 @@ fn documents() {
 }
 
 #[test]
+fn version_2_writes_its_encodings() {
+    let second = |spoil: fn(&mut Value)| {
+        move |f: &mut File| {
+            f.document["version"] = json!(2);
+            f.document["inputs"] = json!([
+                {"name": "direct", "channels": 3, "encoding": "log1p_over_exposure"},
+                {"name": "hit", "channels": 1, "encoding": "flag"}
+            ]);
+            spoil(&mut f.document);
+        }
+    };
+    let mut file = File::sound();
+    second(|_| {})(&mut file);
+    let weights = Weights::from_bytes(&file.bytes()).unwrap();
+    // A file of version 1 means the same.
+    assert_eq!(weights.inputs, Weights::from_bytes(&File::sound().bytes()).unwrap().inputs);
+    one(&["`hit`", "missing"], second(|d| drop(d["inputs"][1].as_object_mut().unwrap().remove("encoding"))));
+    one(&["`hit`", "encoding `signed`", "known: flag"], second(|d| d["inputs"][1]["encoding"] = json!("signed")));
+    one(&["`direct`", "came with version 2"], |f| f.document["inputs"][0]["encoding"] = json!("log1p_over_exposure"));
+    one(&["licence is empty"], second(|d| d["licence"] = json!(" ")));
+}
+
+#[test]
+fn operators_with_a_field_twice() {
+    let file = File::sound();
+    let mut text = file.document.to_string();
+    text = text.replace(r#""name":"a""#, r#""name":"a","stride":1"#);
+    let header = json!({"__metadata__": {KEY: text}}).to_string();
+    let found = problems(&container(&header, b""));
+    assert!(found.iter().any(|p| p.to_string().contains("`stride` stands twice")), "{found:?}");
+}
+
+/// The sound file with the weights of `a` as bytes.
+fn in_bytes() -> File {
+    let mut file = File::sound();
+    file.tensors[0] = ("a.weight".into(), "I8", vec![4, 4, 3, 3], (0..144).map(|i| i as u8).collect());
+    let scales = [0.5f32, 0.25, 2.0, 1.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+    file.tensors.insert(1, ("a.weight_scale".into(), "F32", vec![4], scales));
+    file
+}
+
+#[test]
+fn bytes_are_multiplied_with_the_scale_of_their_output_channel() {
+    let weights = Weights::from_bytes(&in_bytes().bytes()).unwrap();
+    let tensor = &weights.tensors()["a.weight"];
+    assert_eq!(tensor.stored, Dtype::I8);
+    assert_eq!((tensor.data[1], tensor.data[35], tensor.data[36], tensor.data[143]), (0.5, 17.5, 9.0, -113.0));
+    assert!(!weights.tensors().contains_key("a.weight_scale"), "scales are no tensors of the graph");
+    let spoilt = |words: &[&str], spoil: fn(&mut File)| {
+        one(words, |f| {
+            *f = in_bytes();
+            spoil(f);
+        })
+    };
+    spoilt(&["`a.weight_scale` is missing"], |f| drop(f.tensors.remove(1)));
+    spoilt(&["`a.weight_scale`", "[3]", "[4]"], |f| {
+        f.tensors[1].2 = vec![3];
+        f.tensors[1].3.truncate(12);
+    });
+    spoilt(&["`a.weight_scale`", "F16", "scales are F32"], |f| {
+        f.tensors[1].1 = "F16";
+        f.tensors[1].3.truncate(8);
+    });
+    for bad in [f32::NAN, f32::INFINITY, 0.0, -1.0, f32::MAX] {
+        one(&["`a.weight_scale`", "index 2"], |f| {
+            *f = in_bytes();
+            f.tensors[1].3[8..12].copy_from_slice(&bad.to_le_bytes());
+        });
+    }
+    one(&["`a.bias`", "I8"], |f| {
+        f.tensors[1].1 = "I8";
+        f.tensors[1].3.truncate(4);
+    });
+    // Scales without bytes belong to nothing.
+    one(&["`a.weight_scale`", "no operator"], |f| {
+        f.tensors.push(("a.weight_scale".into(), "F32", vec![4], vec![0; 16]))
+    });
+}
+
+#[test]
+fn what_is_written_is_read_again() {
+    for name in ["unet", "conv3x3_wide", "upsample4", "add"] {
+        let weights = Weights::load(&fixture(&format!("{name}.safetensors"))).unwrap();
+        for (dtype, tolerance) in [(Dtype::F32, 0.0), (Dtype::F16, 1.0 / 2048.0), (Dtype::I8, 0.5 / 127.0)] {
+            let bytes = weights.clone().stored_as(dtype).to_bytes();
+            let again = Weights::from_bytes(&bytes).unwrap();
+            assert_eq!(
+                (&again.graph, &again.inputs, &again.provenance),
+                (&weights.graph, &weights.inputs, &weights.provenance)
+            );
+            for (name, tensor) in weights.tensors() {
+                let largest = tensor.data.iter().fold(0f32, |m, v| m.max(v.abs()));
+                let other = &again.tensors()[name];
+                assert_eq!(
+                    (other.stored == dtype, &other.shape),
+                    (tensor.shape.len() == 4 || dtype == Dtype::F32, &tensor.shape)
+                );
+                let worst = tensor.data.iter().zip(&other.data).fold(0f32, |m, (a, b)| m.max((a - b).abs()));
+                let allowed = if tensor.shape.len() == 4 { 1.001 * tolerance * largest } else { 0.0 };
+                assert!(worst <= allowed, "{name} as {dtype:?}: {worst} > {allowed}");
+            }
+        }
+    }
+}
+
+#[test]
+fn variances_below_zero() {
+    let mut file = File::sound();
+    file.document["graph"].as_array_mut().unwrap().insert(
+        1,
+        json!({"op": "batch_norm", "name": "n", "input": "h", "output": "i", "channels": 4, "affine": false}),
+    );
+    file.document["graph"][2]["input"] = json!("i");
+    let four = |v: f32| [0.0, 0.0, v, 0.0].iter().flat_map(|v: &f32| v.to_le_bytes()).collect::<Vec<u8>>();
+    file.tensors.push(("n.running_mean".into(), "F32", vec![4], four(-1.0)));
+    file.tensors.push(("n.running_var".into(), "F32", vec![4], four(1.0)));
+    Weights::from_bytes(&file.bytes()).unwrap();
+    file.tensors.last_mut().unwrap().3 = four(-1.0);
+    let found = file.problems();
+    assert!(
+        matches!(&found[..], [Problem::Negative { tensor, index: 2, .. }] if tensor == "n.running_var"),
+        "{found:?}"
+    );
+}
+
+#[test]
 fn all_faults_are_reported_at_once() {
     let mut file = File::sound();
     file.tensors[0].2 = vec![4, 4, 9];
@@ -206,69 +332,4 @@ fn all_faults_are_reported_at_once() {
     for word in ["a.weight", "a.bias", "b.bias", "stray", "cell"] {
         assert!(text.contains(word), "{word} in {text}");
     }
-}
-
-/// Flips, overwrites, inserts, deletes and swaps pieces of sound files. The reader must come back, with whatever answer.
-#[test]
-fn mutated_files_never_panic() {
-    let sound = File::sound().bytes();
-    let fixture = std::fs::read(fixture("upsample.safetensors")).unwrap();
-    let mut state = 0x2545_f491_4f6c_dd1du64;
-    let mut next = |below: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) as usize) % below.max(1)
-    };
-    let tokens: [&[u8]; 12] = [
-        b"-1",
-        b"1e400",
-        b"18446744073709551615",
-        b"null",
-        b"[]",
-        b"{}",
-        b"\"\"",
-        b"0",
-        b"}",
-        b"\\u0000",
-        b"NaN",
-        b"\xff",
-    ];
-    let (mut refused, mut total) = (0, 0);
-    for round in 0..24_000 {
-        let mut bytes = if round % 2 == 0 { sound.clone() } else { fixture.clone() };
-        let header = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
-        for _ in 0..1 + next(3) {
-            // Mostly the header, where the structure is.
-            let reach = if next(8) == 0 { bytes.len() } else { header.min(bytes.len()) };
-            let at = next(reach);
-            match next(6) {
-                0 => bytes[at] ^= 1 << next(8),
-                1 => bytes[at] = next(256) as u8,
-                2 => {
-                    drop(bytes.splice(at..(at + next(5)).min(bytes.len()), tokens[next(tokens.len())].iter().copied()))
-                }
-                3 => drop(bytes.drain(at..(at + 1 + next(16)).min(bytes.len()))),
-                4 => bytes.truncate(at.max(8)),
-                _ => {
-                    let other = next(reach);
-                    bytes.swap(at, other);
-                }
-            }
-            // Half of the time the length is put right, so that mutations get past the first check.
-            if next(2) == 0 && bytes.len() >= 8 {
-                let length = (header as u64).min(bytes.len() as u64 - 8);
-                bytes[..8].copy_from_slice(&length.to_le_bytes());
-            }
-            if bytes.len() < 9 {
-                break;
-            }
-        }
-        total += 1;
-        if let Err(error) = Weights::from_bytes(&bytes) {
-            assert!(!error.to_string().is_empty());
-            refused += 1;
-        }
-    }
-    assert_eq!(total, 24_000);
-    println!("{refused} of {total} mutated files refused");
-    assert!(refused > total / 2 && refused < total, "some mutations are harmless, most are not: {refused}");
 }

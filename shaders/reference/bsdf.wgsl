@@ -27,10 +27,6 @@ fn fresnel(s: Surface, v_h: f32) -> vec3f {
     );
 }
 
-fn width_of(s: Surface) -> f32 {
-    return max(s.roughness * s.roughness, 1e-3);
-}
-
 struct Lobe {
     // Value times n.l.
     value: vec3f,
@@ -44,7 +40,7 @@ fn gloss_lobe(s: Surface, l: vec3f) -> Lobe {
     let h = normalize(sum);
     let n_l = saturate(dot(s.n, l));
     let n_h = saturate(dot(s.n, h));
-    let alpha = width_of(s);
+    let alpha = s.alpha;
     let a2 = alpha * alpha;
     let c = cross(s.n, h);
     let root = a2 * n_h * n_h + dot(c, c);
@@ -75,7 +71,7 @@ struct Scatter {
 
 fn sample_gloss(s: Surface, u: vec2f) -> Scatter {
     let frame = frame_around(s.n);
-    let alpha = width_of(s);
+    let alpha = s.alpha;
     let v = s.v * frame;
     let h = sample_visible_normal(vec3f(v.xy, max(v.z, 1e-4)), alpha, u);
     let l = reflect(-v, h);

@@ -27,13 +27,16 @@ fn coordinates_at(extra: u32, w: vec3f) -> vec4f {
     return vec4f(a.xy * w.x + a.zw * w.y + b.xy * w.z, b.zw * w.x + c.xy * w.y + c.zw * w.z);
 }
 
+// Four half floats, not negative, from two words. Not every device has `unpack2x16float`.
+fn halves(words: vec2u) -> vec4f {
+    let bits = vec4u(words.x, words.x >> 16u, words.y, words.y >> 16u) & vec4u(0x7fffu);
+    return bitcast<vec4f>(bits << vec4u(13u)) * 5.192297e33;
+}
+
 fn color_at(extra: u32, w: vec3f) -> vec4f {
     if extra == NONE { return vec4f(1.0); }
     let a = triangles[extra + 4u];
-    let b = triangles[extra + 5u].xy;
-    return vec4f(unpack2x16float(a.x), unpack2x16float(a.y)) * w.x
-        + vec4f(unpack2x16float(a.z), unpack2x16float(a.w)) * w.y
-        + vec4f(unpack2x16float(b.x), unpack2x16float(b.y)) * w.z;
+    return halves(a.xy) * w.x + halves(a.zw) * w.y + halves(triangles[extra + 5u].xy) * w.z;
 }
 
 fn wrapped(i: i32, side: i32, mode: u32) -> i32 {
@@ -60,14 +63,17 @@ fn image_at(use_: ImageUse, uv: vec4f, otherwise: vec4f) -> vec4f {
     let at = vec2f(dot(use_.row0, p), dot(use_.row1, p));
     // Far coordinates would leave the range of integers.
     let place = clamp(at, vec2f(-1e4), vec2f(1e4)) * vec2f(use_.size);
-    if (use_.bits & 64u) != 0u { return texel_at(use_, vec2i(floor(place))); }
-    let low = floor(place - 0.5);
-    let f = place - 0.5 - low;
-    let q = vec2i(low);
-    return mix(
-        mix(texel_at(use_, q), texel_at(use_, q + vec2i(1, 0)), f.x),
-        mix(texel_at(use_, q + vec2i(0, 1)), texel_at(use_, q + vec2i(1, 1)), f.x), f.y
-    );
+    let linear = (use_.bits & 64u) == 0u;
+    let low = select(floor(place), floor(place - 0.5), linear);
+    let f = select(vec2f(0.0), place - 0.5 - low, linear);
+    // A loop, not four calls: drivers inline everything, and this is called from many places.
+    var sum = vec4f(0.0);
+    for (var i = 0u; i < 4u; i++) {
+        let corner = vec2u(i & 1u, i >> 1u);
+        let w = select(1.0 - f, f, corner == vec2u(1u));
+        if w.x * w.y > 0.0 { sum += w.x * w.y * texel_at(use_, vec2i(low) + vec2i(corner)); }
+    }
+    return sum;
 }
 
 // Chance that a ray is stopped at this place of a triangle.
@@ -109,6 +115,8 @@ struct Surface {
     // What the single-scattering lobe loses over what it keeps, and the mean of what it keeps over directions.
     missing: f32,
     mean: f32,
+    // Width of the lobe.
+    alpha: f32,
 }
 
 fn energy(roughness: f32, n_v: f32) -> f32 {
@@ -185,6 +193,7 @@ fn surface_at(hit: Hit, direction: vec3f) -> Surface {
     }
     s.albedo = s.base * (1.0 - s.metallic) * (1.0 - env_brdf(vec3f(0.04), s.roughness, max(n_v, 0.0)).x);
     s.gloss = env_brdf(mix(vec3f(0.04), s.base, s.metallic), s.roughness, max(n_v, 0.0));
+    s.alpha = max(s.roughness * s.roughness, 1e-3);
     let kept = energy(s.roughness, s.n_v);
     s.missing = (1.0 - kept) / kept;
     s.mean = energy_mean(s.roughness);

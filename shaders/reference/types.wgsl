@@ -47,7 +47,8 @@ struct Job {
     bounces: u32,
     diffuse_bounces: u32,
     glossy_bounces: u32,
-    pad: vec2u,
+    filter_glossy: f32,
+    pad: u32,
 }
 
 const JOB_POINTS: u32 = 1u;

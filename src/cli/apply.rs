@@ -2,10 +2,15 @@
 
 use super::args::{Global, usage};
 use crate::{
+    gpu::{readback, timing::Recorder},
     image_io::{self, Image},
-    net::{cpu, format::Weights, pictures},
+    net::cpu::{self, Tensor},
+    net::format::Weights,
+    net::gpu::{NetError, Network, Options},
+    net::{pictures, plan::PlanError},
 };
 use anyhow::Result;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -33,7 +38,7 @@ pub struct Args {
     dropout: Option<u32>,
 }
 
-pub fn run(_global: &Global, args: Args) -> Result<()> {
+pub fn run(global: &Global, args: Args) -> Result<()> {
     let name = args.output.display().to_string();
     if name != "-" && !name.to_ascii_lowercase().ends_with(".png") {
         return Err(usage(format!("{name}: the picture's name must end in .png")));
@@ -67,7 +72,7 @@ pub fn run(_global: &Global, args: Args) -> Result<()> {
             normal: &normal.pixels,
         },
     )?;
-    let output = cpu::run(&weights, &input)?;
+    let output = network(global, &weights, &input, args.dropout)?;
     let shown = pictures::picture(&output);
     let bytes: Vec<u8> = shown.iter().map(|v| (v * 255.0).round() as u8).collect();
     let command: Vec<String> = std::env::args().skip(1).collect();
@@ -81,11 +86,54 @@ pub fn run(_global: &Global, args: Args) -> Result<()> {
     Ok(())
 }
 
-/// A picture without transparency; an alpha channel that is 1 everywhere is left out.
+/// Runs on the GPU, or on the slow CPU twin where there is none or the picture is too large for it, saying so.
+fn network(global: &Global, weights: &Weights, input: &Tensor, dropout: Option<u32>) -> Result<Tensor> {
+    let slow = |reason: &dyn std::fmt::Display| {
+        if !global.quiet {
+            eprintln!("warning: {reason}; running without a GPU, which takes minutes for a large network");
+        }
+        Ok(cpu::run_with(weights, input, dropout)?)
+    };
+    let gpu = match global.open_gpu() {
+        Ok(gpu) => gpu,
+        // Whoever names an adapter wants that one.
+        Err(e) if global.adapter.is_some() => return Err(e),
+        Err(e) => return slow(&e),
+    };
+    let options = Options { dropout, ..Default::default() };
+    let size = [input.shape.width, input.shape.height];
+    let network = match Network::with_options(&gpu.device, &gpu.queue, weights, size, options) {
+        Ok(network) => network,
+        Err(e @ (NetError::Plan(PlanError::TooLarge { .. }) | NetError::Limit { .. })) => return slow(&e),
+        Err(e) => return Err(e.into()),
+    };
+    let place = network.input();
+    gpu.queue.write_buffer(place.buffer, place.offset, bytemuck::cast_slice(&input.to_padded()));
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    network.record(&mut Recorder::new(&mut encoder));
+    gpu.queue.submit([encoder.finish()]);
+    let place = network.output();
+    let bytes = readback::buffer(&gpu.device, &gpu.queue, place.buffer, place.offset, place.size)?;
+    let shape = network.plan().tensors[network.plan().output].shape;
+    Ok(Tensor::from_padded(shape, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes)))
+}
+
+/// A picture of 8 bits without transparency; an alpha channel that is 1 everywhere is left out.
 fn rgb(path: &Path) -> Result<Image> {
     let image = image_io::read_png(path)?;
     if image.channels == 4 && image.pixels.chunks_exact(4).any(|p| p[3] < 1.0) {
         return Err(usage(format!("{} is transparent in places; save it without an alpha channel", path.display())));
     }
+    if bit_depth(path)? == 16 {
+        let why = "these networks know pictures of 8; convert it, with the scale that the network was trained on";
+        return Err(usage(format!("{} has 16 bits a channel, and {why}", path.display())));
+    }
     Ok(Image { channels: 3, pixels: image.to_rgb(), ..image })
+}
+
+/// Bits of a channel: byte 24 of a PNG that has been read already.
+fn bit_depth(path: &Path) -> Result<u8> {
+    let mut start = [0; 25];
+    std::fs::File::open(path)?.read_exact(&mut start)?;
+    Ok(start[24])
 }

@@ -53,7 +53,8 @@ impl Progress {
         if self.kind == ProgressKind::Plain && self.last_line.elapsed() >= PLAIN_INTERVAL {
             self.last_line = Instant::now();
             let left = self.started.elapsed().as_secs_f64() / done * (total as f64 - done).max(0.0);
-            eprintln!("{done:.0}/{total} {}, about {left:.0} s left", self.what);
+            let left = if done > 0.0 { format!("about {left:.0} s left") } else { "no guess yet".into() };
+            eprintln!("{done:.0}/{total} {}, {left}", self.what);
         }
     }
 

@@ -5,7 +5,7 @@ use crate::image_io;
 use crate::net::convert::{Arch, Norm, Recipe, convert};
 use crate::net::{
     format::{Dtype, Provenance, Weights},
-    plan::Plan,
+    plan::{Options, Plan},
 };
 use anyhow::{Context, Result};
 use clap::ValueEnum;
@@ -135,8 +135,9 @@ fn convert_file(args: &ConvertArgs) -> Result<()> {
 
 fn info(weights: &Weights, size: [u32; 2]) -> Result<()> {
     let cells = size.map(|n| n.div_ceil(weights.cell));
-    let [width, height] = weights.graph.inner_size(cells[0], cells[1])?;
-    let plan = Plan::new(&weights.graph, width, height)?;
+    // Whatever the size, it can be told what it takes.
+    let plan = Plan::with(&weights.graph, cells[0], cells[1], &Options { limit: u64::MAX, ..Default::default() })?;
+    let [width, height] = plan.inner;
     let features: Vec<_> =
         weights.inputs.iter().map(|f| format!("{} {} ({})", f.name, f.channels, f.encoding)).collect();
     println!("name       {}", weights.name);
@@ -155,20 +156,19 @@ fn info(weights: &Weights, size: [u32; 2]) -> Result<()> {
         plan.traffic() as f64 / 1e6,
         plan.arena_bytes as f64 / 1e6
     );
+    let rows = plan.rows();
+    let wide = rows.iter().map(|row| row.name.len()).max().unwrap_or(0).max("layer".len()) + 2;
+    let head = ["result", "parameters", "MFLOP", "bytes", "offset"];
     println!(
-        "{:<16}{:<28}{:>16}{:>12}{:>10}{:>12}{:>12}",
-        "layer", "kind", "result", "parameters", "MFLOP", "bytes", "offset"
+        "{:<wide$}{:<28}{:>16}{:>12}{:>10}{:>12}{:>12}",
+        "layer", "kind", head[0], head[1], head[2], head[3], head[4]
     );
-    for row in plan.rows() {
+    for row in rows {
         let shape = format!("{}x{}x{}", row.shape.channels, row.shape.height, row.shape.width);
+        let mflop = row.flops as f64 / 1e6;
         println!(
-            "{:<16}{:<28}{shape:>16}{:>12}{:>10.1}{:>12}{:>12}",
-            row.name,
-            row.kind,
-            row.parameters,
-            row.flops as f64 / 1e6,
-            row.bytes,
-            row.offset
+            "{:<wide$}{:<28}{shape:>16}{:>12}{mflop:>10.1}{:>12}{:>12}",
+            row.name, row.kind, row.parameters, row.bytes, row.offset
         );
     }
     if !weights.provenance.is_empty() {

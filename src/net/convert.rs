@@ -2,7 +2,7 @@
 //!
 //! Everything that is wrong with keys, shapes, types and values is reported at once.
 
-mod published;
+pub mod published;
 
 use super::format::{Dtype, Feature, Output, Problem, Provenance, Table, WeightTensor, Weights, WeightsError};
 use super::header::{self, Header, TensorInfo};

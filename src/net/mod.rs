@@ -28,3 +28,6 @@ mod shape;
 mod shipped;
 mod stored;
 mod write;
+
+/// The published generators as graphs.
+pub use convert::published as arch;

@@ -47,8 +47,11 @@ pub struct Job {
     pub diffuse_bounces: u32,
     /// Most glossy bounces.
     pub glossy_bounces: u32,
+    /// Cycles' "Filter Glossy" (1 by default there, 0 for none): after a scattering of low density the specular lobes of
+    /// all further surfaces are widened, which loses some light. Biased; for comparisons with Cycles only.
+    pub filter_glossy: f32,
     /// Unused.
-    pub pad: [u32; 2],
+    pub pad: u32,
 }
 
 /// Flag: points come from the list at group 1, binding 1.

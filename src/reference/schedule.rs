@@ -2,7 +2,10 @@
 //! viewer wants its frame. No wgpu here.
 //!
 //! A pass gives every point the same number of samples of one half; a pass that takes too long for one dispatch is cut by
-//! points. How long a point takes differs by place (sky against a corner), so speed is remembered by place.
+//! points. Passes grow: the first gives one sample, later ones several, since an invocation that has more than one path to
+//! trace need not wait for its neighbours' long ones. How long a point takes differs by place (sky against a corner), so
+//! speed is remembered by place. Where the time is not in the work (a loaded machine), smaller dispatches gain nothing;
+//! then a floor rises.
 
 /// Places that speed is remembered for.
 const PLACES: usize = 16;
@@ -10,11 +13,18 @@ const PLACES: usize = 16;
 /// Points times samples of the first dispatch: a few milliseconds on the slowest device.
 const FIRST_WORK: u64 = 1024;
 
-/// Most samples that one dispatch gives a point.
-const MOST_SAMPLES: u32 = 4096;
+/// Most samples that one dispatch gives a point. Mesa's CPU driver silently ends all loops of an invocation after 65,535
+/// turns in all (`LP_MAX_TGSI_LOOP_ITERATIONS`), those of the traversal included: about 1,000 rays.
+const MOST_SAMPLES: u32 = 16;
+
+/// Most samples that a dispatch gives a point where that means fewer points at once.
+const DEEPEST: u32 = 16;
 
 /// Points of a workgroup: less would leave lanes idle.
-const LEAST_POINTS: u32 = 64;
+const GROUP: u32 = 64;
+
+/// Points that keep several workgroups busy.
+const SEVERAL_GROUPS: u32 = 4 * GROUP;
 
 /// One dispatch: `samples` more samples of `half` for points `first..first + count`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +47,8 @@ struct Pass {
     half: usize,
     samples: u32,
     cursor: u32,
+    /// It would have fewer samples if it were not for the floor.
+    lifted: bool,
 }
 
 /// The work on one film.
@@ -53,12 +65,25 @@ pub struct Schedule {
     last_cost: f64,
     /// The most work that a dispatch has done so far.
     largest: u64,
+    /// Work below which a dispatch is not made smaller, and whether the last one would have been.
+    floor: u64,
+    lifted: bool,
 }
 
 impl Schedule {
     /// For `points` points and dispatches of `target` seconds.
     pub fn new(points: u32, target: f64) -> Self {
-        Self { points, target, done: [0; 2], pass: None, cost: [None; PLACES], last_cost: 0.0, largest: 0 }
+        Self {
+            points,
+            target,
+            done: [0; 2],
+            pass: None,
+            cost: [None; PLACES],
+            last_cost: 0.0,
+            largest: 0,
+            floor: FIRST_WORK,
+            lifted: false,
+        }
     }
 
     /// The same with other points, at the speed known from these.
@@ -111,8 +136,10 @@ impl Schedule {
                 break;
             }
         }
-        let count = (end - pass.cursor).max(LEAST_POINTS).min(self.points - pass.cursor);
-        let count = if pass.cursor + count < self.points { count / LEAST_POINTS * LEAST_POINTS } else { count };
+        let least = (self.floor / u64::from(pass.samples)).clamp(GROUP.into(), self.points.max(GROUP).into()) as u32;
+        self.lifted = pass.lifted || (end < self.points && end - pass.cursor < least);
+        let count = (end - pass.cursor).max(least).min(self.points - pass.cursor);
+        let count = if pass.cursor + count < self.points { count / GROUP * GROUP } else { count };
         let first_sample = self.done[pass.half];
         Some(Chunk { half: pass.half, first: pass.cursor, count, first_sample, samples: pass.samples })
     }
@@ -122,6 +149,12 @@ impl Schedule {
         let work = u64::from(chunk.count) * u64::from(chunk.samples);
         self.largest = self.largest.max(work);
         self.last_cost = seconds / work as f64;
+        // Only what was as large as the floor tells of it.
+        if self.lifted && seconds < 2.0 * self.target && 2 * work > self.floor {
+            self.floor = self.floor.saturating_mul(2);
+        } else if self.lifted && seconds > 4.0 * self.target {
+            self.floor = (self.floor / 2).max(GROUP.into());
+        }
         for place in self.place(chunk.first)..=self.place(chunk.first + chunk.count - 1) {
             self.cost[place] = Some(self.last_cost);
         }
@@ -151,8 +184,14 @@ impl Schedule {
             .sum();
         let by_time = (self.target / time.max(1e-12)) as u64;
         let by_caution = self.most_work() / u64::from(self.points);
-        let samples = by_time.min(by_caution).clamp(1, u64::from(MOST_SAMPLES)) as u32;
-        Some(Pass { half, samples: samples.min(behind(half)), cursor: 0 })
+        let at_once = by_time.min(by_caution).clamp(1, u64::from(MOST_SAMPLES)) as u32;
+        let slowest = self.cost.iter().map(|c| c.unwrap_or(f64::INFINITY)).fold(0.0, f64::max);
+        let deep = (self.target / (f64::from(SEVERAL_GROUPS) * slowest)) as u32;
+        let samples = at_once.max(deep.min(DEEPEST).min(self.done[half]));
+        let least = (self.floor / u64::from(self.points)).min(MOST_SAMPLES.into()) as u32;
+        let lifted = samples < least && behind(half) > samples;
+        let samples = samples.max(least);
+        Some(Pass { half, samples: samples.min(behind(half)), cursor: 0, lifted })
     }
 
     /// Most points times samples of the next dispatch: never more than twice what was tried.
@@ -246,6 +285,34 @@ mod tests {
         let chunks = run(&mut schedule, 100_000, |c| 1e-6 * f64::from(c.count) * f64::from(c.samples));
         assert!(chunks.len() < 60, "{} dispatches", chunks.len());
         assert!(chunks.iter().any(|c| c.0.samples > 1000));
+    }
+
+    #[test]
+    fn a_loaded_machine_gets_no_dust() {
+        // Every dispatch waits 150 ms for its turn, which is more than it should take in all.
+        let mut schedule = Schedule::new(100_000, 0.1);
+        let chunks = run(&mut schedule, 16, |c| 0.15 + 1e-6 * f64::from(c.count) * f64::from(c.samples));
+        check_complete(&chunks, 100_000, 16);
+        assert!(chunks.len() < 60, "{} dispatches", chunks.len());
+        assert!(chunks.iter().all(|c| c.1 < 0.6));
+        // Few points for a long time: the floor stays where it means something.
+        let mut schedule = Schedule::new(153, 0.1);
+        let chunks = run(&mut schedule, 50_000, |c| 0.15 + 1e-5 * f64::from(c.count) * f64::from(c.samples));
+        check_complete(&chunks, 153, 50_000);
+        assert!(chunks.len() < 1000, "{} dispatches", chunks.len());
+        assert!(schedule.floor < 1 << 30, "{}", schedule.floor);
+        assert!(chunks.iter().all(|c| c.1 < 0.8));
+    }
+
+    #[test]
+    fn later_passes_are_deep() {
+        let mut schedule = Schedule::new(500_000, 0.1);
+        let chunks = run(&mut schedule, 256, |c| 1e-3 + 1e-6 * f64::from(c.count) * f64::from(c.samples));
+        check_complete(&chunks, 500_000, 256);
+        assert_eq!(chunks[0].0.samples, 1);
+        let deep: f64 = chunks.iter().filter(|c| c.0.samples >= 8).map(|c| c.1).sum();
+        assert!(deep > 0.8 * chunks.iter().map(|c| c.1).sum::<f64>(), "{deep} s");
+        assert!(chunks.iter().all(|c| c.1 < 0.25));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! The sound files that mutations start from.
 
+#![allow(dead_code, reason = "each test binary uses a part")]
+
 use bouncelight::net::format::KEY;
 use serde_json::{Value, json};
 

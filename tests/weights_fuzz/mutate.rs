@@ -35,12 +35,12 @@ pub fn case(files: &[File], random: &mut Random) -> Vec<u8> {
     let mut entries = None;
     for _ in 0..1 + random.below(3) {
         match random.below(10) {
-            0..=3 if document.is_some() => spoil_value(document.as_mut().expect("just seen"), random, 0),
-            0..=5 => {
+            0..=4 if document.is_some() => spoil_value(document.as_mut().expect("just seen"), random, 0),
+            5 => {
                 let list = entries.get_or_insert_with(|| file.entries());
                 spoil_entries(list, random);
             }
-            6 => spoil_tensor(&mut file, random),
+            6..=7 => spoil_tensor(&mut file, random),
             _ => {}
         }
     }
@@ -80,6 +80,10 @@ fn palette(random: &mut Random) -> Value {
 fn spoil_value(value: &mut Value, random: &mut Random, depth: usize) {
     let stop = random.below(6) == 0 && depth > 0;
     match value {
+        // Most of what there is to spoil is in the operators.
+        Value::Object(map) if depth == 0 && map.contains_key("graph") && random.below(3) > 0 => {
+            spoil_value(&mut map["graph"], random, 1);
+        }
         Value::Object(map) if !map.is_empty() && !stop => {
             let key = map.keys().nth(random.below(map.len())).expect("below its length").clone();
             match random.below(12) {
@@ -138,7 +142,12 @@ fn spoil_entries(entries: &mut Vec<(String, Value)>, random: &mut Random) {
         }
         4 => {
             let dtypes = ["F32", "F16", "I8", "BF16", "F64", "I64", "BOOL", "F8_E4M3", "Q4", ""];
-            entries[at].1["dtype"] = json!(*random.pick(&dtypes));
+            let same_size = match entries[at].1["dtype"].as_str() {
+                Some("F32") => "I32",
+                Some("F16") => "BF16",
+                _ => "U8",
+            };
+            entries[at].1["dtype"] = json!(if random.below(2) == 0 { same_size } else { *random.pick(&dtypes) });
         }
         5 => {
             // A shape of the same size, or one whose size overflows.
@@ -154,7 +163,7 @@ fn spoil_entries(entries: &mut Vec<(String, Value)>, random: &mut Random) {
         6 => {
             let side = random.below(2);
             let offset = entries[at].1["data_offsets"][side].as_u64().unwrap_or(0);
-            let moves = [offset.wrapping_sub(1), offset + 1, offset + 4, 0, u64::MAX, 1 << 40];
+            let moves = [offset.wrapping_sub(1), offset.wrapping_add(1), offset.wrapping_add(4), 0, u64::MAX, 1 << 40];
             entries[at].1["data_offsets"][side] = json!(*random.pick(&moves));
         }
         _ => spoil_value(&mut entries[at].1, random, 0),
@@ -165,7 +174,7 @@ fn spoil_entries(entries: &mut Vec<(String, Value)>, random: &mut Random) {
 fn spoil_tensor(file: &mut File, random: &mut Random) {
     let at = random.below(file.tensors.len());
     let (_, dtype, shape, bytes) = &mut file.tensors[at];
-    match random.below(4) {
+    match random.below(8) {
         0 => bytes.truncate(random.below(bytes.len())),
         1 => bytes.extend([0; 3]),
         2 if !shape.is_empty() => {

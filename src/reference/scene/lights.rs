@@ -33,10 +33,6 @@ struct Choice {
 }
 
 pub(super) fn pack(scene: &Scene, flat: &Flat) -> Lights {
-    let mut vectors: Vec<[f32; 4]> = Vec::new();
-    for light in &scene.lights {
-        vectors.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&LightGpu::new(light))));
-    }
     let reach = extent(flat);
     let analytic: Vec<Choice> =
         (0u32..).zip(&scene.lights).map(|(id, l)| Choice { id, power: power(&l.kind, l.color, reach) }).collect();
@@ -75,6 +71,13 @@ pub(super) fn pack(scene: &Scene, flat: &Flat) -> Lights {
         (true, true) => 1.0,
         (false, true) => (1.0 - EVEN) * sky_power / (sky_power + known) + EVEN * 0.5,
     };
+    let mut vectors: Vec<[f32; 4]> = Vec::new();
+    for (id, light) in (0u32..).zip(&scene.lights) {
+        let mut gpu = LightGpu::new(light);
+        // Rays that hit a light want to know how it would have been sampled; 0 tells that it is not there in truth.
+        gpu.pad[0] = truth.iter().find(|t| t.0 == id).map_or(0, |t| (t.1 as f32).to_bits());
+        vectors.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&gpu)));
+    }
     let truth_table = vectors.len() as u32;
     vectors.extend(alias(&truth));
     let analytic_table = vectors.len() as u32;

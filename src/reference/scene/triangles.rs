@@ -148,7 +148,7 @@ fn extra(data: &mut Vec<[u32; 4]>, mesh: &Mesh, corners: [usize; 3], world: Mat4
     data.push(tangents);
     let color = |i: usize| {
         let [r, g, b, a] =
-            mesh.colors.get(i).copied().unwrap_or([1.0; 4]).map(|v| u32::from(f16::from_f32(v).to_bits()));
+            mesh.colors.get(i).copied().unwrap_or([1.0; 4]).map(|v| u32::from(f16::from_f32(v.max(0.0)).to_bits()));
         [r | g << 16, b | a << 16]
     };
     let [a, b, c] = corners.map(color);

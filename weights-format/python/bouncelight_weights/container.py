@@ -29,8 +29,11 @@ def _refuse(text):
 
 
 def load_json(text):
-    """Objects as `Pairs`; NaN and Infinity are refused, as the JSON specification and the Rust reader do."""
-    return json.loads(text, object_pairs_hook=Pairs, parse_constant=_refuse)
+    """Objects as `Pairs`; NaN, Infinity and halves of surrogate pairs are refused, as the Rust reader does."""
+    value = json.loads(text, object_pairs_hook=Pairs, parse_constant=_refuse)
+    if "\\u" in text:
+        json.dumps(value, ensure_ascii=False).encode()
+    return value
 
 
 def _natural(value):
@@ -41,6 +44,9 @@ def _tensor(name, value):
     """(dtype, shape, [from, to]) of a header entry."""
     if not isinstance(value, Pairs):
         raise NotReadable("not-safetensors", f"the header is not as specified: tensor `{name}` is no object")
+    keys = [key for key, _ in value]
+    if any(keys.count(key) > 1 for key in ("dtype", "shape", "data_offsets")):
+        raise NotReadable("not-safetensors", f"the header is not as specified: tensor `{name}` has a field twice")
     entry = dict(value)
     dtype, shape, place = (entry.get(k) for k in ("dtype", "shape", "data_offsets"))
     sound = (isinstance(dtype, str) and isinstance(shape, list) and not isinstance(shape, Pairs) and all(map(_natural, shape))

@@ -50,7 +50,7 @@ _DOCUMENT = {
     "version": (_natural, True), "name": (_text, False), "licence": (_text, True), "table": (lambda v: _object(v, _TABLE), True),
     "inputs": (lambda v: isinstance(v, list) and all(_object(f, _FEATURE) for f in v), True), "cell": (_u32, True),
     "output": (lambda v: _object(v, _OUTPUT), True), "graph": (lambda v: isinstance(v, list), True),
-    "provenance": (lambda v: v is None or isinstance(v, dict), False),
+    "provenance": (lambda v: True, False),
 }
 
 
@@ -74,6 +74,8 @@ def check(doc):
         fault(f"cell is {doc['cell']}, allowed are 1 to 64")
     if not doc["licence"].strip():
         fault("licence is empty; write an SPDX expression, or LicenseRef-unknown")
+    if not isinstance(doc.get("provenance"), (dict, type(None))):
+        fault("provenance is no object")
     if len(doc["graph"]) > MAX_OPS:
         fault(f"the graph has {len(doc['graph'])} operators, more than the {MAX_OPS} allowed")
         return problems, None

@@ -1,0 +1,104 @@
+//! Every operator: PyTorch ↔ CPU twin ↔ kernels, fused and unfused, in 32 and 16 bits.
+
+use crate::hashed::{self, cases, graphs};
+use crate::{common, run_network};
+use bouncelight::gpu::Gpu;
+use bouncelight::net::cpu;
+use bouncelight::net::gpu::{Network, Options, Variant};
+use bouncelight::net::op_facts::KINDS;
+use bouncelight::net::plan::Precision;
+use std::collections::BTreeSet;
+
+pub const TOLERANCE: f32 = 1e-4;
+pub const TOLERANCE_HALF: f32 = 5e-3;
+
+#[test]
+fn the_cpu_twin_agrees_with_pytorch_on_every_operator() {
+    let (cases, metadata) = cases("operators.safetensors");
+    let graphs = graphs(&metadata.unwrap());
+    assert_eq!(graphs.keys().collect::<Vec<_>>(), cases.keys().collect::<Vec<_>>());
+    let mut worst = (0f32, String::new());
+    for (name, graph) in &graphs {
+        let weights = hashed::network(graph);
+        for case in &cases[name] {
+            let input = hashed::input(name, graph.input_channels, case.size);
+            let e = case.error(&cpu::run(&weights, &input).unwrap());
+            assert!(e <= TOLERANCE, "{name} {:?}: relative error {e}", case.size);
+            worst = if e > worst.0 { (e, name.clone()) } else { worst };
+        }
+    }
+    let kinds: BTreeSet<&str> = graphs.values().flat_map(|g| &g.ops).map(|op| op.kind()).collect();
+    assert_eq!(kinds, KINDS.into_iter().collect(), "every operator is in some graph");
+    println!("{} graphs, {} cases, worst {worst:?}", graphs.len(), cases.values().map(Vec::len).sum::<usize>());
+}
+
+/// Runs every `each`-th graph, from the `first`, at up to `sizes` sizes in the way that `options` say.
+fn check_kernels(gpu: &Gpu, options: Options, first: usize, each: usize, sizes: usize) {
+    let (cases, metadata) = cases("operators.safetensors");
+    let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
+    let mut faults = Vec::new();
+    let mut worst = (0f32, String::new());
+    for (name, graph) in graphs(&metadata.unwrap()).iter().skip(first).step_by(each) {
+        let weights = hashed::network(graph);
+        let mut network: Option<Network> = None;
+        for case in cases[name].iter().rev().take(sizes) {
+            let input = hashed::input(name, graph.input_channels, case.size);
+            let next = match network.take() {
+                None => Network::with_options(&gpu.device, &gpu.queue, &weights, case.size, options),
+                Some(last) => last.rebuilt(&gpu.device, &gpu.queue, &weights, case.size),
+            };
+            let found = run_network(gpu, network.insert(next.unwrap()), &input);
+            let twin = cpu::run(&weights, &input).unwrap();
+            let e = case.error(&found).max(hashed::error(&found.data, &twin.data));
+            if e > tolerance || found.shape != twin.shape {
+                faults.push(format!("{name} {:?}: relative error {e}", case.size));
+            }
+            worst = if e > worst.0 { (e, name.clone()) } else { worst };
+        }
+    }
+    println!("{options:?}: worst {worst:?}");
+    assert!(faults.is_empty(), "{options:?}\n{}", faults.join("\n"));
+}
+
+const FULL: Options = Options { variant: Variant::Blocked, precision: Precision::F32, dropout: None, fuse: true };
+const HALF: Options = Options { precision: Precision::F16, ..FULL };
+
+#[test]
+fn the_kernels_agree_on_every_operator() {
+    let Some(gpu) = common::gpu() else { return };
+    check_kernels(&gpu, FULL, 0, 1, 1);
+    // A fifth of the graphs in each of the other ways; all of them in the test below.
+    check_kernels(&gpu, Options { fuse: false, variant: Variant::Plain, ..FULL }, 1, 5, 1);
+    check_kernels(&gpu, HALF, 3, 5, 1);
+}
+
+#[test]
+#[ignore = "minutes: every graph in every way; run it after a change of kernels"]
+fn the_kernels_agree_in_every_way() {
+    let Some(gpu) = common::gpu() else { return };
+    let plain = Options { variant: Variant::Plain, ..FULL };
+    let storage = Options { variant: Variant::BlockedStorage, ..FULL };
+    for options in [FULL, plain, storage, HALF, Options { variant: Variant::Plain, ..HALF }] {
+        check_kernels(&gpu, options, 0, 1, usize::MAX);
+        check_kernels(&gpu, Options { fuse: false, ..options }, 0, 1, usize::MAX);
+    }
+}
+
+/// Negative control: weights of another name are other weights, and that shows.
+#[test]
+fn other_weights_are_noticed() {
+    let (cases, metadata) = cases("operators.safetensors");
+    let graphs = graphs(&metadata.unwrap());
+    for name in ["conv4x4_s2", "up4x4_s2", "group_norm", "batch_norm"] {
+        let mut graph = graphs[name].clone();
+        let text = serde_json::to_string(&graph.ops).unwrap().replace("\"name\":\"", "\"name\":\"x");
+        let ops: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();
+        graph.ops = hashed::graphs(&serde_json::json!({name: {"input_channels": graph.input_channels, "ops": ops}}))
+            [name]
+            .ops
+            .clone();
+        let case = &cases[name][0];
+        let input = hashed::input(name, graph.input_channels, case.size);
+        assert!(case.error(&cpu::run(&hashed::network(&graph), &input).unwrap()) > 100.0 * TOLERANCE, "{name}");
+    }
+}

@@ -1,0 +1,129 @@
+//! The published generators, narrow, whole: PyTorch ↔ CPU twin ↔ kernels.
+
+use crate::hashed::{self, cases};
+use crate::operators::{TOLERANCE, TOLERANCE_HALF};
+use crate::{common, run_gpu, run_network};
+use bouncelight::net::arch;
+use bouncelight::net::convert::{Arch, Norm};
+use bouncelight::net::cpu;
+use bouncelight::net::gpu::{Network, Options, Variant};
+use bouncelight::net::graph::Graph;
+use bouncelight::net::plan::{self, Plan, Precision};
+
+fn generator(name: &str, width: u32) -> Graph {
+    match name {
+        "pix2pix_group" => arch::graph(Arch::Pix2pix, Norm::Group, width, true),
+        "pix2pix_instance" => arch::graph(Arch::Pix2pix, Norm::Instance, width, true),
+        "pix2pix_batch" => arch::graph(Arch::Pix2pix, Norm::Batch, width, true),
+        _ => arch::graph(Arch::DeepIllumination, Norm::Batch, width, true),
+    }
+}
+
+/// Each generator on the CPU; on the GPU in `ways`.
+fn check_generators(ways: impl Fn(&str) -> Vec<Options>) {
+    let gpu = common::gpu();
+    let (cases, _) = cases("networks.safetensors");
+    for (name, cases) in cases {
+        let weights = hashed::network(&generator(&name, 4));
+        for case in cases {
+            let input = hashed::input(&name, 12, case.size);
+            let twin = cpu::run(&weights, &input).unwrap();
+            let e = case.error(&twin);
+            println!("{name} {:?}: CPU {e:.1e}", case.size);
+            assert!(e <= TOLERANCE, "{name} {:?} on the CPU: relative error {e}", case.size);
+            let Some(gpu) = &gpu else { continue };
+            for options in ways(&name).into_iter().filter(|_| case.size[0] == 256 || name.contains("batch")) {
+                let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
+                let found = run_gpu(gpu, &weights, &input, options);
+                let e = case.error(&found).max(hashed::error(&found.data, &twin.data));
+                println!("{name} {:?}: {options:?} {e:.2e}", case.size);
+                assert!(e <= tolerance, "{name} {:?} {options:?}: relative error {e}", case.size);
+            }
+        }
+    }
+}
+
+const HALF: Options = Options { variant: Variant::Blocked, precision: Precision::F16, dropout: None, fuse: true };
+
+#[test]
+fn the_generators_agree_with_pytorch() {
+    check_generators(|name| match name {
+        "pix2pix_group" => vec![Options::default(), HALF],
+        "deep_illumination" => vec![Options::default()],
+        _ => Vec::new(),
+    });
+}
+
+#[test]
+#[ignore = "minutes: every generator in every way; run it after a change of kernels"]
+fn the_generators_agree_in_every_way() {
+    let full = Options::default();
+    check_generators(|_| vec![full, HALF, Options { fuse: false, ..full }, Options { fuse: false, ..HALF }]);
+}
+
+/// Needs what `make_operators.py --full` has written, named by `BOUNCELIGHT_FULL`. Times and errors are in docs/network.md.
+#[test]
+#[ignore = "218 MB of weights and 26 GFLOP"]
+fn the_papers_generator_at_full_width() {
+    let Some(path) = std::env::var_os("BOUNCELIGHT_FULL") else {
+        println!("SKIP: BOUNCELIGHT_FULL is not set");
+        return;
+    };
+    let Some(gpu) = common::gpu() else { return };
+    let (cases, _) = hashed::cases_at(path.as_ref());
+    let weights = hashed::network(&generator("pix2pix_group", 64));
+    for case in &cases["pix2pix_group"] {
+        let input = hashed::input("pix2pix_group", 12, case.size);
+        for (options, tolerance) in [(Options::default(), TOLERANCE), (HALF, TOLERANCE_HALF)] {
+            let network = Network::with_options(&gpu.device, &gpu.queue, &weights, case.size, options).unwrap();
+            let start = std::time::Instant::now();
+            let found = run_network(&gpu, &network, &input);
+            let (e, seconds) = (case.error(&found), start.elapsed().as_secs_f64());
+            let rate = network.plan().flops() as f64 / seconds / 1e9;
+            println!(
+                "{:?} {:?}: error {e:.1e}, {seconds:.2} s, {rate:.2} GFLOP/s, {} bytes on the GPU",
+                case.size,
+                options.precision,
+                network.bytes()
+            );
+            assert!(e <= tolerance, "{options:?}: {e}");
+        }
+    }
+}
+
+/// Negative control: the same network without its skips' order, or with another norm, is another network.
+#[test]
+fn another_norm_is_noticed() {
+    let (cases, _) = cases("networks.safetensors");
+    let case = &cases["pix2pix_instance"][0];
+    let input = hashed::input("pix2pix_instance", 12, case.size);
+    let other = hashed::network(&generator("pix2pix_group", 4));
+    assert!(case.error(&cpu::run(&other, &input).unwrap()) > 100.0 * TOLERANCE_HALF);
+}
+
+#[test]
+fn the_papers_generator_counted_by_hand() {
+    let graph = generator("pix2pix_group", 64);
+    let downs = [(12u64, 64u64), (64, 128), (128, 256), (256, 512), (512, 512), (512, 512), (512, 512), (512, 512)];
+    let ups = [(512u64, 512u64), (1024, 512), (1024, 512), (1024, 512), (1024, 256), (512, 128), (256, 64)];
+    let convolutions: u64 = downs.iter().chain(&ups).map(|(i, o)| i * o * 16).sum::<u64>() + 128 * 3 * 16 + 3;
+    assert_eq!(convolutions, 54_413_315);
+    // Weight and bias of the norms of six down and seven up steps.
+    let norms: u64 = 2 * (128 + 256 + 4 * 512) + 2 * (4 * 512 + 256 + 128 + 64);
+    assert_eq!(graph.parameters(), convolutions + norms);
+    let pixels = 1024 * 512u64;
+    let down = downs.iter().zip(1..).map(|((i, o), level)| 2 * i * o * 16 * (pixels >> (2 * level))).sum::<u64>();
+    let up = ups.iter().zip(0..).map(|((i, o), level)| 2 * i * o * 16 * (pixels >> (16 - 2 * level))).sum::<u64>();
+    let last = 2 * 128 * 3 * 16 * pixels;
+    println!("{:.3} GFLOP", (down + up + last) as f64 / 1e9);
+    let plan = Plan::new(&graph, 1024, 512).unwrap();
+    let of = |word: &str| plan.rows().iter().filter(|r| r.kind.contains(word)).map(|r| r.flops).sum::<u64>();
+    assert_eq!(of("conv") + of("transposed"), down + up + last);
+    // No tensor is copied to be joined or enlarged: 16 convolutions and 13 norms of three steps each.
+    assert_eq!(plan.steps.len(), 16 + 13 * 3);
+    // Everything lives in one binding of WebGPU's default size, and in half of it in 16 bits.
+    let half = plan::Options { precision: Precision::F16, ..plan::Options::default() };
+    let small = Plan::with(&graph, 1024, 512, &half).unwrap();
+    println!("arenas {} and {}, weights {}", plan.arena_bytes, small.arena_bytes, 4 * graph.parameters());
+    assert!(plan.arena_bytes <= plan::MAX_ARENA && small.arena_bytes < plan.arena_bytes);
+}

@@ -1,0 +1,137 @@
+//! The path tracer's light transport: strategies agree, nothing counts twice, sides and coverage are as documented.
+#![cfg(feature = "reference")]
+
+#[path = "common/build.rs"]
+mod build;
+mod common;
+#[path = "common/trace.rs"]
+mod trace;
+
+use bouncelight::reference::job::{self, Job};
+use bouncelight::scene::{AlphaMode, Material, Scene};
+use build::*;
+use trace::*;
+
+/// Diffuse and glossy surfaces under all kinds of light with size: a wide sun, a point, a spot, two glowing quads, a sky.
+fn everything_shines() -> Scene {
+    let lights = vec![
+        sun([0.3, -1.0, -0.2], 1.0, 0.6),
+        point([1.5, 2.5, 0.5], 3.0, 0.4),
+        spot([-1.5, 3.0, 1.0], [0.2, -1.0, -0.2], 0.3, 0.9, 0.3),
+    ];
+    let mut s = scene(
+        vec![
+            floor(4.0, 0.0),
+            quad([-2.0, 0.0, -1.5], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]),
+            quad([-1.2, 1.6, -0.6], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]),
+            quad([1.2, 0.1, -1.0], [0.0, 0.6, 0.0], [0.0, 0.0, 0.8]),
+        ],
+        lights,
+    );
+    let metal = Material { metallic: 1.0, roughness: 0.35, ..material([0.9, 0.7, 0.4]) };
+    let glow = |r: [f32; 3], double_sided| Material { emissive: r, double_sided, ..material([0.2; 3]) };
+    s.materials.extend([metal, glow([4.0, 3.0, 2.0], false), glow([2.0, 3.0, 5.0], true)]);
+    for (mesh, material) in s.meshes.iter_mut().zip(0..) {
+        mesh.material = material;
+    }
+    s.environment = environment(0.3);
+    s
+}
+
+/// Mean of each slot and the standard error of that mean, from `batches` independent pictures.
+fn estimate(gpu: &bouncelight::gpu::Gpu, tracer: &Tracer, base: Job, batches: u32) -> [(f64, f64); 8] {
+    let runs: Vec<[f64; 8]> =
+        (0..batches).map(|i| means(&tracer.trace(gpu, Job { seed: 100 + i, half: i % 2, ..base }))).collect();
+    let n = f64::from(batches);
+    std::array::from_fn(|k| {
+        let mean = runs.iter().map(|r| r[k]).sum::<f64>() / n;
+        let variance = runs.iter().map(|r| (r[k] - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        (mean, (variance / n).sqrt())
+    })
+}
+
+/// Largest difference of two estimates in standard errors over the light layers.
+fn apart(a: &[(f64, f64); 8], b: &[(f64, f64); 8]) -> f64 {
+    (0..4).map(|k| (a[k].0 - b[k].0).abs() / (a[k].1.powi(2) + b[k].1.powi(2)).sqrt().max(1e-9)).fold(0.0, f64::max)
+}
+
+#[test]
+fn all_strategies_agree() {
+    let Some(gpu) = common::gpu() else { return };
+    let scene = everything_shines();
+    let tracer = Tracer::new(&gpu, &scene);
+    let camera = look_at([0.5, 1.6, 4.0], [0.0, 0.7, 0.0], 0.8);
+    let base = Job { sample_count: 16, bounces: 3, ..Job::new(&camera, [32, 24]) };
+    let run = |flags| {
+        let e = estimate(&gpu, &tracer, Job { flags, ..base }, 12);
+        println!("flags {flags}: {:.5?}", &e[..4]);
+        e
+    };
+    let both = run(0);
+    let lights = run(job::LIGHTS_ONLY);
+    let hits = run(job::HITS_ONLY);
+    let plain = run(job::PLAIN_RANDOM);
+    for (name, other) in [("light samples", &lights), ("hits", &hits), ("plain random numbers", &plain)] {
+        let sigma = apart(&both, other);
+        println!("both against {name}: {sigma:.2} standard errors");
+        assert!(sigma < 4.0, "{name}: {both:?} {other:?}");
+    }
+    assert!((0..4).all(|k| both[k].0 > 1e-3 && both[k].1 < 0.05 * both[k].0), "the check has power: {both:?}");
+    let twice = run(job::COUNT_TWICE);
+    assert!(apart(&both, &twice) > 4.0, "counting twice went unnoticed: {both:?} {twice:?}");
+}
+
+#[test]
+fn camera_rays_pass_back_faces_and_shadow_rays_do_not() {
+    let Some(gpu) = common::gpu() else { return };
+    // A floor that faces up, and above the eye's way a sheet whose front faces up, too: from below it is not seen.
+    let mut s = scene(vec![floor(4.0, 0.0), floor(1.0, 2.0)], vec![sun([0.0, -1.0, 0.0], 3.0, 0.0)]);
+    s.materials[0].double_sided = false;
+    let down = look_at([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 0.5);
+    let up = look_at([0.0, 1.0, 0.0], [0.0, 2.0, 0.0], 0.5);
+    let job = |camera| Job { sample_count: 4, bounces: 0, ..Job::new(camera, [4, 4]) };
+    let tracer = Tracer::new(&gpu, &s);
+    let floor_lit = tracer.trace(&gpu, job(&down));
+    assert!(floor_lit.iter().all(|p| p[0][3] == 1.0 && p[0][0] == 0.0), "the sheet's back casts a shadow");
+    assert!(tracer.trace(&gpu, job(&up)).iter().all(|p| p[0][3] == 0.0), "the sheet's back is not seen");
+    // Negative control: seen from both sides.
+    s.materials[0].double_sided = true;
+    assert!(Tracer::new(&gpu, &s).trace(&gpu, job(&up)).iter().all(|p| p[0][3] == 1.0));
+}
+
+#[test]
+fn coverage_lets_its_share_of_light_through() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut s = scene(vec![floor(4.0, 0.0), floor(3.0, 2.0)], vec![sun([0.0, -1.0, 0.0], 1.0, 0.0)]);
+    s.materials.push(Material {
+        base_color: [1.0, 1.0, 1.0, 0.25],
+        alpha_mode: AlphaMode::Blend,
+        ..material([1.0; 3])
+    });
+    s.meshes[1].material = 1;
+    let camera = look_at([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 0.5);
+    let base = Job { sample_count: 256, bounces: 0, flags: job::LAMBERT, ..Job::new(&camera, [8, 8]) };
+    let mean = |s: &Scene| means(&Tracer::new(&gpu, s).trace(&gpu, base))[0] * std::f64::consts::PI;
+    let (through, n) = (mean(&s), 64.0 * 256.0);
+    let sigma = (0.25f64 * 0.75 / n).sqrt();
+    assert!((through - 0.75).abs() < 4.0 * sigma, "{through}");
+    s.materials[1].alpha_mode = AlphaMode::Mask { cutoff: 0.2 };
+    assert_eq!(mean(&s), 0.0);
+    s.materials[1].alpha_mode = AlphaMode::Mask { cutoff: 0.3 };
+    assert!((mean(&s) - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn stand_ins_light_the_rasteriser_only() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut s = scene(vec![floor(4.0, 0.0)], vec![sun([0.0, -1.0, 0.0], 2.0, 0.0), sun([0.0, -1.0, 0.0], 1.0, 0.0)]);
+    s.lights[1].stands_in = true;
+    let camera = look_at([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 0.5);
+    let base = Job { sample_count: 64, flags: job::LAMBERT, ..Job::new(&camera, [8, 8]) };
+    let tracer = Tracer::new(&gpu, &s);
+    let m = means(&tracer.trace(&gpu, base)).map(|v| v * std::f64::consts::PI);
+    assert!((m[0] - 2.0).abs() < 1e-4 && (m[7] - 3.0).abs() < 0.1, "{m:?}");
+    let flags = base.flags | job::ANALYTIC_ONLY;
+    let m = means(&tracer.trace(&gpu, Job { flags, ..base })).map(|v| v * std::f64::consts::PI);
+    assert!((m[0] - 3.0).abs() < 0.1 && m[0] == m[7] && m[1] == 0.0, "{m:?}");
+}
