@@ -31,3 +31,19 @@ fn culled(triangle: u32, direction: vec3f) -> bool {
     return (materials.items[m].flags & MATERIAL_DOUBLE_SIDED) == 0u
         && dot(front_normal(corners_of(triangle)), direction) >= 0.0;
 }
+
+// True where a ray goes through the triangle that it hit: culled for the camera, or let through by its alpha.
+fn passes(hit: Hit, direction: vec3f, from_camera: bool, salt: u32) -> bool {
+    if from_camera && culled(hit.triangle, direction) { return true; }
+    if (scene.flags & SCENE_COVERED) == 0u { return false; }
+    let solid = coverage_at(hit.triangle, hit.uv);
+    return solid < 1.0 && random_pass(hit.triangle, salt) >= solid;
+}
+
+// Where the ray goes on behind what it passed.
+fn beyond(hit: Hit, direction: vec3f) -> vec3f {
+    let corners = corners_of(hit.triangle);
+    let w = weights(hit.uv);
+    let n = front_normal(corners);
+    return off_surface(corners.a * w.x + corners.b * w.y + corners.c * w.z, select(-n, n, dot(n, direction) > 0.0));
+}

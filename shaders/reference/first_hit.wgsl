@@ -15,16 +15,14 @@ fn first_hit(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 0u; i < 256u; i++) {
         let hit = trace(origin, direction, 1e30, false);
         if hit.triangle == NONE { break; }
-        let corners = corners_of(hit.triangle);
-        let w = weights(hit.uv);
-        let p = corners.a * w.x + corners.b * w.y + corners.c * w.z;
-        let solid = coverage_at(hit.triangle, hit.uv);
-        if !culled(hit.triangle, direction) && (solid >= 1.0 || random_pass(hit.triangle, 0u) < solid) {
+        if !passes(hit, direction, true, 0u) {
+            let corners = corners_of(hit.triangle);
+            let w = weights(hit.uv);
+            let p = corners.a * w.x + corners.b * w.y + corners.c * w.z;
             out = vec4f(p, dot(p - eye(), -job.world_from_view[2].xyz));
             break;
         }
-        let n = front_normal(corners);
-        origin = off_surface(p, select(-n, n, dot(n, direction) > 0.0));
+        origin = beyond(hit, direction);
     }
     found[point - job.film_first] = out;
 }

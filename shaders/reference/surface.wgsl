@@ -63,14 +63,17 @@ fn image_at(use_: ImageUse, uv: vec4f, otherwise: vec4f) -> vec4f {
     let at = vec2f(dot(use_.row0, p), dot(use_.row1, p));
     // Far coordinates would leave the range of integers.
     let place = clamp(at, vec2f(-1e4), vec2f(1e4)) * vec2f(use_.size);
-    if (use_.bits & 64u) != 0u { return texel_at(use_, vec2i(floor(place))); }
-    let low = floor(place - 0.5);
-    let f = place - 0.5 - low;
-    let q = vec2i(low);
-    return mix(
-        mix(texel_at(use_, q), texel_at(use_, q + vec2i(1, 0)), f.x),
-        mix(texel_at(use_, q + vec2i(0, 1)), texel_at(use_, q + vec2i(1, 1)), f.x), f.y
-    );
+    let linear = (use_.bits & 64u) == 0u;
+    let low = select(floor(place), floor(place - 0.5), linear);
+    let f = select(vec2f(0.0), place - 0.5 - low, linear);
+    // A loop, not four calls: drivers inline everything, and this is called from many places.
+    var sum = vec4f(0.0);
+    for (var i = 0u; i < 4u; i++) {
+        let corner = vec2u(i & 1u, i >> 1u);
+        let w = select(1.0 - f, f, corner == vec2u(1u));
+        if w.x * w.y > 0.0 { sum += w.x * w.y * texel_at(use_, vec2i(low) + vec2i(corner)); }
+    }
+    return sum;
 }
 
 // Chance that a ray is stopped at this place of a triangle.
