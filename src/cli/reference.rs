@@ -138,8 +138,8 @@ impl Task {
             // No watchdog there, and other programs may want the cores, too.
             options.dispatch *= 4;
         }
-        let mut tracer = Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options)
-            .map_err(|e| match e {
+        let mut tracer =
+            Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options).map_err(|e| match e {
                 TracerError::Points { .. } | TracerError::Option(_) => usage(e.to_string()),
                 e => e.into(),
             })?;
