@@ -308,7 +308,8 @@ impl<'a> Builder<'a> {
             let Kind::Window { channel, .. } = step.kind else { continue };
             let channels = self.plan.tensors[step.input].shape.channels;
             let end = channel + channels;
-            let whole = channel % 4 == 0 && (end % 4 == 0 || end == self.plan.tensors[step.output].shape.channels);
+            let whole =
+                channel % 4 == 0 && (end.is_multiple_of(4) || end == self.plan.tensors[step.output].shape.channels);
             // The caller reads and writes input and output densely.
             if joins && whole && step.input != 0 && step.input != self.plan.output && self.inside[step.input].is_none()
             {
