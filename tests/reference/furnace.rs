@@ -34,12 +34,12 @@ fn a_closed_sphere_glows_with_one_over_one_minus_albedo() {
 #[test]
 fn many_samples_of_few_points_lose_nothing() {
     let Some(lab) = lab() else { return };
-    let scene = scene(vec![(body(Shape::UvSphere, 2.0, true), glowing(0.8, 1.0))], vec![]);
+    let scene = scene(vec![(body(Shape::UvSphere, 2.0, true), glowing(0.5, 1.0))], vec![]);
     let (device, queue) = (&lab.gpu.device, &lab.gpu.queue);
     let packed = ReferenceScene::new(device, queue, &scene).expect("the furnace packs");
     let eye = camera([0.3, -0.4, 0.5], [1.0, 0.2, 0.0], 1.2);
     let points = grid(SIZE, 8);
-    let options = TracerOptions { samples: 4096, flags: job::LAMBERT, ..Default::default() };
+    let options = TracerOptions { samples: 2048, flags: job::LAMBERT, ..Default::default() };
     let subject = Subject { camera: &eye, size: SIZE, points: Some(&points) };
     let mut tracer =
         Tracer::new(device, queue, &Kernel::new(device), &packed, subject, options).expect("the furnace can be traced");
@@ -49,7 +49,7 @@ fn many_samples_of_few_points_lose_nothing() {
     let mean = light.chunks_exact(4).map(|p| f64::from(p[0])).sum::<f64>() / points.len() as f64;
     let noise = traced.noise_of(Layer::Combined).expect("judged").pixel / (points.len() as f64).sqrt();
     println!("few points, many samples: {mean:.4} ± {:.4}", noise * mean);
-    assert!((mean / 5.0 - 1.0).abs() < SIGMAS * noise && noise < 0.004, "{mean}, noise {noise}");
+    assert!((mean / 2.0 - 1.0).abs() < SIGMAS * noise && noise < 0.004, "{mean}, noise {noise}");
 }
 
 /// An albedo of 0.51 where 0.5 is claimed is 2 % more light, and is noticed.
@@ -94,8 +94,8 @@ fn white_metal_and_white_plastic_lose_no_light() {
             scene.environment = Environment { radiance: [1.0; 3], ..scene.environment };
             // Close enough that every point is on the sphere.
             let eye = camera([1.2, 1.6, 0.0], [0.0; 3], 0.5);
-            let options = Options { samples: 64, seed: seed as u32, ..Default::default() };
-            let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 16), &options);
+            let options = Options { samples: 32, seed: seed as u32, ..Default::default() };
+            let t = lab.trace(&scene, &eye, SIZE, &grid(SIZE, 12), &options);
             assert_eq!(t.mean(|s| s.alpha).value, 1.0);
             let light = t.mean(Sums::radiance);
             println!("white {name} of roughness {roughness}: {:.5} ± {:.5}", light.value, light.error);
