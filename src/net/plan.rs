@@ -282,7 +282,9 @@ impl<'a> Builder<'a> {
         let pair = Shape { channels: shape.vectors() * 8, height: 1, width: tiles };
         let moments = self.tensor(&format!("{name}.moments"), pair, true);
         self.push(self.step(&format!("{name}.moments"), Some(node.op), Kind::Moments, input, moments));
-        let scale = self.tensor(&format!("{name}.scale"), Shape { width: 1, ..pair }, true);
+        // Mean, scale and shift of each channel.
+        let three = Shape { channels: shape.vectors() * 12, height: 1, width: 1 };
+        let scale = self.tensor(&format!("{name}.scale"), three, true);
         let step = self.step(&format!("{name}.scale"), Some(node.op), Kind::Merge { groups, eps }, moments, scale);
         self.push(Step { second: Some(input), ..step });
         scale

@@ -213,3 +213,29 @@ fn norms_of_large_means_are_sound() {
         assert!(e <= 2e-3, "{groups} groups: {e}");
     }
 }
+
+/// Layers as wide as the paper's, whose weights fit no uniform binding.
+#[test]
+fn wide_layers_agree_with_the_cpu_twin() {
+    let Some(gpu) = common::gpu() else { return };
+    let norm = |c: u32| json!([{"op": "group_norm", "name": "y", "input": "input", "output": "y", "channels": c, "groups": 2}]);
+    let joined = |c: u32| json!([conv("a", "input", c, c, 1, 1), {"op": "concat", "name": "j", "inputs": ["a", "input"], "output": "j"}, up("u", "j", 2 * c, 8)]);
+    let cases = [
+        ("conv", 512, json!([conv("c", "input", 512, 64, 4, 2)]), [8, 4]),
+        ("conv odd", 516, json!([conv("c", "input", 516, 20, 4, 2)]), [6, 6]),
+        ("conv many", 128, json!([conv("c", "input", 128, 512, 4, 2)]), [8, 4]),
+        ("conv3x3", 640, json!([conv("c", "input", 640, 24, 3, 1)]), [5, 3]),
+        ("transposed", 1024, json!([up("u", "input", 1024, 32)]), [4, 2]),
+        ("transposed many", 256, json!([up("u", "input", 256, 128)]), [4, 4]),
+        ("norm", 512, norm(512), [32, 16]),
+        ("joined", 256, joined(256), [4, 4]),
+    ];
+    for (name, channels, ops, size) in cases {
+        let weights = hashed::network(&graph(channels, ops));
+        let input = hashed::input("x", channels, size);
+        let e =
+            error(&run_gpu(&gpu, &weights, &input, Options::default()).data, &cpu::run(&weights, &input).unwrap().data);
+        println!("{name}: {e:.1e}");
+        assert!(e <= TOLERANCE, "{name}: {e}");
+    }
+}
