@@ -91,6 +91,13 @@ fn check_memory(graph: &Graph, plan: &Plan) {
     let sum: u64 = plan.tensors.iter().map(|t| t.bytes().next_multiple_of(ALIGN)).sum();
     assert!(plan.arena_bytes <= plan.zero_bytes + sum);
     for (time, step) in plan.steps.iter().enumerate().map(|(i, s)| (i + 1, s)) {
+        // Mean and squares of each tile and channel; mean, scale and shift of each channel.
+        let [input, output] = [step.input, step.output].map(|t| plan.tensors[t].shape);
+        match step.kind {
+            Kind::Moments => assert_eq!(output.vectors(), 2 * input.vectors()),
+            Kind::Merge { .. } => assert_eq!(output.vectors(), 3 * plan.tensors[step.second.unwrap()].shape.vectors()),
+            _ => {}
+        }
         for read in step.reads() {
             assert!(plan.tensors[read].first < time && plan.tensors[read].last >= time);
         }

@@ -27,7 +27,15 @@ struct RasterisedRay {
 fn sample_rasterised(s: Surface, origin: vec3f, pair: u32) -> RasterisedRay {
     let choice = choose(scene.analytic_table, scene.light_count, random2(pair + PAIR_ANALYTIC));
     let light = light_at(choice.id);
-    let point = sample_analytic(light, origin, random2(pair + PAIR_ANALYTIC_POINT));
+    var point = sample_analytic(light, origin, random2(pair + PAIR_ANALYTIC_POINT));
+    if light.kind == LIGHT_SPOT && chance_of(choice.id) == 0.0 {
+        // A spot that stands in for a flat glowing surface is a disc in that surface's plane, just in front of it: one that
+        // faced the point would reach into the surface, and be shadowed by it.
+        let d = in_disc(random2(pair + PAIR_ANALYTIC_POINT)) * light.radius;
+        let along = light.position + frame_around(light.direction) * vec3f(d, 0.0) - origin;
+        point.reach = length(along);
+        point.l = along / max(point.reach, 1e-6);
+    }
     var out = RasterisedRay(point.l, 0.0, rasterised(s, light));
     if dot(s.side, point.l) <= 0.0 || all(out.light.diffuse + out.light.glossy <= vec3f(0.0)) { return out; }
     out.light.diffuse /= choice.chance;

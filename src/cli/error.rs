@@ -4,6 +4,7 @@ use crate::{
     gi::GiError,
     gpu::GpuError,
     net::{convert::ConvertError, format::WeightsError, pictures::PicturesError},
+    render::RenderError,
     scene::{SceneError, environment::EnvironmentError, upload::UploadError},
 };
 use thiserror::Error;
@@ -62,7 +63,12 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
             return NO_ADAPTER;
         }
         // Sound weights that speak of something else than light.
-        if let Some(GiError::Feature { .. } | GiError::Output(_)) = cause.downcast_ref::<GiError>() {
+        // `RenderError` shows what it wraps as if it were its own, so its cause is not in the chain.
+        let wrapped = match cause.downcast_ref::<RenderError>() {
+            Some(RenderError::Gi(e)) => Some(e),
+            _ => None,
+        };
+        if let Some(GiError::Feature { .. } | GiError::Output(_)) = cause.downcast_ref::<GiError>().or(wrapped) {
             return INVALID_INPUT;
         }
         if let Some(ConvertError::NoSuchVariant) = cause.downcast_ref::<ConvertError>() {

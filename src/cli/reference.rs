@@ -133,8 +133,13 @@ impl Task {
         let kernel = Kernel::new(&gpu.device);
         let points = self.points();
         let subject = Subject { camera, size: self.frame, points: points.as_deref() };
-        let mut tracer = Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, self.options.clone())
-            .map_err(|e| match e {
+        let mut options = self.options.clone();
+        if gpu.is_software() {
+            // No watchdog there, and other programs may want the cores, too.
+            options.dispatch *= 4;
+        }
+        let mut tracer =
+            Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options).map_err(|e| match e {
                 TracerError::Points { .. } | TracerError::Option(_) => usage(e.to_string()),
                 e => e.into(),
             })?;

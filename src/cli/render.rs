@@ -34,8 +34,6 @@ pub struct Args {
     /// How indirect light is found; `reference` traces paths until the light is right.
     #[arg(long, value_enum, default_value = "neural")]
     method: MethodName,
-    #[command(flatten)]
-    tracing: reference::Flags,
     /// Weights of `neural`; the shipped ones when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
@@ -66,6 +64,9 @@ pub struct Args {
     /// Picture of where they differ: FLIP's map for flip and hdrflip, else the mean difference up to a quarter.
     #[arg(long, requires = "reference", value_name = "PNG")]
     diff: Option<PathBuf>,
+    // Last, since its heading would go on to what follows.
+    #[command(flatten)]
+    tracing: reference::Flags,
 }
 
 /// Layers by name: `all`, or a list, whose words `find` knows.

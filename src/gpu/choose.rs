@@ -114,14 +114,19 @@ impl Gpu {
         Self::from_adapter(adapter)
     }
 
-    /// Opens a device on `adapter` with WebGPU's default limits (or the adapter's own where they are lower)
-    /// and timestamps where the adapter has them.
+    /// Opens a device on `adapter` with WebGPU's default limits (or the adapter's own where they are lower), buffers as
+    /// large as the adapter grants, and timestamps where it has them. Nothing here needs the larger buffers but larger
+    /// problems: wide networks on large pictures, scenes of many millions of triangles.
     pub fn from_adapter(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
         let info = adapter.get_info();
+        let granted = adapter.limits();
+        let mut limits = wgpu::Limits::default().or_worse_values_from(&granted);
+        limits.max_buffer_size = granted.max_buffer_size;
+        limits.max_storage_buffer_binding_size = granted.max_storage_buffer_binding_size;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("bouncelight"),
             required_features: adapter.features() & wanted_features(),
-            required_limits: wgpu::Limits::default().or_worse_values_from(&adapter.limits()),
+            required_limits: limits,
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))

@@ -138,7 +138,7 @@ fn convolution(errors: &mut Vec<GraphError>, op: &str, channels: [u32; 2], kerne
 }
 
 fn divide(errors: &mut Vec<GraphError>, op: &str, what: &'static str, value: u32, by: u32) {
-    if by != 0 && value % by != 0 {
+    if by != 0 && !value.is_multiple_of(by) {
         errors.push(GraphError::Divide { op: op.into(), what, value, by });
     }
 }

@@ -5,7 +5,6 @@
 pub mod published;
 
 use super::format::{Dtype, Feature, Output, Problem, Provenance, Table, WeightTensor, Weights, WeightsError};
-use super::graph::Graph;
 use super::header::{self, Header, TensorInfo};
 use super::op::Op;
 use super::problem::list;
@@ -76,12 +75,6 @@ pub enum ConvertError {
         /// Every fault; tensors are named by their keys.
         problems: Vec<Problem>,
     },
-}
-
-/// The graph of a generator of base width `width`, operators named as the published code's modules. Channels above what
-/// graphs allow are for [`Graph::check`] to find.
-pub fn generator(arch: Arch, norm: Norm, width: u32) -> Graph {
-    published::graph(arch, norm, width, true)
 }
 
 /// The bytes of the weights file for the state dict in `bytes`, which were read from `path`.

@@ -129,6 +129,7 @@ impl Network {
         let plan = build::plan(device, &weights.graph, size, options)?;
         let kernels: Vec<Kernel> = plan.steps.iter().map(|s| Kernel::choose(&plan, s, options.variant)).collect();
         build::check_limits(device, &plan, &kernels)?;
+        pipelines.keep(&kernels);
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         // wgpu clears new buffers; the kernels count on the zeros at the beginning.
         let arena = build::buffer(device, "net.arena", plan.arena_bytes, usage);

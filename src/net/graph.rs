@@ -133,18 +133,41 @@ impl Graph {
     }
 
     /// The size, at least `width`×`height`, at which the network runs for a picture of that size: the next multiples of the
-    /// smallest power of two for which all its tensors fit together (a U-Net with eight halvings and concatenated skips
-    /// wants multiples of 256; one that resamples to its skips' sizes takes any). The picture's last row and column are
-    /// repeated, and the output is cropped to [`Graph::cropped`].
+    /// smallest power of two for which all its tensors fit together and the output loses no pixels at its edges (a U-Net
+    /// with eight halvings and concatenated skips wants multiples of 256; one that resamples to its skips' sizes takes any).
+    /// The picture's last row and column are repeated, and the output is cropped to [`Graph::cropped`].
+    ///
+    /// # Errors
+    /// What is wrong with the size itself when no larger one will do.
     pub fn inner_size(&self, width: u32, height: u32) -> Result<[u32; 2], GraphError> {
-        let first = match self.shapes(width, height) {
-            Ok(_) => return Ok([width, height]),
-            Err(error) => error,
+        let first = match self.output_edges([width, height]) {
+            Ok(out) if self.keeps_edges([width, height], out) => return Ok([width, height]),
+            other => other,
         };
         let multiples = (1..=10).map(|bits| 1u32 << bits);
         let sizes = multiples.map(|m| [width, height].map(|edge| edge.saturating_add(m - 1) / m * m));
-        let fit = |&[w, h]: &[u32; 2]| self.shapes(w, h).is_ok();
-        sizes.filter(|s| *s != [width, height]).find(fit).ok_or(first)
+        let fit = |size: &[u32; 2]| self.output_edges(*size).is_ok_and(|out| self.keeps_edges(*size, out));
+        let better = sizes.filter(|s| *s != [width, height]).find(fit);
+        // Without a better size one that fits at all will do.
+        better.map_or_else(|| first.map(|_| [width, height]), Ok)
+    }
+
+    fn output_edges(&self, [width, height]: [u32; 2]) -> Result<[u32; 2], GraphError> {
+        let shapes = self.shapes(width, height)?;
+        let made = self.ops.iter().zip(shapes).find(|(op, _)| op.output() == self.output);
+        Ok(made.map_or([width, height], |(_, shape)| [shape.width, shape.height]))
+    }
+
+    /// Whether `out` is as large as it should be for `size`. That is a linear function of the size for a network of
+    /// convolutions and resamplings, and two sizes that most strides divide show which.
+    fn keeps_edges(&self, size: [u32; 2], out: [u32; 2]) -> bool {
+        const PROBE: i64 = 3072;
+        let probe = |edge: i64| self.output_edges([edge as u32; 2]).map(|out| out.map(i64::from));
+        let (Ok(one), Ok(two)) = (probe(PROBE), probe(2 * PROBE)) else { return true };
+        (0..2).all(|i| {
+            let slope = two[i] - one[i];
+            i64::from(out[i]) >= (slope * (i64::from(size[i]) - PROBE)).div_euclid(PROBE) + one[i]
+        })
     }
 
     /// Edge of the output that is kept of `output` pixels when `edge` of `inner` pixels of the input were the picture.

@@ -282,7 +282,9 @@ impl<'a> Builder<'a> {
         let pair = Shape { channels: shape.vectors() * 8, height: 1, width: tiles };
         let moments = self.tensor(&format!("{name}.moments"), pair, true);
         self.push(self.step(&format!("{name}.moments"), Some(node.op), Kind::Moments, input, moments));
-        let scale = self.tensor(&format!("{name}.scale"), Shape { width: 1, ..pair }, true);
+        // Mean, scale and shift of each channel.
+        let three = Shape { channels: shape.vectors() * 12, height: 1, width: 1 };
+        let scale = self.tensor(&format!("{name}.scale"), three, true);
         let step = self.step(&format!("{name}.scale"), Some(node.op), Kind::Merge { groups, eps }, moments, scale);
         self.push(Step { second: Some(input), ..step });
         scale
@@ -308,7 +310,8 @@ impl<'a> Builder<'a> {
             let Kind::Window { channel, .. } = step.kind else { continue };
             let channels = self.plan.tensors[step.input].shape.channels;
             let end = channel + channels;
-            let whole = channel % 4 == 0 && (end % 4 == 0 || end == self.plan.tensors[step.output].shape.channels);
+            let whole =
+                channel % 4 == 0 && (end.is_multiple_of(4) || end == self.plan.tensors[step.output].shape.channels);
             // The caller reads and writes input and output densely.
             if joins && whole && step.input != 0 && step.input != self.plan.output && self.inside[step.input].is_none()
             {

@@ -18,7 +18,7 @@ pub use gpu::AccelGpu;
 
 use thiserror::Error;
 
-/// The most triangles a structure takes: building needs about 500 bytes for each, so 4 GB here.
+/// The most triangles a structure takes: building needs 250 to 500 bytes for each, so 2 to 4 GB here.
 pub const MAX_TRIANGLES: u64 = 1 << 23;
 
 /// Coordinates farther from the origin than this (metres) are left out like non-finite ones: their products overflow.
@@ -91,6 +91,16 @@ impl Accel {
         self.blocks.len()
     }
 
+    /// Inner nodes among the blocks.
+    pub fn node_count(&self) -> usize {
+        self.blocks.iter().filter(|b| b[3] & wide::NODE != 0).count()
+    }
+
+    /// Leaves that hold a triangle or two.
+    pub fn leaf_count(&self) -> usize {
+        self.blocks.iter().filter(|b| b[3] & wide::NODE == 0 && b.iter().any(|w| *w != 0)).count()
+    }
+
     /// Triangles that can be hit.
     pub fn triangle_count(&self) -> usize {
         self.triangles
@@ -105,8 +115,10 @@ impl Accel {
     pub fn depth(&self) -> usize {
         wide::depth(&self.blocks)
     }
+
+    /// The blocks' words, sixteen each: for tests that damage them.
     #[doc(hidden)]
-    pub fn words(&self) -> [&[u32]; 2] {
-        [bytemuck::cast_slice(&self.blocks), &[0; 4]]
+    pub fn words_mut(&mut self) -> &mut [u32] {
+        bytemuck::cast_slice_mut(&mut self.blocks)
     }
 }

@@ -75,7 +75,7 @@ impl Kernel {
         })
     }
 
-    /// Runs one kernel on `points` points and waits until it is done.
+    /// Runs one kernel on `points` points (one workgroup when there are none) and waits until it is done.
     pub(super) fn run(
         &self,
         device: &wgpu::Device,
@@ -95,7 +95,7 @@ impl Kernel {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, groups[0], &[]);
             pass.set_bind_group(1, groups[1], &[]);
-            pass.dispatch_workgroups(points.div_ceil(job::WORKGROUP), 1, 1);
+            pass.dispatch_workgroups(points.div_ceil(job::WORKGROUP).max(1), 1, 1);
         }
         queue.submit([encoder.finish()]);
         device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| TracerError::Wait(e.to_string()))?;

@@ -13,8 +13,9 @@ const PLACES: usize = 16;
 /// Points times samples of the first dispatch: a few milliseconds on the slowest device.
 const FIRST_WORK: u64 = 1024;
 
-/// Most samples that one dispatch gives a point.
-const MOST_SAMPLES: u32 = 4096;
+/// Most samples that one dispatch gives a point. Mesa's CPU driver silently ends all loops of an invocation after 65,535
+/// turns in all (`LP_MAX_TGSI_LOOP_ITERATIONS`), those of the traversal included: about 1,000 rays.
+const MOST_SAMPLES: u32 = 16;
 
 /// Most samples that a dispatch gives a point where that means fewer points at once.
 const DEEPEST: u32 = 16;
@@ -46,6 +47,8 @@ struct Pass {
     half: usize,
     samples: u32,
     cursor: u32,
+    /// It would have fewer samples if it were not for the floor.
+    lifted: bool,
 }
 
 /// The work on one film.
@@ -134,7 +137,7 @@ impl Schedule {
             }
         }
         let least = (self.floor / u64::from(pass.samples)).clamp(GROUP.into(), self.points.max(GROUP).into()) as u32;
-        self.lifted = end - pass.cursor < least;
+        self.lifted = pass.lifted || (end < self.points && end - pass.cursor < least);
         let count = (end - pass.cursor).max(least).min(self.points - pass.cursor);
         let count = if pass.cursor + count < self.points { count / GROUP * GROUP } else { count };
         let first_sample = self.done[pass.half];
@@ -146,8 +149,9 @@ impl Schedule {
         let work = u64::from(chunk.count) * u64::from(chunk.samples);
         self.largest = self.largest.max(work);
         self.last_cost = seconds / work as f64;
-        if self.lifted && seconds < 2.0 * self.target {
-            self.floor *= 2;
+        // Only what was as large as the floor tells of it.
+        if self.lifted && seconds < 2.0 * self.target && 2 * work > self.floor {
+            self.floor = self.floor.saturating_mul(2);
         } else if self.lifted && seconds > 4.0 * self.target {
             self.floor = (self.floor / 2).max(GROUP.into());
         }
@@ -184,7 +188,10 @@ impl Schedule {
         let slowest = self.cost.iter().map(|c| c.unwrap_or(f64::INFINITY)).fold(0.0, f64::max);
         let deep = (self.target / (f64::from(SEVERAL_GROUPS) * slowest)) as u32;
         let samples = at_once.max(deep.min(DEEPEST).min(self.done[half]));
-        Some(Pass { half, samples: samples.min(behind(half)), cursor: 0 })
+        let least = (self.floor / u64::from(self.points)).min(MOST_SAMPLES.into()) as u32;
+        let lifted = samples < least && behind(half) > samples;
+        let samples = samples.max(least);
+        Some(Pass { half, samples: samples.min(behind(half)), cursor: 0, lifted })
     }
 
     /// Most points times samples of the next dispatch: never more than twice what was tried.
@@ -288,6 +295,13 @@ mod tests {
         check_complete(&chunks, 100_000, 16);
         assert!(chunks.len() < 60, "{} dispatches", chunks.len());
         assert!(chunks.iter().all(|c| c.1 < 0.6));
+        // Few points for a long time: the floor stays where it means something.
+        let mut schedule = Schedule::new(153, 0.1);
+        let chunks = run(&mut schedule, 50_000, |c| 0.15 + 1e-5 * f64::from(c.count) * f64::from(c.samples));
+        check_complete(&chunks, 153, 50_000);
+        assert!(chunks.len() < 1000, "{} dispatches", chunks.len());
+        assert!(schedule.floor < 1 << 30, "{}", schedule.floor);
+        assert!(chunks.iter().all(|c| c.1 < 0.8));
     }
 
     #[test]

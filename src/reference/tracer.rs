@@ -55,6 +55,8 @@ pub struct TracerOptions {
     pub glossy_bounces: u32,
     /// Limit of indirect contributions as Cycles' `sample_clamp_indirect`; 0 for none. Darkens.
     pub clamp: f32,
+    /// Cycles' "Filter Glossy"; 0 for none. Biased; for comparisons with Cycles.
+    pub filter_glossy: f32,
     /// Width of the pixel filter as Cycles counts it, pixels; 0 for none. Points never have one.
     pub filter_width: f32,
     /// Mode flags of [`job`], such as [`job::ANALYTIC_ONLY`].
@@ -77,6 +79,7 @@ impl Default for TracerOptions {
             diffuse_bounces: job::UNLIMITED,
             glossy_bounces: job::UNLIMITED,
             clamp: 0.0,
+            filter_glossy: 0.0,
             filter_width: crate::render::sampling::FILTER_WIDTH,
             flags: 0,
             layers: vec![Layer::Combined],
@@ -138,6 +141,7 @@ impl Tracer {
         job.flags = options.flags | if subject.points.is_some() { job::POINTS } else { 0 };
         job.filter_width = if subject.points.is_some() { 0.0 } else { options.filter_width };
         job.clamp = options.clamp;
+        job.filter_glossy = options.filter_glossy;
         job.bounces = options.bounces;
         job.diffuse_bounces = options.diffuse_bounces;
         job.glossy_bounces = options.glossy_bounces;
@@ -177,6 +181,8 @@ impl Tracer {
             samples_before: None,
             options,
         };
+        // Many drivers compile when a kernel runs for the first time; that is no measure of how fast it is.
+        tracer.dispatch(Entry::Path, &tracer.job)?;
         tracer.begin_band()?;
         Ok(tracer)
     }
@@ -359,6 +365,9 @@ fn check_options(options: &TracerOptions) -> Result<(), TracerError> {
     }
     if !(options.clamp.is_finite() && options.clamp >= 0.0) {
         return wrong(format!("a clamp of {} limits nothing; it must be 0 (none) or above", options.clamp));
+    }
+    if !(options.filter_glossy.is_finite() && options.filter_glossy >= 0.0) {
+        return wrong(format!("a glossy filter of {} is none", options.filter_glossy));
     }
     if !(options.filter_width.is_finite() && options.filter_width >= 0.0) {
         return wrong(format!("a pixel filter of width {} is none", options.filter_width));

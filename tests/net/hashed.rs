@@ -97,7 +97,11 @@ pub fn error(found: &[f32], reference: &[f32]) -> f32 {
 
 /// Cases by network, and the file's metadata.
 pub fn cases(file: &str) -> (BTreeMap<String, Vec<Case>>, Option<Value>) {
-    let path = format!("{}/weights-format/fixtures/operators/{file}", env!("CARGO_MANIFEST_DIR"));
+    cases_at(format!("{}/weights-format/fixtures/operators/{file}", env!("CARGO_MANIFEST_DIR")).as_ref())
+}
+
+/// As [`cases`], of a file anywhere.
+pub fn cases_at(path: &std::path::Path) -> (BTreeMap<String, Vec<Case>>, Option<Value>) {
     let bytes = std::fs::read(path).unwrap();
     let (_, header) = safetensors::SafeTensors::read_metadata(&bytes).unwrap();
     let graphs = header.metadata().as_ref().and_then(|m| serde_json::from_str(m.get("graphs")?).ok());

@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod hashed;
+mod life;
 mod operators;
 mod whole;
 
@@ -65,7 +66,10 @@ fn error(found: &Tensor, reference: &Tensor) -> f32 {
 
 fn run_gpu(gpu: &Gpu, weights: &Weights, input: &Tensor, options: Options) -> Tensor {
     let size = [input.shape.width, input.shape.height];
-    let network = Network::with_options(&gpu.device, &gpu.queue, weights, size, options).unwrap();
+    run_network(gpu, &Network::with_options(&gpu.device, &gpu.queue, weights, size, options).unwrap(), input)
+}
+
+fn run_network(gpu: &Gpu, network: &Network, input: &Tensor) -> Tensor {
     // Garbage everywhere but in the zeros at the beginning: nothing may depend on a fresh arena.
     let arena = network.input().buffer;
     let zeros = network.plan().zero_bytes;

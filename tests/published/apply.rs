@@ -1,7 +1,7 @@
 //! Pictures through the networks: against PyTorch's outputs, through the program, with the authors' own pictures.
 
 use super::common;
-use super::convert::{arch, converted, norm};
+use super::convert::{converted, named, norm};
 use super::state::{bytes, hashes, state};
 use bouncelight::image_io;
 use bouncelight::net::cpu;
@@ -78,7 +78,7 @@ fn pictures_are_those_that_pytorch_gives() {
         // "instance" of deep illumination is its batch norm state in training mode.
         let stored = if word("arch") == "pix2pix" { word("norm") } else { "batch" };
         let from = state(word("arch"), stored, number(&case["width"]));
-        let weights = converted(&from, arch(word("arch")), norm(word("norm")), Dtype::F32).unwrap();
+        let weights = converted(&from, named(word("arch")), norm(word("norm")), Dtype::F32).unwrap();
         let size = [width as u32, height as u32];
         let ours: Vec<f32> = run(&weights, size, &synthetic(width, height)).into_iter().step_by(EVERY).collect();
         let theirs: Vec<f32> = case["output"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
@@ -138,7 +138,7 @@ fn the_program_converts_tells_and_applies() {
 fn what_cannot_be_applied() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().expect("a temporary path is text").to_string();
-    let weights = converted(&state("pix2pix", "batch", 1), arch("pix2pix"), norm("batch"), Dtype::F16).unwrap();
+    let weights = converted(&state("pix2pix", "batch", 1), named("pix2pix"), norm("batch"), Dtype::F16).unwrap();
     std::fs::write(path("net.safetensors"), weights.to_bytes()).unwrap();
     write_pictures(folder.path(), [20, 10], &synthetic(20, 10));
     let flags = flags(folder.path());
@@ -171,6 +171,10 @@ fn what_cannot_be_applied() {
     check("--weights", compact.to_str().unwrap(), 4, &["albedo", "screen", "four pictures", "exposure"]);
     let free = root("weights-format/fixtures/add.safetensors");
     check("--weights", free.to_str().unwrap(), 4, &["free", "nothing says what they are"]);
+    if common::gpu().is_some() {
+        let (net, out) = (path("net.safetensors"), path("out.png"));
+        fails(&["render", "interior", "--size", "16x8", "--weights", &net, "-o", &out], 4, &["images", "screen"]);
+    }
     // A faulty state is refused as a whole.
     let mut faulty = state("pix2pix", "batch", 1);
     faulty.remove("final.2.bias");

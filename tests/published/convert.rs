@@ -1,11 +1,12 @@
 //! Conversion: every norm, any width, every fault at once.
 
 use super::state::{State, bytes, state};
-use bouncelight::net::convert::{Arch, ConvertError, Norm, Recipe, convert, generator};
+use bouncelight::net::arch;
+use bouncelight::net::convert::{Arch, ConvertError, Norm, Recipe, convert};
 use bouncelight::net::format::{Dtype, Problem, Provenance, Weights};
 use std::path::Path;
 
-pub fn arch(name: &str) -> Arch {
+pub fn named(name: &str) -> Arch {
     if name == "pix2pix" { Arch::Pix2pix } else { Arch::DeepIllumination }
 }
 
@@ -35,14 +36,14 @@ fn faults(state: &State, arch: Arch, norm: Norm) -> Vec<String> {
 
 #[test]
 fn the_papers_generator_has_its_size() {
-    let graph = generator(Arch::Pix2pix, Norm::Group, 64);
+    let graph = arch::graph(Arch::Pix2pix, Norm::Group, 64, true);
     assert_eq!(graph.check(), []);
     // 54.41 M in convolutions, the rest in norms.
     assert_eq!(graph.parameters(), 54_413_315 + 9_856);
     // By hand, convolutions at 1024×512: 34.69 GFLOP down, 62.88 up, 6.44 in the last one; norms and the like add 0.2.
     let flops = graph.flops(1024, 512).unwrap() as f64 / 1e9;
     assert!((104.0..104.4).contains(&flops), "{flops} GFLOP");
-    let wide = generator(Arch::DeepIllumination, Norm::Batch, 128);
+    let wide = arch::graph(Arch::DeepIllumination, Norm::Batch, 128, true);
     assert_eq!(wide.check(), []);
     let shapes = wide.shapes(256, 256).unwrap();
     let last = shapes.last().unwrap();
@@ -59,8 +60,8 @@ fn any_width_and_norm() {
         ("deep-illumination", "batch", 5),
     ] {
         let from = state(arch_name, norm_name, width);
-        let weights = converted(&from, arch(arch_name), norm(norm_name), Dtype::F32).unwrap();
-        assert_eq!(weights.graph, generator(arch(arch_name), norm(norm_name), width as u32));
+        let weights = converted(&from, named(arch_name), norm(norm_name), Dtype::F32).unwrap();
+        assert_eq!(weights.graph, arch::graph(named(arch_name), norm(norm_name), width as u32, true));
         assert_eq!((weights.table.name.as_str(), weights.provenance["seed"].as_u64()), ("images", Some(1)));
         let key = if arch_name == "pix2pix" { "up3.model.0.weight" } else { "deconv3.weight" };
         assert_eq!(weights.tensors()[key].data, from[key].2);
@@ -100,7 +101,7 @@ fn states_that_differ_a_little() {
     assert!(weights.values("down3.model.1", "weight").is_empty());
     // A batch norm network as it runs in training mode.
     for (arch_name, norm_name) in [("pix2pix", "batch"), ("deep-illumination", "batch")] {
-        let weights = converted(&state(arch_name, norm_name, 2), arch(arch_name), Norm::Instance, Dtype::F32).unwrap();
+        let weights = converted(&state(arch_name, norm_name, 2), named(arch_name), Norm::Instance, Dtype::F32).unwrap();
         assert!(weights.tensors().keys().all(|k| !k.contains("running")));
     }
     let refused = converted(&state("deep-illumination", "batch", 2), Arch::DeepIllumination, Norm::Group, Dtype::F32);

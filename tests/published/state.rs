@@ -47,10 +47,10 @@ pub fn state(arch: &str, norm_name: &str, width: usize) -> State {
     let into = |i: usize| if i == 0 { 12 } else { out[i - 1] };
     let below = |i: usize| if i == 0 { out[7] } else { 2 * out[7 - i] };
     if arch == "pix2pix" {
-        for i in 0..8 {
-            insert(&mut state, &format!("down{}.model.0.weight", i + 1), &[out[i], into(i), 4, 4]);
+        for (i, own) in out.into_iter().enumerate() {
+            insert(&mut state, &format!("down{}.model.0.weight", i + 1), &[own, into(i), 4, 4]);
             if i > 0 && i < 7 {
-                norm(&mut state, &format!("down{}.model.1", i + 1), out[i], norm_name == "batch");
+                norm(&mut state, &format!("down{}.model.1", i + 1), own, norm_name == "batch");
             }
         }
         for i in 0..7 {

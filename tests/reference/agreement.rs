@@ -50,6 +50,11 @@ impl Agreement {
         Self { bias: Mean::of(&first, &second), square: Mean { value: mean, error: (variance / n).sqrt() } }
     }
 
+    /// Is the rms difference at most `bound`, as far as noise lets one say (2 σ)?
+    pub fn within(&self, bound: f64) -> bool {
+        self.square.value <= bound * bound + 2.0 * self.square.error
+    }
+
     /// Root of the mean square difference, which bounds the mean absolute one from above; noise below 0 counts as 0.
     pub fn rms(&self) -> f64 {
         self.square.value.max(0.0).sqrt()

@@ -167,6 +167,7 @@ impl Options {
         };
         if self.like_cycles {
             (job.bounces, job.diffuse_bounces, job.glossy_bounces, job.clamp) = (12, 4, 4, 10.0);
+            job.filter_glossy = 1.0;
         }
         job.bounces = self.bounces.unwrap_or(job.bounces);
         job

@@ -45,10 +45,10 @@ impl Mean {
     /// Fails unless `expected` is within the error bar, the bar is short enough to see 2 %, and 2 % more is seen.
     pub fn assert_is(&self, what: &str, expected: f64) {
         println!(
-            "{what}: {:.6} ± {:.6} (expected {expected:.6}, {:+.1} σ, {:+.3} %)",
+            "{what}: {:.6} ± {:.6} (expected {expected:.6}, {:.1} σ, {:+.3} %)",
             self.value,
             self.error,
-            (self.value - expected) / self.error.max(1e-300),
+            self.sigmas(expected).min(1e6),
             100.0 * (self.value / expected - 1.0)
         );
         assert!(self.sigmas(expected) <= SIGMAS, "{what}: {self:?} is not {expected}");

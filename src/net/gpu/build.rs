@@ -55,12 +55,19 @@ fn offsets(kernel: &Kernel) -> impl Iterator<Item = u64> + use<> {
     (0..kernel.parts.len() as u64).map(move |i| i * each)
 }
 
-/// Compiled shaders. Steps with the same shader and prelude share a pipeline.
+type Compiled = (wgpu::ComputePipeline, wgpu::BindGroupLayout);
+
+/// Compiled shaders by name and prelude. Steps with the same two share a pipeline.
 #[derive(Default)]
-pub(super) struct Pipelines(HashMap<(String, String), (wgpu::ComputePipeline, wgpu::BindGroupLayout)>);
+pub(super) struct Pipelines(HashMap<(String, String), Compiled>);
 
 impl Pipelines {
-    fn get(&mut self, device: &wgpu::Device, kernel: &Kernel) -> (wgpu::ComputePipeline, wgpu::BindGroupLayout) {
+    /// Lets go of what none of `kernels` uses.
+    pub fn keep(&mut self, kernels: &[Kernel]) {
+        self.0.retain(|(shader, prelude), _| kernels.iter().any(|k| k.shader == *shader && k.prelude == *prelude));
+    }
+
+    fn get(&mut self, device: &wgpu::Device, kernel: &Kernel) -> Compiled {
         let make = || {
             let module = shaders::module_with(device, &kernel.shader, &kernel.prelude);
             let descriptor = wgpu::ComputePipelineDescriptor {

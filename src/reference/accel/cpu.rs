@@ -95,20 +95,31 @@ fn triangle([a, b, c]: [Vec3; 3], word: u32, nearest: f32) -> Option<AccelHit> {
 impl Accel {
     /// The nearest hit of the ray with 0 < t < `t_max`, t counted in lengths of `direction`. Both sides of triangles are hit.
     pub fn closest(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32) -> Option<AccelHit> {
+        self.walk(origin, direction, t_max).0
+    }
+
+    /// Blocks that [`Accel::closest`] looks at, in the GPU's order, so that this is also the GPU's number.
+    pub fn visits(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32) -> usize {
+        self.walk(origin, direction, t_max).1
+    }
+
+    fn walk(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32) -> (Option<AccelHit>, usize) {
         let ray = Ray::new(origin.into(), direction.into());
-        let mut best = None;
-        let mut nearest = t_max;
+        let octant = [4, 2, 1].iter().zip(direction).filter(|(_, d)| *d >= 0.0).map(|(bit, _)| bit).sum::<u32>();
+        let (mut best, mut nearest, mut visits) = (None, t_max, 0);
         let mut open = vec![0u32];
         while let Some(index) = open.pop() {
+            visits += 1;
             let block = &self.blocks[index as usize];
             if block[3] & NODE != 0 {
                 let met = ray.children(block, nearest);
-                open.extend((0..8).filter(|child| met & (1 << child) != 0).map(|child| (block[3] & !NODE) + child));
+                let places = (0..8).map(|rank| rank ^ octant).filter(|place| met & (1 << place) != 0);
+                open.extend(places.map(|place| (block[3] & !NODE) + place));
             } else if let Some(hit) = ray.leaf(block, nearest) {
                 nearest = hit.t;
                 best = Some(hit);
             }
         }
-        best
+        (best, visits)
     }
 }

@@ -12,6 +12,9 @@ const ROW: u32 = 2048;
 /// Texels of a block, 16 bytes each.
 const TEXELS: u32 = WORDS as u32 / 4;
 
+/// A block's number has 24 bits in the traversal's stack.
+const MOST: u64 = 1 << 24;
+
 /// Nodes and leaves on the GPU.
 #[derive(Debug)]
 pub struct AccelGpu {
@@ -28,10 +31,11 @@ impl AccelGpu {
     /// [`AccelError::TooLarge`] when the device's textures are too small, [`AccelError::OutOfMemory`] when its memory is.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, accel: &Accel) -> Result<Self, AccelError> {
         let side = device.limits().max_texture_dimension_2d;
-        let rows = (accel.blocks.len() as u64).div_ceil(u64::from(ROW));
-        if side < ROW * TEXELS || rows > u64::from(side) {
-            let limit = if side < ROW * TEXELS { 0 } else { u64::from(ROW) * u64::from(side) };
-            return Err(AccelError::TooLarge { blocks: accel.blocks.len() as u64, limit, side });
+        let blocks = accel.blocks.len() as u64;
+        let rows = blocks.div_ceil(u64::from(ROW));
+        let limit = if side < ROW * TEXELS { 0 } else { (u64::from(ROW) * u64::from(side)).min(MOST) };
+        if blocks > limit {
+            return Err(AccelError::TooLarge { blocks, limit, side });
         }
         let scope = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let blocks = upload(device, queue, &accel.blocks, rows as u32);

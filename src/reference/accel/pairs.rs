@@ -39,6 +39,10 @@ impl Pair {
     }
 }
 
+/// Pairs are made whose box has at most this share of the area of both triangles' boxes. Tried from 0.6 to 9 on rooms and
+/// spheres: 0.9 visits least; at 1 the corners of cubes are joined, whose box is mostly empty.
+const WORTH: f32 = 0.9;
+
 type Edge = [[u32; 3]; 2];
 
 fn edge(triangle: &Triangle, start: usize) -> Edge {
@@ -50,7 +54,7 @@ fn half_area(triangles: &[&Triangle]) -> f32 {
 }
 
 /// Joins the triangles `kept`. Each takes the free neighbour with which it fills the smallest box, if visiting that box
-/// costs no more than visiting both triangles' own.
+/// costs less than visiting both triangles' own.
 pub(super) fn join(triangles: &[Triangle], kept: &[u32]) -> Vec<Pair> {
     let mut owners: HashMap<Edge, (u32, usize)> = HashMap::with_capacity(kept.len() * 3);
     for &index in kept {
@@ -70,7 +74,7 @@ pub(super) fn join(triangles: &[Triangle], kept: &[u32]) -> Vec<Pair> {
             let &(other, other_start) = owners.get(&[to, from])?;
             let theirs = &triangles[other as usize];
             let area = half_area(&[own, theirs]);
-            let worth = !taken[other as usize] && area <= half_area(&[own]) + half_area(&[theirs]);
+            let worth = !taken[other as usize] && area <= WORTH * (half_area(&[own]) + half_area(&[theirs]));
             worth.then_some((area, start, other, other_start))
         });
         match candidates.min_by(|a, b| a.0.total_cmp(&b.0)) {

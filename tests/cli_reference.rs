@@ -1,0 +1,199 @@
+//! `render --method reference` as a user meets it: flags, metadata, exit codes, files that appear or do not.
+
+mod common;
+
+use assert_cmd::Command;
+use bouncelight::image_io::{Layers, read_exr};
+use std::path::Path;
+
+fn bouncelight(args: &[&str]) -> std::process::Output {
+    Command::new(env!("CARGO_BIN_EXE_bouncelight")).args(args).output().expect("the program starts")
+}
+
+#[track_caller]
+fn fails(args: &[&str], code: i32, words: &[&str]) {
+    let out = bouncelight(args);
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(code), "{args:?}: {text}");
+    assert!(!text.contains("panicked"), "{args:?}: {text}");
+    for word in words {
+        assert!(text.contains(word), "{args:?}: `{word}` is missing in: {text}");
+    }
+}
+
+/// Renders the Cornell box with `flags` into `name`; gives the file and what was said.
+#[track_caller]
+fn render(dir: &Path, name: &str, flags: &[&str]) -> (Layers, String) {
+    let path = dir.join(name);
+    let out = path.to_str().expect("a temporary path is text");
+    let args = [&["render", "cornell", "--method", "reference", "-o", out], flags].concat();
+    let done = bouncelight(&args);
+    let text = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert_eq!(done.status.code(), Some(0), "{args:?}: {text}");
+    (read_exr(&path).unwrap(), text)
+}
+
+fn key(layers: &Layers, name: &str) -> String {
+    let found = layers.metadata.iter().find(|(k, _)| k == name);
+    found.unwrap_or_else(|| panic!("no {name} in {:?}", layers.metadata)).1.clone()
+}
+
+#[test]
+fn flags_that_make_no_sense_exit_with_2() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.exr");
+    let out = path.to_str().unwrap();
+    let traced = |flags: &[&str], words: &[&str]| {
+        fails(&[&["render", "cornell", "--method", "reference", "-o", out], flags].concat(), 2, words);
+    };
+    traced(&["--spp", "0"], &["--spp"]);
+    for bound in ["0", "-1", "nan", "inf"] {
+        traced(&["--until-error", bound], &["--until-error", "above 0"]);
+    }
+    traced(&["--clamp", "nan"], &["--clamp", "or above"]);
+    traced(&["--cells", "0"], &["--cells"]);
+    traced(&["--samples", "4"], &["--samples", "--spp"]);
+    traced(&["--weights", "w.safetensors"], &["--weights", "network"]);
+    traced(&["--aov", "Motion"], &["Motion", "Gi, Analytic"]);
+    traced(&["--aov", "Depth,Depth"], &["twice"]);
+    for (flag, value) in
+        [("--spp", "4"), ("--until-error", "0.1"), ("--clamp", "1"), ("--bounces", "3"), ("--cells", "4")]
+    {
+        fails(&["render", "cornell", "--method", "direct", "-o", out, flag, value], 2, &[flag, "--method reference"]);
+    }
+    fails(&["render", "cornell", "--method", "direct", "-o", out, "--aov", "Gi"], 2, &["Gi", "Motion"]);
+    fails(&["bench", "cornell", "--method", "reference"], 2, &["real-time"]);
+    assert!(std::fs::read_dir(dir.path()).unwrap().next().is_none(), "a usage error leaves nothing behind");
+}
+
+#[test]
+fn pictures_tell_their_noise_and_how_they_were_made() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let flags = ["--size", "20x12", "--spp", "5", "--aov", "all", "--seed", "3"];
+    let limits = ["--bounces", "12", "--diffuse-bounces", "4", "--glossy-bounces", "4", "--clamp", "10"];
+    let (a, said) = render(dir.path(), "a.exr", &[&flags[..], &limits].concat());
+    assert_eq!((a.width, a.height), (20, 12));
+    for layer in
+        "DiffDir DiffInd DiffCol GlossDir GlossInd GlossCol Emit Env Gi Analytic Normal Depth Position".split(' ')
+    {
+        a.check_finite(layer).unwrap();
+    }
+    assert!(said.contains("5 samples a pixel") && said.contains("noise left"), "{said}");
+    for (name, value) in [
+        ("ReferenceSamples", "5"),
+        ("ReferenceSamplesMost", "5"),
+        ("ReferenceSeed", "3"),
+        ("ReferenceBounces", "12 4 4"),
+        ("ReferenceClamp", "10"),
+        ("ReferenceCells", "none"),
+    ] {
+        assert_eq!(key(&a, name), value, "{name}");
+    }
+    for name in ["Combined", "DiffInd", "Gi"] {
+        let noise: f64 = key(&a, &format!("ReferenceNoise{name}")).parse().unwrap();
+        let mean: f64 = key(&a, &format!("ReferenceNoiseOfMean{name}")).parse().unwrap();
+        assert!(noise > 0.01 && noise < 10.0 && mean > 0.0 && mean < noise, "{name}: {noise}, {mean}");
+    }
+    assert!(key(&a, "ReferenceSamplesPerSecond").parse::<f64>().unwrap() > 0.0);
+    // The same seed gives the same picture, another seed another one.
+    let (again, _) = render(dir.path(), "again.exr", &[&flags[..], &limits].concat());
+    assert_eq!(again.layers, a.layers);
+    let (other, _) = render(dir.path(), "other.exr", &["--size", "20x12", "--spp", "5", "--aov", "all", "--quiet"]);
+    assert_ne!(other.layer("").unwrap(), a.layer("").unwrap());
+    assert_eq!(key(&other, "ReferenceBounces"), "unlimited unlimited unlimited");
+}
+
+#[test]
+fn cells_and_error_bounds() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let (cells, _) =
+        render(dir.path(), "cells.exr", &["--size", "65x33", "--cells", "4", "--until-error", "0.5", "--aov", "Gi"]);
+    assert_eq!((cells.width, cells.height, key(&cells, "ReferenceCells").as_str()), (17, 9, "4"));
+    assert!(key(&cells, "ReferenceNoiseGi").parse::<f64>().unwrap() <= 0.5);
+    assert!(key(&cells, "ReferenceSamples").parse::<u32>().unwrap() >= 16);
+    // A picture of cells can be judged, and the exit code tells.
+    let (own, out) = (dir.path().join("cells.exr"), dir.path().join("one.png"));
+    let (own, out) = (own.to_str().unwrap(), out.to_str().unwrap());
+    let start = ["render", "cornell", "--method", "reference", "--size", "65x33", "--cells", "4", "--spp", "1"];
+    let judged = |threshold| [&start[..], &["-o", out, "--reference", own, "--threshold", threshold]].concat();
+    assert_eq!(bouncelight(&judged("0.9")).status.code(), Some(0));
+    fails(&judged("0.000001"), 5, &["mae"]);
+}
+
+#[test]
+fn odd_scenes_and_sizes() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = dir.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let empty = file("empty.gltf", r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[]}]}"#);
+    let out = dir.path().join("out.exr");
+    let out = out.to_str().unwrap();
+    let ok = |scene: &str, flags: &[&str]| {
+        let args = [&["render", scene, "--method", "reference", "--spp", "2", "-o", out], flags].concat();
+        let done = bouncelight(&args);
+        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+        read_exr(Path::new(out)).unwrap().check_finite("").unwrap();
+    };
+    ok(&empty, &["--size", "1x1"]);
+    ok("cornell", &["--size", "1x7", "--environment", "0"]);
+    // Inside the left wall, and far outside.
+    ok("cornell", &["--size", "5x3", "--eye", "1e7,0,0", "--look-at", "0,0,0"]);
+    // One vertex is no number: the scene is refused, by name.
+    let positions = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAwH8AAAAA";
+    let text = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+        "buffers":[{{"byteLength":36,"uri":"data:application/octet-stream;base64,{positions}"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,1]}}]}}"#
+    );
+    let broken = file("broken.gltf", &text);
+    let gone = dir.path().join("gone.exr");
+    fails(
+        &["render", &broken, "--method", "reference", "-o", gone.to_str().unwrap()],
+        4,
+        &["broken.gltf", "not a finite"],
+    );
+    assert!(!gone.exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_exits_with_130_and_leaves_nothing() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("long.exr");
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_bouncelight"))
+        .args(["render", "cornell", "--method", "reference", "--size", "64x64", "--spp", "1000000"])
+        .args(["--progress", "plain", "-o", out.to_str().unwrap()])
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The first line of progress says that tracing has begun.
+    let lines = std::io::BufRead::lines(std::io::BufReader::new(child.stderr.take().unwrap()));
+    let mut seen = false;
+    for line in lines.map_while(Result::ok) {
+        if !seen && line.contains("/1000000 samples") {
+            seen = true;
+            let kill = std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+            assert!(kill.unwrap().success());
+        }
+    }
+    assert!(seen, "there was no progress");
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(std::fs::read_dir(dir.path()).unwrap().next().is_none(), "nothing half-written");
+}
