@@ -101,6 +101,7 @@ fn differences(a: &Scene, b: &Scene) -> Vec<String> {
     let numbers = |s: &Scene| -> Vec<f32> {
         let lights = s.lights.iter().flat_map(|l| {
             let mut v = l.color.to_vec();
+            v.push(f32::from(u8::from(l.stands_in)));
             match l.kind {
                 LightKind::Directional { direction, irradiance, angle } => {
                     v.extend(direction);
@@ -151,11 +152,12 @@ fn scenes_survive_being_written_and_read() {
         assert_eq!(differences(scene, &again), Vec::<String>::new(), "{}", scene.name);
         assert_eq!(bounds::world_bounds(scene), bounds::world_bounds(&again));
         // Negative controls: small changes are noticed.
-        let changes: [Change; 5] = [
+        let changes: [Change; 6] = [
             ("positions", |s| s.meshes[0].positions[0][1] += 1e-4),
             ("base colour", |s| s.materials[s.meshes[0].material].base_color[0] *= 0.99),
             ("instance", |s| s.instances[0].transform[3][0] += 1e-4),
             ("lights and cameras", |s| s.cameras[0].yfov += 1e-3),
+            ("lights and cameras", |s| s.lights[0].stands_in ^= true),
             ("environment", |s| s.environment.radiance[0] += 1e-2),
         ];
         for (what, change) in changes {
