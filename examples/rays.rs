@@ -189,7 +189,7 @@ fn measure(gpu: &Gpu, caster: &RayCaster, scene: &mut Prepared) {
 fn chart(rows: &[Row], adapter: &str) -> String {
     let (width, height, left, bottom, top) = (760.0, 420.0, 64.0, 360.0, 48.0);
     let most = rows.iter().flat_map(|r| r.cost).fold(0.0, f64::max) * 1.1;
-    let x = |triangles: f64| left + (triangles.log10() - 3.0) / 3.1 * (width - left - 110.0);
+    let x = |triangles: f64| left + (triangles.log10() - 2.85) / 3.25 * (width - left - 110.0);
     let y = |ns: f64| bottom - ns / most * (bottom - top);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"13\">\n\
