@@ -57,7 +57,7 @@ fn a_panel_lights_the_floor_by_lamberts_formula() {
 
         // Sampling lights alone, hitting them alone and both together are three ways to one answer.
         // The panel overhead is small and rarely hit by chance.
-        let by_chance = [1024, 128][seed];
+        let by_chance = [1024, 512][seed];
         for (strategy, samples) in [(Strategy::LightsOnly, 128), (Strategy::HitsOnly, by_chance)] {
             let options = Options { samples, strategy, ..options };
             let t = lit_floor(lab, vec![], Some(panel.clone()), &options);
