@@ -8,7 +8,8 @@ mod common;
 mod trace;
 
 use bouncelight::reference::job::{self, Job};
-use bouncelight::scene::{AlphaMode, Material, Scene};
+use bouncelight::scene::environment::EnvironmentImage;
+use bouncelight::scene::{AlphaMode, Environment, Material, Scene};
 use build::*;
 use trace::*;
 
@@ -53,6 +54,57 @@ fn estimate(gpu: &bouncelight::gpu::Gpu, tracer: &Tracer, base: Job, batches: u3
 /// Largest difference of two estimates in standard errors over the light layers.
 fn apart(a: &[(f64, f64); 8], b: &[(f64, f64); 8]) -> f64 {
     (0..4).map(|k| (a[k].0 - b[k].0).abs() / (a[k].1.powi(2) + b[k].1.powi(2)).sqrt().max(1e-9)).fold(0.0, f64::max)
+}
+
+/// Light from a picture of the surroundings alone, most of it from a spot that rays hardly find by chance.
+fn sky_with_a_bright_spot() -> Scene {
+    let mut s = everything_shines();
+    s.lights.clear();
+    s.materials.iter_mut().for_each(|m| m.emissive = [0.0; 3]);
+    let (width, height) = (32, 16);
+    let rgb = (0..width * height).flat_map(|i| if i == 3 * width + 20 { [60.0, 50.0, 40.0] } else { [0.1, 0.2, 0.4] });
+    let image = EnvironmentImage { name: "spot".into(), width, height, rgb: rgb.collect() };
+    s.environment = Environment::from_image(image).unwrap();
+    s
+}
+
+#[test]
+fn a_picture_of_the_surroundings_lights_by_every_strategy() {
+    let Some(gpu) = common::gpu() else { return };
+    let tracer = Tracer::new(&gpu, &sky_with_a_bright_spot());
+    let camera = look_at([0.5, 1.6, 4.0], [0.0, 0.7, 0.0], 0.8);
+    let base = Job { sample_count: 16, bounces: 3, ..Job::new(&camera, [32, 24]) };
+    let run = |tracer: &Tracer, flags| estimate(&gpu, tracer, Job { flags, ..base }, 12);
+    let both = run(&tracer, 0);
+    for flags in [job::LIGHTS_ONLY, job::HITS_ONLY] {
+        let one = run(&tracer, flags);
+        println!("flags {flags}: {:.5?} for {:.5?}, {:.1} σ", &one[..4], &both[..4], apart(&both, &one));
+        assert!(apart(&both, &one) < 4.0, "flags {flags}");
+        if flags == job::HITS_ONLY {
+            assert!(both[0].1 < 0.5 * one[0].1, "light samples find the spot");
+        }
+    }
+    assert!(apart(&both, &run(&tracer, job::COUNT_TWICE)) > 8.0, "counting twice must be noticed");
+    // The mean of the picture from everywhere is another light.
+    let mut flat = sky_with_a_bright_spot();
+    flat.environment = Environment::constant(flat.environment.radiance);
+    assert!(apart(&both, &run(&Tracer::new(&gpu, &flat), 0)) > 8.0, "directions must matter");
+}
+
+#[test]
+fn an_index_of_one_leaves_a_diffuse_surface() {
+    let Some(gpu) = common::gpu() else { return };
+    let camera = look_at([0.5, 1.6, 4.0], [0.0, 0.7, 0.0], 0.8);
+    let base = Job { sample_count: 16, bounces: 3, ..Job::new(&camera, [32, 24]) };
+    let run = |f0, flags| {
+        let mut s = everything_shines();
+        s.materials.iter_mut().for_each(|m| (m.f0, m.metallic) = (f0, 0.0));
+        estimate(&gpu, &Tracer::new(&gpu, &s), Job { flags, ..base }, 6)
+    };
+    let (diffuse, lambert, glass) = (run(0.0, 0), run(0.0, job::LAMBERT), run(0.04, 0));
+    assert_eq!((diffuse[2].0, diffuse[3].0), (0.0, 0.0), "nothing to reflect");
+    assert!(apart(&diffuse, &lambert) < 4.0, "{diffuse:?} {lambert:?}");
+    assert!(glass[2].0 > 0.0 && apart(&glass, &lambert) > 8.0, "an index of 1.5 reflects");
 }
 
 #[test]

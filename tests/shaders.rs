@@ -120,6 +120,7 @@ fn the_path_tracers_structs_lie_in_memory_as_their_rust_twins() {
     same_layout!("reference.path", "SceneInfo", SceneInfo, size size_of::<SceneInfo>(), [
         environment, flags, light_count, truth_table, truth_count, analytic_table, environment_share,
         environment_share_alone, environment_texels, environment_table, environment_size,
+        environment_cells,
     ]);
     same_layout!("reference.path", "Job", Job, size size_of::<Job>(), [
         world_from_view, tan_half, size, first_point, point_count, film_first, first_sample, sample_count, seed, half,
@@ -127,8 +128,8 @@ fn the_path_tracers_structs_lie_in_memory_as_their_rust_twins() {
     ]);
     same_layout!("reference.path", "ImageUse", ImageUse, size size_of::<ImageUse>(), [row0, texel, row1, bits, size]);
     same_layout!("reference.path", "RefMaterial", RefMaterial, size size_of::<RefMaterial>(), [
-        base_color, emissive, flags, metallic, roughness, normal_scale, alpha_cutoff, base_use, rough_use, normal_use,
-        emissive_use,
+        base_color, emissive, flags, metallic, roughness, normal_scale, alpha_cutoff, f0, base_use, rough_use,
+        normal_use, emissive_use,
     ]);
 }
 

@@ -1,15 +1,22 @@
 // The specular lobe: GGX with the light that single scattering loses given back (Kulla and Conty 2017 as in Cycles'
-// Principled): white metal keeps all light at every roughness. Its dielectric part has the true Fresnel curve of index
-// 1.5, as Cycles has it and as `env_brdf` was fitted to; the rasteriser's `ggx` has Schlick's curve, which is up to a
-// fifth darker between 45° and 65°. Metal has Schlick's.
+// Principled): white metal keeps all light at every roughness. Its dielectric part has the true Fresnel curve of the
+// material's index, as Cycles has it and as `env_brdf` was fitted to; the rasteriser's `ggx` has Schlick's curve, which is
+// up to a fifth darker between 45° and 65°. Metal has Schlick's.
 
-const INDEX: f32 = 1.5;
-// Mean of the Fresnel curve of index 1.5 over the cosine-weighted hemisphere.
-const INDEX_MEAN: f32 = 0.0918;
+// Index of refraction by the reflectance at normal incidence.
+fn index_of(f0: f32) -> f32 {
+    let r = sqrt(clamp(f0, 0.0, 0.99));
+    return (1.0 + r) / (1.0 - r);
+}
 
-fn fresnel_dielectric(c: f32) -> f32 {
-    let g = sqrt(INDEX * INDEX - 1.0 + c * c);
-    let a = (g - c) / (g + c);
+// Mean of the Fresnel curve over the cosine-weighted hemisphere: Kulla and Conty's fit, scaled to be exact for index 1.5.
+fn mean_fresnel(index: f32) -> f32 {
+    return min(1.0258 * (index - 1.0) / (4.08567 + 1.00071 * index), 1.0);
+}
+
+fn fresnel_dielectric(index: f32, c: f32) -> f32 {
+    let g = sqrt(index * index - 1.0 + c * c);
+    let a = (g - c) / max(g + c, 1e-6);
     let b = (c * (g + c) - 1.0) / (c * (g - c) + 1.0);
     return 0.5 * a * a * (1.0 + b * b);
 }
@@ -18,12 +25,14 @@ fn fresnel_dielectric(c: f32) -> f32 {
 fn fresnel(s: Surface, v_h: f32) -> vec3f {
     let mean_metal = s.base + (1.0 - s.base) / 21.0;
     let again_metal = mean_metal * s.mean / (1.0 - mean_metal * (1.0 - s.mean));
-    let again = INDEX_MEAN * s.mean / (1.0 - INDEX_MEAN * (1.0 - s.mean));
+    let index = index_of(s.f0);
+    let mean = mean_fresnel(index);
+    let again = mean * s.mean / (1.0 - mean * (1.0 - s.mean));
     let q = 1.0 - v_h;
     let q2 = q * q;
     let metal = s.base + (1.0 - s.base) * (q2 * q2 * q);
     return mix(
-        vec3f(fresnel_dielectric(v_h) * (1.0 + again * s.missing)), metal * (1.0 + again_metal * s.missing), s.metallic
+        vec3f(fresnel_dielectric(index, v_h) * (1.0 + again * s.missing)), metal * (1.0 + again_metal * s.missing), s.metallic
     );
 }
 

@@ -110,6 +110,8 @@ struct Surface {
     base: vec3f,
     metallic: f32,
     roughness: f32,
+    // Reflectance of the dielectric at normal incidence.
+    f0: f32,
     // Directional albedo of the specular lobe.
     gloss: vec3f,
     // What the single-scattering lobe loses over what it keeps, and the mean of what it keeps over directions.
@@ -179,6 +181,7 @@ fn surface_at(hit: Hit, direction: vec3f) -> Surface {
     s.metallic = saturate(materials.items[m].metallic * rough_metal.b);
     s.roughness = saturate(materials.items[m].roughness * rough_metal.g);
     s.base = saturate(base);
+    s.f0 = materials.items[m].f0;
     let n_v = dot(s.n, -direction);
     s.v = select(normalize(-direction + s.n * (1e-4 - n_v)), -direction, n_v > 1e-4);
     s.n_v = max(n_v, 1e-4);
@@ -191,8 +194,8 @@ fn surface_at(hit: Hit, direction: vec3f) -> Surface {
         s.albedo = s.base;
         return s;
     }
-    s.albedo = s.base * (1.0 - s.metallic) * (1.0 - env_brdf(vec3f(0.04), s.roughness, max(n_v, 0.0)).x);
-    s.gloss = env_brdf(mix(vec3f(0.04), s.base, s.metallic), s.roughness, max(n_v, 0.0));
+    s.albedo = s.base * (1.0 - s.metallic) * (1.0 - env_brdf(vec3f(s.f0), s.roughness, max(n_v, 0.0)).x);
+    s.gloss = env_brdf(mix(vec3f(s.f0), s.base, s.metallic), s.roughness, max(n_v, 0.0));
     s.alpha = max(s.roughness * s.roughness, 1e-3);
     let kept = energy(s.roughness, s.n_v);
     s.missing = (1.0 - kept) / kept;

@@ -2,7 +2,7 @@
 
 // Rust twin: `reference::scene::SceneInfo`.
 struct SceneInfo {
-    // Constant radiance of the surroundings, W/(m² sr); a tint of the picture where there is one.
+    // Constant radiance of the surroundings, W/(m² sr); the mean where there is a picture.
     environment: vec3f,
     flags: u32,
     // Analytic lights, four vectors each, at the start of `lights`.
@@ -15,12 +15,13 @@ struct SceneInfo {
     // Chance that a light sample goes to the surroundings, and the same when lights are sampled only.
     environment_share: f32,
     environment_share_alone: f32,
-    // Picture of the surroundings in `texels`: first word and size; width 0 for none.
+    // Picture of the surroundings in `texels`, three floats a texel: first word and size; width 0 for none.
     environment_texels: u32,
     // Its alias table: first vector in `lights`.
     environment_table: u32,
     environment_size: vec2u,
-    pad: vec2u,
+    // Columns and rows of the table.
+    environment_cells: vec2u,
 }
 
 // Some material lets rays through by its alpha.
@@ -81,6 +82,11 @@ struct RefMaterial {
     normal_scale: f32,
     // 0 opaque, the mask's cutoff, or 2 for stochastic coverage.
     alpha_cutoff: f32,
+    // Reflectance of the dielectric at normal incidence.
+    f0: f32,
+    pad0: f32,
+    pad1: f32,
+    pad2: f32,
     base_use: ImageUse,
     rough_use: ImageUse,
     normal_use: ImageUse,

@@ -10,6 +10,7 @@
 
 mod lights;
 mod materials;
+mod sky;
 mod tables;
 mod triangles;
 
@@ -89,7 +90,7 @@ pub struct SceneInfo {
     pub environment_texels: u32,
     pub environment_table: u32,
     pub environment_size: [u32; 2],
-    pub pad: [u32; 2],
+    pub environment_cells: [u32; 2],
 }
 
 /// A scene that can be traced. Immutable; build again after a change.
@@ -110,7 +111,7 @@ impl ReferenceScene {
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Self, PackError> {
         let limits = Limits::of(device, scene);
         let flat = triangles::flatten(scene, &limits)?;
-        let (items, words) = materials::pack(scene, &limits)?;
+        let (items, mut words) = materials::pack(scene, &limits)?;
         let lights = lights::pack(scene, &flat);
         limits.check("lights and glowing triangles", 16 * lights.vectors.len() as u64)?;
         let structure = Accel::build(&flat.positions)?;
@@ -120,6 +121,14 @@ impl ReferenceScene {
         let mut store = tables::header();
         store.extend_from_slice(bytemuck::cast_slice(&items));
         let mut info = lights.info;
+        if info.environment_cells != [0; 2]
+            && let Some(image) = &scene.environment.image
+        {
+            limits.check("images and the picture of the surroundings", 4 * (words.len() + image.rgb.len()) as u64)?;
+            info.environment_texels = words.len() as u32;
+            info.environment_size = [image.width, image.height];
+            words.extend(image.rgb.iter().map(|v| v.to_bits()));
+        }
         if scene.materials.iter().any(|m| m.alpha_mode != crate::scene::AlphaMode::Opaque) {
             info.flags |= COVERED;
         }

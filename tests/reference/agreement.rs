@@ -105,7 +105,7 @@ fn synthetic(random: &mut Random, n: usize, difference: impl Fn(usize) -> f64) -
 fn a_known_difference_is_found_under_the_noise() {
     let mut random = Random(3);
     for (off, wave) in [(0.0, 0.0), (0.005, 0.0), (0.0, 0.03), (0.01, 0.05)] {
-        let difference = |i: usize| off + wave * if (i / 64) % 2 == 0 { 1.0 } else { -1.0 };
+        let difference = |i: usize| off + wave * if (i / 64).is_multiple_of(2) { 1.0 } else { -1.0 };
         let pixels = synthetic(&mut random, 1 << 17, difference);
         let a = Agreement::of(&pixels);
         let square = off * off + wave * wave;

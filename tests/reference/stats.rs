@@ -83,7 +83,7 @@ impl Mul<f64> for Mean {
 impl Div<f64> for Mean {
     type Output = Self;
     fn div(self, by: f64) -> Self {
-        self * by.recip()
+        Self { value: self.value / by, error: self.error / by.abs() }
     }
 }
 

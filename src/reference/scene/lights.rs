@@ -3,6 +3,7 @@
 //! Chances follow power with a share for everybody: what lights a closed room may be a weak lamp beside a strong sun
 //! outside. Wrong chances cost noise, never correctness.
 
+use super::sky;
 use super::triangles::Flat;
 use super::{ANALYTIC_APART, SceneInfo};
 use crate::scene::defaults::mean_emission;
@@ -82,6 +83,13 @@ pub(super) fn pack(scene: &Scene, flat: &Flat) -> Lights {
     vectors.extend(alias(&truth));
     let analytic_table = vectors.len() as u32;
     vectors.extend(alias(&analytic.iter().zip(rasterised).map(|(c, p)| (c.id, p)).collect::<Vec<_>>()));
+    let sky_cells = scene.environment.image.as_ref().and_then(|image| sky::cells(image));
+    let environment_table = vectors.len() as u32;
+    let mut environment_cells = [0; 2];
+    if let Some((size, chances)) = sky_cells {
+        environment_cells = size;
+        vectors.extend(alias(&(0u32..).zip(chances).collect::<Vec<_>>()));
+    }
     let info = SceneInfo {
         environment: scene.environment.radiance,
         flags: if apart { ANALYTIC_APART } else { 0 },
@@ -89,8 +97,11 @@ pub(super) fn pack(scene: &Scene, flat: &Flat) -> Lights {
         truth_table,
         truth_count: truth.len() as u32,
         analytic_table,
-        environment_share: 0.0,
+        // A picture may hold a small sun, which rays that leave anyway would hardly find.
+        environment_share: if environment_cells == [0; 2] { 0.0 } else { alone as f32 },
         environment_share_alone: alone as f32,
+        environment_table,
+        environment_cells,
         ..SceneInfo::zeroed()
     };
     Lights { vectors, info, densities }
