@@ -280,11 +280,11 @@ mod tests {
             compile + 1e-6 * f64::from(c.count) * f64::from(c.samples)
         });
         assert!(chunks.len() < 60, "{} dispatches", chunks.len());
-        // Few points: many samples at once instead.
+        // Few points: as many samples at once as may be.
         let mut schedule = Schedule::new(10, 0.1);
         let chunks = run(&mut schedule, 100_000, |c| 1e-6 * f64::from(c.count) * f64::from(c.samples));
-        assert!(chunks.len() < 60, "{} dispatches", chunks.len());
-        assert!(chunks.iter().any(|c| c.0.samples > 1000));
+        assert!(chunks.len() < 100_000 / MOST_SAMPLES as usize + 60, "{} dispatches", chunks.len());
+        assert!(chunks.iter().all(|c| c.0.samples <= MOST_SAMPLES));
     }
 
     #[test]
@@ -299,7 +299,7 @@ mod tests {
         let mut schedule = Schedule::new(153, 0.1);
         let chunks = run(&mut schedule, 50_000, |c| 0.15 + 1e-5 * f64::from(c.count) * f64::from(c.samples));
         check_complete(&chunks, 153, 50_000);
-        assert!(chunks.len() < 1000, "{} dispatches", chunks.len());
+        assert!(chunks.len() < 50_000 / MOST_SAMPLES as usize + 60, "{} dispatches", chunks.len());
         assert!(schedule.floor < 1 << 30, "{}", schedule.floor);
         assert!(chunks.iter().all(|c| c.1 < 0.8));
     }
