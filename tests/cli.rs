@@ -39,7 +39,7 @@ fn usage_errors_exit_with_2() {
     fails(&["render", "interior", "-o", &out, "--eye", "1,2,3", "--look-at", "1,2,3"], 2, &["same point"]);
     fails(&["render", "interior", "-o", &out, "--camera", "99"], 2, &["--camera 99"]);
     fails(&["render", "interior", "-o", &out, "--fov", "180"], 2, &["--fov"]);
-    fails(&["render", "interior", "-o", &out, "--aov", "Bogus"], 2, &["Bogus", "DiffInd"]);
+    fails(&["render", "interior", "-o", &path(&dir, "x.exr"), "--aov", "Bogus"], 2, &["Bogus", "DiffInd"]);
     fails(&["render", "interior", "-o", &out, "--environment", "nan"], 2, &["finite"]);
     fails(&["render", "interior", "-o", &path(&dir, "x.bmp")], 2, &[".png", ".exr"]);
     fails(&["render", "interior"], 2, &["--output"]);
