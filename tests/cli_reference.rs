@@ -170,6 +170,50 @@ fn odd_scenes_and_sizes() {
 }
 
 #[cfg(unix)]
+/// Writes a glTF file of `instances` copies of a fan of `triangles`.
+fn write_copies(path: &Path, triangles: u16, instances: u32) {
+    let mut bytes = Vec::new();
+    for i in 0..triangles + 2 {
+        let angle = f32::from(i) * 1e-3;
+        [angle.cos(), angle.sin(), 0.0].iter().for_each(|x: &f32| bytes.extend(x.to_le_bytes()));
+    }
+    let positions = bytes.len();
+    (1..=triangles).for_each(|i| [0, i, i + 1].iter().for_each(|x: &u16| bytes.extend(x.to_le_bytes())));
+    let count = instances as usize;
+    let nodes = vec![r#"{"mesh":0}"#; count].join(",");
+    let list = (0..count).map(|i| i.to_string()).collect::<Vec<_>>().join(",");
+    let (all, vertices, indices) = (bytes.len(), triangles + 2, 3 * u32::from(triangles));
+    let text = format!(
+        r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":{all},"uri":"fan.bin"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":{positions}}},{{"buffer":0,"byteOffset":{positions},"byteLength":{}}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":{vertices},"type":"VEC3","min":[-1,-1,0],"max":[1,1,0]}},
+        {{"bufferView":1,"componentType":5123,"count":{indices},"type":"SCALAR"}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],
+        "cameras":[{{"type":"perspective","perspective":{{"yfov":1.0,"znear":0.1}}}}],
+        "nodes":[{nodes},{{"camera":0}}],"scenes":[{{"nodes":[{list},{count}]}}],"scene":0}}"#,
+        all - positions
+    );
+    std::fs::write(path, text).unwrap();
+    std::fs::write(path.with_file_name("fan.bin"), bytes).unwrap();
+}
+
+#[test]
+fn more_than_the_device_holds_exits_with_4_before_memory_is_taken() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("copies.gltf");
+    let out = dir.path().join("x.png").display().to_string();
+    let args = ["render", path.to_str().unwrap(), "--method", "reference", "--spp", "1", "--size", "8x8", "-o", &out];
+    // A hundred million triangles are too many for any device's bindings or for the tree.
+    write_copies(&path, 10_000, 10_000);
+    fails(&args, 4, &["copies", "100000000"]);
+    // Negative control: the same file with two copies is drawn.
+    write_copies(&path, 100, 2);
+    fails(&args, 0, &[]);
+}
+
 #[test]
 fn an_interrupted_run_exits_with_130_and_leaves_nothing() {
     if common::gpu().is_none() {

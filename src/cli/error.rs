@@ -4,6 +4,7 @@ use crate::{
     gi::GiError,
     gpu::GpuError,
     net::{convert::ConvertError, format::WeightsError, pictures::PicturesError},
+    reference::PackError,
     render::RenderError,
     scene::{SceneError, environment::EnvironmentError, upload::UploadError},
 };
@@ -62,8 +63,7 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
         if cause.is::<GpuError>() {
             return NO_ADAPTER;
         }
-        // Sound weights that speak of something else than light.
-        // `RenderError` shows what it wraps as if it were its own, so its cause is not in the chain.
+        // Sound weights that speak of something else than light. `RenderError` shows what it wraps as if it were its own, so its cause is not in the chain.
         let wrapped = match cause.downcast_ref::<RenderError>() {
             Some(RenderError::Gi(e)) => Some(e),
             _ => None,
@@ -81,6 +81,7 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
             || cause.is::<UploadError>()
             || cause.is::<WeightsError>()
             || cause.is::<EnvironmentError>()
+            || cause.is::<PackError>()
         {
             return INVALID_INPUT;
         }
