@@ -82,6 +82,38 @@ pub struct Mesh {
     pub material: usize,
 }
 
+impl Mesh {
+    /// Whether the arrays agree with each other and with a scene of `materials` materials.
+    ///
+    /// # Errors
+    /// What disagrees, in words that follow the mesh's name.
+    pub(crate) fn check(&self, materials: usize) -> Result<(), String> {
+        let n = self.positions.len();
+        let arrays = [
+            ("normals", self.normals.len(), false),
+            ("tangents", self.tangents.len(), true),
+            ("uv0", self.uv0.len(), true),
+            ("uv1", self.uv1.len(), true),
+            ("colors", self.colors.len(), true),
+        ];
+        for (name, len, optional) in arrays {
+            if len != n && !(optional && len == 0) {
+                return Err(format!("{len} {name} for {n} positions"));
+            }
+        }
+        if !self.indices.len().is_multiple_of(3) {
+            return Err(format!("{} indices are no whole number of triangles", self.indices.len()));
+        }
+        if let Some(i) = self.indices.iter().find(|&&i| i as usize >= n) {
+            return Err(format!("index {i} with {n} vertices"));
+        }
+        if self.material >= materials {
+            return Err(format!("material {} of {materials}", self.material));
+        }
+        Ok(())
+    }
+}
+
 /// One placement of a mesh.
 #[derive(Debug, Clone)]
 pub struct Instance {

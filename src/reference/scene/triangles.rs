@@ -55,7 +55,7 @@ pub(super) fn flatten(scene: &Scene, limits: &Limits) -> Result<Flat, PackError>
             count: scene.meshes.len(),
         })?;
         if !std::mem::replace(&mut checked[instance.mesh], true) {
-            check(mesh, scene.materials.len())?;
+            mesh.check(scene.materials.len()).map_err(|reason| PackError::Mesh { mesh: mesh.name.clone(), reason })?;
         }
         let triangles = (mesh.indices.len() / 3) as u64;
         count += triangles;
@@ -79,33 +79,6 @@ pub(super) fn flatten(scene: &Scene, limits: &Limits) -> Result<Flat, PackError>
 
 fn has_attributes(mesh: &Mesh) -> bool {
     !(mesh.uv0.is_empty() && mesh.uv1.is_empty() && mesh.colors.is_empty())
-}
-
-fn check(mesh: &Mesh, materials: usize) -> Result<(), PackError> {
-    let wrong = |reason: String| Err(PackError::Mesh { mesh: mesh.name.clone(), reason });
-    let n = mesh.positions.len();
-    let arrays = [
-        ("normals", mesh.normals.len(), false),
-        ("tangents", mesh.tangents.len(), true),
-        ("uv0", mesh.uv0.len(), true),
-        ("uv1", mesh.uv1.len(), true),
-        ("colors", mesh.colors.len(), true),
-    ];
-    for (name, len, optional) in arrays {
-        if len != n && !(optional && len == 0) {
-            return wrong(format!("{len} {name} for {n} positions"));
-        }
-    }
-    if !mesh.indices.len().is_multiple_of(3) {
-        return wrong(format!("{} indices are no whole number of triangles", mesh.indices.len()));
-    }
-    if let Some(i) = mesh.indices.iter().find(|&&i| i as usize >= n) {
-        return wrong(format!("index {i} with {n} vertices"));
-    }
-    if mesh.material >= materials {
-        return wrong(format!("material {} of {materials}", mesh.material));
-    }
-    Ok(())
 }
 
 fn add(flat: &mut Flat, mesh: &Mesh, world: Mat4) {

@@ -83,7 +83,7 @@ pub(super) fn upload(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) 
     let (mut positions, mut attributes, mut indices) = (Vec::new(), Vec::new(), Vec::<u32>::new());
     let mut ranges = Vec::with_capacity(scene.meshes.len());
     for mesh in &scene.meshes {
-        check(mesh, scene.materials.len())?;
+        mesh.check(scene.materials.len()).map_err(|reason| UploadError::Mesh { mesh: mesh.name.clone(), reason })?;
         let too_large = |what, bytes| UploadError::TooLarge { mesh: mesh.name.clone(), what, bytes, limit };
         let vertex_bytes = 36 * (positions.len() + mesh.positions.len()) as u64;
         let index_bytes = 4 * (indices.len() + mesh.indices.len()) as u64;
@@ -148,33 +148,6 @@ pub(super) fn upload(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) 
     let instances = filled(device, queue, "scene.instances", vertex, &rows);
     let bytes = positions.size() + attributes.size() + indices.size() + instances.size();
     Ok(Geometry { positions, attributes, indices, instances, draws, bounds, bytes })
-}
-
-fn check(mesh: &Mesh, materials: usize) -> Result<(), UploadError> {
-    let wrong = |reason: String| Err(UploadError::Mesh { mesh: mesh.name.clone(), reason });
-    let n = mesh.positions.len();
-    let arrays = [
-        ("normals", mesh.normals.len(), false),
-        ("tangents", mesh.tangents.len(), true),
-        ("uv0", mesh.uv0.len(), true),
-        ("uv1", mesh.uv1.len(), true),
-        ("colors", mesh.colors.len(), true),
-    ];
-    for (name, len, optional) in arrays {
-        if len != n && !(optional && len == 0) {
-            return wrong(format!("{len} {name} for {n} positions"));
-        }
-    }
-    if !mesh.indices.len().is_multiple_of(3) {
-        return wrong(format!("{} indices are no whole number of triangles", mesh.indices.len()));
-    }
-    if let Some(i) = mesh.indices.iter().find(|&&i| i as usize >= n) {
-        return wrong(format!("index {i} with {n} vertices"));
-    }
-    if mesh.material >= materials {
-        return wrong(format!("material {} of {materials}", mesh.material));
-    }
-    Ok(())
 }
 
 fn attribute(mesh: &Mesh, i: usize) -> AttributeVertex {
