@@ -1,16 +1,15 @@
-// Puts light and surface together: hdr = albedo (direct + indirect) + specular + gloss colour * indirect + emissive.
+// Puts light and surface together: hdr = albedo (direct + indirect) + direct and indirect specular + emissive.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 // Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL backends would refuse one.
 @group(0) @binding(1) var depth_texture: texture_2d<f32>;
-@group(0) @binding(2) var normal_texture: texture_2d<f32>;
-@group(0) @binding(3) var albedo_texture: texture_2d<f32>;
-@group(0) @binding(4) var specular_texture: texture_2d<f32>;
-@group(0) @binding(5) var emissive_texture: texture_2d<f32>;
-@group(0) @binding(6) var direct_diffuse: texture_2d<f32>;
-@group(0) @binding(7) var direct_specular: texture_2d<f32>;
-@group(0) @binding(8) var indirect: texture_2d<f32>;
-@group(0) @binding(9) var hdr: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(2) var albedo_texture: texture_2d<f32>;
+@group(0) @binding(3) var emissive_texture: texture_2d<f32>;
+@group(0) @binding(4) var direct_diffuse: texture_2d<f32>;
+@group(0) @binding(5) var direct_specular: texture_2d<f32>;
+@group(0) @binding(6) var indirect: texture_2d<f32>;
+@group(0) @binding(7) var indirect_specular: texture_2d<f32>;
+@group(0) @binding(8) var hdr: texture_storage_2d<rgba16float, write>;
 @group(1) @binding(0) var environment_picture: texture_2d<f32>;
 
 // The largest finite half: brighter radiance is held there instead of becoming infinite.
@@ -22,15 +21,11 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     let depth = textureLoad(depth_texture, id.xy, 0).x;
     var radiance = vec3f(0.0);
     if depth > 0.0 {
-        let n = oct_decode(textureLoad(normal_texture, id.xy, 0).xy);
         let albedo = textureLoad(albedo_texture, id.xy, 0);
-        let specular = textureLoad(specular_texture, id.xy, 0);
         // Occlusion maps darken what comes from all around, not the analytic lights (glTF 2.0, 3.9.3).
-        let around = textureLoad(indirect, id.xy, 0).rgb * albedo.a;
-        let gloss = env_brdf(specular.rgb, specular.a, dot(n, to_eye(frame, id.xy)));
-        radiance = albedo.rgb * (textureLoad(direct_diffuse, id.xy, 0).rgb + around)
+        radiance = albedo.rgb * (textureLoad(direct_diffuse, id.xy, 0).rgb + textureLoad(indirect, id.xy, 0).rgb * albedo.a)
             + textureLoad(direct_specular, id.xy, 0).rgb
-            + gloss * around
+            + textureLoad(indirect_specular, id.xy, 0).rgb * albedo.a
             + textureLoad(emissive_texture, id.xy, 0).rgb;
     } else {
         radiance = environment_radiance(-to_eye(frame, id.xy));

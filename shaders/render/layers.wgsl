@@ -20,7 +20,8 @@ struct Options {
 @group(0) @binding(7) var direct_diffuse: texture_2d<f32>;
 @group(0) @binding(8) var direct_specular: texture_2d<f32>;
 @group(0) @binding(9) var indirect: texture_2d<f32>;
-@group(0) @binding(10) var hdr: texture_2d<f32>;
+@group(0) @binding(10) var indirect_specular: texture_2d<f32>;
+@group(0) @binding(11) var hdr: texture_2d<f32>;
 @group(1) @binding(0) var<uniform> options: Options;
 @group(1) @binding(1) var<storage, read_write> out: array<vec4f>;
 
@@ -52,7 +53,7 @@ fn decode(pixel: vec2u) -> vec4f {
         case 2u: { return vec4f(weight * around, 1.0); }
         case 3u: { return vec4f(albedo.rgb, 1.0); }
         case 4u: { return vec4f(textureLoad(direct_specular, pixel, 0).rgb, 1.0); }
-        case 5u: { return vec4f(gloss * around, 1.0); }
+        case 5u: { return vec4f(textureLoad(indirect_specular, pixel, 0).rgb * albedo.a, 1.0); }
         case 6u: { return vec4f(gloss, 1.0); }
         case 7u: { return vec4f(textureLoad(emissive_texture, pixel, 0).rgb, 1.0); }
         case 8u: { return vec4f(n, 1.0); }

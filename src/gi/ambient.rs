@@ -2,9 +2,9 @@
 //!
 //! What it cannot do: see [`crate::gi`].
 
-use super::cache::ViewCache;
 use super::exposure::{self, ExposurePass, output_entry, storage_entry};
 use super::inputs::{InputGroup, check};
+use super::view_cache::ViewCache;
 use super::{GiError, Inputs};
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;

@@ -3,6 +3,7 @@
 
 use super::GiError;
 use super::inputs::{BoundInputs, InputGroup};
+use super::rung::Cost;
 use crate::gpu::readback;
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
@@ -91,6 +92,12 @@ impl ExposurePass {
     pub fn bytes(&self) -> u64 {
         self.partials.size() + self.result.size()
     }
+}
+
+/// What the pass costs: one sample a cell (20 bytes of texels, about 40 operations).
+pub(crate) fn cost(size: [u32; 2]) -> Cost {
+    let [w, h] = super::inputs::cells_of(size).map(f64::from);
+    Cost::new("gi.exposure", w * h * 40.0, w * h * 24.0)
 }
 
 /// Reads an exposure back. Submits and waits: for tools and tests.

@@ -3,7 +3,7 @@
 //! Parameters go into a ring of uniform slots, one slot a recording, so that a host may record several views into one
 //! submission; up to [`SLOTS`] recordings between two submissions keep their own parameters.
 
-use super::cache::ViewCache;
+use super::view_cache::ViewCache;
 use super::{CameraMatrices, GiError, Inputs};
 use glam::{Mat3, Mat4, Vec3};
 

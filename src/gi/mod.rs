@@ -18,14 +18,16 @@
 //! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
 
 pub mod ambient;
-mod cache;
 pub mod exposure;
 pub mod features;
+pub mod glossy;
 pub mod inputs;
 pub mod pack;
 pub mod pass;
 pub mod reconstruct;
+pub mod rung;
 pub mod twin;
+mod view_cache;
 
 pub use exposure::ExposurePass;
 

@@ -16,6 +16,7 @@ use super::features::FeatureSet;
 use super::inputs::{CELL, InputGroup, cells_of};
 use super::pack::{self, NetworkInputs, PackPass};
 use super::reconstruct::ReconstructPass;
+use super::rung::Cost;
 use super::{GiError, Inputs};
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
@@ -166,6 +167,23 @@ impl NeuralGi {
     /// GPU memory of all buffers and weights, bytes.
     pub fn bytes(&self) -> u64 {
         self.inputs.bytes() + self.exposure.bytes() + self.rebuilt.network.bytes()
+    }
+
+    /// What each pass costs for a picture of the present size; for another one the network's layers are scaled by the
+    /// number of cells.
+    pub fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
+        let area = |[w, h]: [u32; 2]| f64::from(w) * f64::from(h);
+        let (pixels, cells) = (area(size), area(cells_of(size)));
+        let scale = cells / area(cells_of(self.rebuilt.size));
+        let plan = self.rebuilt.network.plan();
+        let features = f64::from(4 * self.features.padded());
+        let mut costs =
+            vec![super::exposure::cost(size), Cost::new("gi.pack", cells * 300.0, cells * (features + 28.0 + 64.0))];
+        costs.extend(plan.steps.iter().map(|step| {
+            Cost::new(&format!("net.{}", step.name), scale * step.flops as f64, scale * step.traffic as f64)
+        }));
+        costs.push(Cost::new("gi.reconstruct", pixels * 350.0, pixels * 16.0 + cells * 16.0));
+        costs
     }
 
     /// Bind groups and rebuilds since the start; stands still in steady frames.

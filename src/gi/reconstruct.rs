@@ -7,7 +7,7 @@
 
 use super::exposure::{ExposurePass, output_entry, pipeline, storage_entry};
 use super::inputs::{BoundInputs, InputGroup};
-use super::{GiError, ambient, cache::ViewCache};
+use super::{GiError, ambient, view_cache::ViewCache};
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
 

@@ -45,13 +45,7 @@ pub const RENDER: &[Shader] = &[
     },
     Shader {
         name: "render.composite",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/frame.wgsl",
-            "lib/brdf.wgsl",
-            "lib/environment.wgsl",
-            "render/composite.wgsl"
-        ],
+        files: wgsl!["lib/frame.wgsl", "lib/brdf.wgsl", "lib/environment.wgsl", "render/composite.wgsl"],
     },
     Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
     Shader {
@@ -64,6 +58,10 @@ pub const RENDER: &[Shader] = &[
 pub const GI: &[Shader] = &[
     Shader { name: "gi.exposure", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/exposure.wgsl"] },
     Shader { name: "gi.ambient", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/ambient.wgsl"] },
+    Shader {
+        name: "gi.glossy",
+        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/glossy.wgsl"],
+    },
     Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
     Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },
 ];

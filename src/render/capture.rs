@@ -268,7 +268,7 @@ impl Decoder {
         let t = renderer.targets();
         let stage = wgpu::ShaderStages::COMPUTE;
         let mut types = vec![UNIFORM, LOAD];
-        types.extend([LOAD; 9]);
+        types.extend([LOAD; 10]);
         let picture_layout = layout(device, "render.layers", stage, &types);
         let output_layout = layout(device, "render.layers", stage, &[UNIFORM, READ_WRITE]);
         let pipeline = compute(device, "render.layers", "layers", &[&picture_layout, &output_layout]);
@@ -282,6 +282,7 @@ impl Decoder {
             &t.direct_diffuse,
             &t.direct_specular,
             &t.indirect,
+            &t.indirect_specular,
             &t.hdr,
         ];
         let mut resources = vec![renderer.frame().as_entire_binding()];

@@ -4,7 +4,7 @@ use super::targets::Targets;
 use super::tool;
 use crate::gpu::timing::Recorder;
 
-/// hdr = albedo · (direct + indirect) + specular + gloss colour · indirect + emissive; background = environment.
+/// hdr = albedo · (direct + indirect) + direct and indirect specular + emissive; background = environment.
 pub struct CompositePass {
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
@@ -15,7 +15,7 @@ impl CompositePass {
     /// Builds the pipeline.
     pub fn new(device: &wgpu::Device) -> Self {
         use tool::*;
-        let types = [UNIFORM, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, STORE_HALF];
+        let types = [UNIFORM, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, STORE_HALF];
         let layout = layout(device, "render.composite", wgpu::ShaderStages::COMPUTE, &types);
         let sky_layout = tool::layout(device, "render.composite", wgpu::ShaderStages::COMPUTE, &[LOAD]);
         let pipeline = compute(device, "render.composite", "composite", &[&layout, &sky_layout]);
@@ -32,13 +32,12 @@ impl CompositePass {
             &[
                 frame.as_entire_binding(),
                 tool::view(&t.depth),
-                tool::view(&t.normal),
                 tool::view(&t.albedo),
-                tool::view(&t.specular),
                 tool::view(&t.emissive),
                 tool::view(&t.direct_diffuse),
                 tool::view(&t.direct_specular),
                 tool::view(&t.indirect),
+                tool::view(&t.indirect_specular),
                 tool::view(&t.hdr),
             ],
         )

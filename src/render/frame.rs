@@ -1,4 +1,4 @@
-//! The frame, told in order: shadow → gbuffer → direct → indirect → composite. A display adds `tonemap` after it.
+//! The frame, told in order: shadow → gbuffer → direct → indirect → glossy → composite. A display adds `tonemap` after it.
 
 use super::RenderError;
 use super::composite::CompositePass;
@@ -7,7 +7,11 @@ use super::gbuffer::GbufferPass;
 use super::shadow::{ShadowMaps, ShadowOptions, ShadowPass};
 use super::targets::Targets;
 use super::view::{FrameUniform, View};
-use crate::gi::{self, ambient::AmbientGi, pass::NeuralGi};
+use crate::gi::{
+    self,
+    glossy::GlossyPass,
+    rung::{self, Cost, Rung},
+};
 use crate::gpu::timing::Recorder;
 use crate::scene::upload::SceneGpu;
 
@@ -20,76 +24,10 @@ pub struct RendererOptions {
     pub shadow: ShadowOptions,
 }
 
-/// What fills `indirect`.
-enum Indirect {
-    /// Nothing: direct light alone.
-    Direct,
-    Ambient(Box<AmbientGi>),
-    Neural(Box<NeuralGi>),
-}
-
-impl Indirect {
-    fn new(
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        size: [u32; 2],
-        method: &gi::Method,
-    ) -> Result<Self, RenderError> {
-        Ok(match method {
-            gi::Method::Direct => Indirect::Direct,
-            gi::Method::Ambient => Indirect::Ambient(Box::new(AmbientGi::new(device))),
-            gi::Method::Neural(weights) => {
-                Indirect::Neural(Box::new(NeuralGi::new(device, queue, weights, gi::pass::Options { size })?))
-            }
-        })
-    }
-
-    /// Name on the command line.
-    fn name(&self) -> &'static str {
-        match self {
-            Indirect::Direct => "direct",
-            Indirect::Ambient(_) => "ambient",
-            Indirect::Neural(_) => "neural",
-        }
-    }
-
-    /// The targets are new: nothing that was bound to the old ones is of use.
-    fn forget(&mut self) {
-        match self {
-            Indirect::Direct => {}
-            Indirect::Ambient(ambient) => ambient.forget(),
-            Indirect::Neural(neural) => neural.forget(),
-        }
-    }
-
-    fn bytes(&self) -> u64 {
-        match self {
-            Indirect::Direct => 0,
-            Indirect::Ambient(ambient) => ambient.bytes(),
-            Indirect::Neural(neural) => neural.bytes(),
-        }
-    }
-
-    fn record(
-        &mut self,
-        recorder: &mut Recorder<'_>,
-        queue: &wgpu::Queue,
-        inputs: &gi::Inputs<'_>,
-        targets: &Targets,
-    ) -> Result<(), RenderError> {
-        let output = &targets.indirect.view;
-        match self {
-            Indirect::Direct => clear(recorder, targets),
-            Indirect::Ambient(ambient) => ambient.record(recorder, queue, inputs, output)?,
-            Indirect::Neural(neural) => neural.record_stages(recorder, inputs, output)?,
-        }
-        Ok(())
-    }
-}
-
 /// What is bound as long as the targets stay.
 struct Picture {
     direct: wgpu::BindGroup,
+    glossy: wgpu::BindGroup,
     composite: wgpu::BindGroup,
 }
 
@@ -108,11 +46,39 @@ pub struct Renderer {
     targets: Targets,
     picture: Picture,
     lighting: Option<Lighting>,
-    indirect: Indirect,
+    method: &'static str,
+    /// What fills `indirect`; nothing for direct light alone.
+    indirect: Option<Box<dyn Rung>>,
+    passes: Passes,
+}
+
+/// The passes that every method shares.
+struct Passes {
     shadow: ShadowPass,
     gbuffer: GbufferPass,
     direct: DirectPass,
+    glossy: GlossyPass,
     composite: CompositePass,
+}
+
+impl Passes {
+    fn new(device: &wgpu::Device, frame: &wgpu::Buffer, shadow: ShadowOptions) -> Self {
+        Self {
+            shadow: ShadowPass::new(device, shadow),
+            gbuffer: GbufferPass::new(device, frame),
+            direct: DirectPass::new(device),
+            glossy: GlossyPass::new(device),
+            composite: CompositePass::new(device),
+        }
+    }
+
+    fn bind(&self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets) -> Picture {
+        Picture {
+            direct: self.direct.picture(device, frame, targets),
+            glossy: self.glossy.picture(device, frame, targets),
+            composite: self.composite.picture(device, frame, targets),
+        }
+    }
 }
 
 impl Renderer {
@@ -130,35 +96,42 @@ impl Renderer {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let shadow = ShadowPass::new(device, options.shadow);
-        let gbuffer = GbufferPass::new(device, &frame);
-        let direct = DirectPass::new(device);
-        let composite = CompositePass::new(device);
-        let picture = bind(device, &frame, &targets, &direct, &composite);
-        let device = device.clone();
-        let indirect = Indirect::new(&device, queue, size, &options.method)?;
-        Ok(Self { device, frame, targets, picture, lighting: None, indirect, shadow, gbuffer, direct, composite })
+        let passes = Passes::new(device, &frame, options.shadow);
+        let picture = passes.bind(device, &frame, &targets);
+        let indirect = rung::build(device, queue, size, &options.method)?;
+        let method = options.method.name();
+        Ok(Self { device: device.clone(), frame, targets, picture, lighting: None, method, indirect, passes })
     }
 
     /// New targets of `size` pixels; the views of the old ones are of no use any more.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
         if size != self.targets.size {
             self.targets = Targets::new(&self.device, size)?;
-            self.picture = bind(&self.device, &self.frame, &self.targets, &self.direct, &self.composite);
-            self.indirect.forget();
+            self.picture = self.passes.bind(&self.device, &self.frame, &self.targets);
+            if let Some(indirect) = &mut self.indirect {
+                indirect.forget();
+            }
         }
         Ok(())
     }
 
     /// Changes how indirect light is found; builds the new method's pipelines and buffers.
     pub fn set_method(&mut self, queue: &wgpu::Queue, method: &gi::Method) -> Result<(), RenderError> {
-        self.indirect = Indirect::new(&self.device, queue, self.targets.size, method)?;
+        self.indirect = rung::build(&self.device, queue, self.targets.size, method)?;
+        self.method = method.name();
         Ok(())
     }
 
     /// Name of the method that finds indirect light, as on the command line.
     pub fn method_name(&self) -> &'static str {
-        self.indirect.name()
+        self.method
+    }
+
+    /// Counted cost of the passes that find and add indirect light.
+    pub fn costs(&self) -> Vec<Cost> {
+        let mut costs = self.indirect.as_ref().map(|i| i.costs(self.targets.size)).unwrap_or_default();
+        costs.push(GlossyPass::cost(self.targets.size));
+        costs
     }
 
     /// Width and height of the targets, pixels.
@@ -185,7 +158,7 @@ impl Renderer {
     pub fn bytes(&self) -> Vec<(&'static str, u64)> {
         let mut rows = self.targets.bytes();
         rows.extend(self.lighting.iter().flat_map(|l| l.maps.bytes()));
-        rows.push((self.indirect.name(), self.indirect.bytes()));
+        rows.push((self.method, self.indirect.as_ref().map_or(0, |i| i.bytes())));
         rows
     }
 
@@ -221,34 +194,28 @@ impl Renderer {
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 
         if shadows || fresh {
-            self.shadow.record(recorder, queue, scene, view, &mut lighting.maps);
+            self.passes.shadow.record(recorder, queue, scene, view, &mut lighting.maps);
         }
-        self.gbuffer.record(recorder, scene, &self.targets);
+        self.passes.gbuffer.record(recorder, scene, &self.targets);
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
-        self.direct.record(recorder, inputs);
+        self.passes.direct.record(recorder, inputs);
         let inputs = gi_inputs(&self.targets, view, scene.environment.radiance);
-        self.indirect.record(recorder, queue, &inputs, &self.targets)?;
-        self.composite.record(recorder, &self.picture.composite, &lighting.sky, size);
+        match &mut self.indirect {
+            Some(indirect) => indirect.record(recorder, queue, &inputs, &self.targets.indirect.view)?,
+            None => clear(recorder, &self.targets),
+        }
+        self.passes.glossy.record(recorder, &self.picture.glossy, size);
+        self.passes.composite.record(recorder, &self.picture.composite, &lighting.sky, size);
         self.lighting = Some(lighting);
         Ok(())
     }
 
     fn lighting(&self, queue: &wgpu::Queue, scene: &SceneGpu) -> Lighting {
-        let maps = self.shadow.maps(&self.device, queue, scene);
-        let group = self.direct.lights(&self.device, scene, &maps);
-        let sky = self.composite.sky(&self.device, &scene.environment_view);
+        let maps = self.passes.shadow.maps(&self.device, queue, scene);
+        let group = self.passes.direct.lights(&self.device, scene, &maps);
+        let sky = self.passes.composite.sky(&self.device, &scene.environment_view);
         Lighting { scene: scene.id, maps, group, sky }
     }
-}
-
-fn bind(
-    device: &wgpu::Device,
-    frame: &wgpu::Buffer,
-    targets: &Targets,
-    direct: &DirectPass,
-    composite: &CompositePass,
-) -> Picture {
-    Picture { direct: direct.picture(device, frame, targets), composite: composite.picture(device, frame, targets) }
 }
 
 fn gi_inputs<'a>(targets: &'a Targets, view: &View, environment: [f32; 3]) -> gi::Inputs<'a> {

@@ -16,6 +16,7 @@
 //! | `direct_diffuse` | `Rgba16Float` | E/π of the analytic lights, W/(m²·sr), albedo not multiplied in | 0 |
 //! | `direct_specular` | `Rgba16Float` | radiance of the specular lobe under the analytic lights, W/(m²·sr) | 0 |
 //! | `indirect` | `Rgba16Float` | E/π of sky and bounces, from a GI method | 0 |
+//! | `indirect_specular` | `Rgba16Float` | radiance of the specular lobe under sky and bounces, W/(m²·sr) | 0 |
 //! | `hdr` | `Rgba16Float` | the picture: radiance, W/(m²·sr); a: 1 | the environment |
 //!
 //! The five colour attachments take exactly the 32 bytes a sample that WebGPU grants by default. Unlit materials have

@@ -12,7 +12,7 @@ mod shadow_sun;
 pub mod targets;
 pub mod tonemap;
 pub mod tonemap_curve;
-mod tool;
+pub(crate) mod tool;
 pub mod view;
 
 pub use frame::{Renderer, RendererOptions};

@@ -44,7 +44,7 @@ impl Target {
     }
 }
 
-/// Everything of a picture's size: 60 bytes a pixel.
+/// Everything of a picture's size: 68 bytes a pixel.
 #[derive(Debug, Clone)]
 pub struct Targets {
     /// Width and height, pixels.
@@ -67,6 +67,8 @@ pub struct Targets {
     pub direct_specular: Target,
     /// What a GI method adds: diffuse light, E/π.
     pub indirect: Target,
+    /// Specular radiance that the analytic lights do not give: reflections of sky and surroundings.
+    pub indirect_specular: Target,
     /// The picture: scene-linear radiance.
     pub hdr: Target,
 }
@@ -103,12 +105,13 @@ impl Targets {
                 F::Rgba16Float,
                 attachment | wgpu::TextureUsages::STORAGE_BINDING,
             ),
+            indirect_specular: stored("indirect_specular"),
             hdr: stored("hdr"),
         })
     }
 
     /// All of them, in the order of the frame.
-    pub fn all(&self) -> [&Target; 10] {
+    pub fn all(&self) -> [&Target; 11] {
         [
             &self.depth,
             &self.normal,
@@ -119,6 +122,7 @@ impl Targets {
             &self.direct_diffuse,
             &self.direct_specular,
             &self.indirect,
+            &self.indirect_specular,
             &self.hdr,
         ]
     }

@@ -1,0 +1,117 @@
+//! What all methods share: the trait that a frame drives them by, and what a pass costs by count.
+
+use super::ambient::AmbientGi;
+use super::pass::{NeuralGi, Options};
+use super::{GiError, Inputs, Method};
+use crate::gpu::timing::Recorder;
+use serde::{Deserialize, Serialize};
+
+/// Arithmetic and memory traffic of one pass, counted by hand from its loops and formats.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// The pass's label, as in the timing table.
+    pub pass: String,
+    /// Floating-point operations; a multiply-add counts 2, a transcendental or division 4.
+    pub flops: f64,
+    /// Bytes that have to move between memory and the chip at least once.
+    pub bytes: f64,
+}
+
+impl Cost {
+    /// A row of the table.
+    pub fn new(pass: &str, flops: f64, bytes: f64) -> Self {
+        Self { pass: pass.into(), flops, bytes }
+    }
+}
+
+/// A method at work: G-buffer in, indirect diffuse light (E/π) out. Allocates only when size or views are new.
+pub trait Rung {
+    /// Records all of the method's passes: `output` (`Rgba16Float`, usage STORAGE_BINDING, the inputs' size) becomes
+    /// the light that direct lighting misses; 0 on the background.
+    ///
+    /// # Errors
+    /// [`GiError`] when inputs or output do not fit; then nothing was recorded.
+    fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError>;
+
+    /// The targets are new: lets go of the texture views it remembers.
+    fn forget(&mut self);
+
+    /// GPU memory of buffers, textures and weights, bytes.
+    fn bytes(&self) -> u64;
+
+    /// What each pass costs for a picture of `size` pixels, in frame order.
+    fn costs(&self, size: [u32; 2]) -> Vec<Cost>;
+}
+
+/// Makes the method that `method` names, for pictures of `size` pixels; `None` for [`Method::Direct`], which adds no
+/// light.
+///
+/// # Errors
+/// [`GiError`] when a network does not fit this program or the device.
+pub fn build(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    size: [u32; 2],
+    method: &Method,
+) -> Result<Option<Box<dyn Rung>>, GiError> {
+    Ok(match method {
+        Method::Direct => None,
+        Method::Ambient => Some(Box::new(AmbientGi::new(device))),
+        Method::Neural(weights) => Some(Box::new(NeuralGi::new(device, queue, weights, Options { size })?)),
+    })
+}
+
+impl Rung for AmbientGi {
+    fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError> {
+        AmbientGi::record(self, recorder, queue, inputs, output)
+    }
+
+    fn forget(&mut self) {
+        AmbientGi::forget(self);
+    }
+
+    fn bytes(&self) -> u64 {
+        AmbientGi::bytes(self)
+    }
+
+    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
+        let pixels = f64::from(size[0]) * f64::from(size[1]);
+        vec![super::exposure::cost(size), Cost::new("gi.ambient", pixels * 4.0, pixels * 12.0)]
+    }
+}
+
+impl Rung for NeuralGi {
+    fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        _queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError> {
+        self.record_stages(recorder, inputs, output)
+    }
+
+    fn forget(&mut self) {
+        NeuralGi::forget(self);
+    }
+
+    fn bytes(&self) -> u64 {
+        NeuralGi::bytes(self)
+    }
+
+    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
+        NeuralGi::costs(self, size)
+    }
+}
