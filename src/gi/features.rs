@@ -122,7 +122,8 @@ impl FeatureSet {
 pub fn example_preludes() -> Vec<(&'static str, String)> {
     let few = FeatureSet::new([("direct", 3), ("depth", 1), ("hit", 1)]).expect("rows of the table in order");
     vec![
-        ("gi.ambient", super::ambient::prelude()),
+        ("gi.ambient", super::ambient::unseen_prelude()),
+        ("gi.occlusion", super::bitmask::March::NEAR.prelude()),
         ("gi.pack", FeatureSet::all().prelude()),
         ("gi.pack", few.prelude()),
         ("gi.reconstruct", super::reconstruct::prelude()),

@@ -18,10 +18,12 @@
 //! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
 
 pub mod ambient;
+pub mod bitmask;
 pub mod exposure;
 pub mod features;
 pub mod glossy;
 pub mod inputs;
+pub mod occlusion;
 pub mod pack;
 pub mod pass;
 pub mod reconstruct;

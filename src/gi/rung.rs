@@ -39,6 +39,9 @@ pub trait Rung {
         output: &wgpu::TextureView,
     ) -> Result<(), GiError>;
 
+    /// Number of the frame for methods that may vary their patterns because a history averages frames; 0 without one.
+    fn set_frame(&mut self, _queue: &wgpu::Queue, _frame: u32) {}
+
     /// The targets are new: lets go of the texture views it remembers.
     fn forget(&mut self);
 
@@ -78,6 +81,10 @@ impl Rung for AmbientGi {
         AmbientGi::record(self, recorder, queue, inputs, output)
     }
 
+    fn set_frame(&mut self, queue: &wgpu::Queue, frame: u32) {
+        AmbientGi::set_frame(self, queue, frame);
+    }
+
     fn forget(&mut self) {
         AmbientGi::forget(self);
     }
@@ -87,8 +94,7 @@ impl Rung for AmbientGi {
     }
 
     fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
-        let pixels = f64::from(size[0]) * f64::from(size[1]);
-        vec![super::exposure::cost(size), Cost::new("gi.ambient", pixels * 4.0, pixels * 12.0)]
+        AmbientGi::costs(self, size)
     }
 }
 

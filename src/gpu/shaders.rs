@@ -57,7 +57,18 @@ pub const RENDER: &[Shader] = &[
 /// Shaders of `gi/`.
 pub const GI: &[Shader] = &[
     Shader { name: "gi.exposure", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/exposure.wgsl"] },
-    Shader { name: "gi.ambient", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/ambient.wgsl"] },
+    Shader {
+        name: "gi.ambient",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/unseen.wgsl", "gi/ambient.wgsl"],
+    },
+    Shader {
+        name: "gi.occlusion",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/bitmask.wgsl", "gi/occlusion.wgsl"],
+    },
+    Shader {
+        name: "gi.occlusion_full",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/half.wgsl", "gi/occlusion_full.wgsl"],
+    },
     Shader {
         name: "gi.glossy",
         files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/glossy.wgsl"],
