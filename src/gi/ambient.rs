@@ -35,8 +35,8 @@ pub fn prelude() -> String {
 }
 
 /// The constants of unseen light as WGSL (`shaders/gi/unseen.wgsl`).
-pub fn unseen_prelude() -> String {
-    format!("const SKY = f32({SKY:?});\nconst BOUNCE = f32({BOUNCE:?});\n")
+pub fn unseen_prelude(sky: f32, bounce: f32) -> String {
+    format!("const SKY = f32({sky:?});\nconst BOUNCE = f32({bounce:?});\n")
 }
 
 /// The method: exposure, occlusion and one write a pixel.
@@ -61,7 +61,7 @@ impl AmbientGi {
             label: Some("gi.ambient"),
             entries: &[storage_entry(0, true), texture_entry(1), output_entry(2)],
         });
-        let module = shaders::module_with(device, "gi.ambient", &unseen_prelude());
+        let module = shaders::module_with(device, "gi.ambient", &unseen_prelude(SKY, BOUNCE));
         let pipeline = exposure::pipeline(device, "gi.ambient", &module, "ambient", &inputs, &layout);
         Self {
             device: device.clone(),

@@ -28,6 +28,7 @@ pub mod pack;
 pub mod pass;
 pub mod reconstruct;
 pub mod rung;
+pub mod ssgi;
 pub mod twin;
 mod view_cache;
 
@@ -75,6 +76,8 @@ pub enum Method {
     /// One constant, see [`ambient`].
     #[default]
     Ambient,
+    /// One bounce in screen space, see [`ssgi`].
+    Ssgi,
     /// The network of these weights, see [`pass`].
     Neural(Box<crate::net::format::Weights>),
 }
@@ -85,6 +88,7 @@ impl Method {
         match self {
             Method::Direct => "direct",
             Method::Ambient => "ambient",
+            Method::Ssgi => "ssgi",
             Method::Neural(_) => "neural",
         }
     }

@@ -2,6 +2,7 @@
 
 use super::ambient::AmbientGi;
 use super::pass::{NeuralGi, Options};
+use super::ssgi::{SsgiGi, SsgiOptions};
 use super::{GiError, Inputs, Method};
 use crate::gpu::timing::Recorder;
 use serde::{Deserialize, Serialize};
@@ -66,6 +67,7 @@ pub fn build(
     Ok(match method {
         Method::Direct => None,
         Method::Ambient => Some(Box::new(AmbientGi::new(device))),
+        Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
         Method::Neural(weights) => Some(Box::new(NeuralGi::new(device, queue, weights, Options { size })?)),
     })
 }

@@ -70,6 +70,18 @@ pub const GI: &[Shader] = &[
         files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/half.wgsl", "gi/occlusion_full.wgsl"],
     },
     Shader {
+        name: "gi.radiance",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/unseen.wgsl", "gi/radiance.wgsl"],
+    },
+    Shader {
+        name: "gi.ssgi",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/bitmask.wgsl", "gi/unseen.wgsl", "gi/ssgi.wgsl"],
+    },
+    Shader {
+        name: "gi.ssgi_full",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/half.wgsl", "gi/ssgi_full.wgsl"],
+    },
+    Shader {
         name: "gi.glossy",
         files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/glossy.wgsl"],
     },
