@@ -126,6 +126,10 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.pack", FeatureSet::all().prelude()),
         ("gi.pack", few.prelude()),
         ("gi.reconstruct", super::reconstruct::prelude()),
+        ("gi.cells", super::cells::CellSide::Four.prelude()),
+        ("gi.cells", super::cells::CellSide::Eight.prelude()),
+        ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Four)),
+        ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Eight)),
     ]
 }
 

@@ -18,6 +18,7 @@
 //! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
 
 pub mod ambient;
+pub mod cells;
 pub mod exposure;
 pub mod features;
 pub mod glossy;
@@ -27,6 +28,7 @@ pub mod pass;
 pub mod reconstruct;
 pub mod rung;
 pub mod twin;
+pub mod upsample;
 mod view_cache;
 
 pub use exposure::ExposurePass;

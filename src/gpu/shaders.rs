@@ -62,6 +62,14 @@ pub const GI: &[Shader] = &[
         name: "gi.glossy",
         files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/glossy.wgsl"],
     },
+    Shader {
+        name: "gi.cells",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/choose.wgsl"],
+    },
+    Shader {
+        name: "gi.upsample",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/upsample.wgsl"],
+    },
     Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
     Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },
 ];
