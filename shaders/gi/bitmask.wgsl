@@ -36,6 +36,7 @@ struct Slice {
 // What one step saw.
 struct Seen {
     pixel: vec2i,
+    pixels: f32,       // from the receiver on the screen
     offset: vec3f,     // from the receiver, metres
     bits: u32,         // sectors that it blocks; 0: nothing there
 }
@@ -108,7 +109,7 @@ fn look(here: Receiver, slice: Slice, side: f32, k: i32) -> Seen {
     let farthest = max(REACH * f32(max(params.size.x, params.size.y)), FIRST);
     let pixels = FIRST * exp2(t * log2(farthest / FIRST));
     let pixel = vec2i(floor(vec2f(here.pixel) + 0.5 + side * pixels * slice.direction));
-    var seen = Seen(pixel, vec3f(0.0), 0u);
+    var seen = Seen(pixel, pixels, vec3f(0.0), 0u);
     if any(pixel < vec2i(0)) || any(pixel >= vec2i(params.size)) || all(pixel == here.pixel) {
         return seen;
     }

@@ -10,6 +10,8 @@ struct Params {
     environment: vec4f,           // radiance, finite and not negative
     gravity_from_view: mat3x3f,
     gravity_from_world: mat3x3f,
+    world_from_view: mat3x3f,
+    eye: vec4f,                   // world space, metres
 }
 
 // `gi::exposure::Exposure` is the Rust side and documents the fields.

@@ -3,8 +3,12 @@
 // cosine-weighted light, counting bits gives E/pi. a: distance along the view axis in metres, 0 on the background.
 
 @group(1) @binding(1) var<storage, read> exposure: Exposure;
-@group(1) @binding(2) var radiance_map: texture_2d<f32>;
-@group(1) @binding(3) var output: texture_storage_2d<rgba32float, write>;
+@group(1) @binding(2) var fine: texture_2d<f32>;     // radiance over 2x2 pixels
+@group(1) @binding(3) var coarse: texture_2d<f32>;   // and over 8x8
+@group(1) @binding(4) var output: texture_storage_2d<rgba32float, write>;
+
+// Distance in pixels from which a step reads the coarse radiance: steps are about half as long as their distance.
+const COARSE = 16.0;
 
 // Light of one step's texel that reaches the receiver through the sectors `fresh`.
 fn sent(seen: Seen, fresh: u32) -> vec3f {
@@ -13,7 +17,12 @@ fn sent(seen: Seen, fresh: u32) -> vec3f {
     }
     // A surface that is seen from its front by the eye but from behind by the receiver blocks and sends nothing.
     let faces = dot(normal_at(seen.pixel), seen.offset) < 0.0;
-    let radiance = textureLoad(radiance_map, seen.pixel >> vec2u(1u), 0).rgb;
+    var radiance = vec3f(0.0);
+    if seen.pixels < COARSE {
+        radiance = textureLoad(fine, seen.pixel >> vec2u(1u), 0).rgb;
+    } else {
+        radiance = textureLoad(coarse, seen.pixel >> vec2u(3u), 0).rgb;
+    }
     return select(vec3f(0.0), radiance, faces) * f32(countOneBits(fresh));
 }
 

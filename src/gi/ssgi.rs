@@ -48,7 +48,8 @@ pub struct SsgiGi {
     gather: Kernel,
     full: Kernel,
     pattern: Pattern,
-    sent: Stage,
+    fine: Stage,
+    coarse: Stage,
     half: Stage,
     groups: Option<[wgpu::BindGroup; 2]>,
     outputs: ViewCache<1>,
@@ -61,9 +62,10 @@ impl SsgiGi {
         let inputs = InputGroup::new(device);
         let exposure = ExposurePass::new(device, &inputs);
         let (march, prelude) = (options.march, options.prelude());
-        let entries = [storage_entry(0, true), write_entry(1, Rgba16Float)];
+        let entries = [storage_entry(0, true), write_entry(1, Rgba16Float), write_entry(2, Rgba16Float)];
         let radiance = Kernel::new(device, &inputs, "gi.radiance", &prelude, &entries);
-        let entries = [pattern_entry(0), storage_entry(1, true), texture_entry(2), write_entry(3, Rgba32Float)];
+        let entries =
+            [pattern_entry(0), storage_entry(1, true), texture_entry(2), texture_entry(3), write_entry(4, Rgba32Float)];
         let gather = Kernel::new(device, &inputs, "gi.ssgi", &prelude, &entries);
         let full = Kernel::new(device, &inputs, "gi.ssgi_full", "", &[texture_entry(0), output_entry(1)]);
         Self {
@@ -75,7 +77,8 @@ impl SsgiGi {
             gather,
             full,
             pattern: Pattern::new(device),
-            sent: Stage::new("gi.radiance", Rgba16Float),
+            fine: Stage::new("gi.radiance", Rgba16Float),
+            coarse: Stage::new("gi.radiance_coarse", Rgba16Float),
             half: Stage::new("gi.ssgi", Rgba32Float),
             groups: None,
             outputs: ViewCache::new(),
@@ -89,12 +92,14 @@ impl SsgiGi {
 
     fn fit(&mut self, size: [u32; 2]) {
         let half = half_of(size);
-        if self.sent.fit(&self.device, half) | self.half.fit(&self.device, half) {
+        let fresh = self.fine.fit(&self.device, half) | self.half.fit(&self.device, half);
+        if self.coarse.fit(&self.device, half.map(|n| n.div_ceil(4))) | fresh {
             self.inputs.forget();
             self.outputs.clear();
-            let (sent, light) = (bind(self.sent.get()), self.exposure.buffer().as_entire_binding());
-            let radiance = self.radiance.group(&self.device, &[light.clone(), sent.clone()]);
-            let resources = [self.pattern.binding(), light, sent, bind(self.half.get())];
+            let light = self.exposure.buffer().as_entire_binding();
+            let (fine, coarse) = (bind(self.fine.get()), bind(self.coarse.get()));
+            let radiance = self.radiance.group(&self.device, &[light.clone(), fine.clone(), coarse.clone()]);
+            let resources = [self.pattern.binding(), light, fine, coarse, bind(self.half.get())];
             self.groups = Some([radiance, self.gather.group(&self.device, &resources)]);
         }
     }
@@ -133,7 +138,7 @@ impl Rung for SsgiGi {
     }
 
     fn bytes(&self) -> u64 {
-        self.inputs.bytes() + self.exposure.bytes() + self.sent.bytes() + self.half.bytes() + 16
+        self.inputs.bytes() + self.exposure.bytes() + self.fine.bytes() + self.coarse.bytes() + self.half.bytes() + 16
     }
 
     fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
