@@ -90,15 +90,12 @@ pub enum MethodName {
     Direct,
     /// Sky and mean light from all around, times ambient occlusion.
     Ambient,
-<<<<<<< HEAD
     /// One bounce in screen space.
     Ssgi,
-=======
     /// One bounce of the lights from reflective shadow maps.
     Rsm,
     /// All bounces and the sky from what lights and a cube around the camera see.
     Cache,
->>>>>>> main
     /// The network.
     Neural,
     /// The path tracer, which converges to the truth.
@@ -107,25 +104,23 @@ pub enum MethodName {
 
 impl MethodName {
     /// All real-time methods, cheapest first.
-<<<<<<< HEAD
-    pub const REAL_TIME: [MethodName; 4] =
-        [MethodName::Direct, MethodName::Ambient, MethodName::Ssgi, MethodName::Neural];
-=======
-    pub const REAL_TIME: [MethodName; 5] =
-        [MethodName::Direct, MethodName::Ambient, MethodName::Rsm, MethodName::Cache, MethodName::Neural];
->>>>>>> main
+    pub const REAL_TIME: [MethodName; 6] = [
+        MethodName::Direct,
+        MethodName::Ambient,
+        MethodName::Ssgi,
+        MethodName::Rsm,
+        MethodName::Cache,
+        MethodName::Neural,
+    ];
 
     /// The real-time method with its weights: `weights`, or the shipped ones.
     pub fn method(self, weights: Option<&PathBuf>) -> Result<Method> {
         Ok(match self {
             MethodName::Direct => Method::Direct,
             MethodName::Ambient => Method::Ambient,
-<<<<<<< HEAD
             MethodName::Ssgi => Method::Ssgi,
-=======
             MethodName::Rsm => Method::Rsm,
             MethodName::Cache => Method::Cache,
->>>>>>> main
             MethodName::Neural => Method::Neural(Box::new(load_weights(weights)?)),
             MethodName::Reference => return Err(usage("`reference` is no real-time method".into())),
         })

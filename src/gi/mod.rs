@@ -18,13 +18,10 @@
 //! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
 
 pub mod ambient;
-<<<<<<< HEAD
 pub mod bitmask;
-=======
 pub mod cache;
 pub mod cells;
 pub mod emitters;
->>>>>>> main
 pub mod exposure;
 pub mod features;
 pub mod glossy;
@@ -34,11 +31,8 @@ pub mod pack;
 pub mod pass;
 pub mod reconstruct;
 pub mod rung;
-<<<<<<< HEAD
 pub mod ssgi;
-=======
 pub mod surfels;
->>>>>>> main
 pub mod twin;
 pub mod upsample;
 mod view_cache;
@@ -127,17 +121,14 @@ pub enum Method {
     /// One constant, see [`ambient`].
     #[default]
     Ambient,
-<<<<<<< HEAD
     /// One bounce in screen space, see [`ssgi`].
     Ssgi,
-=======
     /// One bounce from reflective shadow maps, see [`cache`].
     Rsm,
     /// All bounces and the sky from shadow maps and a cube around the camera, see [`cache`].
     Cache,
     /// Either of the two with other options.
     World(cache::Options),
->>>>>>> main
     /// The network of these weights, see [`pass`].
     Neural(Box<crate::net::format::Weights>),
 }
@@ -148,13 +139,10 @@ impl Method {
         match self {
             Method::Direct => "direct",
             Method::Ambient => "ambient",
-<<<<<<< HEAD
             Method::Ssgi => "ssgi",
-=======
             Method::Rsm => "rsm",
             Method::Cache => "cache",
             Method::World(options) => ["rsm", "cache"][usize::from(options.around)],
->>>>>>> main
             Method::Neural(_) => "neural",
         }
     }

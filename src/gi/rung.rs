@@ -68,13 +68,10 @@ pub fn build(
     Ok(match method {
         Method::Direct => None,
         Method::Ambient => Some(Box::new(AmbientGi::new(device))),
-<<<<<<< HEAD
         Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
-=======
         Method::Rsm => Some(Box::new(WorldGi::new(device, size, cache::Options::RSM))),
         Method::Cache => Some(Box::new(WorldGi::new(device, size, cache::Options::CACHE))),
         Method::World(options) => Some(Box::new(WorldGi::new(device, size, *options))),
->>>>>>> main
         Method::Neural(weights) => Some(Box::new(NeuralGi::new(device, queue, weights, Options { size })?)),
     })
 }

@@ -49,13 +49,7 @@ pub const RENDER: &[Shader] = &[
     },
     Shader {
         name: "render.atlas",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/hash.wgsl",
-            "lib/brdf.wgsl",
-            "lib/material.wgsl",
-            "render/atlas.wgsl"
-        ],
+        files: wgsl!["lib/octahedral.wgsl", "lib/hash.wgsl", "lib/brdf.wgsl", "lib/material.wgsl", "render/atlas.wgsl"],
     },
     Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
     Shader {
