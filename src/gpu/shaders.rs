@@ -51,6 +51,7 @@ pub const RENDER: &[Shader] = &[
         name: "render.atlas",
         files: wgsl!["lib/octahedral.wgsl", "lib/hash.wgsl", "lib/brdf.wgsl", "lib/material.wgsl", "render/atlas.wgsl"],
     },
+    Shader { name: "render.taa", files: wgsl!["lib/frame.wgsl", "render/taa.wgsl"] },
     Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
     Shader {
         name: "render.layers",
