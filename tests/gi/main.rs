@@ -3,8 +3,10 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod edges;
+mod screen;
 mod shot;
 mod stages;
+mod taa;
 mod weights;
 mod whole;
 
