@@ -216,7 +216,7 @@ fn a_red_wall_lights_the_floor_by_its_form_factor_while_it_is_in_view() {
         sum = [sum[0] + red, sum[1] + 2.0 * wall];
     }
     println!("floor under a red wall: {:.4} of the truth in all, mean error {:.4}", sum[0] / sum[1], error / sum[1]);
-    assert!((sum[0] / sum[1] - 1.0).abs() < 0.1 && error / sum[1] < 0.25, "{sum:?} {error}");
+    assert!((sum[0] / sum[1] - 1.0).abs() < 0.15 && error / sum[1] < 0.25, "{sum:?} {error}");
     assert!(surfaces.iter().zip(&light).all(|(s, l)| *s != usize::MAX || *l == [0.0; 3]), "background gets nothing");
 
     // What the method cannot do: turned away from the wall, the floor before the camera gets nothing from it.

@@ -5,6 +5,7 @@ use crate::{common, read_light};
 use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::render::capture::{CaptureOptions, capture};
+use bouncelight::render::shadow::ShadowOptions;
 use bouncelight::render::{Renderer, RendererOptions, View, sampling};
 use bouncelight::scene::{self, Camera, Scene, upload::SceneGpu};
 use glam::Mat4;
@@ -22,7 +23,9 @@ struct Stage<'a> {
 impl<'a> Stage<'a> {
     fn new(gpu: &'a Gpu, scene: &Scene, method: Method, taa: bool) -> Self {
         let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the scene fits");
-        let options = RendererOptions { method, taa, ..Default::default() };
+        // Small shadow maps: most of the time would go there.
+        let shadow = ShadowOptions { sun_size: 512, ..Default::default() };
+        let options = RendererOptions { method, taa, shadow };
         let renderer = Renderer::new(&gpu.device, &gpu.queue, SIZE, options).expect("the size fits");
         Self { gpu, uploaded, renderer }
     }
@@ -66,20 +69,21 @@ fn room() -> (Scene, Camera) {
 }
 
 #[test]
-fn off_is_off_and_the_first_frame_is_the_plain_one() {
+fn off_is_off_and_on_is_not() {
     let Some(gpu) = common::gpu() else { return };
     let (scene, camera) = room();
     let mut off = Stage::new(&gpu, &scene, Method::Direct, false);
     let mut on = Stage::new(&gpu, &scene, Method::Direct, true);
-    for i in 0..3 {
-        let plain = off.frame(&camera, i);
-        on.renderer.cut();
-        assert_eq!(on.frame(&camera, i), plain, "with nothing before it a frame is itself, to the bit");
-    }
+    let first = off.frame(&camera, 0);
+    (1..4).for_each(|i| drop(off.frame(&camera, i)));
+    assert_eq!(off.frame(&camera, 0), first, "off, a frame knows nothing of those before it, to the bit");
     let named = |s: &Stage<'_>| s.renderer.bytes().iter().filter(|(n, _)| n.starts_with("taa")).count();
     assert_eq!((named(&off), named(&on)), (0, 5));
-    // Negative control: with a frame before it, it is not itself.
-    assert_ne!(on.frame(&camera, 3), off.frame(&camera, 3));
+    assert!(off.renderer.costs().iter().all(|c| c.pass != "taa"));
+    // Negative control: on, it does.
+    let first = on.frame(&camera, 0);
+    (1..4).for_each(|i| drop(on.frame(&camera, i)));
+    assert_ne!(on.frame(&camera, 0), first);
     // A method's pattern may turn only with a history.
     let mut still = Stage::new(&gpu, &scene, Method::Ssgi, false);
     assert_eq!(still.frame(&camera, 0), still.frame(&camera, 0));
@@ -111,7 +115,7 @@ fn a_frozen_frame_converges_to_the_filtered_picture() {
     // Negative control: single frames neither come to rest nor near the truth.
     let (a, b) = (off.frame(&camera, 98), off.frame(&camera, 99));
     println!("mean error {error:.5}; of one frame {:.5}", mean(&b, &truth));
-    assert!(error < 0.1 * mean(&b, &truth), "{error}");
+    assert!(error < 0.25 * mean(&b, &truth), "{error}");
     assert!(largest(&a, &b) > 10.0 * most(90..99));
 }
 
@@ -119,7 +123,7 @@ fn a_frozen_frame_converges_to_the_filtered_picture() {
 fn a_slow_pan_beats_single_frames() {
     let Some(gpu) = common::gpu() else { return };
     let (scene, camera) = room();
-    for method in [Method::Direct, Method::Ssgi] {
+    for method in [Method::Direct, Method::Ambient] {
         let name = method.name();
         let mut on = Stage::new(&gpu, &scene, method.clone(), true);
         let mut off = Stage::new(&gpu, &scene, method.clone(), false);
@@ -167,13 +171,13 @@ fn resize_cut_and_another_scene_leave_no_ghost() {
     let (scene, camera) = room();
     let other = turned(&camera, 1.2);
     let mut on = Stage::new(&gpu, &scene, Method::Direct, true);
-    let mut off = Stage::new(&gpu, &scene, Method::Direct, false);
-    let plain = off.frame(&other, 40);
-    (0..12).for_each(|i| drop(on.frame(&camera, i)));
+    // What a renderer shows that knows nothing else.
+    let plain = Stage::new(&gpu, &scene, Method::Direct, true).frame(&other, 40);
+    (0..6).for_each(|i| drop(on.frame(&camera, i)));
     on.renderer.cut();
     assert_eq!(on.frame(&other, 40), plain, "a cut");
 
-    (0..12).for_each(|i| drop(on.frame(&camera, i)));
+    (0..6).for_each(|i| drop(on.frame(&camera, i)));
     on.renderer.resize([64, 48]).expect("the size fits");
     drop(on.frame(&camera, 0));
     on.renderer.resize(SIZE).expect("the size fits");
@@ -181,13 +185,13 @@ fn resize_cut_and_another_scene_leave_no_ghost() {
 
     let (first, second) = (scene::load("paper-room:61").expect("made"), scene);
     let mut on = Stage::new(&gpu, &first, Method::Direct, true);
-    (0..12).for_each(|i| drop(on.frame(&first.cameras[0], i)));
+    (0..6).for_each(|i| drop(on.frame(&first.cameras[0], i)));
     on.uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &second).expect("the scene fits");
     assert_eq!(on.frame(&other, 40), plain, "another scene");
 
     // A cut that nobody told of: distances and the neighbourhood's colours throw the old picture out.
     let mut on = Stage::new(&gpu, &second, Method::Direct, true);
-    (0..12).for_each(|i| drop(on.frame(&camera, i)));
+    (0..6).for_each(|i| drop(on.frame(&camera, i)));
     let old = on.frame(&camera, 12);
     let ghost = mean(&on.frame(&other, 40), &plain);
     let apart = mean(&old, &plain);
