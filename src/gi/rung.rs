@@ -1,6 +1,7 @@
 //! What all methods share: the trait that a frame drives them by, and what a pass costs by count.
 
 use super::ambient::AmbientGi;
+use super::cache::{self, WorldGi};
 use super::pass::{NeuralGi, Options};
 use super::{GiError, Inputs, Method};
 use crate::gpu::timing::Recorder;
@@ -63,6 +64,9 @@ pub fn build(
     Ok(match method {
         Method::Direct => None,
         Method::Ambient => Some(Box::new(AmbientGi::new(device))),
+        Method::Rsm => Some(Box::new(WorldGi::new(device, size, cache::Options::RSM))),
+        Method::Cache => Some(Box::new(WorldGi::new(device, size, cache::Options::CACHE))),
+        Method::World(options) => Some(Box::new(WorldGi::new(device, size, *options))),
         Method::Neural(weights) => Some(Box::new(NeuralGi::new(device, queue, weights, Options { size })?)),
     })
 }

@@ -47,6 +47,16 @@ pub const RENDER: &[Shader] = &[
         name: "render.composite",
         files: wgsl!["lib/frame.wgsl", "lib/brdf.wgsl", "lib/environment.wgsl", "render/composite.wgsl"],
     },
+    Shader {
+        name: "render.atlas",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/hash.wgsl",
+            "lib/brdf.wgsl",
+            "lib/material.wgsl",
+            "render/atlas.wgsl"
+        ],
+    },
     Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
     Shader {
         name: "render.layers",
@@ -69,6 +79,47 @@ pub const GI: &[Shader] = &[
     Shader {
         name: "gi.upsample",
         files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/upsample.wgsl"],
+    },
+    Shader {
+        name: "gi.emitters",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "lib/atlas.wgsl",
+            "lib/emitter.wgsl",
+            "gi/emitters.wgsl"
+        ],
+    },
+    Shader {
+        name: "gi.surfels",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "lib/environment.wgsl",
+            "lib/atlas.wgsl",
+            "lib/emitter.wgsl",
+            "gi/surfel.wgsl",
+            "gi/surfels.wgsl"
+        ],
+    },
+    Shader { name: "gi.sky", files: wgsl!["lib/brdf.wgsl", "gi/surfel.wgsl", "gi/sky.wgsl"] },
+    Shader {
+        name: "gi.exchange",
+        files: wgsl!["lib/brdf.wgsl", "lib/emitter.wgsl", "gi/surfel.wgsl", "gi/exchange.wgsl"],
+    },
+    Shader {
+        name: "gi.gather",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/emitter.wgsl",
+            "gi/inputs.wgsl",
+            "gi/cells.wgsl",
+            "gi/surfel.wgsl",
+            "gi/gather.wgsl"
+        ],
     },
     Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
     Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },

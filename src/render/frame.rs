@@ -1,4 +1,4 @@
-//! The frame, told in order: shadow → gbuffer → direct → indirect → glossy → composite. A display adds `tonemap` after it.
+//! The frame, told in order: shadow → (rsm → around) → gbuffer → direct → indirect → glossy → composite. A display adds `tonemap` after it.
 
 use super::RenderError;
 use super::composite::CompositePass;
@@ -7,6 +7,7 @@ use super::gbuffer::GbufferPass;
 use super::shadow::{ShadowMaps, ShadowOptions, ShadowPass};
 use super::targets::Targets;
 use super::view::{FrameUniform, View};
+use super::world::{World, WorldPass};
 use crate::gi::{
     self,
     glossy::GlossyPass,
@@ -35,6 +36,8 @@ struct Picture {
 struct Lighting {
     scene: u64,
     maps: ShadowMaps,
+    /// What lies beyond the screen, once a method needed it.
+    world: Option<World>,
     group: wgpu::BindGroup,
     sky: wgpu::BindGroup,
 }
@@ -50,6 +53,9 @@ pub struct Renderer {
     /// What fills `indirect`; nothing for direct light alone.
     indirect: Option<Box<dyn Rung>>,
     passes: Passes,
+    needs: gi::NeedsWorld,
+    /// The world's passes, once a method needed them.
+    world: Option<WorldPass>,
 }
 
 /// The passes that every method shares.
@@ -100,7 +106,9 @@ impl Renderer {
         let picture = passes.bind(device, &frame, &targets);
         let indirect = rung::build(device, queue, size, &options.method)?;
         let method = options.method.name();
-        Ok(Self { device: device.clone(), frame, targets, picture, lighting: None, method, indirect, passes })
+        let needs = options.method.needs_world();
+        let device = device.clone();
+        Ok(Self { device, frame, targets, picture, lighting: None, method, indirect, passes, needs, world: None })
     }
 
     /// New targets of `size` pixels; the views of the old ones are of no use any more.
@@ -119,6 +127,11 @@ impl Renderer {
     pub fn set_method(&mut self, queue: &wgpu::Queue, method: &gi::Method) -> Result<(), RenderError> {
         self.indirect = rung::build(&self.device, queue, self.targets.size, method)?;
         self.method = method.name();
+        self.needs = method.needs_world();
+        // Drawn anew in the next frame, whatever samples it is.
+        if let Some(lighting) = &mut self.lighting {
+            lighting.world = None;
+        }
         Ok(())
     }
 
@@ -141,7 +154,7 @@ impl Renderer {
 
     /// What a GI method reads of the frame that was drawn with `view` and `environment`.
     pub fn gi_inputs(&self, view: &View, environment: [f32; 3]) -> gi::Inputs<'_> {
-        gi_inputs(&self.targets, view, environment)
+        gi_inputs(&self.targets, view, environment, None)
     }
 
     /// The textures that [`Renderer::record`] fills.
@@ -158,6 +171,7 @@ impl Renderer {
     pub fn bytes(&self) -> Vec<(&'static str, u64)> {
         let mut rows = self.targets.bytes();
         rows.extend(self.lighting.iter().flat_map(|l| l.maps.bytes()));
+        rows.extend(self.lighting.iter().flat_map(|l| &l.world).flat_map(World::bytes));
         rows.push((self.method, self.indirect.as_ref().map_or(0, |i| i.bytes())));
         rows
     }
@@ -196,10 +210,12 @@ impl Renderer {
         if shadows || fresh {
             self.passes.shadow.record(recorder, queue, scene, view, &mut lighting.maps);
         }
+        self.record_world(recorder, queue, scene, view, shadows, &mut lighting);
         self.passes.gbuffer.record(recorder, scene, &self.targets);
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
         self.passes.direct.record(recorder, inputs);
-        let inputs = gi_inputs(&self.targets, view, scene.environment.radiance);
+        let world = lighting.world.as_ref().map(|w| w.inputs(scene));
+        let inputs = gi_inputs(&self.targets, view, scene.environment.radiance, world);
         match &mut self.indirect {
             Some(indirect) => indirect.record(recorder, queue, &inputs, &self.targets.indirect.view)?,
             None => clear(recorder, &self.targets),
@@ -214,11 +230,34 @@ impl Renderer {
         let maps = self.passes.shadow.maps(&self.device, queue, scene);
         let group = self.passes.direct.lights(&self.device, scene, &maps);
         let sky = self.passes.composite.sky(&self.device, &scene.environment_view);
-        Lighting { scene: scene.id, maps, group, sky }
+        Lighting { scene: scene.id, maps, world: None, group, sky }
+    }
+
+    /// Draws what lies beyond the screen, if the method reads it; without `again` only where it was not drawn yet.
+    fn record_world(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        scene: &SceneGpu,
+        view: &View,
+        again: bool,
+        lighting: &mut Lighting,
+    ) {
+        if self.needs == gi::NeedsWorld::Nothing || (lighting.world.is_some() && !again) {
+            return;
+        }
+        let pass = self.world.get_or_insert_with(|| WorldPass::new(&self.device));
+        let world = lighting.world.get_or_insert_with(|| pass.world(&self.device, queue, scene));
+        pass.record(recorder, queue, scene, view, world, self.needs == gi::NeedsWorld::Around);
     }
 }
 
-fn gi_inputs<'a>(targets: &'a Targets, view: &View, environment: [f32; 3]) -> gi::Inputs<'a> {
+fn gi_inputs<'a>(
+    targets: &'a Targets,
+    view: &View,
+    environment: [f32; 3],
+    world: Option<gi::World<'a>>,
+) -> gi::Inputs<'a> {
     gi::Inputs {
         size: targets.size,
         depth: &targets.depth.view,
@@ -228,6 +267,7 @@ fn gi_inputs<'a>(targets: &'a Targets, view: &View, environment: [f32; 3]) -> gi
         direct: &targets.direct_diffuse.view,
         camera: view.matrices(),
         environment,
+        world,
     }
 }
 

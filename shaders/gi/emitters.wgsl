@@ -1,0 +1,86 @@
+// From the texels of reflective shadow maps to emitters: four texels make a fine one, sixty-four a block. Light is
+// summed by what a texel carries (albedo times irradiance times area), so nothing is lost between the levels.
+
+@group(0) @binding(0) var<storage, read> views: array<AtlasView>;
+@group(0) @binding(1) var<storage, read> lights: array<Light>;
+@group(0) @binding(2) var depth_map: texture_2d<f32>;
+@group(0) @binding(3) var albedo_map: texture_2d<f32>;
+@group(0) @binding(4) var normal_map: texture_2d<f32>;
+// Sixteen for each block.
+@group(0) @binding(5) var<storage, read_write> fine: array<Emitter>;
+@group(0) @binding(6) var<storage, read_write> blocks: array<Emitter>;
+
+// Texels on a side of a block.
+const BLOCK = 8u;
+
+// What a group of texels sends: place and normal are weighted by light.
+struct Share {
+    // Place times weight, weight.
+    place: vec4f,
+    // Normal times weight, area.
+    normal: vec4f,
+    // Radiance times area.
+    power: vec3f,
+}
+
+var<workgroup> places: array<vec4f, 64>;
+var<workgroup> normals: array<vec4f, 64>;
+var<workgroup> powers: array<vec3f, 64>;
+
+fn texel_share(view: AtlasView, texel: vec2u) -> Share {
+    let at = view.origin + texel;
+    let depth = textureLoad(depth_map, at, 0).x;
+    if depth <= 0.0 { return Share(vec4f(0.0), vec4f(0.0), vec3f(0.0)); }
+    let p = atlas_position(view, texel, depth);
+    let n = oct_decode(textureLoad(normal_map, at, 0).xy);
+    let area = atlas_area(view, p, n);
+    let s = sample_light(lights[view.light], p);
+    let cosine = max(dot(n, s.l), 0.0);
+    let power = textureLoad(albedo_map, at, 0).rgb * s.irradiance * (cosine * area.y / PI);
+    // The little extra gives dark surfaces a place, too.
+    let weight = dot(power, vec3f(0.2126, 0.7152, 0.0722)) + 1e-12 * area.y;
+    return Share(vec4f(p * weight, weight), vec4f(n * weight, area.y), power);
+}
+
+fn emitter_of(share: Share) -> Emitter {
+    var out: Emitter;
+    if share.place.w > 0.0 {
+        out.position = share.place.xyz / share.place.w;
+        out.normal = normalize(share.normal.xyz + vec3f(0.0, 1e-20, 0.0));
+        out.area = share.normal.w;
+        out.radiance = share.power / share.normal.w;
+    }
+    return out;
+}
+
+// A tile's blocks in x, tiles in y. Neighbouring invocations hold the four texels of one fine emitter.
+@compute @workgroup_size(64)
+fn reflect(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) i: u32) {
+    let view = views[group.y];
+    let per_row = view.side / BLOCK;
+    let valid = group.x < per_row * per_row;
+    let corner = BLOCK * vec2u(group.x % per_row, group.x / per_row);
+    let four = i / 4u;
+    let texel = corner + 2u * vec2u(four % 4u, four / 4u) + vec2u(i & 1u, (i >> 1u) & 1u);
+    var own = Share(vec4f(0.0), vec4f(0.0), vec3f(0.0));
+    if valid { own = texel_share(view, texel); }
+    places[i] = own.place;
+    normals[i] = own.normal;
+    powers[i] = own.power;
+    workgroupBarrier();
+    let block = view.first_block + group.x;
+    if valid && i % 4u == 0u {
+        var sum = own;
+        for (var k = 1u; k < 4u; k++) {
+            sum = Share(sum.place + places[i + k], sum.normal + normals[i + k], sum.power + powers[i + k]);
+        }
+        fine[16u * block + four] = emitter_of(sum);
+    }
+    if valid && i == 0u {
+        var sum = own;
+        for (var k = 1u; k < 64u; k++) {
+            sum = Share(sum.place + places[k], sum.normal + normals[k], sum.power + powers[k]);
+        }
+        blocks[block] = emitter_of(sum);
+    }
+}

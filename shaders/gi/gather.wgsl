@@ -1,0 +1,98 @@
+// Light of all emitters at every cell: blocks of the reflective shadow maps, opened into their sixteen fine emitters
+// where they are near, and (`cache` only) the surfels around the camera with the sky between them. One invocation a cell;
+// emitters pass through workgroup memory, 64 at a time.
+
+@group(1) @binding(0) var<storage, read> cell_pixels: array<u32>;
+@group(1) @binding(1) var<storage, read_write> light: array<vec4f>;
+@group(1) @binding(2) var<storage, read> fine: array<Emitter>;
+@group(1) @binding(3) var<storage, read> blocks: array<Emitter>;
+@group(1) @binding(4) var<storage, read> surfels: array<Surfel>;
+@group(1) @binding(5) var<storage, read> sent: array<vec4f>;
+@group(1) @binding(6) var<storage, read> sky: Sky;
+
+@group(1) @binding(7) var<uniform> counts: Counts;
+
+// A block is opened where it is nearer than so many of its own widths.
+const NEAR_WIDTHS: f32 = 2.0;
+
+struct Sum {
+    // Radiance times direction, per π, for each colour.
+    red: vec3f,
+    green: vec3f,
+    blue: vec3f,
+}
+
+var<workgroup> tile: array<Emitter, 64>;
+
+fn add(sum: ptr<function, Sum>, v: vec3f, radiance: vec3f) {
+    (*sum).red += v * radiance.r;
+    (*sum).green += v * radiance.g;
+    (*sum).blue += v * radiance.b;
+}
+
+// What arrives above the horizon of the receiver's normal `n`.
+fn seen(e: Emitter, p: vec3f, n: vec3f) -> vec3f {
+    let v = arrival(e.position, e.normal, e.area, p);
+    return select(vec3f(0.0), v, dot(v, n) > 0.0);
+}
+
+@compute @workgroup_size(8, 8)
+fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) i: u32) {
+    let grid = cell_grid();
+    let inside = all(id.xy < grid);
+    let index = cell_index(min(id.xy, grid - 1u));
+    let packed = select(NO_PIXEL, cell_pixels[index], inside);
+    var p = vec3f(0.0);
+    var n = vec3f(0.0);
+    if packed != NO_PIXEL {
+        let pixel = unpack_pixel(packed);
+        p = world_position_at(pixel, distance_at(pixel));
+        n = world_normal_at(pixel);
+    }
+    var sum = Sum(vec3f(0.0), vec3f(0.0), vec3f(0.0));
+    for (var first = 0u; first < counts.blocks; first += 64u) {
+        tile[i].area = 0.0;
+        if first + i < counts.blocks { tile[i] = blocks[first + i]; }
+        workgroupBarrier();
+        for (var k = 0u; k < 64u; k++) {
+            let e = tile[k];
+            if e.area == 0.0 { continue; }
+            let offset = e.position - p;
+            if dot(offset, offset) > NEAR_WIDTHS * NEAR_WIDTHS * e.area {
+                add(&sum, seen(e, p, n), e.radiance);
+            } else {
+                for (var f = 16u * (first + k); f < 16u * (first + k) + 16u; f++) {
+                    add(&sum, seen(fine[f], p, n), fine[f].radiance);
+                }
+            }
+        }
+        workgroupBarrier();
+    }
+    if SURFELS > 0u {
+        var covered = vec3f(0.0);
+        var share = 0.0;
+        var near = Sum(vec3f(0.0), vec3f(0.0), vec3f(0.0));
+        for (var first = 0u; first < SURFELS; first += 64u) {
+            let s = surfels[first + i];
+            tile[i] = Emitter(s.position, s.area, s.normal, 0.0, sent[first + i].rgb - s.mapped.rgb, 0.0);
+            workgroupBarrier();
+            for (var k = 0u; k < 64u; k++) {
+                let v = seen(tile[k], p, n);
+                covered += v;
+                share += dot(v, n);
+                add(&near, v, tile[k].radiance);
+            }
+            workgroupBarrier();
+        }
+        let rest = sky_rest(sky, share, n);
+        sum.red += near.red * rest.gain;
+        sum.green += near.green * rest.gain;
+        sum.blue += near.blue * rest.gain;
+        // The open part of the hemisphere: all of it (E/π = 1 along n) without what the surfels cover.
+        add(&sum, (n - covered) * rest.open, rest.radiance);
+    }
+    if packed == NO_PIXEL { return; }
+    light[3u * index] = vec4f(sum.red, 0.0);
+    light[3u * index + 1u] = vec4f(sum.green, 0.0);
+    light[3u * index + 2u] = vec4f(sum.blue, 0.0);
+}
