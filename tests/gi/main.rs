@@ -5,6 +5,7 @@ mod common;
 mod edges;
 mod shot;
 mod stages;
+mod upsample;
 mod weights;
 mod whole;
 
