@@ -1,5 +1,7 @@
-// From the texels of reflective shadow maps to emitters: four texels make a fine one, sixty-four a block. Light is
-// summed by what a texel carries (albedo times irradiance times area), so nothing is lost between the levels.
+// From the texels of reflective shadow maps to emitters: four texels make a fine one, the sixty-four of a block two: what
+// stands nearer to the light than the block's mean, and the rest. (One emitter would put an object's light down
+// to the floor under it, where the floor itself cannot see it.) Light is summed by what a texel carries (albedo times
+// irradiance times area), so nothing is lost between the levels.
 
 @group(0) @binding(0) var<storage, read> views: array<AtlasView>;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
@@ -8,6 +10,7 @@
 @group(0) @binding(4) var normal_map: texture_2d<f32>;
 // Sixteen for each block.
 @group(0) @binding(5) var<storage, read_write> fine: array<Emitter>;
+// Two for each block.
 @group(0) @binding(6) var<storage, read_write> blocks: array<Emitter>;
 
 // Texels on a side of a block.
@@ -46,7 +49,8 @@ fn emitter_of(share: Share) -> Emitter {
     var out: Emitter;
     if share.place.w > 0.0 {
         out.position = share.place.xyz / share.place.w;
-        out.normal = normalize(share.normal.xyz + vec3f(0.0, 1e-20, 0.0));
+        out.normal = share.normal.xyz / share.place.w;
+        out.rest = 0.25 * max(1.0 - length(out.normal), 0.0);
         out.area = share.normal.w;
         out.radiance = share.power / share.normal.w;
     }
@@ -76,11 +80,19 @@ fn reflect(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         }
         fine[16u * block + four] = emitter_of(sum);
     }
-    if valid && i == 0u {
-        var sum = own;
-        for (var k = 1u; k < 64u; k++) {
-            sum = Share(sum.place + places[k], sum.normal + normals[k], sum.power + powers[k]);
+    if valid && i < 2u {
+        // The mean height is weighted like the places.
+        var mean = vec2f(0.0);
+        for (var k = 0u; k < 64u; k++) {
+            mean += vec2f(-dot(places[k].xyz, view.axis), places[k].w);
         }
-        blocks[block] = emitter_of(sum);
+        var sum = Share(vec4f(0.0), vec4f(0.0), vec3f(0.0));
+        for (var k = 0u; k < 64u; k++) {
+            let above = -dot(places[k].xyz, view.axis) * mean.y > mean.x * places[k].w;
+            if above == (i == 1u) {
+                sum = Share(sum.place + places[k], sum.normal + normals[k], sum.power + powers[k]);
+            }
+        }
+        blocks[2u * block + i] = emitter_of(sum);
     }
 }

@@ -32,8 +32,13 @@ fn add(sum: ptr<function, Sum>, v: vec3f, radiance: vec3f) {
 
 // What arrives above the horizon of the receiver's normal `n`.
 fn seen(e: Emitter, p: vec3f, n: vec3f) -> vec3f {
-    let v = arrival(e.position, e.normal, e.area, p);
+    let v = arrival(e.position, e.normal, e.rest, e.area, p);
     return select(vec3f(0.0), v, dot(v, n) > 0.0);
+}
+
+fn far(e: Emitter, area: f32, p: vec3f) -> bool {
+    let v = e.position - p;
+    return e.area == 0.0 || dot(v, v) > NEAR_WIDTHS * NEAR_WIDTHS * area;
 }
 
 @compute @workgroup_size(8, 8)
@@ -50,18 +55,21 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
         n = world_normal_at(pixel);
     }
     var sum = Sum(vec3f(0.0), vec3f(0.0), vec3f(0.0));
-    for (var first = 0u; first < counts.blocks; first += 64u) {
+    for (var first = 0u; first < 2u * counts.blocks; first += 64u) {
         tile[i].area = 0.0;
-        if first + i < counts.blocks { tile[i] = blocks[first + i]; }
+        if first + i < 2u * counts.blocks { tile[i] = blocks[first + i]; }
         workgroupBarrier();
-        for (var k = 0u; k < 64u; k++) {
-            let e = tile[k];
-            if e.area == 0.0 { continue; }
-            let offset = e.position - p;
-            if dot(offset, offset) > NEAR_WIDTHS * NEAR_WIDTHS * e.area {
-                add(&sum, seen(e, p, n), e.radiance);
+        for (var k = 0u; k < 64u; k += 2u) {
+            let low = tile[k];
+            let high = tile[k + 1u];
+            let area = low.area + high.area;
+            if area == 0.0 { continue; }
+            if far(low, area, p) && far(high, area, p) {
+                add(&sum, seen(low, p, n), low.radiance);
+                add(&sum, seen(high, p, n), high.radiance);
             } else {
-                for (var f = 16u * (first + k); f < 16u * (first + k) + 16u; f++) {
+                let start = 8u * (first + k);
+                for (var f = start; f < start + 16u; f++) {
                     add(&sum, seen(fine[f], p, n), fine[f].radiance);
                 }
             }

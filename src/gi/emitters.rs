@@ -61,7 +61,7 @@ impl EmittersPass {
         self.counts = counts;
         queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&counts));
         let needed = u64::from(counts.blocks.max(1));
-        if self.blocks.size() == needed * EMITTER_BYTES {
+        if self.blocks.size() == 2 * needed * EMITTER_BYTES {
             return false;
         }
         [self.fine, self.blocks] = buffers(&self.device, needed);
@@ -105,7 +105,7 @@ impl EmittersPass {
         &self.fine
     }
 
-    /// Blocks.
+    /// Two a block.
     pub fn blocks(&self) -> &wgpu::Buffer {
         &self.blocks
     }
@@ -143,7 +143,7 @@ impl EmittersPass {
 }
 
 fn buffers(device: &wgpu::Device, blocks: u64) -> [wgpu::Buffer; 2] {
-    [("gi.emitters.fine", blocks * FINE), ("gi.emitters.blocks", blocks)].map(|(label, count)| {
+    [("gi.emitters.fine", blocks * FINE), ("gi.emitters.blocks", 2 * blocks)].map(|(label, count)| {
         device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
             size: count * EMITTER_BYTES,
