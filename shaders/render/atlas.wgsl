@@ -3,6 +3,8 @@
 
 struct AtlasCamera {
     clip_from_world: mat4x4f,
+    // How much of the light that the specular lobe reflects counts as albedo.
+    specular: vec4f,
 }
 
 @group(0) @binding(0) var<uniform> camera: AtlasCamera;
@@ -71,10 +73,12 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     let n = normalize(in.normal);
     let metallic = saturate(material.metallic * rough_metal.b);
     let roughness = saturate(material.roughness * rough_metal.g);
+    let color = saturate(base.rgb);
     let share = env_brdf(vec3f(material.f0), roughness, MEAN_COSINE).x;
+    let mirrored = env_brdf(mix(vec3f(material.f0), color, metallic), roughness, MEAN_COSINE) * camera.specular.x;
 
     var out: Fields;
-    out.albedo = vec4f(saturate(base.rgb) * (1.0 - metallic) * (1.0 - share), 1.0);
+    out.albedo = vec4f(color * (1.0 - metallic) * (1.0 - share) + mirrored, 1.0);
     out.normal = oct_encode(select(-n, n, facing == (in.mirror > 0.0)));
     out.emissive = vec4f(material.emissive * glow, 1.0);
     if material.unlit != 0u {

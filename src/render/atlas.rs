@@ -41,8 +41,11 @@ pub struct AtlasViewGpu {
     pub range: f32,
     /// Where the view's blocks of emitters begin.
     pub first_block: u32,
+    /// How much of the light that specular lobes reflect counts as albedo, 0 to 1. A sun's light leaves a lobe in one
+    /// direction, which a diffuse emitter cannot say, so 0 there; light from all around does not care.
+    pub specular: f32,
     /// Unused.
-    pub pad: [u32; 2],
+    pub pad: u32,
 }
 
 /// A tile's place.
@@ -91,12 +94,15 @@ fn finish(clip: Mat4, axis: Vec3, texel: f32, eye: Vec3, near: f32, range: f32, 
         light: tile.light,
         range,
         first_block: tile.first_block,
-        pad: [0; 2],
+        specular: if near > 0.0 { 1.0 } else { 0.0 },
+        pad: 0,
     }
 }
 
 /// Spacing of the cameras in their uniform buffer: the largest alignment a device may ask for.
 const CAMERA_STRIDE: u64 = 256;
+/// A camera: matrix and share of specular light.
+const CAMERA_SIZE: u64 = 80;
 
 /// The textures of an atlas and the cameras of its tiles.
 pub struct Atlas {
@@ -138,7 +144,7 @@ impl AtlasPass {
             has_dynamic_offset: true,
             min_binding_size: None,
         };
-        let layout = tool::layout(device, "render.atlas", wgpu::ShaderStages::VERTEX, &[uniform]);
+        let layout = tool::layout(device, "render.atlas", wgpu::ShaderStages::VERTEX_FRAGMENT, &[uniform]);
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("render.atlas"),
             bind_group_layouts: &[Some(&layout), Some(&material_layout(device))],
@@ -174,7 +180,7 @@ impl AtlasPass {
         };
         let count = views.max(1) as u64;
         let cameras = buffer(count * CAMERA_STRIDE, wgpu::BufferUsages::UNIFORM);
-        let camera = wgpu::BufferBinding { buffer: &cameras, offset: 0, size: wgpu::BufferSize::new(64) };
+        let camera = wgpu::BufferBinding { buffer: &cameras, offset: 0, size: wgpu::BufferSize::new(CAMERA_SIZE) };
         let group = tool::group(device, "render.atlas", &self.layout, &[wgpu::BindingResource::Buffer(camera)]);
         Atlas {
             depth: texture(wgpu::TextureFormat::Depth32Float),
@@ -204,6 +210,7 @@ impl AtlasPass {
         }
         for (view, bytes) in views.iter().zip(atlas.camera_bytes.chunks_exact_mut(CAMERA_STRIDE as usize)) {
             bytes[..64].copy_from_slice(bytemuck::bytes_of(&view.clip_from_world));
+            bytes[64..68].copy_from_slice(&view.specular.to_ne_bytes());
         }
         queue.write_buffer(&atlas.cameras, 0, &atlas.camera_bytes);
         queue.write_buffer(&atlas.views, 0, bytemuck::cast_slice(views));
