@@ -21,7 +21,7 @@ struct AtlasView {
     range: f32,
     // Where the view's blocks of emitters begin.
     first_block: u32,
-    // How much of the light that specular lobes reflect counts as albedo.
+    // Share of the specular lobes' light that counts as albedo.
     specular: f32,
     pad: u32,
 }

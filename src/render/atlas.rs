@@ -7,7 +7,7 @@
 //! | `depth` | `Depth32Float` | reversed: 1 at the near plane | 0 |
 //! | `albedo` | `Rgba8UnormSrgb` | rgb: diffuse reflectance, the specular share taken out; a: 1 | 0 |
 //! | `normal` | `Rg16Float` | unit normal in world space, octahedral, turned to the side that is seen | 0, 0 |
-//! | `emissive` | `Rgba16Float` | rgb: emitted radiance, W/(m²·sr); a: 1 | 0 |
+//! | `emissive` | `Rgba16Float` | rgb: emitted radiance, W/(m²·sr), or in a light's view the share of its light that the specular lobe reflects; a: 1 | 0 |
 
 use super::tool;
 use crate::gpu::{shaders, timing::Recorder};
@@ -41,8 +41,7 @@ pub struct AtlasViewGpu {
     pub range: f32,
     /// Where the view's blocks of emitters begin.
     pub first_block: u32,
-    /// How much of the light that specular lobes reflect counts as albedo, 0 to 1. A sun's light leaves a lobe in one
-    /// direction, which a diffuse emitter cannot say, so 0 there; light from all around does not care.
+    /// Share of the specular lobes' light that counts as albedo; below 0 in views of lights, whose emitters have lobes.
     pub specular: f32,
     /// Unused.
     pub pad: u32,
@@ -94,15 +93,15 @@ fn finish(clip: Mat4, axis: Vec3, texel: f32, eye: Vec3, near: f32, range: f32, 
         light: tile.light,
         range,
         first_block: tile.first_block,
-        specular: if near > 0.0 { 1.0 } else { 0.0 },
+        specular: -1.0,
         pad: 0,
     }
 }
 
 /// Spacing of the cameras in their uniform buffer: the largest alignment a device may ask for.
 const CAMERA_STRIDE: u64 = 256;
-/// A camera: matrix and share of specular light.
-const CAMERA_SIZE: u64 = 80;
+/// A camera: matrix, place and share of specular light.
+const CAMERA_SIZE: u64 = 96;
 
 /// The textures of an atlas and the cameras of its tiles.
 pub struct Atlas {
@@ -210,7 +209,8 @@ impl AtlasPass {
         }
         for (view, bytes) in views.iter().zip(atlas.camera_bytes.chunks_exact_mut(CAMERA_STRIDE as usize)) {
             bytes[..64].copy_from_slice(bytemuck::bytes_of(&view.clip_from_world));
-            bytes[64..68].copy_from_slice(&view.specular.to_ne_bytes());
+            let ([x, y, z], w) = if view.near > 0.0 { (view.eye, 1.0) } else { (view.axis, 0.0) };
+            bytes[64..96].copy_from_slice(bytemuck::bytes_of(&[x, y, z, w, view.specular, 0.0, 0.0, 0.0]));
         }
         queue.write_buffer(&atlas.cameras, 0, &atlas.camera_bytes);
         queue.write_buffer(&atlas.views, 0, bytemuck::cast_slice(views));
