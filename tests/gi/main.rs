@@ -7,6 +7,7 @@ mod screen;
 mod shot;
 mod stages;
 mod taa;
+mod upsample;
 mod weights;
 mod whole;
 
