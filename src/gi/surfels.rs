@@ -40,8 +40,7 @@ pub struct SurfelsPass {
 impl SurfelsPass {
     /// Compiles the shaders and makes buffers of 170 KB. `rounds` of exchange are rounded up to an even number.
     pub fn new(device: &wgpu::Device, rounds: u32) -> Self {
-        let types =
-            [READ, READ, READ, READ, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE, UNIFORM];
+        let types = [READ, READ, READ, READ, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE, UNIFORM];
         let stage = wgpu::ShaderStages::COMPUTE;
         let layout = tool::layout(device, "gi.surfels", stage, &types);
         let sky_layout = tool::layout(device, "gi.sky", stage, &[READ, READ_WRITE]);
@@ -168,12 +167,7 @@ impl SurfelsPass {
     }
 }
 
-fn pipeline(
-    device: &wgpu::Device,
-    name: &str,
-    entry: &str,
-    layout: &wgpu::BindGroupLayout,
-) -> wgpu::ComputePipeline {
+fn pipeline(device: &wgpu::Device, name: &str, entry: &str, layout: &wgpu::BindGroupLayout) -> wgpu::ComputePipeline {
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(name),
         bind_group_layouts: &[Some(layout)],

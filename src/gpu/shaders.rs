@@ -49,13 +49,7 @@ pub const RENDER: &[Shader] = &[
     },
     Shader {
         name: "render.atlas",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/hash.wgsl",
-            "lib/brdf.wgsl",
-            "lib/material.wgsl",
-            "render/atlas.wgsl"
-        ],
+        files: wgsl!["lib/octahedral.wgsl", "lib/hash.wgsl", "lib/brdf.wgsl", "lib/material.wgsl", "render/atlas.wgsl"],
     },
     Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
     Shader {
@@ -69,8 +63,19 @@ pub const GI: &[Shader] = &[
     Shader { name: "gi.exposure", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/exposure.wgsl"] },
     Shader { name: "gi.ambient", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/ambient.wgsl"] },
     Shader {
+        name: "gi.lit",
+        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/outgoing.wgsl", "gi/lit.wgsl"],
+    },
+    Shader {
         name: "gi.glossy",
-        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/glossy.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/frame.wgsl",
+            "lib/brdf.wgsl",
+            "lib/environment.wgsl",
+            "gi/outgoing.wgsl",
+            "gi/glossy.wgsl"
+        ],
     },
     Shader {
         name: "gi.cells",

@@ -163,7 +163,11 @@ fn sun(direction: Vec3, tile: Tile, bounds: (Vec3, Vec3), eye: Vec3) -> AtlasVie
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for i in 0..8 {
         let pick = |bit: usize, low, high| if i & bit == 0 { low } else { high };
-        let p = Vec3::new(pick(1, bounds.0.x, bounds.1.x), pick(2, bounds.0.y, bounds.1.y), pick(4, bounds.0.z, bounds.1.z));
+        let p = Vec3::new(
+            pick(1, bounds.0.x, bounds.1.x),
+            pick(2, bounds.0.y, bounds.1.y),
+            pick(4, bounds.0.z, bounds.1.z),
+        );
         (low, high) = (low.min(along(p)), high.max(along(p)));
     }
     let pad = Vec3::splat(0.01) + 0.005 * (high - low);
