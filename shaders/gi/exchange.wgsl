@@ -12,8 +12,8 @@ fn exchange(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
     let here = surfels[group.x];
     var sum = vec4f(0.0);
     for (var k = i; k < SURFELS; k += 64u) {
-        let v = arrival(surfels[k].position, surfels[k].normal, surfels[k].area, here.position);
-        sum += vec4f(sent[k].rgb, 1.0) * max(dot(v, here.normal), 0.0);
+        let a = arrival(surfels[k].position, surfels[k].normal, 0.0, surfels[k].area, here.position);
+        sum += vec4f(sent[k].rgb, 1.0) * (a.factor * max(dot(a.towards, here.normal), 0.0));
     }
     partial[i] = sum;
     for (var width = 32u; width > 0u; width /= 2u) {

@@ -30,10 +30,16 @@ fn add(sum: ptr<function, Sum>, v: vec3f, radiance: vec3f) {
     (*sum).blue += v * radiance.b;
 }
 
-// What arrives above the horizon of the receiver's normal `n`.
-fn seen(e: Emitter, p: vec3f, n: vec3f) -> vec3f {
-    let v = arrival(e.position, e.normal, e.area, p);
-    return select(vec3f(0.0), v, dot(v, n) > 0.0);
+// What an emitter of a reflective shadow map sends to `p`, above the horizon of the receiver's normal `n`.
+fn add_emitter(sum: ptr<function, Sum>, e: Emitter, p: vec3f, n: vec3f) {
+    let a = arrival(e.position, e.normal, e.rest, e.area, p);
+    let light = e.radiance * a.factor + e.gloss * (a.plain * lobe(e.mirror, -a.towards));
+    add(sum, select(vec3f(0.0), a.towards, dot(a.towards, n) > 0.0), light);
+}
+
+fn far(e: Emitter, area: f32, p: vec3f) -> bool {
+    let v = e.position - p;
+    return e.area == 0.0 || dot(v, v) > NEAR_WIDTHS * NEAR_WIDTHS * area;
 }
 
 @compute @workgroup_size(8, 8)
@@ -50,19 +56,22 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
         n = world_normal_at(pixel);
     }
     var sum = Sum(vec3f(0.0), vec3f(0.0), vec3f(0.0));
-    for (var first = 0u; first < counts.blocks; first += 64u) {
+    for (var first = 0u; first < 2u * counts.blocks; first += 64u) {
         tile[i].area = 0.0;
-        if first + i < counts.blocks { tile[i] = blocks[first + i]; }
+        if first + i < 2u * counts.blocks { tile[i] = blocks[first + i]; }
         workgroupBarrier();
-        for (var k = 0u; k < 64u; k++) {
-            let e = tile[k];
-            if e.area == 0.0 { continue; }
-            let offset = e.position - p;
-            if dot(offset, offset) > NEAR_WIDTHS * NEAR_WIDTHS * e.area {
-                add(&sum, seen(e, p, n), e.radiance);
+        for (var k = 0u; k < 64u; k += 2u) {
+            let low = tile[k];
+            let high = tile[k + 1u];
+            let area = low.area + high.area;
+            if area == 0.0 { continue; }
+            if far(low, area, p) && far(high, area, p) {
+                add_emitter(&sum, low, p, n);
+                add_emitter(&sum, high, p, n);
             } else {
-                for (var f = 16u * (first + k); f < 16u * (first + k) + 16u; f++) {
-                    add(&sum, seen(fine[f], p, n), fine[f].radiance);
+                let start = 8u * (first + k);
+                for (var f = start; f < start + 16u; f++) {
+                    add_emitter(&sum, fine[f], p, n);
                 }
             }
         }
@@ -74,10 +83,14 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
         var near = Sum(vec3f(0.0), vec3f(0.0), vec3f(0.0));
         for (var first = 0u; first < SURFELS; first += 64u) {
             let s = surfels[first + i];
-            tile[i] = Emitter(s.position, s.area, s.normal, 0.0, sent[first + i].rgb - s.mapped.rgb, 0.0);
+            tile[i].position = s.position;
+            tile[i].area = s.area;
+            tile[i].normal = s.normal;
+            tile[i].radiance = sent[first + i].rgb - s.mapped;
             workgroupBarrier();
             for (var k = 0u; k < 64u; k++) {
-                let v = seen(tile[k], p, n);
+                let a = arrival(tile[k].position, tile[k].normal, 0.0, tile[k].area, p);
+                let v = select(vec3f(0.0), a.towards * a.factor, dot(a.towards, n) > 0.0);
                 covered += v;
                 share += dot(v, n);
                 add(&near, v, tile[k].radiance);

@@ -21,8 +21,9 @@ struct AtlasView {
     range: f32,
     // Where the view's blocks of emitters begin.
     first_block: u32,
-    pad0: u32,
-    pad1: u32,
+    // Share of the specular lobes' light that counts as albedo.
+    specular: f32,
+    pad: u32,
 }
 
 // Texels seen at a slant are larger on the surface, up to so many times.

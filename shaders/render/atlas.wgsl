@@ -3,6 +3,11 @@
 
 struct AtlasCamera {
     clip_from_world: mat4x4f,
+    // Where the view stands (w = 1), or its unit direction (w = 0).
+    place: vec4f,
+    // Share of the specular lobe's light that counts as albedo. Below 0 marks a light's view: then the third field
+    // holds how much of its light the lobe reflects.
+    specular: vec4f,
 }
 
 @group(0) @binding(0) var<uniform> camera: AtlasCamera;
@@ -30,6 +35,7 @@ struct Varying {
     @location(2) color: vec4f,
     // Sign of the transform's determinant: a mirrored object turns its front faces round.
     @location(3) @interpolate(flat) mirror: f32,
+    @location(4) world: vec3f,
 }
 
 @vertex
@@ -46,6 +52,7 @@ fn vertex(v: Vertex) -> Varying {
     out.normal = normalize(vec3f(dot(c0, n), dot(c1, n), dot(c2, n))) * out.mirror;
     out.uv = vec4f(v.uv0, v.uv1);
     out.color = v.color;
+    out.world = world;
     return out;
 }
 
@@ -71,15 +78,22 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     let n = normalize(in.normal);
     let metallic = saturate(material.metallic * rough_metal.b);
     let roughness = saturate(material.roughness * rough_metal.g);
+    let color = saturate(base.rgb);
+    let f0 = mix(vec3f(material.f0), color, metallic);
     let share = env_brdf(vec3f(material.f0), roughness, MEAN_COSINE).x;
+    let mirrored = env_brdf(f0, roughness, MEAN_COSINE) * max(camera.specular.x, 0.0);
 
     var out: Fields;
-    out.albedo = vec4f(saturate(base.rgb) * (1.0 - metallic) * (1.0 - share), 1.0);
+    out.albedo = vec4f(color * (1.0 - metallic) * (1.0 - share) + mirrored, 1.0);
     out.normal = oct_encode(select(-n, n, facing == (in.mirror > 0.0)));
     out.emissive = vec4f(material.emissive * glow, 1.0);
+    if camera.specular.x < 0.0 {
+        let ray = normalize(select(camera.place.xyz, in.world - camera.place.xyz, camera.place.w > 0.5));
+        out.emissive = vec4f(env_brdf(f0, roughness, abs(dot(n, ray))), 1.0);
+    }
     if material.unlit != 0u {
         out.albedo = vec4f(0.0, 0.0, 0.0, 1.0);
-        out.emissive = vec4f(max(base.rgb, vec3f(0.0)), 1.0);
+        out.emissive = vec4f(select(max(base.rgb, vec3f(0.0)), vec3f(0.0), camera.specular.x < 0.0), 1.0);
     }
     return out;
 }

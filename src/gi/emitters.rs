@@ -7,7 +7,7 @@ use crate::gpu::timing::Recorder;
 use crate::render::tool::{self, LOAD, READ, READ_WRITE};
 
 /// Bytes of an `Emitter` of `shaders/lib/emitter.wgsl`.
-pub const EMITTER_BYTES: u64 = 48;
+pub const EMITTER_BYTES: u64 = 80;
 /// Fine emitters of a block.
 pub const FINE: u64 = 16;
 
@@ -38,9 +38,9 @@ pub struct EmittersPass {
 impl EmittersPass {
     /// Compiles the shader; the buffers grow with the first scene.
     pub fn new(device: &wgpu::Device) -> Self {
-        let types = [READ, READ, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE];
+        let types = [READ, READ, LOAD, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE];
         let layout = tool::layout(device, "gi.emitters", wgpu::ShaderStages::COMPUTE, &types);
-        let pipeline = tool::compute(device, "gi.emitters", "reflect", &[&layout]);
+        let pipeline = tool::compute(device, "gi.emitters", "collect", &[&layout]);
         let uniform = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("gi.counts"),
             size: size_of::<Counts>() as u64,
@@ -61,7 +61,7 @@ impl EmittersPass {
         self.counts = counts;
         queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&counts));
         let needed = u64::from(counts.blocks.max(1));
-        if self.blocks.size() == needed * EMITTER_BYTES {
+        if self.blocks.size() == 2 * needed * EMITTER_BYTES {
             return false;
         }
         [self.fine, self.blocks] = buffers(&self.device, needed);
@@ -87,6 +87,7 @@ impl EmittersPass {
                     view(rsm.depth),
                     view(rsm.albedo),
                     view(rsm.normal),
+                    view(rsm.emissive),
                     self.fine.as_entire_binding(),
                     self.blocks.as_entire_binding(),
                 ],
@@ -105,7 +106,7 @@ impl EmittersPass {
         &self.fine
     }
 
-    /// Blocks.
+    /// Two a block.
     pub fn blocks(&self) -> &wgpu::Buffer {
         &self.blocks
     }
@@ -143,7 +144,7 @@ impl EmittersPass {
 }
 
 fn buffers(device: &wgpu::Device, blocks: u64) -> [wgpu::Buffer; 2] {
-    [("gi.emitters.fine", blocks * FINE), ("gi.emitters.blocks", blocks)].map(|(label, count)| {
+    [("gi.emitters.fine", blocks * FINE), ("gi.emitters.blocks", 2 * blocks)].map(|(label, count)| {
         device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
             size: count * EMITTER_BYTES,

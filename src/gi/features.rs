@@ -122,7 +122,10 @@ impl FeatureSet {
 pub fn example_preludes() -> Vec<(&'static str, String)> {
     let few = FeatureSet::new([("direct", 3), ("depth", 1), ("hit", 1)]).expect("rows of the table in order");
     vec![
-        ("gi.ambient", super::ambient::prelude()),
+        ("gi.ambient", super::ambient::unseen_prelude(1.0, 0.5)),
+        ("gi.occlusion", super::bitmask::March::NEAR.prelude()),
+        ("gi.radiance", super::ssgi::SsgiOptions::default().prelude()),
+        ("gi.ssgi", super::ssgi::SsgiOptions::default().prelude()),
         ("gi.pack", FeatureSet::all().prelude()),
         ("gi.pack", few.prelude()),
         ("gi.reconstruct", super::reconstruct::prelude()),

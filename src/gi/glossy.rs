@@ -147,7 +147,7 @@ impl GlossyPass {
     pub fn costs(size: [u32; 2]) -> [Cost; 2] {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         [
-            Cost::new("gi.lit", pixels * (0.25 * 140.0 + 12.0 / 12.0), pixels * (0.25 * 40.0 + 8.0 / 3.0 * 2.0)),
+            Cost::new("gi.lit", pixels * (0.25 * 140.0 + 24.0 / 12.0), pixels * (0.25 * 40.0 + 8.0 / 3.0 * 2.0)),
             Cost::new("gi.glossy", pixels * (21.0 * 16.0 + 340.0), pixels * (28.0 + 8.0 / 3.0)),
         ]
     }

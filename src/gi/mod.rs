@@ -18,6 +18,7 @@
 //! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
 
 pub mod ambient;
+pub mod bitmask;
 pub mod cache;
 pub mod cells;
 pub mod emitters;
@@ -25,10 +26,12 @@ pub mod exposure;
 pub mod features;
 pub mod glossy;
 pub mod inputs;
+pub mod occlusion;
 pub mod pack;
 pub mod pass;
 pub mod reconstruct;
 pub mod rung;
+pub mod ssgi;
 pub mod surfels;
 pub mod twin;
 pub mod upsample;
@@ -118,6 +121,8 @@ pub enum Method {
     /// One constant, see [`ambient`].
     #[default]
     Ambient,
+    /// One bounce in screen space, see [`ssgi`].
+    Ssgi,
     /// One bounce from reflective shadow maps, see [`cache`].
     Rsm,
     /// All bounces and the sky from shadow maps and a cube around the camera, see [`cache`].
@@ -134,6 +139,7 @@ impl Method {
         match self {
             Method::Direct => "direct",
             Method::Ambient => "ambient",
+            Method::Ssgi => "ssgi",
             Method::Rsm => "rsm",
             Method::Cache => "cache",
             Method::World(options) => ["rsm", "cache"][usize::from(options.around)],

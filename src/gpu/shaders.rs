@@ -51,6 +51,7 @@ pub const RENDER: &[Shader] = &[
         name: "render.atlas",
         files: wgsl!["lib/octahedral.wgsl", "lib/hash.wgsl", "lib/brdf.wgsl", "lib/material.wgsl", "render/atlas.wgsl"],
     },
+    Shader { name: "render.taa", files: wgsl!["lib/frame.wgsl", "render/taa.wgsl"] },
     Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
     Shader {
         name: "render.layers",
@@ -61,7 +62,30 @@ pub const RENDER: &[Shader] = &[
 /// Shaders of `gi/`.
 pub const GI: &[Shader] = &[
     Shader { name: "gi.exposure", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/exposure.wgsl"] },
-    Shader { name: "gi.ambient", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/ambient.wgsl"] },
+    Shader {
+        name: "gi.ambient",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/unseen.wgsl", "gi/ambient.wgsl"],
+    },
+    Shader {
+        name: "gi.occlusion",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/bitmask.wgsl", "gi/occlusion.wgsl"],
+    },
+    Shader {
+        name: "gi.occlusion_full",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/half.wgsl", "gi/occlusion_full.wgsl"],
+    },
+    Shader {
+        name: "gi.radiance",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/unseen.wgsl", "gi/radiance.wgsl"],
+    },
+    Shader {
+        name: "gi.ssgi",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/bitmask.wgsl", "gi/unseen.wgsl", "gi/ssgi.wgsl"],
+    },
+    Shader {
+        name: "gi.ssgi_full",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/half.wgsl", "gi/ssgi_full.wgsl"],
+    },
     Shader {
         name: "gi.lit",
         files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/outgoing.wgsl", "gi/lit.wgsl"],

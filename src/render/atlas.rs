@@ -7,7 +7,7 @@
 //! | `depth` | `Depth32Float` | reversed: 1 at the near plane | 0 |
 //! | `albedo` | `Rgba8UnormSrgb` | rgb: diffuse reflectance, the specular share taken out; a: 1 | 0 |
 //! | `normal` | `Rg16Float` | unit normal in world space, octahedral, turned to the side that is seen | 0, 0 |
-//! | `emissive` | `Rgba16Float` | rgb: emitted radiance, W/(m²·sr); a: 1 | 0 |
+//! | `emissive` | `Rgba16Float` | rgb: emitted radiance, W/(m²·sr), or in a light's view the share of its light that the specular lobe reflects; a: 1 | 0 |
 
 use super::tool;
 use crate::gpu::{shaders, timing::Recorder};
@@ -41,8 +41,10 @@ pub struct AtlasViewGpu {
     pub range: f32,
     /// Where the view's blocks of emitters begin.
     pub first_block: u32,
+    /// Share of the specular lobes' light that counts as albedo; below 0 in views of lights, whose emitters have lobes.
+    pub specular: f32,
     /// Unused.
-    pub pad: [u32; 2],
+    pub pad: u32,
 }
 
 /// A tile's place.
@@ -91,12 +93,15 @@ fn finish(clip: Mat4, axis: Vec3, texel: f32, eye: Vec3, near: f32, range: f32, 
         light: tile.light,
         range,
         first_block: tile.first_block,
-        pad: [0; 2],
+        specular: -1.0,
+        pad: 0,
     }
 }
 
 /// Spacing of the cameras in their uniform buffer: the largest alignment a device may ask for.
 const CAMERA_STRIDE: u64 = 256;
+/// A camera: matrix, place and share of specular light.
+const CAMERA_SIZE: u64 = 96;
 
 /// The textures of an atlas and the cameras of its tiles.
 pub struct Atlas {
@@ -138,7 +143,7 @@ impl AtlasPass {
             has_dynamic_offset: true,
             min_binding_size: None,
         };
-        let layout = tool::layout(device, "render.atlas", wgpu::ShaderStages::VERTEX, &[uniform]);
+        let layout = tool::layout(device, "render.atlas", wgpu::ShaderStages::VERTEX_FRAGMENT, &[uniform]);
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("render.atlas"),
             bind_group_layouts: &[Some(&layout), Some(&material_layout(device))],
@@ -174,7 +179,7 @@ impl AtlasPass {
         };
         let count = views.max(1) as u64;
         let cameras = buffer(count * CAMERA_STRIDE, wgpu::BufferUsages::UNIFORM);
-        let camera = wgpu::BufferBinding { buffer: &cameras, offset: 0, size: wgpu::BufferSize::new(64) };
+        let camera = wgpu::BufferBinding { buffer: &cameras, offset: 0, size: wgpu::BufferSize::new(CAMERA_SIZE) };
         let group = tool::group(device, "render.atlas", &self.layout, &[wgpu::BindingResource::Buffer(camera)]);
         Atlas {
             depth: texture(wgpu::TextureFormat::Depth32Float),
@@ -204,6 +209,8 @@ impl AtlasPass {
         }
         for (view, bytes) in views.iter().zip(atlas.camera_bytes.chunks_exact_mut(CAMERA_STRIDE as usize)) {
             bytes[..64].copy_from_slice(bytemuck::bytes_of(&view.clip_from_world));
+            let ([x, y, z], w) = if view.near > 0.0 { (view.eye, 1.0) } else { (view.axis, 0.0) };
+            bytes[64..96].copy_from_slice(bytemuck::bytes_of(&[x, y, z, w, view.specular, 0.0, 0.0, 0.0]));
         }
         queue.write_buffer(&atlas.cameras, 0, &atlas.camera_bytes);
         queue.write_buffer(&atlas.views, 0, bytemuck::cast_slice(views));

@@ -1,10 +1,12 @@
-//! The frame, told in order: shadow → (rsm → around) → gbuffer → direct → indirect → glossy → composite. A display adds `tonemap` after it.
+//! The frame, told in order: shadow → (rsm → around) → gbuffer → direct → indirect → glossy → composite (→ taa). A display adds
+//! `tonemap` after it.
 
 use super::RenderError;
 use super::composite::CompositePass;
 use super::direct::{DirectInputs, DirectPass};
 use super::gbuffer::GbufferPass;
 use super::shadow::{ShadowMaps, ShadowOptions, ShadowPass};
+use super::taa::TaaPass;
 use super::targets::Targets;
 use super::view::{FrameUniform, View};
 use super::world::{World, WorldPass};
@@ -23,6 +25,9 @@ pub struct RendererOptions {
     pub method: gi::Method,
     /// Sizes of shadow maps.
     pub shadow: ShadowOptions,
+    /// Temporal anti-aliasing ([`TaaPass`]): `hdr` is the mean over frames. Views should then be jittered by
+    /// [`sampling::offset`](super::sampling::offset) of the frame's number. Off, nothing of it exists.
+    pub taa: bool,
 }
 
 /// What is bound as long as the targets stay.
@@ -57,6 +62,7 @@ pub struct Renderer {
     needs: gi::NeedsWorld,
     /// The world's passes, once a method needed them.
     world: Option<WorldPass>,
+    taa: Option<TaaPass>,
 }
 
 /// The passes that every method shares.
@@ -79,11 +85,21 @@ impl Passes {
         }
     }
 
-    fn bind(&self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets) -> Picture {
+    fn bind(
+        &self,
+        device: &wgpu::Device,
+        frame: &wgpu::Buffer,
+        targets: &Targets,
+        taa: &mut Option<TaaPass>,
+    ) -> Picture {
+        if let Some(taa) = taa {
+            taa.fit(device, frame, targets);
+        }
+        let picture = taa.as_ref().map_or(&targets.hdr, TaaPass::current);
         Picture {
             direct: self.direct.picture(device, frame, targets),
             glossy: self.glossy.picture(device, frame, targets),
-            composite: self.composite.picture(device, frame, targets),
+            composite: self.composite.picture(device, frame, targets, picture),
         }
     }
 }
@@ -104,19 +120,20 @@ impl Renderer {
             mapped_at_creation: false,
         });
         let passes = Passes::new(device, &frame, options.shadow);
-        let picture = passes.bind(device, &frame, &targets);
+        let mut taa = options.taa.then(|| TaaPass::new(device));
+        let picture = passes.bind(device, &frame, &targets, &mut taa);
         let indirect = rung::build(device, queue, size, &options.method)?;
         let method = options.method.name();
         let needs = options.method.needs_world();
         let device = device.clone();
-        Ok(Self { device, frame, targets, picture, lighting: None, method, indirect, passes, needs, world: None })
+        Ok(Self { device, frame, targets, picture, lighting: None, method, indirect, passes, needs, world: None, taa })
     }
 
     /// New targets of `size` pixels; the views of the old ones are of no use any more.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
         if size != self.targets.size {
             self.targets = Targets::new(&self.device, size)?;
-            self.picture = self.passes.bind(&self.device, &self.frame, &self.targets);
+            self.picture = self.passes.bind(&self.device, &self.frame, &self.targets, &mut self.taa);
             if let Some(indirect) = &mut self.indirect {
                 indirect.forget();
             }
@@ -129,11 +146,19 @@ impl Renderer {
         self.indirect = rung::build(&self.device, queue, self.targets.size, method)?;
         self.method = method.name();
         self.needs = method.needs_world();
+        self.cut();
         // Drawn anew in the next frame, whatever samples it is.
         if let Some(lighting) = &mut self.lighting {
             lighting.world = None;
         }
         Ok(())
+    }
+
+    /// The next frame has nothing to do with the last (a cut): temporal anti-aliasing starts anew. Without it, nothing.
+    pub fn cut(&mut self) {
+        if let Some(taa) = &mut self.taa {
+            taa.cut();
+        }
     }
 
     /// Name of the method that finds indirect light, as on the command line.
@@ -147,6 +172,7 @@ impl Renderer {
         if self.indirect.is_some() {
             costs.extend(GlossyPass::costs(self.targets.size));
         }
+        costs.extend(self.taa.as_ref().map(|_| TaaPass::cost(self.targets.size)));
         costs
     }
 
@@ -176,6 +202,7 @@ impl Renderer {
         rows.extend(self.lighting.iter().flat_map(|l| l.maps.bytes()));
         rows.extend(self.lighting.iter().flat_map(|l| &l.world).flat_map(World::bytes));
         rows.push(("gi.lit", self.picture.glossy.bytes()));
+        rows.extend(self.taa.iter().flat_map(TaaPass::bytes));
         rows.push((self.method, self.indirect.as_ref().map_or(0, |i| i.bytes())));
         rows
     }
@@ -208,6 +235,7 @@ impl Renderer {
         let known = self.lighting.take().filter(|l| l.scene == scene.id);
         let fresh = known.is_none();
         let mut lighting = known.unwrap_or_else(|| self.lighting(queue, scene));
+        let view = &self.taa.as_ref().map_or(*view, |taa| taa.follow(view));
         let uniform = view.uniform(&scene.environment, scene.lights.len() as u32);
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 
@@ -220,6 +248,9 @@ impl Renderer {
         self.passes.direct.record(recorder, inputs);
         let world = lighting.world.as_ref().map(|w| w.inputs(scene));
         let inputs = gi_inputs(&self.targets, view, scene.environment.radiance, world);
+        if let (Some(indirect), Some(taa)) = (&mut self.indirect, &self.taa) {
+            indirect.set_frame(queue, taa.frames());
+        }
         match &mut self.indirect {
             Some(indirect) => {
                 indirect.record(recorder, queue, &inputs, &self.targets.indirect.view)?;
@@ -228,6 +259,9 @@ impl Renderer {
             None => clear(recorder, &self.targets),
         }
         self.passes.composite.record(recorder, &self.picture.composite, &lighting.sky, size);
+        if let Some(taa) = &mut self.taa {
+            taa.record(recorder, queue, scene.id, view);
+        }
         self.lighting = Some(lighting);
         Ok(())
     }

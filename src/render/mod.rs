@@ -12,6 +12,7 @@ pub mod sampling;
 pub mod shadow;
 mod shadow_local;
 mod shadow_sun;
+pub mod taa;
 pub mod targets;
 pub mod tonemap;
 pub mod tonemap_curve;
