@@ -8,6 +8,7 @@ mod stages;
 mod upsample;
 mod weights;
 mod whole;
+mod world;
 
 use bouncelight::gpu::Gpu;
 
