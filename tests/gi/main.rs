@@ -13,6 +13,7 @@ mod taa;
 mod upsample;
 mod weights;
 mod whole;
+mod world;
 
 use bouncelight::gpu::Gpu;
 
