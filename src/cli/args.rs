@@ -90,6 +90,8 @@ pub enum MethodName {
     Direct,
     /// One constant times the frame's exposure.
     Ambient,
+    /// Surfels that a bake has linked; holds for static geometry.
+    Probes,
     /// The network.
     Neural,
     /// The path tracer, which converges to the truth.
@@ -98,7 +100,8 @@ pub enum MethodName {
 
 impl MethodName {
     /// All real-time methods, cheapest first.
-    pub const REAL_TIME: [MethodName; 3] = [MethodName::Direct, MethodName::Ambient, MethodName::Neural];
+    pub const REAL_TIME: [MethodName; 4] =
+        [MethodName::Direct, MethodName::Ambient, MethodName::Probes, MethodName::Neural];
 
     /// The real-time method with its weights: `weights`, or the shipped ones.
     pub fn method(self, weights: Option<&PathBuf>) -> Result<Method> {
@@ -106,6 +109,7 @@ impl MethodName {
             MethodName::Direct => Method::Direct,
             MethodName::Ambient => Method::Ambient,
             MethodName::Neural => Method::Neural(Box::new(load_weights(weights)?)),
+            MethodName::Probes => return Err(usage("`probes` needs a bake, which this command does not make".into())),
             MethodName::Reference => return Err(usage("`reference` is no real-time method".into())),
         })
     }

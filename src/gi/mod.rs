@@ -25,6 +25,8 @@ pub mod glossy;
 pub mod inputs;
 pub mod pack;
 pub mod pass;
+#[cfg(feature = "reference")]
+pub mod probes;
 pub mod reconstruct;
 pub mod rung;
 pub mod twin;
@@ -65,6 +67,17 @@ pub struct Inputs<'a> {
     pub camera: CameraMatrices,
     /// Radiance of the constant environment, W/(m²·sr).
     pub environment: [f32; 3],
+    /// The analytic lights, for methods that light more than the picture; `None` counts as no lights there.
+    pub lights: Option<Lights<'a>>,
+}
+
+/// The analytic lights on the GPU.
+#[derive(Debug, Clone, Copy)]
+pub struct Lights<'a> {
+    /// [`crate::scene::upload::LightGpu`] for each.
+    pub buffer: &'a wgpu::Buffer,
+    /// How many.
+    pub count: u32,
 }
 
 /// Which method fills the `indirect` texture of a frame.
@@ -75,6 +88,9 @@ pub enum Method {
     /// One constant, see [`ambient`].
     #[default]
     Ambient,
+    /// Surfels that a bake has linked, see [`probes`]. The bake must be of the scene that is drawn.
+    #[cfg(feature = "reference")]
+    Probes(std::sync::Arc<probes::Bake>),
     /// The network of these weights, see [`pass`].
     Neural(Box<crate::net::format::Weights>),
 }
@@ -85,6 +101,8 @@ impl Method {
         match self {
             Method::Direct => "direct",
             Method::Ambient => "ambient",
+            #[cfg(feature = "reference")]
+            Method::Probes(_) => "probes",
             Method::Neural(_) => "neural",
         }
     }
@@ -133,6 +151,9 @@ pub enum GiError {
         /// The network's own reason.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// A bake that the device cannot hold.
+    #[error("the bake cannot be used: {0}")]
+    Bake(String),
     /// Reading back failed.
     #[error(transparent)]
     Readback(#[from] ReadbackError),

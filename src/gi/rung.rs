@@ -63,6 +63,8 @@ pub fn build(
     Ok(match method {
         Method::Direct => None,
         Method::Ambient => Some(Box::new(AmbientGi::new(device))),
+        #[cfg(feature = "reference")]
+        Method::Probes(bake) => Some(Box::new(super::probes::ProbesGi::new(device, queue, bake)?)),
         Method::Neural(weights) => Some(Box::new(NeuralGi::new(device, queue, weights, Options { size })?)),
     })
 }

@@ -141,7 +141,7 @@ impl Renderer {
 
     /// What a GI method reads of the frame that was drawn with `view` and `environment`.
     pub fn gi_inputs(&self, view: &View, environment: [f32; 3]) -> gi::Inputs<'_> {
-        gi_inputs(&self.targets, view, environment)
+        gi_inputs(&self.targets, view, environment, None)
     }
 
     /// The textures that [`Renderer::record`] fills.
@@ -199,7 +199,7 @@ impl Renderer {
         self.passes.gbuffer.record(recorder, scene, &self.targets);
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
         self.passes.direct.record(recorder, inputs);
-        let inputs = gi_inputs(&self.targets, view, scene.environment.radiance);
+        let inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene));
         match &mut self.indirect {
             Some(indirect) => indirect.record(recorder, queue, &inputs, &self.targets.indirect.view)?,
             None => clear(recorder, &self.targets),
@@ -218,7 +218,12 @@ impl Renderer {
     }
 }
 
-fn gi_inputs<'a>(targets: &'a Targets, view: &View, environment: [f32; 3]) -> gi::Inputs<'a> {
+fn gi_inputs<'a>(
+    targets: &'a Targets,
+    view: &View,
+    environment: [f32; 3],
+    scene: Option<&'a SceneGpu>,
+) -> gi::Inputs<'a> {
     gi::Inputs {
         size: targets.size,
         depth: &targets.depth.view,
@@ -228,6 +233,7 @@ fn gi_inputs<'a>(targets: &'a Targets, view: &View, environment: [f32; 3]) -> gi
         direct: &targets.direct_diffuse.view,
         camera: view.matrices(),
         environment,
+        lights: scene.map(|s| gi::Lights { buffer: &s.light_buffer, count: s.lights.len() as u32 }),
     }
 }
 

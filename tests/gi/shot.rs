@@ -197,6 +197,7 @@ impl Textures {
             direct: &self.direct,
             camera: shot.camera,
             environment: shot.environment,
+            lights: None,
         }
     }
 }
