@@ -10,15 +10,18 @@
 @group(1) @binding(4) var<storage, read> received: array<vec4f>;
 @group(1) @binding(5) var output: texture_storage_2d<rgba16float, write>;
 
-// REACH, OFF_PLANE, TURN and LEAST come from the prelude.
-const REACH2 = REACH * REACH;
+// How far the surfels see along their surfaces: four bits for each of SECTORS directions.
+@group(1) @binding(6) var<storage, read> walls: array<vec2u>;
 
-fn hash(word: u32) -> u32 {
-    var x = word;
-    x = (x ^ (x >> 16u)) * 0x7feb352du;
-    x = (x ^ (x >> 15u)) * 0x846ca68bu;
-    return x ^ (x >> 16u);
-}
+// The same stand in `gi::probes::field`, which says what they mean.
+const REACH = 2.0;
+const OFF_PLANE = 8.0;
+const TURN = 10.7;
+const LEAST = 0.0001;
+const WALLS = 15.0;
+const SECTORS = 16u;
+const PI = 3.14159265;
+const REACH2 = REACH * REACH;
 
 // First entry and length of the list of the cube around `p`.
 fn list_of(p: vec3f) -> vec2u {
@@ -50,6 +53,16 @@ fn normal_of(word: u32) -> vec3f {
     return oct_decode(vec2f(vec2u(word, word >> 12u) & vec2u(4095u)) / 2047.5 - 1.0);
 }
 
+// 1 where nothing stands between the surfel and a point `off` from it, 0 where something does.
+fn open(off: vec3f, normal: vec3f, spacing: f32, words: vec2u) -> f32 {
+    let way = off * frame(normal);
+    let turn = atan2(way.y, way.x) / (2.0 * PI) + 1.0;
+    let sector = u32(turn * f32(SECTORS)) % SECTORS;
+    let free = f32((words[sector / 8u] >> (4u * (sector % 8u))) & 15u);
+    let steps = length(way) * (WALLS / (REACH * spacing));
+    return select(saturate(free + 0.5 - steps), 1.0, free >= WALLS);
+}
+
 @compute @workgroup_size(8, 8)
 fn probes_apply(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= params.size) {
@@ -72,7 +85,10 @@ fn probes_apply(@builtin(global_invocation_id) id: vec3u) {
             let height = dot(off, normal);
             let place = max(1.0 - (dot(off, off) + OFF_PLANE * height * height) / (spacing * spacing * REACH2), 0.0);
             let whole = max(place - TURN / REACH2 * max(1.0 - dot(n, normal), 0.0), 0.0);
-            let weight = whole * whole + LEAST * place * place;
+            var weight = LEAST * place * place;
+            if whole > 0.0 {
+                weight += whole * whole * open(off, normal, spacing, walls[index]);
+            }
             if weight > 0.0 {
                 sum += weight * vec4f(received[index].xyz, 1.0);
             }

@@ -122,6 +122,7 @@ impl FeatureSet {
 pub fn example_preludes() -> Vec<(&'static str, String)> {
     let few = FeatureSet::new([("direct", 3), ("depth", 1), ("hit", 1)]).expect("rows of the table in order");
     vec![
+        ("gi.probes_apply", super::cells::CellSide::Four.prelude()),
         ("gi.ambient", super::ambient::prelude()),
         ("gi.pack", FeatureSet::all().prelude()),
         ("gi.pack", few.prelude()),

@@ -6,9 +6,10 @@
 //!
 //! What is baked (all of it depends on geometry and materials, none of it on light):
 //! - surfels: points about one spacing apart on all surfaces that light paths from the cameras reach, nearer to each
-//!   other where other surfaces are near (Ward 1988), with normal, albedo, emission and a few sample points around;
+//!   other where other surfaces are near (Ward 1988), with normal, material and a few sample points around;
 //! - links: for each surfel, which surfel (or which part of the sky) each of its rays over the hemisphere meets;
-//! - the field: a hash grid that tells which surfels are near a point ([`field`]).
+//! - the field: a hash grid that tells which surfels are near a point, and how far each of them sees along its own
+//!   surface, so that light does not reach round a wall ([`field`]).
 //!
 //! What a frame does: shadow rays from the sample points to every light (`gi.probes.light`, through the reference's
 //! acceleration structure, so that it needs no shadow map that happens to cover the place), three exchanges of light
@@ -17,7 +18,7 @@
 //! transfer (Hašan, Pellacini and Bala 2006) in the form of a sparse matrix.
 //!
 //! What it cannot do: moving or changing objects; detail finer than its spacing (contact shadows); mirrors on the way
-//! (all reflection counts as diffuse); textures whose coverage is partial count as whole or as nothing, a triangle each.
+//! (of the specular lobe it knows what the lights' own light gives at roughness 0.4 and above, all else counts as diffuse); textures whose coverage is partial count as whole or as nothing, a triangle each.
 
 pub mod field;
 mod gpu;
@@ -26,7 +27,7 @@ mod scatter;
 mod spread;
 mod surface;
 
-pub use gpu::ProbesGi;
+pub use gpu::{ProbeParams, ProbesGi};
 use spread::Spread;
 
 use crate::reference::accel::{Accel, AccelError};
@@ -65,7 +66,7 @@ pub struct BakeOptions {
 
 impl Default for BakeOptions {
     fn default() -> Self {
-        Self { records: 16_384, rays: 128, seen_from: Vec::new(), nearness: 0.3, finest: 0.35, seed: 0, threads: 0 }
+        Self { records: 8192, rays: 128, seen_from: Vec::new(), nearness: 0.8, finest: 0.2, seed: 0, threads: 0 }
     }
 }
 
@@ -107,8 +108,12 @@ pub struct Surfel {
     pub normal: [f32; 3],
     /// Distance to its neighbours, metres.
     pub spacing: f32,
-    /// Share of the light that leaves again.
+    /// Diffuse reflectance.
     pub albedo: [f32; 3],
+    /// Specular reflectance at normal incidence.
+    pub f0: [f32; 3],
+    /// Perceptual roughness.
+    pub roughness: f32,
     /// Emitted radiance, W/(m²·sr).
     pub emission: [f32; 3],
 }
@@ -129,6 +134,8 @@ pub struct Bake {
     pub sky: Vec<[f32; 3]>,
     /// Links that met a surface without surfels.
     pub lost: usize,
+    /// Its seed.
+    pub seed: u32,
     /// Seconds that the bake took.
     pub seconds: f64,
     pub(crate) accel: Accel,
@@ -145,12 +152,6 @@ impl Bake {
         progress: &(dyn Fn(f32) -> bool + Sync),
     ) -> Result<Self, BakeError> {
         let start = std::time::Instant::now();
-        let tune = |k: &str, d: f32| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
-        let options = &BakeOptions {
-            nearness: tune("NEARNESS", options.nearness),
-            finest: tune("FINEST", options.finest),
-            ..options.clone()
-        };
         let (records, rays) = (options.records, options.rays);
         if !(1..=MOST).contains(&records) || !(2..=4096).contains(&rays) || rays % 2 != 0 {
             return Err(BakeError::Options { records, rays });
@@ -171,8 +172,13 @@ impl Bake {
         let largest = spacings.iter().copied().fold(0.0f32, f32::max);
         // Numbers of cubes are 10 bits an axis.
         let side = (largest * 0.75).max(2.0 * extent / 1000.0).max(1e-6);
-        let field = Field::new(places, side, (low + high) * 0.5);
-        let near = spread.part(0.25, 0.35).map(candidates.len() as u32, |i| {
+        let mut field = Field::new(places, side, (low + high) * 0.5);
+        let walls = spread.part(0.25, 0.3).map(chosen.len() as u32, |i| {
+            let point = &candidates[chosen[i as usize] as usize].point;
+            walls(&surfaces, point, spacings[i as usize], extent)
+        })?;
+        field.walls = walls;
+        let near = spread.part(0.3, 0.35).map(candidates.len() as u32, |i| {
             let point = &candidates[i as usize].point;
             field.nearest(point.position, point.normal)
         })?;
@@ -185,7 +191,7 @@ impl Bake {
         let lost = links.iter().filter(|&&l| l as usize == black).count();
         let sky = sky(scene);
         let seconds = start.elapsed().as_secs_f64();
-        Ok(Self { surfels, samples, links, rays, field, sky, lost, seconds, accel: surfaces.accel })
+        Ok(Self { surfels, samples, links, rays, field, sky, lost, seed: options.seed, seconds, accel: surfaces.accel })
     }
 
     /// What the bake took, in one line.
@@ -202,7 +208,10 @@ impl Bake {
     /// Bytes of what is baked, as it lies on the GPU.
     pub fn bytes(&self) -> u64 {
         let n = self.surfels.len() as u64;
-        n * (48 + 16 * u64::from(SAMPLES)) + 2 * self.links.len() as u64 + self.field.bytes() + self.accel.bytes()
+        n * (48 + 16 + 8 + 16 * u64::from(SAMPLES))
+            + 2 * self.links.len() as u64
+            + self.field.bytes()
+            + self.accel.bytes()
     }
 }
 
@@ -220,13 +229,9 @@ fn gather(
     near: &[Option<u32>],
     extent: f32,
 ) -> (Vec<Surfel>, Vec<([f32; 3], [f32; 3])>) {
-    let mut sums = vec![(Vec3::ZERO, Vec3::ZERO, 0.0f32); chosen.len()];
     let mut points: Vec<Vec<u32>> = vec![Vec::new(); chosen.len()];
     for (i, owner) in (0u32..).zip(near) {
         if let Some(owner) = *owner {
-            let point = &candidates[i as usize].point;
-            let sum = &mut sums[owner as usize];
-            (sum.0, sum.1, sum.2) = (sum.0 + point.albedo, sum.1 + point.emission, sum.2 + 1.0);
             points[owner as usize].push(i);
         }
     }
@@ -234,25 +239,49 @@ fn gather(
     let mut surfels = Vec::with_capacity(chosen.len());
     for (k, &i) in chosen.iter().enumerate() {
         let point = &candidates[i as usize].point;
-        let (albedo, emission, count) = sums[k];
-        let (albedo, emission) =
-            if count > 0.0 { (albedo / count, emission / count) } else { (point.albedo, point.emission) };
+        let own = if points[k].is_empty() { &chosen[k..=k] } else { &points[k][..] };
+        let mean = |of: &dyn Fn(&surface::Point) -> Vec3| {
+            let sum: Vec3 = own.iter().map(|&j| of(&candidates[j as usize].point)).sum();
+            (sum / own.len() as f32).to_array()
+        };
         surfels.push(Surfel {
             position: point.position.to_array(),
             normal: point.normal.to_array(),
             spacing: spacings[k],
-            albedo: albedo.to_array(),
-            emission: emission.to_array(),
+            albedo: mean(&|p| p.albedo),
+            f0: mean(&|p| p.f0),
+            roughness: mean(&|p| Vec3::splat(p.roughness))[0],
+            emission: mean(&|p| p.emission),
         });
-        let own = &points[k];
         for s in 0..SAMPLES as usize {
             // In the order in which paths found them, which has no order in space.
-            let j = own.get(s * own.len().max(1) / SAMPLES as usize).copied().unwrap_or(i);
+            let j = own[s * own.len() / SAMPLES as usize];
             let p = &candidates[j as usize].point;
             samples.push((scatter::lifted(p, extent).to_array(), p.normal.to_array()));
         }
     }
     (surfels, samples)
+}
+
+/// How far a surfel sees along its surface in each of sixteen directions, see [`field::WALLS`].
+fn walls(surfaces: &surface::Surfaces<'_>, point: &surface::Point, spacing: f32, extent: f32) -> [u32; 2] {
+    let (x, y) = field::frame(point.normal);
+    let origin = scatter::lifted(point, extent) + point.plane * (0.02 * spacing);
+    let reach = field::REACH * spacing;
+    let mut words = [0; 2];
+    for sector in 0..field::SECTORS {
+        let mut free = reach;
+        for (turn, rise) in [(0.2, 0.03), (0.8, 0.03), (0.5, 0.2)] {
+            let phi = (sector as f32 + turn) * (std::f32::consts::TAU / field::SECTORS as f32);
+            let flat = x * phi.cos() + y * phi.sin();
+            if let Some((_, t)) = surfaces.meet(origin, flat + point.normal * rise, free) {
+                free = free.min(t);
+            }
+        }
+        let steps = (free / reach * field::WALLS).ceil().clamp(0.0, field::WALLS) as u32;
+        words[sector as usize / 8] |= steps << (4 * (sector % 8));
+    }
+    words
 }
 
 /// What the rays of a surfel meet.
@@ -265,7 +294,7 @@ fn links(
     extent: f32,
 ) -> Vec<u16> {
     let mut random = random::Stream::new(options.seed ^ 0x5bd1_e995, index);
-    let flips = [random::hash(index ^ options.seed), random::hash(random::hash(index) ^ options.seed)];
+    let flips = random::flips(options.seed, index);
     let origin = scatter::lifted(point, extent);
     let surfels = field.len() as u32;
     let link = |k: u32| {
@@ -275,7 +304,7 @@ fn links(
         if below < 0.0 {
             direction -= 2.0 * below * point.plane;
         }
-        match surfaces.meet(origin, direction) {
+        match surfaces.meet(origin, direction, f32::MAX) {
             None => surfels + sky_part(direction),
             Some((met, _)) => field.pick(met.position, met.normal, random.next()).unwrap_or(surfels + SKY),
         }

@@ -82,7 +82,10 @@ pub const GI: &[Shader] = &[
             "gi/probes_light.wgsl"
         ],
     },
-    Shader { name: "gi.probes_bounce", files: wgsl!["gi/probes_types.wgsl", "gi/probes_bounce.wgsl"] },
+    Shader {
+        name: "gi.probes_bounce",
+        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "gi/probes_types.wgsl", "gi/probes_bounce.wgsl"],
+    },
     Shader {
         name: "gi.probes_apply",
         files: wgsl![

@@ -1,8 +1,12 @@
 //! `gi/` against its CPU twin, against arithmetic and against the laws it promises, on hand-made G-buffers.
 
+#[path = "../common/build.rs"]
+mod build;
 #[path = "../common/mod.rs"]
 mod common;
 mod edges;
+#[cfg(feature = "reference")]
+mod probes;
 mod shot;
 mod stages;
 mod weights;

@@ -1,4 +1,4 @@
-//! Which surfels light a point, and how much: a hash grid of short lists. `shaders/gi/probes_field.wgsl` is its twin.
+//! Which surfels light a point, and how much: a hash grid of short lists. `shaders/gi/probes_apply.wgsl` is its twin.
 
 use super::random::hash;
 use glam::Vec3;
@@ -12,10 +12,34 @@ pub const OFF_PLANE: f32 = 8.0;
 pub const TURN: f32 = 10.7;
 /// Entries of a cell's list at most.
 pub const LONGEST: usize = 64;
-/// Cells are numbered from −512 to 511 along each axis, by 30 bits.
-pub const KEY_LIMIT: i32 = 511;
-/// Share of the weight that normals cannot take away, so that a surface without surfels of its own is lit at all.
+/// Cells are numbered from −511 to 511 along each axis, by 30 bits.
+const KEY_LIMIT: i32 = 511;
+/// Share of the weight that normals and walls cannot take away, so that a surface without surfels of its own is lit at all.
 pub const LEAST: f32 = 1e-4;
+/// Steps in which a surfel's free way along its surface is told in each of [`SECTORS`] directions, four bits each: a
+/// neighbour beyond what stands there gets no light from it. The whole is `REACH` spacings.
+pub const WALLS: f32 = 15.0;
+/// Directions in which the free way is known.
+pub const SECTORS: u32 = 16;
+
+/// Two axes in the plane of `n`; the shader has the same.
+pub fn frame(n: Vec3) -> (Vec3, Vec3) {
+    let sign = 1.0f32.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    (Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vec3::new(b, sign + n.y * n.y * a, -n.y))
+}
+
+/// Whether nothing stands between a surfel and a point `off` from it: 1, or 0, or between where it is close.
+fn open(off: Vec3, normal: Vec3, spacing: f32, walls: [u32; 2]) -> f32 {
+    let (x, y) = frame(normal);
+    let (u, v) = (off.dot(x), off.dot(y));
+    let turn = v.atan2(u) / std::f32::consts::TAU + 1.0;
+    let sector = (turn * SECTORS as f32) as u32 % SECTORS;
+    let free = (walls[sector as usize / 8] >> (4 * (sector % 8)) & 15) as f32;
+    let way = (u * u + v * v).sqrt() * (WALLS / (REACH * spacing));
+    if free >= WALLS { 1.0 } else { (free + 0.5 - way).clamp(0.0, 1.0) }
+}
 
 /// Squared normalised distance of a point from a surfel of `spacing` metres.
 pub fn distance2(p: Vec3, n: Vec3, surfel: Vec3, normal: Vec3, spacing: f32) -> f32 {
@@ -64,6 +88,8 @@ pub struct Field {
     pub table: Vec<[u32; 2]>,
     /// The lists.
     pub lists: Vec<u32>,
+    /// What stands around each surfel, see [`WALLS`].
+    pub walls: Vec<[u32; 2]>,
     surfels: Vec<(Vec3, Vec3, f32)>,
 }
 
@@ -106,7 +132,8 @@ impl Field {
             table[at] = [key, lists.len() as u32 | (list.len() as u32) << 24];
             lists.extend(list.iter().map(|e| e.1));
         }
-        Self { side, centre, table, lists, surfels }
+        let walls = vec![[u32::MAX; 2]; surfels.len()];
+        Self { side, centre, table, lists, walls, surfels }
     }
 
     /// The list of the cube around `p`.
@@ -131,7 +158,8 @@ impl Field {
             let place = 1.0 - place2(p, q, normal, s) / (REACH * REACH);
             let whole = place - TURN * (1.0 - n.dot(normal)).max(0.0) / (REACH * REACH);
             let square = |x: f32| x.max(0.0) * x.max(0.0);
-            (i, square(whole) + LEAST * square(place))
+            let open = if whole > 0.0 { open(p - q, normal, s, self.walls[i as usize]) } else { 0.0 };
+            (i, square(whole) * open + LEAST * square(place))
         })
     }
 
@@ -164,5 +192,26 @@ impl Field {
     /// Bytes of table and lists.
     pub fn bytes(&self) -> u64 {
         8 * self.table.len() as u64 + 4 * self.lists.len() as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shader_has_the_same_numbers() {
+        let text = crate::gpu::shaders::source("gi.probes_apply", "");
+        let lines = [
+            format!("const REACH = {REACH:?};"),
+            format!("const OFF_PLANE = {OFF_PLANE:?};"),
+            format!("const TURN = {TURN:?};"),
+            format!("const LEAST = {LEAST};"),
+            format!("const WALLS = {WALLS:?};"),
+            format!("const SECTORS = {SECTORS}u;"),
+        ];
+        for line in lines {
+            assert!(text.contains(&line), "{line}");
+        }
     }
 }

@@ -1,7 +1,6 @@
 //! The frame's share of `gi.probes`: buffers of a bake, and the passes over them.
 
-use super::field::{LEAST, OFF_PLANE, REACH, TURN};
-use super::{Bake, SAMPLES, SKY};
+use super::{Bake, SAMPLES, SKY, random};
 use crate::gi::cells::CellSide;
 use crate::gi::exposure::{self, output_entry, storage_entry};
 use crate::gi::inputs::InputGroup;
@@ -28,21 +27,14 @@ pub struct ProbeParams {
     pub centre: [f32; 3],
     pub table_mask: u32,
     pub spacing: f32,
-    pub pad: [u32; 3],
+    pub seed: u32,
+    pub pad: [u32; 2],
 }
 
 /// Exchanges of light before the last gather: with it a path bounces four times, as Cycles' paths do by default.
 const ROUNDS: usize = 3;
 /// Links of a surfel that light bounces along; their noise is averaged by the gather that follows.
 const INNER_RAYS: u32 = 32;
-
-/// The numbers of `probes_apply.wgsl`.
-pub fn prelude() -> String {
-    let own = format!(
-        "const REACH = {REACH:?};\nconst OFF_PLANE = {OFF_PLANE:?};\nconst TURN = {TURN:?};\nconst LEAST = {LEAST:?};\n"
-    );
-    CellSide::Four.prelude() + &own
-}
 
 /// The method at work.
 pub struct ProbesGi {
@@ -75,6 +67,9 @@ struct Buffers {
     table: wgpu::Buffer,
     lists: wgpu::Buffer,
     surfels: wgpu::Buffer,
+    walls: wgpu::Buffer,
+    digits: wgpu::Buffer,
+    directions: wgpu::Buffer,
 }
 
 impl ProbesGi {
@@ -95,7 +90,8 @@ impl ProbesGi {
             centre: bake.field.centre.to_array(),
             table_mask: bake.field.table.len() as u32 - 1,
             spacing,
-            pad: [0; 3],
+            seed: bake.seed,
+            pad: [0; 2],
         };
         let accel = AccelGpu::new(device, queue, &bake.accel).map_err(|e| GiError::Bake(e.to_string()))?;
         let links = transposed(bake);
@@ -125,17 +121,31 @@ impl ProbesGi {
             }),
             samples: make("gi.probes.samples", bytemuck::cast_slice(&samples(bake)))?,
             sources: make("gi.probes.sources", bytemuck::cast_slice(&sources(bake)))?,
+            directions: make("gi.probes.directions", &vec![0u8; 4 * n])?,
             direct: make("gi.probes.direct", &lights)?,
             radiance: [make("gi.probes.radiance", &lights)?, make("gi.probes.radiance", &lights)?],
             table: make("gi.probes.table", bytemuck::cast_slice(&bake.field.table))?,
             lists: make("gi.probes.lists", bytemuck::cast_slice(&bake.field.lists))?,
+            walls: make("gi.probes.walls", bytemuck::cast_slice(&bake.field.walls))?,
+            digits: make(
+                "gi.probes.digits",
+                bytemuck::cast_slice(&(0..bake.rays).map(random::digits).collect::<Vec<_>>()),
+            )?,
             surfels: make("gi.probes.surfels", bytemuck::cast_slice(&packed(bake, spacing)))?,
         };
         let bytes = links.size()
-            + [&buffers.samples, &buffers.sources, &buffers.direct, &buffers.table, &buffers.lists, &buffers.surfels]
-                .map(wgpu::Buffer::size)
-                .iter()
-                .sum::<u64>()
+            + [
+                &buffers.samples,
+                &buffers.sources,
+                &buffers.direct,
+                &buffers.table,
+                &buffers.lists,
+                &buffers.surfels,
+                &buffers.walls,
+            ]
+            .map(wgpu::Buffer::size)
+            .iter()
+            .sum::<u64>()
             + 2 * buffers.radiance[0].size()
             + bake.accel.bytes();
 
@@ -152,10 +162,12 @@ impl ProbesGi {
                 storage(4, true),
                 storage(5, false),
                 storage(6, false),
+                storage(7, false),
             ],
         });
         let light = tool::compute(device, "gi.probes_light", "probes_light", &[&light_layout]);
-        let layout = tool::layout(device, "gi.probes.bounce", stage, &[UNIFORM, READ, READ, READ, READ, READ_WRITE]);
+        let layout =
+            tool::layout(device, "gi.probes.bounce", stage, &[UNIFORM, READ, READ, READ, READ, READ_WRITE, READ, READ]);
         let bounce = tool::compute(device, "gi.probes_bounce", "probes_bounce", &[&layout]);
         let gather = tool::compute(device, "gi.probes_bounce", "probes_gather", &[&layout]);
         let bounces = [0, 1].map(|from| {
@@ -170,6 +182,8 @@ impl ProbesGi {
                     buffers.direct.as_entire_binding(),
                     buffers.radiance[from].as_entire_binding(),
                     buffers.radiance[1 - from].as_entire_binding(),
+                    buffers.digits.as_entire_binding(),
+                    buffers.directions.as_entire_binding(),
                 ],
             )
         });
@@ -183,9 +197,10 @@ impl ProbesGi {
                 storage(3, true),
                 storage(4, true),
                 output_entry(5),
+                storage(6, true),
             ],
         });
-        let module = shaders::module_with(device, "gi.probes_apply", &prelude());
+        let module = shaders::module_with(device, "gi.probes_apply", &CellSide::Four.prelude());
         let apply = exposure::pipeline(device, "gi.probes.apply", &module, "probes_apply", &inputs, &apply_layout);
         let no_lights = make("gi.probes.no_lights", &[0; 64])?;
         let cells = bake.field.table.iter().filter(|e| e[0] != 0).count();
@@ -227,6 +242,7 @@ impl ProbesGi {
             bind(4, &b.sources),
             bind(5, &b.direct),
             bind(6, &b.radiance[0]),
+            bind(7, &b.directions),
         ];
         let mut entries: Vec<_> = list
             .iter()
@@ -274,6 +290,7 @@ impl Rung for ProbesGi {
                 .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
                 .collect();
             entries.push(wgpu::BindGroupEntry { binding: 5, resource: wgpu::BindingResource::TextureView(output) });
+            entries.push(wgpu::BindGroupEntry { binding: 6, resource: b.walls.as_entire_binding() });
             Ok::<_, GiError>(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("gi.probes.apply"),
                 layout: &self.apply_layout,
@@ -355,11 +372,14 @@ fn samples(bake: &Bake) -> Vec<[u32; 4]> {
     bake.samples.iter().map(pack).collect()
 }
 
-fn sources(bake: &Bake) -> Vec<[f32; 4]> {
-    let four = |[x, y, z]: [f32; 3]| [x, y, z, 0.0];
-    let surfels = bake.surfels.iter().flat_map(|s| [four(s.albedo), four(s.emission)]);
-    let sky = bake.sky.iter().flat_map(|&c| [[0.0; 4], four(c)]);
-    surfels.chain(sky).chain([[0.0; 4]; 2]).collect()
+fn sources(bake: &Bake) -> Vec<[u32; 4]> {
+    let four = |[x, y, z]: [f32; 3], w: u32| [x.to_bits(), y.to_bits(), z.to_bits(), w];
+    let surfels = bake.surfels.iter().flat_map(|s| {
+        let [x, y] = octahedral(s.normal.into()).map(|c| u32::from((c * 32767.0).round() as i16 as u16));
+        [four(s.albedo, s.roughness.to_bits()), four(s.emission, x | y << 16), four(s.f0, 0)]
+    });
+    let sky = bake.sky.iter().flat_map(|&c| [[0; 4], four(c, 0), [0; 4]]);
+    surfels.chain(sky).chain([[0; 4]; 3]).collect()
 }
 
 fn packed(bake: &Bake, largest: f32) -> Vec<[u32; 4]> {

@@ -34,6 +34,12 @@ fn unit(bits: u32) -> f32 {
 /// Point `i` of Sobol's first two dimensions with all digits flipped at random: every prefix of 2^k points is spread
 /// evenly over the square.
 pub fn sobol(i: u32, flips: [u32; 2]) -> Vec2 {
+    let [first, second] = digits(i);
+    Vec2::new(unit(first ^ flips[0]), unit(second ^ flips[1]))
+}
+
+/// The digits of Sobol's point `i`.
+pub fn digits(i: u32) -> [u32; 2] {
     let mut second = 0;
     let (mut rest, mut direction) = (i, 1u32 << 31);
     while rest != 0 {
@@ -43,12 +49,17 @@ pub fn sobol(i: u32, flips: [u32; 2]) -> Vec2 {
         rest >>= 1;
         direction ^= direction >> 1;
     }
-    Vec2::new(unit(i.reverse_bits() ^ flips[0]), unit(second ^ flips[1]))
+    [i.reverse_bits(), second]
+}
+
+/// The digits that surfel `index` flips.
+pub fn flips(seed: u32, index: u32) -> [u32; 2] {
+    [hash(index ^ seed), hash(hash(index) ^ seed)]
 }
 
 /// A direction around `n` with density cosine / π.
 pub fn cosine(n: Vec3, u: Vec2) -> Vec3 {
-    let (x, y) = n.any_orthonormal_pair();
+    let (x, y) = super::field::frame(n);
     let (r, phi) = (u.x.sqrt(), std::f32::consts::TAU * u.y);
     let d = x * (r * phi.cos()) + y * (r * phi.sin()) + n * (1.0 - u.x).max(0.0).sqrt();
     d.normalize_or(n)

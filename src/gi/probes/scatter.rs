@@ -1,6 +1,6 @@
 //! Where light can come from and go to: points found by random paths, and the sparse, even choice among them.
 
-use super::field::{Grid, KEY_LIMIT, distance2};
+use super::field::{Grid, distance2};
 use super::random::{Stream, cosine, sphere};
 use super::spread::Spread;
 use super::surface::{Point, Surfaces};
@@ -54,7 +54,7 @@ pub fn paths(
         }
         let mut found: Vec<Candidate> = Vec::new();
         while found.len() < VERTICES {
-            let met = surfaces.meet(origin, direction);
+            let met = surfaces.meet(origin, direction, f32::MAX);
             if let Some(last) = found.last_mut() {
                 last.free = met.map_or(f32::INFINITY, |m| m.1);
             }
@@ -98,7 +98,7 @@ pub fn choose(candidates: &[Candidate], options: &BakeOptions, extent: f32) -> (
     let mut base = extent * (4.0 * std::f32::consts::PI / wanted).sqrt();
     let floor = extent * 1e-5;
     let mut best = (Vec::new(), Vec::new());
-    for round in 0..6 {
+    for round in 0..8 {
         let spacings = spacings(candidates, base, options);
         let chosen = thin(candidates, &spacings, base, (wanted * 4.0) as usize);
         let share = chosen.len() as f32 / wanted;
@@ -106,7 +106,7 @@ pub fn choose(candidates: &[Candidate], options: &BakeOptions, extent: f32) -> (
         if fits && chosen.len() > best.0.len() {
             best = (chosen.clone(), chosen.iter().map(|&i| spacings[i as usize]).collect());
         }
-        if fits && (share > 0.93 || base <= floor) || round == 5 && !best.0.is_empty() {
+        if fits && (share > 0.93 || base <= floor) || round == 7 && !best.0.is_empty() {
             break;
         }
         base = (base * (share / 0.97).sqrt().clamp(0.3, 2.5)).max(floor);
@@ -150,9 +150,6 @@ fn thin(candidates: &[Candidate], spacings: &[f32], base: f32, most: usize) -> V
     let mut chosen = Vec::new();
     for (i, c) in (0u32..).zip(candidates) {
         let key = grid.key(c.point.position);
-        if key.iter().any(|k| k.abs() >= KEY_LIMIT) {
-            continue;
-        }
         let near = (-1..2).flat_map(|x| (-1..2).flat_map(move |y| (-1..2).map(move |z| [x, y, z])));
         let mut near = near.filter_map(|o| cells.get(&std::array::from_fn(|a| key[a] + o[a])));
         let taken = near.any(|cell| {

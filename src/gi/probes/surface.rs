@@ -14,8 +14,12 @@ pub struct Point {
     pub normal: Vec3,
     /// Unit normal of the triangle on the ray's side.
     pub plane: Vec3,
-    /// Share of the light that leaves again, the specular lobe's counted as if it were diffuse.
+    /// Diffuse reflectance.
     pub albedo: Vec3,
+    /// Specular reflectance at normal incidence.
+    pub f0: Vec3,
+    /// Perceptual roughness.
+    pub roughness: f32,
     /// Emitted radiance, W/(m²·sr).
     pub emission: Vec3,
 }
@@ -72,9 +76,9 @@ impl<'a> Surfaces<'a> {
         Ok(Self { scene, corners, origin, turn, glow, accel })
     }
 
-    /// The nearest point that the ray meets, and its distance.
-    pub fn meet(&self, origin: Vec3, direction: Vec3) -> Option<(Point, f32)> {
-        let hit = self.accel.closest(origin.to_array(), direction.to_array(), f32::MAX)?;
+    /// The nearest point that the ray meets before `t_max`, and its distance in lengths of `direction`.
+    pub fn meet(&self, origin: Vec3, direction: Vec3, t_max: f32) -> Option<(Point, f32)> {
+        let hit = self.accel.closest(origin.to_array(), direction.to_array(), t_max)?;
         Some((self.point(&hit, direction), hit.t))
     }
 
@@ -108,11 +112,17 @@ impl<'a> Surfaces<'a> {
         let [r, g, b, _] = texel(material.base_color_texture);
         let base = Vec3::from_slice(&material.base_color[..3]) * Vec3::new(r, g, b) * tint;
         let metallic = (material.metallic * texel(material.metallic_roughness_texture)[2]).clamp(0.0, 1.0);
-        let albedo = if material.unlit { Vec3::ZERO } else { reflectance(base, metallic, material.f0) };
+        let f0 = Vec3::splat(material.f0).lerp(base, metallic);
+        let lit = if material.unlit { 0.0 } else { 1.0 };
+        // As the G-buffer has it, seen head-on: what the specular lobe takes is not there for the diffuse share.
+        let albedo = base * ((1.0 - metallic) * (1.0 - material.f0));
+        let roughness = material.roughness * texel(material.metallic_roughness_texture)[1];
         let shines = self.glow && (facing || material.double_sided) && !material.unlit;
         let [r, g, b, _] = if shines { texel(material.emissive_texture) } else { [0.0; 4] };
         let emission = Vec3::from(material.emissive) * Vec3::new(r, g, b);
-        Point { position, normal, plane, albedo: clean(albedo).min(Vec3::ONE), emission: clean(emission) }
+        let share = |v: Vec3| clean(v * lit).min(Vec3::ONE);
+        let (albedo, f0, emission) = (share(albedo), share(f0), clean(emission));
+        Point { position, normal, plane, albedo, f0, roughness, emission }
     }
 
     /// Largest coordinate of a box around all triangles that can be hit, and the box.
@@ -124,14 +134,6 @@ impl<'a> Surfaces<'a> {
             Some((low.min(p), high.max(p)))
         })
     }
-}
-
-/// Diffuse and specular albedo together, averaged over directions: the specular lobe of a dielectric sends back about
-/// 1.3 times its reflectance at normal incidence and takes that from the diffuse share.
-fn reflectance(base: Vec3, metallic: f32, f0: f32) -> Vec3 {
-    let lobe = 1.3 * f0;
-    let dielectric = base * (1.0 - f0) + Vec3::splat(lobe);
-    dielectric.lerp(base, metallic)
 }
 
 fn clean(v: Vec3) -> Vec3 {
