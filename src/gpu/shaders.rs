@@ -75,17 +75,28 @@ macro_rules! net {
 }
 
 /// Shaders of `net/`. They need a prelude; `net::gpu::example_preludes` gives one of each kind. `_wide` has its weights in a
-/// storage buffer, `_half` arena and weights in 16 bits.
+/// storage buffer, `_half` arena and weights in 16 bits; `_mirror` reads its input from a texture, and `_lanes` also its weights,
+/// which the threads of a subgroup share out.
 #[rustfmt::skip]
 pub const NET: &[Shader] = net![
     "conv_plain", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/conv_plain.wgsl"];
     "conv_plain_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/conv_plain.wgsl"];
-    "conv3x3", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"];
-    "conv3x3_wide", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"];
-    "conv3x3_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"];
-    "conv_block", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/column.wgsl", "net/conv_block.wgsl"];
-    "conv_block_wide", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/column.wgsl", "net/conv_block.wgsl"];
-    "conv_block_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/column.wgsl", "net/conv_block.wgsl"];
+    "conv3x3", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/source_arena.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_wide", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/source_arena.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/source_arena.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_mirror", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/source_mirror.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_mirror_wide", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/source_mirror.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_mirror_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/source_mirror.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_lanes", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/source_mirror.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_lanes_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/source_mirror.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv_any", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/source_arena.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_wide", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/source_arena.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/source_arena.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_mirror", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/source_mirror.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_mirror_wide", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/source_mirror.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_mirror_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/source_mirror.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_lanes", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/source_mirror.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_lanes_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/source_mirror.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
     "upsample", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/upsample.wgsl"];
     "upsample_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/upsample.wgsl"];
     "nearest", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/nearest.wgsl"];

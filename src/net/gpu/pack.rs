@@ -1,8 +1,8 @@
 //! Trained numbers as the kernels read them. Pure.
 //!
-//! Convolutions: output channels in blocks of eight. A block is one matrix with the bias in its first two columns, then for
-//! each tap column kx, input vector c, tap row ky, and half h of the block one 4×4 matrix, which takes four input channels to
-//! four output channels. Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
+//! Convolutions: output channels in blocks of one to four vectors. A block is one matrix with the bias, a column a vector, then for
+//! each input vector, tap row, tap column and output vector of the block one 4×4 matrix, which takes four input channels to four
+//! output channels. Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
 //! of stride s is s² ordinary ones, each of which makes every s-th pixel (its phase) in both directions.
 
 use super::kernels::{Bound, Filter, Kernel, Part};
@@ -124,7 +124,8 @@ impl<'a> Layer<'a> {
     }
 
     fn part(&self, part: &Part, kernel: &Kernel) -> Vec<u8> {
-        let half = kernel.bound == Bound::Half;
+        let half = kernel.bound == Bound::Half || (kernel.bound == Bound::Texture && kernel.texel() == 8);
+        let vectors = kernel.vectors as usize;
         let mut bytes = Vec::with_capacity(kernel.bound_bytes() as usize);
         let mut put = |value: f32| {
             if half {
@@ -134,13 +135,15 @@ impl<'a> Layer<'a> {
             }
         };
         for block in part.first_block as usize..(part.first_block + part.blocks) as usize {
-            (0..16).for_each(|i| put(if i < 8 { self.bias.get(block * 8 + i).copied().unwrap_or(0.0) } else { 0.0 }));
-            for kx in 0..self.filter.taps[1] as usize {
-                for c in 0..self.filter.in_vectors as usize {
-                    for ky in 0..self.filter.taps[0] as usize {
+            let first = block * 4 * vectors;
+            let bias = |i: usize| if i < 4 * vectors { self.bias.get(first + i).copied().unwrap_or(0.0) } else { 0.0 };
+            (0..16).for_each(|i| put(bias(i)));
+            for c in 0..self.filter.in_vectors as usize {
+                for ky in 0..self.filter.taps[0] as usize {
+                    for kx in 0..self.filter.taps[1] as usize {
                         // Column-major: column k takes input channel k to the four outputs.
-                        for k in 0..32 {
-                            put(self.at(part, block * 8 + k / 16 * 4 + k % 4, c * 4 + k % 16 / 4, ky, kx));
+                        for k in 0..16 * vectors {
+                            put(self.at(part, first + k / 16 * 4 + k % 4, c * 4 + k % 16 / 4, ky, kx));
                         }
                     }
                 }
