@@ -12,12 +12,12 @@ fn convolve(first: u32, count: u32) {
     let t50 = tap(x, y + 5); let t51 = tap(x + 1, y + 5); let t52 = tap(x + 2, y + 5); let t53 = tap(x + 3, y + 5);
     var w = first;
     for (var i = 0u; i < count; i++) {
-        let v00 = source(t00 + i); let v01 = source(t01 + i); let v02 = source(t02 + i); let v03 = source(t03 + i);
-        let v10 = source(t10 + i); let v11 = source(t11 + i); let v12 = source(t12 + i); let v13 = source(t13 + i);
-        let v20 = source(t20 + i); let v21 = source(t21 + i); let v22 = source(t22 + i); let v23 = source(t23 + i);
-        let v30 = source(t30 + i); let v31 = source(t31 + i); let v32 = source(t32 + i); let v33 = source(t33 + i);
-        let v40 = source(t40 + i); let v41 = source(t41 + i); let v42 = source(t42 + i); let v43 = source(t43 + i);
-        let v50 = source(t50 + i); let v51 = source(t51 + i); let v52 = source(t52 + i); let v53 = source(t53 + i);
+        let v00 = load(t00 + i); let v01 = load(t01 + i); let v02 = load(t02 + i); let v03 = load(t03 + i);
+        let v10 = load(t10 + i); let v11 = load(t11 + i); let v12 = load(t12 + i); let v13 = load(t13 + i);
+        let v20 = load(t20 + i); let v21 = load(t21 + i); let v22 = load(t22 + i); let v23 = load(t23 + i);
+        let v30 = load(t30 + i); let v31 = load(t31 + i); let v32 = load(t32 + i); let v33 = load(t33 + i);
+        let v40 = load(t40 + i); let v41 = load(t41 + i); let v42 = load(t42 + i); let v43 = load(t43 + i);
+        let v50 = load(t50 + i); let v51 = load(t51 + i); let v52 = load(t52 + i); let v53 = load(t53 + i);
         take(w, Eight(v00, v01, v10, v11, v20, v21, v30, v31));
         take(w + VECTORS, Eight(v01, v02, v11, v12, v21, v22, v31, v32));
         take(w + 2u * VECTORS, Eight(v02, v03, v12, v13, v22, v23, v32, v33));

@@ -13,8 +13,8 @@ fn convolve(first: u32, count: u32) {
             let t6 = tap(x, y + 3 * s); let t7 = tap(x + s, y + 3 * s);
             var w = first + (ky * KERNEL_W + kx) * VECTORS;
             for (var i = 0u; i < count; i++) {
-                take(w, Eight(source(t0 + i), source(t1 + i), source(t2 + i), source(t3 + i),
-                              source(t4 + i), source(t5 + i), source(t6 + i), source(t7 + i)));
+                take(w, Eight(load(t0 + i), load(t1 + i), load(t2 + i), load(t3 + i),
+                              load(t4 + i), load(t5 + i), load(t6 + i), load(t7 + i)));
                 w += KERNEL_H * KERNEL_W * VECTORS;
             }
         }

@@ -157,7 +157,7 @@ impl Network {
         // wgpu clears new buffers; the kernels count on the zeros at the beginning.
         let element = build::element(&plan);
         let row = permutation::ROW * element;
-        let mirrored = kernels.iter().any(Kernel::mirrored);
+        let mirrored = kernels.iter().any(|k| k.mirror);
         // Copies take whole rows.
         let bytes = if mirrored { plan.arena_bytes.next_multiple_of(row) } else { plan.arena_bytes };
         let arena = build::buffer(device, "net.arena", bytes, usage);
@@ -246,7 +246,7 @@ impl Network {
     /// Records one step alone, for measurements: its input is whatever lies in the arena.
     pub fn record_step(&self, step: usize, recorder: &mut Recorder<'_>) {
         let layer = &self.layers[step];
-        if let (Some([first, rows]), Some(mirror)) = (layer.copied, &self.mirror) {
+        for (&[first, rows], mirror) in layer.copied.iter().zip(self.mirror.iter().cycle()) {
             let element = build::element(&self.plan);
             let mut layout = rows_of(element);
             layout.offset = u64::from(first) * permutation::ROW * element;

@@ -42,8 +42,8 @@ pub(super) struct Layer {
     pub weights: Trained,
     /// One for each part of the kernel.
     pub bind_groups: Vec<wgpu::BindGroup>,
-    /// First row and number of rows of the mirror that the step reads.
-    pub copied: Option<[u32; 2]>,
+    /// First rows and numbers of rows of the mirror that the step reads.
+    pub copied: Vec<[u32; 2]>,
 }
 
 /// Where a layer's trained numbers are.
@@ -269,7 +269,8 @@ pub(super) fn layers(
                 Trained::Buffer(buffer(device, &label, size, kind | wgpu::BufferUsages::COPY_DST))
             }
         };
-        let copied = mirror.filter(|_| kernel.mirrored()).map(|_| rows(plan, step.input));
+        let read = [Some(step.input), step.skip].into_iter().flatten().filter(|_| kernel.mirror);
+        let copied: Vec<_> = read.map(|t| rows(plan, t)).collect();
         let bind_group = |(part, offset): (usize, u64)| {
             let whole = |buffer, offset, size| {
                 let size = wgpu::BufferSize::new(size);
@@ -282,7 +283,7 @@ pub(super) fn layers(
                 Trained::Textures(textures) => Some(view(&textures[part])),
                 _ => None,
             };
-            let mirrored = mirror.filter(|_| copied.is_some()).map(view);
+            let mirrored = mirror.filter(|_| kernel.mirror).map(view);
             if let Trained::Buffer(buffer) = &weights {
                 resources.push((2, whole(buffer, offset, each)));
             }

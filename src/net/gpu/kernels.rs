@@ -2,13 +2,15 @@
 
 use super::super::graph::{AddAt, Padding};
 use super::super::plan::{Kind, Plan, Precision, Step};
-use super::permutation::{Facts, Layer as ConvLayer, MATRIX, Permutation, ROW, Source, Tuned, Variant};
+use super::permutation::{Facts, Layer as ConvLayer, MATRIX, Permutation, ROW, Source, Tuned, Variant, mirrors};
 use crate::net::graph::Shape;
 
 /// Threads of a workgroup in x and y, as in the shaders.
 const GROUP: [u32; 2] = [16, 4];
 /// Threads of a workgroup of a blocked convolution, each with a tile of 2×4 pixels.
 const TILES: u32 = 64;
+/// Rows that a thread of `scale.wgsl` makes.
+const ROWS_OF_SCALE: u32 = 8;
 /// Workgroups in a row of such a dispatch, half of WebGPU's default limit.
 const ROW_OF_GROUPS: u32 = 1 << 15;
 
@@ -79,6 +81,8 @@ pub struct Kernel {
     pub layer: Option<ConvLayer>,
     /// For blocked convolutions.
     pub permutation: Option<Permutation>,
+    /// It reads its input and its skip from the mirror.
+    pub mirror: bool,
     /// Vectors of output channels of a block of weights.
     pub vectors: u32,
     /// Dispatches.
@@ -118,6 +122,7 @@ impl Kernel {
             filter: None,
             layer: None,
             permutation: None,
+            mirror: false,
             vectors: 0,
             parts: vec![Part { phase: [0, 0], pad: [0, 0], first_block: 0, blocks: 0 }],
             groups: [out.width.div_ceil(GROUP[0]), out.height.div_ceil(GROUP[1]), out.vectors()],
@@ -155,8 +160,9 @@ impl Kernel {
                 "window".into()
             }
             Kind::Moments => {
-                let tiles = output.shape.width;
-                kernel.groups = [input.shape.vectors().div_ceil(GROUP[0]), tiles.div_ceil(GROUP[1]), 1];
+                // At most 2^26 pixels and 1,024 vectors.
+                let groups = (output.shape.width * input.shape.vectors()).div_ceil(TILES);
+                kernel.groups = [groups.min(ROW_OF_GROUPS), groups.div_ceil(ROW_OF_GROUPS), 1];
                 "moments".into()
             }
             Kind::Merge { groups, .. } => {
@@ -180,7 +186,15 @@ impl Kernel {
                 "shuffle".into()
             }
         };
-        kernel.shader = format!("net.{shader}{}", if half { "_half" } else { "" });
+        if matches!(step.kind, Kind::Scale { .. }) {
+            kernel.groups[1] = out.height.div_ceil(GROUP[1] * ROWS_OF_SCALE);
+        }
+        let light = matches!(step.kind, Kind::Upsample | Kind::Copy | Kind::Moments | Kind::Scale { .. });
+        // What is in 32 bits whatever the plan's precision has no mirror.
+        let same = step.reads().all(|t| !half || !plan.tensors[t].full || Some(t) == step.second);
+        let mirror = if light && same && choice.mirrors(plan) { "_mirror" } else { "" };
+        kernel.mirror |= !mirror.is_empty();
+        kernel.shader = format!("net.{shader}{mirror}{}", if half { "_half" } else { "" });
         kernel.prelude = prelude.text();
         kernel
     }
@@ -205,7 +219,7 @@ impl Kernel {
         (self.filter, self.layer, self.permutation) = (Some(filter), Some(layer), permutation);
         let Permutation { weights, mirror, vectors } =
             permutation.unwrap_or(Permutation { weights: Source::Storage, mirror: false, vectors: out.vectors().min(2) });
-        self.vectors = vectors;
+        (self.mirror, self.vectors) = (mirror, vectors);
         self.bound = match weights {
             Source::Lanes => Bound::Texture,
             Source::Uniform => Bound::Uniform,
@@ -251,11 +265,6 @@ impl Kernel {
         format!("{family}{input}{weights}")
     }
 
-    /// It reads its input from the mirror.
-    pub fn mirrored(&self) -> bool {
-        self.permutation.is_some_and(|p| p.mirror)
-    }
-
     /// Workgroups of a dispatch of `blocks` blocks.
     pub fn workgroups(&self, blocks: u32) -> [u32; 3] {
         [self.groups[0], self.groups[1], self.groups[2] * blocks.max(1)]
@@ -288,6 +297,18 @@ pub struct Choice<'a> {
     pub tuned: &'a Tuned,
     /// What the device can do.
     pub facts: Facts,
+}
+
+impl Choice<'_> {
+    /// Kernels that are no convolutions read from the mirror: on processors, unless one kind of kernel is asked for.
+    fn mirrors(&self, plan: &Plan) -> bool {
+        let wanted = match self.variant {
+            Variant::Auto => self.facts.software,
+            Variant::Fixed(permutation) => permutation.mirror,
+            Variant::Plain => false,
+        };
+        wanted && mirrors(plan)
+    }
 }
 
 /// Lines of `const`.

@@ -148,8 +148,7 @@ impl Layer {
     /// The nearest to `wanted` that this layer, plan and device allow.
     pub fn fitted(&self, wanted: Permutation, plan: &Plan, facts: Facts) -> Permutation {
         let vectors = wanted.vectors.clamp(1, self.out_vectors.clamp(1, 4));
-        let element = if plan.precision == Precision::F16 { 8 } else { 16 };
-        let mirror = plan.arena_bytes.div_ceil(element * ROW) <= MAX_ROWS;
+        let mirror = mirrors(plan);
         let matrices = self.filter.matrices(vectors);
         let texels = matrices * u64::from(self.out_vectors.div_ceil(vectors)) * 4;
         let weights = match wanted.weights {
@@ -177,4 +176,10 @@ impl Layer {
             }),
         }
     }
+}
+
+/// The plan's arena fits into a mirror.
+pub(super) fn mirrors(plan: &Plan) -> bool {
+    let element = if plan.precision == Precision::F16 { 8 } else { 16 };
+    plan.arena_bytes.div_ceil(element * ROW) <= MAX_ROWS
 }
