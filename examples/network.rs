@@ -75,7 +75,13 @@ fn profile(gpu: &Gpu, network: &Network) -> Result<(), Failure> {
     for ((row, kernel), seconds) in network.plan().rows().iter().zip(network.kernels()).zip(&least) {
         let how = kernel.permutation.map_or(String::new(), |p| p.to_string());
         let rate = row.flops as f64 / seconds / 1e9;
-        println!("{:<24}{:<28}{:<16}{:>9.3} ms{rate:>8.2} GFLOP/s  {how}", row.name, row.kind, row.shape, seconds * 1e3);
+        println!(
+            "{:<24}{:<28}{:<16}{:>9.3} ms{rate:>8.2} GFLOP/s  {how}",
+            row.name,
+            row.kind,
+            row.shape,
+            seconds * 1e3
+        );
     }
     println!("{:.2} ms in all", least.iter().sum::<f64>() * 1e3);
     Ok(())

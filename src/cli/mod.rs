@@ -10,9 +10,11 @@ mod dataset;
 mod doctor;
 pub mod error;
 mod interrupt;
+mod layers;
 mod progress;
 mod reference;
 mod render;
+mod tuned;
 mod weights;
 
 use clap::{Parser, Subcommand};
@@ -63,7 +65,7 @@ pub fn main() -> ExitCode {
         Command::Compare(a) => compare::run(a),
         Command::Dataset(a) => dataset::run(&cli.global, a),
         Command::Apply(a) => apply::run(&cli.global, a),
-        Command::Weights(a) => weights::run(a),
+        Command::Weights(a) => weights::run(&cli.global, a),
         Command::Doctor(a) => doctor::run(&cli.global, a),
     };
     match done {

@@ -128,6 +128,7 @@ pub const NET: &[Shader] = net![
     "batch_norm_half", [half half], ["net/epilogue.wgsl", "net/scale_fixed.wgsl", "net/scale.wgsl"];
     "batch_norm_mirror", [full mirror], ["net/epilogue.wgsl", "net/scale_fixed.wgsl", "net/scale.wgsl"];
     "batch_norm_mirror_half", [half mirror], ["net/epilogue.wgsl", "net/scale_fixed.wgsl", "net/scale.wgsl"];
+    "peak", [full full], ["net/peak.wgsl"];
     "shuffle", [full full], ["net/epilogue.wgsl", "net/shuffle.wgsl"];
     "shuffle_half", [half half], ["net/epilogue.wgsl", "net/shuffle.wgsl"];
 ];

@@ -186,6 +186,20 @@ impl Network {
         Self::build(device, queue, weights, size, options, pipelines, tuned)
     }
 
+    /// The same network with what a tuner has found in the meantime. Pipelines that serve again are kept.
+    ///
+    /// # Errors
+    /// As [`Network::new`]; then the old network is gone.
+    pub fn retuned(
+        self,
+        (device, queue): (&wgpu::Device, &wgpu::Queue),
+        weights: &Weights,
+        tuned: Arc<Tuned>,
+    ) -> Result<Self, NetError> {
+        let Self { options, pipelines, plan, .. } = self;
+        Self::build(device, queue, weights, [plan.width, plan.height], options, pipelines, tuned)
+    }
+
     /// Replaces the trained numbers from the queue's next submission on. Allocates nothing on the GPU.
     ///
     /// # Errors

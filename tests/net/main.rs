@@ -6,6 +6,7 @@ mod common;
 mod hashed;
 mod life;
 mod operators;
+mod tune;
 mod whole;
 
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};

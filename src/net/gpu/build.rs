@@ -276,8 +276,10 @@ pub(super) fn layers(
                 let size = wgpu::BufferSize::new(size);
                 wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size })
             };
-            let mut resources =
-                vec![(0, whole(steps, slot * SLOT, size_of::<StepUniform>() as u64)), (1, whole(arena, 0, plan.arena_bytes))];
+            let mut resources = vec![
+                (0, whole(steps, slot * SLOT, size_of::<StepUniform>() as u64)),
+                (1, whole(arena, 0, plan.arena_bytes)),
+            ];
             let view = |t: &wgpu::Texture| t.create_view(&Default::default());
             let trained = match &weights {
                 Trained::Textures(textures) => Some(view(&textures[part])),

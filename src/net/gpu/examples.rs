@@ -20,7 +20,13 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
     for shader in crate::gpu::shaders::NET.iter().map(|s| s.name) {
         let convolution = shader.contains("conv");
         let epilogues: &[[u32; 3]] = match shader {
-            _ if shader.contains("window") || shader.contains("moments") || shader.contains("merge") => &[[0, 0, 0]],
+            _ if shader.contains("window")
+                || shader.contains("moments")
+                || shader.contains("merge")
+                || shader.contains("peak") =>
+            {
+                &[[0, 0, 0]]
+            }
             _ if ["_half", "_mirror", "_wide"].iter().any(|s| shader.contains(s)) => &[[0, 0, 0], [1, 1, 0], [6, 2, 1]],
             _ => &[[0, 0, 0], [1, 1, 0], [2, 2, 0], [3, 0, 1], [4, 1, 1], [5, 2, 0], [6, 0, 0], [7, 0, 0]],
         };

@@ -217,8 +217,11 @@ impl Kernel {
         let layer = ConvLayer { filter, out_vectors: out.vectors(), size, precision: plan.precision };
         let permutation = layer.permutation(choice.variant, choice.tuned, plan, choice.facts);
         (self.filter, self.layer, self.permutation) = (Some(filter), Some(layer), permutation);
-        let Permutation { weights, mirror, vectors } =
-            permutation.unwrap_or(Permutation { weights: Source::Storage, mirror: false, vectors: out.vectors().min(2) });
+        let Permutation { weights, mirror, vectors } = permutation.unwrap_or(Permutation {
+            weights: Source::Storage,
+            mirror: false,
+            vectors: out.vectors().min(2),
+        });
         (self.mirror, self.vectors) = (mirror, vectors);
         self.bound = match weights {
             Source::Lanes => Bound::Texture,

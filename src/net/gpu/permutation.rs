@@ -166,7 +166,13 @@ impl Layer {
     }
 
     /// What runs: as `variant` says, with what has been measured. `None` for the plain kernel.
-    pub(super) fn permutation(&self, variant: Variant, tuned: &Tuned, plan: &Plan, facts: Facts) -> Option<Permutation> {
+    pub(super) fn permutation(
+        &self,
+        variant: Variant,
+        tuned: &Tuned,
+        plan: &Plan,
+        facts: Facts,
+    ) -> Option<Permutation> {
         match variant {
             Variant::Plain => None,
             Variant::Fixed(wanted) => Some(self.fitted(wanted, plan, facts)),
