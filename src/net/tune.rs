@@ -103,7 +103,9 @@ impl Cache {
 
     /// Remembers one layer's.
     pub fn insert(&mut self, info: &wgpu::AdapterInfo, layer: &Layer, found: Found) {
-        self.devices.entry(device(info)).or_default().insert(layer.to_string(), found);
+        // So many digits survive writing and reading exactly.
+        let ms = (found.ms * 1e4).round() / 1e4;
+        self.devices.entry(device(info)).or_default().insert(layer.to_string(), Found { ms, ..found });
     }
 }
 
@@ -191,7 +193,11 @@ fn race(gpu: (&wgpu::Device, &wgpu::Queue), networks: [&Network; 2], step: usize
         (TURN / seconds(gpu, n, step, 1)).clamp(1.0, 100.0) as u32
     });
     let mut best = [f64::INFINITY; 2];
-    for _ in 0..TURNS {
+    for turn in 0..TURNS {
+        // Whoever is this far behind does not catch up.
+        if turn > 0 && best[1] > 2.0 * best[0] {
+            break;
+        }
         for i in 0..2 {
             best[i] = best[i].min(seconds(gpu, networks[i], step, repetitions[i]) * 1e3);
         }

@@ -79,6 +79,8 @@ pub struct Kernel {
     pub filter: Option<Filter>,
     /// For convolutions.
     pub layer: Option<ConvLayer>,
+    /// For convolutions of an enlarged input whose taps are merged: the factor and the padding before.
+    pub enlarged: Option<(u32, [i32; 2])>,
     /// For blocked convolutions.
     pub permutation: Option<Permutation>,
     /// It reads its input and its skip from the mirror.
@@ -121,6 +123,7 @@ impl Kernel {
             bound: Bound::None,
             filter: None,
             layer: None,
+            enlarged: None,
             permutation: None,
             mirror: false,
             vectors: 0,
@@ -131,9 +134,17 @@ impl Kernel {
         let shader: String = match step.kind {
             Kind::Conv { kernel: [h, w], stride, padding, nearest } => {
                 let pad = [padding.left as i32, padding.top as i32];
-                let filter = Filter { taps: [h, w], stride, spread: 1, nearest, in_vectors: input.shape.vectors() };
-                let row = ([h, w], stride, padding) == ([3, 3], 1, Padding::all(1));
-                kernel.convolution(&mut prelude, filter, &[([0, 0], pad)], out, row, plan, choice)
+                if nearest > 1 && stride == 1 && choice.variant != Variant::Plain {
+                    let (taps, phases) = merged([h, w], pad, nearest as i32);
+                    let in_vectors = input.shape.vectors();
+                    let filter = Filter { taps, stride, spread: nearest, nearest: 1, in_vectors };
+                    kernel.enlarged = Some((nearest, pad));
+                    kernel.convolution(&mut prelude, filter, &phases, out, false, plan, choice)
+                } else {
+                    let filter = Filter { taps: [h, w], stride, spread: 1, nearest, in_vectors: input.shape.vectors() };
+                    let row = ([h, w], stride, padding) == ([3, 3], 1, Padding::all(1));
+                    kernel.convolution(&mut prelude, filter, &[([0, 0], pad)], out, row, plan, choice)
+                }
             }
             Kind::Transposed { kernel: edges, stride, padding } => {
                 let taps = edges.map(|k| k.div_ceil(stride));
@@ -290,6 +301,20 @@ impl Kernel {
             Bound::Vectors(n) => u64::from(n) * 16,
         }
     }
+}
+
+/// A convolution of a picture enlarged `n` times is n² convolutions of the picture itself, one for each phase of the output, with
+/// the taps that meet the same pixel added up: 4×4 after ×2 has 25 taps in four phases instead of 64. Taps of the largest phase,
+/// and each phase with its padding.
+fn merged([h, w]: [u32; 2], pad: [i32; 2], n: i32) -> ([u32; 2], Vec<([u32; 2], [i32; 2])>) {
+    let least = |phase: i32, pad: i32| (phase - pad).div_euclid(n);
+    let taps = |edge: u32, pad: i32| {
+        let of = |phase: i32| (phase + edge as i32 - 1 - pad).div_euclid(n) - least(phase, pad) + 1;
+        (0..n).map(of).max().unwrap_or(1) as u32
+    };
+    let phases = (0..n * n).map(|i| [i % n, i / n]);
+    let phases = phases.map(|[x, y]| ([x as u32, y as u32], [-least(x, pad[0]), -least(y, pad[1])])).collect();
+    ([taps(h, pad[1]), taps(w, pad[0])], phases)
 }
 
 /// On what the choice of a kernel depends besides its step.

@@ -14,7 +14,7 @@ use crate::net::plan::{Kind, Step};
 pub(super) fn pack(weights: &Weights, step: &Step, kernel: &Kernel) -> Vec<Vec<u8>> {
     let Some(op) = step.op.map(|i| &weights.graph.ops[i]) else { return Vec::new() };
     if let Some(filter) = kernel.filter {
-        let layer = Layer::new(weights, op, step.fold.map(|i| &weights.graph.ops[i]), filter);
+        let layer = Layer::new(weights, op, step.fold.map(|i| &weights.graph.ops[i]), filter, kernel.enlarged);
         return kernel.parts.iter().map(|part| layer.part(part, kernel)).collect();
     }
     let vectors = match step.kind {
@@ -66,10 +66,17 @@ struct Layer<'a> {
     /// Padding of a transposed convolution.
     transposed: Option<u32>,
     filter: Filter,
+    enlarged: Option<(u32, [i32; 2])>,
 }
 
 impl<'a> Layer<'a> {
-    fn new(weights: &'a Weights, op: &Op, fold: Option<&Op>, filter: Filter) -> Self {
+    fn new(
+        weights: &'a Weights,
+        op: &Op,
+        fold: Option<&Op>,
+        filter: Filter,
+        enlarged: Option<(u32, [i32; 2])>,
+    ) -> Self {
         let (in_channels, out_channels, kernel, groups, transposed) = match op {
             Op::Conv2d(o) => (o.in_channels, o.out_channels, o.kernel, o.groups, None),
             Op::ConvTranspose2d(o) => (o.in_channels, o.out_channels, o.kernel, 1, Some(o.padding)),
@@ -94,6 +101,7 @@ impl<'a> Layer<'a> {
             kernel: kernel.map(|k| k as usize),
             transposed,
             filter,
+            enlarged,
         }
     }
 
@@ -108,7 +116,21 @@ impl<'a> Layer<'a> {
             if i / inputs != o / outputs {
                 return 0.0;
             }
-            return self.scale[o] * self.weight[((o * inputs + i % inputs) * kh + ky) * kw + kx];
+            let first = (o * inputs + i % inputs) * kh * kw;
+            let Some((factor, pad)) = self.enlarged else {
+                return self.scale[o] * self.weight[first + ky * kw + kx];
+            };
+            // All taps that meet the same pixel of the picture before it was enlarged.
+            let real = |axis: usize, edge: usize, k: usize| {
+                let meets = move |real: &usize| {
+                    let place = part.phase[axis] as i32 + *real as i32 - pad[axis];
+                    place.div_euclid(factor as i32) + part.pad[axis] == k as i32
+                };
+                (0..edge).filter(meets)
+            };
+            let rows = real(1, kh, ky).flat_map(|y| real(0, kw, kx).map(move |x| y * kw + x));
+            let sum: f64 = rows.map(|tap| f64::from(self.weight[first + tap])).sum();
+            return (f64::from(self.scale[o]) * sum) as f32;
         };
         // Output pixel stride·j + phase hears input pixel j − pad + k through the real tap
         // (phase + padding) mod stride + stride · (taps − 1 − k).
