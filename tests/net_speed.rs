@@ -6,7 +6,7 @@ mod common;
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::net::cpu;
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{Network, Options, Variant};
+use bouncelight::net::gpu::{Network, Options, Permutation, Source, Variant};
 use std::time::Instant;
 
 /// The compact network at a 1024×512 picture, each family of kernels, minimum of several synchronised runs, interleaved
@@ -18,7 +18,11 @@ fn compact_network_at_256x128() {
     println!("{}", gpu.sentence());
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/weights-format/fixtures/unet.safetensors");
     let weights = Weights::load(path.as_ref()).unwrap();
-    let variants = [Variant::Plain, Variant::BlockedStorage, Variant::Blocked];
+    let variants = [
+        Variant::Plain,
+        Variant::Fixed(Permutation { weights: Source::Uniform, mirror: false, vectors: 2 }),
+        Variant::Auto,
+    ];
     let networks = variants.map(|v| {
         let options = Options { variant: v, ..Options::default() };
         Network::with_options(&gpu.device, &gpu.queue, &weights, [256, 128], options).unwrap()

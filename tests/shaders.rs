@@ -20,8 +20,16 @@ fn parse(name: &str, prelude: &str) -> (naga::Module, String) {
 /// Validates against WebGPU without any optional feature. (Packing halves into words belongs to WebGPU; naga counts it as a
 /// capability because some old OpenGL cannot.)
 fn validate(module: &naga::Module) -> Result<(), Box<naga::WithSpan<naga::valid::ValidationError>>> {
+    validate_with(module, naga::valid::Capabilities::empty())
+}
+
+/// As [`validate`], with optional features.
+fn validate_with(
+    module: &naga::Module,
+    more: naga::valid::Capabilities,
+) -> Result<(), Box<naga::WithSpan<naga::valid::ValidationError>>> {
     let (flags, core) = (naga::valid::ValidationFlags::all(), naga::valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32);
-    naga::valid::Validator::new(flags, core).validate(module).map(|_| ()).map_err(Box::new)
+    naga::valid::Validator::new(flags, core | more).validate(module).map(|_| ()).map_err(Box::new)
 }
 
 #[test]
@@ -29,15 +37,19 @@ fn every_shader_validates_in_every_permutation() {
     let permutations = permutations();
     for (name, prelude) in &permutations {
         let (module, text) = parse(name, prelude);
-        validate(&module).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
+        let lanes = name.contains("_lanes");
+        // These alone need an optional feature, and are taken only where the device has it.
+        assert_eq!(validate(&module).is_err(), lanes, "{name}");
+        let more = if lanes { naga::valid::Capabilities::SUBGROUP } else { naga::valid::Capabilities::empty() };
+        validate_with(&module, more).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
     }
     let seen: std::collections::BTreeSet<_> = permutations.iter().map(|p| p.0).collect();
     assert_eq!(seen.len(), shaders::all().count(), "every row of the table was seen");
     assert_eq!(
         (shaders::RENDER.len(), shaders::GI.len(), shaders::NET.len(), shaders::REFERENCE.len()),
-        (8, 21, 26, 3)
+        (8, 21, 47, 3)
     );
-    assert_eq!(permutations.len(), 262);
+    assert_eq!(permutations.len(), 466);
 }
 
 #[test]

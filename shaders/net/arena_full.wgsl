@@ -4,7 +4,6 @@
 // Elements of a vector that is 32 bits in either arena.
 const FULL = 1u;
 
-fn load(at: u32) -> vec4f { return arena[at]; }
 fn store(at: u32, v: vec4f) { arena[at] = v; }
 fn load_full(at: u32) -> vec4f { return arena[at]; }
 fn store_full(at: u32, v: vec4f) { arena[at] = v; }

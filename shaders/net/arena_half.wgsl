@@ -4,11 +4,6 @@
 // Elements of a vector that is 32 bits in either arena.
 const FULL = 2u;
 
-fn load(at: u32) -> vec4f {
-    let v = arena[at];
-    return vec4f(unpack2x16float(v.x), unpack2x16float(v.y));
-}
-
 fn store(at: u32, v: vec4f) {
     let c = clamp(v, vec4f(-65504.0), vec4f(65504.0));
     arena[at] = vec2u(pack2x16float(c.xy), pack2x16float(c.zw));

@@ -13,7 +13,7 @@ struct Step {
     pad: vec2i,
     // Which of the interleaved pictures of a transposed convolution this dispatch makes.
     phase: vec2u,
-    // First block of eight output channels of this dispatch.
+    // First block of output channels of this dispatch.
     first_block: u32,
     // Dropout: the operator's random stream, values below the threshold are dropped, the others multiplied by `keep`.
     stream: u32,

@@ -1,67 +1,32 @@
-// 3×3 convolution, stride 1, padding 1: eight pixels of a column and eight output channels a thread. The ten rows that the
-// three vertical taps share are read once. Weights come tap column by tap column (see kernels.rs), as six matrices an input vector.
-// From the prelude: IN_VECTORS.
+// 3×3 convolution, stride 1, padding 1: the 24 pixels that a tile's taps share are read once an input vector. Weights come tap by
+// tap, row by row, an input vector after the other (see pack.rs). From the prelude: as tile.wgsl and conv_any.wgsl.
 
-@compute @workgroup_size(16, 4)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    let y = id.y * 8u;
-    if any(vec2u(id.x, y) >= made()) { return; }
-    var w = id.z * (1u + 18u * IN_VECTORS);
-    let bias = weight(w);
-    w += 1u;
-    var p0 = bias[0]; var q0 = bias[1];
-    var p1 = bias[0]; var q1 = bias[1];
-    var p2 = bias[0]; var q2 = bias[1];
-    var p3 = bias[0]; var q3 = bias[1];
-    var p4 = bias[0]; var q4 = bias[1];
-    var p5 = bias[0]; var q5 = bias[1];
-    var p6 = bias[0]; var q6 = bias[1];
-    var p7 = bias[0]; var q7 = bias[1];
-    for (var kx = 0; kx < 3; kx++) {
-        let x = i32(id.x) + kx - 1;
-        let top = i32(y) - 1;
-        let t0 = tap(x, top);
-        let t1 = tap(x, top + 1);
-        let t2 = tap(x, top + 2);
-        let t3 = tap(x, top + 3);
-        let t4 = tap(x, top + 4);
-        let t5 = tap(x, top + 5);
-        let t6 = tap(x, top + 6);
-        let t7 = tap(x, top + 7);
-        let t8 = tap(x, top + 8);
-        let t9 = tap(x, top + 9);
-        for (var c = 0u; c < IN_VECTORS; c++) {
-            var m: mat4x4f;
-            let a0 = load(t0 + c);
-            let a1 = load(t1 + c);
-            let a2 = load(t2 + c);
-            let a3 = load(t3 + c);
-            let a4 = load(t4 + c);
-            let a5 = load(t5 + c);
-            let a6 = load(t6 + c);
-            let a7 = load(t7 + c);
-            let a8 = load(t8 + c);
-            let a9 = load(t9 + c);
-            m = weight(w);
-            p0 += m * a0; p1 += m * a1; p2 += m * a2; p3 += m * a3;
-            p4 += m * a4; p5 += m * a5; p6 += m * a6; p7 += m * a7;
-            m = weight(w + 1u);
-            q0 += m * a0; q1 += m * a1; q2 += m * a2; q3 += m * a3;
-            q4 += m * a4; q5 += m * a5; q6 += m * a6; q7 += m * a7;
-            m = weight(w + 2u);
-            p0 += m * a1; p1 += m * a2; p2 += m * a3; p3 += m * a4;
-            p4 += m * a5; p5 += m * a6; p6 += m * a7; p7 += m * a8;
-            m = weight(w + 3u);
-            q0 += m * a1; q1 += m * a2; q2 += m * a3; q3 += m * a4;
-            q4 += m * a5; q5 += m * a6; q6 += m * a7; q7 += m * a8;
-            m = weight(w + 4u);
-            p0 += m * a2; p1 += m * a3; p2 += m * a4; p3 += m * a5;
-            p4 += m * a6; p5 += m * a7; p6 += m * a8; p7 += m * a9;
-            m = weight(w + 5u);
-            q0 += m * a2; q1 += m * a3; q2 += m * a4; q3 += m * a5;
-            q4 += m * a6; q5 += m * a7; q6 += m * a8; q7 += m * a9;
-            w += 6u;
-        }
+fn convolve(first: u32, count: u32) {
+    let x = i32(corner.x) - 1;
+    let y = i32(corner.y) - 1;
+    let t00 = tap(x, y); let t01 = tap(x + 1, y); let t02 = tap(x + 2, y); let t03 = tap(x + 3, y);
+    let t10 = tap(x, y + 1); let t11 = tap(x + 1, y + 1); let t12 = tap(x + 2, y + 1); let t13 = tap(x + 3, y + 1);
+    let t20 = tap(x, y + 2); let t21 = tap(x + 1, y + 2); let t22 = tap(x + 2, y + 2); let t23 = tap(x + 3, y + 2);
+    let t30 = tap(x, y + 3); let t31 = tap(x + 1, y + 3); let t32 = tap(x + 2, y + 3); let t33 = tap(x + 3, y + 3);
+    let t40 = tap(x, y + 4); let t41 = tap(x + 1, y + 4); let t42 = tap(x + 2, y + 4); let t43 = tap(x + 3, y + 4);
+    let t50 = tap(x, y + 5); let t51 = tap(x + 1, y + 5); let t52 = tap(x + 2, y + 5); let t53 = tap(x + 3, y + 5);
+    var w = first;
+    for (var i = 0u; i < count; i++) {
+        let v00 = load(t00 + i); let v01 = load(t01 + i); let v02 = load(t02 + i); let v03 = load(t03 + i);
+        let v10 = load(t10 + i); let v11 = load(t11 + i); let v12 = load(t12 + i); let v13 = load(t13 + i);
+        let v20 = load(t20 + i); let v21 = load(t21 + i); let v22 = load(t22 + i); let v23 = load(t23 + i);
+        let v30 = load(t30 + i); let v31 = load(t31 + i); let v32 = load(t32 + i); let v33 = load(t33 + i);
+        let v40 = load(t40 + i); let v41 = load(t41 + i); let v42 = load(t42 + i); let v43 = load(t43 + i);
+        let v50 = load(t50 + i); let v51 = load(t51 + i); let v52 = load(t52 + i); let v53 = load(t53 + i);
+        take(w, Eight(v00, v01, v10, v11, v20, v21, v30, v31));
+        take(w + VECTORS, Eight(v01, v02, v11, v12, v21, v22, v31, v32));
+        take(w + 2u * VECTORS, Eight(v02, v03, v12, v13, v22, v23, v32, v33));
+        take(w + 3u * VECTORS, Eight(v10, v11, v20, v21, v30, v31, v40, v41));
+        take(w + 4u * VECTORS, Eight(v11, v12, v21, v22, v31, v32, v41, v42));
+        take(w + 5u * VECTORS, Eight(v12, v13, v22, v23, v32, v33, v42, v43));
+        take(w + 6u * VECTORS, Eight(v20, v21, v30, v31, v40, v41, v50, v51));
+        take(w + 7u * VECTORS, Eight(v21, v22, v31, v32, v41, v42, v51, v52));
+        take(w + 8u * VECTORS, Eight(v22, v23, v32, v33, v42, v43, v52, v53));
+        w += 9u * VECTORS;
     }
-    finish_column(id, array(p0, p1, p2, p3, p4, p5, p6, p7), array(q0, q1, q2, q3, q4, q5, q6, q7));
 }

@@ -1,9 +1,12 @@
-// The end of a norm: (x − mean) · scale + shift. From the prelude: IN_PITCH, IN_VECTORS.
+// The end of a norm: (x − mean) · scale + shift, eight rows a thread. From the prelude: IN_PITCH, IN_VECTORS.
 
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= step.out_size) { return; }
-    let pixel = id.y * step.out_size.x + id.x;
+    if id.x >= step.out_size.x { return; }
     let channel = mean_scale_shift(id.z);
-    finish((load(step.input + pixel * IN_PITCH + id.z) - channel[0]) * channel[1] + channel[2], pixel, id.z);
+    let end = min(id.y * 8u + 8u, step.out_size.y);
+    for (var y = id.y * 8u; y < end; y++) {
+        let pixel = y * step.out_size.x + id.x;
+        finish((load(step.input + pixel * IN_PITCH + id.z) - channel[0]) * channel[1] + channel[2], pixel, id.z);
+    }
 }

@@ -1,6 +1,6 @@
 //! `bouncelight apply`: a network on G-buffer pictures from elsewhere.
 
-use super::args::{Global, usage};
+use super::args::{Global, PrecisionName, usage};
 use crate::{
     gpu::{readback, timing::Recorder},
     image_io::{self, Image},
@@ -36,6 +36,9 @@ pub struct Args {
     /// Keep dropout on, with this seed: how the published programs run their networks.
     #[arg(long, value_name = "SEED")]
     dropout: Option<u32>,
+    /// How numbers are stored on the GPU.
+    #[arg(long, value_enum, default_value = "f32")]
+    precision: PrecisionName,
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
@@ -72,7 +75,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
             normal: &normal.pixels,
         },
     )?;
-    let output = network(global, &weights, &input, args.dropout)?;
+    let output = network(global, &weights, &input, &args)?;
     let shown = pictures::picture(&output);
     let bytes: Vec<u8> = shown.iter().map(|v| (v * 255.0).round() as u8).collect();
     let command: Vec<String> = std::env::args().skip(1).collect();
@@ -87,7 +90,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 }
 
 /// Runs on the GPU, or on the slow CPU twin where there is none or the picture is too large for it, saying so.
-fn network(global: &Global, weights: &Weights, input: &Tensor, dropout: Option<u32>) -> Result<Tensor> {
+fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> Result<Tensor> {
+    let dropout = args.dropout;
     let slow = |reason: &dyn std::fmt::Display| {
         if !global.quiet {
             eprintln!("warning: {reason}; running without a GPU, which takes minutes for a large network");
@@ -100,9 +104,16 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, dropout: Option<u
         Err(e) if global.adapter.is_some() => return Err(e),
         Err(e) => return slow(&e),
     };
-    let options = Options { dropout, ..Default::default() };
+    let options = Options { dropout, precision: args.precision.precision(), ..Default::default() };
     let size = [input.shape.width, input.shape.height];
-    let network = match Network::with_options(&gpu.device, &gpu.queue, weights, size, options) {
+    let network = match Network::tuned(
+        &gpu.device,
+        &gpu.queue,
+        weights,
+        size,
+        options,
+        super::tuned::of(&gpu.device, global.quiet),
+    ) {
         Ok(network) => network,
         Err(e @ (NetError::Plan(PlanError::TooLarge { .. }) | NetError::Limit { .. })) => return slow(&e),
         Err(e) => return Err(e.into()),

@@ -42,6 +42,25 @@ pub enum BackendName {
     Dx12,
 }
 
+/// How a network's numbers are stored.
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+pub enum PrecisionName {
+    /// 32 bits.
+    F32,
+    /// 16 bits; arithmetic stays in 32.
+    F16,
+}
+
+impl PrecisionName {
+    /// As the runtime knows it.
+    pub fn precision(self) -> crate::net::plan::Precision {
+        match self {
+            PrecisionName::F32 => crate::net::plan::Precision::F32,
+            PrecisionName::F16 => crate::net::plan::Precision::F16,
+        }
+    }
+}
+
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 pub enum ProgressKind {

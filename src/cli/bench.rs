@@ -1,5 +1,6 @@
 //! `bouncelight bench`: GPU time per pass, wall clock per frame, resident bytes; against a saved base if asked.
 
+use super::layers::Layers;
 use super::{
     args::{Global, MethodName, SceneArgs, usage},
     error::CliError,
@@ -83,6 +84,9 @@ struct Record {
     frames: u32,
     warmup: u32,
     methods: Vec<Measurement>,
+    /// With `--layers`, if the network was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    network: Option<Layers>,
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
@@ -102,6 +106,12 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
             Renderer::new(&gpu.device, &gpu.queue, args.scene.size, RendererOptions { method, ..Default::default() })?;
         methods.push(measure(&gpu, &mut renderer, &uploaded, &camera, options)?);
     }
+    let network = if args.layers && args.method.0.contains(&MethodName::Neural) {
+        let weights = super::args::load_weights(args.weights.as_ref())?;
+        Some(super::layers::measure(&gpu, &weights, args.scene.size, global.quiet)?)
+    } else {
+        None
+    };
     let record = Record {
         schema: 1,
         version: env!("CARGO_PKG_VERSION").into(),
@@ -114,8 +124,12 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         frames: args.frames,
         warmup: args.warmup,
         methods,
+        network,
     };
     print(&record, &gpu, args.layers);
+    if let Some(layers) = &record.network {
+        layers.print();
+    }
     if let Some(path) = &args.json {
         crate::image_io::write_whole(path, format!("{}\n", serde_json::to_string_pretty(&record)?).as_bytes())?;
     }

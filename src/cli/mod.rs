@@ -10,10 +10,12 @@ mod dataset;
 mod doctor;
 pub mod error;
 mod interrupt;
+mod layers;
 mod probes;
 mod progress;
 mod reference;
 mod render;
+mod tuned;
 mod weights;
 
 use clap::{Parser, Subcommand};
@@ -64,7 +66,7 @@ pub fn main() -> ExitCode {
         Command::Compare(a) => compare::run(a),
         Command::Dataset(a) => dataset::run(&cli.global, a),
         Command::Apply(a) => apply::run(&cli.global, a),
-        Command::Weights(a) => weights::run(a),
+        Command::Weights(a) => weights::run(&cli.global, a),
         Command::Doctor(a) => doctor::run(&cli.global, a),
     };
     match done {

@@ -1,6 +1,6 @@
-//! `bouncelight weights info | verify | convert`: what a weights file holds, whether it is sound, and one from a published network.
+//! `bouncelight weights info | verify | convert | tune`: what a weights file holds, whether it is sound, and one from a published network.
 
-use super::args::parse_size;
+use super::args::{Global, PrecisionName, parse_size};
 use crate::image_io;
 use crate::net::convert::{Arch, Norm, Recipe, convert};
 use crate::net::{
@@ -29,6 +29,22 @@ enum Command {
     },
     /// Check everything a reader can check; says `ok` or lists every fault.
     Verify { file: PathBuf },
+    /// Time the ways in which each convolution can run on this device, and remember the fastest for later runs.
+    Tune {
+        file: PathBuf,
+        /// Width and height of the picture in pixels.
+        #[arg(long, default_value = "1024x512", value_parser = parse_size, value_name = "WxH")]
+        size: [u32; 2],
+        /// How numbers are stored.
+        #[arg(long, value_enum, default_value = "f32")]
+        precision: PrecisionName,
+        /// Where to remember it; by default the user's cache folder, or $BOUNCELIGHT_TUNED.
+        #[arg(long, value_name = "F")]
+        cache: Option<PathBuf>,
+        /// Also what is known already.
+        #[arg(long)]
+        again: bool,
+    },
     /// Make a weights file from a published generator's PyTorch state dict, saved as safetensors.
     Convert(ConvertArgs),
 }
@@ -78,7 +94,7 @@ enum DtypeName {
     F16,
 }
 
-pub fn run(args: Args) -> Result<()> {
+pub fn run(global: &Global, args: Args) -> Result<()> {
     match args.command {
         Command::Verify { file } => {
             let weights = Weights::load(&file)?;
@@ -86,6 +102,10 @@ pub fn run(args: Args) -> Result<()> {
         }
         Command::Info { file, size } => info(&Weights::load(&file)?, size)?,
         Command::Convert(args) => convert_file(&args)?,
+        Command::Tune { file, size, precision, cache, again } => {
+            let options = crate::net::gpu::Options { precision: precision.precision(), ..Default::default() };
+            super::tuned::run(global, &file, size, options, cache, again)?;
+        }
     }
     Ok(())
 }

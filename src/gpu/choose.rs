@@ -154,7 +154,7 @@ impl Gpu {
 
 /// Optional features that are used when present: timestamps for the timing tables.
 pub fn wanted_features() -> wgpu::Features {
-    wgpu::Features::TIMESTAMP_QUERY
+    wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP
 }
 
 /// All adapters that fit the backend choice, best first, with the words for what was searched. GL is only asked when

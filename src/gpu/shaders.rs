@@ -179,44 +179,71 @@ pub const GI: &[Shader] = &[
     Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },
 ];
 
-/// The rows of `net/`: name, the files of its arena, and the body's files.
+/// The rows of `net/`: name, precision of its arena, what it reads tensors from, and the body's files.
 macro_rules! net {
-    ($($name:literal, $arena:literal, [$($path:literal),+];)+) => { &[$(Shader {
+    ($($name:literal, [$arena:ident $load:ident], [$($path:literal),+];)+) => { &[$(Shader {
         name: concat!("net.", $name),
-        files: wgsl!["net/common.wgsl", $arena, $($path),+],
+        files: &[
+            ("net/common.wgsl", include_str!("../../shaders/net/common.wgsl")),
+            (concat!("net/arena_", stringify!($arena), ".wgsl"), include_str!(concat!("../../shaders/net/arena_", stringify!($arena), ".wgsl"))),
+            (concat!("net/load_", stringify!($load), ".wgsl"), include_str!(concat!("../../shaders/net/load_", stringify!($load), ".wgsl"))),
+            $(($path, include_str!(concat!("../../shaders/", $path)))),+
+        ],
     }),+] };
 }
 
 /// Shaders of `net/`. They need a prelude; `net::gpu::example_preludes` gives one of each kind. `_wide` has its weights in a
-/// storage buffer, `_half` arena and weights in 16 bits.
+/// storage buffer, `_half` arena and weights in 16 bits; `_mirror` reads tensors from a texture, and `_lanes` also its weights,
+/// which the threads of a subgroup share out.
 #[rustfmt::skip]
 pub const NET: &[Shader] = net![
-    "conv_plain", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/conv_plain.wgsl"];
-    "conv_plain_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/conv_plain.wgsl"];
-    "conv3x3", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"];
-    "conv3x3_wide", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"];
-    "conv3x3_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/column.wgsl", "net/conv3x3.wgsl"];
-    "conv_block", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/column.wgsl", "net/conv_block.wgsl"];
-    "conv_block_wide", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/column.wgsl", "net/conv_block.wgsl"];
-    "conv_block_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/column.wgsl", "net/conv_block.wgsl"];
-    "upsample", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/upsample.wgsl"];
-    "upsample_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/upsample.wgsl"];
-    "nearest", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/nearest.wgsl"];
-    "nearest_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/nearest.wgsl"];
-    "add", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/add.wgsl"];
-    "add_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/add.wgsl"];
-    "window", "net/arena_full.wgsl", ["net/window.wgsl"];
-    "window_half", "net/arena_half.wgsl", ["net/window.wgsl"];
-    "moments", "net/arena_full.wgsl", ["net/moments.wgsl"];
-    "moments_half", "net/arena_half.wgsl", ["net/moments.wgsl"];
-    "merge", "net/arena_full.wgsl", ["net/merge.wgsl"];
-    "merge_half", "net/arena_half.wgsl", ["net/merge.wgsl"];
-    "norm", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/scale_measured.wgsl", "net/scale.wgsl"];
-    "norm_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/scale_measured.wgsl", "net/scale.wgsl"];
-    "batch_norm", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/scale_fixed.wgsl", "net/scale.wgsl"];
-    "batch_norm_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/scale_fixed.wgsl", "net/scale.wgsl"];
-    "shuffle", "net/arena_full.wgsl", ["net/epilogue.wgsl", "net/shuffle.wgsl"];
-    "shuffle_half", "net/arena_half.wgsl", ["net/epilogue.wgsl", "net/shuffle.wgsl"];
+    "conv_plain", [full full], ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/conv_plain.wgsl"];
+    "conv_plain_half", [half half], ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/conv_plain.wgsl"];
+    "conv3x3", [full full], ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_wide", [full full], ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_half", [half half], ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_mirror", [full mirror], ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_mirror_wide", [full mirror], ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_mirror_half", [half mirror], ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_lanes", [full mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_lanes_half", [half mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv_any", [full full], ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_wide", [full full], ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_half", [half half], ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_mirror", [full mirror], ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_mirror_wide", [full mirror], ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_mirror_half", [half mirror], ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_lanes", [full mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "conv_any_lanes_half", [half mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
+    "upsample", [full full], ["net/epilogue.wgsl", "net/upsample.wgsl"];
+    "upsample_half", [half half], ["net/epilogue.wgsl", "net/upsample.wgsl"];
+    "upsample_mirror", [full mirror], ["net/epilogue.wgsl", "net/upsample.wgsl"];
+    "upsample_mirror_half", [half mirror], ["net/epilogue.wgsl", "net/upsample.wgsl"];
+    "nearest", [full full], ["net/epilogue.wgsl", "net/nearest.wgsl"];
+    "nearest_half", [half half], ["net/epilogue.wgsl", "net/nearest.wgsl"];
+    "add", [full full], ["net/epilogue.wgsl", "net/add.wgsl"];
+    "add_half", [half half], ["net/epilogue.wgsl", "net/add.wgsl"];
+    "add_mirror", [full mirror], ["net/epilogue.wgsl", "net/add.wgsl"];
+    "add_mirror_half", [half mirror], ["net/epilogue.wgsl", "net/add.wgsl"];
+    "window", [full full], ["net/window.wgsl"];
+    "window_half", [half half], ["net/window.wgsl"];
+    "moments", [full full], ["net/moments.wgsl"];
+    "moments_half", [half half], ["net/moments.wgsl"];
+    "moments_mirror", [full mirror], ["net/moments.wgsl"];
+    "moments_mirror_half", [half mirror], ["net/moments.wgsl"];
+    "merge", [full full], ["net/merge.wgsl"];
+    "merge_half", [half half], ["net/merge.wgsl"];
+    "norm", [full full], ["net/epilogue.wgsl", "net/scale_measured.wgsl", "net/scale.wgsl"];
+    "norm_half", [half half], ["net/epilogue.wgsl", "net/scale_measured.wgsl", "net/scale.wgsl"];
+    "norm_mirror", [full mirror], ["net/epilogue.wgsl", "net/scale_measured.wgsl", "net/scale.wgsl"];
+    "norm_mirror_half", [half mirror], ["net/epilogue.wgsl", "net/scale_measured.wgsl", "net/scale.wgsl"];
+    "batch_norm", [full full], ["net/epilogue.wgsl", "net/scale_fixed.wgsl", "net/scale.wgsl"];
+    "batch_norm_half", [half half], ["net/epilogue.wgsl", "net/scale_fixed.wgsl", "net/scale.wgsl"];
+    "batch_norm_mirror", [full mirror], ["net/epilogue.wgsl", "net/scale_fixed.wgsl", "net/scale.wgsl"];
+    "batch_norm_mirror_half", [half mirror], ["net/epilogue.wgsl", "net/scale_fixed.wgsl", "net/scale.wgsl"];
+    "peak", [full full], ["net/peak.wgsl"];
+    "shuffle", [full full], ["net/epilogue.wgsl", "net/shuffle.wgsl"];
+    "shuffle_half", [half half], ["net/epilogue.wgsl", "net/shuffle.wgsl"];
 ];
 
 /// Shaders of `reference/`.

@@ -7,15 +7,18 @@ mod build;
 mod examples;
 mod kernels;
 mod pack;
+pub mod permutation;
 
 use super::format::Weights;
 use super::graph::Graph;
 use super::plan::{Plan, PlanError, Precision};
 use crate::gpu::timing::Recorder;
 pub use build::StepUniform;
-use build::{Layer, Pipelines};
+use build::{Layer, Pipelines, Trained};
 pub use examples::example_preludes;
-pub use kernels::{Bound, Filter, Kernel, Part, Variant};
+pub use kernels::{Bound, Choice, Filter, Kernel, Part};
+pub use permutation::{Facts, Permutation, Source, Tuned, Variant};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Why a network cannot run on this device.
@@ -86,8 +89,11 @@ pub struct Network {
     options: Options,
     arena: wgpu::Buffer,
     steps: wgpu::Buffer,
+    /// The arena in a texture, where a kernel reads it so.
+    mirror: Option<wgpu::Texture>,
     layers: Vec<Layer>,
     pipelines: Pipelines,
+    tuned: Arc<Tuned>,
 }
 
 impl Network {
@@ -115,7 +121,22 @@ impl Network {
         size: [u32; 2],
         options: Options,
     ) -> Result<Self, NetError> {
-        Self::build(device, queue, weights, size, options, Pipelines::default())
+        Self::tuned(device, queue, weights, size, options, Arc::default())
+    }
+
+    /// As [`Network::with_options`], with what a tuner has found on this device.
+    ///
+    /// # Errors
+    /// As [`Network::new`].
+    pub fn tuned(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        weights: &Weights,
+        size: [u32; 2],
+        options: Options,
+        tuned: Arc<Tuned>,
+    ) -> Result<Self, NetError> {
+        Self::build(device, queue, weights, size, options, Pipelines::default(), tuned)
     }
 
     fn build(
@@ -125,18 +146,27 @@ impl Network {
         size: [u32; 2],
         options: Options,
         mut pipelines: Pipelines,
+        tuned: Arc<Tuned>,
     ) -> Result<Self, NetError> {
         let plan = build::plan(device, &weights.graph, size, options)?;
-        let kernels: Vec<Kernel> = plan.steps.iter().map(|s| Kernel::choose(&plan, s, options.variant)).collect();
+        let choice = Choice { variant: options.variant, tuned: &tuned, facts: Facts::of(device) };
+        let kernels: Vec<Kernel> = plan.steps.iter().map(|s| Kernel::choose(&plan, s, &choice)).collect();
         build::check_limits(device, &plan, &kernels)?;
         pipelines.keep(&kernels);
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         // wgpu clears new buffers; the kernels count on the zeros at the beginning.
-        let arena = build::buffer(device, "net.arena", plan.arena_bytes, usage);
+        let element = build::element(&plan);
+        let row = permutation::ROW * element;
+        let mirrored = kernels.iter().any(|k| k.mirror);
+        // Copies take whole rows.
+        let bytes = if mirrored { plan.arena_bytes.next_multiple_of(row) } else { plan.arena_bytes };
+        let arena = build::buffer(device, "net.arena", bytes, usage);
+        let mirror = mirrored.then(|| build::texture(device, "net.mirror", (bytes / row) as u32, element));
         let steps = build::steps_buffer(device, &kernels);
         queue.write_buffer(&steps, 0, &build::uniforms(&plan, &kernels, options.dropout));
-        let layers = build::layers(device, &plan, kernels, &mut pipelines, &arena, &steps);
-        let network = Self { graph: weights.graph.clone(), plan, options, arena, steps, layers, pipelines };
+        let layers = build::layers(device, &plan, kernels, &mut pipelines, &arena, &steps, mirror.as_ref());
+        let graph = weights.graph.clone();
+        let network = Self { graph, plan, options, arena, steps, mirror, layers, pipelines, tuned };
         network.upload(queue, weights);
         Ok(network)
     }
@@ -152,8 +182,22 @@ impl Network {
         weights: &Weights,
         size: [u32; 2],
     ) -> Result<Self, NetError> {
-        let Self { options, pipelines, .. } = self;
-        Self::build(device, queue, weights, size, options, pipelines)
+        let Self { options, pipelines, tuned, .. } = self;
+        Self::build(device, queue, weights, size, options, pipelines, tuned)
+    }
+
+    /// The same network with what a tuner has found in the meantime. Pipelines that serve again are kept.
+    ///
+    /// # Errors
+    /// As [`Network::new`]; then the old network is gone.
+    pub fn retuned(
+        self,
+        (device, queue): (&wgpu::Device, &wgpu::Queue),
+        weights: &Weights,
+        tuned: Arc<Tuned>,
+    ) -> Result<Self, NetError> {
+        let Self { options, pipelines, plan, .. } = self;
+        Self::build(device, queue, weights, [plan.width, plan.height], options, pipelines, tuned)
     }
 
     /// Replaces the trained numbers from the queue's next submission on. Allocates nothing on the GPU.
@@ -179,9 +223,18 @@ impl Network {
 
     fn upload(&self, queue: &wgpu::Queue, weights: &Weights) {
         for (layer, step) in self.layers.iter().zip(&self.plan.steps) {
-            if let Some(buffer) = &layer.weights {
-                for (bytes, offset) in pack::pack(weights, step, &layer.kernel).iter().zip(layer.offsets()) {
-                    queue.write_buffer(buffer, offset, bytes);
+            if matches!(layer.weights, Trained::None) {
+                continue;
+            }
+            let parts = pack::pack(weights, step, &layer.kernel);
+            for (i, (bytes, offset)) in parts.iter().zip(layer.offsets()).enumerate() {
+                match &layer.weights {
+                    Trained::None => {}
+                    Trained::Buffer(buffer) => queue.write_buffer(buffer, offset, bytes),
+                    Trained::Textures(textures) => {
+                        let layout = rows_of(layer.kernel.texel());
+                        queue.write_texture(textures[i].as_image_copy(), bytes, layout, textures[i].size());
+                    }
                 }
             }
         }
@@ -199,22 +252,43 @@ impl Network {
 
     /// Records one compute pass a step, labelled `net.NAME`.
     pub fn record(&self, recorder: &mut Recorder<'_>) {
-        for layer in &self.layers {
-            recorder.compute(&layer.label, |pass| {
-                pass.set_pipeline(&layer.pipeline);
-                for (bind_group, part) in layer.bind_groups.iter().zip(&layer.kernel.parts) {
-                    let [x, y, z] = layer.kernel.workgroups(part.blocks);
-                    pass.set_bind_group(0, bind_group, &[]);
-                    pass.dispatch_workgroups(x, y, z);
-                }
-            });
+        for step in 0..self.layers.len() {
+            self.record_step(step, recorder);
         }
+    }
+
+    /// Records one step alone, for measurements: its input is whatever lies in the arena.
+    pub fn record_step(&self, step: usize, recorder: &mut Recorder<'_>) {
+        let layer = &self.layers[step];
+        for (&[first, rows], mirror) in layer.copied.iter().zip(self.mirror.iter().cycle()) {
+            let element = build::element(&self.plan);
+            let mut layout = rows_of(element);
+            layout.offset = u64::from(first) * permutation::ROW * element;
+            let from = wgpu::TexelCopyBufferInfo { buffer: &self.arena, layout };
+            let mut to = mirror.as_image_copy();
+            to.origin.y = first;
+            let size = wgpu::Extent3d { height: rows, ..mirror.size() };
+            recorder.encoder().copy_buffer_to_texture(from, to, size);
+        }
+        recorder.compute(&layer.label, |pass| {
+            pass.set_pipeline(&layer.pipeline);
+            for (bind_group, part) in layer.bind_groups.iter().zip(&layer.kernel.parts) {
+                let [x, y, z] = layer.kernel.workgroups(part.blocks);
+                pass.set_bind_group(0, bind_group, &[]);
+                pass.dispatch_workgroups(x, y, z);
+            }
+        });
+    }
+
+    /// How each step runs.
+    pub fn kernels(&self) -> impl Iterator<Item = &Kernel> {
+        self.layers.iter().map(|l| &l.kernel)
     }
 
     /// GPU memory of tensors, weights and uniforms, bytes.
     pub fn bytes(&self) -> u64 {
-        let weights = self.layers.iter().filter_map(|l| l.weights.as_ref()).map(wgpu::Buffer::size);
-        self.arena.size() + self.steps.size() + weights.sum::<u64>()
+        let mirror = self.mirror.as_ref().map_or(0, build::texture_bytes);
+        self.arena.size() + self.steps.size() + mirror + self.layers.iter().map(|l| l.weights.bytes()).sum::<u64>()
     }
 
     /// Dispatches, memory, FLOPs.
@@ -231,4 +305,10 @@ impl Network {
         let tensor = &self.plan.tensors[index];
         Binding { buffer: &self.arena, offset: tensor.offset, size: tensor.bytes() }
     }
+}
+
+/// Rows of [`permutation::ROW`] texels of `texel` bytes, one after the other.
+fn rows_of(texel: u64) -> wgpu::TexelCopyBufferLayout {
+    let bytes = (permutation::ROW * texel) as u32;
+    wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(bytes), rows_per_image: None }
 }

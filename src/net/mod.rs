@@ -21,12 +21,14 @@ mod graph_error;
 mod header;
 pub mod op;
 pub mod op_facts;
+pub mod peak;
 pub mod pictures;
 pub mod plan;
 mod problem;
 mod shape;
 mod shipped;
 mod stored;
+pub mod tune;
 mod write;
 
 /// The published generators as graphs.

@@ -6,12 +6,13 @@ mod common;
 mod hashed;
 mod life;
 mod operators;
+mod tune;
 mod whole;
 
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
 use bouncelight::net::cpu::{self, Tensor};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{Network, Options, Variant};
+use bouncelight::net::gpu::{Network, Options, Permutation, Source, Variant};
 use bouncelight::net::graph::Shape;
 use safetensors::SafeTensors;
 use std::path::PathBuf;
@@ -42,6 +43,11 @@ fn tensor(file: &SafeTensors<'_>, name: &str) -> Tensor {
     let [channels, height, width] = [0, 1, 2].map(|i| view.shape()[i] as u32);
     let data = view.data().chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
     Tensor { shape: Shape { channels, height, width }, data }
+}
+
+/// One permutation of the convolutions.
+fn fixed(weights: Source, mirror: bool, vectors: u32) -> Variant {
+    Variant::Fixed(Permutation { weights, mirror, vectors })
 }
 
 /// Inputs and PyTorch's outputs of a fixture.
@@ -108,12 +114,12 @@ fn the_cpu_twin_agrees_with_pytorch() {
 fn every_kernel_agrees_with_pytorch_and_with_the_cpu_twin() {
     let Some(gpu) = common::gpu() else { return };
     let mut seen = 0;
-    for variant in [Variant::Plain, Variant::BlockedStorage, Variant::Blocked] {
+    for variant in [Variant::Plain, fixed(Source::Storage, false, 2), Variant::Auto] {
         let mut worst = 0f32;
         for name in NAMES {
             let weights = Weights::load(&fixture(&format!("{name}.safetensors"))).unwrap();
             // Every network compiles its own pipelines; the other variants need the whole net at one size only.
-            let few = name == "unet" && variant != Variant::Blocked;
+            let few = name == "unet" && variant != Variant::Auto;
             for (input, reference) in cases(name).into_iter().take(if few { 1 } else { usize::MAX }) {
                 let found = run_gpu(&gpu, &weights, &input, Options { variant, ..Options::default() });
                 let twin = cpu::run(&weights, &input).unwrap();

@@ -1,10 +1,10 @@
 //! Every operator: PyTorch ↔ CPU twin ↔ kernels, fused and unfused, in 32 and 16 bits.
 
 use crate::hashed::{self, cases, graphs};
-use crate::{common, run_network};
+use crate::{common, fixed, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Network, Options, Variant};
+use bouncelight::net::gpu::{Network, Options, Source, Variant};
 use bouncelight::net::op_facts::KINDS;
 use bouncelight::net::plan::Precision;
 use std::collections::BTreeSet;
@@ -60,8 +60,20 @@ fn check_kernels(gpu: &Gpu, options: Options, first: usize, each: usize, sizes: 
     assert!(faults.is_empty(), "{options:?}\n{}", faults.join("\n"));
 }
 
-const FULL: Options = Options { variant: Variant::Blocked, precision: Precision::F32, dropout: None, fuse: true };
+const FULL: Options = Options { variant: Variant::Auto, precision: Precision::F32, dropout: None, fuse: true };
 const HALF: Options = Options { precision: Precision::F16, ..FULL };
+
+/// Every permutation of the convolutions. Uniform weights do not exist in 16 bits: storage takes their place.
+fn permutations() -> Vec<Variant> {
+    let mut all = Vec::new();
+    for vectors in 1..=4 {
+        all.push(fixed(Source::Lanes, true, vectors));
+        for mirror in [false, true] {
+            all.extend([Source::Uniform, Source::Storage].map(|weights| fixed(weights, mirror, vectors)));
+        }
+    }
+    all
+}
 
 #[test]
 fn the_kernels_agree_on_every_operator() {
@@ -70,17 +82,20 @@ fn the_kernels_agree_on_every_operator() {
     // A fifth of the graphs in each of the other ways; all of them in the test below.
     check_kernels(&gpu, Options { fuse: false, variant: Variant::Plain, ..FULL }, 1, 5, 1);
     check_kernels(&gpu, HALF, 3, 5, 1);
+    check_kernels(&gpu, Options { variant: fixed(Source::Uniform, false, 3), ..FULL }, 2, 5, 1);
+    check_kernels(&gpu, Options { variant: fixed(Source::Storage, true, 2), ..HALF }, 4, 5, 1);
 }
 
 #[test]
 #[ignore = "minutes: every graph in every way; run it after a change of kernels"]
 fn the_kernels_agree_in_every_way() {
     let Some(gpu) = common::gpu() else { return };
-    let plain = Options { variant: Variant::Plain, ..FULL };
-    let storage = Options { variant: Variant::BlockedStorage, ..FULL };
-    for options in [FULL, plain, storage, HALF, Options { variant: Variant::Plain, ..HALF }] {
-        check_kernels(&gpu, options, 0, 1, usize::MAX);
-        check_kernels(&gpu, Options { fuse: false, ..options }, 0, 1, usize::MAX);
+    for variant in permutations().into_iter().chain([Variant::Auto, Variant::Plain]) {
+        for precision in [Precision::F32, Precision::F16] {
+            let options = Options { variant, precision, ..FULL };
+            check_kernels(&gpu, options, 0, 1, usize::MAX);
+            check_kernels(&gpu, Options { fuse: false, ..options }, 0, 1, usize::MAX);
+        }
     }
 }
 

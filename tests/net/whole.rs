@@ -43,7 +43,7 @@ fn check_generators(ways: impl Fn(&str) -> Vec<Options>) {
     }
 }
 
-const HALF: Options = Options { variant: Variant::Blocked, precision: Precision::F16, dropout: None, fuse: true };
+const HALF: Options = Options { variant: Variant::Auto, precision: Precision::F16, dropout: None, fuse: true };
 
 #[test]
 fn the_generators_agree_with_pytorch() {

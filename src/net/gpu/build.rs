@@ -1,6 +1,7 @@
 //! Buffers, pipelines and bind groups of a network.
 
 use super::kernels::{Bound, Kernel, Part};
+use super::permutation::ROW;
 use super::{NetError, Options};
 use crate::gpu::shaders;
 use crate::net::dropout;
@@ -38,9 +39,58 @@ pub(super) struct Layer {
     pub label: String,
     pub kernel: Kernel,
     pub pipeline: wgpu::ComputePipeline,
-    pub weights: Option<wgpu::Buffer>,
+    pub weights: Trained,
     /// One for each part of the kernel.
     pub bind_groups: Vec<wgpu::BindGroup>,
+    /// First rows and numbers of rows of the mirror that the step reads.
+    pub copied: Vec<[u32; 2]>,
+}
+
+/// Where a layer's trained numbers are.
+pub(super) enum Trained {
+    /// It has none.
+    None,
+    /// Those of all parts, at [`Layer::offsets`].
+    Buffer(wgpu::Buffer),
+    /// One for each part, rows of [`ROW`] texels.
+    Textures(Vec<wgpu::Texture>),
+}
+
+impl Trained {
+    /// Bytes on the GPU.
+    pub fn bytes(&self) -> u64 {
+        match self {
+            Trained::None => 0,
+            Trained::Buffer(buffer) => buffer.size(),
+            Trained::Textures(textures) => textures.iter().map(texture_bytes).sum(),
+        }
+    }
+}
+
+/// Bytes of a texture as [`texture`] makes them.
+pub(super) fn texture_bytes(texture: &wgpu::Texture) -> u64 {
+    let texel = texture.format().block_copy_size(None).unwrap_or(0);
+    u64::from(texture.width()) * u64::from(texture.height()) * u64::from(texel)
+}
+
+/// A texture of `rows` rows of [`ROW`] vectors.
+pub(super) fn texture(device: &wgpu::Device, label: &str, rows: u32, texel: u64) -> wgpu::Texture {
+    let (width, height) = (ROW as u32, rows.max(1));
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: if texel == 8 { wgpu::TextureFormat::Rgba16Float } else { wgpu::TextureFormat::Rgba32Float },
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    })
+}
+
+/// Bytes of one element of the arena.
+pub(super) fn element(plan: &Plan) -> u64 {
+    if plan.precision == Precision::F16 { 8 } else { 16 }
 }
 
 impl Layer {
@@ -110,13 +160,17 @@ pub(super) fn check_limits(device: &wgpu::Device, plan: &Plan, kernels: &[Kernel
             if needed > granted { Err(error) } else { Ok(()) }
         };
         let bytes = kernel.bound_bytes();
-        if kernel.bound == Bound::Uniform {
+        if kernel.bound == Bound::Texture {
+            // `permutation` has seen that they fit.
+        } else if kernel.bound == Bound::Uniform {
             check("max_uniform_buffer_binding_size", limits.max_uniform_buffer_binding_size, bytes)?;
         } else {
             check("max_storage_buffer_binding_size", limits.max_storage_buffer_binding_size, bytes)?;
         }
-        let all = bytes.next_multiple_of(SLOT) * kernel.parts.len() as u64;
-        check("max_buffer_size", limits.max_buffer_size, all)?;
+        if kernel.bound != Bound::Texture {
+            let all = bytes.next_multiple_of(SLOT) * kernel.parts.len() as u64;
+            check("max_buffer_size", limits.max_buffer_size, all)?;
+        }
         let blocks = kernel.parts.iter().map(|p| p.blocks).max().unwrap_or(0);
         let most = kernel.workgroups(blocks).into_iter().max().unwrap_or(0);
         let granted = limits.max_compute_workgroups_per_dimension;
@@ -146,7 +200,7 @@ pub(super) fn uniforms<'a>(plan: &Plan, kernels: impl IntoIterator<Item = &'a Ke
 
 fn uniform(plan: &Plan, step: &Step, part: &Part, seed: Option<u32>) -> StepUniform {
     let (input, output) = (&plan.tensors[step.input], &plan.tensors[step.output]);
-    let element = if plan.precision == Precision::F16 { 8 } else { 16 };
+    let element = element(plan);
     // An arena is one binding, so a place counted in its elements fits.
     let place = |t: usize| (plan.tensors[t].offset / element) as u32;
     let mut in_size = [input.shape.width, input.shape.height];
@@ -194,39 +248,69 @@ pub(super) fn layers(
     pipelines: &mut Pipelines,
     arena: &wgpu::Buffer,
     steps: &wgpu::Buffer,
+    mirror: Option<&wgpu::Texture>,
 ) -> Vec<Layer> {
     let mut slot = 0;
     let layer = |(step, kernel): (&Step, Kernel)| {
         let (pipeline, layout) = pipelines.get(device, &kernel);
         let label = format!("net.{}", step.name);
         let each = kernel.bound_bytes();
-        let weights = (each > 0).then(|| {
-            let kind = match kernel.bound {
-                Bound::Uniform => wgpu::BufferUsages::UNIFORM,
-                _ => wgpu::BufferUsages::STORAGE,
-            };
-            let size = each.next_multiple_of(SLOT) * kernel.parts.len() as u64;
-            buffer(device, &label, size, kind | wgpu::BufferUsages::COPY_DST)
-        });
-        let bind_group = |offset: u64| {
+        let parts = kernel.parts.len() as u64;
+        let weights = match kernel.bound {
+            Bound::None => Trained::None,
+            Bound::Texture => {
+                let rows = (each / (ROW * kernel.texel())) as u32;
+                Trained::Textures((0..parts).map(|_| texture(device, &label, rows, kernel.texel())).collect())
+            }
+            bound => {
+                let uniform = bound == Bound::Uniform;
+                let kind = if uniform { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
+                let size = each.next_multiple_of(SLOT) * parts;
+                Trained::Buffer(buffer(device, &label, size, kind | wgpu::BufferUsages::COPY_DST))
+            }
+        };
+        let read = [Some(step.input), step.skip].into_iter().flatten().filter(|_| kernel.mirror);
+        let copied: Vec<_> = read.map(|t| rows(plan, t)).collect();
+        let bind_group = |(part, offset): (usize, u64)| {
             let whole = |buffer, offset, size| {
                 let size = wgpu::BufferSize::new(size);
                 wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size })
             };
-            let mut resources =
-                vec![whole(steps, slot * SLOT, size_of::<StepUniform>() as u64), whole(arena, 0, plan.arena_bytes)];
-            resources.extend(weights.iter().map(|w| whole(w, offset, each)));
+            let mut resources = vec![
+                (0, whole(steps, slot * SLOT, size_of::<StepUniform>() as u64)),
+                (1, whole(arena, 0, plan.arena_bytes)),
+            ];
+            let view = |t: &wgpu::Texture| t.create_view(&Default::default());
+            let trained = match &weights {
+                Trained::Textures(textures) => Some(view(&textures[part])),
+                _ => None,
+            };
+            let mirrored = mirror.filter(|_| kernel.mirror).map(view);
+            if let Trained::Buffer(buffer) = &weights {
+                resources.push((2, whole(buffer, offset, each)));
+            }
+            resources.extend(trained.iter().map(|v| (2, wgpu::BindingResource::TextureView(v))));
+            resources.extend(mirrored.iter().map(|v| (3, wgpu::BindingResource::TextureView(v))));
             slot += 1;
             let entries: Vec<_> =
-                (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+                resources.into_iter().map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
             device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some(&step.name),
                 layout: &layout,
                 entries: &entries,
             })
         };
-        let bind_groups = offsets(&kernel).map(bind_group).collect();
-        Layer { label, kernel, pipeline, weights, bind_groups }
+        let bind_groups = offsets(&kernel).enumerate().map(bind_group).collect();
+        Layer { label, kernel, pipeline, weights, bind_groups, copied }
     };
     plan.steps.iter().zip(kernels).map(layer).collect()
+}
+
+/// First row and number of rows of the mirror that hold tensor `t`.
+fn rows(plan: &Plan, t: usize) -> [u32; 2] {
+    let tensor = &plan.tensors[t];
+    let row = ROW * element(plan);
+    let end = tensor.offset + tensor.shape.pixels() * u64::from(tensor.pitch) * element(plan);
+    let (first, end) = (tensor.offset / row, end.min(plan.arena_bytes).div_ceil(row));
+    [first as u32, (end - first) as u32]
 }

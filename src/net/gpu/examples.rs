@@ -20,16 +20,23 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
     for shader in crate::gpu::shaders::NET.iter().map(|s| s.name) {
         let convolution = shader.contains("conv");
         let epilogues: &[[u32; 3]] = match shader {
-            _ if shader.contains("window") || shader.contains("moments") || shader.contains("merge") => &[[0, 0, 0]],
-            _ if shader.contains("_half") => &[[0, 0, 0], [1, 1, 0], [6, 2, 1]],
+            _ if shader.contains("window")
+                || shader.contains("moments")
+                || shader.contains("merge")
+                || shader.contains("peak") =>
+            {
+                &[[0, 0, 0]]
+            }
+            _ if ["_half", "_mirror", "_wide"].iter().any(|s| shader.contains(s)) => &[[0, 0, 0], [1, 1, 0], [6, 2, 1]],
             _ => &[[0, 0, 0], [1, 1, 0], [2, 2, 0], [3, 0, 1], [4, 1, 1], [5, 2, 0], [6, 0, 0], [7, 0, 0]],
         };
         for [activation, add, dropout] in epilogues {
             let epilogue = lines(&[("ACTIVATION", *activation), ("ADD", *add), ("DROPOUT", *dropout)]);
             let kinds: Vec<String> = if shader.contains("conv3x3") {
-                vec![kernel([3, 1, 1, 1])]
+                (1..=4).map(|v| kernel([3, 1, 1, 1], v)).collect()
             } else if convolution {
-                [[3, 2, 1, 1], [1, 1, 1, 1], [4, 1, 1, 2], [2, 1, 2, 1]].map(kernel).to_vec()
+                let kinds = [[3, 2, 1, 1], [1, 1, 1, 1], [4, 1, 1, 2], [2, 1, 2, 1]];
+                kinds.into_iter().zip([3, 1, 2, 4]).map(|(kind, vectors)| kernel(kind, vectors)).collect()
             } else if shader.contains("window") {
                 let kinds = [[0, 0, 0], [1, 1, 1], [0, 3, 0]];
                 kinds.map(|[c, l, f]| lines(&[("CLAMP", c), ("LANE", l), ("IN_FULL", f), ("OUT_FULL", f)])).to_vec()
@@ -44,8 +51,8 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
     examples
 }
 
-fn kernel([edge, stride, spread, nearest]: [u32; 4]) -> String {
+fn kernel([edge, stride, spread, nearest]: [u32; 4], vectors: u32) -> String {
     format!(
-        "const KERNEL_H = {edge}u;\nconst KERNEL_W = {edge}u;\nconst STRIDE = {stride}u;\nconst SPREAD = {spread}u;\nconst NEAREST = {nearest}u;\n"
+        "const KERNEL_H = {edge}u;\nconst KERNEL_W = {edge}u;\nconst STRIDE = {stride}u;\nconst SPREAD = {spread}u;\nconst NEAREST = {nearest}u;\nconst VECTORS = {vectors}u;\n"
     )
 }

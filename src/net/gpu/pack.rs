@@ -1,8 +1,8 @@
 //! Trained numbers as the kernels read them. Pure.
 //!
-//! Convolutions: output channels in blocks of eight. A block is one matrix with the bias in its first two columns, then for
-//! each tap column kx, input vector c, tap row ky, and half h of the block one 4×4 matrix, which takes four input channels to
-//! four output channels. Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
+//! Convolutions: output channels in blocks of one to four vectors. A block is one matrix with the bias, a column a vector, then for
+//! each input vector, tap row, tap column and output vector of the block one 4×4 matrix, which takes four input channels to four
+//! output channels. Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
 //! of stride s is s² ordinary ones, each of which makes every s-th pixel (its phase) in both directions.
 
 use super::kernels::{Bound, Filter, Kernel, Part};
@@ -14,7 +14,7 @@ use crate::net::plan::{Kind, Step};
 pub(super) fn pack(weights: &Weights, step: &Step, kernel: &Kernel) -> Vec<Vec<u8>> {
     let Some(op) = step.op.map(|i| &weights.graph.ops[i]) else { return Vec::new() };
     if let Some(filter) = kernel.filter {
-        let layer = Layer::new(weights, op, step.fold.map(|i| &weights.graph.ops[i]), filter);
+        let layer = Layer::new(weights, op, step.fold.map(|i| &weights.graph.ops[i]), filter, kernel.enlarged);
         return kernel.parts.iter().map(|part| layer.part(part, kernel)).collect();
     }
     let vectors = match step.kind {
@@ -66,10 +66,17 @@ struct Layer<'a> {
     /// Padding of a transposed convolution.
     transposed: Option<u32>,
     filter: Filter,
+    enlarged: Option<(u32, [i32; 2])>,
 }
 
 impl<'a> Layer<'a> {
-    fn new(weights: &'a Weights, op: &Op, fold: Option<&Op>, filter: Filter) -> Self {
+    fn new(
+        weights: &'a Weights,
+        op: &Op,
+        fold: Option<&Op>,
+        filter: Filter,
+        enlarged: Option<(u32, [i32; 2])>,
+    ) -> Self {
         let (in_channels, out_channels, kernel, groups, transposed) = match op {
             Op::Conv2d(o) => (o.in_channels, o.out_channels, o.kernel, o.groups, None),
             Op::ConvTranspose2d(o) => (o.in_channels, o.out_channels, o.kernel, 1, Some(o.padding)),
@@ -94,6 +101,7 @@ impl<'a> Layer<'a> {
             kernel: kernel.map(|k| k as usize),
             transposed,
             filter,
+            enlarged,
         }
     }
 
@@ -108,7 +116,21 @@ impl<'a> Layer<'a> {
             if i / inputs != o / outputs {
                 return 0.0;
             }
-            return self.scale[o] * self.weight[((o * inputs + i % inputs) * kh + ky) * kw + kx];
+            let first = (o * inputs + i % inputs) * kh * kw;
+            let Some((factor, pad)) = self.enlarged else {
+                return self.scale[o] * self.weight[first + ky * kw + kx];
+            };
+            // All taps that meet the same pixel of the picture before it was enlarged.
+            let real = |axis: usize, edge: usize, k: usize| {
+                let meets = move |real: &usize| {
+                    let place = part.phase[axis] as i32 + *real as i32 - pad[axis];
+                    place.div_euclid(factor as i32) + part.pad[axis] == k as i32
+                };
+                (0..edge).filter(meets)
+            };
+            let rows = real(1, kh, ky).flat_map(|y| real(0, kw, kx).map(move |x| y * kw + x));
+            let sum: f64 = rows.map(|tap| f64::from(self.weight[first + tap])).sum();
+            return (f64::from(self.scale[o]) * sum) as f32;
         };
         // Output pixel stride·j + phase hears input pixel j − pad + k through the real tap
         // (phase + padding) mod stride + stride · (taps − 1 − k).
@@ -124,7 +146,8 @@ impl<'a> Layer<'a> {
     }
 
     fn part(&self, part: &Part, kernel: &Kernel) -> Vec<u8> {
-        let half = kernel.bound == Bound::Half;
+        let half = kernel.bound == Bound::Half || (kernel.bound == Bound::Texture && kernel.texel() == 8);
+        let vectors = kernel.vectors as usize;
         let mut bytes = Vec::with_capacity(kernel.bound_bytes() as usize);
         let mut put = |value: f32| {
             if half {
@@ -134,13 +157,15 @@ impl<'a> Layer<'a> {
             }
         };
         for block in part.first_block as usize..(part.first_block + part.blocks) as usize {
-            (0..16).for_each(|i| put(if i < 8 { self.bias.get(block * 8 + i).copied().unwrap_or(0.0) } else { 0.0 }));
-            for kx in 0..self.filter.taps[1] as usize {
-                for c in 0..self.filter.in_vectors as usize {
-                    for ky in 0..self.filter.taps[0] as usize {
+            let first = block * 4 * vectors;
+            let bias = |i: usize| if i < 4 * vectors { self.bias.get(first + i).copied().unwrap_or(0.0) } else { 0.0 };
+            (0..16).for_each(|i| put(bias(i)));
+            for c in 0..self.filter.in_vectors as usize {
+                for ky in 0..self.filter.taps[0] as usize {
+                    for kx in 0..self.filter.taps[1] as usize {
                         // Column-major: column k takes input channel k to the four outputs.
-                        for k in 0..32 {
-                            put(self.at(part, block * 8 + k / 16 * 4 + k % 4, c * 4 + k % 16 / 4, ky, kx));
+                        for k in 0..16 * vectors {
+                            put(self.at(part, first + k / 16 * 4 + k % 4, c * 4 + k % 16 / 4, ky, kx));
                         }
                     }
                 }

@@ -1,0 +1,128 @@
+//! The tuner and its cache.
+
+use crate::{TOLERANCE, cases, common, error, fixed, fixture, run_gpu, run_network};
+use bouncelight::net::format::Weights;
+use bouncelight::net::gpu::{Network, Options, Permutation, Source, Tuned, Variant};
+use bouncelight::net::tune::{Cache, CacheError, MAX_TEXT, VERSION, tune};
+use bouncelight::wgpu::{AdapterInfo, Backend, DeviceType};
+use std::sync::Arc;
+
+const GOOD: &str = r#"{"version": 1, "devices": {"a | Vulkan | d 1": {"layer": {"permutation":
+    {"weights": "uniform", "mirror": false, "vectors": 2}, "ms": 0.5}}}}"#;
+
+fn info(name: &str, driver_info: &str) -> AdapterInfo {
+    let mut info = AdapterInfo::new(DeviceType::Other, Backend::Vulkan);
+    (info.name, info.driver, info.driver_info) = (name.into(), "d".into(), driver_info.into());
+    info
+}
+
+#[test]
+fn a_cache_survives_its_text_and_knows_its_device() {
+    let cache = Cache::parse(GOOD).unwrap();
+    assert_eq!(Cache::parse(&cache.text()).unwrap(), cache);
+    assert_eq!(VERSION, 1, "adapt the texts here");
+    let known = cache.tuned(&info("a", "1"));
+    assert_eq!(known["layer"], Permutation { weights: Source::Uniform, mirror: false, vectors: 2 });
+    // Negative control: another adapter, another driver.
+    assert!(cache.tuned(&info("b", "1")).is_empty() && cache.tuned(&info("a", "2")).is_empty());
+}
+
+#[test]
+fn foreign_caches_are_refused() {
+    let cut = &GOOD[..GOOD.len() - 3];
+    let nested = "[".repeat(100_000);
+    for text in [
+        "",
+        "null",
+        "[]",
+        "{}",
+        "\u{0}\u{1}",
+        cut,
+        &nested,
+        &GOOD.replace("ms", "seconds"),
+        &GOOD.replace("uniform", "x"),
+    ] {
+        assert!(matches!(Cache::parse(text), Err(CacheError::Text(_))), "{text:.40}");
+    }
+    for (from, to) in [("\"vectors\": 2", "\"vectors\": 0"), ("\"vectors\": 2", "\"vectors\": 5"), ("0.5", "-0.5")] {
+        assert!(matches!(Cache::parse(&GOOD.replace(from, to)), Err(CacheError::Numbers(_))), "{to}");
+    }
+    assert!(Cache::parse(&GOOD.replace("\"ms\": 0.5", "\"ms\": 1e999")).is_err());
+    assert!(matches!(Cache::parse(&GOOD.replace(": 1,", ": 2,")), Err(CacheError::Version { found: 2 })));
+    assert!(matches!(Cache::parse(&" ".repeat(MAX_TEXT + 1)), Err(CacheError::Long(_))));
+}
+
+#[test]
+fn what_is_tuned_is_remembered_and_right() {
+    let Some(gpu) = common::gpu() else { return };
+    let weights = Weights::load(&fixture("conv1x1.safetensors")).unwrap();
+    let (input, reference) = cases("conv1x1").pop().unwrap();
+    let size = [input.shape.width, input.shape.height];
+    let (mut cache, handles) = (Cache::default(), (&gpu.device, &gpu.queue));
+    let reports = tune(handles, &weights, size, Options::default(), &mut cache, false, |_, _| {}).unwrap();
+    assert_eq!(reports.len(), 1);
+    let report = &reports[0];
+    assert!(report.tried > 2 && report.best.1 > 0.0 && report.guess.1 > 0.0, "{report:?}");
+    // The second time nothing is left to do, and the choice stands.
+    let again = tune(handles, &weights, size, Options::default(), &mut cache, false, |_, _| {}).unwrap();
+    assert!(again.is_empty());
+    let tuned = Arc::new(cache.tuned(&gpu.info));
+    assert_eq!(tuned.len(), 1);
+    let network = Network::tuned(&gpu.device, &gpu.queue, &weights, size, Options::default(), tuned).unwrap();
+    let kernel = network.kernels().next().unwrap();
+    assert_eq!(kernel.permutation, Some(report.best.0));
+    assert!(error(&run_network(&gpu, &network, &input), &reference) <= TOLERANCE);
+}
+
+/// A cache may ask for what a layer cannot do; what runs then is the nearest that it can.
+#[test]
+fn wishes_that_cannot_be_met_do_no_harm() {
+    let Some(gpu) = common::gpu() else { return };
+    let weights = Weights::load(&fixture("conv1x1.safetensors")).unwrap();
+    let (input, reference) = cases("conv1x1").pop().unwrap();
+    let size = [input.shape.width, input.shape.height];
+    let plain = Network::new(&gpu.device, &gpu.queue, &weights, size).unwrap();
+    let layer = plain.kernels().next().unwrap().layer.unwrap().to_string();
+    for wish in [
+        Permutation { weights: Source::Lanes, mirror: false, vectors: 4000 },
+        Permutation { weights: Source::Uniform, mirror: true, vectors: 0 },
+    ] {
+        let tuned: Tuned = [(layer.clone(), wish)].into();
+        let network =
+            Network::tuned(&gpu.device, &gpu.queue, &weights, size, Options::default(), Arc::new(tuned)).unwrap();
+        assert!(error(&run_network(&gpu, &network, &input), &reference) <= TOLERANCE, "{wish:?}");
+    }
+    // Negative control: the permutation that is asked for is the one that runs.
+    let Variant::Fixed(wanted) = fixed(Source::Storage, true, 1) else { unreachable!() };
+    let options = Options { variant: Variant::Fixed(wanted), ..Options::default() };
+    let network = Network::with_options(&gpu.device, &gpu.queue, &weights, size, options).unwrap();
+    assert_eq!(network.kernels().next().unwrap().permutation, Some(wanted));
+    assert!(error(&run_gpu(&gpu, &weights, &input, options), &reference) <= TOLERANCE);
+}
+
+/// On the command line: something else in the cache's place is told, ignored and replaced.
+#[test]
+fn a_corrupt_cache_is_told_and_replaced() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let cache = folder.path().join("deep/tuned.json");
+    std::fs::create_dir_all(cache.parent().unwrap()).unwrap();
+    std::fs::write(&cache, "{\"version\": 1, \"dev").unwrap();
+    let run = || {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_bouncelight"));
+        command.args(["weights", "tune", "--size", "8x8"]).arg(fixture("conv1x1.safetensors"));
+        command.arg("--cache").arg(&cache).output().unwrap()
+    };
+    let first = run();
+    let said = String::from_utf8_lossy(&first.stderr).into_owned();
+    assert!(first.status.success() && said.contains("tuned.json is ignored"), "{said}");
+    let text = std::fs::read_to_string(&cache).unwrap();
+    assert!(Cache::parse(&text).is_ok());
+    let second = run();
+    let said = String::from_utf8_lossy(&second.stderr).into_owned();
+    assert!(second.status.success() && !said.contains("ignored"), "{said}");
+    assert!(String::from_utf8_lossy(&second.stdout).contains("0 layers tuned"));
+    assert_eq!(std::fs::read_to_string(&cache).unwrap(), text);
+}
