@@ -1,8 +1,13 @@
 //! `gi/` against its CPU twin, against arithmetic and against the laws it promises, on hand-made G-buffers.
 
+#[path = "../common/build.rs"]
+mod build;
 #[path = "../common/mod.rs"]
 mod common;
 mod edges;
+mod glossy;
+#[cfg(feature = "reference")]
+mod probes;
 mod screen;
 mod shot;
 mod stages;
@@ -10,6 +15,7 @@ mod taa;
 mod upsample;
 mod weights;
 mod whole;
+mod world;
 
 use bouncelight::gpu::Gpu;
 
