@@ -32,6 +32,8 @@ pub mod inputs;
 pub mod occlusion;
 pub mod pack;
 pub mod pass;
+#[cfg(feature = "reference")]
+pub mod probes;
 pub mod reconstruct;
 pub mod rung;
 pub mod ssgi;
@@ -76,6 +78,8 @@ pub struct Inputs<'a> {
     pub environment: [f32; 3],
     /// What lies beyond the picture, for methods that need it ([`Method::needs_world`]).
     pub world: Option<World<'a>>,
+    /// The analytic lights, for methods that light more than the picture; `None` counts as no lights there.
+    pub lights: Option<Lights<'a>>,
 }
 
 /// Tiny G-buffers, several views in one atlas; `render::atlas` says what the texels mean.
@@ -116,6 +120,15 @@ pub struct World<'a> {
     pub environment: &'a wgpu::TextureView,
 }
 
+/// The analytic lights on the GPU.
+#[derive(Debug, Clone, Copy)]
+pub struct Lights<'a> {
+    /// [`crate::scene::upload::LightGpu`] for each.
+    pub buffer: &'a wgpu::Buffer,
+    /// How many.
+    pub count: u32,
+}
+
 /// Which method fills the `indirect` texture of a frame.
 #[derive(Debug, Clone, Default)]
 pub enum Method {
@@ -132,6 +145,9 @@ pub enum Method {
     Cache,
     /// Either of the two with other options.
     World(cache::Options),
+    /// Surfels that a bake has linked, see [`probes`]. The bake must be of the scene that is drawn.
+    #[cfg(feature = "reference")]
+    Probes(std::sync::Arc<probes::Bake>),
     /// The network of these weights, see [`pass`].
     Neural(Box<crate::net::format::Weights>),
 }
@@ -146,6 +162,8 @@ impl Method {
             Method::Rsm => "rsm",
             Method::Cache => "cache",
             Method::World(options) => ["rsm", "cache"][usize::from(options.around)],
+            #[cfg(feature = "reference")]
+            Method::Probes(_) => "probes",
             Method::Neural(_) => "neural",
         }
     }
@@ -219,6 +237,9 @@ pub enum GiError {
         /// The network's own reason.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// A bake that the device cannot hold.
+    #[error("the bake cannot be used: {0}")]
+    Bake(String),
     /// Reading back failed.
     #[error(transparent)]
     Readback(#[from] ReadbackError),

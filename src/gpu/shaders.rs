@@ -151,6 +151,31 @@ pub const GI: &[Shader] = &[
         ],
     },
     Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
+    Shader {
+        name: "gi.probes_light",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "reference/traverse.wgsl",
+            "gi/probes_types.wgsl",
+            "gi/probes_light.wgsl"
+        ],
+    },
+    Shader {
+        name: "gi.probes_bounce",
+        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "gi/probes_types.wgsl", "gi/probes_bounce.wgsl"],
+    },
+    Shader {
+        name: "gi.probes_apply",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "gi/inputs.wgsl",
+            "gi/cells.wgsl",
+            "gi/probes_types.wgsl",
+            "gi/probes_apply.wgsl"
+        ],
+    },
     Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },
 ];
 

@@ -183,7 +183,7 @@ impl Renderer {
 
     /// What a GI method reads of the frame that was drawn with `view` and `environment`.
     pub fn gi_inputs(&self, view: &View, environment: [f32; 3]) -> gi::Inputs<'_> {
-        gi_inputs(&self.targets, view, environment, None)
+        gi_inputs(&self.targets, view, environment, None, None)
     }
 
     /// The textures that [`Renderer::record`] fills.
@@ -247,7 +247,7 @@ impl Renderer {
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
         self.passes.direct.record(recorder, inputs);
         let world = lighting.world.as_ref().map(|w| w.inputs(scene));
-        let inputs = gi_inputs(&self.targets, view, scene.environment.radiance, world);
+        let inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene), world);
         if let (Some(indirect), Some(taa)) = (&mut self.indirect, &self.taa) {
             indirect.set_frame(queue, taa.frames());
         }
@@ -297,6 +297,7 @@ fn gi_inputs<'a>(
     targets: &'a Targets,
     view: &View,
     environment: [f32; 3],
+    scene: Option<&'a SceneGpu>,
     world: Option<gi::World<'a>>,
 ) -> gi::Inputs<'a> {
     gi::Inputs {
@@ -309,6 +310,7 @@ fn gi_inputs<'a>(
         camera: view.matrices(),
         environment,
         world,
+        lights: scene.map(|s| gi::Lights { buffer: &s.light_buffer, count: s.lights.len() as u32 }),
     }
 }
 

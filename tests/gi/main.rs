@@ -6,6 +6,8 @@ mod build;
 mod common;
 mod edges;
 mod glossy;
+#[cfg(feature = "reference")]
+mod probes;
 mod screen;
 mod shot;
 mod stages;

@@ -41,7 +41,8 @@ fn sun(direction: [f32; 3], irradiance: f32) -> LightKind {
 
 fn renderer(gpu: &Gpu, size: [u32; 2], method: Method) -> Renderer {
     let shadow = ShadowOptions { sun_size: 256, cascades: 2, local_size: 256 };
-    Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions { method, shadow, ..Default::default() }).expect("the size fits")
+    Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions { method, shadow, ..Default::default() })
+        .expect("the size fits")
 }
 
 /// Indirect light and positions of the picture.
@@ -89,8 +90,7 @@ const BACKWARDS: [f32; 3] = [0.2, -0.7, 0.7];
 fn a_lit_panel_sends_what_its_form_factor_says() {
     let Some(gpu) = common::gpu() else { return };
     let build = |panel: f32| {
-        let blocks =
-            [([-5.0, -0.2, -5.0], [5.0, 0.0, 5.0], GREY), ([-4.2, 0.0, -2.0], [-4.0, 4.0, 2.0], [panel; 3])];
+        let blocks = [([-5.0, -0.2, -5.0], [5.0, 0.0, 5.0], GREY), ([-4.2, 0.0, -2.0], [-4.0, 4.0, 2.0], [panel; 3])];
         scene(&blocks, &[sun([-1.0, 0.0, 0.0], 2.0)], 0.0, Camera::look_at([0.0, 6.0, 0.001], [0.0, 0.0, 0.0], 1.2))
     };
     let (light, places) = lit(&gpu, &build(0.6), [96, 96], Method::Rsm);
