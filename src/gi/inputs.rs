@@ -44,6 +44,10 @@ pub struct Params {
     pub gravity_from_view: [[f32; 4]; 3],
     /// Columns of the rotation from world space to the gravity frame.
     pub gravity_from_world: [[f32; 4]; 3],
+    /// Columns of the rotation from view space to world space.
+    pub world_from_view: [[f32; 4]; 3],
+    /// The eye in world space, metres; one spare.
+    pub eye: [f32; 4],
 }
 
 impl Params {
@@ -71,7 +75,9 @@ impl Params {
         }
         let gravity_from_world = gravity_from_world(&view)?;
         let view_from_world = Mat3::from_cols(view.x_axis.truncate(), view.y_axis.truncate(), view.z_axis.truncate());
-        let gravity_from_view = gravity_from_world * view_from_world.transpose();
+        let world_from_view = view_from_world.transpose();
+        let gravity_from_view = gravity_from_world * world_from_view;
+        let eye = -(world_from_view * view.w_axis.truncate());
         let clean = environment.map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 });
         Ok(Self {
             size,
@@ -81,6 +87,8 @@ impl Params {
             environment: [clean[0], clean[1], clean[2], 0.0],
             gravity_from_view: columns(gravity_from_view),
             gravity_from_world: columns(gravity_from_world),
+            world_from_view: columns(world_from_view),
+            eye: eye.extend(0.0).to_array(),
         })
     }
 }
@@ -219,7 +227,7 @@ impl InputGroup {
 }
 
 /// A texture that is read by `textureLoad`; depth textures bind as unfilterable float, too.
-fn texture_entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
+pub(crate) fn texture_entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::COMPUTE,

@@ -3,10 +3,13 @@
 //!
 //! # What each method does, and what it cannot do
 //!
-//! [`ambient`] gives every surface the same light: the picture's mean light (direct, emission, sky) times one constant
-//! fitted to the training scenes. It costs one reduction and one write a pixel.
-//! It cannot say where light is: no corner darkens, no wall bleeds its colour, a sealed box glows, and two views of one
+//! [`ambient`] gives every surface one light from all around (the sky, and the mean of what the picture's surfaces send
+//! on, times two constants fitted to the training scenes), dimmed by ambient occlusion ([`occlusion`]).
+//! It cannot say where light is: no wall bleeds its colour, a closed room gets the sky's light, and two views of one
 //! room disagree because each has its own mean.
+//!
+//! [`ssgi`] gathers what the pixels around a pixel send on, by visibility bitmask ([`bitmask`]), and `ambient`'s light
+//! through what nothing blocks. It cannot do anything off the screen or hidden in it.
 //!
 //! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]) go through a U-Net, and its answer comes back
 //! to full resolution guided by depth and normal ([`reconstruct`]). It learns what direct light, albedo and shape in
@@ -14,19 +17,27 @@
 //! guess by the training set's mean, light enters and leaves with what is in view, nothing finer than a cell (4
 //! pixels) gets light of its own, and there is no specular light beyond what `composite` derives from E.
 //!
-//! Both scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
+//! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
 //! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
 
 pub mod ambient;
+pub mod bitmask;
+pub mod cache;
+pub mod cells;
+pub mod emitters;
 pub mod exposure;
 pub mod features;
 pub mod glossy;
 pub mod inputs;
+pub mod occlusion;
 pub mod pack;
 pub mod pass;
 pub mod reconstruct;
 pub mod rung;
+pub mod ssgi;
+pub mod surfels;
 pub mod twin;
+pub mod upsample;
 mod view_cache;
 
 pub use exposure::ExposurePass;
@@ -63,6 +74,46 @@ pub struct Inputs<'a> {
     pub camera: CameraMatrices,
     /// Radiance of the constant environment, W/(m²·sr).
     pub environment: [f32; 3],
+    /// What lies beyond the picture, for methods that need it ([`Method::needs_world`]).
+    pub world: Option<World<'a>>,
+}
+
+/// Tiny G-buffers, several views in one atlas; `render::atlas` says what the texels mean.
+#[derive(Debug, Clone, Copy)]
+pub struct Atlas<'a> {
+    /// Reversed-Z depth, `Depth32Float`.
+    pub depth: &'a wgpu::TextureView,
+    /// Diffuse reflectance, `Rgba8UnormSrgb`.
+    pub albedo: &'a wgpu::TextureView,
+    /// Octahedral world normal, `Rg16Float`.
+    pub normal: &'a wgpu::TextureView,
+    /// Emitted radiance, `Rgba16Float`.
+    pub emissive: &'a wgpu::TextureView,
+    /// `render::atlas::AtlasViewGpu` of each view, a storage buffer.
+    pub views: &'a wgpu::Buffer,
+}
+
+/// The rasterised world beyond the screen.
+#[derive(Debug, Clone, Copy)]
+pub struct World<'a> {
+    /// What each light sees.
+    pub rsm: Atlas<'a>,
+    /// First view and number of views for each light, `vec2u`; none for lights without a map.
+    pub rsm_of_light: &'a wgpu::Buffer,
+    /// Views in `rsm`.
+    pub rsm_views: u32,
+    /// Blocks of 8×8 texels in all views of `rsm`.
+    pub rsm_blocks: u32,
+    /// Blocks of the largest view.
+    pub rsm_most_blocks: u32,
+    /// The cube around the camera: faces +X, −X, +Y, −Y, +Z, −Z side by side.
+    pub around: Atlas<'a>,
+    /// `scene::upload::LightGpu` of each light, a storage buffer.
+    pub lights: &'a wgpu::Buffer,
+    /// Lights.
+    pub light_count: u32,
+    /// Lat-long picture of the surroundings, `Rgba32Float`; one texel for a constant sky.
+    pub environment: &'a wgpu::TextureView,
 }
 
 /// Which method fills the `indirect` texture of a frame.
@@ -70,9 +121,17 @@ pub struct Inputs<'a> {
 pub enum Method {
     /// None: `indirect` is 0. Shows what direct light alone gives.
     Direct,
-    /// One constant, see [`ambient`].
+    /// Even light times occlusion, see [`ambient`].
     #[default]
     Ambient,
+    /// One bounce in screen space, see [`ssgi`].
+    Ssgi,
+    /// One bounce from reflective shadow maps, see [`cache`].
+    Rsm,
+    /// All bounces and the sky from shadow maps and a cube around the camera, see [`cache`].
+    Cache,
+    /// Either of the two with other options.
+    World(cache::Options),
     /// The network of these weights, see [`pass`].
     Neural(Box<crate::net::format::Weights>),
 }
@@ -83,9 +142,35 @@ impl Method {
         match self {
             Method::Direct => "direct",
             Method::Ambient => "ambient",
+            Method::Ssgi => "ssgi",
+            Method::Rsm => "rsm",
+            Method::Cache => "cache",
+            Method::World(options) => ["rsm", "cache"][usize::from(options.around)],
             Method::Neural(_) => "neural",
         }
     }
+
+    /// What of the world beyond the screen the method reads.
+    pub fn needs_world(&self) -> NeedsWorld {
+        match self {
+            Method::Rsm => NeedsWorld::Lights,
+            Method::Cache => NeedsWorld::Around,
+            Method::World(options) if options.around => NeedsWorld::Around,
+            Method::World(_) => NeedsWorld::Lights,
+            _ => NeedsWorld::Nothing,
+        }
+    }
+}
+
+/// What of [`World`] the host has to draw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NeedsWorld {
+    /// Nothing: [`Inputs::world`] may be `None`.
+    Nothing,
+    /// What the lights see.
+    Lights,
+    /// That and the cube around the camera.
+    Around,
 }
 
 /// Why a method could not be made or recorded.
@@ -102,6 +187,9 @@ pub enum GiError {
     /// The camera is not a finite reversed-Z perspective camera.
     #[error("the camera cannot be used: {0}")]
     Camera(&'static str),
+    /// The method reads [`Inputs::world`], which is not there.
+    #[error("this method needs the world beyond the screen (`Inputs::world`), which the host did not supply")]
+    World,
     /// A texture view has another format, size or usage than [`Inputs`] says.
     #[error("texture `{name}` has {found}, but needs {expected}")]
     Texture {

@@ -1,0 +1,51 @@
+// Low-resolution directional light: which pixel stands for a cell, where that pixel is, and what a cell's light says
+// about a direction. A gather joins this file behind gi/inputs.wgsl; the prelude (`CellSide::prelude`) holds
+// CELL_SIDE, the pixels on a side of a cell.
+
+// A cell without any surface, in `cell_pixels`.
+const NO_PIXEL = 0xffffffffu;
+
+// One cell's light, a vec4f a colour channel: E/π(n) = max(0, channel.w + dot(channel.xyz, n)), n a world-space unit
+// normal near the cell's own.
+struct CellLight {
+    red: vec4f,
+    green: vec4f,
+    blue: vec4f,
+}
+
+// Cells of the picture: ceil(size / CELL_SIDE). Not `params.cells`, which are the network's.
+fn cell_grid() -> vec2u {
+    return (params.size + u32(CELL_SIDE) - 1u) / u32(CELL_SIDE);
+}
+
+// Where a cell stands in `cell_pixels`, and a third of where it stands in `light`.
+fn cell_index(cell: vec2u) -> u32 {
+    return cell.y * cell_grid().x + cell.x;
+}
+
+fn pack_pixel(pixel: vec2i) -> u32 {
+    return u32(pixel.x) | (u32(pixel.y) << 16u);
+}
+
+fn unpack_pixel(packed: u32) -> vec2i {
+    return vec2i(i32(packed & 0xffffu), i32(packed >> 16u));
+}
+
+// Metres, world space; `distance` is distance_at(pixel).
+fn world_position_at(pixel: vec2i, distance: f32) -> vec3f {
+    let uv = (vec2f(pixel) + 0.5) / vec2f(params.size);
+    let ndc = vec2f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y);
+    let ray = vec3f((ndc + params.unproject.zw) * params.unproject.xy, -1.0);
+    return params.world_from_view * (ray * distance) + params.eye.xyz;
+}
+
+// Unit normal, world space.
+fn world_normal_at(pixel: vec2i) -> vec3f {
+    return oct_decode(finite3(vec3f(textureLoad(normal_map, pixel, 0).rg, 0.0)).xy);
+}
+
+// E/π on a surface with unit normal `n` (world space).
+fn light_towards(light: CellLight, n: vec3f) -> vec3f {
+    let direction = vec4f(n, 1.0);
+    return max(vec3f(dot(light.red, direction), dot(light.green, direction), dot(light.blue, direction)), vec3f(0.0));
+}

@@ -1,0 +1,149 @@
+//! Cells of low-resolution light: which real pixel stands for each, so that a method gathers light once a cell.
+//!
+//! It is the middle one, unless another surface stands before the middle's: then that surface's pixel nearest to the
+//! middle. A cell that shows any surface has a pixel on one.
+//!
+//! A method at low resolution records [`CellsPass`], then its own gather, which joins `gi/cells.wgsl` behind
+//! `gi/inputs.wgsl`, reads [`CellsPass::pixels`] and writes its light buffer ([`CellSide::light_bytes`]), then
+//! [`UpsamplePass`](super::upsample::UpsamplePass).
+//!
+//! # The light buffer
+//! Three `vec4f` a cell, one a colour channel: `(bx, by, bz, a)` means E/π(n) = max(0, a + b·n) for a world-space unit
+//! normal n near the cell's own. A sum over emitters, each cut off at the cell's horizon, is exactly a = 0 and
+//! b = Σ L·ω (per π); a spherical harmonic gives a and b. What stands in the rows of cells without a surface is not read.
+
+use super::exposure::{pipeline, storage_entry};
+use super::inputs::{BoundInputs, InputGroup};
+use super::rung::Cost;
+use crate::gpu::shaders;
+use crate::gpu::timing::Recorder;
+
+/// What `cell_pixels` holds for a cell that shows the background only; `NO_PIXEL` in `shaders/gi/cells.wgsl`.
+pub const NO_PIXEL: u32 = u32::MAX;
+
+/// Pixels on a side of a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CellSide {
+    /// Quarter resolution.
+    Four,
+    /// Eighth resolution.
+    Eight,
+}
+
+impl CellSide {
+    /// The number.
+    pub fn pixels(self) -> u32 {
+        match self {
+            CellSide::Four => 4,
+            CellSide::Eight => 8,
+        }
+    }
+
+    /// Columns and rows of cells of a picture of `size` pixels.
+    pub fn grid(self, size: [u32; 2]) -> [u32; 2] {
+        size.map(|n| n.div_ceil(self.pixels()))
+    }
+
+    /// Cells of a picture of `size` pixels.
+    pub fn count(self, size: [u32; 2]) -> u64 {
+        let [w, h] = self.grid(size).map(u64::from);
+        w * h
+    }
+
+    /// Size of the light buffer of a picture of `size` pixels, bytes: 48 a cell.
+    pub fn light_bytes(self, size: [u32; 2]) -> u64 {
+        self.count(size) * 48
+    }
+
+    /// `CELL_SIDE` as WGSL, for every shader that joins `gi/cells.wgsl`.
+    pub fn prelude(self) -> String {
+        format!("const CELL_SIDE = {}i;\n", self.pixels())
+    }
+}
+
+/// The pass that chooses, and the buffer it fills.
+pub struct CellsPass {
+    device: wgpu::Device,
+    side: CellSide,
+    pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+    size: [u32; 2],
+    pixels: wgpu::Buffer,
+    group: wgpu::BindGroup,
+}
+
+impl CellsPass {
+    /// Compiles the shader and makes the buffer for pictures of `size` pixels.
+    pub fn new(device: &wgpu::Device, inputs: &InputGroup, side: CellSide, size: [u32; 2]) -> Self {
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("gi.cells"),
+            entries: &[storage_entry(0, false)],
+        });
+        let module = shaders::module_with(device, "gi.cells", &side.prelude());
+        let pipeline = pipeline(device, "gi.cells", &module, "choose", inputs, &layout);
+        let (pixels, group) = buffer(device, &layout, side, size);
+        Self { device: device.clone(), side, pipeline, layout, size, pixels, group }
+    }
+
+    /// Makes the buffer anew when `size` is another; then (true) whoever bound [`pixels`](Self::pixels) binds it again.
+    pub fn fit(&mut self, size: [u32; 2]) -> bool {
+        if size == self.size {
+            return false;
+        }
+        (self.pixels, self.group) = buffer(&self.device, &self.layout, self.side, size);
+        self.size = size;
+        true
+    }
+
+    /// Records pass `gi.cells` for inputs of the size that was last given to [`new`](Self::new) or [`fit`](Self::fit).
+    pub fn record(&self, recorder: &mut Recorder<'_>, inputs: &BoundInputs) {
+        let [w, h] = self.side.grid(inputs.size);
+        recorder.compute("gi.cells", |pass| {
+            inputs.set(pass);
+            pass.set_bind_group(1, &self.group, &[]);
+            pass.set_pipeline(&self.pipeline);
+            pass.dispatch_workgroups(w.div_ceil(8), h.div_ceil(8), 1);
+        });
+    }
+
+    /// One `u32` a cell, row by row: x | y << 16 of its pixel, or [`NO_PIXEL`].
+    pub fn pixels(&self) -> &wgpu::Buffer {
+        &self.pixels
+    }
+
+    /// Pixels on a side of a cell.
+    pub fn side(&self) -> CellSide {
+        self.side
+    }
+
+    /// GPU memory, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.pixels.size()
+    }
+
+    /// What the pass costs for a picture of `size` pixels: 45 operations and one depth a pixel.
+    pub fn cost(side: CellSide, size: [u32; 2]) -> Cost {
+        let pixels = f64::from(size[0]) * f64::from(size[1]);
+        Cost::new("gi.cells", pixels * 45.0, pixels * 4.0 + side.count(size) as f64 * 8.0)
+    }
+}
+
+fn buffer(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    side: CellSide,
+    size: [u32; 2],
+) -> (wgpu::Buffer, wgpu::BindGroup) {
+    let pixels = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("gi.cell_pixels"),
+        size: (side.count(size) * 4).max(4),
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+        mapped_at_creation: false,
+    });
+    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("gi.cells"),
+        layout,
+        entries: &[wgpu::BindGroupEntry { binding: 0, resource: pixels.as_entire_binding() }],
+    });
+    (pixels, group)
+}
