@@ -66,6 +66,9 @@ pub struct Part {
     pub blocks: u32,
 }
 
+/// First output pixel of a phase, and its padding.
+type Phase = ([u32; 2], [i32; 2]);
+
 /// How one step runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Kernel {
@@ -217,7 +220,7 @@ impl Kernel {
         &mut self,
         prelude: &mut Prelude,
         filter: Filter,
-        phases: &[([u32; 2], [i32; 2])],
+        phases: &[Phase],
         out: Shape,
         row: bool,
         plan: &Plan,
@@ -244,7 +247,7 @@ impl Kernel {
         let blocks = out.vectors().div_ceil(vectors);
         let dispatches = if uniform { blocks.div_ceil(layer.uniform_blocks(vectors)) } else { 1 };
         self.blocks_per_part = blocks.div_ceil(dispatches);
-        let part = |(phase, pad): ([u32; 2], [i32; 2])| {
+        let part = |(phase, pad): Phase| {
             let each = self.blocks_per_part;
             (0..blocks).step_by(each as usize).map(move |first_block| {
                 let blocks = each.min(blocks - first_block);
@@ -306,7 +309,7 @@ impl Kernel {
 /// A convolution of a picture enlarged `n` times is n² convolutions of the picture itself, one for each phase of the output, with
 /// the taps that meet the same pixel added up: 4×4 after ×2 has 25 taps in four phases instead of 64. Taps of the largest phase,
 /// and each phase with its padding.
-fn merged([h, w]: [u32; 2], pad: [i32; 2], n: i32) -> ([u32; 2], Vec<([u32; 2], [i32; 2])>) {
+fn merged([h, w]: [u32; 2], pad: [i32; 2], n: i32) -> ([u32; 2], Vec<Phase>) {
     let least = |phase: i32, pad: i32| (phase - pad).div_euclid(n);
     let taps = |edge: u32, pad: i32| {
         let of = |phase: i32| (phase + edge as i32 - 1 - pad).div_euclid(n) - least(phase, pad) + 1;
