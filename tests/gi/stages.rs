@@ -111,7 +111,7 @@ fn ambient_is_its_twin_and_linear() {
     for (seed, size) in SIZES.into_iter().enumerate() {
         let shot = Shot::random(size, seed as u64);
         let (exposure, light) = ambient(&gpu, &shot);
-        let twin = shot.picture().ambient(&exposure);
+        let twin = shot.picture().ambient(&exposure, &vec![1.0; light.len()]);
         assert!(largest_excess(&light, &twin) < 1e-4, "{size:?}");
         let background = shot.buffers.depth.iter().zip(&light).filter(|(d, _)| **d == 0.0);
         assert!(background.into_iter().all(|(_, l)| *l == [0.0; 3]));
