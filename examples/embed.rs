@@ -57,6 +57,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         direct,
         camera: CameraMatrices { view_from_world: identity, clip_from_view: projection },
         environment: [0.05; 3],
+        lights: None,
+        world: None,
     };
 
     // One frame: the host's passes, then ours, then the host submits.

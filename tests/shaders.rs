@@ -35,9 +35,9 @@ fn every_shader_validates_in_every_permutation() {
     assert_eq!(seen.len(), shaders::all().count(), "every row of the table was seen");
     assert_eq!(
         (shaders::RENDER.len(), shaders::GI.len(), shaders::NET.len(), shaders::REFERENCE.len()),
-        (8, 17, 26, 3)
+        (8, 21, 26, 3)
     );
-    assert_eq!(permutations.len(), 258);
+    assert_eq!(permutations.len(), 262);
 }
 
 #[test]
@@ -118,8 +118,12 @@ fn structs_lie_in_memory_as_their_rust_twins() {
 #[test]
 #[cfg(feature = "reference")]
 fn the_path_tracers_structs_lie_in_memory_as_their_rust_twins() {
+    use bouncelight::gi::probes::ProbeParams;
     use bouncelight::reference::Job;
     use bouncelight::reference::scene::{ImageUse, RefMaterial, SceneInfo};
+    same_layout!("gi.probes_light", "ProbeParams", ProbeParams, size size_of::<ProbeParams>(), [
+        surfels, rays, inner_rays, light_count, environment, side, centre, table_mask, spacing, seed,
+    ]);
     same_layout!("reference.path", "SceneInfo", SceneInfo, size size_of::<SceneInfo>(), [
         environment, flags, light_count, truth_table, truth_count, analytic_table, environment_share,
         environment_share_alone, environment_texels, environment_table, environment_size,

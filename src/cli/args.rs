@@ -96,6 +96,8 @@ pub enum MethodName {
     Rsm,
     /// All bounces and the sky from what lights and a cube around the camera see.
     Cache,
+    /// Surfels that a bake has linked; holds for static geometry.
+    Probes,
     /// The network.
     Neural,
     /// The path tracer, which converges to the truth.
@@ -104,12 +106,13 @@ pub enum MethodName {
 
 impl MethodName {
     /// All real-time methods, cheapest first.
-    pub const REAL_TIME: [MethodName; 6] = [
+    pub const REAL_TIME: [MethodName; 7] = [
         MethodName::Direct,
         MethodName::Ambient,
         MethodName::Ssgi,
         MethodName::Rsm,
         MethodName::Cache,
+        MethodName::Probes,
         MethodName::Neural,
     ];
 
@@ -122,6 +125,7 @@ impl MethodName {
             MethodName::Rsm => Method::Rsm,
             MethodName::Cache => Method::Cache,
             MethodName::Neural => Method::Neural(Box::new(load_weights(weights)?)),
+            MethodName::Probes => return Err(usage("`probes` needs a bake, which this command does not make".into())),
             MethodName::Reference => return Err(usage("`reference` is no real-time method".into())),
         })
     }

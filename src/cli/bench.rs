@@ -3,6 +3,7 @@
 use super::{
     args::{Global, MethodName, SceneArgs, usage},
     error::CliError,
+    probes::BakeArgs,
 };
 use crate::{
     gi::rung::Cost,
@@ -28,6 +29,8 @@ pub struct Args {
     /// Weights of `neural`; the shipped ones when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
+    #[command(flatten)]
+    bake: BakeArgs,
     /// Frames that count.
     #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
@@ -91,7 +94,10 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let options = BenchOptions { frames: args.frames, warmup: args.warmup };
     let mut methods = Vec::new();
     for name in &args.method.0 {
-        let method = name.method(args.weights.as_ref())?;
+        let method = match name {
+            MethodName::Probes => args.bake.bake(global, &scene, &camera)?,
+            name => name.method(args.weights.as_ref())?,
+        };
         let mut renderer =
             Renderer::new(&gpu.device, &gpu.queue, args.scene.size, RendererOptions { method, ..Default::default() })?;
         methods.push(measure(&gpu, &mut renderer, &uploaded, &camera, options)?);

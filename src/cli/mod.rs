@@ -10,6 +10,7 @@ mod dataset;
 mod doctor;
 pub mod error;
 mod interrupt;
+mod probes;
 mod progress;
 mod reference;
 mod render;

@@ -5,6 +5,7 @@ use super::{
     compare::{Heat, Shown, shown_bytes},
     error::CliError,
     interrupt,
+    probes::BakeArgs,
     progress::Progress,
     reference,
 };
@@ -67,6 +68,8 @@ pub struct Args {
     /// Picture of where they differ: FLIP's map for flip and hdrflip, else the mean difference up to a quarter.
     #[arg(long, requires = "reference", value_name = "PNG")]
     diff: Option<PathBuf>,
+    #[command(flatten)]
+    bake: BakeArgs,
     // Last, since its heading would go on to what follows.
     #[command(flatten)]
     tracing: reference::Flags,
@@ -112,9 +115,14 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let format = check(&args)?;
     let task = match args.method {
         MethodName::Reference => Task::Trace(args.tracing.task(args.scene.size, args.seed, args.aov.as_deref())?),
-        method => {
+        name => {
             let layers = args.aov.as_deref().map(|text| parse_layers(text, &Layer::ALL, Layer::name)).transpose()?;
-            Task::Rasterise(method.method(args.weights.as_ref())?, layers.unwrap_or_default())
+            // Probes are baked once the scene is there.
+            let method = match name {
+                MethodName::Probes => None,
+                _ => Some(name.method(args.weights.as_ref())?),
+            };
+            Task::Rasterise(method, layers.unwrap_or_default())
         }
     };
     if let Task::Trace(task) = &task {
@@ -129,7 +137,10 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let gpu = global.open_gpu()?;
     let drawn = match task {
         Task::Trace(task) => task.run(global, &gpu, &scene, &camera)?,
-        Task::Rasterise(method, layers) => rasterise(global, &args, &gpu, (&scene, &camera), method, &layers)?,
+        Task::Rasterise(method, layers) => {
+            let method = method.map_or_else(|| args.bake.bake(global, &scene, &camera), Ok)?;
+            rasterise(global, &args, &gpu, (&scene, &camera), method, &layers)?
+        }
     };
     write(&args, format, &drawn, &metadata(&gpu, &drawn))?;
     match reference {
@@ -140,7 +151,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
 
 /// What is to be done, with everything that only flags decide.
 enum Task {
-    Rasterise(Method, Vec<Layer>),
+    Rasterise(Option<Method>, Vec<Layer>),
     Trace(reference::Task),
 }
 

@@ -126,6 +126,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.occlusion", super::bitmask::March::NEAR.prelude()),
         ("gi.radiance", super::ssgi::SsgiOptions::default().prelude()),
         ("gi.ssgi", super::ssgi::SsgiOptions::default().prelude()),
+        ("gi.probes_apply", super::cells::CellSide::Four.prelude()),
         ("gi.pack", FeatureSet::all().prelude()),
         ("gi.pack", few.prelude()),
         ("gi.reconstruct", super::reconstruct::prelude()),

@@ -3,10 +3,13 @@
 //!
 //! # What each method does, and what it cannot do
 //!
-//! [`ambient`] gives every surface the same light: the picture's mean light (direct, emission, sky) times one constant
-//! fitted to the training scenes. It costs one reduction and one write a pixel.
-//! It cannot say where light is: no corner darkens, no wall bleeds its colour, a sealed box glows, and two views of one
+//! [`ambient`] gives every surface one light from all around (the sky, and the mean of what the picture's surfaces send
+//! on, times two constants fitted to the training scenes), dimmed by ambient occlusion ([`occlusion`]).
+//! It cannot say where light is: no wall bleeds its colour, a closed room gets the sky's light, and two views of one
 //! room disagree because each has its own mean.
+//!
+//! [`ssgi`] gathers what the pixels around a pixel send on, by visibility bitmask ([`bitmask`]), and `ambient`'s light
+//! through what nothing blocks. It cannot do anything off the screen or hidden in it.
 //!
 //! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]) go through a U-Net, and its answer comes back
 //! to full resolution guided by depth and normal ([`reconstruct`]). It learns what direct light, albedo and shape in
@@ -14,7 +17,7 @@
 //! guess by the training set's mean, light enters and leaves with what is in view, nothing finer than a cell (4
 //! pixels) gets light of its own, and there is no specular light beyond what `composite` derives from E.
 //!
-//! Both scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
+//! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
 //! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
 
 pub mod ambient;
@@ -29,6 +32,8 @@ pub mod inputs;
 pub mod occlusion;
 pub mod pack;
 pub mod pass;
+#[cfg(feature = "reference")]
+pub mod probes;
 pub mod reconstruct;
 pub mod rung;
 pub mod ssgi;
@@ -73,6 +78,8 @@ pub struct Inputs<'a> {
     pub environment: [f32; 3],
     /// What lies beyond the picture, for methods that need it ([`Method::needs_world`]).
     pub world: Option<World<'a>>,
+    /// The analytic lights, for methods that light more than the picture; `None` counts as no lights there.
+    pub lights: Option<Lights<'a>>,
 }
 
 /// Tiny G-buffers, several views in one atlas; `render::atlas` says what the texels mean.
@@ -113,12 +120,21 @@ pub struct World<'a> {
     pub environment: &'a wgpu::TextureView,
 }
 
+/// The analytic lights on the GPU.
+#[derive(Debug, Clone, Copy)]
+pub struct Lights<'a> {
+    /// [`crate::scene::upload::LightGpu`] for each.
+    pub buffer: &'a wgpu::Buffer,
+    /// How many.
+    pub count: u32,
+}
+
 /// Which method fills the `indirect` texture of a frame.
 #[derive(Debug, Clone, Default)]
 pub enum Method {
     /// None: `indirect` is 0. Shows what direct light alone gives.
     Direct,
-    /// One constant, see [`ambient`].
+    /// Even light times occlusion, see [`ambient`].
     #[default]
     Ambient,
     /// One bounce in screen space, see [`ssgi`].
@@ -129,6 +145,9 @@ pub enum Method {
     Cache,
     /// Either of the two with other options.
     World(cache::Options),
+    /// Surfels that a bake has linked, see [`probes`]. The bake must be of the scene that is drawn.
+    #[cfg(feature = "reference")]
+    Probes(std::sync::Arc<probes::Bake>),
     /// The network of these weights, see [`pass`].
     Neural(Box<crate::net::format::Weights>),
 }
@@ -143,6 +162,8 @@ impl Method {
             Method::Rsm => "rsm",
             Method::Cache => "cache",
             Method::World(options) => ["rsm", "cache"][usize::from(options.around)],
+            #[cfg(feature = "reference")]
+            Method::Probes(_) => "probes",
             Method::Neural(_) => "neural",
         }
     }
@@ -216,6 +237,9 @@ pub enum GiError {
         /// The network's own reason.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// A bake that the device cannot hold.
+    #[error("the bake cannot be used: {0}")]
+    Bake(String),
     /// Reading back failed.
     #[error(transparent)]
     Readback(#[from] ReadbackError),

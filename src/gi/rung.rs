@@ -72,6 +72,8 @@ pub fn build(
         Method::Rsm => Some(Box::new(WorldGi::new(device, size, cache::Options::RSM))),
         Method::Cache => Some(Box::new(WorldGi::new(device, size, cache::Options::CACHE))),
         Method::World(options) => Some(Box::new(WorldGi::new(device, size, *options))),
+        #[cfg(feature = "reference")]
+        Method::Probes(bake) => Some(Box::new(super::probes::ProbesGi::new(device, queue, bake)?)),
         Method::Neural(weights) => Some(Box::new(NeuralGi::new(device, queue, weights, Options { size })?)),
     })
 }

@@ -87,8 +87,19 @@ pub const GI: &[Shader] = &[
         files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/half.wgsl", "gi/ssgi_full.wgsl"],
     },
     Shader {
+        name: "gi.lit",
+        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/outgoing.wgsl", "gi/lit.wgsl"],
+    },
+    Shader {
         name: "gi.glossy",
-        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/glossy.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/frame.wgsl",
+            "lib/brdf.wgsl",
+            "lib/environment.wgsl",
+            "gi/outgoing.wgsl",
+            "gi/glossy.wgsl"
+        ],
     },
     Shader {
         name: "gi.cells",
@@ -140,6 +151,31 @@ pub const GI: &[Shader] = &[
         ],
     },
     Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
+    Shader {
+        name: "gi.probes_light",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "reference/traverse.wgsl",
+            "gi/probes_types.wgsl",
+            "gi/probes_light.wgsl"
+        ],
+    },
+    Shader {
+        name: "gi.probes_bounce",
+        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "gi/probes_types.wgsl", "gi/probes_bounce.wgsl"],
+    },
+    Shader {
+        name: "gi.probes_apply",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "gi/inputs.wgsl",
+            "gi/cells.wgsl",
+            "gi/probes_types.wgsl",
+            "gi/probes_apply.wgsl"
+        ],
+    },
     Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },
 ];
 

@@ -1,10 +1,17 @@
 //! `gi/` against its CPU twin, against arithmetic and against the laws it promises, on hand-made G-buffers.
 
+#[path = "../common/build.rs"]
+mod build;
 #[path = "../common/mod.rs"]
 mod common;
 mod edges;
+mod glossy;
+#[cfg(feature = "reference")]
+mod probes;
+mod screen;
 mod shot;
 mod stages;
+mod taa;
 mod upsample;
 mod weights;
 mod whole;
