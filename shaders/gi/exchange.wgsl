@@ -12,7 +12,7 @@ fn exchange(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
     let here = surfels[group.x];
     var sum = vec4f(0.0);
     for (var k = i; k < SURFELS; k += 64u) {
-        let a = arrival(surfels[k].position, surfels[k].normal, 0.0, surfels[k].area, here.position);
+        let a = arrival(surfels[k].position, surfels[k].normal, 0.0, surfels[k].area, here.position, here.normal);
         sum += vec4f(sent[k].rgb, 1.0) * (a.factor * max(dot(a.towards, here.normal), 0.0));
     }
     partial[i] = sum;

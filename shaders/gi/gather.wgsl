@@ -32,7 +32,7 @@ fn add(sum: ptr<function, Sum>, v: vec3f, radiance: vec3f) {
 
 // What an emitter of a reflective shadow map sends to `p`, above the horizon of the receiver's normal `n`.
 fn add_emitter(sum: ptr<function, Sum>, e: Emitter, p: vec3f, n: vec3f) {
-    let a = arrival(e.position, e.normal, e.rest, e.area, p);
+    let a = arrival(e.position, e.normal, e.rest, e.area, p, n);
     let light = e.radiance * a.factor + e.gloss * (a.plain * lobe(e.mirror, -a.towards));
     add(sum, select(vec3f(0.0), a.towards, dot(a.towards, n) > 0.0), light);
 }
@@ -89,7 +89,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
             tile[i].radiance = sent[first + i].rgb - s.mapped;
             workgroupBarrier();
             for (var k = 0u; k < 64u; k++) {
-                let a = arrival(tile[k].position, tile[k].normal, 0.0, tile[k].area, p);
+                let a = arrival(tile[k].position, tile[k].normal, 0.0, tile[k].area, p, n);
                 let v = select(vec3f(0.0), a.towards * a.factor, dot(a.towards, n) > 0.0);
                 covered += v;
                 share += dot(v, n);

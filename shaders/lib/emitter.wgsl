@@ -36,22 +36,25 @@ fn lobe(mirror: vec3f, ray: vec3f) -> f32 {
     return 4.5 * c2 * c2 * c2 * c2;
 }
 
-// What a disc sends to `p`, not yet times the receiver's cosine.
+// What a disc sends to a receiver.
 struct Arrival {
     // Unit vector from the receiver to the disc.
     towards: vec3f,
-    // Form factor of a diffuse disc; in the distance cosine · area / (π d²). The area in the denominator keeps it finite
-    // close up: a disc seen from its axis is exactly that.
+    // Form factor of a diffuse disc without the receiver's cosine; in the distance cosine · area / (π d²).
     factor: f32,
     // The same without the disc's cosine; 0 behind the disc.
     plain: f32,
 }
 
-fn arrival(at: vec3f, normal: vec3f, rest: f32, area: f32, p: vec3f) -> Arrival {
+// `p` and `n` are the receiver's. The term behind the plus keeps the form factor below 1 close up: a disc seen from its
+// axis is exactly that, and with both cosines in it a wall cut into discs gives the floor beside it what it should (with
+// 4.4 m discs 2 m away 0.473 of 0.475; without them 0.406).
+fn arrival(at: vec3f, normal: vec3f, rest: f32, area: f32, p: vec3f, n: vec3f) -> Arrival {
     let v = at - p;
     let d2 = max(dot(v, v), 1e-12);
     let towards = v * inverseSqrt(d2);
-    let cosine = -dot(normal, towards);
-    let plain = area / (PI * d2 + area);
-    return Arrival(towards, (max(cosine, 0.0) + rest) * plain, select(0.0, plain, cosine > 0.0));
+    let facing = -dot(normal, towards);
+    let cosine = max(facing, 0.0) + rest;
+    let plain = area / (PI * d2 + area * cosine * max(dot(n, towards), 0.0));
+    return Arrival(towards, cosine * plain, select(0.0, plain, facing > 0.0));
 }

@@ -13,7 +13,7 @@ const NEAR: f32 = 0.02;
 
 /// Share of the light reflected by specular lobes that surfels send on as if it were diffuse. All of it would be too
 /// much under an open sky: what falls in from above is mirrored upwards. Fitted to six training rooms.
-const SPECULAR: f32 = 0.5;
+const SPECULAR: f32 = 0.7;
 
 /// The cube.
 pub struct Around {
