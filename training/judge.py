@@ -1,13 +1,23 @@
-"""Pictures of the rooms kept for judging, by every method, against Cycles: the accuracy table of docs/accuracy.md.
+"""Pictures by every method against Cycles: the accuracy table of docs/accuracy.md.
 
     python training/cycles/paper_rooms.py data/judge --rooms 0,27,33,37,47 --views 1 --size 1024x512 --spp 64 --denoise --judge
-    python training/judge.py data/judge out/judge --constant 0.0592,0.0631,0.0570 [--samples 4] [--bouncelight target/release/bouncelight]
+    python training/judge.py out/judge data/judge [../shared/reference/cycles] [--methods direct,ambient,...] [--samples 4]
+                             [--constant 0.0592,0.0631,0.0570] [--csv out/judge.csv] [--bouncelight target/release/bouncelight]
 
---constant is the one ambient light (E/pi) that fits the training rooms best (python -m bouncelight_training.baseline); its row is
-the floor that a network has to pass. `best constant` is fitted to each picture itself, by least absolute error before the view
-transform: nobody can know it, it is there for scale. Prints one Markdown row a method: means over the rooms.
+A folder of references holds either roomIIII_view0.exr, as cycles/paper_rooms.py writes them, or one folder a scene with scene.glb,
+frame0000.exr and meta.json. Rooms are averaged into one row a method; other scenes get a row each. Pictures that exist
+are kept, so a killed run goes on where it stopped: empty the folder when the program changed.
+
+Rows that are no methods: with --constant, that one ambient light (E/pi; python -m bouncelight_training.baseline fits it to the
+training rooms), the floor that everything else has to pass; `best constant` is fitted to each picture itself, by least absolute error
+before the view transform: nobody can know it, it is there for scale.
+
+`light` is the error of the diffuse light that direct lighting misses: mean |difference| / mean after 4x4 pooling, on pixels with
+a surface, against Cycles' DiffInd + DiffDir - our DiffDir (Cycles counts the sky into DiffDir). With 64 samples a pixel Cycles' own
+noise is about 0.02 of it.
 """
 import argparse
+import csv
 import json
 import os
 import re
@@ -17,7 +27,7 @@ import sys
 import numpy as np
 import OpenEXR
 
-METRICS = ["l1", "l2", "paper-ssim", "fid", "psnr", "ssim", "relmse"]
+METRICS = ["l1", "l2", "paper-ssim", "fid", "psnr", "ssim", "flip", "relmse", "light"]
 
 
 def layers(path):
@@ -36,7 +46,7 @@ def write(path, image):
 
 
 def with_constant(direct, light):
-    """The raster's direct light plus a constant diffuse light everywhere, its glossy share by the split sum as in composite."""
+    """The raster's direct light plus a constant diffuse light everywhere, its glossy share by the split sum."""
     on_surface = (direct["Depth.Z"] < 1e9)[..., None]
     return rgb(direct, "") + on_surface * (rgb(direct, "DiffCol") + rgb(direct, "GlossCol")) * np.asarray(light, np.float32)
 
@@ -55,49 +65,90 @@ def best_constant(direct, reference):
     return light
 
 
+def pooled(light, weight):
+    """4x4 means of light where weight is 1."""
+    h, w = (n // 4 * 4 for n in weight.shape)
+    block = lambda a: a[:h, :w].reshape(h // 4, 4, w // 4, 4, -1).sum((1, 3))
+    total = block(weight[..., None])
+    return block(light * weight[..., None]) / np.maximum(total, 1), total[..., 0] > 8
+
+
+def light_error(ours, direct, reference):
+    """The error of the light itself, see above."""
+    weight = ((direct["Depth.Z"] < 1e9) & (rgb(direct, "DiffCol").min(-1) > 0.01)).astype(np.float32)
+    truth, full = pooled(rgb(reference, "DiffInd") + rgb(reference, "DiffDir") - rgb(direct, "DiffDir"), weight)
+    guess, _ = pooled(rgb(ours, "DiffInd"), weight)
+    return float(np.abs(guess - truth)[full].mean() / truth[full].mean())
+
+
+def references(folder):
+    """(group, name, scene arguments, reference picture) of each scene in a folder of references."""
+    for name in sorted(os.listdir(folder)):
+        path = os.path.join(folder, name)
+        room = re.fullmatch(r"room(\d+)_view0\.exr", name)
+        if room:
+            yield "paper rooms", name.removesuffix(".exr"), [f"paper-room:{int(room[1])}"], path
+        elif os.path.exists(os.path.join(path, "scene.glb")):
+            with open(os.path.join(path, "meta.json")) as f:
+                meta = json.load(f)
+            # Cycles' point light has a radius of 0.5 m, which glTF cannot say.
+            flags = ["--environment", str(meta["world"])] + (["--light-radius", "0.5"] if meta["light"] == "point" else [])
+            yield name, name, [os.path.join(path, "scene.glb"), *flags], os.path.join(path, "frame0000.exr")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("cycles", help="folder of cycles/paper_rooms.py")
     parser.add_argument("out", help="folder for our pictures")
-    parser.add_argument("--constant", required=True, type=lambda t: [float(v) for v in t.split(",")])
+    parser.add_argument("references", nargs="+", help="folders of Cycles' pictures")
+    parser.add_argument("--methods", default="direct,ambient,ssgi,rsm,cache,probes,neural", type=lambda t: t.split(","))
+    parser.add_argument("--constant", type=lambda t: [float(v) for v in t.split(",")])
     parser.add_argument("--samples", type=int, default=4)
     parser.add_argument("--weights")
+    parser.add_argument("--csv", help="also write every scene's numbers here")
     parser.add_argument("--bouncelight", default="target/release/bouncelight")
     a = parser.parse_args()
     os.makedirs(a.out, exist_ok=True)
-    rows = {}
+    rows, record = {}, []
 
-    def compare(row, ours, reference):
-        record = ours + ".json"
-        subprocess.run([a.bouncelight, "compare", ours, reference, "--json", record, "--metric", "l1"], check=True, stdout=subprocess.DEVNULL)
-        with open(record) as f:
+    def compare(group, name, row, ours, reference, light=float("nan")):
+        result = ours + ".json"
+        if not os.path.exists(result) or os.path.getmtime(result) < os.path.getmtime(ours):
+            subprocess.run([a.bouncelight, "compare", ours, reference, "--json", result, "-q"], check=True, stdout=subprocess.DEVNULL)
+        with open(result) as f:
             r = json.load(f)
-        values = [r["paper"]["l1"], r["paper"]["l2"], r["paper"]["ssim"], r["paper"]["fid"], r["display"]["psnr"], r["display"]["ssim"], r["linear"]["rel_mse"]]
-        rows.setdefault(row, []).append(values)
+        paper, display, linear = r["paper"], r["display"], r["linear"]
+        values = [paper["l1"], paper["l2"], paper["ssim"], paper["fid"], display["psnr"], display["ssim"], r["flip"], linear["rel_mse"], light]
+        rows.setdefault(group, {}).setdefault(row, []).append(values)
+        record.append([name, row, *values])
 
-    for name in sorted(os.listdir(a.cycles)):
-        match = re.fullmatch(r"room(\d+)_view0\.exr", name)
-        if not match:
-            continue
-        room, reference = int(match[1]), os.path.join(a.cycles, name)
-        pictures = {}
-        for method in ("direct", "ambient", "neural"):
-            pictures[method] = os.path.join(a.out, f"room{room:04}_{method}.exr")
-            command = [a.bouncelight, "render", f"paper-room:{room}", "-o", pictures[method], "--method", method, "--samples", str(a.samples), "--aov", "all", "-q"]
-            if method == "neural" and a.weights:
-                command += ["--weights", a.weights]
-            subprocess.run(command, check=True)
-            compare(method, pictures[method], reference)
-        direct, truth = layers(pictures["direct"]), layers(reference)
-        for row, light in (("constant", a.constant), ("best constant", best_constant(direct, truth))):
-            path = os.path.join(a.out, f"room{room:04}_{row.replace(' ', '_')}.exr")
-            write(path, with_constant(direct, light))
-            compare(row, path, reference)
-        print(f"room {room}: " + ", ".join(f"{row} {values[-1][0]:.0f}" for row, values in rows.items()), file=sys.stderr, flush=True)
-    print("| method | " + " | ".join(METRICS) + " |\n|" + "---|" * (len(METRICS) + 1))
-    for row, values in rows.items():
-        m = np.mean(values, 0)
-        print(f"| {row} | {m[0]:,.0f} | {m[1]:,.0f} | {m[2]:.4f} | {m[3]:.4f} | {m[4]:.2f} | {m[5]:.4f} | {m[6]:.4f} |")
+    for folder in a.references:
+        for group, name, scene, reference in references(folder):
+            truth, drawn = layers(reference), {}
+            for method in ["direct"] + [m for m in a.methods if m != "direct"]:
+                path = os.path.join(a.out, f"{name}_{method}.exr")
+                if not os.path.exists(path):
+                    command = [a.bouncelight, "render", *scene, "-o", path, "--method", method, "--samples", str(a.samples), "--aov", "all", "-q"]
+                    subprocess.run(command + (["--weights", a.weights] if method == "neural" and a.weights else []), check=True)
+                drawn[method] = layers(path)
+                if method in a.methods:
+                    compare(group, name, method, path, reference, light_error(drawn[method], drawn["direct"], truth))
+            extra = [("constant", with_constant(drawn["direct"], a.constant))] if a.constant else []
+            extra += [("best constant", with_constant(drawn["direct"], best_constant(drawn["direct"], truth)))]
+            for row, picture in extra:
+                path = os.path.join(a.out, f"{name}_{row.replace(' ', '_')}.exr")
+                if not os.path.exists(path):
+                    write(path, picture)
+                compare(group, name, row, path, reference)
+            print(f"{name}: L1 " + ", ".join(f"{row} {values[-1][0]:,.0f}" for row, values in rows[group].items()), file=sys.stderr, flush=True)
+    for group, methods in rows.items():
+        print(f"\n| {group} | " + " | ".join(METRICS) + " |\n|" + "---|" * (len(METRICS) + 1))
+        for row, values in methods.items():
+            m = np.mean(values, 0)
+            light = "" if np.isnan(m[8]) else f"{100 * m[8]:.1f} %"
+            print(f"| {row} | {m[0]:,.0f} | {m[1]:,.0f} | {m[2]:.4f} | {m[3]:.4f} | {m[4]:.2f} | {m[5]:.4f} | {m[6]:.4f} | {m[7]:.4f} | {light} |")
+    if a.csv:
+        with open(a.csv, "w", newline="") as f:
+            csv.writer(f).writerows([["scene", "row", *METRICS], *record])
 
 
 if __name__ == "__main__":

@@ -1,23 +1,33 @@
-// Which pixel stands for each cell: its middle one, or where that shows the background the hit pixel nearest to it.
+// Which pixel stands for each cell: its middle one, unless another surface stands before the middle's (or the middle
+// shows the background): then that surface's pixel nearest to the middle. What is in front is small and would often go
+// without any cell of its own; what is behind it is mostly seen by the cells around.
 
 @group(1) @binding(0) var<storage, read_write> cell_pixels: array<u32>;
+
+// Height above the middle's plane, relative to the view distance, from which a pixel is another surface in front.
+const IN_FRONT = 0.002;
+// How much nearer a pixel has to be, relatively, to outweigh one pixel's (squared) distance from the middle.
+const CENTRED = 0.001;
 
 fn chosen(cell: vec2i) -> u32 {
     let first = CELL_SIDE * cell;
     let last = min(first + CELL_SIDE, vec2i(params.size)) - 1;
     let middle = min(first + CELL_SIDE / 2, last);
-    if distance_at(middle) > 0.0 {
-        return pack_pixel(middle);
-    }
-    var best = NO_PIXEL;
-    var nearest = 1000;
+    let z_middle = distance_at(middle);
+    let p = world_position_at(middle, z_middle);
+    let n = world_normal_at(middle);
+    var best = select(NO_PIXEL, pack_pixel(middle), z_middle > 0.0);
+    var least = 1e30;
     for (var y = first.y; y <= last.y; y++) {
         for (var x = first.x; x <= last.x; x++) {
-            let offset = vec2i(x, y) - middle;
-            let away = dot(offset, offset);
-            if away < nearest && distance_at(vec2i(x, y)) > 0.0 {
-                nearest = away;
-                best = pack_pixel(vec2i(x, y));
+            let pixel = vec2i(x, y);
+            let z = distance_at(pixel);
+            let offset = pixel - middle;
+            let score = z * (1.0 + CENTRED * f32(dot(offset, offset)));
+            let before = z < z_middle && dot(n, world_position_at(pixel, z) - p) > IN_FRONT * z_middle;
+            if z > 0.0 && (before || z_middle <= 0.0) && score < least {
+                least = score;
+                best = pack_pixel(pixel);
             }
         }
     }

@@ -8,6 +8,7 @@ struct Partial {
     ln_z: f32,       // ln of the view distance over hit cells
     hits: u32,
     nonfinite: u32,
+    outgoing: vec3f, // radiance that surfaces send on: albedo times direct light, and emission
 }
 
 @group(1) @binding(0) var<storage, read_write> partials: array<Partial>;
@@ -19,7 +20,7 @@ const MAX_GROUPS = 256u;
 var<workgroup> scratch: array<Partial, 256>;
 
 fn plus(a: Partial, b: Partial) -> Partial {
-    return Partial(a.light + b.light, a.ln_z + b.ln_z, a.hits + b.hits, a.nonfinite + b.nonfinite);
+    return Partial(a.light + b.light, a.ln_z + b.ln_z, a.hits + b.hits, a.nonfinite + b.nonfinite, a.outgoing + b.outgoing);
 }
 
 // Sum over the workgroup in a fixed order; valid in thread 0.
@@ -51,14 +52,17 @@ fn read_cell(index: u32) -> Partial {
     let bad = select(1u, 0u, sound);
     let z = distance_at(pixel);
     if z <= 0.0 {
-        return Partial(0.0, 0.0, 0u, bad);
+        return Partial(0.0, 0.0, 0u, bad, vec3f(0.0));
     }
-    return Partial(luminance(light_at(pixel)) + luminance(emissive_at(pixel)), log(z), 1u, bad);
+    let light = light_at(pixel);
+    let emission = emissive_at(pixel);
+    let outgoing = textureLoad(albedo_map, pixel, 0).rgb * light + emission;
+    return Partial(luminance(light) + luminance(emission), log(z), 1u, bad, outgoing);
 }
 
 @compute @workgroup_size(256)
 fn sum_cells(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) index: u32) {
-    var sum = Partial(0.0, 0.0, 0u, 0u);
+    var sum = Partial(0.0, 0.0, 0u, 0u, vec3f(0.0));
     for (var cell = group.x * THREADS + index; cell < cell_count(); cell += group_count() * THREADS) {
         sum = plus(sum, read_cell(cell));
     }
@@ -70,7 +74,7 @@ fn sum_cells(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_inde
 
 @compute @workgroup_size(256)
 fn finish(@builtin(local_invocation_index) index: u32) {
-    var mine = Partial(0.0, 0.0, 0u, 0u);
+    var mine = Partial(0.0, 0.0, 0u, 0u, vec3f(0.0));
     if index < group_count() {
         mine = partials[index];
     }
@@ -86,6 +90,7 @@ fn finish(@builtin(local_invocation_index) index: u32) {
             inv_s = 1.0 / s;
         }
         let ln_m = select(0.0, total.ln_z / f32(max(total.hits, 1u)), total.hits > 0u);
-        result = Exposure(s, inv_s, ln_m, f32(total.hits) / cells, total.nonfinite, 0u, 0u, 0u);
+        let mean = total.outgoing / cells;
+        result = Exposure(s, inv_s, ln_m, f32(total.hits) / cells, total.nonfinite, mean.r, mean.g, mean.b);
     }
 }

@@ -21,9 +21,9 @@ struct Exposure {
     ln_m: f32,
     hit_fraction: f32,
     nonfinite: u32,
-    pad0: u32,
-    pad1: u32,
-    pad2: u32,
+    red: f32,
+    green: f32,
+    blue: f32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -59,6 +59,11 @@ fn luminance(c: vec3f) -> f32 {
 // The pixel that stands for a cell. One real pixel, never an average over an edge.
 fn sample_pixel(cell: vec2i) -> vec2i {
     return min(CELL * cell + CELL / 2, vec2i(params.size) - 1);
+}
+
+// The pixel that stands for a texel of half resolution, ceil(size / 2).
+fn half_pixel(texel: vec2i) -> vec2i {
+    return min(2 * texel + 1, vec2i(params.size) - 1);
 }
 
 fn light_at(pixel: vec2i) -> vec3f {

@@ -88,8 +88,14 @@ impl Global {
 pub enum MethodName {
     /// Analytic lights only.
     Direct,
-    /// One constant times the frame's exposure.
+    /// Sky and mean light from all around, times ambient occlusion.
     Ambient,
+    /// One bounce in screen space.
+    Ssgi,
+    /// One bounce of the lights from reflective shadow maps.
+    Rsm,
+    /// All bounces and the sky from what lights and a cube around the camera see.
+    Cache,
     /// Surfels that a bake has linked; holds for static geometry.
     Probes,
     /// The network.
@@ -100,14 +106,24 @@ pub enum MethodName {
 
 impl MethodName {
     /// All real-time methods, cheapest first.
-    pub const REAL_TIME: [MethodName; 4] =
-        [MethodName::Direct, MethodName::Ambient, MethodName::Probes, MethodName::Neural];
+    pub const REAL_TIME: [MethodName; 7] = [
+        MethodName::Direct,
+        MethodName::Ambient,
+        MethodName::Ssgi,
+        MethodName::Rsm,
+        MethodName::Cache,
+        MethodName::Probes,
+        MethodName::Neural,
+    ];
 
     /// The real-time method with its weights: `weights`, or the shipped ones.
     pub fn method(self, weights: Option<&PathBuf>) -> Result<Method> {
         Ok(match self {
             MethodName::Direct => Method::Direct,
             MethodName::Ambient => Method::Ambient,
+            MethodName::Ssgi => Method::Ssgi,
+            MethodName::Rsm => Method::Rsm,
+            MethodName::Cache => Method::Cache,
             MethodName::Neural => Method::Neural(Box::new(load_weights(weights)?)),
             MethodName::Probes => return Err(usage("`probes` needs a bake, which this command does not make".into())),
             MethodName::Reference => return Err(usage("`reference` is no real-time method".into())),

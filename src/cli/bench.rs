@@ -6,10 +6,14 @@ use super::{
     probes::BakeArgs,
 };
 use crate::{
+    gi::rung::Cost,
     gpu::Gpu,
     render::{Renderer, RendererOptions},
     scene::upload::SceneGpu,
-    study::bench::{BenchOptions, Measurement, measure},
+    study::{
+        bench::{BenchOptions, Measurement, measure},
+        projection::{self, EFFICIENCY, GTX_1050},
+    },
 };
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
@@ -136,6 +140,15 @@ fn print(record: &Record, gpu: &Gpu, layers: bool) {
         if let Some(apart) = m.disagreement() {
             println!("  GPU time and wall clock are {:.0}% apart: trust the wall clock on this adapter", apart * 100.0);
         }
+        let sum = |part: fn(&Cost) -> f64| m.costs.iter().map(part).sum::<f64>();
+        println!(
+            "  indirect light by count: {:.3} GFLOP, {:.1} MB; projected, not measured: {:.2} ms on a {} at {:.0}% of its peaks",
+            sum(|c| c.flops) / 1e9,
+            sum(|c| c.bytes) / 1e6,
+            projection::total_ms(&m.costs, &GTX_1050, EFFICIENCY),
+            GTX_1050.name,
+            EFFICIENCY * 100.0
+        );
         let mib = |b: u64| b as f64 / (1 << 20) as f64;
         let parts = m.bytes.iter().filter(|(_, b)| *b > 0).map(|(n, b)| format!("{n} {:.1}", mib(*b)));
         println!("  {:.1} MiB of GPU memory: {}", mib(m.total_bytes()), parts.collect::<Vec<_>>().join(", "));

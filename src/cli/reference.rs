@@ -32,7 +32,7 @@ pub struct Flags {
     #[arg(long, value_name = "E", value_parser = parse_error_bound, allow_hyphen_values = true)]
     until_error: Option<f64>,
     /// Limit of indirect contributions, as Cycles' clamp; 0 for none. Takes fireflies away, and energy.
-    #[arg(long, value_name = "C", value_parser = parse_clamp, allow_hyphen_values = true)]
+    #[arg(long, value_name = "C", value_parser = parse_limit, allow_hyphen_values = true)]
     clamp: Option<f32>,
     /// Most bounces in all, as Blender counts them; without limit when absent.
     #[arg(long, value_name = "N")]
@@ -43,6 +43,10 @@ pub struct Flags {
     /// Most glossy bounces.
     #[arg(long, value_name = "N")]
     glossy_bounces: Option<u32>,
+    /// Cycles' "Filter Glossy": widens lobes behind blurry bounces, by Blender's default 1; none when absent. Takes the noise
+    /// of light that reflections focus away, and changes where it lands.
+    #[arg(long, value_name = "F", value_parser = parse_limit, allow_hyphen_values = true)]
+    filter_glossy: Option<f32>,
     /// Trace one point for each cell of NxN pixels, the pixel centre that the network samples (N/2, N/2 in the cell), without
     /// pixel filter; the picture has a pixel for each cell.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -58,9 +62,9 @@ fn parse_error_bound(text: &str) -> Result<f64, String> {
     }
 }
 
-fn parse_clamp(text: &str) -> Result<f32, String> {
+fn parse_limit(text: &str) -> Result<f32, String> {
     let clamp: f32 = text.parse().map_err(|e| format!("{e}"))?;
-    if clamp.is_finite() && clamp >= 0.0 { Ok(clamp) } else { Err("it must be 0 (no limit) or above".into()) }
+    if clamp.is_finite() && clamp >= 0.0 { Ok(clamp) } else { Err("it must be 0 (none) or above".into()) }
 }
 
 impl Flags {
@@ -73,6 +77,7 @@ impl Flags {
             ("--bounces", self.bounces.is_some()),
             ("--diffuse-bounces", self.diffuse_bounces.is_some()),
             ("--glossy-bounces", self.glossy_bounces.is_some()),
+            ("--filter-glossy", self.filter_glossy.is_some()),
             ("--cells", self.cells.is_some()),
         ]
         .into_iter()
@@ -95,6 +100,7 @@ impl Flags {
             diffuse_bounces: self.diffuse_bounces.unwrap_or(job::UNLIMITED),
             glossy_bounces: self.glossy_bounces.unwrap_or(job::UNLIMITED),
             clamp: self.clamp.unwrap_or(0.0),
+            filter_glossy: self.filter_glossy.unwrap_or(0.0),
             layers,
             ..Default::default()
         };
@@ -187,6 +193,7 @@ impl Task {
             ("ReferenceSeed", o.seed.to_string()),
             ("ReferenceBounces", [o.bounces, o.diffuse_bounces, o.glossy_bounces].map(limit).join(" ")),
             ("ReferenceClamp", o.clamp.to_string()),
+            ("ReferenceFilterGlossy", o.filter_glossy.to_string()),
             ("ReferenceCells", self.cells.map_or("none".into(), |n| n.to_string())),
             ("ReferenceSeconds", format!("{:.3}", traced.seconds)),
             ("ReferenceSamplesPerSecond", format!("{:.0}", rate(traced))),

@@ -41,6 +41,9 @@ pub struct Args {
     /// Jittered frames that are averaged through Cycles' pixel filter; 1 (the default) is the raw frame.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     samples: Option<u32>,
+    /// Real-time anti-aliasing over this many frames before the one that is written.
+    #[arg(long, conflicts_with = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    taa: Option<u32>,
     /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
     #[arg(long, value_name = "LAYERS")]
     aov: Option<String>,
@@ -165,11 +168,12 @@ fn rasterise(
         _ => "none".into(),
     };
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
-    let options = RendererOptions { method, ..Default::default() };
+    let options = RendererOptions { method, taa: args.taa.is_some(), ..Default::default() };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options)?;
     let samples = args.samples.unwrap_or(1);
-    let options = CaptureOptions { samples, seed: args.seed, layers };
-    let mut progress = Progress::new(global, "samples", samples.into());
+    let warmup = args.taa.unwrap_or(0);
+    let options = CaptureOptions { samples, seed: args.seed, layers, warmup };
+    let mut progress = Progress::new(global, "samples", (samples + warmup).into());
     let frame = capture_with(gpu, &mut renderer, &uploaded, camera, options, &mut || {
         progress.step();
         !interrupt::requested()
@@ -205,11 +209,17 @@ fn check(args: &Args) -> Result<Format> {
         if args.samples.is_some() {
             return Err(usage("--samples averages frames of the rasteriser; --method reference takes --spp".into()));
         }
+        if args.taa.is_some() {
+            return Err(usage("--taa averages frames of the rasteriser; --method reference takes --spp".into()));
+        }
         if args.weights.is_some() {
             return Err(usage("--weights are a network's; --method reference traces paths and has none".into()));
         }
     } else if let Some(flag) = args.tracing.given() {
         return Err(usage(format!("{flag} belongs to --method reference; `{name}` traces no paths")));
+    }
+    if let Some(flag) = args.bake.given().filter(|_| args.method != MethodName::Probes) {
+        return Err(usage(format!("{flag} belongs to --method probes; `{name}` has no bake")));
     }
     image_io::check_writable(path)?;
     if let Some(diff) = &args.diff {

@@ -26,8 +26,9 @@ pub struct Exposure {
     pub hit_fraction: f32,
     /// Cells whose sample had NaN or infinity in depth, normal, direct light or emission (all read as 0).
     pub nonfinite: u32,
-    /// Fills the struct to 32 bytes.
-    pub pad: [u32; 3],
+    /// Mean over all cells of the radiance that surfaces send on at once, albedo · direct light + emission, background
+    /// counting as 0; W/(m²·sr).
+    pub outgoing: [f32; 3],
 }
 
 /// The reduction.
@@ -50,7 +51,7 @@ impl ExposurePass {
                 mapped_at_creation: false,
             })
         };
-        let partials = buffer("gi.exposure.partials", u64::from(MAX_GROUPS) * 16, wgpu::BufferUsages::empty());
+        let partials = buffer("gi.exposure.partials", u64::from(MAX_GROUPS) * 32, wgpu::BufferUsages::empty());
         let result = buffer("gi.exposure", size_of::<Exposure>() as u64, wgpu::BufferUsages::COPY_SRC);
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("gi.exposure"),
@@ -94,10 +95,10 @@ impl ExposurePass {
     }
 }
 
-/// What the pass costs: one sample a cell (20 bytes of texels, about 40 operations).
+/// What the pass costs: one sample a cell (28 bytes of texels, about 55 operations).
 pub(crate) fn cost(size: [u32; 2]) -> Cost {
     let [w, h] = super::inputs::cells_of(size).map(f64::from);
-    Cost::new("gi.exposure", w * h * 40.0, w * h * 24.0)
+    Cost::new("gi.exposure", w * h * 55.0, w * h * 28.0)
 }
 
 /// Reads an exposure back. Submits and waits: for tools and tests.

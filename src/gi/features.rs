@@ -123,12 +123,20 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
     let few = FeatureSet::new([("direct", 3), ("depth", 1), ("hit", 1)]).expect("rows of the table in order");
     vec![
         ("gi.probes_apply", super::cells::CellSide::Four.prelude()),
-        ("gi.ambient", super::ambient::prelude()),
+        ("gi.ambient", super::ambient::unseen_prelude(1.0, 0.5)),
+        ("gi.occlusion", super::bitmask::March::NEAR.prelude()),
+        ("gi.radiance", super::ssgi::SsgiOptions::default().prelude()),
+        ("gi.ssgi", super::ssgi::SsgiOptions::default().prelude()),
         ("gi.pack", FeatureSet::all().prelude()),
         ("gi.pack", few.prelude()),
         ("gi.reconstruct", super::reconstruct::prelude()),
         ("gi.cells", super::cells::CellSide::Four.prelude()),
         ("gi.cells", super::cells::CellSide::Eight.prelude()),
+        ("gi.gather", super::cache::prelude(super::cache::Options::RSM)),
+        ("gi.gather", super::cache::prelude(super::cache::Options::CACHE)),
+        ("gi.surfels", super::surfels::prelude(super::surfels::SURFELS)),
+        ("gi.sky", super::surfels::prelude(super::surfels::SURFELS)),
+        ("gi.exchange", super::surfels::prelude(super::surfels::SURFELS)),
         ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Four)),
         ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Eight)),
     ]

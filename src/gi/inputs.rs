@@ -227,7 +227,7 @@ impl InputGroup {
 }
 
 /// A texture that is read by `textureLoad`; depth textures bind as unfilterable float, too.
-fn texture_entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
+pub(crate) fn texture_entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::COMPUTE,

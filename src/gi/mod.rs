@@ -18,17 +18,23 @@
 //! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
 
 pub mod ambient;
+pub mod bitmask;
+pub mod cache;
 pub mod cells;
+pub mod emitters;
 pub mod exposure;
 pub mod features;
 pub mod glossy;
 pub mod inputs;
+pub mod occlusion;
 pub mod pack;
 pub mod pass;
 #[cfg(feature = "reference")]
 pub mod probes;
 pub mod reconstruct;
 pub mod rung;
+pub mod ssgi;
+pub mod surfels;
 pub mod twin;
 pub mod upsample;
 mod view_cache;
@@ -69,6 +75,8 @@ pub struct Inputs<'a> {
     pub environment: [f32; 3],
     /// The analytic lights, for methods that light more than the picture; `None` counts as no lights there.
     pub lights: Option<Lights<'a>>,
+    /// What lies beyond the picture, for methods that need it ([`Method::needs_world`]).
+    pub world: Option<World<'a>>,
 }
 
 /// The analytic lights on the GPU.
@@ -80,6 +88,44 @@ pub struct Lights<'a> {
     pub count: u32,
 }
 
+/// Tiny G-buffers, several views in one atlas; `render::atlas` says what the texels mean.
+#[derive(Debug, Clone, Copy)]
+pub struct Atlas<'a> {
+    /// Reversed-Z depth, `Depth32Float`.
+    pub depth: &'a wgpu::TextureView,
+    /// Diffuse reflectance, `Rgba8UnormSrgb`.
+    pub albedo: &'a wgpu::TextureView,
+    /// Octahedral world normal, `Rg16Float`.
+    pub normal: &'a wgpu::TextureView,
+    /// Emitted radiance, `Rgba16Float`.
+    pub emissive: &'a wgpu::TextureView,
+    /// `render::atlas::AtlasViewGpu` of each view, a storage buffer.
+    pub views: &'a wgpu::Buffer,
+}
+
+/// The rasterised world beyond the screen.
+#[derive(Debug, Clone, Copy)]
+pub struct World<'a> {
+    /// What each light sees.
+    pub rsm: Atlas<'a>,
+    /// First view and number of views for each light, `vec2u`; none for lights without a map.
+    pub rsm_of_light: &'a wgpu::Buffer,
+    /// Views in `rsm`.
+    pub rsm_views: u32,
+    /// Blocks of 8×8 texels in all views of `rsm`.
+    pub rsm_blocks: u32,
+    /// Blocks of the largest view.
+    pub rsm_most_blocks: u32,
+    /// The cube around the camera: faces +X, −X, +Y, −Y, +Z, −Z side by side.
+    pub around: Atlas<'a>,
+    /// `scene::upload::LightGpu` of each light, a storage buffer.
+    pub lights: &'a wgpu::Buffer,
+    /// Lights.
+    pub light_count: u32,
+    /// Lat-long picture of the surroundings, `Rgba32Float`; one texel for a constant sky.
+    pub environment: &'a wgpu::TextureView,
+}
+
 /// Which method fills the `indirect` texture of a frame.
 #[derive(Debug, Clone, Default)]
 pub enum Method {
@@ -88,6 +134,14 @@ pub enum Method {
     /// One constant, see [`ambient`].
     #[default]
     Ambient,
+    /// One bounce in screen space, see [`ssgi`].
+    Ssgi,
+    /// One bounce from reflective shadow maps, see [`cache`].
+    Rsm,
+    /// All bounces and the sky from shadow maps and a cube around the camera, see [`cache`].
+    Cache,
+    /// Either of the two with other options.
+    World(cache::Options),
     /// Surfels that a bake has linked, see [`probes`]. The bake must be of the scene that is drawn.
     #[cfg(feature = "reference")]
     Probes(std::sync::Arc<probes::Bake>),
@@ -101,11 +155,37 @@ impl Method {
         match self {
             Method::Direct => "direct",
             Method::Ambient => "ambient",
+            Method::Ssgi => "ssgi",
+            Method::Rsm => "rsm",
+            Method::Cache => "cache",
+            Method::World(options) => ["rsm", "cache"][usize::from(options.around)],
             #[cfg(feature = "reference")]
             Method::Probes(_) => "probes",
             Method::Neural(_) => "neural",
         }
     }
+
+    /// What of the world beyond the screen the method reads.
+    pub fn needs_world(&self) -> NeedsWorld {
+        match self {
+            Method::Rsm => NeedsWorld::Lights,
+            Method::Cache => NeedsWorld::Around,
+            Method::World(options) if options.around => NeedsWorld::Around,
+            Method::World(_) => NeedsWorld::Lights,
+            _ => NeedsWorld::Nothing,
+        }
+    }
+}
+
+/// What of [`World`] the host has to draw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NeedsWorld {
+    /// Nothing: [`Inputs::world`] may be `None`.
+    Nothing,
+    /// What the lights see.
+    Lights,
+    /// That and the cube around the camera.
+    Around,
 }
 
 /// Why a method could not be made or recorded.
@@ -122,6 +202,9 @@ pub enum GiError {
     /// The camera is not a finite reversed-Z perspective camera.
     #[error("the camera cannot be used: {0}")]
     Camera(&'static str),
+    /// The method reads [`Inputs::world`], which is not there.
+    #[error("this method needs the world beyond the screen (`Inputs::world`), which the host did not supply")]
+    World,
     /// A texture view has another format, size or usage than [`Inputs`] says.
     #[error("texture `{name}` has {found}, but needs {expected}")]
     Texture {

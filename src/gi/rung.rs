@@ -1,7 +1,9 @@
 //! What all methods share: the trait that a frame drives them by, and what a pass costs by count.
 
 use super::ambient::AmbientGi;
+use super::cache::{self, WorldGi};
 use super::pass::{NeuralGi, Options};
+use super::ssgi::{SsgiGi, SsgiOptions};
 use super::{GiError, Inputs, Method};
 use crate::gpu::timing::Recorder;
 use serde::{Deserialize, Serialize};
@@ -39,6 +41,9 @@ pub trait Rung {
         output: &wgpu::TextureView,
     ) -> Result<(), GiError>;
 
+    /// Number of the frame for methods that may vary their patterns because a history averages frames; 0 without one.
+    fn set_frame(&mut self, _queue: &wgpu::Queue, _frame: u32) {}
+
     /// The targets are new: lets go of the texture views it remembers.
     fn forget(&mut self);
 
@@ -63,6 +68,10 @@ pub fn build(
     Ok(match method {
         Method::Direct => None,
         Method::Ambient => Some(Box::new(AmbientGi::new(device))),
+        Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
+        Method::Rsm => Some(Box::new(WorldGi::new(device, size, cache::Options::RSM))),
+        Method::Cache => Some(Box::new(WorldGi::new(device, size, cache::Options::CACHE))),
+        Method::World(options) => Some(Box::new(WorldGi::new(device, size, *options))),
         #[cfg(feature = "reference")]
         Method::Probes(bake) => Some(Box::new(super::probes::ProbesGi::new(device, queue, bake)?)),
         Method::Neural(weights) => Some(Box::new(NeuralGi::new(device, queue, weights, Options { size })?)),
@@ -80,6 +89,10 @@ impl Rung for AmbientGi {
         AmbientGi::record(self, recorder, queue, inputs, output)
     }
 
+    fn set_frame(&mut self, queue: &wgpu::Queue, frame: u32) {
+        AmbientGi::set_frame(self, queue, frame);
+    }
+
     fn forget(&mut self) {
         AmbientGi::forget(self);
     }
@@ -89,8 +102,7 @@ impl Rung for AmbientGi {
     }
 
     fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
-        let pixels = f64::from(size[0]) * f64::from(size[1]);
-        vec![super::exposure::cost(size), Cost::new("gi.ambient", pixels * 4.0, pixels * 12.0)]
+        AmbientGi::costs(self, size)
     }
 }
 

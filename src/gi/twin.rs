@@ -1,7 +1,7 @@
 //! The slow, obvious CPU twin of `gi/`'s shaders, function by function under the same names. No wgpu. Tests compare
 //! the shaders with it; nothing else uses it. Formulas are documented in the shaders and in `gi::features`.
 
-use super::ambient::AMBIENT;
+use super::ambient::{AMBIENT, BOUNCE, SKY};
 use super::exposure::Exposure;
 use super::features::FeatureSet;
 use super::inputs::{CELL, Params};
@@ -131,6 +131,7 @@ impl<'a> Picture<'a> {
     /// `gi.exposure`, summed in f64.
     pub fn exposure(&self) -> Exposure {
         let (mut light, mut ln_z, mut hits, mut nonfinite) = (0.0f64, 0.0f64, 0u32, 0u32);
+        let mut outgoing = [0.0f64; 3];
         for cell in self.all_cells() {
             let pixel = self.sample_pixel(cell);
             let i = self.index(pixel);
@@ -141,6 +142,9 @@ impl<'a> Picture<'a> {
             let z = self.distance_at(pixel);
             if z > 0.0 {
                 light += f64::from(luminance(self.light_at(pixel)) + luminance(self.emissive_at(pixel)));
+                let [r, g, blue, _] = b.albedo[i];
+                let sent = Vec3::new(r, g, blue) * self.light_at(pixel) + self.emissive_at(pixel);
+                (0..3).for_each(|c| outgoing[c] += f64::from(sent[c]));
                 ln_z += f64::from(z).ln();
                 hits += 1;
             }
@@ -150,18 +154,23 @@ impl<'a> Picture<'a> {
         let s = (light / count + f64::from(luminance(Vec3::new(r, g, b)))) as f32;
         let (s, inv_s) = if s <= 1e-20 { (0.0, 0.0) } else { (s, 1.0 / s) };
         let ln_m = if hits > 0 { (ln_z / f64::from(hits)) as f32 } else { 0.0 };
-        Exposure { s, inv_s, ln_m, hit_fraction: (f64::from(hits) / count) as f32, nonfinite, pad: [0; 3] }
+        let outgoing = outgoing.map(|v| (v / count) as f32);
+        Exposure { s, inv_s, ln_m, hit_fraction: (f64::from(hits) / count) as f32, nonfinite, outgoing }
     }
 
-    /// `gi.ambient`: E/π of every pixel.
-    pub fn ambient(&self, exposure: &Exposure) -> Vec<[f32; 3]> {
-        let light = |pixel| {
+    /// `gi.ambient`: E/π of every pixel, given each pixel's visibility.
+    pub fn ambient(&self, exposure: &Exposure, visibility: &[f32]) -> Vec<[f32; 3]> {
+        let unseen: [f32; 3] = std::array::from_fn(|c| {
+            let [sky, bounce] = [self.params.environment[c], exposure.outgoing[c]];
+            SKY * sky + BOUNCE * bounce
+        });
+        let light = |(pixel, visible): (_, &f32)| {
             if self.distance_at(pixel) <= 0.0 {
                 return [0.0; 3];
             }
-            AMBIENT.map(|a| (a * exposure.s).min(LARGEST))
+            unseen.map(|u| (u * visible).min(LARGEST))
         };
-        self.all_pixels().map(light).collect()
+        self.all_pixels().zip(visibility).map(light).collect()
     }
 
     /// `gi.pack`: NHWC, `features.padded()` channels a cell.

@@ -47,6 +47,11 @@ pub const RENDER: &[Shader] = &[
         name: "render.composite",
         files: wgsl!["lib/frame.wgsl", "lib/brdf.wgsl", "lib/environment.wgsl", "render/composite.wgsl"],
     },
+    Shader {
+        name: "render.atlas",
+        files: wgsl!["lib/octahedral.wgsl", "lib/hash.wgsl", "lib/brdf.wgsl", "lib/material.wgsl", "render/atlas.wgsl"],
+    },
+    Shader { name: "render.taa", files: wgsl!["lib/frame.wgsl", "render/taa.wgsl"] },
     Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
     Shader {
         name: "render.layers",
@@ -57,7 +62,30 @@ pub const RENDER: &[Shader] = &[
 /// Shaders of `gi/`.
 pub const GI: &[Shader] = &[
     Shader { name: "gi.exposure", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/exposure.wgsl"] },
-    Shader { name: "gi.ambient", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/ambient.wgsl"] },
+    Shader {
+        name: "gi.ambient",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/unseen.wgsl", "gi/ambient.wgsl"],
+    },
+    Shader {
+        name: "gi.occlusion",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/bitmask.wgsl", "gi/occlusion.wgsl"],
+    },
+    Shader {
+        name: "gi.occlusion_full",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/half.wgsl", "gi/occlusion_full.wgsl"],
+    },
+    Shader {
+        name: "gi.radiance",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/unseen.wgsl", "gi/radiance.wgsl"],
+    },
+    Shader {
+        name: "gi.ssgi",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/bitmask.wgsl", "gi/unseen.wgsl", "gi/ssgi.wgsl"],
+    },
+    Shader {
+        name: "gi.ssgi_full",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/half.wgsl", "gi/ssgi_full.wgsl"],
+    },
     Shader {
         name: "gi.glossy",
         files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/glossy.wgsl"],
@@ -69,6 +97,47 @@ pub const GI: &[Shader] = &[
     Shader {
         name: "gi.upsample",
         files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/upsample.wgsl"],
+    },
+    Shader {
+        name: "gi.emitters",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "lib/atlas.wgsl",
+            "lib/emitter.wgsl",
+            "gi/emitters.wgsl"
+        ],
+    },
+    Shader {
+        name: "gi.surfels",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "lib/environment.wgsl",
+            "lib/atlas.wgsl",
+            "lib/emitter.wgsl",
+            "gi/surfel.wgsl",
+            "gi/surfels.wgsl"
+        ],
+    },
+    Shader { name: "gi.sky", files: wgsl!["lib/brdf.wgsl", "gi/surfel.wgsl", "gi/sky.wgsl"] },
+    Shader {
+        name: "gi.exchange",
+        files: wgsl!["lib/brdf.wgsl", "lib/emitter.wgsl", "gi/surfel.wgsl", "gi/exchange.wgsl"],
+    },
+    Shader {
+        name: "gi.gather",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/emitter.wgsl",
+            "gi/inputs.wgsl",
+            "gi/cells.wgsl",
+            "gi/surfel.wgsl",
+            "gi/gather.wgsl"
+        ],
     },
     Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
     Shader {

@@ -124,11 +124,13 @@ pub struct CaptureOptions<'a> {
     pub seed: u32,
     /// Layers beside the picture.
     pub layers: &'a [Layer],
+    /// Frames drawn before the first sample, for a renderer with temporal anti-aliasing.
+    pub warmup: u32,
 }
 
 impl Default for CaptureOptions<'_> {
     fn default() -> Self {
-        Self { samples: 1, seed: 0, layers: &[] }
+        Self { samples: 1, seed: 0, layers: &[], warmup: 0 }
     }
 }
 
@@ -203,12 +205,23 @@ pub fn capture_with(
     let mut beauty = vec![0.0; 4 * pixels];
     let mut sums: Vec<(Sum, Vec<f32>)> = needed.iter().map(|&s| (s, vec![0.0; s.channels * pixels])).collect();
     let decoder = Decoder::new(&gpu.device, renderer);
-    for i in 0..options.samples {
+    let mut draw = |i: u32, shadows: bool| -> Result<(), RenderError> {
         let seed = options.seed.wrapping_mul(0x9e37_79b9).wrapping_add(i);
         let view = View::new(camera, size, sampling::offset(i, options.seed)).with_seed(seed);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, i == 0)?;
+        renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, shadows)?;
         gpu.queue.submit([encoder.finish()]);
+        Ok(())
+    };
+    // Backwards, so that the picture's own sample is the one through the pixels' centres.
+    for i in (1..=options.warmup).rev() {
+        draw(i, i == options.warmup)?;
+        if !go_on() {
+            return Ok(None);
+        }
+    }
+    for i in 0..options.samples {
+        draw(i, i == 0 && options.warmup == 0)?;
         decoder.add(gpu, size, 0, &mut beauty, 4)?;
         for (sum, data) in &mut sums {
             if i == 0 || sum.filtered {

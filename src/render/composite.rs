@@ -1,6 +1,6 @@
 //! Puts light and surface together into `hdr` (compute).
 
-use super::targets::Targets;
+use super::targets::{Target, Targets};
 use super::tool;
 use crate::gpu::timing::Recorder;
 
@@ -22,8 +22,14 @@ impl CompositePass {
         Self { pipeline, layout, sky_layout }
     }
 
-    /// Binds the targets; rebuilt on resize.
-    pub fn picture(&self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets) -> wgpu::BindGroup {
+    /// Binds the targets and where the picture goes (`Rgba16Float`); rebuilt on resize.
+    pub fn picture(
+        &self,
+        device: &wgpu::Device,
+        frame: &wgpu::Buffer,
+        targets: &Targets,
+        output: &Target,
+    ) -> wgpu::BindGroup {
         let t = targets;
         tool::group(
             device,
@@ -38,7 +44,7 @@ impl CompositePass {
                 tool::view(&t.direct_specular),
                 tool::view(&t.indirect),
                 tool::view(&t.indirect_specular),
-                tool::view(&t.hdr),
+                tool::view(output),
             ],
         )
     }
@@ -49,7 +55,7 @@ impl CompositePass {
         tool::group(device, "render.composite", &self.sky_layout, &resources)
     }
 
-    /// Fills `hdr`.
+    /// Fills the output.
     pub fn record(
         &self,
         recorder: &mut Recorder<'_>,

@@ -1,12 +1,15 @@
-//! The frame, told in order: shadow → gbuffer → direct → indirect → glossy → composite. A display adds `tonemap` after it.
+//! The frame, told in order: shadow → (rsm → around) → gbuffer → direct → indirect → glossy → composite (→ taa). A display adds
+//! `tonemap` after it.
 
 use super::RenderError;
 use super::composite::CompositePass;
 use super::direct::{DirectInputs, DirectPass};
 use super::gbuffer::GbufferPass;
 use super::shadow::{ShadowMaps, ShadowOptions, ShadowPass};
+use super::taa::TaaPass;
 use super::targets::Targets;
 use super::view::{FrameUniform, View};
+use super::world::{World, WorldPass};
 use crate::gi::{
     self,
     glossy::GlossyPass,
@@ -22,6 +25,9 @@ pub struct RendererOptions {
     pub method: gi::Method,
     /// Sizes of shadow maps.
     pub shadow: ShadowOptions,
+    /// Temporal anti-aliasing ([`TaaPass`]): `hdr` is the mean over frames. Views should then be jittered by
+    /// [`sampling::offset`](super::sampling::offset) of the frame's number. Off, nothing of it exists.
+    pub taa: bool,
 }
 
 /// What is bound as long as the targets stay.
@@ -35,6 +41,8 @@ struct Picture {
 struct Lighting {
     scene: u64,
     maps: ShadowMaps,
+    /// What lies beyond the screen, once a method needed it.
+    world: Option<World>,
     group: wgpu::BindGroup,
     sky: wgpu::BindGroup,
 }
@@ -50,6 +58,10 @@ pub struct Renderer {
     /// What fills `indirect`; nothing for direct light alone.
     indirect: Option<Box<dyn Rung>>,
     passes: Passes,
+    needs: gi::NeedsWorld,
+    /// The world's passes, once a method needed them.
+    world: Option<WorldPass>,
+    taa: Option<TaaPass>,
 }
 
 /// The passes that every method shares.
@@ -72,11 +84,21 @@ impl Passes {
         }
     }
 
-    fn bind(&self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets) -> Picture {
+    fn bind(
+        &self,
+        device: &wgpu::Device,
+        frame: &wgpu::Buffer,
+        targets: &Targets,
+        taa: &mut Option<TaaPass>,
+    ) -> Picture {
+        if let Some(taa) = taa {
+            taa.fit(device, frame, targets);
+        }
+        let picture = taa.as_ref().map_or(&targets.hdr, TaaPass::current);
         Picture {
             direct: self.direct.picture(device, frame, targets),
             glossy: self.glossy.picture(device, frame, targets),
-            composite: self.composite.picture(device, frame, targets),
+            composite: self.composite.picture(device, frame, targets, picture),
         }
     }
 }
@@ -97,17 +119,20 @@ impl Renderer {
             mapped_at_creation: false,
         });
         let passes = Passes::new(device, &frame, options.shadow);
-        let picture = passes.bind(device, &frame, &targets);
+        let mut taa = options.taa.then(|| TaaPass::new(device));
+        let picture = passes.bind(device, &frame, &targets, &mut taa);
         let indirect = rung::build(device, queue, size, &options.method)?;
         let method = options.method.name();
-        Ok(Self { device: device.clone(), frame, targets, picture, lighting: None, method, indirect, passes })
+        let needs = options.method.needs_world();
+        let device = device.clone();
+        Ok(Self { device, frame, targets, picture, lighting: None, method, indirect, passes, needs, world: None, taa })
     }
 
     /// New targets of `size` pixels; the views of the old ones are of no use any more.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
         if size != self.targets.size {
             self.targets = Targets::new(&self.device, size)?;
-            self.picture = self.passes.bind(&self.device, &self.frame, &self.targets);
+            self.picture = self.passes.bind(&self.device, &self.frame, &self.targets, &mut self.taa);
             if let Some(indirect) = &mut self.indirect {
                 indirect.forget();
             }
@@ -119,7 +144,20 @@ impl Renderer {
     pub fn set_method(&mut self, queue: &wgpu::Queue, method: &gi::Method) -> Result<(), RenderError> {
         self.indirect = rung::build(&self.device, queue, self.targets.size, method)?;
         self.method = method.name();
+        self.needs = method.needs_world();
+        self.cut();
+        // Drawn anew in the next frame, whatever samples it is.
+        if let Some(lighting) = &mut self.lighting {
+            lighting.world = None;
+        }
         Ok(())
+    }
+
+    /// The next frame has nothing to do with the last (a cut): temporal anti-aliasing starts anew. Without it, nothing.
+    pub fn cut(&mut self) {
+        if let Some(taa) = &mut self.taa {
+            taa.cut();
+        }
     }
 
     /// Name of the method that finds indirect light, as on the command line.
@@ -131,6 +169,7 @@ impl Renderer {
     pub fn costs(&self) -> Vec<Cost> {
         let mut costs = self.indirect.as_ref().map(|i| i.costs(self.targets.size)).unwrap_or_default();
         costs.push(GlossyPass::cost(self.targets.size));
+        costs.extend(self.taa.as_ref().map(|_| TaaPass::cost(self.targets.size)));
         costs
     }
 
@@ -141,7 +180,7 @@ impl Renderer {
 
     /// What a GI method reads of the frame that was drawn with `view` and `environment`.
     pub fn gi_inputs(&self, view: &View, environment: [f32; 3]) -> gi::Inputs<'_> {
-        gi_inputs(&self.targets, view, environment, None)
+        gi_inputs(&self.targets, view, environment, None, None)
     }
 
     /// The textures that [`Renderer::record`] fills.
@@ -158,6 +197,8 @@ impl Renderer {
     pub fn bytes(&self) -> Vec<(&'static str, u64)> {
         let mut rows = self.targets.bytes();
         rows.extend(self.lighting.iter().flat_map(|l| l.maps.bytes()));
+        rows.extend(self.lighting.iter().flat_map(|l| &l.world).flat_map(World::bytes));
+        rows.extend(self.taa.iter().flat_map(TaaPass::bytes));
         rows.push((self.method, self.indirect.as_ref().map_or(0, |i| i.bytes())));
         rows
     }
@@ -190,22 +231,31 @@ impl Renderer {
         let known = self.lighting.take().filter(|l| l.scene == scene.id);
         let fresh = known.is_none();
         let mut lighting = known.unwrap_or_else(|| self.lighting(queue, scene));
+        let view = &self.taa.as_ref().map_or(*view, |taa| taa.follow(view));
         let uniform = view.uniform(&scene.environment, scene.lights.len() as u32);
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 
         if shadows || fresh {
             self.passes.shadow.record(recorder, queue, scene, view, &mut lighting.maps);
         }
+        self.record_world(recorder, queue, scene, view, shadows, &mut lighting);
         self.passes.gbuffer.record(recorder, scene, &self.targets);
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
         self.passes.direct.record(recorder, inputs);
-        let inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene));
+        let world = lighting.world.as_ref().map(|w| w.inputs(scene));
+        let inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene), world);
+        if let (Some(indirect), Some(taa)) = (&mut self.indirect, &self.taa) {
+            indirect.set_frame(queue, taa.frames());
+        }
         match &mut self.indirect {
             Some(indirect) => indirect.record(recorder, queue, &inputs, &self.targets.indirect.view)?,
             None => clear(recorder, &self.targets),
         }
         self.passes.glossy.record(recorder, &self.picture.glossy, size);
         self.passes.composite.record(recorder, &self.picture.composite, &lighting.sky, size);
+        if let Some(taa) = &mut self.taa {
+            taa.record(recorder, queue, scene.id, view);
+        }
         self.lighting = Some(lighting);
         Ok(())
     }
@@ -214,7 +264,25 @@ impl Renderer {
         let maps = self.passes.shadow.maps(&self.device, queue, scene);
         let group = self.passes.direct.lights(&self.device, scene, &maps);
         let sky = self.passes.composite.sky(&self.device, &scene.environment_view);
-        Lighting { scene: scene.id, maps, group, sky }
+        Lighting { scene: scene.id, maps, world: None, group, sky }
+    }
+
+    /// Draws what lies beyond the screen, if the method reads it; without `again` only where it was not drawn yet.
+    fn record_world(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        scene: &SceneGpu,
+        view: &View,
+        again: bool,
+        lighting: &mut Lighting,
+    ) {
+        if self.needs == gi::NeedsWorld::Nothing || (lighting.world.is_some() && !again) {
+            return;
+        }
+        let pass = self.world.get_or_insert_with(|| WorldPass::new(&self.device));
+        let world = lighting.world.get_or_insert_with(|| pass.world(&self.device, queue, scene));
+        pass.record(recorder, queue, scene, view, world, self.needs == gi::NeedsWorld::Around);
     }
 }
 
@@ -223,6 +291,7 @@ fn gi_inputs<'a>(
     view: &View,
     environment: [f32; 3],
     scene: Option<&'a SceneGpu>,
+    world: Option<gi::World<'a>>,
 ) -> gi::Inputs<'a> {
     gi::Inputs {
         size: targets.size,
@@ -234,6 +303,7 @@ fn gi_inputs<'a>(
         camera: view.matrices(),
         environment,
         lights: scene.map(|s| gi::Lights { buffer: &s.light_buffer, count: s.lights.len() as u32 }),
+        world,
     }
 }
 

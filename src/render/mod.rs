@@ -1,19 +1,24 @@
 //! The rasteriser: one pass, one file; [`frame`] tells the order.
 
+pub mod around;
+pub mod atlas;
 pub mod capture;
 pub mod composite;
 pub mod direct;
 pub mod frame;
 pub mod gbuffer;
+pub mod rsm;
 pub mod sampling;
 pub mod shadow;
 mod shadow_local;
 mod shadow_sun;
+pub mod taa;
 pub mod targets;
 pub mod tonemap;
 pub mod tonemap_curve;
 pub(crate) mod tool;
 pub mod view;
+pub mod world;
 
 pub use frame::{Renderer, RendererOptions};
 pub use targets::Targets;

@@ -15,7 +15,7 @@ pub struct Target {
 }
 
 impl Target {
-    fn new(
+    pub(crate) fn new(
         device: &wgpu::Device,
         name: &'static str,
         size: [u32; 2],

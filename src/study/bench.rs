@@ -1,6 +1,7 @@
 //! Time and memory of one method: GPU milliseconds per pass from timestamps, synchronised wall clock beside them.
 
 use crate::{
+    gi::rung::Cost,
     gpu::{
         Gpu,
         timing::{self, Recorder},
@@ -53,6 +54,9 @@ pub struct Measurement {
     pub wall_ms: Spread,
     /// Resident GPU bytes by owner.
     pub bytes: Vec<(String, u64)>,
+    /// Counted cost of the passes that find and add indirect light; empty in records from before it was counted.
+    #[serde(default)]
+    pub costs: Vec<Cost>,
 }
 
 impl Measurement {
@@ -128,6 +132,7 @@ pub fn measure(
         passes: per_pass(&frames),
         gpu_ms: (!sums.is_empty()).then(|| spread(sums)),
         wall_ms: spread(wall),
+        costs: renderer.costs(),
         bytes: renderer
             .bytes()
             .into_iter()

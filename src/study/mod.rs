@@ -2,4 +2,5 @@
 
 pub mod bench;
 pub mod dataset;
+pub mod projection;
 pub mod views;

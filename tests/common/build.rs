@@ -93,7 +93,7 @@ pub fn direct_only() -> RendererOptions {
 pub fn render(gpu: &Gpu, scene: &Scene, camera: &Camera, size: [u32; 2], samples: u32) -> CapturedFrame {
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the test's scene uploads");
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, direct_only()).expect("the test's size is fine");
-    let options = CaptureOptions { samples, seed: 0, layers: &Layer::ALL };
+    let options = CaptureOptions { samples, layers: &Layer::ALL, ..Default::default() };
     capture(gpu, &mut renderer, &uploaded, camera, options).expect("capture works")
 }
 

@@ -5,16 +5,16 @@ use crate::shot::{Hit, Shot};
 use crate::stages::reconstruct;
 use glam::Vec3;
 
-const FLOOR: usize = 0;
-const WALL: usize = 1;
-const POLE: usize = 2;
-const PLATE: usize = 3;
+pub const FLOOR: usize = 0;
+pub const WALL: usize = 1;
+pub const POLE: usize = 2;
+pub const PLATE: usize = 3;
 /// Light of each surface: a bright floor against a dark wall, a brighter pole and plate before it.
-const LIGHT: [f32; 4] = [1.0, 0.02, 5.0, 2.0];
-const SIZE: [u32; 2] = [256, 128];
+pub const LIGHT: [f32; 4] = [1.0, 0.02, 5.0, 2.0];
+pub const SIZE: [u32; 2] = [256, 128];
 
 /// Floor and wall that meet, a pole two pixels wide and a plate before them, sky above the wall.
-fn room(o: Vec3, d: Vec3) -> Option<Hit> {
+pub fn room(o: Vec3, d: Vec3) -> Option<Hit> {
     let plane = |point: Vec3, normal: Vec3, surface: usize| {
         let t = (point - o).dot(normal) / d.dot(normal);
         (t > 1e-3).then(|| (t, Hit { point: o + d * t, normal, surface }))
@@ -66,7 +66,7 @@ fn bilinear(answers: &[[f32; 3]], cells: [u32; 2]) -> Vec<f32> {
 }
 
 /// Share of a surface's pixels that are wrong by more than 5 %, and the largest relative error.
-fn bleeding(light: &[f32], surfaces: &[usize], scale: f32, surface: usize) -> (f32, f32) {
+pub fn bleeding(light: &[f32], surfaces: &[usize], scale: f32, surface: usize) -> (f32, f32) {
     let errors: Vec<f32> = light
         .iter()
         .zip(surfaces)

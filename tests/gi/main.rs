@@ -9,6 +9,7 @@ mod edges;
 mod probes;
 mod shot;
 mod stages;
+mod upsample;
 mod weights;
 mod whole;
 

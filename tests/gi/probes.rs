@@ -25,7 +25,7 @@ fn indirect(gpu: &Gpu, bake: &Arc<Bake>, scene: &Scene, camera: &Camera, size: [
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("uploads");
     let options = RendererOptions { method: Method::Probes(bake.clone()), ..Default::default() };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, options).expect("a renderer");
-    let options = CaptureOptions { samples: 1, seed: 0, layers: &[Layer::DiffInd] };
+    let options = CaptureOptions { samples: 1, seed: 0, warmup: 0, layers: &[Layer::DiffInd] };
     let frame = capture(gpu, &mut renderer, &uploaded, camera, options).expect("captured");
     frame.layer(Layer::DiffInd).expect("asked for").clone()
 }

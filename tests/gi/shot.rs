@@ -198,6 +198,7 @@ impl Textures {
             camera: shot.camera,
             environment: shot.environment,
             lights: None,
+            world: None,
         }
     }
 }

@@ -2,8 +2,10 @@
 
 use crate::common;
 use crate::read_light;
+use crate::screen::visibility;
 use crate::shot::{Hit, Random, Shot, camera, output, view};
-use bouncelight::gi::ambient::{AMBIENT, AmbientGi};
+use bouncelight::gi::ambient::AmbientGi;
+use bouncelight::gi::bitmask::March;
 use bouncelight::gi::exposure::{self, Exposure, ExposurePass};
 use bouncelight::gi::features::{FEATURES, FeatureSet};
 use bouncelight::gi::inputs::InputGroup;
@@ -79,7 +81,10 @@ fn exposure_is_the_mean_light() {
     }
     shot.buffers.direct[6 + 48] = [100.0; 3]; // background: light that nothing receives
     shot.environment = [0.25; 3];
+    shot.buffers.albedo.fill([0.2, 0.4, 0.6, 1.0]);
     let (found, _) = ambient(&gpu, &shot);
+    let outgoing = [0.2f32, 0.4, 0.6].map(|a| (4.0 * a + 0.5) / 4.0);
+    assert!(found.outgoing.iter().zip(outgoing).all(|(a, b)| close(*a, b, 1e-6)), "{found:?}");
     let s = (1.0 + 3.5) / 4.0 + 0.25;
     assert!(close(found.s, s, 1e-6), "{found:?}");
     assert!(close(found.inv_s, 1.0 / s, 1e-6), "{found:?}");
@@ -111,7 +116,7 @@ fn ambient_is_its_twin_and_linear() {
     for (seed, size) in SIZES.into_iter().enumerate() {
         let shot = Shot::random(size, seed as u64);
         let (exposure, light) = ambient(&gpu, &shot);
-        let twin = shot.picture().ambient(&exposure);
+        let twin = shot.picture().ambient(&exposure, &visibility(&gpu, &shot, March::NEAR, 0));
         assert!(largest_excess(&light, &twin) < 1e-4, "{size:?}");
         let background = shot.buffers.depth.iter().zip(&light).filter(|(d, _)| **d == 0.0);
         assert!(background.into_iter().all(|(_, l)| *l == [0.0; 3]));
@@ -121,13 +126,13 @@ fn ambient_is_its_twin_and_linear() {
         let (dark, none) = ambient(&gpu, &shot.scaled(0.0));
         assert_eq!((dark.s, dark.inv_s), (0.0, 0.0));
         assert!(none.iter().flatten().all(|x| *x == 0.0));
+        assert_eq!(dark.outgoing, [0.0; 3]);
     }
+    // Occlusion maps are the compositor's to apply: the light is the same under any.
     let mut plain = Shot::random([8, 8], 1);
-    plain.buffers.depth.fill(0.1);
-    // Occlusion is the compositor's to apply: the light is the same under an occlusion map of 0.25.
-    plain.buffers.albedo.fill([0.0, 0.0, 0.0, 0.25]);
-    let (exposure, light) = ambient(&gpu, &plain);
-    assert!(close(light[0][1], AMBIENT[1] * exposure.s, 1e-3));
+    let (_, light) = ambient(&gpu, &plain);
+    plain.buffers.albedo.iter_mut().for_each(|a| a[3] = 0.25);
+    assert_eq!(ambient(&gpu, &plain).1, light);
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod cycles;
 mod furnace;
 mod harness;
 mod light;
+mod lobe;
 mod raster;
 mod scenes;
 mod stats;

@@ -1,0 +1,124 @@
+// From the texels of reflective shadow maps to emitters: four texels make a fine one, the sixty-four of a block two: what
+// stands nearer to the light than the block's mean, and the rest. (One emitter would put an object's light down
+// to the floor under it, where the floor itself cannot see it.) Light is summed by what a texel carries (albedo times
+// irradiance times area), so nothing is lost between the levels.
+
+@group(0) @binding(0) var<storage, read> views: array<AtlasView>;
+@group(0) @binding(1) var<storage, read> lights: array<Light>;
+@group(0) @binding(2) var depth_map: texture_2d<f32>;
+@group(0) @binding(3) var albedo_map: texture_2d<f32>;
+@group(0) @binding(4) var normal_map: texture_2d<f32>;
+@group(0) @binding(5) var specular_map: texture_2d<f32>;
+// Sixteen for each block.
+@group(0) @binding(6) var<storage, read_write> fine: array<Emitter>;
+// Two for each block.
+@group(0) @binding(7) var<storage, read_write> blocks: array<Emitter>;
+
+// Texels on a side of a block.
+const BLOCK = 8u;
+
+// What a group of texels sends: place and normal are weighted by light.
+struct Share {
+    // Place times weight, weight.
+    place: vec4f,
+    // Normal times weight, area.
+    normal: vec4f,
+    // Radiance times area.
+    power: vec3f,
+    // The same of the specular lobe.
+    gloss: vec3f,
+    // Mirrored ray times weight.
+    mirror: vec3f,
+}
+
+var<workgroup> places: array<vec4f, 64>;
+var<workgroup> normals: array<vec4f, 64>;
+var<workgroup> powers: array<vec3f, 64>;
+var<workgroup> glosses: array<vec3f, 64>;
+var<workgroup> mirrors: array<vec3f, 64>;
+
+fn nothing() -> Share {
+    return Share(vec4f(0.0), vec4f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
+}
+
+fn plus(a: Share, b: Share) -> Share {
+    return Share(a.place + b.place, a.normal + b.normal, a.power + b.power, a.gloss + b.gloss, a.mirror + b.mirror);
+}
+
+fn share_of(k: u32) -> Share {
+    return Share(places[k], normals[k], powers[k], glosses[k], mirrors[k]);
+}
+
+fn texel_share(view: AtlasView, texel: vec2u) -> Share {
+    let at = view.origin + texel;
+    let depth = textureLoad(depth_map, at, 0).x;
+    if depth <= 0.0 { return nothing(); }
+    let p = atlas_position(view, texel, depth);
+    let n = oct_decode(textureLoad(normal_map, at, 0).xy);
+    let area = atlas_area(view, p, n);
+    let s = sample_light(lights[view.light], p);
+    let cosine = max(dot(n, s.l), 0.0);
+    let received = s.irradiance * (cosine * area.y / PI);
+    let power = textureLoad(albedo_map, at, 0).rgb * received;
+    let gloss = textureLoad(specular_map, at, 0).rgb * received;
+    // The little extra gives dark surfaces a place, too.
+    let weight = dot(power + gloss, vec3f(0.2126, 0.7152, 0.0722)) + 1e-12 * area.y;
+    let mirror = reflect(-s.l, n) * weight;
+    return Share(vec4f(p * weight, weight), vec4f(n * weight, area.y), power, gloss, mirror);
+}
+
+fn emitter_of(share: Share) -> Emitter {
+    var out: Emitter;
+    if share.place.w > 0.0 {
+        out.position = share.place.xyz / share.place.w;
+        out.normal = share.normal.xyz / share.place.w;
+        out.rest = 0.25 * max(1.0 - length(out.normal), 0.0);
+        out.area = share.normal.w;
+        out.radiance = share.power / share.normal.w;
+        out.gloss = share.gloss / share.normal.w;
+        out.mirror = share.mirror / share.place.w;
+    }
+    return out;
+}
+
+// A tile's blocks in x, tiles in y. Neighbouring invocations hold the four texels of one fine emitter.
+@compute @workgroup_size(64)
+fn collect(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) i: u32) {
+    let view = views[group.y];
+    let per_row = view.side / BLOCK;
+    let valid = group.x < per_row * per_row;
+    let corner = BLOCK * vec2u(group.x % per_row, group.x / per_row);
+    let four = i / 4u;
+    let texel = corner + 2u * vec2u(four % 4u, four / 4u) + vec2u(i & 1u, (i >> 1u) & 1u);
+    var own = nothing();
+    if valid { own = texel_share(view, texel); }
+    places[i] = own.place;
+    normals[i] = own.normal;
+    powers[i] = own.power;
+    glosses[i] = own.gloss;
+    mirrors[i] = own.mirror;
+    workgroupBarrier();
+    let block = view.first_block + group.x;
+    if valid && i % 4u == 0u {
+        var sum = own;
+        for (var k = 1u; k < 4u; k++) {
+            sum = plus(sum, share_of(i + k));
+        }
+        fine[16u * block + four] = emitter_of(sum);
+    }
+    if valid && i < 2u {
+        // The mean height is weighted like the places.
+        var mean = vec2f(0.0);
+        for (var k = 0u; k < 64u; k++) {
+            mean += vec2f(-dot(places[k].xyz, view.axis), places[k].w);
+        }
+        var sum = nothing();
+        for (var k = 0u; k < 64u; k++) {
+            let above = -dot(places[k].xyz, view.axis) * mean.y > mean.x * places[k].w;
+            if above == (i == 1u) {
+                sum = plus(sum, share_of(k));
+            }
+        }
+        blocks[2u * block + i] = emitter_of(sum);
+    }
+}

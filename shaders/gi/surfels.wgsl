@@ -1,0 +1,98 @@
+// The cube around the camera becomes surfels, lit by all lights: visible to a light is what its reflective shadow map
+// shows. Then a few rounds in which surfels light each other.
+
+@group(0) @binding(0) var<storage, read> around: array<AtlasView>;
+@group(0) @binding(1) var<storage, read> views: array<AtlasView>;
+@group(0) @binding(2) var<storage, read> lights: array<Light>;
+@group(0) @binding(3) var<storage, read> view_of_light: array<vec2u>;
+@group(0) @binding(4) var around_depth: texture_2d<f32>;
+@group(0) @binding(5) var around_albedo: texture_2d<f32>;
+@group(0) @binding(6) var around_normal: texture_2d<f32>;
+@group(0) @binding(7) var around_emissive: texture_2d<f32>;
+@group(0) @binding(8) var rsm_depth: texture_2d<f32>;
+@group(0) @binding(9) var environment_picture: texture_2d<f32>;
+@group(0) @binding(10) var<storage, read_write> surfels: array<Surfel>;
+@group(0) @binding(11) var<storage, read_write> sent: array<vec4f>;
+
+@group(0) @binding(12) var<uniform> counts: Counts;
+
+// The point is lifted off its surface by so many texels of the map.
+const LIFT: f32 = 1.5;
+
+// Share of four texels of `view` that the light sees at `p`.
+fn lit(view: AtlasView, p: vec3f, n: vec3f) -> f32 {
+    let reach = select(dot(p - view.eye, view.axis), 1.0, view.near == 0.0);
+    if reach <= 0.0 { return 0.0; }
+    let size = view.texel * reach;
+    let c = view.clip_from_world * vec4f(p + n * (LIFT * size), 1.0);
+    if c.w <= 0.0 { return 0.0; }
+    let ndc = c.xyz / c.w;
+    if any(abs(ndc.xy) > vec2f(1.0)) { return 0.0; }
+    let at = (ndc.xy * vec2f(0.5, -0.5) + 0.5) * f32(view.side) - 0.5;
+    let low = floor(at);
+    let t = at - low;
+    // Half a texel nearer than the point counts as the point itself.
+    let nearer = select(view.near / max(c.w - 0.5 * size, view.near), ndc.z + 0.5 * size / view.range, view.near == 0.0);
+    var sum = 0.0;
+    for (var i = 0; i < 4; i++) {
+        let step = vec2i(i & 1, i >> 1);
+        let texel = clamp(vec2i(low) + step, vec2i(0), vec2i(i32(view.side) - 1));
+        let w = select(1.0 - t, t, step == vec2i(1));
+        let stored = textureLoad(rsm_depth, vec2i(view.origin) + texel, 0).x;
+        sum += select(0.0, w.x * w.y, stored <= nearer);
+    }
+    return sum;
+}
+
+// Which view of light `i` looks at `p`; 0xffffffff for none.
+fn view_at(i: u32, p: vec3f) -> u32 {
+    let first = view_of_light[i].x;
+    let count = view_of_light[i].y;
+    if count == 0u { return 0xffffffffu; }
+    if count == 1u { return first; }
+    let away = p - lights[i].position;
+    let a = abs(away);
+    if a.x >= a.y && a.x >= a.z { return first + select(0u, 1u, away.x < 0.0); }
+    if a.y >= a.z { return first + select(2u, 3u, away.y < 0.0); }
+    return first + select(4u, 5u, away.z < 0.0);
+}
+
+@compute @workgroup_size(64)
+fn light_up(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= SURFELS { return; }
+    let face = around[id.x / (SIDE * SIDE)];
+    let texel = vec2u(id.x % SIDE, id.x / SIDE % SIDE);
+    let at = face.origin + texel;
+    let depth = textureLoad(around_depth, at, 0).x;
+    let seen = depth > 0.0;
+    var s: Surfel;
+    s.position = atlas_position(face, texel, select(face.near / 1000.0, depth, seen));
+    let ray = normalize(s.position - face.eye);
+    let cosine = dot(ray, face.axis);
+    s.solid = face.texel * face.texel * cosine * cosine * cosine;
+    if seen {
+        s.normal = oct_decode(textureLoad(around_normal, at, 0).xy);
+        s.area = atlas_area(face, s.position, s.normal).y;
+        s.albedo = textureLoad(around_albedo, at, 0).rgb;
+        s.own = textureLoad(around_emissive, at, 0).rgb;
+        for (var i = 0u; i < counts.lights; i++) {
+            let l = sample_light(lights[i], s.position);
+            let n_l = dot(s.normal, l.l);
+            if n_l <= 0.0 { continue; }
+            let view = view_at(i, s.position);
+            let direct = s.albedo * l.irradiance * (n_l / PI);
+            if view == 0xffffffffu {
+                s.own += direct;
+            } else {
+                let part = direct * lit(views[view], s.position, s.normal);
+                s.own += part;
+                s.mapped += part;
+            }
+        }
+    } else {
+        s.normal = -ray;
+        s.own = environment_radiance(ray);
+    }
+    surfels[id.x] = s;
+    sent[id.x] = vec4f(select(vec3f(0.0), s.own, seen), 0.0);
+}

@@ -1,0 +1,173 @@
+//! The methods `rsm` and `cache`: light that lights and surfels beyond the screen send to cells.
+//!
+//! `rsm` is one bounce of the analytic lights: what their reflective shadow maps show, as emitters, and nothing else; no
+//! sky, no second bounce, no emissive surfaces. `cache` adds the camera-centred cube: its surfels, lit by the lights
+//! and by each other, send on what comes after the first bounce and what they emit, and between them is the sky.
+//! `docs/gi.md` says what neither can do.
+
+use super::cells::{CellSide, CellsPass};
+use super::emitters::EmittersPass;
+use super::exposure::{pipeline, storage_entry};
+use super::inputs::InputGroup;
+use super::rung::{Cost, Rung};
+use super::surfels::{self, SURFELS, SurfelsPass};
+use super::upsample::UpsamplePass;
+use super::{GiError, Inputs};
+use crate::gpu::shaders;
+use crate::gpu::timing::Recorder;
+
+/// How the world beyond the screen is gathered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// With the cube around the camera (`cache`); without it only the reflective shadow maps (`rsm`).
+    pub around: bool,
+    /// Rounds of light exchange between surfels; rounded up to an even number.
+    pub rounds: u32,
+    /// Resolution of the gather.
+    pub side: CellSide,
+}
+
+impl Options {
+    /// The method `rsm`.
+    pub const RSM: Self = Self { around: false, rounds: 0, side: CellSide::Eight };
+    /// The method `cache`.
+    pub const CACHE: Self = Self { around: true, rounds: 4, side: CellSide::Eight };
+}
+
+/// Constants of the gather as WGSL.
+pub fn prelude(options: Options) -> String {
+    options.side.prelude() + &surfels::prelude(if options.around { SURFELS } else { 0 })
+}
+
+/// Either method.
+pub struct WorldGi {
+    device: wgpu::Device,
+    options: Options,
+    inputs: InputGroup,
+    emitters: EmittersPass,
+    surfels: SurfelsPass,
+    cells: CellsPass,
+    upsample: UpsamplePass,
+    gather: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+    /// Light of the cells and the group that writes it.
+    light: Option<(wgpu::Buffer, wgpu::BindGroup)>,
+    made: u64,
+}
+
+impl WorldGi {
+    /// Makes pipelines, and buffers for pictures of `size` pixels.
+    pub fn new(device: &wgpu::Device, size: [u32; 2], options: Options) -> Self {
+        let inputs = InputGroup::new(device);
+        let mut entries: Vec<_> = (0..7).map(|i| storage_entry(i, i != 1)).collect();
+        entries.push(wgpu::BindGroupLayoutEntry { binding: 7, ty: crate::render::tool::UNIFORM, ..entries[0] });
+        let layout = device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("gi.gather"), entries: &entries });
+        let module = shaders::module_with(device, "gi.gather", &prelude(options));
+        Self {
+            gather: pipeline(device, "gi.gather", &module, "gather", &inputs, &layout),
+            emitters: EmittersPass::new(device),
+            surfels: SurfelsPass::new(device, options.rounds),
+            cells: CellsPass::new(device, &inputs, options.side, size),
+            upsample: UpsamplePass::new(device, &inputs, options.side),
+            device: device.clone(),
+            inputs,
+            layout,
+            options,
+            light: None,
+            made: 0,
+        }
+    }
+
+    /// Bind groups made since the start; stands still in steady frames.
+    pub fn allocations(&self) -> u64 {
+        self.made + self.inputs.made() + self.emitters.made() + self.surfels.made() + self.upsample.made()
+    }
+
+    fn light(&self, size: [u32; 2]) -> (wgpu::Buffer, wgpu::BindGroup) {
+        let light = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("gi.light"),
+            size: self.options.side.light_bytes(size),
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let resources = [
+            self.cells.pixels(),
+            &light,
+            self.emitters.fine(),
+            self.emitters.blocks(),
+            self.surfels.surfels(),
+            self.surfels.sent(),
+            self.surfels.sky(),
+            self.emitters.counts(),
+        ]
+        .map(|b| b.as_entire_binding());
+        let group = crate::render::tool::group(&self.device, "gi.gather", &self.layout, &resources);
+        (light, group)
+    }
+}
+
+impl Rung for WorldGi {
+    fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError> {
+        super::ambient::check_output(output, inputs.size)?;
+        let world = inputs.world.as_ref().ok_or(GiError::World)?;
+        let bound = self.inputs.bind(queue, inputs)?;
+        let fresh = self.emitters.fit(queue, world);
+        if self.cells.fit(inputs.size) || fresh || self.light.is_none() {
+            self.upsample.forget();
+            self.light = Some(self.light(inputs.size));
+            self.made += 1;
+        }
+        let (light, group) = self.light.as_ref().expect("made above");
+        self.emitters.record(recorder, world);
+        if self.options.around {
+            self.surfels.record(recorder, world, self.emitters.counts());
+        }
+        self.cells.record(recorder, &bound);
+        let [w, h] = self.options.side.grid(inputs.size);
+        recorder.compute("gi.gather", |pass| {
+            bound.set(pass);
+            pass.set_bind_group(1, group, &[]);
+            pass.set_pipeline(&self.gather);
+            pass.dispatch_workgroups(w.div_ceil(8), h.div_ceil(8), 1);
+        });
+        self.upsample.record(recorder, &bound, &self.cells, light, output)
+    }
+
+    fn forget(&mut self) {
+        self.inputs.forget();
+        self.emitters.forget();
+        self.surfels.forget();
+        self.upsample.forget();
+    }
+
+    fn bytes(&self) -> u64 {
+        self.inputs.bytes()
+            + self.emitters.bytes()
+            + self.surfels.bytes()
+            + self.cells.bytes()
+            + self.light.as_ref().map_or(0, |(light, _)| light.size())
+    }
+
+    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
+        let cells = self.options.side.count(size) as f64;
+        // A pair takes 38 operations; of the blocks about a sixteenth are opened into sixteen.
+        let blocks = 2.0 * f64::from(self.emitters.block_count());
+        let surfels = if self.options.around { f64::from(SURFELS) } else { 0.0 };
+        let mut costs = vec![self.emitters.cost()];
+        if self.options.around {
+            costs.extend(self.surfels.costs());
+        }
+        costs.push(CellsPass::cost(self.options.side, size));
+        let emitters = blocks * 48.0 + surfels * 80.0;
+        costs.push(Cost::new("gi.gather", cells * (blocks + surfels) * 45.0, cells * (4.0 + 8.0 + 48.0) + emitters));
+        costs.push(UpsamplePass::cost(self.options.side, size));
+        costs
+    }
+}

@@ -1,0 +1,145 @@
+//! Temporal anti-aliasing and the history behind it: the mean over frames, each of which samples its pixels elsewhere.
+//!
+//! A camera that stands still in a scene that does not change averages without end, so the picture converges to the
+//! filtered one and stops moving. Otherwise the mean is fetched along the motion vectors, dropped where the surface was
+//! not seen before, and held within the colours around the pixel (variance clipping, Salvi 2016), which keeps ten frames
+//! at most. Jitter comes from the pixel filter itself ([`sampling`](super::sampling)), so plain means are right.
+//!
+//! What it cannot do: tell a changed light from noise faster than the neighbourhood's colours allow; reflections move
+//! with their surfaces; things thinner than a pixel lose brightness while the camera moves.
+
+use super::targets::{Target, Targets};
+use super::tool;
+use super::view::View;
+use crate::gi::rung::Cost;
+use crate::gpu::timing::Recorder;
+
+/// What history is worth in a frame; `mode` in the shader.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mode {
+    /// First frame, new size, another scene, or a cut.
+    Fresh = 0,
+    /// The very view of the frame before.
+    Still = 1,
+    /// Another view of the same scene.
+    Moving = 2,
+}
+
+/// The pass with its history, for one size of targets.
+pub struct TaaPass {
+    pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+    mode: wgpu::Buffer,
+    textures: Option<Textures>,
+    last: Option<(u64, View)>,
+    frames: u32,
+}
+
+struct Textures {
+    /// The frame before anti-aliasing; composite writes it.
+    current: Target,
+    history: [Target; 2],
+    distance: [Target; 2],
+    /// Group `i` reads history `i` and writes the other.
+    groups: [wgpu::BindGroup; 2],
+}
+
+impl TaaPass {
+    /// Builds the pipeline.
+    pub fn new(device: &wgpu::Device) -> Self {
+        use tool::{LOAD, STORE_HALF, UNIFORM};
+        let store_distance = wgpu::BindingType::StorageTexture {
+            access: wgpu::StorageTextureAccess::WriteOnly,
+            format: wgpu::TextureFormat::R32Float,
+            view_dimension: wgpu::TextureViewDimension::D2,
+        };
+        let types = [UNIFORM, LOAD, LOAD, LOAD, LOAD, LOAD, UNIFORM, STORE_HALF, STORE_HALF, store_distance];
+        let layout = tool::layout(device, "render.taa", wgpu::ShaderStages::COMPUTE, &types);
+        let pipeline = tool::compute(device, "render.taa", "taa", &[&layout]);
+        let mode = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("render.taa"),
+            size: 16,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Self { pipeline, layout, mode, textures: None, last: None, frames: 0 }
+    }
+
+    /// Makes the history's textures for `targets` and forgets what it held.
+    pub fn fit(&mut self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets) {
+        use wgpu::TextureFormat::{R32Float, Rgba16Float};
+        let make = |name, format| Target::new(device, name, targets.size, format, wgpu::TextureUsages::STORAGE_BINDING);
+        let current = make("taa.current", Rgba16Float);
+        let history = ["taa.history_a", "taa.history_b"].map(|name| make(name, Rgba16Float));
+        let distance = ["taa.distance_a", "taa.distance_b"].map(|name| make(name, R32Float));
+        let groups = [0, 1].map(|i| {
+            let read = [&targets.depth, &targets.motion, &current, &history[i], &distance[i]].map(tool::view);
+            let written = [&targets.hdr, &history[1 - i], &distance[1 - i]].map(tool::view);
+            let mut resources = vec![frame.as_entire_binding()];
+            resources.extend(read);
+            resources.push(self.mode.as_entire_binding());
+            resources.extend(written);
+            tool::group(device, "render.taa", &self.layout, &resources)
+        });
+        self.textures = Some(Textures { current, history, distance, groups });
+        self.cut();
+    }
+
+    /// Where composite puts the frame before anti-aliasing.
+    ///
+    /// # Panics
+    /// Before [`fit`](Self::fit).
+    pub fn current(&self) -> &Target {
+        &self.textures.as_ref().expect("fitted before it is bound").current
+    }
+
+    /// The next frame has nothing to do with the last: a cut.
+    pub fn cut(&mut self) {
+        self.last = None;
+    }
+
+    /// Frames recorded so far; numbers the patterns of methods that let the history average them.
+    pub fn frames(&self) -> u32 {
+        self.frames
+    }
+
+    /// `view` with motion vectors that point to the frame recorded before it.
+    pub fn follow(&self, view: &View) -> View {
+        self.last.as_ref().map_or(*view, |(_, last)| view.after(last))
+    }
+
+    /// Records the pass: `hdr` of the targets becomes the mean of this frame ([`current`](Self::current)) and history.
+    /// `scene` tells scenes apart.
+    pub fn record(&mut self, recorder: &mut Recorder<'_>, queue: &wgpu::Queue, scene: u64, view: &View) {
+        let Some(textures) = &self.textures else { return };
+        let mode = match &self.last {
+            Some((id, last)) if *id == scene => match last.clip_from_world_unjittered {
+                same if same == view.clip_from_world_unjittered => Mode::Still,
+                _ => Mode::Moving,
+            },
+            _ => Mode::Fresh,
+        };
+        queue.write_buffer(&self.mode, 0, bytemuck::cast_slice(&[mode as u32, 0, 0, 0]));
+        let group = &textures.groups[self.frames as usize % 2];
+        recorder.compute("taa", |pass| {
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, group, &[]);
+            tool::dispatch(pass, view.size);
+        });
+        self.last = Some((scene, *view));
+        self.frames = self.frames.wrapping_add(1);
+    }
+
+    /// Name and bytes of the history's textures.
+    pub fn bytes(&self) -> Vec<(&'static str, u64)> {
+        let Some(t) = &self.textures else { return Vec::new() };
+        [&t.current].into_iter().chain(&t.history).chain(&t.distance).map(|t| (t.name, t.bytes())).collect()
+    }
+
+    /// What a moving frame of `size` pixels costs: statistics of 9 colours, 16 taps of history, 18 depths. Reads depth,
+    /// motion, frame, history and its distance, writes picture, history and distance.
+    pub fn cost(size: [u32; 2]) -> Cost {
+        let pixels = f64::from(size[0]) * f64::from(size[1]);
+        Cost::new("taa", pixels * (9.0 * 26.0 + 16.0 * 8.0 + 160.0), pixels * (4.0 + 4.0 + 8.0 + 8.0 + 4.0 + 20.0))
+    }
+}
