@@ -349,7 +349,7 @@ impl Rung for ProbesGi {
             ),
             Cost::new("gi.probes.bounce", rounds * n * (inner * link + 60.0), rounds * n * (inner * 2.0 + 100.0)),
             Cost::new("gi.probes.gather", n * (rays * link + 40.0), n * (rays * 2.0 + 84.0)),
-            Cost::new("gi.probes.apply", pixels * (120.0 + self.list * 65.0), pixels * 16.0 + n * 48.0),
+            Cost::new("gi.probes.apply", pixels * (120.0 + self.list * 65.0), pixels * 16.0 + n * 52.0),
         ]
     }
 }
