@@ -16,7 +16,7 @@
 // The same stand in `gi::probes::field`, which says what they mean.
 const REACH = 2.0;
 const OFF_PLANE = 8.0;
-const TURN = 10.7;
+const TURN = 16.0;
 const LEAST = 0.0001;
 const WALLS = 255.0;
 const SECTORS = 16u;

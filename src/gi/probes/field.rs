@@ -8,8 +8,8 @@ use std::collections::HashMap;
 pub const REACH: f32 = 2.0;
 /// What a step off the surfel's plane counts more than one along it, squared.
 pub const OFF_PLANE: f32 = 8.0;
-/// What turning the normal counts: 1 − cos of 25° is a distance of 1.
-pub const TURN: f32 = 10.7;
+/// What turning the normal counts: 1 − cos of 20° is a distance of 1.
+pub const TURN: f32 = 16.0;
 /// Entries of a cell's list at most.
 pub const LONGEST: usize = 64;
 /// Cells are numbered from −511 to 511 along each axis, by 30 bits.
