@@ -35,9 +35,9 @@ fn every_shader_validates_in_every_permutation() {
     assert_eq!(seen.len(), shaders::all().count(), "every row of the table was seen");
     assert_eq!(
         (shaders::RENDER.len(), shaders::GI.len(), shaders::NET.len(), shaders::REFERENCE.len()),
-        (8, 20, 26, 3)
+        (8, 21, 26, 3)
     );
-    assert_eq!(permutations.len(), 261);
+    assert_eq!(permutations.len(), 262);
 }
 
 #[test]

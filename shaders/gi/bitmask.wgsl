@@ -3,10 +3,11 @@
 // buffer, and every texel there blocks the angles between its front and a back that is assumed THICKNESS behind it.
 //
 // Two things differ from the paper. The 32 sectors of a slice are not equally wide: each holds the same share of the
-// slice's cosine-weighted light, so that counting bits integrates E/pi without weights, exactly for even light. And the
-// assumed thickness grows with the step: the depth buffer is known as densely as it is sampled.
+// slice's cosine-weighted light, so that counting bits integrates E/pi without weights, exactly for even light. And a
+// step that lies near the one before it blocks all angles between the two, and half as much again beyond it: a wall
+// must not fall apart between steps, nor end at the last one that met it.
 //
-// The prelude (gi::bitmask) holds SLICES, STEPS, REACH, RADIUS, THICKNESS, GROWTH. Group 1 binding 0 is the pattern.
+// The prelude (gi::bitmask) holds SLICES, STEPS, REACH, RADIUS, THICKNESS, GROWTH, JOIN. Group 1 binding 0 is the pattern.
 
 @group(1) @binding(0) var<uniform> pattern: vec4u;   // x: number of the frame, 0 without history
 
@@ -31,6 +32,13 @@ struct Slice {
     cos_tilt: f32,
     sin_tilt: f32,
     share: f32,        // cosine-weighted measure of the slice; their mean over all slices is 1
+}
+
+// The step before on the same side.
+struct Last {
+    there: bool,
+    place: f32,        // of its front
+    offset: vec3f,
 }
 
 // What one step saw.
@@ -85,13 +93,17 @@ fn slice_at(here: Receiver, k: i32) -> Slice {
     return Slice(direction, tilt, cos_tilt, sin_tilt, share);
 }
 
-// Which of the 32 sectors' borders lies at `angle`, 0 to 32, rounded by the pattern.
-fn border(here: Receiver, slice: Slice, angle: f32) -> u32 {
+// Where `angle` lies among the sectors, 0 to 32.
+fn place(slice: Slice, angle: f32) -> f32 {
     let low = slice.tilt - 0.5 * PI;
     let inside = clamp(angle, low, slice.tilt + 0.5 * PI);
     let whole = max(slice.cos_tilt + slice.tilt * slice.sin_tilt, 1e-4);
-    let share = (arc(slice, low) + sign(inside) * arc(slice, inside)) / whole;
-    return u32(clamp(share, 0.0, 1.0) * SECTORS + here.shift.z);
+    return SECTORS * (arc(slice, low) + sign(inside) * arc(slice, inside)) / whole;
+}
+
+// The border at or below `place`, rounded by the pattern.
+fn border(here: Receiver, place: f32) -> u32 {
+    return u32(clamp(place, 0.0, SECTORS) + here.shift.z);
 }
 
 // Bits from border `a` up to border `b`, both 0 to 32.
@@ -103,13 +115,16 @@ fn angle_to(here: Receiver, offset: vec3f) -> f32 {
     return acos(clamp(dot(offset, here.to_eye) / max(length(offset), 1e-9), -1.0, 1.0));
 }
 
-// Step `k` of STEPS to one side (1 or -1) of the slice. Steps grow geometrically from one texel to the reach.
-fn look(here: Receiver, slice: Slice, side: f32, k: i32) -> Seen {
+// Step `k` of STEPS to one side (1 or -1) of the slice, after the step `last` there. Steps grow geometrically from one
+// texel to the reach.
+fn look(here: Receiver, slice: Slice, side: f32, k: i32, last: ptr<function, Last>) -> Seen {
     let t = (f32(k) + here.shift.y) / f32(STEPS);
     let farthest = max(REACH * f32(max(params.size.x, params.size.y)), FIRST);
     let pixels = FIRST * exp2(t * log2(farthest / FIRST));
     let pixel = vec2i(floor(vec2f(here.pixel) + 0.5 + side * pixels * slice.direction));
     var seen = Seen(pixel, pixels, vec3f(0.0), 0u);
+    let before = *last;
+    (*last).there = false;
     if any(pixel < vec2i(0)) || any(pixel >= vec2i(params.size)) || all(pixel == here.pixel) {
         return seen;
     }
@@ -126,8 +141,16 @@ fn look(here: Receiver, slice: Slice, side: f32, k: i32) -> Seen {
     // The back lies on the same ray from the eye, so it is in the slice, too.
     let far = length(front);
     let back = front * ((max(THICKNESS * far, GROWTH * apart)) / far) + seen.offset;
-    let a = border(here, slice, side * angle_to(here, seen.offset));
-    let b = border(here, slice, side * angle_to(here, back));
-    seen.bits = between(min(a, b), max(a, b));
+    let a = place(slice, side * angle_to(here, seen.offset));
+    let b = place(slice, side * angle_to(here, back));
+    var low = min(a, b);
+    var high = max(a, b);
+    if before.there && distance(before.offset, seen.offset) < JOIN * apart {
+        let beyond = a + 0.5 * (a - before.place);
+        low = min(low, min(before.place, beyond));
+        high = max(high, max(before.place, beyond));
+    }
+    *last = Last(true, a, seen.offset);
+    seen.bits = between(border(here, low), border(here, high));
     return seen;
 }

@@ -1,26 +1,161 @@
-// Specular light of sky and bounces: what the surface would show if the light that its own side receives came evenly
-// from everywhere (split sum). Right for rough surfaces; a mirror shows a flat colour instead of a picture.
+// Specular light of sky and bounces: the split sum's share times what one ray along the mirrored direction finds on the
+// screen, blurred by the lobe's width there. Where the ray finds nothing: the light that the surface's own side receives,
+// mixed with the picture's colour where the ray leaves it, or the surroundings where only they are there.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL backends would refuse one.
-@group(0) @binding(1) var depth_texture: texture_2d<f32>;
-@group(0) @binding(2) var normal_texture: texture_2d<f32>;
-@group(0) @binding(3) var specular_texture: texture_2d<f32>;
-@group(0) @binding(4) var indirect: texture_2d<f32>;
-@group(0) @binding(5) var indirect_specular: texture_storage_2d<rgba16float, write>;
+@group(1) @binding(0) var lit_picture: texture_2d<f32>;
+@group(1) @binding(1) var blurred: sampler;
+@group(1) @binding(2) var indirect_specular: texture_storage_2d<rgba16float, write>;
+@group(2) @binding(0) var environment_picture: texture_2d<f32>;
 
 // The largest finite half: brighter light is held there instead of becoming infinite.
 const HALF_MAX: f32 = 65504.0;
+// Steps of a ray of a rough and of a smooth surface, and of halving the step that hit.
+const STEPS_ROUGH = 16;
+const STEPS_SMOOTH = 48;
+const HALVINGS = 5;
+// Depth of everything on the screen, relative to its view distance: a ray that passes further behind goes on.
+const THICKNESS = 0.05;
+// A ray starts this far above its surface, relative to the view distance.
+const LIFT = 0.002;
+// Pixels on the way that are the surface itself.
+const NEXT_PIXEL = 1.5;
+const FAR = 1e9;
+// Level of the lit picture (pixels: 2^(level + 1)) that guesses what lies beyond its border.
+const BORDER_LEVEL = 4.0;
+
+// A ray on the screen: pixel position and 1/distance are linear between its ends.
+struct Track {
+    start: vec3f,
+    end: vec3f,
+}
+
+// Pixels and 1/distance of a clip-space point.
+fn on_screen(clip: vec4f) -> vec3f {
+    let uv = 0.5 + clip.xy / clip.w * vec2f(0.5, -0.5);
+    return vec3f(uv * vec2f(frame.size), 1.0 / clip.w);
+}
+
+// From `origin` along `direction` until it leaves the screen or comes too near the eye.
+fn track_of(origin: vec3f, direction: vec3f) -> Track {
+    let from_clip = frame.clip_from_world * vec4f(origin, 1.0);
+    let along = frame.clip_from_world * vec4f(direction, 0.0);
+    var t = 1e4 * from_clip.w;
+    if along.w < 0.0 { t = 0.99 * (frame.near - from_clip.w) / along.w; }
+    for (var side = 0; side < 4; side++) {
+        let axis = side >> 1;
+        let edge = f32((side & 1) * 2 - 1);
+        let crossing = (edge * from_clip.w - from_clip[axis]) / (along[axis] - edge * along.w);
+        if crossing > 1e-6 && crossing < t { t = crossing; }
+    }
+    return Track(on_screen(from_clip), on_screen(from_clip + t * along));
+}
+
+fn distance_of(pixel: vec2u) -> f32 {
+    let depth = textureLoad(depth_texture, pixel, 0).x;
+    return select(FAR, frame.near / depth, depth > 0.0);
+}
+
+fn pixel_of(place: vec3f) -> vec2u {
+    return vec2u(clamp(place.xy, vec2f(0.0), vec2f(frame.size) - 1.0));
+}
+
+// Where along the track (0 to 1) a ray towards `r` goes behind something that faces it; negative for nowhere.
+fn march(track: Track, r: vec3f, steps: i32) -> f32 {
+    let length = distance(track.start.xy, track.end.xy);
+    if length < NEXT_PIXEL { return -1.0; }
+    let first = NEXT_PIXEL / length;
+    var before = first;
+    var last = 1.0 / mix(track.start.z, track.end.z, first);
+    for (var i = 0; i < steps; i++) {
+        let even = (f32(i) + 0.5) / f32(steps);
+        let u = mix(first, 1.0, even * sqrt(even)); // finer near the surface, where reflections are sharp
+        let place = mix(track.start, track.end, u);
+        let ray = 1.0 / place.z;
+        let pixel = pixel_of(place);
+        let seen = distance_of(pixel);
+        let behind = seen < ray && seen * (1.0 + THICKNESS) > min(ray, last);
+        if behind && dot(normal_of(pixel), r) < 0.0 {
+            return halve(track, before, u);
+        }
+        before = u;
+        last = ray;
+    }
+    return -1.0;
+}
+
+fn halve(track: Track, before: f32, behind: f32) -> f32 {
+    var low = before;
+    var high = behind;
+    for (var i = 0; i < HALVINGS; i++) {
+        let middle = 0.5 * (low + high);
+        let place = mix(track.start, track.end, middle);
+        let inside = distance_of(pixel_of(place)) * place.z < 1.0;
+        low = select(middle, low, inside);
+        high = select(high, middle, inside);
+    }
+    return high;
+}
+
+// The lit picture around a place (pixels), `level` of it.
+fn blurred_at(place: vec2f, level: f32) -> vec4f {
+    return textureSampleLevel(lit_picture, blurred, place / vec2f(frame.size), level);
+}
+
+// What a ray finds: radiance (rgb) and how far to trust it (a).
+fn found(track: Track, u: f32, p: vec3f, r: vec3f, cone: f32) -> vec4f {
+    let place = mix(track.start, track.end, u);
+    let pixel = pixel_of(place);
+    let depth = textureLoad(depth_texture, pixel, 0).x;
+    if depth <= 0.0 || dot(normal_of(pixel), r) >= 0.0 { return vec4f(0.0); }
+    // The lobe's radius at the hit, in pixels.
+    let pixels_per_metre = f32(frame.size.y) * 0.5 / frame.tan_half.y * place.z;
+    let radius = cone * distance(world_position(frame, pixel, depth), p) * pixels_per_metre;
+    let margin = min(place.xy, vec2f(frame.size) - place.xy);
+    let trust = saturate(min(margin.x, margin.y) / max(radius, 8.0));
+    if radius < 1.0 { return vec4f(outgoing(pixel), trust); }
+    let color = blurred_at(place.xy, log2(radius) - 1.0);
+    return vec4f(color.rgb / max(color.a, 1e-3), trust);
+}
+
+// What a ray that found nothing may see beyond the picture's border (rgb), and how likely (a): the surroundings where
+// only they are seen there, else more of the same.
+fn beyond(track: Track, r: vec3f) -> vec4f {
+    let border = vec2f(frame.size) * 0.04;
+    let color = blurred_at(clamp(track.end.xy, border, vec2f(frame.size) - border), BORDER_LEVEL);
+    let open = 1.0 - saturate(color.a);
+    // Only what lies ahead can look like the picture's border.
+    // And a ray that leaves at once has come to know nothing.
+    let length = distance(track.start.xy, track.end.xy) / (0.25 * f32(frame.size.y));
+    let ahead = saturate(2.0 * dot(r, -frame.world_from_view[2].xyz)) * saturate(length);
+    return vec4f(color.rgb + open * environment_radiance(r), ahead * (0.5 + 0.5 * open));
+}
+
+fn reflected(pixel: vec2u, depth: f32, n: vec3f, roughness: f32) -> vec3f {
+    let p = world_position(frame, pixel, depth);
+    let r = reflect(-to_eye(frame, pixel), n);
+    let around = textureLoad(indirect, pixel, 0).rgb;
+    let cone = roughness * roughness;
+    let track = track_of(p + n * (LIFT * linear_depth(frame, depth)), r);
+    let u = march(track, r, select(STEPS_SMOOTH, STEPS_ROUGH, roughness > 0.35));
+    var hit = vec4f(0.0);
+    if u >= 0.0 { hit = found(track, u, p, r, cone); }
+    // A lobe that fills the hemisphere shows what the surface's own side receives, and no ray tells it better.
+    let narrow = 1.0 - smoothstep(0.6, 1.0, roughness);
+    let guess = beyond(track, r);
+    return mix(mix(around, guess.rgb, narrow * guess.a), hit.rgb, narrow * hit.a);
+}
 
 @compute @workgroup_size(8, 8)
 fn glossy(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     var radiance = vec3f(0.0);
-    if textureLoad(depth_texture, id.xy, 0).x > 0.0 {
-        let n = oct_decode(textureLoad(normal_texture, id.xy, 0).xy);
-        let specular = textureLoad(specular_texture, id.xy, 0);
-        let share = env_brdf(specular.rgb, specular.a, dot(n, to_eye(frame, id.xy)));
-        radiance = share * textureLoad(indirect, id.xy, 0).rgb;
+    let depth = textureLoad(depth_texture, id.xy, 0).x;
+    if depth > 0.0 {
+        let n = normal_of(id.xy);
+        let share = lobe_share(id.xy, n);
+        if any(share > vec3f(0.0)) {
+            radiance = share * reflected(id.xy, depth, n, textureLoad(specular_texture, id.xy, 0).a);
+        }
     }
     textureStore(indirect_specular, id.xy, vec4f(min(radiance, vec3f(HALF_MAX)), 1.0));
 }

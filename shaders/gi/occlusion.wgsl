@@ -20,8 +20,10 @@ fn occlusion(@builtin(global_invocation_id) id: vec3u) {
     for (var s = 0; s < SLICES; s++) {
         let slice = slice_at(here, s);
         var blocked = 0u;
+        var right: Last;
+        var left: Last;
         for (var k = 0; k < STEPS; k++) {
-            blocked |= look(here, slice, 1.0, k).bits | look(here, slice, -1.0, k).bits;
+            blocked |= look(here, slice, 1.0, k, &right).bits | look(here, slice, -1.0, k, &left).bits;
         }
         open += slice.share * (1.0 - f32(countOneBits(blocked)) / SECTORS);
         whole += slice.share;

@@ -45,11 +45,13 @@ fn ssgi(@builtin(global_invocation_id) id: vec3u) {
         let slice = slice_at(here, s);
         var blocked = 0u;
         var sum = vec3f(0.0);
+        var last_right: Last;
+        var last_left: Last;
         for (var k = 0; k < STEPS; k++) {
-            let right = look(here, slice, 1.0, k);
+            let right = look(here, slice, 1.0, k, &last_right);
             sum += sent(right, right.bits & ~blocked);
             blocked |= right.bits;
-            let left = look(here, slice, -1.0, k);
+            let left = look(here, slice, -1.0, k, &last_left);
             sum += sent(left, left.bits & ~blocked);
             blocked |= left.bits;
         }

@@ -26,9 +26,6 @@ struct Sky {
     open: vec4f,
 }
 
-// Share of the sphere that must be sky before gaps between surfels count as sky, too.
-const OPEN_SKY: f32 = 0.02;
-
 struct Rest {
     // Factor for the surfels' light.
     gain: f32,
@@ -38,22 +35,24 @@ struct Rest {
     radiance: vec3f,
 }
 
-// What to make of a hemisphere around `n` of which surfels cover `share` (cosine-weighted, 1 = all). Under an open sky
-// the rest is sky. Where the camera sees next to no sky the gaps are errors of the surfels, so their light is scaled up
-// to the full hemisphere instead: a closed room must not glow.
+// Where gaps are closed, light of the surfels stands in for at most so much more than there is.
+const MOST_GAIN: f32 = 2.0;
+
+// What to make of a hemisphere around `n` of which surfels cover `share` (cosine-weighted, 1 = all). The gaps are sky,
+// as seen from here, but also what the camera does not see; the camera's own share of sky in that direction knows
+// nothing of this place. Their geometric mean is taken for the sky: it is right where both are, and 0 where either is,
+// so a closed room stays dark. The rest of the hemisphere shows the mean of what surfels show.
 fn sky_rest(sky: Sky, share: f32, n: vec3f) -> Rest {
-    let opened = saturate(sky.open.w / OPEN_SKY);
-    let closed_gain = 1.0 / max(share, 0.5);
     let n1 = vec4f(n, 1.0);
     let seen = max(vec4f(dot(sky.red, n1), dot(sky.green, n1), dot(sky.blue, n1), dot(sky.open, n1)), vec4f(0.0));
+    let gaps = max(1.0 - share, 0.0);
+    let open = sqrt(gaps * min(seen.a, 1.0));
     // Mean over the part of the sky around n, held to the mean over all of it where n sees little.
     let mean = vec4f(sky.red.w, sky.green.w, sky.blue.w, sky.open.w);
     let around = seen + 0.1 * mean;
-    // Overlapping surfels cannot send more than a full hemisphere.
-    let full_gain = 1.0 / max(share, 1.0);
     return Rest(
-        mix(closed_gain, full_gain, opened),
-        select(0.0, opened, share < 1.0),
+        clamp((1.0 - open) / max(share, 1e-6), 0.0, MOST_GAIN),
+        open / max(gaps, 1e-6),
         around.rgb / max(around.a, 1e-20),
     );
 }

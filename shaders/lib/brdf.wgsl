@@ -1,4 +1,5 @@
-// glTF's metallic-roughness BRDF: Lambert + GGX with height-correlated Smith visibility and Schlick's Fresnel.
+// glTF's metallic-roughness BRDF: Lambert + GGX with height-correlated Smith visibility; Fresnel's curve for dielectrics,
+// Schlick's for metals.
 
 const PI: f32 = 3.14159265358979;
 
@@ -29,6 +30,32 @@ fn env_brdf(f0: vec3f, roughness: f32, n_dot_v: f32) -> vec3f {
     return f0 * ab.x + ab.y * f90;
 }
 
+// Index of refraction by the reflectance at normal incidence.
+fn index_of(f0: f32) -> f32 {
+    let r = sqrt(clamp(f0, 0.0, 0.99));
+    return (1.0 + r) / (1.0 - r);
+}
+
+// Reflected share of unpolarised light; c: cosine of the angle of incidence.
+fn fresnel_dielectric(index: f32, c: f32) -> f32 {
+    let g = sqrt(index * index - 1.0 + c * c);
+    let a = (g - c) / max(g + c, 1e-6);
+    let b = (c * (g + c) - 1.0) / (c * (g - c) + 1.0);
+    return 0.5 * a * a * (1.0 + b * b);
+}
+
+// Schlick's curve, and for dielectrics the true one, which is up to a quarter brighter between 45° and 65°. What is a
+// dielectric is told by F0: below 0.1 (index 1.9) all of it, above 0.3 nothing.
+fn fresnel_of(f0: vec3f, c: f32) -> vec3f {
+    let most = max(f0.x, max(f0.y, f0.z));
+    let q = 1.0 - c;
+    let q5 = q * q * q * q * q;
+    let schlick = f0 + (saturate(50.0 * most) - f0) * q5;
+    let dielectric = saturate((0.3 - most) / 0.2);
+    if dielectric <= 0.0 { return schlick; }
+    return schlick + dielectric * (fresnel_dielectric(index_of(most), c) - most - (saturate(50.0 * most) - most) * q5);
+}
+
 // GGX: D * V * F, in 1/sr; multiply by n.l and the light.
 fn ggx(n: vec3f, v: vec3f, l: vec3f, f0: vec3f, roughness: f32) -> vec3f {
     let h = normalize(v + l);
@@ -43,7 +70,5 @@ fn ggx(n: vec3f, v: vec3f, l: vec3f, f0: vec3f, roughness: f32) -> vec3f {
     let d_root = a2 * n_h * n_h + dot(c, c);
     let d = a2 / (PI * d_root * d_root);
     let vis = 0.5 / max(n_l * sqrt(n_v * n_v * (1.0 - a2) + a2) + n_v * sqrt(n_l * n_l * (1.0 - a2) + a2), 1e-6);
-    let f90 = saturate(50.0 * max(f0.x, max(f0.y, f0.z)));
-    let f = f0 + (f90 - f0) * pow(1.0 - v_h, 5.0);
-    return d * vis * f;
+    return d * vis * fresnel_of(f0, v_h);
 }

@@ -1,24 +1,10 @@
 // The specular lobe: GGX with the light that single scattering loses given back (Kulla and Conty 2017 as in Cycles'
 // Principled): white metal keeps all light at every roughness. Its dielectric part has the true Fresnel curve of the
-// material's index, as Cycles has it and as `env_brdf` was fitted to; the rasteriser's `ggx` has Schlick's curve, which is
-// up to a fifth darker between 45° and 65°. Metal has Schlick's.
-
-// Index of refraction by the reflectance at normal incidence.
-fn index_of(f0: f32) -> f32 {
-    let r = sqrt(clamp(f0, 0.0, 0.99));
-    return (1.0 + r) / (1.0 - r);
-}
+// material's index, as the rasteriser's `ggx` and Cycles have it and as `env_brdf` was fitted to. Metal has Schlick's.
 
 // Mean of the Fresnel curve over the cosine-weighted hemisphere: Kulla and Conty's fit, scaled to be exact for index 1.5.
 fn mean_fresnel(index: f32) -> f32 {
     return min(1.0258 * (index - 1.0) / (4.08567 + 1.00071 * index), 1.0);
-}
-
-fn fresnel_dielectric(index: f32, c: f32) -> f32 {
-    let g = sqrt(index * index - 1.0 + c * c);
-    let a = (g - c) / max(g + c, 1e-6);
-    let b = (c * (g + c) - 1.0) / (c * (g - c) + 1.0);
-    return 0.5 * a * a * (1.0 + b * b);
 }
 
 // Fresnel term with the factor for the lost light.

@@ -1,5 +1,5 @@
-// Temporal anti-aliasing: each frame samples its pixels somewhere else, and the mean over frames is the filtered
-// picture. A camera that stands still averages without end. One that moves fetches the mean from where the surface
+// Temporal anti-aliasing: each frame samples its pixels somewhere else; the 3x3 samples around a pixel's centre, weighted
+// by the pixel filter, are this frame's value, and the mean over frames is the filtered picture. A camera that stands still averages without end. One that moves fetches the mean from where the surface
 // was, drops it where the surface was hidden, and holds it within what the pixel's neighbourhood shows now.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -10,13 +10,20 @@
 @group(0) @binding(4) var history: texture_2d<f32>;
 // Distance along the view axis, metres; 0 on the background.
 @group(0) @binding(5) var history_distance: texture_2d<f32>;
-@group(0) @binding(6) var<uniform> mode: vec4u;   // x: one of the three below
+@group(0) @binding(6) var<uniform> blend: Blend;
 @group(0) @binding(7) var hdr: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(8) var history_out: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(9) var distance_out: texture_storage_2d<r32float, write>;
 
-const STILL = 1u;
-const MOVING = 2u;                  // 0: there is no history
+// `render::taa::Blend` is the Rust side.
+struct Blend {
+    mode: vec4i,       // x: 0 without history, or one of the two below; yz: pixels by which the jitter moves a sample
+    wx: vec4f,         // the filter at the columns of the 3x3 samples (xyz)
+    wy: vec4f,         // and at the rows
+}
+
+const STILL = 1;
+const MOVING = 2;
 
 const HALF_MAX: f32 = 65504.0;
 // Frames in the mean: a half float counts to 2048; a moving picture loses sharpness with each fetch.
@@ -64,20 +71,33 @@ fn weights(t: f32, w: ptr<function, array<f32, 4>>) {
     (*w)[3] = -0.5 * s * t * t;
 }
 
-// `value` moved towards the middle of the 3x3 pixels' colours until it lies in their box.
-fn held(pixel: vec2i, value: vec3f) -> vec3f {
+// The 3x3 samples around a pixel's centre.
+struct Around {
+    value: vec3f,      // through the pixel filter
+    middle: vec3f,     // mean, in YCoCg
+    size: vec3f,       // standard deviation, in YCoCg
+}
+
+fn around(centre: vec2i) -> Around {
+    var value = vec3f(0.0);
     var first = vec3f(0.0);
     var second = vec3f(0.0);
     for (var i = 0; i < 9; i++) {
-        let c = to_ycocg(textureLoad(current, inside(pixel + vec2i(i % 3, i / 3) - 1), 0).rgb);
+        let color = textureLoad(current, inside(centre + vec2i(i % 3, i / 3) - 1), 0).rgb;
+        value += blend.wx[i % 3] * blend.wy[i / 3] * color;
+        let c = to_ycocg(color);
         first += c / 9.0;
         second += c * c / 9.0;
     }
-    let size = BOX * sqrt(max(second - first * first, vec3f(0.0))) + 1e-6 * first.x;
-    let off = to_ycocg(value) - first;
-    let beyond = abs(off) / max(size, vec3f(1e-12));
+    return Around(value, first, sqrt(max(second - first * first, vec3f(0.0))));
+}
+
+// `value` moved towards the middle of the 3x3 samples' colours until it lies in their box.
+fn held(here: Around, value: vec3f) -> vec3f {
+    let off = to_ycocg(value) - here.middle;
+    let beyond = abs(off) / max(BOX * here.size + 1e-6 * here.middle.x, vec3f(1e-12));
     let most = max(max(beyond.x, beyond.y), beyond.z);
-    return max(from_ycocg(first + off / max(most, 1.0)), vec3f(0.0));
+    return max(from_ycocg(here.middle + off / max(most, 1.0)), vec3f(0.0));
 }
 
 // The nearest of the 3x3 pixels: edges move with what is in front.
@@ -100,9 +120,9 @@ struct Before {
     distance: f32,     // metres along its axis; 0: background
 }
 
-fn before(pixel: vec2i) -> Before {
+fn before(pixel: vec2i, centre: vec2i) -> Before {
     let size = vec2f(frame.size);
-    let front = nearest(pixel);
+    let front = nearest(centre);
     let depth = textureLoad(depth_texture, front, 0).x;
     if depth > 0.0 {
         let motion = textureLoad(motion_texture, front, 0).xy;
@@ -131,22 +151,24 @@ fn was_seen(there: Before) -> bool {
 fn taa(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let pixel = vec2i(id.xy);
-    let color = textureLoad(current, pixel, 0).rgb;
-    var mean = color;
+    // The pixel whose sample lies nearest to this one's centre.
+    let centre = inside(pixel - blend.mode.yz);
+    let here = around(centre);
+    var mean = here.value;
     var count = 0.0;
-    if mode.x == STILL {
+    if blend.mode.x == STILL {
         let old = textureLoad(history, pixel, 0);
         count = min(old.a, MOST_STILL);
         mean = old.rgb;
-    } else if mode.x == MOVING {
-        let there = before(pixel);
+    } else if blend.mode.x == MOVING {
+        let there = before(pixel, centre);
         if all(there.place >= vec2f(0.0)) && all(there.place < vec2f(frame.size)) && was_seen(there) {
             count = min(textureLoad(history, vec2i(floor(there.place)), 0).a, MOST_MOVING);
-            mean = held(pixel, fetch(there.place));
+            mean = held(here, fetch(there.place));
         }
     }
-    mean = min(mix(mean, color, 1.0 / (count + 1.0)), vec3f(HALF_MAX));
-    let depth = textureLoad(depth_texture, pixel, 0).x;
+    mean = min(mix(mean, here.value, 1.0 / (count + 1.0)), vec3f(HALF_MAX));
+    let depth = textureLoad(depth_texture, centre, 0).x;
     var distance = 0.0;
     if depth > 0.0 { distance = linear_depth(frame, depth); }
     textureStore(hdr, pixel, vec4f(mean, 1.0));

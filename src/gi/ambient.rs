@@ -22,11 +22,11 @@ pub const AMBIENT: [f32; 3] = [0.3985, 0.3985, 0.3985];
 /// The environment's share in what the screen does not show.
 /// Fitted with [`BOUNCE`] to paper rooms 2, 3, 6, 7, 60 and 61: least mean of Σ|ΔE| / ΣE after 4×4 pooling, for this
 /// method and [`ssgi`](super::ssgi) together. The rooms are open above; a room with a roof gets too much sky.
-pub const SKY: f32 = 0.85;
+pub const SKY: f32 = 0.83;
 
 /// What the picture's surfaces send on (mean of albedo · direct light + emission), as a multiple of it: stands for
 /// all bounces.
-pub const BOUNCE: f32 = 0.6;
+pub const BOUNCE: f32 = 0.56;
 
 /// The fallback's constant as WGSL.
 pub fn prelude() -> String {

@@ -3,10 +3,13 @@
 //!
 //! # What each method does, and what it cannot do
 //!
-//! [`ambient`] gives every surface the same light: the picture's mean light (direct, emission, sky) times one constant
-//! fitted to the training scenes. It costs one reduction and one write a pixel.
-//! It cannot say where light is: no corner darkens, no wall bleeds its colour, a sealed box glows, and two views of one
+//! [`ambient`] gives every surface one light from all around (the sky, and the mean of what the picture's surfaces send
+//! on, times two constants fitted to the training scenes), dimmed by ambient occlusion ([`occlusion`]).
+//! It cannot say where light is: no wall bleeds its colour, a closed room gets the sky's light, and two views of one
 //! room disagree because each has its own mean.
+//!
+//! [`ssgi`] gathers what the pixels around a pixel send on, by visibility bitmask ([`bitmask`]), and `ambient`'s light
+//! through what nothing blocks. It cannot do anything off the screen or hidden in it.
 //!
 //! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]) go through a U-Net, and its answer comes back
 //! to full resolution guided by depth and normal ([`reconstruct`]). It learns what direct light, albedo and shape in
@@ -14,7 +17,7 @@
 //! guess by the training set's mean, light enters and leaves with what is in view, nothing finer than a cell (4
 //! pixels) gets light of its own, and there is no specular light beyond what `composite` derives from E.
 //!
-//! Both scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
+//! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
 //! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
 
 pub mod ambient;
@@ -131,7 +134,7 @@ pub struct World<'a> {
 pub enum Method {
     /// None: `indirect` is 0. Shows what direct light alone gives.
     Direct,
-    /// One constant, see [`ambient`].
+    /// Even light times occlusion, see [`ambient`].
     #[default]
     Ambient,
     /// One bounce in screen space, see [`ssgi`].

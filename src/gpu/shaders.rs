@@ -87,8 +87,19 @@ pub const GI: &[Shader] = &[
         files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/half.wgsl", "gi/ssgi_full.wgsl"],
     },
     Shader {
+        name: "gi.lit",
+        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/outgoing.wgsl", "gi/lit.wgsl"],
+    },
+    Shader {
         name: "gi.glossy",
-        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/glossy.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/frame.wgsl",
+            "lib/brdf.wgsl",
+            "lib/environment.wgsl",
+            "gi/outgoing.wgsl",
+            "gi/glossy.wgsl"
+        ],
     },
     Shader {
         name: "gi.cells",

@@ -12,7 +12,7 @@ use super::view::{FrameUniform, View};
 use super::world::{World, WorldPass};
 use crate::gi::{
     self,
-    glossy::GlossyPass,
+    glossy::{GlossyPass, GlossyPicture},
     rung::{self, Cost, Rung},
 };
 use crate::gpu::timing::Recorder;
@@ -33,7 +33,7 @@ pub struct RendererOptions {
 /// What is bound as long as the targets stay.
 struct Picture {
     direct: wgpu::BindGroup,
-    glossy: wgpu::BindGroup,
+    glossy: GlossyPicture,
     composite: wgpu::BindGroup,
 }
 
@@ -45,6 +45,7 @@ struct Lighting {
     world: Option<World>,
     group: wgpu::BindGroup,
     sky: wgpu::BindGroup,
+    glossy_sky: wgpu::BindGroup,
 }
 
 /// The rasteriser. The host owns device, queue and encoder; a steady frame allocates nothing on the GPU.
@@ -168,7 +169,9 @@ impl Renderer {
     /// Counted cost of the passes that find and add indirect light.
     pub fn costs(&self) -> Vec<Cost> {
         let mut costs = self.indirect.as_ref().map(|i| i.costs(self.targets.size)).unwrap_or_default();
-        costs.push(GlossyPass::cost(self.targets.size));
+        if self.indirect.is_some() {
+            costs.extend(GlossyPass::costs(self.targets.size));
+        }
         costs.extend(self.taa.as_ref().map(|_| TaaPass::cost(self.targets.size)));
         costs
     }
@@ -198,6 +201,7 @@ impl Renderer {
         let mut rows = self.targets.bytes();
         rows.extend(self.lighting.iter().flat_map(|l| l.maps.bytes()));
         rows.extend(self.lighting.iter().flat_map(|l| &l.world).flat_map(World::bytes));
+        rows.push(("gi.lit", self.picture.glossy.bytes()));
         rows.extend(self.taa.iter().flat_map(TaaPass::bytes));
         rows.push((self.method, self.indirect.as_ref().map_or(0, |i| i.bytes())));
         rows
@@ -248,10 +252,12 @@ impl Renderer {
             indirect.set_frame(queue, taa.frames());
         }
         match &mut self.indirect {
-            Some(indirect) => indirect.record(recorder, queue, &inputs, &self.targets.indirect.view)?,
+            Some(indirect) => {
+                indirect.record(recorder, queue, &inputs, &self.targets.indirect.view)?;
+                self.passes.glossy.record(recorder, &self.picture.glossy, &lighting.glossy_sky, size);
+            }
             None => clear(recorder, &self.targets),
         }
-        self.passes.glossy.record(recorder, &self.picture.glossy, size);
         self.passes.composite.record(recorder, &self.picture.composite, &lighting.sky, size);
         if let Some(taa) = &mut self.taa {
             taa.record(recorder, queue, scene.id, view);
@@ -264,7 +270,8 @@ impl Renderer {
         let maps = self.passes.shadow.maps(&self.device, queue, scene);
         let group = self.passes.direct.lights(&self.device, scene, &maps);
         let sky = self.passes.composite.sky(&self.device, &scene.environment_view);
-        Lighting { scene: scene.id, maps, world: None, group, sky }
+        let glossy_sky = self.passes.glossy.sky(&self.device, &scene.environment_view);
+        Lighting { scene: scene.id, maps, world: None, group, sky, glossy_sky }
     }
 
     /// Draws what lies beyond the screen, if the method reads it; without `again` only where it was not drawn yet.
@@ -307,13 +314,15 @@ fn gi_inputs<'a>(
     }
 }
 
-/// No indirect light.
+/// No indirect light, neither diffuse nor specular.
 fn clear(recorder: &mut Recorder<'_>, targets: &Targets) {
-    let attachment = wgpu::RenderPassColorAttachment {
-        view: &targets.indirect.view,
-        depth_slice: None,
-        resolve_target: None,
-        ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store },
-    };
-    recorder.render("indirect", &[Some(attachment)], None, |_| {});
+    let attachments = [&targets.indirect, &targets.indirect_specular].map(|target| {
+        Some(wgpu::RenderPassColorAttachment {
+            view: &target.view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store },
+        })
+    });
+    recorder.render("indirect", &attachments, None, |_| {});
 }

@@ -3,11 +3,13 @@
 //! A camera that stands still in a scene that does not change averages without end, so the picture converges to the
 //! filtered one and stops moving. Otherwise the mean is fetched along the motion vectors, dropped where the surface was
 //! not seen before, and held within the colours around the pixel (variance clipping, Salvi 2016), which keeps ten frames
-//! at most. Jitter comes from the pixel filter itself ([`sampling`](super::sampling)), so plain means are right.
+//! at most. A frame's value at a pixel is the mean of the 3×3 samples around its centre under the pixel filter
+//! ([`sampling`]), whatever the jitter, so the mean over frames is the filtered picture.
 //!
 //! What it cannot do: tell a changed light from noise faster than the neighbourhood's colours allow; reflections move
 //! with their surfaces; things thinner than a pixel lose brightness while the camera moves.
 
+use super::sampling;
 use super::targets::{Target, Targets};
 use super::tool;
 use super::view::View;
@@ -23,6 +25,33 @@ enum Mode {
     Still = 1,
     /// Another view of the same scene.
     Moving = 2,
+}
+
+/// `Blend` of `shaders/render/taa.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Blend {
+    mode: [i32; 4],
+    wx: [f32; 4],
+    wy: [f32; 4],
+}
+
+impl Blend {
+    /// The pixel filter at the samples that lie around a pixel's centre in a frame that is jittered by `jitter` pixels.
+    /// Summed over frames they are the filter's integral, whichever way the jitter goes.
+    fn new(mode: Mode, jitter: [f32; 2]) -> Self {
+        let whole = jitter.map(f32::round);
+        let weights = |axis: usize| {
+            let at = |i: usize| {
+                let x = i as f32 - 1.0 + jitter[axis] - whole[axis];
+                sampling::window(x.clamp(-sampling::FILTER_WIDTH, sampling::FILTER_WIDTH)).max(0.0)
+            };
+            let w = [at(0), at(1), at(2)];
+            let sum: f32 = w.iter().sum();
+            [w[0] / sum, w[1] / sum, w[2] / sum, 0.0]
+        };
+        Self { mode: [mode as i32, whole[0] as i32, whole[1] as i32, 0], wx: weights(0), wy: weights(1) }
+    }
 }
 
 /// The pass with its history, for one size of targets.
@@ -58,7 +87,7 @@ impl TaaPass {
         let pipeline = tool::compute(device, "render.taa", "taa", &[&layout]);
         let mode = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("render.taa"),
-            size: 16,
+            size: size_of::<Blend>() as u64,
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
@@ -119,7 +148,7 @@ impl TaaPass {
             },
             _ => Mode::Fresh,
         };
-        queue.write_buffer(&self.mode, 0, bytemuck::cast_slice(&[mode as u32, 0, 0, 0]));
+        queue.write_buffer(&self.mode, 0, bytemuck::bytes_of(&Blend::new(mode, view.jitter)));
         let group = &textures.groups[self.frames as usize % 2];
         recorder.compute("taa", |pass| {
             pass.set_pipeline(&self.pipeline);
@@ -140,6 +169,6 @@ impl TaaPass {
     /// motion, frame, history and its distance, writes picture, history and distance.
     pub fn cost(size: [u32; 2]) -> Cost {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
-        Cost::new("taa", pixels * (9.0 * 26.0 + 16.0 * 8.0 + 160.0), pixels * (4.0 + 4.0 + 8.0 + 8.0 + 4.0 + 20.0))
+        Cost::new("taa", pixels * (9.0 * 32.0 + 16.0 * 8.0 + 160.0), pixels * (4.0 + 4.0 + 8.0 + 8.0 + 4.0 + 20.0))
     }
 }

@@ -87,6 +87,8 @@ impl Targets {
         use wgpu::TextureFormat as F;
         let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let drawn = |name, format| Target::new(device, name, size, format, attachment);
+        let both =
+            |name| Target::new(device, name, size, F::Rgba16Float, attachment | wgpu::TextureUsages::STORAGE_BINDING);
         let stored = |name| Target::new(device, name, size, F::Rgba16Float, wgpu::TextureUsages::STORAGE_BINDING);
         Ok(Self {
             size,
@@ -98,14 +100,8 @@ impl Targets {
             motion: drawn("motion", F::Rg16Float),
             direct_diffuse: stored("direct_diffuse"),
             direct_specular: stored("direct_specular"),
-            indirect: Target::new(
-                device,
-                "indirect",
-                size,
-                F::Rgba16Float,
-                attachment | wgpu::TextureUsages::STORAGE_BINDING,
-            ),
-            indirect_specular: stored("indirect_specular"),
+            indirect: both("indirect"),
+            indirect_specular: both("indirect_specular"),
             hdr: stored("hdr"),
         })
     }

@@ -68,6 +68,12 @@ const fn texture(
     wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false }
 }
 
+/// A colour texture read through a filtering sampler.
+pub(crate) const SAMPLE: wgpu::BindingType =
+    texture(wgpu::TextureSampleType::Float { filterable: true }, wgpu::TextureViewDimension::D2);
+/// The sampler for it.
+pub(crate) const SAMPLER: wgpu::BindingType = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+
 /// An `Rgba16Float` texture written by a compute shader.
 pub(crate) const STORE_HALF: wgpu::BindingType = wgpu::BindingType::StorageTexture {
     access: wgpu::StorageTextureAccess::WriteOnly,

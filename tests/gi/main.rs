@@ -5,13 +5,17 @@ mod build;
 #[path = "../common/mod.rs"]
 mod common;
 mod edges;
+mod glossy;
 #[cfg(feature = "reference")]
 mod probes;
+mod screen;
 mod shot;
 mod stages;
+mod taa;
 mod upsample;
 mod weights;
 mod whole;
+mod world;
 
 use bouncelight::gpu::Gpu;
 

@@ -231,7 +231,7 @@ pub fn output(device: &wgpu::Device, size: [u32; 2]) -> wgpu::Texture {
     empty_texture(device, size, wgpu::TextureFormat::Rgba16Float, usage)
 }
 
-fn texture_with(
+pub fn texture_with(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
     size: [u32; 2],

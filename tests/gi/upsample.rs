@@ -125,10 +125,11 @@ fn a_cell_that_shows_a_surface_has_a_pixel_on_the_one_in_front() {
                 continue;
             };
             assert!(inside(pixel) && surfaces[pixel] != usize::MAX);
-            // Before floor or wall alone the pole or the plate has the cell; of three surfaces either front one may.
+            // Before the wall alone the pole or the plate has the cell; of three surfaces either front one may, and the
+            // floor may lie nearer than a foot that stands on it.
             let kinds: std::collections::BTreeSet<_> = shown.iter().copied().collect();
             for front in [POLE, PLATE] {
-                if [FLOOR, WALL].iter().any(|back| kinds == [*back, front].into()) {
+                if kinds == [WALL, front].into() {
                     assert_eq!(surfaces[pixel], front, "{side:?} cell {i}");
                     fronts += 1;
                 }
@@ -138,7 +139,7 @@ fn a_cell_that_shows_a_surface_has_a_pixel_on_the_one_in_front() {
                 assert_eq!(pixel, middle, "one surface: the middle stands for it");
             }
         }
-        assert!(fronts > 20, "{side:?}: {fronts}");
+        assert!(fronts > 8, "{side:?}: {fronts}");
     }
 }
 

@@ -1,0 +1,200 @@
+//! Temporal anti-aliasing: off is off, a still picture converges to the filtered one, a slow pan beats single frames, and
+//! what was never there leaves no ghost.
+
+use crate::{common, read_light};
+use bouncelight::gi::Method;
+use bouncelight::gpu::{Gpu, timing::Recorder};
+use bouncelight::render::capture::{CaptureOptions, capture};
+use bouncelight::render::shadow::ShadowOptions;
+use bouncelight::render::{Renderer, RendererOptions, View, sampling};
+use bouncelight::scene::{self, Camera, Scene, upload::SceneGpu};
+use glam::Mat4;
+
+const SIZE: [u32; 2] = [96, 48];
+
+type Rgb = Vec<[f32; 3]>;
+
+struct Stage<'a> {
+    gpu: &'a Gpu,
+    uploaded: SceneGpu,
+    renderer: Renderer,
+}
+
+impl<'a> Stage<'a> {
+    fn new(gpu: &'a Gpu, scene: &Scene, method: Method, taa: bool) -> Self {
+        let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the scene fits");
+        // Small shadow maps: most of the time would go there.
+        let shadow = ShadowOptions { sun_size: 512, ..Default::default() };
+        let options = RendererOptions { method, taa, shadow };
+        let renderer = Renderer::new(&gpu.device, &gpu.queue, SIZE, options).expect("the size fits");
+        Self { gpu, uploaded, renderer }
+    }
+
+    /// Frame number `i` through `camera`, jittered.
+    fn frame(&mut self, camera: &Camera, i: u32) -> Rgb {
+        let view = View::new(camera, self.renderer.size(), sampling::offset(i, 0)).with_seed(i);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let mut recorder = Recorder::new(&mut encoder);
+        self.renderer.record(&mut recorder, &self.gpu.queue, &self.uploaded, &view).expect("the frame is drawn");
+        self.gpu.queue.submit([encoder.finish()]);
+        read_light(self.gpu, &self.renderer.targets().hdr.texture)
+    }
+
+    /// The mean of many samples: what the picture should be.
+    fn truth(&mut self, camera: &Camera, samples: u32) -> Rgb {
+        let options = CaptureOptions { samples, ..Default::default() };
+        let frame = capture(self.gpu, &mut self.renderer, &self.uploaded, camera, options).expect("drawn");
+        frame.beauty.data.chunks_exact(4).map(|c| [c[0], c[1], c[2]]).collect()
+    }
+}
+
+fn largest(a: &Rgb, b: &Rgb) -> f32 {
+    a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+fn mean(a: &Rgb, b: &Rgb) -> f32 {
+    a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).sum::<f32>() / (3 * a.len()) as f32
+}
+
+/// The camera turned about the vertical by `angle`.
+fn turned(camera: &Camera, angle: f32) -> Camera {
+    let transform = Mat4::from_cols_array_2d(&camera.transform) * Mat4::from_rotation_y(angle);
+    Camera { transform: transform.to_cols_array_2d(), ..camera.clone() }
+}
+
+fn room() -> (Scene, Camera) {
+    let scene = scene::load("paper-room:60").expect("the room is made by code");
+    let camera = scene.cameras[0].clone();
+    (scene, camera)
+}
+
+#[test]
+fn off_is_off_and_on_is_not() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, camera) = room();
+    let mut off = Stage::new(&gpu, &scene, Method::Direct, false);
+    let mut on = Stage::new(&gpu, &scene, Method::Direct, true);
+    let first = off.frame(&camera, 0);
+    (1..4).for_each(|i| drop(off.frame(&camera, i)));
+    assert_eq!(off.frame(&camera, 0), first, "off, a frame knows nothing of those before it, to the bit");
+    let named = |s: &Stage<'_>| s.renderer.bytes().iter().filter(|(n, _)| n.starts_with("taa")).count();
+    assert_eq!((named(&off), named(&on)), (0, 5));
+    assert!(off.renderer.costs().iter().all(|c| c.pass != "taa"));
+    // Negative control: on, it does.
+    let first = on.frame(&camera, 0);
+    (1..4).for_each(|i| drop(on.frame(&camera, i)));
+    assert_ne!(on.frame(&camera, 0), first);
+    // A method's pattern may turn only with a history.
+    let mut still = Stage::new(&gpu, &scene, Method::Ssgi, false);
+    assert_eq!(still.frame(&camera, 0), still.frame(&camera, 0));
+}
+
+#[test]
+fn a_frozen_frame_converges_to_the_filtered_picture() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, camera) = room();
+    let mut on = Stage::new(&gpu, &scene, Method::Ambient, true);
+    let mut off = Stage::new(&gpu, &scene, Method::Ambient, false);
+    let mut last = on.frame(&camera, 0);
+    let mut changes = Vec::new();
+    for i in 1..100 {
+        let now = on.frame(&camera, i);
+        changes.push(largest(&now, &last));
+        last = now;
+    }
+    let most = |r: std::ops::Range<usize>| changes[r].iter().fold(0.0f32, |a, b| a.max(*b));
+    println!(
+        "largest change: {:.4} at first, {:.4} after 30 frames, {:.4} after 90",
+        most(0..9),
+        most(30..40),
+        most(90..99)
+    );
+    assert!(most(90..99) < 0.05 * most(0..9) && most(90..99) < 0.02, "{changes:?}");
+    let truth = off.truth(&camera, 100);
+    let error = mean(&last, &truth);
+    // Negative control: single frames neither come to rest nor near the truth.
+    let (a, b) = (off.frame(&camera, 98), off.frame(&camera, 99));
+    println!("mean error {error:.5}; of one frame {:.5}", mean(&b, &truth));
+    assert!(error < 0.25 * mean(&b, &truth), "{error}");
+    assert!(largest(&a, &b) > 10.0 * most(90..99));
+}
+
+#[test]
+fn a_slow_pan_beats_single_frames() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, camera) = room();
+    for method in [Method::Direct, Method::Ambient] {
+        let name = method.name();
+        let mut on = Stage::new(&gpu, &scene, method.clone(), true);
+        let mut off = Stage::new(&gpu, &scene, method.clone(), false);
+        let mut centred = Stage::new(&gpu, &scene, method, false);
+        // A third of a pixel a frame.
+        let step = 0.33 * 2.0 * (camera.yfov * 0.5).tan() / SIZE[1] as f32;
+        let (mut with, mut without, mut count) = (0.0, 0.0, 0);
+        let (mut wobble, mut wobble_without) = (0.0, 0.0);
+        let mut before: Option<[Rgb; 3]> = None;
+        for i in 0..26 {
+            let camera = turned(&camera, step * i as f32);
+            let taa = on.frame(&camera, i);
+            if i < 20 {
+                continue;
+            }
+            let truth = off.truth(&camera, 24);
+            let plain = centred.frame(&camera, 0);
+            with += mean(&taa, &truth);
+            without += mean(&plain, &truth);
+            // Change from frame to frame, against the truth's own.
+            if let Some([a, b, c]) = &before {
+                let change = |now: &Rgb, old: &Rgb| -> Rgb {
+                    now.iter().zip(old).map(|(n, o)| std::array::from_fn(|c| n[c] - o[c])).collect()
+                };
+                let own = change(&truth, c);
+                wobble += mean(&change(&taa, a), &own);
+                wobble_without += mean(&change(&plain, b), &own);
+            }
+            before = Some([taa, plain, truth]);
+            count += 1;
+        }
+        println!(
+            "{name}: error {:.5} against {:.5}; temporal {wobble:.5} against {wobble_without:.5}",
+            with / 6.0,
+            without / 6.0
+        );
+        assert!(count == 6 && with < 0.8 * without, "{name}: {with} {without}");
+        assert!(wobble < 0.8 * wobble_without, "{name}: {wobble} {wobble_without}");
+    }
+}
+
+#[test]
+fn resize_cut_and_another_scene_leave_no_ghost() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, camera) = room();
+    let other = turned(&camera, 1.2);
+    let mut on = Stage::new(&gpu, &scene, Method::Direct, true);
+    // What a renderer shows that knows nothing else.
+    let plain = Stage::new(&gpu, &scene, Method::Direct, true).frame(&other, 40);
+    (0..6).for_each(|i| drop(on.frame(&camera, i)));
+    on.renderer.cut();
+    assert_eq!(on.frame(&other, 40), plain, "a cut");
+
+    (0..6).for_each(|i| drop(on.frame(&camera, i)));
+    on.renderer.resize([64, 48]).expect("the size fits");
+    drop(on.frame(&camera, 0));
+    on.renderer.resize(SIZE).expect("the size fits");
+    assert_eq!(on.frame(&other, 40), plain, "a new size");
+
+    let (first, second) = (scene::load("paper-room:61").expect("made"), scene);
+    let mut on = Stage::new(&gpu, &first, Method::Direct, true);
+    (0..6).for_each(|i| drop(on.frame(&first.cameras[0], i)));
+    on.uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &second).expect("the scene fits");
+    assert_eq!(on.frame(&other, 40), plain, "another scene");
+
+    // A cut that nobody told of: distances and the neighbourhood's colours throw the old picture out.
+    let mut on = Stage::new(&gpu, &second, Method::Direct, true);
+    (0..6).for_each(|i| drop(on.frame(&camera, i)));
+    let old = on.frame(&camera, 12);
+    let ghost = mean(&on.frame(&other, 40), &plain);
+    let apart = mean(&old, &plain);
+    println!("untold cut: {ghost:.5} from the plain frame; the pictures are {apart:.5} apart");
+    assert!(ghost < 0.1 * apart, "{ghost} {apart}");
+}

@@ -1,0 +1,312 @@
+//! `rsm` and `cache`: light from beyond the screen against arithmetic and against the laws it promises.
+
+use crate::common;
+use bouncelight::gi::{GiError, Method};
+use bouncelight::gpu::{Gpu, timing::Recorder};
+use bouncelight::render::capture::{CaptureOptions, Layer, Picture, capture};
+use bouncelight::render::shadow::ShadowOptions;
+use bouncelight::render::{RenderError, Renderer, RendererOptions, View};
+use bouncelight::scene::upload::SceneGpu;
+use bouncelight::scene::{Camera, Environment, Instance, Light, LightKind, Material, Scene, shapes};
+
+/// A Lambertian box from `low` to `high`.
+type Block = ([f32; 3], [f32; 3], [f32; 3]);
+
+/// Boxes under lights and a sky.
+fn scene(blocks: &[Block], lights: &[LightKind], sky: f32, camera: Camera) -> Scene {
+    let mut scene = Scene { cameras: vec![camera], ..Default::default() };
+    scene.environment = Environment { radiance: [sky; 3], ..Default::default() };
+    for (i, (low, high, color)) in blocks.iter().enumerate() {
+        let [r, g, b] = *color;
+        let base_color = [r, g, b, 1.0];
+        scene.materials.push(Material { base_color, metallic: 0.0, f0: 0.0, ..Default::default() });
+        let mut mesh = shapes::flat(shapes::Shape::Cube);
+        mesh.material = i;
+        scene.meshes.push(mesh);
+        let half: [f32; 3] = std::array::from_fn(|k| 0.5 * (high[k] - low[k]));
+        let middle: [f32; 3] = std::array::from_fn(|k| 0.5 * (high[k] + low[k]));
+        let mut transform = [[0.0; 4]; 4];
+        (0..3).for_each(|k| transform[k][k] = half[k]);
+        transform[3] = [middle[0], middle[1], middle[2], 1.0];
+        scene.instances.push(Instance { name: String::new(), mesh: i, transform });
+    }
+    let light = |kind: &LightKind| Light { name: String::new(), color: [1.0; 3], kind: *kind, stands_in: false };
+    scene.lights = lights.iter().map(light).collect();
+    scene
+}
+
+fn sun(direction: [f32; 3], irradiance: f32) -> LightKind {
+    LightKind::Directional { direction, irradiance, angle: 0.0 }
+}
+
+fn renderer(gpu: &Gpu, size: [u32; 2], method: Method) -> Renderer {
+    let shadow = ShadowOptions { sun_size: 256, cascades: 2, local_size: 256 };
+    Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions { method, shadow, ..Default::default() }).expect("the size fits")
+}
+
+/// Indirect light and positions of the picture.
+fn lit(gpu: &Gpu, scene: &Scene, size: [u32; 2], method: Method) -> (Picture, Picture) {
+    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the scene fits");
+    let options = CaptureOptions { layers: &[Layer::DiffInd, Layer::Position], ..Default::default() };
+    let mut renderer = renderer(gpu, size, method);
+    let frame = capture(gpu, &mut renderer, &uploaded, &scene.cameras[0], options).expect("the frame is drawn");
+    let layer = |l| frame.layer(l).expect("it was asked for").clone();
+    (layer(Layer::DiffInd), layer(Layer::Position))
+}
+
+fn light(gpu: &Gpu, scene: &Scene, size: [u32; 2], method: Method) -> Vec<f32> {
+    lit(gpu, scene, size, method).0.data
+}
+
+fn mean(v: &[f32]) -> f64 {
+    v.iter().map(|&x| f64::from(x)).sum::<f64>() / v.len().max(1) as f64
+}
+
+/// Mean of |a − b| over the mean of b.
+fn difference(a: &[f32], b: &[f32]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / b.len() as f64 / mean(b).max(1e-12)
+}
+
+const GREY: [f32; 3] = [0.5; 3];
+
+/// A floor, an open top and four walls; the one behind the camera has a colour of its own.
+fn hall(behind: [f32; 3], lights: &[LightKind], sky: f32, yfov: f32) -> Scene {
+    let blocks = [
+        ([-6.0, -0.2, -6.0], [6.0, 0.0, 6.0], GREY),
+        ([-6.2, 0.0, -6.0], [-6.0, 4.0, 6.0], GREY),
+        ([6.0, 0.0, -6.0], [6.2, 4.0, 6.0], GREY),
+        ([-6.0, 0.0, -6.2], [6.0, 4.0, -6.0], GREY),
+        ([-6.0, 0.0, 6.0], [6.0, 4.0, 6.2], behind),
+        ([-1.0, 0.0, -3.0], [1.0, 1.5, -1.0], GREY),
+    ];
+    scene(&blocks, lights, sky, Camera::look_at([0.0, 1.6, 3.0], [0.0, 0.6, -3.0], yfov))
+}
+
+/// Shines onto the wall behind the camera.
+const BACKWARDS: [f32; 3] = [0.2, -0.7, 0.7];
+
+#[test]
+fn a_lit_panel_sends_what_its_form_factor_says() {
+    let Some(gpu) = common::gpu() else { return };
+    let build = |panel: f32| {
+        let blocks = [([-5.0, -0.2, -5.0], [5.0, 0.0, 5.0], GREY), ([-4.2, 0.0, -2.0], [-4.0, 4.0, 2.0], [panel; 3])];
+        scene(&blocks, &[sun([-1.0, 0.0, 0.0], 2.0)], 0.0, Camera::look_at([0.0, 6.0, 0.001], [0.0, 0.0, 0.0], 1.2))
+    };
+    let (light, places) = lit(&gpu, &build(0.6), [96, 96], Method::Rsm);
+    let (mut error, mut sum) = (0.0, 0.0);
+    for (e, p) in light.data.chunks_exact(3).zip(places.data.chunks_exact(3)) {
+        if p[1].abs() > 1e-3 || p[0] < -3.4 {
+            continue;
+        }
+        // E/π of a panel of radiance 0.6 · 2/π, by the midpoints of 40 × 40 squares.
+        let mut expected = 0.0;
+        for k in 0..1600 {
+            let (y, z) = (0.1 * ((k / 40) as f32 + 0.5), 0.1 * ((k % 40) as f32 + 0.5) - 2.0);
+            let v = [p[0] + 4.0, y - p[1], z - p[2]];
+            let d2 = v.iter().map(|x| x * x).sum::<f32>();
+            expected += 0.01 * v[0] * v[1] / (d2 * d2);
+        }
+        expected *= 0.6 * 2.0 / std::f32::consts::PI.powi(2);
+        error += f64::from((e[0] - expected).abs());
+        sum += f64::from(expected);
+    }
+    println!("a panel's light on the floor: {:.2} % off", 100.0 * error / sum);
+    assert!(error / sum < 0.04, "{}", error / sum);
+    // Negative control: a black panel sends nothing.
+    assert_eq!(mean(&lit(&gpu, &build(0.0), [32, 32], Method::Rsm).0.data), 0.0);
+}
+
+#[test]
+fn light_scales_and_no_light_gives_none() {
+    let Some(gpu) = common::gpu() else { return };
+    let size = [48, 32];
+    let build = |light: f32, sky: f32| hall(GREY, &[sun(BACKWARDS, light)], sky, 1.0);
+    for method in [Method::Rsm, Method::Cache] {
+        let [once, twice] = [1.0, 2.0].map(|k| light(&gpu, &build(k, 0.1 * k), size, method.clone()));
+        let doubled: Vec<f32> = once.iter().map(|x| 2.0 * x).collect();
+        assert!(mean(&once) > 1e-3 && difference(&twice, &doubled) < 2e-3, "{}", method.name());
+        assert!(light(&gpu, &build(0.0, 0.0), size, method.clone()).iter().all(|x| *x == 0.0), "{}", method.name());
+    }
+    // The sky is no light to `rsm`, and the negative control: `cache` sees it.
+    assert!(light(&gpu, &build(0.0, 0.1), size, Method::Rsm).iter().all(|x| *x == 0.0));
+    assert!(mean(&light(&gpu, &build(0.0, 0.1), size, Method::Cache)) > 1e-2);
+}
+
+/// The middle of a picture is the same with a wide and with a narrow field of view.
+#[test]
+fn what_the_picture_shows_besides_does_not_matter() {
+    let Some(gpu) = common::gpu() else { return };
+    let build = |tangent: f32| hall([0.9, 0.1, 0.1], &[sun(BACKWARDS, 3.0)], 0.05, 2.0 * tangent.atan());
+    let apart = |method: Method| {
+        let wide = light(&gpu, &build(1.0), [128, 128], method.clone());
+        let narrow = light(&gpu, &build(0.5), [64, 64], method);
+        let middle = (0..64).flat_map(|y| &wide[3 * (128 * (y + 32) + 32)..][..3 * 64]).copied();
+        difference(&middle.collect::<Vec<_>>(), &narrow)
+    };
+    for method in [Method::Rsm, Method::Cache] {
+        let (name, apart) = (method.name(), apart(method));
+        println!("{name}: wide against narrow {:.3} %", 100.0 * apart);
+        assert!(apart < 0.02, "{name}: {apart}");
+    }
+    // Negative control: the mean of the picture changes with the picture.
+    assert!(apart(Method::Ambient) > 0.02);
+}
+
+#[test]
+fn a_red_wall_behind_the_camera_tints_the_floor() {
+    let Some(gpu) = common::gpu() else { return };
+    let redness = |behind, method| {
+        let light = light(&gpu, &hall(behind, &[sun(BACKWARDS, 3.0)], 0.02, 1.0), [48, 32], method);
+        let channel = |c: usize| light.iter().skip(c).step_by(3).map(|&x| f64::from(x)).sum::<f64>();
+        channel(0) / channel(1)
+    };
+    for method in [Method::Rsm, Method::Cache] {
+        let (red, grey) = (redness([0.9, 0.1, 0.1], method.clone()), redness(GREY, method.clone()));
+        println!("{}: red over green {red:.3} by a red wall, {grey:.3} by a grey one", method.name());
+        assert!(red > 1.15 && (grey - 1.0).abs() < 0.01, "{red}, {grey}");
+    }
+}
+
+#[test]
+fn light_that_moves_slowly_does_not_jump() {
+    let Some(gpu) = common::gpu() else { return };
+    // Second difference of neighbouring steps over the light, the worst 8 × 8 patch of pixels.
+    let jump = |method: Method, step: f32| {
+        let frames: Vec<Vec<f32>> = (0..6)
+            .map(|i| {
+                let a = 0.4 + step * i as f32;
+                let build = hall(GREY, &[sun([0.3, -a.cos(), a.sin()], 3.0)], 0.02, 1.0);
+                let light = light(&gpu, &build, [64, 32], method.clone());
+                let patch = |p: usize| (0..64).map(move |k| (8 * (p / 8) + k / 8) * 64 + 8 * (p % 8) + k % 8);
+                (0..32).map(|p| patch(p).map(|i| light[3 * i]).sum::<f32>()).collect()
+            })
+            .collect();
+        let second = |w: &[Vec<f32>], p: usize| (w[0][p] - 2.0 * w[1][p] + w[2][p]).abs() / w[1][p].max(1e-3);
+        frames.windows(3).flat_map(|w| (0..32).map(move |p| second(w, p))).fold(0.0, f32::max)
+    };
+    for method in [Method::Rsm, Method::Cache] {
+        let (name, slow, fast) = (method.name(), jump(method.clone(), 0.002), jump(method, 0.3));
+        println!("{name}: second difference {slow:.4} at 0.11°, {fast:.3} at 17° a frame");
+        assert!(slow < 0.03, "{name}: {slow}");
+        // Negative control.
+        assert!(fast > 3.0 * slow, "{name}: {fast}");
+    }
+}
+
+#[test]
+fn a_closed_room_stays_dark_under_a_bright_sky() {
+    let Some(gpu) = common::gpu() else { return };
+    let build = |top: f32| {
+        let mut blocks: Vec<Block> = vec![
+            ([-3.2, -0.2, -3.2], [3.2, 0.0, 3.2], GREY),
+            ([-3.2, 0.0, -3.2], [-3.0, 3.0, 3.2], GREY),
+            ([3.0, 0.0, -3.2], [3.2, 3.0, 3.2], GREY),
+            ([-3.2, 0.0, -3.2], [3.2, 3.0, -3.0], GREY),
+            ([-3.2, 0.0, 3.0], [3.2, 3.0, 3.2], GREY),
+        ];
+        blocks.push(([-3.2, 3.0, -3.2], [top, 3.1, 3.2], GREY));
+        scene(&blocks, &[], 1.0, Camera::look_at([1.0, 1.5, 2.0], [0.0, 1.0, -3.0], 1.0))
+    };
+    let [closed, half] = [3.2, 0.0].map(|top| mean(&light(&gpu, &build(top), [48, 32], Method::Cache)));
+    println!("E/π under a sky of 1: {closed:.5} closed, {half:.3} with half a roof");
+    assert!(closed < 1e-4, "{closed}");
+    assert!(half > 0.05, "negative control: {half}");
+}
+
+/// Nothing stands between an emitter and a point in these methods, so light goes through inner walls. This holds the
+/// number that the documentation states.
+#[test]
+fn an_inner_wall_leaks_no_more_than_stated() {
+    let Some(gpu) = common::gpu() else { return };
+    let build = |x: f32| {
+        let blocks = [
+            ([-6.2, -0.2, -3.2], [6.2, 0.0, 3.2], GREY),
+            ([-6.2, 0.0, -3.2], [-6.0, 3.0, 3.2], GREY),
+            ([6.0, 0.0, -3.2], [6.2, 3.0, 3.2], GREY),
+            ([-6.2, 0.0, -3.2], [6.2, 3.0, -3.0], GREY),
+            ([-6.2, 0.0, 3.0], [6.2, 3.0, 3.2], GREY),
+            ([-6.2, 3.0, -3.2], [6.2, 3.1, 3.2], GREY),
+            ([-0.1, 0.0, -3.0], [0.1, 3.0, 3.0], GREY),
+        ];
+        let lamp = LightKind::Point { position: [-3.0, 2.0, 0.0], intensity: 10.0, radius: 0.05, range: None };
+        scene(&blocks, &[lamp], 0.0, Camera::look_at([x, 1.5, 2.5], [x, 1.0, -3.0], 1.0))
+    };
+    for (method, stated) in [(Method::Rsm, 0.45), (Method::Cache, 0.45)] {
+        let [bright, dark] = [-3.0, 3.0].map(|x| mean(&light(&gpu, &build(x), [48, 32], method.clone())));
+        println!("{}: {:.3} of the lit room's light in the dark one", method.name(), dark / bright);
+        assert!(bright > 0.1 && dark / bright < stated, "{bright}, {dark}");
+    }
+}
+
+#[test]
+fn many_lights_odd_sizes_and_empty_scenes() {
+    let Some(gpu) = common::gpu() else { return };
+    let point = |x: f32| LightKind::Point { position: [x, 2.0, 0.0], intensity: 5.0, radius: 0.05, range: None };
+    let spot = |outer_angle: f32| LightKind::Spot {
+        position: [0.0, 3.0, 2.0],
+        direction: [0.0, -0.5, -1.0],
+        intensity: 20.0,
+        radius: 0.02,
+        range: Some(30.0),
+        inner_angle: 0.2,
+        outer_angle,
+    };
+    let all = [sun(BACKWARDS, 1.0), sun([0.5, -1.0, 0.1], 1.0), point(3.0), point(-3.0), spot(0.6), spot(1.3)];
+    let size = [48, 32];
+    for method in [Method::Rsm, Method::Cache] {
+        let together = light(&gpu, &hall(GREY, &all, 0.0, 1.0), size, method.clone());
+        let mut apart = vec![0.0; together.len()];
+        for kind in all {
+            let one = light(&gpu, &hall(GREY, &[kind], 0.0, 1.0), size, method.clone());
+            assert!(mean(&one) > 1e-3, "{}: {kind:?}", method.name());
+            apart.iter_mut().zip(one).for_each(|(sum, x)| *sum += x);
+        }
+        // Maps are smaller when there are several lights, so the sum is not exact.
+        let off = difference(&together, &apart);
+        println!("{}: six lights together {:.2} % from their sum", method.name(), 100.0 * off);
+        assert!(off < 0.05, "{}: {off}", method.name());
+        for odd in [[1, 1], [17, 13]] {
+            assert!(light(&gpu, &hall(GREY, &all, 0.1, 1.0), odd, method.clone()).iter().all(|x| x.is_finite()));
+        }
+        let empty = scene(&[], &[sun(BACKWARDS, 1.0)], 1.0, Camera::look_at([0.0; 3], [0.0, 0.0, -1.0], 1.0));
+        assert!(light(&gpu, &empty, [9, 9], method).iter().all(|x| *x == 0.0));
+    }
+    // Forty lights are more than the maps' budget.
+    let crowd: Vec<LightKind> = (0..40).map(|i| point(0.2 * i as f32 - 4.0)).collect();
+    assert!(mean(&light(&gpu, &hall(GREY, &crowd, 0.0, 1.0), [16, 16], Method::Cache)) > 0.0);
+}
+
+#[test]
+fn steady_frames_allocate_nothing_and_a_missing_world_is_named() {
+    let Some(gpu) = common::gpu() else { return };
+    let build = hall(GREY, &[sun(BACKWARDS, 1.0)], 0.1, 1.0);
+    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &build).expect("the scene fits");
+    let mut renderer = renderer(&gpu, [64, 32], Method::Cache);
+    let frame = |renderer: &mut Renderer| {
+        let view = View::new(&build.cameras[0], renderer.size(), [0.0; 2]);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let recorded = renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, &uploaded, &view);
+        gpu.queue.submit([encoder.finish()]);
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).expect("the device answers");
+        recorded
+    };
+    let held = || gpu.device.generate_allocator_report().map(|r| r.total_allocated_bytes);
+    (0..3).for_each(|_| frame(&mut renderer).expect("the frame is drawn"));
+    let (own, before) = (renderer.bytes(), held());
+    (0..5).for_each(|_| frame(&mut renderer).expect("the frame is drawn"));
+    assert_eq!((renderer.bytes(), held()), (own.clone(), before));
+    // Negative control, and after a resize it draws as before.
+    renderer.resize([128, 64]).expect("the size fits");
+    frame(&mut renderer).expect("the frame is drawn");
+    assert_ne!(renderer.bytes(), own);
+
+    let inputs = renderer.gi_inputs(&View::new(&build.cameras[0], [128, 64], [0.0; 2]), [0.1; 3]);
+    let mut rung = bouncelight::gi::rung::build(&gpu.device, &gpu.queue, [128, 64], &Method::Rsm)
+        .expect("it can be made")
+        .expect("it is a method");
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let target = &renderer.targets().indirect.view;
+    let error = rung.record(&mut Recorder::new(&mut encoder), &gpu.queue, &inputs, target).unwrap_err();
+    assert!(matches!(error, GiError::World), "{error}");
+    assert!(RenderError::from(error).to_string().contains("Inputs::world"));
+}
