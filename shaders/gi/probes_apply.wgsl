@@ -10,15 +10,15 @@
 @group(1) @binding(4) var<storage, read> received: array<vec4f>;
 @group(1) @binding(5) var output: texture_storage_2d<rgba16float, write>;
 
-// How far the surfels see along their surfaces: four bits for each of SECTORS directions.
-@group(1) @binding(6) var<storage, read> walls: array<vec2u>;
+// How far the surfels see along their surfaces: a byte for each of SECTORS directions.
+@group(1) @binding(6) var<storage, read> walls: array<vec4u>;
 
 // The same stand in `gi::probes::field`, which says what they mean.
 const REACH = 2.0;
 const OFF_PLANE = 8.0;
-const TURN = 10.7;
+const TURN = 16.0;
 const LEAST = 0.0001;
-const WALLS = 15.0;
+const WALLS = 255.0;
 const SECTORS = 16u;
 const PI = 3.14159265;
 const REACH2 = REACH * REACH;
@@ -54,13 +54,13 @@ fn normal_of(word: u32) -> vec3f {
 }
 
 // 1 where nothing stands between the surfel and a point `off` from it, 0 where something does.
-fn open(off: vec3f, normal: vec3f, spacing: f32, words: vec2u) -> f32 {
+fn open(off: vec3f, normal: vec3f, spacing: f32, words: vec4u) -> f32 {
     let way = off * frame(normal);
     let turn = atan2(way.y, way.x) / (2.0 * PI) + 1.0;
     let sector = u32(turn * f32(SECTORS)) % SECTORS;
-    let free = f32((words[sector / 8u] >> (4u * (sector % 8u))) & 15u);
+    let free = f32((words[sector / 4u] >> (8u * (sector % 4u))) & 255u);
     let steps = length(way) * (WALLS / (REACH * spacing));
-    return select(saturate(free + 0.5 - steps), 1.0, free >= WALLS);
+    return select(saturate(0.5 * (free + 2.0 - steps)), 1.0, free >= WALLS);
 }
 
 @compute @workgroup_size(8, 8)

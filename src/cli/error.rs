@@ -2,6 +2,7 @@
 
 use crate::{
     gi::GiError,
+    gi::probes::BakeError,
     gpu::GpuError,
     net::{convert::ConvertError, format::WeightsError, pictures::PicturesError},
     reference::PackError,
@@ -82,6 +83,7 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
             || cause.is::<WeightsError>()
             || cause.is::<EnvironmentError>()
             || cause.is::<PackError>()
+            || cause.is::<BakeError>()
         {
             return INVALID_INPUT;
         }

@@ -1,6 +1,11 @@
 //! The bake that `--method probes` needs, made on the fly.
 
-use super::{args::Global, error::CliError, interrupt, progress::Progress};
+use super::{
+    args::{Global, usage},
+    error::CliError,
+    interrupt,
+    progress::Progress,
+};
 use crate::{
     gi::{
         Method,
@@ -23,6 +28,12 @@ pub struct BakeArgs {
 }
 
 impl BakeArgs {
+    /// A flag that was given and is of no use without a bake.
+    pub fn given(&self) -> Option<&'static str> {
+        let flags = [("--surfels", self.surfels.is_some()), ("--links", self.links.is_some())];
+        flags.iter().find(|f| f.1).map(|f| f.0)
+    }
+
     /// Bakes `scene` for views from its cameras and from `camera`, and says on standard error what that took.
     pub fn bake(&self, global: &Global, scene: &Scene, camera: &Camera) -> Result<Method> {
         let place = |c: &Camera| [c.transform[3][0], c.transform[3][1], c.transform[3][2]];
@@ -43,6 +54,7 @@ impl BakeArgs {
         });
         let bake = match bake {
             Err(BakeError::Stopped) => return Err(CliError::Interrupted.into()),
+            Err(e @ BakeError::Options { .. }) => return Err(usage(e.to_string())),
             other => other?,
         };
         if let Ok(progress) = progress.into_inner() {

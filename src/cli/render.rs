@@ -218,6 +218,9 @@ fn check(args: &Args) -> Result<Format> {
     } else if let Some(flag) = args.tracing.given() {
         return Err(usage(format!("{flag} belongs to --method reference; `{name}` traces no paths")));
     }
+    if let Some(flag) = args.bake.given().filter(|_| args.method != MethodName::Probes) {
+        return Err(usage(format!("{flag} belongs to --method probes; `{name}` has no bake")));
+    }
     image_io::check_writable(path)?;
     if let Some(diff) = &args.diff {
         image_io::check_writable(diff)?;

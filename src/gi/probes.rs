@@ -208,7 +208,7 @@ impl Bake {
     /// Bytes of what is baked, as it lies on the GPU.
     pub fn bytes(&self) -> u64 {
         let n = self.surfels.len() as u64;
-        n * (48 + 16 + 8 + 16 * u64::from(SAMPLES))
+        n * (48 + 16 + 16 + 16 * u64::from(SAMPLES))
             + 2 * self.links.len() as u64
             + self.field.bytes()
             + self.accel.bytes()
@@ -264,11 +264,11 @@ fn gather(
 }
 
 /// How far a surfel sees along its surface in each of sixteen directions, see [`field::WALLS`].
-fn walls(surfaces: &surface::Surfaces<'_>, point: &surface::Point, spacing: f32, extent: f32) -> [u32; 2] {
+fn walls(surfaces: &surface::Surfaces<'_>, point: &surface::Point, spacing: f32, extent: f32) -> [u32; 4] {
     let (x, y) = field::frame(point.normal);
     let origin = scatter::lifted(point, extent) + point.plane * (0.02 * spacing);
     let reach = field::REACH * spacing;
-    let mut words = [0; 2];
+    let mut words = [0; 4];
     for sector in 0..field::SECTORS {
         let mut free = reach;
         for (turn, rise) in [(0.2, 0.03), (0.8, 0.03), (0.5, 0.2)] {
@@ -279,7 +279,7 @@ fn walls(surfaces: &surface::Surfaces<'_>, point: &surface::Point, spacing: f32,
             }
         }
         let steps = (free / reach * field::WALLS).ceil().clamp(0.0, field::WALLS) as u32;
-        words[sector as usize / 8] |= steps << (4 * (sector % 8));
+        words[sector as usize / 4] |= steps << (8 * (sector % 4));
     }
     words
 }

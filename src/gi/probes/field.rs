@@ -8,17 +8,17 @@ use std::collections::HashMap;
 pub const REACH: f32 = 2.0;
 /// What a step off the surfel's plane counts more than one along it, squared.
 pub const OFF_PLANE: f32 = 8.0;
-/// What turning the normal counts: 1 − cos of 25° is a distance of 1.
-pub const TURN: f32 = 10.7;
+/// What turning the normal counts: 1 − cos of 20° is a distance of 1.
+pub const TURN: f32 = 16.0;
 /// Entries of a cell's list at most.
 pub const LONGEST: usize = 64;
 /// Cells are numbered from −511 to 511 along each axis, by 30 bits.
 const KEY_LIMIT: i32 = 511;
 /// Share of the weight that normals and walls cannot take away, so that a surface without surfels of its own is lit at all.
 pub const LEAST: f32 = 1e-4;
-/// Steps in which a surfel's free way along its surface is told in each of [`SECTORS`] directions, four bits each: a
+/// Steps in which a surfel's free way along its surface is told in each of [`SECTORS`] directions, a byte each: a
 /// neighbour beyond what stands there gets no light from it. The whole is `REACH` spacings.
-pub const WALLS: f32 = 15.0;
+pub const WALLS: f32 = 255.0;
 /// Directions in which the free way is known.
 pub const SECTORS: u32 = 16;
 
@@ -31,14 +31,14 @@ pub fn frame(n: Vec3) -> (Vec3, Vec3) {
 }
 
 /// Whether nothing stands between a surfel and a point `off` from it: 1, or 0, or between where it is close.
-fn open(off: Vec3, normal: Vec3, spacing: f32, walls: [u32; 2]) -> f32 {
+fn open(off: Vec3, normal: Vec3, spacing: f32, walls: [u32; 4]) -> f32 {
     let (x, y) = frame(normal);
     let (u, v) = (off.dot(x), off.dot(y));
     let turn = v.atan2(u) / std::f32::consts::TAU + 1.0;
     let sector = (turn * SECTORS as f32) as u32 % SECTORS;
-    let free = (walls[sector as usize / 8] >> (4 * (sector % 8)) & 15) as f32;
+    let free = (walls[sector as usize / 4] >> (8 * (sector % 4)) & 255) as f32;
     let way = (u * u + v * v).sqrt() * (WALLS / (REACH * spacing));
-    if free >= WALLS { 1.0 } else { (free + 0.5 - way).clamp(0.0, 1.0) }
+    if free >= WALLS { 1.0 } else { (0.5 * (free + 2.0 - way)).clamp(0.0, 1.0) }
 }
 
 /// Squared normalised distance of a point from a surfel of `spacing` metres.
@@ -89,7 +89,7 @@ pub struct Field {
     /// The lists.
     pub lists: Vec<u32>,
     /// What stands around each surfel, see [`WALLS`].
-    pub walls: Vec<[u32; 2]>,
+    pub walls: Vec<[u32; 4]>,
     surfels: Vec<(Vec3, Vec3, f32)>,
 }
 
@@ -132,7 +132,7 @@ impl Field {
             table[at] = [key, lists.len() as u32 | (list.len() as u32) << 24];
             lists.extend(list.iter().map(|e| e.1));
         }
-        let walls = vec![[u32::MAX; 2]; surfels.len()];
+        let walls = vec![[u32::MAX; 4]; surfels.len()];
         Self { side, centre, table, lists, walls, surfels }
     }
 

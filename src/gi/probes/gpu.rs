@@ -337,17 +337,19 @@ impl Rung for ProbesGi {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let n = f64::from(self.params.surfels);
         let (inner, rays) = (f64::from(self.params.inner_rays), f64::from(self.params.rays));
-        // One light; half of the sample points face it. A shadow ray looks at about 20 blocks of 64 bytes, 250 operations each.
+        // One light, which half of the sample points face. A shadow ray looks at about 20 blocks of 64 bytes, 250
+        // operations each. A link's direction and the gleam that half of the surfels have make 75 operations.
         let shadow_rays = n * f64::from(SAMPLES) * 0.5;
+        let (rounds, link) = (ROUNDS as f64, 75.0);
         vec![
-            Cost::new("gi.probes.light", shadow_rays * 20.0 * 250.0, n * (f64::from(SAMPLES) * 16.0 + 64.0)),
             Cost::new(
-                "gi.probes.bounce",
-                ROUNDS as f64 * n * (inner * 3.0 + 12.0),
-                ROUNDS as f64 * n * (inner * 2.0 + 80.0),
+                "gi.probes.light",
+                shadow_rays * 20.0 * 250.0,
+                shadow_rays * 1280.0 + n * (f64::from(SAMPLES) * 16.0 + 88.0),
             ),
-            Cost::new("gi.probes.gather", n * rays * 3.0, n * (rays * 2.0 + 32.0)),
-            Cost::new("gi.probes.apply", pixels * (80.0 + self.list * 55.0), pixels * 16.0 + n * 32.0),
+            Cost::new("gi.probes.bounce", rounds * n * (inner * link + 60.0), rounds * n * (inner * 2.0 + 100.0)),
+            Cost::new("gi.probes.gather", n * (rays * link + 40.0), n * (rays * 2.0 + 84.0)),
+            Cost::new("gi.probes.apply", pixels * (120.0 + self.list * 65.0), pixels * 16.0 + n * 52.0),
         ]
     }
 }

@@ -10,6 +10,8 @@ use std::collections::HashMap;
 
 /// Points of a path at most.
 const VERTICES: usize = 6;
+/// Spacing on a thing at most, as a share of the square root of its area.
+const SMALL: f32 = 0.25;
 
 /// A point that a path met, and how far its next ray flew; infinite when it left the scene.
 #[derive(Debug, Clone, Copy)]
@@ -138,7 +140,8 @@ fn spacings(candidates: &[Candidate], base: f32, options: &BakeOptions) -> Vec<f
     let spacing = |c: &Candidate| {
         let (inverse, count) = sums[&key(c)];
         let harmonic = if inverse > 0.0 { count / inverse } else { f32::INFINITY };
-        (options.nearness * harmonic).clamp(base * options.finest, base)
+        // A small thing gets a dozen surfels at least, however far it is from others.
+        (options.nearness * harmonic).min(SMALL * c.point.size).clamp(base * options.finest, base)
     };
     candidates.iter().map(spacing).collect()
 }

@@ -22,6 +22,8 @@ pub struct Point {
     pub roughness: f32,
     /// Emitted radiance, W/(m²·sr).
     pub emission: Vec3,
+    /// Square root of its instance's area, metres.
+    pub size: f32,
 }
 
 /// Triangles with their acceleration structure.
@@ -33,6 +35,8 @@ pub struct Surfaces<'a> {
     origin: Vec<(u32, u32)>,
     /// World-from-object normals of each instance: cofactor matrix, and −1 for mirrored ones.
     turn: Vec<(glam::Mat3, f32)>,
+    /// Square root of the area of each instance, metres.
+    sizes: Vec<f32>,
     /// Glowing surfaces shine; not where analytic lights stand in for them.
     glow: bool,
     /// What rays hit.
@@ -71,9 +75,15 @@ impl<'a> Surfaces<'a> {
                 origin.push((index, first));
             }
         }
+        let mut sizes = vec![0.0; scene.instances.len()];
+        for (corners, (instance, _)) in corners.iter().zip(&origin) {
+            let [a, b, c] = corners.map(Vec3::from);
+            sizes[*instance as usize] += 0.5 * (b - a).cross(c - a).length();
+        }
+        sizes.iter_mut().for_each(|s: &mut f32| *s = s.sqrt());
         let accel = Accel::build(&corners)?;
         let glow = !scene.lights.iter().any(|l| l.stands_in);
-        Ok(Self { scene, corners, origin, turn, glow, accel })
+        Ok(Self { scene, corners, origin, turn, sizes, glow, accel })
     }
 
     /// The nearest point that the ray meets before `t_max`, and its distance in lengths of `direction`.
@@ -122,7 +132,8 @@ impl<'a> Surfaces<'a> {
         let emission = Vec3::from(material.emissive) * Vec3::new(r, g, b);
         let share = |v: Vec3| clean(v * lit).min(Vec3::ONE);
         let (albedo, f0, emission) = (share(albedo), share(f0), clean(emission));
-        Point { position, normal, plane, albedo, f0, roughness, emission }
+        let size = self.sizes[instance as usize];
+        Point { position, normal, plane, albedo, f0, roughness, emission, size }
     }
 
     /// Largest coordinate of a box around all triangles that can be hit, and the box.
