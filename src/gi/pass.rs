@@ -55,10 +55,10 @@ struct Rebuilt {
 }
 
 impl NeuralGi {
-    /// Features that would be used where the adapter has them: timestamps, and those only by hosts that time passes.
-    /// None is needed.
+    /// Features that would be used where the adapter has them: timestamps, by hosts that time passes, and subgroups, by some
+    /// of the network's kernels. None is needed.
     pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
-        adapter.features() & wgpu::Features::TIMESTAMP_QUERY
+        adapter.features() & (wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP)
     }
 
     /// Limits that the device must have: WebGPU's defaults.

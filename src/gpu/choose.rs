@@ -152,7 +152,7 @@ impl Gpu {
     }
 }
 
-/// Optional features that are used when present: timestamps for the timing tables.
+/// Optional features that are used when present: timestamps for the timing tables, subgroups for some of the network's kernels.
 pub fn wanted_features() -> wgpu::Features {
     wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP
 }
