@@ -41,7 +41,8 @@ fn sun(direction: [f32; 3], irradiance: f32) -> LightKind {
 
 fn renderer(gpu: &Gpu, size: [u32; 2], method: Method) -> Renderer {
     let shadow = ShadowOptions { sun_size: 256, cascades: 2, local_size: 256 };
-    Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions { method, shadow, ..Default::default() }).expect("the size fits")
+    Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions { method, shadow, ..Default::default() })
+        .expect("the size fits")
 }
 
 /// Indirect light and positions of the picture.
