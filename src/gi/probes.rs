@@ -118,12 +118,15 @@ pub struct Surfel {
     pub emission: [f32; 3],
 }
 
+/// A place and a unit normal.
+pub type Sample = ([f32; 3], [f32; 3]);
+
 /// The baked transfer. Belongs to the scene it was made of.
 pub struct Bake {
     /// The surfels.
     pub surfels: Vec<Surfel>,
     /// Sample points, [`SAMPLES`] a surfel: lifted place and unit normal.
-    pub samples: Vec<([f32; 3], [f32; 3])>,
+    pub samples: Vec<Sample>,
     /// Links, `rays` a surfel: a surfel, or `surfels.len()` + part of the sky, or that + [`SKY`] for what is black.
     pub links: Vec<u16>,
     /// Links of each surfel.
@@ -153,7 +156,7 @@ impl Bake {
     ) -> Result<Self, BakeError> {
         let start = std::time::Instant::now();
         let (records, rays) = (options.records, options.rays);
-        if !(1..=MOST).contains(&records) || !(2..=4096).contains(&rays) || rays % 2 != 0 {
+        if !(1..=MOST).contains(&records) || !(2..=4096).contains(&rays) || !rays.is_multiple_of(2) {
             return Err(BakeError::Options { records, rays });
         }
         let surfaces = surface::Surfaces::new(scene)?;
@@ -228,7 +231,7 @@ fn gather(
     spacings: &[f32],
     near: &[Option<u32>],
     extent: f32,
-) -> (Vec<Surfel>, Vec<([f32; 3], [f32; 3])>) {
+) -> (Vec<Surfel>, Vec<Sample>) {
     let mut points: Vec<Vec<u32>> = vec![Vec::new(); chosen.len()];
     for (i, owner) in (0u32..).zip(near) {
         if let Some(owner) = *owner {

@@ -42,7 +42,7 @@ pub fn paths(
         if eyes.is_empty() {
             // A line through the ball around the scene, seen from outside, and for what is closed from its middle.
             let out = sphere(Vec2::new(random.next(), random.next()));
-            let inside = i % 4 == 0;
+            let inside = i.is_multiple_of(4);
             let across = cosine(-out, Vec2::new(random.next(), random.next()));
             origin = if inside {
                 low + (high - low) * Vec3::new(random.next(), random.next(), random.next())
