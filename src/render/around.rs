@@ -6,7 +6,7 @@ use crate::gpu::timing::Recorder;
 use crate::scene::upload::SceneGpu;
 use glam::Vec3;
 
-/// Texels on a side of a face; `AROUND_SIDE` in the shaders.
+/// Texels on a side of a face; `SIDE` in the shaders.
 pub const SIDE: u32 = 12;
 /// Nearest thing that is seen, metres.
 const NEAR: f32 = 0.02;
