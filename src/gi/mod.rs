@@ -11,6 +11,9 @@
 //! [`ssgi`] gathers what the pixels around a pixel send on, by visibility bitmask ([`bitmask`]), and `ambient`'s light
 //! through what nothing blocks. It cannot do anything off the screen or hidden in it.
 //!
+//! [`cache`] holds two methods that gather what the rasterised world beyond the picture sends: `rsm` one bounce of the
+//! lights, `cache` all bounces, emission and the sky. They do not know what stands between.
+//!
 //! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]) go through a U-Net, and its answer comes back
 //! to full resolution guided by depth and normal ([`reconstruct`]). It learns what direct light, albedo and shape in
 //! the picture imply. It cannot know what is outside the picture or hidden in it: light from behind the camera is a

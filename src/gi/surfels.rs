@@ -10,6 +10,8 @@ use crate::render::tool::{self, LOAD, READ, READ_WRITE, UNIFORM};
 
 /// Texels of the cube.
 pub const SURFELS: u32 = 6 * around::SIDE * around::SIDE;
+/// Rows of the buffers: the gather reads whole tiles of 64, and what no pass writes stays 0, which is no surfel.
+const ROWS: u64 = SURFELS.next_multiple_of(64) as u64;
 /// Bytes of a `Surfel` of `shaders/gi/surfel.wgsl`.
 const SURFEL_BYTES: u64 = 80;
 /// Bytes of `Sky`.
@@ -38,7 +40,7 @@ pub struct SurfelsPass {
 }
 
 impl SurfelsPass {
-    /// Compiles the shaders and makes buffers of 170 KB. `rounds` of exchange are rounded up to an even number.
+    /// Compiles the shaders and makes buffers of 0.1 MB. `rounds` of exchange are rounded up to an even number.
     pub fn new(device: &wgpu::Device, rounds: u32) -> Self {
         let types = [READ, READ, READ, READ, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE, UNIFORM];
         let stage = wgpu::ShaderStages::COMPUTE;
@@ -53,8 +55,8 @@ impl SurfelsPass {
                 mapped_at_creation: false,
             })
         };
-        let surfels = buffer("gi.surfels", u64::from(SURFELS) * SURFEL_BYTES);
-        let sent = ["gi.sent.0", "gi.sent.1"].map(|label| buffer(label, u64::from(SURFELS) * 16));
+        let surfels = buffer("gi.surfels", ROWS * SURFEL_BYTES);
+        let sent = ["gi.sent.0", "gi.sent.1"].map(|label| buffer(label, ROWS * 16));
         let sky_buffer = buffer("gi.sky", SKY_BYTES);
         let resources = [surfels.as_entire_binding(), sky_buffer.as_entire_binding()];
         let sky_group = tool::group(device, "gi.sky", &sky_layout, &resources);
@@ -161,8 +163,8 @@ impl SurfelsPass {
         let n = f64::from(SURFELS);
         [
             Cost::new("gi.surfels", n * 400.0, n * 140.0),
-            // A pair: 5 for the offset, 15 for the form factor, 14 for the sums; buffers stay in cache.
-            Cost::new("gi.exchange", f64::from(self.rounds) * n * n * 36.0, f64::from(self.rounds) * n * 112.0),
+            // A pair: 39 for what arrives, 9 for the sums; buffers stay in cache.
+            Cost::new("gi.exchange", f64::from(self.rounds) * n * n * 48.0, f64::from(self.rounds) * n * 112.0),
         ]
     }
 }

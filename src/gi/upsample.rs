@@ -3,7 +3,7 @@
 //!
 //! The four cells around a pixel are weighted bilinearly times how much their sample lies on the pixel's own surface:
 //! distance from the pixel's plane relative to the pixel's depth, and agreement of normals (the tolerances are
-//! [`reconstruct`]'s). Where those four mostly disagree the 4×4 cells around are blended in. Background pixels get 0. A
+//! [`reconstruct`](super::reconstruct)'s). Where those four mostly disagree the 4×4 cells around are blended in. Background pixels get 0. A
 //! workgroup reads each cell around its 8×8 pixels once, into its shared memory.
 
 use super::cells::{CellSide, CellsPass};

@@ -22,6 +22,8 @@ use glam::{Quat, Vec2, Vec3};
 pub const BLOCK: u32 = 8;
 /// How far a sun's tile reaches from the eye, metres.
 pub const REACH: f32 = 96.0;
+/// Angle between a sun's tile and the world's axes, radians: about one texel in eight.
+const TILT: f32 = 0.13;
 /// Columns of the atlas, texels.
 const WIDTH: u32 = 512;
 
@@ -155,9 +157,10 @@ fn near(radius: f32) -> f32 {
 
 fn sun(direction: Vec3, tile: Tile, bounds: (Vec3, Vec3), eye: Vec3) -> AtlasViewGpu {
     let to_light = -direction.normalize_or(Vec3::NEG_Y);
-    // Axes that follow the world's while the sun is above: a room's walls then lie along the tile's sides. The only
-    // direction where they turn suddenly is straight up from below.
-    let turn = Quat::from_rotation_arc(Vec3::Y, to_light);
+    // Axes that nearly follow the world's while the sun is above: a room then fills the tile. Nearly, so that an edge of
+    // a wall or its shadow crosses the texels of a row one after the other and not all at once when the sun moves. The
+    // only direction where they turn suddenly is straight up from below.
+    let turn = Quat::from_rotation_arc(Vec3::Y, to_light) * Quat::from_rotation_y(TILT);
     let axes = [turn * Vec3::X, turn * Vec3::NEG_Z, to_light];
     let along = |p: Vec3| Vec3::new(p.dot(axes[0]), p.dot(axes[1]), p.dot(axes[2]));
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
