@@ -32,15 +32,19 @@ pub struct GlossyPass {
 /// The lit picture and all bindings of one set of targets.
 pub struct GlossyPicture {
     surfaces: wgpu::BindGroup,
-    /// Each level's group and size; the first is filled from the targets, the others from the one before.
-    levels: Vec<(wgpu::BindGroup, [u32; 2])>,
+    /// Each level's group and texture; the first is filled from the targets, the others from the one before.
+    levels: Vec<(wgpu::BindGroup, wgpu::Texture)>,
+    /// All levels in one texture, for look-ups. Not written in place: OpenGL ignores stores to a level of a texture
+    /// while another of its levels is bound for reading.
+    chain: wgpu::Texture,
     trace: wgpu::BindGroup,
 }
 
 impl GlossyPicture {
     /// GPU memory of the lit picture, bytes.
     pub fn bytes(&self) -> u64 {
-        self.levels.iter().map(|(_, [w, h])| 8 * u64::from(*w) * u64::from(*h)).sum()
+        // Every level is there twice: as it is made, and in the chain.
+        self.levels.iter().map(|(_, t)| 2 * 8 * u64::from(t.width()) * u64::from(t.height())).sum()
     }
 }
 
@@ -76,44 +80,41 @@ impl GlossyPass {
         let t = targets;
         let half = t.size.map(|n| n.div_ceil(2));
         let count = LEVELS.min(half[0].max(half[1]).ilog2() + 1);
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("gi.lit"),
-            size: wgpu::Extent3d { width: half[0], height: half[1], depth_or_array_layers: 1 },
-            mip_level_count: count,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba16Float,
-            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        let views: Vec<_> = (0..count)
-            .map(|base_mip_level| {
-                texture.create_view(&wgpu::TextureViewDescriptor {
-                    base_mip_level,
-                    mip_level_count: Some(1),
-                    ..Default::default()
-                })
+        let texture = |[width, height]: [u32; 2], mip_level_count, usage| {
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("gi.lit"),
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                mip_level_count,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba16Float,
+                usage: usage | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
             })
-            .collect();
+        };
+        let chain = texture(half, count, wgpu::TextureUsages::COPY_DST);
         // The first level reads the targets; what stands in its place as the finer one is not read.
-        let mut finer = &t.indirect.view;
+        let mut finer = t.indirect.view.clone();
         let mut levels = Vec::new();
-        for (i, view) in (0..).zip(&views) {
-            let views = [finer, view].map(wgpu::BindingResource::TextureView);
-            levels.push((tool::group(device, "gi.lit", &self.level, &views), half.map(|n| (n >> i).max(1))));
+        for i in 0..count {
+            let made = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_SRC;
+            let level = texture(half.map(|n| (n >> i).max(1)), 1, made);
+            let view = level.create_view(&Default::default());
+            let views = [&finer, &view].map(wgpu::BindingResource::TextureView);
+            levels.push((tool::group(device, "gi.lit", &self.level, &views), level));
             finer = view;
         }
         let read = [&t.depth, &t.normal, &t.specular, &t.albedo, &t.emissive, &t.direct_diffuse, &t.indirect];
         let all: Vec<_> = [frame.as_entire_binding()].into_iter().chain(read.map(tool::view)).collect();
         let surfaces = tool::group(device, "gi.glossy", &self.surfaces, &all);
-        let whole = texture.create_view(&Default::default());
+        let whole = chain.create_view(&Default::default());
         let resources = [
             wgpu::BindingResource::TextureView(&whole),
             wgpu::BindingResource::Sampler(&self.sampler),
             tool::view(&t.indirect_specular),
         ];
         let trace = tool::group(device, "gi.glossy", &self.trace, &resources);
-        GlossyPicture { surfaces, levels, trace }
+        GlossyPicture { surfaces, levels, chain, trace }
     }
 
     /// Binds the environment; rebuilt when the scene changes.
@@ -125,12 +126,16 @@ impl GlossyPass {
     pub fn record(&self, recorder: &mut Recorder<'_>, picture: &GlossyPicture, sky: &wgpu::BindGroup, size: [u32; 2]) {
         recorder.compute("gi.lit", |pass| {
             pass.set_bind_group(0, &picture.surfaces, &[]);
-            for (i, (group, size)) in picture.levels.iter().enumerate() {
+            for (i, (group, level)) in picture.levels.iter().enumerate() {
                 pass.set_pipeline(if i == 0 { &self.lit } else { &self.halve });
                 pass.set_bind_group(1, group, &[]);
-                tool::dispatch(pass, *size);
+                tool::dispatch(pass, [level.width(), level.height()]);
             }
         });
+        for (mip_level, (_, level)) in (0..).zip(&picture.levels) {
+            let chain = wgpu::TexelCopyTextureInfo { mip_level, ..picture.chain.as_image_copy() };
+            recorder.encoder().copy_texture_to_texture(level.as_image_copy(), chain, level.size());
+        }
         recorder.compute("gi.glossy", |pass| {
             pass.set_pipeline(&self.glossy);
             pass.set_bind_group(0, &picture.surfaces, &[]);
@@ -141,13 +146,13 @@ impl GlossyPass {
     }
 
     /// What the passes cost for a picture of `size` pixels without smooth surfaces, each ray marching all of its steps.
-    /// `gi.lit`: a quarter of the pixels with 140 operations and 40 bytes, then levels of 8 bytes read and written.
+    /// `gi.lit`: a quarter of the pixels with 140 operations and 40 bytes, then levels of 8 bytes read and written, and copied.
     /// `gi.glossy`: 21 steps of 16 operations, the track 110, split sum 110, look-ups 60, the rest 60; depth, normal,
     /// specular, indirect and the result, and the lit picture once.
     pub fn costs(size: [u32; 2]) -> [Cost; 2] {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         [
-            Cost::new("gi.lit", pixels * (0.25 * 140.0 + 24.0 / 12.0), pixels * (0.25 * 40.0 + 8.0 / 3.0 * 2.0)),
+            Cost::new("gi.lit", pixels * (0.25 * 140.0 + 24.0 / 12.0), pixels * (0.25 * 40.0 + 8.0 / 3.0 * 4.0)),
             Cost::new("gi.glossy", pixels * (21.0 * 16.0 + 340.0), pixels * (28.0 + 8.0 / 3.0)),
         ]
     }

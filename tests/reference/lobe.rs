@@ -20,7 +20,7 @@ fn distribution_and_visibility(alpha: f64, n_h: f64, n_l: f64, n_v: f64) -> f64 
 /// Share of the light towards `mu` that the lobe with perfect reflection keeps: the sum of D·V·n_l over the hemisphere
 /// of half vectors, with the density of the half vector taken along so that narrow lobes are met.
 fn kept(alpha: f64, mu: f64) -> f64 {
-    const N: usize = 150;
+    const N: usize = 200;
     let v = DVec3::new((1.0 - mu * mu).sqrt(), 0.0, mu);
     let mut sum = 0.0;
     for i in 0..N {
@@ -47,10 +47,23 @@ fn kept(alpha: f64, mu: f64) -> f64 {
     sum / (N * N) as f64
 }
 
+/// [`kept`] at these even steps of `mu` above 0, for interpolation.
+const STEPS: usize = 24;
+
+fn kept_table(alpha: f64) -> Vec<f64> {
+    (0..=STEPS).map(|i| kept(alpha, (i as f64 / STEPS as f64).max(0.01))).collect()
+}
+
+fn look_up(table: &[f64], mu: f64) -> f64 {
+    let at = mu * STEPS as f64;
+    let i = (at as usize).min(STEPS - 1);
+    table[i] + (table[i + 1] - table[i]) * (at - i as f64)
+}
+
 /// Mean over the cosine-weighted hemisphere.
-fn kept_mean(alpha: f64) -> f64 {
-    const N: usize = 24;
-    (0..N).map(|i| ((i as f64 + 0.5) / N as f64).sqrt()).map(|mu| kept(alpha, mu)).sum::<f64>() / N as f64
+fn kept_mean(table: &[f64]) -> f64 {
+    const N: usize = 200;
+    (0..N).map(|i| ((i as f64 + 0.5) / N as f64).sqrt()).map(|mu| look_up(table, mu)).sum::<f64>() / N as f64
 }
 
 /// Fresnel's equations for unpolarised light, by the angle of refraction.
@@ -74,7 +87,7 @@ struct Kind {
 fn the_lobe_has_ggxs_shape() {
     let Some(lab) = lab() else { return };
     let size = [64, 64];
-    let points = grid(size, 6);
+    let points = grid(size, 12);
     let mean = |f: fn(f64) -> f64| {
         let n = 2000;
         (0..n).map(|i| f(((f64::from(i) + 0.5) / f64::from(n)).sqrt())).sum::<f64>() / f64::from(n)
@@ -89,6 +102,7 @@ fn the_lobe_has_ggxs_shape() {
     for (k, kind) in kinds.into_iter().enumerate() {
         for (seed, roughness) in [0.25f32, 0.5, 0.9].into_iter().enumerate() {
             let alpha = f64::from(roughness).powi(2);
+            let table = kept_table(alpha);
             // Opposite the eye (the mirror direction and beside it), and from the side.
             for (s, towards) in [DVec3::new(0.1, 1.0, -1.1), DVec3::new(1.0, 0.8, 0.2)].into_iter().enumerate() {
                 let l = towards.normalize();
@@ -99,12 +113,12 @@ fn the_lobe_has_ggxs_shape() {
                 let options = Options { samples: 16, seed: (10 * k + seed) as u32, ..Default::default() };
                 let t = lab.trace(&scene, &eye, size, &points, &options);
 
-                let (all, mut expected, mut wider) = (kept_mean(alpha), 0.0, 0.0);
+                let (all, mut expected, mut wider) = (kept_mean(&table), 0.0, 0.0);
                 let again = kind.mean * all / (1.0 - kind.mean * (1.0 - all));
                 for p in &points {
                     let v = -ray(&eye, size, *p).1.normalize();
                     let h = (v + l).normalize();
-                    let e = kept(alpha, v.y);
+                    let e = look_up(&table, v.y);
                     let boost = 1.0 + again * (1.0 - e) / e;
                     let at = |alpha| {
                         2.0 * l.y * (kind.fresnel)(v.dot(h)) * boost * distribution_and_visibility(alpha, h.y, l.y, v.y)
