@@ -1,6 +1,7 @@
-//! What `cargo xtask demo` runs: the bundled interior as raster | neural | reference in out/demo.png, then the timing table.
+//! What `cargo xtask demo` runs: the bundled interior in out/demo.png (above raster | cache, below
+//! neural | reference), then the timing table.
 //!
-//! It is also the shortest tour of the library: load a scene, open a device, draw with two methods, write a picture.
+//! It is also the shortest tour of the library: load a scene, open a device, draw with three methods, write a picture.
 
 use bouncelight::{
     gi::Method,
@@ -17,11 +18,11 @@ use bouncelight::{
 };
 use std::path::Path;
 
-/// Size of each of the three pictures.
+/// Size of each of the four pictures.
 const SIZE: [u32; 2] = [640, 320];
 /// Size of the frames that are timed.
 const TIMED_SIZE: [u32; 2] = [1024, 512];
-/// White columns between the pictures.
+/// White columns and rows between the pictures.
 const GAP: usize = 4;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -33,7 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let neural = || Weights::shipped().map(|w| Method::Neural(Box::new(w)));
 
     let mut pictures = Vec::new();
-    for method in [Method::Direct, neural()?] {
+    for method in [Method::Direct, Method::Cache, neural()?] {
         let options = RendererOptions { method, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, SIZE, options)?;
         let options = CaptureOptions { samples: 8, ..Default::default() };
@@ -48,18 +49,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let row = SIZE[0] as usize * 3;
     let gap = [255; GAP * 3];
-    let rows = (0..SIZE[1] as usize).flat_map(|y| {
-        let rows: Vec<&[u8]> = pictures.iter().map(|p| &p[y * row..(y + 1) * row]).collect();
-        rows.join(&gap[..])
-    });
-    let strip: Vec<u8> = rows.collect();
+    let beside = |[left, right]: [&Vec<u8>; 2]| -> Vec<u8> {
+        left.chunks(row).zip(right.chunks(row)).flat_map(|(l, r)| [l, &gap, r].concat()).collect()
+    };
+    let between = vec![255; GAP * (2 * row + gap.len())];
+    let sheet = [beside([&pictures[0], &pictures[1]]), between, beside([&pictures[2], &pictures[3]])].concat();
     let out = root.join("out/demo.png");
     std::fs::create_dir_all(root.join("out"))?;
-    image_io::write_png(&out, SIZE[0] * 3 + 2 * GAP as u32, SIZE[1], &strip, &[("Adapter".into(), gpu.sentence())])?;
-    println!("raster | neural | reference: {}\n", out.display());
+    image_io::write_png(
+        &out,
+        SIZE[0] * 2 + GAP as u32,
+        SIZE[1] * 2 + GAP as u32,
+        &sheet,
+        &[("Adapter".into(), gpu.sentence())],
+    )?;
+    println!("raster | cache above, neural | reference below: {}\n", out.display());
 
     println!("interior at {}x{}, one frame:", TIMED_SIZE[0], TIMED_SIZE[1]);
-    for method in [Method::Direct, Method::Ambient, neural()?] {
+    for method in [Method::Direct, Method::Ambient, Method::Cache, neural()?] {
         let options = RendererOptions { method, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, TIMED_SIZE, options)?;
         let options = BenchOptions { frames: 5, warmup: 2 };

@@ -32,9 +32,10 @@ pub struct Args {
     /// Where the picture goes: .png, .exr, or `-` for a PNG on standard output.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How indirect light is found; `reference` traces paths until the light is right.
-    #[arg(long, value_enum, default_value = "neural")]
-    method: MethodName,
+    /// How indirect light is found; `reference` traces paths until the light is right. `cache` when absent, or `neural` when
+    /// weights are given.
+    #[arg(long, value_enum)]
+    method: Option<MethodName>,
     /// Weights of `neural`; the shipped ones when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
@@ -111,9 +112,17 @@ pub(super) struct Drawn {
     pub facts: Metadata,
 }
 
+impl Args {
+    /// The method asked for, or the best that needs nothing but the scene.
+    fn method(&self) -> MethodName {
+        let default = if self.weights.is_some() { MethodName::Neural } else { MethodName::Cache };
+        self.method.unwrap_or(default)
+    }
+}
+
 pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let format = check(&args)?;
-    let task = match args.method {
+    let task = match args.method() {
         MethodName::Reference => Task::Trace(args.tracing.task(args.scene.size, args.seed, args.aov.as_deref())?),
         name => {
             let layers = args.aov.as_deref().map(|text| parse_layers(text, &Layer::ALL, Layer::name)).transpose()?;
@@ -204,8 +213,8 @@ fn check(args: &Args) -> Result<Format> {
     if !args.exposure.is_finite() {
         return Err(usage(format!("--exposure {} is not a finite number of stops", args.exposure)));
     }
-    let name = args.method.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default();
-    if args.method == MethodName::Reference {
+    let name = args.method().to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default();
+    if args.method() == MethodName::Reference {
         if args.samples.is_some() {
             return Err(usage("--samples averages frames of the rasteriser; --method reference takes --spp".into()));
         }
@@ -218,7 +227,7 @@ fn check(args: &Args) -> Result<Format> {
     } else if let Some(flag) = args.tracing.given() {
         return Err(usage(format!("{flag} belongs to --method reference; `{name}` traces no paths")));
     }
-    if let Some(flag) = args.bake.given().filter(|_| args.method != MethodName::Probes) {
+    if let Some(flag) = args.bake.given().filter(|_| args.method() != MethodName::Probes) {
         return Err(usage(format!("{flag} belongs to --method probes; `{name}` has no bake")));
     }
     image_io::check_writable(path)?;
