@@ -48,10 +48,11 @@ pub(super) fn clutter(scene: &Scene) -> Clutter {
     let area: f32 = small.iter().map(|b| b.area).sum();
     // Never denser than one mean free path across the box.
     let extinction = (area / (size.x * size.y * size.z)).min(1.0 / size.length());
-    if !(extinction > 0.0) {
-        return Clutter::default();
+    if extinction.is_finite() && extinction > 0.0 {
+        Clutter { extinction, low: low.to_array(), high: high.to_array() }
+    } else {
+        Clutter::default()
     }
-    Clutter { extinction, low: low.to_array(), high: high.to_array() }
 }
 
 fn body(mesh: &Mesh, transform: &Mat4) -> Option<Body> {
