@@ -13,6 +13,7 @@
 @group(0) @binding(6) var<storage, read_write> fine: array<Emitter>;
 // Two for each block.
 @group(0) @binding(7) var<storage, read_write> blocks: array<Emitter>;
+@group(0) @binding(8) var<uniform> counts: Counts;
 
 // Texels on a side of a block.
 const BLOCK = 8u;
@@ -77,6 +78,7 @@ fn emitter_of(share: Share) -> Emitter {
         out.radiance = share.power / share.normal.w;
         out.gloss = share.gloss / share.normal.w;
         out.mirror = share.mirror / share.place.w;
+        out.haze = haze(counts, out.position);
     }
     return out;
 }

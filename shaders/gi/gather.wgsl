@@ -30,11 +30,13 @@ fn add(sum: ptr<function, Sum>, v: vec3f, radiance: vec3f) {
     (*sum).blue += v * radiance.b;
 }
 
-// What an emitter of a reflective shadow map sends to `p`, above the horizon of the receiver's normal `n`.
-fn add_emitter(sum: ptr<function, Sum>, e: Emitter, p: vec3f, n: vec3f) {
+// What an emitter of a reflective shadow map sends to `p`, above the horizon of the receiver's normal `n`, through the
+// small objects between, whose haze at `p` is `here`.
+fn add_emitter(sum: ptr<function, Sum>, e: Emitter, p: vec3f, n: vec3f, here: f32) {
     let a = arrival(e.position, e.normal, e.rest, e.area, p, n);
+    let through = exp(-max(e.haze + here, 0.0) * a.distance);
     let light = e.radiance * a.factor + e.gloss * (a.plain * lobe(e.mirror, -a.towards));
-    add(sum, select(vec3f(0.0), a.towards, dot(a.towards, n) > 0.0), light);
+    add(sum, select(vec3f(0.0), a.towards * through, dot(a.towards, n) > 0.0), light);
 }
 
 fn far(e: Emitter, area: f32, p: vec3f) -> bool {
@@ -55,6 +57,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
         p = world_position_at(pixel, distance_at(pixel));
         n = world_normal_at(pixel);
     }
+    let here = haze(counts, p);
     var sum = Sum(vec3f(0.0), vec3f(0.0), vec3f(0.0));
     for (var first = 0u; first < 2u * counts.blocks; first += 64u) {
         tile[i].area = 0.0;
@@ -66,12 +69,12 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
             let area = low.area + high.area;
             if area == 0.0 { continue; }
             if far(low, area, p) && far(high, area, p) {
-                add_emitter(&sum, low, p, n);
-                add_emitter(&sum, high, p, n);
+                add_emitter(&sum, low, p, n, here);
+                add_emitter(&sum, high, p, n, here);
             } else {
                 let start = 8u * (first + k);
                 for (var f = start; f < start + 16u; f++) {
-                    add_emitter(&sum, fine[f], p, n);
+                    add_emitter(&sum, fine[f], p, n, here);
                 }
             }
         }
@@ -88,6 +91,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
             tile[i].normal = s.normal;
             tile[i].radiance = sent[first + i].rgb - s.mapped;
             workgroupBarrier();
+            // Nothing is taken for what stands between: that is surfels too, and they fill the hemisphere together.
             for (var k = 0u; k < 64u; k++) {
                 let a = arrival(tile[k].position, tile[k].normal, 0.0, tile[k].area, p, n);
                 let v = select(vec3f(0.0), a.towards * a.factor, dot(a.towards, n) > 0.0);

@@ -10,7 +10,8 @@ struct Emitter {
     rest: f32,
     // Radiance sent to everywhere in front.
     radiance: vec3f,
-    pad0: f32,
+    // `haze` where it is.
+    haze: f32,
     // Where the light's rays go on to when the surface mirrors them: mean of unit vectors.
     mirror: vec3f,
     pad1: f32,
@@ -25,6 +26,20 @@ struct Counts {
     lights: u32,
     pad0: u32,
     pad1: u32,
+    // The box that the scene's small objects fill: middle, and one over its half size.
+    clutter_middle: vec3f,
+    // Half of the share of light that they stop on each metre inside it.
+    half_extinction: f32,
+    clutter_scale: vec3f,
+    pad2: f32,
+}
+
+// Half of what the scene's small objects take of light on each metre around `p`, so that the sum over both ends of a
+// segment, at least 0, is what they take on each of its metres. From the middle of the box to beyond its top the sum is
+// in proportion to the part that lies inside; between ends outside it is 0 or less from twice the box's size on.
+fn haze(counts: Counts, p: vec3f) -> f32 {
+    let m = abs(p - counts.clutter_middle) * counts.clutter_scale;
+    return counts.half_extinction * (2.0 / max(max(m.x, m.y), max(m.z, 1.0)) - 1.0);
 }
 
 // Emitters of reflective shadow maps know where their light came from, so their specular lobe has a direction. At a
@@ -44,6 +59,8 @@ struct Arrival {
     factor: f32,
     // The same without the disc's cosine; 0 behind the disc.
     plain: f32,
+    // Metres between the two.
+    distance: f32,
 }
 
 // `p` and `n` are the receiver's. The term behind the plus keeps the form factor below 1 close up: a disc seen from its
@@ -52,9 +69,10 @@ struct Arrival {
 fn arrival(at: vec3f, normal: vec3f, rest: f32, area: f32, p: vec3f, n: vec3f) -> Arrival {
     let v = at - p;
     let d2 = max(dot(v, v), 1e-12);
-    let towards = v * inverseSqrt(d2);
+    let inverse = inverseSqrt(d2);
+    let towards = v * inverse;
     let facing = -dot(normal, towards);
     let cosine = max(facing, 0.0) + rest;
     let plain = area / (PI * d2 + area * cosine * max(dot(n, towards), 0.0));
-    return Arrival(towards, cosine * plain, select(0.0, plain, facing > 0.0));
+    return Arrival(towards, cosine * plain, select(0.0, plain, facing > 0.0), d2 * inverse);
 }

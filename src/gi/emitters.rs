@@ -4,7 +4,7 @@ use super::World;
 use super::rung::Cost;
 use super::view_cache::ViewCache;
 use crate::gpu::timing::Recorder;
-use crate::render::tool::{self, LOAD, READ, READ_WRITE};
+use crate::render::tool::{self, LOAD, READ, READ_WRITE, UNIFORM};
 
 /// Bytes of an `Emitter` of `shaders/lib/emitter.wgsl`.
 pub const EMITTER_BYTES: u64 = 80;
@@ -13,7 +13,7 @@ pub const FINE: u64 = 16;
 
 /// `Counts` of `shaders/lib/emitter.wgsl`.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Counts {
     /// Blocks of all reflective shadow maps.
     pub blocks: u32,
@@ -21,6 +21,28 @@ pub struct Counts {
     pub lights: u32,
     /// Unused.
     pub pad: [u32; 2],
+    /// Middle of the box that the scene's small objects fill, metres.
+    pub clutter_middle: [f32; 3],
+    /// Half of [`crate::scene::upload::Clutter::extinction`], 1/m.
+    pub half_extinction: f32,
+    /// One over the box's half size, 1/m.
+    pub clutter_scale: [f32; 3],
+    /// Unused.
+    pub pad1: f32,
+}
+
+impl Counts {
+    fn new(world: &World<'_>) -> Self {
+        let c = world.clutter;
+        Self {
+            blocks: world.rsm_blocks,
+            lights: world.light_count,
+            clutter_middle: std::array::from_fn(|k| 0.5 * (c.low[k] + c.high[k])),
+            half_extinction: 0.5 * c.extinction,
+            clutter_scale: std::array::from_fn(|k| 2.0 / (c.high[k] - c.low[k]).max(1e-6)),
+            ..Self::default()
+        }
+    }
 }
 
 /// Makes emitters of what lights see.
@@ -38,7 +60,7 @@ pub struct EmittersPass {
 impl EmittersPass {
     /// Compiles the shader; the buffers grow with the first scene.
     pub fn new(device: &wgpu::Device) -> Self {
-        let types = [READ, READ, LOAD, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE];
+        let types = [READ, READ, LOAD, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE, UNIFORM];
         let layout = tool::layout(device, "gi.emitters", wgpu::ShaderStages::COMPUTE, &types);
         let pipeline = tool::compute(device, "gi.emitters", "collect", &[&layout]);
         let uniform = device.create_buffer(&wgpu::BufferDescriptor {
@@ -54,7 +76,7 @@ impl EmittersPass {
 
     /// Makes room for the emitters of `world`. True when buffers are new, so that whoever bound them binds them again.
     pub fn fit(&mut self, queue: &wgpu::Queue, world: &World<'_>) -> bool {
-        let counts = Counts { blocks: world.rsm_blocks, lights: world.light_count, pad: [0; 2] };
+        let counts = Counts::new(world);
         if counts == self.counts {
             return false;
         }
@@ -90,6 +112,7 @@ impl EmittersPass {
                     view(rsm.emissive),
                     self.fine.as_entire_binding(),
                     self.blocks.as_entire_binding(),
+                    self.uniform.as_entire_binding(),
                 ],
             ))
         });

@@ -121,6 +121,8 @@ pub struct World<'a> {
     pub light_count: u32,
     /// Lat-long picture of the surroundings, `Rgba32Float`; one texel for a constant sky.
     pub environment: &'a wgpu::TextureView,
+    /// The scene's small objects.
+    pub clutter: crate::scene::upload::Clutter,
 }
 
 /// The analytic lights on the GPU.

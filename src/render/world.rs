@@ -67,6 +67,7 @@ impl World {
             lights: &scene.light_buffer,
             light_count: scene.lights.len() as u32,
             environment: &scene.environment_view,
+            clutter: scene.clutter,
         }
     }
 

@@ -4,11 +4,13 @@
 //! attribute stream (normal 4, tangent 8, two texture coordinate sets 16, colour 8). An instance takes 48 bytes (three
 //! rows of the world-from-object matrix), a light 64, a material 256.
 
+mod clutter;
 mod environment;
 mod material;
 mod mesh;
 mod texture;
 
+pub use clutter::Clutter;
 pub use material::{MaterialGpu, TextureUse, material_layout};
 pub use mesh::{AttributeVertex, Draw, attribute_layouts, position_layouts};
 
@@ -155,6 +157,8 @@ pub struct SceneGpu {
     pub environment_view: wgpu::TextureView,
     /// World-space bounds of all instances; `None` for a scene without triangles.
     pub bounds: Option<([f32; 3], [f32; 3])>,
+    /// Its small objects.
+    pub clutter: Clutter,
     /// What was mended on the way, one sentence each.
     pub warnings: Vec<String>,
     bytes: u64,
@@ -188,6 +192,7 @@ impl SceneGpu {
             environment: scene.environment.clone(),
             environment_view,
             bounds: geometry.bounds,
+            clutter: clutter::clutter(scene),
             warnings,
             bytes,
         })

@@ -117,6 +117,60 @@ fn a_lit_panel_sends_what_its_form_factor_says() {
     assert_eq!(mean(&lit(&gpu, &mut renderer, &build(0.0)).0.data), 0.0);
 }
 
+/// Small black cubes at the corners of a box take of a panel's light what Cauchy's mean projection and their number say.
+#[test]
+fn small_objects_take_light_by_their_mean_projection() {
+    let Some(gpu) = common::gpu() else { return };
+    let build = |cubes: usize| {
+        let mut blocks = vec![([-5.0, -0.2, -5.0], [5.0, 0.0, 5.0], GREY), ([-4.2, 0.0, -2.0], [-4.0, 4.0, 2.0], GREY)];
+        blocks.extend((0..cubes).map(|i| {
+            let low: [f32; 3] = std::array::from_fn(|k| if i >> k & 1 == 0 { [-4.9, 0.01, -4.9][k] } else { 4.0 });
+            (low, low.map(|x| x + 0.9), [0.0; 3])
+        }));
+        scene(&blocks, &[sun([-1.0, 0.0, 0.0], 2.0)], 0.0, Camera::look_at([0.0, 6.0, 0.001], [0.0, 0.0, 0.0], 1.2))
+    };
+    let clutter = |scene: &Scene| SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the scene fits").clutter;
+    let box_volume = 9.8 * 9.8 * 4.89;
+    let expected = 8.0 * 6.0 * 0.81 / 4.0 / box_volume;
+    let extinction = clutter(&build(8)).extinction;
+    assert!((extinction / expected - 1.0).abs() < 1e-3, "{extinction}, {expected}");
+    // Seven say nothing about a mean, and walls are no small objects.
+    assert_eq!(clutter(&build(7)).extinction, 0.0);
+    assert_eq!(clutter(&hall(GREY, &[], 0.0, 1.0)).extinction, 0.0);
+    // Packed as closely as can be, light still goes as far as their box is wide.
+    let packed: Vec<Block> = (0..125)
+        .map(|i| [i % 5, i / 5 % 5, i / 25].map(|x| x as f32))
+        .map(|low| (low, low.map(|x| x + 1.0), GREY))
+        .collect();
+    let packed = clutter(&scene(&packed, &[], 0.0, Camera::look_at([9.0; 3], [0.0; 3], 1.0))).extinction;
+    assert!((packed * 5.0 * 3f32.sqrt() - 1.0).abs() < 1e-3, "{packed}");
+
+    let mut renderer = renderer(&gpu, [96, 96], Method::Rsm);
+    let [(open, places), (taken, _)] = [7, 8].map(|cubes| lit(&gpu, &mut renderer, &build(cubes)));
+    let (mut before, mut after, mut predicted) = (0.0, 0.0, 0.0);
+    for (i, p) in places.data.chunks_exact(3).enumerate() {
+        // The floor between panel and cubes.
+        if p[1].abs() > 1e-3 || p[0] < -3.4 || p.iter().step_by(2).any(|x| x.abs() > 3.5) {
+            continue;
+        }
+        let (mut all, mut rest) = (0.0, 0.0);
+        for k in 0..400 {
+            let (y, z) = (0.2 * ((k / 20) as f32 + 0.5), 0.2 * ((k % 20) as f32 + 0.5) - 2.0);
+            let v = [p[0] + 4.0, y, z - p[2]];
+            let d2 = v.iter().map(|x| x * x).sum::<f32>();
+            all += v[0] * v[1] / (d2 * d2);
+            rest += v[0] * v[1] / (d2 * d2) * (-extinction * d2.sqrt()).exp();
+        }
+        before += f64::from(open.data[3 * i]);
+        after += f64::from(taken.data[3 * i]);
+        predicted += f64::from(open.data[3 * i] * rest / all);
+    }
+    let (loss, expected) = (1.0 - after / before, 1.0 - predicted / before);
+    println!("small cubes take {:.2} % of a panel's light, expected {:.2} %", 100.0 * loss, 100.0 * expected);
+    // Negative control: it is much more than the tolerance.
+    assert!(expected > 0.03 && (loss - expected).abs() < 0.15 * expected, "{loss}, {expected}");
+}
+
 #[test]
 fn light_scales_and_no_light_gives_none() {
     let Some(gpu) = common::gpu() else { return };
