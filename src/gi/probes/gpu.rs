@@ -342,7 +342,7 @@ impl Rung for ProbesGi {
             Cost::new(
                 "gi.probes.light",
                 shadow_rays * 20.0 * 250.0,
-                shadow_rays * 1280.0 + n * (f64::from(SAMPLES) * 16.0 + 88.0),
+                shadow_rays * 1280.0 + n * (f64::from(SAMPLES) * 16.0 + 104.0),
             ),
             Cost::new("gi.probes.bounce", rounds * n * (inner * link + 60.0), rounds * n * (inner * 2.0 + 100.0)),
             Cost::new("gi.probes.gather", n * (rays * link + 40.0), n * (rays * 2.0 + 84.0)),
