@@ -85,7 +85,7 @@ fn probes_apply(@builtin(global_invocation_id) id: vec3u) {
             let height = dot(off, normal);
             let place = max(1.0 - (dot(off, off) + OFF_PLANE * height * height) / (spacing * spacing * REACH2), 0.0);
             let whole = max(place - TURN / REACH2 * max(1.0 - dot(n, normal), 0.0), 0.0);
-            var weight = LEAST * place * place;
+            var weight = LEAST * max(dot(n, normal), 0.0) * place * place;
             if whole > 0.0 {
                 weight += whole * whole * open(off, normal, spacing, walls[index]);
             }

@@ -88,5 +88,8 @@ fn probes_light(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocat
     let main = select(vec3f(0.0, 0.0, 1.0), l, dot(l, l) > 0.0);
     direct[surfel] = vec4f(sum / f32(SAMPLES), 0.0);
     directions[surfel] = pack2x16snorm(oct_encode(main));
-    light[surfel] = vec4f(bitcast<vec3f>(sources[3u * surfel + 1u].xyz), 0.0);
+    // The first exchange already brings reflected light: a path from a lamp bounces as often as one from a glowing surface.
+    let albedo = bitcast<vec3f>(sources[3u * surfel].xyz);
+    let emission = bitcast<vec3f>(sources[3u * surfel + 1u].xyz);
+    light[surfel] = vec4f(emission + albedo * sum / f32(SAMPLES), 0.0);
 }

@@ -2,7 +2,7 @@
 
 use crate::{build, common};
 use bouncelight::gi::Method;
-use bouncelight::gi::probes::{Bake, BakeError, BakeOptions};
+use bouncelight::gi::probes::{Bake, BakeError, BakeOptions, Surfel};
 use bouncelight::gpu::Gpu;
 use bouncelight::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
 use bouncelight::render::capture::{CaptureOptions, Layer, Picture, capture};
@@ -97,13 +97,20 @@ fn a_closed_room_glows_with_the_series_of_its_albedo() {
     let camera = build::look_at([0.0; 3], [1.0, 0.3, 0.2], 1.2);
     let baked = bake(&scene, 300, 32);
     assert_eq!(baked.lost, 0, "every link meets a surfel");
+    // The walls are seen from outside, too, and have surfels there: black ones, and no way leads to them.
+    let outside = |s: &Surfel| Vec3::from(s.position).dot(s.normal.into()) > 0.0;
+    let (mut inner, mut outer) = (0, 0);
+    for (surfel, row) in baked.surfels.iter().zip(baked.links.chunks_exact(32)) {
+        let slips = |&&link: &&u16| baked.surfels.get(usize::from(link)).is_none_or(outside);
+        *if outside(surfel) { &mut outer } else { &mut inner } += row.iter().filter(slips).count();
+    }
+    assert!(inner == 0 && outer > 0, "{inner} links from inside end outside, {outer} from outside do");
     let light = indirect(&gpu, &baked, &scene, &camera, [32, 32]);
     // What shines directly, and three bounces of it; without end it would be glow / (1 − albedo).
     let series = glow * (0..4).map(|k| albedo.powi(k)).sum::<f32>();
-    for pixel in light.data.chunks_exact(light.channels) {
-        // The room's walls share no corners: a link may slip out between two of them.
-        assert!((pixel[0] / series - 1.0).abs() < 1e-2, "{} for {series}", pixel[0]);
-    }
+    let worst = light.data.chunks_exact(light.channels).map(|p| (p[0] / series - 1.0).abs()).fold(0.0, f32::max);
+    // The texture's half floats have steps of 0.1 % here.
+    assert!(worst < 1e-3, "{worst} off {series}");
     assert!((glow * (0..3).map(|k| albedo.powi(k)).sum::<f32>() / series - 1.0).abs() > 0.05, "a bounce counts");
 }
 
@@ -138,10 +145,19 @@ fn it_agrees_with_the_path_tracer_and_follows_the_lamp() {
     let (moved, _) = colored_room([1.4, 0.8, -1.3]);
     let there = indirect(&gpu, &baked, &moved, &camera, size);
     build::show("probes_moved", &there, 1.0);
-    let of = |p: &Picture, scene: &Scene| error(&p.data, &truth(&gpu, scene, &camera, size, 96), size, [p.channels, 3]);
-    let (first, second, wrong) = (of(&here, &scene), of(&there, &moved), of(&here, &moved));
-    println!("probes against the path tracer: {first:.4}, with the lamp moved {second:.4}; control {wrong:.4}");
-    assert!(first < 0.08 && second < 0.10, "{first} {second}");
+    let truths = [&scene, &moved].map(|s| truth(&gpu, s, &camera, size, 96));
+    let of = |p: &Picture, truth: &[f32]| error(&p.data, truth, size, [p.channels, 3]);
+    let (first, second, wrong) = (of(&here, &truths[0]), of(&there, &truths[1]), of(&here, &truths[1]));
+    let sum = |p: &[f32], n: usize| p.chunks_exact(n).flat_map(|c| &c[..3]).map(|x| f64::from(*x)).sum::<f64>();
+    let bias = |p: &Picture, truth: &[f32]| sum(&p.data, p.channels) / sum(truth, 3) - 1.0;
+    let biases = [bias(&here, &truths[0]), bias(&there, &truths[1])];
+    println!(
+        "probes against the path tracer: {first:.4}, with the lamp moved {second:.4}; bias {biases:.4?}; control {wrong:.4}"
+    );
+    // Two truths of 96 samples and different seeds differ by 3.5 and 3.9 %, so that one's noise is 2.5 and 2.8 % of what is
+    // measured (3.6 and 4.2 %). A bounce too few shows as a bias of −8 %.
+    assert!(first < 0.05 && second < 0.055, "{first} {second}");
+    assert!(biases.iter().all(|b| b.abs() < 0.02), "{biases:?}");
     assert!(wrong > 0.2, "the lamp's place is seen");
     // The bake knows no light: a fresh one is the same.
     assert!(indirect(&gpu, &bake(&moved, 2500, 64), &moved, &camera, size).data == there.data);

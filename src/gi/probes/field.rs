@@ -14,7 +14,9 @@ pub const TURN: f32 = 16.0;
 pub const LONGEST: usize = 64;
 /// Cells are numbered from −511 to 511 along each axis, by 30 bits.
 const KEY_LIMIT: i32 = 511;
-/// Share of the weight that normals and walls cannot take away, so that a surface without surfels of its own is lit at all.
+/// Share of the weight that walls and turned normals (up to a right angle) cannot take away, so that a point in a corner
+/// between shut ways is lit at all. Beyond a right angle nothing is left: where nothing else had a weight, the dark back
+/// of a wall would be all that counts.
 pub const LEAST: f32 = 1e-4;
 /// Steps in which a surfel's free way along its surface is told in each of [`SECTORS`] directions, a byte each: a
 /// neighbour beyond what stands there gets no light from it. The whole is `REACH` spacings.
@@ -159,7 +161,8 @@ impl Field {
             let whole = place - TURN * (1.0 - n.dot(normal)).max(0.0) / (REACH * REACH);
             let square = |x: f32| x.max(0.0) * x.max(0.0);
             let open = if whole > 0.0 { open(p - q, normal, s, self.walls[i as usize]) } else { 0.0 };
-            (i, square(whole) * open + LEAST * square(place))
+            let least = LEAST * n.dot(normal).max(0.0);
+            (i, square(whole) * open + least * square(place))
         })
     }
 

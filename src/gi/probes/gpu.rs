@@ -112,6 +112,7 @@ impl ProbesGi {
         };
         let lights = vec![0u8; 16 * (n + SKY as usize + 1)];
         let links = make("gi.probes.links", bytemuck::cast_slice(&links))?;
+        let digits: Vec<_> = (0..bake.rays).map(random::digits).collect();
         let buffers = Buffers {
             params: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("gi.probes"),
@@ -127,10 +128,7 @@ impl ProbesGi {
             table: make("gi.probes.table", bytemuck::cast_slice(&bake.field.table))?,
             lists: make("gi.probes.lists", bytemuck::cast_slice(&bake.field.lists))?,
             walls: make("gi.probes.walls", bytemuck::cast_slice(&bake.field.walls))?,
-            digits: make(
-                "gi.probes.digits",
-                bytemuck::cast_slice(&(0..bake.rays).map(random::digits).collect::<Vec<_>>()),
-            )?,
+            digits: make("gi.probes.digits", bytemuck::cast_slice(&digits))?,
             surfels: make("gi.probes.surfels", bytemuck::cast_slice(&packed(bake, spacing)))?,
         };
         let bytes = links.size()
@@ -150,19 +148,18 @@ impl ProbesGi {
             + bake.accel.bytes();
 
         let stage = wgpu::ShaderStages::COMPUTE;
-        let storage = |binding, read_only| storage_entry(binding, read_only);
         let uniform = wgpu::BindGroupLayoutEntry { binding: 0, visibility: stage, ty: UNIFORM, count: None };
         let light_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("gi.probes.light"),
             entries: &[
                 uniform,
                 AccelGpu::layout_entry(),
-                storage(2, true),
-                storage(3, true),
-                storage(4, true),
-                storage(5, false),
-                storage(6, false),
-                storage(7, false),
+                storage_entry(2, true),
+                storage_entry(3, true),
+                storage_entry(4, true),
+                storage_entry(5, false),
+                storage_entry(6, false),
+                storage_entry(7, false),
             ],
         });
         let light = tool::compute(device, "gi.probes_light", "probes_light", &[&light_layout]);
@@ -192,12 +189,12 @@ impl ProbesGi {
             label: Some("gi.probes.apply"),
             entries: &[
                 uniform,
-                storage(1, true),
-                storage(2, true),
-                storage(3, true),
-                storage(4, true),
+                storage_entry(1, true),
+                storage_entry(2, true),
+                storage_entry(3, true),
+                storage_entry(4, true),
                 output_entry(5),
-                storage(6, true),
+                storage_entry(6, true),
             ],
         });
         let module = shaders::module_with(device, "gi.probes_apply", &CellSide::Four.prelude());
@@ -345,7 +342,7 @@ impl Rung for ProbesGi {
             Cost::new(
                 "gi.probes.light",
                 shadow_rays * 20.0 * 250.0,
-                shadow_rays * 1280.0 + n * (f64::from(SAMPLES) * 16.0 + 88.0),
+                shadow_rays * 1280.0 + n * (f64::from(SAMPLES) * 16.0 + 104.0),
             ),
             Cost::new("gi.probes.bounce", rounds * n * (inner * link + 60.0), rounds * n * (inner * 2.0 + 100.0)),
             Cost::new("gi.probes.gather", n * (rays * link + 40.0), n * (rays * 2.0 + 84.0)),
