@@ -180,7 +180,7 @@ fn render_writes_a_whole_picture_with_provenance() {
     let Some(gpu) = common::gpu() else { return };
     let dir = tempfile::tempdir().unwrap();
     let png = path(&dir, "cornell.png");
-    let out = bouncelight(&["render", "cornell", "-o", &png, "--size", "160x80"]);
+    let out = bouncelight(&["render", "cornell", "--method", "neural", "-o", &png, "--size", "160x80"]);
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let (image, metadata) = bouncelight::image_io::read_png_with_metadata(Path::new(&png)).unwrap();
     assert_eq!((image.width, image.height), (160, 80));
