@@ -18,6 +18,7 @@
 //! - [`gi`]: global-illumination methods, cheapest first; `gi::pass` is the embeddable pass.
 //! - `reference` (feature `reference`): the path tracer that everything else is measured against.
 //! - [`metrics`]: image metrics, no wgpu.
+//! - `viewer` (feature `viewer`): the window of `bouncelight view`.
 //! - [`study`]: what is measured over methods and scenes.
 //!
 //! Conventions (units, spaces, encodings) stand in `docs/architecture.md`.
@@ -36,5 +37,8 @@ pub mod study;
 
 #[cfg(feature = "cli")]
 pub mod cli;
+
+#[cfg(feature = "viewer")]
+pub mod viewer;
 
 pub use wgpu;

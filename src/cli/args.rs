@@ -5,7 +5,10 @@ use crate::{
     gi::Method,
     gpu::{Backend, Gpu, GpuOptions},
     net::format::Weights,
-    scene::{self, Camera, Environment, LightKind, Scene},
+    scene::{
+        self, Camera, Environment, LightKind, Scene,
+        edit::{LightEdit, ObjectEdit},
+    },
 };
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
@@ -187,6 +190,12 @@ pub struct SceneArgs {
     /// Angular diameter of directional lights, radians.
     #[arg(long, value_name = "RAD")]
     pub sun_angle: Option<f32>,
+    /// Changes a light: its number and any of color=R,G,B strength=S direction=X,Y,Z position=X,Y,Z size=S; may be repeated.
+    #[arg(long, value_name = "N KEY=VALUE ...")]
+    pub light: Vec<LightEdit>,
+    /// Moves an object: its number and X,Y,Z in metres; may be repeated.
+    #[arg(long, value_name = "N X,Y,Z")]
+    pub object: Vec<ObjectEdit>,
 }
 
 impl SceneArgs {
@@ -211,6 +220,8 @@ impl SceneArgs {
                 }
             }
         }
+        self.light.iter().try_for_each(|edit| edit.apply(&mut scene)).map_err(|e| usage(format!("--light: {e}")))?;
+        self.object.iter().try_for_each(|edit| edit.apply(&mut scene)).map_err(|e| usage(format!("--object: {e}")))?;
         Ok(scene)
     }
 

@@ -64,6 +64,15 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
         if cause.is::<GpuError>() {
             return NO_ADAPTER;
         }
+        #[cfg(feature = "viewer")]
+        if let Some(e) = cause.downcast_ref::<crate::viewer::ViewError>() {
+            use crate::viewer::ViewError;
+            return match e {
+                ViewError::Gpu(_) => NO_ADAPTER,
+                ViewError::Method(_) | ViewError::Script(_) => USAGE,
+                _ => RUNTIME,
+            };
+        }
         // Sound weights that speak of something else than light. `RenderError` shows what it wraps as if it were its own, so its cause is not in the chain.
         let wrapped = match cause.downcast_ref::<RenderError>() {
             Some(RenderError::Gi(e)) => Some(e),

@@ -16,6 +16,8 @@ mod progress;
 mod reference;
 mod render;
 mod tuned;
+#[cfg(feature = "viewer")]
+mod view;
 mod weights;
 
 use clap::{Parser, Subcommand};
@@ -33,6 +35,9 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Open a window: see a scene, measure it, compare methods with the live reference.
+    #[cfg(feature = "viewer")]
+    View(view::Args),
     /// Draw a scene into a PNG or multi-layer EXR.
     Render(render::Args),
     /// Measure GPU time per pass, wall-clock time per frame and memory.
@@ -61,6 +66,8 @@ pub fn main() -> ExitCode {
     };
     init_logging(&cli.global);
     let done = match cli.command {
+        #[cfg(feature = "viewer")]
+        Command::View(a) => view::run(&cli.global, a),
         Command::Render(a) => render::run(&cli.global, a),
         Command::Bench(a) => bench::run(&cli.global, a),
         Command::Compare(a) => compare::run(a),

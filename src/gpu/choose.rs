@@ -59,6 +59,14 @@ pub enum GpuError {
         /// Names that exist.
         found: String,
     },
+    /// Adapters exist, but none can present to the window.
+    #[error("no adapter can show pictures in this window ({message}); there are: {found}")]
+    NoSurface {
+        /// Names that exist.
+        found: String,
+        /// What the last one said.
+        message: String,
+    },
     /// `WGPU_BACKEND` holds a word that is no backend.
     #[error("WGPU_BACKEND is `{0}`, which names no backend; use vulkan, gl, metal or dx12")]
     UnknownBackend(String),
@@ -99,8 +107,7 @@ impl Gpu {
     /// Opens the best device that fits `options`.
     pub fn open(options: &GpuOptions) -> Result<Self, GpuError> {
         let (searched, adapters) = candidates(options)?;
-        let wanted = options.adapter.clone().or_else(|| std::env::var("WGPU_ADAPTER_NAME").ok());
-        let wanted = wanted.filter(|w| !w.is_empty());
+        let wanted = wanted_name(options);
         let names = adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
         if adapters.is_empty() {
             return Err(GpuError::NoAdapter { searched });
@@ -112,6 +119,43 @@ impl Gpu {
         let adapter =
             adapter.ok_or_else(|| GpuError::NoSuchAdapter { wanted: wanted.unwrap_or_default(), found: names })?;
         Self::from_adapter(adapter)
+    }
+
+    /// Opens the best device that fits `options` and can present to `window`, with the surface of that window and the
+    /// instance that made it, from which a lost surface can be made anew.
+    ///
+    /// # Errors
+    /// [`GpuError`]; [`GpuError::NoSurface`] where adapters exist but none can show pictures in this window.
+    pub fn open_for_window<W>(
+        options: &GpuOptions,
+        window: &W,
+    ) -> Result<(Self, wgpu::Instance, wgpu::Surface<'static>), GpuError>
+    where
+        W: wgpu::rwh::HasWindowHandle + wgpu::rwh::HasDisplayHandle + Clone + std::fmt::Debug + Send + Sync + 'static,
+    {
+        let display = || -> Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>> { Some(Box::new(window.clone())) };
+        let (searched, adapters) = candidates_of(options, &display)?;
+        if adapters.is_empty() {
+            return Err(GpuError::NoAdapter { searched });
+        }
+        let wanted = wanted_name(options);
+        let names = adapters.iter().map(|(_, a)| a.get_info().name).collect::<Vec<_>>().join(", ");
+        let mut matching =
+            adapters.into_iter().filter(|(_, a)| wanted.as_ref().is_none_or(|w| matches(&a.get_info(), w)));
+        let mut last = None;
+        for (instance, adapter) in &mut matching {
+            match instance.create_surface(window.clone()) {
+                Ok(surface) if adapter.is_surface_supported(&surface) => {
+                    return Ok((Self::from_adapter(adapter)?, instance, surface));
+                }
+                Ok(_) => last = Some("the adapter cannot present to it".to_string()),
+                Err(e) => last = Some(e.to_string()),
+            }
+        }
+        Err(match last {
+            Some(message) => GpuError::NoSurface { found: names, message },
+            None => GpuError::NoSuchAdapter { wanted: wanted.unwrap_or_default(), found: names },
+        })
     }
 
     /// Opens a device on `adapter` with WebGPU's default limits (or the adapter's own where they are lower), buffers as
@@ -160,6 +204,24 @@ pub fn wanted_features() -> wgpu::Features {
 /// All adapters that fit the backend choice, best first, with the words for what was searched. GL is only asked when
 /// nothing else is hardware and GL might be: opening it looks for window systems, which takes time and prints.
 pub fn candidates(options: &GpuOptions) -> Result<(String, Vec<wgpu::Adapter>), GpuError> {
+    let (searched, found) = candidates_of(options, &|| None)?;
+    Ok((searched, found.into_iter().map(|(_, adapter)| adapter).collect()))
+}
+
+/// The adapter's name that was asked for, by option or variable.
+fn wanted_name(options: &GpuOptions) -> Option<String> {
+    let wanted = options.adapter.clone().or_else(|| std::env::var("WGPU_ADAPTER_NAME").ok());
+    wanted.filter(|w| !w.is_empty())
+}
+
+/// Gives an instance the display that it is to present to, if any.
+type Display<'a> = &'a dyn Fn() -> Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>;
+
+/// As [`candidates`], each with the instance that it belongs to.
+fn candidates_of(
+    options: &GpuOptions,
+    display: Display<'_>,
+) -> Result<(String, Vec<(wgpu::Instance, wgpu::Adapter)>), GpuError> {
     let mask = match (options.backend, std::env::var("WGPU_BACKEND")) {
         (Backend::Auto, Ok(text)) if !text.is_empty() => {
             let mask = wgpu::Backends::from_comma_list(&text);
@@ -170,12 +232,12 @@ pub fn candidates(options: &GpuOptions) -> Result<(String, Vec<wgpu::Adapter>), 
         }
         (backend, _) => backend.mask(),
     };
-    let mut adapters = enumerate(mask - wgpu::Backends::GL);
-    let software = adapters.iter().all(|a| is_software(&a.get_info()));
+    let mut adapters = enumerate(mask - wgpu::Backends::GL, display());
+    let software = adapters.iter().all(|(_, a)| is_software(&a.get_info()));
     if adapters.is_empty() || (software && has_graphics_device()) {
-        adapters.extend(enumerate(mask & wgpu::Backends::GL));
+        adapters.extend(enumerate(mask & wgpu::Backends::GL, display()));
     }
-    adapters.sort_by_key(|a| rank(&a.get_info()));
+    adapters.sort_by_key(|(_, a)| rank(&a.get_info()));
     let names = mask.iter_names().map(|(name, _)| name.to_lowercase()).collect::<Vec<_>>();
     Ok((format!("searched: {}", names.join(", ")), adapters))
 }
@@ -185,16 +247,21 @@ fn has_graphics_device() -> bool {
     !cfg!(target_os = "linux") || ["/dev/dri", "/dev/nvidiactl"].iter().any(|d| std::path::Path::new(d).exists())
 }
 
-fn enumerate(mask: wgpu::Backends) -> Vec<wgpu::Adapter> {
+fn enumerate(
+    mask: wgpu::Backends,
+    display: Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>,
+) -> Vec<(wgpu::Instance, wgpu::Adapter)> {
     if mask.is_empty() {
         return Vec::new();
     }
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = mask;
     descriptor.flags = descriptor.flags.with_env();
-    let mut adapters = pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(mask));
+    descriptor.display = display;
+    let instance = wgpu::Instance::new(descriptor);
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(mask));
     adapters.retain(is_usable);
-    adapters
+    adapters.into_iter().map(|adapter| (instance.clone(), adapter)).collect()
 }
 
 /// The passes are compute shaders with storage buffers; an adapter without them is of no use.

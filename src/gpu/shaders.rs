@@ -285,9 +285,34 @@ pub const REFERENCE: &[Shader] = &[
     },
 ];
 
+/// Shaders of `viewer/`.
+pub const VIEWER: &[Shader] = &[
+    Shader { name: "viewer.sum", files: wgsl!["viewer/sum.wgsl"] },
+    Shader {
+        name: "viewer.show",
+        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/tonemap.wgsl", "viewer/show.wgsl"],
+    },
+];
+
 /// Every shader there is.
 pub fn all() -> impl Iterator<Item = &'static Shader> {
-    RENDER.iter().chain(GI).chain(NET).chain(REFERENCE)
+    RENDER.iter().chain(GI).chain(NET).chain(REFERENCE).chain(VIEWER)
+}
+
+/// Where [`source`] reads files instead of what was compiled in; nothing by default.
+static FOLDER: std::sync::RwLock<Option<std::path::PathBuf>> = std::sync::RwLock::new(None);
+
+/// Reads shaders from `folder` from now on, where it has them, so that they can be edited while a program runs. `None` goes back to
+/// what was compiled in.
+pub fn read_from(folder: Option<std::path::PathBuf>) {
+    if let Ok(mut place) = FOLDER.write() {
+        *place = folder;
+    }
+}
+
+/// The folder that shaders are read from, if any.
+pub fn folder() -> Option<std::path::PathBuf> {
+    FOLDER.read().ok().and_then(|f| f.clone())
 }
 
 /// The WGSL text of shader `name` with `prelude` (lines of `const`) in front.
@@ -297,8 +322,12 @@ pub fn all() -> impl Iterator<Item = &'static Shader> {
 pub fn source(name: &str, prelude: &str) -> String {
     let shader = all().find(|s| s.name == name).unwrap_or_else(|| panic!("no shader named {name}"));
     let mut text = String::from(prelude);
-    for (_, body) in shader.files {
-        text.push_str(body);
+    let folder = folder();
+    for (file, body) in shader.files {
+        match folder.as_ref().and_then(|f| std::fs::read_to_string(f.join(file)).ok()) {
+            Some(edited) => text.push_str(&edited),
+            None => text.push_str(body),
+        }
         text.push('\n');
     }
     text

@@ -101,7 +101,7 @@ impl Plan {
 }
 
 /// True for lights whose cone fits into one map.
-pub(super) fn is_flat(kind: &LightKind) -> bool {
+pub(crate) fn is_flat(kind: &LightKind) -> bool {
     matches!(kind, LightKind::Spot { outer_angle, .. } if *outer_angle <= shadow_local::WIDEST_SPOT)
 }
 

@@ -11,6 +11,7 @@ pub mod bounds;
 pub mod bundled;
 mod camera;
 pub mod defaults;
+pub mod edit;
 pub mod environment;
 #[cfg(feature = "io")]
 mod error;

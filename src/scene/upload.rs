@@ -131,7 +131,8 @@ impl LightGpu {
     }
 }
 
-/// A scene on the GPU. Immutable; upload again after a change.
+/// A scene on the GPU. Lights, the surroundings and placements can be changed in place; upload again after any other
+/// change.
 pub struct SceneGpu {
     /// Tells uploads apart, so that bind groups can be kept as long as the scene stays.
     pub id: u64,
@@ -167,7 +168,6 @@ pub struct SceneGpu {
 impl SceneGpu {
     /// Uploads `scene`. Images larger than the device allows are halved until they fit, with a warning.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Self, UploadError> {
-        static NEXT: AtomicU64 = AtomicU64::new(1);
         let mut warnings = Vec::new();
         let geometry = mesh::upload(device, queue, scene)?;
         let textures = texture::upload(device, queue, &scene.images, &mut warnings)?;
@@ -198,11 +198,66 @@ impl SceneGpu {
         })
     }
 
+    /// Takes over the lights of `scene`. In place where their kinds stay, so that shadow maps stay, too.
+    ///
+    /// Whatever else of `scene` has changed is left as it is here.
+    pub fn set_lights(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) {
+        let lights: Vec<LightGpu> = scene.lights.iter().map(LightGpu::new).collect();
+        // A spot's maps depend on how wide it is.
+        let kind = |l: &Light| (std::mem::discriminant(&l.kind), crate::render::shadow::is_flat(&l.kind));
+        let same = self.lights.iter().map(kind).eq(scene.lights.iter().map(kind));
+        self.lights = scene.lights.clone();
+        if same {
+            queue.write_buffer(&self.light_buffer, 0, bytemuck::cast_slice(&lights));
+        } else {
+            self.light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &lights);
+            self.renew();
+        }
+    }
+
+    /// Takes over the surroundings of `scene`.
+    ///
+    /// # Errors
+    /// A picture that does not fit in itself; then nothing has changed.
+    pub fn set_environment(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        scene: &Scene,
+    ) -> Result<(), UploadError> {
+        let mut warnings = Vec::new();
+        let (view, _) = environment::upload(device, queue, &scene.environment, &mut warnings)?;
+        self.environment = scene.environment.clone();
+        self.environment_view = view;
+        self.warnings.extend(warnings);
+        self.renew();
+        Ok(())
+    }
+
+    /// Takes over the placements of `scene`, whose meshes and materials are those that were uploaded.
+    pub fn set_placements(&mut self, queue: &wgpu::Queue, scene: &Scene) {
+        let (rows, draws) = mesh::placements(scene);
+        self.draws = draws;
+        if !rows.is_empty() {
+            queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&rows));
+        }
+        self.bounds = self.draws.iter().map(|d| d.bounds).reduce(mesh::union);
+        self.clutter = clutter::clutter(scene);
+    }
+
+    /// What was bound of this scene is bound anew.
+    fn renew(&mut self) {
+        self.id = NEXT.fetch_add(1, Ordering::Relaxed);
+    }
+
     /// Bytes of all buffers and textures.
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 }
+
+/// Number of the next upload.
+static NEXT: AtomicU64 = AtomicU64::new(1);
 
 /// True where alpha decides about coverage, so that the pass needs a fragment stage that can discard.
 fn is_covered(mode: AlphaMode) -> bool {

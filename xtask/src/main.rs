@@ -43,6 +43,7 @@ fn demo() -> Result<(), String> {
 
 fn test() -> Result<(), String> {
     see_to_adapter(&[])?;
+    see_to_display()?;
     cargo(&["test", "--workspace"])
 }
 
@@ -62,6 +63,18 @@ fn see_to_adapter(profile: &[&str]) -> Result<(), String> {
     apt(&["update", "-q"])?;
     apt(&["install", "-y", "-q", "--no-install-recommends", "mesa-vulkan-drivers"])?;
     if doctor(profile)? { Ok(()) } else { Err("still no adapter after installing mesa-vulkan-drivers".into()) }
+}
+
+/// The viewer's tests need an X server without a screen, and what a window under X loads at run time.
+fn see_to_display() -> Result<(), String> {
+    let runs = |program: &str| Command::new(program).arg("-help").output().is_ok();
+    if runs("Xvfb") || !std::path::Path::new("/etc/debian_version").exists() {
+        return Ok(());
+    }
+    eprintln!("xtask: no Xvfb; installing xvfb and X's client libraries with apt-get, for the viewer's tests");
+    apt(&["update", "-q"])?;
+    let libraries = ["libx11-6", "libx11-xcb1", "libxcursor1", "libxi6", "libxrandr2", "libxkbcommon-x11-0"];
+    apt(&[["install", "-y", "-q", "--no-install-recommends", "xvfb"].as_slice(), &libraries].concat())
 }
 
 /// True when `bouncelight doctor` finds an adapter.

@@ -81,7 +81,6 @@ pub(super) struct Geometry {
 pub(super) fn upload(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Geometry, UploadError> {
     let limit = device.limits().max_buffer_size;
     let (mut positions, mut attributes, mut indices) = (Vec::new(), Vec::new(), Vec::<u32>::new());
-    let mut ranges = Vec::with_capacity(scene.meshes.len());
     for mesh in &scene.meshes {
         mesh.check(scene.materials.len()).map_err(|reason| UploadError::Mesh { mesh: mesh.name.clone(), reason })?;
         let too_large = |what, bytes| UploadError::TooLarge { mesh: mesh.name.clone(), what, bytes, limit };
@@ -93,24 +92,50 @@ pub(super) fn upload(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) 
         if index_bytes > limit {
             return Err(too_large("indices", index_bytes));
         }
-        ranges.push((positions.len() as i32, indices.len() as u32..(indices.len() + mesh.indices.len()) as u32));
         positions.extend_from_slice(&mesh.positions);
         attributes.extend((0..mesh.positions.len()).map(|i| attribute(mesh, i)));
         indices.extend_from_slice(&mesh.indices);
     }
 
+    for instance in &scene.instances {
+        if instance.mesh >= scene.meshes.len() {
+            return Err(UploadError::MissingMesh {
+                instance: instance.name.clone(),
+                mesh: instance.mesh,
+                count: scene.meshes.len(),
+            });
+        }
+    }
+    let (rows, draws) = placements(scene);
+    let bounds = draws.iter().map(|d| d.bounds).reduce(union);
+    let vertex = wgpu::BufferUsages::VERTEX;
+    let positions = filled(device, queue, "scene.positions", vertex, &positions);
+    let attributes = filled(device, queue, "scene.attributes", vertex, &attributes);
+    let indices = filled(device, queue, "scene.indices", wgpu::BufferUsages::INDEX, &indices);
+    let instances = filled(device, queue, "scene.instances", vertex, &rows);
+    let bytes = positions.size() + attributes.size() + indices.size() + instances.size();
+    Ok(Geometry { positions, attributes, indices, instances, draws, bounds, bytes })
+}
+
+/// Rows of the world-from-object matrices in the order of the instance buffer, and the draws that refer to them, for a
+/// scene whose instances name meshes that exist.
+pub(super) fn placements(scene: &Scene) -> (Vec<[[f32; 4]; 3]>, Vec<Draw>) {
+    // Where each mesh begins in the shared buffers.
+    let (mut vertex, mut index) = (0, 0);
+    let mut ranges = Vec::with_capacity(scene.meshes.len());
+    for mesh in &scene.meshes {
+        let indices = mesh.indices.len() as u32;
+        ranges.push((vertex, index..index + indices));
+        vertex += mesh.positions.len() as i32;
+        index += indices;
+    }
+
     // Grouped by material, then by mesh and winding, so that instances of one mesh become one draw.
     let mut order = Vec::with_capacity(scene.instances.len());
     for instance in &scene.instances {
-        let mesh = scene.meshes.get(instance.mesh).ok_or_else(|| UploadError::MissingMesh {
-            instance: instance.name.clone(),
-            mesh: instance.mesh,
-            count: scene.meshes.len(),
-        })?;
-        if !mesh.indices.is_empty() {
-            let transform = Mat4::from_cols_array_2d(&instance.transform);
-            order.push((mesh.material, instance.mesh, transform.determinant() < 0.0, transform));
-        }
+        let Some(mesh) = scene.meshes.get(instance.mesh).filter(|m| !m.indices.is_empty()) else { continue };
+        let transform = Mat4::from_cols_array_2d(&instance.transform);
+        order.push((mesh.material, instance.mesh, transform.determinant() < 0.0, transform));
     }
     order.sort_by_key(|o| (o.0, o.1, o.2));
     let mut rows = Vec::with_capacity(order.len());
@@ -140,14 +165,7 @@ pub(super) fn upload(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) 
             bounds,
         });
     }
-    let bounds = draws.iter().map(|d| d.bounds).reduce(union);
-    let vertex = wgpu::BufferUsages::VERTEX;
-    let positions = filled(device, queue, "scene.positions", vertex, &positions);
-    let attributes = filled(device, queue, "scene.attributes", vertex, &attributes);
-    let indices = filled(device, queue, "scene.indices", wgpu::BufferUsages::INDEX, &indices);
-    let instances = filled(device, queue, "scene.instances", vertex, &rows);
-    let bytes = positions.size() + attributes.size() + indices.size() + instances.size();
-    Ok(Geometry { positions, attributes, indices, instances, draws, bounds, bytes })
+    (rows, draws)
 }
 
 fn attribute(mesh: &Mesh, i: usize) -> AttributeVertex {
@@ -189,6 +207,6 @@ fn world_bounds(mesh: &Mesh, transform: &Mat4) -> ([f32; 3], [f32; 3]) {
     (low.to_array(), high.to_array())
 }
 
-fn union(a: ([f32; 3], [f32; 3]), b: ([f32; 3], [f32; 3])) -> ([f32; 3], [f32; 3]) {
+pub(super) fn union(a: ([f32; 3], [f32; 3]), b: ([f32; 3], [f32; 3])) -> ([f32; 3], [f32; 3]) {
     (Vec3::from(a.0).min(b.0.into()).to_array(), Vec3::from(a.1).max(b.1.into()).to_array())
 }

@@ -1,0 +1,51 @@
+//! `bouncelight view`: the window.
+
+use super::args::{Global, MethodName, parse_size};
+use crate::viewer::{self, Options};
+use anyhow::Result;
+use clap::ValueEnum;
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, or a bundled scene; the bundled interior when absent.
+    scene: Option<String>,
+    /// Weights of `neural`; the shipped ones when absent.
+    #[arg(long, value_name = "W")]
+    weights: Option<PathBuf>,
+    /// How indirect light is found at first.
+    #[arg(long, value_enum)]
+    method: Option<MethodName>,
+    /// Load scene and weights again when their files change; in a checkout, shaders, too.
+    #[arg(long)]
+    watch: bool,
+    /// Run the steps of this file instead of waiting for hands (docs/viewer.md); reads and saves no settings.
+    #[arg(long, value_name = "JSON")]
+    script: Option<PathBuf>,
+    /// Width and height of the window, points.
+    #[arg(long, value_parser = parse_size, value_name = "WxH")]
+    size: Option<[u32; 2]>,
+    /// Folder for captures; the current one when absent.
+    #[arg(long, value_name = "FOLDER")]
+    captures: Option<PathBuf>,
+}
+
+pub fn run(global: &Global, args: Args) -> Result<()> {
+    if args.watch {
+        // Only where the sources of this very program lie.
+        let shaders = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+        crate::gpu::shaders::read_from(Some(shaders).filter(|s| s.is_dir()));
+    }
+    let method = args.method.and_then(|m| m.to_possible_value()).map(|v| v.get_name().to_owned());
+    let options = Options {
+        scene: args.scene,
+        weights: args.weights,
+        method,
+        watch: args.watch,
+        script: args.script,
+        size: args.size,
+        captures: args.captures,
+        gpu: global.gpu_options(),
+    };
+    Ok(viewer::run(options)?)
+}

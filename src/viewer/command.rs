@@ -1,0 +1,94 @@
+//! "Copy as command": the `bouncelight render` line whose picture is the one on show, bit for bit.
+
+use super::choice::Source;
+use super::state::State;
+
+/// The line for the left side of the view. `output` is the file it writes, `view.png` if nobody says.
+pub fn line(state: &State, output: Option<&str>) -> String {
+    let words = words(state, output.unwrap_or("view.png"));
+    let quoted: Vec<String> = words.iter().map(|w| quote(w)).collect();
+    format!("bouncelight {}", quoted.join(" "))
+}
+
+/// The same as separate words, without the program's name.
+pub fn words(state: &State, output: &str) -> Vec<String> {
+    let Some(shown) = &state.shown else { return vec!["doctor".into()] };
+    let s = &state.settings;
+    let mut words: Vec<String> = vec!["render".into(), shown.spec.clone(), "-o".into(), output.into()];
+    let mut flag = |name: &str, value: String| {
+        // As one word, since values may begin with a minus.
+        words.push(format!("--{name}={value}"));
+    };
+    flag("size", format!("{}x{}", state.size[0], state.size[1]));
+    let n = &state.navigator;
+    match n.file_camera {
+        Some(camera) => flag("camera", camera.to_string()),
+        None => {
+            flag("eye", format!("{},{},{}", n.eye.x, n.eye.y, n.eye.z));
+            flag("look-at", format!("{},{},{}", n.target.x, n.target.y, n.target.z));
+            flag("fov", n.fov.to_string());
+        }
+    }
+    flag("method", s.left.name().into());
+    match s.left {
+        Source::Reference => flag("spp", s.spp.to_string()),
+        _ => flag("samples", s.samples.to_string()),
+    }
+    if let (Source::Neural, Some(weights)) = (s.left, &s.weights) {
+        flag("weights", weights.display().to_string());
+    }
+    if let Some(environment) = &shown.environment {
+        flag("environment", environment.clone());
+    }
+    for edit in state.light_edits() {
+        flag("light", edit.to_string());
+    }
+    for (object, [x, y, z]) in &shown.moved {
+        flag("object", format!("{object} {x},{y},{z}"));
+    }
+    if s.exposure != 0.0 {
+        flag("exposure", s.exposure.to_string());
+    }
+    flag("tonemap", s.tonemap.name().into());
+    words
+}
+
+/// For a POSIX shell.
+fn quote(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_=+,.:/@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) { word.into() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::edit::LightEdit;
+    use crate::viewer::state::Action;
+    use std::sync::Arc;
+
+    #[test]
+    fn the_line_says_everything_that_differs() {
+        let mut state = State::new(Default::default());
+        state.show("it's here.glb".into(), Arc::new(crate::scene::bundled::scene("interior").unwrap()));
+        let text = line(&state, None);
+        assert!(
+            text.starts_with(r"bouncelight render 'it'\''s here.glb' -o view.png --size=640x360 --camera=0"),
+            "{text}"
+        );
+        assert!(!text.contains("--light") && !text.contains("--environment") && !text.contains("--exposure"), "{text}");
+        state.navigator.orbit(-30.0, 10.0);
+        let edit = LightEdit { light: 0, strength: Some(3.25), ..LightEdit::default() };
+        for action in [Action::Light(edit), Action::Exposure(-0.5), Action::Sky(0.25), Action::Select(Some(2))] {
+            state.apply(action);
+        }
+        state.apply(Action::Move(glam::Vec3::new(0.5, 0.0, -1.0)));
+        let text = line(&state, None);
+        for word in
+            ["'--light=0 strength=3.25'", "--exposure=-0.5", "--environment=0.25", "'--object=2 0.5,0,-1'", "--eye="]
+        {
+            assert!(text.contains(word), "{word} is missing in {text}");
+        }
+        state.apply(Action::Undo);
+        assert!(!line(&state, None).contains("--object"));
+    }
+}

@@ -1,0 +1,308 @@
+//! One picture of the window: hands, scene, overlay, in this order, so that what hands did is seen at once.
+
+use super::app::App;
+use super::screen::Acquired;
+use super::state::Request;
+use super::ui;
+use crate::gpu::{readback, timing, timing::Recorder};
+use std::path::Path;
+use std::time::{Duration, Instant};
+use winit::event_loop::ActiveEventLoop;
+
+impl App {
+    /// Draws the window, if it is to be seen. Tells when it wants to be called again by itself.
+    pub fn frame(&mut self, event_loop: &ActiveEventLoop) {
+        self.redraw = false;
+        let (Some(screen), Some(stage)) = (&mut self.screen, &self.stage) else { return };
+        let device = stage.gpu.device.clone();
+        if !screen.fit(&device) {
+            return;
+        }
+        let started = Instant::now();
+        let mut raw = screen.input.take_egui_input(&screen.window);
+        if self.script.is_some() {
+            // Whatever the real mouse does is not part of the script.
+            raw.events = std::mem::take(&mut self.scripted);
+            raw.focused = true;
+        } else {
+            raw.events.append(&mut self.scripted);
+        }
+        let theme = if self.state.settings.dark { egui::Theme::Dark } else { egui::Theme::Light };
+        self.egui.set_theme(theme);
+        if self.state.settings.zoom != self.zoomed {
+            self.egui.set_zoom_factor(self.state.settings.zoom);
+        } else {
+            // Ctrl and + or −, which egui hears itself.
+            self.state.settings.zoom = self.egui.zoom_factor();
+        }
+        self.zoomed = self.state.settings.zoom;
+        let egui = self.egui.clone();
+        let mut place = egui::Rect::NOTHING;
+        let output = egui.run_ui(raw, |ui| place = self.overlay(ui));
+        let density = output.pixels_per_point;
+        let jobs = egui.tessellate(output.shapes, density);
+        let mut overlay = started.elapsed();
+        self.state.size = [place.width(), place.height()].map(|n| ((n * density).round() as u32).max(1));
+        let origin = [place.left(), place.top()].map(|n| (n * density).round().max(0.0) as u32);
+        self.serve(event_loop);
+        self.reconcile();
+
+        let recording = Instant::now();
+        let drawn = self.draw_scene();
+        let mut cpu = overlay + recording.elapsed();
+
+        let (Some(screen), Some(stage)) = (&mut self.screen, &mut self.stage) else { return };
+        screen.input.handle_platform_output(&screen.window, output.platform_output);
+        let painting = Instant::now();
+        let queue = stage.gpu.queue.clone();
+        for (id, deltas) in &output.textures_delta.set {
+            deltas.iter().for_each(|delta| screen.painter.update_texture(&device, &queue, *id, delta));
+        }
+        let window = egui_wgpu::ScreenDescriptor { size_in_pixels: screen.size(), pixels_per_point: density };
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let mut buffers = screen.painter.update_buffers(&device, &queue, &mut encoder, &jobs, &window);
+        overlay += painting.elapsed();
+        cpu += painting.elapsed();
+
+        let screenshot = self.screenshot.take();
+        let mut kept = None;
+        let texture = match &screenshot {
+            // Into a texture that can be read back, composed just the same.
+            Some(_) => {
+                let texture = device.create_texture(&wgpu::TextureDescriptor {
+                    label: Some("viewer.screenshot"),
+                    size: wgpu::Extent3d {
+                        width: screen.size()[0],
+                        height: screen.size()[1],
+                        depth_or_array_layers: 1,
+                    },
+                    mip_level_count: 1,
+                    sample_count: 1,
+                    dimension: wgpu::TextureDimension::D2,
+                    format: screen.format(),
+                    usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+                    view_formats: &[],
+                });
+                self.redraw = true;
+                texture
+            }
+            None => match screen.acquire(&device) {
+                Acquired::Texture(texture) => kept.insert(texture).texture.clone(),
+                Acquired::Again => {
+                    self.redraw = true;
+                    return;
+                }
+                Acquired::Hidden => {
+                    self.wake(Duration::from_millis(100));
+                    return;
+                }
+            },
+        };
+        let finishing = Instant::now();
+        let view = texture.create_view(&Default::default());
+        let timed = screen.profiler.as_ref().filter(|_| drawn);
+        let mut recorder = match timed {
+            Some(profiler) => Recorder::timed(&mut encoder, profiler),
+            None => Recorder::new(&mut encoder),
+        };
+        let fill = egui.global_style().visuals.panel_fill;
+        let shade = |c: u8| f64::from(c) / 255.0;
+        let clear = wgpu::Color { r: shade(fill.r()), g: shade(fill.g()), b: shade(fill.b()), a: 1.0 };
+        stage.present(&mut recorder, &self.state, origin, density, clear, &view);
+        let attachment = wgpu::RenderPassColorAttachment {
+            view: &view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+        };
+        let query = timed.map(|p| p.begin_pass_query("viewer.overlay", &mut encoder));
+        let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("viewer.overlay"),
+            color_attachments: &[Some(attachment)],
+            timestamp_writes: query.as_ref().and_then(|q| q.render_pass_timestamp_writes()),
+            ..Default::default()
+        });
+        screen.painter.render(&mut pass.forget_lifetime(), &jobs, &window);
+        if let (Some(profiler), Some(query)) = (&mut screen.profiler, query) {
+            profiler.end_query(&mut encoder, query);
+            profiler.resolve_queries(&mut encoder);
+        }
+        buffers.push(encoder.finish());
+        queue.submit(buffers);
+        if drawn && let Some(profiler) = &mut screen.profiler {
+            match profiler.end_frame() {
+                Ok(()) => self.timed_frames += 1,
+                Err(e) => tracing::debug!("a frame was not timed: {e}"),
+            }
+        }
+        if let Some(texture) = kept {
+            screen.window.pre_present_notify();
+            queue.present(texture);
+        }
+        cpu += finishing.elapsed();
+        for id in &output.textures_delta.free {
+            screen.painter.free_texture(id);
+        }
+        if drawn && screen.profiler.is_none() {
+            // Without timestamps the clock has to do.
+            if device.poll(wgpu::PollType::wait_indefinitely()).is_ok() {
+                self.times.wall.add(Instant::now(), recording.elapsed().as_secs_f64() * 1e3);
+                self.learn();
+            }
+        }
+        if let Some(path) = screenshot
+            && let Err(e) = save_screenshot(&device, &queue, &texture, &path)
+        {
+            self.fail(e);
+        }
+        self.frames += 1;
+        self.times.cpu.add(Instant::now(), cpu.as_secs_f64() * 1e3);
+        self.times.overlay.add(Instant::now(), overlay.as_secs_f64() * 1e3);
+        self.collect_times();
+        self.schedule(&output.viewport_output);
+    }
+
+    /// The overlay's layout, with what it tells.
+    fn overlay(&mut self, ui: &mut egui::Ui) -> egui::Rect {
+        let Some(stage) = &self.stage else { return egui::Rect::NOTHING };
+        let facts = ui::Facts {
+            adapter: &stage.gpu.info.name,
+            software: stage.gpu.is_software(),
+            timestamps: self.screen.as_ref().is_some_and(|s| s.profiler.is_some()),
+            times: &self.times,
+            memory: &self.memory,
+            jobs: &self.jobs,
+            reference: self.reference,
+            verdict: self.verdict,
+            measured: &self.measured,
+            still: stage.still(),
+            feature: stage.feature(),
+            flicker: self.flicker,
+        };
+        ui::show(ui, &mut self.state, &mut self.memory_of_ui, &facts)
+    }
+
+    /// Records and submits the scene's next frame, if one is due.
+    fn draw_scene(&mut self) -> bool {
+        let (Some(stage), Some(shown)) = (&mut self.stage, &self.state.shown) else { return false };
+        let stale = std::mem::take(&mut self.state.stale);
+        if let Err(e) = stage.refresh(&shown.scene, stale) {
+            self.state.tell(e, true);
+            return false;
+        }
+        let camera = self.state.navigator.camera(&shown.scene);
+        let mut encoder = stage.gpu.device.create_command_encoder(&Default::default());
+        let profiler = self.screen.as_ref().and_then(|s| s.profiler.as_ref());
+        let mut recorder = match profiler {
+            Some(profiler) => Recorder::timed(&mut encoder, profiler),
+            None => Recorder::new(&mut encoder),
+        };
+        let drawn = match stage.draw(&mut recorder, &self.state, &camera, self.state.measure) {
+            Ok(drawn) => drawn,
+            Err(e) => {
+                self.state.tell(e.to_string(), true);
+                false
+            }
+        };
+        if drawn {
+            stage.gpu.queue.submit([encoder.finish()]);
+            self.scene_frames += 1;
+            if stage.still() == 1 {
+                self.verdict = None;
+            }
+            if !stage.is_converging(&self.state) {
+                self.judge_at = Some(Instant::now() + Duration::from_millis(200));
+            }
+        }
+        if let Err(e) = stage.update_feature(&self.state, &camera) {
+            self.state.tell(e, true);
+        }
+        drawn
+    }
+
+    /// Takes in the GPU times that have arrived.
+    pub fn collect_times(&mut self) {
+        let (Some(screen), Some(stage)) = (&mut self.screen, &self.stage) else { return };
+        let Some(profiler) = &mut screen.profiler else { return };
+        if self.timed_frames == 0 {
+            return;
+        }
+        let _ = stage.gpu.device.poll(wgpu::PollType::Poll);
+        let mut any = false;
+        while let Some(results) = profiler.process_finished_frame(stage.gpu.queue.get_timestamp_period()) {
+            self.timed_frames = self.timed_frames.saturating_sub(1);
+            self.times.frame(Instant::now(), &timing::milliseconds(&results));
+            any = true;
+        }
+        if any {
+            self.learn();
+            self.redraw_once = true;
+        }
+    }
+
+    /// Remembers what the method on show costs here.
+    fn learn(&mut self) {
+        let single = self.state.sources().len() == 1;
+        let timed = self.screen.as_ref().is_some_and(|s| s.profiler.is_some());
+        let track = if timed { &self.times.gpu } else { &self.times.wall };
+        if let (true, Some(spread), Some((source, _))) =
+            (single, track.spread(), self.stage.as_ref().and_then(|s| s.key(0)))
+        {
+            self.measured.insert(source as usize, spread.median);
+        }
+        if let Some(stage) = &self.stage {
+            self.memory = stage.bytes();
+        }
+    }
+
+    /// When the next picture is due.
+    fn schedule(&mut self, outputs: &egui::OrderedViewportIdMap<egui::ViewportOutput>) {
+        let converging = self.stage.as_ref().is_some_and(|s| s.is_converging(&self.state));
+        if converging || (self.state.measure && self.stage.as_ref().is_some_and(|s| s.has_scene())) {
+            self.redraw = true;
+        }
+        let delay = outputs.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |o| o.repaint_delay);
+        if delay.is_zero() {
+            self.redraw = true;
+        } else if delay < Duration::from_secs(3600) {
+            self.wake(delay);
+        }
+        if self.timed_frames > 0 {
+            self.wake(Duration::from_millis(20));
+        }
+        if self.redraw {
+            self.request_redraw();
+        }
+    }
+
+    /// Does what the state asks of the world outside.
+    fn serve(&mut self, event_loop: &ActiveEventLoop) {
+        for request in std::mem::take(&mut self.state.requests) {
+            match request {
+                Request::Quit => self.quit(event_loop),
+                Request::Copy(text) => {
+                    self.egui.copy_text(text.clone());
+                    if let Some(screen) = self.screen.as_mut().filter(|_| self.script.is_none()) {
+                        screen.input.set_clipboard_text(text.clone());
+                    }
+                    self.copied = Some(text);
+                }
+                request => self.start(request),
+            }
+        }
+    }
+}
+
+/// Writes what the window shows.
+fn save_screenshot(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    texture: &wgpu::Texture,
+    path: &Path,
+) -> Result<(), String> {
+    let bytes = readback::texture(device, queue, texture).map_err(|e| e.to_string())?;
+    let bgra = matches!(texture.format(), wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Bgra8UnormSrgb);
+    let rgb: Vec<u8> =
+        bytes.chunks_exact(4).flat_map(|p| if bgra { [p[2], p[1], p[0]] } else { [p[0], p[1], p[2]] }).collect();
+    crate::image_io::write_png(path, texture.width(), texture.height(), &rgb, &[]).map_err(|e| e.to_string())
+}

@@ -1,0 +1,140 @@
+//! Keys and what they do: one table, which the help page shows, too.
+
+use super::choice::View;
+use super::state::{Action, State};
+use egui::{Key, Modifiers};
+
+/// Modifier keys of a binding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum With {
+    Nothing,
+    Shift,
+    Ctrl,
+}
+
+/// A key and what it does.
+pub struct Binding {
+    pub key: Key,
+    pub with: With,
+    pub doc: &'static str,
+    pub action: fn(&State) -> Action,
+}
+
+const fn bind(key: Key, with: With, doc: &'static str, action: fn(&State) -> Action) -> Binding {
+    Binding { key, with, doc, action }
+}
+
+/// All keys but those that fly (W A S D Q E, held) and the arrows.
+pub const BINDINGS: &[Binding] = &[
+    bind(Key::Num1, With::Nothing, "picture", |_| Action::View(View::Picture)),
+    bind(Key::Num2, With::Nothing, "albedo", |_| Action::View(View::Albedo)),
+    bind(Key::Num3, With::Nothing, "normals", |_| Action::View(View::Normal)),
+    bind(Key::Num4, With::Nothing, "depth", |_| Action::View(View::Depth)),
+    bind(Key::Num5, With::Nothing, "direct light", |_| Action::View(View::Direct)),
+    bind(Key::Num6, With::Nothing, "indirect light", |_| Action::View(View::Indirect)),
+    bind(Key::Num7, With::Nothing, "reflections", |_| Action::View(View::Reflections)),
+    bind(Key::Num8, With::Nothing, "roughness", |_| Action::View(View::Roughness)),
+    bind(Key::Num9, With::Nothing, "error against the other side", |_| Action::View(View::Error)),
+    bind(Key::Num0, With::Nothing, "network inputs, next channel", |_| Action::Feature(1)),
+    bind(Key::Num0, With::Shift, "network inputs, previous channel", |_| Action::Feature(-1)),
+    bind(Key::M, With::Nothing, "next method", |_| Action::NextMethod(1)),
+    bind(Key::M, With::Shift, "previous method", |_| Action::NextMethod(-1)),
+    bind(Key::X, With::Nothing, "split the picture", |_| Action::Split),
+    bind(Key::OpenBracket, With::Nothing, "line to the left", |_| Action::MoveSplit(-0.02)),
+    bind(Key::CloseBracket, With::Nothing, "line to the right", |_| Action::MoveSplit(0.02)),
+    bind(Key::Comma, With::Nothing, "darker by a quarter stop", |s| Action::Exposure(s.settings.exposure - 0.25)),
+    bind(Key::Period, With::Nothing, "brighter by a quarter stop", |s| Action::Exposure(s.settings.exposure + 0.25)),
+    bind(Key::T, With::Nothing, "next tonemap", |_| Action::Tonemap(None)),
+    bind(Key::F, With::Nothing, "fit the scene", |_| Action::Fit),
+    bind(Key::V, With::Nothing, "next side: front, right, back, left, top, corner", |_| Action::NextPreset),
+    bind(Key::C, With::Nothing, "next camera of the file", |_| Action::NextCamera),
+    bind(Key::G, With::Nothing, "drags orbit or turn the head", |_| Action::Fly),
+    bind(Key::B, With::Nothing, "draw without end, to measure", |_| Action::Measure),
+    bind(Key::P, With::Nothing, "panel", |_| Action::Panel),
+    bind(Key::K, With::Nothing, "copy as command", |_| Action::CopyCommand),
+    bind(Key::U, With::Nothing, "lights and objects as in the file", |_| Action::Undo),
+    bind(Key::F5, With::Nothing, "load the scene again", |_| Action::Reload),
+    bind(Key::F12, With::Nothing, "capture PNG", |_| Action::Capture { exr: false }),
+    bind(Key::F12, With::Shift, "capture EXR with layers", |_| Action::Capture { exr: true }),
+    bind(Key::H, With::Nothing, "this help", |_| Action::Help),
+    bind(Key::F1, With::Nothing, "this help", |_| Action::Help),
+    bind(Key::Escape, With::Nothing, "close, let go, cancel", |_| Action::Escape),
+    bind(Key::Q, With::Ctrl, "quit", |_| Action::Quit),
+];
+
+/// What pressing `key` does.
+pub fn action(key: Key, modifiers: Modifiers, state: &State) -> Option<Action> {
+    let with = match (modifiers.command || modifiers.ctrl, modifiers.shift) {
+        (true, _) => With::Ctrl,
+        (_, true) => With::Shift,
+        _ => With::Nothing,
+    };
+    BINDINGS.iter().find(|b| b.key == key && b.with == with).map(|b| (b.action)(state))
+}
+
+/// What the arrows do: move the selected object over the floor, else orbit. Points of the drag they stand for, or metres.
+pub fn arrow(key: Key) -> Option<[f32; 2]> {
+    match key {
+        Key::ArrowLeft => Some([-1.0, 0.0]),
+        Key::ArrowRight => Some([1.0, 0.0]),
+        Key::ArrowUp => Some([0.0, -1.0]),
+        Key::ArrowDown => Some([0.0, 1.0]),
+        _ => None,
+    }
+}
+
+/// The setting that a binding changes, as it is now.
+pub fn current(binding: &Binding, state: &State) -> String {
+    let s = &state.settings;
+    let on = |b: bool| if b { "on" } else { "off" }.to_string();
+    match (binding.action)(state) {
+        Action::View(view) if view == s.view => "shown".into(),
+        Action::Feature(_) if s.view == View::Feature => format!("channel {}", s.feature),
+        Action::NextMethod(_) => s.left.name().into(),
+        Action::Split => on(s.split),
+        Action::MoveSplit(_) => format!("{:.0} %", 100.0 * s.line),
+        Action::Exposure(_) => format!("{:+.2} EV", s.exposure),
+        Action::Tonemap(_) => s.tonemap.name().into(),
+        Action::NextPreset => state.preset.map_or("", |p| p.name()).into(),
+        Action::NextCamera => state.navigator.file_camera.map_or("moved".into(), |n| format!("camera {n}")),
+        Action::Fly => if state.navigator.fly { "head" } else { "orbit" }.into(),
+        Action::Measure => on(state.measure),
+        Action::Panel => on(s.panel),
+        _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_means_two_things() {
+        for (i, a) in BINDINGS.iter().enumerate() {
+            assert!(BINDINGS[..i].iter().all(|b| b.key != a.key || b.with != a.with), "{:?}", a.key);
+            let flies = [Key::W, Key::A, Key::S, Key::D, Key::Q, Key::E].contains(&a.key);
+            assert!(!flies || a.with == With::Ctrl, "{:?} flies", a.key);
+        }
+    }
+
+    #[test]
+    fn keys_act_and_the_help_tells_how_it_stands() {
+        let mut state = State::new(Default::default());
+        let mut press = |state: &mut State, key, modifiers| {
+            let action = action(key, modifiers, state).expect("bound");
+            state.apply(action);
+        };
+        press(&mut state, Key::Num2, Modifiers::NONE);
+        assert_eq!(state.settings.view, View::Albedo);
+        press(&mut state, Key::Period, Modifiers::NONE);
+        press(&mut state, Key::Period, Modifiers::NONE);
+        press(&mut state, Key::M, Modifiers::SHIFT);
+        let row = |key| current(BINDINGS.iter().find(|b| b.key == key).unwrap(), &state);
+        assert_eq!(
+            (row(Key::Period).as_str(), row(Key::M).as_str(), row(Key::Num2).as_str()),
+            ("+0.50 EV", "rsm", "shown")
+        );
+        assert_eq!(action(Key::W, Modifiers::NONE, &state), None);
+        assert_eq!(action(Key::Q, Modifiers::NONE, &state), None);
+    }
+}

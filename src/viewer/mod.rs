@@ -1,0 +1,93 @@
+//! The window of `bouncelight view`: see it, measure it, distrust it.
+//!
+//! ```text
+//!  winit ──► egui's events ──► ui ──► state (pure) ──► requests ──► jobs (threads) ──┐
+//!                               ▲                                                      │ events
+//!                               └── facts ── app ◄── stage (renderers, show) ◄─────────┤
+//!                                                       ▲                              │
+//!                                                       └────────── live (reference) ◄─┘
+//! ```
+//!
+//! `state` knows neither window nor wgpu; `ui` turns hands into its actions; `stage` holds the GPU's side; `app` brings them
+//! together and draws only when something has changed. `script` drives all of it for tests. `docs/viewer.md` is for users.
+
+mod app;
+mod choice;
+mod command;
+mod frame;
+mod jobs;
+mod judge;
+mod keys;
+mod live;
+mod navigate;
+mod pick;
+mod report;
+mod saved;
+mod screen;
+mod script;
+mod show;
+mod stage;
+mod state;
+mod stats;
+mod ui;
+mod watch;
+
+use crate::gpu::{GpuError, GpuOptions};
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// What `bouncelight view` was told.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// A file, a bundled scene or `paper-room:INDEX`; the bundled interior when absent.
+    pub scene: Option<String>,
+    /// The network's weights; the shipped ones when absent.
+    pub weights: Option<PathBuf>,
+    /// Name of the method on the left.
+    pub method: Option<String>,
+    /// Load scene, weights and, in a checkout, shaders again when their files change.
+    pub watch: bool,
+    /// Steps to run instead of waiting for hands; then no settings are read or saved.
+    pub script: Option<PathBuf>,
+    /// Width and height of the window, points.
+    pub size: Option<[u32; 2]>,
+    /// Folder for captures; the current one when absent.
+    pub captures: Option<PathBuf>,
+    /// Which adapter.
+    pub gpu: GpuOptions,
+}
+
+/// Why the window cannot be, or ended badly.
+#[derive(Debug, Error)]
+pub enum ViewError {
+    /// No window system answers.
+    #[error(
+        "no window can be opened here: {0}. Set DISPLAY or WAYLAND_DISPLAY, or use `bouncelight render`, which needs no window"
+    )]
+    NoDisplay(String),
+    /// No adapter that can present to the window.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The method does not exist.
+    #[error("`{0}` is no method; choose direct, ambient, ssgi, rsm, cache, probes, neural or reference")]
+    Method(String),
+    /// The script cannot be read.
+    #[error("the script cannot be used: {0}")]
+    Script(String),
+    /// A step of the script failed.
+    #[error("the script failed at {0}")]
+    Expectation(String),
+    /// The device went away and could not be had back.
+    #[error(
+        "the GPU was lost: {0}. Start again, or choose another adapter with --adapter; `bouncelight doctor` lists them"
+    )]
+    DeviceLost(String),
+}
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// [`ViewError`]. Bad scenes and weights are told in the window instead.
+pub fn run(options: Options) -> Result<(), ViewError> {
+    app::run(options)
+}

@@ -1,0 +1,64 @@
+//! How things stand, as JSON: what scripts ask.
+
+use super::app::App;
+use super::choice::Side;
+use serde_json::{Value, json};
+
+/// Everything that a script can expect.
+pub fn report(app: &App) -> Value {
+    let (s, n) = (&app.state.settings, &app.state.navigator);
+    let stage = app.stage.as_ref();
+    let key = |side: Side| stage.and_then(|st| st.key(side as usize)).map(|k| k.0.name());
+    let shown = app.state.shown.as_ref();
+    let scene = shown.map(|shown| {
+        let lights: Vec<_> = shown.scene.lights.iter().enumerate().map(|(i, l)| crate::scene::edit::LightEdit::of(i, l).to_string()).collect();
+        json!({
+            "spec": shown.spec, "objects": shown.scene.instances.len(), "lights": lights, "environment": shown.environment,
+            "sky": shown.scene.environment.radiance, "moved": shown.moved.len(),
+        })
+    });
+    let found = stage.and_then(|st| st.reference());
+    let memory: std::collections::BTreeMap<String, u64> = app.memory.iter().cloned().collect();
+    let passes: Vec<_> = app.times.passes.iter().map(|r| r.name.clone()).collect();
+    let mut report = json!({
+        "loaded": shown.is_some() && stage.is_some_and(|st| st.has_scene() && st.still() > 0),
+        "idle": app.is_idle(),
+        "frames": app.frames, "scene_frames": app.scene_frames,
+        "view": s.view.name(), "left": s.left.name(), "right": s.right.name(), "split": s.split, "line": s.line,
+        "drawn": { "left": key(Side::Left), "right": key(Side::Right) },
+        "exposure": s.exposure, "tonemap": s.tonemap.name(), "samples": s.samples,
+        "still": stage.map_or(0, |st| st.still()),
+        "panel": s.panel, "help": app.state.help, "dark": s.dark, "zoom": s.zoom, "measure": app.state.measure,
+        "feature": stage.and_then(|st| st.feature()).map(|f| f.0.to_string()),
+    });
+    let world = json!({
+        "camera": {
+            "eye": n.eye.to_array(), "target": n.target.to_array(), "fov": n.fov, "fly": n.fly, "speed": n.speed,
+            "file": n.file_camera,
+        },
+        "selected": app.state.selected, "scene": scene, "weights": s.weights, "recent": s.recent,
+        "size": app.state.size, "window": app.screen.as_ref().map(|sc| sc.size()),
+        "density": app.screen.as_ref().map(|sc| sc.window.scale_factor()),
+        "messages": app.state.messages.iter().map(|m| m.text.clone()).collect::<Vec<_>>(),
+        "errors": app.state.messages.iter().filter(|m| m.error).count(),
+        "jobs": app.jobs.iter().map(|j| j.name.clone()).collect::<Vec<_>>(),
+        "copied": app.copied, "captured": app.captured, "rebuilt": app.rebuilt,
+        "software": stage.map(|st| st.gpu.is_software()),
+    });
+    let v = app.verdict;
+    let measured = json!({
+        "reference": {
+            "samples": found.map_or(0, |f| f.samples), "finished": found.is_some_and(|f| f.finished),
+            "noise": found.map(|f| f.noise),
+        },
+        "verdict": v.map(|v| json!({ "psnr": v.psnr, "ssim": v.ssim, "mae": v.mae, "relmse": v.rel_mse, "bias": v.bias })),
+        "flicker": app.flicker, "passes": passes, "memory": memory,
+        "gpu_ms": app.times.gpu.spread().map(|t| t.median), "cpu_ms": app.times.cpu.spread().map(|t| t.median),
+        "overlay_ms": app.times.overlay.spread().map(|t| t.median),
+    });
+    if let (Some(all), Value::Object(world), Value::Object(measured)) = (report.as_object_mut(), world, measured) {
+        all.extend(world);
+        all.extend(measured);
+    }
+    report
+}

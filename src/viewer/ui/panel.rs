@@ -1,0 +1,238 @@
+//! The panel's controls.
+
+use super::{Facts, Memory, light, source_box, times};
+use crate::render::tonemap_curve::Tonemap;
+use crate::viewer::choice::{Side, Source, View};
+use crate::viewer::navigate::Preset;
+use crate::viewer::state::{Action, State};
+use egui::{RichText, Ui};
+
+/// All of it, from top to bottom.
+pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
+    let open = |title: &str, open: bool| egui::CollapsingHeader::new(RichText::new(title).strong()).default_open(open);
+    open("Scene", true).show(ui, |ui| scene(ui, state, memory));
+    open("Method", true).show(ui, |ui| method(ui, state, memory, facts));
+    open("Picture", true).show(ui, |ui| picture(ui, state));
+    open("Times", true).show(ui, |ui| times::times(ui, facts));
+    open("Speed and accuracy", false).show(ui, |ui| times::frontier(ui, state, facts));
+    open("Camera", false).show(ui, |ui| camera(ui, state));
+    open("Light", false).show(ui, |ui| light::lights(ui, state));
+    open("Objects", false).show(ui, |ui| light::objects(ui, state));
+    open("GPU memory", false).show(ui, |ui| times::memory(ui, facts));
+    open("Window", false).show(ui, |ui| window(ui, state));
+}
+
+fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
+    match &state.shown {
+        Some(shown) => {
+            let s = &shown.scene;
+            let triangles: usize =
+                s.instances.iter().filter_map(|i| Some(s.meshes.get(i.mesh)?.indices.len() / 3)).sum();
+            ui.add(egui::Label::new(RichText::new(&shown.spec).strong()).truncate());
+            ui.label(format!("{} objects, {triangles} triangles, {} lights", s.instances.len(), s.lights.len()));
+        }
+        None => {
+            ui.label("no scene yet");
+        }
+    }
+    ui.horizontal(|ui| {
+        let hint = "file, interior, paper-room:7";
+        let field = ui.add(egui::TextEdit::singleline(&mut memory.path).hint_text(hint).desired_width(200.0));
+        let enter = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+        if (ui.button("Open").clicked() || enter) && !memory.path.trim().is_empty() {
+            state.apply(Action::Open(memory.path.trim().into()));
+        }
+    });
+    let recent = state.settings.recent.clone();
+    if recent.len() > 1 {
+        egui::ComboBox::from_id_salt("recent").selected_text("recent").width(200.0).show_ui(ui, |ui| {
+            for spec in recent {
+                if ui.selectable_label(false, &spec).clicked() {
+                    state.apply(Action::Open(spec));
+                }
+            }
+        });
+    }
+}
+
+fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
+    egui::Grid::new("method").num_columns(2).show(ui, |ui| {
+        ui.label("Left");
+        source_box(ui, "left", state, Side::Left);
+        ui.end_row();
+        let mut split = state.settings.split;
+        if ui.checkbox(&mut split, "Split").changed() {
+            state.apply(Action::Split);
+        }
+        source_box(ui, "right", state, Side::Right);
+        ui.end_row();
+        ui.label("Show");
+        let mut view = state.settings.view;
+        egui::ComboBox::from_id_salt("view").selected_text(view.name()).width(130.0).show_ui(ui, |ui| {
+            for v in View::ALL {
+                ui.selectable_value(&mut view, v, v.name()).on_hover_text(v.doc());
+            }
+        });
+        if view != state.settings.view {
+            state.apply(Action::View(view));
+        }
+        ui.end_row();
+    });
+    if state.settings.view == View::Feature {
+        ui.horizontal(|ui| {
+            let (less, more) = (ui.button("<").clicked(), ui.button(">").clicked());
+            if less || more {
+                state.apply(Action::Feature(if more { 1 } else { -1 }));
+            }
+            ui.label(format!("input channel {}", state.settings.feature % 21));
+        });
+    }
+    if [state.settings.left, state.settings.right].contains(&Source::Neural) {
+        let name = state.settings.weights.as_ref().map_or("shipped weights".into(), |p| p.display().to_string());
+        ui.add(egui::Label::new(name).truncate());
+        ui.horizontal(|ui| {
+            ui.add(
+                egui::TextEdit::singleline(&mut memory.weights).hint_text("weights.safetensors").desired_width(150.0),
+            );
+            if ui.button("Use").clicked() && !memory.weights.trim().is_empty() {
+                state.apply(Action::Weights(Some(memory.weights.trim().into())));
+            }
+            if state.settings.weights.is_some() && ui.button("Shipped").clicked() {
+                state.apply(Action::Weights(None));
+            }
+        });
+    }
+    if state.wants_reference() {
+        reference(ui, state, facts);
+    }
+    if let Some(v) = facts.verdict {
+        let (left, right) = (state.settings.left.name(), state.settings.right.name());
+        ui.label(RichText::new(format!("{left} against {right}")).strong());
+        egui::Grid::new("verdict").num_columns(4).show(ui, |ui| {
+            for (name, value) in [
+                ("PSNR", format!("{:.2} dB", v.psnr)),
+                ("SSIM", format!("{:.4}", v.ssim)),
+                ("MAE", format!("{:.4}", v.mae)),
+                ("relMSE", format!("{:.4}", v.rel_mse)),
+                ("bias", format!("{:+.2} %", 100.0 * v.bias)),
+            ] {
+                ui.label(RichText::new(name).weak());
+                ui.label(value);
+                if ["SSIM", "relMSE"].contains(&name) {
+                    ui.end_row();
+                }
+            }
+        });
+    }
+}
+
+fn reference(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
+    ui.horizontal(|ui| {
+        ui.label("Reference up to");
+        ui.add(egui::DragValue::new(&mut state.settings.spp).range(1..=65_536).suffix(" samples"));
+    });
+    if let Some(r) = facts.reference {
+        let noise = r
+            .noise
+            .filter(|n| n.is_finite())
+            .map_or(String::new(), |n| format!(", noise of a pixel {:.1} %", 100.0 * n));
+        let coarse = if r.texel > 1 { format!(", at 1/{} of the resolution", r.texel) } else { String::new() };
+        let stage = if r.finished { "finished" } else { r.stage };
+        ui.add(egui::ProgressBar::new(r.share as f32).desired_height(6.0));
+        ui.label(format!("{stage}: {} samples{noise}{coarse}", r.samples));
+    }
+}
+
+fn picture(ui: &mut Ui, state: &mut State) {
+    egui::Grid::new("picture").num_columns(2).show(ui, |ui| {
+        ui.label("Exposure");
+        let mut ev = state.settings.exposure;
+        if ui.add(egui::Slider::new(&mut ev, -8.0..=8.0).suffix(" EV").max_decimals(2)).changed() {
+            state.apply(Action::Exposure(ev));
+        }
+        ui.end_row();
+        ui.label("Tonemap");
+        let mut kind = state.settings.tonemap;
+        egui::ComboBox::from_id_salt("tonemap").selected_text(kind.name()).show_ui(ui, |ui| {
+            for t in Tonemap::ALL {
+                ui.selectable_value(&mut kind, t, t.name());
+            }
+        });
+        if kind != state.settings.tonemap {
+            state.apply(Action::Tonemap(Some(kind)));
+        }
+        ui.end_row();
+        ui.label("Average");
+        let mut samples = state.settings.samples;
+        let drag = egui::DragValue::new(&mut samples).range(1..=4096).suffix(" frames at rest");
+        if ui.add(drag).on_hover_text("frames averaged while nothing moves: smooth edges, soft shadows").changed() {
+            state.apply(Action::Samples(samples));
+        }
+        ui.end_row();
+    });
+    ui.horizontal_wrapped(|ui| {
+        if ui.button("PNG (F12)").clicked() {
+            state.apply(Action::Capture { exr: false });
+        }
+        if ui.button("EXR (Shift F12)").clicked() {
+            state.apply(Action::Capture { exr: true });
+        }
+        if ui.button("Copy as command (K)").clicked() {
+            state.apply(Action::CopyCommand);
+        }
+    });
+}
+
+fn camera(ui: &mut Ui, state: &mut State) {
+    ui.horizontal_wrapped(|ui| {
+        if ui.button("Fit").clicked() {
+            state.apply(Action::Fit);
+        }
+        for preset in Preset::ALL {
+            if ui.button(preset.name()).clicked() {
+                state.apply(Action::Preset(preset));
+            }
+        }
+    });
+    let cameras: Vec<String> = state.shown.iter().flat_map(|s| &s.scene.cameras).map(|c| c.name.clone()).collect();
+    let now =
+        state.navigator.file_camera.map_or("moved".into(), |n| format!("{n}: {}", cameras.get(n).map_or("", |c| c)));
+    egui::ComboBox::from_id_salt("camera").selected_text(now).width(200.0).show_ui(ui, |ui| {
+        for (n, name) in cameras.iter().enumerate() {
+            if ui.selectable_label(state.navigator.file_camera == Some(n), format!("{n}: {name}")).clicked() {
+                state.apply(Action::Camera(n));
+            }
+        }
+    });
+    ui.horizontal(|ui| {
+        let mut fly = state.navigator.fly;
+        ui.selectable_value(&mut fly, false, "orbit");
+        ui.selectable_value(&mut fly, true, "fly");
+        state.navigator.fly = fly;
+        ui.add(egui::DragValue::new(&mut state.navigator.speed).range(0.001..=1e5).speed(0.05).suffix(" m/s"));
+    });
+    let mut fov = state.navigator.fov;
+    if ui.add(egui::Slider::new(&mut fov, 5.0..=150.0).text("field of view").suffix("°")).changed() {
+        state.navigator.fov = fov;
+        state.navigator.file_camera = None;
+    }
+    let e = state.navigator.eye;
+    ui.label(RichText::new(format!("eye {:.2}, {:.2}, {:.2}", e.x, e.y, e.z)).weak());
+}
+
+fn window(ui: &mut Ui, state: &mut State) {
+    ui.horizontal(|ui| {
+        ui.selectable_value(&mut state.settings.dark, true, "dark");
+        ui.selectable_value(&mut state.settings.dark, false, "light");
+    });
+    let mut zoom = state.settings.zoom;
+    let drag =
+        egui::DragValue::new(&mut zoom).range(0.5..=4.0).speed(0.02).prefix("text × ").update_while_editing(false);
+    if ui.add(drag).changed() {
+        state.settings.zoom = zoom;
+    }
+    let mut measure = state.measure;
+    if ui.checkbox(&mut measure, "draw without end, to measure (B)").changed() {
+        state.apply(Action::Measure);
+    }
+}

@@ -1,0 +1,193 @@
+//! Where the time and the memory go, and what accuracy costs.
+
+use super::{BLUE, Facts, ORANGE, SKY, VERMILLION};
+use crate::viewer::choice::{Side, Source};
+use crate::viewer::state::{Action, State};
+use crate::viewer::stats::{CURVE, Row, Spread, Track};
+use egui::{Align2, Color32, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, Ui, Vec2};
+
+/// Passes, curve, CPU, and what the overlay itself costs.
+pub fn times(ui: &mut Ui, facts: &Facts<'_>) {
+    let times = facts.times;
+    let main = if facts.timestamps { &times.gpu } else { &times.wall };
+    curve(ui, main, &times.cpu, facts);
+    if !facts.timestamps {
+        let text = "This adapter has no GPU timestamps. Shown instead: time from recording until the device is idle.";
+        ui.label(RichText::new(text).color(ui.visuals().warn_fg_color));
+    }
+    let count = main.spread().map_or(0, |s| s.count);
+    ui.label(RichText::new(format!("last two seconds, {count} frames drawn; ms")).weak());
+    egui::Grid::new("times").num_columns(3).min_col_width(50.0).striped(true).show(ui, |ui| {
+        for head in ["", "median", "p95"] {
+            ui.label(RichText::new(head).weak());
+        }
+        ui.end_row();
+        let (layers, passes): (Vec<&Row>, Vec<&Row>) = times.passes.iter().partition(|r| r.name.starts_with("net."));
+        row(ui, if facts.timestamps { "GPU, all passes" } else { "frame, waited for" }, main.spread(), true);
+        row(ui, "CPU, frame", times.cpu.spread(), true);
+        row(ui, "CPU, this overlay", times.overlay.spread(), true);
+        for pass in passes {
+            row(ui, &pass.name, pass.track.spread(), false);
+        }
+        if !layers.is_empty() {
+            let all: f64 = layers.iter().filter_map(|r| r.track.spread()).map(|s| s.median).sum();
+            ui.label(RichText::new(format!("network, {} layers", layers.len())).strong());
+            ui.label(RichText::new(format!("{all:.3}")).strong());
+            ui.label("");
+            ui.end_row();
+            for layer in layers {
+                row(ui, &layer.name, layer.track.spread(), false);
+            }
+        }
+    });
+    if let Some(flicker) = facts.flicker {
+        ui.label(format!("flicker {:.2} / 255 between frames", 255.0 * flicker)).on_hover_text(
+            "mean change of display values from one frame to the next of a view that stands still: jitter and noise",
+        );
+    }
+}
+
+fn row(ui: &mut Ui, name: &str, spread: Option<Spread>, strong: bool) {
+    let text = RichText::new(name);
+    ui.label(if strong { text.strong() } else { text });
+    for value in spread.map_or([None; 2], |s| [Some(s.median), Some(s.p95)]) {
+        let text = value.map_or("–".into(), |v| format!("{v:.3}"));
+        ui.label(RichText::new(text).monospace());
+    }
+    ui.end_row();
+}
+
+/// Scrolling curves of GPU and CPU time.
+fn curve(ui: &mut Ui, gpu: &Track, cpu: &Track, facts: &Facts<'_>) {
+    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 70.0), Sense::hover());
+    let painter = ui.painter().with_clip_rect(rect);
+    let visuals = ui.visuals();
+    painter.rect_filled(rect, 2.0, visuals.extreme_bg_color);
+    let most = gpu.curve().chain(cpu.curve()).fold(0.0f32, f32::max);
+    let top = nice(most.max(0.1));
+    let font = FontId::proportional(10.0);
+    for share in [0.5, 1.0] {
+        let y = rect.bottom() - share * (rect.height() - 12.0);
+        painter.hline(rect.x_range(), y, Stroke::new(0.5, visuals.weak_text_color()));
+        painter.text(
+            Pos2::new(rect.left() + 2.0, y),
+            Align2::LEFT_BOTTOM,
+            format!("{} ms", top * share),
+            font.clone(),
+            visuals.weak_text_color(),
+        );
+    }
+    let dark = visuals.dark_mode;
+    for (track, colour, dashed) in [(cpu, ORANGE, true), (gpu, if dark { SKY } else { BLUE }, false)] {
+        let n = track.curve().len();
+        let points: Vec<Pos2> = track
+            .curve()
+            .enumerate()
+            .map(|(i, ms)| {
+                let x = rect.right() - (n - 1 - i) as f32 * rect.width() / CURVE as f32;
+                Pos2::new(x, rect.bottom() - (ms / top).min(1.0) * (rect.height() - 12.0))
+            })
+            .collect();
+        if dashed {
+            // Told apart without colour, too.
+            painter.extend(Shape::dashed_line(&points, Stroke::new(1.2, colour), 4.0, 3.0));
+        } else {
+            painter.line(points, Stroke::new(1.5, colour));
+        }
+    }
+    let name = if facts.timestamps { "GPU ——   CPU – –" } else { "frame ——   CPU – –" };
+    painter.text(rect.right_top() + Vec2::new(-4.0, 1.0), Align2::RIGHT_TOP, name, font, visuals.text_color());
+}
+
+/// 1, 2 or 5 times a power of ten, not below `v`.
+fn nice(v: f32) -> f32 {
+    let power = 10f32.powf(v.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].map(|n| n * power).into_iter().find(|n| *n >= v).unwrap_or(v)
+}
+
+/// GPU memory by owner.
+pub fn memory(ui: &mut Ui, facts: &Facts<'_>) {
+    let all: u64 = facts.memory.iter().map(|(_, b)| b).sum();
+    let megabytes = |b: u64| format!("{:.1}", b as f64 / 1e6);
+    egui::Grid::new("memory").num_columns(2).striped(true).show(ui, |ui| {
+        ui.label(RichText::new("all, MB").strong());
+        ui.label(RichText::new(megabytes(all)).monospace());
+        ui.end_row();
+        let mut rows: Vec<_> = facts.memory.iter().collect();
+        rows.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
+        for (name, bytes) in rows {
+            ui.label(name);
+            ui.label(RichText::new(megabytes(*bytes)).monospace());
+            ui.end_row();
+        }
+    });
+}
+
+/// Error against time: what was measured here across, what docs/accuracy.md has up. A dot chooses its method.
+pub fn frontier(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
+    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 150.0), Sense::hover());
+    let visuals = ui.visuals().clone();
+    ui.painter().rect_filled(rect, 2.0, visuals.extreme_bg_color);
+    let plot = Rect::from_min_max(rect.min + Vec2::new(34.0, 10.0), rect.max - Vec2::new(14.0, 24.0));
+    let most = facts.measured.values().copied().fold(1.0, f64::max);
+    let least = facts.measured.values().copied().fold(most, f64::min).max(1e-3);
+    let (low, high) = (0.6 * least, 1.7 * most);
+    let at = |ms: f64, error: f64| {
+        let x = (ms.max(low) / low).ln() / (high / low).ln();
+        let y = (error / 3.0).ln() / (130.0f64 / 3.0).ln();
+        Pos2::new(plot.left() + x as f32 * plot.width(), plot.bottom() - y as f32 * plot.height())
+    };
+    let font = FontId::proportional(10.0);
+    let weak = visuals.weak_text_color();
+    for error in [3.0, 10.0, 30.0, 100.0] {
+        let y = at(low, error).y;
+        ui.painter().hline(plot.x_range(), y, Stroke::new(0.5, weak));
+        ui.painter().text(
+            Pos2::new(plot.left() - 4.0, y),
+            Align2::RIGHT_CENTER,
+            format!("{error} %"),
+            font.clone(),
+            weak,
+        );
+    }
+    for ms in [low, (low * high).sqrt(), high] {
+        let text = format!("{ms:.2} ms");
+        ui.painter().text(at(ms, 3.0) + Vec2::new(0.0, 3.0), Align2::CENTER_TOP, text, font.clone(), weak);
+    }
+    let mut missing = Vec::new();
+    for source in Source::ALL {
+        let Some(error) = source.static_error() else { continue };
+        let Some(&ms) = facts.measured.get(&(source as usize)) else {
+            missing.push(source);
+            continue;
+        };
+        let p = at(ms, error);
+        let response = ui.interact(
+            Rect::from_center_size(p, Vec2::splat(16.0)),
+            ui.scope_id().with(source.name()),
+            Sense::click(),
+        );
+        let now = source == state.settings.left;
+        let colour = if now { VERMILLION } else { SKY };
+        ui.painter().circle_filled(p, if now { 6.0 } else { 4.5 }, colour);
+        if response.has_focus() || response.hovered() {
+            ui.painter().circle_stroke(p, 8.0, Stroke::new(1.5, visuals.text_color()));
+        }
+        let text = if now { Color32::from(visuals.strong_text_color()) } else { visuals.text_color() };
+        ui.painter().text(p + Vec2::new(0.0, -7.0), Align2::CENTER_BOTTOM, source.name(), font.clone(), text);
+        if response.on_hover_text(format!("{}: {ms:.2} ms here, {error} % there", source.name())).clicked() {
+            state.apply(Action::Source(Side::Left, source));
+        }
+    }
+    ui.label(RichText::new("across: GPU ms measured in this window; up: mean error of indirect light on five judged rooms (docs/accuracy.md), not measured here").weak().small());
+    if !missing.is_empty() {
+        ui.horizontal_wrapped(|ui| {
+            ui.label(RichText::new("not measured yet:").weak());
+            for source in missing {
+                if ui.small_button(source.name()).clicked() {
+                    state.apply(Action::Source(Side::Left, source));
+                }
+            }
+        });
+    }
+}
