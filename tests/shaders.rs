@@ -49,8 +49,8 @@ fn every_shader_validates_in_every_permutation() {
         (shaders::RENDER.len(), shaders::GI.len(), shaders::NET.len(), shaders::REFERENCE.len()),
         (8, 21, 47, 3)
     );
-    assert_eq!(shaders::VIEWER.len(), 2);
-    assert_eq!(permutations.len(), 468);
+    assert_eq!(shaders::VIEWER.len(), 3);
+    assert_eq!(permutations.len(), 469);
 }
 
 #[test]

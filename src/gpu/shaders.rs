@@ -288,6 +288,7 @@ pub const REFERENCE: &[Shader] = &[
 /// Shaders of `viewer/`.
 pub const VIEWER: &[Shader] = &[
     Shader { name: "viewer.sum", files: wgsl!["viewer/sum.wgsl"] },
+    Shader { name: "viewer.flicker", files: wgsl!["lib/tonemap.wgsl", "viewer/flicker.wgsl"] },
     Shader {
         name: "viewer.show",
         files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/tonemap.wgsl", "viewer/show.wgsl"],

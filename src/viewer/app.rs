@@ -428,8 +428,8 @@ impl App {
             }
         }
         if let Some(live) = &self.live {
-            // Hands that are at work want the GPU for themselves.
-            live.pause(self.egui.is_using_pointer() && self.state.measure);
+            // Its dispatches would count as the frame's.
+            live.pause(self.state.measure);
         }
         let rested = self.resting.as_ref().is_some_and(|(_, since)| now.duration_since(*since) >= REST);
         if self.live.is_some() || self.live_failed.as_ref() == Some(&subject) {

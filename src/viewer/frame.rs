@@ -38,7 +38,9 @@ impl App {
         self.zoomed = self.state.settings.zoom;
         let egui = self.egui.clone();
         let mut place = egui::Rect::NOTHING;
-        let output = egui.run_ui(raw, |ui| place = self.overlay(ui));
+        let mut output = egui.run_ui(raw, |ui| place = self.overlay(ui));
+        let textures = std::mem::take(&mut output.textures_delta.set);
+        let freed = std::mem::take(&mut output.textures_delta.free);
         let density = output.pixels_per_point;
         let jobs = egui.tessellate(output.shapes, density);
         let mut overlay = started.elapsed();
@@ -55,7 +57,7 @@ impl App {
         screen.input.handle_platform_output(&screen.window, output.platform_output);
         let painting = Instant::now();
         let queue = stage.gpu.queue.clone();
-        for (id, deltas) in &output.textures_delta.set {
+        for (id, deltas) in &textures {
             deltas.iter().for_each(|delta| screen.painter.update_texture(&device, &queue, *id, delta));
         }
         let window = egui_wgpu::ScreenDescriptor { size_in_pixels: screen.size(), pixels_per_point: density };
@@ -140,7 +142,7 @@ impl App {
             queue.present(texture);
         }
         cpu += finishing.elapsed();
-        for id in &output.textures_delta.free {
+        for id in &freed {
             screen.painter.free_texture(id);
         }
         if drawn && screen.profiler.is_none() {

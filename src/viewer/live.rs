@@ -98,7 +98,7 @@ impl Live {
         Self { subject, stop, pause }
     }
 
-    /// Leaves the GPU alone for as long as `pause` says, which is while hands move the view.
+    /// Leaves the GPU alone for as long as `pause` says, which is while frames are measured.
     pub fn pause(&self, pause: bool) {
         self.pause.store(pause, Ordering::Relaxed);
     }

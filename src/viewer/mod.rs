@@ -14,6 +14,7 @@
 mod app;
 mod choice;
 mod command;
+mod flicker;
 mod frame;
 mod jobs;
 mod judge;
