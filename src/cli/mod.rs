@@ -54,6 +54,21 @@ enum Command {
     Doctor(doctor::Args),
 }
 
+impl Command {
+    /// It runs a network on a device, so that a precision can be asked for.
+    fn runs_network(&self) -> bool {
+        match self {
+            #[cfg(feature = "viewer")]
+            Command::View(_) => true,
+            Command::Render(a) => a.runs_network(),
+            Command::Bench(a) => a.runs_network(),
+            Command::Apply(_) => true,
+            Command::Weights(a) => a.runs_network(),
+            Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) => false,
+        }
+    }
+}
+
 /// Runs the program and returns its exit code.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -66,6 +81,9 @@ pub fn main() -> ExitCode {
     };
     init_logging(&cli.global);
     let done = match cli.command {
+        command if cli.global.precision != args::PrecisionName::F32 && !command.runs_network() => {
+            Err(args::usage("--precision f16 is for networks, and none runs here; leave it out".into()))
+        }
         #[cfg(feature = "viewer")]
         Command::View(a) => view::run(&cli.global, a),
         Command::Render(a) => render::run(&cli.global, a),

@@ -46,6 +46,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         size: args.size,
         captures: args.captures,
         gpu: global.gpu_options(),
+        precision: global.precision.precision(),
+        tuned: Some(|device| super::tuned::of(device, true)),
     };
     Ok(viewer::run(options)?)
 }

@@ -55,6 +55,7 @@ pub struct App {
     failed: HashSet<Key>,
     /// How often weights, scene and shaders were replaced.
     stamps: [u64; 3],
+    network: jobs::Network,
     live: Option<Live>,
     kept: Kept,
     live_failed: Option<Subjects>,
@@ -67,6 +68,10 @@ pub struct App {
     judged: u64,
     pub times: Times,
     pub timed_frames: u32,
+    /// Frames still to be drawn only to be timed: a renderer's first one also compiles.
+    pub settling: u32,
+    /// Timed frames on their way that do not count.
+    pub discard: u32,
     pub memory: Vec<(String, u64)>,
     pub measured: BTreeMap<usize, f64>,
     pub flicker: Option<f64>,
@@ -132,6 +137,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         building: [None; 2],
         failed: HashSet::new(),
         stamps: [0; 3],
+        network: jobs::Network::default(),
         live: None,
         kept: Kept::default(),
         live_failed: None,
@@ -143,6 +149,8 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         judged: 0,
         times: Times::default(),
         timed_frames: 0,
+        settling: 0,
+        discard: 0,
         memory: Vec::new(),
         measured: BTreeMap::new(),
         flicker: None,
@@ -202,7 +210,14 @@ impl App {
             self.state.wants_reference() && self.reference.is_none_or(|r| !r.finished) && self.live_failed.is_none();
         let judging = self.judging.is_some() || self.judge_at.is_some();
         let building = self.building.iter().any(Option::is_some);
-        !(converging || tracing || judging || building || self.redraw || self.requested || !self.jobs.is_empty())
+        !(converging
+            || self.settling == 1
+            || tracing
+            || judging
+            || building
+            || self.redraw
+            || self.requested
+            || !self.jobs.is_empty())
     }
 
     /// Ends a script badly.
@@ -250,6 +265,9 @@ impl App {
         gpu.device.on_uncaptured_error(Arc::new(move |e| {
             let _ = proxy.send_event(Event::GpuError(e.to_string()));
         }));
+        let tuned = self.options.tuned.map(|of| of(&gpu.device)).unwrap_or_default();
+        self.network = jobs::Network { precision: self.options.precision, tuned };
+        self.state.half = self.options.precision == crate::net::plan::Precision::F16;
         self.stage = Some(Stage::new(gpu, screen.format()));
         self.screen = Some(screen);
         self.redraw = true;
@@ -288,7 +306,7 @@ impl App {
                     ("Driver", driver),
                 ];
                 let facts = facts.map(|(k, v)| (k.to_string(), v)).into();
-                let Some(shot) = Shot::new(&self.state, output, facts) else { return };
+                let Some(shot) = Shot::new(&self.state, self.network.clone(), output, facts) else { return };
                 let name = format!("capture {}", shot.output.display());
                 self.spawn(name, Kind::Capture, move |p| jobs::capture(&gpu, &shot, p));
             }
@@ -384,6 +402,7 @@ impl App {
                 key,
                 size: self.state.size,
                 weights: self.state.settings.weights.clone(),
+                network: self.network.clone(),
                 scene: scene.clone(),
                 eye: self.state.navigator.camera(&scene).eye(),
             };
@@ -445,7 +464,7 @@ impl App {
             let _ = proxy.send_event(Event::Reference(subject, report));
         };
         let (handles, kept, scene) = (stage.handles(), self.kept.clone(), shown.scene.clone());
-        self.live = Some(Live::start(handles, kept, scene, camera, subject, send));
+        self.live = Some(Live::start(handles, kept, scene, (camera, stage.gpu.is_software()), subject, send));
     }
 
     fn hear_reference(&mut self, subject: Subjects, report: Report) {
@@ -539,6 +558,7 @@ impl App {
                 if self.building[side] == Some(key) {
                     self.building[side] = None;
                     stage.set_renderer(side, key, *renderer);
+                    self.settling = 2;
                     self.times.gpu = Track::default();
                     self.times.wall = Track::default();
                     self.times.passes.clear();
@@ -573,6 +593,7 @@ impl App {
         self.kept = Kept::default();
         self.building = [None; 2];
         self.timed_frames = 0;
+        self.discard = 0;
         self.requested = false;
         self.stage = None;
         let Some(screen) = self.screen.take() else { return };

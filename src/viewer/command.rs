@@ -37,6 +37,9 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     if let (Source::Neural, Some(weights)) = (s.left, &s.weights) {
         flag("weights", weights.display().to_string());
     }
+    if s.left == Source::Neural && state.half {
+        flag("precision", "f16".into());
+    }
     if let Some(environment) = &shown.environment {
         flag("environment", environment.clone());
     }

@@ -137,18 +137,20 @@ impl App {
                 Err(e) => tracing::debug!("a frame was not timed: {e}"),
             }
         }
+        cpu += finishing.elapsed();
         if let Some(texture) = kept {
             screen.window.pre_present_notify();
             queue.present(texture);
         }
-        cpu += finishing.elapsed();
         for id in &freed {
             screen.painter.free_texture(id);
         }
         if drawn && screen.profiler.is_none() {
             // Without timestamps the clock has to do.
             if device.poll(wgpu::PollType::wait_indefinitely()).is_ok() {
-                self.times.wall.add(Instant::now(), recording.elapsed().as_secs_f64() * 1e3);
+                if self.settling < 2 {
+                    self.times.wall.add(Instant::now(), recording.elapsed().as_secs_f64() * 1e3);
+                }
                 self.learn();
             }
         }
@@ -156,6 +158,10 @@ impl App {
             && let Err(e) = save_screenshot(&device, &queue, &texture, &path)
         {
             self.fail(e);
+        }
+        if drawn && self.settling > 0 {
+            self.settling -= 1;
+            self.discard += u32::from(self.settling == 1);
         }
         self.frames += 1;
         self.times.cpu.add(Instant::now(), cpu.as_secs_f64() * 1e3);
@@ -193,13 +199,14 @@ impl App {
             return false;
         }
         let camera = self.state.navigator.camera(&shown.scene);
+        let again = self.state.measure || self.settling == 1;
         let mut encoder = stage.gpu.device.create_command_encoder(&Default::default());
         let profiler = self.screen.as_ref().and_then(|s| s.profiler.as_ref());
         let mut recorder = match profiler {
             Some(profiler) => Recorder::timed(&mut encoder, profiler),
             None => Recorder::new(&mut encoder),
         };
-        let drawn = match stage.draw(&mut recorder, &self.state, &camera, self.state.measure) {
+        let drawn = match stage.draw(&mut recorder, &self.state, &camera, again) {
             Ok(drawn) => drawn,
             Err(e) => {
                 self.state.tell(e.to_string(), true);
@@ -209,6 +216,12 @@ impl App {
         if drawn {
             stage.gpu.queue.submit([encoder.finish()]);
             self.scene_frames += 1;
+            if self.state.settings.flicker {
+                match stage.measure_flicker(&self.state) {
+                    Ok(found) => self.flicker = found.or(self.flicker.filter(|_| stage.still() > 1)),
+                    Err(e) => self.state.tell(e.to_string(), true),
+                }
+            }
             if stage.still() == 1 {
                 self.verdict = None;
             }
@@ -233,6 +246,10 @@ impl App {
         let mut any = false;
         while let Some(results) = profiler.process_finished_frame(stage.gpu.queue.get_timestamp_period()) {
             self.timed_frames = self.timed_frames.saturating_sub(1);
+            if self.discard > 0 {
+                self.discard -= 1;
+                continue;
+            }
             self.times.frame(Instant::now(), &timing::milliseconds(&results));
             any = true;
         }
@@ -260,7 +277,10 @@ impl App {
     /// When the next picture is due.
     fn schedule(&mut self, outputs: &egui::OrderedViewportIdMap<egui::ViewportOutput>) {
         let converging = self.stage.as_ref().is_some_and(|s| s.is_converging(&self.state));
-        if converging || (self.state.measure && self.stage.as_ref().is_some_and(|s| s.has_scene())) {
+        if converging
+            || self.settling == 1
+            || (self.state.measure && self.stage.as_ref().is_some_and(|s| s.has_scene()))
+        {
             self.redraw = true;
         }
         let delay = outputs.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |o| o.repaint_delay);

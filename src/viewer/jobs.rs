@@ -6,10 +6,11 @@ use super::command;
 use super::state::State;
 use crate::gi::{
     Method,
+    pass::Neural,
     probes::{Bake, BakeOptions},
 };
 use crate::image_io;
-use crate::net::format::Weights;
+use crate::net::{format::Weights, gpu::Tuned, plan::Precision};
 use crate::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
 use crate::render::capture::{CaptureOptions, Layer, capture_with};
 use crate::render::{Renderer, RendererOptions};
@@ -149,10 +150,17 @@ pub fn scene(handles: &Handles, spec: String, progress: &Progress) -> Result<Pro
     Ok(Product::Scene { spec, scene: Box::new(scene), gpu: Box::new(gpu) })
 }
 
+/// How networks are run.
+#[derive(Debug, Clone, Default)]
+pub struct Network {
+    pub precision: Precision,
+    pub tuned: Arc<Tuned>,
+}
+
 /// The method behind a source; bakes and reads weights.
 fn method(
     source: Source,
-    weights: Option<&Path>,
+    (weights, network): (Option<&Path>, &Network),
     scene: &Scene,
     eye: [f32; 3],
     progress: &Progress,
@@ -165,7 +173,10 @@ fn method(
         Source::Cache => Method::Cache,
         Source::Neural => {
             let weights = weights.map_or_else(Weights::shipped, Weights::load).map_err(|e| e.to_string())?;
-            Method::Neural(Box::new(weights))
+            let mut neural = Neural::from(weights);
+            neural.network.precision = network.precision;
+            neural.tuned = network.tuned.clone();
+            Method::Neural(Box::new(neural))
         }
         Source::Probes => {
             progress.stage("baking surfels");
@@ -184,13 +195,14 @@ pub struct Plan {
     pub key: Key,
     pub size: [u32; 2],
     pub weights: Option<PathBuf>,
+    pub network: Network,
     pub scene: Arc<Scene>,
     pub eye: [f32; 3],
 }
 
 /// Builds a renderer. Shaders or weights that the driver refuses are an error, not the end.
 pub fn renderer(handles: &Handles, plan: Plan, progress: &Progress) -> Result<Product, String> {
-    let method = method(plan.key.0, plan.weights.as_deref(), &plan.scene, plan.eye, progress)?;
+    let method = method(plan.key.0, (plan.weights.as_deref(), &plan.network), &plan.scene, plan.eye, progress)?;
     progress.stage(&format!("building {}", plan.key.0.name()));
     let scope = handles.device.push_error_scope(wgpu::ErrorFilter::Validation);
     let options = RendererOptions { method, ..Default::default() };
@@ -207,6 +219,7 @@ pub struct Shot {
     pub output: PathBuf,
     pub source: Source,
     pub weights: Option<PathBuf>,
+    pub network: Network,
     pub scene: Arc<Scene>,
     pub camera: Camera,
     pub size: [u32; 2],
@@ -218,7 +231,7 @@ pub struct Shot {
 
 impl Shot {
     /// Of what `state` shows on the left.
-    pub fn new(state: &State, output: PathBuf, facts: image_io::Metadata) -> Option<Self> {
+    pub fn new(state: &State, network: Network, output: PathBuf, facts: image_io::Metadata) -> Option<Self> {
         let shown = state.shown.as_ref()?;
         let s = &state.settings;
         let text = command::line(state, Some(&output.display().to_string()));
@@ -229,6 +242,7 @@ impl Shot {
             output,
             source: s.left,
             weights: s.weights.clone(),
+            network,
             scene: shown.scene.clone(),
             camera: state.navigator.camera(&shown.scene),
             size: state.size,
@@ -251,7 +265,8 @@ pub fn capture(gpu: &crate::gpu::Gpu, shot: &Shot, progress: &Progress) -> Resul
         let Some(traced) = trace(gpu, shot, progress)? else { return cancelled() };
         traced
     } else {
-        let method = method(shot.source, shot.weights.as_deref(), &shot.scene, shot.camera.eye(), progress)?;
+        let method =
+            method(shot.source, (shot.weights.as_deref(), &shot.network), &shot.scene, shot.camera.eye(), progress)?;
         progress.stage("capturing");
         let scene = SceneGpu::new(&gpu.device, &gpu.queue, &shot.scene).map_err(|e| e.to_string())?;
         let options = RendererOptions { method, ..Default::default() };

@@ -80,12 +80,20 @@ impl Live {
         handles: Handles,
         kept: Kept,
         scene: Arc<Scene>,
-        camera: Camera,
+        (camera, software): (Camera, bool),
         subject: Subjects,
         send: impl Fn(Subjects, Report) + Send + 'static,
     ) -> Self {
         let (stop, pause) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
-        let work = Work { handles, kept, camera, subject: subject.clone(), stop: stop.clone(), pause: pause.clone() };
+        let work = Work {
+            handles,
+            kept,
+            camera,
+            software,
+            subject: subject.clone(),
+            stop: stop.clone(),
+            pause: pause.clone(),
+        };
         let spawned = std::thread::Builder::new().name("reference".into()).spawn(move || {
             let told = work.subject.clone();
             if let Err(e) = work.run(scene, &|report| send(told.clone(), report)) {
@@ -108,6 +116,7 @@ struct Work {
     handles: Handles,
     kept: Kept,
     camera: Camera,
+    software: bool,
     subject: Subjects,
     stop: Arc<AtomicBool>,
     pause: Arc<AtomicBool>,
@@ -140,7 +149,8 @@ impl Work {
         let options = TracerOptions {
             samples: self.subject.samples,
             layers: vec![Layer::Combined, Layer::Gi],
-            dispatch: Duration::from_millis(12),
+            // Between two of the window's pictures; on a CPU both take long.
+            dispatch: Duration::from_millis(if self.software { 100 } else { 12 }),
             ..Default::default()
         };
         if stopped() {
@@ -148,6 +158,7 @@ impl Work {
         }
         let subject = Subject { camera: &self.camera, size, points: None };
         let mut tracer = Tracer::new(device, queue, &kernel, &packed, subject, options).map_err(|e| e.to_string())?;
+        let patience = if self.software { 4 * PICTURES } else { PICTURES };
         let (mut last, mut seen, mut told) = (Instant::now(), 0, Instant::now());
         loop {
             if stopped() {
@@ -159,12 +170,12 @@ impl Work {
             }
             let more = tracer.step().map_err(|e| e.to_string())?;
             let samples = tracer.samples();
-            if told.elapsed() > PICTURES / 2 {
+            if told.elapsed() > patience / 2 {
                 told = Instant::now();
                 send(Report::At { stage: "tracing", samples, share: tracer.progress() });
             }
             // Whole passes only: a picture with two samples here and one there flickers.
-            let worth = samples > seen && (seen == 0 || last.elapsed() > PICTURES);
+            let worth = samples > seen && (seen == 0 || last.elapsed() > patience);
             if worth || !more {
                 (last, seen) = (Instant::now(), samples);
                 let traced = tracer.resolve().map_err(|e| e.to_string())?;

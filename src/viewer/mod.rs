@@ -34,7 +34,9 @@ mod ui;
 mod watch;
 
 use crate::gpu::{GpuError, GpuOptions};
+use crate::net::{gpu::Tuned, plan::Precision};
 use std::path::PathBuf;
+use std::sync::Arc;
 use thiserror::Error;
 
 /// What `bouncelight view` was told.
@@ -56,6 +58,10 @@ pub struct Options {
     pub captures: Option<PathBuf>,
     /// Which adapter.
     pub gpu: GpuOptions,
+    /// How networks store their numbers.
+    pub precision: Precision,
+    /// What a tuner has found on a device, if somebody knows.
+    pub tuned: Option<fn(&wgpu::Device) -> Arc<Tuned>>,
 }
 
 /// Why the window cannot be, or ended badly.

@@ -29,6 +29,8 @@ pub struct Settings {
     /// Samples a pixel that the live reference stops at.
     pub spp: u32,
     pub panel: bool,
+    /// The flicker meter is on.
+    pub flicker: bool,
     pub dark: bool,
     /// Factor on the text's size.
     pub zoom: f32,
@@ -53,6 +55,7 @@ impl Default for Settings {
             samples: 16,
             spp: 256,
             panel: true,
+            flicker: false,
             dark: true,
             zoom: 1.0,
             weights: None,

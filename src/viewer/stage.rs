@@ -2,6 +2,7 @@
 //! what a frame of the window records. Nothing here knows winit or egui.
 
 use super::choice::{Side, Source, View};
+use super::flicker::FlickerPass;
 use super::jobs::{Handles, Key};
 use super::live::Found;
 use super::navigate::sphere;
@@ -53,6 +54,7 @@ pub struct Stage {
     slots: [Option<Slot>; 2],
     show: ShowPass,
     sum: SumPass,
+    flicker: FlickerPass,
     reference: Option<Reference>,
     feature: Option<Feature>,
     sight: Option<Sight>,
@@ -65,7 +67,19 @@ impl Stage {
     pub fn new(gpu: Arc<Gpu>, format: wgpu::TextureFormat) -> Self {
         let show = ShowPass::new(&gpu.device, format);
         let sum = SumPass::new(&gpu.device, &gpu.queue);
-        Self { gpu, scene: None, slots: [None, None], show, sum, reference: None, feature: None, sight: None, still: 0 }
+        let flicker = FlickerPass::new(&gpu.device);
+        Self {
+            gpu,
+            scene: None,
+            slots: [None, None],
+            show,
+            sum,
+            flicker,
+            reference: None,
+            feature: None,
+            sight: None,
+            still: 0,
+        }
     }
 
     /// Device and queue for threads.
@@ -330,6 +344,17 @@ impl Stage {
         rows.extend(self.reference.as_ref().map(|r| ("reference".into(), r.radiance.bytes() + r.indirect.bytes())));
         rows.retain(|(_, bytes)| *bytes > 0);
         rows
+    }
+
+    /// What the flicker meter says of the frame that was just submitted; `None` where the view is new.
+    ///
+    /// # Errors
+    /// Reading back failed.
+    pub fn measure_flicker(&mut self, state: &State) -> Result<Option<f64>, readback::ReadbackError> {
+        let Some(slot) = &self.slots[0] else { return Ok(None) };
+        let shown = (state.settings.exposure, state.settings.tonemap);
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        self.flicker.measure(device, queue, &slot.renderer.targets().hdr, shown, self.still > 1)
     }
 
     /// The last report of the path tracer.

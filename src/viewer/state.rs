@@ -112,6 +112,8 @@ pub struct State {
     /// Width by height of the picture, pixels.
     pub size: [u32; 2],
     pub preset: Option<Preset>,
+    /// Networks store their numbers in 16 bits.
+    pub half: bool,
 }
 
 impl State {

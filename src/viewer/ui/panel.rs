@@ -13,7 +13,7 @@ pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
     open("Scene", true).show(ui, |ui| scene(ui, state, memory));
     open("Method", true).show(ui, |ui| method(ui, state, memory, facts));
     open("Picture", true).show(ui, |ui| picture(ui, state));
-    open("Times", true).show(ui, |ui| times::times(ui, facts));
+    open("Times", true).show(ui, |ui| times::times(ui, state, facts));
     open("Speed and accuracy", false).show(ui, |ui| times::frontier(ui, state, facts));
     open("Camera", false).show(ui, |ui| camera(ui, state));
     open("Light", false).show(ui, |ui| light::lights(ui, state));

@@ -7,7 +7,7 @@ use crate::viewer::stats::{CURVE, Row, Spread, Track};
 use egui::{Align2, Color32, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, Ui, Vec2};
 
 /// Passes, curve, CPU, and what the overlay itself costs.
-pub fn times(ui: &mut Ui, facts: &Facts<'_>) {
+pub fn times(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
     let times = facts.times;
     let main = if facts.timestamps { &times.gpu } else { &times.wall };
     curve(ui, main, &times.cpu, facts);
@@ -40,11 +40,18 @@ pub fn times(ui: &mut Ui, facts: &Facts<'_>) {
             }
         }
     });
-    if let Some(flicker) = facts.flicker {
-        ui.label(format!("flicker {:.2} / 255 between frames", 255.0 * flicker)).on_hover_text(
-            "mean change of display values from one frame to the next of a view that stands still: jitter and noise",
-        );
-    }
+    ui.horizontal(|ui| {
+        let doc =
+            "mean change of display values from one frame to the next of a view that stands still; waits for the GPU";
+        ui.checkbox(&mut state.settings.flicker, "flicker meter").on_hover_text(doc);
+        match facts.flicker.filter(|_| state.settings.flicker) {
+            Some(flicker) => ui.label(format!("{:.2} of 255 between frames", 255.0 * flicker)),
+            None if state.settings.flicker && state.settings.samples == 1 => {
+                ui.label("needs more than 1 frame at rest")
+            }
+            None => ui.label(""),
+        };
+    });
 }
 
 fn row(ui: &mut Ui, name: &str, spread: Option<Spread>, strong: bool) {
