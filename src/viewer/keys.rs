@@ -46,7 +46,7 @@ pub const BINDINGS: &[Binding] = &[
     bind(Key::Period, With::Nothing, "brighter by a quarter stop", |s| Action::Exposure(s.settings.exposure + 0.25)),
     bind(Key::T, With::Nothing, "next tonemap", |_| Action::Tonemap(None)),
     bind(Key::F, With::Nothing, "fit the scene", |_| Action::Fit),
-    bind(Key::V, With::Nothing, "next side: front, right, back, left, top, corner", |_| Action::NextPreset),
+    bind(Key::V, With::Nothing, "next side of the scene", |_| Action::NextPreset),
     bind(Key::C, With::Nothing, "next camera of the file", |_| Action::NextCamera),
     bind(Key::G, With::Nothing, "drags orbit or turn the head", |_| Action::Fly),
     bind(Key::B, With::Nothing, "draw without end, to measure", |_| Action::Measure),

@@ -1,5 +1,7 @@
 //! `bouncelight view` for real: a window under Xvfb on whatever adapter answers, driven by scripts with mouse and keys.
 
+#![recursion_limit = "512"]
+
 mod display;
 
 use display::Display;
