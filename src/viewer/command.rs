@@ -72,7 +72,7 @@ mod tests {
     #[test]
     fn the_line_says_everything_that_differs() {
         let mut state = State::new(Default::default());
-        state.show("it's here.glb".into(), Arc::new(crate::scene::bundled::scene("interior").unwrap()));
+        state.show("it's here.glb".into(), Arc::new(crate::scene::paper_room::scene(3)));
         let text = line(&state, None);
         assert!(
             text.starts_with(r"bouncelight render 'it'\''s here.glb' -o view.png --size=640x360 --camera=0"),

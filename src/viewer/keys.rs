@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn keys_act_and_the_help_tells_how_it_stands() {
         let mut state = State::new(Default::default());
-        let mut press = |state: &mut State, key, modifiers| {
+        let press = |state: &mut State, key, modifiers| {
             let action = action(key, modifiers, state).expect("bound");
             state.apply(action);
         };

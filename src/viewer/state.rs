@@ -365,3 +365,92 @@ pub fn from_angles([azimuth, height]: [f32; 2]) -> [f32; 3] {
     let from = Vec3::new(azimuth.sin() * height.cos(), height.sin(), azimuth.cos() * height.cos());
     (-from).to_array()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn state() -> State {
+        let mut state = State::new(Settings::default());
+        state.show("interior".into(), Arc::new(crate::scene::paper_room::scene(3)));
+        state
+    }
+
+    #[test]
+    fn objects_move_from_where_the_file_has_them() {
+        let mut state = state();
+        state.apply(Action::Move(Vec3::X));
+        assert_eq!(state.version, 1, "nothing is selected, so nothing moves");
+        state.apply(Action::Select(Some(3)));
+        for _ in 0..10 {
+            state.apply(Action::Move(Vec3::new(0.1, 0.0, 0.0)));
+        }
+        let shown = state.shown.as_ref().unwrap();
+        let mut again = (*shown.original).clone();
+        ObjectEdit { object: 3, by: shown.moved[&3] }.apply(&mut again).unwrap();
+        assert_eq!(again.instances[3].transform, shown.scene.instances[3].transform, "bit for bit");
+        assert!(state.stale.placements && !state.stale.lights);
+        state.apply(Action::Undo);
+        let shown = state.shown.as_ref().unwrap();
+        assert_eq!(shown.scene.instances[3].transform, shown.original.instances[3].transform);
+    }
+
+    #[test]
+    fn the_sun_turns_and_comes_back() {
+        let mut state = state();
+        let before = state.shown.as_ref().unwrap().scene.lights.clone();
+        let sun = state.sun().unwrap();
+        state.apply(Action::TurnSun { dx: 50.0, dy: 0.0 });
+        assert_eq!(state.light_edits().len(), 1);
+        assert_eq!(state.light_edits()[0].light, sun);
+        assert!(state.stale.lights);
+        state.apply(Action::Undo);
+        assert_eq!(state.light_edits(), []);
+        assert_eq!(state.shown.as_ref().unwrap().scene.lights[sun].kind, before[sun].kind);
+        let back = from_angles(angles([0.3, -0.8, 0.1]));
+        let length = Vec3::new(0.3, -0.8, 0.1).normalize();
+        assert!(Vec3::from(back).distance(length) < 1e-5);
+    }
+
+    #[test]
+    fn dropped_files_are_sorted_by_their_names() {
+        let mut state = state();
+        for path in ["a.HDR", "b.exr", "net.safetensors", "scene.glb", "interior"] {
+            state.apply(Action::Open(path.into()));
+        }
+        let expected = [
+            Request::Surroundings("a.HDR".into()),
+            Request::Surroundings("b.exr".into()),
+            Request::Weights(Some("net.safetensors".into())),
+            Request::Load("scene.glb".into()),
+            Request::Load("interior".into()),
+        ];
+        assert_eq!(state.requests, expected);
+    }
+
+    #[test]
+    fn the_error_view_finds_itself_a_truth() {
+        let mut state = state();
+        assert_eq!(state.sources(), [Source::Cache]);
+        assert!(!state.wants_reference());
+        state.settings.right = Source::Cache;
+        state.apply(Action::View(View::Error));
+        assert_eq!(state.sources(), [Source::Cache, Source::Reference]);
+        assert!(state.wants_reference());
+        state.apply(Action::Escape);
+        assert_eq!(state.requests, [Request::Cancel]);
+    }
+
+    #[test]
+    fn the_same_scene_again_keeps_the_camera() {
+        let mut state = state();
+        state.navigator.orbit(10.0, 0.0);
+        let camera = state.navigator.clone();
+        let scene = state.shown.as_ref().unwrap().original.clone();
+        state.show("interior".into(), scene.clone());
+        assert_eq!(state.navigator, camera);
+        state.show("another".into(), scene);
+        assert_ne!(state.navigator, camera);
+        assert_eq!(state.settings.recent, ["another", "interior"]);
+    }
+}

@@ -430,3 +430,100 @@ fn source_box(ui: &mut Ui, id: &str, state: &mut State, side: Side) {
         state.apply(Action::Source(side, chosen));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    /// Runs the overlay without any window, one frame for each list of events.
+    fn run(state: &mut State, frames: Vec<Vec<egui::Event>>) -> Rect {
+        let (context, mut memory) = (egui::Context::default(), Memory::default());
+        let (times, measured) = (Times::default(), BTreeMap::new());
+        let mut place = Rect::NOTHING;
+        for events in frames {
+            let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 500.0)));
+            let input = egui::RawInput { screen_rect, events, focused: true, ..Default::default() };
+            let facts = Facts {
+                adapter: "none",
+                software: true,
+                timestamps: false,
+                times: &times,
+                memory: &[],
+                jobs: &[],
+                reference: None,
+                verdict: None,
+                measured: &measured,
+                still: 1,
+                feature: None,
+                flicker: None,
+            };
+            let mut output = context.run_ui(input, |ui| place = show(ui, state, &mut memory, &facts));
+            output.textures_delta.clear();
+        }
+        place
+    }
+
+    fn state() -> State {
+        let mut state = State::new(Default::default());
+        state.show("cornell".into(), Arc::new(crate::scene::bundled::scene("cornell").expect("bundled")));
+        state
+    }
+
+    fn press(key: egui::Key) -> egui::Event {
+        egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Default::default() }
+    }
+
+    fn button(pos: Pos2, pressed: bool) -> egui::Event {
+        egui::Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Default::default() }
+    }
+
+    #[test]
+    fn the_panel_leaves_the_rest_to_the_picture() {
+        let mut state = state();
+        let place = run(&mut state, vec![vec![], vec![]]);
+        assert_eq!((place.left(), place.right()), (0.0, 500.0));
+        assert!(place.top() > 10.0 && place.bottom() < 490.0, "banner and status: {place}");
+        state.apply(Action::Panel);
+        assert_eq!(run(&mut state, vec![vec![], vec![]]), Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 500.0)));
+    }
+
+    #[test]
+    fn hands_over_the_picture_move_the_camera_and_over_the_panel_they_do_not() {
+        let drag = |from: Pos2| {
+            let to = from + Vec2::new(30.0, 0.0);
+            vec![
+                vec![egui::Event::PointerMoved(from)],
+                vec![button(from, true)],
+                vec![egui::Event::PointerMoved(to)],
+                vec![button(to, false)],
+            ]
+        };
+        let mut state = state();
+        let eye = state.navigator.eye;
+        run(&mut state, drag(Pos2::new(700.0, 420.0)));
+        assert_eq!(state.navigator.eye, eye, "the panel is no picture");
+        run(&mut state, drag(Pos2::new(200.0, 200.0)));
+        assert_ne!(state.navigator.eye, eye);
+        // The line is nearer than the camera to a hand that grabs it.
+        state.settings.split = true;
+        let (eye, line) = (state.navigator.eye, state.settings.line);
+        run(&mut state, drag(Pos2::new(250.0, 200.0)));
+        assert_eq!(state.navigator.eye, eye);
+        assert!((state.settings.line - line - 30.0 / 500.0).abs() < 1e-3, "{}", state.settings.line);
+    }
+
+    #[test]
+    fn keys_reach_the_state_but_not_while_somebody_types() {
+        let mut state = state();
+        run(&mut state, vec![vec![press(egui::Key::Num4)], vec![press(egui::Key::H)]]);
+        assert_eq!((state.settings.view, state.help), (View::Depth, true));
+        state.apply(Action::Escape);
+        // Tab goes to the first control; from then on letters are its own.
+        let mut tabbed = vec![vec![]];
+        tabbed.extend((0..3).map(|_| vec![press(egui::Key::Tab)]));
+        tabbed.push(vec![press(egui::Key::Num1)]);
+        run(&mut state, tabbed);
+        assert_eq!(state.settings.view, View::Depth);
+    }
+}
