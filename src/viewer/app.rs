@@ -78,6 +78,8 @@ pub struct App {
     pub script: Option<Script>,
     pub scripted: Vec<egui::Event>,
     next_step: Instant,
+    /// Frames drawn when the last step was made.
+    step_frame: u64,
     pub screenshot: Option<PathBuf>,
     watch: Watch,
     next_look: Instant,
@@ -157,6 +159,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         script,
         scripted: Vec::new(),
         next_step: now,
+        step_frame: 0,
         screenshot: None,
         watch: Watch::default(),
         next_look: now,
@@ -242,7 +245,8 @@ impl App {
         let fresh = self.script.is_some() || saved::path().is_none_or(|p| !p.exists());
         if fresh && self.stage.as_ref().is_some_and(|s| s.gpu.is_software()) {
             // A frame takes as long as sixteen on the slowest card.
-            (self.state.settings.samples, self.state.settings.spp) = (1, 32);
+            self.state.settings.samples = 1;
+            self.state.settings.spp = if self.script.is_some() { 8 } else { 32 };
         }
         let spec = self.options.scene.clone().unwrap_or_else(|| "interior".into());
         self.start(Request::Load(spec));
@@ -753,8 +757,11 @@ impl ApplicationHandler<Event> for App {
         if self.judge_at.is_some_and(|at| at <= now) {
             self.redraw = true;
         }
-        if self.script.is_some() && now >= self.next_step && !self.requested && !self.redraw {
+        // One frame after the other: also where held keys let the window draw without end.
+        let seen = self.frames > self.step_frame || !(self.requested || self.redraw);
+        if self.script.is_some() && now >= self.next_step && self.scripted.is_empty() && seen {
             self.next_step = now + STEP;
+            self.step_frame = self.frames;
             self.step(event_loop);
         }
         if self.redraw {

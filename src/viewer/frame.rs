@@ -18,6 +18,12 @@ impl App {
         if !screen.fit(&device) {
             return;
         }
+        if !screen.is_alive(&stage.gpu.queue) {
+            // Brings the news, which then builds everything anew.
+            let _ = device.poll(wgpu::PollType::Poll);
+            self.wake(Duration::from_millis(50));
+            return;
+        }
         let started = Instant::now();
         let mut raw = screen.input.take_egui_input(&screen.window);
         if self.script.is_some() {

@@ -14,6 +14,8 @@ pub struct Screen {
     pub input: egui_winit::State,
     pub painter: egui_wgpu::Renderer,
     pub profiler: Option<GpuProfiler>,
+    /// Written to ask whether the device still answers.
+    probe: wgpu::Buffer,
 }
 
 /// What acquiring the next picture of the window gave.
@@ -62,7 +64,18 @@ impl Screen {
         let timed = gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         let settings = GpuProfilerSettings { enable_debug_groups: false, ..Default::default() };
         let profiler = timed.then(|| GpuProfiler::new(&gpu.device, settings).ok()).flatten();
-        Ok((Self { window, instance, surface, config, input, painter, profiler }, Arc::new(gpu)))
+        let probe = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("viewer.probe"),
+            size: 16,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Ok((Self { window, instance, surface, config, input, painter, profiler, probe }, Arc::new(gpu)))
+    }
+
+    /// False once the device is lost. egui's painter would panic then, so it is asked first.
+    pub fn is_alive(&self, queue: &wgpu::Queue) -> bool {
+        wgpu::BufferSize::new(16).is_some_and(|size| queue.write_buffer_with(&self.probe, 0, size).is_some())
     }
 
     /// Format of the window's pictures.

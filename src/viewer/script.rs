@@ -160,6 +160,7 @@ impl Script {
                 }
                 continue;
             }
+            tracing::info!("step {i}");
             self.act(&step, &mut turn);
             return turn;
         }
