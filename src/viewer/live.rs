@@ -59,7 +59,10 @@ pub struct Found {
 
 /// What stays from one subject to the next.
 #[derive(Clone, Default)]
-pub struct Kept(Arc<Mutex<Option<(u64, Kernel, Arc<ReferenceScene>)>>>);
+pub struct Kept(Arc<Mutex<Option<Packed>>>);
+
+/// Version of the scene, the compiled kernels, the packed scene.
+type Packed = (u64, Kernel, Arc<ReferenceScene>);
 
 /// The thread; it ends soon after this is dropped.
 pub struct Live {

@@ -155,7 +155,7 @@ impl Navigator {
 
     fn fit_from(&mut self, scene: &Scene, aspect: f32, direction: Vec3) {
         let (middle, radius) = sphere(scene);
-        let tangent = (0.5 * self.fov.to_radians()).tan() * aspect.min(1.0).max(0.05);
+        let tangent = (0.5 * self.fov.to_radians()).tan() * aspect.clamp(0.05, 1.0);
         let distance = radius / tangent.atan().sin().max(1e-3);
         self.target = middle;
         self.eye = middle + direction * distance;

@@ -180,7 +180,7 @@ fn methods_and_the_live_reference_side_by_side() {
         { "screenshot": "error.png" },
         // Another camera begins anew.
         { "key": "1" }, { "key": "V" }, { "wait": 60 }, { "wait": "idle" }, { "expect": { "/reference/finished": true } },
-        { "key": "0" }, { "wait": "idle" }, { "expect": { "/feature": "direct.1" } },
+        { "key": "0" }, { "key": "0" }, { "wait": "idle" }, { "expect": { "/view": "feature", "/feature": "direct.1" } },
     ]);
     let out = session(&display, dir.path(), script, &["cornell", "--method", "direct", "--size", "160x120"]);
     succeeds(&out);

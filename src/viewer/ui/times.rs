@@ -4,7 +4,7 @@ use super::{BLUE, Facts, ORANGE, SKY, VERMILLION};
 use crate::viewer::choice::{Side, Source};
 use crate::viewer::state::{Action, State};
 use crate::viewer::stats::{CURVE, Row, Spread, Track};
-use egui::{Align2, Color32, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, Ui, Vec2};
+use egui::{Align2, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, Ui, Vec2};
 
 /// Passes, curve, CPU, and what the overlay itself costs.
 pub fn times(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
@@ -180,7 +180,7 @@ pub fn frontier(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
         if response.has_focus() || response.hovered() {
             ui.painter().circle_stroke(p, 8.0, Stroke::new(1.5, visuals.text_color()));
         }
-        let text = if now { Color32::from(visuals.strong_text_color()) } else { visuals.text_color() };
+        let text = if now { visuals.strong_text_color() } else { visuals.text_color() };
         ui.painter().text(p + Vec2::new(0.0, -7.0), Align2::CENTER_BOTTOM, source.name(), font.clone(), text);
         if response.on_hover_text(format!("{}: {ms:.2} ms here, {error} % there", source.name())).clicked() {
             state.apply(Action::Source(Side::Left, source));
