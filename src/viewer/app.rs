@@ -246,7 +246,7 @@ impl App {
         if fresh && self.stage.as_ref().is_some_and(|s| s.gpu.is_software()) {
             // A frame takes as long as sixteen on the slowest card.
             self.state.settings.samples = 1;
-            self.state.settings.spp = if self.script.is_some() { 8 } else { 32 };
+            self.state.settings.spp = if self.script.is_some() { 4 } else { 32 };
         }
         let spec = self.options.scene.clone().unwrap_or_else(|| "interior".into());
         self.start(Request::Load(spec));
