@@ -20,13 +20,31 @@ use super::rung::Cost;
 use super::{GiError, Inputs};
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
-use crate::net::gpu::Network;
+use crate::net::gpu::{self, Network, Tuned};
+use std::sync::Arc;
 
 /// What the host chooses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// Width and height of the pictures to come, pixels. A recording of another size rebuilds the buffers.
     pub size: [u32; 2],
+}
+
+/// A network as a frame's method: what was trained, and how it runs.
+#[derive(Debug, Clone)]
+pub struct Neural {
+    /// The trained numbers.
+    pub weights: Weights,
+    /// Kernels and storage. Dropout does not belong into frames; with a seed every frame has the same.
+    pub network: gpu::Options,
+    /// What a tuner has found on this device; empty without one.
+    pub tuned: Arc<Tuned>,
+}
+
+impl From<Weights> for Neural {
+    fn from(weights: Weights) -> Self {
+        Self { weights, network: gpu::Options::default(), tuned: Arc::default() }
+    }
 }
 
 /// The meaning of the output that reconstruction undoes: y = ln(E/π / s).
@@ -38,7 +56,7 @@ const MEANING: &str = "log_irradiance_over_exposure";
 pub struct NeuralGi {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    weights: Weights,
+    neural: Neural,
     features: FeatureSet,
     inputs: InputGroup,
     exposure: ExposurePass,
@@ -77,15 +95,28 @@ impl NeuralGi {
         weights: &Weights,
         options: Options,
     ) -> Result<Self, GiError> {
-        let features = check_weights(weights)?;
+        Self::with(device, queue, &weights.clone().into(), options)
+    }
+
+    /// As [`NeuralGi::new`], told how the network runs.
+    ///
+    /// # Errors
+    /// As [`NeuralGi::new`].
+    pub fn with(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        neural: &Neural,
+        options: Options,
+    ) -> Result<Self, GiError> {
+        let features = check_weights(&neural.weights)?;
         let inputs = InputGroup::new(device);
         let exposure = ExposurePass::new(device, &inputs);
         let reconstruct = ReconstructPass::new(device, &inputs);
-        let rebuilt = Rebuilt::new(device, queue, weights, &features, &inputs, &exposure, options.size)?;
+        let rebuilt = Rebuilt::new(device, queue, neural, &features, &inputs, &exposure, options.size)?;
         Ok(Self {
             device: device.clone(),
             queue: queue.clone(),
-            weights: weights.clone(),
+            neural: neural.clone(),
             features,
             inputs,
             exposure,
@@ -133,7 +164,7 @@ impl NeuralGi {
 
     fn resize(&mut self, size: [u32; 2]) -> Result<(), GiError> {
         self.rebuilt =
-            Rebuilt::new(&self.device, &self.queue, &self.weights, &self.features, &self.inputs, &self.exposure, size)?;
+            Rebuilt::new(&self.device, &self.queue, &self.neural, &self.features, &self.inputs, &self.exposure, size)?;
         self.rebuilds += 1;
         self.forget();
         Ok(())
@@ -157,6 +188,11 @@ impl NeuralGi {
     /// The exposure of the last recording, see [`super::exposure::read`].
     pub fn exposure_buffer(&self) -> &wgpu::Buffer {
         self.exposure.buffer()
+    }
+
+    /// How the network runs.
+    pub fn network(&self) -> &Network {
+        &self.rebuilt.network
     }
 
     /// The features that the weights use.
@@ -196,7 +232,7 @@ impl Rebuilt {
     fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
-        weights: &Weights,
+        neural: &Neural,
         features: &FeatureSet,
         inputs: &InputGroup,
         exposure: &ExposurePass,
@@ -204,8 +240,9 @@ impl Rebuilt {
     ) -> Result<Self, GiError> {
         pack::feature_bytes(device, features, size)?;
         let cells = cells_of(size);
-        let network =
-            Network::new(device, queue, weights, cells).map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
+        let Neural { weights, network, tuned } = neural;
+        let network = Network::tuned(device, queue, weights, cells, *network, tuned.clone())
+            .map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
         let pack = PackPass::new(device, inputs, exposure, features, network.input().resource());
         Ok(Self { size, network, pack })
     }
