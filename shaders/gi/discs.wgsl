@@ -6,6 +6,13 @@
 // Squares, then the four surfels of each.
 @group(0) @binding(2) var<storage, read_write> discs: array<Disc>;
 
+// What the camera's surroundings send to it, for reflections: six faces side by side. rgb: radiance; a: metres from the
+// camera.
+@group(0) @binding(3) var surroundings: texture_storage_2d<rgba16float, write>;
+
+// The largest finite half.
+const HALF_MAX: f32 = 65504.0;
+
 // A square is opened nearer than the root of so many times the largest squared distance of its surfels from their middle
 // (at 10, a little over one width of a flat one).
 const REACH: f32 = 10.0;
@@ -42,8 +49,21 @@ fn join(@builtin(global_invocation_id) id: vec3u) {
     if id.x < SQUARES { join_square(id.x, false); }
 }
 
-// For the gather: what they send beyond what reflective shadow maps hold.
+fn paint(square: u32) {
+    let half = SIDE / 2u;
+    let face = square / (half * half);
+    let at = vec2u(square % half, square / half % half);
+    for (var k = 0u; k < 4u; k++) {
+        let s = 4u * square + k;
+        let texel = min(vec4f(sent[s].rgb, surfels[s].range), vec4f(HALF_MAX));
+        textureStore(surroundings, 2u * at + vec2u(face * SIDE + (k & 1u), k >> 1u), texel);
+    }
+}
+
+// For the gather: what they send beyond what reflective shadow maps hold. For reflections: all of it.
 @compute @workgroup_size(64)
 fn finish(@builtin(global_invocation_id) id: vec3u) {
-    if id.x < SQUARES { join_square(id.x, true); }
+    if id.x >= SQUARES { return; }
+    join_square(id.x, true);
+    paint(id.x);
 }

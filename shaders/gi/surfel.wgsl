@@ -10,7 +10,8 @@ struct Surfel {
     // 1 for a window.
     window: f32,
     albedo: vec3f,
-    pad0: f32,
+    // From the camera, metres.
+    range: f32,
     // What it sends by itself: emission, and albedo times direct light; the sky's radiance through a window.
     own: vec3f,
     pad1: f32,

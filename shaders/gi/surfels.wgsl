@@ -111,6 +111,7 @@ fn light_up(@builtin(global_invocation_id) id: vec3u) {
         s.window = 1.0;
         s.own = environment_radiance(ray);
     }
+    s.range = distance(s.position, face.eye);
     surfels[id.x] = s;
     sent[id.x] = vec4f(s.own, 0.0);
 }

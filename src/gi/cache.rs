@@ -149,6 +149,10 @@ impl Rung for WorldGi {
         self.upsample.record(recorder, &bound, &self.cells, light, output)
     }
 
+    fn surroundings(&self) -> Option<&wgpu::TextureView> {
+        self.options.around.then(|| self.surfels.surroundings())
+    }
+
     fn forget(&mut self) {
         self.inputs.forget();
         self.emitters.forget();

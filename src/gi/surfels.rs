@@ -7,7 +7,7 @@ use super::view_cache::ViewCache;
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
 use crate::render::around;
-use crate::render::tool::{self, LOAD, READ, READ_WRITE, UNIFORM};
+use crate::render::tool::{self, LOAD, READ, READ_WRITE, STORE_HALF, UNIFORM};
 
 /// Texels of the cube.
 pub const SURFELS: u32 = 6 * around::SIDE * around::SIDE;
@@ -15,6 +15,8 @@ pub const SURFELS: u32 = 6 * around::SIDE * around::SIDE;
 const SURFEL_BYTES: u64 = 80;
 /// Bytes of a `Disc`.
 const DISC_BYTES: u64 = 48;
+/// Width and height of the picture of the surroundings: six faces side by side.
+const PAINTED: [u32; 2] = [6 * around::SIDE, around::SIDE];
 
 /// How many surfels a shader gathers, as WGSL.
 pub fn prelude(surfels: u32) -> String {
@@ -35,6 +37,7 @@ pub struct SurfelsPass {
     surfels: wgpu::Buffer,
     sent: wgpu::Buffer,
     discs: wgpu::Buffer,
+    surroundings: wgpu::TextureView,
     rounds: u32,
 }
 
@@ -44,7 +47,7 @@ impl SurfelsPass {
         let types = [READ, READ, READ, READ, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE, UNIFORM];
         let stage = wgpu::ShaderStages::COMPUTE;
         let layout = tool::layout(device, "gi.surfels", stage, &types);
-        let join_layout = tool::layout(device, "gi.discs", stage, &[READ, READ, READ_WRITE]);
+        let join_layout = tool::layout(device, "gi.discs", stage, &[READ, READ, READ_WRITE, STORE_HALF]);
         let exchange_layout = tool::layout(device, "gi.exchange", stage, &[READ, READ, READ_WRITE]);
         let buffer = |label, size| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -57,8 +60,21 @@ impl SurfelsPass {
         let surfels = buffer("gi.surfels", u64::from(SURFELS) * SURFEL_BYTES);
         let sent = buffer("gi.sent", u64::from(SURFELS) * 16);
         let discs = buffer("gi.discs", u64::from(SURFELS + SURFELS / 4) * DISC_BYTES);
-        let resources = [&surfels, &sent, &discs].map(|b| b.as_entire_binding());
-        let join_group = tool::group(device, "gi.discs", &join_layout, &resources);
+        let surroundings = device
+            .create_texture(&wgpu::TextureDescriptor {
+                label: Some("gi.surroundings"),
+                size: wgpu::Extent3d { width: PAINTED[0], height: PAINTED[1], depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba16Float,
+                usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            })
+            .create_view(&Default::default());
+        let [a, b, c] = [&surfels, &sent, &discs].map(|b| b.as_entire_binding());
+        let painted = wgpu::BindingResource::TextureView(&surroundings);
+        let join_group = tool::group(device, "gi.discs", &join_layout, &[a, b, c, painted]);
         let resources = [&surfels, &discs, &sent].map(|b| b.as_entire_binding());
         let exchange_group = tool::group(device, "gi.exchange", &exchange_layout, &resources);
         Self {
@@ -74,6 +90,7 @@ impl SurfelsPass {
             surfels,
             sent,
             discs,
+            surroundings,
             rounds,
         }
     }
@@ -134,6 +151,11 @@ impl SurfelsPass {
         &self.discs
     }
 
+    /// What the surroundings send to the camera, for reflections: [`super::rung::Rung::surroundings`].
+    pub fn surroundings(&self) -> &wgpu::TextureView {
+        &self.surroundings
+    }
+
     /// Lets go of texture views and of the buffers bound with them.
     pub fn forget(&mut self) {
         self.groups.clear();
@@ -146,7 +168,7 @@ impl SurfelsPass {
 
     /// GPU memory, bytes.
     pub fn bytes(&self) -> u64 {
-        self.surfels.size() + self.sent.size() + self.discs.size()
+        self.surfels.size() + self.sent.size() + self.discs.size() + 8 * u64::from(PAINTED[0] * PAINTED[1])
     }
 
     /// What the passes cost.

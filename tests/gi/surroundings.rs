@@ -4,7 +4,9 @@
 use crate::common;
 use crate::world::{Block, GREY, difference, hall, light, mean, renderer, scene};
 use bouncelight::gi::Method;
+use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::scene::environment::EnvironmentImage;
+use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{AlphaMode, Camera, Scene};
 use std::sync::Arc;
 
@@ -86,4 +88,29 @@ fn a_shining_wall_behind_the_camera_lights_the_room() {
     // Negative controls: a wall that does not shine, and a method that knows lights only.
     assert!(none.iter().all(|x| *x == 0.0));
     assert_eq!(mean(&light(&gpu, &mut renderer(&gpu, [48, 32], Method::Rsm), &build(1.0))), 0.0);
+}
+
+#[test]
+fn a_mirror_shows_the_glowing_wall_behind_the_camera() {
+    let Some(gpu) = common::gpu() else { return };
+    // The wall before the camera mirrors the one behind it, which glows red and reflects nothing.
+    let mut room = room(0.0);
+    let glow = 2.0;
+    (room.materials[4].emissive, room.materials[4].base_color) = ([glow, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]);
+    (room.materials[3].metallic, room.materials[3].roughness, room.materials[3].base_color) = (1.0, 0.05, [1.0; 4]);
+    room.cameras = vec![Camera::look_at([0.0, 1.5, 2.0], [0.0, 1.5, -3.0], 0.6)];
+    let seen = |method| {
+        let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &room).expect("the scene fits");
+        let options = CaptureOptions { layers: &[Layer::GlossInd], ..Default::default() };
+        let mut renderer = renderer(&gpu, [48, 32], method);
+        let frame = capture(&gpu, &mut renderer, &uploaded, &room.cameras[0], options).expect("the frame is drawn");
+        let data = &frame.layer(Layer::GlossInd).expect("it was asked for").data;
+        // The picture's middle: red, green, blue.
+        data.chunks_exact(3).nth(16 * 48 + 24).expect("inside").to_vec()
+    };
+    let cache = seen(Method::Cache);
+    assert!((cache[0] / glow - 1.0).abs() < 0.05 && cache[1] == 0.0 && cache[2] == 0.0, "{cache:?}");
+    // Negative control: a method that knows the screen does not know the wall.
+    let ssgi = seen(Method::Ssgi);
+    assert!(ssgi[0] < 0.5 * glow, "{ssgi:?}");
 }
