@@ -84,6 +84,8 @@ pub struct Kernel {
     pub layer: Option<ConvLayer>,
     /// For convolutions of an enlarged input whose taps are merged: the factor and the padding before.
     pub enlarged: Option<(u32, [i32; 2])>,
+    /// Weights of 3×3 taps come transformed for Winograd's F(2, 3) along rows: 3×4 matrices.
+    pub pairs: bool,
     /// For blocked convolutions.
     pub permutation: Option<Permutation>,
     /// It reads its input and its skip from the mirror.
@@ -127,6 +129,7 @@ impl Kernel {
             filter: None,
             layer: None,
             enlarged: None,
+            pairs: false,
             permutation: None,
             mirror: false,
             vectors: 0,
@@ -230,6 +233,8 @@ impl Kernel {
         let size = [out.width, out.height];
         let layer = ConvLayer { filter, out_vectors: out.vectors(), size, precision: plan.precision };
         let permutation = layer.permutation(choice.variant, choice.tuned, plan, choice.facts);
+        self.pairs = row && permutation.is_some_and(|p| p.weights == Source::Lanes);
+        let filter = if self.pairs { Filter { taps: [3, 4], ..filter } } else { filter };
         (self.filter, self.layer, self.permutation) = (Some(filter), Some(layer), permutation);
         let Permutation { weights, mirror, vectors } = permutation.unwrap_or(Permutation {
             weights: Source::Storage,

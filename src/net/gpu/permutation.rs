@@ -151,7 +151,8 @@ impl Layer {
         let vectors = wanted.vectors.clamp(1, self.out_vectors.clamp(1, 4));
         let mirror = mirrors(plan);
         let matrices = self.filter.matrices(vectors);
-        let texels = matrices * u64::from(self.out_vectors.div_ceil(vectors)) * 4;
+        // Weights of 3×3 taps take a third more when they are transformed.
+        let texels = (matrices * u64::from(self.out_vectors.div_ceil(vectors)) * 4).div_ceil(3) * 4;
         let weights = match wanted.weights {
             Source::Lanes if facts.lanes && mirror && texels.div_ceil(ROW) <= MAX_ROWS => Source::Lanes,
             Source::Storage => Source::Storage,
