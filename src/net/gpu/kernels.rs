@@ -162,7 +162,16 @@ impl Kernel {
                     .collect();
                 kernel.convolution(&mut prelude, filter, &phases, out, false, plan, choice)
             }
-            Kind::Upsample => "upsample".into(),
+            Kind::Upsample => {
+                let double = [input.shape.width * 2, input.shape.height * 2] == [out.width, out.height];
+                prelude.add("DOUBLE", double.into());
+                if double {
+                    // Blocks of two by two begin one pixel before the picture.
+                    let blocks = |edge: u32, group: u32| (edge / 2 + 1).div_ceil(group);
+                    kernel.groups = [blocks(out.width, GROUP[0]), blocks(out.height, GROUP[1]), out.vectors()];
+                }
+                "upsample".into()
+            }
             Kind::Nearest => "nearest".into(),
             Kind::Copy => "add".into(),
             Kind::Window { left, top, clamp, channel } => {
