@@ -8,6 +8,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
     let common = lines(&[
         ("OUT_CHANNELS", 14),
         ("OUT_VECTORS", 4),
+        ("GROUP_VECTORS", 4),
         ("OUT_PITCH", 8),
         ("IN_VECTORS", 6),
         ("IN_PITCH", 6),

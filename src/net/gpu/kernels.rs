@@ -42,8 +42,10 @@ pub struct Filter {
     pub spread: u32,
     /// Factor by which the input is enlarged.
     pub nearest: u32,
-    /// Four-channel vectors read.
+    /// Four-channel vectors read for each output.
     pub in_vectors: u32,
+    /// Four-channel vectors written that read the same: those of a group of channels, or all.
+    pub group_vectors: u32,
 }
 
 impl Filter {
@@ -138,23 +140,27 @@ impl Kernel {
             blocks_per_part: 0,
         };
         let shader: String = match step.kind {
-            Kind::Conv { kernel: [h, w], stride, padding, nearest } => {
+            Kind::Conv { kernel: [h, w], stride, padding, nearest, groups } => {
+                // Groups of whole vectors read their own; others run as one, with zeros for what they do not see.
+                let whole = [input.shape.channels, out.channels].iter().all(|n| n.is_multiple_of(4 * groups));
+                let groups = if whole && choice.variant != Variant::Plain { groups } else { 1 };
+                let [in_vectors, group_vectors] = [input.shape, out].map(|s| s.vectors() / groups);
                 let pad = [padding.left as i32, padding.top as i32];
                 if nearest > 1 && stride == 1 && choice.variant != Variant::Plain {
                     let (taps, phases) = merged([h, w], pad, nearest as i32);
-                    let in_vectors = input.shape.vectors();
-                    let filter = Filter { taps, stride, spread: nearest, nearest: 1, in_vectors };
+                    let filter = Filter { taps, stride, spread: nearest, nearest: 1, in_vectors, group_vectors };
                     kernel.enlarged = Some((nearest, pad));
                     kernel.convolution(&mut prelude, filter, &phases, out, false, plan, choice)
                 } else {
-                    let filter = Filter { taps: [h, w], stride, spread: 1, nearest, in_vectors: input.shape.vectors() };
+                    let filter = Filter { taps: [h, w], stride, spread: 1, nearest, in_vectors, group_vectors };
                     let row = ([h, w], stride, padding) == ([3, 3], 1, Padding::all(1));
                     kernel.convolution(&mut prelude, filter, &[([0, 0], pad)], out, row, plan, choice)
                 }
             }
             Kind::Transposed { kernel: edges, stride, padding } => {
                 let taps = edges.map(|k| k.div_ceil(stride));
-                let filter = Filter { taps, stride: 1, spread: stride, nearest: 1, in_vectors: input.shape.vectors() };
+                let [in_vectors, group_vectors] = [input.shape, out].map(Shape::vectors);
+                let filter = Filter { taps, stride: 1, spread: stride, nearest: 1, in_vectors, group_vectors };
                 let pad = |phase: u32, taps: u32| taps as i32 - 1 - ((phase + padding) / stride) as i32;
                 let phases: Vec<_> = (0..stride * stride)
                     .map(|i| [i % stride, i / stride])
@@ -269,6 +275,8 @@ impl Kernel {
             })
         };
         self.parts = phases.iter().copied().flat_map(part).collect();
+        prelude.set("IN_VECTORS", filter.in_vectors);
+        prelude.add("GROUP_VECTORS", filter.group_vectors);
         prelude.add("KERNEL_H", filter.taps[0]);
         prelude.add("KERNEL_W", filter.taps[1]);
         prelude.add("STRIDE", filter.stride);

@@ -162,12 +162,15 @@ impl<'a> Layer<'a> {
             let first = block * 4 * vectors;
             let bias = |i: usize| if i < 4 * vectors { self.bias.get(first + i).copied().unwrap_or(0.0) } else { 0.0 };
             (0..16).for_each(|i| put(bias(i)));
+            // The channels that the block's group reads; all of them where groups run as one.
+            let grouped = self.filter.in_vectors as usize * 4 < self.in_channels;
+            let begin = if grouped { first / self.group[1] * self.group[0] } else { 0 };
             for c in 0..self.filter.in_vectors as usize {
                 for ky in 0..self.filter.taps[0] as usize {
                     for kx in 0..self.filter.taps[1] as usize {
                         // Column-major: column k takes input channel k to the four outputs.
                         for k in 0..16 * vectors {
-                            put(self.at(part, first + k / 16 * 4 + k % 4, c * 4 + k % 16 / 4, ky, kx));
+                            put(self.at(part, first + k / 16 * 4 + k % 4, begin + c * 4 + k % 16 / 4, ky, kx));
                         }
                     }
                 }
