@@ -49,7 +49,7 @@ fn every_shader_validates_in_every_permutation() {
         (shaders::RENDER.len(), shaders::GI.len(), shaders::NET.len(), shaders::REFERENCE.len()),
         (8, 21, 47, 3)
     );
-    assert_eq!(permutations.len(), 466);
+    assert_eq!(permutations.len(), 483);
 }
 
 #[test]
