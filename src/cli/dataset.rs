@@ -93,7 +93,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make the folder {}", args.out.display()))?;
     interrupt::install()?;
     let gpu = global.open_gpu()?;
-    let options = RendererOptions { method: Method::Direct, ..Default::default() };
+    let options = RendererOptions { method: Method::Cache, ..Default::default() };
     let renderer = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
     let mut writer = Writer { gpu, renderer, out: args.out.clone() };
     match (&args.rooms, &args.scene) {

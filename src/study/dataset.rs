@@ -46,15 +46,16 @@ pub struct Sample {
     pub depth: Vec<f32>,
 }
 
-/// Draws `camera`'s view once, unjittered, and reads what training needs of it; any method will do, the network's
-/// inputs do not depend on it. Blocks.
+/// Draws `camera`'s view once, unjittered, and reads what training needs of it. `renderer`'s method is `cache`, whose answer is
+/// one of the network's inputs. Blocks.
 pub fn sample(gpu: &Gpu, renderer: &mut Renderer, scene: &SceneGpu, camera: &Camera) -> Result<Sample, DatasetError> {
     let view = View::new(camera, renderer.size(), [0.0; 2]);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view)?;
     gpu.queue.submit([encoder.finish()]);
     let gi_inputs = renderer.gi_inputs(&view, scene.environment.radiance);
-    let inputs = read_features(&gpu.device, &gpu.queue, &FeatureSet::all(), &gi_inputs)?;
+    let guess = &renderer.targets().indirect.view;
+    let inputs = read_features(&gpu.device, &gpu.queue, &FeatureSet::all(), &gi_inputs, guess)?;
     let cells = Cells { size: renderer.size(), low: inputs.cells };
     let targets = renderer.targets();
     let read = |texture: &wgpu::Texture| readback::texture(&gpu.device, &gpu.queue, texture);

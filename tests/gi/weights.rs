@@ -1,14 +1,16 @@
-//! A tiny weights file in memory: a 1×1 and a 3×3 convolution on all features.
+//! A tiny weights file in memory: a 1×1 and a 3×3 convolution on all features of the G-buffer.
 
-use bouncelight::gi::features::FEATURES;
+use bouncelight::gi::features::{FEATURES, FeatureSet};
 use safetensors::tensor::{Dtype, TensorView};
 
 use crate::shot::Random;
 
 /// The bytes of the file. `replace` changes one word of its document, for files that must be refused.
 pub fn bytes(replace: Option<(&str, &str)>) -> Vec<u8> {
+    let screen = FeatureSet::screen();
+    let used = FEATURES.iter().filter(|f| screen.offset(f.name).is_some());
     let inputs: Vec<String> =
-        FEATURES.iter().map(|f| format!(r#"{{"name": "{}", "channels": {}}}"#, f.name, f.channels)).collect();
+        used.map(|f| format!(r#"{{"name": "{}", "channels": {}}}"#, f.name, f.channels)).collect();
     let mut document = format!(
         r#"{{"version": 1, "licence": "CC0-1.0", "table": {{"name": "screen", "version": 1}}, "inputs": [{}],
             "cell": 4, "output": {{"tensor": "y", "meaning": "log_irradiance_over_exposure", "channels": 3}},

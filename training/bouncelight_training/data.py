@@ -156,7 +156,7 @@ def pairs_of(features_dir, cycles_dir, rooms):
 
 
 def build(features_dir, cycles_dir, out, rooms=None):
-    """Writes the split's cache and returns the mask report. Arrays: features f16 [n,21,h,w], target f16 [n,3,h,w] in units
+    """Writes the split's cache and returns the mask report. Arrays: features f16 [n,24,h,w], target f16 [n,3,h,w] in units
     of s, mask bool [n,h,w], scale f32 [n], room and view i32 [n], report (JSON text)."""
     pairs = pairs_of(features_dir, cycles_dir, rooms)
     columns = {key: [] for key in ("features", "target", "mask", "scale", "room", "view")}

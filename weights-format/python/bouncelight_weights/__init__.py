@@ -4,7 +4,7 @@ The specification is ../../README.md. `torch_graph` in this package (optional, n
 describes, so that the topology stands in one place: the list of operators.
 
     from bouncelight_weights import write, read, verify, unet
-    graph, output = unet(in_channels=21)
+    graph, output = unet(in_channels=24)
     write("net.safetensors", state_dict, document(graph, output, provenance={...}))
 """
 
@@ -32,7 +32,7 @@ def conv2d(name, input, output, in_channels, out_channels, kernel=3, stride=1, p
             "padding": kernel // 2 if padding is None else padding, "activation": activation, **rest}
 
 
-def unet(in_channels=21, widths=(16, 24, 32, 48), out_channels=3):
+def unet(in_channels=24, widths=(16, 24, 32, 48), out_channels=3):
     """The compact U-Net: (graph, output tensor's name). Additive skips, 1x1 before each upsampling, no normalisation."""
     graph, level = [], "input"
     channels = in_channels
