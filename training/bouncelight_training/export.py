@@ -16,8 +16,8 @@ import torch
 from .data import Split
 from .errors import TrainingError, reported
 from .features import TABLE, channels_of
-from .model import ANSWER, MEANING, compact_unet, flops, parameter_count
-from .train import Config, read_checkpoint, validate
+from .model import ANSWER, MEANING, flops, parameter_count
+from .train import Config, network, read_checkpoint, validate
 from .weights import GraphNet, WeightsError, document, read, write
 
 ODD_SIZES = [(37, 21), (5, 3), (1, 1)]
@@ -28,8 +28,7 @@ TARGETS = "Cycles 4.5, 256x128, 32 samples a pixel"
 
 def network_of(state):
     """The network of a checkpoint with its averaged weights."""
-    config = state["config"]
-    model = compact_unet(config["widths"], len(channels_of(config["features"])))
+    model = network(Config(**state["config"]))
     model.load_state_dict(state["average"])
     return model.eval()
 

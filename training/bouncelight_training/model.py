@@ -15,10 +15,10 @@ WIDTHS = (16, 24, 32, 48)
 MEANING, ANSWER = "gain_and_rest_on_cache", 6
 
 
-def compact_unet(widths=WIDTHS, channels=CHANNELS):
+def compact_unet(widths=WIDTHS, channels=CHANNELS, pointwise=0):
     """[n,24,h,w] features to [n,6,h,w] gain and rest, any h and w. The last layer starts with zero weights, so that an
-    untrained network changes nothing."""
-    model = GraphNet(*unet(channels, tuple(widths), ANSWER))
+    untrained network changes nothing. The first `pointwise` levels have 1x1 kernels."""
+    model = GraphNet(*unet(channels, tuple(widths), ANSWER, pointwise))
     for op in model.graph:
         if op["op"] == "conv2d":
             layer = model.get_submodule(op["name"])

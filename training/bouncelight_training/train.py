@@ -39,6 +39,7 @@ class Config:
     train: str = ""
     validation: str = ""
     widths: tuple = (16, 24, 32, 48)
+    pointwise: int = 0  # levels with 1x1 kernels
     features: tuple = NAMES  # what the network is given, of the table
     epochs: int = 60
     minutes: float = 0.0  # 0: as many epochs as above; else until this much training time is used
@@ -98,6 +99,11 @@ class Stop(Exception):
     """Somebody asked the run to end; its state is saved first."""
 
 
+def network(config):
+    """The untrained network of a configuration."""
+    return compact_unet(config.widths, len(channels_of(config.features)), config.pointwise)
+
+
 def start_from(model, path):
     """Loads a weights file's numbers into a network of the same graph."""
     try:
@@ -124,7 +130,7 @@ class Run:
             torch.set_num_threads(config.threads)
         self.device, self.commit = torch.device(config.device), commit()
         self.channels = channels_of(config.features)
-        self.model = compact_unet(config.widths, len(self.channels)).to(self.device, memory_format=torch.channels_last)
+        self.model = network(config).to(self.device, memory_format=torch.channels_last)
         if config.init:
             start_from(self.model, config.init)
         self.average = {name: p.detach().clone() for name, p in self.model.state_dict().items()}
@@ -221,7 +227,7 @@ class Run:
 
     def averaged(self):
         """The model with averaged weights."""
-        model = compact_unet(self.config.widths).to(self.device, memory_format=torch.channels_last)
+        model = network(self.config).to(self.device, memory_format=torch.channels_last)
         model.load_state_dict(self.average)
         return model.eval()
 
