@@ -1,4 +1,4 @@
-"""The compact U-Net: additive skips, no normalisation, no dropout, 3x3 convolutions and ReLU.
+"""The compact U-Net: additive skips, no normalisation, no dropout, 3x3 convolutions and leaky ReLU.
 
 The topology stands in one place, `bouncelight_weights.unet`, as the list of operators that is also exported; here it gets
 its starting weights and its meaning: a gain g and a rest r on what method `cache` answers,
@@ -12,17 +12,19 @@ from .features import CHANNELS, MOST_ADDED, MOST_GAIN, SLICES
 from .weights import GraphNet, unet
 
 WIDTHS = (16, 24, 32, 48)
+# Slope below 0. With 0 (ReLU) whole runs died: every unit of a layer below 0 for all pictures, and no gradient back.
+LEAK = 0.1
 MEANING, ANSWER = "gain_and_rest_on_cache", 6
 
 
 def compact_unet(widths=WIDTHS, channels=CHANNELS, pointwise=0):
     """[n,24,h,w] features to [n,6,h,w] gain and rest, any h and w. The last layer starts with zero weights, so that an
     untrained network changes nothing. The first `pointwise` levels have 1x1 kernels."""
-    model = GraphNet(*unet(channels, tuple(widths), ANSWER, pointwise))
+    model = GraphNet(*unet(channels, tuple(widths), ANSWER, pointwise, {"leaky_relu": LEAK}))
     for op in model.graph:
         if op["op"] == "conv2d":
             layer = model.get_submodule(op["name"])
-            nn.init.kaiming_normal_(layer.weight, nonlinearity="relu" if op["activation"] == "relu" else "linear")
+            nn.init.kaiming_normal_(layer.weight, nonlinearity="linear" if op["activation"] == "none" else "leaky_relu", a=LEAK)
             nn.init.zeros_(layer.bias)
     nn.init.zeros_(layer.weight)
     return model

@@ -95,6 +95,22 @@ class Toy(unittest.TestCase):
         self.assertEqual(int((~split.mask[0]).sum()), 2 * H)
         self.assertAlmostEqual(split.report["rejected"]["shadow"], 1 - split.report["kept"], places=6)
 
+    def test_own_light_needs_no_cycles(self):
+        folder = tempfile.mkdtemp(dir=self.folder)
+        write_views(folder, [6], 1)
+        path = os.path.join(folder, "features", "room0006_view0.safetensors")
+        features, out = os.path.join(folder, "features"), os.path.join(folder, "own.npz")
+        with self.assertRaisesRegex(TrainingError, "no traced light"):
+            data.build(features, None, out)
+        tensors = load_file(path)
+        tensors["light"] = np.full((3, H, W), 0.25, np.float32)
+        os.remove(path)
+        save_file(tensors, os.path.join(features, "varied0003_view0.safetensors"))
+        data.build(features, None, out)
+        split = data.Split(out)
+        self.assertEqual((int(split.room[0]), float(split.mask.mean())), (-4, 1.0))
+        np.testing.assert_allclose(split.target[0].astype(np.float32) * split.scale[0], 0.25, rtol=1e-3)
+
     def test_masks_see_what_is_wrong(self):
         folder = tempfile.mkdtemp(dir=self.folder)
         write_views(folder, [6], 1)
