@@ -44,13 +44,17 @@ struct Surface {
 
 // Light times weight (rgb) and weight (a) of one staged cell. A point of the same surface weighs 1. The tails are heavy on
 // purpose: where nothing agrees the least bad cell wins by ratio, without a branch and without a division by zero.
+//
+// A cell knows the light above its own horizon only. Where a pixel that looks elsewhere has nothing better, the cell's light
+// is taken for a direction between the two normals: never less than LEAST_COSINE towards the cell's.
 fn tap(here: Surface, at: i32, spatial: f32) -> vec4f {
     let found = points[at];
     let off_plane = dot(here.normal, found.xyz - here.position) / (PLANE_TOLERANCE * here.distance);
     let lorentz = 1.0 + min(off_plane * off_plane, 1e12);
-    let facing = max(pow(max(dot(here.normal, normals[at]), 0.0), NORMAL_POWER), NORMAL_FLOOR);
+    let cosine = dot(here.normal, normals[at]);
+    let facing = max(pow(max(cosine, 0.0), NORMAL_POWER), NORMAL_FLOOR);
     let weight = found.w * spatial * max(facing / (lorentz * lorentz), WEIGHT_FLOOR);
-    return vec4f(finite3(light_towards(lights[at], here.normal)) * weight, weight);
+    return vec4f(finite3(light_towards(lights[at], here.normal + max(LEAST_COSINE - cosine, 0.0) * normals[at])) * weight, weight);
 }
 
 // Tent-weighted sum over the 2r x 2r cells around `place` (in cells, from the first staged one).

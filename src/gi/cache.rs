@@ -15,13 +15,14 @@ use super::upsample::UpsamplePass;
 use super::{GiError, Inputs};
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
+use crate::scene::upload::LightGpu;
 
 /// How the world beyond the screen is gathered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// With the cube around the camera (`cache`); without it only the reflective shadow maps (`rsm`).
     pub around: bool,
-    /// Rounds of light exchange between surfels; rounded up to an even number.
+    /// Rounds of light exchange between surfels.
     pub rounds: u32,
     /// Resolution of the gather.
     pub side: CellSide,
@@ -50,6 +51,8 @@ pub struct WorldGi {
     upsample: UpsamplePass,
     gather: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
+    /// Bound where the host names no lights.
+    no_lights: wgpu::Buffer,
     /// Light of the cells and the group that writes it.
     light: Option<(wgpu::Buffer, wgpu::BindGroup)>,
     made: u64,
@@ -59,8 +62,8 @@ impl WorldGi {
     /// Makes pipelines, and buffers for pictures of `size` pixels.
     pub fn new(device: &wgpu::Device, size: [u32; 2], options: Options) -> Self {
         let inputs = InputGroup::new(device);
-        let mut entries: Vec<_> = (0..7).map(|i| storage_entry(i, i != 1)).collect();
-        entries.push(wgpu::BindGroupLayoutEntry { binding: 7, ty: crate::render::tool::UNIFORM, ..entries[0] });
+        let mut entries: Vec<_> = (0..6).map(|i| storage_entry(i, i != 1)).collect();
+        entries.push(wgpu::BindGroupLayoutEntry { binding: 6, ty: crate::render::tool::UNIFORM, ..entries[0] });
         let layout = device
             .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("gi.gather"), entries: &entries });
         let module = shaders::module_with(device, "gi.gather", &prelude(options));
@@ -69,6 +72,12 @@ impl WorldGi {
             emitters: EmittersPass::new(device),
             surfels: SurfelsPass::new(device, options.rounds),
             cells: CellsPass::new(device, &inputs, options.side, size),
+            no_lights: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("gi.no_lights"),
+                size: size_of::<LightGpu>() as u64,
+                usage: wgpu::BufferUsages::STORAGE,
+                mapped_at_creation: false,
+            }),
             upsample: UpsamplePass::new(device, &inputs, options.side),
             device: device.clone(),
             inputs,
@@ -96,9 +105,8 @@ impl WorldGi {
             &light,
             self.emitters.fine(),
             self.emitters.blocks(),
-            self.surfels.surfels(),
-            self.surfels.sent(),
-            self.surfels.sky(),
+            self.emitters.coarse(),
+            self.surfels.discs(),
             self.emitters.counts(),
         ]
         .map(|b| b.as_entire_binding());
@@ -118,16 +126,17 @@ impl Rung for WorldGi {
         super::ambient::check_output(output, inputs.size)?;
         let world = inputs.world.as_ref().ok_or(GiError::World)?;
         let bound = self.inputs.bind(queue, inputs)?;
-        let fresh = self.emitters.fit(queue, world);
+        let lights = inputs.lights.map_or(&self.no_lights, |l| l.buffer);
+        let fresh = self.emitters.fit(queue, world, inputs.lights.map_or(0, |l| l.count));
         if self.cells.fit(inputs.size) || fresh || self.light.is_none() {
             self.upsample.forget();
             self.light = Some(self.light(inputs.size));
             self.made += 1;
         }
         let (light, group) = self.light.as_ref().expect("made above");
-        self.emitters.record(recorder, world);
+        self.emitters.record(recorder, world, lights);
         if self.options.around {
-            self.surfels.record(recorder, world, self.emitters.counts());
+            self.surfels.record(recorder, world, lights, self.emitters.counts());
         }
         self.cells.record(recorder, &bound);
         let [w, h] = self.options.side.grid(inputs.size);

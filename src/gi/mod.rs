@@ -115,12 +115,10 @@ pub struct World<'a> {
     pub rsm_most_blocks: u32,
     /// The cube around the camera: faces +X, −X, +Y, −Y, +Z, −Z side by side.
     pub around: Atlas<'a>,
-    /// `scene::upload::LightGpu` of each light, a storage buffer.
-    pub lights: &'a wgpu::Buffer,
-    /// Lights.
-    pub light_count: u32,
     /// Lat-long picture of the surroundings, `Rgba32Float`; one texel for a constant sky.
     pub environment: &'a wgpu::TextureView,
+    /// Lowest and highest corner of the scene, metres.
+    pub bounds: [[f32; 3]; 2],
     /// The scene's small objects.
     pub clutter: crate::scene::upload::Clutter,
 }

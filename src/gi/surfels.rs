@@ -1,4 +1,5 @@
-//! The cube around the camera as surfels: lit by the lights, exchanging light for a few rounds, with the sky between.
+//! The cube around the camera as surfels: lit by the lights, exchanging light for a few rounds, with windows to the sky
+//! between; and as discs for the gather.
 
 use super::World;
 use super::rung::Cost;
@@ -10,43 +11,41 @@ use crate::render::tool::{self, LOAD, READ, READ_WRITE, UNIFORM};
 
 /// Texels of the cube.
 pub const SURFELS: u32 = 6 * around::SIDE * around::SIDE;
-/// Rows of the buffers: the gather reads whole tiles of 64, and what no pass writes stays 0, which is no surfel.
-const ROWS: u64 = SURFELS.next_multiple_of(64) as u64;
 /// Bytes of a `Surfel` of `shaders/gi/surfel.wgsl`.
 const SURFEL_BYTES: u64 = 80;
-/// Bytes of `Sky`.
-const SKY_BYTES: u64 = 64;
+/// Bytes of a `Disc`.
+const DISC_BYTES: u64 = 48;
 
 /// How many surfels a shader gathers, as WGSL.
 pub fn prelude(surfels: u32) -> String {
-    format!("const SURFELS = {surfels}u;\nconst SIDE = {}u;\n", around::SIDE)
+    format!("const SURFELS = {surfels}u;\nconst SQUARES = {}u;\nconst SIDE = {}u;\n", surfels / 4, around::SIDE)
 }
 
 /// Lights the surfels and lets them light each other.
 pub struct SurfelsPass {
     device: wgpu::Device,
     light_up: wgpu::ComputePipeline,
-    sky: wgpu::ComputePipeline,
+    join: wgpu::ComputePipeline,
+    finish: wgpu::ComputePipeline,
     exchange: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
     groups: ViewCache<3>,
-    sky_group: wgpu::BindGroup,
-    /// From the first buffer of sent light to the second, and back.
-    exchange_groups: [wgpu::BindGroup; 2],
+    join_group: wgpu::BindGroup,
+    exchange_group: wgpu::BindGroup,
     surfels: wgpu::Buffer,
-    sent: [wgpu::Buffer; 2],
-    sky_buffer: wgpu::Buffer,
+    sent: wgpu::Buffer,
+    discs: wgpu::Buffer,
     rounds: u32,
 }
 
 impl SurfelsPass {
-    /// Compiles the shaders and makes buffers of 0.1 MB. `rounds` of exchange are rounded up to an even number.
+    /// Compiles the shaders and makes buffers of 0.1 MB.
     pub fn new(device: &wgpu::Device, rounds: u32) -> Self {
         let types = [READ, READ, READ, READ, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE, UNIFORM];
         let stage = wgpu::ShaderStages::COMPUTE;
         let layout = tool::layout(device, "gi.surfels", stage, &types);
-        let sky_layout = tool::layout(device, "gi.sky", stage, &[READ, READ_WRITE]);
-        let exchange_layout = tool::layout(device, "gi.exchange", stage, &[READ, READ, READ, READ_WRITE]);
+        let join_layout = tool::layout(device, "gi.discs", stage, &[READ, READ, READ_WRITE]);
+        let exchange_layout = tool::layout(device, "gi.exchange", stage, &[READ, READ, READ_WRITE]);
         let buffer = |label, size| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -55,38 +54,38 @@ impl SurfelsPass {
                 mapped_at_creation: false,
             })
         };
-        let surfels = buffer("gi.surfels", ROWS * SURFEL_BYTES);
-        let sent = ["gi.sent.0", "gi.sent.1"].map(|label| buffer(label, ROWS * 16));
-        let sky_buffer = buffer("gi.sky", SKY_BYTES);
-        let resources = [surfels.as_entire_binding(), sky_buffer.as_entire_binding()];
-        let sky_group = tool::group(device, "gi.sky", &sky_layout, &resources);
-        let exchange_groups = [(0, 1), (1, 0)].map(|(from, to): (usize, usize)| {
-            let resources = [
-                surfels.as_entire_binding(),
-                sky_buffer.as_entire_binding(),
-                sent[from].as_entire_binding(),
-                sent[to].as_entire_binding(),
-            ];
-            tool::group(device, "gi.exchange", &exchange_layout, &resources)
-        });
+        let surfels = buffer("gi.surfels", u64::from(SURFELS) * SURFEL_BYTES);
+        let sent = buffer("gi.sent", u64::from(SURFELS) * 16);
+        let discs = buffer("gi.discs", u64::from(SURFELS + SURFELS / 4) * DISC_BYTES);
+        let resources = [&surfels, &sent, &discs].map(|b| b.as_entire_binding());
+        let join_group = tool::group(device, "gi.discs", &join_layout, &resources);
+        let resources = [&surfels, &discs, &sent].map(|b| b.as_entire_binding());
+        let exchange_group = tool::group(device, "gi.exchange", &exchange_layout, &resources);
         Self {
             device: device.clone(),
             light_up: pipeline(device, "gi.surfels", "light_up", &layout),
-            sky: pipeline(device, "gi.sky", "add_up", &sky_layout),
+            join: pipeline(device, "gi.discs", "join", &join_layout),
+            finish: pipeline(device, "gi.discs", "finish", &join_layout),
             exchange: pipeline(device, "gi.exchange", "exchange", &exchange_layout),
             layout,
             groups: ViewCache::new(),
-            sky_group,
-            exchange_groups,
+            join_group,
+            exchange_group,
             surfels,
             sent,
-            sky_buffer,
-            rounds: rounds.next_multiple_of(2),
+            discs,
+            rounds,
         }
     }
 
-    /// Records passes `gi.surfels`, `gi.sky` and `gi.exchange`. `counts` is [`super::emitters::EmittersPass::counts`].
-    pub fn record(&mut self, recorder: &mut Recorder<'_>, world: &World<'_>, counts: &wgpu::Buffer) {
+    /// Records passes `gi.surfels` and `gi.exchange`. `counts` is [`super::emitters::EmittersPass::counts`].
+    pub fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        world: &World<'_>,
+        lights: &wgpu::Buffer,
+        counts: &wgpu::Buffer,
+    ) {
         let view = wgpu::BindingResource::TextureView;
         let group = self.groups.get([world.around.depth, world.rsm.depth, world.environment], || {
             Ok::<_, std::convert::Infallible>(tool::group(
@@ -96,7 +95,7 @@ impl SurfelsPass {
                 &[
                     world.around.views.as_entire_binding(),
                     world.rsm.views.as_entire_binding(),
-                    world.lights.as_entire_binding(),
+                    lights.as_entire_binding(),
                     world.rsm_of_light.as_entire_binding(),
                     view(world.around.depth),
                     view(world.around.albedo),
@@ -105,7 +104,7 @@ impl SurfelsPass {
                     view(world.rsm.depth),
                     view(world.environment),
                     self.surfels.as_entire_binding(),
-                    self.sent[0].as_entire_binding(),
+                    self.sent.as_entire_binding(),
                     counts.as_entire_binding(),
                 ],
             ))
@@ -115,32 +114,24 @@ impl SurfelsPass {
             pass.set_pipeline(&self.light_up);
             pass.set_bind_group(0, &group, &[]);
             pass.dispatch_workgroups(SURFELS.div_ceil(64), 1, 1);
-            pass.set_pipeline(&self.sky);
-            pass.set_bind_group(0, &self.sky_group, &[]);
-            pass.dispatch_workgroups(1, 1, 1);
         });
         recorder.compute("gi.exchange", |pass| {
-            pass.set_pipeline(&self.exchange);
-            for round in 0..self.rounds {
-                pass.set_bind_group(0, &self.exchange_groups[round as usize % 2], &[]);
-                pass.dispatch_workgroups(SURFELS, 1, 1);
+            for round in 0..=self.rounds {
+                pass.set_pipeline(if round < self.rounds { &self.join } else { &self.finish });
+                pass.set_bind_group(0, &self.join_group, &[]);
+                pass.dispatch_workgroups((SURFELS / 4).div_ceil(64), 1, 1);
+                if round < self.rounds {
+                    pass.set_pipeline(&self.exchange);
+                    pass.set_bind_group(0, &self.exchange_group, &[]);
+                    pass.dispatch_workgroups(SURFELS, 1, 1);
+                }
             }
         });
     }
 
-    /// The surfels.
-    pub fn surfels(&self) -> &wgpu::Buffer {
-        &self.surfels
-    }
-
-    /// Radiance that each sends, `vec4f`.
-    pub fn sent(&self) -> &wgpu::Buffer {
-        &self.sent[0]
-    }
-
-    /// What the camera sees of the sky.
-    pub fn sky(&self) -> &wgpu::Buffer {
-        &self.sky_buffer
+    /// What surfels and windows send: discs of four each, then every one.
+    pub fn discs(&self) -> &wgpu::Buffer {
+        &self.discs
     }
 
     /// Lets go of texture views and of the buffers bound with them.
@@ -155,7 +146,7 @@ impl SurfelsPass {
 
     /// GPU memory, bytes.
     pub fn bytes(&self) -> u64 {
-        self.surfels.size() + 2 * self.sent[0].size() + self.sky_buffer.size()
+        self.surfels.size() + self.sent.size() + self.discs.size()
     }
 
     /// What the passes cost.

@@ -18,6 +18,9 @@ use crate::gpu::timing::Recorder;
 /// Sum of the four weights below which the 4×4 cells around are blended in.
 pub const TRUST: f32 = 0.3;
 
+/// Least cosine to a cell's own normal for which its light is evaluated.
+pub const LEAST_COSINE: f32 = 0.5;
+
 /// The constants as WGSL.
 pub fn prelude(side: CellSide) -> String {
     let mut text = side.prelude();
@@ -27,6 +30,7 @@ pub fn prelude(side: CellSide) -> String {
         ("NORMAL_FLOOR", NORMAL_FLOOR),
         ("WEIGHT_FLOOR", WEIGHT_FLOOR),
         ("TRUST", TRUST),
+        ("LEAST_COSINE", LEAST_COSINE),
     ] {
         text.push_str(&format!("const {name} = f32({value:?});\n"));
     }

@@ -133,7 +133,7 @@ pub const GI: &[Shader] = &[
             "gi/surfels.wgsl"
         ],
     },
-    Shader { name: "gi.sky", files: wgsl!["lib/brdf.wgsl", "gi/surfel.wgsl", "gi/sky.wgsl"] },
+    Shader { name: "gi.discs", files: wgsl!["lib/brdf.wgsl", "lib/emitter.wgsl", "gi/surfel.wgsl", "gi/discs.wgsl"] },
     Shader {
         name: "gi.exchange",
         files: wgsl!["lib/brdf.wgsl", "lib/emitter.wgsl", "gi/surfel.wgsl", "gi/exchange.wgsl"],
