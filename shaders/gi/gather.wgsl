@@ -10,7 +10,8 @@
 @group(1) @binding(5) var<storage, read> discs: array<Disc>;
 @group(1) @binding(6) var<uniform> counts: Counts;
 
-// A square of blocks, or a block, is opened where it is nearer than so many of its own widths.
+// A square of blocks, or a block, is opened where it is nearer than so many of its own widths. (At 1.4 the mean error of six
+// rooms is 0.3 points larger for squares alone, 0.45 for both.)
 const NEAR_WIDTHS: f32 = 2.0;
 
 struct Sum {
@@ -38,9 +39,8 @@ fn add(sum: ptr<function, Sum>, v: vec3f, radiance: vec3f) {
     (*sum).blue += v * radiance.b;
 }
 
-// What an emitter of a reflective shadow map sends, through the small objects between.
-fn add_emitter(sum: ptr<function, Sum>, e: Emitter, here: Place) {
-    let v = e.position - here.p;
+// What an emitter of a reflective shadow map at `v` from here sends, through the small objects between.
+fn add_emitter(sum: ptr<function, Sum>, e: Emitter, v: vec3f, here: Place) {
     let d2 = squared(v);
     let inverse = inverseSqrt(d2);
     let d = d2 * inverse;
@@ -52,8 +52,7 @@ fn add_emitter(sum: ptr<function, Sum>, e: Emitter, here: Place) {
 }
 
 // Nothing is taken for what stands between: that is surfels too, and they fill the hemisphere together.
-fn add_disc(sum: ptr<function, Sum>, disc: Disc, here: Place) {
-    let v = disc.position - here.p;
+fn add_disc(sum: ptr<function, Sum>, disc: Disc, v: vec3f, here: Place) {
     let a = at_least(dot(disc.back, v), disc.least);
     let r = dot(here.n, v);
     let w = a * nearness(a, r, squared(v));
@@ -61,8 +60,8 @@ fn add_disc(sum: ptr<function, Sum>, disc: Disc, here: Place) {
     add(sum, v, disc.radiance * w);
 }
 
-fn far(e: Emitter, area: f32, p: vec3f) -> bool {
-    let v = e.position - p;
+// True where an emitter at `v` is farther away than so many widths of its group, of `area` m².
+fn far(e: Emitter, v: vec3f, area: f32) -> bool {
     return e.area == 0.0 || dot(v, v) > NEAR_WIDTHS * NEAR_WIDTHS * area;
 }
 
@@ -72,12 +71,14 @@ fn add_block(sum: ptr<function, Sum>, block: u32, here: Place) {
     let high = blocks[2u * block + 1u];
     let area = low.area + high.area;
     if area == 0.0 { return; }
-    if far(low, area, here.p) && far(high, area, here.p) {
-        add_emitter(sum, low, here);
-        add_emitter(sum, high, here);
+    let v_low = low.position - here.p;
+    let v_high = high.position - here.p;
+    if far(low, v_low, area) && far(high, v_high, area) {
+        add_emitter(sum, low, v_low, here);
+        add_emitter(sum, high, v_high, here);
     } else {
         for (var k = 32u * block; k < 32u * block + 32u; k++) {
-            if fine[k].area > 0.0 { add_emitter(sum, fine[k], here); }
+            if fine[k].area > 0.0 { add_emitter(sum, fine[k], fine[k].position - here.p, here); }
         }
     }
 }
@@ -93,11 +94,12 @@ fn add_world(sum: ptr<function, Sum>, here: Place, i: u32) {
         for (var k = 0u; k < 64u; k++) {
             let v = squares[k].position - here.p;
             if dot(v, v) >= squares[k].reach2 {
-                if squares[k].window > 0.0 { add_disc(&sky, squares[k], here); } else { add_disc(&seen, squares[k], here); }
+                if squares[k].window > 0.0 { add_disc(&sky, squares[k], v, here); } else { add_disc(&seen, squares[k], v, here); }
             } else {
                 let start = SQUARES + 4u * (first + k);
                 for (var f = start; f < start + 4u; f++) {
-                    if discs[f].window > 0.0 { add_disc(&sky, discs[f], here); } else { add_disc(&seen, discs[f], here); }
+                    let w = discs[f].position - here.p;
+                    if discs[f].window > 0.0 { add_disc(&sky, discs[f], w, here); } else { add_disc(&seen, discs[f], w, here); }
                 }
             }
         }
@@ -130,9 +132,11 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
         for (var k = 0u; k < 64u; k += 2u) {
             let area = emitters[k].area + emitters[k + 1u].area;
             if area == 0.0 { continue; }
-            if far(emitters[k], area, here.p) && far(emitters[k + 1u], area, here.p) {
-                add_emitter(&sum, emitters[k], here);
-                add_emitter(&sum, emitters[k + 1u], here);
+            let v_low = emitters[k].position - here.p;
+            let v_high = emitters[k + 1u].position - here.p;
+            if far(emitters[k], v_low, area) && far(emitters[k + 1u], v_high, area) {
+                add_emitter(&sum, emitters[k], v_low, here);
+                add_emitter(&sum, emitters[k + 1u], v_high, here);
             } else {
                 let start = 2u * (first + k);
                 for (var block = start; block < start + 4u; block++) {

@@ -181,10 +181,11 @@ impl EmittersPass {
         self.counts.blocks
     }
 
-    /// What the pass costs: a texel reads 16 bytes and takes about 170 operations; a block is 18 emitters.
+    /// What the pass costs: a texel reads 16 bytes and takes about 230 operations; a block is 34 emitters and half
+    /// of a coarse one.
     pub fn cost(&self) -> Cost {
         let blocks = f64::from(self.counts.blocks);
-        Cost::new("gi.emitters", blocks * 64.0 * 170.0, blocks * (64.0 * 16.0 + 18.0 * EMITTER_BYTES as f64))
+        Cost::new("gi.emitters", blocks * 64.0 * 230.0, blocks * (64.0 * 16.0 + 34.5 * EMITTER_BYTES as f64))
     }
 }
 
