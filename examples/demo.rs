@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("{}", gpu.sentence());
     let scene = scene::load("interior")?;
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
-    let neural = || Weights::shipped().map(|w| Method::Neural(Box::new(w)));
+    let neural = || Weights::shipped().map(|w| Method::Neural(Box::new(w.into())));
 
     let mut pictures = Vec::new();
     for method in [Method::Direct, Method::Cache, neural()?] {

@@ -38,6 +38,12 @@ fn usage_errors_exit_with_2() {
     fails(&["render", "interior", "-o", &out, "--eye", "1,2,3"], 2, &["--look-at"]);
     fails(&["render", "interior", "-o", &out, "--eye", "1,2,3", "--look-at", "1,2,3"], 2, &["same point"]);
     fails(&["render", "interior", "-o", &out, "--camera", "99"], 2, &["--camera 99"]);
+    // 16 bits are for networks: where none runs, nothing can be had of them.
+    let word = &["--precision", "network"];
+    fails(&["render", "interior", "-o", &out, "--precision", "f16"], 2, word);
+    fails(&["bench", "interior", "--method", "cache", "--precision", "f16"], 2, word);
+    fails(&["doctor", "--precision", "f16"], 2, word);
+    fails(&["render", "interior", "-o", &out, "--precision", "f8"], 2, &["f16"]);
     fails(&["render", "interior", "-o", &out, "--fov", "180"], 2, &["--fov"]);
     fails(&["render", "interior", "-o", &path(&dir, "x.exr"), "--aov", "Bogus"], 2, &["Bogus", "DiffInd"]);
     fails(&["render", "interior", "-o", &out, "--environment", "nan"], 2, &["finite"]);

@@ -11,7 +11,7 @@ use bouncelight::scene::{self, LightKind, Scene, upload::SceneGpu};
 
 fn neural() -> RendererOptions {
     let weights = Weights::shipped().expect("the shipped weights are sound");
-    RendererOptions { method: Method::Neural(Box::new(weights)), ..Default::default() }
+    RendererOptions { method: Method::Neural(Box::new(weights.into())), ..Default::default() }
 }
 
 fn draw(gpu: &Gpu, scene: &Scene, size: [u32; 2]) -> CapturedFrame {

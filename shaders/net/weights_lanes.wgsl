@@ -1,6 +1,6 @@
 // A layer's weights in a texture, a column of a matrix a texel, and the entry point of the convolutions that read them so: each
 // of the first eight threads of a subgroup loads one column, and all get all eight. Needs subgroups of at least eight.
-@group(0) @binding(2) var weights: texture_2d<f32>;
+@group(0) @binding(2) var weights: Texels;
 
 struct Pair { first: mat4x4f, second: mat4x4f }
 
@@ -9,7 +9,7 @@ var<private> lane: u32;
 
 fn pair(at: u32) -> Pair {
     let texel = at * 4u + lane;
-    let own = textureLoad(weights, vec2u(texel & 2047u, texel >> 11u), 0);
+    let own = textureLoad(weights, vec2u(texel & 2047u, texel >> 11u));
     return Pair(
         mat4x4f(subgroupBroadcast(own, 0u), subgroupBroadcast(own, 1u), subgroupBroadcast(own, 2u), subgroupBroadcast(own, 3u)),
         mat4x4f(subgroupBroadcast(own, 4u), subgroupBroadcast(own, 5u), subgroupBroadcast(own, 6u), subgroupBroadcast(own, 7u)),

@@ -36,9 +36,6 @@ pub struct Args {
     /// Keep dropout on, with this seed: how the published programs run their networks.
     #[arg(long, value_name = "SEED")]
     dropout: Option<u32>,
-    /// How numbers are stored on the GPU.
-    #[arg(long, value_enum, default_value = "f32")]
-    precision: PrecisionName,
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
@@ -93,6 +90,11 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> Result<Tensor> {
     let dropout = args.dropout;
     let slow = |reason: &dyn std::fmt::Display| {
+        if global.precision == PrecisionName::F16 {
+            return Err(usage(format!(
+                "{reason}; and without a GPU networks run in 32 bits only: leave --precision out"
+            )));
+        }
         if !global.quiet {
             eprintln!("warning: {reason}; running without a GPU, which takes minutes for a large network");
         }
@@ -104,7 +106,7 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
         Err(e) if global.adapter.is_some() => return Err(e),
         Err(e) => return slow(&e),
     };
-    let options = Options { dropout, precision: args.precision.precision(), ..Default::default() };
+    let options = Options { dropout, precision: global.precision.precision(), ..Default::default() };
     let size = [input.shape.width, input.shape.height];
     let network = match Network::tuned(
         &gpu.device,

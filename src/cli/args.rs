@@ -2,13 +2,14 @@
 
 use super::error::CliError;
 use crate::{
-    gi::Method,
+    gi::{Method, pass::Neural},
     gpu::{Backend, Gpu, GpuOptions},
     net::format::Weights,
     scene::{self, Camera, Environment, LightKind, Scene},
 };
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Flags every subcommand takes.
@@ -20,6 +21,9 @@ pub struct Global {
     /// Graphics API.
     #[arg(long, global = true, value_enum, default_value = "auto")]
     pub backend: BackendName,
+    /// How a network's numbers are stored on the GPU.
+    #[arg(long, global = true, value_enum, default_value = "f32")]
+    pub precision: PrecisionName,
     /// Only errors.
     #[arg(short, long, global = true)]
     pub quiet: bool,
@@ -43,9 +47,11 @@ pub enum BackendName {
 }
 
 /// How a network's numbers are stored.
-#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum PrecisionName {
     /// 32 bits.
+    #[default]
     F32,
     /// 16 bits; arithmetic stays in 32.
     F16,
@@ -135,15 +141,19 @@ impl MethodName {
         MethodName::Neural,
     ];
 
-    /// The real-time method with its weights: `weights`, or the shipped ones.
-    pub fn method(self, weights: Option<&PathBuf>) -> Result<Method> {
+    /// The real-time method with its weights: `weights`, or the shipped ones. [`tuned`](super::tuned::tuned) adds what a device is needed for.
+    pub fn method(self, global: &Global, weights: Option<&PathBuf>) -> Result<Method> {
         Ok(match self {
             MethodName::Direct => Method::Direct,
             MethodName::Ambient => Method::Ambient,
             MethodName::Ssgi => Method::Ssgi,
             MethodName::Rsm => Method::Rsm,
             MethodName::Cache => Method::Cache,
-            MethodName::Neural => Method::Neural(Box::new(load_weights(weights)?)),
+            MethodName::Neural => {
+                let mut neural = Neural::from(load_weights(weights)?);
+                neural.network.precision = global.precision.precision();
+                Method::Neural(Box::new(neural))
+            }
             MethodName::Probes => return Err(usage("`probes` needs a bake, which this command does not make".into())),
             MethodName::Reference => return Err(usage("`reference` is no real-time method".into())),
         })

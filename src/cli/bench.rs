@@ -2,7 +2,7 @@
 
 use super::layers::Layers;
 use super::{
-    args::{Global, MethodName, SceneArgs, usage},
+    args::{Global, MethodName, PrecisionName, SceneArgs, usage},
     error::CliError,
     probes::BakeArgs,
 };
@@ -81,12 +81,22 @@ struct Record {
     backend: String,
     driver: String,
     software: bool,
+    /// How the network's numbers are stored.
+    #[serde(default)]
+    precision: PrecisionName,
     frames: u32,
     warmup: u32,
     methods: Vec<Measurement>,
     /// With `--layers`, if the network was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     network: Option<Layers>,
+}
+
+impl Args {
+    /// It runs a network on a device.
+    pub fn runs_network(&self) -> bool {
+        self.method.0.contains(&MethodName::Neural)
+    }
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
@@ -100,15 +110,15 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     for name in &args.method.0 {
         let method = match name {
             MethodName::Probes => args.bake.bake(global, &scene, &camera)?,
-            name => name.method(args.weights.as_ref())?,
+            name => super::tuned::tuned(name.method(global, args.weights.as_ref())?, &gpu, global.quiet),
         };
         let mut renderer =
             Renderer::new(&gpu.device, &gpu.queue, args.scene.size, RendererOptions { method, ..Default::default() })?;
         methods.push(measure(&gpu, &mut renderer, &uploaded, &camera, options)?);
     }
-    let network = if args.layers && args.method.0.contains(&MethodName::Neural) {
+    let network = if args.layers && args.runs_network() {
         let weights = super::args::load_weights(args.weights.as_ref())?;
-        Some(super::layers::measure(&gpu, &weights, args.scene.size, global.quiet)?)
+        Some(super::layers::measure(global, &gpu, &weights, args.scene.size)?)
     } else {
         None
     };
@@ -121,6 +131,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         backend: format!("{:?}", gpu.info.backend).to_lowercase(),
         driver: format!("{} {}", gpu.info.driver, gpu.info.driver_info),
         software: gpu.is_software(),
+        precision: global.precision,
         frames: args.frames,
         warmup: args.warmup,
         methods,
@@ -198,6 +209,9 @@ fn read_record(path: &PathBuf) -> Result<Record> {
 fn compare(base: &Record, now: &Record, allowed: f64) -> Result<()> {
     if (&base.adapter, &base.backend, base.size) != (&now.adapter, &now.backend, now.size) {
         return Err(usage("the base record is of another adapter, backend or size: times cannot be compared".into()));
+    }
+    if base.precision != now.precision {
+        return Err(usage("the base record's network stored its numbers in another precision".into()));
     }
     let time = |m: &Measurement| m.gpu_ms.unwrap_or(m.wall_ms).median;
     let slower: Vec<String> = now

@@ -1,5 +1,6 @@
 //! `bench --layers`: each step of the network alone, against what the device can do at best.
 
+use super::args::Global;
 use crate::gi::inputs::cells_of;
 use crate::gpu::Gpu;
 use crate::net::format::Weights;
@@ -38,9 +39,10 @@ struct Layer {
 }
 
 /// Times the layers for a picture of `size`.
-pub fn measure(gpu: &Gpu, weights: &Weights, size: [u32; 2], quiet: bool) -> Result<Layers> {
-    let tuned = super::tuned::of(&gpu.device, quiet);
-    let network = Network::tuned(&gpu.device, &gpu.queue, weights, cells_of(size), Options::default(), tuned)?;
+pub fn measure(global: &Global, gpu: &Gpu, weights: &Weights, size: [u32; 2]) -> Result<Layers> {
+    let tuned = super::tuned::of(&gpu.device, global.quiet);
+    let options = Options { precision: global.precision.precision(), ..Options::default() };
+    let network = Network::tuned(&gpu.device, &gpu.queue, weights, cells_of(size), options, tuned)?;
     let peak = peak::measure(&gpu.device, &gpu.queue);
     let times = tune::layers((&gpu.device, &gpu.queue), &network, TURNS);
     let layer = |((row, kernel), ms): ((crate::net::plan::Row, _), f64)| {

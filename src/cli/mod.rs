@@ -49,6 +49,19 @@ enum Command {
     Doctor(doctor::Args),
 }
 
+impl Command {
+    /// It runs a network on a device, so that a precision can be asked for.
+    fn runs_network(&self) -> bool {
+        match self {
+            Command::Render(a) => a.runs_network(),
+            Command::Bench(a) => a.runs_network(),
+            Command::Apply(_) => true,
+            Command::Weights(a) => a.runs_network(),
+            Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) => false,
+        }
+    }
+}
+
 /// Runs the program and returns its exit code.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -61,6 +74,9 @@ pub fn main() -> ExitCode {
     };
     init_logging(&cli.global);
     let done = match cli.command {
+        command if cli.global.precision != args::PrecisionName::F32 && !command.runs_network() => {
+            Err(args::usage("--precision f16 is for networks, and none runs here; leave it out".into()))
+        }
         Command::Render(a) => render::run(&cli.global, a),
         Command::Bench(a) => bench::run(&cli.global, a),
         Command::Compare(a) => compare::run(a),

@@ -118,6 +118,11 @@ impl Args {
         let default = if self.weights.is_some() { MethodName::Neural } else { MethodName::Cache };
         self.method.unwrap_or(default)
     }
+
+    /// It runs a network on a device.
+    pub fn runs_network(&self) -> bool {
+        self.method() == MethodName::Neural
+    }
 }
 
 pub fn run(global: &Global, mut args: Args) -> Result<()> {
@@ -129,7 +134,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
             // Probes are baked once the scene is there.
             let method = match name {
                 MethodName::Probes => None,
-                _ => Some(name.method(args.weights.as_ref())?),
+                _ => Some(name.method(global, args.weights.as_ref())?),
             };
             Task::Rasterise(method, layers.unwrap_or_default())
         }
@@ -148,6 +153,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
         Task::Trace(task) => task.run(global, &gpu, &scene, &camera)?,
         Task::Rasterise(method, layers) => {
             let method = method.map_or_else(|| args.bake.bake(global, &scene, &camera), Ok)?;
+            let method = super::tuned::tuned(method, &gpu, global.quiet);
             rasterise(global, &args, &gpu, (&scene, &camera), method, &layers)?
         }
     };
@@ -173,7 +179,7 @@ fn rasterise(
     layers: &[Layer],
 ) -> Result<Drawn> {
     let weights = match &method {
-        Method::Neural(weights) => weights.hash_text(),
+        Method::Neural(neural) => neural.weights.hash_text(),
         _ => "none".into(),
     };
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;

@@ -1,6 +1,8 @@
 //! The tuner on the command line: `weights tune`, and where its cache lies.
 
 use super::args::Global;
+use crate::gi::Method;
+use crate::gpu::Gpu;
 use crate::image_io;
 use crate::net::format::Weights;
 use crate::net::gpu::{Options, Tuned};
@@ -51,6 +53,14 @@ pub fn load(path: &Path, quiet: bool) -> Cache {
 pub fn of(device: &wgpu::Device, quiet: bool) -> Arc<Tuned> {
     let cache = path().map(|path| load(&path, quiet)).unwrap_or_default();
     Arc::new(cache.tuned(&device.adapter_info()))
+}
+
+/// The method with what the user's cache knows of its network on this device; others as they are.
+pub fn tuned(mut method: Method, gpu: &Gpu, quiet: bool) -> Method {
+    if let Method::Neural(neural) = &mut method {
+        neural.tuned = of(&gpu.device, quiet);
+    }
+    method
 }
 
 /// `weights tune`.

@@ -1,6 +1,6 @@
 //! `bouncelight weights info | verify | convert | tune`: what a weights file holds, whether it is sound, and one from a published network.
 
-use super::args::{Global, PrecisionName, parse_size};
+use super::args::{Global, parse_size};
 use crate::image_io;
 use crate::net::convert::{Arch, Norm, Recipe, convert};
 use crate::net::{
@@ -35,9 +35,6 @@ enum Command {
         /// Width and height of the picture in pixels.
         #[arg(long, default_value = "1024x512", value_parser = parse_size, value_name = "WxH")]
         size: [u32; 2],
-        /// How numbers are stored.
-        #[arg(long, value_enum, default_value = "f32")]
-        precision: PrecisionName,
         /// Where to remember it; by default the user's cache folder, or $BOUNCELIGHT_TUNED.
         #[arg(long, value_name = "F")]
         cache: Option<PathBuf>,
@@ -94,6 +91,13 @@ enum DtypeName {
     F16,
 }
 
+impl Args {
+    /// It runs a network on a device.
+    pub fn runs_network(&self) -> bool {
+        matches!(self.command, Command::Tune { .. })
+    }
+}
+
 pub fn run(global: &Global, args: Args) -> Result<()> {
     match args.command {
         Command::Verify { file } => {
@@ -102,8 +106,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         }
         Command::Info { file, size } => info(&Weights::load(&file)?, size)?,
         Command::Convert(args) => convert_file(&args)?,
-        Command::Tune { file, size, precision, cache, again } => {
-            let options = crate::net::gpu::Options { precision: precision.precision(), ..Default::default() };
+        Command::Tune { file, size, cache, again } => {
+            let options = crate::net::gpu::Options { precision: global.precision.precision(), ..Default::default() };
             super::tuned::run(global, &file, size, options, cache, again)?;
         }
     }

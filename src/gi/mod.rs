@@ -151,8 +151,8 @@ pub enum Method {
     /// Surfels that a bake has linked, see [`probes`]. The bake must be of the scene that is drawn.
     #[cfg(feature = "reference")]
     Probes(std::sync::Arc<probes::Bake>),
-    /// The network of these weights, see [`pass`].
-    Neural(Box<crate::net::format::Weights>),
+    /// A network, see [`pass`]; `weights.into()` runs it with defaults.
+    Neural(Box<pass::Neural>),
 }
 
 impl Method {

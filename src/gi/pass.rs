@@ -25,7 +25,8 @@ use super::rung::{Cost, Rung};
 use super::{GiError, Inputs};
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
-use crate::net::gpu::Network;
+use crate::net::gpu::{self, Network, Tuned};
+use std::sync::Arc;
 
 /// What the host chooses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,10 +35,32 @@ pub struct Options {
     pub size: [u32; 2],
 }
 
+<<<<<<< HEAD
 /// Whether weights have method `cache` run before them, and so need [`Inputs::world`].
 pub fn needs_guess(weights: &Weights) -> bool {
     weights.output.meaning == Answer::Gain.name() || weights.inputs.iter().any(|f| f.name == "cache")
 }
+=======
+/// A network as a frame's method: what was trained, and how it runs.
+#[derive(Debug, Clone)]
+pub struct Neural {
+    /// The trained numbers.
+    pub weights: Weights,
+    /// Kernels and storage. Dropout does not belong into frames; with a seed every frame has the same.
+    pub network: gpu::Options,
+    /// What a tuner has found on this device; empty without one.
+    pub tuned: Arc<Tuned>,
+}
+
+impl From<Weights> for Neural {
+    fn from(weights: Weights) -> Self {
+        Self { weights, network: gpu::Options::default(), tuned: Arc::default() }
+    }
+}
+
+/// The meaning of the output that reconstruction undoes: y = ln(E/π / s).
+const MEANING: &str = "log_irradiance_over_exposure";
+>>>>>>> main
 
 /// The embeddable pass. Keeps clones of device and queue (both are handles) to rebuild on a change of size and to
 /// write its parameters; parameters become visible to the GPU with the host's next submission, and up to
@@ -45,7 +68,7 @@ pub fn needs_guess(weights: &Weights) -> bool {
 pub struct NeuralGi {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    weights: Weights,
+    neural: Neural,
     features: FeatureSet,
     inputs: InputGroup,
     exposure: ExposurePass,
@@ -88,15 +111,36 @@ impl NeuralGi {
         weights: &Weights,
         options: Options,
     ) -> Result<Self, GiError> {
+<<<<<<< HEAD
         let (features, answer) = check_weights(weights)?;
         let inputs = InputGroup::new(device);
         let exposure = ExposurePass::new(device, &inputs);
         let reconstruct = ReconstructPass::new(device, &inputs, answer);
         let rebuilt = Rebuilt::new(device, queue, weights, &features, &inputs, &exposure, options.size)?;
+=======
+        Self::with(device, queue, &weights.clone().into(), options)
+    }
+
+    /// As [`NeuralGi::new`], told how the network runs.
+    ///
+    /// # Errors
+    /// As [`NeuralGi::new`].
+    pub fn with(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        neural: &Neural,
+        options: Options,
+    ) -> Result<Self, GiError> {
+        let features = check_weights(&neural.weights)?;
+        let inputs = InputGroup::new(device);
+        let exposure = ExposurePass::new(device, &inputs);
+        let reconstruct = ReconstructPass::new(device, &inputs);
+        let rebuilt = Rebuilt::new(device, queue, neural, &features, &inputs, &exposure, options.size)?;
+>>>>>>> main
         Ok(Self {
             device: device.clone(),
             queue: queue.clone(),
-            weights: weights.clone(),
+            neural: neural.clone(),
             features,
             inputs,
             exposure,
@@ -149,7 +193,7 @@ impl NeuralGi {
 
     fn resize(&mut self, size: [u32; 2]) -> Result<(), GiError> {
         self.rebuilt =
-            Rebuilt::new(&self.device, &self.queue, &self.weights, &self.features, &self.inputs, &self.exposure, size)?;
+            Rebuilt::new(&self.device, &self.queue, &self.neural, &self.features, &self.inputs, &self.exposure, size)?;
         self.rebuilds += 1;
         self.forget();
         Ok(())
@@ -177,6 +221,11 @@ impl NeuralGi {
     /// The exposure of the last recording, see [`super::exposure::read`].
     pub fn exposure_buffer(&self) -> &wgpu::Buffer {
         self.exposure.buffer()
+    }
+
+    /// How the network runs.
+    pub fn network(&self) -> &Network {
+        &self.rebuilt.network
     }
 
     /// The features that the weights use.
@@ -222,7 +271,7 @@ impl Rebuilt {
     fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
-        weights: &Weights,
+        neural: &Neural,
         features: &FeatureSet,
         inputs: &InputGroup,
         exposure: &ExposurePass,
@@ -230,11 +279,19 @@ impl Rebuilt {
     ) -> Result<Self, GiError> {
         pack::feature_bytes(device, features, size)?;
         let cells = cells_of(size);
+<<<<<<< HEAD
         let network =
             Network::new(device, queue, weights, cells).map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
         let guess = guess_texture(device, if needs_guess(weights) { size } else { [1, 1] });
         let pack = PackPass::new(device, inputs, exposure, features, network.input().resource(), &guess);
         Ok(Self { size, network, pack, guess })
+=======
+        let Neural { weights, network, tuned } = neural;
+        let network = Network::tuned(device, queue, weights, cells, *network, tuned.clone())
+            .map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
+        let pack = PackPass::new(device, inputs, exposure, features, network.input().resource());
+        Ok(Self { size, network, pack })
+>>>>>>> main
     }
 }
 

@@ -74,7 +74,7 @@ pub fn build(
         Method::World(options) => Some(Box::new(WorldGi::new(device, size, *options))),
         #[cfg(feature = "reference")]
         Method::Probes(bake) => Some(Box::new(super::probes::ProbesGi::new(device, queue, bake)?)),
-        Method::Neural(weights) => Some(Box::new(NeuralGi::new(device, queue, weights, Options { size })?)),
+        Method::Neural(neural) => Some(Box::new(NeuralGi::with(device, queue, neural, Options { size })?)),
     })
 }
 

@@ -205,8 +205,8 @@ pub const NET: &[Shader] = net![
     "conv3x3_mirror", [full mirror], ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
     "conv3x3_mirror_wide", [full mirror], ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
     "conv3x3_mirror_half", [half mirror], ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
-    "conv3x3_lanes", [full mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
-    "conv3x3_lanes_half", [half mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
+    "conv3x3_lanes", [full mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv3x3_pixels.wgsl"];
+    "conv3x3_lanes_half", [half mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv3x3_pixels.wgsl"];
     "conv_any", [full full], ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
     "conv_any_wide", [full full], ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
     "conv_any_half", [half half], ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];

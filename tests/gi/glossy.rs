@@ -1,7 +1,7 @@
 //! Reflections of bounced light under a given diffuse light: even light, a mirror, darkness, linearity.
 
 use crate::build::{floor, look_at, material, quad, scene};
-use crate::shot::{texture_with, view};
+use crate::shot::{Write, texture_with};
 use crate::{common, read_light};
 use bouncelight::gi::{Method, glossy::GlossyPass};
 use bouncelight::gpu::{Gpu, timing::Recorder};
@@ -12,55 +12,12 @@ use half::f16;
 
 const SIZE: [u32; 2] = [128, 96];
 
-const WRITE: &str = "
-@group(0) @binding(0) var source: texture_2d<f32>;
-@vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return vec4f(f32(i32(i) / 2) * 4.0 - 1.0, f32(i32(i) % 2) * 4.0 - 1.0, 0.0, 1.0);
-}
-@fragment fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
-    return textureLoad(source, vec2i(at.xy), 0);
-}";
-
 /// Copies `source` into the target `indirect`, which takes no copies.
 fn give(gpu: &Gpu, recorder: &mut Recorder<'_>, source: &wgpu::Texture, target: &wgpu::TextureView) {
-    let device = &gpu.device;
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: None,
-        source: wgpu::ShaderSource::Wgsl(WRITE.into()),
-    });
-    let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: None,
-        layout: None,
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: Default::default(),
-        depth_stencil: None,
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fragment"),
-            compilation_options: Default::default(),
-            targets: &[Some(wgpu::TextureFormat::Rgba16Float.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    });
-    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: None,
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&view(source)) }],
-    });
+    let write = Write::new(&gpu.device, source, wgpu::TextureFormat::Rgba16Float);
     let ops = wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store };
     let attachment = wgpu::RenderPassColorAttachment { view: target, depth_slice: None, resolve_target: None, ops };
-    recorder.render("given", &[Some(attachment)], None, |pass| {
-        pass.set_pipeline(&pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        pass.draw(0..3, 0..1);
-    });
+    recorder.render("given", &[Some(attachment)], None, |pass| write.draw(pass));
 }
 
 /// `indirect_specular` and the colour of the lobe (GlossCol) of each pixel, when `light` gives the diffuse light.

@@ -255,66 +255,89 @@ pub fn texture_with(
     texture
 }
 
-const WRITE_DEPTH: &str = "
+const WRITE: &str = "
 @group(0) @binding(0) var source: texture_2d<f32>;
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
     return vec4f(f32(i32(i) / 2) * 4.0 - 1.0, f32(i32(i) % 2) * 4.0 - 1.0, 0.0, 1.0);
 }
-@fragment fn fragment(@builtin(position) at: vec4f) -> @builtin(frag_depth) f32 {
+@fragment fn depth(@builtin(position) at: vec4f) -> @builtin(frag_depth) f32 {
     return textureLoad(source, vec2i(at.xy), 0).r;
+}
+@fragment fn color(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    return textureLoad(source, vec2i(at.xy), 0);
 }";
 
-fn write_depth(device: &wgpu::Device, queue: &wgpu::Queue, source: &wgpu::Texture, target: &wgpu::Texture) {
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: None,
-        source: wgpu::ShaderSource::Wgsl(WRITE_DEPTH.into()),
-    });
-    let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: None,
-        layout: None,
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: Default::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: wgpu::TextureFormat::Depth32Float,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(wgpu::CompareFunction::Always),
-            stencil: Default::default(),
-            bias: Default::default(),
-        }),
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fragment"),
-            compilation_options: Default::default(),
-            targets: &[],
-        }),
-        multiview_mask: None,
-        cache: None,
-    });
-    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: None,
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&view(source)) }],
-    });
-    let target = view(target);
-    let mut encoder = device.create_command_encoder(&Default::default());
-    {
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &target,
-                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
-                stencil_ops: None,
-            }),
-            ..Default::default()
+/// Draws one texture's texels into a target that takes no copies: a depth texture, or a colour texture of the frame.
+pub struct Write {
+    pipeline: wgpu::RenderPipeline,
+    group: wgpu::BindGroup,
+}
+
+impl Write {
+    /// Texels of `source`; the target's format is `Depth32Float`, which takes red, or `Rgba16Float`.
+    pub fn new(device: &wgpu::Device, source: &wgpu::Texture, format: wgpu::TextureFormat) -> Self {
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: None,
+            source: wgpu::ShaderSource::Wgsl(WRITE.into()),
         });
-        pass.set_pipeline(&pipeline);
-        pass.set_bind_group(0, &group, &[]);
+        let depth = format.is_depth_stencil_format();
+        let color = [Some(wgpu::TextureFormat::Rgba16Float.into())];
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: None,
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("vertex"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: depth.then(|| wgpu::DepthStencilState {
+                format,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::Always),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some(if depth { "depth" } else { "color" }),
+                compilation_options: Default::default(),
+                targets: if depth { &[] } else { &color },
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(&view(source)),
+            }],
+        });
+        Self { pipeline, group }
+    }
+
+    /// Draws them in an open pass on the target.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.group, &[]);
         pass.draw(0..3, 0..1);
     }
+}
+
+fn write_depth(device: &wgpu::Device, queue: &wgpu::Queue, source: &wgpu::Texture, target: &wgpu::Texture) {
+    let write = Write::new(device, source, target.format());
+    let mut encoder = device.create_command_encoder(&Default::default());
+    write.draw(&mut encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            view: &view(target),
+            depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+            stencil_ops: None,
+        }),
+        ..Default::default()
+    }));
     queue.submit([encoder.finish()]);
 }

@@ -83,7 +83,7 @@ pub(super) fn texture(device: &wgpu::Device, label: &str, rows: u32, texel: u64)
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format: if texel == 8 { wgpu::TextureFormat::Rgba16Float } else { wgpu::TextureFormat::Rgba32Float },
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     })
 }
