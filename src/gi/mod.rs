@@ -178,7 +178,7 @@ impl Method {
             Method::Cache => NeedsWorld::Around,
             Method::World(options) if options.around => NeedsWorld::Around,
             Method::World(_) => NeedsWorld::Lights,
-            Method::Neural(weights) if pass::needs_guess(weights) => NeedsWorld::Around,
+            Method::Neural(neural) if pass::needs_guess(&neural.weights) => NeedsWorld::Around,
             _ => NeedsWorld::Nothing,
         }
     }

@@ -35,12 +35,11 @@ pub struct Options {
     pub size: [u32; 2],
 }
 
-<<<<<<< HEAD
 /// Whether weights have method `cache` run before them, and so need [`Inputs::world`].
 pub fn needs_guess(weights: &Weights) -> bool {
     weights.output.meaning == Answer::Gain.name() || weights.inputs.iter().any(|f| f.name == "cache")
 }
-=======
+
 /// A network as a frame's method: what was trained, and how it runs.
 #[derive(Debug, Clone)]
 pub struct Neural {
@@ -57,10 +56,6 @@ impl From<Weights> for Neural {
         Self { weights, network: gpu::Options::default(), tuned: Arc::default() }
     }
 }
-
-/// The meaning of the output that reconstruction undoes: y = ln(E/π / s).
-const MEANING: &str = "log_irradiance_over_exposure";
->>>>>>> main
 
 /// The embeddable pass. Keeps clones of device and queue (both are handles) to rebuild on a change of size and to
 /// write its parameters; parameters become visible to the GPU with the host's next submission, and up to
@@ -111,13 +106,6 @@ impl NeuralGi {
         weights: &Weights,
         options: Options,
     ) -> Result<Self, GiError> {
-<<<<<<< HEAD
-        let (features, answer) = check_weights(weights)?;
-        let inputs = InputGroup::new(device);
-        let exposure = ExposurePass::new(device, &inputs);
-        let reconstruct = ReconstructPass::new(device, &inputs, answer);
-        let rebuilt = Rebuilt::new(device, queue, weights, &features, &inputs, &exposure, options.size)?;
-=======
         Self::with(device, queue, &weights.clone().into(), options)
     }
 
@@ -131,12 +119,11 @@ impl NeuralGi {
         neural: &Neural,
         options: Options,
     ) -> Result<Self, GiError> {
-        let features = check_weights(&neural.weights)?;
+        let (features, answer) = check_weights(&neural.weights)?;
         let inputs = InputGroup::new(device);
         let exposure = ExposurePass::new(device, &inputs);
-        let reconstruct = ReconstructPass::new(device, &inputs);
+        let reconstruct = ReconstructPass::new(device, &inputs, answer);
         let rebuilt = Rebuilt::new(device, queue, neural, &features, &inputs, &exposure, options.size)?;
->>>>>>> main
         Ok(Self {
             device: device.clone(),
             queue: queue.clone(),
@@ -145,7 +132,7 @@ impl NeuralGi {
             inputs,
             exposure,
             reconstruct,
-            cache: needs_guess(weights).then(|| WorldGi::new(device, options.size, cache::Options::CACHE)),
+            cache: needs_guess(&neural.weights).then(|| WorldGi::new(device, options.size, cache::Options::CACHE)),
             rebuilt,
             rebuilds: 0,
         })
@@ -279,19 +266,12 @@ impl Rebuilt {
     ) -> Result<Self, GiError> {
         pack::feature_bytes(device, features, size)?;
         let cells = cells_of(size);
-<<<<<<< HEAD
-        let network =
-            Network::new(device, queue, weights, cells).map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
-        let guess = guess_texture(device, if needs_guess(weights) { size } else { [1, 1] });
-        let pack = PackPass::new(device, inputs, exposure, features, network.input().resource(), &guess);
-        Ok(Self { size, network, pack, guess })
-=======
         let Neural { weights, network, tuned } = neural;
         let network = Network::tuned(device, queue, weights, cells, *network, tuned.clone())
             .map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
-        let pack = PackPass::new(device, inputs, exposure, features, network.input().resource());
-        Ok(Self { size, network, pack })
->>>>>>> main
+        let guess = guess_texture(device, if needs_guess(weights) { size } else { [1, 1] });
+        let pack = PackPass::new(device, inputs, exposure, features, network.input().resource(), &guess);
+        Ok(Self { size, network, pack, guess })
     }
 }
 

@@ -378,7 +378,7 @@ fn steady_frames_allocate_nothing_and_a_missing_world_is_named() {
 
 /// A hall, and what a network that answers the same everywhere makes of `cache`.
 fn corrected(gpu: &Gpu, answer: [f32; 6], factor: f32) -> Vec<f32> {
-    let method = Method::Neural(Box::new(crate::weights::constant_gain(answer)));
+    let method = Method::Neural(Box::new(crate::weights::constant_gain(answer).into()));
     light(
         gpu,
         &mut renderer(gpu, [96, 64], method),
