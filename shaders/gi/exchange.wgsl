@@ -6,6 +6,8 @@
 
 var<workgroup> partial: array<vec4f, 64>;
 var<workgroup> windows: array<vec4f, 64>;
+var<workgroup> counts: array<u32, 64>;
+var<workgroup> senders: array<u32, SURFELS>;
 
 // Light and share of the hemisphere that a disc sends to `p`.
 fn arrived(disc: Disc, p: vec3f, n: vec3f) -> vec4f {
@@ -15,21 +17,43 @@ fn arrived(disc: Disc, p: vec3f, n: vec3f) -> vec4f {
     return vec4f(disc.radiance, 1.0) * (a * r * nearness(a, r, squared(v)));
 }
 
+fn is_far(square: u32, p: vec3f) -> bool {
+    let v = discs[square].position - p;
+    return dot(v, v) >= discs[square].reach2;
+}
+
 @compute @workgroup_size(64)
 fn exchange(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) i: u32) {
     let here = surfels[group.x];
     let n = here.back * (-PI / max(here.area, 1e-12));
     var sum = vec4f(0.0);
     var sky = vec4f(0.0);
-    for (var k = i; k < SQUARES; k += 64u) {
-        let square = discs[k];
-        let v = square.position - here.position;
-        let far = dot(v, v) >= square.reach2;
-        let first = select(SQUARES + 4u * k, k, far);
-        for (var f = first; f < first + select(4u, 1u, far); f++) {
-            let light = arrived(discs[f], here.position, n);
-            if discs[f].window > 0.0 { sky += light; } else { sum += light; }
+    // First a list of what sends, so that no invocation waits for those whose squares are opened.
+    let mine = (SQUARES + 63u) / 64u;
+    var count = 0u;
+    for (var k = i * mine; k < min((i + 1u) * mine, SQUARES); k++) {
+        count += select(4u, 1u, is_far(k, here.position));
+    }
+    counts[i] = count;
+    workgroupBarrier();
+    var at = 0u;
+    var all = 0u;
+    for (var k = 0u; k < 64u; k++) {
+        at += select(0u, counts[k], k < i);
+        all += counts[k];
+    }
+    for (var k = i * mine; k < min((i + 1u) * mine, SQUARES); k++) {
+        let far = is_far(k, here.position);
+        for (var f = 0u; f < select(4u, 1u, far); f++) {
+            senders[at] = select(SQUARES + 4u * k + f, k, far);
+            at += 1u;
         }
+    }
+    workgroupBarrier();
+    for (var k = i; k < all; k += 64u) {
+        let disc = discs[senders[k]];
+        let light = arrived(disc, here.position, n);
+        if disc.window > 0.0 { sky += light; } else { sum += light; }
     }
     partial[i] = sum;
     windows[i] = sky;

@@ -151,15 +151,15 @@ impl SurfelsPass {
 
     /// What the passes cost.
     pub fn costs(&self) -> [Cost; 2] {
-        let n = f64::from(SURFELS);
+        let (n, rounds) = (f64::from(SURFELS), f64::from(self.rounds));
         [
             Cost::new("gi.surfels", n * 400.0, n * 140.0),
-            // A surfel meets 0.44 discs a surfel, as cells do: 40 operations each, 9 for each square that it opens; joining a
-            // surfel takes 30. Buffers stay in cache.
+            // A surfel meets 0.44 discs a surfel, as cells do, shared by 64 invocations: 40 operations each, and 18 to ask
+            // each square twice; joining a surfel takes 30. Buffers stay in cache.
             Cost::new(
                 "gi.exchange",
-                f64::from(self.rounds) * n * (n * (0.44 * 40.0 + 0.07 * 9.0) + 30.0),
-                f64::from(self.rounds) * n * 200.0,
+                rounds * n * (64.0 * ((0.44 * n / 64.0).ceil() * 40.0 + (n / 256.0).ceil() * 18.0) + 30.0),
+                rounds * n * 200.0,
             ),
         ]
     }

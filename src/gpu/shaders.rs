@@ -28,6 +28,7 @@ pub const RENDER: &[Shader] = &[
             "lib/frame.wgsl",
             "lib/brdf.wgsl",
             "lib/material.wgsl",
+            "render/mesh.wgsl",
             "render/gbuffer.wgsl"
         ],
     },
@@ -49,7 +50,14 @@ pub const RENDER: &[Shader] = &[
     },
     Shader {
         name: "render.atlas",
-        files: wgsl!["lib/octahedral.wgsl", "lib/hash.wgsl", "lib/brdf.wgsl", "lib/material.wgsl", "render/atlas.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/hash.wgsl",
+            "lib/brdf.wgsl",
+            "lib/material.wgsl",
+            "render/mesh.wgsl",
+            "render/atlas.wgsl"
+        ],
     },
     Shader { name: "render.taa", files: wgsl!["lib/frame.wgsl", "render/taa.wgsl"] },
     Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },

@@ -10,10 +10,10 @@ use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{Camera, Environment, Instance, Light, LightKind, Material, Scene, shapes};
 
 /// A Lambertian box from `low` to `high`.
-type Block = ([f32; 3], [f32; 3], [f32; 3]);
+pub(crate) type Block = ([f32; 3], [f32; 3], [f32; 3]);
 
 /// Boxes under lights and a sky.
-fn scene(blocks: &[Block], lights: &[LightKind], sky: f32, camera: Camera) -> Scene {
+pub(crate) fn scene(blocks: &[Block], lights: &[LightKind], sky: f32, camera: Camera) -> Scene {
     let mut scene = Scene { cameras: vec![camera], ..Default::default() };
     scene.environment = Environment { radiance: [sky; 3], ..Default::default() };
     for (i, (low, high, color)) in blocks.iter().enumerate() {
@@ -39,7 +39,7 @@ fn sun(direction: [f32; 3], irradiance: f32) -> LightKind {
     LightKind::Directional { direction, irradiance, angle: 0.0 }
 }
 
-fn renderer(gpu: &Gpu, size: [u32; 2], method: Method) -> Renderer {
+pub(crate) fn renderer(gpu: &Gpu, size: [u32; 2], method: Method) -> Renderer {
     let shadow = ShadowOptions { sun_size: 256, cascades: 2, local_size: 256 };
     Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions { method, shadow, ..Default::default() })
         .expect("the size fits")
@@ -54,23 +54,23 @@ fn lit(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene) -> (Picture, Picture) 
     (layer(Layer::DiffInd), layer(Layer::Position))
 }
 
-fn light(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene) -> Vec<f32> {
+pub(crate) fn light(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene) -> Vec<f32> {
     lit(gpu, renderer, scene).0.data
 }
 
-fn mean(v: &[f32]) -> f64 {
+pub(crate) fn mean(v: &[f32]) -> f64 {
     v.iter().map(|&x| f64::from(x)).sum::<f64>() / v.len().max(1) as f64
 }
 
 /// Mean of |a − b| over the mean of b.
-fn difference(a: &[f32], b: &[f32]) -> f64 {
+pub(crate) fn difference(a: &[f32], b: &[f32]) -> f64 {
     a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / b.len() as f64 / mean(b).max(1e-12)
 }
 
-const GREY: [f32; 3] = [0.5; 3];
+pub(crate) const GREY: [f32; 3] = [0.5; 3];
 
 /// A floor, an open top and four walls; the one behind the camera has a colour of its own.
-fn hall(behind: [f32; 3], lights: &[LightKind], sky: f32, yfov: f32) -> Scene {
+pub(crate) fn hall(behind: [f32; 3], lights: &[LightKind], sky: f32, yfov: f32) -> Scene {
     let blocks = [
         ([-6.0, -0.2, -6.0], [6.0, 0.0, 6.0], GREY),
         ([-6.2, 0.0, -6.0], [-6.0, 4.0, 6.0], GREY),
