@@ -174,7 +174,12 @@ impl Writer {
 
     /// Draws, traces and writes the sample `stem`; `seed` is the path tracer's.
     fn write(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32) -> Result<()> {
-        let mut sample = self.sample(&scene.raster, camera)?;
+        let sample = self.sample(&scene.raster, camera)?;
+        self.complete(stem, scene, camera, seed, sample)
+    }
+
+    /// Traces and writes a sample that is drawn already.
+    fn complete(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32, mut sample: Sample) -> Result<()> {
         if let (Some(kernel), Some(traced)) = (&self.kernel, &scene.traced) {
             let options = target::options(self.spp, seed);
             let go_on = || !interrupt::requested();
@@ -276,12 +281,13 @@ fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> R
             break;
         }
         // Which views are fit is found out by drawing them, the same ones by every shard.
-        if writer.sample(&uploaded.raster, &camera)?.closer_than(TOO_CLOSE * scene_size(&scene)) > 0.1 {
+        let sample = writer.sample(&uploaded.raster, &camera)?;
+        if sample.closer_than(TOO_CLOSE * scene_size(&scene)) > 0.1 {
             continue;
         }
         let name = format!("{stem}_view{view}");
         if view % of == shard && !writer.has(&name)? {
-            writer.write(&name, &uploaded, &camera, view)?;
+            writer.complete(&name, &uploaded, &camera, view, sample)?;
         }
         cameras.push(json!({ "world_from_camera": camera.transform, "yfov": camera.yfov }));
         progress.step();

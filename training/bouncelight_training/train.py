@@ -21,6 +21,7 @@ import time
 
 import numpy as np
 import torch
+from torch import nn
 
 from . import augment, losses, pictures
 from .data import Split, check_apart
@@ -45,7 +46,7 @@ class Config:
     minutes: float = 0.0  # 0: as many epochs as above; else until this much training time is used
     batch: int = 4
     crop: int = 0  # width in cells of the windows that are cut from pictures; 0: whole pictures
-    init: str = ""  # a weights file to start from (fine-tuning); widths and features must be its own
+    init: str = ""  # a weights file to start from (fine-tuning), of this network or a smaller one with the same features
     learning_rate: float = 2e-3
     final_learning_rate: float = 2e-5
     warmup_steps: int = 50
@@ -105,12 +106,30 @@ def network(config):
 
 
 def start_from(model, path):
-    """Loads a weights file's numbers into a network of the same graph."""
+    """Loads a weights file's numbers into a network of the same graph, or of one that has grown in width, in the size of its
+    kernels or by convolutions between others: what is new then starts so that the answer stays (nearly) the same."""
     try:
         tensors, _ = read(path)
-        model.load_state_dict({name: torch.from_numpy(values.astype(np.float32)) for name, values in tensors.items()})
-    except (OSError, WeightsError, RuntimeError) as error:
+    except (OSError, WeightsError) as error:
         raise TrainingError(f"{path}: cannot start from it: {error}") from error
+    state = model.state_dict()
+    unknown = set(tensors) - set(state)
+    if unknown:
+        raise TrainingError(f"{path}: cannot start from it: this network has no {sorted(unknown)[0]}")
+    for name, values in state.items():
+        old = torch.from_numpy(tensors[name].astype(np.float32)) if name in tensors else None
+        if old is None and values.dim() == 4 and values.shape[0] == values.shape[1]:
+            nn.init.dirac_(values)
+        elif old is not None and any(a > b for a, b in zip(old.shape, values.shape)):
+            raise TrainingError(f"{path}: cannot start from it: its {name} is larger")
+        elif old is not None and values.dim() == 4:
+            # New channels go out with zeros until they have learnt something.
+            (rows, columns), (y, x) = old.shape[:2], [(n - o) // 2 for n, o in zip(values.shape[2:], old.shape[2:])]
+            values[:rows] = 0
+            values[:rows, :columns, y:y + old.shape[2], x:x + old.shape[3]] = old
+        elif old is not None:
+            values[:len(old)] = old
+    model.load_state_dict(state)
 
 
 def batch_of(split, indices, rng, device, crop=0):
