@@ -9,7 +9,7 @@ static FILES: [(&str, &[u8]); 2] = [
 ];
 
 /// The one that is taken where nobody chose.
-const DEFAULT: &str = "medium";
+const DEFAULT: &str = "small";
 
 impl Weights {
     /// The shipped network that is used by default. It corrects what method `cache` answers.

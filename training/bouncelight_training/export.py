@@ -39,7 +39,13 @@ def provenance(state, error, targets):
     for name in ("train", "validation", "init"):
         config[name] = os.path.basename(config[name])
     last = state["rows"][-10:]
-    return {
+    before = {}
+    if state["config"].get("init"):
+        try:
+            before = {"started_from": {k: v for k, v in read(state["config"]["init"])[1].get("provenance", {}).items() if k != "last_epochs"}}
+        except (WeightsError, OSError) as error:
+            before = {"started_from": f"{config['init']}, which is gone: {error.__class__.__name__}"}
+    return {**before,
         "command": state["command"], "commit": state["commit"], "date": datetime.date.today().isoformat(),
         "device": state["machine"], "seed": config["seed"], "config": config, "samples_seen": state["samples"],
         "training_minutes": round(state["elapsed"] / 60, 1),
