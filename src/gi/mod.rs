@@ -178,6 +178,7 @@ impl Method {
             Method::Cache => NeedsWorld::Around,
             Method::World(options) if options.around => NeedsWorld::Around,
             Method::World(_) => NeedsWorld::Lights,
+            Method::Neural(neural) if pass::needs_guess(&neural.weights) => NeedsWorld::Around,
             _ => NeedsWorld::Nothing,
         }
     }
@@ -229,8 +230,8 @@ pub enum GiError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The weights' output is not three channels of light.
-    #[error("the weights' output is {0}; this program needs 3 channels of light")]
+    /// The weights' output is no light and no gain on a first guess.
+    #[error("the weights' output is {0}; this program needs 3 channels of light, or 6 of gain and rest")]
     Output(String),
     /// The network could not be built.
     #[error("the network could not be built for {}x{} cells: {source}", cells[0], cells[1])]

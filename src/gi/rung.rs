@@ -125,6 +125,10 @@ impl Rung for NeuralGi {
         self.record_stages(recorder, inputs, output)
     }
 
+    fn surroundings(&self) -> Option<&wgpu::TextureView> {
+        NeuralGi::surroundings(self)
+    }
+
     fn forget(&mut self) {
         NeuralGi::forget(self);
     }

@@ -6,6 +6,7 @@ use crate::stages::largest_excess;
 use crate::{read_light, weights};
 use bouncelight::gi::GiError;
 use bouncelight::gi::pass::{Neural, NeuralGi, Options};
+use bouncelight::gi::reconstruct::Answer;
 use bouncelight::gpu::Gpu;
 use bouncelight::net::gpu::{Permutation, Source};
 use bouncelight::net::{cpu, format::Weights, graph::Shape, plan::Precision};
@@ -31,11 +32,11 @@ fn twin(shot: &Shot) -> Vec<[f32; 3]> {
     let picture = shot.picture();
     let exposure = picture.exposure();
     let [width, height] = shot.cells();
-    let rows = picture.pack(&exposure, &bouncelight::gi::features::FeatureSet::all());
+    let rows = picture.pack(&exposure, &bouncelight::gi::features::FeatureSet::screen());
     let input = cpu::Tensor::from_padded(Shape { channels: 21, height, width }, &rows);
     let y = cpu::run(&weights, &input).expect("runs").to_padded();
-    let answers: Vec<[f32; 3]> = y.chunks_exact(4).map(|c| [c[0], c[1], c[2]]).collect();
-    picture.reconstruct(&exposure, &answers)
+    let answers: Vec<[f32; 6]> = y.chunks_exact(4).map(|c| [c[0], c[1], c[2], 0.0, 0.0, 0.0]).collect();
+    picture.reconstruct(&exposure, Answer::Light, &answers)
 }
 
 #[test]
