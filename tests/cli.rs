@@ -51,6 +51,7 @@ fn usage_errors_exit_with_2() {
     fails(&["render", "interior"], 2, &["--output"]);
     fails(&["paint"], 2, &["paint"]);
     fails(&["dataset", "--rooms", "5-47", "--out", &path(&dir, "d")], 2, &["judging", "47"]);
+    fails(&["dataset", "--rooms", "5", "--shard", "4/4", "--out", &path(&dir, "d")], 2, &["4/4", "n-1"]);
     assert!(is_empty(dir.path()), "a usage error leaves nothing behind");
 }
 
@@ -350,4 +351,47 @@ fn gl_draws_the_same_picture_as_vulkan() {
         let control = psnr(&files[0], &brighter);
         assert!(control < 50.0, "{scene}: {control} dB for another exposure");
     }
+}
+
+#[test]
+fn a_dataset_is_made_in_shards_with_its_light_and_checksums() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let out = path(&dir, "samples");
+    let make = |shard: &str| {
+        let args = [
+            "dataset",
+            "--recipe",
+            "paper-room-varied",
+            "--rooms",
+            "7-8",
+            "--views",
+            "1",
+            "--size",
+            "32x16",
+            "--spp",
+            "2",
+        ];
+        let done = bouncelight(&[&args[..], &["--shard", shard, "--out", &out]].concat());
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        String::from_utf8_lossy(&done.stderr).into_owned()
+    };
+    assert!(make("0/2").contains("1 samples, 0.0 MB"));
+    let first = std::fs::read(Path::new(&out).join("varied0007_view0.safetensors")).unwrap();
+    assert!(!Path::new(&out).join("varied0008_view0.safetensors").exists(), "that is the other shard's");
+    // What a kill leaves: a sample without its line in the list, another not begun.
+    std::fs::remove_file(Path::new(&out).join("SHA256SUMS")).unwrap();
+    make("0/2");
+    make("1/2");
+    assert_eq!(first, std::fs::read(Path::new(&out).join("varied0007_view0.safetensors")).unwrap(), "it was kept");
+    let list = std::fs::read_to_string(Path::new(&out).join("SHA256SUMS")).unwrap();
+    let named: Vec<_> = list.lines().map(|l| l.split_once("  ").expect("sum and name").1).collect();
+    assert_eq!(named, ["varied0007_view0.safetensors", "varied0008_view0.safetensors"]);
+    let file = safetensors::SafeTensors::deserialize(&first).unwrap();
+    let values = |name: &str| -> Vec<f32> { bytemuck::pod_collect_to_vec(file.tensor(name).unwrap().data()) };
+    assert_eq!((file.tensor("features").unwrap().shape(), values("noise").len()), (&[24, 4, 8][..], 1));
+    assert_eq!(values("light").len(), 3 * 32);
+    assert!(values("light").iter().all(|x| x.is_finite()) && values("light").iter().any(|x| *x > 0.0));
 }

@@ -30,7 +30,9 @@ def arguments():
     parser.add_argument("size", help="WIDTHxHEIGHT of the network's input")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=20)
-    parser.add_argument("--bouncelight", metavar="PROGRAM", help="example `network`, which answers on standard input and output")
+    parser.add_argument("--bouncelight", metavar="PROGRAM", action="append", default=[],
+                        help="example `network`, which answers on standard input and output; several are compared")
+    parser.add_argument("--no-torch", action="store_true", help="do not time PyTorch")
     parser.add_argument("--pix2pix", type=int, metavar="WIDTH", help="write the paper's generator of this base width there first")
     parser.add_argument("--json", metavar="FILE", help="write the record there")
     return parser.parse_args()
@@ -157,13 +159,16 @@ def main():
     with torch.inference_mode():
         exact = module.double().padded(torch.from_numpy(x).double()).numpy()
     module.float()
-    runtimes = {"PyTorch": Torch(module, x, False), "PyTorch, channels last": Torch(module, x, True)}
+    runtimes = {}
+    if not args.no_torch:
+        runtimes = {"PyTorch": Torch(module, x, False), "PyTorch, channels last": Torch(module, x, True)}
     try:
         runtimes["ONNX Runtime"] = Onnx(module, x, args.threads)
     except ImportError as missing:
         print(f"without ONNX Runtime: {missing}", file=sys.stderr)
-    if args.bouncelight:
-        runtimes["bouncelight"] = Bouncelight(args.bouncelight, args.weights, x)
+    for program in args.bouncelight:
+        name = "bouncelight" if len(args.bouncelight) == 1 else f"bouncelight {program[-12:]}"
+        runtimes[name] = Bouncelight(program, args.weights, x)
     turns = {name: [] for name in runtimes}
     for turn in range(args.rounds + 1):
         for name, runtime in runtimes.items():
@@ -172,7 +177,7 @@ def main():
                 turns[name].append((wall * 1e3, used * 1e3 / args.threads))
     record = {"schema": 1, "weights": os.path.basename(args.weights), "size": [width, height], "threads": args.threads,
               "rounds": args.rounds, "load": os.getloadavg()[0], "torch": torch.__version__, "runtimes": {}}
-    base = turns.get("ONNX Runtime") or turns["PyTorch"]
+    base = turns.get("ONNX Runtime") or next(iter(turns.values()))
     print(f"{record['weights']} at {args.size}, {args.threads} threads, {args.rounds} rounds, load {record['load']:.1f}")
     print(f"{'':<24}{'clock, ms':>20}{'processor time / threads, ms':>32}{'':>14}")
     print(f"{'':<24}{'fastest':>10}{'ratio':>10}{'fastest':>20}{'ratio':>12}{'max error':>14}")

@@ -4,6 +4,8 @@
     python training/judge.py out/judge data/judge [../shared/reference/cycles] [--methods direct,ambient,...] [--samples 4]
                              [--constant 0.0592,0.0631,0.0570] [--csv out/judge.csv] [--bouncelight target/release/bouncelight]
 
+A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file.
+
 A folder of references holds either roomIIII_view0.exr, as cycles/paper_rooms.py writes them, or one folder a scene with scene.glb,
 frame0000.exr and meta.json. Rooms are averaged into one row a method; other scenes get a row each. Pictures that exist
 are kept, so a killed run goes on where it stopped: empty the folder when the program changed.
@@ -103,7 +105,6 @@ def main():
     parser.add_argument("--methods", default="direct,ambient,ssgi,rsm,cache,probes,neural", type=lambda t: t.split(","))
     parser.add_argument("--constant", type=lambda t: [float(v) for v in t.split(",")])
     parser.add_argument("--samples", type=int, default=4)
-    parser.add_argument("--weights")
     parser.add_argument("--csv", help="also write every scene's numbers here")
     parser.add_argument("--bouncelight", default="target/release/bouncelight")
     a = parser.parse_args()
@@ -125,13 +126,15 @@ def main():
         for group, name, scene, reference in references(folder):
             truth, drawn = layers(reference), {}
             for method in ["direct"] + [m for m in a.methods if m != "direct"]:
-                path = os.path.join(a.out, f"{name}_{method}.exr")
+                kind, _, weights = method.partition(":")
+                row = f"{kind} {os.path.splitext(os.path.basename(weights))[0]}".strip()
+                path = os.path.join(a.out, f"{name}_{row.replace(' ', '_')}.exr")
                 if not os.path.exists(path):
-                    command = [a.bouncelight, "render", *scene, "-o", path, "--method", method, "--samples", str(a.samples), "--aov", "all", "-q"]
-                    subprocess.run(command + (["--weights", a.weights] if method == "neural" and a.weights else []), check=True)
+                    command = [a.bouncelight, "render", *scene, "-o", path, "--method", kind, "--samples", str(a.samples), "--aov", "all", "-q"]
+                    subprocess.run(command + (["--weights", weights] if weights else []), check=True)
                 drawn[method] = layers(path)
                 if method in a.methods:
-                    compare(group, name, method, path, reference, light_error(drawn[method], drawn["direct"], truth))
+                    compare(group, name, row, path, reference, light_error(drawn[method], drawn["direct"], truth))
             extra = [("constant", with_constant(drawn["direct"], a.constant))] if a.constant else []
             extra += [("best constant", with_constant(drawn["direct"], best_constant(drawn["direct"], truth)))]
             for row, picture in extra:

@@ -1,18 +1,17 @@
-// Light of all emitters at every cell: blocks of the reflective shadow maps, opened into their sixteen fine emitters
-// where they are near, and (`cache` only) the surfels around the camera with the sky between them. One invocation a cell;
-// emitters pass through workgroup memory, 64 at a time.
+// Light of all emitters at every cell: coarse ones of the reflective shadow maps, opened into blocks where they are near and
+// those into fine ones where they are nearer still, and (`cache` only) the surfels around the camera with windows to the sky
+// between them. One invocation a cell; what all cells read passes through workgroup memory, 64 at a time.
 
 @group(1) @binding(0) var<storage, read> cell_pixels: array<u32>;
 @group(1) @binding(1) var<storage, read_write> light: array<vec4f>;
 @group(1) @binding(2) var<storage, read> fine: array<Emitter>;
 @group(1) @binding(3) var<storage, read> blocks: array<Emitter>;
-@group(1) @binding(4) var<storage, read> surfels: array<Surfel>;
-@group(1) @binding(5) var<storage, read> sent: array<vec4f>;
-@group(1) @binding(6) var<storage, read> sky: Sky;
+@group(1) @binding(4) var<storage, read> coarse: array<Emitter>;
+@group(1) @binding(5) var<storage, read> discs: array<Disc>;
+@group(1) @binding(6) var<uniform> counts: Counts;
 
-@group(1) @binding(7) var<uniform> counts: Counts;
-
-// A block is opened where it is nearer than so many of its own widths.
+// A square of blocks, or a block, is opened where it is nearer than so many of its own widths. (At 1.4 the mean error of six
+// rooms is 0.3 points larger for squares alone, 0.45 for both.)
 const NEAR_WIDTHS: f32 = 2.0;
 
 struct Sum {
@@ -20,9 +19,19 @@ struct Sum {
     red: vec3f,
     green: vec3f,
     blue: vec3f,
+    // Of the hemisphere, cosine-weighted.
+    share: f32,
 }
 
-var<workgroup> tile: array<Emitter, 64>;
+// A cell's surface.
+struct Place {
+    p: vec3f,
+    n: vec3f,
+    haze: f32,
+}
+
+var<workgroup> emitters: array<Emitter, 64>;
+var<workgroup> squares: array<Disc, 64>;
 
 fn add(sum: ptr<function, Sum>, v: vec3f, radiance: vec3f) {
     (*sum).red += v * radiance.r;
@@ -30,18 +39,76 @@ fn add(sum: ptr<function, Sum>, v: vec3f, radiance: vec3f) {
     (*sum).blue += v * radiance.b;
 }
 
-// What an emitter of a reflective shadow map sends to `p`, above the horizon of the receiver's normal `n`, through the
-// small objects between, whose haze at `p` is `here`.
-fn add_emitter(sum: ptr<function, Sum>, e: Emitter, p: vec3f, n: vec3f, here: f32) {
-    let a = arrival(e.position, e.normal, e.rest, e.area, p, n);
-    let through = exp(-max(e.haze + here, 0.0) * a.distance);
-    let light = e.radiance * a.factor + e.gloss * (a.plain * lobe(e.mirror, -a.towards));
-    add(sum, select(vec3f(0.0), a.towards * through, dot(a.towards, n) > 0.0), light);
+// What an emitter of a reflective shadow map at `v` from here sends, through the small objects between.
+fn add_emitter(sum: ptr<function, Sum>, e: Emitter, v: vec3f, here: Place) {
+    let d2 = squared(v);
+    let inverse = inverseSqrt(d2);
+    let d = d2 * inverse;
+    let facing = dot(e.back, v);
+    let a = at_least(facing, e.least) + e.rest * d;
+    let through = exp(-max(e.haze + here.haze, 0.0) * d);
+    let mirrored = select(0.0, d * lobe(-dot(e.mirror, v) * inverse), facing > 0.0);
+    add(sum, v * (through * nearness(a, dot(here.n, v), d2)), e.radiance * a + e.gloss * mirrored);
 }
 
-fn far(e: Emitter, area: f32, p: vec3f) -> bool {
-    let v = e.position - p;
+// Nothing is taken for what stands between: that is surfels too, and they fill the hemisphere together.
+fn add_disc(sum: ptr<function, Sum>, disc: Disc, v: vec3f, here: Place) {
+    let a = at_least(dot(disc.back, v), disc.least);
+    let r = dot(here.n, v);
+    let w = a * nearness(a, r, squared(v));
+    (*sum).share += w * r;
+    add(sum, v, disc.radiance * w);
+}
+
+// True where an emitter at `v` is farther away than so many widths of its group, of `area` m².
+fn far(e: Emitter, v: vec3f, area: f32) -> bool {
     return e.area == 0.0 || dot(v, v) > NEAR_WIDTHS * NEAR_WIDTHS * area;
+}
+
+// Block number `block`, whole or opened.
+fn add_block(sum: ptr<function, Sum>, block: u32, here: Place) {
+    let low = blocks[2u * block];
+    let high = blocks[2u * block + 1u];
+    let area = low.area + high.area;
+    if area == 0.0 { return; }
+    let v_low = low.position - here.p;
+    let v_high = high.position - here.p;
+    if far(low, v_low, area) && far(high, v_high, area) {
+        add_emitter(sum, low, v_low, here);
+        add_emitter(sum, high, v_high, here);
+    } else {
+        for (var k = 32u * block; k < 32u * block + 32u; k++) {
+            if fine[k].area > 0.0 { add_emitter(sum, fine[k], fine[k].position - here.p, here); }
+        }
+    }
+}
+
+fn add_world(sum: ptr<function, Sum>, here: Place, i: u32) {
+    var seen = Sum();
+    var sky = Sum();
+    for (var first = 0u; first < SURFELS / 4u; first += 64u) {
+        squares[i].reach2 = 0.0;
+        squares[i].back = vec3f(0.0);
+        if first + i < SURFELS / 4u { squares[i] = discs[first + i]; }
+        workgroupBarrier();
+        for (var k = 0u; k < 64u; k++) {
+            let v = squares[k].position - here.p;
+            if dot(v, v) >= squares[k].reach2 {
+                if squares[k].window > 0.0 { add_disc(&sky, squares[k], v, here); } else { add_disc(&seen, squares[k], v, here); }
+            } else {
+                let start = SQUARES + 4u * (first + k);
+                for (var f = start; f < start + 4u; f++) {
+                    let w = discs[f].position - here.p;
+                    if discs[f].window > 0.0 { add_disc(&sky, discs[f], w, here); } else { add_disc(&seen, discs[f], w, here); }
+                }
+            }
+        }
+        workgroupBarrier();
+    }
+    let gain = gains(sky.share, seen.share);
+    (*sum).red += sky.red * gain.x + seen.red * gain.y;
+    (*sum).green += sky.green * gain.x + seen.green * gain.y;
+    (*sum).blue += sky.blue * gain.x + seen.blue * gain.y;
 }
 
 @compute @workgroup_size(8, 8)
@@ -50,64 +117,36 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
     let inside = all(id.xy < grid);
     let index = cell_index(min(id.xy, grid - 1u));
     let packed = select(NO_PIXEL, cell_pixels[index], inside);
-    var p = vec3f(0.0);
-    var n = vec3f(0.0);
+    var here = Place();
     if packed != NO_PIXEL {
         let pixel = unpack_pixel(packed);
-        p = world_position_at(pixel, distance_at(pixel));
-        n = world_normal_at(pixel);
+        here.p = world_position_at(pixel, distance_at(pixel));
+        here.n = world_normal_at(pixel);
     }
-    let here = haze(counts, p);
-    var sum = Sum(vec3f(0.0), vec3f(0.0), vec3f(0.0));
-    for (var first = 0u; first < 2u * counts.blocks; first += 64u) {
-        tile[i].area = 0.0;
-        if first + i < 2u * counts.blocks { tile[i] = blocks[first + i]; }
+    here.haze = haze(counts, here.p);
+    var sum = Sum();
+    for (var first = 0u; first < counts.blocks / 2u; first += 64u) {
+        emitters[i].area = 0.0;
+        if first + i < counts.blocks / 2u { emitters[i] = coarse[first + i]; }
         workgroupBarrier();
         for (var k = 0u; k < 64u; k += 2u) {
-            let low = tile[k];
-            let high = tile[k + 1u];
-            let area = low.area + high.area;
+            let area = emitters[k].area + emitters[k + 1u].area;
             if area == 0.0 { continue; }
-            if far(low, area, p) && far(high, area, p) {
-                add_emitter(&sum, low, p, n, here);
-                add_emitter(&sum, high, p, n, here);
+            let v_low = emitters[k].position - here.p;
+            let v_high = emitters[k + 1u].position - here.p;
+            if far(emitters[k], v_low, area) && far(emitters[k + 1u], v_high, area) {
+                add_emitter(&sum, emitters[k], v_low, here);
+                add_emitter(&sum, emitters[k + 1u], v_high, here);
             } else {
-                let start = 8u * (first + k);
-                for (var f = start; f < start + 16u; f++) {
-                    add_emitter(&sum, fine[f], p, n, here);
+                let start = 2u * (first + k);
+                for (var block = start; block < start + 4u; block++) {
+                    add_block(&sum, block, here);
                 }
             }
         }
         workgroupBarrier();
     }
-    if SURFELS > 0u {
-        var covered = vec3f(0.0);
-        var share = 0.0;
-        var near = Sum(vec3f(0.0), vec3f(0.0), vec3f(0.0));
-        for (var first = 0u; first < SURFELS; first += 64u) {
-            let s = surfels[first + i];
-            tile[i].position = s.position;
-            tile[i].area = s.area;
-            tile[i].normal = s.normal;
-            tile[i].radiance = sent[first + i].rgb - s.mapped;
-            workgroupBarrier();
-            // Nothing is taken for what stands between: that is surfels too, and they fill the hemisphere together.
-            for (var k = 0u; k < 64u; k++) {
-                let a = arrival(tile[k].position, tile[k].normal, 0.0, tile[k].area, p, n);
-                let v = select(vec3f(0.0), a.towards * a.factor, dot(a.towards, n) > 0.0);
-                covered += v;
-                share += dot(v, n);
-                add(&near, v, tile[k].radiance);
-            }
-            workgroupBarrier();
-        }
-        let rest = sky_rest(sky, share, n);
-        sum.red += near.red * rest.gain;
-        sum.green += near.green * rest.gain;
-        sum.blue += near.blue * rest.gain;
-        // The open part of the hemisphere: all of it (E/π = 1 along n) without what the surfels cover.
-        add(&sum, (n - covered) * rest.open, rest.radiance);
-    }
+    if SURFELS > 0u { add_world(&sum, here, i); }
     if packed == NO_PIXEL { return; }
     light[3u * index] = vec4f(sum.red, 0.0);
     light[3u * index + 1u] = vec4f(sum.green, 0.0);

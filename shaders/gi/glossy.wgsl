@@ -1,11 +1,14 @@
 // Specular light of sky and bounces: the split sum's share times what one ray along the mirrored direction finds on the
-// screen, blurred by the lobe's width there. Where the ray finds nothing: the light that the surface's own side receives,
-// mixed with the picture's colour where the ray leaves it, or the surroundings where only they are there.
+// screen, blurred by the lobe's width there. Where the ray finds nothing: what the cube around the camera shows, if the surface
+// is smooth and the method has one; else the light that the surface's own side receives, mixed with the picture's
+// colour where the ray leaves it, or the surroundings where only they are there.
 
 @group(1) @binding(0) var lit_picture: texture_2d<f32>;
 @group(1) @binding(1) var blurred: sampler;
 @group(1) @binding(2) var indirect_specular: texture_storage_2d<rgba16float, write>;
 @group(2) @binding(0) var environment_picture: texture_2d<f32>;
+// What the cube around the camera shows (`Rung::surroundings`); one texel where the method has none.
+@group(2) @binding(1) var surroundings: texture_2d<f32>;
 
 // The largest finite half: brighter light is held there instead of becoming infinite.
 const HALF_MAX: f32 = 65504.0;
@@ -22,6 +25,11 @@ const NEXT_PIXEL = 1.5;
 const FAR = 1e9;
 // Level of the lit picture (pixels: 2^(level + 1)) that guesses what lies beyond its border.
 const BORDER_LEVEL = 4.0;
+// Roughness up to which the cube is all that is asked, and from which on nothing: it holds a mirror's ray, not a lobe.
+const CUBE_SHARP = 0.2;
+const CUBE_BLUNT = 0.5;
+// Times that a ray's way out of the cube around the camera is looked up again.
+const LOOKS = 2;
 
 // A ray on the screen: pixel position and 1/distance are linear between its ends.
 struct Track {
@@ -130,6 +138,31 @@ fn beyond(track: Track, r: vec3f) -> vec4f {
     return vec4f(color.rgb + open * environment_radiance(r), ahead * (0.5 + 0.5 * open));
 }
 
+// The cube's radiance (rgb) and distance (a) in this direction.
+fn cube_at(d: vec3f) -> vec4f {
+    let size = vec2f(textureDimensions(surroundings));
+    let a = abs(d);
+    let k = select(select(2u, 1u, a.y >= a.z), 0u, a.x >= a.y && a.x >= a.z);
+    let away = d[k] < 0.0;
+    let ndc = vec2f(select(1.0, -1.0, away) * d[(k + 2u) % 3u], d[(k + 1u) % 3u]) / max(a[k], 1e-9);
+    let at = clamp((0.5 + ndc * vec2f(0.5, -0.5)) * size.y, vec2f(0.5), vec2f(size.y - 0.5));
+    let corner = vec2f(f32(2u * k + u32(away)) * size.y, 0.0);
+    return textureSampleLevel(surroundings, blurred, (corner + at) / size, 0.0);
+}
+
+// What a ray from `p` finds beyond the screen: where it leaves the sphere about the camera whose radius the cube knows in
+// the direction of where it leaves it.
+fn elsewhere(p: vec3f, r: vec3f) -> vec3f {
+    let o = p - frame.world_from_view[3].xyz;
+    let along = dot(o, r);
+    var seen = cube_at(r);
+    for (var i = 0; i < LOOKS; i++) {
+        let t = sqrt(max(along * along - dot(o, o) + seen.a * seen.a, 0.0)) - along;
+        seen = cube_at(o + max(t, 0.0) * r);
+    }
+    return seen.rgb;
+}
+
 fn reflected(pixel: vec2u, depth: f32, n: vec3f, roughness: f32) -> vec3f {
     let p = world_position(frame, pixel, depth);
     let r = reflect(-to_eye(frame, pixel), n);
@@ -141,7 +174,11 @@ fn reflected(pixel: vec2u, depth: f32, n: vec3f, roughness: f32) -> vec3f {
     if u >= 0.0 { hit = found(track, u, p, r, cone); }
     // A lobe that fills the hemisphere shows what the surface's own side receives, and no ray tells it better.
     let narrow = 1.0 - smoothstep(0.6, 1.0, roughness);
-    let guess = beyond(track, r);
+    var guess = beyond(track, r);
+    let sharp = 1.0 - smoothstep(CUBE_SHARP, CUBE_BLUNT, roughness);
+    if sharp > 0.0 && textureDimensions(surroundings).x > 1u {
+        guess = mix(guess, vec4f(elsewhere(p, r), 1.0), sharp);
+    }
     return mix(mix(around, guess.rgb, narrow * guess.a), hit.rgb, narrow * hit.a);
 }
 

@@ -1,10 +1,14 @@
-// The network's light, one answer per 4x4 cell, brought to every pixel: bilinear where the surface goes on, and only
-// from cells of the pixel's own surface where it does not. All of it in f32; light is averaged, not its logarithm.
-// The prelude holds AMBIENT and the tolerances (gi::reconstruct documents them).
+// The network's answers, one per 4x4 cell, brought to every pixel: bilinear where the surface goes on, and only from cells
+// of the pixel's own surface where it does not. All of it in f32; factors are averaged, not their logarithms.
+//     light = base * exp(y.rgb) + s * (the three numbers after them)
+// where the base is s itself (GAIN false; then there are only three numbers) or the first guess at the pixel (GAIN true).
+// The prelude holds GAIN, LOWEST, HIGHEST, MOST, FALLBACK and the tolerances (gi::reconstruct documents them).
 
 @group(1) @binding(0) var<storage, read> exposure: Exposure;
 @group(1) @binding(1) var<storage, read> answers: array<vec4f>;
 @group(1) @binding(2) var output: texture_storage_2d<rgba16float, write>;
+// The first guess, E/π; one texel where GAIN is false.
+@group(1) @binding(3) var guess_map: texture_2d<f32>;
 
 struct Surface {
     position: vec3f,
@@ -22,59 +26,76 @@ fn agreement(here: Surface, pixel: vec2i, z: f32) -> f32 {
     return max(facing, NORMAL_FLOOR) / (lorentz * lorentz);
 }
 
-// Light times weight (rgb) and weight (a) of one cell; nothing where the cell shows the background.
-fn tap(here: Surface, cell: vec2i, spatial: f32) -> vec4f {
+// Sum over cells of their factors and additions, times weight, and of the weights.
+struct Sum {
+    factor: vec3f,
+    addition: vec3f,
+    weight: f32,
+}
+
+fn plus(a: Sum, b: Sum) -> Sum {
+    return Sum(a.factor + b.factor, a.addition + b.addition, a.weight + b.weight);
+}
+
+// What one cell says; nothing where it shows the background.
+fn tap(here: Surface, cell: vec2i, spatial: f32) -> Sum {
     let pixel = sample_pixel(cell);
     let z = distance_at(pixel);
     if z <= 0.0 {
-        return vec4f(0.0);
+        return Sum();
     }
-    let y = answers[u32(cell.y) * params.cells.x + u32(cell.x)].rgb;
-    let light = exp(clamp(finite3(y), vec3f(-10.0), vec3f(6.0)));
+    let index = u32(cell.y) * params.cells.x + u32(cell.x);
     let weight = spatial * max(agreement(here, pixel, z), WEIGHT_FLOOR);
-    return vec4f(light * weight, weight);
+    if !GAIN {
+        let y = answers[index].rgb;
+        return Sum(exp(clamp(finite3(y), vec3f(LOWEST), vec3f(HIGHEST))) * weight, vec3f(0.0), weight);
+    }
+    let y = answers[2u * index];
+    let factor = exp(clamp(finite3(y.rgb), vec3f(LOWEST), vec3f(HIGHEST)));
+    let addition = clamp(finite3(vec3f(y.a, answers[2u * index + 1u].rg)), vec3f(-MOST), vec3f(MOST));
+    return Sum(factor * weight, addition * weight, weight);
 }
 
 // Tent-weighted sum over the 2r x 2r cells around `place` (in cells).
-fn gather(here: Surface, place: vec2f, radius: i32) -> vec4f {
+fn gather(here: Surface, place: vec2f, radius: i32) -> Sum {
     let base = vec2i(floor(place));
     let first = max(base - (radius - 1), vec2i(0));
     let last = min(base + radius, vec2i(params.cells) - 1);
-    var sum = vec4f(0.0);
+    var sum = Sum();
     for (var y = first.y; y <= last.y; y++) {
         for (var x = first.x; x <= last.x; x++) {
             let tent = 1.0 - abs(vec2f(f32(x), f32(y)) - place) / (f32(radius) + 1.0);
-            sum += tap(here, vec2i(x, y), tent.x * tent.y);
+            sum = plus(sum, tap(here, vec2i(x, y), tent.x * tent.y));
         }
     }
     return sum;
 }
 
-fn mean(sum: vec4f) -> vec3f {
-    return sum.rgb / max(sum.a, 1e-30);
+fn light(sum: Sum, base: vec3f) -> vec3f {
+    return (base * sum.factor + exposure.s * sum.addition) / max(sum.weight, 1e-30);
 }
 
-fn light_of(pixel: vec2i, here: Surface) -> vec3f {
+fn light_of(pixel: vec2i, here: Surface, base: vec3f) -> vec3f {
     let place = (vec2f(pixel) - f32(CELL / 2)) / f32(CELL);
-    let base = vec2i(floor(place));
+    let corner = vec2i(floor(place));
     let f = place - floor(place);
     let top = vec2i(params.cells) - 1;
-    let near = tap(here, clamp(base, vec2i(0), top), (1.0 - f.x) * (1.0 - f.y))
-        + tap(here, clamp(base + vec2i(1, 0), vec2i(0), top), f.x * (1.0 - f.y))
-        + tap(here, clamp(base + vec2i(0, 1), vec2i(0), top), (1.0 - f.x) * f.y)
-        + tap(here, clamp(base + vec2i(1, 1), vec2i(0), top), f.x * f.y);
-    if near.a >= TRUST {
-        return mean(near);
+    var near = tap(here, clamp(corner, vec2i(0), top), (1.0 - f.x) * (1.0 - f.y));
+    near = plus(near, tap(here, clamp(corner + vec2i(1, 0), vec2i(0), top), f.x * (1.0 - f.y)));
+    near = plus(near, tap(here, clamp(corner + vec2i(0, 1), vec2i(0), top), (1.0 - f.x) * f.y));
+    near = plus(near, tap(here, clamp(corner + vec2i(1, 1), vec2i(0), top), f.x * f.y));
+    if near.weight >= TRUST {
+        return light(near, base);
     }
     // The four cells around this pixel lie on other surfaces: look further out, and blend so that no seam shows.
     var wide = gather(here, place, 2);
-    if wide.a < LOST {
+    if wide.weight < LOST {
         wide = gather(here, place, 4);
     }
-    if wide.a <= 0.0 {
-        return AMBIENT;
+    if wide.weight <= 0.0 {
+        return base * FALLBACK;
     }
-    return mix(mean(wide), mean(near), near.a / TRUST);
+    return mix(light(wide, base), light(near, base), near.weight / TRUST);
 }
 
 @compute @workgroup_size(8, 8)
@@ -84,10 +105,14 @@ fn reconstruct(@builtin(global_invocation_id) id: vec3u) {
     }
     let pixel = vec2i(id.xy);
     let z = distance_at(pixel);
-    var light = vec3f(0.0);
+    var result = vec3f(0.0);
     if z > 0.0 {
         let here = Surface(position_at(pixel, z), normal_at(pixel), z);
-        light = min(exposure.s * light_of(pixel, here), vec3f(LARGEST));
+        var base = vec3f(exposure.s);
+        if GAIN {
+            base = max(finite3(textureLoad(guess_map, pixel, 0).rgb), vec3f(0.0));
+        }
+        result = clamp(light_of(pixel, here, base), vec3f(0.0), vec3f(LARGEST));
     }
-    textureStore(output, pixel, vec4f(light, 1.0));
+    textureStore(output, pixel, vec4f(result, 1.0));
 }

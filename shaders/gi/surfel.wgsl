@@ -1,15 +1,18 @@
-// The texels of the cube around the camera as discs of surface, and the sky between them.
+// The texels of the cube around the camera: discs of surface, and the sky as windows in a box around scene and camera.
+// The four texels of a square of a face follow each other.
 
 struct Surfel {
     position: vec3f,
-    // m²; 0 where the texel shows the sky.
+    // m²; 0 for no surfel.
     area: f32,
-    normal: vec3f,
-    // The texel's solid angle seen from the camera, sr.
-    solid: f32,
+    // Minus its normal times area/π.
+    back: vec3f,
+    // 1 for a window.
+    window: f32,
     albedo: vec3f,
-    pad0: f32,
-    // What it sends by itself: emission, and albedo times direct light. The sky's radiance in texels that show it.
+    // From the camera, metres.
+    range: f32,
+    // What it sends by itself: emission, and albedo times direct light; the sky's radiance through a window.
     own: vec3f,
     pad1: f32,
     // The part of that which reflective shadow maps already hold.
@@ -17,42 +20,26 @@ struct Surfel {
     pad2: f32,
 }
 
-// What the camera sees of the sky, as the first two orders of a spherical function: E/π(n) = w + dot(xyz, n).
-struct Sky {
-    red: vec4f,
-    green: vec4f,
-    blue: vec4f,
-    // The same for a sky of radiance 1.
-    open: vec4f,
-}
-
-struct Rest {
-    // Factor for the surfels' light.
-    gain: f32,
-    // Factor for the gaps between them.
-    open: f32,
-    // The sky's radiance around n.
+// A surfel, or four, as exchange and gather take it.
+struct Disc {
+    position: vec3f,
+    window: f32,
+    back: vec3f,
+    // Four are opened within the square root of this, metres.
+    reach2: f32,
+    // What it sends, in the end without what reflective shadow maps hold.
     radiance: vec3f,
+    // `least_facing` of one surfel.
+    least: f32,
 }
 
-// Where gaps are closed, light of the surfels stands in for at most so much more than there is.
+// Surfels stand in for what the camera does not see by at most so much more light than they send.
 const MOST_GAIN: f32 = 2.0;
 
-// What to make of a hemisphere around `n` of which surfels cover `share` (cosine-weighted, 1 = all). The gaps are sky,
-// as seen from here, but also what the camera does not see; the camera's own share of sky in that direction knows
-// nothing of this place. Their geometric mean is taken for the sky: it is right where both are, and 0 where either is,
-// so a closed room stays dark. The rest of the hemisphere shows the mean of what surfels show.
-fn sky_rest(sky: Sky, share: f32, n: vec3f) -> Rest {
-    let n1 = vec4f(n, 1.0);
-    let seen = max(vec4f(dot(sky.red, n1), dot(sky.green, n1), dot(sky.blue, n1), dot(sky.open, n1)), vec4f(0.0));
-    let gaps = max(1.0 - share, 0.0);
-    let open = sqrt(gaps * min(seen.a, 1.0));
-    // Mean over the part of the sky around n, held to the mean over all of it where n sees little.
-    let mean = vec4f(sky.red.w, sky.green.w, sky.blue.w, sky.open.w);
-    let around = seen + 0.1 * mean;
-    return Rest(
-        clamp((1.0 - open) / max(share, 1e-6), 0.0, MOST_GAIN),
-        open / max(gaps, 1e-6),
-        around.rgb / max(around.a, 1e-20),
-    );
+// Factors for the light of windows (x) and of surfels (y) where windows cover `open` and surfels `share` of a hemisphere
+// (cosine-weighted, 1 = all). Where both together are too much, one hides the other; where they are too little, the
+// rest is something that the camera does not see, and no sky: it shows the mean of what surfels show.
+fn gains(open: f32, share: f32) -> vec2f {
+    let less = 1.0 / max(open + share, 1.0);
+    return vec2f(less, min((1.0 - open * less) / max(share, 1e-6), MOST_GAIN));
 }

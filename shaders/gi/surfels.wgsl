@@ -16,6 +16,8 @@
 
 @group(0) @binding(12) var<uniform> counts: Counts;
 
+// The box of windows keeps so much of its longest side between itself and the camera.
+const ROOM: f32 = 0.25;
 // The point is lifted off its surface by so many texels of the map.
 const LIFT: f32 = 1.5;
 
@@ -57,42 +59,59 @@ fn view_at(i: u32, p: vec3f) -> u32 {
     return first + select(4u, 5u, away.z < 0.0);
 }
 
+// Where a ray from the camera to the sky leaves the box around the scene: inward normal and metres. A surface inside sees
+// that part of the sky through the same part of the box, if nothing hides it from one of the two.
+fn window_at(eye: vec3f, ray: vec3f) -> vec4f {
+    let size = counts.high - counts.low;
+    let room = ROOM * max(max(size.x, size.y), max(size.z, 1e-3));
+    let side = select(min(counts.low, eye - room), max(counts.high, eye + room), ray > vec3f(0.0)) - eye;
+    let t = side / select(ray, vec3f(1e-6), abs(ray) < vec3f(1e-6));
+    let least = min(abs(t.x), min(abs(t.y), abs(t.z)));
+    return vec4f(normalize(-sign(ray) * vec3f(abs(t) <= vec3f(least))), least);
+}
+
 @compute @workgroup_size(64)
 fn light_up(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= SURFELS { return; }
     let face = around[id.x / (SIDE * SIDE)];
-    let texel = vec2u(id.x % SIDE, id.x / SIDE % SIDE);
+    let square = id.x / 4u;
+    let texel = 2u * vec2u(square % (SIDE / 2u), square / (SIDE / 2u) % (SIDE / 2u)) + vec2u(id.x & 1u, (id.x >> 1u) & 1u);
     let at = face.origin + texel;
     let depth = textureLoad(around_depth, at, 0).x;
     let seen = depth > 0.0;
     var s: Surfel;
     s.position = atlas_position(face, texel, select(face.near / 1000.0, depth, seen));
     let ray = normalize(s.position - face.eye);
-    let cosine = dot(ray, face.axis);
-    s.solid = face.texel * face.texel * cosine * cosine * cosine;
     if seen {
-        s.normal = oct_decode(textureLoad(around_normal, at, 0).xy);
-        s.area = atlas_area(face, s.position, s.normal).y;
+        let n = oct_decode(textureLoad(around_normal, at, 0).xy);
+        s.area = atlas_area(face, s.position, n).y;
+        s.back = n * (-s.area / PI);
         s.albedo = textureLoad(around_albedo, at, 0).rgb;
         s.own = textureLoad(around_emissive, at, 0).rgb;
         for (var i = 0u; i < counts.lights; i++) {
             let l = sample_light(lights[i], s.position);
-            let n_l = dot(s.normal, l.l);
+            let n_l = dot(n, l.l);
             if n_l <= 0.0 { continue; }
             let view = view_at(i, s.position);
             let direct = s.albedo * l.irradiance * (n_l / PI);
             if view == 0xffffffffu {
                 s.own += direct;
             } else {
-                let part = direct * lit(views[view], s.position, s.normal);
+                let part = direct * lit(views[view], s.position, n);
                 s.own += part;
                 s.mapped += part;
             }
         }
     } else {
-        s.normal = -ray;
+        let window = window_at(face.eye, ray);
+        s.position = face.eye + ray * window.w;
+        let n = window.xyz;
+        s.area = atlas_area(face, s.position, n).y;
+        s.back = n * (-s.area / PI);
+        s.window = 1.0;
         s.own = environment_radiance(ray);
     }
+    s.range = distance(s.position, face.eye);
     surfels[id.x] = s;
-    sent[id.x] = vec4f(select(vec3f(0.0), s.own, seen), 0.0);
+    sent[id.x] = vec4f(s.own, 0.0);
 }

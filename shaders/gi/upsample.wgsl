@@ -39,28 +39,35 @@ fn stage(index: u32, first: vec2i) {
 struct Surface {
     position: vec3f,
     normal: vec3f,
-    distance: f32,
+    // One over the distance from its plane that counts as little, 1/m.
+    strictness: f32,
 }
 
 // Light times weight (rgb) and weight (a) of one staged cell. A point of the same surface weighs 1. The tails are heavy on
 // purpose: where nothing agrees the least bad cell wins by ratio, without a branch and without a division by zero.
-fn tap(here: Surface, at: i32, spatial: f32) -> vec4f {
+//
+// A cell knows the light above its own horizon only. Where a pixel that looks elsewhere has nothing better, the cell's light
+// is taken for a direction between the two normals, `least_cosine` or more towards the cell's.
+fn tap(here: Surface, at: i32, spatial: f32, least_cosine: f32) -> vec4f {
     let found = points[at];
-    let off_plane = dot(here.normal, found.xyz - here.position) / (PLANE_TOLERANCE * here.distance);
+    let off_plane = dot(here.normal, found.xyz - here.position) * here.strictness;
     let lorentz = 1.0 + min(off_plane * off_plane, 1e12);
-    let facing = max(pow(max(dot(here.normal, normals[at]), 0.0), NORMAL_POWER), NORMAL_FLOOR);
+    let cosine = dot(here.normal, normals[at]);
+    let facing = max(pow(max(cosine, 0.0), NORMAL_POWER), NORMAL_FLOOR);
     let weight = found.w * spatial * max(facing / (lorentz * lorentz), WEIGHT_FLOOR);
-    return vec4f(finite3(light_towards(lights[at], here.normal)) * weight, weight);
+    var direction = here.normal;
+    if least_cosine > 0.0 { direction += max(least_cosine - cosine, 0.0) * normals[at]; }
+    return vec4f(finite3(light_towards(lights[at], direction)) * weight, weight);
 }
 
 // Tent-weighted sum over the 2r x 2r cells around `place` (in cells, from the first staged one).
-fn gather(here: Surface, place: vec2f, radius: i32) -> vec4f {
+fn gather(here: Surface, place: vec2f, radius: i32, least_cosine: f32) -> vec4f {
     let base = vec2i(floor(place)) - (radius - 1);
     var sum = vec4f(0.0);
     for (var i = 0; i < 4 * radius * radius; i++) {
         let cell = base + vec2i(i % (2 * radius), i / (2 * radius));
         let tent = 1.0 - abs(vec2f(cell) - place) / f32(radius);
-        sum += tap(here, cell.y * STAGED + cell.x, tent.x * tent.y);
+        sum += tap(here, cell.y * STAGED + cell.x, tent.x * tent.y, least_cosine);
     }
     return sum;
 }
@@ -70,12 +77,12 @@ fn mean(sum: vec4f) -> vec3f {
 }
 
 fn light_of(here: Surface, place: vec2f) -> vec3f {
-    let near = gather(here, place, 1);
+    let near = gather(here, place, 1, 0.0);
     if near.a >= TRUST {
         return mean(near);
     }
     // The four cells around this pixel lie on other surfaces: look further out, and blend so that no seam shows.
-    return mix(mean(gather(here, place, 2)), mean(near), near.a / TRUST);
+    return mix(mean(gather(here, place, 2, LEAST_COSINE)), mean(near), near.a / TRUST);
 }
 
 @compute @workgroup_size(8, 8)
@@ -94,7 +101,7 @@ fn upsample(
     let z = distance_at(pixel);
     var result = vec3f(0.0);
     if z > 0.0 {
-        let here = Surface(world_position_at(pixel, z), world_normal_at(pixel), z);
+        let here = Surface(world_position_at(pixel, z), world_normal_at(pixel), 1.0 / (PLANE_TOLERANCE * z));
         // A cell counts as lying at its middle, whichever pixel stands for it.
         let place = (vec2f(pixel) - f32(CELL_SIDE / 2)) / f32(CELL_SIDE) - vec2f(first);
         result = min(light_of(here, place), vec3f(LARGEST));

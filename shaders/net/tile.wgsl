@@ -1,13 +1,16 @@
 // What the blocked convolutions share: a thread makes two columns by four rows of pixels and VECTORS (1 to 4) vectors of output
 // channels of them. Tiles are counted row by row through the whole picture, so a workgroup of a small picture is full too.
 // From the prelude: IN_PITCH, NEAREST (factor by which the input is enlarged), SPREAD (distance of output pixels: 1, or the
-// stride of a transposed convolution), OUT_VECTORS, VECTORS.
+// stride of a transposed convolution), OUT_VECTORS, VECTORS, IN_VECTORS and GROUP_VECTORS (vectors read by, and written of, a group of
+// channels).
 
 // One vector of each pixel of the tile, row by row.
 struct Eight { p0: vec4f, p1: vec4f, p2: vec4f, p3: vec4f, p4: vec4f, p5: vec4f, p6: vec4f, p7: vec4f }
 
 // The tile's first pixel among those that this dispatch makes, and its sums: one `Eight` an output vector.
 var<private> corner: vec2u;
+// Where the channels begin that the group reads.
+var<private> inputs: u32;
 var<private> a: Eight;
 var<private> b: Eight;
 var<private> c: Eight;
@@ -20,7 +23,7 @@ fn made() -> vec2u { return (step.out_size - step.phase + SPREAD - 1u) / SPREAD;
 fn tap(x: i32, y: i32) -> u32 {
     let size = vec2i(step.in_size * NEAREST);
     let inside = x >= 0 && y >= 0 && x < size.x && y < size.y;
-    return select(0u, step.input + (u32(y) / NEAREST * step.in_size.x + u32(x) / NEAREST) * IN_PITCH, inside);
+    return select(0u, inputs + (u32(y) / NEAREST * step.in_size.x + u32(x) / NEAREST) * IN_PITCH, inside);
 }
 
 fn all_of(v: vec4f) -> Eight { return Eight(v, v, v, v, v, v, v, v); }
@@ -71,6 +74,7 @@ fn make(group: vec3u, groups: vec3u, local: u32) {
     let tile = (group.y * groups.x + group.x) * 64u + local;
     corner = vec2u(tile % across * 2u, tile / across * 4u);
     let first = group.z * (1u + KERNEL_W * KERNEL_H * IN_VECTORS * VECTORS);
+    inputs = step.input + (step.first_block + group.z) * VECTORS / GROUP_VECTORS * IN_VECTORS;
     let bias = weight(first);
     a = all_of(bias[0]);
     b = all_of(bias[1]);

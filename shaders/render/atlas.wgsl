@@ -16,44 +16,9 @@ struct AtlasCamera {
 // the share is the one for this cosine, near its mean over the hemisphere.
 const MEAN_COSINE: f32 = 0.6;
 
-struct Vertex {
-    @location(0) position: vec3f,
-    @location(1) normal: vec2f,
-    @location(3) uv0: vec2f,
-    @location(4) uv1: vec2f,
-    @location(5) color: vec4f,
-    // Rows of the world-from-object matrix.
-    @location(6) row0: vec4f,
-    @location(7) row1: vec4f,
-    @location(8) row2: vec4f,
-}
-
-struct Varying {
-    @builtin(position) position: vec4f,
-    @location(0) normal: vec3f,
-    @location(1) uv: vec4f,
-    @location(2) color: vec4f,
-    // Sign of the transform's determinant: a mirrored object turns its front faces round.
-    @location(3) @interpolate(flat) mirror: f32,
-    @location(4) world: vec3f,
-}
-
 @vertex
 fn vertex(v: Vertex) -> Varying {
-    let p = vec4f(v.position, 1.0);
-    let world = vec3f(dot(v.row0, p), dot(v.row1, p), dot(v.row2, p));
-    let c0 = cross(v.row1.xyz, v.row2.xyz);
-    let c1 = cross(v.row2.xyz, v.row0.xyz);
-    let c2 = cross(v.row0.xyz, v.row1.xyz);
-    let n = oct_decode(v.normal);
-    var out: Varying;
-    out.mirror = select(1.0, -1.0, dot(v.row0.xyz, c0) < 0.0);
-    out.position = camera.clip_from_world * vec4f(world, 1.0);
-    out.normal = normalize(vec3f(dot(c0, n), dot(c1, n), dot(c2, n))) * out.mirror;
-    out.uv = vec4f(v.uv0, v.uv1);
-    out.color = v.color;
-    out.world = world;
-    return out;
+    return placed(v, camera.clip_from_world);
 }
 
 struct Fields {

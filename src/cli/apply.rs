@@ -1,6 +1,7 @@
 //! `bouncelight apply`: a network on G-buffer pictures from elsewhere.
 
 use super::args::{Global, PrecisionName, usage};
+use super::progress::Progress;
 use crate::{
     gpu::{readback, timing::Recorder},
     image_io::{self, Image},
@@ -122,9 +123,21 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
     };
     let place = network.input();
     gpu.queue.write_buffer(place.buffer, place.offset, bytemuck::cast_slice(&input.to_padded()));
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    network.record(&mut Recorder::new(&mut encoder));
-    gpu.queue.submit([encoder.finish()]);
+    let plan = network.plan();
+    if !global.quiet {
+        let (gflop, mb) = (plan.flops() as f64 / 1e9, network.bytes() as f64 / 1e6);
+        eprintln!("{} steps at {}x{}, {gflop:.1} GFLOP, {mb:.0} MB on the GPU", plan.steps.len(), size[0], size[1]);
+    }
+    // Step by step, so that a large network on a slow device shows how far it is. The first use of a kernel may compile it.
+    let mut progress = Progress::new(global, "steps", plan.steps.len() as u64);
+    for step in 0..plan.steps.len() {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        network.record_step(step, &mut Recorder::new(&mut encoder));
+        gpu.queue.submit([encoder.finish()]);
+        gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
+        progress.step();
+    }
+    progress.finish();
     let place = network.output();
     let bytes = readback::buffer(&gpu.device, &gpu.queue, place.buffer, place.offset, place.size)?;
     let shape = network.plan().tensors[network.plan().output].shape;

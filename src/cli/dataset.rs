@@ -1,6 +1,7 @@
-//! `bouncelight dataset`: network inputs of views around the paper's rooms or through a scene, one safetensors file a view.
+//! `bouncelight dataset`: network inputs of views around the paper's rooms, through rooms of their kind or through a scene, one
+//! safetensors file a view (training/README.md has the format).
 //!
-//! The targets that belong to them are rendered by Cycles under the same file stems: `training/cycles/paper_rooms.py`
+//! The light to be learnt is path-traced here (`--spp`), or rendered by Cycles under the same file stems: `training/cycles/paper_rooms.py`
 //! draws the same rooms from the same stream, `training/cycles/scene_file.py` reads the `views.json` written here.
 
 use super::{
@@ -9,19 +10,26 @@ use super::{
     progress::Progress,
 };
 use crate::{
-    gi::Method,
+    gi::{Method, features::FeatureSet, inputs::cells_of},
     gpu::Gpu,
     image_io::write_whole,
+    reference::{Kernel, ReferenceScene},
     render::{Renderer, RendererOptions},
     scene::{self, Camera, LightKind, Scene, paper_room, upload::SceneGpu},
     study::{
         dataset::{Sample, sample},
+        target, varied,
         views::{around, turned},
     },
 };
 use anyhow::{Context, Result};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use sha2::{Digest, Sha256};
+use std::{
+    collections::HashSet,
+    io::Write,
+    path::{Path, PathBuf},
+};
 
 /// Rooms that pictures are judged on; training never sees them (docs/accuracy.md).
 const JUDGED: [u32; 10] = [0, 1, 10, 11, 12, 14, 27, 33, 37, 47];
@@ -33,8 +41,8 @@ pub struct Args {
     /// What is drawn.
     #[arg(long, value_enum, default_value = "paper-room")]
     recipe: Recipe,
-    /// Indices of rooms, such as 6-9,13 (recipe paper-room).
-    #[arg(long, value_parser = parse_rooms, required_if_eq("recipe", "paper-room"))]
+    /// Indices of rooms, such as 6-9,13 (recipes paper-room and paper-room-varied).
+    #[arg(long, value_parser = parse_rooms, required_if_eq_any([("recipe", "paper-room"), ("recipe", "paper-room-varied")]))]
     rooms: Option<Rooms>,
     /// A scene file or bundled scene (recipe scene).
     #[arg(long, required_if_eq("recipe", "scene"))]
@@ -48,6 +56,12 @@ pub struct Args {
     /// Width and height of the rasterised picture; the inputs have a quarter of it.
     #[arg(long, default_value = "1024x512", value_parser = super::args::parse_size, value_name = "WxH")]
     size: [u32; 2],
+    /// Path-trace the light to be learnt with so many samples for each cell; 0 leaves it out, for targets from Cycles.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=65_536), value_name = "N")]
+    spp: u32,
+    /// Only every n-th room (or view of a scene), beginning with the i-th: 0/4, 1/4 … for four machines that share the work.
+    #[arg(long, default_value = "0/1", value_parser = parse_shard, value_name = "I/N")]
+    shard: [u32; 2],
     /// Folder for the samples; those that exist are kept, so a stopped run goes on where it was.
     #[arg(long)]
     out: PathBuf,
@@ -60,6 +74,8 @@ pub struct Args {
 enum Recipe {
     /// The scene stream of the paper's authors.
     PaperRoom,
+    /// Rooms of that kind with other lights, skies, roofs, metals, sizes and cameras.
+    PaperRoomVaried,
     /// Views through one scene.
     Scene,
 }
@@ -81,8 +97,15 @@ fn parse_rooms(text: &str) -> Result<Rooms, String> {
     Ok(Rooms(rooms))
 }
 
+fn parse_shard(text: &str) -> Result<[u32; 2], String> {
+    let number = |t: &str| t.trim().parse::<u32>().map_err(|e| format!("{t}: {e}"));
+    let (i, n) = text.split_once('/').ok_or("a shard is I/N, such as 0/4")?;
+    let shard = [number(i)?, number(n)?];
+    if shard[0] < shard[1] { Ok(shard) } else { Err(format!("{text}: of n shards the first is 0, the last n-1")) }
+}
+
 pub fn run(global: &Global, args: Args) -> Result<()> {
-    if let Some(Rooms(rooms)) = &args.rooms {
+    if let (Recipe::PaperRoom, Some(Rooms(rooms))) = (args.recipe, &args.rooms) {
         let kept: Vec<_> = rooms.iter().filter(|i| JUDGED.contains(i) || **i >= JUDGED_FROM).collect();
         if !kept.is_empty() && !args.judge {
             return Err(usage(format!(
@@ -93,51 +116,147 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make the folder {}", args.out.display()))?;
     interrupt::install()?;
     let gpu = global.open_gpu()?;
-    let options = RendererOptions { method: Method::Direct, ..Default::default() };
+    let options = RendererOptions { method: Method::Cache, ..Default::default() };
     let renderer = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
-    let mut writer = Writer { gpu, renderer, out: args.out.clone() };
-    match (&args.rooms, &args.scene) {
-        (Some(Rooms(rooms)), _) if args.recipe == Recipe::PaperRoom => {
-            paper_rooms(global, &mut writer, rooms, args.views)?
-        }
-        (_, Some(spec)) if args.recipe == Recipe::Scene => one_scene(global, &mut writer, spec, args.views, args.seed)?,
-        _ => return Err(usage("--rooms goes with recipe paper-room, --scene with recipe scene".into())),
+    let kernel = (args.spp > 0).then(|| Kernel::new(&gpu.device));
+    let mut writer = Writer { gpu, renderer, kernel, spp: args.spp, out: args.out.clone(), listed: HashSet::new() };
+    writer.open_list()?;
+    match (args.recipe, &args.rooms, &args.scene) {
+        (Recipe::PaperRoom | Recipe::PaperRoomVaried, Some(rooms), _) => many_rooms(global, &mut writer, rooms, &args)?,
+        (Recipe::Scene, _, Some(spec)) => one_scene(global, &mut writer, spec, &args)?,
+        _ => return Err(usage("--rooms goes with the rooms' recipes, --scene with recipe scene".into())),
     }
     report(&args.out)
 }
+
+/// Says before the work begins what it will take up.
+fn announce(global: &Global, args: &Args, samples: usize) {
+    let [w, h] = cells_of(args.size).map(u64::from);
+    // Features, direct light, albedo, normal, depth, and the light to be learnt; about 1 KB of header.
+    let planes = u64::from(FeatureSet::all().channels()) + 10 + if args.spp > 0 { 3 } else { 0 };
+    let bytes = samples as u64 * (w * h * planes * 4 + 1024);
+    if !global.quiet {
+        eprintln!("{samples} samples, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
+    }
+}
+
+/// File with the SHA-256 of every sample, as `sha256sum -c` reads it.
+const LIST: &str = "SHA256SUMS";
 
 /// Draws samples and writes them; a file that exists is kept.
 struct Writer {
     gpu: Gpu,
     renderer: Renderer,
+    /// The path tracer, if it makes the targets.
+    kernel: Option<Kernel>,
+    spp: u32,
     out: PathBuf,
+    /// Names in the list of checksums.
+    listed: HashSet<String>,
+}
+
+/// A scene as both renderers want it.
+struct Uploaded {
+    raster: SceneGpu,
+    traced: Option<ReferenceScene>,
 }
 
 impl Writer {
-    /// Writes the sample `stem`, unless it is there already.
-    fn write(&mut self, stem: &str, scene: &SceneGpu, camera: &Camera) -> Result<()> {
-        let path = self.out.join(format!("{stem}.safetensors"));
-        if !path.exists() {
-            let sample = self.sample(scene, camera)?;
-            write_whole(&path, &sample.to_bytes()?)?;
+    fn upload(&self, scene: &Scene) -> Result<Uploaded> {
+        let raster = SceneGpu::new(&self.gpu.device, &self.gpu.queue, scene)?;
+        let trace = |_| ReferenceScene::new(&self.gpu.device, &self.gpu.queue, scene);
+        Ok(Uploaded { raster, traced: self.kernel.as_ref().map(trace).transpose()? })
+    }
+
+    fn path(&self, stem: &str) -> PathBuf {
+        self.out.join(format!("{stem}.safetensors"))
+    }
+
+    /// Draws, traces and writes the sample `stem`; `seed` is the path tracer's.
+    fn write(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32) -> Result<()> {
+        let sample = self.sample(&scene.raster, camera)?;
+        self.complete(stem, scene, camera, seed, sample)
+    }
+
+    /// Traces and writes a sample that is drawn already.
+    fn complete(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32, mut sample: Sample) -> Result<()> {
+        if let (Some(kernel), Some(traced)) = (&self.kernel, &scene.traced) {
+            let options = target::options(self.spp, seed);
+            let go_on = || !interrupt::requested();
+            sample.target = target::target(&self.gpu, kernel, traced, camera, self.renderer.size(), options, go_on)?;
+            interrupt::check()?;
         }
-        Ok(())
+        self.save(stem, &sample)
+    }
+
+    fn save(&mut self, stem: &str, sample: &Sample) -> Result<()> {
+        let bytes = sample.to_bytes()?;
+        write_whole(&self.path(stem), &bytes)?;
+        self.list(stem, &bytes)
     }
 
     fn sample(&mut self, scene: &SceneGpu, camera: &Camera) -> Result<Sample> {
         interrupt::check()?;
         Ok(sample(&self.gpu, &mut self.renderer, scene, camera)?)
     }
+
+    fn open_list(&mut self) -> Result<()> {
+        let text = std::fs::read_to_string(self.out.join(LIST)).unwrap_or_default();
+        self.listed = text.lines().filter_map(|l| l.split_once("  ")).map(|(_, name)| name.to_owned()).collect();
+        Ok(())
+    }
+
+    /// Adds a sample to the list of checksums. One write, so that several shards may share a folder.
+    fn list(&mut self, stem: &str, bytes: &[u8]) -> Result<()> {
+        let name = format!("{stem}.safetensors");
+        let sum: String = Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect();
+        let path = self.out.join(LIST);
+        let file = std::fs::OpenOptions::new().create(true).append(true).open(&path);
+        let line = format!("{sum}  {name}\n");
+        file.and_then(|mut f| f.write_all(line.as_bytes()))
+            .with_context(|| format!("cannot write {}", path.display()))?;
+        self.listed.insert(name);
+        Ok(())
+    }
+
+    /// Whether the sample is there; one that a kill left without its checksum gets it now.
+    fn has(&mut self, stem: &str) -> Result<bool> {
+        let path = self.path(stem);
+        if !path.exists() {
+            return Ok(false);
+        }
+        if !self.listed.contains(&format!("{stem}.safetensors")) {
+            let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+            self.list(stem, &bytes)?;
+        }
+        Ok(true)
+    }
 }
 
-fn paper_rooms(global: &Global, writer: &mut Writer, rooms: &[u32], views: u32) -> Result<()> {
-    let mut progress = Progress::new(global, "views", rooms.len() as u64 * u64::from(views));
-    for &room in rooms {
-        let scene = paper_room::scene(room);
-        let uploaded = SceneGpu::new(&writer.gpu.device, &writer.gpu.queue, &scene)?;
-        for view in 0..views {
-            let camera = turned(&scene.cameras[0], view as f32 / views as f32);
-            writer.write(&format!("room{room:04}_view{view}"), &uploaded, &camera)?;
+fn many_rooms(global: &Global, writer: &mut Writer, Rooms(rooms): &Rooms, args: &Args) -> Result<()> {
+    let [shard, of] = args.shard;
+    let mine: Vec<u32> = rooms.iter().copied().skip(shard as usize).step_by(of as usize).collect();
+    announce(global, args, mine.len() * args.views as usize);
+    let mut progress = Progress::new(global, "views", mine.len() as u64 * u64::from(args.views));
+    let varied = args.recipe == Recipe::PaperRoomVaried;
+    for room in mine {
+        let stem = |view: u32| format!("{}{room:04}_view{view}", if varied { "varied" } else { "room" });
+        let mut missing = Vec::new();
+        for view in 0..args.views {
+            if writer.has(&stem(view))? {
+                progress.step();
+            } else {
+                missing.push(view);
+            }
+        }
+        if missing.is_empty() {
+            continue;
+        }
+        let scene = if varied { varied::scene(room) } else { paper_room::scene(room) };
+        let uploaded = writer.upload(&scene)?;
+        for view in missing {
+            let camera = turned(&scene.cameras[0], view as f32 / args.views as f32);
+            writer.write(&stem(view), &uploaded, &camera, room.wrapping_mul(10_007).wrapping_add(view))?;
             progress.step();
         }
     }
@@ -148,22 +267,28 @@ fn paper_rooms(global: &Global, writer: &mut Writer, rooms: &[u32], views: u32) 
 /// Views in which much of the picture is closer than this part of the scene's size stand in front of a wall or in one.
 const TOO_CLOSE: f32 = 0.03;
 
-fn one_scene(global: &Global, writer: &mut Writer, spec: &str, views: u32, seed: u64) -> Result<()> {
+fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> Result<()> {
     let scene = scene::load(spec)?;
-    let uploaded = SceneGpu::new(&writer.gpu.device, &writer.gpu.queue, &scene)?;
+    let uploaded = writer.upload(&scene)?;
     let stem = Path::new(spec).file_stem().map_or(spec.into(), |s| s.to_string_lossy().into_owned());
-    let mut progress = Progress::new(global, "views", views.into());
+    let [shard, of] = args.shard;
+    announce(global, args, (args.views.saturating_sub(shard)).div_ceil(of) as usize);
+    let mut progress = Progress::new(global, "views", args.views.into());
     let mut cameras = Vec::new();
-    for camera in around(&scene, seed).take(views as usize * 20) {
-        if cameras.len() == views as usize {
+    for camera in around(&scene, args.seed).take(args.views as usize * 20) {
+        let view = cameras.len() as u32;
+        if view == args.views {
             break;
         }
-        let sample = writer.sample(&uploaded, &camera)?;
+        // Which views are fit is found out by drawing them, the same ones by every shard.
+        let sample = writer.sample(&uploaded.raster, &camera)?;
         if sample.closer_than(TOO_CLOSE * scene_size(&scene)) > 0.1 {
             continue;
         }
-        let path = writer.out.join(format!("{stem}_view{}.safetensors", cameras.len()));
-        write_whole(&path, &sample.to_bytes()?)?;
+        let name = format!("{stem}_view{view}");
+        if view % of == shard && !writer.has(&name)? {
+            writer.complete(&name, &uploaded, &camera, view, sample)?;
+        }
         cameras.push(json!({ "world_from_camera": camera.transform, "yfov": camera.yfov }));
         progress.step();
     }
@@ -174,7 +299,7 @@ fn one_scene(global: &Global, writer: &mut Writer, spec: &str, views: u32, seed:
         LightKind::Point { radius, .. } | LightKind::Spot { radius, .. } => json!({ "name": l.name, "radius": radius }),
     };
     let record = json!({
-        "schema": 1, "scene": spec, "seed": seed, "size": writer.renderer.size(), "views": cameras,
+        "schema": 1, "scene": spec, "seed": args.seed, "size": writer.renderer.size(), "views": cameras,
         "environment": scene.environment.radiance, "lights": scene.lights.iter().map(radius).collect::<Vec<_>>(),
     });
     write_whole(&writer.out.join(format!("{stem}_views.json")), format!("{record:#}\n").as_bytes())?;

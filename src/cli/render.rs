@@ -32,11 +32,10 @@ pub struct Args {
     /// Where the picture goes: .png, .exr, or `-` for a PNG on standard output.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How indirect light is found; `reference` traces paths until the light is right. `cache` when absent, or `neural` when
-    /// weights are given.
+    /// How indirect light is found; `reference` traces paths until the light is right. `neural` when absent.
     #[arg(long, value_enum)]
     method: Option<MethodName>,
-    /// Weights of `neural`; the shipped ones when absent.
+    /// Weights of `neural`: a file, or the name of shipped ones (small, medium); `small` when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
     /// Jittered frames that are averaged through Cycles' pixel filter; 1 (the default) is the raw frame.
@@ -115,8 +114,7 @@ pub(super) struct Drawn {
 impl Args {
     /// The method asked for, or the best that needs nothing but the scene.
     fn method(&self) -> MethodName {
-        let default = if self.weights.is_some() { MethodName::Neural } else { MethodName::Cache };
-        self.method.unwrap_or(default)
+        self.method.unwrap_or(MethodName::Neural)
     }
 
     /// It runs a network on a device.

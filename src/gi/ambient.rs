@@ -28,12 +28,6 @@ pub const SKY: f32 = 0.83;
 /// all bounces.
 pub const BOUNCE: f32 = 0.56;
 
-/// The fallback's constant as WGSL.
-pub fn prelude() -> String {
-    let [r, g, b] = AMBIENT;
-    format!("const AMBIENT = vec3f({r:?}, {g:?}, {b:?});\n")
-}
-
 /// The constants of unseen light as WGSL (`shaders/gi/unseen.wgsl`).
 pub fn unseen_prelude(sky: f32, bounce: f32) -> String {
     format!("const SKY = f32({sky:?});\nconst BOUNCE = f32({bounce:?});\n")

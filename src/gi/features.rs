@@ -18,7 +18,7 @@ pub struct FeatureInfo {
 /// column where that lies outside. `s` and `m` (e^ln_m) are [`Exposure`](super::exposure::Exposure)'s. Texels that are
 /// NaN or infinite read as 0, radiances below 0 too. Where the sample is background all but `hit` and `sky` are 0, and
 /// `hit` says so.
-pub const FEATURES: [FeatureInfo; 9] = [
+pub const FEATURES: [FeatureInfo; 10] = [
     FeatureInfo { name: "direct", channels: 3, doc: "ln(1 + L/s), L = direct diffuse light E/π without albedo" },
     FeatureInfo { name: "outgoing", channels: 3, doc: "ln(1 + (albedo·L + emission)/s)" },
     FeatureInfo { name: "albedo", channels: 3, doc: "diffuse reflectance, linear, 0 to 1" },
@@ -36,6 +36,7 @@ pub const FEATURES: [FeatureInfo; 9] = [
     },
     FeatureInfo { name: "hit", channels: 1, doc: "1 where the sample hit something, else 0" },
     FeatureInfo { name: "sky", channels: 3, doc: "ln(1 + environment radiance/s)" },
+    FeatureInfo { name: "cache", channels: 3, doc: "ln(1 + C/s), C = what method `cache` answers at the pixel, E/π" },
 ];
 
 /// The features that one network uses, in table order.
@@ -47,9 +48,15 @@ pub struct FeatureSet {
 }
 
 impl FeatureSet {
-    /// All features: 21 channels.
+    /// All features: 24 channels.
     pub fn all() -> Self {
         let names = FEATURES.iter().map(|f| (f.name, f.channels));
+        Self::new(names).expect("the table agrees with itself")
+    }
+
+    /// The features that the G-buffer alone gives, all but `cache`: 21 channels.
+    pub fn screen() -> Self {
+        let names = FEATURES.iter().filter(|f| f.name != "cache").map(|f| (f.name, f.channels));
         Self::new(names).expect("the table agrees with itself")
     }
 
@@ -129,13 +136,14 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.probes_apply", super::cells::CellSide::Four.prelude()),
         ("gi.pack", FeatureSet::all().prelude()),
         ("gi.pack", few.prelude()),
-        ("gi.reconstruct", super::reconstruct::prelude()),
+        ("gi.reconstruct", super::reconstruct::prelude(super::reconstruct::Answer::Light)),
+        ("gi.reconstruct", super::reconstruct::prelude(super::reconstruct::Answer::Gain)),
         ("gi.cells", super::cells::CellSide::Four.prelude()),
         ("gi.cells", super::cells::CellSide::Eight.prelude()),
         ("gi.gather", super::cache::prelude(super::cache::Options::RSM)),
         ("gi.gather", super::cache::prelude(super::cache::Options::CACHE)),
         ("gi.surfels", super::surfels::prelude(super::surfels::SURFELS)),
-        ("gi.sky", super::surfels::prelude(super::surfels::SURFELS)),
+        ("gi.discs", super::surfels::prelude(super::surfels::SURFELS)),
         ("gi.exchange", super::surfels::prelude(super::surfels::SURFELS)),
         ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Four)),
         ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Eight)),
@@ -149,7 +157,8 @@ mod tests {
     #[test]
     fn offsets_follow_the_table() {
         let all = FeatureSet::all();
-        assert_eq!((all.channels(), all.padded()), (21, 24));
+        assert_eq!((all.channels(), all.padded()), (24, 24));
+        assert_eq!((FeatureSet::screen().channels(), FeatureSet::screen().offset("cache")), (21, None));
         assert_eq!(all.offset("depth"), Some(15));
         let few = FeatureSet::new([("albedo", 3), ("hit", 1)]).unwrap();
         assert_eq!((few.offset("albedo"), few.offset("hit"), few.offset("sky")), (Some(0), Some(3), None));

@@ -115,12 +115,10 @@ pub struct World<'a> {
     pub rsm_most_blocks: u32,
     /// The cube around the camera: faces +X, −X, +Y, −Y, +Z, −Z side by side.
     pub around: Atlas<'a>,
-    /// `scene::upload::LightGpu` of each light, a storage buffer.
-    pub lights: &'a wgpu::Buffer,
-    /// Lights.
-    pub light_count: u32,
     /// Lat-long picture of the surroundings, `Rgba32Float`; one texel for a constant sky.
     pub environment: &'a wgpu::TextureView,
+    /// Lowest and highest corner of the scene, metres.
+    pub bounds: [[f32; 3]; 2],
     /// The scene's small objects.
     pub clutter: crate::scene::upload::Clutter,
 }
@@ -180,6 +178,7 @@ impl Method {
             Method::Cache => NeedsWorld::Around,
             Method::World(options) if options.around => NeedsWorld::Around,
             Method::World(_) => NeedsWorld::Lights,
+            Method::Neural(neural) if pass::needs_guess(&neural.weights) => NeedsWorld::Around,
             _ => NeedsWorld::Nothing,
         }
     }
@@ -231,8 +230,8 @@ pub enum GiError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The weights' output is not three channels of light.
-    #[error("the weights' output is {0}; this program needs 3 channels of light")]
+    /// The weights' output is no light and no gain on a first guess.
+    #[error("the weights' output is {0}; this program needs 3 channels of light, or 6 of gain and rest")]
     Output(String),
     /// The network could not be built.
     #[error("the network could not be built for {}x{} cells: {source}", cells[0], cells[1])]

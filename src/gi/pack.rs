@@ -2,7 +2,7 @@
 
 use super::exposure::{ExposurePass, pipeline, storage_entry};
 use super::features::FeatureSet;
-use super::inputs::{BoundInputs, InputGroup, cells_of};
+use super::inputs::{BoundInputs, InputGroup, cells_of, check, texture_entry};
 use super::{GiError, Inputs};
 use crate::gpu::timing::Recorder;
 use crate::gpu::{readback, shaders};
@@ -14,17 +14,19 @@ pub struct PackPass {
 }
 
 impl PackPass {
-    /// Compiles the shader for `features` and binds `target`: NHWC f32, `features.padded()` channels a cell.
+    /// Compiles the shader for `features` and binds `target` (NHWC f32, `features.padded()` channels a cell) and `guess`,
+    /// what method `cache` answers (`Rgba16Float`, of the picture's size; any texture if `features` has no `cache`).
     pub fn new(
         device: &wgpu::Device,
         inputs: &InputGroup,
         exposure: &ExposurePass,
         features: &FeatureSet,
         target: wgpu::BindingResource<'_>,
+        guess: &wgpu::TextureView,
     ) -> Self {
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("gi.pack"),
-            entries: &[storage_entry(0, true), storage_entry(1, false)],
+            entries: &[storage_entry(0, true), storage_entry(1, false), texture_entry(2)],
         });
         let module = shaders::module_with(device, "gi.pack", &features.prelude());
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -33,6 +35,7 @@ impl PackPass {
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
                 wgpu::BindGroupEntry { binding: 1, resource: target },
+                wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(guess) },
             ],
         });
         Self { pipeline: pipeline(device, "gi.pack", &module, "pack", inputs, &layout), group }
@@ -64,8 +67,9 @@ pub struct NetworkInputs {
     pub exposure: super::exposure::Exposure,
 }
 
-/// Computes and reads back the features of one picture, without any network. Makes its own buffers, submits and
-/// waits: for the `dataset` command and tests, not for frames.
+/// Computes and reads back the features of one picture, without any network. `guess` is what method `cache` made of the same
+/// inputs, not read if `features` has no `cache`. Makes its own buffers, submits and waits: for the `dataset` command and
+/// tests, not for frames.
 ///
 /// # Errors
 /// [`GiError`] for inputs that do not fit and for features larger than the device binds.
@@ -74,8 +78,12 @@ pub fn read_features(
     queue: &wgpu::Queue,
     features: &FeatureSet,
     inputs: &Inputs<'_>,
+    guess: &wgpu::TextureView,
 ) -> Result<NetworkInputs, GiError> {
     let size = inputs.size;
+    if features.offset("cache").is_some() {
+        check("guess", guess, size, wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::TEXTURE_BINDING)?;
+    }
     let cells = cells_of(size);
     let bytes = feature_bytes(device, features, size)?;
     let mut group = InputGroup::new(device);
@@ -87,7 +95,7 @@ pub fn read_features(
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     });
-    let pack = PackPass::new(device, &group, &exposure, features, target.as_entire_binding());
+    let pack = PackPass::new(device, &group, &exposure, features, target.as_entire_binding(), guess);
     let mut encoder = device.create_command_encoder(&Default::default());
     let mut recorder = Recorder::new(&mut encoder);
     exposure.record(&mut recorder, &bound);

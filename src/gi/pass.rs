@@ -6,17 +6,22 @@
 //!  normal ──────┼──────────────┼──────────────────────────────┐   │
 //!  albedo ──────┼──────────────┤                              │   │
 //!  emissive ────┼─► exposure ─┬┴► pack ─► U-Net (net.*) ─► reconstruct ─► E/π
-//!  direct ──────┘      s      └──────────────────────────────►┘
+//!  direct ──────┘      s      ├──►│                           │
+//!  world ──► cache ─► guess ──┴───┴──────────────────────────►┘
 //! ```
+//!
+//! Weights whose answer is a gain on the first guess ([`Answer::Gain`]) have method `cache` run before them, and need the world
+//! beyond the picture as it does; weights that answer light itself need the G-buffer alone.
 //!
 //! What the method cannot do: see [`crate::gi`].
 
+use super::cache::{self, WorldGi};
 use super::exposure::ExposurePass;
 use super::features::FeatureSet;
 use super::inputs::{CELL, InputGroup, cells_of};
 use super::pack::{self, NetworkInputs, PackPass};
-use super::reconstruct::ReconstructPass;
-use super::rung::Cost;
+use super::reconstruct::{Answer, ReconstructPass};
+use super::rung::{Cost, Rung};
 use super::{GiError, Inputs};
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
@@ -28,6 +33,11 @@ use std::sync::Arc;
 pub struct Options {
     /// Width and height of the pictures to come, pixels. A recording of another size rebuilds the buffers.
     pub size: [u32; 2],
+}
+
+/// Whether weights have method `cache` run before them, and so need [`Inputs::world`].
+pub fn needs_guess(weights: &Weights) -> bool {
+    weights.output.meaning == Answer::Gain.name() || weights.inputs.iter().any(|f| f.name == "cache")
 }
 
 /// A network as a frame's method: what was trained, and how it runs.
@@ -47,9 +57,6 @@ impl From<Weights> for Neural {
     }
 }
 
-/// The meaning of the output that reconstruction undoes: y = ln(E/π / s).
-const MEANING: &str = "log_irradiance_over_exposure";
-
 /// The embeddable pass. Keeps clones of device and queue (both are handles) to rebuild on a change of size and to
 /// write its parameters; parameters become visible to the GPU with the host's next submission, and up to
 /// [`SLOTS`](super::inputs::SLOTS) recordings may go into one submission.
@@ -61,6 +68,8 @@ pub struct NeuralGi {
     inputs: InputGroup,
     exposure: ExposurePass,
     reconstruct: ReconstructPass,
+    /// The method whose answer the network corrects.
+    cache: Option<WorldGi>,
     rebuilt: Rebuilt,
     rebuilds: u64,
 }
@@ -70,6 +79,8 @@ struct Rebuilt {
     size: [u32; 2],
     network: Network,
     pack: PackPass,
+    /// What `cache` answers; one texel where nobody asks it.
+    guess: wgpu::TextureView,
 }
 
 impl NeuralGi {
@@ -108,10 +119,10 @@ impl NeuralGi {
         neural: &Neural,
         options: Options,
     ) -> Result<Self, GiError> {
-        let features = check_weights(&neural.weights)?;
+        let (features, answer) = check_weights(&neural.weights)?;
         let inputs = InputGroup::new(device);
         let exposure = ExposurePass::new(device, &inputs);
-        let reconstruct = ReconstructPass::new(device, &inputs);
+        let reconstruct = ReconstructPass::new(device, &inputs, answer);
         let rebuilt = Rebuilt::new(device, queue, neural, &features, &inputs, &exposure, options.size)?;
         Ok(Self {
             device: device.clone(),
@@ -121,6 +132,7 @@ impl NeuralGi {
             inputs,
             exposure,
             reconstruct,
+            cache: needs_guess(&neural.weights).then(|| WorldGi::new(device, options.size, cache::Options::CACHE)),
             rebuilt,
             rebuilds: 0,
         })
@@ -156,10 +168,14 @@ impl NeuralGi {
             self.resize(inputs.size)?;
         }
         let bound = self.inputs.bind(&self.queue, inputs)?;
+        let Rebuilt { network, pack, guess, .. } = &self.rebuilt;
+        if let Some(cache) = &mut self.cache {
+            cache.record(recorder, &self.queue, inputs, guess)?;
+        }
         self.exposure.record(recorder, &bound);
-        self.rebuilt.pack.record(recorder, &bound);
-        self.rebuilt.network.record(recorder);
-        self.reconstruct.record(recorder, &bound, &self.exposure, self.rebuilt.network.output().resource(), output)
+        pack.record(recorder, &bound);
+        network.record(recorder);
+        self.reconstruct.record(recorder, &bound, &self.exposure, network.output().resource(), guess, output)
     }
 
     fn resize(&mut self, size: [u32; 2]) -> Result<(), GiError> {
@@ -170,19 +186,28 @@ impl NeuralGi {
         Ok(())
     }
 
-    /// What the network is given for `inputs`, read back. Makes its own buffers, submits and waits: for tools, not
-    /// for frames. [`pack::read_features`] does the same without weights.
+    /// What the network is given for `inputs`, read back; they must be those of the last recording where the weights use the
+    /// first guess. Makes its own buffers, submits and waits: for tools, not for frames. [`pack::read_features`] does the
+    /// same without weights.
     ///
     /// # Errors
     /// [`GiError`] when the inputs do not fit or reading back fails.
     pub fn read_inputs(&self, inputs: &Inputs<'_>) -> Result<NetworkInputs, GiError> {
-        pack::read_features(&self.device, &self.queue, &self.features, inputs)
+        pack::read_features(&self.device, &self.queue, &self.features, inputs, &self.rebuilt.guess)
+    }
+
+    /// What the first guess knows of the camera's surroundings: [`Rung::surroundings`].
+    pub fn surroundings(&self) -> Option<&wgpu::TextureView> {
+        self.cache.as_ref().and_then(|cache| cache.surroundings())
     }
 
     /// Lets go of the remembered texture views, and so of the textures; call it when targets are rebuilt.
     pub fn forget(&mut self) {
         self.inputs.forget();
         self.reconstruct.forget();
+        if let Some(cache) = &mut self.cache {
+            cache.forget();
+        }
     }
 
     /// The exposure of the last recording, see [`super::exposure::read`].
@@ -202,7 +227,8 @@ impl NeuralGi {
 
     /// GPU memory of all buffers and weights, bytes.
     pub fn bytes(&self) -> u64 {
-        self.inputs.bytes() + self.exposure.bytes() + self.rebuilt.network.bytes()
+        let cache = self.cache.as_ref().map_or(0, |cache| cache.bytes() + guess_bytes(self.rebuilt.size));
+        self.inputs.bytes() + self.exposure.bytes() + self.rebuilt.network.bytes() + cache
     }
 
     /// What each pass costs for a picture of the present size; for another one the network's layers are scaled by the
@@ -213,18 +239,23 @@ impl NeuralGi {
         let scale = cells / area(cells_of(self.rebuilt.size));
         let plan = self.rebuilt.network.plan();
         let features = f64::from(4 * self.features.padded());
-        let mut costs =
-            vec![super::exposure::cost(size), Cost::new("gi.pack", cells * 300.0, cells * (features + 28.0 + 64.0))];
+        let mut costs = self.cache.as_ref().map(|cache| cache.costs(size)).unwrap_or_default();
+        // With a first guess: 8 bytes more a pixel and a cell, and twice the numbers of a cell.
+        let guess = f64::from(8 * u8::from(self.cache.is_some()));
+        costs.push(super::exposure::cost(size));
+        costs.push(Cost::new("gi.pack", cells * 300.0, cells * (features + guess + 28.0 + 64.0)));
         costs.extend(plan.steps.iter().map(|step| {
             Cost::new(&format!("net.{}", step.name), scale * step.flops as f64, scale * step.traffic as f64)
         }));
-        costs.push(Cost::new("gi.reconstruct", pixels * 350.0, pixels * 16.0 + cells * 16.0));
+        let bytes = pixels * (16.0 + guess) + cells * (16.0 + 2.0 * guess);
+        costs.push(Cost::new("gi.reconstruct", pixels * 350.0, bytes));
         costs
     }
 
     /// Bind groups and rebuilds since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
-        self.inputs.made() + self.reconstruct.made() + self.rebuilds
+        let cache = self.cache.as_ref().map_or(0, WorldGi::allocations);
+        self.inputs.made() + self.reconstruct.made() + self.rebuilds + cache
     }
 }
 
@@ -243,22 +274,42 @@ impl Rebuilt {
         let Neural { weights, network, tuned } = neural;
         let network = Network::tuned(device, queue, weights, cells, *network, tuned.clone())
             .map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
-        let pack = PackPass::new(device, inputs, exposure, features, network.input().resource());
-        Ok(Self { size, network, pack })
+        let guess = guess_texture(device, if needs_guess(weights) { size } else { [1, 1] });
+        let pack = PackPass::new(device, inputs, exposure, features, network.input().resource(), &guess);
+        Ok(Self { size, network, pack, guess })
     }
 }
 
-/// The feature set of weights that this pass can run.
-fn check_weights(weights: &Weights) -> Result<FeatureSet, GiError> {
+fn guess_texture(device: &wgpu::Device, size: [u32; 2]) -> wgpu::TextureView {
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("gi.guess"),
+        size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba16Float,
+        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    texture.create_view(&Default::default())
+}
+
+fn guess_bytes(size: [u32; 2]) -> u64 {
+    8 * u64::from(size[0]) * u64::from(size[1])
+}
+
+/// The feature set of weights that this pass can run, and what their numbers mean.
+fn check_weights(weights: &Weights) -> Result<(FeatureSet, Answer), GiError> {
     let table = &weights.table;
     if (table.name.as_str(), table.version, weights.cell) != ("screen", 1, CELL) {
         let found = format!("table {} version {}, {} pixels a cell", table.name, table.version, weights.cell);
         let reason = format!("list is made for {found}; this program makes screen version 1, {CELL} pixels a cell");
         return Err(GiError::Feature { name: "(all)".into(), reason });
     }
-    if weights.output.meaning != MEANING || weights.output.channels != 3 {
-        let found = format!("{} channels of `{}`", weights.output.channels, weights.output.meaning);
-        return Err(GiError::Output(found));
-    }
-    FeatureSet::new(weights.inputs.iter().map(|f| (f.name.as_str(), f.channels)))
+    let output = &weights.output;
+    let fits = |a: &Answer| output.meaning == a.name() && output.channels == a.channels();
+    let Some(answer) = [Answer::Light, Answer::Gain].into_iter().find(fits) else {
+        return Err(GiError::Output(format!("{} channels of `{}`", output.channels, output.meaning)));
+    };
+    Ok((FeatureSet::new(weights.inputs.iter().map(|f| (f.name.as_str(), f.channels)))?, answer))
 }

@@ -45,6 +45,14 @@ pub trait Rung: Send {
     /// Number of the frame for methods that may vary their patterns because a history averages frames; 0 without one.
     fn set_frame(&mut self, _queue: &wgpu::Queue, _frame: u32) {}
 
+    /// What the camera's surroundings send to it, if the method knows, for reflections of what is off the screen. The
+    /// same view for the method's whole life, `Rgba16Float`: faces +X, −X, +Y, −Y, +Z, −Z of a cube side by side; on the
+    /// face along ±axis k columns follow ±axis k + 2 and rows fall along axis k + 1. rgb is radiance, a the
+    /// distance from the camera in metres.
+    fn surroundings(&self) -> Option<&wgpu::TextureView> {
+        None
+    }
+
     /// The targets are new: lets go of the texture views it remembers.
     fn forget(&mut self);
 
@@ -116,6 +124,10 @@ impl Rung for NeuralGi {
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
         self.record_stages(recorder, inputs, output)
+    }
+
+    fn surroundings(&self) -> Option<&wgpu::TextureView> {
+        NeuralGi::surroundings(self)
     }
 
     fn forget(&mut self) {

@@ -1,4 +1,5 @@
-//! The cube around the camera as surfels: lit by the lights, exchanging light for a few rounds, with the sky between.
+//! The cube around the camera as surfels: lit by the lights, exchanging light for a few rounds, with windows to the sky
+//! between; and as discs for the gather.
 
 use super::World;
 use super::rung::Cost;
@@ -6,47 +7,48 @@ use super::view_cache::ViewCache;
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
 use crate::render::around;
-use crate::render::tool::{self, LOAD, READ, READ_WRITE, UNIFORM};
+use crate::render::tool::{self, LOAD, READ, READ_WRITE, STORE_HALF, UNIFORM};
 
 /// Texels of the cube.
 pub const SURFELS: u32 = 6 * around::SIDE * around::SIDE;
-/// Rows of the buffers: the gather reads whole tiles of 64, and what no pass writes stays 0, which is no surfel.
-const ROWS: u64 = SURFELS.next_multiple_of(64) as u64;
 /// Bytes of a `Surfel` of `shaders/gi/surfel.wgsl`.
 const SURFEL_BYTES: u64 = 80;
-/// Bytes of `Sky`.
-const SKY_BYTES: u64 = 64;
+/// Bytes of a `Disc`.
+const DISC_BYTES: u64 = 48;
+/// Width and height of the picture of the surroundings: six faces side by side.
+const PAINTED: [u32; 2] = [6 * around::SIDE, around::SIDE];
 
 /// How many surfels a shader gathers, as WGSL.
 pub fn prelude(surfels: u32) -> String {
-    format!("const SURFELS = {surfels}u;\nconst SIDE = {}u;\n", around::SIDE)
+    format!("const SURFELS = {surfels}u;\nconst SQUARES = {}u;\nconst SIDE = {}u;\n", surfels / 4, around::SIDE)
 }
 
 /// Lights the surfels and lets them light each other.
 pub struct SurfelsPass {
     device: wgpu::Device,
     light_up: wgpu::ComputePipeline,
-    sky: wgpu::ComputePipeline,
+    join: wgpu::ComputePipeline,
+    finish: wgpu::ComputePipeline,
     exchange: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
     groups: ViewCache<3>,
-    sky_group: wgpu::BindGroup,
-    /// From the first buffer of sent light to the second, and back.
-    exchange_groups: [wgpu::BindGroup; 2],
+    join_group: wgpu::BindGroup,
+    exchange_group: wgpu::BindGroup,
     surfels: wgpu::Buffer,
-    sent: [wgpu::Buffer; 2],
-    sky_buffer: wgpu::Buffer,
+    sent: wgpu::Buffer,
+    discs: wgpu::Buffer,
+    surroundings: wgpu::TextureView,
     rounds: u32,
 }
 
 impl SurfelsPass {
-    /// Compiles the shaders and makes buffers of 0.1 MB. `rounds` of exchange are rounded up to an even number.
+    /// Compiles the shaders and makes buffers of 0.1 MB.
     pub fn new(device: &wgpu::Device, rounds: u32) -> Self {
         let types = [READ, READ, READ, READ, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE, UNIFORM];
         let stage = wgpu::ShaderStages::COMPUTE;
         let layout = tool::layout(device, "gi.surfels", stage, &types);
-        let sky_layout = tool::layout(device, "gi.sky", stage, &[READ, READ_WRITE]);
-        let exchange_layout = tool::layout(device, "gi.exchange", stage, &[READ, READ, READ, READ_WRITE]);
+        let join_layout = tool::layout(device, "gi.discs", stage, &[READ, READ, READ_WRITE, STORE_HALF]);
+        let exchange_layout = tool::layout(device, "gi.exchange", stage, &[READ, READ, READ_WRITE]);
         let buffer = |label, size| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -55,38 +57,52 @@ impl SurfelsPass {
                 mapped_at_creation: false,
             })
         };
-        let surfels = buffer("gi.surfels", ROWS * SURFEL_BYTES);
-        let sent = ["gi.sent.0", "gi.sent.1"].map(|label| buffer(label, ROWS * 16));
-        let sky_buffer = buffer("gi.sky", SKY_BYTES);
-        let resources = [surfels.as_entire_binding(), sky_buffer.as_entire_binding()];
-        let sky_group = tool::group(device, "gi.sky", &sky_layout, &resources);
-        let exchange_groups = [(0, 1), (1, 0)].map(|(from, to): (usize, usize)| {
-            let resources = [
-                surfels.as_entire_binding(),
-                sky_buffer.as_entire_binding(),
-                sent[from].as_entire_binding(),
-                sent[to].as_entire_binding(),
-            ];
-            tool::group(device, "gi.exchange", &exchange_layout, &resources)
-        });
+        let surfels = buffer("gi.surfels", u64::from(SURFELS) * SURFEL_BYTES);
+        let sent = buffer("gi.sent", u64::from(SURFELS) * 16);
+        let discs = buffer("gi.discs", u64::from(SURFELS + SURFELS / 4) * DISC_BYTES);
+        let surroundings = device
+            .create_texture(&wgpu::TextureDescriptor {
+                label: Some("gi.surroundings"),
+                size: wgpu::Extent3d { width: PAINTED[0], height: PAINTED[1], depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba16Float,
+                usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            })
+            .create_view(&Default::default());
+        let [a, b, c] = [&surfels, &sent, &discs].map(|b| b.as_entire_binding());
+        let painted = wgpu::BindingResource::TextureView(&surroundings);
+        let join_group = tool::group(device, "gi.discs", &join_layout, &[a, b, c, painted]);
+        let resources = [&surfels, &discs, &sent].map(|b| b.as_entire_binding());
+        let exchange_group = tool::group(device, "gi.exchange", &exchange_layout, &resources);
         Self {
             device: device.clone(),
             light_up: pipeline(device, "gi.surfels", "light_up", &layout),
-            sky: pipeline(device, "gi.sky", "add_up", &sky_layout),
+            join: pipeline(device, "gi.discs", "join", &join_layout),
+            finish: pipeline(device, "gi.discs", "finish", &join_layout),
             exchange: pipeline(device, "gi.exchange", "exchange", &exchange_layout),
             layout,
             groups: ViewCache::new(),
-            sky_group,
-            exchange_groups,
+            join_group,
+            exchange_group,
             surfels,
             sent,
-            sky_buffer,
-            rounds: rounds.next_multiple_of(2),
+            discs,
+            surroundings,
+            rounds,
         }
     }
 
-    /// Records passes `gi.surfels`, `gi.sky` and `gi.exchange`. `counts` is [`super::emitters::EmittersPass::counts`].
-    pub fn record(&mut self, recorder: &mut Recorder<'_>, world: &World<'_>, counts: &wgpu::Buffer) {
+    /// Records passes `gi.surfels` and `gi.exchange`. `counts` is [`super::emitters::EmittersPass::counts`].
+    pub fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        world: &World<'_>,
+        lights: &wgpu::Buffer,
+        counts: &wgpu::Buffer,
+    ) {
         let view = wgpu::BindingResource::TextureView;
         let group = self.groups.get([world.around.depth, world.rsm.depth, world.environment], || {
             Ok::<_, std::convert::Infallible>(tool::group(
@@ -96,7 +112,7 @@ impl SurfelsPass {
                 &[
                     world.around.views.as_entire_binding(),
                     world.rsm.views.as_entire_binding(),
-                    world.lights.as_entire_binding(),
+                    lights.as_entire_binding(),
                     world.rsm_of_light.as_entire_binding(),
                     view(world.around.depth),
                     view(world.around.albedo),
@@ -105,7 +121,7 @@ impl SurfelsPass {
                     view(world.rsm.depth),
                     view(world.environment),
                     self.surfels.as_entire_binding(),
-                    self.sent[0].as_entire_binding(),
+                    self.sent.as_entire_binding(),
                     counts.as_entire_binding(),
                 ],
             ))
@@ -115,32 +131,29 @@ impl SurfelsPass {
             pass.set_pipeline(&self.light_up);
             pass.set_bind_group(0, &group, &[]);
             pass.dispatch_workgroups(SURFELS.div_ceil(64), 1, 1);
-            pass.set_pipeline(&self.sky);
-            pass.set_bind_group(0, &self.sky_group, &[]);
-            pass.dispatch_workgroups(1, 1, 1);
         });
         recorder.compute("gi.exchange", |pass| {
-            pass.set_pipeline(&self.exchange);
-            for round in 0..self.rounds {
-                pass.set_bind_group(0, &self.exchange_groups[round as usize % 2], &[]);
-                pass.dispatch_workgroups(SURFELS, 1, 1);
+            for round in 0..=self.rounds {
+                pass.set_pipeline(if round < self.rounds { &self.join } else { &self.finish });
+                pass.set_bind_group(0, &self.join_group, &[]);
+                pass.dispatch_workgroups((SURFELS / 4).div_ceil(64), 1, 1);
+                if round < self.rounds {
+                    pass.set_pipeline(&self.exchange);
+                    pass.set_bind_group(0, &self.exchange_group, &[]);
+                    pass.dispatch_workgroups(SURFELS, 1, 1);
+                }
             }
         });
     }
 
-    /// The surfels.
-    pub fn surfels(&self) -> &wgpu::Buffer {
-        &self.surfels
+    /// What surfels and windows send: discs of four each, then every one.
+    pub fn discs(&self) -> &wgpu::Buffer {
+        &self.discs
     }
 
-    /// Radiance that each sends, `vec4f`.
-    pub fn sent(&self) -> &wgpu::Buffer {
-        &self.sent[0]
-    }
-
-    /// What the camera sees of the sky.
-    pub fn sky(&self) -> &wgpu::Buffer {
-        &self.sky_buffer
+    /// What the surroundings send to the camera, for reflections: [`super::rung::Rung::surroundings`].
+    pub fn surroundings(&self) -> &wgpu::TextureView {
+        &self.surroundings
     }
 
     /// Lets go of texture views and of the buffers bound with them.
@@ -155,16 +168,21 @@ impl SurfelsPass {
 
     /// GPU memory, bytes.
     pub fn bytes(&self) -> u64 {
-        self.surfels.size() + 2 * self.sent[0].size() + self.sky_buffer.size()
+        self.surfels.size() + self.sent.size() + self.discs.size() + 8 * u64::from(PAINTED[0] * PAINTED[1])
     }
 
     /// What the passes cost.
     pub fn costs(&self) -> [Cost; 2] {
-        let n = f64::from(SURFELS);
+        let (n, rounds) = (f64::from(SURFELS), f64::from(self.rounds));
         [
             Cost::new("gi.surfels", n * 400.0, n * 140.0),
-            // A pair: 39 for what arrives, 9 for the sums; buffers stay in cache.
-            Cost::new("gi.exchange", f64::from(self.rounds) * n * n * 48.0, f64::from(self.rounds) * n * 112.0),
+            // A surfel meets 0.44 discs a surfel, as cells do, shared by 64 invocations: 40 operations each, and 18 to ask
+            // each square twice; joining a surfel takes 30. Buffers stay in cache.
+            Cost::new(
+                "gi.exchange",
+                rounds * n * (64.0 * ((0.44 * n / 64.0).ceil() * 40.0 + (n / 256.0).ceil() * 18.0) + 30.0),
+                rounds * n * 200.0,
+            ),
         ]
     }
 }

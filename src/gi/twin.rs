@@ -1,11 +1,11 @@
 //! The slow, obvious CPU twin of `gi/`'s shaders, function by function under the same names. No wgpu. Tests compare
 //! the shaders with it; nothing else uses it. Formulas are documented in the shaders and in `gi::features`.
 
-use super::ambient::{AMBIENT, BOUNCE, SKY};
+use super::ambient::{BOUNCE, SKY};
 use super::exposure::Exposure;
 use super::features::FeatureSet;
 use super::inputs::{CELL, Params};
-use super::reconstruct::{LOST, NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, TRUST, WEIGHT_FLOOR};
+use super::reconstruct::{Answer, LOST, MOST_ADDED, NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, TRUST, WEIGHT_FLOOR};
 use glam::{IVec2, Mat3, Vec2, Vec3, Vec3Swizzles};
 
 /// Largest value that is stored in the half-float output.
@@ -24,6 +24,8 @@ pub struct GBuffer {
     pub emissive: Vec<[f32; 3]>,
     /// Direct diffuse light, E/π.
     pub direct: Vec<[f32; 3]>,
+    /// What method `cache` answers, E/π.
+    pub guess: Vec<[f32; 3]>,
 }
 
 /// A picture as the shaders see it.
@@ -91,6 +93,10 @@ impl<'a> Picture<'a> {
 
     fn light_at(&self, pixel: IVec2) -> Vec3 {
         finite3(Vec3::from_array(self.buffers.direct[self.index(pixel)])).max(Vec3::ZERO)
+    }
+
+    fn guess_at(&self, pixel: IVec2) -> Vec3 {
+        finite3(Vec3::from_array(self.buffers.guess[self.index(pixel)])).max(Vec3::ZERO)
     }
 
     fn emissive_at(&self, pixel: IVec2) -> Vec3 {
@@ -210,6 +216,7 @@ impl<'a> Picture<'a> {
         put("depth", &[(z.ln() - exposure.ln_m).clamp(-4.0, 4.0)]);
         put("spread", &[self.spread_of(cell, z)]);
         put("hit", &[1.0]);
+        put("cache", &compress(self.guess_at(pixel)));
     }
 
     fn spread_of(&self, cell: IVec2, z: f32) -> f32 {
@@ -225,15 +232,17 @@ impl<'a> Picture<'a> {
         spread.min(1.0)
     }
 
-    /// `gi.reconstruct`: E/π of every pixel from `answers` (y, one a cell).
-    pub fn reconstruct(&self, exposure: &Exposure, answers: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    /// `gi.reconstruct`: E/π of every pixel from `answers`, one a cell: y or g, and r (zeros for [`Answer::Light`]).
+    pub fn reconstruct(&self, exposure: &Exposure, answer: Answer, answers: &[[f32; 6]]) -> Vec<[f32; 3]> {
         let light = |pixel| {
             let distance = self.distance_at(pixel);
             if distance <= 0.0 {
                 return [0.0; 3];
             }
             let here = Surface { position: self.position_at(pixel, distance), normal: self.normal_at(pixel), distance };
-            (exposure.s * self.light_of(pixel, &here, answers)).min(Vec3::splat(LARGEST)).to_array()
+            let base = if answer == Answer::Gain { self.guess_at(pixel) } else { Vec3::splat(exposure.s) };
+            let (factor, addition) = self.answer_of(pixel, &here, answer, answers);
+            (base * factor + exposure.s * addition).clamp(Vec3::ZERO, Vec3::splat(LARGEST)).to_array()
         };
         self.all_pixels().map(light).collect()
     }
@@ -246,40 +255,42 @@ impl<'a> Picture<'a> {
         facing.max(NORMAL_FLOOR) / (lorentz * lorentz)
     }
 
-    /// Light times weight, and weight.
-    fn tap(&self, here: &Surface, cell: IVec2, spatial: f32, answers: &[[f32; 3]]) -> (Vec3, f32) {
+    /// Factor and addition times weight, and weight.
+    fn tap(&self, here: &Surface, cell: IVec2, spatial: f32, answer: Answer, answers: &[[f32; 6]]) -> Sum {
         let pixel = self.sample_pixel(cell);
         let z = self.distance_at(pixel);
         if z <= 0.0 {
-            return (Vec3::ZERO, 0.0);
+            return Sum::default();
         }
-        let y = finite3(Vec3::from_array(answers[(cell.y * self.cells.x + cell.x) as usize]));
-        let light = y.clamp(Vec3::splat(-10.0), Vec3::splat(6.0)).exp();
+        let [a, b, c, d, e, f] = answers[(cell.y * self.cells.x + cell.x) as usize];
+        let [lowest, highest] = answer.range();
+        let factor = finite3(Vec3::new(a, b, c)).clamp(Vec3::splat(lowest), Vec3::splat(highest)).exp();
+        let addition = finite3(Vec3::new(d, e, f)).clamp(Vec3::splat(-MOST_ADDED), Vec3::splat(MOST_ADDED));
         let weight = spatial * self.agreement(here, pixel, z).max(WEIGHT_FLOOR);
-        (light * weight, weight)
+        Sum { factor: factor * weight, addition: addition * weight, weight }
     }
 
-    fn gather(&self, here: &Surface, place: Vec2, radius: i32, answers: &[[f32; 3]]) -> (Vec3, f32) {
+    fn gather(&self, here: &Surface, place: Vec2, radius: i32, answer: Answer, answers: &[[f32; 6]]) -> Sum {
         let base = place.floor().as_ivec2();
         let first = (base - (radius - 1)).max(IVec2::ZERO);
         let last = (base + radius).min(self.cells - 1);
-        let mut sum = (Vec3::ZERO, 0.0);
+        let mut sum = Sum::default();
         for y in first.y..=last.y {
             for x in first.x..=last.x {
                 let tent = 1.0 - (IVec2::new(x, y).as_vec2() - place).abs() / (radius as f32 + 1.0);
-                let (light, weight) = self.tap(here, IVec2::new(x, y), tent.x * tent.y, answers);
-                sum = (sum.0 + light, sum.1 + weight);
+                sum = sum.plus(self.tap(here, IVec2::new(x, y), tent.x * tent.y, answer, answers));
             }
         }
         sum
     }
 
-    fn light_of(&self, pixel: IVec2, here: &Surface, answers: &[[f32; 3]]) -> Vec3 {
+    /// Factor and addition at a pixel.
+    fn answer_of(&self, pixel: IVec2, here: &Surface, answer: Answer, answers: &[[f32; 6]]) -> (Vec3, Vec3) {
         let edge = CELL as f32;
         let place = (pixel.as_vec2() - edge / 2.0) / edge;
         let base = place.floor().as_ivec2();
         let f = place - place.floor();
-        let mut near = (Vec3::ZERO, 0.0);
+        let mut near = Sum::default();
         for (step, wx, wy) in [
             (IVec2::new(0, 0), 1.0 - f.x, 1.0 - f.y),
             (IVec2::new(1, 0), f.x, 1.0 - f.y),
@@ -287,20 +298,42 @@ impl<'a> Picture<'a> {
             (IVec2::new(1, 1), f.x, f.y),
         ] {
             let cell = (base + step).clamp(IVec2::ZERO, self.cells - 1);
-            let (light, weight) = self.tap(here, cell, wx * wy, answers);
-            near = (near.0 + light, near.1 + weight);
+            near = near.plus(self.tap(here, cell, wx * wy, answer, answers));
         }
-        let mean = |sum: (Vec3, f32)| sum.0 / sum.1.max(1e-30);
-        if near.1 >= TRUST {
-            return mean(near);
+        if near.weight >= TRUST {
+            return near.mean();
         }
-        let mut wide = self.gather(here, place, 2, answers);
-        if wide.1 < LOST {
-            wide = self.gather(here, place, 4, answers);
+        let mut wide = self.gather(here, place, 2, answer, answers);
+        if wide.weight < LOST {
+            wide = self.gather(here, place, 4, answer, answers);
         }
-        if wide.1 <= 0.0 {
-            return Vec3::from_array(AMBIENT);
+        if wide.weight <= 0.0 {
+            return (Vec3::from_array(answer.fallback()), Vec3::ZERO);
         }
-        mean(wide).lerp(mean(near), near.1 / TRUST)
+        let (wide, trust, near) = (wide.mean(), near.weight / TRUST, near.mean());
+        (wide.0.lerp(near.0, trust), wide.1.lerp(near.1, trust))
+    }
+}
+
+/// A weighted sum over cells.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    factor: Vec3,
+    addition: Vec3,
+    weight: f32,
+}
+
+impl Sum {
+    fn plus(self, other: Sum) -> Sum {
+        Sum {
+            factor: self.factor + other.factor,
+            addition: self.addition + other.addition,
+            weight: self.weight + other.weight,
+        }
+    }
+
+    fn mean(self) -> (Vec3, Vec3) {
+        let weight = self.weight.max(1e-30);
+        (self.factor / weight, self.addition / weight)
     }
 }

@@ -18,6 +18,9 @@ use crate::gpu::timing::Recorder;
 /// Sum of the four weights below which the 4×4 cells around are blended in.
 pub const TRUST: f32 = 0.3;
 
+/// Least cosine to a cell's own normal for which its light is evaluated where no cell agrees with a pixel.
+pub const LEAST_COSINE: f32 = 0.5;
+
 /// The constants as WGSL.
 pub fn prelude(side: CellSide) -> String {
     let mut text = side.prelude();
@@ -27,6 +30,7 @@ pub fn prelude(side: CellSide) -> String {
         ("NORMAL_FLOOR", NORMAL_FLOOR),
         ("WEIGHT_FLOOR", WEIGHT_FLOOR),
         ("TRUST", TRUST),
+        ("LEAST_COSINE", LEAST_COSINE),
     ] {
         text.push_str(&format!("const {name} = f32({value:?});\n"));
     }
@@ -97,14 +101,14 @@ impl UpsamplePass {
         self.outputs.made()
     }
 
-    /// What the pass costs for a picture of `size` pixels. A pixel: 4 cells of 62 operations, its own place and normal
+    /// What the pass costs for a picture of `size` pixels. A pixel: 4 cells of 67 operations, its own place and normal
     /// 60, the mean 14; a workgroup stages 25 or 36 cells of 60 operations and 64 bytes, most of which the chip's cache
     /// has, so that each cell comes from memory once. Pixels at edges that ask 16 cells (about 3 % of a picture) are
     /// counted with 1,000 more.
     pub fn cost(side: CellSide, size: [u32; 2]) -> Cost {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let staged = f64::from(8 / side.pixels() + 4).powi(2) * 60.0 / 64.0;
-        let flops = pixels * (4.0 * 62.0 + 74.0 + staged + 30.0);
+        let flops = pixels * (4.0 * 67.0 + 74.0 + staged + 30.0);
         Cost::new("gi.upsample", flops, pixels * 16.0 + side.count(size) as f64 * 60.0)
     }
 }

@@ -28,6 +28,7 @@ pub const RENDER: &[Shader] = &[
             "lib/frame.wgsl",
             "lib/brdf.wgsl",
             "lib/material.wgsl",
+            "render/mesh.wgsl",
             "render/gbuffer.wgsl"
         ],
     },
@@ -49,7 +50,14 @@ pub const RENDER: &[Shader] = &[
     },
     Shader {
         name: "render.atlas",
-        files: wgsl!["lib/octahedral.wgsl", "lib/hash.wgsl", "lib/brdf.wgsl", "lib/material.wgsl", "render/atlas.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/hash.wgsl",
+            "lib/brdf.wgsl",
+            "lib/material.wgsl",
+            "render/mesh.wgsl",
+            "render/atlas.wgsl"
+        ],
     },
     Shader { name: "render.taa", files: wgsl!["lib/frame.wgsl", "render/taa.wgsl"] },
     Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
@@ -133,7 +141,7 @@ pub const GI: &[Shader] = &[
             "gi/surfels.wgsl"
         ],
     },
-    Shader { name: "gi.sky", files: wgsl!["lib/brdf.wgsl", "gi/surfel.wgsl", "gi/sky.wgsl"] },
+    Shader { name: "gi.discs", files: wgsl!["lib/brdf.wgsl", "lib/emitter.wgsl", "gi/surfel.wgsl", "gi/discs.wgsl"] },
     Shader {
         name: "gi.exchange",
         files: wgsl!["lib/brdf.wgsl", "lib/emitter.wgsl", "gi/surfel.wgsl", "gi/exchange.wgsl"],
@@ -205,8 +213,8 @@ pub const NET: &[Shader] = net![
     "conv3x3_mirror", [full mirror], ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
     "conv3x3_mirror_wide", [full mirror], ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
     "conv3x3_mirror_half", [half mirror], ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv3x3.wgsl"];
-    "conv3x3_lanes", [full mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv3x3_pixels.wgsl"];
-    "conv3x3_lanes_half", [half mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv3x3_pixels.wgsl"];
+    "conv3x3_lanes", [full mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv3x3_pairs.wgsl"];
+    "conv3x3_lanes_half", [half mirror], ["net/epilogue.wgsl", "net/weights_lanes.wgsl", "net/tile.wgsl", "net/conv3x3_pairs.wgsl"];
     "conv_any", [full full], ["net/epilogue.wgsl", "net/weights_uniform.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
     "conv_any_wide", [full full], ["net/epilogue.wgsl", "net/weights_storage.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];
     "conv_any_half", [half half], ["net/epilogue.wgsl", "net/weights_half.wgsl", "net/pair.wgsl", "net/threads.wgsl", "net/tile.wgsl", "net/conv_any.wgsl"];

@@ -227,7 +227,9 @@ impl<'a> Builder<'a> {
         let flops =
             node.merged.iter().map(|i| ops[*i].flops(self.shape_of(ops[*i].inputs()[0]), self.shapes[*i])).sum();
         let kind = match node.work {
-            Work::Conv { kernel, stride, padding, nearest } => Kind::Conv { kernel, stride, padding, nearest },
+            Work::Conv { kernel, stride, padding, nearest, groups } => {
+                Kind::Conv { kernel, stride, padding, nearest, groups }
+            }
             Work::Transposed { kernel, stride, padding } => Kind::Transposed { kernel, stride, padding },
             Work::Bilinear => Kind::Upsample,
             Work::Nearest => Kind::Nearest,

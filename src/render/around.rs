@@ -7,13 +7,12 @@ use crate::scene::upload::SceneGpu;
 use glam::Vec3;
 
 /// Texels on a side of a face; `SIDE` in the shaders.
-pub const SIDE: u32 = 12;
+pub const SIDE: u32 = 14;
 /// Nearest thing that is seen, metres.
 const NEAR: f32 = 0.02;
 
-/// Share of the light reflected by specular lobes that surfels send on as if it were diffuse. All of it would be too
-/// much under an open sky: what falls in from above is mirrored upwards. Fitted to six training rooms.
-const SPECULAR: f32 = 0.4;
+/// Share of the light reflected by specular lobes that surfels send on as if it were diffuse: all of it.
+const SPECULAR: f32 = 1.0;
 
 /// The cube.
 pub struct Around {

@@ -9,9 +9,10 @@
 //! | `normal` | `Rg16Float` | unit normal in world space, octahedral, turned to the side that is seen | 0, 0 |
 //! | `emissive` | `Rgba16Float` | rgb: emitted radiance, W/(m²·sr), or in a light's view the share of its light that the specular lobe reflects; a: 1 | 0 |
 
+use super::gbuffer::mesh_pipeline;
 use super::tool;
 use crate::gpu::{shaders, timing::Recorder};
-use crate::scene::upload::{Draw, SceneGpu, attribute_layouts, material_layout};
+use crate::scene::upload::{Draw, SceneGpu, material_layout};
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, Mat4, Vec3, Vec4};
 
@@ -150,7 +151,11 @@ impl AtlasPass {
             immediate_size: 0,
         });
         let module = shaders::module(device, "render.atlas");
-        let [opaque, covered] = [false, true].map(|covered| pipeline(device, &pipeline_layout, &module, covered));
+        use wgpu::TextureFormat as F;
+        let formats = [F::Rgba8UnormSrgb, F::Rg16Float, F::Rgba16Float];
+        // Both faces, as in the shadow maps: a single-sided wall stops light from behind, too.
+        let [opaque, covered] = [false, true]
+            .map(|covered| mesh_pipeline(device, "render.atlas", (&pipeline_layout, &module), &formats, None, covered));
         Self { layout, opaque, covered }
     }
 
@@ -267,52 +272,12 @@ fn sees(view: &AtlasViewGpu, draw: &Draw) -> bool {
     !outside.contains(&true)
 }
 
-fn pipeline(
-    device: &wgpu::Device,
-    layout: &wgpu::PipelineLayout,
-    module: &wgpu::ShaderModule,
-    covered: bool,
-) -> wgpu::RenderPipeline {
-    use wgpu::TextureFormat as F;
-    let targets = [F::Rgba8UnormSrgb, F::Rg16Float, F::Rgba16Float]
-        .map(|format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL }));
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("render.atlas"),
-        layout: Some(layout),
-        vertex: wgpu::VertexState {
-            module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers: &attribute_layouts(),
-        },
-        // Both faces, as in the shadow maps: a single-sided wall stops light from behind, too.
-        primitive: Default::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: F::Depth32Float,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(wgpu::CompareFunction::Greater),
-            stencil: Default::default(),
-            bias: Default::default(),
-        }),
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module,
-            entry_point: Some("fragment"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[("ALPHA", if covered { 1.0 } else { 0.0 })],
-                ..Default::default()
-            },
-            targets: &targets,
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
-}
-
 /// Right, up and forward of a cube's face: +X, −X, +Y, −Y, +Z, −Z in this order.
 pub(super) fn cube_axes(face: usize) -> [Vec3; 3] {
-    let forward = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z][face];
-    upright(forward)
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z];
+    let sign = if face % 2 == 0 { 1.0 } else { -1.0 };
+    let [forward, up, right] = [0, 1, 2].map(|i| axes[(face / 2 + i) % 3]);
+    [right * sign, up, forward * sign]
 }
 
 /// Right and up for a view along `forward`: right × up looks back, so front faces wind as in any camera.

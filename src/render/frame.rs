@@ -270,7 +270,11 @@ impl Renderer {
         let maps = self.passes.shadow.maps(&self.device, queue, scene);
         let group = self.passes.direct.lights(&self.device, scene, &maps);
         let sky = self.passes.composite.sky(&self.device, &scene.environment_view);
-        let glossy_sky = self.passes.glossy.sky(&self.device, &scene.environment_view);
+        let glossy_sky = self.passes.glossy.sky(
+            &self.device,
+            &scene.environment_view,
+            self.indirect.as_ref().and_then(|i| i.surroundings()),
+        );
         Lighting { scene: scene.id, maps, world: None, group, sky, glossy_sky }
     }
 

@@ -103,10 +103,25 @@ fn pipeline(
     variant: usize,
 ) -> wgpu::RenderPipeline {
     use wgpu::TextureFormat as F;
-    let targets = [F::Rg16Float, F::Rgba8UnormSrgb, F::Rgba8UnormSrgb, F::Rgba16Float, F::Rg16Float]
-        .map(|format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL }));
+    let formats = [F::Rg16Float, F::Rgba8UnormSrgb, F::Rgba8UnormSrgb, F::Rgba16Float, F::Rg16Float];
+    let cull = [Some(wgpu::Face::Back), Some(wgpu::Face::Front), None][variant % 3];
+    mesh_pipeline(device, "render.gbuffer", (layout, module), &formats, cull, variant >= 3)
+}
+
+/// A pipeline that draws a scene's meshes with reversed depth into targets of these `formats`; `covered`: alpha decides
+/// which fragments there are.
+pub(super) fn mesh_pipeline(
+    device: &wgpu::Device,
+    label: &str,
+    (layout, module): (&wgpu::PipelineLayout, &wgpu::ShaderModule),
+    formats: &[wgpu::TextureFormat],
+    cull_mode: Option<wgpu::Face>,
+    covered: bool,
+) -> wgpu::RenderPipeline {
+    let target = |&format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL });
+    let targets: Vec<_> = formats.iter().map(target).collect();
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("render.gbuffer"),
+        label: Some(label),
         layout: Some(layout),
         vertex: wgpu::VertexState {
             module,
@@ -114,12 +129,9 @@ fn pipeline(
             compilation_options: Default::default(),
             buffers: &attribute_layouts(),
         },
-        primitive: wgpu::PrimitiveState {
-            cull_mode: [Some(wgpu::Face::Back), Some(wgpu::Face::Front), None][variant % 3],
-            ..Default::default()
-        },
+        primitive: wgpu::PrimitiveState { cull_mode, ..Default::default() },
         depth_stencil: Some(wgpu::DepthStencilState {
-            format: F::Depth32Float,
+            format: wgpu::TextureFormat::Depth32Float,
             depth_write_enabled: Some(true),
             depth_compare: Some(wgpu::CompareFunction::Greater),
             stencil: Default::default(),
@@ -130,7 +142,7 @@ fn pipeline(
             module,
             entry_point: Some("fragment"),
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[("ALPHA", if variant >= 3 { 1.0 } else { 0.0 })],
+                constants: &[("ALPHA", if covered { 1.0 } else { 0.0 })],
                 ..Default::default()
             },
             targets: &targets,

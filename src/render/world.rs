@@ -64,9 +64,8 @@ impl World {
             rsm_blocks: self.rsm.blocks(),
             rsm_most_blocks: self.rsm.most_blocks(),
             around: atlas(&self.around.atlas),
-            lights: &scene.light_buffer,
-            light_count: scene.lights.len() as u32,
             environment: &scene.environment_view,
+            bounds: scene.bounds.map_or([[0.0; 3]; 2], |(low, high)| [low, high]),
             clutter: scene.clutter,
         }
     }

@@ -26,6 +26,10 @@ pub enum DatasetError {
     /// The GI pass did not give its inputs.
     #[error(transparent)]
     Gi(#[from] crate::gi::GiError),
+    /// The path tracer failed.
+    #[cfg(feature = "reference")]
+    #[error(transparent)]
+    Tracer(#[from] crate::reference::TracerError),
     /// Serialisation failed.
     #[error("cannot serialise the sample: {0}")]
     Serialize(String),
@@ -44,17 +48,21 @@ pub struct Sample {
     pub normal: Vec<f32>,
     /// Distance along the view axis, metres, one plane; 0 on background.
     pub depth: Vec<f32>,
+    /// The light to be learnt, if it was traced.
+    #[cfg(feature = "reference")]
+    pub target: Option<super::target::Target>,
 }
 
-/// Draws `camera`'s view once, unjittered, and reads what training needs of it; any method will do, the network's
-/// inputs do not depend on it. Blocks.
+/// Draws `camera`'s view once, unjittered, and reads what training needs of it. `renderer`'s method is `cache`, whose answer is
+/// one of the network's inputs. Blocks.
 pub fn sample(gpu: &Gpu, renderer: &mut Renderer, scene: &SceneGpu, camera: &Camera) -> Result<Sample, DatasetError> {
     let view = View::new(camera, renderer.size(), [0.0; 2]);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view)?;
     gpu.queue.submit([encoder.finish()]);
     let gi_inputs = renderer.gi_inputs(&view, scene.environment.radiance);
-    let inputs = read_features(&gpu.device, &gpu.queue, &FeatureSet::all(), &gi_inputs)?;
+    let guess = &renderer.targets().indirect.view;
+    let inputs = read_features(&gpu.device, &gpu.queue, &FeatureSet::all(), &gi_inputs, guess)?;
     let cells = Cells { size: renderer.size(), low: inputs.cells };
     let targets = renderer.targets();
     let read = |texture: &wgpu::Texture| readback::texture(&gpu.device, &gpu.queue, texture);
@@ -67,6 +75,8 @@ pub fn sample(gpu: &Gpu, renderer: &mut Renderer, scene: &SceneGpu, camera: &Cam
         normal: cells.pick(&read(&targets.normal.texture)?, |b: [u8; 4]| octahedral(half(&b), half(&b[2..]))),
         depth: depth.into_iter().map(|d| if d > 0.0 { camera.near / d } else { 0.0 }).collect(),
         inputs,
+        #[cfg(feature = "reference")]
+        target: None,
     })
 }
 
@@ -78,12 +88,12 @@ impl Sample {
     }
 
     /// The sample as a safetensors file: `features` [channels, h, w], `scale` (the exposure s, one value), `direct`, `albedo` and
-    /// `normal` [3, h, w], `depth` [h, w], all f32.
+    /// `normal` [3, h, w], `depth` [h, w], and, where it was traced, `light` [3, h, w] and its `noise` (one value), all f32.
     pub fn to_bytes(&self) -> Result<Vec<u8>, DatasetError> {
         let [w, h] = self.inputs.cells.map(|n| n as usize);
         let channels = self.inputs.features.len() / (w * h);
         let scale = [self.inputs.exposure.s];
-        let tensors: [(&str, Vec<usize>, &[f32]); 6] = [
+        let mut tensors: Vec<(&str, Vec<usize>, &[f32])> = vec![
             ("features", vec![channels, h, w], &self.inputs.features),
             ("scale", vec![1], &scale),
             ("direct", vec![3, h, w], &self.direct),
@@ -91,6 +101,11 @@ impl Sample {
             ("normal", vec![3, h, w], &self.normal),
             ("depth", vec![h, w], &self.depth),
         ];
+        #[cfg(feature = "reference")]
+        if let Some(target) = &self.target {
+            tensors.push(("light", vec![3, h, w], &target.light));
+            tensors.push(("noise", vec![1], std::slice::from_ref(&target.noise)));
+        }
         let failed = |e: safetensors::SafeTensorError| DatasetError::Serialize(e.to_string());
         let views = tensors
             .iter()

@@ -3,4 +3,8 @@
 pub mod bench;
 pub mod dataset;
 pub mod projection;
+#[cfg(feature = "reference")]
+pub mod target;
+#[cfg(feature = "io")]
+pub mod varied;
 pub mod views;

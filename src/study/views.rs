@@ -34,11 +34,17 @@ pub fn around(scene: &Scene, seed: u64) -> impl Iterator<Item = Camera> {
 }
 
 /// Steele, Lea and Flood's SplitMix64: a few lines for reproducible scattering, no statistics hang on it.
-struct SplitMix(u64);
+pub(super) struct SplitMix(u64);
 
 impl SplitMix {
+    /// Another seed, another row.
+    #[cfg(feature = "io")]
+    pub(super) fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
     /// Uniform in [0, 1).
-    fn next(&mut self) -> f32 {
+    pub(super) fn next(&mut self) -> f32 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

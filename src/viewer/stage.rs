@@ -305,7 +305,7 @@ impl Stage {
         if self.still == 0 || slot.renderer.size() != state.size {
             return Ok(());
         }
-        let set = crate::gi::features::FeatureSet::all();
+        let set = crate::gi::features::FeatureSet::screen();
         let channel = state.settings.feature % set.channels();
         let name = channel_name(channel);
         if self.feature.as_ref().is_some_and(|f| f.name == name) {
@@ -314,7 +314,8 @@ impl Stage {
         let view = Eye::new(camera, state.size, [0.0; 2]);
         let inputs = slot.renderer.gi_inputs(&view, scene.environment.radiance);
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
-        let read = crate::gi::pack::read_features(device, queue, &set, &inputs).map_err(|e| e.to_string())?;
+        let read = crate::gi::pack::read_features(device, queue, &set, &inputs, &slot.renderer.targets().indirect.view)
+            .map_err(|e| e.to_string())?;
         let [w, h] = read.cells;
         let plane = (w * h) as usize;
         let values = &read.features[channel as usize * plane..][..plane];

@@ -11,6 +11,7 @@ mod probes;
 mod screen;
 mod shot;
 mod stages;
+mod surroundings;
 mod taa;
 mod upsample;
 mod weights;

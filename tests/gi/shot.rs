@@ -70,6 +70,7 @@ impl Shot {
             albedo: vec![[0.0; 4]; n],
             emissive: vec![[0.0; 3]; n],
             direct: vec![[0.0; 3]; n],
+            guess: vec![[0.0; 3]; n],
         };
         Self { size, camera: camera(size, Vec3::ZERO, Vec3::NEG_Z, [0.0; 2]), environment: [0.0; 3], buffers }
     }
@@ -92,6 +93,7 @@ impl Shot {
             let n = Vec3::new(r.unit() - 0.5, r.unit() - 0.5, r.unit() - 0.5).normalize_or(Vec3::Y);
             shot.buffers.normal[i] = oct_encode(n.to_array()).map(half);
             shot.buffers.direct[i] = [r.unit(), r.unit(), 0.1 * r.unit()].map(half);
+            shot.buffers.guess[i] = [0.5 * r.unit(), 0.2 * r.unit(), r.unit()].map(half);
             shot.buffers.emissive[i] = if r.unit() > 0.9 { [2.0, r.unit(), 0.5].map(half) } else { [0.0; 3] };
             let rgb = [r.unit(), r.unit(), r.unit()];
             shot.set_albedo(i, rgb, r.unit());
@@ -143,7 +145,7 @@ impl Shot {
     /// All light times `k` (a power of two keeps half floats exact).
     pub fn scaled(&self, k: f32) -> Self {
         let mut shot = self.clone();
-        let light = shot.buffers.direct.iter_mut().chain(&mut shot.buffers.emissive);
+        let light = shot.buffers.direct.iter_mut().chain(&mut shot.buffers.emissive).chain(&mut shot.buffers.guess);
         light.for_each(|c| *c = c.map(|x| x * k));
         shot.environment = shot.environment.map(|x| x * k);
         shot
@@ -173,6 +175,7 @@ impl Shot {
             albedo: view(&make(F::Rgba8Unorm, &albedo)),
             emissive: view(&make(F::Rgba16Float, bytemuck::cast_slice(&wide(&b.emissive)))),
             direct: view(&make(F::Rgba16Float, bytemuck::cast_slice(&wide(&b.direct)))),
+            guess: view(&make(F::Rgba16Float, bytemuck::cast_slice(&wide(&b.guess)))),
         }
     }
 }
@@ -184,6 +187,8 @@ pub struct Textures {
     albedo: wgpu::TextureView,
     emissive: wgpu::TextureView,
     direct: wgpu::TextureView,
+    /// What method `cache` would answer.
+    pub guess: wgpu::TextureView,
 }
 
 impl Textures {

@@ -10,7 +10,7 @@ use bouncelight::gi::exposure::{self, Exposure, ExposurePass};
 use bouncelight::gi::features::{FEATURES, FeatureSet};
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gi::pack::{NetworkInputs, read_features};
-use bouncelight::gi::reconstruct::ReconstructPass;
+use bouncelight::gi::reconstruct::{Answer, ReconstructPass};
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu::timing::Recorder;
 use glam::Vec3;
@@ -29,14 +29,17 @@ pub fn ambient(gpu: &Gpu, shot: &Shot) -> (Exposure, Vec<[f32; 3]>) {
 
 pub fn features(gpu: &Gpu, shot: &Shot, set: &FeatureSet) -> NetworkInputs {
     let textures = shot.upload(&gpu.device, &gpu.queue);
-    read_features(&gpu.device, &gpu.queue, set, &textures.inputs(shot)).expect("packs")
+    read_features(&gpu.device, &gpu.queue, set, &textures.inputs(shot), &textures.guess).expect("packs")
 }
 
-pub fn reconstruct(gpu: &Gpu, shot: &Shot, answers: &[[f32; 3]]) -> Vec<[f32; 3]> {
+/// Light of every pixel from three numbers a cell, or six.
+pub fn reconstruct<const N: usize>(gpu: &Gpu, shot: &Shot, answers: &[[f32; N]]) -> Vec<[f32; 3]> {
     let (device, queue) = (&gpu.device, &gpu.queue);
     let textures = shot.upload(device, queue);
     let target = output(device, shot.size);
-    let padded: Vec<[f32; 4]> = answers.iter().map(|y| [y[0], y[1], y[2], 0.0]).collect();
+    let answer = if N == 6 { Answer::Gain } else { Answer::Light };
+    let row = |y: &[f32; N]| (0..N.next_multiple_of(4)).map(|c| y.get(c).copied().unwrap_or(7.0)).collect::<Vec<_>>();
+    let padded: Vec<f32> = answers.iter().flat_map(row).collect();
     let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: None,
         contents: bytemuck::cast_slice(&padded),
@@ -44,12 +47,13 @@ pub fn reconstruct(gpu: &Gpu, shot: &Shot, answers: &[[f32; 3]]) -> Vec<[f32; 3]
     });
     let mut group = InputGroup::new(device);
     let exposure = ExposurePass::new(device, &group);
-    let mut pass = ReconstructPass::new(device, &group);
+    let mut pass = ReconstructPass::new(device, &group, answer);
     let bound = group.bind(queue, &textures.inputs(shot)).expect("binds");
     let mut encoder = device.create_command_encoder(&Default::default());
     let mut recorder = Recorder::new(&mut encoder);
     exposure.record(&mut recorder, &bound);
-    pass.record(&mut recorder, &bound, &exposure, buffer.as_entire_binding(), &view(&target)).expect("records");
+    pass.record(&mut recorder, &bound, &exposure, buffer.as_entire_binding(), &textures.guess, &view(&target))
+        .expect("records");
     queue.submit([encoder.finish()]);
     read_light(gpu, &target)
 }
@@ -181,7 +185,7 @@ fn features_mean_what_the_table_says() {
         let first = FeatureSet::all().offset(name).expect("in the table") as usize;
         found.features[(first + c) * n + middle]
     };
-    assert_eq!(FEATURES.len(), 9);
+    assert_eq!(FEATURES.len(), 10);
     let s = found.exposure.s;
     assert!(close(at("direct", 0), (1.0 + 1.0 / s).ln(), 1e-4));
     assert!(close(at("outgoing", 0), (1.0 + shot.buffers.albedo[34 * 64 + 34][0] / s).ln(), 1e-4));
@@ -201,6 +205,29 @@ fn features_mean_what_the_table_says() {
     }
 }
 
+/// The twin's light of three numbers a cell, or six.
+fn twin<const N: usize>(shot: &Shot, answers: &[[f32; N]]) -> Vec<[f32; 3]> {
+    let six: Vec<[f32; 6]> =
+        answers.iter().map(|y| std::array::from_fn(|c| y.get(c).copied().unwrap_or(0.0))).collect();
+    let picture = shot.picture();
+    picture.reconstruct(&picture.exposure(), if N == 6 { Answer::Gain } else { Answer::Light }, &six)
+}
+
+fn same_as_twin<const N: usize>(gpu: &Gpu, shot: &Shot, mut answers: Vec<[f32; N]>) {
+    if answers.len() > 1 {
+        answers[1] = std::array::from_fn(|c| [f32::NAN, 90.0, -90.0][c % 3]);
+    }
+    let light = reconstruct(gpu, shot, &answers);
+    let excess = largest_excess(&light, &twin(shot, &answers));
+    println!("{:?}: {excess}", shot.size);
+    assert!(excess < 1e-4, "{:?}: {excess}", shot.size);
+    for c in 0..N {
+        let mut other = answers.clone();
+        other.iter_mut().for_each(|y| y[c] += 0.2);
+        assert!(largest_excess(&light, &twin(shot, &other)) > 1e-3, "sees a fifth in number {c}");
+    }
+}
+
 #[test]
 fn reconstruct_is_its_twin() {
     let Some(gpu) = common::gpu() else { return };
@@ -208,16 +235,34 @@ fn reconstruct_is_its_twin() {
         let shot = Shot::random(size, 200 + seed as u64);
         let mut r = Random(7);
         let [w, h] = shot.cells();
-        let mut answers: Vec<[f32; 3]> = (0..w * h).map(|_| [3.0 * r.unit() - 2.0, r.unit(), -r.unit()]).collect();
-        if answers.len() > 1 {
-            answers[1] = [f32::NAN, 90.0, -90.0];
-        }
-        let light = reconstruct(&gpu, &shot, &answers);
-        let exposure = shot.picture().exposure();
-        let excess = largest_excess(&light, &shot.picture().reconstruct(&exposure, &answers));
-        println!("{size:?}: {excess}");
-        assert!(excess < 1e-4, "{size:?}: {excess}");
-        answers.iter_mut().for_each(|y| y.iter_mut().for_each(|v| *v += 0.05));
-        assert!(largest_excess(&light, &shot.picture().reconstruct(&exposure, &answers)) > 1e-3, "sees five percent");
+        let mut number = |scale: f32, offset: f32| scale * r.unit() + offset;
+        same_as_twin(
+            &gpu,
+            &shot,
+            (0..w * h).map(|_| [number(3.0, -2.0), number(1.0, 0.0), number(-1.0, 0.0)]).collect(),
+        );
+        let six = |_| std::array::from_fn::<f32, 6, _>(|c| if c < 3 { number(2.0, -1.0) } else { number(0.6, 0.0) });
+        same_as_twin(&gpu, &shot, (0..w * h).map(six).collect());
     }
+}
+
+#[test]
+fn a_gain_of_nothing_is_the_first_guess() {
+    let Some(gpu) = common::gpu() else { return };
+    let shot = Shot::random([61, 35], 31);
+    let [w, h] = shot.cells();
+    let nothing = vec![[0.0f32; 6]; (w * h) as usize];
+    // 1.0 to a half float's last bit, which a driver may round towards zero.
+    let ulps = |light: &[[f32; 3]]| {
+        let bits = |x: f32| i32::from(half::f16::from_f32(x).to_bits());
+        let hit = light.iter().zip(&shot.buffers.guess).zip(&shot.buffers.depth).filter(|(_, d)| **d > 0.0);
+        hit.flat_map(|((l, g), _)| (0..3).map(move |c| (bits(l[c]) - bits(g[c])).abs())).max()
+    };
+    assert!(ulps(&reconstruct(&gpu, &shot, &nothing)) <= Some(1));
+    let brighter = vec![[0.004, 0.0, 0.0, 0.0, 0.0, 0.0]; nothing.len()];
+    assert!(ulps(&reconstruct(&gpu, &shot, &brighter)) > Some(1), "sees four per mille");
+    // Without light a network may say what it likes.
+    let loud = vec![[1.9f32; 6]; nothing.len()];
+    assert!(reconstruct(&gpu, &shot.scaled(0.0), &loud).iter().flatten().all(|x| *x == 0.0));
+    assert!(reconstruct(&gpu, &shot, &loud).iter().flatten().any(|x| *x > 0.0));
 }

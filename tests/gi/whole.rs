@@ -5,13 +5,19 @@ use crate::shot::{Random, Shot, output, view};
 use crate::stages::largest_excess;
 use crate::{read_light, weights};
 use bouncelight::gi::GiError;
-use bouncelight::gi::pass::{NeuralGi, Options};
+use bouncelight::gi::pass::{Neural, NeuralGi, Options};
+use bouncelight::gi::reconstruct::Answer;
 use bouncelight::gpu::Gpu;
-use bouncelight::net::{cpu, format::Weights, graph::Shape};
+use bouncelight::net::gpu::{Permutation, Source};
+use bouncelight::net::{cpu, format::Weights, graph::Shape, plan::Precision};
+use std::sync::Arc;
 
 fn neural(gpu: &Gpu, shot: &Shot) -> Vec<[f32; 3]> {
-    let mut gi =
-        NeuralGi::new(&gpu.device, &gpu.queue, &weights::weights(), Options { size: shot.size }).expect("made");
+    let options = Options { size: shot.size };
+    light(gpu, shot, NeuralGi::new(&gpu.device, &gpu.queue, &weights::weights(), options).expect("made"))
+}
+
+fn light(gpu: &Gpu, shot: &Shot, mut gi: NeuralGi) -> Vec<[f32; 3]> {
     let textures = shot.upload(&gpu.device, &gpu.queue);
     let target = output(&gpu.device, shot.size);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -26,11 +32,11 @@ fn twin(shot: &Shot) -> Vec<[f32; 3]> {
     let picture = shot.picture();
     let exposure = picture.exposure();
     let [width, height] = shot.cells();
-    let rows = picture.pack(&exposure, &bouncelight::gi::features::FeatureSet::all());
+    let rows = picture.pack(&exposure, &bouncelight::gi::features::FeatureSet::screen());
     let input = cpu::Tensor::from_padded(Shape { channels: 21, height, width }, &rows);
     let y = cpu::run(&weights, &input).expect("runs").to_padded();
-    let answers: Vec<[f32; 3]> = y.chunks_exact(4).map(|c| [c[0], c[1], c[2]]).collect();
-    picture.reconstruct(&exposure, &answers)
+    let answers: Vec<[f32; 6]> = y.chunks_exact(4).map(|c| [c[0], c[1], c[2], 0.0, 0.0, 0.0]).collect();
+    picture.reconstruct(&exposure, Answer::Light, &answers)
 }
 
 #[test]
@@ -44,6 +50,35 @@ fn the_whole_is_its_twin() {
         let other = Shot::random(size, 400 + seed as u64);
         assert!(size == [1, 1] || largest_excess(&light, &twin(&other)) > 1e-2, "another picture is told apart");
     }
+}
+
+#[test]
+fn a_frames_network_runs_as_asked() {
+    let Some(gpu) = common::gpu() else { return };
+    let shot = Shot::random([64, 40], 31);
+    let made =
+        |neural: &Neural| NeuralGi::with(&gpu.device, &gpu.queue, neural, Options { size: shot.size }).expect("made");
+    let full = Neural::from(weights::weights());
+    let gi = made(&full);
+    let guessed =
+        gi.network().kernels().find_map(|k| Some((k.layer?.to_string(), k.permutation))).expect("it convolves");
+    let reference = light(&gpu, &shot, gi);
+
+    let mut half = full.clone();
+    half.network.precision = Precision::F16;
+    let gi = made(&half);
+    assert_eq!(gi.network().plan().precision, Precision::F16);
+    let stored = light(&gpu, &shot, gi);
+    let excess = largest_excess(&stored, &reference);
+    assert!(stored != reference && excess < 3e-2, "16 bits differ, but little: {excess}");
+
+    let wish = Permutation { weights: Source::Storage, mirror: false, vectors: 1 };
+    let tuned = Neural { tuned: Arc::new([(guessed.0.clone(), wish)].into()), ..full };
+    assert_ne!(guessed.1, Some(wish), "otherwise the next check shows nothing");
+    let gi = made(&tuned);
+    assert_eq!(gi.network().kernels().find(|k| k.layer.is_some()).and_then(|k| k.permutation), Some(wish));
+    let excess = largest_excess(&light(&gpu, &shot, gi), &reference);
+    assert!(excess < 5e-4, "what is tuned changes times, not light: {excess}");
 }
 
 #[test]

@@ -10,10 +10,10 @@ use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{Camera, Environment, Instance, Light, LightKind, Material, Scene, shapes};
 
 /// A Lambertian box from `low` to `high`.
-type Block = ([f32; 3], [f32; 3], [f32; 3]);
+pub(crate) type Block = ([f32; 3], [f32; 3], [f32; 3]);
 
 /// Boxes under lights and a sky.
-fn scene(blocks: &[Block], lights: &[LightKind], sky: f32, camera: Camera) -> Scene {
+pub(crate) fn scene(blocks: &[Block], lights: &[LightKind], sky: f32, camera: Camera) -> Scene {
     let mut scene = Scene { cameras: vec![camera], ..Default::default() };
     scene.environment = Environment { radiance: [sky; 3], ..Default::default() };
     for (i, (low, high, color)) in blocks.iter().enumerate() {
@@ -39,7 +39,7 @@ fn sun(direction: [f32; 3], irradiance: f32) -> LightKind {
     LightKind::Directional { direction, irradiance, angle: 0.0 }
 }
 
-fn renderer(gpu: &Gpu, size: [u32; 2], method: Method) -> Renderer {
+pub(crate) fn renderer(gpu: &Gpu, size: [u32; 2], method: Method) -> Renderer {
     let shadow = ShadowOptions { sun_size: 256, cascades: 2, local_size: 256 };
     Renderer::new(&gpu.device, &gpu.queue, size, RendererOptions { method, shadow, ..Default::default() })
         .expect("the size fits")
@@ -54,23 +54,23 @@ fn lit(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene) -> (Picture, Picture) 
     (layer(Layer::DiffInd), layer(Layer::Position))
 }
 
-fn light(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene) -> Vec<f32> {
+pub(crate) fn light(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene) -> Vec<f32> {
     lit(gpu, renderer, scene).0.data
 }
 
-fn mean(v: &[f32]) -> f64 {
+pub(crate) fn mean(v: &[f32]) -> f64 {
     v.iter().map(|&x| f64::from(x)).sum::<f64>() / v.len().max(1) as f64
 }
 
 /// Mean of |a − b| over the mean of b.
-fn difference(a: &[f32], b: &[f32]) -> f64 {
+pub(crate) fn difference(a: &[f32], b: &[f32]) -> f64 {
     a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / b.len() as f64 / mean(b).max(1e-12)
 }
 
-const GREY: [f32; 3] = [0.5; 3];
+pub(crate) const GREY: [f32; 3] = [0.5; 3];
 
 /// A floor, an open top and four walls; the one behind the camera has a colour of its own.
-fn hall(behind: [f32; 3], lights: &[LightKind], sky: f32, yfov: f32) -> Scene {
+pub(crate) fn hall(behind: [f32; 3], lights: &[LightKind], sky: f32, yfov: f32) -> Scene {
     let blocks = [
         ([-6.0, -0.2, -6.0], [6.0, 0.0, 6.0], GREY),
         ([-6.2, 0.0, -6.0], [-6.0, 4.0, 6.0], GREY),
@@ -374,4 +374,45 @@ fn steady_frames_allocate_nothing_and_a_missing_world_is_named() {
     let error = rung.record(&mut Recorder::new(&mut encoder), &gpu.queue, &inputs, target).unwrap_err();
     assert!(matches!(error, GiError::World), "{error}");
     assert!(RenderError::from(error).to_string().contains("Inputs::world"));
+}
+
+/// A hall, and what a network that answers the same everywhere makes of `cache`.
+fn corrected(gpu: &Gpu, answer: [f32; 6], factor: f32) -> Vec<f32> {
+    let method = Method::Neural(Box::new(crate::weights::constant_gain(answer).into()));
+    light(
+        gpu,
+        &mut renderer(gpu, [96, 64], method),
+        &hall([0.8, 0.1, 0.1], &[sun(BACKWARDS, 3.0 * factor)], 0.2 * factor, 1.0),
+    )
+}
+
+#[test]
+fn an_untrained_network_is_cache() {
+    let Some(gpu) = common::gpu() else { return };
+    let hall = hall([0.8, 0.1, 0.1], &[sun(BACKWARDS, 3.0)], 0.2, 1.0);
+    let cache = light(&gpu, &mut renderer(&gpu, [96, 64], Method::Cache), &hall);
+    assert!(mean(&cache) > 0.01);
+    // To a half float's last bit, which a driver may round towards zero.
+    let ulps = |other: &[f32]| {
+        let bits = |x: f32| i32::from(half::f16::from_f32(x).to_bits());
+        cache.iter().zip(other).map(|(a, b)| (bits(*a) - bits(*b)).abs()).max()
+    };
+    assert!(ulps(&corrected(&gpu, [0.0; 6], 1.0)) <= Some(1));
+    assert!(ulps(&corrected(&gpu, [0.01; 6], 1.0)) > Some(1), "sees one percent");
+    // A gain of 2 in red is twice the red and nothing else.
+    let ln2 = std::f32::consts::LN_2;
+    let red = corrected(&gpu, [ln2, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0);
+    let expected: Vec<f32> = cache.iter().enumerate().map(|(i, c)| if i % 3 == 0 { 2.0 * c } else { *c }).collect();
+    assert!(difference(&red, &expected) < 1e-3 && difference(&red, &cache) > 0.1);
+}
+
+#[test]
+fn a_corrected_guess_is_linear_and_none_gives_none() {
+    let Some(gpu) = common::gpu() else { return };
+    let answer = [0.3, -0.2, 0.1, 0.05, 0.02, -0.03];
+    let one = corrected(&gpu, answer, 1.0);
+    let doubled: Vec<f32> = one.iter().map(|x| 2.0 * x).collect();
+    let two = corrected(&gpu, answer, 2.0);
+    assert!(difference(&two, &doubled) < 1e-3 && difference(&two, &one) > 0.4);
+    assert!(corrected(&gpu, answer, 0.0).iter().all(|x| *x == 0.0));
 }

@@ -78,8 +78,10 @@ fn permutations() -> Vec<Variant> {
 #[test]
 fn the_kernels_agree_on_every_operator() {
     let Some(gpu) = common::gpu() else { return };
-    check_kernels(&gpu, FULL, 0, 1, 1);
+    // Narrow tiles: most of the time goes into compilation, which grows with the tile.
+    check_kernels(&gpu, Options { variant: fixed(Source::Lanes, true, 1), ..FULL }, 0, 1, 1);
     // A fifth of the graphs in each of the other ways; all of them in the test below.
+    check_kernels(&gpu, FULL, 0, 5, 1);
     check_kernels(&gpu, Options { fuse: false, variant: Variant::Plain, ..FULL }, 1, 5, 1);
     check_kernels(&gpu, HALF, 3, 5, 1);
     check_kernels(&gpu, Options { variant: fixed(Source::Uniform, false, 3), ..FULL }, 2, 5, 1);
@@ -95,6 +97,41 @@ fn the_kernels_agree_in_every_way() {
             let options = Options { variant, precision, ..FULL };
             check_kernels(&gpu, options, 0, 1, usize::MAX);
             check_kernels(&gpu, Options { fuse: false, ..options }, 0, 1, usize::MAX);
+        }
+    }
+}
+
+/// Groups of whole vectors read their own channels only, in every kind of kernel.
+#[test]
+fn groups_read_their_own() {
+    let Some(gpu) = common::gpu() else { return };
+    let conv = |groups: u32, kernel: u32, stride: u32| {
+        serde_json::json!({"op": "conv2d", "name": "c", "input": "input", "output": "y", "in_channels": 16, "out_channels": 24 * groups / 2,
+            "kernel": [kernel, kernel], "stride": stride, "padding": kernel / 2, "groups": groups, "activation": "none"})
+    };
+    for (groups, kernel, stride) in [(2, 3, 1), (4, 3, 2), (2, 1, 1)] {
+        let name = "grouped";
+        let graph =
+            hashed::graphs(&serde_json::json!({name: {"input_channels": 16, "ops": [conv(groups, kernel, stride)]}}))
+                [name]
+                .clone();
+        let weights = hashed::network(&graph);
+        let input = hashed::input(name, 16, [7, 9]);
+        let twin = cpu::run(&weights, &input).unwrap();
+        for variant in [
+            fixed(Source::Lanes, true, 4),
+            fixed(Source::Uniform, false, 3),
+            fixed(Source::Storage, true, 2),
+            Variant::Plain,
+        ] {
+            let options = Options { variant, ..FULL };
+            let network = Network::with_options(&gpu.device, &gpu.queue, &weights, [7, 9], options).unwrap();
+            let filter = network.kernels().find_map(|k| k.filter).unwrap();
+            let dense = variant == Variant::Plain;
+            assert_eq!(filter.in_vectors, if dense { 4 } else { 4 / groups }, "{variant:?}");
+            let found = run_network(&gpu, &network, &input);
+            let e = hashed::error(&found.data, &twin.data);
+            assert!(e <= TOLERANCE && found.shape == twin.shape, "{groups} groups, {variant:?}: relative error {e}");
         }
     }
 }

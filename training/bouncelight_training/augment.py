@@ -6,8 +6,8 @@ import numpy as np
 
 from .features import LUMINANCE, SLICES, channel_means
 
-COLOURED = ["direct", "outgoing", "albedo", "sky"]
-LIGHTS = ["direct", "outgoing", "sky"]
+COLOURED = ["direct", "outgoing", "albedo", "sky", "cache"]
+LIGHTS = ["direct", "outgoing", "sky", "cache"]
 
 
 def permute_colours(features, target, order):
@@ -34,8 +34,16 @@ def mirror(features, target, mask):
     return features, target[..., ::-1], mask[..., ::-1]
 
 
-def augmented(features, target, mask, rng):
-    """One of the twelve versions of a picture, float32."""
+def cropped(features, target, mask, width, rng):
+    """A window of `width` cells, as high as the picture, at a random place; the network sees about so far."""
+    left = int(rng.integers(0, max(mask.shape[-1] - width, 0) + 1))
+    return features[..., left:left + width], target[..., left:left + width], mask[..., left:left + width]
+
+
+def augmented(features, target, mask, rng, crop=0):
+    """One of the twelve versions of a picture, or of a window `crop` cells wide (0: of all of it), float32."""
+    if crop:
+        features, target, mask = cropped(features, target, mask, crop, rng)
     features, target = features.astype(np.float32), target.astype(np.float32)
     features, target = permute_colours(features, target, rng.permutation(3))
     if rng.random() < 0.5:

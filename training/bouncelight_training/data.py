@@ -1,9 +1,12 @@
-"""Pairs rasterised features with light that Cycles traced, and keeps the pairs of one split in one .npz.
+"""Pairs rasterised features with path-traced light, and keeps the pairs of one split in one .npz.
 
-    python -m bouncelight_training.data --features DIR --cycles DIR --out train.npz [--rooms 6-9,13]
+    python -m bouncelight_training.data --features DIR --out train.npz [--rooms 6-9,13]                 light traced by bouncelight
+    python -m bouncelight_training.data --features DIR --cycles DIR --out train.npz [--rooms 6-9,13]    light rendered by Cycles
 
-FEATURES/roomIIII_viewV.safetensors is what `bouncelight dataset` writes; CYCLES/roomIIII_viewV.exr what cycles/paper_rooms.py
-writes. Views of the bundled scenes (interior_viewV, cornell_viewV) come from recipe `scene` and cycles/scene_file.py. The target is the light that a GI method must add, as E/pi: Cycles' DiffDir (which holds the sky's light) + DiffInd
+FEATURES/roomIIII_viewV.safetensors (or variedIIII_viewV, or SCENE_viewV) is what `bouncelight dataset` writes. With `--spp N` it traces the
+light at the very points that the cells look at, and nothing has to be left out but the background.
+
+Otherwise CYCLES/roomIIII_viewV.exr comes from cycles/paper_rooms.py, that of a scene from cycles/scene_file.py. The target is the light that a GI method must add, as E/pi: Cycles' DiffDir (which holds the sky's light) + DiffInd
 minus our own direct light, so whatever our direct light gets wrong is not charged to the network twice.
 
 The raster has one sample point a cell; Cycles' pixel is a filtered mean over about the cell. Where the two cannot be the
@@ -24,6 +27,7 @@ import os
 import re
 import sys
 import zipfile
+import zlib
 
 import numpy as np
 import OpenEXR
@@ -37,9 +41,15 @@ FIRST_JUDGED = 2200
 REASONS = ["background", "spread", "normal", "depth", "albedo", "shadow", "negative"]
 MAX_SPREAD, MIN_COSINE, MIN_LENGTH = 0.05, float(np.cos(np.radians(10))), 0.95
 MAX_DEPTH_RATIO, MAX_ALBEDO, MAX_VARIATION = 1.1, 0.05, 0.10
-NAME = re.compile(r"(?:room(\d{4,})|(interior|cornell))_view(\d+)\.(safetensors|exr)$")
-# Scenes that are no rooms of the stream get numbers below zero, so that splits by room hold for them too.
-SCENES = {"interior": -1, "cornell": -2}
+NAME = re.compile(r"(?:(room|varied)(\d{4,})|(.+))_view(\d+)\.(safetensors|exr)$")
+
+
+def number_of(match):
+    """A number for the room or scene of a file's name, so that splits hold for all of them: rooms of the stream have their own, all
+    others one below zero."""
+    if match[1]:
+        return int(match[2]) if match[1] == "room" else -1 - int(match[2])
+    return -1_000_000 - zlib.crc32(match[3].encode()) % 1_000_000_000
 
 
 def refuse_judged(rooms):
@@ -87,6 +97,8 @@ def read_features(path):
             raise TrainingError(f"{path}: tensor {name} has shape {tensors[name].shape}, expected {shape}")
         if not np.isfinite(tensors[name]).all():
             raise TrainingError(f"{path}: tensor {name} holds {np.count_nonzero(~np.isfinite(tensors[name]))} values that are not finite")
+    if "light" in tensors and (tensors["light"].shape != (3, h, w) or not np.isfinite(tensors["light"]).all()):
+        raise TrainingError(f"{path}: tensor light has shape {tensors['light'].shape} or values that are not finite; make the sample again")
     if tensors["scale"][0] <= 0:
         raise TrainingError(f"{path}: scale is {tensors['scale'][0]}; a picture without any light teaches nothing, leave it out")
     return tensors
@@ -101,6 +113,13 @@ def neighbourhood(a, reduce, padding):
         for dx in range(3):
             out = reduce(out, padded[dy:dy + h, dx:dx + w])
     return out
+
+
+def own(raster):
+    """As `pair`, with the light that bouncelight traced."""
+    hit = (raster["features"][SLICES["hit"]][0] > 0.5) & (raster["depth"] > 0)
+    counts = dict.fromkeys(REASONS, 0) | {"background": int((~hit).sum())}
+    return raster["light"] / float(raster["scale"][0]), hit, counts
 
 
 def pair(raster, cycles):
@@ -133,21 +152,22 @@ def pair(raster, cycles):
 
 
 def pairs_of(features_dir, cycles_dir, rooms):
-    """The views that both folders hold: list of (room, view, feature path, EXR path)."""
+    """The views to be paired: list of (room, view, feature path, EXR path or None)."""
     found = {}
-    for folder, extension in ((features_dir, "safetensors"), (cycles_dir, "exr")):
+    folders = [(features_dir, "safetensors")] + ([(cycles_dir, "exr")] if cycles_dir else [])
+    for folder, extension in folders:
         if not os.path.isdir(folder):
             raise TrainingError(f"{folder}: no such folder")
         for name in os.listdir(folder):
             match = NAME.fullmatch(name)
-            if not match or match[4] != extension:
+            if not match or match[5] != extension:
                 continue
-            room = int(match[1]) if match[1] else SCENES[match[2]]
+            room = number_of(match)
             if rooms is None or room in rooms:
-                found.setdefault((room, int(match[3])), {})[extension] = os.path.join(folder, name)
-    pairs = [(room, view, paths["safetensors"], paths["exr"]) for (room, view), paths in sorted(found.items()) if len(paths) == 2]
+                found.setdefault((room, int(match[4])), {})[extension] = os.path.join(folder, name)
+    pairs = [(room, view, paths["safetensors"], paths.get("exr")) for (room, view), paths in sorted(found.items()) if len(paths) == len(folders)]
     if not pairs:
-        raise TrainingError(f"{features_dir} and {cycles_dir} share no view roomIIII_viewV or SCENE_viewV")
+        raise TrainingError(f"{' and '.join(f for f, _ in folders)} share no view roomIIII_viewV or SCENE_viewV")
     alone = len(found) - len(pairs)
     if alone:
         print(f"{alone} views are in one of the folders only and are left out", file=sys.stderr)
@@ -156,16 +176,19 @@ def pairs_of(features_dir, cycles_dir, rooms):
 
 
 def build(features_dir, cycles_dir, out, rooms=None):
-    """Writes the split's cache and returns the mask report. Arrays: features f16 [n,21,h,w], target f16 [n,3,h,w] in units
+    """Writes the split's cache and returns the mask report. Arrays: features f16 [n,24,h,w], target f16 [n,3,h,w] in units
     of s, mask bool [n,h,w], scale f32 [n], room and view i32 [n], report (JSON text)."""
     pairs = pairs_of(features_dir, cycles_dir, rooms)
     columns = {key: [] for key in ("features", "target", "mask", "scale", "room", "view")}
     totals = dict.fromkeys(REASONS, 0)
     for room, view, feature_path, exr_path in pairs:
-        raster, cycles = read_features(feature_path), read_cycles(exr_path)
-        if raster["depth"].shape != cycles["depth"].shape:
+        raster = read_features(feature_path)
+        if exr_path is None and "light" not in raster:
+            raise TrainingError(f"{feature_path} holds no traced light; make it with --spp, or pass --cycles")
+        cycles = exr_path and read_cycles(exr_path)
+        if cycles and raster["depth"].shape != cycles["depth"].shape:
             raise TrainingError(f"{feature_path} has {raster['depth'].shape} cells, {exr_path} {cycles['depth'].shape} pixels; both must be the same")
-        target, mask, counts = pair(raster, cycles)
+        target, mask, counts = pair(raster, cycles) if cycles else own(raster)
         if mask.mean() < 0.1:
             print(f"warning: {feature_path}: only {mask.mean():.1%} of the cells can be trusted; {counts}", file=sys.stderr)
         for reason in REASONS:
@@ -237,7 +260,7 @@ def indices(text):
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--features", required=True, help="folder of `bouncelight dataset`")
-    parser.add_argument("--cycles", required=True, help="folder of cycles/paper_rooms.py")
+    parser.add_argument("--cycles", help="folder of cycles/paper_rooms.py; absent: the light that `bouncelight dataset --spp` traced")
     parser.add_argument("--out", required=True, help="the .npz to write")
     parser.add_argument("--rooms", type=indices, help="take these rooms only")
     a = parser.parse_args(arguments)

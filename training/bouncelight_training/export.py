@@ -15,8 +15,9 @@ import torch
 
 from .data import Split
 from .errors import TrainingError, reported
-from .model import compact_unet, flops, parameter_count
-from .train import read_checkpoint, validate
+from .features import TABLE, channels_of
+from .model import ANSWER, MEANING, flops, parameter_count
+from .train import Config, network, read_checkpoint, validate
 from .weights import GraphNet, WeightsError, document, read, write
 
 ODD_SIZES = [(37, 21), (5, 3), (1, 1)]
@@ -27,7 +28,7 @@ TARGETS = "Cycles 4.5, 256x128, 32 samples a pixel"
 
 def network_of(state):
     """The network of a checkpoint with its averaged weights."""
-    model = compact_unet(state["config"]["widths"])
+    model = network(Config(**state["config"]))
     model.load_state_dict(state["average"])
     return model.eval()
 
@@ -35,10 +36,16 @@ def network_of(state):
 def provenance(state, error, targets):
     """Where the numbers come from; paths are reduced to file names. `targets` says in words how the light was path-traced."""
     config = dict(state["config"])
-    for name in ("train", "validation"):
+    for name in ("train", "validation", "init"):
         config[name] = os.path.basename(config[name])
     last = state["rows"][-10:]
-    return {
+    before = {}
+    if state["config"].get("init"):
+        try:
+            before = {"started_from": {k: v for k, v in read(state["config"]["init"])[1].get("provenance", {}).items() if k != "last_epochs"}}
+        except (WeightsError, OSError) as error:
+            before = {"started_from": f"{config['init']}, which is gone: {error.__class__.__name__}"}
+    return {**before,
         "command": state["command"], "commit": state["commit"], "date": datetime.date.today().isoformat(),
         "device": state["machine"], "seed": config["seed"], "config": config, "samples_seen": state["samples"],
         "training_minutes": round(state["elapsed"] / 60, 1),
@@ -62,7 +69,8 @@ def verify(path, model, tolerance, split=None):
     channels = sum(feature["channels"] for feature in doc["inputs"])
     inputs = [torch.rand(1, channels, h, w, generator=generator) for w, h in ODD_SIZES]
     if split is not None:
-        inputs += [torch.from_numpy(split.features[:1].astype(np.float32))]
+        named = channels_of([feature["name"] for feature in doc["inputs"]])
+        inputs += [torch.from_numpy(split.features[:1].astype(np.float32))[:, named]]
     worst = 0.0
     with torch.no_grad():
         for x in inputs:
@@ -75,17 +83,18 @@ def verify(path, model, tolerance, split=None):
 def export(run, out, validation=None, name="", half=False, targets=TARGETS):
     """Writes the file and its provenance; returns a summary."""
     state = read_checkpoint(os.path.join(run, "checkpoint.pt"))
-    model = network_of(state)
-    split = Split(validation or state["config"]["validation"])
-    error = validate(model, split, state["config"]["epsilon"])[0]["validation_error"]
+    model, config = network_of(state), Config(**state["config"])
+    split = Split(validation or config.validation)
+    error = validate(model, split, config)[0]["validation_error"]
     about = provenance(state, error, targets)
     tensors = {k: (v.half() if half else v).contiguous() for k, v in model.state_dict().items()}
     try:
-        write(out, tensors, document(model.graph, model.output, name=name or os.path.basename(os.path.normpath(run)), provenance=about))
+        write(out, tensors, document(model.graph, model.output, inputs=[(n, c) for n, c in TABLE if n in config.features], meaning=MEANING, output_channels=ANSWER,
+                                     name=name or os.path.basename(os.path.normpath(run)), provenance=about))
     except (WeightsError, OSError) as problem:
         raise TrainingError(str(problem)) from problem
     worst, again = verify(out, model, TOLERANCE_HALF if half else TOLERANCE, split)
-    reread = validate(again, split, state["config"]["epsilon"])[0]["validation_error"]
+    reread = validate(again, split, config)[0]["validation_error"]
     with open(os.path.splitext(out)[0] + ".json", "w") as file:
         json.dump(about, file, indent=1)
         file.write("\n")

@@ -1,14 +1,15 @@
 """The feature table that the rasteriser writes and the network reads, and the colours hidden in it.
 
 All radiance enters as ln(1 + L/s) with s the picture's exposure, so multiplying every light by one number changes neither
-the network's input nor its output: E = s * exp(y) is linear in light by construction.
+the network's input nor its output: what it makes of s and of the first guess is linear in light by construction.
 """
 import numpy as np
 
-TABLE = [("direct", 3), ("outgoing", 3), ("albedo", 3), ("normal", 3), ("position", 3), ("depth", 1), ("spread", 1), ("hit", 1), ("sky", 3)]
+TABLE = [("direct", 3), ("outgoing", 3), ("albedo", 3), ("normal", 3), ("position", 3), ("depth", 1), ("spread", 1), ("hit", 1), ("sky", 3), ("cache", 3)]
+NAMES = tuple(n for n, _ in TABLE)
 CHANNELS = sum(n for _, n in TABLE)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
-Y_MIN, Y_MAX = -10.0, 6.0
+MOST_GAIN, MOST_ADDED = 2.0, 1.0  # of the answer: |g| and |r|, see src/gi/reconstruct.rs
 
 _offset = 0
 SLICES = {}
@@ -17,8 +18,13 @@ for _name, _n in TABLE:
     _offset += _n
 
 
+def channels_of(names):
+    """Channels of some features, as a list of indices."""
+    return [c for name, _ in TABLE if name in names for c in range(SLICES[name].start, SLICES[name].stop)]
+
+
 def light_of(features, name):
-    """A light feature ("direct", "outgoing" or "sky") in units of s: float32 [3,h,w]."""
+    """A light feature ("direct", "outgoing", "sky" or "cache") in units of s: float32 [3,h,w]."""
     return np.expm1(features[SLICES[name]].astype(np.float32))
 
 

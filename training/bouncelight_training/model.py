@@ -1,35 +1,40 @@
-"""The compact U-Net: additive skips, no normalisation, no dropout, 3x3 convolutions and ReLU.
+"""The compact U-Net: additive skips, no normalisation, no dropout, 3x3 convolutions and leaky ReLU.
 
 The topology stands in one place, `bouncelight_weights.unet`, as the list of operators that is also exported; here it gets
-its starting weights and its meaning: E/pi = s * exp(clamp(y, -10, 6)).
+its starting weights and its meaning: a gain g and a rest r on what method `cache` answers,
+
+    E/pi = max(0, cache * exp(clamp(g, -2, 2)) + s * clamp(r, -1, 1))
 """
 import torch
 from torch import nn
 
-from .features import CHANNELS, Y_MAX, Y_MIN
+from .features import CHANNELS, MOST_ADDED, MOST_GAIN, SLICES
 from .weights import GraphNet, unet
 
 WIDTHS = (16, 24, 32, 48)
+# Slope below 0. With 0 (ReLU) whole runs died: every unit of a layer below 0 for all pictures, and no gradient back.
+LEAK = 0.1
+MEANING, ANSWER = "gain_and_rest_on_cache", 6
 
 
-def compact_unet(widths=WIDTHS, channels=CHANNELS, bias=(0.0, 0.0, 0.0)):
-    """[n,21,h,w] features to [n,3,h,w] y, any h and w. The last layer starts with zero weights and `bias`, so that an
-    untrained network gives the constant s * exp(bias)."""
-    model = GraphNet(*unet(channels, tuple(widths)))
+def compact_unet(widths=WIDTHS, channels=CHANNELS, pointwise=0):
+    """[n,24,h,w] features to [n,6,h,w] gain and rest, any h and w. The last layer starts with zero weights, so that an
+    untrained network changes nothing. The first `pointwise` levels have 1x1 kernels."""
+    model = GraphNet(*unet(channels, tuple(widths), ANSWER, pointwise, {"leaky_relu": LEAK}))
     for op in model.graph:
         if op["op"] == "conv2d":
             layer = model.get_submodule(op["name"])
-            nn.init.kaiming_normal_(layer.weight, nonlinearity="relu" if op["activation"] == "relu" else "linear")
+            nn.init.kaiming_normal_(layer.weight, nonlinearity="linear" if op["activation"] == "none" else "leaky_relu", a=LEAK)
             nn.init.zeros_(layer.bias)
     nn.init.zeros_(layer.weight)
-    with torch.no_grad():
-        layer.bias.copy_(torch.as_tensor(bias))
     return model
 
 
-def light(y):
-    """E/pi in units of s from the network's output."""
-    return torch.exp(torch.clamp(y, Y_MIN, Y_MAX))
+def light(answer, features):
+    """E/pi in units of s from the network's answer; not cut off at 0, so that a loss can pull it up again."""
+    guess = torch.expm1(features[:, SLICES["cache"]])
+    gain, rest = answer[:, :3].clamp(-MOST_GAIN, MOST_GAIN), answer[:, 3:].clamp(-MOST_ADDED, MOST_ADDED)
+    return guess * torch.exp(gain) + rest
 
 
 def parameter_count(model):

@@ -21,12 +21,14 @@ import time
 
 import numpy as np
 import torch
+from torch import nn
 
 from . import augment, losses, pictures
 from .data import Split, check_apart
 from .errors import TrainingError, reported
-from .features import SLICES
+from .features import NAMES, SLICES, channels_of, light_of
 from .model import compact_unet, flops, light, parameter_count
+from .weights import WeightsError, read
 
 FIELDS = ["epoch", "step", "samples", "seconds", "learning_rate", "train_loss", "validation_loss", "validation_error"]
 
@@ -38,9 +40,13 @@ class Config:
     train: str = ""
     validation: str = ""
     widths: tuple = (16, 24, 32, 48)
+    pointwise: int = 0  # levels with 1x1 kernels
+    features: tuple = NAMES  # what the network is given, of the table
     epochs: int = 60
     minutes: float = 0.0  # 0: as many epochs as above; else until this much training time is used
     batch: int = 4
+    crop: int = 0  # width in cells of the windows that are cut from pictures; 0: whole pictures
+    init: str = ""  # a weights file to start from (fine-tuning), of this network or a smaller one with the same features
     learning_rate: float = 2e-3
     final_learning_rate: float = 2e-5
     warmup_steps: int = 50
@@ -56,7 +62,7 @@ class Config:
 
 
 # What may differ between a run's first command and the one that continues it.
-FREE = {"minutes", "threads", "device", "checkpoint_seconds", "train", "validation"}
+FREE = {"minutes", "threads", "device", "checkpoint_seconds", "train", "validation", "init"}
 
 
 def command_of(config, folder):
@@ -94,20 +100,41 @@ class Stop(Exception):
     """Somebody asked the run to end; its state is saved first."""
 
 
-def head_bias(split):
-    """log of the mean target in units of s: the untrained network is this constant."""
-    total = np.zeros(3)
-    for target, mask in zip(split.target, split.mask):
-        total += target.astype(np.float64)[:, mask].sum(1)
-    mean = total / max(int(split.mask.sum()), 1)
-    if not (mean > 0).all():
-        raise TrainingError(f"{split.path}: the mean target is {mean.tolist()}; direct light is brighter than all light, check units")
-    return np.log(mean)
+def network(config):
+    """The untrained network of a configuration."""
+    return compact_unet(config.widths, len(channels_of(config.features)), config.pointwise)
 
 
-def batch_of(split, indices, rng, device):
+def start_from(model, path):
+    """Loads a weights file's numbers into a network of the same graph, or of one that has grown in width, in the size of its
+    kernels or by convolutions between others: what is new then starts so that the answer stays (nearly) the same."""
+    try:
+        tensors, _ = read(path)
+    except (OSError, WeightsError) as error:
+        raise TrainingError(f"{path}: cannot start from it: {error}") from error
+    state = model.state_dict()
+    unknown = set(tensors) - set(state)
+    if unknown:
+        raise TrainingError(f"{path}: cannot start from it: this network has no {sorted(unknown)[0]}")
+    for name, values in state.items():
+        old = torch.from_numpy(tensors[name].astype(np.float32)) if name in tensors else None
+        if old is None and values.dim() == 4 and values.shape[0] == values.shape[1]:
+            nn.init.dirac_(values)
+        elif old is not None and any(a > b for a, b in zip(old.shape, values.shape)):
+            raise TrainingError(f"{path}: cannot start from it: its {name} is larger")
+        elif old is not None and values.dim() == 4:
+            # New channels go out with zeros until they have learnt something.
+            (rows, columns), (y, x) = old.shape[:2], [(n - o) // 2 for n, o in zip(values.shape[2:], old.shape[2:])]
+            values[:rows] = 0
+            values[:rows, :columns, y:y + old.shape[2], x:x + old.shape[3]] = old
+        elif old is not None:
+            values[:len(old)] = old
+    model.load_state_dict(state)
+
+
+def batch_of(split, indices, rng, device, crop=0):
     """Augmented pictures as tensors: features, target, mask."""
-    made = [augment.augmented(split.features[i], split.target[i], split.mask[i], rng) for i in indices]
+    made = [augment.augmented(split.features[i], split.target[i], split.mask[i], rng, crop) for i in indices]
     features, target, mask = (torch.from_numpy(np.stack([np.ascontiguousarray(m[k]) for m in made])) for k in range(3))
     return features.to(device, memory_format=torch.channels_last), target.to(device), mask.to(device)
 
@@ -121,7 +148,10 @@ class Run:
         if config.threads:
             torch.set_num_threads(config.threads)
         self.device, self.commit = torch.device(config.device), commit()
-        self.model = compact_unet(config.widths, bias=head_bias(train)).to(self.device, memory_format=torch.channels_last)
+        self.channels = channels_of(config.features)
+        self.model = network(config).to(self.device, memory_format=torch.channels_last)
+        if config.init:
+            start_from(self.model, config.init)
         self.average = {name: p.detach().clone() for name, p in self.model.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step, self.elapsed, self.rows, self.sums = 0, 0.0, [], [0.0, 0]
@@ -191,11 +221,11 @@ class Run:
         place = self.step % self.steps_per_epoch
         order = np.random.default_rng((self.config.seed, self.epoch)).permutation(len(self.train))
         chosen = order[place * self.config.batch:(place + 1) * self.config.batch]
-        features, target, mask = batch_of(self.train, chosen, np.random.default_rng((self.config.seed, 1 << 20, self.step)), self.device)
+        features, target, mask = batch_of(self.train, chosen, np.random.default_rng((self.config.seed, 1 << 20, self.step)), self.device, self.config.crop)
         for group in self.optimiser.param_groups:
             group["lr"] = self.learning_rate()
         self.model.train()
-        loss = self.loss(light(self.model(features)), features, target, mask)
+        loss = self.loss(light(self.model(features[:, self.channels]), features), features, target, mask)
         value = loss.item()
         views = ", ".join(f"room {self.train.room[i]} view {self.train.view[i]}" for i in chosen)
         if not math.isfinite(value):
@@ -216,13 +246,13 @@ class Run:
 
     def averaged(self):
         """The model with averaged weights."""
-        model = compact_unet(self.config.widths).to(self.device, memory_format=torch.channels_last)
+        model = network(self.config).to(self.device, memory_format=torch.channels_last)
         model.load_state_dict(self.average)
         return model.eval()
 
     def finish_epoch(self, draw):
         """Validates, logs and saves."""
-        scores, predicted = validate(self.averaged(), self.validation, self.config.epsilon, self.device)
+        scores, predicted = validate(self.averaged(), self.validation, self.config, self.device)
         row = {"epoch": self.epoch, "step": self.step, "samples": self.samples(), "seconds": round(self.elapsed, 1), "learning_rate": self.learning_rate(),
                "train_loss": self.sums[0] / max(self.sums[1], 1), **scores}
         self.rows.append(row)
@@ -237,8 +267,9 @@ class Run:
               f"  error {row['validation_error']:.2%}", file=sys.stderr, flush=True)
 
 
-def validate(model, split, epsilon, device="cpu", draw=4):
+def validate(model, split, config, device="cpu", draw=4):
     """Loss and pooled error over a split, and the predictions of the views that are drawn (one a room first)."""
+    channels = channels_of(config.features)
     loss = above = below = 0.0
     first = {}
     for i, room in enumerate(split.room):
@@ -247,15 +278,27 @@ def validate(model, split, epsilon, device="cpu", draw=4):
     with torch.no_grad():
         for i in range(len(split)):
             features, target, mask = (torch.from_numpy(a[i:i + 1]) for a in (split.features, split.target, split.mask))
-            prediction = light(model(features.float().to(device, memory_format=torch.channels_last))).cpu().contiguous()
+            features = features.float().to(device, memory_format=torch.channels_last)
+            prediction = light(model(features[:, channels]), features).clamp(min=0).cpu().contiguous()
             target = target.float()
-            loss += losses.relative_square(prediction, target, mask, epsilon).item() / len(split)
+            loss += losses.relative_square(prediction, target, mask, config.epsilon).item() / len(split)
             # Back to E/pi: pictures are weighed by their light, as on a screen.
             difference, light_sum = losses.pooled_error(prediction * float(split.scale[i]), target * float(split.scale[i]), mask)
             above, below = above + difference, below + light_sum
             if i in drawn:
                 predicted[i] = prediction[0].numpy()
     return {"validation_loss": loss, "validation_error": above / max(below, 1e-20)}, predicted
+
+
+def guess_error(split):
+    """The pooled error of the first guess, which an untrained network has too."""
+    above = below = 0.0
+    for i in range(len(split)):
+        guess = torch.from_numpy(light_of(split.features[i], "cache"))[None]
+        difference, light_sum = losses.pooled_error(guess * float(split.scale[i]), torch.from_numpy(split.target[i:i + 1]).float() * float(split.scale[i]),
+                                                    torch.from_numpy(split.mask[i:i + 1]))
+        above, below = above + difference, below + light_sum
+    return above / max(below, 1e-20)
 
 
 def read_checkpoint(path):
@@ -285,7 +328,8 @@ def train(config, folder, stop_after=None):
         json.dump(dataclasses.asdict(config), file, indent=1)
     h, w = train_split.mask.shape[1:]
     print(f"{parameter_count(run.model)} parameters, {flops(run.model, h, w) / 1e9:.2f} GFLOP at {w}x{h} cells; {len(train_split)} training and "
-          f"{len(validation)} validation views, {train_split.report['kept']:.0%} and {validation.report['kept']:.0%} of the cells kept", file=sys.stderr, flush=True)
+          f"{len(validation)} validation views, {train_split.report['kept']:.0%} and {validation.report['kept']:.0%} of the cells kept; "
+          f"the first guess is wrong by {guess_error(validation):.2%}", file=sys.stderr, flush=True)
     saved, begun, drawn = time.monotonic(), run.step, 0.0
     while run.progress() < 1:
         run.train_step()
@@ -314,7 +358,7 @@ def main(arguments=None):
     parser.add_argument("--run", required=True, help="folder of the run; continued if it has a checkpoint")
     parser.add_argument("--config", help="JSON with any of the settings below; flags win over it")
     for field in dataclasses.fields(Config):
-        kind = (lambda t: tuple(int(n) for n in t.split(","))) if field.name == "widths" else type(field.default)
+        kind = {"widths": lambda t: tuple(int(n) for n in t.split(",")), "features": lambda t: tuple(t.split(","))}.get(field.name, type(field.default))
         parser.add_argument("--" + field.name.replace("_", "-"), type=kind, default=None, help=f"default {field.default}")
     a = vars(parser.parse_args(arguments))
     folder, file = a.pop("run"), a.pop("config")
@@ -330,7 +374,10 @@ def main(arguments=None):
             raise TrainingError(f"{file}: no such setting: {sorted(unknown)[0]}")
     settings |= {k: v for k, v in a.items() if v is not None}
     config = Config(**settings)
-    config.widths = tuple(config.widths)
+    config.widths, config.features = tuple(config.widths), tuple(config.features)
+    unknown = set(config.features) - set(NAMES)
+    if unknown:
+        raise TrainingError(f"no such feature: {sorted(unknown)[0]}; there are {', '.join(NAMES)}")
     for name in ("train", "validation"):
         if not getattr(config, name):
             raise TrainingError(f"--{name} is missing: the .npz of the split, made by python -m bouncelight_training.data")

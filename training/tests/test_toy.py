@@ -31,9 +31,12 @@ def view(rng):
     depth = np.where(floor, 10.0, 20.0) * rng.uniform(0.5, 2)
     s = float((np.tensordot(LUMINANCE, direct, 1)).mean() + LUMINANCE @ SKY)
     ones = np.ones((1, H, W))
-    features = np.concatenate([np.log1p(direct / s), np.log1p(albedo * direct / s), albedo, normal, np.zeros((3, H, W)),
-                               np.log(depth / depth.mean())[None], 0 * ones, ones, np.log1p(SKY / s)[:, None, None] * np.ones((3, H, W))])
     light = SKY[:, None, None] * np.where(floor, 0.8, 0.5) + 0.2 * albedo.mean((1, 2), keepdims=True) * direct.mean((1, 2), keepdims=True)
+    # A first guess that is too bright on floors and too dark on walls.
+    guess = light * np.where(floor, 1.5, 0.6)
+    features = np.concatenate([np.log1p(direct / s), np.log1p(albedo * direct / s), albedo, normal, np.zeros((3, H, W)),
+                               np.log(depth / depth.mean())[None], 0 * ones, ones, np.log1p(SKY / s)[:, None, None] * np.ones((3, H, W)),
+                               np.log1p(guess / s)])
     noisy = light * rng.gamma(100, 1 / 100, (3, H, W))
     raster = {"features": features, "scale": np.array([s]), "direct": direct, "albedo": albedo, "normal": normal, "depth": depth}
     raster = {name: np.ascontiguousarray(v, np.float32) for name, v in raster.items()}
@@ -92,6 +95,22 @@ class Toy(unittest.TestCase):
         self.assertEqual(int((~split.mask[0]).sum()), 2 * H)
         self.assertAlmostEqual(split.report["rejected"]["shadow"], 1 - split.report["kept"], places=6)
 
+    def test_own_light_needs_no_cycles(self):
+        folder = tempfile.mkdtemp(dir=self.folder)
+        write_views(folder, [6], 1)
+        path = os.path.join(folder, "features", "room0006_view0.safetensors")
+        features, out = os.path.join(folder, "features"), os.path.join(folder, "own.npz")
+        with self.assertRaisesRegex(TrainingError, "no traced light"):
+            data.build(features, None, out)
+        tensors = load_file(path)
+        tensors["light"] = np.full((3, H, W), 0.25, np.float32)
+        os.remove(path)
+        save_file(tensors, os.path.join(features, "varied0003_view0.safetensors"))
+        data.build(features, None, out)
+        split = data.Split(out)
+        self.assertEqual((int(split.room[0]), float(split.mask.mean())), (-4, 1.0))
+        np.testing.assert_allclose(split.target[0].astype(np.float32) * split.scale[0], 0.25, rtol=1e-3)
+
     def test_masks_see_what_is_wrong(self):
         folder = tempfile.mkdtemp(dir=self.folder)
         write_views(folder, [6], 1)
@@ -132,6 +151,10 @@ class Toy(unittest.TestCase):
         whole = self.run_in("whole")
         self.assertEqual((whole.step, whole.samples()), (30, 90))
         self.assertLess(whole.rows[-1]["train_loss"], 0.5 * whole.rows[0]["train_loss"])
+        # Untrained the error is that of the first guess, about 0.45.
+        untrained = model.compact_unet(whole.config.widths)
+        guessed = train.validate(untrained, data.Split(self.validation), whole.config)[0]["validation_error"]
+        self.assertTrue(0.35 < guessed < 0.55, guessed)
         self.assertLess(whole.rows[-1]["validation_error"], 0.2)
         # Stopped at step 13, in the middle of an epoch, with a save as a signal makes it; then killed without one at step 20.
         self.run_in("killed", stop_after=13).save()
@@ -217,12 +240,17 @@ class Toy(unittest.TestCase):
 
     def test_size(self):
         network = model.compact_unet()
-        self.assertEqual(model.parameter_count(network), 105651)
-        self.assertAlmostEqual(model.flops(network, 128, 256) / 1e9, 0.93, delta=0.01)
+        self.assertEqual(model.parameter_count(network), 106518)
+        self.assertAlmostEqual(model.flops(network, 128, 256) / 1e9, 0.98, delta=0.01)
         for h, w in ((1, 1), (5, 3), (17, 13)):
             y = network(torch.randn(2, CHANNELS, h, w))
-            self.assertEqual(tuple(y.shape), (2, 3, h, w))
+            self.assertEqual(tuple(y.shape), (2, 6, h, w))
             self.assertEqual(y.abs().max().item(), 0)
+            # Untrained, the light is the first guess.
+            features = torch.rand(2, CHANNELS, h, w)
+            guess = torch.expm1(features[:, SLICES["cache"]])
+            torch.testing.assert_close(model.light(y, features), guess, rtol=0, atol=0)
+            self.assertFalse(torch.equal(model.light(y + 0.01, features), guess))
 
     def test_baseline(self):
         rows, _ = baseline.fit(data.Split(self.train), data.Split(self.validation))

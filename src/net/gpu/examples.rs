@@ -8,6 +8,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
     let common = lines(&[
         ("OUT_CHANNELS", 14),
         ("OUT_VECTORS", 4),
+        ("GROUP_VECTORS", 4),
         ("OUT_PITCH", 8),
         ("IN_VECTORS", 6),
         ("IN_PITCH", 6),
@@ -40,6 +41,8 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
             } else if shader.contains("window") {
                 let kinds = [[0, 0, 0], [1, 1, 1], [0, 3, 0]];
                 kinds.map(|[c, l, f]| lines(&[("CLAMP", c), ("LANE", l), ("IN_FULL", f), ("OUT_FULL", f)])).to_vec()
+            } else if shader.contains("upsample") {
+                [0, 1].map(|double| lines(&[("DOUBLE", double)])).to_vec()
             } else if shader.contains("shuffle") {
                 [0, 1].map(|down| lines(&[("FACTOR", 2), ("DOWN", down)])).to_vec()
             } else {

@@ -42,8 +42,10 @@ pub struct Filter {
     pub spread: u32,
     /// Factor by which the input is enlarged.
     pub nearest: u32,
-    /// Four-channel vectors read.
+    /// Four-channel vectors read for each output.
     pub in_vectors: u32,
+    /// Four-channel vectors written that read the same: those of a group of channels, or all.
+    pub group_vectors: u32,
 }
 
 impl Filter {
@@ -84,6 +86,8 @@ pub struct Kernel {
     pub layer: Option<ConvLayer>,
     /// For convolutions of an enlarged input whose taps are merged: the factor and the padding before.
     pub enlarged: Option<(u32, [i32; 2])>,
+    /// Weights of 3×3 taps come transformed for Winograd's F(2, 3) along rows: 3×4 matrices.
+    pub pairs: bool,
     /// For blocked convolutions.
     pub permutation: Option<Permutation>,
     /// It reads its input and its skip from the mirror.
@@ -127,6 +131,7 @@ impl Kernel {
             filter: None,
             layer: None,
             enlarged: None,
+            pairs: false,
             permutation: None,
             mirror: false,
             vectors: 0,
@@ -135,23 +140,27 @@ impl Kernel {
             blocks_per_part: 0,
         };
         let shader: String = match step.kind {
-            Kind::Conv { kernel: [h, w], stride, padding, nearest } => {
+            Kind::Conv { kernel: [h, w], stride, padding, nearest, groups } => {
+                // Groups of whole vectors read their own; others run as one, with zeros for what they do not see.
+                let whole = [input.shape.channels, out.channels].iter().all(|n| n.is_multiple_of(4 * groups));
+                let groups = if whole && choice.variant != Variant::Plain { groups } else { 1 };
+                let [in_vectors, group_vectors] = [input.shape, out].map(|s| s.vectors() / groups);
                 let pad = [padding.left as i32, padding.top as i32];
                 if nearest > 1 && stride == 1 && choice.variant != Variant::Plain {
                     let (taps, phases) = merged([h, w], pad, nearest as i32);
-                    let in_vectors = input.shape.vectors();
-                    let filter = Filter { taps, stride, spread: nearest, nearest: 1, in_vectors };
+                    let filter = Filter { taps, stride, spread: nearest, nearest: 1, in_vectors, group_vectors };
                     kernel.enlarged = Some((nearest, pad));
                     kernel.convolution(&mut prelude, filter, &phases, out, false, plan, choice)
                 } else {
-                    let filter = Filter { taps: [h, w], stride, spread: 1, nearest, in_vectors: input.shape.vectors() };
+                    let filter = Filter { taps: [h, w], stride, spread: 1, nearest, in_vectors, group_vectors };
                     let row = ([h, w], stride, padding) == ([3, 3], 1, Padding::all(1));
                     kernel.convolution(&mut prelude, filter, &[([0, 0], pad)], out, row, plan, choice)
                 }
             }
             Kind::Transposed { kernel: edges, stride, padding } => {
                 let taps = edges.map(|k| k.div_ceil(stride));
-                let filter = Filter { taps, stride: 1, spread: stride, nearest: 1, in_vectors: input.shape.vectors() };
+                let [in_vectors, group_vectors] = [input.shape, out].map(Shape::vectors);
+                let filter = Filter { taps, stride: 1, spread: stride, nearest: 1, in_vectors, group_vectors };
                 let pad = |phase: u32, taps: u32| taps as i32 - 1 - ((phase + padding) / stride) as i32;
                 let phases: Vec<_> = (0..stride * stride)
                     .map(|i| [i % stride, i / stride])
@@ -159,7 +168,16 @@ impl Kernel {
                     .collect();
                 kernel.convolution(&mut prelude, filter, &phases, out, false, plan, choice)
             }
-            Kind::Upsample => "upsample".into(),
+            Kind::Upsample => {
+                let double = [input.shape.width * 2, input.shape.height * 2] == [out.width, out.height];
+                prelude.add("DOUBLE", double.into());
+                if double {
+                    // Blocks of two by two begin one pixel before the picture.
+                    let blocks = |edge: u32, group: u32| (edge / 2 + 1).div_ceil(group);
+                    kernel.groups = [blocks(out.width, GROUP[0]), blocks(out.height, GROUP[1]), out.vectors()];
+                }
+                "upsample".into()
+            }
             Kind::Nearest => "nearest".into(),
             Kind::Copy => "add".into(),
             Kind::Window { left, top, clamp, channel } => {
@@ -230,6 +248,8 @@ impl Kernel {
         let size = [out.width, out.height];
         let layer = ConvLayer { filter, out_vectors: out.vectors(), size, precision: plan.precision };
         let permutation = layer.permutation(choice.variant, choice.tuned, plan, choice.facts);
+        self.pairs = row && permutation.is_some_and(|p| p.weights == Source::Lanes);
+        let filter = if self.pairs { Filter { taps: [3, 4], ..filter } } else { filter };
         (self.filter, self.layer, self.permutation) = (Some(filter), Some(layer), permutation);
         let Permutation { weights, mirror, vectors } = permutation.unwrap_or(Permutation {
             weights: Source::Storage,
@@ -255,6 +275,8 @@ impl Kernel {
             })
         };
         self.parts = phases.iter().copied().flat_map(part).collect();
+        prelude.set("IN_VECTORS", filter.in_vectors);
+        prelude.add("GROUP_VECTORS", filter.group_vectors);
         prelude.add("KERNEL_H", filter.taps[0]);
         prelude.add("KERNEL_W", filter.taps[1]);
         prelude.add("STRIDE", filter.stride);

@@ -3,7 +3,8 @@
 //! Convolutions: output channels in blocks of one to four vectors. A block is one matrix with the bias, a column a vector, then for
 //! each input vector, tap row, tap column and output vector of the block one 4×4 matrix, which takes four input channels to four
 //! output channels. Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
-//! of stride s is s² ordinary ones, each of which makes every s-th pixel (its phase) in both directions.
+//! of stride s is s² ordinary ones, each of which makes every s-th pixel (its phase) in both directions. Where the kernel works by
+//! Winograd's F(2, 3), three neighbouring taps become four.
 
 use super::kernels::{Bound, Filter, Kernel, Part};
 use crate::net::format::Weights;
@@ -14,7 +15,7 @@ use crate::net::plan::{Kind, Step};
 pub(super) fn pack(weights: &Weights, step: &Step, kernel: &Kernel) -> Vec<Vec<u8>> {
     let Some(op) = step.op.map(|i| &weights.graph.ops[i]) else { return Vec::new() };
     if let Some(filter) = kernel.filter {
-        let layer = Layer::new(weights, op, step.fold.map(|i| &weights.graph.ops[i]), filter, kernel.enlarged);
+        let layer = Layer::new(weights, op, step.fold.map(|i| &weights.graph.ops[i]), filter, kernel);
         return kernel.parts.iter().map(|part| layer.part(part, kernel)).collect();
     }
     let vectors = match step.kind {
@@ -67,16 +68,11 @@ struct Layer<'a> {
     transposed: Option<u32>,
     filter: Filter,
     enlarged: Option<(u32, [i32; 2])>,
+    pairs: bool,
 }
 
 impl<'a> Layer<'a> {
-    fn new(
-        weights: &'a Weights,
-        op: &Op,
-        fold: Option<&Op>,
-        filter: Filter,
-        enlarged: Option<(u32, [i32; 2])>,
-    ) -> Self {
+    fn new(weights: &'a Weights, op: &Op, fold: Option<&Op>, filter: Filter, kernel_choice: &Kernel) -> Self {
         let (in_channels, out_channels, kernel, groups, transposed) = match op {
             Op::Conv2d(o) => (o.in_channels, o.out_channels, o.kernel, o.groups, None),
             Op::ConvTranspose2d(o) => (o.in_channels, o.out_channels, o.kernel, 1, Some(o.padding)),
@@ -101,7 +97,8 @@ impl<'a> Layer<'a> {
             kernel: kernel.map(|k| k as usize),
             transposed,
             filter,
-            enlarged,
+            enlarged: kernel_choice.enlarged,
+            pairs: kernel_choice.pairs,
         }
     }
 
@@ -117,6 +114,11 @@ impl<'a> Layer<'a> {
                 return 0.0;
             }
             let first = (o * inputs + i % inputs) * kh * kw;
+            if self.pairs {
+                let [left, middle, right] = [0, 1, 2].map(|x| f64::from(self.weight[first + ky * kw + x]));
+                let mixed = [left, (left + middle + right) / 2.0, (left - middle + right) / 2.0, right][kx];
+                return (f64::from(self.scale[o]) * mixed) as f32;
+            }
             let Some((factor, pad)) = self.enlarged else {
                 return self.scale[o] * self.weight[first + ky * kw + kx];
             };
@@ -160,12 +162,15 @@ impl<'a> Layer<'a> {
             let first = block * 4 * vectors;
             let bias = |i: usize| if i < 4 * vectors { self.bias.get(first + i).copied().unwrap_or(0.0) } else { 0.0 };
             (0..16).for_each(|i| put(bias(i)));
+            // The channels that the block's group reads; all of them where groups run as one.
+            let grouped = self.filter.in_vectors as usize * 4 < self.in_channels;
+            let begin = if grouped { first / self.group[1] * self.group[0] } else { 0 };
             for c in 0..self.filter.in_vectors as usize {
                 for ky in 0..self.filter.taps[0] as usize {
                     for kx in 0..self.filter.taps[1] as usize {
                         // Column-major: column k takes input channel k to the four outputs.
                         for k in 0..16 * vectors {
-                            put(self.at(part, first + k / 16 * 4 + k % 4, c * 4 + k % 16 / 4, ky, kx));
+                            put(self.at(part, first + k / 16 * 4 + k % 4, begin + c * 4 + k % 16 / 4, ky, kx));
                         }
                     }
                 }

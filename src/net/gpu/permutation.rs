@@ -97,11 +97,12 @@ pub struct Layer {
 
 impl std::fmt::Display for Layer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Filter { taps: [h, w], stride, spread, nearest, in_vectors } = self.filter;
+        let Filter { taps: [h, w], stride, spread, nearest, in_vectors, group_vectors } = self.filter;
         let [width, height] = self.size;
         let bits = if self.precision == Precision::F16 { 16 } else { 32 };
         write!(f, "{h}x{w} stride {stride} spread {spread} nearest {nearest} {in_vectors}>{} ", self.out_vectors)?;
-        write!(f, "{width}x{height} f{bits}")
+        write!(f, "{width}x{height} f{bits}")?;
+        if group_vectors < self.out_vectors { write!(f, " groups of {group_vectors}") } else { Ok(()) }
     }
 }
 
@@ -148,10 +149,15 @@ impl Layer {
 
     /// The nearest to `wanted` that this layer, plan and device allow.
     pub fn fitted(&self, wanted: Permutation, plan: &Plan, facts: Facts) -> Permutation {
-        let vectors = wanted.vectors.clamp(1, self.out_vectors.clamp(1, 4));
+        let mut vectors = wanted.vectors.clamp(1, self.out_vectors.clamp(1, 4));
+        // A block of output channels stays within a group.
+        while self.filter.group_vectors < self.out_vectors && !self.filter.group_vectors.is_multiple_of(vectors) {
+            vectors -= 1;
+        }
         let mirror = mirrors(plan);
         let matrices = self.filter.matrices(vectors);
-        let texels = matrices * u64::from(self.out_vectors.div_ceil(vectors)) * 4;
+        // Weights of 3×3 taps take a third more when they are transformed.
+        let texels = (matrices * u64::from(self.out_vectors.div_ceil(vectors)) * 4).div_ceil(3) * 4;
         let weights = match wanted.weights {
             Source::Lanes if facts.lanes && mirror && texels.div_ceil(ROW) <= MAX_ROWS => Source::Lanes,
             Source::Storage => Source::Storage,

@@ -12,6 +12,7 @@ pub(super) enum Work {
         stride: u32,
         padding: Padding,
         nearest: u32,
+        groups: u32,
     },
     Transposed {
         kernel: [u32; 2],
@@ -87,7 +88,8 @@ fn node(i: usize, op: &Op, options: &Options) -> Node {
         Op::Conv2d(o) => {
             node.inputs.truncate(1);
             (node.skip, node.add_at) = (o.add.clone(), o.add_at);
-            let work = Work::Conv { kernel: o.kernel, stride: o.stride, padding: o.padding, nearest: 1 };
+            let work =
+                Work::Conv { kernel: o.kernel, stride: o.stride, padding: o.padding, nearest: 1, groups: o.groups };
             (work, o.activation)
         }
         Op::ConvTranspose2d(o) => {

@@ -79,6 +79,8 @@ pub enum Kind {
         padding: Padding,
         /// Factor by which the input is enlarged first (nearest), 1 for none.
         nearest: u32,
+        /// Groups of channels that do not see each other.
+        groups: u32,
     },
     /// Transposed convolution with bias.
     Transposed {

@@ -4,7 +4,7 @@ The specification is ../../README.md. `torch_graph` in this package (optional, n
 describes, so that the topology stands in one place: the list of operators.
 
     from bouncelight_weights import write, read, verify, unet
-    graph, output = unet(in_channels=21)
+    graph, output = unet(in_channels=24)
     write("net.safetensors", state_dict, document(graph, output, provenance={...}))
 """
 
@@ -32,19 +32,23 @@ def conv2d(name, input, output, in_channels, out_channels, kernel=3, stride=1, p
             "padding": kernel // 2 if padding is None else padding, "activation": activation, **rest}
 
 
-def unet(in_channels=21, widths=(16, 24, 32, 48), out_channels=3):
-    """The compact U-Net: (graph, output tensor's name). Additive skips, 1x1 before each upsampling, no normalisation."""
+def unet(in_channels=24, widths=(16, 24, 32, 48), out_channels=3, pointwise=0, activation="relu"):
+    """The compact U-Net: (graph, output tensor's name). Additive skips, 1x1 before each upsampling, no normalisation. The first
+    `pointwise` levels look at single places only (1x1 kernels, one before the way down and one after the way up), which
+    is a fifth of the arithmetic: for answers that are smooth along surfaces, and change from one to the next."""
     graph, level = [], "input"
     channels = in_channels
     last = len(widths) - 1
     for i, width in enumerate(widths):
         block = "enc0" if i == 0 else f"down{i}"
-        convs = 3 if i == last else 2
+        small = i < pointwise
+        convs = 3 if i == last else 1 if small else 2
         for j in range(convs):
             letter = "abc"[j]
             output = f"e{i}" if j == convs - 1 else f"{block}.{letter}"
             stride = 2 if i > 0 and j == 0 else 1
-            graph.append(conv2d(f"{block}.{letter}", level, output, channels, width, stride=stride, activation="relu"))
+            kernel = 1 if small and stride == 1 else 3
+            graph.append(conv2d(f"{block}.{letter}", level, output, channels, width, kernel, stride, activation=activation))
             level, channels = output, width
     for i in range(last - 1, -1, -1):
         width, block = widths[i], f"up{i}"
@@ -53,10 +57,10 @@ def unet(in_channels=21, widths=(16, 24, 32, 48), out_channels=3):
             {"op": "upsample_bilinear", "name": f"{block}.upsample", "input": f"{block}.lateral", "size_as": f"e{i}",
              "output": f"{block}.upsample"},
             {"op": "add", "name": f"{block}.skip", "inputs": [f"{block}.upsample", f"e{i}"], "output": f"{block}.skip"},
-            conv2d(f"{block}.conv", f"{block}.skip", f"d{i}", width, width, activation="relu"),
+            conv2d(f"{block}.conv", f"{block}.skip", f"d{i}", width, width, 1 if i < pointwise else 3, activation=activation),
         ]
         level, channels = f"d{i}", width
-    graph.append(conv2d("head", level, "y", channels, out_channels))
+    graph.append(conv2d("head", level, "y", channels, out_channels, 1 if pointwise else 3))
     return graph, "y"
 
 

@@ -10,13 +10,14 @@ VERSION = 2
 KNOWN_VERSIONS = (1, 2)
 KEY = "bouncelight"
 MAX_OPS = 1024
-MEANINGS = ("log_irradiance_over_exposure", "display_signed", "plain")
+MEANINGS = ("log_irradiance_over_exposure", "gain_and_rest_on_cache", "display_signed", "plain")
 _PICTURE = ("signed", "signed_stretched", "unit")
 # Feature: (channels, encodings); files of version 1 mean the first encoding.
 SCREEN_V1 = {
     "direct": (3, ("log1p_over_exposure",)), "outgoing": (3, ("log1p_over_exposure",)), "albedo": (3, ("linear",)),
     "normal": (3, ("gravity_frame",)), "position": (3, ("gravity_frame_squashed",)), "depth": (1, ("log_over_mean",)),
     "spread": (1, ("log_ratio",)), "hit": (1, ("flag",)), "sky": (3, ("log1p_over_exposure",)),
+    "cache": (3, ("log1p_over_exposure",)),
 }
 IMAGES_V1 = {name: (3, _PICTURE) for name in ("depth", "direct", "diffuse", "normal")}
 # Table: (features, whether a network uses them in the table's order).

@@ -91,7 +91,7 @@ def test_round_trips(folder):
 
 
 def test_nothing_faulty_is_written(folder):
-    graph, output = bw.unet(21, widths=(2, 3))
+    graph, output = bw.unet(24, widths=(2, 3))
     arrays = arrays_for(graph)
     arrays.pop("head.bias")
     arrays["head.weight"] = arrays["head.weight"].astype(np.float64)
@@ -139,7 +139,7 @@ def test_schema(_):
     except ImportError:
         return print("SKIP: jsonschema is not installed")
     validator = jsonschema.Draft202012Validator(schema)
-    unet = bw.document(*bw.unet(21))
+    unet = bw.document(*bw.unet(24))
     for doc in (unet, picture_document(*every_operator())):
         assert not list(validator.iter_errors(doc))
     # Everything that the schema refuses, the package refuses; a schema cannot see how operators fit together.
