@@ -40,7 +40,7 @@ fn usage_errors_exit_with_2() {
     fails(&["render", "interior", "-o", &out, "--camera", "99"], 2, &["--camera 99"]);
     // 16 bits are for networks: where none runs, nothing can be had of them.
     let word = &["--precision", "network"];
-    fails(&["render", "interior", "-o", &out, "--precision", "f16"], 2, word);
+    fails(&["render", "interior", "--method", "cache", "-o", &out, "--precision", "f16"], 2, word);
     fails(&["bench", "interior", "--method", "cache", "--precision", "f16"], 2, word);
     fails(&["doctor", "--precision", "f16"], 2, word);
     fails(&["render", "interior", "-o", &out, "--precision", "f8"], 2, &["f16"]);

@@ -14,11 +14,11 @@
 //! [`cache`] holds two methods that gather what the rasterised world beyond the picture sends: `rsm` one bounce of the
 //! lights, `cache` all bounces, emission and the sky. They do not know what stands between.
 //!
-//! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]) go through a U-Net, and its answer comes back
-//! to full resolution guided by depth and normal ([`reconstruct`]). It learns what direct light, albedo and shape in
-//! the picture imply. It cannot know what is outside the picture or hidden in it: light from behind the camera is a
-//! guess by the training set's mean, light enters and leaves with what is in view, nothing finer than a cell (4
-//! pixels) gets light of its own, and there is no specular light beyond what `composite` derives from E.
+//! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]), what `cache` says among them, go through a U-Net,
+//! and its gain and rest are applied to `cache`'s answer at full resolution, guided by depth and normal
+//! ([`reconstruct`]). It learns where that answer errs: missing occlusion, light that the cube does not see. It knows
+//! no more of the world than `cache` and the picture show, corrects nothing finer than a cell (4 pixels), and adds no
+//! specular light beyond what `composite` derives from E.
 //!
 //! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
 //! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
