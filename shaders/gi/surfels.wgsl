@@ -93,7 +93,9 @@ fn light_up(@builtin(global_invocation_id) id: vec3u) {
             let n_l = dot(n, l.l);
             if n_l <= 0.0 { continue; }
             let view = view_at(i, s.position);
-            let direct = s.albedo * l.irradiance * (n_l / PI);
+            // The mean over a disc of this area: a lamp nearer than its width lights a spot of it only.
+            let spread = 1.0 / (1.0 + s.area / PI / l.distance / l.distance);
+            let direct = s.albedo * l.irradiance * (n_l / PI * spread);
             if view == 0xffffffffu {
                 s.own += direct;
             } else {

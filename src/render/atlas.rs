@@ -275,7 +275,7 @@ fn sees(view: &AtlasViewGpu, draw: &Draw) -> bool {
 /// Right, up and forward of a cube's face: +X, −X, +Y, −Y, +Z, −Z in this order.
 pub(super) fn cube_axes(face: usize) -> [Vec3; 3] {
     let axes = [Vec3::X, Vec3::Y, Vec3::Z];
-    let sign = if face % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
     let [forward, up, right] = [0, 1, 2].map(|i| axes[(face / 2 + i) % 3]);
     [right * sign, up, forward * sign]
 }
