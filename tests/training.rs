@@ -19,5 +19,5 @@ fn training_runs_end_to_end_at_toy_scale() {
     let text = String::from_utf8_lossy(&run.stderr);
     assert!(run.status.success(), "{text}");
     // unittest says how many it ran; an empty run must not pass.
-    assert!(text.contains("Ran 10 tests"), "{text}");
+    assert!(text.contains("Ran 11 tests"), "{text}");
 }

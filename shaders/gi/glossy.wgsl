@@ -28,6 +28,8 @@ const BORDER_LEVEL = 4.0;
 // Roughness up to which the cube is all that is asked, and from which on nothing: it holds a mirror's ray, not a lobe.
 const CUBE_SHARP = 0.2;
 const CUBE_BLUNT = 0.5;
+// Two of the cube's texels, in shares of the distance from the camera.
+const CUBE_NEAR = 0.2;
 // Times that a ray's way out of the cube around the camera is looked up again.
 const LOOKS = 2;
 
@@ -151,16 +153,18 @@ fn cube_at(d: vec3f) -> vec4f {
 }
 
 // What a ray from `p` finds beyond the screen: where it leaves the sphere about the camera whose radius the cube knows in
-// the direction of where it leaves it.
-fn elsewhere(p: vec3f, r: vec3f) -> vec3f {
+// the direction of where it leaves it. a: how far to trust it; what is nearer than a few of the cube's texels may be the
+// surface itself.
+fn elsewhere(p: vec3f, r: vec3f) -> vec4f {
     let o = p - frame.world_from_view[3].xyz;
     let along = dot(o, r);
     var seen = cube_at(r);
+    var way = 0.0;
     for (var i = 0; i < LOOKS; i++) {
-        let t = sqrt(max(along * along - dot(o, o) + seen.a * seen.a, 0.0)) - along;
-        seen = cube_at(o + max(t, 0.0) * r);
+        way = max(sqrt(max(along * along - dot(o, o) + seen.a * seen.a, 0.0)) - along, 0.0);
+        seen = cube_at(o + way * r);
     }
-    return seen.rgb;
+    return vec4f(seen.rgb, smoothstep(CUBE_NEAR, 2.0 * CUBE_NEAR, way / max(length(o), 1e-6)));
 }
 
 fn reflected(pixel: vec2u, depth: f32, n: vec3f, roughness: f32) -> vec3f {
@@ -177,7 +181,8 @@ fn reflected(pixel: vec2u, depth: f32, n: vec3f, roughness: f32) -> vec3f {
     var guess = beyond(track, r);
     let sharp = 1.0 - smoothstep(CUBE_SHARP, CUBE_BLUNT, roughness);
     if sharp > 0.0 && textureDimensions(surroundings).x > 1u {
-        guess = mix(guess, vec4f(elsewhere(p, r), 1.0), sharp);
+        let cube = elsewhere(p, r);
+        guess = mix(guess, vec4f(cube.rgb, 1.0), sharp * cube.a);
     }
     return mix(mix(around, guess.rgb, narrow * guess.a), hit.rgb, narrow * hit.a);
 }
