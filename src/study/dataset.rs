@@ -93,7 +93,7 @@ impl Sample {
         let [w, h] = self.inputs.cells.map(|n| n as usize);
         let channels = self.inputs.features.len() / (w * h);
         let scale = [self.inputs.exposure.s];
-        let mut tensors: Vec<(&str, Vec<usize>, &[f32])> = vec![
+        let own: [(&str, Vec<usize>, &[f32]); 6] = [
             ("features", vec![channels, h, w], &self.inputs.features),
             ("scale", vec![1], &scale),
             ("direct", vec![3, h, w], &self.direct),
@@ -102,15 +102,17 @@ impl Sample {
             ("depth", vec![h, w], &self.depth),
         ];
         #[cfg(feature = "reference")]
-        if let Some(target) = &self.target {
-            tensors.push(("light", vec![3, h, w], &target.light));
-            tensors.push(("noise", vec![1], std::slice::from_ref(&target.noise)));
-        }
+        let traced = self.target.iter().flat_map(|t| {
+            [("light", vec![3, h, w], t.light.as_slice()), ("noise", vec![1], std::slice::from_ref(&t.noise))]
+        });
+        #[cfg(not(feature = "reference"))]
+        let traced = std::iter::empty();
         let failed = |e: safetensors::SafeTensorError| DatasetError::Serialize(e.to_string());
-        let views = tensors
-            .iter()
+        let views = own
+            .into_iter()
+            .chain(traced)
             .map(|(name, shape, values)| {
-                TensorView::new(Dtype::F32, shape.clone(), bytemuck::cast_slice(values)).map(|view| (*name, view))
+                TensorView::new(Dtype::F32, shape, bytemuck::cast_slice(values)).map(|view| (name, view))
             })
             .collect::<Result<Vec<_>, _>>()
             .map_err(failed)?;
