@@ -1,7 +1,7 @@
 // Surfels as discs that send light: each one, and each four of a square as one.
 
 @group(0) @binding(0) var<storage, read> surfels: array<Surfel>;
-// What each sends after the last round.
+// What each sends after the last round, beyond what reflective shadow maps hold.
 @group(0) @binding(1) var<storage, read> sent: array<vec4f>;
 // Squares, then the four surfels of each.
 @group(0) @binding(2) var<storage, read_write> discs: array<Disc>;
@@ -18,14 +18,15 @@ const HALF_MAX: f32 = 65504.0;
 const REACH: f32 = 10.0;
 // Part of the area that has to be left of the sum of areas as vectors, or else the four face too many ways to be one.
 const FLAT: f32 = 0.9;
-fn join_square(square_at: u32, beyond_maps: bool) {
+
+fn join_square(square_at: u32) {
     var square: Disc;
     var weight = 0.0;
     var places = vec3f(0.0);
     var light = vec3f(0.0);
     for (var k = 4u * square_at; k < 4u * square_at + 4u; k++) {
         let s = surfels[k];
-        let radiance = sent[k].rgb - select(vec3f(0.0), s.mapped, beyond_maps);
+        let radiance = sent[k].rgb;
         discs[SQUARES + k] = Disc(s.position, s.window, s.back, 0.0, radiance, least_facing(s.area));
         weight += s.area;
         places += s.position * s.area;
@@ -43,10 +44,9 @@ fn join_square(square_at: u32, beyond_maps: bool) {
     discs[square_at] = square;
 }
 
-// For the exchange: all that surfels send.
 @compute @workgroup_size(64)
 fn join(@builtin(global_invocation_id) id: vec3u) {
-    if id.x < SQUARES { join_square(id.x, false); }
+    if id.x < SQUARES { join_square(id.x); }
 }
 
 fn paint(square: u32) {
@@ -55,15 +55,15 @@ fn paint(square: u32) {
     let at = vec2u(square % half, square / half % half);
     for (var k = 0u; k < 4u; k++) {
         let s = 4u * square + k;
-        let texel = min(vec4f(sent[s].rgb, surfels[s].range), vec4f(HALF_MAX));
+        let texel = min(vec4f(sent[s].rgb + surfels[s].mapped, surfels[s].range), vec4f(HALF_MAX));
         textureStore(surroundings, 2u * at + vec2u(face * SIDE + (k & 1u), k >> 1u), texel);
     }
 }
 
-// For the gather: what they send beyond what reflective shadow maps hold. For reflections: all of it.
+// After the last round: for the gather, and for reflections.
 @compute @workgroup_size(64)
 fn finish(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= SQUARES { return; }
-    join_square(id.x, true);
+    join_square(id.x);
     paint(id.x);
 }

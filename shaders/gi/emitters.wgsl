@@ -88,6 +88,7 @@ fn emitter_of(share: Share) -> Emitter {
         out.gloss = share.gloss * (LOBE / PI);
         out.mirror = share.mirror / share.place.w;
         out.haze = haze(counts, out.position);
+        out.closeness = 1e30;
     }
     return out;
 }
@@ -144,6 +145,7 @@ fn collect(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         for (var k = 0u; k < 2u; k++) {
             var emitter = emitter_of(sums[k]);
             emitter.least = least_facing(emitter.area);
+            emitter.closeness = closeness(emitter.area);
             fine[32u * block + 2u * four + k] = emitter;
         }
     }

@@ -12,10 +12,11 @@ struct Surfel {
     albedo: vec3f,
     // From the camera, metres.
     range: f32,
-    // What it sends by itself: emission, and albedo times direct light; the sky's radiance through a window.
+    // What it sends by itself: emission, the light of lamps without a map, and the first bounce; the sky's radiance through a
+    // window.
     own: vec3f,
     pad1: f32,
-    // The part of that which reflective shadow maps already hold.
+    // What it sends on of light that reflective shadow maps hold; it counts in reflections only.
     mapped: vec3f,
     pad2: f32,
 }
@@ -27,7 +28,7 @@ struct Disc {
     back: vec3f,
     // Four are opened within the square root of this, metres.
     reach2: f32,
-    // What it sends, in the end without what reflective shadow maps hold.
+    // What it sends beyond what reflective shadow maps hold.
     radiance: vec3f,
     // `least_facing` of one surfel.
     least: f32,

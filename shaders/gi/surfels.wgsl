@@ -1,5 +1,5 @@
 // The cube around the camera becomes surfels, lit by all lights: visible to a light is what its reflective shadow map
-// shows. Then a few rounds in which surfels light each other.
+// shows.
 
 @group(0) @binding(0) var<storage, read> around: array<AtlasView>;
 @group(0) @binding(1) var<storage, read> views: array<AtlasView>;
@@ -12,9 +12,7 @@
 @group(0) @binding(8) var rsm_depth: texture_2d<f32>;
 @group(0) @binding(9) var environment_picture: texture_2d<f32>;
 @group(0) @binding(10) var<storage, read_write> surfels: array<Surfel>;
-@group(0) @binding(11) var<storage, read_write> sent: array<vec4f>;
-
-@group(0) @binding(12) var<uniform> counts: Counts;
+@group(0) @binding(11) var<uniform> counts: Counts;
 
 // The box of windows keeps so much of its longest side between itself and the camera.
 const ROOM: f32 = 0.25;
@@ -99,9 +97,7 @@ fn light_up(@builtin(global_invocation_id) id: vec3u) {
             if view == 0xffffffffu {
                 s.own += direct;
             } else {
-                let part = direct * lit(views[view], s.position, n);
-                s.own += part;
-                s.mapped += part;
+                s.mapped += direct * lit(views[view], s.position, n);
             }
         }
     } else {
@@ -115,5 +111,4 @@ fn light_up(@builtin(global_invocation_id) id: vec3u) {
     }
     s.range = distance(s.position, face.eye);
     surfels[id.x] = s;
-    sent[id.x] = vec4f(s.own, 0.0);
 }

@@ -6,6 +6,8 @@
 @group(1) @binding(0) var<storage, read> cell_pixels: array<u32>;
 @group(1) @binding(1) var<storage, read> light: array<vec4f>;
 @group(1) @binding(2) var output: texture_storage_2d<rgba16float, write>;
+// What gi.contact found, half the picture's size.
+@group(1) @binding(3) var contact: texture_2d<f32>;
 
 // Cells on a side of what a workgroup reads: its own 8 / CELL_SIDE and two on each side.
 const STAGED = 8 / CELL_SIDE + 4;
@@ -14,6 +16,48 @@ const STAGED = 8 / CELL_SIDE + 4;
 var<workgroup> points: array<vec4f, STAGED * STAGED>;
 var<workgroup> normals: array<vec3f, STAGED * STAGED>;
 var<workgroup> lights: array<CellLight, STAGED * STAGED>;
+
+// Texels of half resolution on a side of what a workgroup reads, and each one's surface point and visibility.
+const HALVES = 6;
+var<workgroup> halves: array<vec4f, HALVES * HALVES>;
+
+// Thread `index` brings one texel of visibility of the square that begins at texel `first`; visibility -1 where there is
+// no surface.
+fn stage_contact(index: u32, first: vec2i) {
+    if index >= u32(HALVES * HALVES) {
+        return;
+    }
+    let texel = first + vec2i(i32(index) % HALVES, i32(index) / HALVES);
+    halves[index] = vec4f(0.0, 0.0, 0.0, -1.0);
+    if any(texel < vec2i(0)) || any(texel >= vec2i(textureDimensions(contact))) {
+        return;
+    }
+    let pixel = half_pixel(texel);
+    let z = distance_at(pixel);
+    if z > 0.0 {
+        halves[index] = vec4f(world_position_at(pixel, z), textureLoad(contact, texel, 0).x);
+    }
+}
+
+// The part of its light that a surface keeps beside its neighbours: mean of the 2x2 texels around its pixel that lie on its
+// own plane (one of each phase of the pattern, so all weigh the same), and what neighbours of even albedo give back for
+// what they take (Jimenez and others 2016, their fit for the albedo ALBEDO).
+fn kept(here: Surface, base: vec2i) -> f32 {
+    var sum = 0.0;
+    var weight = 0.0;
+    for (var i = 0; i < 4; i++) {
+        let at = base + vec2i(i & 1, i >> 1u);
+        let found = halves[at.y * HALVES + at.x];
+        let off_plane = dot(here.normal, found.xyz - here.position) * here.strictness;
+        let lorentz = 1.0 + min(off_plane * off_plane, 1e12);
+        let w = select(0.0, 1.0 / (lorentz * lorentz), found.w >= 0.0);
+        sum += w * found.w;
+        weight += w;
+    }
+    let open = sum / max(weight, 1e-30);
+    let v = select(1.0, open, weight > 0.0);
+    return max(v, ((v * (2.0404 * ALBEDO - 0.3324) + (0.6417 - 4.7951 * ALBEDO)) * v + (2.7552 * ALBEDO + 0.6903)) * v);
+}
 
 // Thread `index` brings one cell of the square that begins at cell `first`. Cells beyond the picture count as empty.
 fn stage(index: u32, first: vec2i) {
@@ -93,6 +137,7 @@ fn upsample(
 ) {
     let first = vec2i(group.xy) * (8 / CELL_SIDE) - 2;
     stage(index, first);
+    stage_contact(index, 4 * vec2i(group.xy) - 1);
     workgroupBarrier();
     if any(id.xy >= params.size) {
         return;
@@ -104,7 +149,8 @@ fn upsample(
         let here = Surface(world_position_at(pixel, z), world_normal_at(pixel), 1.0 / (PLANE_TOLERANCE * z));
         // A cell counts as lying at its middle, whichever pixel stands for it.
         let place = (vec2f(pixel) - f32(CELL_SIDE / 2)) / f32(CELL_SIDE) - vec2f(first);
-        result = min(light_of(here, place), vec3f(LARGEST));
+        let half_base = ((pixel - 1) >> vec2u(1u)) - (4 * vec2i(group.xy) - 1);
+        result = min(light_of(here, place) * kept(here, half_base), vec3f(LARGEST));
     }
     textureStore(output, pixel, vec4f(result, 1.0));
 }

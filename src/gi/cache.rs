@@ -6,6 +6,7 @@
 //! `docs/gi.md` says what neither can do.
 
 use super::cells::{CellSide, CellsPass};
+use super::contact::ContactPass;
 use super::emitters::EmittersPass;
 use super::exposure::{pipeline, storage_entry};
 use super::inputs::InputGroup;
@@ -32,7 +33,7 @@ impl Options {
     /// The method `rsm`.
     pub const RSM: Self = Self { around: false, rounds: 0, side: CellSide::Eight };
     /// The method `cache`.
-    pub const CACHE: Self = Self { around: true, rounds: 4, side: CellSide::Eight };
+    pub const CACHE: Self = Self { around: true, rounds: 3, side: CellSide::Eight };
 }
 
 /// Constants of the gather as WGSL.
@@ -48,6 +49,7 @@ pub struct WorldGi {
     emitters: EmittersPass,
     surfels: SurfelsPass,
     cells: CellsPass,
+    contact: ContactPass,
     upsample: UpsamplePass,
     gather: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
@@ -78,6 +80,7 @@ impl WorldGi {
                 usage: wgpu::BufferUsages::STORAGE,
                 mapped_at_creation: false,
             }),
+            contact: ContactPass::new(device, &inputs),
             upsample: UpsamplePass::new(device, &inputs, options.side),
             device: device.clone(),
             inputs,
@@ -90,7 +93,12 @@ impl WorldGi {
 
     /// Bind groups made since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
-        self.made + self.inputs.made() + self.emitters.made() + self.surfels.made() + self.upsample.made()
+        self.made
+            + self.inputs.made()
+            + self.emitters.made()
+            + self.surfels.made()
+            + self.contact.made()
+            + self.upsample.made()
     }
 
     fn light(&self, size: [u32; 2]) -> (wgpu::Buffer, wgpu::BindGroup) {
@@ -128,6 +136,10 @@ impl Rung for WorldGi {
         let bound = self.inputs.bind(queue, inputs)?;
         let lights = inputs.lights.map_or(&self.no_lights, |l| l.buffer);
         let fresh = self.emitters.fit(queue, world, inputs.lights.map_or(0, |l| l.count));
+        if fresh {
+            self.surfels.forget();
+        }
+        self.contact.fit(inputs.size);
         if self.cells.fit(inputs.size) || fresh || self.light.is_none() {
             self.upsample.forget();
             self.light = Some(self.light(inputs.size));
@@ -136,7 +148,7 @@ impl Rung for WorldGi {
         let (light, group) = self.light.as_ref().expect("made above");
         self.emitters.record(recorder, world, lights);
         if self.options.around {
-            self.surfels.record(recorder, world, lights, self.emitters.counts());
+            self.surfels.record(recorder, world, lights, &self.emitters);
         }
         self.cells.record(recorder, &bound);
         let [w, h] = self.options.side.grid(inputs.size);
@@ -146,7 +158,8 @@ impl Rung for WorldGi {
             pass.set_pipeline(&self.gather);
             pass.dispatch_workgroups(w.div_ceil(8), h.div_ceil(8), 1);
         });
-        self.upsample.record(recorder, &bound, &self.cells, light, output)
+        self.contact.record(recorder, &bound);
+        self.upsample.record(recorder, &bound, &self.cells, light, self.contact.visibility(), output)
     }
 
     fn surroundings(&self) -> Option<&wgpu::TextureView> {
@@ -165,6 +178,7 @@ impl Rung for WorldGi {
             + self.emitters.bytes()
             + self.surfels.bytes()
             + self.cells.bytes()
+            + self.contact.bytes()
             + self.light.as_ref().map_or(0, |(light, _)| light.size())
     }
 
@@ -180,11 +194,12 @@ impl Rung for WorldGi {
         let flops = blocks * (2.02 * 90.0 + 0.25 * 9.0) + surfels * (0.44 * 55.0 + 0.07 * 9.0);
         let mut costs = vec![self.emitters.cost()];
         if self.options.around {
-            costs.extend(self.surfels.costs());
+            costs.extend(self.surfels.costs(self.emitters.block_count()));
         }
         costs.push(CellsPass::cost(self.options.side, size));
         let bytes = cells * (4.0 + 8.0 + 48.0) + 34.5 * 80.0 * blocks + surfels * 60.0;
         costs.push(Cost::new("gi.gather", cells * flops, bytes));
+        costs.push(ContactPass::cost(size));
         costs.push(UpsamplePass::cost(self.options.side, size));
         costs
     }

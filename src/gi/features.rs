@@ -143,8 +143,10 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.gather", super::cache::prelude(super::cache::Options::RSM)),
         ("gi.gather", super::cache::prelude(super::cache::Options::CACHE)),
         ("gi.surfels", super::surfels::prelude(super::surfels::SURFELS)),
+        ("gi.first", super::surfels::prelude(super::surfels::SURFELS)),
         ("gi.discs", super::surfels::prelude(super::surfels::SURFELS)),
         ("gi.exchange", super::surfels::prelude(super::surfels::SURFELS)),
+        ("gi.contact", super::contact::prelude()),
         ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Four)),
         ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Eight)),
     ]

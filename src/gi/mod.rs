@@ -27,6 +27,7 @@ pub mod ambient;
 pub mod bitmask;
 pub mod cache;
 pub mod cells;
+pub mod contact;
 pub mod emitters;
 pub mod exposure;
 pub mod features;

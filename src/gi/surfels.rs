@@ -2,6 +2,7 @@
 //! between; and as discs for the gather.
 
 use super::World;
+use super::emitters::EmittersPass;
 use super::rung::Cost;
 use super::view_cache::ViewCache;
 use crate::gpu::shaders;
@@ -27,10 +28,13 @@ pub fn prelude(surfels: u32) -> String {
 pub struct SurfelsPass {
     device: wgpu::Device,
     light_up: wgpu::ComputePipeline,
+    first: wgpu::ComputePipeline,
     join: wgpu::ComputePipeline,
     finish: wgpu::ComputePipeline,
     exchange: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
+    first_layout: wgpu::BindGroupLayout,
+    first_group: Option<wgpu::BindGroup>,
     groups: ViewCache<3>,
     join_group: wgpu::BindGroup,
     exchange_group: wgpu::BindGroup,
@@ -44,9 +48,11 @@ pub struct SurfelsPass {
 impl SurfelsPass {
     /// Compiles the shaders and makes buffers of 0.1 MB.
     pub fn new(device: &wgpu::Device, rounds: u32) -> Self {
-        let types = [READ, READ, READ, READ, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE, UNIFORM];
+        let types = [READ, READ, READ, READ, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, READ_WRITE, UNIFORM];
         let stage = wgpu::ShaderStages::COMPUTE;
         let layout = tool::layout(device, "gi.surfels", stage, &types);
+        let first_types = [READ, READ, READ, UNIFORM, READ_WRITE, READ_WRITE];
+        let first_layout = tool::layout(device, "gi.first", stage, &first_types);
         let join_layout = tool::layout(device, "gi.discs", stage, &[READ, READ, READ_WRITE, STORE_HALF]);
         let exchange_layout = tool::layout(device, "gi.exchange", stage, &[READ, READ, READ_WRITE]);
         let buffer = |label, size| {
@@ -80,10 +86,13 @@ impl SurfelsPass {
         Self {
             device: device.clone(),
             light_up: pipeline(device, "gi.surfels", "light_up", &layout),
+            first: pipeline(device, "gi.first", "first_bounce", &first_layout),
             join: pipeline(device, "gi.discs", "join", &join_layout),
             finish: pipeline(device, "gi.discs", "finish", &join_layout),
             exchange: pipeline(device, "gi.exchange", "exchange", &exchange_layout),
             layout,
+            first_layout,
+            first_group: None,
             groups: ViewCache::new(),
             join_group,
             exchange_group,
@@ -95,13 +104,13 @@ impl SurfelsPass {
         }
     }
 
-    /// Records passes `gi.surfels` and `gi.exchange`. `counts` is [`super::emitters::EmittersPass::counts`].
+    /// Records passes `gi.surfels`, `gi.first` and `gi.exchange`. When `emitters` has new buffers, [`forget`](Self::forget) first.
     pub fn record(
         &mut self,
         recorder: &mut Recorder<'_>,
         world: &World<'_>,
         lights: &wgpu::Buffer,
-        counts: &wgpu::Buffer,
+        emitters: &EmittersPass,
     ) {
         let view = wgpu::BindingResource::TextureView;
         let group = self.groups.get([world.around.depth, world.rsm.depth, world.environment], || {
@@ -121,8 +130,7 @@ impl SurfelsPass {
                     view(world.rsm.depth),
                     view(world.environment),
                     self.surfels.as_entire_binding(),
-                    self.sent.as_entire_binding(),
-                    counts.as_entire_binding(),
+                    emitters.counts().as_entire_binding(),
                 ],
             ))
         });
@@ -131,6 +139,17 @@ impl SurfelsPass {
             pass.set_pipeline(&self.light_up);
             pass.set_bind_group(0, &group, &[]);
             pass.dispatch_workgroups(SURFELS.div_ceil(64), 1, 1);
+        });
+        let first_group = self.first_group.get_or_insert_with(|| {
+            let resources =
+                [emitters.fine(), emitters.blocks(), emitters.coarse(), emitters.counts(), &self.surfels, &self.sent]
+                    .map(|b| b.as_entire_binding());
+            tool::group(&self.device, "gi.first", &self.first_layout, &resources)
+        });
+        recorder.compute("gi.first", |pass| {
+            pass.set_pipeline(&self.first);
+            pass.set_bind_group(0, &*first_group, &[]);
+            pass.dispatch_workgroups(SURFELS, 1, 1);
         });
         recorder.compute("gi.exchange", |pass| {
             for round in 0..=self.rounds {
@@ -159,6 +178,7 @@ impl SurfelsPass {
     /// Lets go of texture views and of the buffers bound with them.
     pub fn forget(&mut self) {
         self.groups.clear();
+        self.first_group = None;
     }
 
     /// Bind groups made so far, the fixed ones not counted.
@@ -171,11 +191,14 @@ impl SurfelsPass {
         self.surfels.size() + self.sent.size() + self.discs.size() + 8 * u64::from(PAINTED[0] * PAINTED[1])
     }
 
-    /// What the passes cost.
-    pub fn costs(&self) -> [Cost; 2] {
+    /// What the passes cost with so many blocks of emitters.
+    pub fn costs(&self, blocks: u32) -> [Cost; 3] {
+        let blocks = f64::from(blocks);
         let (n, rounds) = (f64::from(SURFELS), f64::from(self.rounds));
         [
             Cost::new("gi.surfels", n * 400.0, n * 140.0),
+            // As in gi.gather, 2.02 emitters a block.
+            Cost::new("gi.first", n * blocks * (2.02 * 90.0 + 0.25 * 9.0), 34.5 * 80.0 * blocks + n * 100.0),
             // A surfel meets 0.44 discs a surfel, as cells do, shared by 64 invocations: 40 operations each, and 18 to ask
             // each square twice; joining a surfel takes 30. Buffers stay in cache.
             Cost::new(

@@ -8,7 +8,7 @@
 
 use super::cells::{CellSide, CellsPass};
 use super::exposure::{output_entry, pipeline, storage_entry};
-use super::inputs::{BoundInputs, InputGroup};
+use super::inputs::{BoundInputs, InputGroup, texture_entry};
 use super::reconstruct::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
 use super::rung::Cost;
 use super::{GiError, ambient, view_cache::ViewCache};
@@ -21,6 +21,9 @@ pub const TRUST: f32 = 0.3;
 /// Least cosine to a cell's own normal for which its light is evaluated where no cell agrees with a pixel.
 pub const LEAST_COSINE: f32 = 0.5;
 
+/// Albedo of what stands beside a surface, for the light that it gives back.
+pub const ALBEDO: f32 = 0.5;
+
 /// The constants as WGSL.
 pub fn prelude(side: CellSide) -> String {
     let mut text = side.prelude();
@@ -31,6 +34,7 @@ pub fn prelude(side: CellSide) -> String {
         ("WEIGHT_FLOOR", WEIGHT_FLOOR),
         ("TRUST", TRUST),
         ("LEAST_COSINE", LEAST_COSINE),
+        ("ALBEDO", ALBEDO),
     ] {
         text.push_str(&format!("const {name} = f32({value:?});\n"));
     }
@@ -42,7 +46,7 @@ pub struct UpsamplePass {
     device: wgpu::Device,
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
-    outputs: ViewCache<1>,
+    outputs: ViewCache<2>,
 }
 
 impl UpsamplePass {
@@ -50,7 +54,7 @@ impl UpsamplePass {
     pub fn new(device: &wgpu::Device, inputs: &InputGroup, side: CellSide) -> Self {
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("gi.upsample"),
-            entries: &[storage_entry(0, true), storage_entry(1, true), output_entry(2)],
+            entries: &[storage_entry(0, true), storage_entry(1, true), output_entry(2), texture_entry(3)],
         });
         let module = shaders::module_with(device, "gi.upsample", &prelude(side));
         let pipeline = pipeline(device, "gi.upsample", &module, "upsample", inputs, &layout);
@@ -68,10 +72,11 @@ impl UpsamplePass {
         inputs: &BoundInputs,
         cells: &CellsPass,
         light: &wgpu::Buffer,
+        contact: &wgpu::TextureView,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
         ambient::check_output(output, inputs.size)?;
-        let group = self.outputs.get([output], || {
+        let group = self.outputs.get([output, contact], || {
             Ok::<_, GiError>(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("gi.upsample"),
                 layout: &self.layout,
@@ -79,6 +84,7 @@ impl UpsamplePass {
                     wgpu::BindGroupEntry { binding: 0, resource: cells.pixels().as_entire_binding() },
                     wgpu::BindGroupEntry { binding: 1, resource: light.as_entire_binding() },
                     wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(output) },
+                    wgpu::BindGroupEntry { binding: 3, resource: wgpu::BindingResource::TextureView(contact) },
                 ],
             }))
         })?;
@@ -102,13 +108,13 @@ impl UpsamplePass {
     }
 
     /// What the pass costs for a picture of `size` pixels. A pixel: 4 cells of 67 operations, its own place and normal
-    /// 60, the mean 14; a workgroup stages 25 or 36 cells of 60 operations and 64 bytes, most of which the chip's cache
+    /// 60, the mean 14, visibility 4 × 20 and 20; a workgroup stages 25 or 36 cells of 60 operations and 64 bytes and 36 texels of 45 operations, most of which the chip's cache
     /// has, so that each cell comes from memory once. Pixels at edges that ask 16 cells (about 3 % of a picture) are
     /// counted with 1,000 more.
     pub fn cost(side: CellSide, size: [u32; 2]) -> Cost {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let staged = f64::from(8 / side.pixels() + 4).powi(2) * 60.0 / 64.0;
-        let flops = pixels * (4.0 * 67.0 + 74.0 + staged + 30.0);
-        Cost::new("gi.upsample", flops, pixels * 16.0 + side.count(size) as f64 * 60.0)
+        let flops = pixels * (4.0 * 67.0 + 74.0 + 100.0 + staged + 36.0 * 45.0 / 64.0 + 30.0);
+        Cost::new("gi.upsample", flops, pixels * 17.0 + side.count(size) as f64 * 60.0)
     }
 }

@@ -114,6 +114,10 @@ pub const GI: &[Shader] = &[
         files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/choose.wgsl"],
     },
     Shader {
+        name: "gi.contact",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/contact.wgsl"],
+    },
+    Shader {
         name: "gi.upsample",
         files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/upsample.wgsl"],
     },
@@ -141,6 +145,10 @@ pub const GI: &[Shader] = &[
             "gi/surfels.wgsl"
         ],
     },
+    Shader {
+        name: "gi.first",
+        files: wgsl!["lib/brdf.wgsl", "lib/emitter.wgsl", "gi/surfel.wgsl", "gi/tree.wgsl", "gi/first.wgsl"],
+    },
     Shader { name: "gi.discs", files: wgsl!["lib/brdf.wgsl", "lib/emitter.wgsl", "gi/surfel.wgsl", "gi/discs.wgsl"] },
     Shader {
         name: "gi.exchange",
@@ -155,6 +163,7 @@ pub const GI: &[Shader] = &[
             "gi/inputs.wgsl",
             "gi/cells.wgsl",
             "gi/surfel.wgsl",
+            "gi/tree.wgsl",
             "gi/gather.wgsl"
         ],
     },

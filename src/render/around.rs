@@ -7,7 +7,7 @@ use crate::scene::upload::SceneGpu;
 use glam::Vec3;
 
 /// Texels on a side of a face; `SIDE` in the shaders.
-pub const SIDE: u32 = 16;
+pub const SIDE: u32 = 12;
 /// Nearest thing that is seen, metres.
 const NEAR: f32 = 0.02;
 

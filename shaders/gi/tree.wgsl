@@ -1,0 +1,79 @@
+// What emitters of reflective shadow maps send to a place: the tree is coarse pairs, opened into blocks where they are near,
+// and those into fine emitters where they are nearer still. Who includes this binds `fine` and `blocks`.
+
+// A square of blocks, or a block, is opened where it is nearer than so many of its own widths. (At 1.4 the mean error of six
+// rooms is 0.3 points larger for squares alone, 0.45 for both.)
+const NEAR_WIDTHS: f32 = 2.0;
+
+struct Sum {
+    // Radiance times direction, per π, for each colour.
+    red: vec3f,
+    green: vec3f,
+    blue: vec3f,
+    // Of the hemisphere, cosine-weighted.
+    share: f32,
+}
+
+// What receives.
+struct Place {
+    p: vec3f,
+    n: vec3f,
+    haze: f32,
+}
+
+fn add(sum: ptr<function, Sum>, v: vec3f, radiance: vec3f) {
+    (*sum).red += v * radiance.r;
+    (*sum).green += v * radiance.g;
+    (*sum).blue += v * radiance.b;
+}
+
+// What an emitter of a reflective shadow map at `v` from here sends, through the small objects between.
+fn add_emitter(sum: ptr<function, Sum>, e: Emitter, v: vec3f, here: Place) {
+    let d2 = squared(v);
+    let inverse = inverseSqrt(d2);
+    let d = d2 * inverse;
+    let facing = dot(e.back, v);
+    let a = at_least(facing, e.least) + e.rest * d;
+    let through = exp(-max(e.haze + here.haze, 0.0) * d) * min(d2 * e.closeness, 1.0);
+    let mirrored = select(0.0, d * lobe(-dot(e.mirror, v) * inverse), facing > 0.0);
+    add(sum, v * (through * nearness(a, dot(here.n, v), d2)), e.radiance * a + e.gloss * mirrored);
+}
+
+// True where an emitter at `v` is farther away than so many widths of its group, of `area` m².
+fn far(e: Emitter, v: vec3f, area: f32) -> bool {
+    return e.area == 0.0 || dot(v, v) > NEAR_WIDTHS * NEAR_WIDTHS * area;
+}
+
+// Block number `block`, whole or opened.
+fn add_block(sum: ptr<function, Sum>, block: u32, here: Place) {
+    let low = blocks[2u * block];
+    let high = blocks[2u * block + 1u];
+    let area = low.area + high.area;
+    if area == 0.0 { return; }
+    let v_low = low.position - here.p;
+    let v_high = high.position - here.p;
+    if far(low, v_low, area) && far(high, v_high, area) {
+        add_emitter(sum, low, v_low, here);
+        add_emitter(sum, high, v_high, here);
+    } else {
+        for (var k = 32u * block; k < 32u * block + 32u; k++) {
+            if fine[k].area > 0.0 { add_emitter(sum, fine[k], fine[k].position - here.p, here); }
+        }
+    }
+}
+
+// Square number `square` of four blocks, whole (its pair of coarse emitters) or opened.
+fn add_square(sum: ptr<function, Sum>, square: u32, low: Emitter, high: Emitter, here: Place) {
+    let area = low.area + high.area;
+    if area == 0.0 { return; }
+    let v_low = low.position - here.p;
+    let v_high = high.position - here.p;
+    if far(low, v_low, area) && far(high, v_high, area) {
+        add_emitter(sum, low, v_low, here);
+        add_emitter(sum, high, v_high, here);
+    } else {
+        for (var block = 4u * square; block < 4u * square + 4u; block++) {
+            add_block(sum, block, here);
+        }
+    }
+}
