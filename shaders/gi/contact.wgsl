@@ -1,5 +1,5 @@
 // How much of the light from all around reaches a surface past what stands right beside it, at half resolution: what cells
-// and surfels are too coarse for. AZIMUTHS directions in the tangent plane, evenly spread there and not on the screen, TAPS
+// and surfels are too coarse for. AZIMUTHS directions, evenly spread in the tangent plane and not on the screen, TAPS
 // points on each; what a point's depth shows raises the horizon, and a horizon of elevation h leaves 1 - sin² h of the
 // light of its direction, cosine-weighted. The prelude (gi::contact) holds AZIMUTHS, TAPS, RADIUS, NEAREST and BIAS.
 
@@ -51,6 +51,10 @@ fn contact(@builtin(global_invocation_id) id: vec3u) {
     let up = cross(n, side);
     let radius = RADIUS * z;
     let start = project(here);
+    // The far point lies in the tangent plane, the near ones half-way up from it: a floor seen at a glancing angle shows what
+    // stands on it only above the plane. (All of them up took the light of large walls, which send their own, from corners:
+    // 4.79 instead of 4.60 % of error; none left floors without contact shadows.)
+    let above = project(n);
     var open = 0.0;
     for (var k = 0; k < AZIMUTHS; k++) {
         let angle = 2.0 * PI * (f32(k) + phase) / f32(AZIMUTHS);
@@ -58,7 +62,7 @@ fn contact(@builtin(global_invocation_id) id: vec3u) {
         var most = 0.0;
         for (var j = 0; j < TAPS; j++) {
             let t = (f32(j) + fract(phase + 0.5 * f32(k) + 0.125)) / f32(TAPS);
-            most = max(most, blocked(here, n, start + along * (radius * pow(NEAREST, t)), radius));
+            most = max(most, blocked(here, n, start + (along + select(vec3f(0.0), above, j > 0)) * (radius * pow(NEAREST, t)), radius));
         }
         open += 1.0 - most;
     }
