@@ -50,7 +50,7 @@ fn every_shader_validates_in_every_permutation() {
         (8, 21, 47, 3)
     );
     assert_eq!(shaders::VIEWER.len(), 3);
-    assert_eq!(permutations.len(), 487);
+    assert_eq!(permutations.len(), 490);
 }
 
 #[test]

@@ -16,7 +16,7 @@ const TAPS: u32 = 2;
 /// How far an occluder may be, as part of the distance from the camera: about as wide as a texel of the cube around the
 /// camera is there, beyond which surfels are blockers themselves. (Error of the light on training rooms 2 to 5 with points in
 /// the tangent plane only: 0.06 4.70 %, 0.1 4.64 %, 0.16 4.57 %, 0.25 4.62 %; without the pass 4.87 %.)
-const RADIUS: f32 = 0.16;
+pub const RADIUS: f32 = 0.16;
 /// The nearest point, as part of the radius.
 const NEAREST: f32 = 0.06;
 /// Sine of the elevation that counts as the surface itself.

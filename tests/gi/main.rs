@@ -4,6 +4,7 @@
 mod build;
 #[path = "../common/mod.rs"]
 mod common;
+mod contact;
 mod edges;
 mod glossy;
 #[cfg(feature = "reference")]

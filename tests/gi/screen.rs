@@ -10,14 +10,17 @@ use bouncelight::gi::ssgi::{SsgiGi, SsgiOptions};
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
 use glam::Vec3;
 
-const SIZE: [u32; 2] = [192, 128];
-const FLOOR: usize = 0;
+pub const SIZE: [u32; 2] = [192, 128];
+pub const FLOOR: usize = 0;
 const WALL: usize = 1;
 
-type Trace = fn(Vec3, Vec3) -> Option<Hit>;
+pub const EYE: Vec3 = Vec3::new(0.4, 2.2, 3.5);
+pub const TARGET: Vec3 = Vec3::new(0.0, 0.9, -4.0);
+
+pub type Trace = fn(Vec3, Vec3) -> Option<Hit>;
 
 /// A floor, and a wall 3 m high and 8 m wide that stands on it at z = −4.
-fn corner(o: Vec3, d: Vec3) -> Option<Hit> {
+pub fn corner(o: Vec3, d: Vec3) -> Option<Hit> {
     let floor = plane(o, d, Vec3::ZERO, Vec3::Y, FLOOR).filter(|(_, h)| h.point.z > -4.0);
     let wall = plane(o, d, Vec3::new(0.0, 0.0, -4.0), Vec3::Z, WALL)
         .filter(|(_, h)| h.point.x.abs() < 4.0 && (0.0..3.0).contains(&h.point.y));
@@ -25,7 +28,7 @@ fn corner(o: Vec3, d: Vec3) -> Option<Hit> {
 }
 
 /// A sphere of radius 1.2 m that lies on a floor.
-fn ball(o: Vec3, d: Vec3) -> Option<Hit> {
+pub fn ball(o: Vec3, d: Vec3) -> Option<Hit> {
     let d = d.normalize();
     let from = o - Vec3::new(0.0, 1.2, -3.0);
     let (b, c) = (from.dot(d), from.length_squared() - 1.44);
@@ -37,7 +40,7 @@ fn ball(o: Vec3, d: Vec3) -> Option<Hit> {
     nearest([plane(o, d, Vec3::ZERO, Vec3::Y, FLOOR), sphere])
 }
 
-fn flat(o: Vec3, d: Vec3) -> Option<Hit> {
+pub fn flat(o: Vec3, d: Vec3) -> Option<Hit> {
     nearest([plane(o, d, Vec3::ZERO, Vec3::Y, FLOOR), None])
 }
 
@@ -50,12 +53,17 @@ fn nearest(hits: [Option<(f32, Hit)>; 2]) -> Option<Hit> {
     hits.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, hit)| hit)
 }
 
-fn shot(trace: Trace) -> (Shot, Vec<usize>) {
-    Shot::traced(SIZE, Vec3::new(0.4, 2.2, 3.5), Vec3::new(0.0, 0.9, -4.0), trace)
+pub fn shot(trace: Trace) -> (Shot, Vec<usize>) {
+    Shot::traced(SIZE, EYE, TARGET, trace)
 }
 
 /// Cosine-weighted share of the hemisphere over the point under `pixel` that hits nothing, and that hits the wall.
 fn rays(shot: &Shot, trace: Trace, pixel: [u32; 2], r: &mut Random) -> [f32; 2] {
+    rays_within(shot, trace, pixel, f32::INFINITY, r)
+}
+
+/// The same of what is less than `reach` metres away.
+pub fn rays_within(shot: &Shot, trace: Trace, pixel: [u32; 2], reach: f32, r: &mut Random) -> [f32; 2] {
     let (point, n) = under(shot, trace, pixel);
     let tangent = n.any_orthonormal_vector();
     let (mut open, mut wall) = (0, 0);
@@ -64,7 +72,7 @@ fn rays(shot: &Shot, trace: Trace, pixel: [u32; 2], r: &mut Random) -> [f32; 2] 
         let (u, phi) = (r.unit(), std::f32::consts::TAU * r.unit());
         let flat = tangent * phi.cos() + n.cross(tangent) * phi.sin();
         let d = flat * u.sqrt() + n * (1.0 - u).sqrt();
-        match trace(point + n * 1e-3, d) {
+        match trace(point + n * 1e-3, d).filter(|hit| hit.point.distance(point) < reach) {
             None => open += 1,
             Some(hit) if hit.surface == WALL => wall += 1,
             Some(_) => {}
@@ -74,7 +82,7 @@ fn rays(shot: &Shot, trace: Trace, pixel: [u32; 2], r: &mut Random) -> [f32; 2] 
 }
 
 /// Point and normal under a pixel's centre.
-fn under(shot: &Shot, trace: Trace, pixel: [u32; 2]) -> (Vec3, Vec3) {
+pub fn under(shot: &Shot, trace: Trace, pixel: [u32; 2]) -> (Vec3, Vec3) {
     let world = glam::Mat4::from_cols_array_2d(&shot.camera.view_from_world).inverse();
     let p = shot.camera.clip_from_view;
     let x = 2.0 * (pixel[0] as f32 + 0.5) / SIZE[0] as f32 - 1.0;
@@ -113,7 +121,7 @@ fn grid(surfaces: &[usize], surface: usize) -> Vec<[u32; 2]> {
     all.filter(|p| surfaces[(p[1] * SIZE[0] + p[0]) as usize] == surface).collect()
 }
 
-fn at<T: Copy>(values: &[T], pixel: [u32; 2]) -> T {
+pub fn at<T: Copy>(values: &[T], pixel: [u32; 2]) -> T {
     values[(pixel[1] * SIZE[0] + pixel[0]) as usize]
 }
 

@@ -3,7 +3,7 @@
 use crate::common;
 use crate::edges::{FLOOR, LIGHT, PLATE, POLE, SIZE, WALL, bleeding, room};
 use crate::read_light;
-use crate::shot::{Hit, Shot, output, view};
+use crate::shot::{Hit, Shot, output, texture_with, view};
 use bouncelight::gi::cells::{CellSide, CellsPass, NO_PIXEL};
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gi::twin::oct_decode;
@@ -54,9 +54,22 @@ fn upsample(gpu: &Gpu, shot: &Shot, side: CellSide, light: impl Fn(usize) -> [Ch
     let mut encoder = device.create_command_encoder(&Default::default());
     let mut recorder = Recorder::new(&mut encoder);
     cells.record(&mut recorder, &bound);
-    pass.record(&mut recorder, &bound, &cells, &buffer, &view(&target)).expect("records");
+    let open = visibility(gpu, shot.size, 1.0);
+    pass.record(&mut recorder, &bound, &cells, &buffer, &view(&open), &view(&target)).expect("records");
     queue.submit([encoder.finish()]);
     read_light(gpu, &target)
+}
+
+/// The same visibility everywhere, as `gi.contact` would write it.
+fn visibility(gpu: &Gpu, size: [u32; 2], value: f32) -> wgpu::Texture {
+    let half = size.map(|n| n.div_ceil(2));
+    texture_with(
+        &gpu.device,
+        &gpu.queue,
+        half,
+        wgpu::TextureFormat::R32Float,
+        bytemuck::cast_slice(&vec![value; (half[0] * half[1]) as usize]),
+    )
 }
 
 fn even(value: f32) -> [Channel; 3] {
