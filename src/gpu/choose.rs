@@ -196,9 +196,10 @@ impl Gpu {
     }
 }
 
-/// Optional features that are used when present: timestamps for the timing tables, subgroups for some of the network's kernels.
+/// Optional features that are used when present: timestamps for the timing tables, subgroups and 16-bit arithmetic for some of the
+/// network's kernels.
 pub fn wanted_features() -> wgpu::Features {
-    wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP
+    wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP | wgpu::Features::SHADER_F16
 }
 
 /// All adapters that fit the backend choice, best first, with the words for what was searched. GL is only asked when

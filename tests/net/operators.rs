@@ -4,10 +4,12 @@ use crate::hashed::{self, cases, graphs};
 use crate::{common, fixed, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Network, Options, Source, Variant};
+use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Source, Variant};
+use bouncelight::net::graph::Graph;
 use bouncelight::net::op_facts::KINDS;
 use bouncelight::net::plan::Precision;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 pub const TOLERANCE: f32 = 1e-4;
 pub const TOLERANCE_HALF: f32 = 5e-3;
@@ -32,19 +34,23 @@ fn the_cpu_twin_agrees_with_pytorch_on_every_operator() {
     println!("{} graphs, {} cases, worst {worst:?}", graphs.len(), cases.values().map(Vec::len).sum::<usize>());
 }
 
-/// Runs every `each`-th graph, from the `first`, at up to `sizes` sizes in the way that `options` say.
-fn check_kernels(gpu: &Gpu, options: Options, first: usize, each: usize, sizes: usize) {
+/// Runs the graphs that `wanted` picks at up to `sizes` sizes in the way that `options` say, with compiled kernels shared.
+fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usize, wanted: impl Fn(&Graph) -> bool) {
     let (cases, metadata) = cases("operators.safetensors");
     let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
+    let start = std::time::Instant::now();
     let mut faults = Vec::new();
     let mut worst = (0f32, String::new());
-    for (name, graph) in graphs(&metadata.unwrap()).iter().skip(first).step_by(each) {
+    for (name, graph) in graphs(&metadata.unwrap()).iter().filter(|(_, g)| wanted(g)) {
         let weights = hashed::network(graph);
         let mut network: Option<Network> = None;
         for case in cases[name].iter().rev().take(sizes) {
             let input = hashed::input(name, graph.input_channels, case.size);
             let next = match network.take() {
-                None => Network::with_options(&gpu.device, &gpu.queue, &weights, case.size, options),
+                None => {
+                    let handles = (&gpu.device, &gpu.queue);
+                    Network::sharing(handles, &weights, case.size, options, Arc::default(), pipelines.clone())
+                }
                 Some(last) => last.rebuilt(&gpu.device, &gpu.queue, &weights, case.size),
             };
             let found = run_network(gpu, network.insert(next.unwrap()), &input);
@@ -56,7 +62,7 @@ fn check_kernels(gpu: &Gpu, options: Options, first: usize, each: usize, sizes: 
             worst = if e > worst.0 { (e, name.clone()) } else { worst };
         }
     }
-    println!("{options:?}: worst {worst:?}");
+    println!("{options:?}: worst {worst:?}, {} kernels, {:.1} s", pipelines.len(), start.elapsed().as_secs_f64());
     assert!(faults.is_empty(), "{options:?}\n{}", faults.join("\n"));
 }
 
@@ -67,10 +73,14 @@ const HALF: Options = Options { precision: Precision::F16, ..FULL };
 fn permutations() -> Vec<Variant> {
     let mut all = Vec::new();
     for vectors in 1..=4 {
-        all.push(fixed(Source::Lanes, true, vectors));
+        let parts = [1, 3][vectors as usize % 2];
+        all.push(Variant::Fixed(Permutation { parts, ..Permutation::new(Source::Lanes, true, vectors) }));
         for mirror in [false, true] {
             all.extend([Source::Uniform, Source::Storage].map(|weights| fixed(weights, mirror, vectors)));
         }
+    }
+    for (vectors, parts, half) in [(1, 1, false), (2, 1, false), (2, 3, false), (1, 1, true), (2, 4, true)] {
+        all.push(Variant::Fixed(Permutation { parts, half, ..Permutation::new(Source::Staged, false, vectors) }));
     }
     all
 }
@@ -78,25 +88,12 @@ fn permutations() -> Vec<Variant> {
 #[test]
 fn the_kernels_agree_on_every_operator() {
     let Some(gpu) = common::gpu() else { return };
-    // Narrow tiles: most of the time goes into compilation, which grows with the tile.
-    check_kernels(&gpu, Options { variant: fixed(Source::Lanes, true, 1), ..FULL }, 0, 1, 1);
-    // A fifth of the graphs in each of the other ways; all of them in the test below.
-    check_kernels(&gpu, FULL, 0, 5, 1);
-    check_kernels(&gpu, Options { fuse: false, variant: Variant::Plain, ..FULL }, 1, 5, 1);
-    check_kernels(&gpu, HALF, 3, 5, 1);
-    check_kernels(&gpu, Options { variant: fixed(Source::Uniform, false, 3), ..FULL }, 2, 5, 1);
-    check_kernels(&gpu, Options { variant: fixed(Source::Storage, true, 2), ..HALF }, 4, 5, 1);
-}
-
-#[test]
-#[ignore = "minutes: every graph in every way; run it after a change of kernels"]
-fn the_kernels_agree_in_every_way() {
-    let Some(gpu) = common::gpu() else { return };
     for variant in permutations().into_iter().chain([Variant::Auto, Variant::Plain]) {
         for precision in [Precision::F32, Precision::F16] {
+            let pipelines = Pipelines::default();
             let options = Options { variant, precision, ..FULL };
-            check_kernels(&gpu, options, 0, 1, usize::MAX);
-            check_kernels(&gpu, Options { fuse: false, ..options }, 0, 1, usize::MAX);
+            check_kernels(&gpu, &pipelines, options, usize::MAX, |_| true);
+            check_kernels(&gpu, &pipelines, Options { fuse: false, ..options }, usize::MAX, |_| true);
         }
     }
 }

@@ -22,7 +22,7 @@ fn a_cache_survives_its_text_and_knows_its_device() {
     assert_eq!(Cache::parse(&cache.text()).unwrap(), cache);
     assert_eq!(VERSION, 2, "adapt the texts here");
     let known = cache.tuned(&info("a", "1"));
-    assert_eq!(known["layer"], Permutation { weights: Source::Uniform, mirror: false, vectors: 2 });
+    assert_eq!(known["layer"], Permutation::new(Source::Uniform, false, 2));
     // Negative control: another adapter, another driver.
     assert!(cache.tuned(&info("b", "1")).is_empty() && cache.tuned(&info("a", "2")).is_empty());
 }
@@ -84,8 +84,8 @@ fn wishes_that_cannot_be_met_do_no_harm() {
     let plain = Network::new(&gpu.device, &gpu.queue, &weights, size).unwrap();
     let layer = plain.kernels().next().unwrap().layer.unwrap().to_string();
     for wish in [
-        Permutation { weights: Source::Lanes, mirror: false, vectors: 4000 },
-        Permutation { weights: Source::Uniform, mirror: true, vectors: 0 },
+        Permutation { parts: 4000, half: true, ..Permutation::new(Source::Lanes, false, 4000) },
+        Permutation::new(Source::Uniform, true, 0),
     ] {
         let tuned: Tuned = [(layer.clone(), wish)].into();
         let network =
