@@ -37,11 +37,15 @@ fn every_shader_validates_in_every_permutation() {
     let permutations = permutations();
     for (name, prelude) in &permutations {
         let (module, text) = parse(name, prelude);
-        let more = match name {
-            _ if name.contains("_lanes") => naga::valid::Capabilities::SUBGROUP,
-            _ if name.contains("_arithmetic") => naga::valid::Capabilities::SHADER_FLOAT16,
-            _ => naga::valid::Capabilities::empty(),
-        };
+        let needs = [
+            ("_lanes", naga::valid::Capabilities::SUBGROUP),
+            ("_arithmetic", naga::valid::Capabilities::SHADER_FLOAT16),
+            ("_words", naga::valid::Capabilities::SHADER_INT64),
+        ];
+        let more = needs
+            .into_iter()
+            .filter(|(part, _)| name.contains(part))
+            .fold(naga::valid::Capabilities::empty(), |all, (_, needed)| all | needed);
         // These alone need an optional feature, and are taken only where the device has it.
         assert_eq!(validate(&module).is_err(), !more.is_empty(), "{name}");
         validate_with(&module, more).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
@@ -50,10 +54,10 @@ fn every_shader_validates_in_every_permutation() {
     assert_eq!(seen.len(), shaders::all().count(), "every row of the table was seen");
     assert_eq!(
         (shaders::RENDER.len(), shaders::GI.len(), shaders::NET.len(), shaders::REFERENCE.len()),
-        (8, 21, 59, 3)
+        (8, 21, 67, 3)
     );
     assert_eq!(shaders::VIEWER.len(), 3);
-    assert_eq!(permutations.len(), 638);
+    assert_eq!(permutations.len(), 701);
 }
 
 #[test]

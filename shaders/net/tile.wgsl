@@ -1,15 +1,17 @@
 // What the blocked convolutions share: a thread makes two columns by four rows of pixels and VECTORS (1 to 4) vectors of output
 // channels of them. Tiles are counted row by row through the whole picture, so a workgroup of a small picture is full too.
-// From the prelude: KERNEL_W, KERNEL_H, VECTORS; place.wgsl and whole.wgsl or parts.wgsl come before.
+// From the prelude: KERNEL_W, KERNEL_H, VECTORS; place.wgsl and whole.wgsl or parts.wgsl come before, make.wgsl after.
+
+const TILE = vec2u(2u, 4u);
 
 // One vector of each pixel of the tile, row by row.
 struct Eight { p0: vec4f, p1: vec4f, p2: vec4f, p3: vec4f, p4: vec4f, p5: vec4f, p6: vec4f, p7: vec4f }
 
 var<private> place: Place;
-// The tile's first pixel among those of its phase, and its sums: one `Eight` an output vector.
+// The tile's first pixel among those of its phase, and where the channels begin that the group reads.
 var<private> corner: vec2u;
-// Where the channels begin that the group reads.
 var<private> inputs: u32;
+// The tile's sums: one `Eight` an output vector.
 var<private> a: Eight;
 var<private> b: Eight;
 var<private> c: Eight;
@@ -42,6 +44,14 @@ fn take(at: u32, v: Eight) {
     }
 }
 
+// Begins the sums with the bias.
+fn begin(bias: mat4x4f) {
+    a = all_of(bias[0]);
+    b = all_of(bias[1]);
+    c = all_of(bias[2]);
+    d = all_of(bias[3]);
+}
+
 // Writes the vectors that exist of the pixels that exist. A loop on purpose: unrolled it is most of a kernel's compilation.
 fn write() {
     let first = place.block * VECTORS;
@@ -58,28 +68,4 @@ fn write() {
             done(sums[i], place.part, pixel.y * step.out_size.x + pixel.x, first + i / 8u);
         }
     }
-}
-
-// The whole work of thread `local` of workgroup `group`. `convolve(first, count)` adds what the taps see of `count` input vectors, the
-// weights of this block of output channels beginning at `first`.
-fn make(group: vec3u, groups: vec3u, local: u32) {
-    place = place_of(group.z);
-    let size = made(place.phase);
-    let across = (size.x + 1u) / 2u;
-    let tile = (group.y * groups.x + group.x) * 64u + local;
-    corner = vec2u(tile % across * 2u, tile / across * 4u);
-    let each = KERNEL_W * KERNEL_H * VECTORS;
-    let begin = place.stored * (1u + each * step.in_vectors);
-    let start = first_input(place.part);
-    inputs = step.input + place.block * VECTORS / step.group * step.in_vectors + start;
-    // The first part of the sum begins with the bias.
-    let bias = weight(begin) * select(0.0, 1.0, place.part == 0u);
-    a = all_of(bias[0]);
-    b = all_of(bias[1]);
-    c = all_of(bias[2]);
-    d = all_of(bias[3]);
-    // Threads without a tile add nothing, but where threads exchange weights they stay with the others.
-    let count = end_input(place.part) - start;
-    convolve(begin + 1u + start * each, select(0u, count, any_here(corner.y < size.y)));
-    write();
 }

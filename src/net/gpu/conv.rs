@@ -146,7 +146,11 @@ impl Kernel {
             prelude.feature = if half { "enable f16;\n" } else { "" };
             return format!("conv_staged{arithmetic}{cut}");
         }
-        self.groups = in_rows((columns.div_ceil(2) * rows.div_ceil(4)).div_ceil(THREADS));
+        let [wide, high] = if self.pairs { [4, 4] } else { [2, 4] };
+        // A processor needs no more threads than its vectors are wide, and smaller groups share small pictures out better.
+        let threads = if choice.facts.software { THREADS / 4 } else { THREADS };
+        prelude.add("THREADS", threads);
+        self.groups = in_rows((columns.div_ceil(wide) * rows.div_ceil(high)).div_ceil(threads));
         let family = if row { "conv3x3" } else { "conv_any" };
         let input = if mirror && self.bound != Bound::Texture { "_mirror" } else { "" };
         let weights = match self.bound {

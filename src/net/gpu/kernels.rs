@@ -212,7 +212,13 @@ impl Kernel {
         let same = step.reads().all(|t| !half || !plan.tensors[t].full || Some(t) == step.second);
         let mirror = if light && same && choice.mirrors(plan) { "_mirror" } else { "" };
         kernel.mirror |= !mirror.is_empty();
-        kernel.shader = format!("net.{shader}{mirror}{}", if half { "_half" } else { "" });
+        let reads_mirror = ["_lanes", "_mirror"].iter().any(|end| format!("{shader}{mirror}").ends_with(end));
+        let kind = match (half, reads_mirror && choice.facts.words && step.kind != Kind::Moments) {
+            (true, _) => "_half",
+            (false, true) => "_words",
+            (false, false) => "",
+        };
+        kernel.shader = format!("net.{shader}{mirror}{kind}");
         kernel.prelude = prelude.text();
         kernel
     }

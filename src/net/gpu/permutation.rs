@@ -14,7 +14,7 @@ const MAX_UNIFORM: u64 = 64 << 10;
 /// Workgroups that keep a large GPU busy: some for each of its processors.
 const CROWD: u32 = 256;
 /// Most parts of a sum.
-const MAX_PARTS: u32 = 64;
+pub const MAX_PARTS: u32 = 64;
 /// Most bytes of a sum's parts.
 const MAX_PARTIAL: u64 = 16 << 20;
 /// Bytes of one matrix of weights in 32 bits.
@@ -102,16 +102,20 @@ pub struct Facts {
     pub software: bool,
     /// Shaders can calculate in 16 bits.
     pub half: bool,
+    /// Shaders on the processor can store words of 64 bits.
+    pub words: bool,
 }
 
 impl Facts {
     /// Of a device.
     pub fn of(device: &wgpu::Device) -> Self {
         let info = device.adapter_info();
+        let software = info.device_type == wgpu::DeviceType::Cpu;
         Self {
             lanes: device.features().contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= 8,
-            software: info.device_type == wgpu::DeviceType::Cpu,
+            software,
             half: device.features().contains(wgpu::Features::SHADER_F16),
+            words: software && device.features().contains(wgpu::Features::SHADER_INT64),
         }
     }
 }
