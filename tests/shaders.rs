@@ -49,6 +49,10 @@ fn every_shader_validates_in_every_permutation() {
         // These alone need an optional feature, and are taken only where the device has it.
         assert_eq!(validate(&module).is_err(), !more.is_empty(), "{name}");
         validate_with(&module, more).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
+        let shared = module.global_variables.iter().filter(|(_, v)| v.space == naga::AddressSpace::WorkGroup);
+        let bytes: u32 = shared.map(|(_, v)| module.types[v.ty].inner.size(module.to_ctx())).sum();
+        // WebGPU's default limit.
+        assert!(bytes <= 16384, "{name}: {bytes} bytes of a workgroup's memory");
     }
     let seen: std::collections::BTreeSet<_> = permutations.iter().map(|p| p.0).collect();
     assert_eq!(seen.len(), shaders::all().count(), "every row of the table was seen");

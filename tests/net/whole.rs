@@ -6,7 +6,7 @@ use crate::{common, run_gpu, run_network};
 use bouncelight::net::arch;
 use bouncelight::net::convert::{Arch, Norm};
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Network, Options, Variant};
+use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Tuned, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::{self, Plan, Precision};
 
@@ -99,6 +99,40 @@ fn another_norm_is_noticed() {
     let input = hashed::input("pix2pix_instance", 12, case.size);
     let other = hashed::network(&generator("pix2pix_group", 4));
     assert!(case.error(&cpu::run(&other, &input).unwrap()) > 100.0 * TOLERANCE_HALF);
+}
+
+/// On a GPU every convolution of the paper's generator, down to 4×2 pixels, has a permutation of at least 128 workgroups in one
+/// dispatch, and its parts of sums, written and read, move less than it moves anyhow.
+#[test]
+fn small_pictures_can_fill_a_gpu() {
+    let plan = Plan::new(&generator("pix2pix_group", 64), 1024, 512).unwrap();
+    let facts = Facts { lanes: false, software: false, half: false, words: false };
+    let (mut starved, mut small) = (0, 0);
+    for step in &plan.steps {
+        let way = |variant| Kernel::choose(&plan, step, &Choice { variant, tuned: &Tuned::new(), facts });
+        let Some(layer) = way(Variant::Auto).layer else { continue };
+        let groups = |p: &Permutation| {
+            let kernel = way(Variant::Fixed(*p));
+            assert_eq!(kernel.permutation, Some(*p));
+            kernel.parts.iter().map(|part| kernel.workgroups(part).iter().product::<u32>()).max().unwrap_or(0)
+        };
+        let candidates = layer.candidates(&plan, facts);
+        let whole = candidates.iter().filter(|p| p.parts == 1).map(groups).max().unwrap();
+        let best = candidates.iter().max_by_key(|p| groups(p)).unwrap();
+        let sum = way(Variant::Fixed(*best)).sum.map_or(0, |s| s.bytes);
+        println!(
+            "{:<16}{layer}: guess {}, whole {whole}, {best} {}, parts {sum} bytes",
+            step.name,
+            groups(&candidates[0]),
+            groups(best)
+        );
+        assert!(groups(best) >= 128, "{}", step.name);
+        assert!(2 * sum < step.traffic, "{}: {sum} bytes of parts", step.name);
+        starved += u32::from(groups(&candidates[0]) < 128);
+        small += u32::from(whole < 128);
+    }
+    // Negative control: without parts there are layers that cannot, and the guess is worse.
+    assert!(small > 2 && starved > small, "{small} {starved}");
 }
 
 #[test]

@@ -148,8 +148,8 @@ impl std::fmt::Display for Layer {
 pub type Tuned = HashMap<String, Permutation>;
 
 impl Layer {
-    /// Every permutation worth timing here, the guess first. On processors buffers are several times slower than textures, and work
-    /// groups' memory is no faster than any other, so what needs them is left out, and 16-bit arithmetic, which they convert.
+    /// Every permutation worth timing here, the guess first. On processors buffers are several times slower than textures, a workgroup's
+    /// memory is no faster than any other, 16-bit arithmetic is converted, and a few workgroups are enough: all that is left out there.
     pub fn candidates(&self, plan: &Plan, facts: Facts) -> Vec<Permutation> {
         let mut vectors: Vec<u32> = (1..=self.out_vectors.min(4)).collect();
         vectors.sort_by_key(|v| self.rounds(*v));
@@ -168,7 +168,8 @@ impl Layer {
                 );
             }
         }
-        let parts = wanted.clone().into_iter().flat_map(|p| self.parts(p).map(move |parts| Permutation { parts, ..p }));
+        let cut = wanted.clone().into_iter().filter(|_| !facts.software);
+        let parts = cut.flat_map(|p| self.parts(p).map(move |parts| Permutation { parts, ..p }));
         let mut found = vec![self.guess(plan, facts)];
         for wanted in wanted.iter().copied().chain(parts) {
             if self.fitted(wanted, plan, facts) == wanted && !found.contains(&wanted) {
