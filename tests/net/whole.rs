@@ -2,13 +2,14 @@
 
 use crate::hashed::{self, cases};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
-use crate::{common, run_gpu, run_network};
+use crate::{common, run_network};
 use bouncelight::net::arch;
 use bouncelight::net::convert::{Arch, Norm};
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Tuned, Variant};
+use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Pipelines, Tuned, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::{self, Plan, Precision};
+use std::sync::Arc;
 
 fn generator(name: &str, width: u32) -> Graph {
     match name {
@@ -22,6 +23,7 @@ fn generator(name: &str, width: u32) -> Graph {
 /// Each generator on the CPU; on the GPU in `ways`.
 fn check_generators(ways: impl Fn(&str) -> Vec<Options>) {
     let gpu = common::gpu();
+    let pipelines = Pipelines::default();
     let (cases, _) = cases("networks.safetensors");
     for (name, cases) in cases {
         let weights = hashed::network(&generator(&name, 4));
@@ -34,7 +36,10 @@ fn check_generators(ways: impl Fn(&str) -> Vec<Options>) {
             let Some(gpu) = &gpu else { continue };
             for options in ways(&name).into_iter().filter(|_| case.size[0] == 256 || name.contains("batch")) {
                 let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
-                let found = run_gpu(gpu, &weights, &input, options);
+                let handles = (&gpu.device, &gpu.queue);
+                let network =
+                    Network::sharing(handles, &weights, case.size, options, Arc::default(), pipelines.clone()).unwrap();
+                let found = run_network(gpu, &network, &input);
                 let e = case.error(&found).max(hashed::error(&found.data, &twin.data));
                 println!("{name} {:?}: {options:?} {e:.2e}", case.size);
                 assert!(e <= tolerance, "{name} {:?} {options:?}: relative error {e}", case.size);
