@@ -2,11 +2,11 @@
 
 use crate::hashed::{self, cases};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
-use crate::{common, run_network};
+use crate::{common, fixed, run_network};
 use bouncelight::net::arch;
 use bouncelight::net::convert::{Arch, Norm};
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Pipelines, Tuned, Variant};
+use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Pipelines, Source, Tuned, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::{self, Plan, Precision};
 use std::sync::Arc;
@@ -138,6 +138,35 @@ fn small_pictures_can_fill_a_gpu() {
     }
     // Negative control: without parts there are layers that cannot, and the guess is worse.
     assert!(small > 2 && starved > small, "{small} {starved}");
+}
+
+/// Weights of all phases of a transposed convolution that are more than one binding holds go into several dispatches.
+#[test]
+fn weights_are_bound_in_pieces_that_fit() {
+    let up = serde_json::json!({"op": "conv_transpose2d", "name": "u", "input": "input", "output": "y", "in_channels": 2048,
+        "out_channels": 1024, "kernel": [4, 4], "stride": 2, "padding": 1});
+    let graph = hashed::graphs(&serde_json::json!({"g": {"input_channels": 2048, "ops": [up]}})).remove("g").unwrap();
+    let plan = Plan::new(&graph, 4, 2).unwrap();
+    let facts = Facts { lanes: true, software: false, half: false, words: false };
+    for variant in [
+        Variant::Auto,
+        Variant::Plain,
+        fixed(Source::Lanes, true, 4),
+        fixed(Source::Storage, false, 1),
+        fixed(Source::Staged, false, 2),
+    ] {
+        let kernel = Kernel::choose(&plan, &plan.steps[0], &Choice { variant, tuned: &Tuned::new(), facts });
+        let mut blocks = 0;
+        for part in &kernel.parts {
+            assert_eq!(part.first_block, blocks);
+            blocks += part.blocks;
+        }
+        assert_eq!(blocks, 4 * 256u32.div_ceil(kernel.vectors), "{variant:?}: every phase once");
+        let all: u64 = kernel.bound_bytes() * kernel.parts.len() as u64;
+        assert!(all > 128 << 20, "{variant:?}: {all}");
+        let texture = kernel.permutation.is_some_and(|p| p.weights == Source::Lanes);
+        assert!(texture || kernel.bound_bytes() <= 128 << 20, "{variant:?}: {} bytes", kernel.bound_bytes());
+    }
 }
 
 #[test]

@@ -9,6 +9,9 @@ use super::kernels::{Bound, Choice, GROUP, Kernel, Part, Prelude, Sum, THREADS, 
 use super::permutation::{Layer, Permutation, Source, Variant};
 use crate::net::graph::Shape;
 
+/// WebGPU's default limit of workgroups in one dimension.
+const MAX_DEPTH: u32 = 65535;
+
 /// The convolution kernel's view of a layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Filter {
@@ -101,8 +104,14 @@ impl Kernel {
         let blocks = out.vectors().div_ceil(self.vectors);
         let all = blocks * filter.spread * filter.spread;
         let uniform = self.bound == Bound::Uniform;
-        let dispatches = if uniform { all.div_ceil(layer.uniform_blocks(vectors)) } else { 1 };
-        self.blocks_per_part = all.div_ceil(dispatches);
+        // As many blocks a dispatch as a binding of weights, and its workgroups in z, allow; staged kernels need all at once.
+        let bound = match self.bound {
+            Bound::Uniform => layer.uniform_blocks(vectors),
+            Bound::Storage | Bound::Half if !staged => layer.storage_blocks(self.vectors),
+            _ => all,
+        };
+        let deep = if permutation.is_none() { vectors } else { parts };
+        self.blocks_per_part = all.div_ceil(all.div_ceil(bound.min(MAX_DEPTH / deep)));
         let part = |first_block| {
             let blocks = self.blocks_per_part.min(all - first_block);
             Part { first_block, blocks, depth: blocks * parts }

@@ -17,6 +17,10 @@ const CROWD: u32 = 256;
 pub const MAX_PARTS: u32 = 64;
 /// Most bytes of a sum's parts.
 const MAX_PARTIAL: u64 = 16 << 20;
+/// WebGPU's default limit of one storage binding.
+const MAX_STORAGE: u64 = 128 << 20;
+/// Most blocks of a staged kernel: with all its parts they stay below WebGPU's default limit of workgroups in one dimension.
+const MAX_STAGED: u32 = 65535 / MAX_PARTS * 2;
 /// Bytes of one matrix of weights in 32 bits.
 pub const MATRIX: u64 = 64;
 
@@ -235,7 +239,9 @@ impl Layer {
         let texels = (matrices * u64::from(blocks) * 4).div_ceil(3) * 4;
         let weights = match wanted.weights {
             Source::Lanes if facts.lanes && mirror && texels.div_ceil(ROW) <= MAX_ROWS => Source::Lanes,
-            Source::Staged if !grouped => Source::Staged,
+            Source::Staged if !grouped && self.stored_blocks() <= self.storage_blocks(1).min(MAX_STAGED) => {
+                Source::Staged
+            }
             Source::Storage | Source::Staged => Source::Storage,
             _ if plan.precision == Precision::F16 || matrices * MATRIX > MAX_UNIFORM => Source::Storage,
             _ => Source::Uniform,
@@ -257,6 +263,16 @@ impl Layer {
     /// How many blocks of output channels fit into one uniform binding.
     pub(super) fn uniform_blocks(&self, vectors: u32) -> u32 {
         ((MAX_UNIFORM / (self.filter.matrices(vectors) * MATRIX)) as u32).max(1)
+    }
+
+    /// How many fit into one storage binding.
+    pub(super) fn storage_blocks(&self, vectors: u32) -> u32 {
+        ((MAX_STORAGE / (self.filter.matrices(vectors) * MATRIX)) as u32).max(1)
+    }
+
+    /// Blocks of one vector of output channels, of all phases.
+    fn stored_blocks(&self) -> u32 {
+        self.out_vectors * self.filter.spread * self.filter.spread
     }
 
     /// What runs: as `variant` says, with what has been measured. `None` for the plain kernel.
