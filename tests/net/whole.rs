@@ -20,10 +20,13 @@ fn generator(name: &str, width: u32) -> Graph {
     }
 }
 
+/// Unfused, each norm's input is rounded to 16 bits once more, so what rounding adds grows by up to √2. Nothing but tests runs so.
+const TOLERANCE_HALF_UNFUSED: f32 = 7e-3;
+
 /// Each generator on the CPU; on the GPU in `ways`.
-fn check_generators(ways: impl Fn(&str) -> Vec<Options>) {
+fn check_generators(ways: &[Options]) {
     let gpu = common::gpu();
-    let pipelines = Pipelines::default();
+    let (pipelines, mut faults) = (Pipelines::default(), Vec::new());
     let (cases, _) = cases("networks.safetensors");
     for (name, cases) in cases {
         let weights = hashed::network(&generator(&name, 4));
@@ -34,36 +37,33 @@ fn check_generators(ways: impl Fn(&str) -> Vec<Options>) {
             println!("{name} {:?}: CPU {e:.1e}", case.size);
             assert!(e <= TOLERANCE, "{name} {:?} on the CPU: relative error {e}", case.size);
             let Some(gpu) = &gpu else { continue };
-            for options in ways(&name).into_iter().filter(|_| case.size[0] == 256 || name.contains("batch")) {
-                let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
+            for &options in ways {
+                let tolerance = match (options.precision, options.fuse) {
+                    (Precision::F32, _) => TOLERANCE,
+                    (Precision::F16, true) => TOLERANCE_HALF,
+                    (Precision::F16, false) => TOLERANCE_HALF_UNFUSED,
+                };
                 let handles = (&gpu.device, &gpu.queue);
                 let network =
                     Network::sharing(handles, &weights, case.size, options, Arc::default(), pipelines.clone()).unwrap();
                 let found = run_network(gpu, &network, &input);
                 let e = case.error(&found).max(hashed::error(&found.data, &twin.data));
                 println!("{name} {:?}: {options:?} {e:.2e}", case.size);
-                assert!(e <= tolerance, "{name} {:?} {options:?}: relative error {e}", case.size);
+                if e > tolerance {
+                    faults.push(format!("{name} {:?} {options:?}: relative error {e}", case.size));
+                }
             }
         }
     }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 const HALF: Options = Options { variant: Variant::Auto, precision: Precision::F16, dropout: None, fuse: true };
 
 #[test]
 fn the_generators_agree_with_pytorch() {
-    check_generators(|name| match name {
-        "pix2pix_group" => vec![Options::default(), HALF],
-        "deep_illumination" => vec![Options::default()],
-        _ => Vec::new(),
-    });
-}
-
-#[test]
-#[ignore = "minutes: every generator in every way; run it after a change of kernels"]
-fn the_generators_agree_in_every_way() {
     let full = Options::default();
-    check_generators(|_| vec![full, HALF, Options { fuse: false, ..full }, Options { fuse: false, ..HALF }]);
+    check_generators(&[full, HALF, Options { fuse: false, ..full }, Options { fuse: false, ..HALF }]);
 }
 
 /// Needs what `make_operators.py --full` has written, named by `BOUNCELIGHT_FULL`. Times and errors are in docs/network.md.
