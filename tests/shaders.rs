@@ -37,20 +37,31 @@ fn every_shader_validates_in_every_permutation() {
     let permutations = permutations();
     for (name, prelude) in &permutations {
         let (module, text) = parse(name, prelude);
-        let lanes = name.contains("_lanes");
+        let needs = [
+            ("_lanes", naga::valid::Capabilities::SUBGROUP),
+            ("_arithmetic", naga::valid::Capabilities::SHADER_FLOAT16),
+            ("_words", naga::valid::Capabilities::SHADER_INT64),
+        ];
+        let more = needs
+            .into_iter()
+            .filter(|(part, _)| name.contains(part))
+            .fold(naga::valid::Capabilities::empty(), |all, (_, needed)| all | needed);
         // These alone need an optional feature, and are taken only where the device has it.
-        assert_eq!(validate(&module).is_err(), lanes, "{name}");
-        let more = if lanes { naga::valid::Capabilities::SUBGROUP } else { naga::valid::Capabilities::empty() };
+        assert_eq!(validate(&module).is_err(), !more.is_empty(), "{name}");
         validate_with(&module, more).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
+        let shared = module.global_variables.iter().filter(|(_, v)| v.space == naga::AddressSpace::WorkGroup);
+        let bytes: u32 = shared.map(|(_, v)| module.types[v.ty].inner.size(module.to_ctx())).sum();
+        // WebGPU's default limit.
+        assert!(bytes <= 16384, "{name}: {bytes} bytes of a workgroup's memory");
     }
     let seen: std::collections::BTreeSet<_> = permutations.iter().map(|p| p.0).collect();
     assert_eq!(seen.len(), shaders::all().count(), "every row of the table was seen");
     assert_eq!(
         (shaders::RENDER.len(), shaders::GI.len(), shaders::NET.len(), shaders::REFERENCE.len()),
-        (8, 21, 47, 3)
+        (8, 21, 67, 3)
     );
     assert_eq!(shaders::VIEWER.len(), 3);
-    assert_eq!(permutations.len(), 490);
+    assert_eq!(permutations.len(), 704);
 }
 
 #[test]

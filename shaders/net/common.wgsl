@@ -9,17 +9,30 @@ struct Step {
     output: u32,
     skip: u32,
     second: u32,
-    // Columns and rows of padding at the left and the top.
+    // Columns and rows of padding at the left and the top; of phase p (see place.wgsl) ⌊(p + base) / SPREAD⌋ less.
     pad: vec2i,
-    // Which of the interleaved pictures of a transposed convolution this dispatch makes.
-    phase: vec2u,
-    // First block of output channels of this dispatch.
+    base: vec2i,
+    // First block of output channels of this dispatch, counted through the phases, and blocks of a phase.
     first_block: u32,
+    blocks: u32,
+    // Parts into which the sum over input channels is split.
+    parts: u32,
+    // Channels and four-channel vectors of the input that one output reads; vectors from pixel to pixel.
+    in_channels: u32,
+    in_vectors: u32,
+    in_pitch: u32,
+    // Of the output, and of the skip.
+    out_channels: u32,
+    out_vectors: u32,
+    out_pitch: u32,
+    skip_pitch: u32,
+    // Output vectors that read the same input channels; in a norm, channels with common statistics.
+    group: u32,
     // Dropout: the operator's random stream, values below the threshold are dropped, the others multiplied by `keep`.
     stream: u32,
     threshold: u32,
     keep: f32,
-    // Of the leaky ReLU.
+    // What the activation multiplies negative values with.
     slope: f32,
     // Of a norm.
     epsilon: f32,

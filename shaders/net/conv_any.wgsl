@@ -1,12 +1,13 @@
 // Any convolution: 1×1 and strided ones, whose taps share little, and each phase of a transposed one. From the prelude:
-// KERNEL_W, KERNEL_H, STRIDE, IN_VECTORS.
+// KERNEL_W, KERNEL_H, STRIDE.
 
 fn convolve(first: u32, count: u32) {
     let s = i32(STRIDE);
+    let pad = padding(place.phase);
     for (var ky = 0u; ky < KERNEL_H; ky++) {
         for (var kx = 0u; kx < KERNEL_W; kx++) {
-            let x = i32(corner.x * STRIDE + kx) - step.pad.x;
-            let y = i32(corner.y * STRIDE + ky) - step.pad.y;
+            let x = i32(corner.x * STRIDE + kx) - pad.x;
+            let y = i32(corner.y * STRIDE + ky) - pad.y;
             let t0 = tap(x, y); let t1 = tap(x + s, y);
             let t2 = tap(x, y + s); let t3 = tap(x + s, y + s);
             let t4 = tap(x, y + 2 * s); let t5 = tap(x + s, y + 2 * s);

@@ -1,9 +1,9 @@
 // What follows a kernel's work: skip, activation, dropout, and the write.
-// From the prelude: ACTIVATION (`Activation::code`), ADD (0 no skip, 1 before, 2 after the activation), DROPOUT (0 or 1),
-// OUT_CHANNELS, and the distances of pixels OUT_PITCH and SKIP_PITCH.
+// From the prelude: ACTIVATION (`Activation::code`, 2 for all that are linear on both sides of zero), ADD (0 no skip, 1 before, 2 after
+// the activation), DROPOUT (0 or 1).
 
 fn activate(x: vec4f) -> vec4f {
-    if ACTIVATION == 1u { return max(x, vec4f(0.0)); }
+    // With a slope of 1 nothing, with 0 a ReLU.
     if ACTIVATION == 2u { return select(step.slope * x, x, x > vec4f(0.0)); }
     // Beyond 10 the tangent is 1 in f32; some drivers' own overflows.
     if ACTIVATION == 3u { return tanh(clamp(x, vec4f(-10.0), vec4f(10.0))); }
@@ -32,13 +32,13 @@ fn dropped(v: vec4f, first: u32) -> vec4f {
 // Finishes vector `vector` of output pixel `pixel`, counted row by row.
 fn finish(value: vec4f, pixel: u32, vector: u32) {
     var v = value;
-    if ADD == 1u { v += load(step.skip + pixel * SKIP_PITCH + vector); }
+    if ADD == 1u { v += load(step.skip + pixel * step.skip_pitch + vector); }
     v = activate(v);
-    if ADD == 2u { v += load(step.skip + pixel * SKIP_PITCH + vector); }
-    if DROPOUT == 1u { v = dropped(v, pixel * OUT_CHANNELS + vector * 4u); }
+    if ADD == 2u { v += load(step.skip + pixel * step.skip_pitch + vector); }
+    if DROPOUT == 1u { v = dropped(v, pixel * step.out_channels + vector * 4u); }
     // Channels that only pad stay zero, whatever the function makes of zero.
-    if ACTIVATION >= 4u && OUT_CHANNELS % 4u != 0u {
-        v = select(vec4f(0.0), v, vec4u(vector * 4u) + vec4u(0u, 1u, 2u, 3u) < vec4u(OUT_CHANNELS));
+    if ACTIVATION >= 4u && step.out_channels % 4u != 0u {
+        v = select(vec4f(0.0), v, vec4u(vector * 4u) + vec4u(0u, 1u, 2u, 3u) < vec4u(step.out_channels));
     }
-    store(step.output + pixel * OUT_PITCH + vector, v);
+    store(step.output + pixel * step.out_pitch + vector, v);
 }

@@ -1,6 +1,5 @@
 // The second level of a norm: one workgroup merges the tiles of all channels of a group, two at a time (Chan, Golub and
-// LeVeque 1983), and writes mean, scale and shift of each of its channels. From the prelude: IN_VECTORS, CHANNELS,
-// PER_GROUP (channels of a group).
+// LeVeque 1983), and writes mean, scale and shift of each of its channels.
 
 // Weights of all channels, then biases.
 @group(0) @binding(2) var<storage, read> trained: array<vec4f>;
@@ -18,15 +17,15 @@ fn union_of(a: vec3f, b: vec3f) -> vec3f {
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) me: u32) {
-    let first = group.x * PER_GROUP;
+    let first = group.x * step.group;
     let pixels = step.in_size.x * step.in_size.y;
     var own = vec3f(0.0);
-    for (var i = me; i < step.tiles * PER_GROUP; i += 64u) {
-        let tile = i / PER_GROUP;
-        let channel = first + i % PER_GROUP;
-        let at = step.input + (tile * 2u * IN_VECTORS + channel / 4u) * FULL;
+    for (var i = me; i < step.tiles * step.group; i += 64u) {
+        let tile = i / step.group;
+        let channel = first + i % step.group;
+        let at = step.input + (tile * 2u * step.in_vectors + channel / 4u) * FULL;
         let mean = load_full(at)[channel % 4u];
-        let squares = load_full(at + IN_VECTORS * FULL)[channel % 4u];
+        let squares = load_full(at + step.in_vectors * FULL)[channel % 4u];
         own = union_of(own, vec3f(f32(min(256u, pixels - tile * 256u)), mean, squares));
     }
     parts[me] = own;
@@ -37,9 +36,9 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) me
     workgroupBarrier();
     let all = parts[0];
     let scale = inverseSqrt(all.z / all.x + step.epsilon);
-    for (var i = me; i < PER_GROUP; i += 64u) { write(first + i, all.y, scale); }
+    for (var i = me; i < step.group; i += 64u) { write(first + i, all.y, scale); }
     // Channels that only pad.
-    if group.x == 0u && CHANNELS + me < IN_VECTORS * 4u { write(CHANNELS + me, 0.0, 0.0); }
+    if group.x == 0u && step.out_channels + me < step.in_vectors * 4u { write(step.out_channels + me, 0.0, 0.0); }
 }
 
 fn write(channel: u32, mean: f32, scale: f32) {
@@ -47,6 +46,6 @@ fn write(channel: u32, mean: f32, scale: f32) {
     let lane = channel % 4u;
     let to = step.output + vector * FULL;
     store_full_lane(to, lane, mean);
-    store_full_lane(to + IN_VECTORS * FULL, lane, scale * trained[vector][lane]);
-    store_full_lane(to + 2u * IN_VECTORS * FULL, lane, trained[IN_VECTORS + vector][lane]);
+    store_full_lane(to + step.in_vectors * FULL, lane, scale * trained[vector][lane]);
+    store_full_lane(to + 2u * step.in_vectors * FULL, lane, trained[step.in_vectors + vector][lane]);
 }

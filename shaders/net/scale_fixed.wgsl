@@ -2,5 +2,5 @@
 @group(0) @binding(2) var<storage, read> trained: array<vec4f>;
 
 fn mean_scale_shift(vector: u32) -> array<vec4f, 3> {
-    return array(trained[vector], trained[IN_VECTORS + vector], trained[2u * IN_VECTORS + vector]);
+    return array(trained[vector], trained[step.in_vectors + vector], trained[2u * step.in_vectors + vector]);
 }

@@ -1,5 +1,5 @@
 // Pixel shuffle (DOWN 0: channels become pixels) and its inverse (DOWN 1), in PyTorch's order.
-// From the prelude: IN_PITCH, OUT_CHANNELS, FACTOR, DOWN.
+// From the prelude: FACTOR, DOWN.
 
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -7,14 +7,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var v = vec4f(0.0);
     for (var lane = 0u; lane < 4u; lane++) {
         let c = id.z * 4u + lane;
-        if c < OUT_CHANNELS {
+        if c < step.out_channels {
             var place = id.xy / FACTOR;
             var channel = (c * FACTOR + id.y % FACTOR) * FACTOR + id.x % FACTOR;
             if DOWN == 1u {
                 place = id.xy * FACTOR + vec2u(c % FACTOR, c / FACTOR % FACTOR);
                 channel = c / (FACTOR * FACTOR);
             }
-            v[lane] = load(step.input + (place.y * step.in_size.x + place.x) * IN_PITCH + channel / 4u)[channel % 4u];
+            v[lane] = load(step.input + (place.y * step.in_size.x + place.x) * step.in_pitch + channel / 4u)[channel % 4u];
         }
     }
     finish(v, id.y * step.out_size.x + id.x, id.z);

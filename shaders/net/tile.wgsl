@@ -1,30 +1,24 @@
 // What the blocked convolutions share: a thread makes two columns by four rows of pixels and VECTORS (1 to 4) vectors of output
 // channels of them. Tiles are counted row by row through the whole picture, so a workgroup of a small picture is full too.
-// From the prelude: IN_PITCH, NEAREST (factor by which the input is enlarged), SPREAD (distance of output pixels: 1, or the
-// stride of a transposed convolution), OUT_VECTORS, VECTORS, IN_VECTORS and GROUP_VECTORS (vectors read by, and written of, a group of
-// channels).
+// From the prelude: KERNEL_W, KERNEL_H, VECTORS; place.wgsl and whole.wgsl or parts.wgsl come before, make.wgsl after.
+
+const TILE = vec2u(2u, 4u);
 
 // One vector of each pixel of the tile, row by row.
 struct Eight { p0: vec4f, p1: vec4f, p2: vec4f, p3: vec4f, p4: vec4f, p5: vec4f, p6: vec4f, p7: vec4f }
 
-// The tile's first pixel among those that this dispatch makes, and its sums: one `Eight` an output vector.
+var<private> place: Place;
+// The tile's first pixel among those of its phase, and where the channels begin that the group reads.
 var<private> corner: vec2u;
-// Where the channels begin that the group reads.
 var<private> inputs: u32;
+// The tile's sums: one `Eight` an output vector.
 var<private> a: Eight;
 var<private> b: Eight;
 var<private> c: Eight;
 var<private> d: Eight;
 
-// Columns and rows that a dispatch makes.
-fn made() -> vec2u { return (step.out_size - step.phase + SPREAD - 1u) / SPREAD; }
-
-// Index of the first vector of pixel (x, y), or of the arena's zeros outside the picture.
-fn tap(x: i32, y: i32) -> u32 {
-    let size = vec2i(step.in_size * NEAREST);
-    let inside = x >= 0 && y >= 0 && x < size.x && y < size.y;
-    return select(0u, inputs + (u32(y) / NEAREST * step.in_size.x + u32(x) / NEAREST) * IN_PITCH, inside);
-}
+// Index of the first vector that the group reads of pixel (x, y), or of the arena's zeros outside the picture.
+fn tap(x: i32, y: i32) -> u32 { return vector_of(inputs, x, y); }
 
 fn all_of(v: vec4f) -> Eight { return Eight(v, v, v, v, v, v, v, v); }
 
@@ -50,37 +44,28 @@ fn take(at: u32, v: Eight) {
     }
 }
 
+// Begins the sums with the bias.
+fn begin(bias: mat4x4f) {
+    a = all_of(bias[0]);
+    b = all_of(bias[1]);
+    c = all_of(bias[2]);
+    d = all_of(bias[3]);
+}
+
 // Writes the vectors that exist of the pixels that exist. A loop on purpose: unrolled it is most of a kernel's compilation.
-fn write(block: u32) {
-    let first = (step.first_block + block) * VECTORS;
-    let end = min(VECTORS, OUT_VECTORS - first) * 8u;
-    var all = array(
+fn write() {
+    let first = place.block * VECTORS;
+    let end = min(VECTORS, step.out_vectors - first) * 8u;
+    let size = made(place.phase);
+    var sums = array(
         a.p0, a.p1, a.p2, a.p3, a.p4, a.p5, a.p6, a.p7, b.p0, b.p1, b.p2, b.p3, b.p4, b.p5, b.p6, b.p7,
         c.p0, c.p1, c.p2, c.p3, c.p4, c.p5, c.p6, c.p7, d.p0, d.p1, d.p2, d.p3, d.p4, d.p5, d.p6, d.p7,
     );
     for (var i = 0u; i < end; i++) {
         let at = corner + vec2u(i % 2u, i % 8u / 2u);
-        if at.x < made().x && at.y < made().y {
-            let pixel = at * SPREAD + step.phase;
-            finish(all[i], pixel.y * step.out_size.x + pixel.x, first + i / 8u);
+        if all(at < size) {
+            let pixel = at * SPREAD + place.phase;
+            done(sums[i], place.part, pixel.y * step.out_size.x + pixel.x, first + i / 8u);
         }
     }
-}
-
-// The whole work of thread `local` of workgroup `group`. `convolve(first, count)` adds what the taps see of the first `count`
-// input vectors, the weights of this block of output channels beginning at `first`.
-fn make(group: vec3u, groups: vec3u, local: u32) {
-    let across = (made().x + 1u) / 2u;
-    let tile = (group.y * groups.x + group.x) * 64u + local;
-    corner = vec2u(tile % across * 2u, tile / across * 4u);
-    let first = group.z * (1u + KERNEL_W * KERNEL_H * IN_VECTORS * VECTORS);
-    inputs = step.input + (step.first_block + group.z) * VECTORS / GROUP_VECTORS * IN_VECTORS;
-    let bias = weight(first);
-    a = all_of(bias[0]);
-    b = all_of(bias[1]);
-    c = all_of(bias[2]);
-    d = all_of(bias[3]);
-    // Threads without a tile add nothing, but where threads exchange weights they stay with the others.
-    convolve(first + 1u, select(0u, IN_VECTORS, any_here(corner.y < made().y)));
-    write(group.z);
 }

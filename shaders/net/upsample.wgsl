@@ -1,9 +1,9 @@
 // Bilinear resampling to the output's size, half-pixel centres, edges clamped (PyTorch's align_corners=False). A thread makes the two by
-// two pixels that begin at odd places: at twice the size they lie between the same four of the input. From the prelude: IN_PITCH, DOUBLE
+// two pixels that begin at odd places: at twice the size they lie between the same four of the input. From the prelude: DOUBLE
 // (1 for exactly twice the size).
 
 fn texel(x: u32, y: u32, c: u32) -> vec4f {
-    return load(step.input + (y * step.in_size.x + x) * IN_PITCH + c);
+    return load(step.input + (y * step.in_size.x + x) * step.in_pitch + c);
 }
 
 // A column of two input pixels.

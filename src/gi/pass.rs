@@ -84,10 +84,10 @@ struct Rebuilt {
 }
 
 impl NeuralGi {
-    /// Features that would be used where the adapter has them: timestamps, by hosts that time passes, and subgroups, by some
-    /// of the network's kernels. None is needed.
+    /// Features that would be used where the adapter has them: timestamps, by hosts that time passes, and what some of the network's
+    /// kernels use. None is needed.
     pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
-        adapter.features() & (wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP)
+        adapter.features() & crate::gpu::wanted_features()
     }
 
     /// Limits that the device must have: WebGPU's defaults.

@@ -196,9 +196,10 @@ impl Gpu {
     }
 }
 
-/// Optional features that are used when present: timestamps for the timing tables, subgroups for some of the network's kernels.
+/// Optional features that are used when present: timestamps for the timing tables, the others for some of the network's kernels.
 pub fn wanted_features() -> wgpu::Features {
-    wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP
+    use wgpu::Features;
+    Features::TIMESTAMP_QUERY | Features::SUBGROUP | Features::SHADER_F16 | Features::SHADER_INT64
 }
 
 /// All adapters that fit the backend choice, best first, with the words for what was searched. GL is only asked when

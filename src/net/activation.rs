@@ -46,12 +46,10 @@ impl Activation {
         }
     }
 
-    /// Number by which the kernels know it; `ACTIVATION` in `shaders/net/activation.wgsl`.
+    /// Number by which the kernels know it; `ACTIVATION` in `shaders/net/epilogue.wgsl`.
     pub fn code(self) -> u32 {
         match self {
-            Activation::None => 0,
-            Activation::Relu => 1,
-            Activation::LeakyRelu(_) => 2,
+            Activation::None | Activation::Relu | Activation::LeakyRelu(_) => 2,
             Activation::Tanh => 3,
             Activation::Sigmoid => 4,
             Activation::Silu => 5,
@@ -60,9 +58,13 @@ impl Activation {
         }
     }
 
-    /// The slope of [`Activation::LeakyRelu`], else 0.
+    /// What those of code 2 multiply negative values with.
     pub fn slope(self) -> f32 {
-        if let Activation::LeakyRelu(slope) = self { slope } else { 0.0 }
+        match self {
+            Activation::None => 1.0,
+            Activation::LeakyRelu(slope) => slope,
+            _ => 0.0,
+        }
     }
 
     /// As the file spells it.

@@ -4,20 +4,24 @@
 //! [`Network::output`]. Recording allocates nothing. The input's memory is reused by later layers.
 
 mod build;
+mod conv;
 mod examples;
 mod kernels;
 mod pack;
 pub mod permutation;
+mod pipelines;
 
 use super::format::Weights;
 use super::graph::Graph;
 use super::plan::{Plan, PlanError, Precision};
 use crate::gpu::timing::Recorder;
 pub use build::StepUniform;
-use build::{Layer, Pipelines, Trained};
+use build::{Layer, Memory, Trained};
+pub use conv::Filter;
 pub use examples::example_preludes;
-pub use kernels::{Bound, Choice, Filter, Kernel, Part};
+pub use kernels::{Bound, Choice, Kernel, Numbers, Part, Sum};
 pub use permutation::{Facts, Permutation, Source, Tuned, Variant};
+pub use pipelines::Pipelines;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -87,10 +91,7 @@ pub struct Network {
     graph: Graph,
     plan: Plan,
     options: Options,
-    arena: wgpu::Buffer,
-    steps: wgpu::Buffer,
-    /// The arena in a texture, where a kernel reads it so.
-    mirror: Option<wgpu::Texture>,
+    memory: Memory,
     layers: Vec<Layer>,
     pipelines: Pipelines,
     tuned: Arc<Tuned>,
@@ -136,37 +137,31 @@ impl Network {
         options: Options,
         tuned: Arc<Tuned>,
     ) -> Result<Self, NetError> {
-        Self::build(device, queue, weights, size, options, Pipelines::default(), tuned)
+        Self::sharing((device, queue), weights, size, options, tuned, Pipelines::default())
     }
 
-    fn build(
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
+    /// As [`Network::tuned`], with compiled kernels that other networks of this device use too.
+    ///
+    /// # Errors
+    /// As [`Network::new`].
+    pub fn sharing(
+        (device, queue): (&wgpu::Device, &wgpu::Queue),
         weights: &Weights,
         size: [u32; 2],
         options: Options,
-        mut pipelines: Pipelines,
         tuned: Arc<Tuned>,
+        pipelines: Pipelines,
     ) -> Result<Self, NetError> {
         let plan = build::plan(device, &weights.graph, size, options)?;
         let choice = Choice { variant: options.variant, tuned: &tuned, facts: Facts::of(device) };
         let kernels: Vec<Kernel> = plan.steps.iter().map(|s| Kernel::choose(&plan, s, &choice)).collect();
         build::check_limits(device, &plan, &kernels)?;
         pipelines.keep(&kernels);
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-        // wgpu clears new buffers; the kernels count on the zeros at the beginning.
-        let element = build::element(&plan);
-        let row = permutation::ROW * element;
-        let mirrored = kernels.iter().any(|k| k.mirror);
-        // Copies take whole rows.
-        let bytes = if mirrored { plan.arena_bytes.next_multiple_of(row) } else { plan.arena_bytes };
-        let arena = build::buffer(device, "net.arena", bytes, usage);
-        let mirror = mirrored.then(|| build::texture(device, "net.mirror", (bytes / row) as u32, element));
-        let steps = build::steps_buffer(device, &kernels);
-        queue.write_buffer(&steps, 0, &build::uniforms(&plan, &kernels, options.dropout));
-        let layers = build::layers(device, &plan, kernels, &mut pipelines, &arena, &steps, mirror.as_ref());
+        let memory = Memory::new(device, &plan, &kernels);
+        queue.write_buffer(&memory.steps, 0, &build::uniforms(&plan, &kernels, options.dropout));
+        let layers = build::layers(device, &plan, kernels, &pipelines, &memory);
         let graph = weights.graph.clone();
-        let network = Self { graph, plan, options, arena, steps, mirror, layers, pipelines, tuned };
+        let network = Self { graph, plan, options, memory, layers, pipelines, tuned };
         network.upload(queue, weights);
         Ok(network)
     }
@@ -183,7 +178,7 @@ impl Network {
         size: [u32; 2],
     ) -> Result<Self, NetError> {
         let Self { options, pipelines, tuned, .. } = self;
-        Self::build(device, queue, weights, size, options, pipelines, tuned)
+        Self::sharing((device, queue), weights, size, options, tuned, pipelines)
     }
 
     /// The same network with what a tuner has found in the meantime. Pipelines that serve again are kept.
@@ -197,7 +192,7 @@ impl Network {
         tuned: Arc<Tuned>,
     ) -> Result<Self, NetError> {
         let Self { options, pipelines, plan, .. } = self;
-        Self::build(device, queue, weights, [plan.width, plan.height], options, pipelines, tuned)
+        Self::sharing((device, queue), weights, [plan.width, plan.height], options, tuned, pipelines)
     }
 
     /// Replaces the trained numbers from the queue's next submission on. Allocates nothing on the GPU.
@@ -217,7 +212,7 @@ impl Network {
         if self.options.dropout.is_some() {
             self.options.dropout = Some(seed);
             let kernels = self.layers.iter().map(|l| &l.kernel);
-            queue.write_buffer(&self.steps, 0, &build::uniforms(&self.plan, kernels, self.options.dropout));
+            queue.write_buffer(&self.memory.steps, 0, &build::uniforms(&self.plan, kernels, self.options.dropout));
         }
     }
 
@@ -260,11 +255,11 @@ impl Network {
     /// Records one step alone, for measurements: its input is whatever lies in the arena.
     pub fn record_step(&self, step: usize, recorder: &mut Recorder<'_>) {
         let layer = &self.layers[step];
-        for (&[first, rows], mirror) in layer.copied.iter().zip(self.mirror.iter().cycle()) {
+        for (&[first, rows], mirror) in layer.copied.iter().zip(self.memory.mirror.iter().cycle()) {
             let element = build::element(&self.plan);
             let mut layout = rows_of(element);
             layout.offset = u64::from(first) * permutation::ROW * element;
-            let from = wgpu::TexelCopyBufferInfo { buffer: &self.arena, layout };
+            let from = wgpu::TexelCopyBufferInfo { buffer: &self.memory.arena, layout };
             let mut to = mirror.as_image_copy();
             to.origin.y = first;
             let size = wgpu::Extent3d { height: rows, ..mirror.size() };
@@ -273,7 +268,13 @@ impl Network {
         recorder.compute(&layer.label, |pass| {
             pass.set_pipeline(&layer.pipeline);
             for (bind_group, part) in layer.bind_groups.iter().zip(&layer.kernel.parts) {
-                let [x, y, z] = layer.kernel.workgroups(part.blocks);
+                let [x, y, z] = layer.kernel.workgroups(part);
+                pass.set_bind_group(0, bind_group, &[]);
+                pass.dispatch_workgroups(x, y, z);
+            }
+            if let (Some((pipeline, bind_group)), Some(sum)) = (&layer.sum, &layer.kernel.sum) {
+                let [x, y, z] = sum.groups;
+                pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, bind_group, &[]);
                 pass.dispatch_workgroups(x, y, z);
             }
@@ -287,8 +288,7 @@ impl Network {
 
     /// GPU memory of tensors, weights and uniforms, bytes.
     pub fn bytes(&self) -> u64 {
-        let mirror = self.mirror.as_ref().map_or(0, build::texture_bytes);
-        self.arena.size() + self.steps.size() + mirror + self.layers.iter().map(|l| l.weights.bytes()).sum::<u64>()
+        self.memory.bytes() + self.layers.iter().map(|l| l.weights.bytes()).sum::<u64>()
     }
 
     /// Dispatches, memory, FLOPs.
@@ -303,7 +303,7 @@ impl Network {
 
     fn tensor(&self, index: usize) -> Binding<'_> {
         let tensor = &self.plan.tensors[index];
-        Binding { buffer: &self.arena, offset: tensor.offset, size: tensor.bytes() }
+        Binding { buffer: &self.memory.arena, offset: tensor.offset, size: tensor.bytes() }
     }
 }
 

@@ -4,8 +4,8 @@
 //! permutations give the same result up to rounding, so a wrong cache costs time, never correctness.
 
 use super::format::Weights;
-use super::gpu::permutation::Layer;
-use super::gpu::{Facts, NetError, Network, Options, Permutation, Tuned};
+use super::gpu::permutation::{Layer, MAX_PARTS};
+use super::gpu::{Facts, NetError, Network, Options, Permutation, Pipelines, Tuned};
 use crate::gpu::timing::Recorder;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use std::time::Instant;
 use thiserror::Error;
 
 /// Version of the kernels that a cache speaks of. To be raised with every change that moves their times.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 /// Longest text that is read as a cache, bytes.
 pub const MAX_TEXT: usize = 4 << 20;
 /// By how much a permutation must be faster than the one before it to take its place.
@@ -81,7 +81,10 @@ impl Cache {
         if cache.version != VERSION {
             return Err(CacheError::Version { found: cache.version });
         }
-        let sound = |f: &Found| (1..=4).contains(&f.permutation.vectors) && f.ms.is_finite() && f.ms >= 0.0;
+        let sound = |f: &Found| {
+            let p = f.permutation;
+            (1..=4).contains(&p.vectors) && (1..=MAX_PARTS).contains(&p.parts) && f.ms.is_finite() && f.ms >= 0.0
+        };
         let wrong = cache.devices.values().flatten().find(|(_, found)| !sound(found));
         match wrong {
             Some((layer, _)) => Err(CacheError::Numbers(layer.clone())),
@@ -144,7 +147,11 @@ pub fn tune(
 ) -> Result<Vec<Report>, NetError> {
     let (info, facts) = (device.adapter_info(), Facts::of(device));
     let known = if again { Tuned::new() } else { cache.tuned(&info) };
-    let build = |tuned: &Tuned| Network::tuned(device, queue, weights, size, options, Arc::new(tuned.clone()));
+    // What both rivals share is compiled once.
+    let pipelines = Pipelines::default();
+    let build = |tuned: &Tuned| {
+        Network::sharing((device, queue), weights, size, options, Arc::new(tuned.clone()), pipelines.clone())
+    };
     let mut champion = build(&known)?;
     // Steps of one shape share what is found.
     let mut rivals: BTreeMap<String, (usize, Layer, Vec<Permutation>)> = BTreeMap::new();

@@ -47,7 +47,7 @@ fn tensor(file: &SafeTensors<'_>, name: &str) -> Tensor {
 
 /// One permutation of the convolutions.
 fn fixed(weights: Source, mirror: bool, vectors: u32) -> Variant {
-    Variant::Fixed(Permutation { weights, mirror, vectors })
+    Variant::Fixed(Permutation::new(weights, mirror, vectors))
 }
 
 /// Inputs and PyTorch's outputs of a fixture.

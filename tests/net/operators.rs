@@ -4,10 +4,14 @@ use crate::hashed::{self, cases, graphs};
 use crate::{common, fixed, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Network, Options, Source, Variant};
+use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Source, Variant};
+use bouncelight::net::graph::Graph;
+use bouncelight::net::op::Op;
 use bouncelight::net::op_facts::KINDS;
 use bouncelight::net::plan::Precision;
+use std::cell::RefCell;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 pub const TOLERANCE: f32 = 1e-4;
 pub const TOLERANCE_HALF: f32 = 5e-3;
@@ -32,19 +36,23 @@ fn the_cpu_twin_agrees_with_pytorch_on_every_operator() {
     println!("{} graphs, {} cases, worst {worst:?}", graphs.len(), cases.values().map(Vec::len).sum::<usize>());
 }
 
-/// Runs every `each`-th graph, from the `first`, at up to `sizes` sizes in the way that `options` say.
-fn check_kernels(gpu: &Gpu, options: Options, first: usize, each: usize, sizes: usize) {
+/// Runs the graphs that `wanted` picks at up to `sizes` sizes in the way that `options` say, with compiled kernels shared.
+fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usize, wanted: impl Fn(&Graph) -> bool) {
     let (cases, metadata) = cases("operators.safetensors");
     let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
+    let start = std::time::Instant::now();
     let mut faults = Vec::new();
     let mut worst = (0f32, String::new());
-    for (name, graph) in graphs(&metadata.unwrap()).iter().skip(first).step_by(each) {
+    for (name, graph) in graphs(&metadata.unwrap()).iter().filter(|(_, g)| wanted(g)) {
         let weights = hashed::network(graph);
         let mut network: Option<Network> = None;
         for case in cases[name].iter().rev().take(sizes) {
             let input = hashed::input(name, graph.input_channels, case.size);
             let next = match network.take() {
-                None => Network::with_options(&gpu.device, &gpu.queue, &weights, case.size, options),
+                None => {
+                    let handles = (&gpu.device, &gpu.queue);
+                    Network::sharing(handles, &weights, case.size, options, Arc::default(), pipelines.clone())
+                }
                 Some(last) => last.rebuilt(&gpu.device, &gpu.queue, &weights, case.size),
             };
             let found = run_network(gpu, network.insert(next.unwrap()), &input);
@@ -56,47 +64,89 @@ fn check_kernels(gpu: &Gpu, options: Options, first: usize, each: usize, sizes: 
             worst = if e > worst.0 { (e, name.clone()) } else { worst };
         }
     }
-    println!("{options:?}: worst {worst:?}");
+    println!("{options:?}: worst {worst:?}, {} kernels, {:.1} s", pipelines.len(), start.elapsed().as_secs_f64());
     assert!(faults.is_empty(), "{options:?}\n{}", faults.join("\n"));
 }
 
 const FULL: Options = Options { variant: Variant::Auto, precision: Precision::F32, dropout: None, fuse: true };
-const HALF: Options = Options { precision: Precision::F16, ..FULL };
 
-/// Every permutation of the convolutions. Uniform weights do not exist in 16 bits: storage takes their place.
-fn permutations() -> Vec<Variant> {
-    let mut all = Vec::new();
+/// Permutations of the convolutions in which each kind of weights, each way to read the input and each width meets the others: all
+/// pairs of them or, if `all`, every combination. Uniform weights do not exist in 16 bits: storage takes their place.
+fn permutations(all: bool) -> Vec<Variant> {
+    let mut found = Vec::new();
     for vectors in 1..=4 {
-        all.push(fixed(Source::Lanes, true, vectors));
-        for mirror in [false, true] {
-            all.extend([Source::Uniform, Source::Storage].map(|weights| fixed(weights, mirror, vectors)));
+        let parts = [1, 3][vectors as usize % 2];
+        found.push(Variant::Fixed(Permutation { parts, ..Permutation::new(Source::Lanes, true, vectors) }));
+        for (i, weights) in [Source::Uniform, Source::Storage].into_iter().enumerate() {
+            let mirror = (vectors as usize + i).is_multiple_of(2);
+            found.push(fixed(weights, mirror, vectors));
+            if all {
+                found.push(fixed(weights, !mirror, vectors));
+            }
         }
     }
-    all
+    for (vectors, parts, half) in [(1, 1, false), (2, 1, false), (2, 3, false), (1, 1, true), (2, 4, true)] {
+        found.push(Variant::Fixed(Permutation { parts, half, ..Permutation::new(Source::Staged, false, vectors) }));
+    }
+    found
+}
+
+/// What a permutation of the convolutions may get wrong: their taps, steps, sides, groups, and channels that pad.
+fn shapes(graph: &Graph) -> BTreeSet<String> {
+    let enlarged = graph.ops.iter().any(|op| op.kind() == "upsample_nearest");
+    let shape = |op: &Op| match op {
+        Op::Conv2d(o) => {
+            let padded = [o.in_channels, o.out_channels].map(|n| n % 4 != 0);
+            Some(format!("{:?} {} {:?} {} {padded:?} {enlarged}", o.kernel, o.stride, o.padding, o.groups))
+        }
+        Op::ConvTranspose2d(o) => Some(format!("{:?} {} {} up", o.kernel, o.stride, o.padding)),
+        _ => None,
+    };
+    graph.ops.iter().filter_map(shape).collect()
+}
+
+/// Every graph at every size, fused and not, by the kernels that are chosen here and by the plain ones; then in every permutation as
+/// many graphs as it takes to meet every shape of convolution. Kernels of the same text are compiled once for all of them.
+fn check_permutations(precision: Precision) {
+    let Some(gpu) = common::gpu() else { return };
+    let pipelines = Pipelines::default();
+    for variant in [Variant::Auto, Variant::Plain] {
+        let options = Options { variant, precision, ..FULL };
+        check_kernels(&gpu, &pipelines, options, usize::MAX, |_| true);
+        check_kernels(&gpu, &pipelines, Options { fuse: false, ..options }, usize::MAX, |_| true);
+    }
+    for variant in permutations(false) {
+        let seen = RefCell::new(BTreeSet::new());
+        let new = |graph: &Graph| {
+            let (shapes, mut seen) = (shapes(graph), seen.borrow_mut());
+            let before = seen.len();
+            seen.extend(shapes);
+            seen.len() > before
+        };
+        check_kernels(&gpu, &pipelines, Options { variant, precision, ..FULL }, usize::MAX, new);
+    }
 }
 
 #[test]
 fn the_kernels_agree_on_every_operator() {
-    let Some(gpu) = common::gpu() else { return };
-    // Narrow tiles: most of the time goes into compilation, which grows with the tile.
-    check_kernels(&gpu, Options { variant: fixed(Source::Lanes, true, 1), ..FULL }, 0, 1, 1);
-    // A fifth of the graphs in each of the other ways; all of them in the test below.
-    check_kernels(&gpu, FULL, 0, 5, 1);
-    check_kernels(&gpu, Options { fuse: false, variant: Variant::Plain, ..FULL }, 1, 5, 1);
-    check_kernels(&gpu, HALF, 3, 5, 1);
-    check_kernels(&gpu, Options { variant: fixed(Source::Uniform, false, 3), ..FULL }, 2, 5, 1);
-    check_kernels(&gpu, Options { variant: fixed(Source::Storage, true, 2), ..HALF }, 4, 5, 1);
+    check_permutations(Precision::F32);
 }
 
 #[test]
-#[ignore = "minutes: every graph in every way; run it after a change of kernels"]
+fn the_kernels_agree_on_every_operator_in_16_bits() {
+    check_permutations(Precision::F16);
+}
+
+#[test]
+#[ignore = "half an hour: every graph in every way; run it after a change of kernels"]
 fn the_kernels_agree_in_every_way() {
     let Some(gpu) = common::gpu() else { return };
-    for variant in permutations().into_iter().chain([Variant::Auto, Variant::Plain]) {
+    let pipelines = Pipelines::default();
+    for variant in permutations(true) {
         for precision in [Precision::F32, Precision::F16] {
             let options = Options { variant, precision, ..FULL };
-            check_kernels(&gpu, options, 0, 1, usize::MAX);
-            check_kernels(&gpu, Options { fuse: false, ..options }, 0, 1, usize::MAX);
+            check_kernels(&gpu, &pipelines, options, usize::MAX, |_| true);
+            check_kernels(&gpu, &pipelines, Options { fuse: false, ..options }, usize::MAX, |_| true);
         }
     }
 }
@@ -122,6 +172,8 @@ fn groups_read_their_own() {
             fixed(Source::Lanes, true, 4),
             fixed(Source::Uniform, false, 3),
             fixed(Source::Storage, true, 2),
+            // Staged kernels do not do groups.
+            fixed(Source::Staged, false, 1),
             Variant::Plain,
         ] {
             let options = Options { variant, ..FULL };

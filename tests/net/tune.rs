@@ -7,7 +7,7 @@ use bouncelight::net::tune::{Cache, CacheError, MAX_TEXT, VERSION, tune};
 use bouncelight::wgpu::{AdapterInfo, Backend, DeviceType};
 use std::sync::Arc;
 
-const GOOD: &str = r#"{"version": 2, "devices": {"a | Vulkan | d 1": {"layer": {"permutation":
+const GOOD: &str = r#"{"version": 3, "devices": {"a | Vulkan | d 1": {"layer": {"permutation":
     {"weights": "uniform", "mirror": false, "vectors": 2}, "ms": 0.5}}}}"#;
 
 fn info(name: &str, driver_info: &str) -> AdapterInfo {
@@ -20,9 +20,9 @@ fn info(name: &str, driver_info: &str) -> AdapterInfo {
 fn a_cache_survives_its_text_and_knows_its_device() {
     let cache = Cache::parse(GOOD).unwrap();
     assert_eq!(Cache::parse(&cache.text()).unwrap(), cache);
-    assert_eq!(VERSION, 2, "adapt the texts here");
+    assert_eq!(VERSION, 3, "adapt the texts here");
     let known = cache.tuned(&info("a", "1"));
-    assert_eq!(known["layer"], Permutation { weights: Source::Uniform, mirror: false, vectors: 2 });
+    assert_eq!(known["layer"], Permutation::new(Source::Uniform, false, 2));
     // Negative control: another adapter, another driver.
     assert!(cache.tuned(&info("b", "1")).is_empty() && cache.tuned(&info("a", "2")).is_empty());
 }
@@ -44,11 +44,17 @@ fn foreign_caches_are_refused() {
     ] {
         assert!(matches!(Cache::parse(text), Err(CacheError::Text(_))), "{text:.40}");
     }
-    for (from, to) in [("\"vectors\": 2", "\"vectors\": 0"), ("\"vectors\": 2", "\"vectors\": 5"), ("0.5", "-0.5")] {
+    for (from, to) in [
+        ("\"vectors\": 2", "\"vectors\": 0"),
+        ("\"vectors\": 2", "\"vectors\": 5"),
+        ("\"vectors\": 2", "\"vectors\": 2, \"parts\": 0"),
+        ("\"vectors\": 2", "\"vectors\": 2, \"parts\": 65"),
+        ("0.5", "-0.5"),
+    ] {
         assert!(matches!(Cache::parse(&GOOD.replace(from, to)), Err(CacheError::Numbers(_))), "{to}");
     }
     assert!(Cache::parse(&GOOD.replace("\"ms\": 0.5", "\"ms\": 1e999")).is_err());
-    assert!(matches!(Cache::parse(&GOOD.replace(": 2,", ": 3,")), Err(CacheError::Version { found: 3 })));
+    assert!(matches!(Cache::parse(&GOOD.replace(": 3,", ": 2,")), Err(CacheError::Version { found: 2 })));
     assert!(matches!(Cache::parse(&" ".repeat(MAX_TEXT + 1)), Err(CacheError::Long(_))));
 }
 
@@ -84,8 +90,8 @@ fn wishes_that_cannot_be_met_do_no_harm() {
     let plain = Network::new(&gpu.device, &gpu.queue, &weights, size).unwrap();
     let layer = plain.kernels().next().unwrap().layer.unwrap().to_string();
     for wish in [
-        Permutation { weights: Source::Lanes, mirror: false, vectors: 4000 },
-        Permutation { weights: Source::Uniform, mirror: true, vectors: 0 },
+        Permutation { parts: 4000, half: true, ..Permutation::new(Source::Lanes, false, 4000) },
+        Permutation::new(Source::Uniform, true, 0),
     ] {
         let tuned: Tuned = [(layer.clone(), wish)].into();
         let network =
@@ -109,7 +115,7 @@ fn a_corrupt_cache_is_told_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let cache = folder.path().join("deep/tuned.json");
     std::fs::create_dir_all(cache.parent().unwrap()).unwrap();
-    std::fs::write(&cache, "{\"version\": 2, \"dev").unwrap();
+    std::fs::write(&cache, "{\"version\": 3, \"dev").unwrap();
     let run = || {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_bouncelight"));
         command.args(["weights", "tune", "--size", "8x8"]).arg(fixture("conv1x1.safetensors"));

@@ -2,13 +2,14 @@
 
 use crate::hashed::{self, cases};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
-use crate::{common, run_gpu, run_network};
+use crate::{common, fixed, run_network};
 use bouncelight::net::arch;
 use bouncelight::net::convert::{Arch, Norm};
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Network, Options, Variant};
+use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Pipelines, Source, Tuned, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::{self, Plan, Precision};
+use std::sync::Arc;
 
 fn generator(name: &str, width: u32) -> Graph {
     match name {
@@ -19,9 +20,13 @@ fn generator(name: &str, width: u32) -> Graph {
     }
 }
 
+/// Unfused, each norm's input is rounded to 16 bits once more, so what rounding adds grows by up to √2. Nothing but tests runs so.
+const TOLERANCE_HALF_UNFUSED: f32 = 7e-3;
+
 /// Each generator on the CPU; on the GPU in `ways`.
-fn check_generators(ways: impl Fn(&str) -> Vec<Options>) {
+fn check_generators(ways: &[Options]) {
     let gpu = common::gpu();
+    let (pipelines, mut faults) = (Pipelines::default(), Vec::new());
     let (cases, _) = cases("networks.safetensors");
     for (name, cases) in cases {
         let weights = hashed::network(&generator(&name, 4));
@@ -32,33 +37,33 @@ fn check_generators(ways: impl Fn(&str) -> Vec<Options>) {
             println!("{name} {:?}: CPU {e:.1e}", case.size);
             assert!(e <= TOLERANCE, "{name} {:?} on the CPU: relative error {e}", case.size);
             let Some(gpu) = &gpu else { continue };
-            for options in ways(&name).into_iter().filter(|_| case.size[0] == 256 || name.contains("batch")) {
-                let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
-                let found = run_gpu(gpu, &weights, &input, options);
+            for &options in ways {
+                let tolerance = match (options.precision, options.fuse) {
+                    (Precision::F32, _) => TOLERANCE,
+                    (Precision::F16, true) => TOLERANCE_HALF,
+                    (Precision::F16, false) => TOLERANCE_HALF_UNFUSED,
+                };
+                let handles = (&gpu.device, &gpu.queue);
+                let network =
+                    Network::sharing(handles, &weights, case.size, options, Arc::default(), pipelines.clone()).unwrap();
+                let found = run_network(gpu, &network, &input);
                 let e = case.error(&found).max(hashed::error(&found.data, &twin.data));
                 println!("{name} {:?}: {options:?} {e:.2e}", case.size);
-                assert!(e <= tolerance, "{name} {:?} {options:?}: relative error {e}", case.size);
+                if e > tolerance {
+                    faults.push(format!("{name} {:?} {options:?}: relative error {e}", case.size));
+                }
             }
         }
     }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 const HALF: Options = Options { variant: Variant::Auto, precision: Precision::F16, dropout: None, fuse: true };
 
 #[test]
 fn the_generators_agree_with_pytorch() {
-    check_generators(|name| match name {
-        "pix2pix_group" => vec![Options::default(), HALF],
-        "deep_illumination" => vec![Options::default()],
-        _ => Vec::new(),
-    });
-}
-
-#[test]
-#[ignore = "minutes: every generator in every way; run it after a change of kernels"]
-fn the_generators_agree_in_every_way() {
     let full = Options::default();
-    check_generators(|_| vec![full, HALF, Options { fuse: false, ..full }, Options { fuse: false, ..HALF }]);
+    check_generators(&[full, HALF, Options { fuse: false, ..full }, Options { fuse: false, ..HALF }]);
 }
 
 /// Needs what `make_operators.py --full` has written, named by `BOUNCELIGHT_FULL`. Times and errors are in docs/network.md.
@@ -99,6 +104,69 @@ fn another_norm_is_noticed() {
     let input = hashed::input("pix2pix_instance", 12, case.size);
     let other = hashed::network(&generator("pix2pix_group", 4));
     assert!(case.error(&cpu::run(&other, &input).unwrap()) > 100.0 * TOLERANCE_HALF);
+}
+
+/// On a GPU every convolution of the paper's generator, down to 4×2 pixels, has a permutation of at least 128 workgroups in one
+/// dispatch, and its parts of sums, written and read, move less than it moves anyhow.
+#[test]
+fn small_pictures_can_fill_a_gpu() {
+    let plan = Plan::new(&generator("pix2pix_group", 64), 1024, 512).unwrap();
+    let facts = Facts { lanes: false, software: false, half: false, words: false };
+    let (mut starved, mut small) = (0, 0);
+    for step in &plan.steps {
+        let way = |variant| Kernel::choose(&plan, step, &Choice { variant, tuned: &Tuned::new(), facts });
+        let Some(layer) = way(Variant::Auto).layer else { continue };
+        let groups = |p: &Permutation| {
+            let kernel = way(Variant::Fixed(*p));
+            assert_eq!(kernel.permutation, Some(*p));
+            kernel.parts.iter().map(|part| kernel.workgroups(part).iter().product::<u32>()).max().unwrap_or(0)
+        };
+        let candidates = layer.candidates(&plan, facts);
+        let whole = candidates.iter().filter(|p| p.parts == 1).map(groups).max().unwrap();
+        let best = candidates.iter().max_by_key(|p| groups(p)).unwrap();
+        let sum = way(Variant::Fixed(*best)).sum.map_or(0, |s| s.bytes);
+        println!(
+            "{:<16}{layer}: guess {}, whole {whole}, {best} {}, parts {sum} bytes",
+            step.name,
+            groups(&candidates[0]),
+            groups(best)
+        );
+        assert!(groups(best) >= 128, "{}", step.name);
+        assert!(2 * sum < step.traffic, "{}: {sum} bytes of parts", step.name);
+        starved += u32::from(groups(&candidates[0]) < 128);
+        small += u32::from(whole < 128);
+    }
+    // Negative control: without parts there are layers that cannot, and the guess is worse.
+    assert!(small > 2 && starved > small, "{small} {starved}");
+}
+
+/// Weights of all phases of a transposed convolution that are more than one binding holds go into several dispatches.
+#[test]
+fn weights_are_bound_in_pieces_that_fit() {
+    let up = serde_json::json!({"op": "conv_transpose2d", "name": "u", "input": "input", "output": "y", "in_channels": 2048,
+        "out_channels": 1024, "kernel": [4, 4], "stride": 2, "padding": 1});
+    let graph = hashed::graphs(&serde_json::json!({"g": {"input_channels": 2048, "ops": [up]}})).remove("g").unwrap();
+    let plan = Plan::new(&graph, 4, 2).unwrap();
+    let facts = Facts { lanes: true, software: false, half: false, words: false };
+    for variant in [
+        Variant::Auto,
+        Variant::Plain,
+        fixed(Source::Lanes, true, 4),
+        fixed(Source::Storage, false, 1),
+        fixed(Source::Staged, false, 2),
+    ] {
+        let kernel = Kernel::choose(&plan, &plan.steps[0], &Choice { variant, tuned: &Tuned::new(), facts });
+        let mut blocks = 0;
+        for part in &kernel.parts {
+            assert_eq!(part.first_block, blocks);
+            blocks += part.blocks;
+        }
+        assert_eq!(blocks, 4 * 256u32.div_ceil(kernel.vectors), "{variant:?}: every phase once");
+        let all: u64 = kernel.bound_bytes() * kernel.parts.len() as u64;
+        assert!(all > 128 << 20, "{variant:?}: {all}");
+        let texture = kernel.permutation.is_some_and(|p| p.weights == Source::Lanes);
+        assert!(texture || kernel.bound_bytes() <= 128 << 20, "{variant:?}: {} bytes", kernel.bound_bytes());
+    }
 }
 
 #[test]

@@ -1,13 +1,12 @@
 //! Buffers, pipelines and bind groups of a network.
 
-use super::kernels::{Bound, Kernel, Part};
+use super::kernels::{Bound, Kernel, Numbers, Part};
 use super::permutation::ROW;
+use super::pipelines::Pipelines;
 use super::{NetError, Options};
-use crate::gpu::shaders;
 use crate::net::dropout;
 use crate::net::graph::Graph;
 use crate::net::plan::{self, Kind, Plan, Precision, Step};
-use std::collections::HashMap;
 
 /// The uniform that a kernel reads; `Step` in `shaders/net/common.wgsl`.
 #[repr(C)]
@@ -20,8 +19,18 @@ pub struct StepUniform {
     skip: u32,
     second: u32,
     pad: [i32; 2],
-    phase: [u32; 2],
+    base: [i32; 2],
     first_block: u32,
+    blocks: u32,
+    parts: u32,
+    in_channels: u32,
+    in_vectors: u32,
+    in_pitch: u32,
+    out_channels: u32,
+    out_vectors: u32,
+    out_pitch: u32,
+    skip_pitch: u32,
+    group: u32,
     stream: u32,
     threshold: u32,
     keep: f32,
@@ -42,6 +51,8 @@ pub(super) struct Layer {
     pub weights: Trained,
     /// One for each part of the kernel.
     pub bind_groups: Vec<wgpu::BindGroup>,
+    /// What adds up the parts that the kernel has made.
+    pub sum: Option<(wgpu::ComputePipeline, wgpu::BindGroup)>,
     /// First rows and numbers of rows of the mirror that the step reads.
     pub copied: Vec<[u32; 2]>,
 }
@@ -57,6 +68,25 @@ pub(super) enum Trained {
 }
 
 impl Trained {
+    /// Room for what a kernel reads.
+    fn new(device: &wgpu::Device, label: &str, kernel: &Kernel) -> Self {
+        let each = kernel.bound_bytes();
+        let parts = kernel.parts.len() as u64;
+        match kernel.bound {
+            Bound::None => Trained::None,
+            Bound::Texture => {
+                let rows = (each / (ROW * kernel.texel())) as u32;
+                Trained::Textures((0..parts).map(|_| texture(device, label, rows, kernel.texel())).collect())
+            }
+            bound => {
+                let uniform = bound == Bound::Uniform;
+                let kind = if uniform { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
+                let size = each.next_multiple_of(SLOT) * parts;
+                Trained::Buffer(buffer(device, label, size, kind | wgpu::BufferUsages::COPY_DST))
+            }
+        }
+    }
+
     /// Bytes on the GPU.
     pub fn bytes(&self) -> u64 {
         match self {
@@ -74,7 +104,7 @@ pub(super) fn texture_bytes(texture: &wgpu::Texture) -> u64 {
 }
 
 /// A texture of `rows` rows of [`ROW`] vectors.
-pub(super) fn texture(device: &wgpu::Device, label: &str, rows: u32, texel: u64) -> wgpu::Texture {
+fn texture(device: &wgpu::Device, label: &str, rows: u32, texel: u64) -> wgpu::Texture {
     let (width, height) = (ROW as u32, rows.max(1));
     device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
@@ -103,37 +133,6 @@ impl Layer {
 fn offsets(kernel: &Kernel) -> impl Iterator<Item = u64> + use<> {
     let each = kernel.bound_bytes().next_multiple_of(SLOT);
     (0..kernel.parts.len() as u64).map(move |i| i * each)
-}
-
-type Compiled = (wgpu::ComputePipeline, wgpu::BindGroupLayout);
-
-/// Compiled shaders by name and prelude. Steps with the same two share a pipeline.
-#[derive(Default)]
-pub(super) struct Pipelines(HashMap<(String, String), Compiled>);
-
-impl Pipelines {
-    /// Lets go of what none of `kernels` uses.
-    pub fn keep(&mut self, kernels: &[Kernel]) {
-        self.0.retain(|(shader, prelude), _| kernels.iter().any(|k| k.shader == *shader && k.prelude == *prelude));
-    }
-
-    fn get(&mut self, device: &wgpu::Device, kernel: &Kernel) -> Compiled {
-        let make = || {
-            let module = shaders::module_with(device, &kernel.shader, &kernel.prelude);
-            let descriptor = wgpu::ComputePipelineDescriptor {
-                label: Some(&kernel.shader),
-                layout: None,
-                module: &module,
-                entry_point: Some("main"),
-                compilation_options: Default::default(),
-                cache: None,
-            };
-            let pipeline = device.create_compute_pipeline(&descriptor);
-            let layout = pipeline.get_bind_group_layout(0);
-            (pipeline, layout)
-        };
-        self.0.entry((kernel.shader.clone(), kernel.prelude.clone())).or_insert_with(make).clone()
-    }
 }
 
 pub(super) fn buffer(device: &wgpu::Device, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
@@ -171,8 +170,8 @@ pub(super) fn check_limits(device: &wgpu::Device, plan: &Plan, kernels: &[Kernel
             let all = bytes.next_multiple_of(SLOT) * kernel.parts.len() as u64;
             check("max_buffer_size", limits.max_buffer_size, all)?;
         }
-        let blocks = kernel.parts.iter().map(|p| p.blocks).max().unwrap_or(0);
-        let most = kernel.workgroups(blocks).into_iter().max().unwrap_or(0);
+        let sum = kernel.sum.iter().flat_map(|s| s.groups);
+        let most = kernel.parts.iter().flat_map(|p| kernel.workgroups(p)).chain(sum).max().unwrap_or(0);
         let granted = limits.max_compute_workgroups_per_dimension;
         check("max_compute_workgroups_per_dimension", granted.into(), most.into())?;
     }
@@ -180,7 +179,7 @@ pub(super) fn check_limits(device: &wgpu::Device, plan: &Plan, kernels: &[Kernel
 }
 
 /// Room for the uniforms of all dispatches.
-pub(super) fn steps_buffer(device: &wgpu::Device, kernels: &[Kernel]) -> wgpu::Buffer {
+fn steps_buffer(device: &wgpu::Device, kernels: &[Kernel]) -> wgpu::Buffer {
     let parts: usize = kernels.iter().map(|k| k.parts.len()).sum();
     let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
     buffer(device, "net.steps", (parts.max(1) as u64) * SLOT, usage)
@@ -191,14 +190,14 @@ pub(super) fn uniforms<'a>(plan: &Plan, kernels: impl IntoIterator<Item = &'a Ke
     let mut data = Vec::new();
     for (step, kernel) in plan.steps.iter().zip(kernels) {
         for part in &kernel.parts {
-            data.extend_from_slice(bytemuck::bytes_of(&uniform(plan, step, part, seed)));
+            data.extend_from_slice(bytemuck::bytes_of(&uniform(plan, step, (&kernel.numbers, part), seed)));
             data.resize(data.len().next_multiple_of(SLOT as usize), 0);
         }
     }
     data
 }
 
-fn uniform(plan: &Plan, step: &Step, part: &Part, seed: Option<u32>) -> StepUniform {
+fn uniform(plan: &Plan, step: &Step, (numbers, part): (&Numbers, &Part), seed: Option<u32>) -> StepUniform {
     let (input, output) = (&plan.tensors[step.input], &plan.tensors[step.output]);
     let element = element(plan);
     // An arena is one binding, so a place counted in its elements fits.
@@ -227,9 +226,19 @@ fn uniform(plan: &Plan, step: &Step, part: &Part, seed: Option<u32>) -> StepUnif
         output: place(step.output),
         skip: step.skip.map_or(0, place),
         second: step.second.map_or(0, place),
-        pad: part.pad,
-        phase: part.phase,
+        pad: numbers.pad,
+        base: numbers.base,
         first_block: part.first_block,
+        blocks: numbers.blocks,
+        parts: numbers.parts,
+        in_channels: numbers.in_channels,
+        in_vectors: numbers.in_vectors,
+        in_pitch: numbers.in_pitch,
+        out_channels: numbers.out_channels,
+        out_vectors: numbers.out_vectors,
+        out_pitch: numbers.out_pitch,
+        skip_pitch: numbers.skip_pitch,
+        group: numbers.group,
         stream,
         threshold: dropout::threshold(p),
         keep: 1.0 / (1.0 - p),
@@ -240,68 +249,102 @@ fn uniform(plan: &Plan, step: &Step, part: &Part, seed: Option<u32>) -> StepUnif
     }
 }
 
+/// What all steps share.
+pub(super) struct Memory {
+    pub arena: wgpu::Buffer,
+    /// The uniforms of all dispatches.
+    pub steps: wgpu::Buffer,
+    /// The arena in a texture, where a kernel reads it so.
+    pub mirror: Option<wgpu::Texture>,
+    /// Parts of sums, where a convolution works in parts.
+    pub partial: Option<wgpu::Buffer>,
+}
+
+impl Memory {
+    /// For a plan and the kernels chosen for it.
+    pub fn new(device: &wgpu::Device, plan: &Plan, kernels: &[Kernel]) -> Self {
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        let row = ROW * element(plan);
+        let mirrored = kernels.iter().any(|k| k.mirror);
+        // Copies take whole rows.
+        let bytes = if mirrored { plan.arena_bytes.next_multiple_of(row) } else { plan.arena_bytes };
+        let partial = kernels.iter().filter_map(|k| k.sum.as_ref()).map(|s| s.bytes).max();
+        Self {
+            // wgpu clears new buffers; the kernels count on the zeros at the beginning.
+            arena: buffer(device, "net.arena", bytes, usage),
+            steps: steps_buffer(device, kernels),
+            mirror: mirrored.then(|| texture(device, "net.mirror", (bytes / row) as u32, element(plan))),
+            partial: partial.map(|bytes| buffer(device, "net.partial", bytes, wgpu::BufferUsages::STORAGE)),
+        }
+    }
+
+    /// On the GPU.
+    pub fn bytes(&self) -> u64 {
+        let mirror = self.mirror.as_ref().map_or(0, texture_bytes);
+        self.arena.size() + self.steps.size() + mirror + self.partial.as_ref().map_or(0, wgpu::Buffer::size)
+    }
+}
+
 /// Pipelines, bind groups and buffers for weights (not yet filled) of every step.
 pub(super) fn layers(
     device: &wgpu::Device,
     plan: &Plan,
     kernels: Vec<Kernel>,
-    pipelines: &mut Pipelines,
-    arena: &wgpu::Buffer,
-    steps: &wgpu::Buffer,
-    mirror: Option<&wgpu::Texture>,
+    pipelines: &Pipelines,
+    memory: &Memory,
 ) -> Vec<Layer> {
     let mut slot = 0;
     let layer = |(step, kernel): (&Step, Kernel)| {
-        let (pipeline, layout) = pipelines.get(device, &kernel);
         let label = format!("net.{}", step.name);
-        let each = kernel.bound_bytes();
-        let parts = kernel.parts.len() as u64;
-        let weights = match kernel.bound {
-            Bound::None => Trained::None,
-            Bound::Texture => {
-                let rows = (each / (ROW * kernel.texel())) as u32;
-                Trained::Textures((0..parts).map(|_| texture(device, &label, rows, kernel.texel())).collect())
-            }
-            bound => {
-                let uniform = bound == Bound::Uniform;
-                let kind = if uniform { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
-                let size = each.next_multiple_of(SLOT) * parts;
-                Trained::Buffer(buffer(device, &label, size, kind | wgpu::BufferUsages::COPY_DST))
-            }
-        };
+        let weights = Trained::new(device, &label, &kernel);
+        let (pipeline, layout) = pipelines.get(device, &kernel.shader, &kernel.prelude);
         let read = [Some(step.input), step.skip].into_iter().flatten().filter(|_| kernel.mirror);
         let copied: Vec<_> = read.map(|t| rows(plan, t)).collect();
+        let first_slot = slot;
+        let whole = |buffer, offset, size| {
+            let size = wgpu::BufferSize::new(size);
+            wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size })
+        };
+        let group = |layout: &wgpu::BindGroupLayout, resources: Vec<(u32, wgpu::BindingResource<'_>)>| {
+            let entries: Vec<_> =
+                resources.into_iter().map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+            let label = Some(step.name.as_str());
+            device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout, entries: &entries })
+        };
+        let shared = |slot: u64| {
+            vec![
+                (0, whole(&memory.steps, slot * SLOT, size_of::<StepUniform>() as u64)),
+                (1, whole(&memory.arena, 0, plan.arena_bytes)),
+            ]
+        };
+        let partial = kernel.sum.as_ref().and(memory.partial.as_ref()).map(|b| (4, b.as_entire_binding()));
         let bind_group = |(part, offset): (usize, u64)| {
-            let whole = |buffer, offset, size| {
-                let size = wgpu::BufferSize::new(size);
-                wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size })
-            };
-            let mut resources = vec![
-                (0, whole(steps, slot * SLOT, size_of::<StepUniform>() as u64)),
-                (1, whole(arena, 0, plan.arena_bytes)),
-            ];
+            let mut resources = shared(slot);
+            // What reads the mirror and writes parts of sums does not touch the arena.
+            resources.truncate(if kernel.mirror && kernel.sum.is_some() { 1 } else { 2 });
             let view = |t: &wgpu::Texture| t.create_view(&Default::default());
             let trained = match &weights {
                 Trained::Textures(textures) => Some(view(&textures[part])),
                 _ => None,
             };
-            let mirrored = mirror.filter(|_| kernel.mirror).map(view);
+            let mirrored = memory.mirror.as_ref().filter(|_| kernel.mirror).map(view);
             if let Trained::Buffer(buffer) = &weights {
-                resources.push((2, whole(buffer, offset, each)));
+                resources.push((2, whole(buffer, offset, kernel.bound_bytes())));
             }
             resources.extend(trained.iter().map(|v| (2, wgpu::BindingResource::TextureView(v))));
             resources.extend(mirrored.iter().map(|v| (3, wgpu::BindingResource::TextureView(v))));
+            resources.extend(partial.clone());
             slot += 1;
-            let entries: Vec<_> =
-                resources.into_iter().map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
-            device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some(&step.name),
-                layout: &layout,
-                entries: &entries,
-            })
+            group(&layout, resources)
         };
         let bind_groups = offsets(&kernel).enumerate().map(bind_group).collect();
-        Layer { label, kernel, pipeline, weights, bind_groups, copied }
+        let sum = kernel.sum.as_ref().map(|sum| {
+            let (pipeline, layout) = pipelines.get(device, &sum.shader, &sum.prelude);
+            let mut resources = shared(first_slot);
+            resources.extend(partial.clone());
+            (pipeline, group(&layout, resources))
+        });
+        Layer { label, kernel, pipeline, weights, bind_groups, sum, copied }
     };
     plan.steps.iter().zip(kernels).map(layer).collect()
 }

@@ -5,19 +5,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
     let mut examples = Vec::new();
     let lines =
         |pairs: &[(&str, u32)]| -> String { pairs.iter().map(|(n, v)| format!("const {n} = {v}u;\n")).collect() };
-    let common = lines(&[
-        ("OUT_CHANNELS", 14),
-        ("OUT_VECTORS", 4),
-        ("GROUP_VECTORS", 4),
-        ("OUT_PITCH", 8),
-        ("IN_VECTORS", 6),
-        ("IN_PITCH", 6),
-        ("SKIP_PITCH", 4),
-        ("MATRICES", 218),
-        ("IN_CHANNELS", 22),
-        ("CHANNELS", 22),
-        ("PER_GROUP", 11),
-    ]);
+    let common = lines(&[("MATRICES", 256), ("THREADS", 64)]);
     for shader in crate::gpu::shaders::NET.iter().map(|s| s.name) {
         let convolution = shader.contains("conv");
         let epilogues: &[[u32; 3]] = match shader {
@@ -28,19 +16,28 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
             {
                 &[[0, 0, 0]]
             }
-            _ if ["_half", "_mirror", "_wide"].iter().any(|s| shader.contains(s)) => &[[0, 0, 0], [1, 1, 0], [6, 2, 1]],
-            _ => &[[0, 0, 0], [1, 1, 0], [2, 2, 0], [3, 0, 1], [4, 1, 1], [5, 2, 0], [6, 0, 0], [7, 0, 0]],
+            _ if ["_half", "_mirror", "_wide", "_parts", "_words"].iter().any(|s| shader.contains(s)) => {
+                &[[2, 0, 0], [3, 1, 0], [6, 2, 1]]
+            }
+            _ => &[[2, 0, 0], [2, 1, 0], [2, 2, 0], [3, 0, 1], [4, 1, 1], [5, 2, 0], [6, 0, 0], [7, 0, 0]],
         };
         for [activation, add, dropout] in epilogues {
             let epilogue = lines(&[("ACTIVATION", *activation), ("ADD", *add), ("DROPOUT", *dropout)]);
             let kinds: Vec<String> = if shader.contains("conv3x3") {
                 (1..=4).map(|v| kernel([3, 1, 1, 1], v)).collect()
+            } else if shader.contains("staged") {
+                let kinds = [[3, 2, 1, 1], [1, 1, 1, 1], [4, 1, 1, 2], [2, 1, 2, 1]];
+                let stages = [[8, 8, 2], [4, 4, 1], [2, 2, 2], [1, 1, 1]];
+                let with = |(kind, [columns, pixels, vectors]): ([u32; 4], [u32; 3])| {
+                    kernel(kind, vectors) + &lines(&[("COLUMNS", columns), ("PIXELS", pixels)])
+                };
+                kinds.into_iter().zip(stages).map(with).collect()
             } else if convolution {
                 let kinds = [[3, 2, 1, 1], [1, 1, 1, 1], [4, 1, 1, 2], [2, 1, 2, 1]];
                 kinds.into_iter().zip([3, 1, 2, 4]).map(|(kind, vectors)| kernel(kind, vectors)).collect()
             } else if shader.contains("window") {
-                let kinds = [[0, 0, 0], [1, 1, 1], [0, 3, 0]];
-                kinds.map(|[c, l, f]| lines(&[("CLAMP", c), ("LANE", l), ("IN_FULL", f), ("OUT_FULL", f)])).to_vec()
+                let kinds = [[0, 0], [1, 1], [0, 1]];
+                kinds.map(|[c, f]| lines(&[("CLAMP", c), ("IN_FULL", f), ("OUT_FULL", f)])).to_vec()
             } else if shader.contains("upsample") {
                 [0, 1].map(|double| lines(&[("DOUBLE", double)])).to_vec()
             } else if shader.contains("shuffle") {
@@ -48,7 +45,8 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
             } else {
                 vec![String::new()]
             };
-            examples.extend(kinds.iter().map(|kind| (shader, format!("{common}{epilogue}{kind}"))));
+            let feature = if shader.contains("_arithmetic") { "enable f16;\n" } else { "" };
+            examples.extend(kinds.iter().map(|kind| (shader, format!("{feature}{common}{epilogue}{kind}"))));
         }
     }
     examples

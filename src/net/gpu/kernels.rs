@@ -1,14 +1,14 @@
-//! Which kernel runs a step, its prelude, and how many workgroups it takes. Pure.
+//! Which kernel runs a step, its numbers, and how many workgroups it takes. Pure. Convolutions are in [`super::conv`].
 
-use super::super::graph::{AddAt, Padding};
+use super::super::graph::AddAt;
 use super::super::plan::{Kind, Plan, Precision, Step};
-use super::permutation::{Facts, Layer as ConvLayer, MATRIX, Permutation, ROW, Source, Tuned, Variant, mirrors};
-use crate::net::graph::Shape;
+use super::conv::Filter;
+use super::permutation::{Facts, Layer as ConvLayer, MATRIX, Permutation, ROW, Tuned, Variant, mirrors};
 
 /// Threads of a workgroup in x and y, as in the shaders.
-const GROUP: [u32; 2] = [16, 4];
-/// Threads of a workgroup of a blocked convolution, each with a tile of 2×4 pixels.
-const TILES: u32 = 64;
+pub(super) const GROUP: [u32; 2] = [16, 4];
+/// Threads of a workgroup that counts what it makes in one row.
+pub(super) const THREADS: u32 = 64;
 /// Rows that a thread of `scale.wgsl` makes.
 const ROWS_OF_SCALE: u32 = 8;
 /// Workgroups in a row of such a dispatch, half of WebGPU's default limit.
@@ -31,45 +31,46 @@ pub enum Bound {
     Vectors(u32),
 }
 
-/// The convolution kernel's view of a layer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Filter {
-    /// Taps, height and width; of one phase, for a transposed convolution.
-    pub taps: [u32; 2],
-    /// Distance of input pixels.
-    pub stride: u32,
-    /// Distance of output pixels: the stride of a transposed convolution.
-    pub spread: u32,
-    /// Factor by which the input is enlarged.
-    pub nearest: u32,
-    /// Four-channel vectors read for each output.
-    pub in_vectors: u32,
-    /// Four-channel vectors written that read the same: those of a group of channels, or all.
-    pub group_vectors: u32,
-}
-
-impl Filter {
-    /// Matrices of one block of `vectors` vectors of output channels.
-    pub fn matrices(self, vectors: u32) -> u64 {
-        1 + u64::from(self.taps[0]) * u64::from(self.taps[1]) * u64::from(self.in_vectors) * u64::from(vectors)
-    }
-}
-
 /// One dispatch of a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Part {
-    /// Column and row of the first output pixel, for a transposed convolution.
-    pub phase: [u32; 2],
-    /// Padding at the left and the top.
-    pub pad: [i32; 2],
-    /// First block of output channels.
+    /// First block of output channels, counted through the phases.
     pub first_block: u32,
-    /// How many.
+    /// How many, as the weights are stored.
     pub blocks: u32,
+    /// Workgroups in z.
+    pub depth: u32,
 }
 
-/// First output pixel of a phase, and its padding.
-type Phase = ([u32; 2], [i32; 2]);
+/// A second dispatch, which adds up what the first has made in parts.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sum {
+    /// Name in `gpu::shaders::NET`.
+    pub shader: String,
+    /// Generated `const` lines.
+    pub prelude: String,
+    /// Workgroups.
+    pub groups: [u32; 3],
+    /// Bytes of the parts.
+    pub bytes: u64,
+}
+
+/// What a kernel is told in its uniform about shapes; see `shaders/net/common.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Numbers {
+    pub(super) pad: [i32; 2],
+    pub(super) base: [i32; 2],
+    pub(super) blocks: u32,
+    pub(super) parts: u32,
+    pub(super) in_channels: u32,
+    pub(super) in_vectors: u32,
+    pub(super) in_pitch: u32,
+    pub(super) out_channels: u32,
+    pub(super) out_vectors: u32,
+    pub(super) out_pitch: u32,
+    pub(super) skip_pitch: u32,
+    pub(super) group: u32,
+}
 
 /// How one step runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -96,9 +97,13 @@ pub struct Kernel {
     pub vectors: u32,
     /// Dispatches.
     pub parts: Vec<Part>,
-    /// Workgroups in x and y, and in z for each block (convolutions) or in all.
-    pub groups: [u32; 3],
-    blocks_per_part: u32,
+    /// What follows them.
+    pub sum: Option<Sum>,
+    /// Workgroups in x and y.
+    pub groups: [u32; 2],
+    /// Shapes.
+    pub numbers: Numbers,
+    pub(super) blocks_per_part: u32,
 }
 
 impl Kernel {
@@ -108,11 +113,6 @@ impl Kernel {
         let (input, output) = (&plan.tensors[step.input], &plan.tensors[step.output]);
         let out = output.shape;
         let mut prelude = Prelude::default();
-        prelude.add("OUT_CHANNELS", out.channels);
-        prelude.add("OUT_VECTORS", out.vectors());
-        prelude.add("OUT_PITCH", output.pitch);
-        prelude.add("IN_VECTORS", input.shape.vectors());
-        prelude.add("IN_PITCH", input.pitch);
         if !matches!(step.kind, Kind::Window { .. } | Kind::Moments | Kind::Merge { .. }) {
             let add = match (step.skip, step.add_at) {
                 (None, _) => 0,
@@ -122,8 +122,21 @@ impl Kernel {
             prelude.add("ACTIVATION", step.activation.code());
             prelude.add("ADD", add);
             prelude.add("DROPOUT", step.dropout.is_some().into());
-            prelude.add("SKIP_PITCH", step.skip.map_or(0, |s| plan.tensors[s].pitch));
         }
+        let numbers = Numbers {
+            pad: [0, 0],
+            base: [0, 0],
+            blocks: 1,
+            parts: 1,
+            in_channels: input.shape.channels,
+            in_vectors: input.shape.vectors(),
+            in_pitch: input.pitch,
+            out_channels: out.channels,
+            out_vectors: out.vectors(),
+            out_pitch: output.pitch,
+            skip_pitch: step.skip.map_or(0, |s| plan.tensors[s].pitch),
+            group: 1,
+        };
         let mut kernel = Kernel {
             shader: String::new(),
             prelude: String::new(),
@@ -135,75 +148,48 @@ impl Kernel {
             permutation: None,
             mirror: false,
             vectors: 0,
-            parts: vec![Part { phase: [0, 0], pad: [0, 0], first_block: 0, blocks: 0 }],
-            groups: [out.width.div_ceil(GROUP[0]), out.height.div_ceil(GROUP[1]), out.vectors()],
+            parts: vec![Part { first_block: 0, blocks: 0, depth: out.vectors() }],
+            sum: None,
+            groups: [out.width.div_ceil(GROUP[0]), out.height.div_ceil(GROUP[1])],
+            numbers,
             blocks_per_part: 0,
         };
         let shader: String = match step.kind {
-            Kind::Conv { kernel: [h, w], stride, padding, nearest, groups } => {
-                // Groups of whole vectors read their own; others run as one, with zeros for what they do not see.
-                let whole = [input.shape.channels, out.channels].iter().all(|n| n.is_multiple_of(4 * groups));
-                let groups = if whole && choice.variant != Variant::Plain { groups } else { 1 };
-                let [in_vectors, group_vectors] = [input.shape, out].map(|s| s.vectors() / groups);
-                let pad = [padding.left as i32, padding.top as i32];
-                if nearest > 1 && stride == 1 && choice.variant != Variant::Plain {
-                    let (taps, phases) = merged([h, w], pad, nearest as i32);
-                    let filter = Filter { taps, stride, spread: nearest, nearest: 1, in_vectors, group_vectors };
-                    kernel.enlarged = Some((nearest, pad));
-                    kernel.convolution(&mut prelude, filter, &phases, out, false, plan, choice)
-                } else {
-                    let filter = Filter { taps: [h, w], stride, spread: 1, nearest, in_vectors, group_vectors };
-                    let row = ([h, w], stride, padding) == ([3, 3], 1, Padding::all(1));
-                    kernel.convolution(&mut prelude, filter, &[([0, 0], pad)], out, row, plan, choice)
-                }
-            }
-            Kind::Transposed { kernel: edges, stride, padding } => {
-                let taps = edges.map(|k| k.div_ceil(stride));
-                let [in_vectors, group_vectors] = [input.shape, out].map(Shape::vectors);
-                let filter = Filter { taps, stride: 1, spread: stride, nearest: 1, in_vectors, group_vectors };
-                let pad = |phase: u32, taps: u32| taps as i32 - 1 - ((phase + padding) / stride) as i32;
-                let phases: Vec<_> = (0..stride * stride)
-                    .map(|i| [i % stride, i / stride])
-                    .map(|[x, y]| ([x, y], [pad(x, taps[1]), pad(y, taps[0])]))
-                    .collect();
-                kernel.convolution(&mut prelude, filter, &phases, out, false, plan, choice)
-            }
+            Kind::Conv { .. } | Kind::Transposed { .. } => kernel.convolution(&mut prelude, step, plan, choice),
             Kind::Upsample => {
                 let double = [input.shape.width * 2, input.shape.height * 2] == [out.width, out.height];
                 prelude.add("DOUBLE", double.into());
                 if double {
                     // Blocks of two by two begin one pixel before the picture.
                     let blocks = |edge: u32, group: u32| (edge / 2 + 1).div_ceil(group);
-                    kernel.groups = [blocks(out.width, GROUP[0]), blocks(out.height, GROUP[1]), out.vectors()];
+                    kernel.groups = [blocks(out.width, GROUP[0]), blocks(out.height, GROUP[1])];
                 }
                 "upsample".into()
             }
             Kind::Nearest => "nearest".into(),
             Kind::Copy => "add".into(),
             Kind::Window { left, top, clamp, channel } => {
-                kernel.parts[0].pad = [left as i32, top as i32];
-                let lane = channel % 4;
-                prelude.add("IN_CHANNELS", input.shape.channels);
+                kernel.numbers.pad = [left as i32, top as i32];
                 prelude.add("CLAMP", clamp.into());
-                prelude.add("LANE", lane);
                 prelude.add("IN_FULL", input.full.into());
                 prelude.add("OUT_FULL", output.full.into());
-                kernel.groups[2] = (lane + input.shape.channels).div_ceil(4);
+                kernel.parts[0].depth = (channel % 4 + input.shape.channels).div_ceil(4);
                 "window".into()
             }
             Kind::Moments => {
                 // At most 2^26 pixels and 1,024 vectors.
-                let groups = (output.shape.width * input.shape.vectors()).div_ceil(TILES);
-                kernel.groups = [groups.min(ROW_OF_GROUPS), groups.div_ceil(ROW_OF_GROUPS), 1];
+                kernel.groups = in_rows((output.shape.width * input.shape.vectors()).div_ceil(THREADS));
+                kernel.parts[0].depth = 1;
                 "moments".into()
             }
             Kind::Merge { groups, .. } => {
                 // The moments' picture says how many channels there are.
                 let picture = step.second.map_or(input.shape, |s| plan.tensors[s].shape);
-                prelude.set("IN_VECTORS", picture.vectors());
-                prelude.add("CHANNELS", picture.channels);
-                prelude.add("PER_GROUP", picture.channels / groups.max(1));
-                kernel.groups = [groups, 1, 1];
+                kernel.numbers.in_vectors = picture.vectors();
+                kernel.numbers.out_channels = picture.channels;
+                kernel.numbers.group = picture.channels / groups.max(1);
+                kernel.groups = [groups, 1];
+                kernel.parts[0].depth = 1;
                 kernel.bound = Bound::Vectors(2 * picture.vectors());
                 "merge".into()
             }
@@ -226,87 +212,20 @@ impl Kernel {
         let same = step.reads().all(|t| !half || !plan.tensors[t].full || Some(t) == step.second);
         let mirror = if light && same && choice.mirrors(plan) { "_mirror" } else { "" };
         kernel.mirror |= !mirror.is_empty();
-        kernel.shader = format!("net.{shader}{mirror}{}", if half { "_half" } else { "" });
+        let reads_mirror = ["_lanes", "_mirror"].iter().any(|end| format!("{shader}{mirror}").ends_with(end));
+        let kind = match (half, reads_mirror && choice.facts.words && step.kind != Kind::Moments) {
+            (true, _) => "_half",
+            (false, true) => "_words",
+            (false, false) => "",
+        };
+        kernel.shader = format!("net.{shader}{mirror}{kind}");
         kernel.prelude = prelude.text();
         kernel
     }
 
-    /// Fills in what a convolution needs and names its shader. `phases`: first output pixel and padding of each; `row`: 3×3,
-    /// stride 1, padding 1.
-    #[allow(clippy::too_many_arguments, reason = "one caller, and every one is needed")]
-    fn convolution(
-        &mut self,
-        prelude: &mut Prelude,
-        filter: Filter,
-        phases: &[Phase],
-        out: Shape,
-        row: bool,
-        plan: &Plan,
-        choice: &Choice<'_>,
-    ) -> String {
-        let half = plan.precision == Precision::F16;
-        let size = [out.width, out.height];
-        let layer = ConvLayer { filter, out_vectors: out.vectors(), size, precision: plan.precision };
-        let permutation = layer.permutation(choice.variant, choice.tuned, plan, choice.facts);
-        self.pairs = row && permutation.is_some_and(|p| p.weights == Source::Lanes);
-        let filter = if self.pairs { Filter { taps: [3, 4], ..filter } } else { filter };
-        (self.filter, self.layer, self.permutation) = (Some(filter), Some(layer), permutation);
-        let Permutation { weights, mirror, vectors } = permutation.unwrap_or(Permutation {
-            weights: Source::Storage,
-            mirror: false,
-            vectors: out.vectors().min(2),
-        });
-        (self.mirror, self.vectors) = (mirror, vectors);
-        self.bound = match weights {
-            Source::Lanes => Bound::Texture,
-            Source::Uniform => Bound::Uniform,
-            Source::Storage if half => Bound::Half,
-            Source::Storage => Bound::Storage,
-        };
-        let uniform = self.bound == Bound::Uniform;
-        let blocks = out.vectors().div_ceil(vectors);
-        let dispatches = if uniform { blocks.div_ceil(layer.uniform_blocks(vectors)) } else { 1 };
-        self.blocks_per_part = blocks.div_ceil(dispatches);
-        let part = |(phase, pad): Phase| {
-            let each = self.blocks_per_part;
-            (0..blocks).step_by(each as usize).map(move |first_block| {
-                let blocks = each.min(blocks - first_block);
-                Part { phase, pad, first_block, blocks }
-            })
-        };
-        self.parts = phases.iter().copied().flat_map(part).collect();
-        prelude.set("IN_VECTORS", filter.in_vectors);
-        prelude.add("GROUP_VECTORS", filter.group_vectors);
-        prelude.add("KERNEL_H", filter.taps[0]);
-        prelude.add("KERNEL_W", filter.taps[1]);
-        prelude.add("STRIDE", filter.stride);
-        prelude.add("SPREAD", filter.spread);
-        prelude.add("NEAREST", filter.nearest);
-        prelude.add("VECTORS", vectors);
-        if uniform {
-            prelude.add("MATRICES", (filter.matrices(vectors) * u64::from(self.blocks_per_part)) as u32);
-        }
-        let [columns, rows] = size.map(|edge| edge.div_ceil(filter.spread));
-        if permutation.is_none() {
-            self.groups = [columns.div_ceil(GROUP[0]), rows.div_ceil(GROUP[1]), vectors];
-            return "conv_plain".into();
-        }
-        // At most 2^26 pixels, so the tiles fit.
-        let groups = (columns.div_ceil(2) * rows.div_ceil(4)).div_ceil(TILES);
-        self.groups = [groups.min(ROW_OF_GROUPS), groups.div_ceil(ROW_OF_GROUPS), 1];
-        let family = if row { "conv3x3" } else { "conv_any" };
-        let input = if mirror && self.bound != Bound::Texture { "_mirror" } else { "" };
-        let weights = match self.bound {
-            Bound::Texture => "_lanes",
-            Bound::Storage => "_wide",
-            _ => "",
-        };
-        format!("{family}{input}{weights}")
-    }
-
-    /// Workgroups of a dispatch of `blocks` blocks.
-    pub fn workgroups(&self, blocks: u32) -> [u32; 3] {
-        [self.groups[0], self.groups[1], self.groups[2] * blocks.max(1)]
+    /// Workgroups of a dispatch.
+    pub fn workgroups(&self, part: &Part) -> [u32; 3] {
+        [self.groups[0], self.groups[1], part.depth]
     }
 
     /// Bytes of a texel of weights.
@@ -319,7 +238,8 @@ impl Kernel {
         let matrices = self.filter.map_or(0, |f| f.matrices(self.vectors)) * u64::from(self.blocks_per_part);
         match self.bound {
             Bound::None => 0,
-            Bound::Uniform | Bound::Storage => matrices * MATRIX,
+            Bound::Uniform => matrices.next_power_of_two() * MATRIX,
+            Bound::Storage => matrices * MATRIX,
             Bound::Half => matrices * MATRIX / 2,
             // Whole rows.
             Bound::Texture => (matrices * 4).next_multiple_of(ROW) * self.texel(),
@@ -328,18 +248,9 @@ impl Kernel {
     }
 }
 
-/// A convolution of a picture enlarged `n` times is n² convolutions of the picture itself, one for each phase of the output, with
-/// the taps that meet the same pixel added up: 4×4 after ×2 has 25 taps in four phases instead of 64. Taps of the largest phase,
-/// and each phase with its padding.
-fn merged([h, w]: [u32; 2], pad: [i32; 2], n: i32) -> ([u32; 2], Vec<Phase>) {
-    let least = |phase: i32, pad: i32| (phase - pad).div_euclid(n);
-    let taps = |edge: u32, pad: i32| {
-        let of = |phase: i32| (phase + edge as i32 - 1 - pad).div_euclid(n) - least(phase, pad) + 1;
-        (0..n).map(of).max().unwrap_or(1) as u32
-    };
-    let phases = (0..n * n).map(|i| [i % n, i / n]);
-    let phases = phases.map(|[x, y]| ([x as u32, y as u32], [-least(x, pad[0]), -least(y, pad[1])])).collect();
-    ([taps(h, pad[1]), taps(w, pad[0])], phases)
+/// So many workgroups, in rows that the dimensions of a dispatch allow.
+pub(super) fn in_rows(groups: u32) -> [u32; 2] {
+    [groups.min(ROW_OF_GROUPS), groups.div_ceil(ROW_OF_GROUPS)]
 }
 
 /// On what the choice of a kernel depends besides its step.
@@ -364,21 +275,20 @@ impl Choice<'_> {
     }
 }
 
-/// Lines of `const`.
+/// Lines before a shader's text: `const`s, and the optional feature that it needs.
 #[derive(Default)]
-struct Prelude(Vec<(&'static str, u32)>);
+pub(super) struct Prelude {
+    pub feature: &'static str,
+    numbers: Vec<(&'static str, u32)>,
+}
 
 impl Prelude {
-    fn add(&mut self, name: &'static str, value: u32) {
-        self.0.push((name, value));
+    pub fn add(&mut self, name: &'static str, value: u32) {
+        self.numbers.push((name, value));
     }
 
-    fn set(&mut self, name: &'static str, value: u32) {
-        self.0.retain(|(n, _)| *n != name);
-        self.add(name, value);
-    }
-
-    fn text(&self) -> String {
-        self.0.iter().map(|(name, value)| format!("const {name} = {value}u;\n")).collect()
+    pub fn text(&self) -> String {
+        let lines = self.numbers.iter().map(|(name, value)| format!("const {name} = {value}u;\n"));
+        std::iter::once(self.feature.to_string()).chain(lines).collect()
     }
 }

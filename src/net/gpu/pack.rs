@@ -2,11 +2,13 @@
 //!
 //! Convolutions: output channels in blocks of one to four vectors. A block is one matrix with the bias, a column a vector, then for
 //! each input vector, tap row, tap column and output vector of the block one 4×4 matrix, which takes four input channels to four
-//! output channels. Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
+//! output channels. (For staged kernels input vectors come within taps.) All blocks of one phase come before those of the next. Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
 //! of stride s is s² ordinary ones, each of which makes every s-th pixel (its phase) in both directions. Where the kernel works by
 //! Winograd's F(2, 3), three neighbouring taps become four.
 
-use super::kernels::{Bound, Filter, Kernel, Part};
+use super::conv::Filter;
+use super::kernels::{Bound, Kernel, Part};
+use super::permutation::Source;
 use crate::net::format::Weights;
 use crate::net::graph::Op;
 use crate::net::plan::{Kind, Step};
@@ -67,6 +69,9 @@ struct Layer<'a> {
     /// Padding of a transposed convolution.
     transposed: Option<u32>,
     filter: Filter,
+    /// Padding and base of a phase, as in `shaders/net/place.wgsl`.
+    pad: [i32; 2],
+    base: [i32; 2],
     enlarged: Option<(u32, [i32; 2])>,
     pairs: bool,
 }
@@ -97,13 +102,15 @@ impl<'a> Layer<'a> {
             kernel: kernel.map(|k| k as usize),
             transposed,
             filter,
+            pad: kernel_choice.numbers.pad,
+            base: kernel_choice.numbers.base,
             enlarged: kernel_choice.enlarged,
             pairs: kernel_choice.pairs,
         }
     }
 
-    /// The weight that takes input channel `i` under tap (ky, kx) of `part`'s kernel to output channel `o`.
-    fn at(&self, part: &Part, o: usize, i: usize, ky: usize, kx: usize) -> f32 {
+    /// The weight that takes input channel `i` under tap (ky, kx) of a phase's kernel to output channel `o`.
+    fn at(&self, phase: [u32; 2], o: usize, i: usize, ky: usize, kx: usize) -> f32 {
         let [kh, kw] = self.kernel;
         if o >= self.bias.len() || i >= self.in_channels {
             return 0.0;
@@ -123,10 +130,13 @@ impl<'a> Layer<'a> {
                 return self.scale[o] * self.weight[first + ky * kw + kx];
             };
             // All taps that meet the same pixel of the picture before it was enlarged.
+            let of_phase = [0, 1].map(|axis| {
+                self.pad[axis] - (phase[axis] as i32 + self.base[axis]).div_euclid(self.filter.spread as i32)
+            });
             let real = |axis: usize, edge: usize, k: usize| {
                 let meets = move |real: &usize| {
-                    let place = part.phase[axis] as i32 + *real as i32 - pad[axis];
-                    place.div_euclid(factor as i32) + part.pad[axis] == k as i32
+                    let place = phase[axis] as i32 + *real as i32 - pad[axis];
+                    place.div_euclid(factor as i32) + of_phase[axis] == k as i32
                 };
                 (0..edge).filter(meets)
             };
@@ -140,7 +150,7 @@ impl<'a> Layer<'a> {
             let stride = self.filter.spread;
             ((phase + padding) % stride) as usize + stride as usize * (taps as usize - 1 - k)
         };
-        let (ky, kx) = (real(part.phase[1], self.filter.taps[0], ky), real(part.phase[0], self.filter.taps[1], kx));
+        let (ky, kx) = (real(phase[1], self.filter.taps[0], ky), real(phase[0], self.filter.taps[1], kx));
         if ky >= kh || kx >= kw {
             return 0.0;
         }
@@ -158,22 +168,28 @@ impl<'a> Layer<'a> {
                 bytes.extend(value.to_le_bytes());
             }
         };
+        // Blocks of a phase as they are stored, which may be more than a workgroup's.
+        let blocks = self.bias.len().div_ceil(4).div_ceil(vectors);
+        let staged = kernel.permutation.is_some_and(|p| p.weights == Source::Staged);
         for block in part.first_block as usize..(part.first_block + part.blocks) as usize {
-            let first = block * 4 * vectors;
+            let (phase, spread) = ((block / blocks) as u32, self.filter.spread);
+            let phase = [phase % spread, phase / spread];
+            let first = block % blocks * 4 * vectors;
             let bias = |i: usize| if i < 4 * vectors { self.bias.get(first + i).copied().unwrap_or(0.0) } else { 0.0 };
             (0..16).for_each(|i| put(bias(i)));
             // The channels that the block's group reads; all of them where groups run as one.
             let grouped = self.filter.in_vectors as usize * 4 < self.in_channels;
             let begin = if grouped { first / self.group[1] * self.group[0] } else { 0 };
-            for c in 0..self.filter.in_vectors as usize {
-                for ky in 0..self.filter.taps[0] as usize {
-                    for kx in 0..self.filter.taps[1] as usize {
-                        // Column-major: column k takes input channel k to the four outputs.
-                        for k in 0..16 * vectors {
-                            put(self.at(part, first + k / 16 * 4 + k % 4, begin + c * 4 + k % 16 / 4, ky, kx));
-                        }
-                    }
+            // One tap of one input vector. Column-major: column k takes input channel k to the four outputs.
+            let mut matrices = |c: usize, tap: usize| {
+                let (ky, kx) = (tap / self.filter.taps[1] as usize, tap % self.filter.taps[1] as usize);
+                for k in 0..16 * vectors {
+                    put(self.at(phase, first + k / 16 * 4 + k % 4, begin + c * 4 + k % 16 / 4, ky, kx));
                 }
+            };
+            let (inputs, taps) = (self.filter.in_vectors as usize, self.filter.taps.iter().product::<u32>() as usize);
+            for i in 0..inputs * taps {
+                if staged { matrices(i % inputs, i / inputs) } else { matrices(i / taps, i % taps) }
             }
         }
         bytes.resize(kernel.bound_bytes() as usize, 0);

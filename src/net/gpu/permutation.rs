@@ -1,7 +1,7 @@
 //! The ways in which a convolution can run, which of them a device can do, and which is taken when nobody has measured. Pure.
 
 use super::super::plan::{Plan, Precision};
-use super::kernels::Filter;
+use super::conv::{Filter, Stage};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -11,6 +11,16 @@ pub const ROW: u64 = 2048;
 const MAX_ROWS: u64 = 8192;
 /// WebGPU's default limit of one uniform binding.
 const MAX_UNIFORM: u64 = 64 << 10;
+/// Workgroups that keep a large GPU busy: some for each of its processors.
+const CROWD: u32 = 256;
+/// Most parts of a sum.
+pub const MAX_PARTS: u32 = 64;
+/// Most bytes of a sum's parts.
+const MAX_PARTIAL: u64 = 16 << 20;
+/// WebGPU's default limit of one storage binding.
+const MAX_STORAGE: u64 = 128 << 20;
+/// Most blocks of a staged kernel: with all its parts they stay below WebGPU's default limit of workgroups in one dimension.
+const MAX_STAGED: u32 = 65535 / MAX_PARTS * 2;
 /// Bytes of one matrix of weights in 32 bits.
 pub const MATRIX: u64 = 64;
 
@@ -24,6 +34,8 @@ pub enum Source {
     Storage,
     /// In a texture, shared out among the threads of a subgroup: an optional feature. Reads the input from the mirror too.
     Lanes,
+    /// In a storage buffer, and with the input staged in the memory of a workgroup.
+    Staged,
 }
 
 /// One way to run a convolution. All give the same result up to rounding.
@@ -34,8 +46,26 @@ pub struct Permutation {
     pub weights: Source,
     /// It reads its input from a copy of the arena in a texture.
     pub mirror: bool,
-    /// Vectors of output channels a thread, 1 to 4.
+    /// Vectors of output channels a thread, 1 to 4, staged at most 2.
     pub vectors: u32,
+    /// Parts into which the sum over input channels is cut, so that small pictures have work for more workgroups; staged and lanes only.
+    #[serde(default = "one")]
+    pub parts: u32,
+    /// Products are taken in 16 bits, of four input channels each, and added up in 32: an optional feature, staged and with 16-bit
+    /// storage only. Sums of four products beyond 65504 become infinite.
+    #[serde(default)]
+    pub half: bool,
+}
+
+fn one() -> u32 {
+    1
+}
+
+impl Permutation {
+    /// In one part, in 32 bits.
+    pub const fn new(weights: Source, mirror: bool, vectors: u32) -> Self {
+        Self { weights, mirror, vectors, parts: 1, half: false }
+    }
 }
 
 impl std::fmt::Display for Permutation {
@@ -44,9 +74,14 @@ impl std::fmt::Display for Permutation {
             Source::Uniform => "uniform",
             Source::Storage => "storage",
             Source::Lanes => "lanes",
+            Source::Staged => "staged",
         };
         let mirror = if self.mirror && self.weights != Source::Lanes { " mirror" } else { "" };
-        write!(f, "{weights}{mirror} 8×{}", 4 * self.vectors)
+        write!(f, "{weights}{mirror} 8×{}", 4 * self.vectors)?;
+        if self.parts > 1 {
+            write!(f, " /{}", self.parts)?;
+        }
+        if self.half { write!(f, " f16") } else { Ok(()) }
     }
 }
 
@@ -69,15 +104,22 @@ pub struct Facts {
     pub lanes: bool,
     /// The adapter runs on the processor.
     pub software: bool,
+    /// Shaders can calculate in 16 bits.
+    pub half: bool,
+    /// Shaders on the processor can store words of 64 bits.
+    pub words: bool,
 }
 
 impl Facts {
     /// Of a device.
     pub fn of(device: &wgpu::Device) -> Self {
         let info = device.adapter_info();
+        let software = info.device_type == wgpu::DeviceType::Cpu;
         Self {
             lanes: device.features().contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= 8,
-            software: info.device_type == wgpu::DeviceType::Cpu,
+            software,
+            half: device.features().contains(wgpu::Features::SHADER_F16),
+            words: software && device.features().contains(wgpu::Features::SHADER_INT64),
         }
     }
 }
@@ -110,24 +152,59 @@ impl std::fmt::Display for Layer {
 pub type Tuned = HashMap<String, Permutation>;
 
 impl Layer {
-    /// Every permutation worth timing here, the guess first. On processors buffers are several times slower than textures, so
-    /// what reads them is left out.
+    /// Every permutation worth timing here, the guess first. On processors buffers are several times slower than textures, a workgroup's
+    /// memory is no faster than any other, 16-bit arithmetic is converted, and a few workgroups are enough: all that is left out there.
     pub fn candidates(&self, plan: &Plan, facts: Facts) -> Vec<Permutation> {
         let mut vectors: Vec<u32> = (1..=self.out_vectors.min(4)).collect();
         vectors.sort_by_key(|v| self.rounds(*v));
         vectors.truncate(2);
-        let mut found = vec![self.guess(plan, facts)];
+        let mut wanted = Vec::new();
         for vectors in vectors {
             for weights in [Source::Lanes, Source::Uniform, Source::Storage] {
-                for mirror in [true, false].into_iter().filter(|mirror| *mirror || !facts.software) {
-                    let wanted = Permutation { weights, mirror, vectors };
-                    if self.fitted(wanted, plan, facts) == wanted && !found.contains(&wanted) {
-                        found.push(wanted);
-                    }
-                }
+                let mirrors = [true, false].into_iter().filter(|mirror| *mirror || !facts.software);
+                wanted.extend(mirrors.map(|mirror| Permutation::new(weights, mirror, vectors)));
+            }
+        }
+        if !facts.software {
+            for half in [false, true] {
+                wanted.extend(
+                    [1, 2].map(|vectors| Permutation { half, ..Permutation::new(Source::Staged, false, vectors) }),
+                );
+            }
+        }
+        let cut = wanted.clone().into_iter().filter(|_| !facts.software);
+        let parts = cut.flat_map(|p| self.parts(p).map(move |parts| Permutation { parts, ..p }));
+        let mut found = vec![self.guess(plan, facts)];
+        for wanted in wanted.iter().copied().chain(parts) {
+            if self.fitted(wanted, plan, facts) == wanted && !found.contains(&wanted) {
+                found.push(wanted);
             }
         }
         found
+    }
+
+    /// Into how many parts to cut the sum besides one: those that bring at least a quarter of [`CROWD`] workgroups, up to the first that
+    /// brings all.
+    fn parts(&self, permutation: Permutation) -> impl Iterator<Item = u32> + use<> {
+        let groups = self.groups(permutation).max(1);
+        let all = (CROWD / groups).next_power_of_two();
+        [all / 4, all].into_iter().filter(|parts| *parts > 1)
+    }
+
+    /// Workgroups of a permutation in one part.
+    fn groups(&self, p: Permutation) -> u32 {
+        let phases = self.filter.spread * self.filter.spread;
+        if p.weights == Source::Staged {
+            let stage = Stage::of(self, p.vectors);
+            return stage.groups(self) * self.out_vectors.div_ceil(stage.columns * p.vectors) * phases;
+        }
+        self.filter.pixels(self.size).div_ceil(8 * 64) * self.out_vectors.div_ceil(p.vectors) * phases
+    }
+
+    /// Bytes of the sums' parts.
+    pub(super) fn partial_bytes(&self, parts: u32) -> u64 {
+        let [width, height] = self.size.map(u64::from);
+        width * height * u64::from(self.out_vectors) * u64::from(parts) * 16
     }
 
     /// What is known without timing. On processors loads are dear, and textures and shared weights the cheapest of them. Of
@@ -135,9 +212,9 @@ impl Layer {
     pub fn guess(&self, plan: &Plan, facts: Facts) -> Permutation {
         let wanted = if facts.software {
             let best = (1..=self.out_vectors.min(4)).rev().min_by_key(|v| self.rounds(*v)).unwrap_or(1);
-            Permutation { weights: Source::Lanes, mirror: true, vectors: best }
+            Permutation::new(Source::Lanes, true, best)
         } else {
-            Permutation { weights: Source::Uniform, mirror: false, vectors: self.out_vectors.min(2) }
+            Permutation::new(Source::Uniform, false, self.out_vectors.min(2))
         };
         self.fitted(wanted, plan, facts)
     }
@@ -155,21 +232,47 @@ impl Layer {
             vectors -= 1;
         }
         let mirror = mirrors(plan);
+        let grouped = self.filter.group_vectors < self.out_vectors;
         let matrices = self.filter.matrices(vectors);
+        let blocks = self.out_vectors.div_ceil(vectors) * self.filter.spread * self.filter.spread;
         // Weights of 3×3 taps take a third more when they are transformed.
-        let texels = (matrices * u64::from(self.out_vectors.div_ceil(vectors)) * 4).div_ceil(3) * 4;
+        let texels = (matrices * u64::from(blocks) * 4).div_ceil(3) * 4;
         let weights = match wanted.weights {
             Source::Lanes if facts.lanes && mirror && texels.div_ceil(ROW) <= MAX_ROWS => Source::Lanes,
-            Source::Storage => Source::Storage,
+            Source::Staged if !grouped && self.stored_blocks() <= self.storage_blocks(1).min(MAX_STAGED) => {
+                Source::Staged
+            }
+            Source::Storage | Source::Staged => Source::Storage,
             _ if plan.precision == Precision::F16 || matrices * MATRIX > MAX_UNIFORM => Source::Storage,
             _ => Source::Uniform,
         };
-        Permutation { weights, mirror: weights == Source::Lanes || (mirror && wanted.mirror), vectors }
+        let staged = weights == Source::Staged;
+        let most = ((MAX_PARTIAL / self.partial_bytes(1).max(1)) as u32)
+            .clamp(1, MAX_PARTS)
+            .min(self.filter.in_vectors.max(1));
+        let cut = staged || weights == Source::Lanes;
+        Permutation {
+            weights,
+            mirror: weights == Source::Lanes || (mirror && wanted.mirror && !staged),
+            vectors: if staged { vectors.min(2) } else { vectors },
+            parts: if cut { wanted.parts.clamp(1, most) } else { 1 },
+            half: staged && wanted.half && facts.half && plan.precision == Precision::F16,
+        }
     }
 
     /// How many blocks of output channels fit into one uniform binding.
     pub(super) fn uniform_blocks(&self, vectors: u32) -> u32 {
         ((MAX_UNIFORM / (self.filter.matrices(vectors) * MATRIX)) as u32).max(1)
+    }
+
+    /// How many fit into one storage binding.
+    pub(super) fn storage_blocks(&self, vectors: u32) -> u32 {
+        ((MAX_STORAGE / (self.filter.matrices(vectors) * MATRIX)) as u32).max(1)
+    }
+
+    /// Blocks of one vector of output channels, of all phases.
+    fn stored_blocks(&self) -> u32 {
+        self.out_vectors * self.filter.spread * self.filter.spread
     }
 
     /// What runs: as `variant` says, with what has been measured. `None` for the plain kernel.

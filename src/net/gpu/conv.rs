@@ -1,0 +1,213 @@
+//! How a convolution runs: as taps, phases and blocks of output channels, in one of several permutations. Pure.
+//!
+//! A transposed convolution of stride s, and a convolution of a picture enlarged s times, are s² ordinary ones of the picture itself, each
+//! of which makes every s-th output pixel in both directions: its phase. All phases go into one dispatch wherever their weights do.
+
+use super::super::graph::Padding;
+use super::super::plan::{Kind, Plan, Precision, Step};
+use super::kernels::{Bound, Choice, GROUP, Kernel, Part, Prelude, Sum, THREADS, in_rows};
+use super::permutation::{Layer, Permutation, Source, Variant};
+use crate::net::graph::Shape;
+
+/// WebGPU's default limit of workgroups in one dimension.
+const MAX_DEPTH: u32 = 65535;
+
+/// The convolution kernel's view of a layer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Filter {
+    /// Taps, height and width; of one phase, where there are several.
+    pub taps: [u32; 2],
+    /// Distance of input pixels.
+    pub stride: u32,
+    /// Distance of output pixels: there are as many phases in both directions.
+    pub spread: u32,
+    /// Factor by which the input is enlarged.
+    pub nearest: u32,
+    /// Four-channel vectors read for each output.
+    pub in_vectors: u32,
+    /// Four-channel vectors written that read the same: those of a group of channels, or all.
+    pub group_vectors: u32,
+}
+
+impl Filter {
+    /// Matrices of one block of `vectors` vectors of output channels.
+    pub fn matrices(self, vectors: u32) -> u64 {
+        1 + u64::from(self.taps[0]) * u64::from(self.taps[1]) * u64::from(self.in_vectors) * u64::from(vectors)
+    }
+
+    /// Pixels of one phase of an output of `size`, the largest one's.
+    pub fn pixels(self, size: [u32; 2]) -> u32 {
+        // At most 2^26 pixels, so the product fits.
+        size.map(|edge| edge.div_ceil(self.spread)).iter().product()
+    }
+}
+
+/// How a workgroup of `conv_staged.wgsl` is divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Stage {
+    /// Threads side by side in output channels; the others of the 64 in pixels.
+    pub columns: u32,
+    /// Pixels of a thread.
+    pub pixels: u32,
+}
+
+impl Stage {
+    /// For `vectors` vectors a thread: as few columns as cover the output channels, and no more pixels than there are.
+    pub fn of(layer: &Layer, vectors: u32) -> Self {
+        let columns = layer.out_vectors.div_ceil(vectors).next_power_of_two().min(8);
+        let rows = THREADS / columns;
+        let pixels = layer.filter.pixels(layer.size).div_ceil(rows).next_power_of_two().min(8);
+        Self { columns, pixels }
+    }
+
+    /// Workgroups for the pixels of one phase.
+    pub fn groups(self, layer: &Layer) -> u32 {
+        layer.filter.pixels(layer.size).div_ceil(THREADS / self.columns * self.pixels)
+    }
+}
+
+/// Taps of one phase, and its padding: `pad` − ⌊(phase + `base`) / spread⌋.
+struct Phases {
+    filter: Filter,
+    pad: [i32; 2],
+    base: [i32; 2],
+}
+
+impl Kernel {
+    /// Fills in what a convolution needs and names its shader.
+    pub(super) fn convolution(
+        &mut self,
+        prelude: &mut Prelude,
+        step: &Step,
+        plan: &Plan,
+        choice: &Choice<'_>,
+    ) -> String {
+        let out = plan.tensors[step.output].shape;
+        let Phases { filter, pad, base } = self.phases(step, plan, choice);
+        let size = [out.width, out.height];
+        let layer = Layer { filter, out_vectors: out.vectors(), size, precision: plan.precision };
+        let permutation = layer.permutation(choice.variant, choice.tuned, plan, choice.facts);
+        let row = matches!(step.kind, Kind::Conv { kernel: [3, 3], stride: 1, nearest: 1, padding, .. } if padding == Padding::all(1));
+        self.pairs = row && permutation.is_some_and(|p| p.weights == Source::Lanes);
+        let filter = if self.pairs { Filter { taps: [3, 4], ..filter } } else { filter };
+        (self.filter, self.layer, self.permutation) = (Some(filter), Some(layer), permutation);
+        let plain = Permutation::new(Source::Storage, false, out.vectors().min(2));
+        let Permutation { weights, mirror, vectors, parts, half } = permutation.unwrap_or(plain);
+        let staged = weights == Source::Staged;
+        (self.mirror, self.vectors) = (mirror, if staged { 1 } else { vectors });
+        self.bound = match weights {
+            Source::Lanes => Bound::Texture,
+            Source::Uniform => Bound::Uniform,
+            Source::Storage | Source::Staged if plan.precision == Precision::F16 => Bound::Half,
+            Source::Storage | Source::Staged => Bound::Storage,
+        };
+        let blocks = out.vectors().div_ceil(self.vectors);
+        let all = blocks * filter.spread * filter.spread;
+        let uniform = self.bound == Bound::Uniform;
+        // As many blocks a dispatch as a binding of weights, and its workgroups in z, allow; staged kernels need all at once.
+        let bound = match self.bound {
+            Bound::Uniform => layer.uniform_blocks(vectors),
+            Bound::Storage | Bound::Half if !staged => layer.storage_blocks(self.vectors),
+            _ => all,
+        };
+        let deep = if permutation.is_none() { vectors } else { parts };
+        self.blocks_per_part = all.div_ceil(all.div_ceil(bound.min(MAX_DEPTH / deep)));
+        let part = |first_block| {
+            let blocks = self.blocks_per_part.min(all - first_block);
+            Part { first_block, blocks, depth: blocks * parts }
+        };
+        self.parts = (0..all).step_by(self.blocks_per_part as usize).map(part).collect();
+        (self.numbers.pad, self.numbers.base, self.numbers.blocks) = (pad, base, blocks);
+        (self.numbers.in_vectors, self.numbers.group) = (filter.in_vectors, filter.group_vectors);
+        self.numbers.parts = parts;
+        if parts > 1 {
+            let vectors = out.pixels() as u32 * out.vectors();
+            let [x, y] = in_rows(vectors.div_ceil(THREADS));
+            let shader = if plan.precision == Precision::F16 { "net.sum_half" } else { "net.sum" };
+            let bytes = layer.partial_bytes(parts);
+            self.sum = Some(Sum { shader: shader.into(), prelude: prelude.text(), groups: [x, y, 1], bytes });
+        }
+        prelude.add("KERNEL_H", filter.taps[0]);
+        prelude.add("KERNEL_W", filter.taps[1]);
+        prelude.add("STRIDE", filter.stride);
+        prelude.add("SPREAD", filter.spread);
+        prelude.add("NEAREST", filter.nearest);
+        prelude.add("VECTORS", vectors);
+        if uniform {
+            prelude.add("MATRICES", (self.bound_bytes() / super::permutation::MATRIX) as u32);
+        }
+        let cut = if parts > 1 { "_parts" } else { "" };
+        let [columns, rows] = size.map(|edge| edge.div_ceil(filter.spread));
+        if permutation.is_none() {
+            self.groups = [columns.div_ceil(GROUP[0]), rows.div_ceil(GROUP[1])];
+            self.parts.iter_mut().for_each(|p| p.depth *= vectors);
+            return "conv_plain".into();
+        }
+        if staged {
+            let stage = Stage::of(&layer, vectors);
+            prelude.add("COLUMNS", stage.columns);
+            prelude.add("PIXELS", stage.pixels);
+            self.groups = in_rows(stage.groups(&layer));
+            // A workgroup makes several of the blocks as they are stored.
+            self.numbers.blocks = out.vectors().div_ceil(stage.columns * vectors);
+            self.parts[0].depth = self.numbers.blocks * filter.spread * filter.spread * parts;
+            let arithmetic = if half { "_arithmetic" } else { "" };
+            prelude.feature = if half { "enable f16;\n" } else { "" };
+            return format!("conv_staged{arithmetic}{cut}");
+        }
+        let [wide, high] = if self.pairs { [4, 4] } else { [2, 4] };
+        // A processor needs no more threads than its vectors are wide, and smaller groups share small pictures out better.
+        let threads = if choice.facts.software { THREADS / 4 } else { THREADS };
+        prelude.add("THREADS", threads);
+        self.groups = in_rows((columns.div_ceil(wide) * rows.div_ceil(high)).div_ceil(threads));
+        let family = if row { "conv3x3" } else { "conv_any" };
+        let input = if mirror && self.bound != Bound::Texture { "_mirror" } else { "" };
+        let weights = match self.bound {
+            Bound::Texture => "_lanes",
+            Bound::Storage => "_wide",
+            _ => "",
+        };
+        format!("{family}{input}{weights}{cut}")
+    }
+
+    /// The taps and phases of a step.
+    fn phases(&mut self, step: &Step, plan: &Plan, choice: &Choice<'_>) -> Phases {
+        let (input, out) = (plan.tensors[step.input].shape, plan.tensors[step.output].shape);
+        match step.kind {
+            Kind::Transposed { kernel, stride, padding } => {
+                let taps = kernel.map(|k| k.div_ceil(stride));
+                let [in_vectors, group_vectors] = [input, out].map(Shape::vectors);
+                let filter = Filter { taps, stride: 1, spread: stride, nearest: 1, in_vectors, group_vectors };
+                Phases { filter, pad: [taps[1] as i32 - 1, taps[0] as i32 - 1], base: [padding as i32; 2] }
+            }
+            Kind::Conv { kernel, stride, padding, nearest, groups } => {
+                // Groups of whole vectors read their own; others run as one, with zeros for what they do not see.
+                let whole = [input.channels, out.channels].iter().all(|n| n.is_multiple_of(4 * groups));
+                let groups = if whole && choice.variant != Variant::Plain { groups } else { 1 };
+                let [in_vectors, group_vectors] = [input, out].map(|s| s.vectors() / groups);
+                let pad = [padding.left as i32, padding.top as i32];
+                if nearest > 1 && stride == 1 && choice.variant != Variant::Plain {
+                    self.enlarged = Some((nearest, pad));
+                    let taps = [merged(kernel[0], pad[1], nearest as i32), merged(kernel[1], pad[0], nearest as i32)];
+                    let filter = Filter { taps, stride, spread: nearest, nearest: 1, in_vectors, group_vectors };
+                    return Phases { filter, pad: [0, 0], base: pad.map(|n| -n) };
+                }
+                let filter = Filter { taps: kernel, stride, spread: 1, nearest, in_vectors, group_vectors };
+                Phases { filter, pad, base: [0, 0] }
+            }
+            // Nothing else is a convolution.
+            _ => {
+                let [in_vectors, group_vectors] = [input, out].map(Shape::vectors);
+                let filter = Filter { taps: [1, 1], stride: 1, spread: 1, nearest: 1, in_vectors, group_vectors };
+                Phases { filter, pad: [0, 0], base: [0, 0] }
+            }
+        }
+    }
+}
+
+/// Along one edge of a kernel after enlarging `n` times: the taps that meet the same pixel are added up, so 4×4 after ×2 has 25 taps in
+/// four phases instead of 64. How many the largest phase has.
+fn merged(edge: u32, pad: i32, n: i32) -> u32 {
+    let of = |phase: i32| (phase + edge as i32 - 1 - pad).div_euclid(n) - (phase - pad).div_euclid(n) + 1;
+    (0..n).map(of).max().unwrap_or(1) as u32
+}
