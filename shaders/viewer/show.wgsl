@@ -43,11 +43,6 @@ struct Show {
 @group(0) @binding(13) var right: texture_2d<f32>;
 @group(0) @binding(14) var feature: texture_2d<f32>;
 
-@vertex
-fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return vec4f(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
-}
-
 @fragment
 fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let pixel = vec2u(max(position.xy - show.origin, vec2f(0.0)));
@@ -58,14 +53,7 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
         // White with a dark rim is seen on anything.
         shown = select(vec3f(0.0), vec3f(1.0), from_line < show.line);
     }
-    if show.linear_target != 0u {
-        shown = srgb_decode(shown);
-    }
-    return vec4f(shown, 1.0);
-}
-
-fn srgb_decode(c: vec3f) -> vec3f {
-    return select(pow((c + 0.055) / 1.055, vec3f(2.4)), c / 12.92, c <= vec3f(0.04045));
+    return screen_color(shown, show.linear_target);
 }
 
 // Display-encoded colour of a pixel.

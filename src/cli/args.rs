@@ -1,6 +1,7 @@
 //! Flags that several subcommands share, and how they turn into a device, a scene, a camera and a method.
 
 use super::error::CliError;
+pub use crate::gi::name::MethodName;
 use crate::{
     gi::{Method, pass::Neural},
     gpu::{Backend, Gpu, GpuOptions},
@@ -111,55 +112,19 @@ impl Global {
     }
 }
 
-/// Names of the GI methods.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MethodName {
-    /// Analytic lights only.
-    Direct,
-    /// Sky and mean light from all around, times ambient occlusion.
-    Ambient,
-    /// One bounce in screen space.
-    Ssgi,
-    /// One bounce of the lights from reflective shadow maps.
-    Rsm,
-    /// All bounces and the sky from what lights and a cube around the camera see.
-    Cache,
-    /// Surfels that a bake has linked; holds for static geometry.
-    Probes,
-    /// The network.
-    Neural,
-    /// The path tracer, which converges to the truth.
-    Reference,
-}
-
 impl MethodName {
-    /// All real-time methods, cheapest first.
-    pub const REAL_TIME: [MethodName; 7] = [
-        MethodName::Direct,
-        MethodName::Ambient,
-        MethodName::Ssgi,
-        MethodName::Rsm,
-        MethodName::Cache,
-        MethodName::Probes,
-        MethodName::Neural,
-    ];
-
     /// The real-time method with its weights: `weights`, or the shipped ones. [`tuned`](super::tuned::tuned) adds what a device is needed for.
     pub fn method(self, global: &Global, weights: Option<&PathBuf>) -> Result<Method> {
-        Ok(match self {
-            MethodName::Direct => Method::Direct,
-            MethodName::Ambient => Method::Ambient,
-            MethodName::Ssgi => Method::Ssgi,
-            MethodName::Rsm => Method::Rsm,
-            MethodName::Cache => Method::Cache,
-            MethodName::Neural => {
+        match (self.plain(), self) {
+            (Some(method), _) => Ok(method),
+            (None, MethodName::Neural) => {
                 let mut neural = Neural::from(load_weights(weights)?);
                 neural.network.precision = global.precision.precision();
-                Method::Neural(Box::new(neural))
+                Ok(Method::Neural(Box::new(neural)))
             }
-            MethodName::Probes => return Err(usage("`probes` needs a bake, which this command does not make".into())),
-            MethodName::Reference => return Err(usage("`reference` is no real-time method".into())),
-        })
+            (None, MethodName::Probes) => Err(usage("`probes` needs a bake, which this command does not make".into())),
+            (None, _) => Err(usage(format!("`{}` is no real-time method", self.name()))),
+        }
     }
 }
 

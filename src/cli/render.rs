@@ -22,7 +22,6 @@ use crate::{
     scene::{Camera, Scene, upload::SceneGpu},
 };
 use anyhow::Result;
-use clap::ValueEnum;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -217,7 +216,7 @@ fn check(args: &Args) -> Result<Format> {
     if !args.exposure.is_finite() {
         return Err(usage(format!("--exposure {} is not a finite number of stops", args.exposure)));
     }
-    let name = args.method().to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default();
+    let name = args.method().name();
     if args.method() == MethodName::Reference {
         if args.samples.is_some() {
             return Err(usage("--samples averages frames of the rasteriser; --method reference takes --spp".into()));

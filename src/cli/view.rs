@@ -3,7 +3,6 @@
 use super::args::{Global, MethodName, parse_size};
 use crate::viewer::{self, Options};
 use anyhow::Result;
-use clap::ValueEnum;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -36,11 +35,10 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         let shaders = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
         crate::gpu::shaders::read_from(Some(shaders).filter(|s| s.is_dir()));
     }
-    let method = args.method.and_then(|m| m.to_possible_value()).map(|v| v.get_name().to_owned());
     let options = Options {
         scene: args.scene,
         weights: args.weights,
-        method,
+        method: args.method,
         watch: args.watch,
         script: args.script,
         size: args.size,

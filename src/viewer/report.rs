@@ -18,8 +18,8 @@ pub fn report(app: &App) -> Value {
         })
     });
     let found = stage.and_then(|st| st.reference());
-    let memory: std::collections::BTreeMap<String, u64> = app.memory.iter().cloned().collect();
-    let passes: Vec<_> = app.times.passes.iter().map(|r| r.name.clone()).collect();
+    let memory: std::collections::BTreeMap<String, u64> = app.meter.memory.iter().cloned().collect();
+    let passes: Vec<_> = app.meter.times.passes.iter().map(|r| r.name.clone()).collect();
     let mut report = json!({
         "loaded": shown.is_some() && stage.is_some_and(|st| st.has_scene() && st.still() > 0),
         "idle": app.is_idle(),
@@ -45,16 +45,16 @@ pub fn report(app: &App) -> Value {
         "copied": app.copied, "captured": app.captured, "rebuilt": app.rebuilt,
         "software": stage.map(|st| st.gpu.is_software()),
     });
-    let v = app.verdict;
+    let v = app.tracing.verdict;
     let measured = json!({
         "reference": {
             "samples": found.map_or(0, |f| f.samples), "finished": found.is_some_and(|f| f.finished),
             "noise": found.map(|f| f.noise),
         },
         "verdict": v.map(|v| json!({ "psnr": v.psnr, "ssim": v.ssim, "mae": v.mae, "relmse": v.rel_mse, "bias": v.bias })),
-        "flicker": app.flicker, "passes": passes, "memory": memory,
-        "gpu_ms": app.times.gpu.spread().map(|t| t.median), "cpu_ms": app.times.cpu.spread().map(|t| t.median),
-        "overlay_ms": app.times.overlay.spread().map(|t| t.median),
+        "flicker": app.meter.flicker, "passes": passes, "memory": memory,
+        "gpu_ms": app.meter.times.gpu.spread().map(|t| t.median), "cpu_ms": app.meter.times.cpu.spread().map(|t| t.median),
+        "overlay_ms": app.meter.times.overlay.spread().map(|t| t.median),
     });
     if let (Some(all), Value::Object(world), Value::Object(measured)) = (report.as_object_mut(), world, measured) {
         all.extend(world);

@@ -1,10 +1,10 @@
 //! One picture of the window: hands, scene, overlay, in this order, so that what hands did is seen at once.
 
-use super::app::App;
-use super::screen::Acquired;
-use super::state::Request;
-use super::ui;
-use crate::gpu::{readback, timing, timing::Recorder};
+use super::App;
+use crate::gpu::{readback, timing::Recorder};
+use crate::viewer::screen::Acquired;
+use crate::viewer::state::Request;
+use crate::viewer::ui;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
@@ -139,7 +139,7 @@ impl App {
         queue.submit(buffers);
         if drawn && let Some(profiler) = &mut screen.profiler {
             match profiler.end_frame() {
-                Ok(()) => self.timed_frames += 1,
+                Ok(()) => self.meter.timed_frames += 1,
                 Err(e) => tracing::debug!("a frame was not timed: {e}"),
             }
         }
@@ -154,8 +154,8 @@ impl App {
         if drawn && screen.profiler.is_none() {
             // Without timestamps the clock has to do.
             if device.poll(wgpu::PollType::wait_indefinitely()).is_ok() {
-                if self.settling < 2 {
-                    self.times.wall.add(Instant::now(), recording.elapsed().as_secs_f64() * 1e3);
+                if self.meter.settling < 2 {
+                    self.meter.times.wall.add(Instant::now(), recording.elapsed().as_secs_f64() * 1e3);
                 }
                 self.learn();
             }
@@ -165,13 +165,13 @@ impl App {
         {
             self.fail(e);
         }
-        if drawn && self.settling > 0 {
-            self.settling -= 1;
-            self.discard += u32::from(self.settling == 1);
+        if drawn && self.meter.settling > 0 {
+            self.meter.settling -= 1;
+            self.meter.discard += u32::from(self.meter.settling == 1);
         }
         self.frames += 1;
-        self.times.cpu.add(Instant::now(), cpu.as_secs_f64() * 1e3);
-        self.times.overlay.add(Instant::now(), overlay.as_secs_f64() * 1e3);
+        self.meter.times.cpu.add(Instant::now(), cpu.as_secs_f64() * 1e3);
+        self.meter.times.overlay.add(Instant::now(), overlay.as_secs_f64() * 1e3);
         self.collect_times();
         self.schedule(&output.viewport_output);
     }
@@ -183,15 +183,15 @@ impl App {
             adapter: &stage.gpu.info.name,
             software: stage.gpu.is_software(),
             timestamps: self.screen.as_ref().is_some_and(|s| s.profiler.is_some()),
-            times: &self.times,
-            memory: &self.memory,
+            times: &self.meter.times,
+            memory: &self.meter.memory,
             jobs: &self.jobs,
-            reference: self.reference,
-            verdict: self.verdict,
-            measured: &self.measured,
+            reference: self.tracing.facts,
+            verdict: self.tracing.verdict,
+            measured: &self.meter.measured,
             still: stage.still(),
             feature: stage.feature(),
-            flicker: self.flicker,
+            flicker: self.meter.flicker,
         };
         ui::show(ui, &mut self.state, &mut self.memory_of_ui, &facts)
     }
@@ -205,7 +205,7 @@ impl App {
             return false;
         }
         let camera = self.state.navigator.camera(&shown.scene);
-        let again = self.state.measure || self.settling == 1;
+        let again = self.state.measure || self.meter.settling == 1;
         let mut encoder = stage.gpu.device.create_command_encoder(&Default::default());
         let profiler = self.screen.as_ref().and_then(|s| s.profiler.as_ref());
         let mut recorder = match profiler {
@@ -224,15 +224,15 @@ impl App {
             self.scene_frames += 1;
             if self.state.settings.flicker {
                 match stage.measure_flicker(&self.state) {
-                    Ok(found) => self.flicker = found.or(self.flicker.filter(|_| stage.still() > 1)),
+                    Ok(found) => self.meter.flicker = found.or(self.meter.flicker.filter(|_| stage.still() > 1)),
                     Err(e) => self.state.tell(e.to_string(), true),
                 }
             }
             if stage.still() == 1 {
-                self.verdict = None;
+                self.tracing.verdict = None;
             }
             if !stage.is_converging(&self.state) {
-                self.judge_at = Some(Instant::now() + Duration::from_millis(200));
+                self.tracing.judge_at = Some(Instant::now() + Duration::from_millis(200));
             }
         }
         if let Err(e) = stage.update_feature(&self.state, &camera) {
@@ -241,50 +241,11 @@ impl App {
         drawn
     }
 
-    /// Takes in the GPU times that have arrived.
-    pub fn collect_times(&mut self) {
-        let (Some(screen), Some(stage)) = (&mut self.screen, &self.stage) else { return };
-        let Some(profiler) = &mut screen.profiler else { return };
-        if self.timed_frames == 0 {
-            return;
-        }
-        let _ = stage.gpu.device.poll(wgpu::PollType::Poll);
-        let mut any = false;
-        while let Some(results) = profiler.process_finished_frame(stage.gpu.queue.get_timestamp_period()) {
-            self.timed_frames = self.timed_frames.saturating_sub(1);
-            if self.discard > 0 {
-                self.discard -= 1;
-                continue;
-            }
-            self.times.frame(Instant::now(), &timing::milliseconds(&results));
-            any = true;
-        }
-        if any {
-            self.learn();
-            self.redraw_once = true;
-        }
-    }
-
-    /// Remembers what the method on show costs here.
-    fn learn(&mut self) {
-        let single = self.state.sources().len() == 1;
-        let timed = self.screen.as_ref().is_some_and(|s| s.profiler.is_some());
-        let track = if timed { &self.times.gpu } else { &self.times.wall };
-        if let (true, Some(spread), Some((source, _))) =
-            (single, track.spread(), self.stage.as_ref().and_then(|s| s.key(0)))
-        {
-            self.measured.insert(source as usize, spread.median);
-        }
-        if let Some(stage) = &self.stage {
-            self.memory = stage.bytes();
-        }
-    }
-
     /// When the next picture is due.
     fn schedule(&mut self, outputs: &egui::OrderedViewportIdMap<egui::ViewportOutput>) {
         let converging = self.stage.as_ref().is_some_and(|s| s.is_converging(&self.state));
         if converging
-            || self.settling == 1
+            || self.meter.settling == 1
             || (self.state.measure && self.stage.as_ref().is_some_and(|s| s.has_scene()))
         {
             self.redraw = true;
@@ -295,7 +256,7 @@ impl App {
         } else if delay < Duration::from_secs(3600) {
             self.wake(delay);
         }
-        if self.timed_frames > 0 {
+        if self.meter.timed_frames > 0 {
             self.wake(Duration::from_millis(20));
         }
         if self.redraw {
