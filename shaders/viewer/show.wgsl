@@ -88,6 +88,15 @@ fn display(pixel: vec2u, side: u32) -> vec3f {
             let cell = min(pixel / 4u, textureDimensions(feature) - 1u);
             return magma((textureLoad(feature, cell, 0).x - show.low) / max(show.high - show.low, 1e-9));
         }
+        case 11u: {
+            // All tiles, as large as they fit.
+            let size = vec2f(textureDimensions(feature));
+            let window = vec2f(textureDimensions(depth_texture));
+            let texel = (vec2f(pixel) + 0.5) / min(window.x / size.x, window.y / size.y);
+            let inside = all(texel < size);
+            let value = textureLoad(feature, vec2u(min(texel, size - 1.0)), 0);
+            return select(vec3f(0.2), magma(value.x), inside && value.y > 0.0);
+        }
         default: { return radiance_shown(textureLoad(emissive_texture, pixel, 0).rgb); }
     }
 }

@@ -8,6 +8,7 @@ mod examples;
 mod kernels;
 mod pack;
 pub mod permutation;
+mod tap;
 
 use super::format::Weights;
 use super::graph::Graph;
@@ -19,6 +20,7 @@ pub use examples::example_preludes;
 pub use kernels::{Bound, Choice, Filter, Kernel, Part};
 pub use permutation::{Facts, Permutation, Source, Tuned, Variant};
 use std::sync::Arc;
+pub use tap::Tap;
 use thiserror::Error;
 
 /// Why a network cannot run on this device.

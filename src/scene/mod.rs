@@ -27,6 +27,8 @@ mod load;
 pub mod obj;
 #[cfg(feature = "io")]
 pub mod paper_room;
+#[cfg(feature = "io")]
+pub mod path;
 pub mod shapes;
 #[cfg(feature = "io")]
 mod texture;

@@ -35,11 +35,12 @@ pub enum View {
     Error = 8,
     Feature = 9,
     Emission = 10,
+    Layer = 11,
 }
 
 impl View {
     /// All of them: keys 1 to 9 and 0, then what only the list has.
-    pub const ALL: [View; 11] = [
+    pub const ALL: [View; 12] = [
         View::Picture,
         View::Albedo,
         View::Normal,
@@ -51,6 +52,7 @@ impl View {
         View::Error,
         View::Feature,
         View::Emission,
+        View::Layer,
     ];
 
     /// Name in lists, scripts and saved state.
@@ -67,6 +69,7 @@ impl View {
             "error",
             "feature",
             "emission",
+            "layer",
         ][self as usize]
     }
 
@@ -84,6 +87,7 @@ impl View {
             "display difference of both sides, bright at a quarter",
             "what the network is given, lowest to highest",
             "emitted radiance",
+            "channels of a layer of the network",
         ][self as usize]
     }
 

@@ -14,6 +14,7 @@
 mod app;
 mod choice;
 mod command;
+mod film;
 mod flicker;
 mod jobs;
 mod judge;

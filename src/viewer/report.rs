@@ -2,6 +2,7 @@
 
 use super::app::App;
 use super::choice::Side;
+use super::film::Film;
 use serde_json::{Value, json};
 
 /// Everything that a script can expect.
@@ -23,7 +24,7 @@ pub fn report(app: &App) -> Value {
     let mut report = json!({
         "loaded": shown.is_some() && stage.is_some_and(|st| st.has_scene() && st.still() > 0),
         "idle": app.is_idle(),
-        "frames": app.frames, "scene_frames": app.scene_frames,
+        "frames": app.frames, "layouts": app.overlay.layouts, "places": app.overlay.memory.places, "density_drawn": app.overlay.density, "scene_frames": app.scene_frames,
         "view": s.view.name(), "left": s.left.name(), "right": s.right.name(), "split": s.split, "line": s.line,
         "drawn": { "left": key(Side::Left), "right": key(Side::Right) },
         "exposure": s.exposure, "tonemap": s.tonemap.name(), "samples": s.samples,
@@ -35,6 +36,10 @@ pub fn report(app: &App) -> Value {
         "camera": {
             "eye": n.eye.to_array(), "target": n.target.to_array(), "fov": n.fov, "fly": n.fly, "speed": n.speed,
             "file": n.file_camera,
+        },
+        "path": {
+            "keys": app.state.path.as_ref().map_or(0, |p| p.keys.len()),
+            "recording": matches!(app.state.film, Film::Records(_)), "playing": matches!(app.state.film, Film::Plays { .. }),
         },
         "selected": app.state.selected, "scene": scene, "weights": s.weights, "recent": s.recent,
         "size": app.state.size, "window": app.screen.as_ref().map(|sc| sc.size()),
@@ -54,7 +59,8 @@ pub fn report(app: &App) -> Value {
         "verdict": v.map(|v| json!({ "psnr": v.psnr, "ssim": v.ssim, "mae": v.mae, "relmse": v.rel_mse, "bias": v.bias })),
         "flicker": app.meter.flicker, "passes": passes, "memory": memory,
         "gpu_ms": app.meter.times.gpu.spread().map(|t| t.median), "cpu_ms": app.meter.times.cpu.spread().map(|t| t.median),
-        "overlay_ms": app.meter.times.overlay.spread().map(|t| t.median),
+        "overlay_ms": app.meter.times.overlay.spread().map(|t| t.mean),
+        "overlay": app.meter.times.overlay.spread().map(|t| json!({ "median": t.median, "p95": t.p95, "count": t.count })),
     });
     if let (Some(all), Value::Object(world), Value::Object(measured)) = (report.as_object_mut(), world, measured) {
         all.extend(world);

@@ -1,5 +1,6 @@
 //! The device behind the window: opened, and opened anew when it is lost.
 
+use super::overlay::Overlay;
 use super::{App, Event};
 use crate::viewer::jobs::{self, Kind, Product};
 use crate::viewer::live::Kept;
@@ -37,10 +38,9 @@ impl App {
     /// Opens a device for `window`, at the start and after the loss of one.
     pub(super) fn connect(&mut self, window: Arc<Window>) -> Result<(), ViewError> {
         // A fresh context uploads its font anew.
-        self.egui = egui::Context::default();
-        self.egui.set_zoom_factor(self.state.settings.zoom);
-        self.zoomed = self.state.settings.zoom;
-        let (screen, gpu) = Screen::new(window, &self.options.gpu, &self.egui)?;
+        let zoom = self.state.settings.zoom;
+        self.overlay = std::mem::replace(&mut self.overlay, Overlay::new(zoom)).renewed(zoom);
+        let (screen, gpu) = Screen::new(window, &self.options.gpu, &self.overlay.egui)?;
         self.generation += 1;
         let (generation, proxy) = (self.generation, self.proxy.clone());
         gpu.device.set_device_lost_callback(move |_, message| {

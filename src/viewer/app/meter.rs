@@ -45,7 +45,7 @@ impl App {
         }
         if any {
             self.learn();
-            self.redraw_once = true;
+            self.overlay.outdate();
         }
     }
 

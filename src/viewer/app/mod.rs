@@ -4,6 +4,7 @@
 mod device;
 mod frame;
 mod meter;
+mod overlay;
 mod reference;
 mod sides;
 mod steps;
@@ -18,10 +19,10 @@ use super::screen::Screen;
 use super::script::Script;
 use super::stage::Stage;
 use super::state::{Action, State};
-use super::ui;
 use super::watch::{self, Watch};
 use super::{Options, ViewError};
 use meter::Meter;
+use overlay::Overlay;
 use reference::Tracing;
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -40,6 +41,8 @@ pub enum Event {
     GpuError(String),
 }
 
+/// Time between two looks for GPU times that have not arrived.
+const POLL: Duration = Duration::from_millis(20);
 /// Time between two steps of a script.
 const STEP: Duration = Duration::from_millis(8);
 
@@ -48,9 +51,7 @@ pub struct App {
     options: Options,
     proxy: EventLoopProxy<Event>,
     pub state: State,
-    pub memory_of_ui: ui::Memory,
-    pub egui: egui::Context,
-    pub zoomed: f32,
+    pub overlay: Overlay,
     pub screen: Option<Screen>,
     pub stage: Option<Stage>,
     pub jobs: Vec<Job>,
@@ -70,9 +71,10 @@ pub struct App {
     pub screenshot: Option<PathBuf>,
     watch: Watch,
     next_look: Instant,
+    /// The window is to be drawn, overlay and all.
     pub redraw: bool,
-    /// Another picture, once, for numbers that came late.
-    pub redraw_once: bool,
+    /// The picture is to be drawn; the overlay may stay as it is.
+    pub again: bool,
     requested: bool,
     wake_at: Option<Instant>,
     generation: u32,
@@ -117,9 +119,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
     let mut app = App {
         proxy: event_loop.create_proxy(),
         state,
-        memory_of_ui: ui::Memory::default(),
-        egui: egui::Context::default(),
-        zoomed: 1.0,
+        overlay: Overlay::new(1.0),
         screen: None,
         stage: None,
         jobs: Vec::new(),
@@ -137,7 +137,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         watch: Watch::default(),
         next_look: now,
         redraw: true,
-        redraw_once: false,
+        again: false,
         requested: false,
         wake_at: None,
         generation: 0,
@@ -192,6 +192,8 @@ impl App {
             || self.tracing.is_judging()
             || building
             || self.redraw
+            || self.again
+            || self.overlay.is_stale()
             || self.requested
             || !self.jobs.is_empty())
     }
@@ -263,7 +265,7 @@ impl ApplicationHandler<Event> for App {
             }
             // What egui moves on every event of a window that is only being looked at is no reason to draw.
             WindowEvent::CursorMoved { .. } if self.script.is_some() => {}
-            _ => self.redraw |= response.repaint,
+            _ => self.again |= response.repaint,
         }
     }
 
@@ -279,31 +281,31 @@ impl ApplicationHandler<Event> for App {
         }
         if self.wake_at.is_some_and(|at| at <= now) {
             self.wake_at = None;
-            // Late numbers alone redraw once and not for ever.
-            let timed = self.meter.timed_frames > 0;
-            self.collect_times();
-            self.redraw |= !timed || std::mem::take(&mut self.redraw_once);
-            if self.meter.timed_frames > 0 {
-                self.wake(Duration::from_millis(20));
-            }
-        }
-        if self.tracing.judge_at.is_some_and(|at| at <= now) {
             self.redraw = true;
         }
+        self.collect_times();
+        let due = |at: Option<Instant>| at.is_some_and(|at| at <= now);
+        self.again |= due(self.tracing.judge_at);
+        // Where frames are drawn anyway, they decide themselves when numbers are due.
+        self.redraw |= due(self.overlay.due()) && !self.again && !self.requested;
         // One frame after the other: also where held keys let the window draw without end.
-        let seen = self.frames > self.step_frame || !(self.requested || self.redraw);
+        let seen = self.frames > self.step_frame || !(self.requested || self.redraw || self.again);
         if self.script.is_some() && now >= self.next_step && self.scripted.is_empty() && seen {
             self.next_step = now + STEP;
             self.step_frame = self.frames;
             self.step(event_loop);
         }
-        if self.redraw {
+        if self.redraw || self.again {
             self.request_redraw();
         }
-        let mut next = [self.wake_at, self.tracing.judge_at, self.options.watch.then_some(self.next_look)];
-        if self.script.is_some() {
-            next[0] = Some(next[0].map_or(now + STEP, |n| n.min(now + STEP)));
-        }
+        let next = [
+            self.wake_at,
+            self.tracing.judge_at,
+            self.overlay.due().filter(|_| !self.again),
+            (self.meter.timed_frames > 0).then(|| now + POLL),
+            self.options.watch.then_some(self.next_look),
+            self.script.is_some().then(|| now + STEP),
+        ];
         match next.into_iter().flatten().min() {
             Some(at) => event_loop.set_control_flow(ControlFlow::WaitUntil(at)),
             None => event_loop.set_control_flow(ControlFlow::Wait),

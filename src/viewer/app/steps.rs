@@ -13,15 +13,33 @@ impl App {
         let turn = script.turn(&report::report(self));
         self.script = Some(script);
         self.scripted.extend(turn.events);
-        self.redraw |= !self.scripted.is_empty();
+        self.again |= !self.scripted.is_empty();
         for order in turn.orders {
             let window = self.screen.as_ref().map(|s| s.window.clone());
             match order {
+                Order::Resize([w, h]) if w == 0 || h == 0 => {
+                    if let Some(screen) = &mut self.screen {
+                        screen.empty = true;
+                    }
+                }
                 Order::Resize([w, h]) => {
+                    if let Some(screen) = &mut self.screen {
+                        screen.empty = false;
+                    }
                     let size = winit::dpi::LogicalSize::new(w, h);
                     let _ = window.and_then(|w| w.request_inner_size(size));
                 }
                 Order::Zoom(zoom) => self.state.settings.zoom = zoom,
+                Order::Scale(scale) => {
+                    if let Some(screen) = &mut self.screen {
+                        screen.scale = Some(scale);
+                    }
+                }
+                Order::Copy([from, to]) => {
+                    if let Err(e) = std::fs::copy(&from, &to) {
+                        self.fail(format!("copying {} to {}: {e}", from.display(), to.display()));
+                    }
+                }
                 Order::Minimise(minimise) => {
                     self.minimised = minimise;
                     if let Some(window) = window {

@@ -1,6 +1,8 @@
 //! Work on threads: begun when the state or a file asks for it, taken in when it is done.
 
 use super::{App, Event};
+use crate::image_io;
+use crate::scene::path::CameraPath;
 use crate::viewer::choice::Source;
 use crate::viewer::jobs::{self, Done, Kind, Product, Shot};
 use crate::viewer::state::Request;
@@ -33,7 +35,7 @@ impl App {
                 Ok(Product::Weights(path))
             }),
             Request::Capture { exr } => {
-                let output = self.capture_name(if exr { "exr" } else { "png" });
+                let output = self.free_name("bouncelight", if exr { "exr" } else { "png" });
                 let info = &gpu.info;
                 let driver = format!("{} {}", info.driver, info.driver_info);
                 let facts = [
@@ -58,6 +60,23 @@ impl App {
                     }
                 }
             }
+            Request::Path(path) => match CameraPath::load(&path) {
+                Ok(found) => {
+                    let text = format!("{}: {:.1} seconds; Y plays it", path.display(), found.end());
+                    self.state.path = Some(found);
+                    self.state.tell(text, false);
+                }
+                Err(e) => self.state.tell(e.to_string(), true),
+            },
+            Request::SavePath => {
+                let Some(path) = &self.state.path else { return };
+                let file = self.free_name("camera", "json");
+                let told = match image_io::write_whole(&file, path.to_json().as_bytes()) {
+                    Ok(()) => (format!("written: {}; Y plays it", file.display()), false),
+                    Err(e) => (e.to_string(), true),
+                };
+                self.state.tell(told.0, told.1);
+            }
             Request::Copy(_) | Request::Quit => {}
         }
     }
@@ -80,9 +99,9 @@ impl App {
     }
 
     /// The first free `bouncelight-0001.png`.
-    pub(super) fn capture_name(&self, extension: &str) -> PathBuf {
+    pub(super) fn free_name(&self, stem: &str, extension: &str) -> PathBuf {
         let folder = self.options.captures.clone().unwrap_or_default();
-        let name = |i: u32| folder.join(format!("bouncelight-{i:04}.{extension}"));
+        let name = |i: u32| folder.join(format!("{stem}-{i:04}.{extension}"));
         (1..10_000).map(name).find(|p| !p.exists()).unwrap_or_else(|| name(0))
     }
 

@@ -12,6 +12,7 @@ use std::path::PathBuf;
 pub enum Action {
     View(View),
     Feature(i32),
+    Layer(i32),
     Source(Side, Source),
     NextMethod(isize),
     Split,
@@ -28,17 +29,29 @@ pub enum Action {
     Camera(usize),
     NextCamera,
     Fly,
-    Capture { exr: bool },
+    Capture {
+        exr: bool,
+    },
     CopyCommand,
     Open(String),
     Weights(Option<PathBuf>),
     Light(LightEdit),
     Sky(f32),
-    TurnSun { dx: f32, dy: f32 },
+    TurnSun {
+        dx: f32,
+        dy: f32,
+    },
     Select(Option<usize>),
     Move(Vec3),
     Undo,
     Escape,
+    /// Begins or ends recording the camera's path.
+    Record,
+    /// Plays the path, or stops it.
+    Play,
+    /// Changes between dark and light.
+    Theme,
+    Flicker,
     Reload,
     Quit,
 }
@@ -49,7 +62,13 @@ pub enum Request {
     Load(String),
     Surroundings(PathBuf),
     Weights(Option<PathBuf>),
-    Capture { exr: bool },
+    Capture {
+        exr: bool,
+    },
+    /// Reads a camera path.
+    Path(PathBuf),
+    /// Writes the camera path that was just recorded.
+    SavePath,
     Copy(String),
     Cancel,
     Quit,

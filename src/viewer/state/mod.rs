@@ -6,14 +6,16 @@ mod action;
 mod edit;
 
 use super::choice::{Side, Source, View};
+use super::film::{self, Film, Recording};
 use super::navigate::{Navigator, Preset};
 use super::saved::Settings;
 use crate::render::tonemap_curve::Tonemap;
-use crate::scene::Scene;
+use crate::scene::{Scene, path::CameraPath};
 pub use action::{Action, Request};
 pub use edit::{angles, from_angles};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// What of the scene on the GPU is out of date.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -28,7 +30,7 @@ pub struct Stale {
 pub struct Message {
     pub text: String,
     pub error: bool,
-    pub at: std::time::Instant,
+    pub at: Instant,
 }
 
 /// The scene that is shown.
@@ -66,6 +68,10 @@ pub struct State {
     pub preset: Option<Preset>,
     /// Networks store their numbers in 16 bits.
     pub half: bool,
+    /// The camera path that was recorded or dropped last.
+    pub path: Option<CameraPath>,
+    /// What is done with it.
+    pub film: Film,
 }
 
 impl State {
@@ -78,7 +84,7 @@ impl State {
     pub fn tell(&mut self, text: impl Into<String>, error: bool) {
         let text = text.into();
         self.messages.retain(|m| m.text != text);
-        self.messages.push(Message { text, error, at: std::time::Instant::now() });
+        self.messages.push(Message { text, error, at: Instant::now() });
         let surplus = self.messages.len().saturating_sub(5);
         self.messages.drain(..surplus);
     }
@@ -132,9 +138,15 @@ impl State {
             }
             A::Feature(by) => {
                 if self.settings.view == View::Feature {
-                    self.settings.feature = self.settings.feature.wrapping_add_signed(by);
+                    self.settings.feature = self.settings.feature.saturating_add_signed(by);
                 }
                 self.settings.view = View::Feature;
+            }
+            A::Layer(by) => {
+                if self.settings.view == View::Layer {
+                    self.settings.layer = self.settings.layer.saturating_add_signed(by);
+                }
+                self.settings.view = View::Layer;
             }
             A::Source(side, source) => match side {
                 Side::Left => self.settings.left = source,
@@ -195,6 +207,10 @@ impl State {
                     self.requests.push(Request::Cancel);
                 }
             }
+            A::Record => self.record(),
+            A::Play => self.play(),
+            A::Theme => self.settings.dark = !self.settings.dark,
+            A::Flicker => self.settings.flicker = !self.settings.flicker,
             A::Reload => {
                 if let Some(shown) = &self.shown {
                     self.requests.push(Request::Load(shown.spec.clone()));
@@ -202,6 +218,44 @@ impl State {
             }
             A::Quit => self.requests.push(Request::Quit),
         }
+    }
+
+    fn record(&mut self) {
+        let now = Instant::now();
+        match std::mem::take(&mut self.film) {
+            Film::Records(recording) => {
+                self.path = Some(recording.finish(&self.navigator, now));
+                self.requests.push(Request::SavePath);
+            }
+            _ => {
+                self.film = Film::Records(Recording::new(&self.navigator, now));
+                self.tell("the camera is recorded until R is pressed again", false);
+            }
+        }
+    }
+
+    fn play(&mut self) {
+        match (&self.film, &self.path) {
+            (Film::Plays { .. }, _) => self.film = Film::Rests,
+            (_, Some(_)) => self.film = Film::Plays { since: Instant::now() },
+            (_, None) => self.tell("there is no camera path yet: record one (R) or drop its file", false),
+        }
+    }
+
+    /// The film goes on; true while it moves the camera by itself.
+    pub fn roll(&mut self, now: Instant) -> bool {
+        let rolls = match (&mut self.film, &self.path) {
+            (Film::Records(recording), _) => {
+                recording.look(&self.navigator, now);
+                return false;
+            }
+            (Film::Plays { since }, Some(path)) => film::play(path, *since, now, &mut self.navigator),
+            _ => return false,
+        };
+        if !rolls {
+            self.film = Film::Rests;
+        }
+        rolls
     }
 
     fn with_scene(&mut self, act: impl FnOnce(&mut Navigator, &Scene)) {
@@ -217,6 +271,8 @@ impl State {
             Request::Surroundings(path.into())
         } else if lower.ends_with(".safetensors") {
             Request::Weights(Some(path.into()))
+        } else if lower.ends_with(".json") {
+            Request::Path(path.into())
         } else {
             Request::Load(path.into())
         };

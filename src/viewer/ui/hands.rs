@@ -6,20 +6,30 @@ use crate::scene::bounds::instance_bounds;
 use crate::viewer::navigate::Navigator;
 use crate::viewer::state::{Action, State};
 use crate::viewer::{keys, pick};
-use egui::{PointerButton, Pos2, Rect, Ui, Vec2};
+use egui::{Key, PointerButton, Pos2, Rect, Ui, Vec2};
 use glam::Vec3;
 
 /// Distance from the line in which it is grabbed, points.
 const GRAB: f32 = 7.0;
 
+/// Keys that fly while they are held.
+pub const FLY: [Key; 6] = [Key::W, Key::A, Key::S, Key::D, Key::Q, Key::E];
+
 /// What a drag over the picture does, decided where it began.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) enum Grip {
-    #[default]
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Grip {
     View,
+    Slide,
     Line,
     Sun,
     Object,
+}
+
+/// A drag over the picture that has got as far as `at`.
+#[derive(Debug)]
+pub struct Drag {
+    grip: Grip,
+    at: Pos2,
 }
 
 pub(super) fn keyboard(ui: &Ui, state: &mut State) {
@@ -39,7 +49,6 @@ pub(super) fn keyboard(ui: &Ui, state: &mut State) {
             state.apply(action);
         }
     }
-    fly(ui, state);
 }
 
 /// A step of a selected object over the floor, along the axes that are nearest to the picture's.
@@ -50,20 +59,40 @@ fn nudge(navigator: &Navigator, x: f32, y: f32) -> Vec3 {
     (flat(right) * x - flat(forward) * y) * step
 }
 
-/// Held keys fly.
-fn fly(ui: &Ui, state: &mut State) {
-    use egui::Key;
-    let (direction, seconds, fast) = ui.input(|i| {
+/// Held keys fly for `seconds`; true while they do.
+pub fn fly(context: &egui::Context, state: &mut State, seconds: f32) -> bool {
+    if context.egui_wants_keyboard_input() {
+        return false;
+    }
+    let (direction, fast) = context.input(|i| {
         if i.modifiers.ctrl || i.modifiers.command {
-            return (Vec3::ZERO, 0.0, false);
+            return (Vec3::ZERO, false);
         }
         let axis = |plus, minus| f32::from(i8::from(i.key_down(plus)) - i8::from(i.key_down(minus)));
         let direction = Vec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S));
-        (direction, i.stable_dt.min(0.1), i.modifiers.shift)
+        (direction, i.modifiers.shift)
     });
     if direction != Vec3::ZERO {
         state.navigator.fly(direction, if fast { 4.0 * seconds } else { seconds });
-        ui.ctx().request_repaint();
+    }
+    direction != Vec3::ZERO
+}
+
+/// A drag over the picture goes on to the place `to` of the window.
+pub fn drag(state: &mut State, memory: &mut Memory, to: Pos2, rect: Rect) {
+    let Some(drag) = &mut memory.drag else { return };
+    let d = to - drag.at;
+    drag.at = to;
+    if d == Vec2::ZERO {
+        return;
+    }
+    match drag.grip {
+        Grip::Line => state.apply(Action::MoveSplit(d.x / rect.width().max(1.0))),
+        Grip::Sun => state.apply(Action::TurnSun { dx: d.x, dy: d.y }),
+        Grip::Object => drag_object(state, d, rect),
+        Grip::Slide => state.navigator.pan(d.x, d.y, rect.height()),
+        Grip::View if state.navigator.fly => state.navigator.look(-d.x, -d.y),
+        Grip::View => state.navigator.orbit(d.x, d.y),
     }
 }
 
@@ -80,7 +109,7 @@ pub(super) fn hands(ui: &Ui, state: &mut State, memory: &mut Memory, response: &
     if response.drag_started() {
         response.surrender_focus();
         let origin = ui.input(|i| i.pointer.press_origin()).unwrap_or(rect.center());
-        memory.grip = match () {
+        let grip = match () {
             () if on_line(origin) => Grip::Line,
             () if modifiers.ctrl || modifiers.command => Grip::Sun,
             () if modifiers.shift => {
@@ -89,20 +118,16 @@ pub(super) fn hands(ui: &Ui, state: &mut State, memory: &mut Memory, response: &
                 }
                 Grip::Object
             }
+            () if !response.dragged_by(PointerButton::Primary) => Grip::Slide,
             () => Grip::View,
         };
+        memory.drag = Some(Drag { grip, at: origin });
     }
-    let d = response.drag_delta();
-    if response.dragged() && d != Vec2::ZERO {
-        let primary = response.dragged_by(PointerButton::Primary);
-        match memory.grip {
-            Grip::Line => state.apply(Action::MoveSplit(d.x / rect.width().max(1.0))),
-            Grip::Sun => state.apply(Action::TurnSun { dx: d.x, dy: d.y }),
-            Grip::Object => drag_object(state, d, rect),
-            Grip::View if !primary => state.navigator.pan(d.x, d.y, rect.height()),
-            Grip::View if state.navigator.fly => state.navigator.look(-d.x, -d.y),
-            Grip::View => state.navigator.orbit(d.x, d.y),
-        }
+    if let Some(at) = response.interact_pointer_pos().filter(|_| response.dragged() || response.drag_stopped()) {
+        drag(state, memory, at, rect);
+    }
+    if !response.dragged() {
+        memory.drag = None;
     }
     if response.clicked() {
         ui.ctx().memory_mut(|m| m.stop_text_input());

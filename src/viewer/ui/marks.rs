@@ -27,7 +27,9 @@ pub(super) fn marks(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect) {
     } else {
         let text = match (s.view, facts.feature) {
             (View::Picture, _) => s.left.name().to_string(),
-            (View::Feature, Some((name, [low, high]))) => format!("network input `{name}`: {low:.3} to {high:.3}"),
+            (View::Feature, Some((name, [low, high]))) => format!("{name}: {low:.3} to {high:.3}"),
+            (View::Layer, Some((name, [low, high]))) => format!("{name}; all {low:.3} to {high:.3}"),
+            (View::Layer, None) => "only `neural` has layers".into(),
             (View::Error, _) => format!("error: {} against {}, bright at 0.25", s.left.name(), s.right.name()),
             (view, _) => view.doc().to_string(),
         };

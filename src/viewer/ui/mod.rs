@@ -1,11 +1,12 @@
 //! The overlay: panels around the picture, marks on it, and what hands do over it. It draws with egui and changes nothing but
 //! the [`State`], so tests run it without a window.
 
-mod hands;
+pub mod hands;
 mod help;
 mod light;
 mod marks;
 mod panel;
+mod table;
 mod times;
 
 use super::choice::{Side, Source};
@@ -14,7 +15,6 @@ use super::judge::Verdict;
 use super::state::{Action, State};
 use super::stats::{Times, Track};
 use egui::{Color32, Pos2, Rect, Sense, Ui};
-use hands::Grip;
 use std::collections::BTreeMap;
 
 /// Okabe and Ito's colours, which the colour-blind tell apart, too.
@@ -39,6 +39,8 @@ pub struct Facts<'a> {
     pub measured: &'a BTreeMap<usize, f64>,
     pub still: u32,
     pub feature: Option<(&'a str, [f32; 2])>,
+    /// Names of the network's layers.
+    pub layers: &'a [&'a str],
     pub flicker: Option<f64>,
 }
 
@@ -58,13 +60,25 @@ pub struct ReferenceFacts {
 pub struct Memory {
     path: String,
     weights: String,
-    grip: Grip,
-    /// The window was left to others and its wheel rests.
-    pub picture: Option<Rect>,
+    /// Where named things of the panel are seen, points; for scripts.
+    pub places: BTreeMap<String, [f32; 2]>,
+    /// The drag over the picture that is under way.
+    pub drag: Option<hands::Drag>,
+}
+
+impl Memory {
+    /// Remembers where `name` is, if it is to be seen.
+    fn place(&mut self, name: &str, response: &egui::Response) {
+        let middle = response.rect.center();
+        if response.rect.is_positive() && response.ctx.content_rect().contains(middle) {
+            self.places.insert(name.into(), [middle.x, middle.y]);
+        }
+    }
 }
 
 /// Draws the overlay and lets hands act on `state`. Returns the picture's place, points.
 pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) -> Rect {
+    memory.places.clear();
     hands::keyboard(ui, state);
     if state.settings.panel {
         if facts.software {
@@ -80,7 +94,6 @@ pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
     }
     let rect = ui.available_rect_before_wrap();
     let rect = pixel_aligned(rect, ui.ctx().pixels_per_point());
-    memory.picture = Some(rect);
     let response = ui.interact(rect, ui.scope_id().with("picture"), Sense::click_and_drag());
     hands::hands(ui, state, memory, &response, rect);
     marks::marks(ui, state, facts, rect);
@@ -120,13 +133,10 @@ fn status(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
         } else {
             format!("frame {} ms (no GPU timestamps; waited for)", ms(&times.wall))
         };
-        let mut text = format!(
-            "{}×{}  ·  {gpu}  ·  CPU {} ms, overlay {} ms",
-            state.size[0],
-            state.size[1],
-            ms(&times.cpu),
-            ms(&times.overlay)
-        );
+        // Most frames draw the overlay as it was, so its median says little.
+        let overlay = times.overlay.spread().map_or("–".into(), |s| format!("{:.2} ms on average", s.mean));
+        let mut text =
+            format!("{}×{}  ·  {gpu}  ·  CPU {} ms, overlay {overlay}", state.size[0], state.size[1], ms(&times.cpu),);
         text += &format!("  ·  {} of {} frames averaged", facts.still, state.settings.samples);
         if let Some(r) = facts.reference {
             text += &format!("  ·  reference {} of {}", r.samples, state.settings.spp);
@@ -179,6 +189,7 @@ mod tests {
                 measured: &measured,
                 still: 1,
                 feature: None,
+                layers: &[],
                 flicker: None,
             };
             let mut output = context.run_ui(input, |ui| place = show(ui, state, &mut memory, &facts));

@@ -9,17 +9,21 @@ use egui::{RichText, Ui};
 
 /// All of it, from top to bottom.
 pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
-    let open = |title: &str, open: bool| egui::CollapsingHeader::new(RichText::new(title).strong()).default_open(open);
-    open("Scene", true).show(ui, |ui| scene(ui, state, memory));
-    open("Method", true).show(ui, |ui| method(ui, state, memory, facts));
-    open("Picture", true).show(ui, |ui| picture(ui, state));
-    open("Times", true).show(ui, |ui| times::times(ui, state, facts));
-    open("Speed and accuracy", false).show(ui, |ui| times::frontier(ui, state, facts));
-    open("Camera", false).show(ui, |ui| camera(ui, state));
-    open("Light", false).show(ui, |ui| light::lights(ui, state));
-    open("Objects", false).show(ui, |ui| light::objects(ui, state));
-    open("GPU memory", false).show(ui, |ui| times::memory(ui, facts));
-    open("Window", false).show(ui, |ui| window(ui, state));
+    let mut room = |ui: &mut Ui, title: &str, open: bool, add: &mut dyn FnMut(&mut Ui, &mut Memory)| {
+        let header = egui::CollapsingHeader::new(RichText::new(title).strong()).default_open(open);
+        let shown = header.show(ui, |ui| add(ui, memory));
+        memory.place(title, &shown.header_response);
+    };
+    room(ui, "Scene", true, &mut |ui, memory| scene(ui, state, memory));
+    room(ui, "Method", true, &mut |ui, memory| method(ui, state, memory, facts));
+    room(ui, "Picture", true, &mut |ui, _| picture(ui, state));
+    room(ui, "Times", true, &mut |ui, memory| times::times(ui, state, memory, facts));
+    room(ui, "Speed and accuracy", false, &mut |ui, memory| times::frontier(ui, state, memory, facts));
+    room(ui, "Camera", false, &mut |ui, _| camera(ui, state));
+    room(ui, "Light", false, &mut |ui, _| light::lights(ui, state));
+    room(ui, "Objects", false, &mut |ui, _| light::objects(ui, state));
+    room(ui, "GPU memory", false, &mut |ui, _| times::memory(ui, facts));
+    room(ui, "Window", false, &mut |ui, _| window(ui, state));
 }
 
 fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
@@ -84,7 +88,19 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
             if less || more {
                 state.apply(Action::Feature(if more { 1 } else { -1 }));
             }
-            ui.label(format!("input channel {}", state.settings.feature % 21));
+            let name = facts.feature.map_or("", |f| f.0);
+            ui.add(egui::Label::new(name).truncate());
+        });
+    }
+    if state.settings.view == View::Layer && !facts.layers.is_empty() {
+        let now = state.settings.layer as usize % facts.layers.len();
+        let text = |i: usize| format!("{}: {}", i + 1, facts.layers[i]);
+        egui::ComboBox::from_id_salt("layer").selected_text(text(now)).width(240.0).show_ui(ui, |ui| {
+            for i in 0..facts.layers.len() {
+                if ui.selectable_label(i == now, text(i)).clicked() {
+                    state.settings.layer = i as u32;
+                }
+            }
         });
     }
     if [state.settings.left, state.settings.right].contains(&Source::Neural) {

@@ -1,13 +1,14 @@
 //! Where the time and the memory go, and what accuracy costs.
 
-use super::{BLUE, Facts, ORANGE, SKY, VERMILLION};
+use super::table::{Line, table};
+use super::{BLUE, Facts, Memory, ORANGE, SKY, VERMILLION};
 use crate::viewer::choice::{Side, Source};
 use crate::viewer::state::{Action, State};
 use crate::viewer::stats::{CURVE, Row, Spread, Track};
 use egui::{Align2, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, Ui, Vec2};
 
 /// Passes, curve, CPU, and what the overlay itself costs.
-pub fn times(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
+pub fn times(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
     let times = facts.times;
     let main = if facts.timestamps { &times.gpu } else { &times.wall };
     curve(ui, main, &times.cpu, facts);
@@ -17,33 +18,13 @@ pub fn times(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
     }
     let count = main.spread().map_or(0, |s| s.count);
     ui.label(RichText::new(format!("last two seconds, {count} frames drawn; ms")).weak());
-    egui::Grid::new("times").num_columns(3).min_col_width(50.0).striped(true).show(ui, |ui| {
-        for head in ["", "median", "p95"] {
-            ui.label(RichText::new(head).weak());
-        }
-        ui.end_row();
-        let (layers, passes): (Vec<&Row>, Vec<&Row>) = times.passes.iter().partition(|r| r.name.starts_with("net."));
-        row(ui, if facts.timestamps { "GPU, all passes" } else { "frame, waited for" }, main.spread(), true);
-        row(ui, "CPU, frame", times.cpu.spread(), true);
-        row(ui, "CPU, this overlay", times.overlay.spread(), true);
-        for pass in passes {
-            row(ui, &pass.name, pass.track.spread(), false);
-        }
-        if !layers.is_empty() {
-            let all: f64 = layers.iter().filter_map(|r| r.track.spread()).map(|s| s.median).sum();
-            ui.label(RichText::new(format!("network, {} layers", layers.len())).strong());
-            ui.label(RichText::new(format!("{all:.3}")).strong());
-            ui.label("");
-            ui.end_row();
-            for layer in layers {
-                row(ui, &layer.name, layer.track.spread(), false);
-            }
-        }
-    });
+    let lines = lines(facts);
+    table(ui, ["median", "p95"], lines.len(), |i| lines[i].clone());
     ui.horizontal(|ui| {
         let doc =
             "mean change of display values from one frame to the next of a view that stands still; waits for the GPU";
-        ui.checkbox(&mut state.settings.flicker, "flicker meter").on_hover_text(doc);
+        let response = ui.checkbox(&mut state.settings.flicker, "flicker meter").on_hover_text(doc);
+        memory.place("flicker meter", &response);
         match facts.flicker.filter(|_| state.settings.flicker) {
             Some(flicker) => ui.label(format!("{:.2} of 255 between frames", 255.0 * flicker)),
             None if state.settings.flicker && state.settings.samples == 1 => {
@@ -54,14 +35,29 @@ pub fn times(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
     });
 }
 
-fn row(ui: &mut Ui, name: &str, spread: Option<Spread>, strong: bool) {
-    let text = RichText::new(name);
-    ui.label(if strong { text.strong() } else { text });
-    for value in spread.map_or([None; 2], |s| [Some(s.median), Some(s.p95)]) {
-        let text = value.map_or("–".into(), |v| format!("{v:.3}"));
-        ui.label(RichText::new(text).monospace());
+/// Sums, CPU, passes, network layers.
+fn lines<'a>(facts: &Facts<'a>) -> Vec<Line<'a>> {
+    let times = facts.times;
+    let number = |v: f64| format!("{v:.3}");
+    let line = |name, spread: Option<Spread>, strong| {
+        let values = spread.map_or(["–".into(), "–".into()], |s| [number(s.median), number(s.p95)]);
+        Line::new(name, values, strong)
+    };
+    let (name, main) =
+        if facts.timestamps { ("GPU, all passes", &times.gpu) } else { ("frame, waited for", &times.wall) };
+    let mut lines = vec![
+        line(name, main.spread(), true),
+        line("CPU, frame", times.cpu.spread(), true),
+        line("CPU, this overlay", times.overlay.spread(), true),
+    ];
+    let (layers, passes): (Vec<&Row>, Vec<&Row>) = times.passes.iter().partition(|r| r.name.starts_with("net."));
+    lines.extend(passes.iter().map(|r| line(&r.name, r.track.spread(), false)));
+    if !layers.is_empty() {
+        let all: f64 = layers.iter().filter_map(|r| r.track.spread()).map(|s| s.median).sum();
+        lines.push(Line::new("network, all layers", [number(all), String::new()], true));
+        lines.extend(layers.iter().map(|r| line(&r.name, r.track.spread(), false)));
     }
-    ui.end_row();
+    lines
 }
 
 /// Scrolling curves of GPU and CPU time.
@@ -116,22 +112,16 @@ fn nice(v: f32) -> f32 {
 pub fn memory(ui: &mut Ui, facts: &Facts<'_>) {
     let all: u64 = facts.memory.iter().map(|(_, b)| b).sum();
     let megabytes = |b: u64| format!("{:.1}", b as f64 / 1e6);
-    egui::Grid::new("memory").num_columns(2).striped(true).show(ui, |ui| {
-        ui.label(RichText::new("all, MB").strong());
-        ui.label(RichText::new(megabytes(all)).monospace());
-        ui.end_row();
-        let mut rows: Vec<_> = facts.memory.iter().collect();
-        rows.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
-        for (name, bytes) in rows {
-            ui.label(name);
-            ui.label(RichText::new(megabytes(*bytes)).monospace());
-            ui.end_row();
-        }
+    let mut rows: Vec<_> = facts.memory.iter().collect();
+    rows.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
+    table(ui, ["", "MB"], rows.len() + 1, |i| match i.checked_sub(1) {
+        Some(i) => Line::new(&rows[i].0, [String::new(), megabytes(rows[i].1)], false),
+        None => Line::new("all", [String::new(), megabytes(all)], true),
     });
 }
 
 /// Error against time: what was measured here across, what docs/accuracy.md has up. A dot chooses its method.
-pub fn frontier(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
+pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 150.0), Sense::hover());
     let visuals = ui.visuals().clone();
     ui.painter().rect_filled(rect, 2.0, visuals.extreme_bg_color);
@@ -174,6 +164,7 @@ pub fn frontier(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
             ui.scope_id().with(source.name()),
             Sense::click(),
         );
+        memory.place(&format!("dot {}", source.name()), &response);
         let now = source == state.settings.left;
         let colour = if now { VERMILLION } else { SKY };
         ui.painter().circle_filled(p, if now { 6.0 } else { 4.5 }, colour);
