@@ -130,9 +130,7 @@ impl MethodName {
 
 /// The weights in `path`, or the shipped ones of that name; without a path those shipped as the default.
 pub fn load_weights(path: Option<&PathBuf>) -> Result<Weights> {
-    let Some(path) = path else { return Ok(Weights::shipped()?) };
-    let named = path.to_str().filter(|_| !path.exists()).and_then(Weights::shipped_as);
-    Ok(named.unwrap_or_else(|| Weights::load(path))?)
+    Ok(Weights::find(path.map(PathBuf::as_path))?)
 }
 
 /// Which scene, how it is lit, and from where it is seen.

@@ -21,6 +21,9 @@ pub struct Args {
     /// Run the steps of this file instead of waiting for hands (docs/viewer.md); reads and saves no settings.
     #[arg(long, value_name = "JSON")]
     script: Option<PathBuf>,
+    /// Settings to begin with instead of the saved ones, as `view.json` holds them; nothing is saved then.
+    #[arg(long, value_name = "JSON")]
+    settings: Option<PathBuf>,
     /// Width and height of the window, points.
     #[arg(long, value_parser = parse_size, value_name = "WxH")]
     size: Option<[u32; 2]>,
@@ -42,6 +45,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         method: args.method,
         watch: args.watch,
         script: args.script,
+        settings: args.settings,
         size: args.size,
         captures: args.captures,
         gpu: global.gpu_options(),

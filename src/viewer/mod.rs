@@ -53,6 +53,8 @@ pub struct Options {
     pub watch: bool,
     /// Steps to run instead of waiting for hands; then no settings are read or saved.
     pub script: Option<PathBuf>,
+    /// Settings to begin with instead of the saved ones; then none are saved.
+    pub settings: Option<PathBuf>,
     /// Width and height of the window, points.
     pub size: Option<[u32; 2]>,
     /// Folder for captures; the current one when absent.
@@ -79,6 +81,9 @@ pub enum ViewError {
     /// The script cannot be read.
     #[error("the script cannot be used: {0}")]
     Script(String),
+    /// The settings that were named cannot be read.
+    #[error("the settings cannot be used: {0}")]
+    Settings(String),
     /// A step of the script failed.
     #[error("the script failed at {0}")]
     Expectation(String),

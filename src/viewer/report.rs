@@ -24,7 +24,7 @@ pub fn report(app: &App) -> Value {
     let mut report = json!({
         "loaded": shown.is_some() && stage.is_some_and(|st| st.has_scene() && st.still() > 0),
         "idle": app.is_idle(),
-        "frames": app.frames, "layouts": app.overlay.layouts, "places": app.overlay.memory.places, "density_drawn": app.overlay.density, "scene_frames": app.scene_frames,
+        "frames": app.frames, "layouts": app.overlay.layouts, "built": app.built, "places": app.overlay.memory.places, "density_drawn": app.overlay.density, "scene_frames": app.scene_frames,
         "view": s.view.name(), "left": s.left.name(), "right": s.right.name(), "split": s.split, "line": s.line,
         "drawn": { "left": key(Side::Left), "right": key(Side::Right) },
         "exposure": s.exposure, "tonemap": s.tonemap.name(), "samples": s.samples,

@@ -24,7 +24,8 @@ impl App {
             .with_inner_size(winit::dpi::LogicalSize::new(width, height));
         let window = event_loop.create_window(attributes).map_err(|e| ViewError::NoDisplay(e.to_string()))?;
         self.connect(Arc::new(window))?;
-        let fresh = self.script.is_some() || saved::path().is_none_or(|p| !p.exists());
+        let fresh =
+            self.options.settings.is_none() && (self.script.is_some() || saved::path().is_none_or(|p| !p.exists()));
         if fresh && self.stage.as_ref().is_some_and(|s| s.gpu.is_software()) {
             // A frame takes as long as sixteen on the slowest card.
             self.state.settings.samples = 1;

@@ -16,6 +16,8 @@ impl App {
         let (Some(screen), Some(stage)) = (&mut self.screen, &self.stage) else { return };
         let device = stage.gpu.device.clone();
         if !screen.fit(&device) {
+            // What hands do is heard once there is a window again.
+            self.overlay.defer(&mut self.scripted);
             return;
         }
         if !screen.is_alive(&stage.gpu.queue) {

@@ -80,6 +80,8 @@ pub struct App {
     generation: u32,
     lost_at: Option<Instant>,
     pub rebuilt: u32,
+    /// Renderers that were put to use.
+    pub built: u32,
     pub frames: u64,
     pub scene_frames: u64,
     pub copied: Option<String>,
@@ -96,10 +98,15 @@ pub fn run(options: Options) -> Result<(), ViewError> {
     let mut trouble = None;
     // Nobody's old settings may decide what a script sees.
     let known = if scripted { None } else { saved::path().filter(|p| p.exists()) };
-    match known.as_deref().map(Settings::load) {
-        Some(Ok(Some(found))) => settings = found,
-        Some(Err(e)) => trouble = Some(format!("saved settings are ignored: {e}")),
-        _ => {}
+    if let Some(named) = &options.settings {
+        let found = Settings::load(named).map_err(ViewError::Settings)?;
+        settings = found.ok_or_else(|| ViewError::Settings(format!("{}: there is no such file", named.display())))?;
+    } else {
+        match known.as_deref().map(Settings::load) {
+            Some(Ok(Some(found))) => settings = found,
+            Some(Err(e)) => trouble = Some(format!("saved settings are ignored: {e}")),
+            _ => {}
+        }
     }
     if let Some(method) = options.method {
         settings.left = method;
@@ -143,6 +150,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         generation: 0,
         lost_at: None,
         rebuilt: 0,
+        built: 0,
         frames: 0,
         scene_frames: 0,
         copied: None,
@@ -153,6 +161,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
     };
     event_loop.run_app(&mut app).map_err(|e| ViewError::NoDisplay(e.to_string()))?;
     if app.script.is_none()
+        && app.options.settings.is_none()
         && app.stage.is_some()
         && let Some(path) = saved::path()
         && let Err(e) = app.state.settings.save(&path)

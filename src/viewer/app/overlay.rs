@@ -91,6 +91,11 @@ impl Overlay {
         (age < PERIOD || (self.frames < FRAMES && age < LATEST)) && self.due.is_none_or(|t| t > now)
     }
 
+    /// Keeps events until egui hears them.
+    pub fn defer(&mut self, events: &mut Vec<Event>) {
+        self.pending.append(events);
+    }
+
     /// True while numbers wait to be shown.
     pub fn is_stale(&self) -> bool {
         self.stale
@@ -136,7 +141,7 @@ impl App {
                 hands::drag(&mut self.state, &mut self.overlay.memory, at, self.overlay.place);
             }
             if scripted {
-                self.overlay.pending.append(&mut self.scripted);
+                self.overlay.defer(&mut self.scripted);
             }
             self.overlay.frames += 1;
         }

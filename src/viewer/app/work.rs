@@ -29,9 +29,7 @@ impl App {
                 });
             }
             Request::Weights(path) => self.spawn("read weights".into(), Kind::Weights, move |_| {
-                if let Some(path) = &path {
-                    crate::net::format::Weights::load(path).map_err(|e| e.to_string())?;
-                }
+                crate::net::format::Weights::find(path.as_deref()).map_err(|e| e.to_string())?;
                 Ok(Product::Weights(path))
             }),
             Request::Capture { exr } => {
@@ -132,6 +130,7 @@ impl App {
             Ok(Product::Renderer { side, key, renderer }) => {
                 if self.building[side] == Some(key) {
                     self.building[side] = None;
+                    self.built += 1;
                     stage.set_renderer(side, key, *renderer);
                     self.meter.settling = 2;
                     self.meter.times.gpu = Track::default();

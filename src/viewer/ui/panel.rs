@@ -1,11 +1,13 @@
 //! The panel's controls.
 
 use super::{Facts, Memory, light, source_box, times};
+use crate::net::format::Weights;
 use crate::render::tonemap_curve::Tonemap;
 use crate::viewer::choice::{Side, Source, View};
 use crate::viewer::navigate::Preset;
 use crate::viewer::state::{Action, State};
 use egui::{RichText, Ui};
+use std::path::PathBuf;
 
 /// All of it, from top to bottom.
 pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
@@ -104,19 +106,7 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
         });
     }
     if [state.settings.left, state.settings.right].contains(&Source::Neural) {
-        let name = state.settings.weights.as_ref().map_or("shipped weights".into(), |p| p.display().to_string());
-        ui.add(egui::Label::new(name).truncate());
-        ui.horizontal(|ui| {
-            ui.add(
-                egui::TextEdit::singleline(&mut memory.weights).hint_text("weights.safetensors").desired_width(150.0),
-            );
-            if ui.button("Use").clicked() && !memory.weights.trim().is_empty() {
-                state.apply(Action::Weights(Some(memory.weights.trim().into())));
-            }
-            if state.settings.weights.is_some() && ui.button("Shipped").clicked() {
-                state.apply(Action::Weights(None));
-            }
-        });
+        weights(ui, state, memory);
     }
     if state.wants_reference() {
         reference(ui, state, facts);
@@ -140,6 +130,30 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
             }
         });
     }
+}
+
+/// Which network: one of those that come with the program, or a file.
+fn weights(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
+    let now = state.settings.weights.clone();
+    let text = now.as_ref().map_or("weights: default".into(), |p| format!("weights: {}", p.display()));
+    let list = egui::ComboBox::from_id_salt("weights").selected_text(text).width(240.0).truncate();
+    list.show_ui(ui, |ui| {
+        if ui.selectable_label(now.is_none(), "default").clicked() {
+            state.apply(Action::Weights(None));
+        }
+        for name in Weights::shipped_names() {
+            let path = PathBuf::from(name);
+            if ui.selectable_label(now.as_ref() == Some(&path), name).clicked() {
+                state.apply(Action::Weights(Some(path)));
+            }
+        }
+    });
+    ui.horizontal(|ui| {
+        ui.add(egui::TextEdit::singleline(&mut memory.weights).hint_text("weights.safetensors").desired_width(200.0));
+        if ui.button("Use").clicked() && !memory.weights.trim().is_empty() {
+            state.apply(Action::Weights(Some(memory.weights.trim().into())));
+        }
+    });
 }
 
 fn reference(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
