@@ -162,6 +162,15 @@ pub struct SceneArgs {
     /// Angular diameter of directional lights, radians.
     #[arg(long, value_name = "RAD")]
     pub sun_angle: Option<f32>,
+    /// Variant of materials, by name or number from 0.
+    #[arg(long, value_name = "NAME|N")]
+    pub variant: Option<String>,
+    /// Animation that places the objects, from 0; at --pose-time.
+    #[arg(long, value_name = "N")]
+    pub animation: Option<usize>,
+    /// Time in the animation, seconds.
+    #[arg(long, requires = "animation", default_value_t = 0.0, value_name = "SECONDS")]
+    pub pose_time: f32,
     /// Changes a light: its number and any of color=R,G,B strength=S direction=X,Y,Z position=X,Y,Z size=S; may be repeated.
     #[arg(long, value_name = "N KEY=VALUE ...")]
     pub light: Vec<LightEdit>,
@@ -191,6 +200,17 @@ impl SceneArgs {
                     *radius = positive("--light-radius", self.light_radius, *radius)?;
                 }
             }
+        }
+        if let Some(name) = &self.variant {
+            let known = scene.variants.iter().position(|v| v == name).or_else(|| name.parse().ok());
+            if !known.is_some_and(|n| scene.choose_variant(n)) {
+                let all = scene.variants.join(", ");
+                return Err(usage(format!("--variant {name}: the scene has {} variants: {all}", scene.variants.len())));
+            }
+        }
+        if let Some(n) = self.animation.filter(|&n| !scene.pose(n, self.pose_time)) {
+            let count = scene.rig.as_ref().map_or(0, |r| r.animations.len());
+            return Err(usage(format!("--animation {n}: the scene has {count} animations")));
         }
         self.light.iter().try_for_each(|edit| edit.apply(&mut scene)).map_err(|e| usage(format!("--light: {e}")))?;
         self.object.iter().try_for_each(|edit| edit.apply(&mut scene)).map_err(|e| usage(format!("--object: {e}")))?;

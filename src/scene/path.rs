@@ -75,7 +75,8 @@ impl CameraPath {
         }
         for (i, key) in self.keys.iter().enumerate() {
             let finite = key.time.is_finite() && key.eye.iter().chain(&key.look_at).all(|v| v.is_finite());
-            if !finite || !(key.fov > 0.0 && key.fov < 180.0) || key.eye == key.look_at {
+            let sees = key.fov > 0.0 && key.fov < 180.0 && key.eye != key.look_at;
+            if !(finite && sees) {
                 return Err(format!("keys[{i}] is no camera"));
             }
             if i > 0 && key.time <= self.keys[i - 1].time {
@@ -95,8 +96,7 @@ impl CameraPath {
         self.keys.last().map_or(0.0, |k| k.time)
     }
 
-    /// The camera at `time`, seconds: through every key, with a steady speed from one to the next (cubic Hermite, tangents from
-    /// the neighbours); before the first and after the last it stands still. `None` without keys.
+    /// The camera at `time`, seconds: through every key, smoothly (cubic Hermite), never swinging out beyond them; before the first and after the last it stands still. `None` without keys.
     pub fn at(&self, time: f64) -> Option<PathKey> {
         let (first, last) = (self.keys.first()?, self.keys.last()?);
         if time <= first.time {
@@ -109,20 +109,26 @@ impl CameraPath {
         let (a, b) = (next - 1, next);
         let span = (self.keys[b].time - self.keys[a].time) as f32;
         let t = (time - self.keys[a].time) as f32 / span;
-        let curve = |of: &dyn Fn(&PathKey) -> Vec3| {
-            // Change by second at a key: between its neighbours, or at an end towards the only one.
-            let slope = |i: usize| {
-                let (p, n) = (i.saturating_sub(1), (i + 1).min(self.keys.len() - 1));
-                (of(&self.keys[n]) - of(&self.keys[p])) / (self.keys[n].time - self.keys[p].time) as f32
+        let curve = |of: &dyn Fn(&PathKey) -> [f32; 3]| {
+            let value = |i: usize| Vec3::from(of(&self.keys[i]));
+            let secant = |i: usize| (value(i + 1) - value(i)) / (self.keys[i + 1].time - self.keys[i].time) as f32;
+            // Change by second at a key: between those before and after it, and none where it turns or rests, so that the
+            // camera never swings out (harmonic mean, Fritsch and Butland 1984).
+            let slope = |i: usize| match (i.checked_sub(1).map(secant), (i + 1 < self.keys.len()).then(|| secant(i))) {
+                (Some(p), Some(n)) => {
+                    let mean = |p: f32, n: f32| if p * n > 0.0 { 2.0 * p * n / (p + n) } else { 0.0 };
+                    Vec3::new(mean(p.x, n.x), mean(p.y, n.y), mean(p.z, n.z))
+                }
+                (p, n) => p.or(n).unwrap_or_default(),
             };
             let (t2, t3) = (t * t, t * t * t);
-            of(&self.keys[a]) * (2.0 * t3 - 3.0 * t2 + 1.0)
+            value(a) * (2.0 * t3 - 3.0 * t2 + 1.0)
                 + slope(a) * span * (t3 - 2.0 * t2 + t)
-                + of(&self.keys[b]) * (3.0 * t2 - 2.0 * t3)
+                + value(b) * (3.0 * t2 - 2.0 * t3)
                 + slope(b) * span * (t3 - t2)
         };
         let fov = self.keys[a].fov + (self.keys[b].fov - self.keys[a].fov) * t;
-        let (eye, look_at) = (curve(&|k| k.eye.into()), curve(&|k| k.look_at.into()));
+        let (eye, look_at) = (curve(&|k| k.eye), curve(&|k| k.look_at));
         Some(PathKey { time, eye: eye.to_array(), look_at: look_at.to_array(), fov })
     }
 }

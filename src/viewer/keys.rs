@@ -52,6 +52,7 @@ pub const BINDINGS: &[Binding] = &[
     bind(Key::V, With::Nothing, "next side of the scene", |_| Action::NextPreset),
     bind(Key::C, With::Nothing, "next camera of the file", |_| Action::NextCamera),
     bind(Key::G, With::Nothing, "drags orbit or turn the head", |_| Action::Fly),
+    bind(Key::I, With::Nothing, "play the file's animation", |_| Action::Animate),
     bind(Key::R, With::Nothing, "record the camera's path", |_| Action::Record),
     bind(Key::Y, With::Nothing, "play the camera's path", |_| Action::Play),
     bind(Key::N, With::Nothing, "average twice as many frames", |s| Action::Samples(2 * s.settings.samples)),
@@ -114,6 +115,7 @@ pub fn current(binding: &Binding, state: &State) -> String {
         Action::Theme => if s.dark { "dark" } else { "light" }.into(),
         Action::Samples(_) => format!("{} frames", s.samples),
         Action::Record => on(matches!(state.film, Film::Records(_))),
+        Action::Animate => on(state.animated.is_some()),
         Action::Play => on(matches!(state.film, Film::Plays { .. })),
         _ => String::new(),
     }

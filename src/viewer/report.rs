@@ -16,6 +16,8 @@ pub fn report(app: &App) -> Value {
         json!({
             "spec": shown.spec, "objects": shown.scene.instances.len(), "lights": lights, "environment": shown.environment,
             "sky": shown.scene.environment.radiance, "moved": shown.moved.len(),
+            "variant": shown.variant, "variants": shown.scene.variants, "pose": shown.pose,
+            "animations": shown.scene.rig.as_ref().map_or(0, |r| r.animations.len()),
         })
     });
     let found = stage.and_then(|st| st.reference());

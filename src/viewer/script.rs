@@ -7,7 +7,7 @@
 //!
 //! Places are in points from the window's top left; a `click` can also name something of the panel that is to be seen (`/places`). Steps: `wait` (`loaded`, `idle`, `samples:N`, or a number of frames), `key`
 //! (`"F12"`, `"Shift+F12"`), `hold` and `release` of a key, `text`, `move`, `press`, `lift`, `click`, `drag` with optional
-//! `button` and `keys`, `wheel`, `drop` of a file, `copy` of one over another, `resize` (to nothing, too), `zoom` of the text, `scale` (pixels a point), `minimise`, `lose` (`surface`, `device`),
+//! `button` and `keys`, `wheel`, `drop` of a file, `copy` of one over another, `resize` (to nothing, too), `zoom` of the text, `scale` (pixels a point), `minimise`, `lose` (`surface`, `device`), `variant` of materials by number,
 //! `expect` (JSON pointer into the state: a value, or `{"min","max","contains","not"}`), `until` (the same, waited for), `save` of such values, `expect_saved` and `expect_not_saved`,
 //! `print` of values on standard output, `screenshot`, `quit`.
 
@@ -51,6 +51,7 @@ struct Step {
     save: Option<BTreeMap<String, String>>,
     expect_saved: Option<BTreeMap<String, String>>,
     expect_not_saved: Option<BTreeMap<String, String>>,
+    variant: Option<usize>,
     print: Option<Vec<String>>,
     screenshot: Option<PathBuf>,
     quit: Option<bool>,
@@ -72,6 +73,7 @@ pub enum Order {
     /// Pixels a point, as after a change of screens.
     Scale(f32),
     Copy([PathBuf; 2]),
+    Variant(usize),
     Minimise(bool),
     LoseSurface,
     LoseDevice,
@@ -283,6 +285,7 @@ impl Script {
         orders.extend(step.resize.map(Order::Resize));
         orders.extend(step.zoom.map(Order::Zoom));
         orders.extend(step.scale.map(Order::Scale));
+        orders.extend(step.variant.map(Order::Variant));
         orders.extend(step.copy.clone().map(Order::Copy));
         orders.extend(step.minimise.map(Order::Minimise));
         orders.extend(step.lose.as_deref().map(

@@ -198,4 +198,94 @@ fn a_camera_path_is_recorded_and_played() {
     let path =
         bouncelight::scene::path::CameraPath::load(&dir.path().join("camera-0001.json")).expect("it was written");
     assert!(path.end() > 0.05 && path.keys.len() >= 2);
+    // The command line draws it: two frames, the first and a later one, which differ.
+    let render = |frames: &str| {
+        let args = [
+            "render",
+            "cornell",
+            "--method",
+            "direct",
+            "--size",
+            "60x40",
+            "--path",
+            "camera-0001.json",
+            "--fixed-dt",
+            "1/50",
+        ];
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_bouncelight"));
+        command
+            .args(args)
+            .args(["--frames", frames, "-o", "out_{frame:03}.png"])
+            .current_dir(dir.path())
+            .env("NODEVICE_SELECT", "1");
+        command.output().expect("the program starts")
+    };
+    succeeds(&render("0..1"));
+    succeeds(&render("500..501"));
+    let picture = |name: &str| bouncelight::image_io::read_png(&dir.path().join(name)).expect("it was drawn").pixels;
+    assert_ne!(picture("out_000.png"), picture("out_500.png"));
+    assert_eq!(render("3..3").status.code(), Some(2));
+}
+
+/// A file with an animation and two variants: both change the picture, and the copied command draws what is seen.
+#[test]
+fn animations_play_and_variants_change_materials() {
+    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let numbers: Vec<f32> = [
+        // A triangle, two times, two places.
+        [-1.0f32, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0, 0.0].to_vec(),
+        vec![0.0, 2.0],
+        vec![0.0, 0.0, 0.0, 0.0, 1.5, 0.0],
+    ]
+    .concat();
+    std::fs::write(dir.path().join("scene.bin"), bytes(&numbers)).unwrap();
+    let material = |r: f32, b: f32| json!({ "pbrMetallicRoughness": { "baseColorFactor": [r, 0.05, b, 1.0] }, "doubleSided": true });
+    let view = |offset: u32, length: u32| json!({ "buffer": 0, "byteOffset": offset, "byteLength": length });
+    let accessor = |view: u32, count: u32, kind: &str| json!({ "bufferView": view, "componentType": 5126, "count": count, "type": kind });
+    let mappings = json!({ "mappings": [{ "material": 1, "variants": [0] }] });
+    let file = json!({
+        "asset": { "version": "2.0" }, "extensionsUsed": ["KHR_materials_variants"],
+        "extensions": { "KHR_materials_variants": { "variants": [{ "name": "in blue" }] } },
+        "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "name": "flag", "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0, "extensions": { "KHR_materials_variants": mappings } }] }],
+        "materials": [material(0.8, 0.05), material(0.05, 0.8)],
+        "buffers": [{ "uri": "scene.bin", "byteLength": 4 * numbers.len() }],
+        "bufferViews": [view(0, 36), view(36, 8), view(44, 24)],
+        "accessors": [accessor(0, 3, "VEC3"), accessor(1, 2, "SCALAR"), accessor(2, 2, "VEC3")],
+        "animations": [{ "name": "rise", "samplers": [{ "input": 1, "output": 2 }],
+            "channels": [{ "sampler": 0, "target": { "node": 0, "path": "translation" } }] }],
+    });
+    std::fs::write(dir.path().join("flag.gltf"), file.to_string()).unwrap();
+    let script = json!([
+        { "wait": "loaded" }, { "wait": "idle" }, { "expect": { "/scene/animations": 1, "/scene/variants": ["in blue"], "/scene/pose": null } },
+        { "key": "P" }, { "wait": "idle" }, { "screenshot": "rest.png" }, { "save": { "frames": "/scene_frames" } },
+        { "key": "I" }, { "until": { "/scene/pose/1": { "min": 0.3 } } }, { "key": "I" }, { "wait": "idle" },
+        { "expect_not_saved": { "frames": "/scene_frames" } }, { "save": { "pose": "/scene/pose" } }, { "wait": 10 },
+        { "expect_saved": { "pose": "/scene/pose" } }, { "screenshot": "risen.png" },
+        { "variant": 0 }, { "wait": "idle" }, { "expect": { "/scene/variant": 0 } }, { "expect_saved": { "pose": "/scene/pose" } },
+        { "screenshot": "blue.png" }, { "key": "K" },
+        { "expect": { "/copied": { "contains": "--animation=0" } } }, { "expect": { "/copied": { "contains": "'--variant=in blue'" } } },
+        { "key": "F12" }, { "wait": "idle" }, { "key": "U" }, { "wait": "idle" },
+        { "expect": { "/scene/variant": null, "/scene/pose": null } }, { "screenshot": "again.png" }
+    ]);
+    succeeds(&session(&display, dir.path(), script, &["flag.gltf", "--method", "direct", "--size", "200x160"]));
+    let all = |name: &str| bouncelight::image_io::read_png(&dir.path().join(name)).expect("it was drawn").pixels;
+    assert!(all("rest.png") != all("risen.png"));
+    let [red, _, blue] = mean(&dir.path().join("blue.png"), 0..200, 40..160);
+    let [red_before, _, blue_before] = mean(&dir.path().join("risen.png"), 0..200, 40..160);
+    assert!(blue > blue_before + 2.0 && red < red_before - 2.0, "{red} {blue}, before {red_before} {blue_before}");
+    // The command in the picture's metadata draws it again.
+    let captured = dir.path().join("bouncelight-0001.png");
+    let (ours, metadata) = bouncelight::image_io::read_png_with_metadata(&captured).expect("F12 wrote it");
+    let command = &metadata.iter().find(|(k, _)| k == "Command").expect("the command stands in the file").1;
+    let line = command.replacen("bouncelight ", "\"$0\" ", 1).replacen(captured.to_str().unwrap(), "drawn.png", 1);
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", &line, env!("CARGO_BIN_EXE_bouncelight")]).current_dir(dir.path()).env("NODEVICE_SELECT", "1");
+    succeeds(&shell.output().expect("a shell"));
+    assert!(ours.pixels == all("drawn.png"), "byte by byte");
+}
+
+fn bytes(numbers: &[f32]) -> Vec<u8> {
+    numbers.iter().flat_map(|v| v.to_le_bytes()).collect()
 }

@@ -2,7 +2,7 @@
 
 use super::overlay::Overlay;
 use super::{App, Event};
-use crate::viewer::jobs::{self, Kind, Product};
+use crate::viewer::jobs;
 use crate::viewer::live::Kept;
 use crate::viewer::screen::Screen;
 use crate::viewer::stage::Stage;
@@ -87,11 +87,6 @@ impl App {
         }
         self.rebuilt += 1;
         self.state.tell(format!("the GPU was lost ({message}); everything was built anew"), false);
-        let (Some(stage), Some(shown)) = (&self.stage, &self.state.shown) else { return };
-        let (handles, scene) = (stage.handles(), shown.scene.clone());
-        self.spawn("upload the scene again".into(), Kind::Scene, move |_| {
-            let gpu = crate::scene::upload::SceneGpu::new(&handles.device, &handles.queue, &scene);
-            Ok(Product::Uploaded(Box::new(gpu.map_err(|e| e.to_string())?)))
-        });
+        self.start(Request::Upload);
     }
 }

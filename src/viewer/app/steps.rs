@@ -30,6 +30,7 @@ impl App {
                     let _ = window.and_then(|w| w.request_inner_size(size));
                 }
                 Order::Zoom(zoom) => self.state.settings.zoom = zoom,
+                Order::Variant(n) => self.state.apply(Action::Variant(Some(n))),
                 Order::Scale(scale) => {
                     if let Some(screen) = &mut self.screen {
                         screen.scale = Some(scale);

@@ -5,7 +5,7 @@ use crate::image_io;
 use crate::scene::path::CameraPath;
 use crate::viewer::choice::Source;
 use crate::viewer::jobs::{self, Done, Kind, Product, Shot};
-use crate::viewer::state::Request;
+use crate::viewer::state::{Request, Stale};
 use crate::viewer::stats::Track;
 use crate::viewer::watch::Changed;
 use std::path::PathBuf;
@@ -57,6 +57,13 @@ impl App {
                         self.give_up(side, key);
                     }
                 }
+            }
+            Request::Upload => {
+                let Some(scene) = self.state.shown.as_ref().map(|s| s.scene.clone()) else { return };
+                self.spawn("upload the scene again".into(), Kind::Scene, move |_| {
+                    let gpu = crate::scene::upload::SceneGpu::new(&handles.device, &handles.queue, &scene);
+                    Ok(Product::Uploaded(Box::new(gpu.map_err(|e| e.to_string())?)))
+                });
             }
             Request::Path(path) => match CameraPath::load(&path) {
                 Ok(found) => {
@@ -118,7 +125,12 @@ impl App {
                 }
                 self.state.show(spec, Arc::from(scene));
             }
-            Ok(Product::Uploaded(gpu)) => stage.set_scene(*gpu),
+            Ok(Product::Uploaded(gpu)) => {
+                stage.set_scene(*gpu);
+                // A bake has the materials it was made with; and hands may have changed something meanwhile.
+                self.stamps[1] += 1;
+                self.state.stale = Stale { lights: true, placements: true, environment: true };
+            }
             Ok(Product::Surroundings { path, environment }) => self.state.surround(&path, environment),
             Ok(Product::Weights(path)) => {
                 self.state.settings.weights = path;

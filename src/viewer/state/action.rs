@@ -49,6 +49,12 @@ pub enum Action {
     Record,
     /// Plays the path, or stops it.
     Play,
+    /// Materials of a variant, or as the file has them.
+    Variant(Option<usize>),
+    /// Places the objects as an animation has them at a time, or as the file has them.
+    Pose(Option<(usize, f32)>),
+    /// Plays the animation, or stops it.
+    Animate,
     /// Changes between dark and light.
     Theme,
     Flicker,
@@ -65,6 +71,8 @@ pub enum Request {
     Capture {
         exr: bool,
     },
+    /// Brings the whole scene to the GPU anew.
+    Upload,
     /// Reads a camera path.
     Path(PathBuf),
     /// Writes the camera path that was just recorded.

@@ -1,12 +1,13 @@
 //! Changes of the scene by hand: lights, objects, surroundings. They are kept so that the command line can repeat them.
 
-use super::{Stale, State};
+use super::{Request, Stale, State};
 use crate::scene::{
     Environment,
     edit::{LightEdit, ObjectEdit},
 };
 use glam::Vec3;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 impl State {
     /// Takes a picture of the surroundings from `path`.
@@ -61,23 +62,83 @@ impl State {
     pub(super) fn move_selected(&mut self, by: Vec3) {
         let (Some(object), Some(shown)) = (self.selected, &mut self.shown) else { return };
         let all = (Vec3::from(shown.moved.get(&object).copied().unwrap_or_default()) + by).to_array();
-        if !all.iter().all(|v| v.is_finite()) {
+        if !all.iter().all(|v| v.is_finite()) || object >= shown.original.instances.len() {
             return;
         }
+        shown.moved.insert(object, all);
+        self.place();
+    }
+
+    /// Places all objects: at rest or as the animation has them, then moved by hand. Always from the file's places, so that the
+    /// command line can repeat it bit for bit.
+    fn place(&mut self) {
+        let Some(shown) = &mut self.shown else { return };
         let scene = Arc::make_mut(&mut shown.scene);
-        let Some(original) = shown.original.instances.get(object) else { return };
-        // Always from the file's place, so that the command line can repeat it bit for bit.
-        scene.instances[object].transform = original.transform;
-        if (ObjectEdit { object, by: all }).apply(scene).is_ok() {
-            shown.moved.insert(object, all);
-            self.stale.placements = true;
-            self.version += 1;
+        for (instance, original) in scene.instances.iter_mut().zip(&shown.original.instances) {
+            instance.transform = original.transform;
         }
+        if let Some((animation, time)) = shown.pose {
+            scene.pose(animation, time);
+        }
+        for (&object, &by) in &shown.moved {
+            // Only objects that are there are ever moved.
+            let _ = ObjectEdit { object, by }.apply(scene);
+        }
+        self.stale.placements = true;
+        self.version += 1;
+    }
+
+    pub(super) fn pose(&mut self, pose: Option<(usize, f32)>) {
+        let Some(shown) = &mut self.shown else { return };
+        let count = shown.original.rig.as_ref().map_or(0, |r| r.animations.len());
+        shown.pose = pose.filter(|(animation, _)| *animation < count);
+        self.place();
+    }
+
+    /// Plays the animation that was chosen last from where it stands, or stops it.
+    pub(super) fn animate(&mut self, now: Instant) {
+        let Some(rig) = self.shown.as_ref().and_then(|s| s.original.rig.as_ref()) else {
+            return self.tell("this scene has no animation", false);
+        };
+        if self.animated.take().is_none() {
+            let (_, time) = self.shown.as_ref().and_then(|s| s.pose).unwrap_or_default();
+            let end = rig.animations.iter().map(|a| a.end).fold(0.0, f32::max);
+            self.animated = now.checked_sub(Duration::from_secs_f32(time.clamp(0.0, end)));
+        }
+    }
+
+    /// The animation goes on, over and over; true while it plays.
+    pub(super) fn animation(&mut self, now: Instant) -> bool {
+        let (Some(since), Some(shown)) = (self.animated, &self.shown) else { return false };
+        let animation = shown.pose.map_or(0, |p| p.0);
+        let Some(end) = shown.original.rig.as_ref().and_then(|r| r.animations.get(animation)).map(|a| a.end) else {
+            return false;
+        };
+        let time = now.duration_since(since).as_secs_f32();
+        self.pose(Some((animation, if end > 0.0 { time % end } else { 0.0 })));
+        true
+    }
+
+    /// Materials of a variant; those of the file without one.
+    pub(super) fn choose_variant(&mut self, variant: Option<usize>) {
+        let Some(shown) = &mut self.shown else { return };
+        let scene = Arc::make_mut(&mut shown.scene);
+        for (mesh, original) in scene.meshes.iter_mut().zip(&shown.original.meshes) {
+            mesh.material = original.material;
+        }
+        shown.variant = variant.filter(|&n| scene.choose_variant(n));
+        self.requests.push(Request::Upload);
+        self.version += 1;
     }
 
     /// Lights, objects and surroundings as the file has them.
     pub(super) fn undo(&mut self) {
         let Some(shown) = &mut self.shown else { return };
+        if shown.variant.take().is_some() {
+            self.requests.push(Request::Upload);
+        }
+        shown.pose = None;
+        self.animated = None;
         shown.scene = shown.original.clone();
         shown.moved.clear();
         shown.environment = None;

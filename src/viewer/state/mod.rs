@@ -44,6 +44,10 @@ pub struct Shown {
     pub scene: Arc<Scene>,
     /// How objects were moved, metres.
     pub moved: BTreeMap<usize, [f32; 3]>,
+    /// Which variant of materials, if not the file's own.
+    pub variant: Option<usize>,
+    /// Animation and time, seconds, that place the objects, if they are not at rest.
+    pub pose: Option<(usize, f32)>,
     /// The surroundings as `--environment` names them, if they are not the file's.
     pub environment: Option<String>,
 }
@@ -72,6 +76,8 @@ pub struct State {
     pub path: Option<CameraPath>,
     /// What is done with it.
     pub film: Film,
+    /// Since when the animation plays that began at time 0.
+    pub animated: Option<Instant>,
 }
 
 impl State {
@@ -103,7 +109,16 @@ impl State {
         }
         self.selected = self.selected.filter(|&i| i < scene.instances.len());
         self.settings.remember(&spec);
-        self.shown = Some(Shown { spec, original: scene.clone(), scene, moved: BTreeMap::new(), environment: None });
+        self.animated = None;
+        self.shown = Some(Shown {
+            spec,
+            original: scene.clone(),
+            scene,
+            moved: BTreeMap::new(),
+            variant: None,
+            pose: None,
+            environment: None,
+        });
         self.stale = Stale::default();
         self.version += 1;
     }
@@ -209,6 +224,12 @@ impl State {
             }
             A::Record => self.record(),
             A::Play => self.play(),
+            A::Variant(variant) => self.choose_variant(variant),
+            A::Pose(pose) => {
+                self.animated = None;
+                self.pose(pose);
+            }
+            A::Animate => self.animate(Instant::now()),
             A::Theme => self.settings.dark = !self.settings.dark,
             A::Flicker => self.settings.flicker = !self.settings.flicker,
             A::Reload => {
@@ -242,8 +263,12 @@ impl State {
         }
     }
 
-    /// The film goes on; true while it moves the camera by itself.
+    /// Camera path and animation go on; true while they move something by themselves.
     pub fn roll(&mut self, now: Instant) -> bool {
+        self.animation(now) | self.camera_path(now)
+    }
+
+    fn camera_path(&mut self, now: Instant) -> bool {
         let rolls = match (&mut self.film, &self.path) {
             (Film::Records(recording), _) => {
                 recording.look(&self.navigator, now);

@@ -41,6 +41,16 @@ fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
             ui.label("no scene yet");
         }
     }
+    if let Some(shown) = &state.shown {
+        let (names, variant, pose) = (shown.scene.variants.clone(), shown.variant, shown.pose);
+        let ends = shown.original.rig.as_ref().map(|r| r.animations.iter().map(|a| (a.name.clone(), a.end)).collect());
+        if !names.is_empty() {
+            variants(ui, state, &names, variant);
+        }
+        if let Some(ends) = ends {
+            animation(ui, state, ends, pose);
+        }
+    }
     ui.horizontal(|ui| {
         let hint = "file, interior, paper-room:7";
         let field = ui.add(egui::TextEdit::singleline(&mut memory.path).hint_text(hint).desired_width(200.0));
@@ -58,6 +68,42 @@ fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
                 }
             }
         });
+    }
+}
+
+fn variants(ui: &mut Ui, state: &mut State, names: &[String], now: Option<usize>) {
+    let text = now.map_or("materials: the file's", |n| &names[n]);
+    egui::ComboBox::from_id_salt("variant").selected_text(text).width(240.0).truncate().show_ui(ui, |ui| {
+        if ui.selectable_label(now.is_none(), "the file's").clicked() {
+            state.apply(Action::Variant(None));
+        }
+        for (n, name) in names.iter().enumerate() {
+            if ui.selectable_label(now == Some(n), name).clicked() {
+                state.apply(Action::Variant(Some(n)));
+            }
+        }
+    });
+}
+
+fn animation(ui: &mut Ui, state: &mut State, all: Vec<(String, f32)>, pose: Option<(usize, f32)>) {
+    let (now, mut time) = pose.unwrap_or_default();
+    ui.horizontal(|ui| {
+        let text = if state.animated.is_some() { "Stop (I)" } else { "Play (I)" };
+        if ui.button(text).clicked() {
+            state.apply(Action::Animate);
+        }
+        let name = all.get(now).map_or("", |a| &a.0);
+        egui::ComboBox::from_id_salt("animation").selected_text(name).width(150.0).truncate().show_ui(ui, |ui| {
+            for (n, (name, _)) in all.iter().enumerate() {
+                if ui.selectable_label(n == now, name).clicked() {
+                    state.apply(Action::Pose(Some((n, 0.0))));
+                }
+            }
+        });
+    });
+    let end = all.get(now).map_or(0.0, |a| a.1);
+    if ui.add(egui::Slider::new(&mut time, 0.0..=end).suffix(" s").max_decimals(2)).changed() {
+        state.apply(Action::Pose(Some((now, time))));
     }
 }
 

@@ -38,7 +38,6 @@ pub fn times(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<
 /// Sums, CPU, passes, network layers.
 fn lines<'a>(facts: &Facts<'a>) -> Vec<Line<'a>> {
     let times = facts.times;
-    let number = |v: f64| format!("{v:.3}");
     let line = |name, spread: Option<Spread>, strong| {
         let values = spread.map_or(["–".into(), "–".into()], |s| [number(s.median), number(s.p95)]);
         Line::new(name, values, strong)
@@ -68,7 +67,7 @@ fn curve(ui: &mut Ui, gpu: &Track, cpu: &Track, facts: &Facts<'_>) {
     painter.rect_filled(rect, 2.0, visuals.extreme_bg_color);
     let most = gpu.curve().chain(cpu.curve()).fold(0.0f32, f32::max);
     let top = nice(most.max(0.1));
-    let font = FontId::proportional(10.0);
+    let font = FontId::proportional(11.0);
     for share in [0.5, 1.0] {
         let y = rect.bottom() - share * (rect.height() - 12.0);
         painter.hline(rect.x_range(), y, Stroke::new(0.5, visuals.weak_text_color()));
@@ -100,6 +99,12 @@ fn curve(ui: &mut Ui, gpu: &Track, cpu: &Track, facts: &Facts<'_>) {
     }
     let name = if facts.timestamps { "GPU ——   CPU – –" } else { "frame ——   CPU – –" };
     painter.text(rect.right_top() + Vec2::new(-4.0, 1.0), Align2::RIGHT_TOP, name, font, visuals.text_color());
+}
+
+/// Four digits that count, no more than three of them behind the point.
+fn number(v: f64) -> String {
+    let places = if v < 10.0 { 3 } else { 3 - (v.log10() as usize).min(3) };
+    format!("{v:.places$}")
 }
 
 /// 1, 2 or 5 times a power of ten, not below `v`.
@@ -134,8 +139,8 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
         let y = (error / 3.0).ln() / (130.0f64 / 3.0).ln();
         Pos2::new(plot.left() + x as f32 * plot.width(), plot.bottom() - y as f32 * plot.height())
     };
-    let font = FontId::proportional(10.0);
-    let weak = visuals.weak_text_color();
+    let font = FontId::proportional(11.0);
+    let weak = visuals.text_color();
     for error in [3.0, 10.0, 30.0, 100.0] {
         let y = at(low, error).y;
         ui.painter().hline(plot.x_range(), y, Stroke::new(0.5, weak));
@@ -147,9 +152,10 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
             weak,
         );
     }
-    for ms in [low, (low * high).sqrt(), high] {
-        let text = format!("{ms:.2} ms");
-        ui.painter().text(at(ms, 3.0) + Vec2::new(0.0, 3.0), Align2::CENTER_TOP, text, font.clone(), weak);
+    let ticks = [(low, Align2::LEFT_TOP), ((low * high).sqrt(), Align2::CENTER_TOP), (high, Align2::RIGHT_TOP)];
+    for (ms, align) in ticks {
+        let text = format!("{} ms", number(ms));
+        ui.painter().text(at(ms, 3.0) + Vec2::new(0.0, 3.0), align, text, font.clone(), weak);
     }
     let mut missing = Vec::new();
     for source in Source::ALL {
@@ -166,7 +172,13 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
         );
         memory.place(&format!("dot {}", source.name()), &response);
         let now = source == state.settings.left;
-        let colour = if now { VERMILLION } else { SKY };
+        let colour = if now {
+            VERMILLION
+        } else if visuals.dark_mode {
+            SKY
+        } else {
+            BLUE
+        };
         ui.painter().circle_filled(p, if now { 6.0 } else { 4.5 }, colour);
         if response.has_focus() || response.hovered() {
             ui.painter().circle_stroke(p, 8.0, Stroke::new(1.5, visuals.text_color()));
@@ -177,7 +189,7 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
             state.apply(Action::Source(Side::Left, source));
         }
     }
-    ui.label(RichText::new("across: GPU ms measured in this window; up: mean error of indirect light on five judged rooms (docs/accuracy.md), not measured here").weak().small());
+    ui.label(RichText::new("across: GPU ms measured in this window; up: mean error of indirect light on five judged rooms (docs/accuracy.md), not measured here").small());
     if !missing.is_empty() {
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("not measured yet:").weak());
