@@ -2,8 +2,9 @@
 //! between: a picture that moves needs no new panels, and nobody reads numbers that change more than four times a second.
 
 use super::App;
-use crate::viewer::ui::{self, hands};
-use egui::{ClippedPrimitive, Event, Rect};
+use crate::viewer::state::State;
+use crate::viewer::ui::{self, hands, marks};
+use egui::{ClippedPrimitive, Event, Rect, epaint::ClippedShape};
 use std::time::{Duration, Instant};
 
 /// Numbers are brought up to date while frames are drawn after this time …
@@ -21,6 +22,8 @@ pub struct Overlay {
     /// Events of hands that have moved the camera, but that egui has not heard.
     pending: Vec<Event>,
     pub jobs: Vec<ClippedPrimitive>,
+    /// As many of them at the beginning are the selected object's box, which follows every frame.
+    outline: usize,
     /// `jobs` are not on the GPU yet.
     pub changed: bool,
     /// Textures to let go of once `jobs` are drawn.
@@ -52,6 +55,7 @@ impl Overlay {
             zoomed: zoom,
             pending: Vec::new(),
             jobs: Vec::new(),
+            outline: 0,
             changed: true,
             freed: Vec::new(),
             place: Rect::NOTHING,
@@ -101,6 +105,19 @@ impl Overlay {
         self.stale
     }
 
+    /// Draws the selected object's box where it is now.
+    fn outline(&mut self, state: &State) {
+        let shapes = marks::outline(state, self.place, self.density);
+        if self.outline == 0 && shapes.is_empty() {
+            return;
+        }
+        let clipped = shapes.into_iter().map(|shape| ClippedShape::new(self.place, shape)).collect();
+        let jobs = self.egui.tessellate(clipped, self.density);
+        let count = jobs.len();
+        self.jobs.splice(0..self.outline, jobs);
+        (self.outline, self.changed) = (count, true);
+    }
+
     /// True for what only moves the camera or what a drag has hold of.
     fn is_motion(&self, event: &Event) -> bool {
         match event {
@@ -146,6 +163,7 @@ impl App {
             self.overlay.frames += 1;
         }
         self.fly(started);
+        self.overlay.outline(&self.state);
         started.elapsed()
     }
 
@@ -177,6 +195,7 @@ impl App {
         o.zoomed = self.state.settings.zoom;
         o.density = output.pixels_per_point;
         o.jobs = egui.tessellate(output.shapes, o.density);
+        o.outline = 0;
         o.changed = true;
         (o.place, o.size, o.stale) = (place, size, false);
         o.freed.extend(freed);

@@ -5,13 +5,13 @@ use crate::render::View as Eye;
 use crate::scene::bounds::instance_bounds;
 use crate::viewer::choice::{Source, View};
 use crate::viewer::state::{Request, State};
-use egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, Ui, Vec2};
+use egui::{Align2, Color32, FontId, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 use glam::Vec3;
 
 /// How long a message stays.
 const MESSAGE_SECONDS: u64 = 12;
 
-/// Names of the sides, the selected object's box, the channel on show.
+/// Names of the sides, the channel on show.
 pub(super) fn marks(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect) {
     let s = &state.settings;
     let painter = ui.painter().with_clip_rect(rect);
@@ -35,9 +35,6 @@ pub(super) fn marks(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect) {
         };
         label(&painter, rect.left_top() + Vec2::splat(8.0), Align2::LEFT_TOP, &text, false);
     }
-    if let Some(object) = state.selected {
-        outline(ui, &painter, state, object, rect);
-    }
 }
 
 /// Text on a dark ground, so that it is read on any picture.
@@ -50,16 +47,13 @@ fn label(painter: &egui::Painter, at: Pos2, align: Align2, text: &str, error: bo
     rect.expand(3.0)
 }
 
-/// The edges of an object's box.
-fn outline(ui: &Ui, painter: &egui::Painter, state: &State, object: usize, rect: Rect) {
-    let Some(shown) = &state.shown else { return };
-    let Some(instance) = shown.scene.instances.get(object) else { return };
-    let Some((low, high)) = shown.scene.meshes.get(instance.mesh).and_then(|m| instance_bounds(instance, m)) else {
-        return;
-    };
+/// The edges of the selected object's box, in a picture at `rect` of `density` pixels a point.
+pub fn outline(state: &State, rect: Rect, density: f32) -> Vec<Shape> {
+    let Some((object, shown)) = state.selected.zip(state.shown.as_ref()) else { return Vec::new() };
+    let found = shown.scene.instances.get(object).and_then(|i| instance_bounds(i, shown.scene.meshes.get(i.mesh)?));
+    let Some((low, high)) = found else { return Vec::new() };
     let eye = Eye::new(&state.navigator.camera(&shown.scene), state.size, [0.0; 2]);
     let clip = glam::Mat4::from_cols_array_2d(&eye.clip_from_world);
-    let density = ui.ctx().pixels_per_point();
     let corner = |i: usize| {
         let pick = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
         let p = clip * Vec3::new(pick(0), pick(1), pick(2)).extend(1.0);
@@ -68,15 +62,17 @@ fn outline(ui: &Ui, painter: &egui::Painter, state: &State, object: usize, rect:
         let place = rect.min + Vec2::new(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * size;
         (p.w > eye.near).then_some(place)
     };
+    let mut shapes = Vec::new();
     for i in 0..8usize {
         for axis in 0..3 {
             let j = i | 1 << axis;
             if let (true, Some(a), Some(b)) = (j != i, corner(i), corner(j)) {
-                painter.line_segment([a, b], Stroke::new(3.0, Color32::from_black_alpha(160)));
-                painter.line_segment([a, b], Stroke::new(1.5, ORANGE));
+                shapes.push(Shape::line_segment([a, b], Stroke::new(3.0, Color32::from_black_alpha(160))));
+                shapes.push(Shape::line_segment([a, b], Stroke::new(1.5, ORANGE)));
             }
         }
     }
+    shapes
 }
 
 pub(super) fn messages(ui: &Ui, state: &mut State, rect: Rect) {

@@ -4,7 +4,7 @@
 pub mod hands;
 mod help;
 mod light;
-mod marks;
+pub mod marks;
 mod panel;
 mod table;
 mod times;

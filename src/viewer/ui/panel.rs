@@ -4,6 +4,7 @@ use super::{Facts, Memory, light, source_box, times};
 use crate::net::format::Weights;
 use crate::render::tonemap_curve::Tonemap;
 use crate::viewer::choice::{Side, Source, View};
+use crate::viewer::film::Film;
 use crate::viewer::navigate::Preset;
 use crate::viewer::state::{Action, State};
 use egui::{RichText, Ui};
@@ -292,6 +293,17 @@ fn camera(ui: &mut Ui, state: &mut State) {
         state.navigator.fov = fov;
         state.navigator.file_camera = None;
     }
+    ui.horizontal(|ui| {
+        let records = matches!(state.film, Film::Records(_));
+        if ui.button(if records { "Stop recording (R)" } else { "Record a path (R)" }).clicked() {
+            state.apply(Action::Record);
+        }
+        let plays = matches!(state.film, Film::Plays { .. });
+        let button = egui::Button::new(if plays { "Stop (Y)" } else { "Play (Y)" });
+        if ui.add_enabled(state.path.is_some(), button).clicked() {
+            state.apply(Action::Play);
+        }
+    });
     let e = state.navigator.eye;
     ui.label(RichText::new(format!("eye {:.2}, {:.2}, {:.2}", e.x, e.y, e.z)).weak());
 }
