@@ -12,7 +12,7 @@ const PERIOD: Duration = Duration::from_millis(250);
 /// … and so many frames, so that the overlay stays cheap where these are slow, …
 const FRAMES: u32 = 8;
 /// … but no later than this.
-const LATEST: Duration = Duration::from_secs(1);
+const LATEST: Duration = Duration::from_secs(2);
 
 /// The overlay as it was laid out last.
 pub struct Overlay {

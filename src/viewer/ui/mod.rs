@@ -171,7 +171,11 @@ mod tests {
 
     /// Runs the overlay without any window, one frame for each list of events.
     fn run(state: &mut State, frames: Vec<Vec<egui::Event>>) -> Rect {
-        let (context, mut memory) = (egui::Context::default(), Memory::default());
+        run_in(&egui::Context::default(), state, frames)
+    }
+
+    fn run_in(context: &egui::Context, state: &mut State, frames: Vec<Vec<egui::Event>>) -> Rect {
+        let mut memory = Memory::default();
         let (times, measured) = (Times::default(), BTreeMap::new());
         let mut place = Rect::NOTHING;
         for events in frames {
@@ -259,5 +263,34 @@ mod tests {
         tabbed.push(vec![press(egui::Key::Num1)]);
         run(&mut state, tabbed);
         assert_eq!(state.settings.view, View::Depth);
+    }
+
+    #[test]
+    fn tab_reaches_every_control_and_space_presses_it() {
+        let (mut state, context) = (state(), egui::Context::default());
+        let mut seen = std::collections::HashSet::new();
+        for _ in 0..60 {
+            run_in(&context, &mut state, vec![vec![press(egui::Key::Tab)]]);
+            let Some(id) = context.memory(|m| m.focused()) else { continue };
+            // The first time a control has the focus it is pressed; what that changes is changed back.
+            if seen.insert(id) {
+                let (split, help) = (state.settings.split, state.help);
+                run_in(&context, &mut state, vec![vec![press(egui::Key::Space)], vec![]]);
+                if state.settings.split != split {
+                    seen.insert(egui::Id::unique("split was pressed"));
+                    state.apply(Action::Split);
+                }
+                if state.help != help {
+                    seen.insert(egui::Id::unique("help was pressed"));
+                    state.apply(Action::Help);
+                }
+                run_in(&context, &mut state, vec![vec![press(egui::Key::Space)], vec![]]);
+                (state.help, state.settings.split) = (help, split);
+            }
+        }
+        let pressed = ["split was pressed", "help was pressed"].map(|name| seen.contains(&egui::Id::unique(name)));
+        assert_eq!(pressed, [true, true]);
+        // Ten rooms, the status line, and what the four open ones hold.
+        assert!(seen.len() >= 24, "{} controls", seen.len());
     }
 }

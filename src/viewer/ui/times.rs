@@ -17,7 +17,7 @@ pub fn times(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<
         ui.label(RichText::new(text).color(ui.visuals().warn_fg_color));
     }
     let count = main.spread().map_or(0, |s| s.count);
-    ui.label(RichText::new(format!("last two seconds, {count} frames drawn; ms")).weak());
+    ui.label(RichText::new(format!("ms; frames drawn in the last two seconds: {count}")).weak());
     let lines = lines(facts);
     table(ui, ["median", "p95"], lines.len(), |i| lines[i].clone());
     ui.horizontal(|ui| {
@@ -125,6 +125,19 @@ pub fn memory(ui: &mut Ui, facts: &Facts<'_>) {
     });
 }
 
+/// Where a name of `size` stands beside the dot at `p`: the first of four places that nothing else has.
+fn free_place(p: Pos2, size: Vec2, taken: &[Rect], within: Rect) -> Rect {
+    let sides = [
+        (Align2::CENTER_BOTTOM, Vec2::new(0.0, -7.0)),
+        (Align2::CENTER_TOP, Vec2::new(0.0, 7.0)),
+        (Align2::LEFT_CENTER, Vec2::new(9.0, 0.0)),
+        (Align2::RIGHT_CENTER, Vec2::new(-9.0, 0.0)),
+    ];
+    let places = sides.map(|(align, by)| align.anchor_size(p + by, size));
+    let free = |r: &&Rect| within.contains_rect(**r) && !taken.iter().any(|t| t.intersects(**r));
+    *places.iter().find(free).unwrap_or(&places[0])
+}
+
 /// Error against time: what was measured here across, what docs/accuracy.md has up. A dot chooses its method.
 pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 150.0), Sense::hover());
@@ -158,6 +171,8 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
         ui.painter().text(at(ms, 3.0) + Vec2::new(0.0, 3.0), align, text, font.clone(), weak);
     }
     let mut missing = Vec::new();
+    let dots = Source::ALL.into_iter().filter_map(|s| Some(at(*facts.measured.get(&(s as usize))?, s.static_error()?)));
+    let mut taken: Vec<Rect> = dots.map(|p| Rect::from_center_size(p, Vec2::splat(12.0))).collect();
     for source in Source::ALL {
         let Some(error) = source.static_error() else { continue };
         let Some(&ms) = facts.measured.get(&(source as usize)) else {
@@ -184,7 +199,11 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
             ui.painter().circle_stroke(p, 8.0, Stroke::new(1.5, visuals.text_color()));
         }
         let text = if now { visuals.strong_text_color() } else { visuals.text_color() };
-        ui.painter().text(p + Vec2::new(0.0, -7.0), Align2::CENTER_BOTTOM, source.name(), font.clone(), text);
+        let galley = ui.painter().layout_no_wrap(source.name().into(), font.clone(), text);
+        let name = free_place(p, galley.size(), &taken, rect);
+        taken.push(name);
+        ui.painter().rect_filled(name, 2.0, visuals.extreme_bg_color);
+        ui.painter().galley(name.min, galley, text);
         if response.on_hover_text(format!("{}: {ms:.2} ms here, {error} % there", source.name())).clicked() {
             state.apply(Action::Source(Side::Left, source));
         }
