@@ -126,7 +126,8 @@ pub(super) fn jobs(ui: &Ui, state: &mut State, facts: &Facts<'_>, rect: Rect) {
                 });
                 match share {
                     Some(share) => ui.add(egui::ProgressBar::new(share).desired_height(6.0)),
-                    None => ui.add(egui::Spinner::new().size(12.0)),
+                    // A wheel that turns would lay the overlay out sixty times a second.
+                    None => ui.label("…"),
                 };
             }
             if ui.button("Cancel (Esc)").clicked() {
