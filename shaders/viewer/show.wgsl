@@ -43,11 +43,6 @@ struct Show {
 @group(0) @binding(13) var right: texture_2d<f32>;
 @group(0) @binding(14) var feature: texture_2d<f32>;
 
-@vertex
-fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return vec4f(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
-}
-
 @fragment
 fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let pixel = vec2u(max(position.xy - show.origin, vec2f(0.0)));
@@ -58,14 +53,7 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
         // White with a dark rim is seen on anything.
         shown = select(vec3f(0.0), vec3f(1.0), from_line < show.line);
     }
-    if show.linear_target != 0u {
-        shown = srgb_decode(shown);
-    }
-    return vec4f(shown, 1.0);
-}
-
-fn srgb_decode(c: vec3f) -> vec3f {
-    return select(pow((c + 0.055) / 1.055, vec3f(2.4)), c / 12.92, c <= vec3f(0.04045));
+    return screen_color(shown, show.linear_target);
 }
 
 // Display-encoded colour of a pixel.
@@ -99,6 +87,15 @@ fn display(pixel: vec2u, side: u32) -> vec3f {
         case 9u: {
             let cell = min(pixel / 4u, textureDimensions(feature) - 1u);
             return magma((textureLoad(feature, cell, 0).x - show.low) / max(show.high - show.low, 1e-9));
+        }
+        case 11u: {
+            // All tiles, as large as they fit.
+            let size = vec2f(textureDimensions(feature));
+            let window = vec2f(textureDimensions(depth_texture));
+            let texel = (vec2f(pixel) + 0.5) / min(window.x / size.x, window.y / size.y);
+            let inside = all(texel < size);
+            let value = textureLoad(feature, vec2u(min(texel, size - 1.0)), 0);
+            return select(vec3f(0.2), magma(value.x), inside && value.y > 0.0);
         }
         default: { return radiance_shown(textureLoad(emissive_texture, pixel, 0).rgb); }
     }

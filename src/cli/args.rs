@@ -1,6 +1,7 @@
 //! Flags that several subcommands share, and how they turn into a device, a scene, a camera and a method.
 
 use super::error::CliError;
+pub use crate::gi::name::MethodName;
 use crate::{
     gi::{Method, pass::Neural},
     gpu::{Backend, Gpu, GpuOptions},
@@ -111,63 +112,25 @@ impl Global {
     }
 }
 
-/// Names of the GI methods.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MethodName {
-    /// Analytic lights only.
-    Direct,
-    /// Sky and mean light from all around, times ambient occlusion.
-    Ambient,
-    /// One bounce in screen space.
-    Ssgi,
-    /// One bounce of the lights from reflective shadow maps.
-    Rsm,
-    /// All bounces and the sky from what lights and a cube around the camera see.
-    Cache,
-    /// Surfels that a bake has linked; holds for static geometry.
-    Probes,
-    /// The network.
-    Neural,
-    /// The path tracer, which converges to the truth.
-    Reference,
-}
-
 impl MethodName {
-    /// All real-time methods, cheapest first.
-    pub const REAL_TIME: [MethodName; 7] = [
-        MethodName::Direct,
-        MethodName::Ambient,
-        MethodName::Ssgi,
-        MethodName::Rsm,
-        MethodName::Cache,
-        MethodName::Probes,
-        MethodName::Neural,
-    ];
-
     /// The real-time method with its weights: `weights`, or the shipped ones. [`tuned`](super::tuned::tuned) adds what a device is needed for.
     pub fn method(self, global: &Global, weights: Option<&PathBuf>) -> Result<Method> {
-        Ok(match self {
-            MethodName::Direct => Method::Direct,
-            MethodName::Ambient => Method::Ambient,
-            MethodName::Ssgi => Method::Ssgi,
-            MethodName::Rsm => Method::Rsm,
-            MethodName::Cache => Method::Cache,
-            MethodName::Neural => {
+        match (self.plain(), self) {
+            (Some(method), _) => Ok(method),
+            (None, MethodName::Neural) => {
                 let mut neural = Neural::from(load_weights(weights)?);
                 neural.network.precision = global.precision.precision();
-                Method::Neural(Box::new(neural))
+                Ok(Method::Neural(Box::new(neural)))
             }
-            MethodName::Probes => return Err(usage("`probes` needs a bake, which this command does not make".into())),
-            MethodName::Reference => return Err(usage("`reference` is no real-time method".into())),
-        })
+            (None, MethodName::Probes) => Err(usage("`probes` needs a bake, which this command does not make".into())),
+            (None, _) => Err(usage(format!("`{}` is no real-time method", self.name()))),
+        }
     }
 }
 
 /// The weights in `path`, or the shipped ones of that name; without a path those shipped as the default.
 pub fn load_weights(path: Option<&PathBuf>) -> Result<Weights> {
-    let Some(path) = path else { return Ok(Weights::shipped()?) };
-    let named = path.to_str().filter(|_| !path.exists()).and_then(Weights::shipped_as);
-    Ok(named.unwrap_or_else(|| Weights::load(path))?)
+    Ok(Weights::find(path.map(PathBuf::as_path))?)
 }
 
 /// Which scene, how it is lit, and from where it is seen.
@@ -199,6 +162,15 @@ pub struct SceneArgs {
     /// Angular diameter of directional lights, radians.
     #[arg(long, value_name = "RAD")]
     pub sun_angle: Option<f32>,
+    /// Variant of materials, by name or number from 0.
+    #[arg(long, value_name = "NAME|N")]
+    pub variant: Option<String>,
+    /// Animation that places the objects, from 0; at --pose-time.
+    #[arg(long, value_name = "N")]
+    pub animation: Option<usize>,
+    /// Time in the animation, seconds.
+    #[arg(long, requires = "animation", default_value_t = 0.0, value_name = "SECONDS")]
+    pub pose_time: f32,
     /// Changes a light: its number and any of color=R,G,B strength=S direction=X,Y,Z position=X,Y,Z size=S; may be repeated.
     #[arg(long, value_name = "N KEY=VALUE ...")]
     pub light: Vec<LightEdit>,
@@ -228,6 +200,17 @@ impl SceneArgs {
                     *radius = positive("--light-radius", self.light_radius, *radius)?;
                 }
             }
+        }
+        if let Some(name) = &self.variant {
+            let known = scene.variants.iter().position(|v| v == name).or_else(|| name.parse().ok());
+            if !known.is_some_and(|n| scene.choose_variant(n)) {
+                let all = scene.variants.join(", ");
+                return Err(usage(format!("--variant {name}: the scene has {} variants: {all}", scene.variants.len())));
+            }
+        }
+        if let Some(n) = self.animation.filter(|&n| !scene.pose(n, self.pose_time)) {
+            let count = scene.rig.as_ref().map_or(0, |r| r.animations.len());
+            return Err(usage(format!("--animation {n}: the scene has {count} animations")));
         }
         self.light.iter().try_for_each(|edit| edit.apply(&mut scene)).map_err(|e| usage(format!("--light: {e}")))?;
         self.object.iter().try_for_each(|edit| edit.apply(&mut scene)).map_err(|e| usage(format!("--object: {e}")))?;

@@ -69,7 +69,7 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
             use crate::viewer::ViewError;
             return match e {
                 ViewError::Gpu(_) => NO_ADAPTER,
-                ViewError::Method(_) | ViewError::Script(_) => USAGE,
+                ViewError::Script(_) | ViewError::Settings(_) => USAGE,
                 _ => RUNTIME,
             };
         }

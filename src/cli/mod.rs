@@ -15,6 +15,7 @@ mod probes;
 mod progress;
 mod reference;
 mod render;
+mod sequence;
 mod tuned;
 #[cfg(feature = "viewer")]
 mod view;

@@ -7,7 +7,7 @@ use super::{
     interrupt,
     probes::BakeArgs,
     progress::Progress,
-    reference,
+    reference, sequence,
 };
 use crate::{
     gi::Method,
@@ -22,8 +22,7 @@ use crate::{
     scene::{Camera, Scene, upload::SceneGpu},
 };
 use anyhow::Result;
-use clap::ValueEnum;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -68,6 +67,8 @@ pub struct Args {
     /// Picture of where they differ: FLIP's map for flip and hdrflip, else the mean difference up to a quarter.
     #[arg(long, requires = "reference", value_name = "PNG")]
     diff: Option<PathBuf>,
+    #[command(flatten)]
+    sequence: sequence::SequenceFlags,
     #[command(flatten)]
     bake: BakeArgs,
     // Last, since its heading would go on to what follows.
@@ -143,8 +144,12 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
     }
     let judged = |path| Shown::reference(path, args.tonemap, args.exposure, args.scene.size, &args.metric);
     let reference = args.reference.as_deref().map(judged).transpose()?;
+    let sequence = args.sequence.sequence(&args.output)?;
     let scene = args.scene.load(global.quiet)?;
-    let camera = args.scene.camera(&scene)?;
+    let camera = match sequence.as_ref().and_then(|s| s.frames().next()) {
+        Some((_, camera)) => camera,
+        None => args.scene.camera(&scene)?,
+    };
     interrupt::install()?;
     let gpu = global.open_gpu()?;
     let drawn = match task {
@@ -152,10 +157,14 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
         Task::Rasterise(method, layers) => {
             let method = method.map_or_else(|| args.bake.bake(global, &scene, &camera), Ok)?;
             let method = super::tuned::tuned(method, &gpu, global.quiet);
-            rasterise(global, &args, &gpu, (&scene, &camera), method, &layers)?
+            let mut raster = Raster::new(&args, &gpu, &scene, method, layers)?;
+            if let Some(sequence) = sequence {
+                return film(global, &args, format, raster, &sequence);
+            }
+            raster.draw(global, &args, &camera)?
         }
     };
-    write(&args, format, &drawn, &metadata(&gpu, &drawn))?;
+    write(&args, &args.output, format, &drawn, &metadata(&gpu, &drawn))?;
     match reference {
         Some(reference) => judge(&args, &drawn.frame, &reference),
         None => Ok(()),
@@ -168,37 +177,65 @@ enum Task {
     Trace(reference::Task),
 }
 
-fn rasterise(
-    global: &Global,
-    args: &Args,
-    gpu: &Gpu,
-    (scene, camera): (&Scene, &Camera),
-    method: Method,
-    layers: &[Layer],
-) -> Result<Drawn> {
-    let weights = match &method {
-        Method::Neural(neural) => neural.weights.hash_text(),
-        _ => "none".into(),
-    };
-    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
-    let options = RendererOptions { method, taa: args.taa.is_some(), ..Default::default() };
-    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options)?;
-    let samples = args.samples.unwrap_or(1);
-    let warmup = args.taa.unwrap_or(0);
-    let options = CaptureOptions { samples, seed: args.seed, layers, warmup };
-    let mut progress = Progress::new(global, "samples", (samples + warmup).into());
-    let frame = capture_with(gpu, &mut renderer, &uploaded, camera, options, &mut || {
+/// The rasteriser, ready to draw.
+struct Raster<'a> {
+    gpu: &'a Gpu,
+    scene: SceneGpu,
+    renderer: Renderer,
+    layers: Vec<Layer>,
+    weights: String,
+}
+
+impl<'a> Raster<'a> {
+    fn new(args: &Args, gpu: &'a Gpu, scene: &Scene, method: Method, layers: Vec<Layer>) -> Result<Self> {
+        let weights = match &method {
+            Method::Neural(neural) => neural.weights.hash_text(),
+            _ => "none".into(),
+        };
+        let scene = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
+        let options = RendererOptions { method, taa: args.taa.is_some(), ..Default::default() };
+        let renderer = Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options)?;
+        Ok(Self { gpu, scene, renderer, layers, weights })
+    }
+
+    /// A picture, with progress of its own.
+    fn draw(&mut self, global: &Global, args: &Args, camera: &Camera) -> Result<Drawn> {
+        let count = args.samples.unwrap_or(1) + args.taa.unwrap_or(0);
+        let mut progress = Progress::new(global, "samples", count.into());
+        let drawn = self.picture(args, camera, &mut || progress.step())?;
+        progress.finish();
+        Ok(drawn)
+    }
+
+    fn picture(&mut self, args: &Args, camera: &Camera, step: &mut dyn FnMut()) -> Result<Drawn> {
+        let warmup = args.taa.unwrap_or(0);
+        let options =
+            CaptureOptions { samples: args.samples.unwrap_or(1), seed: args.seed, layers: &self.layers, warmup };
+        let frame = capture_with(self.gpu, &mut self.renderer, &self.scene, camera, options, &mut || {
+            step();
+            !interrupt::requested()
+        })?;
+        interrupt::check()?;
+        let frame = frame.ok_or(CliError::Interrupted)?;
+        let layer = |(layer, picture): &(Layer, Picture)| {
+            image_io::Layer::new(layer.name(), &layer.channels().concat(), &picture.data)
+        };
+        let layers = frame.layers.iter().map(layer).collect();
+        Ok(Drawn { frame, layers, facts: vec![("Weights".into(), self.weights.clone())] })
+    }
+}
+
+/// A picture for each frame of a camera path.
+fn film(global: &Global, args: &Args, format: Format, mut raster: Raster, sequence: &sequence::Sequence) -> Result<()> {
+    let mut progress = Progress::new(global, "frames", sequence.count());
+    for (number, camera) in sequence.frames() {
+        let drawn = raster.picture(args, &camera, &mut || ())?;
+        let metadata = metadata(raster.gpu, &drawn);
+        write(args, &sequence::name(&args.output, number), format, &drawn, &metadata)?;
         progress.step();
-        !interrupt::requested()
-    })?;
+    }
     progress.finish();
-    interrupt::check()?;
-    let frame = frame.ok_or(CliError::Interrupted)?;
-    let layer = |(layer, picture): &(Layer, Picture)| {
-        image_io::Layer::new(layer.name(), &layer.channels().concat(), &picture.data)
-    };
-    let layers = frame.layers.iter().map(layer).collect();
-    Ok(Drawn { frame, layers, facts: vec![("Weights".into(), weights)] })
+    Ok(())
 }
 
 /// Faults that can be told before anything is drawn.
@@ -217,13 +254,18 @@ fn check(args: &Args) -> Result<Format> {
     if !args.exposure.is_finite() {
         return Err(usage(format!("--exposure {} is not a finite number of stops", args.exposure)));
     }
-    let name = args.method().to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default();
+    let name = args.method().name();
     if args.method() == MethodName::Reference {
         if args.samples.is_some() {
             return Err(usage("--samples averages frames of the rasteriser; --method reference takes --spp".into()));
         }
         if args.taa.is_some() {
             return Err(usage("--taa averages frames of the rasteriser; --method reference takes --spp".into()));
+        }
+        if args.sequence.is_given() {
+            return Err(usage(
+                "--path draws frames of the rasteriser; trace single ones with --eye and --look-at".into(),
+            ));
         }
         if args.weights.is_some() {
             return Err(usage("--weights are a network's; --method reference traces paths and has none".into()));
@@ -258,17 +300,17 @@ fn metadata(gpu: &Gpu, drawn: &Drawn) -> Metadata {
     .collect()
 }
 
-fn write(args: &Args, format: Format, drawn: &Drawn, metadata: &Metadata) -> Result<()> {
+fn write(args: &Args, output: &Path, format: Format, drawn: &Drawn, metadata: &Metadata) -> Result<()> {
     let [width, height] = args.scene.size;
     match format {
         Format::Png => {
             let rgb = shown_bytes(&rgb(&drawn.frame), args.exposure, args.tonemap);
-            image_io::write_png(&args.output, width, height, &rgb, metadata)?;
+            image_io::write_png(output, width, height, &rgb, metadata)?;
         }
         Format::Exr => {
             let mut layers = vec![image_io::Layer::new("", "RGBA", &drawn.frame.beauty.data)];
             layers.extend(drawn.layers.iter().cloned());
-            image_io::write_exr(&args.output, width, height, &layers, metadata)?;
+            image_io::write_exr(output, width, height, &layers, metadata)?;
         }
     }
     Ok(())

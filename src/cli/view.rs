@@ -3,7 +3,6 @@
 use super::args::{Global, MethodName, parse_size};
 use crate::viewer::{self, Options};
 use anyhow::Result;
-use clap::ValueEnum;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -22,6 +21,9 @@ pub struct Args {
     /// Run the steps of this file instead of waiting for hands (docs/viewer.md); reads and saves no settings.
     #[arg(long, value_name = "JSON")]
     script: Option<PathBuf>,
+    /// Settings to begin with instead of the saved ones, as `view.json` holds them; nothing is saved then.
+    #[arg(long, value_name = "JSON")]
+    settings: Option<PathBuf>,
     /// Width and height of the window, points.
     #[arg(long, value_parser = parse_size, value_name = "WxH")]
     size: Option<[u32; 2]>,
@@ -32,17 +34,18 @@ pub struct Args {
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
     if args.watch {
-        // Only where the sources of this very program lie.
-        let shaders = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+        // Where one is told, else where the sources of this very program lie.
+        let told = std::env::var_os("BOUNCELIGHT_SHADERS").map(PathBuf::from);
+        let shaders = told.unwrap_or_else(|| std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"));
         crate::gpu::shaders::read_from(Some(shaders).filter(|s| s.is_dir()));
     }
-    let method = args.method.and_then(|m| m.to_possible_value()).map(|v| v.get_name().to_owned());
     let options = Options {
         scene: args.scene,
         weights: args.weights,
-        method,
+        method: args.method,
         watch: args.watch,
         script: args.script,
+        settings: args.settings,
         size: args.size,
         captures: args.captures,
         gpu: global.gpu_options(),

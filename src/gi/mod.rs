@@ -33,6 +33,7 @@ pub mod exposure;
 pub mod features;
 pub mod glossy;
 pub mod inputs;
+pub mod name;
 pub mod occlusion;
 pub mod pack;
 pub mod pass;

@@ -25,7 +25,7 @@ use super::rung::{Cost, Rung};
 use super::{GiError, Inputs};
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
-use crate::net::gpu::{self, Network, Tuned};
+use crate::net::gpu::{self, Network, Tap, Tuned};
 use std::sync::Arc;
 
 /// What the host chooses.
@@ -194,6 +194,33 @@ impl NeuralGi {
     /// [`GiError`] when the inputs do not fit or reading back fails.
     pub fn read_inputs(&self, inputs: &Inputs<'_>) -> Result<NetworkInputs, GiError> {
         pack::read_features(&self.device, &self.queue, &self.features, inputs, &self.rebuilt.guess)
+    }
+
+    /// Names of the network's layers in order, as [`NeuralGi::read_layer`] numbers them.
+    pub fn layers(&self) -> Vec<&str> {
+        self.rebuilt.network.taps().into_iter().map(|(_, name)| name).collect()
+    }
+
+    /// What a layer of the network makes of `inputs`, which must be those of the last recording; `None` if there is no such
+    /// layer. Runs the network as far as that layer, submits and waits: for tools, not for frames.
+    ///
+    /// # Errors
+    /// [`GiError`] when the inputs do not fit or reading back fails.
+    pub fn read_layer(&mut self, inputs: &Inputs<'_>, layer: usize) -> Result<Option<Tap>, GiError> {
+        let taps = self.rebuilt.network.taps();
+        let Some(&(step, _)) = taps.get(layer).filter(|_| inputs.size == self.rebuilt.size) else { return Ok(None) };
+        let bound = self.inputs.bind(&self.queue, inputs)?;
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        let mut recorder = Recorder::new(&mut encoder);
+        self.rebuilt.pack.record(&mut recorder, &bound);
+        self.rebuilt.network.record_until(step, &mut recorder);
+        self.queue.submit([encoder.finish()]);
+        Ok(Some(self.rebuilt.network.read_tap(&self.device, &self.queue, step)?))
+    }
+
+    /// What method `cache` answered in the last recording, where the network builds on it.
+    pub fn guess(&self) -> Option<&wgpu::TextureView> {
+        self.cache.as_ref().map(|_| &self.rebuilt.guess)
     }
 
     /// What the first guess knows of the camera's surroundings: [`Rung::surroundings`].

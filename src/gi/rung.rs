@@ -53,6 +53,16 @@ pub trait Rung: Send {
         None
     }
 
+    /// The network, if the method is one.
+    fn neural(&self) -> Option<&NeuralGi> {
+        None
+    }
+
+    /// As [`Rung::neural`], to look into it.
+    fn neural_mut(&mut self) -> Option<&mut NeuralGi> {
+        None
+    }
+
     /// The targets are new: lets go of the texture views it remembers.
     fn forget(&mut self);
 
@@ -128,6 +138,14 @@ impl Rung for NeuralGi {
 
     fn surroundings(&self) -> Option<&wgpu::TextureView> {
         NeuralGi::surroundings(self)
+    }
+
+    fn neural(&self) -> Option<&NeuralGi> {
+        Some(self)
+    }
+
+    fn neural_mut(&mut self) -> Option<&mut NeuralGi> {
+        Some(self)
     }
 
     fn forget(&mut self) {

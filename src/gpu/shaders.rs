@@ -60,7 +60,7 @@ pub const RENDER: &[Shader] = &[
         ],
     },
     Shader { name: "render.taa", files: wgsl!["lib/frame.wgsl", "render/taa.wgsl"] },
-    Shader { name: "render.tonemap", files: wgsl!["lib/tonemap.wgsl", "render/tonemap.wgsl"] },
+    Shader { name: "render.tonemap", files: wgsl!["lib/screen.wgsl", "lib/tonemap.wgsl", "render/tonemap.wgsl"] },
     Shader {
         name: "render.layers",
         files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "render/layers.wgsl"],
@@ -329,7 +329,13 @@ pub const VIEWER: &[Shader] = &[
     Shader { name: "viewer.flicker", files: wgsl!["lib/tonemap.wgsl", "viewer/flicker.wgsl"] },
     Shader {
         name: "viewer.show",
-        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/tonemap.wgsl", "viewer/show.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/frame.wgsl",
+            "lib/screen.wgsl",
+            "lib/tonemap.wgsl",
+            "viewer/show.wgsl"
+        ],
     },
 ];
 

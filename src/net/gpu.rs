@@ -10,6 +10,7 @@ mod kernels;
 mod pack;
 pub mod permutation;
 mod pipelines;
+mod tap;
 
 use super::format::Weights;
 use super::graph::Graph;
@@ -23,6 +24,7 @@ pub use kernels::{Bound, Choice, Kernel, Numbers, Part, Sum};
 pub use permutation::{Facts, Permutation, Source, Tuned, Variant};
 pub use pipelines::Pipelines;
 use std::sync::Arc;
+pub use tap::Tap;
 use thiserror::Error;
 
 /// Why a network cannot run on this device.

@@ -25,6 +25,16 @@ impl Weights {
         FILES.iter().find(|(n, _)| *n == name).map(|(_, bytes)| Self::from_bytes(bytes))
     }
 
+    /// The weights in `path`, or the shipped ones of that name where there is no such file; without a path the default.
+    ///
+    /// # Errors
+    /// As [`Weights::load`].
+    pub fn find(path: Option<&std::path::Path>) -> Result<Self, WeightsError> {
+        let Some(path) = path else { return Self::shipped() };
+        let named = path.to_str().filter(|_| !path.exists()).and_then(Self::shipped_as);
+        named.unwrap_or_else(|| Self::load(path))
+    }
+
     /// Names of the shipped networks, smallest first.
     pub fn shipped_names() -> impl Iterator<Item = &'static str> {
         FILES.iter().map(|(name, _)| *name)

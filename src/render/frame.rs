@@ -12,10 +12,13 @@ use super::view::{FrameUniform, View};
 use super::world::{World, WorldPass};
 use crate::gi::{
     self,
+    features::FeatureSet,
     glossy::{GlossyPass, GlossyPicture},
+    pack,
     rung::{self, Cost, Rung},
 };
 use crate::gpu::timing::Recorder;
+use crate::net::gpu::Tap;
 use crate::scene::upload::SceneGpu;
 
 /// How a [`Renderer`] is made.
@@ -184,6 +187,39 @@ impl Renderer {
     /// What a GI method reads of the frame that was drawn with `view` and `environment`.
     pub fn gi_inputs(&self, view: &View, environment: [f32; 3]) -> gi::Inputs<'_> {
         gi_inputs(&self.targets, view, environment, None, None)
+    }
+
+    /// All that a network can be given of the last frame, which `view` drew, read back: the G-buffer's features and, where the
+    /// method has computed it, what `cache` answers. Waits for the GPU.
+    ///
+    /// # Errors
+    /// As [`pack::read_features`].
+    pub fn read_features(
+        &self,
+        queue: &wgpu::Queue,
+        view: &View,
+        environment: [f32; 3],
+    ) -> Result<pack::NetworkInputs, gi::GiError> {
+        let own = (self.method == "cache").then_some(&self.targets.indirect.view);
+        let guess = self.indirect.as_ref().and_then(|i| i.neural()?.guess()).or(own);
+        let set = if guess.is_some() { FeatureSet::all() } else { FeatureSet::screen() };
+        let inputs = self.gi_inputs(view, environment);
+        pack::read_features(&self.device, queue, &set, &inputs, guess.unwrap_or(&self.targets.indirect.view))
+    }
+
+    /// Names of the network's layers; none without a network.
+    pub fn layers(&self) -> Vec<&str> {
+        self.indirect.as_ref().and_then(|i| i.neural()).map(|n| n.layers()).unwrap_or_default()
+    }
+
+    /// What a layer of the network made of the last frame, which `view` drew; `None` where there is no such layer. Runs the
+    /// network again and waits for the GPU.
+    ///
+    /// # Errors
+    /// As [`NeuralGi::read_layer`](gi::pass::NeuralGi::read_layer).
+    pub fn read_layer(&mut self, view: &View, environment: [f32; 3], layer: usize) -> Result<Option<Tap>, gi::GiError> {
+        let Some(neural) = self.indirect.as_mut().and_then(|i| i.neural_mut()) else { return Ok(None) };
+        neural.read_layer(&gi_inputs(&self.targets, view, environment, None, None), layer)
     }
 
     /// The textures that [`Renderer::record`] fills.

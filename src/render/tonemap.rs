@@ -2,7 +2,7 @@
 
 use super::tonemap_curve::Tonemap;
 use super::tool;
-use crate::gpu::{shaders, timing::Recorder};
+use crate::gpu::timing::Recorder;
 use bytemuck::{Pod, Zeroable};
 
 /// Exposure and curve.
@@ -38,39 +38,8 @@ impl TonemapPass {
     pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
         let stages = wgpu::ShaderStages::FRAGMENT;
         let layout = tool::layout(device, "render.tonemap", stages, &[tool::UNIFORM, tool::LOAD]);
-        let module = shaders::module(device, "render.tonemap");
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("render.tonemap"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("render.tonemap"),
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("vertex"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: Default::default(),
-            depth_stencil: None,
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("fragment"),
-                compilation_options: Default::default(),
-                targets: &[Some(format.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
-        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("render.tonemap"),
-            size: size_of::<Uniform>() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let pipeline = tool::screen(device, "render.tonemap", format, &layout);
+        let uniform = tool::uniform(device, "render.tonemap", size_of::<Uniform>());
         Self { device: device.clone(), pipeline, layout, uniform, linear_target: format.is_srgb(), bound: None }
     }
 

@@ -27,6 +27,9 @@ mod load;
 pub mod obj;
 #[cfg(feature = "io")]
 pub mod paper_room;
+#[cfg(feature = "io")]
+pub mod path;
+pub mod rig;
 pub mod shapes;
 #[cfg(feature = "io")]
 mod texture;
@@ -56,6 +59,10 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// What rays see that hit nothing.
     pub environment: Environment,
+    /// Names of the variants of materials that the file has; see [`Scene::choose_variant`].
+    pub variants: Vec<String>,
+    /// How the objects move, if they do; see [`Scene::pose`].
+    pub rig: Option<rig::Rig>,
     /// What was mended or left out while loading, one plain sentence each, naming the file and place.
     pub warnings: Vec<String>,
 }
@@ -81,6 +88,8 @@ pub struct Mesh {
     pub indices: Vec<u32>,
     /// Index into [`Scene::materials`].
     pub material: usize,
+    /// The same for each of [`Scene::variants`]; empty where none differs.
+    pub variants: Vec<usize>,
 }
 
 impl Mesh {

@@ -43,6 +43,13 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     if let Some(environment) = &shown.environment {
         flag("environment", environment.clone());
     }
+    if let Some(name) = shown.variant.and_then(|n| shown.scene.variants.get(n)) {
+        flag("variant", name.clone());
+    }
+    if let Some((animation, time)) = shown.pose {
+        flag("animation", animation.to_string());
+        flag("pose-time", time.to_string());
+    }
     for edit in state.light_edits() {
         flag("light", edit.to_string());
     }

@@ -27,12 +27,7 @@ impl FlickerPass {
         let types = [tool::UNIFORM, tool::LOAD, tool::LOAD, tool::READ_WRITE];
         let layout = tool::layout(device, "viewer.flicker", wgpu::ShaderStages::COMPUTE, &types);
         let pipeline = tool::compute(device, "viewer.flicker", "flicker", &[&layout]);
-        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("viewer.flicker"),
-            size: 16,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let uniform = tool::uniform(device, "viewer.flicker", 16);
         Self { pipeline, layout, uniform, kept: None }
     }
 

@@ -172,7 +172,7 @@ fn method(
         Source::Rsm => Method::Rsm,
         Source::Cache => Method::Cache,
         Source::Neural => {
-            let weights = weights.map_or_else(Weights::shipped, Weights::load).map_err(|e| e.to_string())?;
+            let weights = Weights::find(weights).map_err(|e| e.to_string())?;
             let mut neural = Neural::from(weights);
             neural.network.precision = network.precision;
             neural.tuned = network.tuned.clone();

@@ -1,6 +1,7 @@
 //! Keys and what they do: one table, which the help page shows, too.
 
 use super::choice::View;
+use super::film::Film;
 use super::state::{Action, State};
 use egui::{Key, Modifiers};
 
@@ -37,6 +38,8 @@ pub const BINDINGS: &[Binding] = &[
     bind(Key::Num9, With::Nothing, "error against the other side", |_| Action::View(View::Error)),
     bind(Key::Num0, With::Nothing, "network inputs, next channel", |_| Action::Feature(1)),
     bind(Key::Num0, With::Shift, "network inputs, previous channel", |_| Action::Feature(-1)),
+    bind(Key::L, With::Nothing, "network layers, next", |_| Action::Layer(1)),
+    bind(Key::L, With::Shift, "network layers, previous", |_| Action::Layer(-1)),
     bind(Key::M, With::Nothing, "next method", |_| Action::NextMethod(1)),
     bind(Key::M, With::Shift, "previous method", |_| Action::NextMethod(-1)),
     bind(Key::X, With::Nothing, "split the picture", |_| Action::Split),
@@ -49,6 +52,13 @@ pub const BINDINGS: &[Binding] = &[
     bind(Key::V, With::Nothing, "next side of the scene", |_| Action::NextPreset),
     bind(Key::C, With::Nothing, "next camera of the file", |_| Action::NextCamera),
     bind(Key::G, With::Nothing, "drags orbit or turn the head", |_| Action::Fly),
+    bind(Key::I, With::Nothing, "play the file's animation", |_| Action::Animate),
+    bind(Key::R, With::Nothing, "record the camera's path", |_| Action::Record),
+    bind(Key::Y, With::Nothing, "play the camera's path", |_| Action::Play),
+    bind(Key::N, With::Nothing, "average twice as many frames", |s| Action::Samples(2 * s.settings.samples)),
+    bind(Key::N, With::Shift, "average half as many frames", |s| Action::Samples(s.settings.samples / 2)),
+    bind(Key::B, With::Shift, "flicker meter", |_| Action::Flicker),
+    bind(Key::T, With::Shift, "light or dark", |_| Action::Theme),
     bind(Key::B, With::Nothing, "draw without end, to measure", |_| Action::Measure),
     bind(Key::P, With::Nothing, "panel", |_| Action::Panel),
     bind(Key::K, With::Nothing, "copy as command", |_| Action::CopyCommand),
@@ -90,6 +100,7 @@ pub fn current(binding: &Binding, state: &State) -> String {
     match (binding.action)(state) {
         Action::View(view) if view == s.view => "shown".into(),
         Action::Feature(_) if s.view == View::Feature => format!("channel {}", s.feature),
+        Action::Layer(_) if s.view == View::Layer => format!("layer {}", s.layer + 1),
         Action::NextMethod(_) => s.left.name().into(),
         Action::Split => on(s.split),
         Action::MoveSplit(_) => format!("{:.0} %", 100.0 * s.line),
@@ -100,6 +111,12 @@ pub fn current(binding: &Binding, state: &State) -> String {
         Action::Fly => if state.navigator.fly { "head" } else { "orbit" }.into(),
         Action::Measure => on(state.measure),
         Action::Panel => on(s.panel),
+        Action::Flicker => on(s.flicker),
+        Action::Theme => if s.dark { "dark" } else { "light" }.into(),
+        Action::Samples(_) => format!("{} frames", s.samples),
+        Action::Record => on(matches!(state.film, Film::Records(_))),
+        Action::Animate => on(state.animated.is_some()),
+        Action::Play => on(matches!(state.film, Film::Plays { .. })),
         _ => String::new(),
     }
 }

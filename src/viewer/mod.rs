@@ -14,8 +14,8 @@
 mod app;
 mod choice;
 mod command;
+mod film;
 mod flicker;
-mod frame;
 mod jobs;
 mod judge;
 mod keys;
@@ -33,6 +33,7 @@ mod stats;
 mod ui;
 mod watch;
 
+use crate::gi::name::MethodName;
 use crate::gpu::{GpuError, GpuOptions};
 use crate::net::{gpu::Tuned, plan::Precision};
 use std::path::PathBuf;
@@ -46,12 +47,14 @@ pub struct Options {
     pub scene: Option<String>,
     /// The network's weights; the shipped ones when absent.
     pub weights: Option<PathBuf>,
-    /// Name of the method on the left.
-    pub method: Option<String>,
+    /// The method on the left.
+    pub method: Option<MethodName>,
     /// Load scene, weights and, in a checkout, shaders again when their files change.
     pub watch: bool,
     /// Steps to run instead of waiting for hands; then no settings are read or saved.
     pub script: Option<PathBuf>,
+    /// Settings to begin with instead of the saved ones; then none are saved.
+    pub settings: Option<PathBuf>,
     /// Width and height of the window, points.
     pub size: Option<[u32; 2]>,
     /// Folder for captures; the current one when absent.
@@ -75,12 +78,12 @@ pub enum ViewError {
     /// No adapter that can present to the window.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The method does not exist.
-    #[error("`{0}` is no method; choose direct, ambient, ssgi, rsm, cache, probes, neural or reference")]
-    Method(String),
     /// The script cannot be read.
     #[error("the script cannot be used: {0}")]
     Script(String),
+    /// The settings that were named cannot be read.
+    #[error("the settings cannot be used: {0}")]
+    Settings(String),
     /// A step of the script failed.
     #[error("the script failed at {0}")]
     Expectation(String),

@@ -2,6 +2,7 @@
 
 use super::app::App;
 use super::choice::Side;
+use super::film::Film;
 use serde_json::{Value, json};
 
 /// Everything that a script can expect.
@@ -15,15 +16,17 @@ pub fn report(app: &App) -> Value {
         json!({
             "spec": shown.spec, "objects": shown.scene.instances.len(), "lights": lights, "environment": shown.environment,
             "sky": shown.scene.environment.radiance, "moved": shown.moved.len(),
+            "variant": shown.variant, "variants": shown.scene.variants, "pose": shown.pose,
+            "animations": shown.scene.rig.as_ref().map_or(0, |r| r.animations.len()),
         })
     });
     let found = stage.and_then(|st| st.reference());
-    let memory: std::collections::BTreeMap<String, u64> = app.memory.iter().cloned().collect();
-    let passes: Vec<_> = app.times.passes.iter().map(|r| r.name.clone()).collect();
+    let memory: std::collections::BTreeMap<String, u64> = app.meter.memory.iter().cloned().collect();
+    let passes: Vec<_> = app.meter.times.passes.iter().map(|r| r.name.clone()).collect();
     let mut report = json!({
         "loaded": shown.is_some() && stage.is_some_and(|st| st.has_scene() && st.still() > 0),
         "idle": app.is_idle(),
-        "frames": app.frames, "scene_frames": app.scene_frames,
+        "frames": app.frames, "layouts": app.overlay.layouts, "built": app.built, "places": app.overlay.memory.places, "density_drawn": app.overlay.density, "scene_frames": app.scene_frames,
         "view": s.view.name(), "left": s.left.name(), "right": s.right.name(), "split": s.split, "line": s.line,
         "drawn": { "left": key(Side::Left), "right": key(Side::Right) },
         "exposure": s.exposure, "tonemap": s.tonemap.name(), "samples": s.samples,
@@ -36,6 +39,10 @@ pub fn report(app: &App) -> Value {
             "eye": n.eye.to_array(), "target": n.target.to_array(), "fov": n.fov, "fly": n.fly, "speed": n.speed,
             "file": n.file_camera,
         },
+        "path": {
+            "keys": app.state.path.as_ref().map_or(0, |p| p.keys.len()),
+            "recording": matches!(app.state.film, Film::Records(_)), "playing": matches!(app.state.film, Film::Plays { .. }),
+        },
         "selected": app.state.selected, "scene": scene, "weights": s.weights, "recent": s.recent,
         "size": app.state.size, "window": app.screen.as_ref().map(|sc| sc.size()),
         "density": app.screen.as_ref().map(|sc| sc.window.scale_factor()),
@@ -45,16 +52,17 @@ pub fn report(app: &App) -> Value {
         "copied": app.copied, "captured": app.captured, "rebuilt": app.rebuilt,
         "software": stage.map(|st| st.gpu.is_software()),
     });
-    let v = app.verdict;
+    let v = app.tracing.verdict;
     let measured = json!({
         "reference": {
             "samples": found.map_or(0, |f| f.samples), "finished": found.is_some_and(|f| f.finished),
             "noise": found.map(|f| f.noise),
         },
         "verdict": v.map(|v| json!({ "psnr": v.psnr, "ssim": v.ssim, "mae": v.mae, "relmse": v.rel_mse, "bias": v.bias })),
-        "flicker": app.flicker, "passes": passes, "memory": memory,
-        "gpu_ms": app.times.gpu.spread().map(|t| t.median), "cpu_ms": app.times.cpu.spread().map(|t| t.median),
-        "overlay_ms": app.times.overlay.spread().map(|t| t.median),
+        "flicker": app.meter.flicker, "passes": passes, "memory": memory,
+        "gpu_ms": app.meter.times.gpu.spread().map(|t| t.median), "cpu_ms": app.meter.times.cpu.spread().map(|t| t.median),
+        "overlay_ms": app.meter.times.overlay.spread().map(|t| t.mean),
+        "overlay": app.meter.times.overlay.spread().map(|t| json!({ "median": t.median, "p95": t.p95, "count": t.count })),
     });
     if let (Some(all), Value::Object(world), Value::Object(measured)) = (report.as_object_mut(), world, measured) {
         all.extend(world);

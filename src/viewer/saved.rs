@@ -21,6 +21,8 @@ pub struct Settings {
     pub view: View,
     /// Number of the network's input channel that is shown.
     pub feature: u32,
+    /// Number of the network's layer that is shown.
+    pub layer: u32,
     pub exposure: f32,
     #[serde(with = "tonemap_name")]
     pub tonemap: Tonemap,
@@ -50,6 +52,7 @@ impl Default for Settings {
             line: 0.5,
             view: View::Picture,
             feature: 0,
+            layer: 0,
             exposure: 0.0,
             tonemap: Tonemap::Filmic,
             samples: 16,

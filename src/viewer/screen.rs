@@ -14,6 +14,10 @@ pub struct Screen {
     pub input: egui_winit::State,
     pub painter: egui_wgpu::Renderer,
     pub profiler: Option<GpuProfiler>,
+    /// A script plays a window without any size.
+    pub empty: bool,
+    /// Pixels a point that a script plays; the window's own without one.
+    pub scale: Option<f32>,
     /// Written to ask whether the device still answers.
     probe: wgpu::Buffer,
 }
@@ -70,7 +74,10 @@ impl Screen {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        Ok((Self { window, instance, surface, config, input, painter, profiler, probe }, Arc::new(gpu)))
+        Ok((
+            Self { window, instance, surface, config, input, painter, profiler, empty: false, scale: None, probe },
+            Arc::new(gpu),
+        ))
     }
 
     /// False once the device is lost. egui's painter would panic then, so it is asked first.
@@ -91,7 +98,7 @@ impl Screen {
     /// Follows the window's size. False while it has none.
     pub fn fit(&mut self, device: &wgpu::Device) -> bool {
         let size = self.window.inner_size();
-        if size.width == 0 || size.height == 0 {
+        if self.empty || size.width == 0 || size.height == 0 {
             return false;
         }
         let most = device.limits().max_texture_dimension_2d;
@@ -112,6 +119,18 @@ impl Screen {
             }
             Err(e) => tracing::warn!("the window's surface cannot be made anew: {e}"),
         }
+    }
+
+    /// What hands did since the last call.
+    pub fn take_input(&mut self) -> egui::RawInput {
+        let mut raw = self.input.take_egui_input(&self.window);
+        if let Some(scale) = self.scale {
+            raw.viewports.entry(raw.viewport_id).or_default().native_pixels_per_point = Some(scale);
+            let density = scale * self.input.egui_ctx().zoom_factor();
+            let size = self.size().map(|n| n as f32 / density);
+            raw.screen_rect = Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size.into()));
+        }
+        raw
     }
 
     /// The next picture to draw into.

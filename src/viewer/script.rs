@@ -5,11 +5,11 @@
 //!   { "drag": [[200, 150], [260, 150]] }, { "screenshot": "albedo.png" }, { "resize": [500, 300] } ]
 //! ```
 //!
-//! Places are in points from the window's top left. Steps: `wait` (`loaded`, `idle`, `samples:N`, or a number of frames), `key`
+//! Places are in points from the window's top left; a `click` can also name something of the panel that is to be seen (`/places`). Steps: `wait` (`loaded`, `idle`, `samples:N`, or a number of frames), `key`
 //! (`"F12"`, `"Shift+F12"`), `hold` and `release` of a key, `text`, `move`, `press`, `lift`, `click`, `drag` with optional
-//! `button` and `keys`, `wheel`, `drop` of a file, `resize`, `zoom` of the text, `minimise`, `lose` (`surface`, `device`),
-//! `expect` (JSON pointer into the state: a value, or `{"min","max","contains","not"}`), `save` of such values, `expect_saved` and `expect_not_saved`,
-//! `screenshot`, `quit`.
+//! `button` and `keys`, `wheel`, `drop` of a file, `copy` of one over another, `resize` (to nothing, too), `zoom` of the text, `scale` (pixels a point), `minimise`, `lose` (`surface`, `device`), `variant` of materials by number,
+//! `expect` (JSON pointer into the state: a value, or `{"min","max","contains","not"}`), `until` (the same, waited for), `save` of such values, `expect_saved` and `expect_not_saved`,
+//! `print` of values on standard output, `screenshot`, `quit`.
 
 use egui::{Event, Key, Modifiers, PointerButton, Pos2};
 use serde::Deserialize;
@@ -34,7 +34,10 @@ struct Step {
     to: Option<[f32; 2]>,
     press: Option<[f32; 2]>,
     lift: Option<[f32; 2]>,
-    click: Option<[f32; 2]>,
+    click: Option<Place>,
+    until: Option<BTreeMap<String, Value>>,
+    copy: Option<[PathBuf; 2]>,
+    scale: Option<f32>,
     drag: Option<Vec<[f32; 2]>>,
     button: Option<String>,
     keys: Option<String>,
@@ -48,8 +51,18 @@ struct Step {
     save: Option<BTreeMap<String, String>>,
     expect_saved: Option<BTreeMap<String, String>>,
     expect_not_saved: Option<BTreeMap<String, String>>,
+    variant: Option<usize>,
+    print: Option<Vec<String>>,
     screenshot: Option<PathBuf>,
     quit: Option<bool>,
+}
+
+/// A place of the window: points, or the name of something in the panel.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged)]
+enum Place {
+    At([f32; 2]),
+    Named(String),
 }
 
 /// What the window has to do for a step that is no event.
@@ -57,6 +70,10 @@ struct Step {
 pub enum Order {
     Resize([u32; 2]),
     Zoom(f32),
+    /// Pixels a point, as after a change of screens.
+    Scale(f32),
+    Copy([PathBuf; 2]),
+    Variant(usize),
     Minimise(bool),
     LoseSurface,
     LoseDevice,
@@ -120,7 +137,7 @@ impl Script {
             turn.events.push(event);
             return turn;
         }
-        while let Some((i, step)) = self.steps.front().cloned() {
+        while let Some((i, mut step)) = self.steps.front().cloned() {
             if let Some(wait) = &step.wait {
                 if !self.is_over(wait, state) {
                     if self.since.elapsed() > PATIENCE {
@@ -131,15 +148,27 @@ impl Script {
                 self.advance();
                 continue;
             }
+            if let Some(all) = &step.until {
+                if let Some(text) = all.iter().find_map(|(place, wanted)| differs(state, place, wanted)) {
+                    if self.since.elapsed() > PATIENCE {
+                        turn.orders.push(Order::Fail(format!("step {i}: waited in vain; {text}; {state:#}")));
+                    }
+                    return turn;
+                }
+                self.advance();
+                continue;
+            }
             self.advance();
             if let Some(all) = &step.expect {
-                for (place, wanted) in all {
-                    let found = state.pointer(place).unwrap_or(&Value::Null);
-                    if !agrees(found, wanted) {
-                        turn.orders.push(Order::Fail(format!("step {i}: {place} is {found}, not {wanted}")));
-                        return turn;
-                    }
+                if let Some(text) = all.iter().find_map(|(place, wanted)| differs(state, place, wanted)) {
+                    turn.orders.push(Order::Fail(format!("step {i}: {text}")));
+                    return turn;
                 }
+                continue;
+            }
+            if let Some(all) = &step.print {
+                let found = |p: &String| (p.clone(), state.pointer(p).cloned().unwrap_or(Value::Null));
+                println!("{}", Value::Object(all.iter().map(found).collect()));
                 continue;
             }
             if let Some(all) = &step.save {
@@ -161,6 +190,15 @@ impl Script {
                 continue;
             }
             tracing::info!("step {i}");
+            if let Some(Place::Named(name)) = &step.click {
+                let place = state.get("places").and_then(|p| p.get(name));
+                let Some(place) = place.and_then(|p| serde_json::from_value(p.clone()).ok()) else {
+                    turn.orders
+                        .push(Order::Fail(format!("step {i}: `{name}` is not to be seen; {:#}", state["places"])));
+                    return turn;
+                };
+                step.click = Some(Place::At(place));
+            }
             self.act(&step, &mut turn);
             return turn;
         }
@@ -218,7 +256,7 @@ impl Script {
             self.pointer = at(p);
             turn.events.extend([Event::PointerMoved(self.pointer), pointer(self.pointer, step.press.is_some())]);
         }
-        if let Some(p) = step.click {
+        if let Some(Place::At(p)) = step.click {
             self.pointer = at(p);
             turn.events.push(Event::PointerMoved(self.pointer));
             // egui learns what lies under the pointer a frame later.
@@ -246,6 +284,9 @@ impl Script {
         orders.extend(step.drop.clone().map(Order::Drop));
         orders.extend(step.resize.map(Order::Resize));
         orders.extend(step.zoom.map(Order::Zoom));
+        orders.extend(step.scale.map(Order::Scale));
+        orders.extend(step.variant.map(Order::Variant));
+        orders.extend(step.copy.clone().map(Order::Copy));
         orders.extend(step.minimise.map(Order::Minimise));
         orders.extend(step.lose.as_deref().map(
             |what| {
@@ -271,6 +312,12 @@ fn key(name: &str) -> Option<Key> {
 fn key_event(name: &str, pressed: bool) -> Event {
     let key = key(name).unwrap_or(Key::F35);
     Event::Key { key, physical_key: None, pressed, repeat: false, modifiers: modifiers(name) }
+}
+
+/// How a value differs from what a script wants.
+fn differs(state: &Value, place: &str, wanted: &Value) -> Option<String> {
+    let found = state.pointer(place).unwrap_or(&Value::Null);
+    (!agrees(found, wanted)).then(|| format!("{place} is {found}, not {wanted}"))
 }
 
 /// Whether a value is what a script wants.

@@ -72,39 +72,8 @@ impl ShowPass {
         let mut types = vec![UNIFORM; 2];
         types.extend([LOAD; 13]);
         let layout = tool::layout(device, "viewer.show", wgpu::ShaderStages::FRAGMENT, &types);
-        let module = crate::gpu::shaders::module(device, "viewer.show");
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("viewer.show"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("viewer.show"),
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("vertex"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: Default::default(),
-            depth_stencil: None,
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("fragment"),
-                compilation_options: Default::default(),
-                targets: &[Some(format.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
-        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("viewer.show"),
-            size: size_of::<ShowUniform>() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let pipeline = tool::screen(device, "viewer.show", format, &layout);
+        let uniform = tool::uniform(device, "viewer.show", size_of::<ShowUniform>());
         let blank = picture(device, "viewer.blank", [1, 1]).view;
         Self { device: device.clone(), pipeline, layout, uniform, linear_target: format.is_srgb(), blank, bound: None }
     }
@@ -237,12 +206,7 @@ impl SumPass {
         let layout = tool::layout(device, "viewer.sum", wgpu::ShaderStages::COMPUTE, &types);
         let pipeline = tool::compute(device, "viewer.sum", "sum", &[&layout]);
         let first = [0u32, 1].map(|first| {
-            let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("viewer.sum"),
-                size: 16,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
+            let buffer = tool::uniform(device, "viewer.sum", 16);
             queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&[first, 0, 0, 0]));
             buffer
         });

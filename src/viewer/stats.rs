@@ -34,7 +34,12 @@ impl Track {
         values.sort_by(f64::total_cmp);
         let n = values.len();
         let at = |q: f64| values[((n as f64 * q).ceil() as usize).clamp(1, n) - 1];
-        (n > 0).then(|| Spread { median: at(0.5), p95: at(0.95), count: n })
+        (n > 0).then(|| Spread {
+            median: at(0.5),
+            p95: at(0.95),
+            mean: values.iter().sum::<f64>() / n as f64,
+            count: n,
+        })
     }
 
     /// The latest values, oldest first.
@@ -48,6 +53,7 @@ impl Track {
 pub struct Spread {
     pub median: f64,
     pub p95: f64,
+    pub mean: f64,
     pub count: usize,
 }
 
@@ -112,7 +118,7 @@ mod tests {
         }
         // 21 values: 79 to 99.
         let s = track.spread().unwrap();
-        assert_eq!(s, Spread { median: 89.0, p95: 98.0, count: 21 });
+        assert_eq!(s, Spread { median: 89.0, p95: 98.0, mean: 89.0, count: 21 });
         assert_eq!(track.curve().len(), 100);
         assert_eq!(Track::default().spread(), None);
     }

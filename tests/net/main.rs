@@ -6,6 +6,7 @@ mod common;
 mod hashed;
 mod life;
 mod operators;
+mod tap;
 mod tune;
 mod whole;
 

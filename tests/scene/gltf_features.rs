@@ -305,3 +305,62 @@ fn external_files_and_data_uris() {
         assert_eq!(scene.warnings.len(), 1, "only the default sun: {:?}", scene.warnings);
     }
 }
+
+#[test]
+fn nodes_move_as_their_animation_says() {
+    let mut glb = Glb::triangle();
+    let times = glb.floats("SCALAR", &[0.5, 1.5]);
+    let places = glb.floats("VEC3", &[0.0, 0.0, 0.0, 0.0, 2.0, 0.0]);
+    glb.json["scenes"] = json!([{"nodes": [0]}]);
+    glb.json["nodes"] = json!([
+        {"translation": [1.0, 0.0, 0.0], "children": [1, 2]},
+        {"name": "moves", "mesh": 0},
+        {"name": "stays", "mesh": 0, "translation": [0.0, 0.0, 3.0]},
+        {"name": "not in the scene", "mesh": 0},
+    ]);
+    let channel =
+        |node: usize, path: &str, sampler: usize| json!({"sampler": sampler, "target": {"node": node, "path": path}});
+    glb.json["animations"] = json!([
+        {"name": "up", "samplers": [{"input": times, "output": places}], "channels": [channel(1, "translation", 0), channel(3, "translation", 0)]},
+        {"name": "broken", "samplers": [{"input": times, "output": 99}], "channels": [channel(1, "translation", 0), channel(1, "weights", 7)]},
+    ]);
+    let mut scene = load(&glb);
+    let rig = scene.rig.clone().expect("it moves");
+    assert_eq!((rig.animations.len(), rig.animations[0].name.as_str(), rig.animations[0].end), (1, "up", 1.5));
+    assert_eq!(rig.animations[0].channels.len(), 1, "a node of no scene moves nothing");
+    assert!(scene.warnings.iter().any(|w| w.contains("animations[1].channels[0]")), "{:?}", scene.warnings);
+    let at =
+        |scene: &Scene, i: usize| Mat4::from_cols_array_2d(&scene.instances[i].transform).transform_point3(Vec3::ZERO);
+    let rest = [at(&scene, 0), at(&scene, 1)];
+    assert!(scene.pose(0, 1.0) && !scene.pose(1, 1.0));
+    assert!(at(&scene, 0).distance(Vec3::new(1.0, 1.0, 0.0)) < 1e-5 && at(&scene, 1) == rest[1], "{}", at(&scene, 0));
+    // Negative control: another time is another place, and the beginning is where the file has it.
+    assert!(scene.pose(0, 1.4) && at(&scene, 0).y > 1.5);
+    assert!(scene.pose(0, 0.0) && at(&scene, 0).distance(rest[0]) < 1e-6);
+}
+
+#[test]
+fn variants_change_materials() {
+    let mut glb = Glb::triangle();
+    let colour = |r: f32| json!({"pbrMetallicRoughness": {"baseColorFactor": [r, 0.0, 0.0, 1.0]}});
+    glb.json["materials"] = json!([colour(0.1), colour(0.2), colour(0.3)]);
+    glb.json["extensionsUsed"] = json!(["KHR_materials_variants"]);
+    glb.json["extensions"] =
+        json!({"KHR_materials_variants": {"variants": [{"name": "day"}, {"name": "night"}, {"name": "plain"}]}});
+    let primitive = &mut glb.json["meshes"][0]["primitives"][0];
+    primitive["material"] = json!(0);
+    primitive["extensions"] = json!({"KHR_materials_variants": {"mappings": [
+        {"material": 2, "variants": [1, 9]}, {"material": 1, "variants": [0]}, {"material": 77, "variants": [2]}
+    ]}});
+    let mut scene = load(&glb);
+    assert_eq!(scene.variants, ["day", "night", "plain"]);
+    assert!(!scene.warnings.iter().any(|w| w.contains("variants")), "{:?}", scene.warnings);
+    let red = |scene: &Scene| scene.materials[scene.meshes[0].material].base_color[0];
+    let mut seen = vec![red(&scene)];
+    for variant in 0..3 {
+        assert!(scene.choose_variant(variant));
+        seen.push(red(&scene));
+    }
+    assert!(close(&seen, &[0.1, 0.2, 0.3, 0.1]), "{seen:?}");
+    assert!(!scene.choose_variant(3));
+}

@@ -8,6 +8,7 @@ mod accessor;
 mod light;
 mod material;
 mod mesh;
+mod motion;
 mod source;
 
 use std::collections::HashMap;
@@ -20,17 +21,18 @@ use super::{Camera, Environment, Instance, Scene, SceneError, defaults, error};
 use source::Source;
 
 /// Extensions that this loader has.
-const SUPPORTED: [&str; 6] = [
+const SUPPORTED: [&str; 7] = [
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];
 
 /// Extensions without which a file still looks much as it should, even where it says that it requires them.
-const IGNORED: [&str; 2] = ["KHR_materials_specular", "KHR_materials_variants"];
+const IGNORED: [&str; 1] = ["KHR_materials_specular"];
 
 /// Loads the file's default scene (else its first, else every root node) and fills in what is missing, as
 /// [`super::defaults`] says. What was mended or left out stands in [`Scene::warnings`].
@@ -53,6 +55,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
         loader.warn("extensionsUsed", &format!("{extension} is not supported; the file is shown without it"));
     }
     loader.walk()?;
+    loader.variants(json);
     let mut scene = loader.scene;
     defaults::complete(&mut scene);
     Ok(scene)
@@ -165,8 +168,11 @@ impl<'a> Loader<'a> {
             }
         };
         let mut seen = vec![false; document.nodes().len()];
-        let mut stack: Vec<(gltf::Node, Mat4)> = roots.into_iter().rev().map(|n| (n, Mat4::IDENTITY)).collect();
-        while let Some((node, parent)) = stack.pop() {
+        let mut stack: Vec<(gltf::Node, Mat4, Option<usize>)> =
+            roots.into_iter().rev().map(|n| (n, Mat4::IDENTITY, None)).collect();
+        // For animations: nodes in the order of this walk, and which of them each instance belongs to.
+        let (mut walked, mut placed) = (Vec::new(), Vec::new());
+        while let Some((node, parent, above)) = stack.pop() {
             if std::mem::replace(&mut seen[node.index()], true) {
                 let place = format!("nodes[{}]", node.index());
                 return Err(self.broken(place, "is reached twice; nodes must form trees, not cycles"));
@@ -176,12 +182,12 @@ impl<'a> Loader<'a> {
                 return Err(self.broken(format!("nodes[{}]", node.index()), "has a transform that is not finite"));
             }
             self.node(&node, world)?;
-            let children: Vec<_> = node.children().map(|child| (child, world)).collect();
+            placed.resize(self.scene.instances.len(), walked.len());
+            let children: Vec<_> = node.children().map(|child| (child, world, Some(walked.len()))).collect();
+            walked.push((node, above));
             stack.extend(children.into_iter().rev());
         }
-        if !document.as_json().animations.is_empty() {
-            self.warn("animations", "are not played; the scene stands in its rest pose");
-        }
+        self.animations(&walked, placed);
         Ok(())
     }
 

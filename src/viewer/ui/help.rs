@@ -28,9 +28,9 @@ pub fn show(ui: &Ui, state: &mut State) {
         .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO)
         .show(ui.ctx(), |ui| {
             ui.set_min_width((size.x - 60.0).clamp(100.0, 800.0));
-            egui::ScrollArea::both().max_height(size.y - 90.0).max_width(size.x - 60.0).show(ui, |ui| {
+            egui::ScrollArea::both().max_height(size.y - 90.0).min_scrolled_height(size.y - 90.0).max_width(size.x - 60.0).show(ui, |ui| {
                 ui.horizontal_top(|ui| {
-                    let half = BINDINGS.len().div_ceil(2);
+                    let half = (BINDINGS.len() + HANDS.len()).div_ceil(2);
                     for (i, part) in BINDINGS.chunks(half).enumerate() {
                         egui::Grid::new(("keys", i)).striped(true).num_columns(3).show(ui, |ui| {
                             for binding in part {
@@ -41,7 +41,7 @@ pub fn show(ui: &Ui, state: &mut State) {
                                 }];
                                 ui.label(RichText::new(format!("{with}{}", binding.key.symbol_or_name())).strong());
                                 ui.label(binding.doc);
-                                ui.label(RichText::new(keys::current(binding, state)).weak());
+                                ui.label(RichText::new(keys::current(binding, state)).italics());
                                 ui.end_row();
                             }
                             if i == 1 {

@@ -1,22 +1,20 @@
 //! The overlay: panels around the picture, marks on it, and what hands do over it. It draws with egui and changes nothing but
 //! the [`State`], so tests run it without a window.
 
+pub mod hands;
 mod help;
 mod light;
+pub mod marks;
 mod panel;
+mod table;
 mod times;
 
-use super::choice::{Side, Source, View};
+use super::choice::{Side, Source};
 use super::jobs::Job;
 use super::judge::Verdict;
-use super::pick;
 use super::state::{Action, State};
-use super::stats::Times;
-use super::{keys, navigate::Navigator};
-use crate::render::View as Eye;
-use crate::scene::bounds::instance_bounds;
-use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Stroke, Ui, Vec2};
-use glam::Vec3;
+use super::stats::{Times, Track};
+use egui::{Color32, Pos2, Rect, Sense, Ui};
 use std::collections::BTreeMap;
 
 /// Okabe and Ito's colours, which the colour-blind tell apart, too.
@@ -27,11 +25,6 @@ pub const VERMILLION: Color32 = Color32::from_rgb(0xd5, 0x5e, 0x00);
 
 /// Width of the panel, points.
 const PANEL: f32 = 300.0;
-/// Distance from the line in which it is grabbed, points.
-const GRAB: f32 = 7.0;
-/// How long a message stays.
-const MESSAGE_SECONDS: u64 = 12;
-
 /// What the overlay tells of the world outside.
 pub struct Facts<'a> {
     pub adapter: &'a str,
@@ -46,6 +39,8 @@ pub struct Facts<'a> {
     pub measured: &'a BTreeMap<usize, f64>,
     pub still: u32,
     pub feature: Option<(&'a str, [f32; 2])>,
+    /// Names of the network's layers.
+    pub layers: &'a [&'a str],
     pub flicker: Option<f64>,
 }
 
@@ -60,29 +55,31 @@ pub struct ReferenceFacts {
     pub finished: bool,
 }
 
-/// What a drag over the picture does, decided where it began.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-enum Grip {
-    #[default]
-    View,
-    Line,
-    Sun,
-    Object,
-}
-
 /// What the overlay remembers that is nobody else's business.
 #[derive(Debug, Default)]
 pub struct Memory {
     path: String,
     weights: String,
-    grip: Grip,
-    /// The window was left to others and its wheel rests.
-    pub picture: Option<Rect>,
+    /// Where named things of the panel are seen, points; for scripts.
+    pub places: BTreeMap<String, [f32; 2]>,
+    /// The drag over the picture that is under way.
+    pub drag: Option<hands::Drag>,
+}
+
+impl Memory {
+    /// Remembers where `name` is, if it is to be seen.
+    fn place(&mut self, name: &str, response: &egui::Response) {
+        let middle = response.rect.center();
+        if response.rect.is_positive() && response.ctx.content_rect().contains(middle) {
+            self.places.insert(name.into(), [middle.x, middle.y]);
+        }
+    }
 }
 
 /// Draws the overlay and lets hands act on `state`. Returns the picture's place, points.
 pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) -> Rect {
-    keyboard(ui, state);
+    memory.places.clear();
+    hands::keyboard(ui, state);
     if state.settings.panel {
         if facts.software {
             banner(ui, facts);
@@ -97,12 +94,11 @@ pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
     }
     let rect = ui.available_rect_before_wrap();
     let rect = pixel_aligned(rect, ui.ctx().pixels_per_point());
-    memory.picture = Some(rect);
     let response = ui.interact(rect, ui.scope_id().with("picture"), Sense::click_and_drag());
-    hands(ui, state, memory, &response, rect);
-    marks(ui, state, facts, rect);
-    messages(ui, state, rect);
-    jobs(ui, state, facts, rect);
+    hands::hands(ui, state, memory, &response, rect);
+    marks::marks(ui, state, facts, rect);
+    marks::messages(ui, state, rect);
+    marks::jobs(ui, state, facts, rect);
     if state.help {
         help::show(ui, state);
     }
@@ -114,268 +110,6 @@ fn pixel_aligned(rect: Rect, density: f32) -> Rect {
     let whole = |v: f32| (v * density).round() / density;
     let low = Pos2::new(whole(rect.left()), whole(rect.top()));
     Rect::from_min_max(low, Pos2::new(whole(rect.right()).max(low.x), whole(rect.bottom()).max(low.y)))
-}
-
-fn keyboard(ui: &Ui, state: &mut State) {
-    if ui.ctx().egui_wants_keyboard_input() {
-        return;
-    }
-    let events = ui.input(|i| i.events.clone());
-    for event in events {
-        let egui::Event::Key { key, pressed: true, repeat, modifiers, .. } = event else { continue };
-        if let Some([x, y]) = keys::arrow(key) {
-            match state.selected {
-                Some(_) => state.apply(Action::Move(nudge(&state.navigator, x, y))),
-                None if state.navigator.fly => state.navigator.look(-10.0 * x, -10.0 * y),
-                None => state.navigator.orbit(10.0 * x, 10.0 * y),
-            }
-        } else if !repeat && let Some(action) = keys::action(key, modifiers, state) {
-            state.apply(action);
-        }
-    }
-    fly(ui, state);
-}
-
-/// A step of a selected object over the floor, along the axes that are nearest to the picture's.
-fn nudge(navigator: &Navigator, x: f32, y: f32) -> Vec3 {
-    let [right, _, forward] = navigator.axes();
-    let step = 0.02 * navigator.eye.distance(navigator.target);
-    let flat = |v: Vec3| Vec3::new(v.x, 0.0, v.z).normalize_or(Vec3::X);
-    (flat(right) * x - flat(forward) * y) * step
-}
-
-/// Held keys fly.
-fn fly(ui: &Ui, state: &mut State) {
-    use egui::Key;
-    let (direction, seconds, fast) = ui.input(|i| {
-        if i.modifiers.ctrl || i.modifiers.command {
-            return (Vec3::ZERO, 0.0, false);
-        }
-        let axis = |plus, minus| f32::from(i8::from(i.key_down(plus)) - i8::from(i.key_down(minus)));
-        let direction = Vec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S));
-        (direction, i.stable_dt.min(0.1), i.modifiers.shift)
-    });
-    if direction != Vec3::ZERO {
-        state.navigator.fly(direction, if fast { 4.0 * seconds } else { seconds });
-        ui.ctx().request_repaint();
-    }
-}
-
-/// Drags, clicks and the wheel over the picture.
-fn hands(ui: &Ui, state: &mut State, memory: &mut Memory, response: &egui::Response, rect: Rect) {
-    let modifiers = ui.input(|i| i.modifiers);
-    let line = rect.left() + rect.width() * state.settings.line;
-    let on_line = |p: Pos2| state.settings.split && state.settings.view.has_sides() && (p.x - line).abs() < GRAB;
-    if let Some(p) = response.hover_pos()
-        && on_line(p)
-    {
-        ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
-    }
-    if response.drag_started() {
-        response.surrender_focus();
-        let origin = ui.input(|i| i.pointer.press_origin()).unwrap_or(rect.center());
-        memory.grip = match () {
-            () if on_line(origin) => Grip::Line,
-            () if modifiers.ctrl || modifiers.command => Grip::Sun,
-            () if modifiers.shift => {
-                if state.selected.is_none() {
-                    state.selected = object_at(ui, state, origin, rect);
-                }
-                Grip::Object
-            }
-            () => Grip::View,
-        };
-    }
-    let d = response.drag_delta();
-    if response.dragged() && d != Vec2::ZERO {
-        let primary = response.dragged_by(PointerButton::Primary);
-        match memory.grip {
-            Grip::Line => state.apply(Action::MoveSplit(d.x / rect.width().max(1.0))),
-            Grip::Sun => state.apply(Action::TurnSun { dx: d.x, dy: d.y }),
-            Grip::Object => drag_object(state, d, rect),
-            Grip::View if !primary => state.navigator.pan(d.x, d.y, rect.height()),
-            Grip::View if state.navigator.fly => state.navigator.look(-d.x, -d.y),
-            Grip::View => state.navigator.orbit(d.x, d.y),
-        }
-    }
-    if response.clicked() {
-        ui.ctx().memory_mut(|m| m.stop_text_input());
-        if let Some(p) = response.interact_pointer_pos() {
-            state.apply(Action::Select(object_at(ui, state, p, rect)));
-        }
-    }
-    if response.hovered() {
-        let notches = ui.input(|i| wheel(&i.events));
-        if notches != 0.0 && state.navigator.fly {
-            state.navigator.faster(notches);
-            let text = format!("speed {:.2} m/s", state.navigator.speed);
-            state.messages.retain(|m| !m.text.starts_with("speed "));
-            state.tell(text, false);
-        } else if notches != 0.0 {
-            state.navigator.dolly(notches);
-        }
-    }
-}
-
-/// Notches that a wheel was turned; a touchpad's points count a fiftieth.
-fn wheel(events: &[egui::Event]) -> f32 {
-    let notches = events.iter().map(|e| match e {
-        egui::Event::MouseWheel { unit: egui::MouseWheelUnit::Point, delta, .. } => delta.y / 50.0,
-        egui::Event::MouseWheel { delta, .. } => delta.y,
-        _ => 0.0,
-    });
-    notches.sum()
-}
-
-/// The object under a place of the window.
-fn object_at(ui: &Ui, state: &State, p: Pos2, rect: Rect) -> Option<usize> {
-    let shown = state.shown.as_ref()?;
-    let eye = Eye::new(&state.navigator.camera(&shown.scene), state.size, [0.0; 2]);
-    let density = ui.ctx().pixels_per_point();
-    let (origin, direction) = pick::ray(&eye, [(p.x - rect.left()) * density, (p.y - rect.top()) * density]);
-    pick::pick(&shown.scene, origin, direction).map(|(object, _)| object)
-}
-
-/// Moves the selected object with the pointer, parallel to the picture.
-fn drag_object(state: &mut State, d: Vec2, rect: Rect) {
-    let Some((object, shown)) = state.selected.zip(state.shown.as_ref()) else { return };
-    let Some(instance) = shown.scene.instances.get(object) else { return };
-    let Some((low, high)) = shown.scene.meshes.get(instance.mesh).and_then(|m| instance_bounds(instance, m)) else {
-        return;
-    };
-    let middle = 0.5 * (Vec3::from(low) + Vec3::from(high));
-    let [right, up, forward] = state.navigator.axes();
-    let distance = (middle - state.navigator.eye).dot(forward).max(1e-3);
-    let metres = 2.0 * (0.5 * state.navigator.fov.to_radians()).tan() * distance / rect.height().max(1.0);
-    state.apply(Action::Move((right * d.x - up * d.y) * metres));
-}
-
-/// Names of the sides, the selected object's box, the channel on show.
-fn marks(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect) {
-    let s = &state.settings;
-    let painter = ui.painter().with_clip_rect(rect);
-    if s.split && s.view.has_sides() {
-        let line = rect.left() + rect.width() * s.line;
-        let name = |source: Source| match (source, facts.reference) {
-            (Source::Reference, Some(r)) => format!("reference {}", r.samples),
-            (source, _) => source.name().into(),
-        };
-        let y = rect.top() + 8.0;
-        label(&painter, Pos2::new(line - 8.0, y), Align2::RIGHT_TOP, &name(s.left), false);
-        label(&painter, Pos2::new(line + 8.0, y), Align2::LEFT_TOP, &name(s.right), false);
-    } else {
-        let text = match (s.view, facts.feature) {
-            (View::Picture, _) => s.left.name().to_string(),
-            (View::Feature, Some((name, [low, high]))) => format!("network input `{name}`: {low:.3} to {high:.3}"),
-            (View::Error, _) => format!("error: {} against {}, bright at 0.25", s.left.name(), s.right.name()),
-            (view, _) => view.doc().to_string(),
-        };
-        label(&painter, rect.left_top() + Vec2::splat(8.0), Align2::LEFT_TOP, &text, false);
-    }
-    if let Some(object) = state.selected {
-        outline(ui, &painter, state, object, rect);
-    }
-}
-
-/// Text on a dark ground, so that it is read on any picture.
-fn label(painter: &egui::Painter, at: Pos2, align: Align2, text: &str, error: bool) -> Rect {
-    let galley = painter.layout_no_wrap(text.into(), FontId::proportional(13.0), Color32::WHITE);
-    let rect = align.anchor_size(at, galley.size());
-    let ground = if error { Color32::from_rgb(0x8a, 0x2c, 0x00) } else { Color32::from_black_alpha(190) };
-    painter.rect_filled(rect.expand2(Vec2::new(5.0, 2.0)), 4.0, ground);
-    painter.galley(rect.min, galley, Color32::WHITE);
-    rect.expand(3.0)
-}
-
-/// The edges of an object's box.
-fn outline(ui: &Ui, painter: &egui::Painter, state: &State, object: usize, rect: Rect) {
-    let Some(shown) = &state.shown else { return };
-    let Some(instance) = shown.scene.instances.get(object) else { return };
-    let Some((low, high)) = shown.scene.meshes.get(instance.mesh).and_then(|m| instance_bounds(instance, m)) else {
-        return;
-    };
-    let eye = Eye::new(&state.navigator.camera(&shown.scene), state.size, [0.0; 2]);
-    let clip = glam::Mat4::from_cols_array_2d(&eye.clip_from_world);
-    let density = ui.ctx().pixels_per_point();
-    let corner = |i: usize| {
-        let pick = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
-        let p = clip * Vec3::new(pick(0), pick(1), pick(2)).extend(1.0);
-        let ndc = p.truncate() / p.w;
-        let size = Vec2::new(state.size[0] as f32, state.size[1] as f32) / density;
-        let place = rect.min + Vec2::new(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * size;
-        (p.w > eye.near).then_some(place)
-    };
-    for i in 0..8usize {
-        for axis in 0..3 {
-            let j = i | 1 << axis;
-            if let (true, Some(a), Some(b)) = (j != i, corner(i), corner(j)) {
-                painter.line_segment([a, b], Stroke::new(3.0, Color32::from_black_alpha(160)));
-                painter.line_segment([a, b], Stroke::new(1.5, ORANGE));
-            }
-        }
-    }
-}
-
-fn messages(ui: &Ui, state: &mut State, rect: Rect) {
-    state.messages.retain(|m| m.error || m.at.elapsed().as_secs() < MESSAGE_SECONDS);
-    let painter = ui.painter().with_clip_rect(rect);
-    let mut at = rect.left_bottom() + Vec2::new(8.0, -8.0);
-    for message in state.messages.iter().rev() {
-        let text = wrapped(&message.text, (rect.width() / 7.0) as usize);
-        at.y = label(&painter, at, Align2::LEFT_BOTTOM, &text, message.error).top() - 4.0;
-        if !message.error {
-            let left = MESSAGE_SECONDS.saturating_sub(message.at.elapsed().as_secs());
-            ui.ctx().request_repaint_after(std::time::Duration::from_secs(left + 1));
-        }
-    }
-}
-
-/// Lines of at most `most` letters.
-fn wrapped(text: &str, most: usize) -> String {
-    let mut out = String::new();
-    for line in text.lines() {
-        let mut length = 0;
-        for word in line.split(' ') {
-            if length > 0 && length + word.chars().count() > most.max(20) {
-                out.push('\n');
-                length = 0;
-            } else if length > 0 {
-                out.push(' ');
-            }
-            out.push_str(word);
-            length += word.chars().count() + 1;
-        }
-        out.push('\n');
-    }
-    out.trim_end().into()
-}
-
-/// What is at work, how far, and the way to stop it.
-fn jobs(ui: &Ui, state: &mut State, facts: &Facts<'_>, rect: Rect) {
-    if facts.jobs.is_empty() {
-        return;
-    }
-    let area = egui::Area::new(egui::Id::unique("jobs")).fixed_pos(rect.center_top() + Vec2::new(-140.0, 40.0));
-    area.show(ui.ctx(), |ui| {
-        egui::Frame::popup(ui.style()).show(ui, |ui| {
-            ui.set_width(280.0);
-            for job in facts.jobs {
-                let (stage, share) = job.progress.read();
-                let seconds = job.started.elapsed().as_secs();
-                ui.horizontal(|ui| {
-                    ui.add(egui::Label::new(format!("{stage} ({seconds} s)")).truncate());
-                });
-                match share {
-                    Some(share) => ui.add(egui::ProgressBar::new(share).desired_height(6.0)),
-                    None => ui.add(egui::Spinner::new().size(12.0)),
-                };
-            }
-            if ui.button("Cancel (Esc)").clicked() {
-                state.requests.push(super::state::Request::Cancel);
-            }
-        });
-    });
-    ui.ctx().request_repaint_after(std::time::Duration::from_millis(200));
 }
 
 /// Says plainly that numbers are not a GPU's.
@@ -392,20 +126,17 @@ fn banner(ui: &mut Ui, facts: &Facts<'_>) {
 
 fn status(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
     ui.horizontal(|ui| {
-        let ms = |track: &super::stats::Track| track.spread().map_or("–".into(), |s| format!("{:.2}", s.median));
+        let ms = |track: &Track| track.spread().map_or("–".into(), |s| format!("{:.2}", s.median));
         let times = facts.times;
         let gpu = if facts.timestamps {
             format!("GPU {} ms", ms(&times.gpu))
         } else {
             format!("frame {} ms (no GPU timestamps; waited for)", ms(&times.wall))
         };
-        let mut text = format!(
-            "{}×{}  ·  {gpu}  ·  CPU {} ms, overlay {} ms",
-            state.size[0],
-            state.size[1],
-            ms(&times.cpu),
-            ms(&times.overlay)
-        );
+        // Most frames draw the overlay as it was, so its median says little.
+        let overlay = times.overlay.spread().map_or("–".into(), |s| format!("{:.2} ms on average", s.mean));
+        let mut text =
+            format!("{}×{}  ·  {gpu}  ·  CPU {} ms, overlay {overlay}", state.size[0], state.size[1], ms(&times.cpu),);
         text += &format!("  ·  {} of {} frames averaged", facts.still, state.settings.samples);
         if let Some(r) = facts.reference {
             text += &format!("  ·  reference {} of {}", r.samples, state.settings.spp);
@@ -434,11 +165,17 @@ fn source_box(ui: &mut Ui, id: &str, state: &mut State, side: Side) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::viewer::choice::View;
+    use egui::{PointerButton, Vec2};
     use std::sync::Arc;
 
     /// Runs the overlay without any window, one frame for each list of events.
     fn run(state: &mut State, frames: Vec<Vec<egui::Event>>) -> Rect {
-        let (context, mut memory) = (egui::Context::default(), Memory::default());
+        run_in(&egui::Context::default(), state, frames)
+    }
+
+    fn run_in(context: &egui::Context, state: &mut State, frames: Vec<Vec<egui::Event>>) -> Rect {
+        let mut memory = Memory::default();
         let (times, measured) = (Times::default(), BTreeMap::new());
         let mut place = Rect::NOTHING;
         for events in frames {
@@ -456,6 +193,7 @@ mod tests {
                 measured: &measured,
                 still: 1,
                 feature: None,
+                layers: &[],
                 flicker: None,
             };
             let mut output = context.run_ui(input, |ui| place = show(ui, state, &mut memory, &facts));
@@ -525,5 +263,34 @@ mod tests {
         tabbed.push(vec![press(egui::Key::Num1)]);
         run(&mut state, tabbed);
         assert_eq!(state.settings.view, View::Depth);
+    }
+
+    #[test]
+    fn tab_reaches_every_control_and_space_presses_it() {
+        let (mut state, context) = (state(), egui::Context::default());
+        let mut seen = std::collections::HashSet::new();
+        for _ in 0..60 {
+            run_in(&context, &mut state, vec![vec![press(egui::Key::Tab)]]);
+            let Some(id) = context.memory(|m| m.focused()) else { continue };
+            // The first time a control has the focus it is pressed; what that changes is changed back.
+            if seen.insert(id) {
+                let (split, help) = (state.settings.split, state.help);
+                run_in(&context, &mut state, vec![vec![press(egui::Key::Space)], vec![]]);
+                if state.settings.split != split {
+                    seen.insert(egui::Id::unique("split was pressed"));
+                    state.apply(Action::Split);
+                }
+                if state.help != help {
+                    seen.insert(egui::Id::unique("help was pressed"));
+                    state.apply(Action::Help);
+                }
+                run_in(&context, &mut state, vec![vec![press(egui::Key::Space)], vec![]]);
+                (state.help, state.settings.split) = (help, split);
+            }
+        }
+        let pressed = ["split was pressed", "help was pressed"].map(|name| seen.contains(&egui::Id::unique(name)));
+        assert_eq!(pressed, [true, true]);
+        // Ten rooms, the status line, and what the four open ones hold.
+        assert!(seen.len() >= 24, "{} controls", seen.len());
     }
 }

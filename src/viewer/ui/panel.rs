@@ -1,25 +1,32 @@
 //! The panel's controls.
 
 use super::{Facts, Memory, light, source_box, times};
+use crate::net::format::Weights;
 use crate::render::tonemap_curve::Tonemap;
 use crate::viewer::choice::{Side, Source, View};
+use crate::viewer::film::Film;
 use crate::viewer::navigate::Preset;
 use crate::viewer::state::{Action, State};
 use egui::{RichText, Ui};
+use std::path::PathBuf;
 
 /// All of it, from top to bottom.
 pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
-    let open = |title: &str, open: bool| egui::CollapsingHeader::new(RichText::new(title).strong()).default_open(open);
-    open("Scene", true).show(ui, |ui| scene(ui, state, memory));
-    open("Method", true).show(ui, |ui| method(ui, state, memory, facts));
-    open("Picture", true).show(ui, |ui| picture(ui, state));
-    open("Times", true).show(ui, |ui| times::times(ui, state, facts));
-    open("Speed and accuracy", false).show(ui, |ui| times::frontier(ui, state, facts));
-    open("Camera", false).show(ui, |ui| camera(ui, state));
-    open("Light", false).show(ui, |ui| light::lights(ui, state));
-    open("Objects", false).show(ui, |ui| light::objects(ui, state));
-    open("GPU memory", false).show(ui, |ui| times::memory(ui, facts));
-    open("Window", false).show(ui, |ui| window(ui, state));
+    let mut room = |ui: &mut Ui, title: &str, open: bool, add: &mut dyn FnMut(&mut Ui, &mut Memory)| {
+        let header = egui::CollapsingHeader::new(RichText::new(title).strong()).default_open(open);
+        let shown = header.show(ui, |ui| add(ui, memory));
+        memory.place(title, &shown.header_response);
+    };
+    room(ui, "Scene", true, &mut |ui, memory| scene(ui, state, memory));
+    room(ui, "Method", true, &mut |ui, memory| method(ui, state, memory, facts));
+    room(ui, "Picture", true, &mut |ui, _| picture(ui, state));
+    room(ui, "Times", true, &mut |ui, memory| times::times(ui, state, memory, facts));
+    room(ui, "Speed and accuracy", false, &mut |ui, memory| times::frontier(ui, state, memory, facts));
+    room(ui, "Camera", false, &mut |ui, _| camera(ui, state));
+    room(ui, "Light", false, &mut |ui, _| light::lights(ui, state));
+    room(ui, "Objects", false, &mut |ui, _| light::objects(ui, state));
+    room(ui, "GPU memory", false, &mut |ui, _| times::memory(ui, facts));
+    room(ui, "Window", false, &mut |ui, _| window(ui, state));
 }
 
 fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
@@ -33,6 +40,16 @@ fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
         }
         None => {
             ui.label("no scene yet");
+        }
+    }
+    if let Some(shown) = &state.shown {
+        let (names, variant, pose) = (shown.scene.variants.clone(), shown.variant, shown.pose);
+        let ends = shown.original.rig.as_ref().map(|r| r.animations.iter().map(|a| (a.name.clone(), a.end)).collect());
+        if !names.is_empty() {
+            variants(ui, state, &names, variant);
+        }
+        if let Some(ends) = ends {
+            animation(ui, state, ends, pose);
         }
     }
     ui.horizontal(|ui| {
@@ -52,6 +69,42 @@ fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
                 }
             }
         });
+    }
+}
+
+fn variants(ui: &mut Ui, state: &mut State, names: &[String], now: Option<usize>) {
+    let text = now.map_or("materials: the file's", |n| &names[n]);
+    egui::ComboBox::from_id_salt("variant").selected_text(text).width(240.0).truncate().show_ui(ui, |ui| {
+        if ui.selectable_label(now.is_none(), "the file's").clicked() {
+            state.apply(Action::Variant(None));
+        }
+        for (n, name) in names.iter().enumerate() {
+            if ui.selectable_label(now == Some(n), name).clicked() {
+                state.apply(Action::Variant(Some(n)));
+            }
+        }
+    });
+}
+
+fn animation(ui: &mut Ui, state: &mut State, all: Vec<(String, f32)>, pose: Option<(usize, f32)>) {
+    let (now, mut time) = pose.unwrap_or_default();
+    ui.horizontal(|ui| {
+        let text = if state.animated.is_some() { "Stop (I)" } else { "Play (I)" };
+        if ui.button(text).clicked() {
+            state.apply(Action::Animate);
+        }
+        let name = all.get(now).map_or("", |a| &a.0);
+        egui::ComboBox::from_id_salt("animation").selected_text(name).width(150.0).truncate().show_ui(ui, |ui| {
+            for (n, (name, _)) in all.iter().enumerate() {
+                if ui.selectable_label(n == now, name).clicked() {
+                    state.apply(Action::Pose(Some((n, 0.0))));
+                }
+            }
+        });
+    });
+    let end = all.get(now).map_or(0.0, |a| a.1);
+    if ui.add(egui::Slider::new(&mut time, 0.0..=end).suffix(" s").max_decimals(2)).changed() {
+        state.apply(Action::Pose(Some((now, time))));
     }
 }
 
@@ -84,23 +137,23 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
             if less || more {
                 state.apply(Action::Feature(if more { 1 } else { -1 }));
             }
-            ui.label(format!("input channel {}", state.settings.feature % 21));
+            let name = facts.feature.map_or("", |f| f.0);
+            ui.add(egui::Label::new(name).truncate());
+        });
+    }
+    if state.settings.view == View::Layer && !facts.layers.is_empty() {
+        let now = state.settings.layer as usize % facts.layers.len();
+        let text = |i: usize| format!("{}: {}", i + 1, facts.layers[i]);
+        egui::ComboBox::from_id_salt("layer").selected_text(text(now)).width(240.0).show_ui(ui, |ui| {
+            for i in 0..facts.layers.len() {
+                if ui.selectable_label(i == now, text(i)).clicked() {
+                    state.settings.layer = i as u32;
+                }
+            }
         });
     }
     if [state.settings.left, state.settings.right].contains(&Source::Neural) {
-        let name = state.settings.weights.as_ref().map_or("shipped weights".into(), |p| p.display().to_string());
-        ui.add(egui::Label::new(name).truncate());
-        ui.horizontal(|ui| {
-            ui.add(
-                egui::TextEdit::singleline(&mut memory.weights).hint_text("weights.safetensors").desired_width(150.0),
-            );
-            if ui.button("Use").clicked() && !memory.weights.trim().is_empty() {
-                state.apply(Action::Weights(Some(memory.weights.trim().into())));
-            }
-            if state.settings.weights.is_some() && ui.button("Shipped").clicked() {
-                state.apply(Action::Weights(None));
-            }
-        });
+        weights(ui, state, memory);
     }
     if state.wants_reference() {
         reference(ui, state, facts);
@@ -124,6 +177,30 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
             }
         });
     }
+}
+
+/// Which network: one of those that come with the program, or a file.
+fn weights(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
+    let now = state.settings.weights.clone();
+    let text = now.as_ref().map_or("weights: default".into(), |p| format!("weights: {}", p.display()));
+    let list = egui::ComboBox::from_id_salt("weights").selected_text(text).width(240.0).truncate();
+    list.show_ui(ui, |ui| {
+        if ui.selectable_label(now.is_none(), "default").clicked() {
+            state.apply(Action::Weights(None));
+        }
+        for name in Weights::shipped_names() {
+            let path = PathBuf::from(name);
+            if ui.selectable_label(now.as_ref() == Some(&path), name).clicked() {
+                state.apply(Action::Weights(Some(path)));
+            }
+        }
+    });
+    ui.horizontal(|ui| {
+        ui.add(egui::TextEdit::singleline(&mut memory.weights).hint_text("weights.safetensors").desired_width(200.0));
+        if ui.button("Use").clicked() && !memory.weights.trim().is_empty() {
+            state.apply(Action::Weights(Some(memory.weights.trim().into())));
+        }
+    });
 }
 
 fn reference(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
@@ -216,6 +293,17 @@ fn camera(ui: &mut Ui, state: &mut State) {
         state.navigator.fov = fov;
         state.navigator.file_camera = None;
     }
+    ui.horizontal(|ui| {
+        let records = matches!(state.film, Film::Records(_));
+        if ui.button(if records { "Stop recording (R)" } else { "Record a path (R)" }).clicked() {
+            state.apply(Action::Record);
+        }
+        let plays = matches!(state.film, Film::Plays { .. });
+        let button = egui::Button::new(if plays { "Stop (Y)" } else { "Play (Y)" });
+        if ui.add_enabled(state.path.is_some(), button).clicked() {
+            state.apply(Action::Play);
+        }
+    });
     let e = state.navigator.eye;
     ui.label(RichText::new(format!("eye {:.2}, {:.2}, {:.2}", e.x, e.y, e.z)).weak());
 }

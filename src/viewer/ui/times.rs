@@ -1,13 +1,14 @@
 //! Where the time and the memory go, and what accuracy costs.
 
-use super::{BLUE, Facts, ORANGE, SKY, VERMILLION};
+use super::table::{Line, table};
+use super::{BLUE, Facts, Memory, ORANGE, SKY, VERMILLION};
 use crate::viewer::choice::{Side, Source};
 use crate::viewer::state::{Action, State};
 use crate::viewer::stats::{CURVE, Row, Spread, Track};
 use egui::{Align2, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, Ui, Vec2};
 
 /// Passes, curve, CPU, and what the overlay itself costs.
-pub fn times(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
+pub fn times(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
     let times = facts.times;
     let main = if facts.timestamps { &times.gpu } else { &times.wall };
     curve(ui, main, &times.cpu, facts);
@@ -16,34 +17,14 @@ pub fn times(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
         ui.label(RichText::new(text).color(ui.visuals().warn_fg_color));
     }
     let count = main.spread().map_or(0, |s| s.count);
-    ui.label(RichText::new(format!("last two seconds, {count} frames drawn; ms")).weak());
-    egui::Grid::new("times").num_columns(3).min_col_width(50.0).striped(true).show(ui, |ui| {
-        for head in ["", "median", "p95"] {
-            ui.label(RichText::new(head).weak());
-        }
-        ui.end_row();
-        let (layers, passes): (Vec<&Row>, Vec<&Row>) = times.passes.iter().partition(|r| r.name.starts_with("net."));
-        row(ui, if facts.timestamps { "GPU, all passes" } else { "frame, waited for" }, main.spread(), true);
-        row(ui, "CPU, frame", times.cpu.spread(), true);
-        row(ui, "CPU, this overlay", times.overlay.spread(), true);
-        for pass in passes {
-            row(ui, &pass.name, pass.track.spread(), false);
-        }
-        if !layers.is_empty() {
-            let all: f64 = layers.iter().filter_map(|r| r.track.spread()).map(|s| s.median).sum();
-            ui.label(RichText::new(format!("network, {} layers", layers.len())).strong());
-            ui.label(RichText::new(format!("{all:.3}")).strong());
-            ui.label("");
-            ui.end_row();
-            for layer in layers {
-                row(ui, &layer.name, layer.track.spread(), false);
-            }
-        }
-    });
+    ui.label(RichText::new(format!("ms; frames drawn in the last two seconds: {count}")).weak());
+    let lines = lines(facts);
+    table(ui, ["median", "p95"], lines.len(), |i| lines[i].clone());
     ui.horizontal(|ui| {
         let doc =
             "mean change of display values from one frame to the next of a view that stands still; waits for the GPU";
-        ui.checkbox(&mut state.settings.flicker, "flicker meter").on_hover_text(doc);
+        let response = ui.checkbox(&mut state.settings.flicker, "flicker meter").on_hover_text(doc);
+        memory.place("flicker meter", &response);
         match facts.flicker.filter(|_| state.settings.flicker) {
             Some(flicker) => ui.label(format!("{:.2} of 255 between frames", 255.0 * flicker)),
             None if state.settings.flicker && state.settings.samples == 1 => {
@@ -54,14 +35,28 @@ pub fn times(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
     });
 }
 
-fn row(ui: &mut Ui, name: &str, spread: Option<Spread>, strong: bool) {
-    let text = RichText::new(name);
-    ui.label(if strong { text.strong() } else { text });
-    for value in spread.map_or([None; 2], |s| [Some(s.median), Some(s.p95)]) {
-        let text = value.map_or("–".into(), |v| format!("{v:.3}"));
-        ui.label(RichText::new(text).monospace());
+/// Sums, CPU, passes, network layers.
+fn lines<'a>(facts: &Facts<'a>) -> Vec<Line<'a>> {
+    let times = facts.times;
+    let line = |name, spread: Option<Spread>, strong| {
+        let values = spread.map_or(["–".into(), "–".into()], |s| [number(s.median), number(s.p95)]);
+        Line::new(name, values, strong)
+    };
+    let (name, main) =
+        if facts.timestamps { ("GPU, all passes", &times.gpu) } else { ("frame, waited for", &times.wall) };
+    let mut lines = vec![
+        line(name, main.spread(), true),
+        line("CPU, frame", times.cpu.spread(), true),
+        line("CPU, this overlay", times.overlay.spread(), true),
+    ];
+    let (layers, passes): (Vec<&Row>, Vec<&Row>) = times.passes.iter().partition(|r| r.name.starts_with("net."));
+    lines.extend(passes.iter().map(|r| line(&r.name, r.track.spread(), false)));
+    if !layers.is_empty() {
+        let all: f64 = layers.iter().filter_map(|r| r.track.spread()).map(|s| s.median).sum();
+        lines.push(Line::new("network, all layers", [number(all), String::new()], true));
+        lines.extend(layers.iter().map(|r| line(&r.name, r.track.spread(), false)));
     }
-    ui.end_row();
+    lines
 }
 
 /// Scrolling curves of GPU and CPU time.
@@ -72,7 +67,7 @@ fn curve(ui: &mut Ui, gpu: &Track, cpu: &Track, facts: &Facts<'_>) {
     painter.rect_filled(rect, 2.0, visuals.extreme_bg_color);
     let most = gpu.curve().chain(cpu.curve()).fold(0.0f32, f32::max);
     let top = nice(most.max(0.1));
-    let font = FontId::proportional(10.0);
+    let font = FontId::proportional(11.0);
     for share in [0.5, 1.0] {
         let y = rect.bottom() - share * (rect.height() - 12.0);
         painter.hline(rect.x_range(), y, Stroke::new(0.5, visuals.weak_text_color()));
@@ -106,6 +101,12 @@ fn curve(ui: &mut Ui, gpu: &Track, cpu: &Track, facts: &Facts<'_>) {
     painter.text(rect.right_top() + Vec2::new(-4.0, 1.0), Align2::RIGHT_TOP, name, font, visuals.text_color());
 }
 
+/// Four digits that count, no more than three of them behind the point.
+fn number(v: f64) -> String {
+    let places = if v < 10.0 { 3 } else { 3 - (v.log10() as usize).min(3) };
+    format!("{v:.places$}")
+}
+
 /// 1, 2 or 5 times a power of ten, not below `v`.
 fn nice(v: f32) -> f32 {
     let power = 10f32.powf(v.log10().floor());
@@ -116,22 +117,29 @@ fn nice(v: f32) -> f32 {
 pub fn memory(ui: &mut Ui, facts: &Facts<'_>) {
     let all: u64 = facts.memory.iter().map(|(_, b)| b).sum();
     let megabytes = |b: u64| format!("{:.1}", b as f64 / 1e6);
-    egui::Grid::new("memory").num_columns(2).striped(true).show(ui, |ui| {
-        ui.label(RichText::new("all, MB").strong());
-        ui.label(RichText::new(megabytes(all)).monospace());
-        ui.end_row();
-        let mut rows: Vec<_> = facts.memory.iter().collect();
-        rows.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
-        for (name, bytes) in rows {
-            ui.label(name);
-            ui.label(RichText::new(megabytes(*bytes)).monospace());
-            ui.end_row();
-        }
+    let mut rows: Vec<_> = facts.memory.iter().collect();
+    rows.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
+    table(ui, ["", "MB"], rows.len() + 1, |i| match i.checked_sub(1) {
+        Some(i) => Line::new(&rows[i].0, [String::new(), megabytes(rows[i].1)], false),
+        None => Line::new("all", [String::new(), megabytes(all)], true),
     });
 }
 
+/// Where a name of `size` stands beside the dot at `p`: the first of four places that nothing else has.
+fn free_place(p: Pos2, size: Vec2, taken: &[Rect], within: Rect) -> Rect {
+    let sides = [
+        (Align2::CENTER_BOTTOM, Vec2::new(0.0, -7.0)),
+        (Align2::CENTER_TOP, Vec2::new(0.0, 7.0)),
+        (Align2::LEFT_CENTER, Vec2::new(9.0, 0.0)),
+        (Align2::RIGHT_CENTER, Vec2::new(-9.0, 0.0)),
+    ];
+    let places = sides.map(|(align, by)| align.anchor_size(p + by, size));
+    let free = |r: &&Rect| within.contains_rect(**r) && !taken.iter().any(|t| t.intersects(**r));
+    *places.iter().find(free).unwrap_or(&places[0])
+}
+
 /// Error against time: what was measured here across, what docs/accuracy.md has up. A dot chooses its method.
-pub fn frontier(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
+pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 150.0), Sense::hover());
     let visuals = ui.visuals().clone();
     ui.painter().rect_filled(rect, 2.0, visuals.extreme_bg_color);
@@ -144,8 +152,8 @@ pub fn frontier(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
         let y = (error / 3.0).ln() / (130.0f64 / 3.0).ln();
         Pos2::new(plot.left() + x as f32 * plot.width(), plot.bottom() - y as f32 * plot.height())
     };
-    let font = FontId::proportional(10.0);
-    let weak = visuals.weak_text_color();
+    let font = FontId::proportional(11.0);
+    let weak = visuals.text_color();
     for error in [3.0, 10.0, 30.0, 100.0] {
         let y = at(low, error).y;
         ui.painter().hline(plot.x_range(), y, Stroke::new(0.5, weak));
@@ -157,11 +165,14 @@ pub fn frontier(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
             weak,
         );
     }
-    for ms in [low, (low * high).sqrt(), high] {
-        let text = format!("{ms:.2} ms");
-        ui.painter().text(at(ms, 3.0) + Vec2::new(0.0, 3.0), Align2::CENTER_TOP, text, font.clone(), weak);
+    let ticks = [(low, Align2::LEFT_TOP), ((low * high).sqrt(), Align2::CENTER_TOP), (high, Align2::RIGHT_TOP)];
+    for (ms, align) in ticks {
+        let text = format!("{} ms", number(ms));
+        ui.painter().text(at(ms, 3.0) + Vec2::new(0.0, 3.0), align, text, font.clone(), weak);
     }
     let mut missing = Vec::new();
+    let dots = Source::ALL.into_iter().filter_map(|s| Some(at(*facts.measured.get(&(s as usize))?, s.static_error()?)));
+    let mut taken: Vec<Rect> = dots.map(|p| Rect::from_center_size(p, Vec2::splat(12.0))).collect();
     for source in Source::ALL {
         let Some(error) = source.static_error() else { continue };
         let Some(&ms) = facts.measured.get(&(source as usize)) else {
@@ -174,19 +185,30 @@ pub fn frontier(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
             ui.scope_id().with(source.name()),
             Sense::click(),
         );
+        memory.place(&format!("dot {}", source.name()), &response);
         let now = source == state.settings.left;
-        let colour = if now { VERMILLION } else { SKY };
+        let colour = if now {
+            VERMILLION
+        } else if visuals.dark_mode {
+            SKY
+        } else {
+            BLUE
+        };
         ui.painter().circle_filled(p, if now { 6.0 } else { 4.5 }, colour);
         if response.has_focus() || response.hovered() {
             ui.painter().circle_stroke(p, 8.0, Stroke::new(1.5, visuals.text_color()));
         }
         let text = if now { visuals.strong_text_color() } else { visuals.text_color() };
-        ui.painter().text(p + Vec2::new(0.0, -7.0), Align2::CENTER_BOTTOM, source.name(), font.clone(), text);
+        let galley = ui.painter().layout_no_wrap(source.name().into(), font.clone(), text);
+        let name = free_place(p, galley.size(), &taken, rect);
+        taken.push(name);
+        ui.painter().rect_filled(name, 2.0, visuals.extreme_bg_color);
+        ui.painter().galley(name.min, galley, text);
         if response.on_hover_text(format!("{}: {ms:.2} ms here, {error} % there", source.name())).clicked() {
             state.apply(Action::Source(Side::Left, source));
         }
     }
-    ui.label(RichText::new("across: GPU ms measured in this window; up: mean error of indirect light on five judged rooms (docs/accuracy.md), not measured here").weak().small());
+    ui.label(RichText::new("across: GPU ms measured in this window; up: mean error of indirect light on five judged rooms (docs/accuracy.md), not measured here").small());
     if !missing.is_empty() {
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("not measured yet:").weak());

@@ -1,10 +1,9 @@
 //! One picture of the window: hands, scene, overlay, in this order, so that what hands did is seen at once.
 
-use super::app::App;
-use super::screen::Acquired;
-use super::state::Request;
-use super::ui;
-use crate::gpu::{readback, timing, timing::Recorder};
+use super::App;
+use crate::gpu::{readback, timing::Recorder};
+use crate::viewer::screen::Acquired;
+use crate::viewer::state::Request;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
@@ -12,10 +11,13 @@ use winit::event_loop::ActiveEventLoop;
 impl App {
     /// Draws the window, if it is to be seen. Tells when it wants to be called again by itself.
     pub fn frame(&mut self, event_loop: &ActiveEventLoop) {
-        self.redraw = false;
+        let anew = std::mem::take(&mut self.redraw);
+        self.again = false;
         let (Some(screen), Some(stage)) = (&mut self.screen, &self.stage) else { return };
         let device = stage.gpu.device.clone();
         if !screen.fit(&device) {
+            // What hands do is heard once there is a window again.
+            self.overlay.defer(&mut self.scripted);
             return;
         }
         if !screen.is_alive(&stage.gpu.queue) {
@@ -24,33 +26,8 @@ impl App {
             self.wake(Duration::from_millis(50));
             return;
         }
-        let started = Instant::now();
-        let mut raw = screen.input.take_egui_input(&screen.window);
-        if self.script.is_some() {
-            // Whatever the real mouse does is not part of the script.
-            raw.events = std::mem::take(&mut self.scripted);
-            raw.focused = true;
-        } else {
-            raw.events.append(&mut self.scripted);
-        }
-        let theme = if self.state.settings.dark { egui::Theme::Dark } else { egui::Theme::Light };
-        self.egui.set_theme(theme);
-        if self.state.settings.zoom != self.zoomed {
-            self.egui.set_zoom_factor(self.state.settings.zoom);
-        } else {
-            // Ctrl and + or −, which egui hears itself.
-            self.state.settings.zoom = self.egui.zoom_factor();
-        }
-        self.zoomed = self.state.settings.zoom;
-        let egui = self.egui.clone();
-        let mut place = egui::Rect::NOTHING;
-        let mut output = egui.run_ui(raw, |ui| place = self.overlay(ui));
-        let textures = std::mem::take(&mut output.textures_delta.set);
-        let freed = std::mem::take(&mut output.textures_delta.free);
-        let density = output.pixels_per_point;
-        let jobs = egui.tessellate(output.shapes, density);
-        let mut overlay = started.elapsed();
-        self.state.size = [place.width(), place.height()].map(|n| ((n * density).round() as u32).max(1));
+        let mut overlay = self.overlay(anew);
+        let (density, place) = (self.overlay.density, self.overlay.place);
         let origin = [place.left(), place.top()].map(|n| (n * density).round().max(0.0) as u32);
         self.serve(event_loop);
         self.reconcile();
@@ -60,15 +37,15 @@ impl App {
         let mut cpu = overlay + recording.elapsed();
 
         let (Some(screen), Some(stage)) = (&mut self.screen, &mut self.stage) else { return };
-        screen.input.handle_platform_output(&screen.window, output.platform_output);
         let painting = Instant::now();
         let queue = stage.gpu.queue.clone();
-        for (id, deltas) in &textures {
-            deltas.iter().for_each(|delta| screen.painter.update_texture(&device, &queue, *id, delta));
-        }
         let window = egui_wgpu::ScreenDescriptor { size_in_pixels: screen.size(), pixels_per_point: density };
         let mut encoder = device.create_command_encoder(&Default::default());
-        let mut buffers = screen.painter.update_buffers(&device, &queue, &mut encoder, &jobs, &window);
+        let jobs = &self.overlay.jobs;
+        let mut buffers = match std::mem::take(&mut self.overlay.changed) {
+            true => screen.painter.update_buffers(&device, &queue, &mut encoder, jobs, &window),
+            false => Vec::new(),
+        };
         overlay += painting.elapsed();
         cpu += painting.elapsed();
 
@@ -113,7 +90,7 @@ impl App {
             Some(profiler) => Recorder::timed(&mut encoder, profiler),
             None => Recorder::new(&mut encoder),
         };
-        let fill = egui.global_style().visuals.panel_fill;
+        let fill = self.overlay.egui.global_style().visuals.panel_fill;
         let shade = |c: u8| f64::from(c) / 255.0;
         let clear = wgpu::Color { r: shade(fill.r()), g: shade(fill.g()), b: shade(fill.b()), a: 1.0 };
         stage.present(&mut recorder, &self.state, origin, density, clear, &view);
@@ -130,7 +107,9 @@ impl App {
             timestamp_writes: query.as_ref().and_then(|q| q.render_pass_timestamp_writes()),
             ..Default::default()
         });
-        screen.painter.render(&mut pass.forget_lifetime(), &jobs, &window);
+        let painting = Instant::now();
+        screen.painter.render(&mut pass.forget_lifetime(), jobs, &window);
+        overlay += painting.elapsed();
         if let (Some(profiler), Some(query)) = (&mut screen.profiler, query) {
             profiler.end_query(&mut encoder, query);
             profiler.resolve_queries(&mut encoder);
@@ -139,7 +118,7 @@ impl App {
         queue.submit(buffers);
         if drawn && let Some(profiler) = &mut screen.profiler {
             match profiler.end_frame() {
-                Ok(()) => self.timed_frames += 1,
+                Ok(()) => self.meter.timed_frames += 1,
                 Err(e) => tracing::debug!("a frame was not timed: {e}"),
             }
         }
@@ -148,14 +127,14 @@ impl App {
             screen.window.pre_present_notify();
             queue.present(texture);
         }
-        for id in &freed {
-            screen.painter.free_texture(id);
+        for id in self.overlay.freed.drain(..) {
+            screen.painter.free_texture(&id);
         }
         if drawn && screen.profiler.is_none() {
             // Without timestamps the clock has to do.
             if device.poll(wgpu::PollType::wait_indefinitely()).is_ok() {
-                if self.settling < 2 {
-                    self.times.wall.add(Instant::now(), recording.elapsed().as_secs_f64() * 1e3);
+                if self.meter.settling < 2 {
+                    self.meter.times.wall.add(Instant::now(), recording.elapsed().as_secs_f64() * 1e3);
                 }
                 self.learn();
             }
@@ -165,35 +144,15 @@ impl App {
         {
             self.fail(e);
         }
-        if drawn && self.settling > 0 {
-            self.settling -= 1;
-            self.discard += u32::from(self.settling == 1);
+        if drawn && self.meter.settling > 0 {
+            self.meter.settling -= 1;
+            self.meter.discard += u32::from(self.meter.settling == 1);
         }
         self.frames += 1;
-        self.times.cpu.add(Instant::now(), cpu.as_secs_f64() * 1e3);
-        self.times.overlay.add(Instant::now(), overlay.as_secs_f64() * 1e3);
+        self.meter.times.cpu.add(Instant::now(), cpu.as_secs_f64() * 1e3);
+        self.meter.times.overlay.add(Instant::now(), overlay.as_secs_f64() * 1e3);
         self.collect_times();
-        self.schedule(&output.viewport_output);
-    }
-
-    /// The overlay's layout, with what it tells.
-    fn overlay(&mut self, ui: &mut egui::Ui) -> egui::Rect {
-        let Some(stage) = &self.stage else { return egui::Rect::NOTHING };
-        let facts = ui::Facts {
-            adapter: &stage.gpu.info.name,
-            software: stage.gpu.is_software(),
-            timestamps: self.screen.as_ref().is_some_and(|s| s.profiler.is_some()),
-            times: &self.times,
-            memory: &self.memory,
-            jobs: &self.jobs,
-            reference: self.reference,
-            verdict: self.verdict,
-            measured: &self.measured,
-            still: stage.still(),
-            feature: stage.feature(),
-            flicker: self.flicker,
-        };
-        ui::show(ui, &mut self.state, &mut self.memory_of_ui, &facts)
+        self.schedule(drawn);
     }
 
     /// Records and submits the scene's next frame, if one is due.
@@ -205,7 +164,7 @@ impl App {
             return false;
         }
         let camera = self.state.navigator.camera(&shown.scene);
-        let again = self.state.measure || self.settling == 1;
+        let again = self.state.measure || self.meter.settling == 1;
         let mut encoder = stage.gpu.device.create_command_encoder(&Default::default());
         let profiler = self.screen.as_ref().and_then(|s| s.profiler.as_ref());
         let mut recorder = match profiler {
@@ -224,15 +183,15 @@ impl App {
             self.scene_frames += 1;
             if self.state.settings.flicker {
                 match stage.measure_flicker(&self.state) {
-                    Ok(found) => self.flicker = found.or(self.flicker.filter(|_| stage.still() > 1)),
+                    Ok(found) => self.meter.flicker = found.or(self.meter.flicker.filter(|_| stage.still() > 1)),
                     Err(e) => self.state.tell(e.to_string(), true),
                 }
             }
             if stage.still() == 1 {
-                self.verdict = None;
+                self.tracing.verdict = None;
             }
-            if !stage.is_converging(&self.state) {
-                self.judge_at = Some(Instant::now() + Duration::from_millis(200));
+            if !stage.is_converging(&self.state) && self.state.sources().len() == 2 {
+                self.tracing.judge_at = Some(Instant::now() + Duration::from_millis(200));
             }
         }
         if let Err(e) = stage.update_feature(&self.state, &camera) {
@@ -241,64 +200,15 @@ impl App {
         drawn
     }
 
-    /// Takes in the GPU times that have arrived.
-    pub fn collect_times(&mut self) {
-        let (Some(screen), Some(stage)) = (&mut self.screen, &self.stage) else { return };
-        let Some(profiler) = &mut screen.profiler else { return };
-        if self.timed_frames == 0 {
-            return;
-        }
-        let _ = stage.gpu.device.poll(wgpu::PollType::Poll);
-        let mut any = false;
-        while let Some(results) = profiler.process_finished_frame(stage.gpu.queue.get_timestamp_period()) {
-            self.timed_frames = self.timed_frames.saturating_sub(1);
-            if self.discard > 0 {
-                self.discard -= 1;
-                continue;
-            }
-            self.times.frame(Instant::now(), &timing::milliseconds(&results));
-            any = true;
-        }
-        if any {
-            self.learn();
-            self.redraw_once = true;
-        }
-    }
-
-    /// Remembers what the method on show costs here.
-    fn learn(&mut self) {
-        let single = self.state.sources().len() == 1;
-        let timed = self.screen.as_ref().is_some_and(|s| s.profiler.is_some());
-        let track = if timed { &self.times.gpu } else { &self.times.wall };
-        if let (true, Some(spread), Some((source, _))) =
-            (single, track.spread(), self.stage.as_ref().and_then(|s| s.key(0)))
-        {
-            self.measured.insert(source as usize, spread.median);
-        }
-        if let Some(stage) = &self.stage {
-            self.memory = stage.bytes();
-        }
-    }
-
     /// When the next picture is due.
-    fn schedule(&mut self, outputs: &egui::OrderedViewportIdMap<egui::ViewportOutput>) {
+    fn schedule(&mut self, drawn: bool) {
+        if drawn {
+            self.overlay.outdate();
+        }
         let converging = self.stage.as_ref().is_some_and(|s| s.is_converging(&self.state));
-        if converging
-            || self.settling == 1
-            || (self.state.measure && self.stage.as_ref().is_some_and(|s| s.has_scene()))
-        {
-            self.redraw = true;
-        }
-        let delay = outputs.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |o| o.repaint_delay);
-        if delay.is_zero() {
-            self.redraw = true;
-        } else if delay < Duration::from_secs(3600) {
-            self.wake(delay);
-        }
-        if self.timed_frames > 0 {
-            self.wake(Duration::from_millis(20));
-        }
-        if self.redraw {
+        let measuring = self.state.measure && self.stage.as_ref().is_some_and(|s| s.has_scene());
+        self.again |= converging || measuring || self.meter.settling == 1;
+        if self.redraw || self.again {
             self.request_redraw();
         }
     }
@@ -309,7 +219,7 @@ impl App {
             match request {
                 Request::Quit => self.quit(event_loop),
                 Request::Copy(text) => {
-                    self.egui.copy_text(text.clone());
+                    self.overlay.egui.copy_text(text.clone());
                     if let Some(screen) = self.screen.as_mut().filter(|_| self.script.is_none()) {
                         screen.input.set_clipboard_text(text.clone());
                     }

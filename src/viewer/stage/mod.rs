@@ -1,16 +1,20 @@
 //! The GPU's side of the viewer: the uploaded scene, a renderer for each side of the line, the live reference's picture, and
 //! what a frame of the window records. Nothing here knows winit or egui.
 
-use super::choice::{Side, Source, View};
+mod feature;
+mod sides;
+
+use super::choice::Side;
 use super::flicker::FlickerPass;
 use super::jobs::{Handles, Key};
-use super::live::Found;
 use super::navigate::sphere;
-use super::show::{ShowInputs, ShowPass, SideView, SumPass, Sums, picture};
+use super::show::{ShowInputs, ShowPass, SumPass, Sums};
 use super::state::{Stale, State};
 use crate::gpu::{Gpu, readback, timing::Recorder};
-use crate::render::{RenderError, Renderer, View as Eye, sampling, targets::Target};
+use crate::render::{RenderError, Renderer, View as Eye, sampling};
 use crate::scene::{Camera, Scene, upload::SceneGpu};
+use feature::Feature;
+use sides::Reference;
 use std::sync::Arc;
 
 /// A side's renderer.
@@ -18,21 +22,6 @@ struct Slot {
     key: Key,
     renderer: Renderer,
     sums: Option<Sums>,
-}
-
-/// The live reference as textures.
-struct Reference {
-    radiance: Target,
-    indirect: Target,
-    texel: u32,
-    found: Found,
-}
-
-/// An input channel of the network as a texture.
-struct Feature {
-    texture: Target,
-    range: [f32; 2],
-    name: String,
 }
 
 /// What decides how the picture looks; when it changes, averaging begins anew.
@@ -138,37 +127,6 @@ impl Stage {
         Ok(())
     }
 
-    /// Takes what the path tracer has found so far.
-    pub fn set_reference(&mut self, found: Found) {
-        let fits = |r: &Reference| r.found.size == found.size;
-        let known = self.reference.take().filter(fits);
-        let make = |name| picture(&self.gpu.device, name, found.size);
-        let (radiance, indirect) =
-            known.map_or_else(|| (make("viewer.reference"), make("viewer.reference_gi")), |r| (r.radiance, r.indirect));
-        self.fill(&radiance, &found.radiance);
-        let rgba: Vec<f32> = found.indirect.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 1.0]).collect();
-        self.fill(&indirect, &rgba);
-        self.reference = Some(Reference { radiance, indirect, texel: found.texel, found });
-    }
-
-    /// The path tracer begins anew.
-    pub fn forget_reference(&mut self) {
-        self.reference = None;
-    }
-
-    fn fill(&self, target: &Target, rgba: &[f32]) {
-        let (width, height) = (target.texture.width(), target.texture.height());
-        if rgba.len() as u64 != 4 * u64::from(width) * u64::from(height) {
-            return;
-        }
-        self.gpu.queue.write_texture(
-            target.texture.as_image_copy(),
-            bytemuck::cast_slice(rgba),
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(16 * width), rows_per_image: None },
-            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        );
-    }
-
     /// True while another frame would change the picture.
     pub fn is_converging(&self, state: &State) -> bool {
         self.scene.is_some() && self.slots[0].is_some() && self.still < state.settings.samples
@@ -235,34 +193,6 @@ impl Stage {
         Ok(drawn)
     }
 
-    /// What one side shows: radiance, added light, scale.
-    fn side(&self, state: &State, side: Side) -> SideView {
-        let s = &state.settings;
-        let source = if side == Side::Left { s.left } else { s.right };
-        if source == Source::Reference {
-            return match &self.reference {
-                Some(r) => SideView {
-                    radiance: r.radiance.view.clone(),
-                    indirect: r.indirect.view.clone(),
-                    scale: 1.0,
-                    texel: r.texel,
-                },
-                None => self.show.blank(),
-            };
-        }
-        let slot = match side {
-            Side::Right if s.right != s.left => self.slots[1].as_ref(),
-            _ => self.slots[0].as_ref(),
-        };
-        let Some(slot) = slot else { return self.show.blank() };
-        let t = slot.renderer.targets();
-        let (radiance, scale) = match &slot.sums {
-            Some(sums) => (sums.current().view.clone(), 1.0 / self.still.max(1) as f32),
-            None => (t.hdr.view.clone(), 1.0),
-        };
-        SideView { radiance, indirect: t.indirect.view.clone(), scale, texel: 1 }
-    }
-
     /// Draws what the window shows under the overlay.
     pub fn present(
         &mut self,
@@ -292,47 +222,6 @@ impl Stage {
         self.show.record(recorder, &self.gpu.queue, inputs.as_ref(), clear, target);
     }
 
-    /// Computes and uploads the network's input channel that is wanted, if it is not there already. Waits for the GPU.
-    ///
-    /// # Errors
-    /// What the pass says.
-    pub fn update_feature(&mut self, state: &State, camera: &Camera) -> Result<(), String> {
-        if state.settings.view != View::Feature {
-            self.feature = None;
-            return Ok(());
-        }
-        let (Some(slot), Some(scene)) = (&self.slots[0], &self.scene) else { return Ok(()) };
-        if self.still == 0 || slot.renderer.size() != state.size {
-            return Ok(());
-        }
-        let set = crate::gi::features::FeatureSet::screen();
-        let channel = state.settings.feature % set.channels();
-        let name = channel_name(channel);
-        if self.feature.as_ref().is_some_and(|f| f.name == name) {
-            return Ok(());
-        }
-        let view = Eye::new(camera, state.size, [0.0; 2]);
-        let inputs = slot.renderer.gi_inputs(&view, scene.environment.radiance);
-        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
-        let read = crate::gi::pack::read_features(device, queue, &set, &inputs, &slot.renderer.targets().indirect.view)
-            .map_err(|e| e.to_string())?;
-        let [w, h] = read.cells;
-        let plane = (w * h) as usize;
-        let values = &read.features[channel as usize * plane..][..plane];
-        let low = values.iter().copied().fold(f32::INFINITY, f32::min);
-        let high = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        let texture = picture(device, "viewer.feature", [w, h]);
-        self.fill(&texture, &values.iter().flat_map(|&v| [v, v, v, 1.0]).collect::<Vec<_>>());
-        self.show.forget();
-        self.feature = Some(Feature { texture, range: [low, high], name });
-        Ok(())
-    }
-
-    /// Name and range of the input channel on show.
-    pub fn feature(&self) -> Option<(&str, [f32; 2])> {
-        self.feature.as_ref().map(|f| (f.name.as_str(), f.range))
-    }
-
     /// Name and bytes of everything on the GPU that is the viewer's or its renderers'.
     pub fn bytes(&self) -> Vec<(String, u64)> {
         let mut rows = Vec::new();
@@ -356,67 +245,5 @@ impl Stage {
         let shown = (state.settings.exposure, state.settings.tonemap);
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         self.flicker.measure(device, queue, &slot.renderer.targets().hdr, shown, self.still > 1)
-    }
-
-    /// The last report of the path tracer.
-    pub fn reference(&self) -> Option<&Found> {
-        self.reference.as_ref().map(|r| &r.found)
-    }
-
-    /// Linear RGB of what a side shows, read back; `None` while it is not whole. Waits for the GPU.
-    ///
-    /// # Errors
-    /// Reading back failed.
-    pub fn read_side(&self, state: &State, side: Side) -> Result<Option<Vec<f32>>, readback::ReadbackError> {
-        let s = &state.settings;
-        let source = if side == Side::Left { s.left } else { s.right };
-        if source == Source::Reference {
-            let whole = self.reference.as_ref().filter(|r| r.texel == 1 && r.found.size == state.size);
-            return Ok(whole.map(|r| r.found.radiance.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()));
-        }
-        let slot = match side {
-            Side::Right if s.right != s.left => self.slots[1].as_ref(),
-            _ => self.slots[0].as_ref(),
-        };
-        let Some(slot) = slot.filter(|_| self.still >= s.samples) else { return Ok(None) };
-        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
-        Ok(Some(match &slot.sums {
-            Some(sums) => {
-                let bytes = readback::texture(device, queue, &sums.current().texture)?;
-                let scale = 1.0 / self.still.max(1) as f32;
-                let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
-                texels.iter().flat_map(|p| [p[0] * scale, p[1] * scale, p[2] * scale]).collect()
-            }
-            None => {
-                let bytes = readback::texture(device, queue, &slot.renderer.targets().hdr.texture)?;
-                let texels: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
-                texels.iter().flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
-            }
-        }))
-    }
-}
-
-/// Name of a channel of the network's inputs, such as `normal.1`.
-fn channel_name(channel: u32) -> String {
-    let mut first = 0;
-    for feature in crate::gi::features::FEATURES {
-        if channel < first + feature.channels {
-            let which = channel - first;
-            return if feature.channels == 1 { feature.name.into() } else { format!("{}.{which}", feature.name) };
-        }
-        first += feature.channels;
-    }
-    channel.to_string()
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn channels_have_the_names_of_the_table() {
-        let names: Vec<_> = (0..21).map(super::channel_name).collect();
-        assert_eq!(
-            (names[0].as_str(), names[5].as_str(), names[15].as_str(), names[20].as_str()),
-            ("direct.0", "outgoing.2", "depth", "sky.2")
-        );
     }
 }

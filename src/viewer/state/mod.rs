@@ -2,66 +2,20 @@
 //! tests and scripts can ask it everything. Hands act through [`State::apply`]; what has to be done outside is queued in
 //! [`State::requests`].
 
+mod action;
+mod edit;
+
 use super::choice::{Side, Source, View};
+use super::film::{self, Film, Recording};
 use super::navigate::{Navigator, Preset};
 use super::saved::Settings;
 use crate::render::tonemap_curve::Tonemap;
-use crate::scene::{
-    Environment, Scene,
-    edit::{LightEdit, ObjectEdit},
-};
-use glam::Vec3;
+use crate::scene::{Scene, path::CameraPath};
+pub use action::{Action, Request};
+pub use edit::{angles, from_angles};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::sync::Arc;
-
-/// What a key, a control or a script can ask for.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Action {
-    View(View),
-    Feature(i32),
-    Source(Side, Source),
-    NextMethod(isize),
-    Split,
-    MoveSplit(f32),
-    Exposure(f32),
-    Tonemap(Option<Tonemap>),
-    Samples(u32),
-    Help,
-    Panel,
-    Measure,
-    Fit,
-    Preset(Preset),
-    NextPreset,
-    Camera(usize),
-    NextCamera,
-    Fly,
-    Capture { exr: bool },
-    CopyCommand,
-    Open(String),
-    Weights(Option<PathBuf>),
-    Light(LightEdit),
-    Sky(f32),
-    TurnSun { dx: f32, dy: f32 },
-    Select(Option<usize>),
-    Move(Vec3),
-    Undo,
-    Escape,
-    Reload,
-    Quit,
-}
-
-/// What the world outside has to do.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Request {
-    Load(String),
-    Surroundings(PathBuf),
-    Weights(Option<PathBuf>),
-    Capture { exr: bool },
-    Copy(String),
-    Cancel,
-    Quit,
-}
+use std::time::Instant;
 
 /// What of the scene on the GPU is out of date.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -76,7 +30,7 @@ pub struct Stale {
 pub struct Message {
     pub text: String,
     pub error: bool,
-    pub at: std::time::Instant,
+    pub at: Instant,
 }
 
 /// The scene that is shown.
@@ -90,6 +44,10 @@ pub struct Shown {
     pub scene: Arc<Scene>,
     /// How objects were moved, metres.
     pub moved: BTreeMap<usize, [f32; 3]>,
+    /// Which variant of materials, if not the file's own.
+    pub variant: Option<usize>,
+    /// Animation and time, seconds, that place the objects, if they are not at rest.
+    pub pose: Option<(usize, f32)>,
     /// The surroundings as `--environment` names them, if they are not the file's.
     pub environment: Option<String>,
 }
@@ -114,6 +72,12 @@ pub struct State {
     pub preset: Option<Preset>,
     /// Networks store their numbers in 16 bits.
     pub half: bool,
+    /// The camera path that was recorded or dropped last.
+    pub path: Option<CameraPath>,
+    /// What is done with it.
+    pub film: Film,
+    /// Since when the animation plays that began at time 0.
+    pub animated: Option<Instant>,
 }
 
 impl State {
@@ -126,7 +90,7 @@ impl State {
     pub fn tell(&mut self, text: impl Into<String>, error: bool) {
         let text = text.into();
         self.messages.retain(|m| m.text != text);
-        self.messages.push(Message { text, error, at: std::time::Instant::now() });
+        self.messages.push(Message { text, error, at: Instant::now() });
         let surplus = self.messages.len().saturating_sub(5);
         self.messages.drain(..surplus);
     }
@@ -145,17 +109,17 @@ impl State {
         }
         self.selected = self.selected.filter(|&i| i < scene.instances.len());
         self.settings.remember(&spec);
-        self.shown = Some(Shown { spec, original: scene.clone(), scene, moved: BTreeMap::new(), environment: None });
+        self.animated = None;
+        self.shown = Some(Shown {
+            spec,
+            original: scene.clone(),
+            scene,
+            moved: BTreeMap::new(),
+            variant: None,
+            pose: None,
+            environment: None,
+        });
         self.stale = Stale::default();
-        self.version += 1;
-    }
-
-    /// Takes a picture of the surroundings from `path`.
-    pub fn surround(&mut self, path: &std::path::Path, environment: Environment) {
-        let Some(shown) = &mut self.shown else { return };
-        Arc::make_mut(&mut shown.scene).environment = environment;
-        shown.environment = Some(path.display().to_string());
-        self.stale.environment = true;
         self.version += 1;
     }
 
@@ -189,9 +153,15 @@ impl State {
             }
             A::Feature(by) => {
                 if self.settings.view == View::Feature {
-                    self.settings.feature = self.settings.feature.wrapping_add_signed(by);
+                    self.settings.feature = self.settings.feature.saturating_add_signed(by);
                 }
                 self.settings.view = View::Feature;
+            }
+            A::Layer(by) => {
+                if self.settings.view == View::Layer {
+                    self.settings.layer = self.settings.layer.saturating_add_signed(by);
+                }
+                self.settings.view = View::Layer;
             }
             A::Source(side, source) => match side {
                 Side::Left => self.settings.left = source,
@@ -239,15 +209,7 @@ impl State {
             A::Open(path) => self.open(&path),
             A::Weights(path) => self.requests.push(Request::Weights(path)),
             A::Light(edit) => self.edit_light(&edit),
-            A::Sky(radiance) => {
-                if let Some(shown) = &mut self.shown {
-                    let radiance = radiance.clamp(0.0, 1e4);
-                    Arc::make_mut(&mut shown.scene).environment = Environment::constant([radiance; 3]);
-                    shown.environment = Some(radiance.to_string());
-                    self.stale.environment = true;
-                    self.version += 1;
-                }
-            }
+            A::Sky(radiance) => self.set_sky(radiance),
             A::TurnSun { dx, dy } => self.turn_sun(dx, dy),
             A::Select(object) => self.selected = object,
             A::Move(by) => self.move_selected(by),
@@ -260,6 +222,16 @@ impl State {
                     self.requests.push(Request::Cancel);
                 }
             }
+            A::Record => self.record(),
+            A::Play => self.play(),
+            A::Variant(variant) => self.choose_variant(variant),
+            A::Pose(pose) => {
+                self.animated = None;
+                self.pose(pose);
+            }
+            A::Animate => self.animate(Instant::now()),
+            A::Theme => self.settings.dark = !self.settings.dark,
+            A::Flicker => self.settings.flicker = !self.settings.flicker,
             A::Reload => {
                 if let Some(shown) = &self.shown {
                     self.requests.push(Request::Load(shown.spec.clone()));
@@ -267,6 +239,48 @@ impl State {
             }
             A::Quit => self.requests.push(Request::Quit),
         }
+    }
+
+    fn record(&mut self) {
+        let now = Instant::now();
+        match std::mem::take(&mut self.film) {
+            Film::Records(recording) => {
+                self.path = Some(recording.finish(&self.navigator, now));
+                self.requests.push(Request::SavePath);
+            }
+            _ => {
+                self.film = Film::Records(Recording::new(&self.navigator, now));
+                self.tell("the camera is recorded until R is pressed again", false);
+            }
+        }
+    }
+
+    fn play(&mut self) {
+        match (&self.film, &self.path) {
+            (Film::Plays { .. }, _) => self.film = Film::Rests,
+            (_, Some(_)) => self.film = Film::Plays { since: Instant::now() },
+            (_, None) => self.tell("there is no camera path yet: record one (R) or drop its file", false),
+        }
+    }
+
+    /// Camera path and animation go on; true while they move something by themselves.
+    pub fn roll(&mut self, now: Instant) -> bool {
+        self.animation(now) | self.camera_path(now)
+    }
+
+    fn camera_path(&mut self, now: Instant) -> bool {
+        let rolls = match (&mut self.film, &self.path) {
+            (Film::Records(recording), _) => {
+                recording.look(&self.navigator, now);
+                return false;
+            }
+            (Film::Plays { since }, Some(path)) => film::play(path, *since, now, &mut self.navigator),
+            _ => return false,
+        };
+        if !rolls {
+            self.film = Film::Rests;
+        }
+        rolls
     }
 
     fn with_scene(&mut self, act: impl FnOnce(&mut Navigator, &Scene)) {
@@ -282,134 +296,23 @@ impl State {
             Request::Surroundings(path.into())
         } else if lower.ends_with(".safetensors") {
             Request::Weights(Some(path.into()))
+        } else if lower.ends_with(".json") {
+            Request::Path(path.into())
         } else {
             Request::Load(path.into())
         };
         self.requests.push(request);
     }
-
-    fn edit_light(&mut self, edit: &LightEdit) {
-        let Some(shown) = &mut self.shown else { return };
-        match edit.apply(Arc::make_mut(&mut shown.scene)) {
-            Ok(()) => {
-                self.stale.lights = true;
-                self.version += 1;
-            }
-            Err(e) => self.tell(e.to_string(), true),
-        }
-    }
-
-    /// Index of the first sun.
-    pub fn sun(&self) -> Option<usize> {
-        use crate::scene::LightKind::Directional;
-        self.shown.as_ref()?.scene.lights.iter().position(|l| matches!(l.kind, Directional { .. }))
-    }
-
-    /// Turns the first sun about the vertical and up or down, as a drag over the picture does.
-    fn turn_sun(&mut self, dx: f32, dy: f32) {
-        let Some((light, shown)) = self.sun().zip(self.shown.as_ref()) else {
-            self.tell("this scene has no sun to turn", false);
-            return;
-        };
-        if let crate::scene::LightKind::Directional { direction, .. } = shown.scene.lights[light].kind {
-            let [azimuth, height] = angles(direction);
-            let direction = from_angles([azimuth + 0.006 * dx, height - 0.006 * dy]);
-            self.edit_light(&LightEdit { light, direction: Some(direction), ..LightEdit::default() });
-        }
-    }
-
-    fn move_selected(&mut self, by: Vec3) {
-        let (Some(object), Some(shown)) = (self.selected, &mut self.shown) else { return };
-        let all = (Vec3::from(shown.moved.get(&object).copied().unwrap_or_default()) + by).to_array();
-        if !all.iter().all(|v| v.is_finite()) {
-            return;
-        }
-        let scene = Arc::make_mut(&mut shown.scene);
-        let Some(original) = shown.original.instances.get(object) else { return };
-        // Always from the file's place, so that the command line can repeat it bit for bit.
-        scene.instances[object].transform = original.transform;
-        if (ObjectEdit { object, by: all }).apply(scene).is_ok() {
-            shown.moved.insert(object, all);
-            self.stale.placements = true;
-            self.version += 1;
-        }
-    }
-
-    /// Lights, objects and surroundings as the file has them.
-    fn undo(&mut self) {
-        let Some(shown) = &mut self.shown else { return };
-        shown.scene = shown.original.clone();
-        shown.moved.clear();
-        shown.environment = None;
-        self.stale = Stale { lights: true, placements: true, environment: true };
-        self.version += 1;
-    }
-
-    /// What was changed in the lights.
-    pub fn light_edits(&self) -> Vec<LightEdit> {
-        let Some(shown) = &self.shown else { return Vec::new() };
-        let pairs = shown.original.lights.iter().zip(&shown.scene.lights).enumerate();
-        pairs.filter_map(|(i, (from, to))| LightEdit::between(i, from, to)).collect()
-    }
-}
-
-/// Azimuth and height of the place that light along `direction` comes from, radians.
-pub fn angles(direction: [f32; 3]) -> [f32; 2] {
-    let from = -Vec3::from(direction).normalize_or(Vec3::NEG_Y);
-    [from.x.atan2(from.z), from.y.clamp(-1.0, 1.0).asin()]
-}
-
-/// The direction of light from a place; height within a quarter turn.
-pub fn from_angles([azimuth, height]: [f32; 2]) -> [f32; 3] {
-    let height = height.clamp(-1.57, 1.57);
-    let from = Vec3::new(azimuth.sin() * height.cos(), height.sin(), azimuth.cos() * height.cos());
-    (-from).to_array()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn state() -> State {
+    pub fn state() -> State {
         let mut state = State::new(Settings::default());
         state.show("interior".into(), Arc::new(crate::scene::paper_room::scene(3)));
         state
-    }
-
-    #[test]
-    fn objects_move_from_where_the_file_has_them() {
-        let mut state = state();
-        state.apply(Action::Move(Vec3::X));
-        assert_eq!(state.version, 1, "nothing is selected, so nothing moves");
-        state.apply(Action::Select(Some(3)));
-        for _ in 0..10 {
-            state.apply(Action::Move(Vec3::new(0.1, 0.0, 0.0)));
-        }
-        let shown = state.shown.as_ref().unwrap();
-        let mut again = (*shown.original).clone();
-        ObjectEdit { object: 3, by: shown.moved[&3] }.apply(&mut again).unwrap();
-        assert_eq!(again.instances[3].transform, shown.scene.instances[3].transform, "bit for bit");
-        assert!(state.stale.placements && !state.stale.lights);
-        state.apply(Action::Undo);
-        let shown = state.shown.as_ref().unwrap();
-        assert_eq!(shown.scene.instances[3].transform, shown.original.instances[3].transform);
-    }
-
-    #[test]
-    fn the_sun_turns_and_comes_back() {
-        let mut state = state();
-        let before = state.shown.as_ref().unwrap().scene.lights.clone();
-        let sun = state.sun().unwrap();
-        state.apply(Action::TurnSun { dx: 50.0, dy: 0.0 });
-        assert_eq!(state.light_edits().len(), 1);
-        assert_eq!(state.light_edits()[0].light, sun);
-        assert!(state.stale.lights);
-        state.apply(Action::Undo);
-        assert_eq!(state.light_edits(), []);
-        assert_eq!(state.shown.as_ref().unwrap().scene.lights[sun].kind, before[sun].kind);
-        let back = from_angles(angles([0.3, -0.8, 0.1]));
-        let length = Vec3::new(0.3, -0.8, 0.1).normalize();
-        assert!(Vec3::from(back).distance(length) < 1e-5);
     }
 
     #[test]

@@ -1,0 +1,102 @@
+//! Where a picture's indirect light comes from, by name: the one list that command line, window and studies share.
+
+use super::Method;
+use serde::{Deserialize, Serialize};
+
+/// A method, or the truth that methods are measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MethodName {
+    /// Analytic lights only.
+    Direct,
+    /// Sky and mean light from all around, times ambient occlusion.
+    Ambient,
+    /// One bounce in screen space.
+    Ssgi,
+    /// One bounce of the lights from reflective shadow maps.
+    Rsm,
+    /// All bounces and the sky from what lights and a cube around the camera see.
+    Cache,
+    /// Surfels that a bake has linked; holds for static geometry.
+    Probes,
+    /// The network.
+    Neural,
+    /// The path tracer, which converges to the truth.
+    Reference,
+}
+
+use MethodName as M;
+
+impl MethodName {
+    /// All of them, cheapest first, the truth last.
+    pub const ALL: [MethodName; 8] =
+        [M::Direct, M::Ambient, M::Ssgi, M::Rsm, M::Cache, M::Probes, M::Neural, M::Reference];
+
+    /// All real-time methods, cheapest first.
+    pub const REAL_TIME: [MethodName; 7] = [M::Direct, M::Ambient, M::Ssgi, M::Rsm, M::Cache, M::Probes, M::Neural];
+
+    /// Name on the command line, in records and in the window.
+    pub fn name(self) -> &'static str {
+        ["direct", "ambient", "ssgi", "rsm", "cache", "probes", "neural", "reference"][self as usize]
+    }
+
+    /// What lists say beside the name.
+    pub fn doc(self) -> &'static str {
+        [
+            "Analytic lights only",
+            "Sky and mean light from all around, times ambient occlusion",
+            "One bounce in screen space",
+            "One bounce of the lights from reflective shadow maps",
+            "All bounces and the sky from what lights and a cube around the camera see",
+            "Surfels that a bake has linked; holds for static geometry",
+            "The network",
+            "The path tracer, which converges to the truth",
+        ][self as usize]
+    }
+
+    /// The method, where its name says all that it needs: not `probes` (a bake), `neural` (weights) and `reference`.
+    pub fn plain(self) -> Option<Method> {
+        Some(match self {
+            M::Direct => Method::Direct,
+            M::Ambient => Method::Ambient,
+            M::Ssgi => Method::Ssgi,
+            M::Rsm => Method::Rsm,
+            M::Cache => Method::Cache,
+            M::Probes | M::Neural | M::Reference => return None,
+        })
+    }
+
+    /// The one called `name`.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|m| m.name() == name)
+    }
+}
+
+#[cfg(feature = "cli")]
+impl clap::ValueEnum for MethodName {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<clap::builder::PossibleValue> {
+        Some(clap::builder::PossibleValue::new(self.name()).help(self.doc()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_those_of_the_methods() {
+        for (i, method) in MethodName::ALL.into_iter().enumerate() {
+            assert_eq!(method as usize, i);
+            assert_eq!(MethodName::from_name(method.name()), Some(method));
+            assert_eq!(serde_json::to_value(method).unwrap(), method.name());
+        }
+        let plain: Vec<_> = MethodName::ALL.into_iter().filter_map(|m| Some((m.name(), m.plain()?.name()))).collect();
+        assert!(plain.len() == 5 && plain.iter().all(|(ours, theirs)| ours == theirs), "{plain:?}");
+        assert_eq!(MethodName::from_name("magic"), None);
+        assert_eq!(MethodName::REAL_TIME[..], MethodName::ALL[..7]);
+    }
+}

@@ -1,0 +1,79 @@
+//! What is built is brought in line with what is chosen.
+
+use super::App;
+use crate::viewer::choice::Source;
+use crate::viewer::jobs::{self, Key, Kind, Plan};
+use std::time::Instant;
+
+impl App {
+    /// What decides how a source is built.
+    pub(super) fn key(&self, source: Source) -> Key {
+        let [weights, scene, shaders] = self.stamps;
+        let own = match source {
+            Source::Neural => weights,
+            Source::Probes => scene,
+            _ => 0,
+        };
+        (source, shaders << 32 | own)
+    }
+
+    /// Brings what is built in line with what is chosen, and the path tracer with what is seen.
+    pub fn reconcile(&mut self) {
+        self.reconcile_renderers();
+        self.reconcile_reference();
+        if self.tracing.judge_at.is_some_and(|at| at <= Instant::now()) {
+            self.tracing.judge_at = None;
+            self.judge();
+        }
+    }
+
+    pub(super) fn reconcile_renderers(&mut self) {
+        let (Some(stage), Some(shown)) = (&mut self.stage, &self.state.shown) else { return };
+        let s = &self.state.settings;
+        let left = match s.left {
+            // Somebody has to draw the G-buffer.
+            Source::Reference => stage.key(0).map_or(Source::Direct, |k| k.0),
+            source => source,
+        };
+        let two = self.state.sources().len() == 2 && s.right != s.left && s.right != Source::Reference;
+        if !two {
+            stage.drop_right();
+            self.building[1] = None;
+        }
+        let scene = shown.scene.clone();
+        let wanted = [Some(left), two.then_some(s.right)];
+        for (side, source) in wanted.into_iter().enumerate() {
+            let Some(key) = source.map(|s| self.key(s)) else { continue };
+            let Some(stage) = &self.stage else { return };
+            if stage.key(side) == Some(key) {
+                self.building[side] = None;
+                continue;
+            }
+            if self.building[side] == Some(key) || self.failed.contains(&key) {
+                continue;
+            }
+            self.building[side] = Some(key);
+            let plan = Plan {
+                side,
+                key,
+                size: self.state.size,
+                weights: self.state.settings.weights.clone(),
+                network: self.network.clone(),
+                scene: scene.clone(),
+                eye: self.state.navigator.camera(&scene).eye(),
+            };
+            let handles = stage.handles();
+            let name = format!("build {}", key.0.name());
+            self.spawn(name, Kind::Renderer(side), move |p| jobs::renderer(&handles, plan, p));
+        }
+    }
+
+    /// A source that cannot be had: the side keeps what it has.
+    pub(super) fn give_up(&mut self, side: usize, key: Key) {
+        let kept = self.stage.as_ref().and_then(|s| s.key(side)).map_or(Source::Direct, |k| k.0);
+        let place = if side == 0 { &mut self.state.settings.left } else { &mut self.state.settings.right };
+        if *place == key.0 && kept != key.0 {
+            *place = kept;
+        }
+    }
+}

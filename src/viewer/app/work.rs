@@ -1,0 +1,184 @@
+//! Work on threads: begun when the state or a file asks for it, taken in when it is done.
+
+use super::{App, Event};
+use crate::image_io;
+use crate::scene::path::CameraPath;
+use crate::viewer::choice::Source;
+use crate::viewer::jobs::{self, Done, Kind, Product, Shot};
+use crate::viewer::state::{Request, Stale};
+use crate::viewer::stats::Track;
+use crate::viewer::watch::Changed;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+impl App {
+    /// Begins a piece of work that the state asked for.
+    pub fn start(&mut self, request: Request) {
+        let Some(stage) = &self.stage else { return };
+        let (handles, gpu) = (stage.handles(), stage.gpu.clone());
+        match request {
+            Request::Load(spec) => {
+                let name = format!("load {spec}");
+                self.spawn(name, Kind::Scene, move |p| jobs::scene(&handles, spec, p));
+            }
+            Request::Surroundings(path) => {
+                let name = format!("load {}", path.display());
+                self.spawn(name, Kind::Surroundings, move |_| {
+                    let environment = crate::scene::Environment::load(&path).map_err(|e| e.to_string())?;
+                    Ok(Product::Surroundings { path, environment })
+                });
+            }
+            Request::Weights(path) => self.spawn("read weights".into(), Kind::Weights, move |_| {
+                crate::net::format::Weights::find(path.as_deref()).map_err(|e| e.to_string())?;
+                Ok(Product::Weights(path))
+            }),
+            Request::Capture { exr } => {
+                let output = self.free_name("bouncelight", if exr { "exr" } else { "png" });
+                let info = &gpu.info;
+                let driver = format!("{} {}", info.driver, info.driver_info);
+                let facts = [
+                    ("Adapter", info.name.clone()),
+                    ("Backend", format!("{:?}", info.backend).to_lowercase()),
+                    ("Driver", driver),
+                ];
+                let facts = facts.map(|(k, v)| (k.to_string(), v)).into();
+                let Some(shot) = Shot::new(&self.state, self.network.clone(), output, facts) else { return };
+                let name = format!("capture {}", shot.output.display());
+                self.spawn(name, Kind::Capture, move |p| jobs::capture(&gpu, &shot, p));
+            }
+            Request::Cancel => {
+                for job in std::mem::take(&mut self.jobs) {
+                    job.progress.cancel();
+                    self.state.tell(format!("cancelled: {}", job.name), false);
+                    if let Kind::Renderer(side) = job.kind
+                        && let Some(key) = self.building[side].take()
+                    {
+                        self.failed.insert(key);
+                        self.give_up(side, key);
+                    }
+                }
+            }
+            Request::Upload => {
+                let Some(scene) = self.state.shown.as_ref().map(|s| s.scene.clone()) else { return };
+                self.spawn("upload the scene again".into(), Kind::Scene, move |_| {
+                    let gpu = crate::scene::upload::SceneGpu::new(&handles.device, &handles.queue, &scene);
+                    Ok(Product::Uploaded(Box::new(gpu.map_err(|e| e.to_string())?)))
+                });
+            }
+            Request::Path(path) => match CameraPath::load(&path) {
+                Ok(found) => {
+                    let text = format!("{}: {:.1} seconds; Y plays it", path.display(), found.end());
+                    self.state.path = Some(found);
+                    self.state.tell(text, false);
+                }
+                Err(e) => self.state.tell(e.to_string(), true),
+            },
+            Request::SavePath => {
+                let Some(path) = &self.state.path else { return };
+                let file = self.free_name("camera", "json");
+                let told = match image_io::write_whole(&file, path.to_json().as_bytes()) {
+                    Ok(()) => (format!("written: {}; Y plays it", file.display()), false),
+                    Err(e) => (e.to_string(), true),
+                };
+                self.state.tell(told.0, told.1);
+            }
+            Request::Copy(_) | Request::Quit => {}
+        }
+    }
+
+    pub(super) fn spawn(
+        &mut self,
+        name: String,
+        kind: Kind,
+        work: impl FnOnce(&jobs::Progress) -> Result<Product, String> + Send + 'static,
+    ) {
+        // A newer wish of the same kind replaces the older one.
+        self.jobs.iter().filter(|j| j.kind == kind).for_each(|j| j.progress.cancel());
+        self.jobs.retain(|j| j.kind != kind);
+        let proxy = self.proxy.clone();
+        let send = move |done| {
+            let _ = proxy.send_event(Event::Job(done));
+        };
+        self.jobs.push(jobs::spawn(name, kind, send, work));
+        self.redraw = true;
+    }
+
+    /// The first free `bouncelight-0001.png`.
+    pub(super) fn free_name(&self, stem: &str, extension: &str) -> PathBuf {
+        let folder = self.options.captures.clone().unwrap_or_default();
+        let name = |i: u32| folder.join(format!("{stem}-{i:04}.{extension}"));
+        (1..10_000).map(name).find(|p| !p.exists()).unwrap_or_else(|| name(0))
+    }
+
+    pub(super) fn hear_job(&mut self, done: Done) {
+        let Some(at) = self.jobs.iter().position(|j| j.kind == done.kind && !done.progress.stopped()) else { return };
+        let job = self.jobs.remove(at);
+        self.redraw = true;
+        let Some(stage) = &mut self.stage else { return };
+        match done.product {
+            Ok(Product::Scene { spec, scene, gpu }) => {
+                stage.set_scene(*gpu);
+                self.stamps[1] += 1;
+                self.tracing.forget();
+                if let Some(screen) = &self.screen {
+                    screen.window.set_title(&format!("{spec} – bouncelight"));
+                }
+                self.state.show(spec, Arc::from(scene));
+            }
+            Ok(Product::Uploaded(gpu)) => {
+                stage.set_scene(*gpu);
+                // A bake has the materials it was made with; and hands may have changed something meanwhile.
+                self.stamps[1] += 1;
+                self.state.stale = Stale { lights: true, placements: true, environment: true };
+            }
+            Ok(Product::Surroundings { path, environment }) => self.state.surround(&path, environment),
+            Ok(Product::Weights(path)) => {
+                self.state.settings.weights = path;
+                self.stamps[0] += 1;
+                if self.state.settings.left != Source::Neural && self.state.settings.right != Source::Neural {
+                    self.state.settings.left = Source::Neural;
+                }
+            }
+            Ok(Product::Renderer { side, key, renderer }) => {
+                if self.building[side] == Some(key) {
+                    self.building[side] = None;
+                    self.built += 1;
+                    stage.set_renderer(side, key, *renderer);
+                    self.meter.settling = 2;
+                    self.meter.times.gpu = Track::default();
+                    self.meter.times.wall = Track::default();
+                    self.meter.times.passes.clear();
+                }
+            }
+            Ok(Product::Captured(path)) => {
+                self.captured = Some(path.display().to_string());
+                self.state.tell(format!("written: {}", path.display()), false);
+            }
+            Err(text) => {
+                self.state.tell(format!("{}: {text}", job.name), true);
+                if let Kind::Renderer(side) = job.kind
+                    && let Some(key) = self.building[side].take()
+                {
+                    self.failed.insert(key);
+                    self.give_up(side, key);
+                }
+            }
+        }
+    }
+
+    pub(super) fn look_at_files(&mut self) {
+        let shaders = crate::gpu::shaders::folder();
+        let spec = self.state.shown.as_ref().map(|s| s.spec.clone());
+        let weights = self.state.settings.weights.clone();
+        for changed in self.watch.look(spec.as_deref(), weights.as_deref(), shaders.as_deref()) {
+            match changed {
+                Changed::Scene => self.start(Request::Load(spec.clone().unwrap_or_default())),
+                Changed::Weights => self.start(Request::Weights(weights.clone())),
+                Changed::Shaders => {
+                    self.stamps[2] += 1;
+                    self.redraw = true;
+                }
+            }
+        }
+    }
+}
