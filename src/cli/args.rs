@@ -113,7 +113,7 @@ impl Global {
 }
 
 impl MethodName {
-    /// The real-time method with its weights: `weights`, or the shipped ones. [`tuned`](super::tuned::tuned) adds what a device is needed for.
+    /// The real-time method with its weights: `weights`, or the shipped ones. `tuned` adds what a device is needed for.
     pub fn method(self, global: &Global, weights: Option<&PathBuf>) -> Result<Method> {
         match (self.plain(), self) {
             (Some(method), _) => Ok(method),

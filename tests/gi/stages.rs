@@ -242,7 +242,7 @@ fn reconstruct_is_its_twin() {
             &shot,
             (0..w * h).map(|_| [number(3.0, -2.0), number(1.0, 0.0), number(-1.0, 0.0)]).collect(),
         );
-        let six = |_| std::array::from_fn::<f32, 6, _>(|c| if c < 3 { number(2.0, -1.0) } else { number(0.6, 0.0) });
+        let six = |_| std::array::from_fn::<f32, 6, _>(|c| if c < 3 { number(0.5, -0.3) } else { number(0.16, -0.12) });
         same_as_twin(&gpu, &shot, (0..w * h).map(six).collect());
     }
 }
