@@ -1,6 +1,7 @@
 //! `rsm` and `cache`: light from beyond the screen against arithmetic and against the laws it promises.
 
 use crate::common;
+use bouncelight::gi::reconstruct::MOST_GAIN;
 use bouncelight::gi::{GiError, Method};
 use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::render::capture::{CaptureOptions, Layer, Picture, capture};
@@ -399,11 +400,13 @@ fn an_untrained_network_is_cache() {
     };
     assert!(ulps(&corrected(&gpu, [0.0; 6], 1.0)) <= Some(1));
     assert!(ulps(&corrected(&gpu, [0.01; 6], 1.0)) > Some(1), "sees one percent");
-    // A gain of 2 in red is twice the red and nothing else.
-    let ln2 = std::f32::consts::LN_2;
-    let red = corrected(&gpu, [ln2, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0);
-    let expected: Vec<f32> = cache.iter().enumerate().map(|(i, c)| if i % 3 == 0 { 2.0 * c } else { *c }).collect();
-    assert!(difference(&red, &expected) < 1e-3 && difference(&red, &cache) > 0.1);
+    // A gain of ln 1.25 in red is a quarter more red and nothing else; of 9 it is what the limit says.
+    for (gain, factor) in [(1.25f32.ln(), 1.25), (9.0, MOST_GAIN.exp())] {
+        let red = corrected(&gpu, [gain, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0);
+        let times = |i: usize| if i % 3 == 0 { factor } else { 1.0 };
+        let expected: Vec<f32> = cache.iter().enumerate().map(|(i, c)| times(i) * c).collect();
+        assert!(difference(&red, &expected) < 1e-3 && difference(&red, &cache) > 0.03, "{gain}");
+    }
 }
 
 #[test]
