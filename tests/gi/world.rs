@@ -403,7 +403,7 @@ fn an_untrained_network_is_cache() {
     // A gain of ln 1.25 in red is a quarter more red and nothing else; of 9 it is what the limit says.
     for (gain, factor) in [(1.25f32.ln(), 1.25), (9.0, MOST_GAIN.exp())] {
         let red = corrected(&gpu, [gain, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0);
-        let times = |i: usize| if i % 3 == 0 { factor } else { 1.0 };
+        let times = |i: usize| if i.is_multiple_of(3) { factor } else { 1.0 };
         let expected: Vec<f32> = cache.iter().enumerate().map(|(i, c)| times(i) * c).collect();
         assert!(difference(&red, &expected) < 1e-3 && difference(&red, &cache) > 0.03, "{gain}");
     }
