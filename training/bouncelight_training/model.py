@@ -3,7 +3,7 @@
 The topology stands in one place, `bouncelight_weights.unet`, as the list of operators that is also exported; here it gets
 its starting weights and its meaning: a gain g and a rest r on what method `cache` answers,
 
-    E/pi = max(0, cache * exp(clamp(g, -0.3, 0.3)) + s * clamp(r, -0.1, 0.1))
+    E/pi = max(0, cache * exp(clamp(g, -2, 2)) + s * clamp(r, -1, 1))
 """
 import torch
 from torch import nn
