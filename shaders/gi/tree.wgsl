@@ -44,36 +44,30 @@ fn far(e: Emitter, v: vec3f, area: f32) -> bool {
     return e.area == 0.0 || dot(v, v) > NEAR_WIDTHS * NEAR_WIDTHS * area;
 }
 
-// Block number `block`, whole or opened.
-fn add_block(sum: ptr<function, Sum>, block: u32, here: Place) {
-    let low = blocks[2u * block];
-    let high = blocks[2u * block + 1u];
+// The two emitters of a group as they are. False, and nothing added, where one is so near that the group is to be opened.
+fn add_whole(sum: ptr<function, Sum>, low: Emitter, high: Emitter, here: Place) -> bool {
     let area = low.area + high.area;
-    if area == 0.0 { return; }
+    if area == 0.0 { return true; }
     let v_low = low.position - here.p;
     let v_high = high.position - here.p;
-    if far(low, v_low, area) && far(high, v_high, area) {
-        add_emitter(sum, low, v_low, here);
-        add_emitter(sum, high, v_high, here);
-    } else {
-        for (var k = 32u * block; k < 32u * block + 32u; k++) {
-            if fine[k].area > 0.0 { add_emitter(sum, fine[k], fine[k].position - here.p, here); }
-        }
+    if !far(low, v_low, area) || !far(high, v_high, area) { return false; }
+    add_emitter(sum, low, v_low, here);
+    add_emitter(sum, high, v_high, here);
+    return true;
+}
+
+// Block number `block`, whole or opened.
+fn add_block(sum: ptr<function, Sum>, block: u32, here: Place) {
+    if add_whole(sum, blocks[2u * block], blocks[2u * block + 1u], here) { return; }
+    for (var k = 32u * block; k < 32u * block + 32u; k++) {
+        if fine[k].area > 0.0 { add_emitter(sum, fine[k], fine[k].position - here.p, here); }
     }
 }
 
 // Square number `square` of four blocks, whole (its pair of coarse emitters) or opened.
 fn add_square(sum: ptr<function, Sum>, square: u32, low: Emitter, high: Emitter, here: Place) {
-    let area = low.area + high.area;
-    if area == 0.0 { return; }
-    let v_low = low.position - here.p;
-    let v_high = high.position - here.p;
-    if far(low, v_low, area) && far(high, v_high, area) {
-        add_emitter(sum, low, v_low, here);
-        add_emitter(sum, high, v_high, here);
-    } else {
-        for (var block = 4u * square; block < 4u * square + 4u; block++) {
-            add_block(sum, block, here);
-        }
+    if add_whole(sum, low, high, here) { return; }
+    for (var block = 4u * square; block < 4u * square + 4u; block++) {
+        add_block(sum, block, here);
     }
 }
