@@ -106,13 +106,17 @@ fn reconstruct(@builtin(global_invocation_id) id: vec3u) {
     let pixel = vec2i(id.xy);
     let z = distance_at(pixel);
     var result = vec3f(0.0);
+    // How much of it arrives along the mirrored view direction is the guess's to say.
+    var tilt = 1.0;
     if z > 0.0 {
         let here = Surface(position_at(pixel, z), normal_at(pixel), z);
         var base = vec3f(exposure.s);
         if GAIN {
-            base = max(finite3(textureLoad(guess_map, pixel, 0).rgb), vec3f(0.0));
+            let guess = textureLoad(guess_map, pixel, 0);
+            base = max(finite3(guess.rgb), vec3f(0.0));
+            tilt = finite(guess.a);
         }
         result = clamp(light_of(pixel, here, base), vec3f(0.0), vec3f(LARGEST));
     }
-    textureStore(output, pixel, vec4f(result, 1.0));
+    textureStore(output, pixel, vec4f(result, tilt));
 }

@@ -52,6 +52,7 @@ fn direct(@builtin(global_invocation_id) id: vec3u) {
             diffuse += e / PI;
             specular += e * ggx(n, v, s.l, surface.rgb, surface.a);
         }
+        if any(specular > vec3f(0.0)) { specular *= lobe_gain(surface.rgb, surface.a, dot(n, v)); }
     }
     textureStore(direct_diffuse, id.xy, vec4f(min(diffuse, vec3f(HALF_MAX)), 1.0));
     textureStore(direct_specular, id.xy, vec4f(min(specular, vec3f(HALF_MAX)), 1.0));

@@ -7,7 +7,7 @@ use super::bitmask::{March, bind};
 use super::exposure::{self, ExposurePass, output_entry, storage_entry};
 use super::inputs::{InputGroup, check, texture_entry};
 use super::occlusion::OcclusionPass;
-use super::rung::Cost;
+use super::rung::{Cost, Rung};
 use super::view_cache::ViewCache;
 use super::{GiError, Inputs};
 use crate::gpu::shaders;
@@ -33,7 +33,7 @@ pub fn unseen_prelude(sky: f32, bounce: f32) -> String {
     format!("const SKY = f32({sky:?});\nconst BOUNCE = f32({bounce:?});\n")
 }
 
-/// The method: exposure, occlusion and one write a pixel.
+/// The method: exposure, occlusion and one write a pixel (`gi.exposure`, `gi.occlusion`, `gi.occlusion_full`, `gi.ambient`).
 pub struct AmbientGi {
     device: wgpu::Device,
     inputs: InputGroup,
@@ -69,12 +69,24 @@ impl AmbientGi {
         }
     }
 
-    /// Records `gi.exposure`, `gi.occlusion`, `gi.occlusion_full` and `gi.ambient`: `output` (`Rgba16Float`, storage, full size) becomes E/π; 0 on the
-    /// background.
-    ///
-    /// # Errors
-    /// [`GiError`] when inputs or output do not fit; nothing is recorded then.
-    pub fn record(
+    /// The exposure of the last recording, see [`exposure::read`].
+    pub fn exposure_buffer(&self) -> &wgpu::Buffer {
+        self.exposure.buffer()
+    }
+
+    /// The visibility of the last recording, see [`OcclusionPass::visibility`].
+    pub fn visibility(&self) -> &wgpu::TextureView {
+        self.occlusion.visibility()
+    }
+
+    /// Bind groups made since the start; stands still in steady frames.
+    pub fn allocations(&self) -> u64 {
+        self.inputs.made() + self.outputs.made() + self.occlusion.made()
+    }
+}
+
+impl Rung for AmbientGi {
+    fn record(
         &mut self,
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,
@@ -112,42 +124,23 @@ impl AmbientGi {
         Ok(())
     }
 
-    /// The exposure of the last recording, see [`exposure::read`].
-    pub fn exposure_buffer(&self) -> &wgpu::Buffer {
-        self.exposure.buffer()
-    }
-
-    /// The visibility of the last recording, see [`OcclusionPass::visibility`].
-    pub fn visibility(&self) -> &wgpu::TextureView {
-        self.occlusion.visibility()
-    }
-
-    /// Moves the pattern of the occlusion, see [`OcclusionPass::set_frame`].
-    pub fn set_frame(&self, queue: &wgpu::Queue, frame: u32) {
+    fn set_frame(&mut self, queue: &wgpu::Queue, frame: u32) {
         self.occlusion.set_frame(queue, frame);
     }
 
-    /// What the passes cost for a picture of `size` pixels.
-    pub fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
+    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let [gather, full] = self.occlusion.costs(size);
         vec![exposure::cost(size), gather, full, Cost::new("gi.ambient", pixels * 8.0, pixels * 16.0)]
     }
 
-    /// Lets go of the texture views it remembers; call it when targets are rebuilt.
-    pub fn forget(&mut self) {
+    fn forget(&mut self) {
         self.inputs.forget();
         self.outputs.clear();
     }
 
-    /// GPU memory, bytes.
-    pub fn bytes(&self) -> u64 {
+    fn bytes(&self) -> u64 {
         self.inputs.bytes() + self.exposure.bytes() + self.occlusion.bytes()
-    }
-
-    /// Bind groups made since the start; stands still in steady frames.
-    pub fn allocations(&self) -> u64 {
-        self.inputs.made() + self.outputs.made() + self.occlusion.made()
     }
 }
 

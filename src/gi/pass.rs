@@ -286,6 +286,43 @@ impl NeuralGi {
     }
 }
 
+// What a frame of our own sees; hosts that embed the pass use its own methods and need not know the trait.
+impl Rung for NeuralGi {
+    fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        _queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError> {
+        self.record_stages(recorder, inputs, output)
+    }
+
+    fn surroundings(&self) -> Option<&wgpu::TextureView> {
+        self.surroundings()
+    }
+
+    fn neural(&self) -> Option<&NeuralGi> {
+        Some(self)
+    }
+
+    fn neural_mut(&mut self) -> Option<&mut NeuralGi> {
+        Some(self)
+    }
+
+    fn forget(&mut self) {
+        self.forget();
+    }
+
+    fn bytes(&self) -> u64 {
+        self.bytes()
+    }
+
+    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
+        self.costs(size)
+    }
+}
+
 impl Rebuilt {
     fn new(
         device: &wgpu::Device,

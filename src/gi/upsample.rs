@@ -5,6 +5,10 @@
 //! distance from the pixel's plane relative to the pixel's depth, and agreement of normals (the tolerances are
 //! [`reconstruct`](super::reconstruct)'s). Where those four mostly disagree the 4×4 cells around are blended in. Background pixels get 0. A
 //! workgroup reads each cell around its 8×8 pixels once, into its shared memory.
+//!
+//! Alpha says how many times as bright as from all of its side the light is that a pixel's surface mirrors to the eye, as far as the cells'
+//! vectors tell: radiance a + g·ω has the vector a n + ⅔ g over the hemisphere of n (per π), so the part of the vector in the
+//! surface's plane gives g. It is what `gi.glossy` shows where a ray finds nothing.
 
 use super::cells::{CellSide, CellsPass};
 use super::exposure::{output_entry, pipeline, storage_entry};
@@ -62,7 +66,8 @@ impl UpsamplePass {
     }
 
     /// Records pass `gi.upsample`. `light` is laid out as [`cells`](super::cells) says; it and the cells' buffer must be
-    /// the same until [`forget`](Self::forget). `output` (`Rgba16Float`, storage, full size) becomes E/π.
+    /// the same until [`forget`](Self::forget). `output` (`Rgba16Float`, storage, full size) becomes E/π, and in
+    /// alpha how many times as bright the mirrored direction is.
     ///
     /// # Errors
     /// [`GiError::Texture`] when `output` does not fit.
@@ -107,14 +112,14 @@ impl UpsamplePass {
         self.outputs.made()
     }
 
-    /// What the pass costs for a picture of `size` pixels. A pixel: 4 cells of 67 operations, its own place and normal
-    /// 60, the mean 14, visibility 4 × 20 and 20; a workgroup stages 25 or 36 cells of 60 operations and 64 bytes and 36 texels of 45 operations, most of which the chip's cache
+    /// What the pass costs for a picture of `size` pixels. A pixel: 4 cells of 74 operations, its own place, normal and
+    /// mirrored direction 80, the means 30, visibility 4 × 20 and 20; a workgroup stages 25 or 36 cells of 75 operations and 64 bytes and 36 texels of 45 operations, most of which the chip's cache
     /// has, so that each cell comes from memory once. Pixels at edges that ask 16 cells (about 3 % of a picture) are
     /// counted with 1,000 more.
     pub fn cost(side: CellSide, size: [u32; 2]) -> Cost {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
-        let staged = f64::from(8 / side.pixels() + 4).powi(2) * 60.0 / 64.0;
-        let flops = pixels * (4.0 * 67.0 + 74.0 + 100.0 + staged + 36.0 * 45.0 / 64.0 + 30.0);
+        let staged = f64::from(8 / side.pixels() + 4).powi(2) * 75.0 / 64.0;
+        let flops = pixels * (4.0 * 74.0 + 110.0 + 100.0 + staged + 36.0 * 45.0 / 64.0 + 30.0);
         Cost::new("gi.upsample", flops, pixels * 17.0 + side.count(size) as f64 * 60.0)
     }
 }

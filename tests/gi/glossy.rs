@@ -88,6 +88,74 @@ fn even_light_gives_exactly_the_split_sum() {
     }
 }
 
+/// What a GGX metal of reflectance `f0` shows of even light at the cosine `c`, the light that single scattering loses given back
+/// (Kulla and Conty 2017) or not: numerical integrals over visible normals (Dupuy and Benyoub 2023), height-correlated Smith.
+fn metal(f0: f64, roughness: f64, c: f64, again: bool) -> f64 {
+    let single = |c: f64| {
+        let (alpha, steps) = (roughness * roughness, 48);
+        let a2 = alpha * alpha;
+        let s = (1.0 - c * c).sqrt();
+        let w = glam::DVec3::new(s * alpha, 0.0, c).normalize();
+        let (mut kept, mut rim) = (0.0, 0.0);
+        for i in 0..steps * steps {
+            let (u, v) =
+                ((f64::from(i % steps) + 0.5) / f64::from(steps), (f64::from(i / steps) + 0.5) / f64::from(steps));
+            let z = (1.0 - v) * (1.0 + w.z) - w.z;
+            let r = (1.0 - z * z).max(0.0).sqrt();
+            let phi = std::f64::consts::TAU * u;
+            let cap = glam::DVec3::new(r * phi.cos(), r * phi.sin(), z) + w;
+            let h = glam::DVec3::new(cap.x * alpha, cap.y * alpha, cap.z).normalize();
+            let v_h = s * h.x + c * h.z;
+            let l = 2.0 * v_h * h.z - c;
+            if l <= 0.0 {
+                continue;
+            }
+            let g = |x: f64| (x * x * (1.0 - a2) + a2).sqrt();
+            let part = l * (c + g(c)) / (l * g(c) + c * g(l)) / f64::from(steps * steps);
+            kept += part;
+            rim += part * (1.0 - v_h).max(0.0).powi(5);
+        }
+        (kept, rim)
+    };
+    let (kept, rim) = single(c);
+    let once = f0 * (kept - rim) + rim;
+    if !again {
+        return once;
+    }
+    let mean = (0..32).map(|i| (f64::from(i) + 0.5) / 32.0).map(|x| 2.0 * x * single(x).0 / 32.0).sum::<f64>();
+    let fresnel = f0 + (1.0 - f0) / 21.0;
+    once * (1.0 + fresnel * mean / (1.0 - fresnel * (1.0 - mean)) * (1.0 - kept) / kept)
+}
+
+#[test]
+fn rough_metals_keep_the_light_that_is_scattered_twice() {
+    let Some(gpu) = common::gpu() else { return };
+    let color = [1.0, 0.75, 0.35];
+    for roughness in [0.3_f32, 0.5, 0.7, 1.0] {
+        let mut s = scene(vec![floor(8.0, 0.0)], vec![]);
+        (s.materials[0].metallic, s.materials[0].roughness, s.materials[0].base_color) =
+            (1.0, roughness, [color[0], color[1], color[2], 1.0]);
+        for (height, away) in [(3.0_f32, 1.0_f32), (1.0, 3.0)] {
+            let camera = look_at([0.0, height, away], [0.0, 0.0, 0.0], 0.01);
+            let (_, share) = shine(&gpu, &s, &camera, [5, 5], |_| [0.5; 3]);
+            let c = f64::from(height / height.hypot(away));
+            for i in 0..3 {
+                let found = f64::from(share[3 * 12 + i]);
+                let (expected, once) = (
+                    metal(f64::from(color[i]), f64::from(roughness), c, true),
+                    metal(f64::from(color[i]), f64::from(roughness), c, false),
+                );
+                assert!(
+                    (found - expected).abs() < 0.015,
+                    "roughness {roughness}, cosine {c:.2}: {found} of {expected}"
+                );
+                // Negative control: what is scattered once is clearly less.
+                assert!(roughness < 0.7 || i > 0 || found > once + 0.1, "{found} must lie above {once}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_mirror_shows_what_stands_behind_it_at_the_right_place() {
     let Some(gpu) = common::gpu() else { return };

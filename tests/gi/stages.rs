@@ -11,6 +11,7 @@ use bouncelight::gi::features::{FEATURES, FeatureSet};
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gi::pack::{NetworkInputs, read_features};
 use bouncelight::gi::reconstruct::{Answer, ReconstructPass};
+use bouncelight::gi::rung::Rung;
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu::timing::Recorder;
 use glam::Vec3;
