@@ -99,7 +99,7 @@ impl Plan {
         builder.begin();
         let nodes = fuse::nodes(graph, &shapes, options);
         for node in &nodes {
-            builder.add(node);
+            builder.add(node, &nodes);
         }
         builder.end();
         if options.fuse {
@@ -218,7 +218,7 @@ impl<'a> Builder<'a> {
         self.plan.tensors[at].last = self.plan.steps.len() + 1;
     }
 
-    fn add(&mut self, node: &Node) {
+    fn add(&mut self, node: &Node, nodes: &[Node]) {
         let ops = &self.graph.ops;
         let name = ops[node.op].name();
         let last = node.merged.iter().copied().max().unwrap_or(node.op);
@@ -245,7 +245,13 @@ impl<'a> Builder<'a> {
             Work::Norm { groups, eps } => Some(self.measure(node, inputs[0], groups, eps)),
             _ => None,
         };
-        let output = self.output(last, shape);
+        // What a batch norm of its own scales is rounded but once, after it, as if it had been folded into the weights.
+        let mut readers = nodes.iter().filter(|n| n.inputs.iter().chain(&n.skip).any(|t| *t == node.output));
+        let unrounded = node.is_conv()
+            && node.output != self.graph.output
+            && readers.next().is_some_and(|n| n.work == Work::Affine && n.skip.is_none())
+            && readers.next().is_none();
+        let output = self.output(last, shape, unrounded);
         let step = self.step(name, Some(node.op), kind, inputs[0], output);
         self.push(Step {
             second: measured,
@@ -269,9 +275,9 @@ impl<'a> Builder<'a> {
         })
     }
 
-    fn output(&mut self, op: usize, shape: Shape) -> usize {
+    fn output(&mut self, op: usize, shape: Shape, full: bool) -> usize {
         let name = self.graph.ops[op].output();
-        let output = self.tensor(name, shape, false);
+        let output = self.tensor(name, shape, full);
         self.index.insert(name, output);
         output
     }
@@ -294,7 +300,7 @@ impl<'a> Builder<'a> {
 
     /// One copy for each input. [`Builder::slice`] takes away those that their makers can write in place.
     fn concat(&mut self, node: &Node, inputs: &[usize], shape: Shape) {
-        let output = self.output(node.op, shape);
+        let output = self.output(node.op, shape, false);
         let name = self.graph.ops[node.op].name();
         let mut channel = 0;
         for input in inputs {

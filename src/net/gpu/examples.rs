@@ -22,7 +22,10 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
             _ => &[[2, 0, 0], [2, 1, 0], [2, 2, 0], [3, 0, 1], [4, 1, 1], [5, 2, 0], [6, 0, 0], [7, 0, 0]],
         };
         for [activation, add, dropout] in epilogues {
-            let epilogue = lines(&[("ACTIVATION", *activation), ("ADD", *add), ("DROPOUT", *dropout)]);
+            let mut epilogue = lines(&[("ACTIVATION", *activation), ("ADD", *add), ("DROPOUT", *dropout)]);
+            if !shader.contains("window") {
+                epilogue += &lines(&[("OUT_FULL", *dropout)]);
+            }
             let kinds: Vec<String> = if shader.contains("conv3x3") {
                 (1..=4).map(|v| kernel([3, 1, 1, 1], v)).collect()
             } else if shader.contains("staged") {
@@ -38,6 +41,8 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
             } else if shader.contains("window") {
                 let kinds = [[0, 0], [1, 1], [0, 1]];
                 kinds.map(|[c, f]| lines(&[("CLAMP", c), ("IN_FULL", f), ("OUT_FULL", f)])).to_vec()
+            } else if shader.contains("norm") {
+                [0, 1].map(|full| lines(&[("IN_FULL", full)])).to_vec()
             } else if shader.contains("upsample") {
                 [0, 1].map(|double| lines(&[("DOUBLE", double)])).to_vec()
             } else if shader.contains("shuffle") {

@@ -122,6 +122,7 @@ impl Kernel {
             prelude.add("ACTIVATION", step.activation.code());
             prelude.add("ADD", add);
             prelude.add("DROPOUT", step.dropout.is_some().into());
+            prelude.add("OUT_FULL", (half && output.full).into());
         }
         let numbers = Numbers {
             pad: [0, 0],
@@ -205,6 +206,7 @@ impl Kernel {
             }
         };
         if matches!(step.kind, Kind::Scale { .. }) {
+            prelude.add("IN_FULL", (half && input.full).into());
             kernel.groups[1] = out.height.div_ceil(GROUP[1] * ROWS_OF_SCALE);
         }
         let light = matches!(step.kind, Kind::Upsample | Kind::Copy | Kind::Moments | Kind::Scale { .. });
