@@ -38,8 +38,9 @@ struct Step {
     epsilon: f32,
     // First output channel of a window.
     channel: u32,
-    // Tiles of a norm's moments.
+    // Tiles of a norm's moments, and place of those that a convolution takes.
     tiles: u32,
+    moments: u32,
 }
 
 @group(0) @binding(0) var<uniform> step: Step;

@@ -29,8 +29,8 @@ fn dropped(v: vec4f, first: u32) -> vec4f {
     return kept;
 }
 
-// Finishes vector `vector` of output pixel `pixel`, counted row by row.
-fn finish(value: vec4f, pixel: u32, vector: u32) {
+// Finishes vector `vector` of output pixel `pixel`, counted row by row, and answers with what it has become.
+fn finish(value: vec4f, pixel: u32, vector: u32) -> vec4f {
     var v = value;
     if ADD == 1u { v += load(step.skip + pixel * step.skip_pitch + vector); }
     v = activate(v);
@@ -42,4 +42,5 @@ fn finish(value: vec4f, pixel: u32, vector: u32) {
     }
     let to = pixel * step.out_pitch + vector;
     if OUT_FULL == 1u { store_full(step.output + to * FULL, v); } else { store(step.output + to, v); }
+    return v;
 }

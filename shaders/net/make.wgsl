@@ -18,5 +18,6 @@ fn make(group: vec3u, groups: vec3u, local: u32) {
     // Threads without a tile add nothing, but where threads exchange weights they stay with the others.
     let count = end_input(place.part) - start;
     convolve(first + 1u + start * each, select(0u, count, any_here(corner.y < size.y)));
-    write();
+    let tiles = groups.x * groups.y;
+    write((place.phase.y * SPREAD + place.phase.x) * tiles + group.y * groups.x + group.x, local);
 }

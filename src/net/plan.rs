@@ -6,6 +6,7 @@
 //! what it reads for the last time, if each thread reads just the element that it then writes (`place`).
 
 mod fuse;
+mod norm;
 mod place;
 mod types;
 
@@ -95,7 +96,8 @@ impl Plan {
             zero_bytes: 0,
             arena_bytes: 0,
         };
-        let mut builder = Builder { graph, shapes: &shapes, plan, index: HashMap::new(), inside: Vec::new() };
+        let mut builder =
+            Builder { graph, shapes: &shapes, plan, index: HashMap::new(), inside: Vec::new(), measure: options.fuse };
         builder.begin();
         let nodes = fuse::nodes(graph, &shapes, options);
         for node in &nodes {
@@ -137,6 +139,8 @@ struct Builder<'a> {
     /// Tensors by name.
     index: HashMap<&'a str, usize>,
     inside: Vec<Option<Inside>>,
+    /// Convolutions measure what they make for the norm that reads it.
+    measure: bool,
 }
 
 impl<'a> Builder<'a> {
@@ -165,6 +169,7 @@ impl<'a> Builder<'a> {
             dropout: None,
             fold: None,
             output,
+            moments: None,
             flops: 0,
             traffic: 0,
             parameters: 0,
@@ -173,7 +178,10 @@ impl<'a> Builder<'a> {
 
     fn push(&mut self, mut step: Step) {
         let bytes = if self.plan.precision == Precision::F16 { 2 } else { 4 };
-        let moved = step.reads().chain([step.output]).map(|t| self.plan.tensors[t].bytes());
+        // Of the picture that was measured a merge wants the size alone.
+        let merge = matches!(step.kind, Kind::Merge { .. });
+        let read = step.reads().filter(|t| !merge || step.second != Some(*t));
+        let moved = read.chain([step.output]).map(|t| self.plan.tensors[t].bytes());
         step.traffic = moved.sum::<u64>() + bytes * step.parameters;
         let time = self.plan.steps.len() + 1;
         for read in step.reads() {
@@ -280,22 +288,6 @@ impl<'a> Builder<'a> {
         let output = self.tensor(name, shape, full);
         self.index.insert(name, output);
         output
-    }
-
-    /// The two steps that lead to each channel's scale and shift.
-    fn measure(&mut self, node: &Node, input: usize, groups: u32, eps: f32) -> usize {
-        let name = self.graph.ops[node.op].name();
-        let shape = self.plan.tensors[input].shape;
-        let tiles = shape.pixels().div_ceil(TILE.into()) as u32;
-        let pair = Shape { channels: shape.vectors() * 8, height: 1, width: tiles };
-        let moments = self.tensor(&format!("{name}.moments"), pair, true);
-        self.push(self.step(&format!("{name}.moments"), Some(node.op), Kind::Moments, input, moments));
-        // Mean, scale and shift of each channel.
-        let three = Shape { channels: shape.vectors() * 12, height: 1, width: 1 };
-        let scale = self.tensor(&format!("{name}.scale"), three, true);
-        let step = self.step(&format!("{name}.scale"), Some(node.op), Kind::Merge { groups, eps }, moments, scale);
-        self.push(Step { second: Some(input), ..step });
-        scale
     }
 
     /// One copy for each input. [`Builder::slice`] takes away those that their makers can write in place.

@@ -9,6 +9,8 @@ use super::kernels::{Bound, Choice, GROUP, Kernel, Part, Prelude, Sum, THREADS, 
 use super::permutation::{Layer, Permutation, Source, Variant};
 use crate::net::graph::Shape;
 
+/// Vectors side by side in a workgroup that adds up and measures, as in `sum_measured.wgsl`.
+const SUM_COLUMNS: u32 = 8;
 /// WebGPU's default limit of workgroups in one dimension.
 const MAX_DEPTH: u32 = 65535;
 
@@ -122,10 +124,17 @@ impl Kernel {
         self.numbers.parts = parts;
         if parts > 1 {
             let vectors = out.pixels() as u32 * out.vectors();
-            let [x, y] = in_rows(vectors.div_ceil(THREADS));
-            let shader = if plan.precision == Precision::F16 { "net.sum_half" } else { "net.sum" };
-            let bytes = layer.partial_bytes(parts);
-            self.sum = Some(Sum { shader: shader.into(), prelude: prelude.text(), groups: [x, y, 1], bytes });
+            let [mut x, mut y] = in_rows(vectors.div_ceil(THREADS));
+            let half = if plan.precision == Precision::F16 { "_half" } else { "" };
+            let mut text = prelude.text();
+            let mut measured = "";
+            if step.moments.is_some() {
+                (x, y) = ((out.pixels() as u32).div_ceil(THREADS), out.vectors().div_ceil(SUM_COLUMNS));
+                (self.numbers.tiles, measured) = (x, "_measured");
+                text += &format!("const THREADS = {THREADS}u;\n");
+            }
+            let (shader, bytes) = (format!("net.sum{half}{measured}"), layer.partial_bytes(parts));
+            self.sum = Some(Sum { shader, prelude: text, groups: [x, y, 1], bytes });
         }
         prelude.add("KERNEL_H", filter.taps[0]);
         prelude.add("KERNEL_W", filter.taps[1]);
@@ -138,16 +147,24 @@ impl Kernel {
         }
         let cut = if parts > 1 { "_parts" } else { "" };
         let [columns, rows] = size.map(|edge| edge.div_ceil(filter.spread));
+        // Each phase's workgroups in x and y measure what they make.
+        let phases = filter.spread * filter.spread;
+        let tiles =
+            |kernel: &Self| if parts > 1 { kernel.numbers.tiles } else { phases * kernel.groups[0] * kernel.groups[1] };
         if permutation.is_none() {
+            prelude.add("THREADS", THREADS);
             self.groups = [columns.div_ceil(GROUP[0]), rows.div_ceil(GROUP[1])];
             self.parts.iter_mut().for_each(|p| p.depth *= vectors);
+            self.numbers.tiles = tiles(self);
             return "conv_plain".into();
         }
         if staged {
             let stage = Stage::of(&layer, vectors);
             prelude.add("COLUMNS", stage.columns);
             prelude.add("PIXELS", stage.pixels);
+            prelude.add("THREADS", THREADS);
             self.groups = in_rows(stage.groups(&layer));
+            self.numbers.tiles = tiles(self);
             // A workgroup makes several of the blocks as they are stored.
             self.numbers.blocks = out.vectors().div_ceil(stage.columns * vectors);
             self.parts[0].depth = self.numbers.blocks * filter.spread * filter.spread * parts;
@@ -160,6 +177,7 @@ impl Kernel {
         let threads = if choice.facts.software { THREADS / 4 } else { THREADS };
         prelude.add("THREADS", threads);
         self.groups = in_rows((columns.div_ceil(wide) * rows.div_ceil(high)).div_ceil(threads));
+        self.numbers.tiles = tiles(self);
         let family = if row { "conv3x3" } else { "conv_any" };
         let input = if mirror && self.bound != Bound::Texture { "_mirror" } else { "" };
         let weights = match self.bound {

@@ -16,7 +16,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
             {
                 &[[0, 0, 0]]
             }
-            _ if ["_half", "_mirror", "_wide", "_parts", "_words"].iter().any(|s| shader.contains(s)) => {
+            _ if ["_half", "_mirror", "_wide", "_parts", "_words", "_measured"].iter().any(|s| shader.contains(s)) => {
                 &[[2, 0, 0], [3, 1, 0], [6, 2, 1]]
             }
             _ => &[[2, 0, 0], [2, 1, 0], [2, 2, 0], [3, 0, 1], [4, 1, 1], [5, 2, 0], [6, 0, 0], [7, 0, 0]],

@@ -70,6 +70,7 @@ pub struct Numbers {
     pub(super) out_pitch: u32,
     pub(super) skip_pitch: u32,
     pub(super) group: u32,
+    pub(super) tiles: u32,
 }
 
 /// How one step runs.
@@ -137,6 +138,7 @@ impl Kernel {
             out_pitch: output.pitch,
             skip_pitch: step.skip.map_or(0, |s| plan.tensors[s].pitch),
             group: 1,
+            tiles: 0,
         };
         let mut kernel = Kernel {
             shader: String::new(),
@@ -179,7 +181,8 @@ impl Kernel {
             }
             Kind::Moments => {
                 // At most 2^26 pixels and 1,024 vectors.
-                kernel.groups = in_rows((output.shape.width * input.shape.vectors()).div_ceil(THREADS));
+                kernel.numbers.tiles = out.width;
+                kernel.groups = in_rows((out.width * input.shape.vectors()).div_ceil(THREADS));
                 kernel.parts[0].depth = 1;
                 "moments".into()
             }
@@ -189,6 +192,8 @@ impl Kernel {
                 kernel.numbers.in_vectors = picture.vectors();
                 kernel.numbers.out_channels = picture.channels;
                 kernel.numbers.group = picture.channels / groups.max(1);
+                let maker = plan.steps.iter().find(|s| s.moments.unwrap_or(s.output) == step.input);
+                kernel.numbers.tiles = maker.map_or(0, |maker| Self::choose(plan, maker, choice).numbers.tiles);
                 kernel.groups = [groups, 1];
                 kernel.parts[0].depth = 1;
                 kernel.bound = Bound::Vectors(2 * picture.vectors());
@@ -220,7 +225,8 @@ impl Kernel {
             (false, true) => "_words",
             (false, false) => "",
         };
-        kernel.shader = format!("net.{shader}{mirror}{kind}");
+        let measured = if step.moments.is_some() && kernel.sum.is_none() { "_measured" } else { "" };
+        kernel.shader = format!("net.{shader}{mirror}{kind}{measured}");
         kernel.prelude = prelude.text();
         kernel
     }
@@ -228,6 +234,11 @@ impl Kernel {
     /// Workgroups of a dispatch.
     pub fn workgroups(&self, part: &Part) -> [u32; 3] {
         [self.groups[0], self.groups[1], part.depth]
+    }
+
+    /// Tiles of the moments that it writes or reads: of a convolution that measures what it makes one a workgroup and vector of channels.
+    pub fn tiles(&self) -> u32 {
+        self.numbers.tiles
     }
 
     /// Bytes of a texel of weights.
