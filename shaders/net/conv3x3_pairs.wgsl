@@ -223,17 +223,18 @@ fn write_one(s: Four, vector: u32) {
 fn write(tile: u32, me: u32) {
     let first = place.block * VECTORS;
     write_one(a, first);
-    close(first, 1u, tile, me);
+    close(0u, me);
     if VECTORS > 1u {
         write_one(b, first + 1u);
-        close(first + 1u, 1u, tile, me);
+        close(1u, me);
     }
     if VECTORS > 2u {
         write_one(c, first + 2u);
-        close(first + 2u, 1u, tile, me);
+        close(2u, me);
     }
     if VECTORS > 3u {
         write_one(d, first + 3u);
-        close(first + 3u, 1u, tile, me);
+        close(3u, me);
     }
+    gather(first, 1u, tile, me);
 }

@@ -30,5 +30,6 @@ fn main(
         done(sum, 0u, at.y * step.out_size.x + at.x, vector);
     }
     let tiles = groups.x * groups.y;
-    close(vector, 1u, (place.phase.y * SPREAD + place.phase.x) * tiles + group.y * groups.x + group.x, me);
+    close(0u, me);
+    gather(vector, 1u, (place.phase.y * SPREAD + place.phase.x) * tiles + group.y * groups.x + group.x, me);
 }

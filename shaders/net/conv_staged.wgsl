@@ -117,9 +117,10 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let tiles = groups.x * groups.y;
     let measured = (place.phase.y * SPREAD + place.phase.x) * tiles + group.y * groups.x + group.x;
     write(a, place, tile, row, first + own);
-    close(first + own, COLUMNS, measured, me);
+    close(0u, me);
     if VECTORS > 1u {
         write(b, place, tile, row, first + own + 1u);
-        close(first + own + 1u, COLUMNS, measured, me);
+        close(1u, me);
     }
+    gather(first, COLUMNS, measured, me);
 }

@@ -1,11 +1,11 @@
 // A convolution that measures what it makes, for the norm after it: of each workgroup and channel the number of values, their mean and the
 // sum of their squared deviations from it. A thread adds up by how much its values differ from its first one, so that nothing is lost
-// however far from zero they lie; threads are merged two at a time, always in the same order (Chan, Golub and LeVeque 1983).
-// Otherwise as whole.wgsl. From the prelude: THREADS.
+// however far from zero they lie; threads are merged one after the other (Chan, Golub and LeVeque 1983).
+// Otherwise as whole.wgsl. From the prelude: THREADS, and MADE, the vectors that a thread makes.
 
-var<workgroup> counts: array<f32, THREADS>;
-var<workgroup> means: array<vec4f, THREADS>;
-var<workgroup> squares: array<vec4f, THREADS>;
+var<workgroup> counts: array<f32, MADE * THREADS>;
+var<workgroup> means: array<vec4f, MADE * THREADS>;
+var<workgroup> squares: array<vec4f, MADE * THREADS>;
 
 // Of this thread's values of one vector how many there are, the first, and sums of the differences from it and of their squares.
 var<private> seen: f32;
@@ -25,32 +25,39 @@ fn done(value: vec4f, part: u32, pixel: u32, vector: u32) {
     away2 += d * d;
 }
 
-// Writes what thread `me` and all others whose index leaves the same rest divided by `columns` have seen of vector `vector` as
-// tile `tile`. The whole workgroup comes here.
-fn close(vector: u32, columns: u32, tile: u32, me: u32) {
+// Hands on what thread `me` has seen of its `i`th vector.
+fn close(i: u32, me: u32) {
     let mean = away / max(seen, 1.0);
-    counts[me] = seen;
-    means[me] = origin + mean;
-    squares[me] = max(away2 - away * mean, vec4f(0.0));
+    let at = i * THREADS + me;
+    counts[at] = seen;
+    means[at] = origin + mean;
+    squares[at] = max(away2 - away * mean, vec4f(0.0));
     seen = 0.0;
     away = vec4f(0.0);
     away2 = vec4f(0.0);
-    for (var reach = THREADS / 2u; reach >= columns; reach /= 2u) {
-        workgroupBarrier();
-        if me < reach {
-            let n = counts[me] + counts[me + reach];
-            let share = counts[me + reach] / max(n, 1.0);
-            let d = means[me + reach] - means[me];
-            squares[me] += squares[me + reach] + d * d * counts[me] * share;
-            means[me] += d * share;
-            counts[me] = n;
-        }
-    }
-    if me < columns && vector < step.out_vectors {
-        let to = step.moments + (tile * 3u * step.out_vectors + vector) * FULL;
-        store_full(to, vec4f(counts[me]));
-        store_full(to + step.out_vectors * FULL, means[me]);
-        store_full(to + 2u * step.out_vectors * FULL, squares[me]);
-    }
+}
+
+// Writes the moments of tile `tile`. The whole workgroup comes here. Threads lie in rows of `columns`, and those in a column make the same
+// MADE vectors, the first column from `first` on.
+fn gather(first: u32, columns: u32, tile: u32, me: u32) {
     workgroupBarrier();
+    let column = me % columns;
+    let i = me / columns;
+    let vector = first + column * MADE + i;
+    if i >= MADE || vector >= step.out_vectors { return; }
+    var n = 0.0;
+    var mean = vec4f(0.0);
+    var square = vec4f(0.0);
+    for (var at = i * THREADS + column; at < i * THREADS + THREADS; at += columns) {
+        let count = counts[at];
+        let d = means[at] - mean;
+        let share = count / max(n + count, 1.0);
+        square += squares[at] + d * d * n * share;
+        mean += d * share;
+        n += count;
+    }
+    let to = step.moments + (tile * 3u * step.out_vectors + vector) * FULL;
+    store_full(to, vec4f(n));
+    store_full(to + step.out_vectors * FULL, mean);
+    store_full(to + 2u * step.out_vectors * FULL, square);
 }

@@ -10,4 +10,5 @@ fn done(value: vec4f, part: u32, pixel: u32, vector: u32) {
 }
 
 // What is measured is their sum.
-fn close(vector: u32, columns: u32, tile: u32, me: u32) {}
+fn close(i: u32, me: u32) {}
+fn gather(first: u32, columns: u32, tile: u32, me: u32) {}

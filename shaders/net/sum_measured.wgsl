@@ -15,5 +15,6 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) me
         }
         done(sum, 0u, pixel, vector);
     }
-    close(vector, COLUMNS, group.x, me);
+    close(0u, me);
+    gather(group.y * COLUMNS, COLUMNS, group.x, me);
 }

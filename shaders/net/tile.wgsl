@@ -69,6 +69,7 @@ fn write(tile: u32, me: u32) {
                 done(sums[v * 8u + i], place.part, pixel.y * step.out_size.x + pixel.x, first + v);
             }
         }
-        close(first + v, 1u, tile, me);
+        close(v, me);
     }
+    gather(first, 1u, tile, me);
 }

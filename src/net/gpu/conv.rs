@@ -131,7 +131,7 @@ impl Kernel {
             if step.moments.is_some() {
                 (x, y) = ((out.pixels() as u32).div_ceil(THREADS), out.vectors().div_ceil(SUM_COLUMNS));
                 (self.numbers.tiles, measured) = (x, "_measured");
-                text += &format!("const THREADS = {THREADS}u;\n");
+                text += &format!("const THREADS = {THREADS}u;\nconst MADE = 1u;\n");
             }
             let (shader, bytes) = (format!("net.sum{half}{measured}"), layer.partial_bytes(parts));
             self.sum = Some(Sum { shader, prelude: text, groups: [x, y, 1], bytes });
@@ -151,6 +151,7 @@ impl Kernel {
         let phases = filter.spread * filter.spread;
         let tiles =
             |kernel: &Self| if parts > 1 { kernel.numbers.tiles } else { phases * kernel.groups[0] * kernel.groups[1] };
+        prelude.add("MADE", if permutation.is_none() { 1 } else { vectors });
         if permutation.is_none() {
             prelude.add("THREADS", THREADS);
             self.groups = [columns.div_ceil(GROUP[0]), rows.div_ceil(GROUP[1])];

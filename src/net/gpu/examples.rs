@@ -43,6 +43,8 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
                 kinds.map(|[c, f]| lines(&[("CLAMP", c), ("IN_FULL", f), ("OUT_FULL", f)])).to_vec()
             } else if shader.contains("norm") {
                 [0, 1].map(|full| lines(&[("IN_FULL", full)])).to_vec()
+            } else if shader.contains("sum") {
+                vec![lines(&[("MADE", 1)])]
             } else if shader.contains("upsample") {
                 [0, 1].map(|double| lines(&[("DOUBLE", double)])).to_vec()
             } else if shader.contains("shuffle") {
@@ -59,6 +61,6 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
 
 fn kernel([edge, stride, spread, nearest]: [u32; 4], vectors: u32) -> String {
     format!(
-        "const KERNEL_H = {edge}u;\nconst KERNEL_W = {edge}u;\nconst STRIDE = {stride}u;\nconst SPREAD = {spread}u;\nconst NEAREST = {nearest}u;\nconst VECTORS = {vectors}u;\n"
+        "const KERNEL_H = {edge}u;\nconst KERNEL_W = {edge}u;\nconst STRIDE = {stride}u;\nconst SPREAD = {spread}u;\nconst NEAREST = {nearest}u;\nconst VECTORS = {vectors}u;\nconst MADE = {vectors}u;\n"
     )
 }
