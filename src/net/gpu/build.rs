@@ -39,8 +39,7 @@ pub struct StepUniform {
     channel: u32,
     tiles: u32,
     moments: u32,
-    /// To a multiple of eight bytes.
-    unused: u32,
+    group_inputs: u32,
 }
 
 /// Distance of uniforms in their buffer, and alignment of weights: WebGPU's default alignment of bindings.
@@ -249,7 +248,7 @@ fn uniform(plan: &Plan, step: &Step, (numbers, part): (&Numbers, &Part), seed: O
         channel,
         tiles: numbers.tiles,
         moments: step.moments.map_or(0, place),
-        unused: 0,
+        group_inputs: numbers.group_inputs,
     }
 }
 

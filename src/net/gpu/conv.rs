@@ -86,6 +86,7 @@ impl Kernel {
     ) -> String {
         let out = plan.tensors[step.output].shape;
         let Phases { filter, pad, base } = self.phases(step, plan, choice);
+        let group = channels_of_a_group(step.kind, plan.tensors[step.input].shape, out);
         let size = [out.width, out.height];
         let layer = Layer { filter, out_vectors: out.vectors(), size, precision: plan.precision };
         let permutation = layer.permutation(choice.variant, choice.tuned, plan, choice.facts);
@@ -120,7 +121,8 @@ impl Kernel {
         };
         self.parts = (0..all).step_by(self.blocks_per_part as usize).map(part).collect();
         (self.numbers.pad, self.numbers.base, self.numbers.blocks) = (pad, base, blocks);
-        (self.numbers.in_vectors, self.numbers.group) = (filter.in_vectors, filter.group_vectors);
+        self.numbers.in_vectors = filter.in_vectors;
+        [self.numbers.group_inputs, self.numbers.group] = group;
         self.numbers.parts = parts;
         if parts > 1 {
             let vectors = out.pixels() as u32 * out.vectors();
@@ -200,10 +202,9 @@ impl Kernel {
                 Phases { filter, pad: [taps[1] as i32 - 1, taps[0] as i32 - 1], base: [padding as i32; 2] }
             }
             Kind::Conv { kernel, stride, padding, nearest, groups } => {
-                // Groups of whole vectors read their own; others run as one, with zeros for what they do not see.
-                let whole = [input.channels, out.channels].iter().all(|n| n.is_multiple_of(4 * groups));
-                let groups = if whole && choice.variant != Variant::Plain { groups } else { 1 };
-                let [in_vectors, group_vectors] = [input, out].map(|s| s.vectors() / groups);
+                let grouped = choice.variant != Variant::Plain;
+                let [in_vectors, group_vectors] =
+                    if grouped { read_of(input, out, groups) } else { read_of(input, out, 1) };
                 let pad = [padding.left as i32, padding.top as i32];
                 if nearest > 1 && stride == 1 && choice.variant != Variant::Plain {
                     self.enlarged = Some((nearest, pad));
@@ -221,6 +222,30 @@ impl Kernel {
                 Phases { filter, pad: [0, 0], base: [0, 0] }
             }
         }
+    }
+}
+
+/// Input and output channels of one of the groups that do not see each other.
+fn channels_of_a_group(kind: Kind, input: Shape, out: Shape) -> [u32; 2] {
+    let groups = if let Kind::Conv { groups, .. } = kind { groups.max(1) } else { 1 };
+    [input, out].map(|s| (s.channels / groups).max(1))
+}
+
+/// Vectors that an output reads, and how many output vectors read the same. Groups of whole vectors read their own. Where groups begin
+/// within vectors each output vector reads those that its groups touch; if these are more than half of all, every one reads all.
+fn read_of(input: Shape, out: Shape, groups: u32) -> [u32; 2] {
+    let all = [input, out].map(Shape::vectors);
+    let [inputs, outputs] = [input, out].map(|s| s.channels / groups);
+    if inputs.is_multiple_of(4) && outputs.is_multiple_of(4) {
+        return all.map(|n| n / groups);
+    }
+    let touched = |vector: u32| {
+        let [first, last] = [vector * 4, (vector * 4 + 3).min(out.channels - 1)].map(|channel| channel / outputs);
+        ((last + 1) * inputs).div_ceil(4) - first * inputs / 4
+    };
+    match (0..all[1]).map(touched).max() {
+        Some(most) if 2 * most <= all[0] => [most, 1],
+        _ => all,
     }
 }
 

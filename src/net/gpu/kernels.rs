@@ -71,6 +71,7 @@ pub struct Numbers {
     pub(super) skip_pitch: u32,
     pub(super) group: u32,
     pub(super) tiles: u32,
+    pub(super) group_inputs: u32,
 }
 
 /// How one step runs.
@@ -139,6 +140,7 @@ impl Kernel {
             skip_pitch: step.skip.map_or(0, |s| plan.tensors[s].pitch),
             group: 1,
             tiles: 0,
+            group_inputs: 0,
         };
         let mut kernel = Kernel {
             shader: String::new(),

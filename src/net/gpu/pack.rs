@@ -177,9 +177,9 @@ impl<'a> Layer<'a> {
             let first = block % blocks * 4 * vectors;
             let bias = |i: usize| if i < 4 * vectors { self.bias.get(first + i).copied().unwrap_or(0.0) } else { 0.0 };
             (0..16).for_each(|i| put(bias(i)));
-            // The channels that the block's group reads; all of them where groups run as one.
-            let grouped = self.filter.in_vectors as usize * 4 < self.in_channels;
-            let begin = if grouped { first / self.group[1] * self.group[0] } else { 0 };
+            // The first channel that the block reads, as in make.wgsl.
+            let own = first / self.group[1].max(1) * self.group[0] / 4;
+            let begin = 4 * own.min(self.in_channels.div_ceil(4) - self.filter.in_vectors as usize);
             // One tap of one input vector. Column-major: column k takes input channel k to the four outputs.
             let mut matrices = |c: usize, tap: usize| {
                 let (ky, kx) = (tap / self.filter.taps[1] as usize, tap % self.filter.taps[1] as usize);
