@@ -1,4 +1,4 @@
-// The work of a thread of a blocked convolution, whose tile comes from tile.wgsl or pairs.wgsl: TILE, begin, convolve, write.
+// The work of a thread of a blocked convolution, whose tile comes from tile.wgsl or conv3x3_rows.wgsl: TILE, begin, convolve, write.
 // From the prelude: THREADS, of a workgroup.
 
 // First input vector that a block from output vector `vector` on reads. Where groups begin within a vector it reads neighbours too, with

@@ -91,8 +91,11 @@ impl Kernel {
         let layer = Layer { filter, out_vectors: out.vectors(), size, precision: plan.precision };
         let permutation = layer.permutation(choice.variant, choice.tuned, plan, choice.facts);
         let row = matches!(step.kind, Kind::Conv { kernel: [3, 3], stride: 1, nearest: 1, padding, .. } if padding == Padding::all(1));
-        self.pairs = row && permutation.is_some_and(|p| p.weights == Source::Lanes);
-        let filter = if self.pairs { Filter { taps: [3, 4], ..filter } } else { filter };
+        if row && permutation.is_some_and(|p| p.weights == Source::Lanes) {
+            // In 16 bits the larger transform would cost accuracy.
+            self.winograd = if plan.precision == Precision::F16 { 2 } else { 4 };
+        }
+        let filter = if self.winograd > 0 { Filter { taps: [3, self.winograd + 2], ..filter } } else { filter };
         (self.filter, self.layer, self.permutation) = (Some(filter), Some(layer), permutation);
         let plain = Permutation::new(Source::Storage, false, out.vectors().min(2));
         let Permutation { weights, mirror, vectors, parts, half } = permutation.unwrap_or(plain);
@@ -175,7 +178,7 @@ impl Kernel {
             prelude.feature = if half { "enable f16;\n" } else { "" };
             return format!("conv_staged{arithmetic}{cut}");
         }
-        let [wide, high] = if self.pairs { [4, 4] } else { [2, 4] };
+        let [wide, high] = if self.winograd > 0 { [4, 4] } else { [2, 4] };
         // A processor needs no more threads than its vectors are wide, and smaller groups share small pictures out better.
         let threads = if choice.facts.software { THREADS / 4 } else { THREADS };
         prelude.add("THREADS", threads);

@@ -89,8 +89,8 @@ pub struct Kernel {
     pub layer: Option<ConvLayer>,
     /// For convolutions of an enlarged input whose taps are merged: the factor and the padding before.
     pub enlarged: Option<(u32, [i32; 2])>,
-    /// Weights of 3×3 taps come transformed for Winograd's F(2, 3) along rows: 3×4 matrices.
-    pub pairs: bool,
+    /// Weights of 3×3 taps come transformed for Winograd's F(n, 3) along rows, 3×(n + 2) matrices: n, or 0 where they do not.
+    pub winograd: u32,
     /// For blocked convolutions.
     pub permutation: Option<Permutation>,
     /// It reads its input and its skip from the mirror.
@@ -149,7 +149,7 @@ impl Kernel {
             filter: None,
             layer: None,
             enlarged: None,
-            pairs: false,
+            winograd: 0,
             permutation: None,
             mirror: false,
             vectors: 0,
