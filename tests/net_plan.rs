@@ -1,10 +1,11 @@
 //! The planner: totals against counts by hand, fusion, and memory that no two living tensors share.
 
 use bouncelight::net::format::Weights;
+use bouncelight::net::gpu::{Choice, Facts, Kernel, Permutation, Source, Tuned, Variant};
 use bouncelight::net::graph::{
     Activation, Add, AddAt, Concat, Conv2d, Graph, GraphError, Op, Padding, Shape, Upsample,
 };
-use bouncelight::net::plan::{ALIGN, Kind, Options, Plan, PlanError, Precision, Tensor};
+use bouncelight::net::plan::{ALIGN, Kind, Options, Plan, PlanError, Precision, Step, Tensor};
 use proptest::prelude::*;
 
 fn conv(name: &str, input: &str, output: &str, [i, o]: [u32; 2], edge: u32, stride: u32) -> Op {
@@ -102,14 +103,35 @@ fn check_memory(graph: &Graph, plan: &Plan) {
     let sum: u64 = plan.tensors.iter().map(|t| t.bytes().next_multiple_of(ALIGN)).sum();
     assert!(plan.arena_bytes <= plan.zero_bytes + sum);
     for (time, step) in plan.steps.iter().enumerate().map(|(i, s)| (i + 1, s)) {
-        // Mean and squares of each tile and channel; mean, scale and shift of each channel.
+        // Number, mean and squares of each tile and channel; mean, scale and shift of each channel.
         let [input, output] = [step.input, step.output].map(|t| plan.tensors[t].shape);
         match step.kind {
-            Kind::Moments => assert_eq!(output.vectors(), 2 * input.vectors()),
-            Kind::Merge { .. } => assert_eq!(output.vectors(), 3 * plan.tensors[step.second.unwrap()].shape.vectors()),
+            Kind::Moments => assert_eq!(output.vectors(), 3 * input.vectors()),
+            Kind::Merge { .. } => {
+                let picture = step.second.unwrap();
+                assert_eq!(output.vectors(), 3 * plan.tensors[picture].shape.vectors());
+                // The moments are those of the picture, taken once.
+                let of = |s: &&Step| match s.kind {
+                    Kind::Moments => s.output == step.input && s.input == picture,
+                    _ => s.moments == Some(step.input) && s.output == picture,
+                };
+                assert_eq!(plan.steps[..time - 1].iter().filter(of).count(), 1, "{}", step.name);
+            }
             _ => {}
         }
+        if let Some(moments) = step.moments {
+            let tensor = &plan.tensors[moments];
+            assert_eq!(tensor.shape.vectors(), 3 * output.vectors());
+            assert!(
+                tensor.full && tensor.first == time && matches!(step.kind, Kind::Conv { .. } | Kind::Transposed { .. })
+            );
+        }
         for read in step.reads() {
+            // Only these kernels read 32 bits out of an arena of 16.
+            let wide = plan.precision == Precision::F16 && plan.tensors[read].full && step.second != Some(read);
+            let reads_wide =
+                matches!(step.kind, Kind::Window { .. } | Kind::Scale { fixed: true } | Kind::Merge { .. });
+            assert!(!wide || reads_wide, "{} is read by {}", plan.tensors[read].name, step.name);
             assert!(plan.tensors[read].first < time && plan.tensors[read].last >= time);
         }
     }
@@ -168,6 +190,24 @@ fn sums_fuse_where_they_may() {
     let plan = Plan::new(&sums, 9, 5).unwrap();
     assert_eq!(plan.steps.len(), 5);
     check_memory(&sums, &plan);
+}
+
+/// A batch norm that is not folded rounds once, as one that is: what it alone reads of a convolution stays in 32 bits.
+#[test]
+fn what_a_batch_norm_reads_is_not_rounded() {
+    let norm = serde_json::json!({"name": "n", "input": "a", "output": "n", "channels": 4});
+    let norm = Op::parse("batch_norm", norm).unwrap().unwrap();
+    let alone = graph(4, vec![conv("a", "input", "a", [4, 4], 3, 1), norm.clone(), conv("b", "n", "b", [4, 4], 3, 1)]);
+    let options = Options { fuse: false, precision: Precision::F16, ..Options::default() };
+    let full = |graph: &Graph| {
+        let plan = Plan::with(graph, 9, 5, &options).unwrap();
+        check_memory(graph, &plan);
+        ["a", "n"].map(|name| plan.tensors.iter().find(|t| t.name == name).unwrap().full)
+    };
+    assert_eq!(full(&alone), [true, false]);
+    // Somebody else reads it too, and would not know.
+    let shared = graph(4, vec![conv("a", "input", "a", [4, 4], 3, 1), norm, conv("b", "a", "b", [4, 4], 3, 1)]);
+    assert_eq!(full(&shared), [false, false]);
 }
 
 #[test]
@@ -235,6 +275,89 @@ fn random_graph(choices: &[(u8, u8, u8)], [width, height]: [u32; 2]) -> Graph {
     }
     graph.output = made.last().unwrap().0.clone();
     graph
+}
+
+/// A convolution measures what it makes for the norm that reads it; anything else is read again.
+#[test]
+fn norms_are_measured_where_their_input_is_made() {
+    let norm = |name: &str, input: &str, groups: u32| {
+        let fields = serde_json::json!({"name": name, "input": input, "output": name, "channels": 4, "groups": groups});
+        Op::parse("group_norm", fields).unwrap().unwrap()
+    };
+    let count = |ops: Vec<Op>, fuse: bool| {
+        let graph = graph(4, ops);
+        let plan = Plan::with(&graph, 70, 50, &Options { fuse, ..Options::default() }).unwrap();
+        check_memory(&graph, &plan);
+        let moments = plan.steps.iter().filter(|s| s.kind == Kind::Moments).count();
+        let told = plan.rows().iter().filter(|r| r.kind.ends_with(" + moments")).count();
+        assert_eq!(told, plan.steps.iter().filter(|s| s.moments.is_some()).count());
+        [moments, told]
+    };
+    let conv = |name: &str, input: &str| conv(name, input, name, [4, 4], 3, 1);
+    assert_eq!(count(vec![conv("a", "input"), norm("n", "a", 2)], true), [0, 1]);
+    assert_eq!(count(vec![conv("a", "input"), norm("n", "a", 2)], false), [1, 0]);
+    // Two norms of one picture share what was measured.
+    let two = vec![conv("a", "input"), norm("n", "a", 2), norm("m", "a", 1), add("s", "n", "m", Activation::None)];
+    assert_eq!(count(two, true), [0, 1]);
+    // The input, and the result of another norm, nobody measures.
+    assert_eq!(count(vec![norm("n", "input", 2), norm("m", "n", 1), conv("a", "m")], true), [2, 0]);
+    // A resampling that is not fused stands between.
+    let between = vec![conv("a", "input"), up("u", "a", "a"), norm("n", "u", 2)];
+    assert_eq!(count(between, true), [1, 0]);
+}
+
+/// Every kernel's tiles find room, whatever the picture.
+#[test]
+fn moments_of_every_kernel_fit() {
+    let conv = |kernel: u32, stride: u32, groups: u32| {
+        serde_json::json!({"op": "conv2d", "name": "c", "input": "n", "output": "c", "in_channels": 8, "out_channels": 20,
+            "kernel": [kernel, kernel], "stride": stride, "padding": kernel / 2, "groups": groups})
+    };
+    let up = |kernel: u32, stride: u32| {
+        serde_json::json!({"op": "conv_transpose2d", "name": "c", "input": "n", "output": "c", "in_channels": 8,
+            "out_channels": 20, "kernel": [kernel, kernel], "stride": stride})
+    };
+    let layers = [conv(3, 1, 1), conv(1, 1, 1), conv(4, 2, 1), conv(3, 1, 4), up(4, 2), up(2, 3), up(7, 4)];
+    let sizes = [[1, 1], [1, 200], [200, 1], [37, 29], [2, 77], [64, 64], [500, 3], [16, 16], [33, 4]];
+    let (mut seen, mut tight) = (0, 0);
+    for (layer, nearest) in layers.into_iter().flat_map(|l| [(l.clone(), 1), (l, 2)]) {
+        let parse = |mut fields: serde_json::Value| {
+            let kind = fields.as_object_mut().unwrap().remove("op").unwrap();
+            Op::parse(kind.as_str().unwrap(), fields).unwrap().unwrap()
+        };
+        let enlarge = serde_json::json!({"op": "upsample_nearest", "name": "n", "input": "input", "output": "n", "scale": nearest});
+        let norm = serde_json::json!({"op": "instance_norm", "name": "y", "input": "c", "output": "y", "channels": 20});
+        let graph = graph(8, [enlarge, layer, norm].map(parse).to_vec());
+        for [width, height] in sizes {
+            for precision in [Precision::F32, Precision::F16] {
+                let Ok(plan) = Plan::with(&graph, width, height, &Options { precision, ..Options::default() }) else {
+                    continue;
+                };
+                let step = plan.steps.iter().find(|s| s.moments.is_some()).unwrap();
+                let room = plan.tensors[step.moments.unwrap()].shape.width;
+                let ways = [Source::Lanes, Source::Uniform, Source::Storage, Source::Staged].into_iter();
+                let ways = ways.flat_map(|w| (1..=4).map(move |v| Permutation::new(w, w == Source::Lanes, v)));
+                let cut = ways.clone().map(|p| Permutation { parts: 2, ..p });
+                let variants = ways.chain(cut).map(Variant::Fixed).chain([Variant::Auto, Variant::Plain]);
+                for (variant, software) in variants.flat_map(|v| [(v, true), (v, false)]) {
+                    let facts = Facts { lanes: true, software, half: true, words: true };
+                    let choice = Choice { variant, tuned: &Tuned::new(), facts };
+                    let kernel = Kernel::choose(&plan, step, &choice);
+                    assert!(
+                        (1..=room).contains(&kernel.tiles()),
+                        "{variant:?} {width}×{height}: {} of {room}",
+                        kernel.tiles()
+                    );
+                    let merge = plan.steps.iter().find(|s| matches!(s.kind, Kind::Merge { .. })).unwrap();
+                    assert_eq!(Kernel::choose(&plan, merge, &choice).tiles(), kernel.tiles());
+                    seen += 1;
+                    tight += usize::from(kernel.tiles() == room);
+                }
+            }
+        }
+    }
+    // Negative control: less room would not do.
+    assert!(seen > 10_000 && tight > 100, "{seen} {tight}");
 }
 
 proptest! {

@@ -12,6 +12,7 @@ fn word(v: vec2u) -> u64 { return u64(v.x) | (u64(v.y) << 32u); }
 fn numbers(w: u64) -> vec2f { return vec2f(bitcast<f32>(u32(w & 0xfffffffflu)), bitcast<f32>(u32(w >> 32u))); }
 
 fn store(at: u32, v: vec4f) { arena[at] = vec2<u64>(word(bitcast<vec2u>(v.xy)), word(bitcast<vec2u>(v.zw))); }
+fn store_full(at: u32, v: vec4f) { store(at, v); }
 fn load_full(at: u32) -> vec4f {
     let words = arena[at];
     return vec4f(numbers(words.x), numbers(words.y));

@@ -17,7 +17,7 @@ struct Step {
     blocks: u32,
     // Parts into which the sum over input channels is split.
     parts: u32,
-    // Channels and four-channel vectors of the input that one output reads; vectors from pixel to pixel.
+    // Channels of the input; four-channel vectors of it that one output reads; vectors from pixel to pixel.
     in_channels: u32,
     in_vectors: u32,
     in_pitch: u32,
@@ -26,7 +26,7 @@ struct Step {
     out_vectors: u32,
     out_pitch: u32,
     skip_pitch: u32,
-    // Output vectors that read the same input channels; in a norm, channels with common statistics.
+    // Output channels that read the same input channels; in a norm, channels with common statistics.
     group: u32,
     // Dropout: the operator's random stream, values below the threshold are dropped, the others multiplied by `keep`.
     stream: u32,
@@ -38,8 +38,11 @@ struct Step {
     epsilon: f32,
     // First output channel of a window.
     channel: u32,
-    // Tiles of a norm's moments.
+    // Tiles of a norm's moments, and place of those that a convolution takes.
     tiles: u32,
+    moments: u32,
+    // Input channels that a group of output channels reads.
+    group_inputs: u32,
 }
 
 @group(0) @binding(0) var<uniform> step: Step;

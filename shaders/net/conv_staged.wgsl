@@ -114,6 +114,13 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
             }
         }
     }
+    let tiles = groups.x * groups.y;
+    let measured = (place.phase.y * SPREAD + place.phase.x) * tiles + group.y * groups.x + group.x;
     write(a, place, tile, row, first + own);
-    if VECTORS > 1u { write(b, place, tile, row, first + own + 1u); }
+    close(0u, me);
+    if VECTORS > 1u {
+        write(b, place, tile, row, first + own + 1u);
+        close(1u, me);
+    }
+    gather(first, COLUMNS, measured, me);
 }

@@ -1,6 +1,6 @@
 // What follows a kernel's work: skip, activation, dropout, and the write.
 // From the prelude: ACTIVATION (`Activation::code`, 2 for all that are linear on both sides of zero), ADD (0 no skip, 1 before, 2 after
-// the activation), DROPOUT (0 or 1).
+// the activation), DROPOUT (0 or 1), OUT_FULL (1 if the output is 32 bits in an arena of 16).
 
 fn activate(x: vec4f) -> vec4f {
     // With a slope of 1 nothing, with 0 a ReLU.
@@ -29,8 +29,8 @@ fn dropped(v: vec4f, first: u32) -> vec4f {
     return kept;
 }
 
-// Finishes vector `vector` of output pixel `pixel`, counted row by row.
-fn finish(value: vec4f, pixel: u32, vector: u32) {
+// Finishes vector `vector` of output pixel `pixel`, counted row by row, and answers with what it has become.
+fn finish(value: vec4f, pixel: u32, vector: u32) -> vec4f {
     var v = value;
     if ADD == 1u { v += load(step.skip + pixel * step.skip_pitch + vector); }
     v = activate(v);
@@ -40,5 +40,7 @@ fn finish(value: vec4f, pixel: u32, vector: u32) {
     if ACTIVATION >= 4u && step.out_channels % 4u != 0u {
         v = select(vec4f(0.0), v, vec4u(vector * 4u) + vec4u(0u, 1u, 2u, 3u) < vec4u(step.out_channels));
     }
-    store(step.output + pixel * step.out_pitch + vector, v);
+    let to = pixel * step.out_pitch + vector;
+    if OUT_FULL == 1u { store_full(step.output + to * FULL, v); } else { store(step.output + to, v); }
+    return v;
 }

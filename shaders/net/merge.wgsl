@@ -18,15 +18,20 @@ fn union_of(a: vec3f, b: vec3f) -> vec3f {
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) me: u32) {
     let first = group.x * step.group;
-    let pixels = step.in_size.x * step.in_size.y;
+    let end = first + step.group;
+    // The vectors that hold the group, some of them in part.
+    let vectors = (end + 3u) / 4u - first / 4u;
     var own = vec3f(0.0);
-    for (var i = me; i < step.tiles * step.group; i += 64u) {
-        let tile = i / step.group;
-        let channel = first + i % step.group;
-        let at = step.input + (tile * 2u * step.in_vectors + channel / 4u) * FULL;
-        let mean = load_full(at)[channel % 4u];
-        let squares = load_full(at + step.in_vectors * FULL)[channel % 4u];
-        own = union_of(own, vec3f(f32(min(256u, pixels - tile * 256u)), mean, squares));
+    for (var i = me; i < step.tiles * vectors; i += 64u) {
+        let vector = first / 4u + i % vectors;
+        let at = step.input + (i / vectors * 3u * step.in_vectors + vector) * FULL;
+        let count = load_full(at).x;
+        let mean = load_full(at + step.in_vectors * FULL);
+        let squares = load_full(at + 2u * step.in_vectors * FULL);
+        for (var lane = 0u; lane < 4u; lane++) {
+            let channel = vector * 4u + lane;
+            if channel >= first && channel < end { own = union_of(own, vec3f(count, mean[lane], squares[lane])); }
+        }
     }
     parts[me] = own;
     for (var reach = 32u; reach > 0u; reach /= 2u) {

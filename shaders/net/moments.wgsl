@@ -1,5 +1,5 @@
-// The first level of a norm: for each tile of 256 pixels and each channel the mean and the sum of squared deviations from
-// it, in two passes, the second of which also mends the rounding of the first.
+// The first level of a norm whose input no convolution has measured: for each tile of 256 pixels and each channel the number of values,
+// their mean and the sum of squared deviations from it, in two passes, the second of which also mends the rounding of the first.
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -22,7 +22,8 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         squares += d * d;
     }
     let mend = rest / f32(count);
-    let to = step.output + (tile * 2u * step.in_vectors + vector) * FULL;
-    store_full(to, guess + mend);
-    store_full(to + step.in_vectors * FULL, max(squares - rest * mend, vec4f(0.0)));
+    let to = step.output + (tile * 3u * step.in_vectors + vector) * FULL;
+    store_full(to, vec4f(f32(count)));
+    store_full(to + step.in_vectors * FULL, guess + mend);
+    store_full(to + 2u * step.in_vectors * FULL, max(squares - rest * mend, vec4f(0.0)));
 }

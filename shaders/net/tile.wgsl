@@ -52,20 +52,24 @@ fn begin(bias: mat4x4f) {
     d = all_of(bias[3]);
 }
 
-// Writes the vectors that exist of the pixels that exist. A loop on purpose: unrolled it is most of a kernel's compilation.
-fn write() {
+// Writes the vectors that exist of the pixels that exist. Loops on purpose: unrolled they are most of a kernel's compilation.
+fn write(tile: u32, me: u32) {
     let first = place.block * VECTORS;
-    let end = min(VECTORS, step.out_vectors - first) * 8u;
     let size = made(place.phase);
     var sums = array(
         a.p0, a.p1, a.p2, a.p3, a.p4, a.p5, a.p6, a.p7, b.p0, b.p1, b.p2, b.p3, b.p4, b.p5, b.p6, b.p7,
         c.p0, c.p1, c.p2, c.p3, c.p4, c.p5, c.p6, c.p7, d.p0, d.p1, d.p2, d.p3, d.p4, d.p5, d.p6, d.p7,
     );
-    for (var i = 0u; i < end; i++) {
-        let at = corner + vec2u(i % 2u, i % 8u / 2u);
-        if all(at < size) {
-            let pixel = at * SPREAD + place.phase;
-            done(sums[i], place.part, pixel.y * step.out_size.x + pixel.x, first + i / 8u);
+    for (var v = 0u; v < VECTORS; v++) {
+        let end = select(0u, 8u, first + v < step.out_vectors);
+        for (var i = 0u; i < end; i++) {
+            let at = corner + vec2u(i % 2u, i / 2u);
+            if all(at < size) {
+                let pixel = at * SPREAD + place.phase;
+                done(sums[v * 8u + i], place.part, pixel.y * step.out_size.x + pixel.x, first + v);
+            }
         }
+        close(v, me);
     }
+    gather(first, 1u, tile, me);
 }

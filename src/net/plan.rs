@@ -6,6 +6,7 @@
 //! what it reads for the last time, if each thread reads just the element that it then writes (`place`).
 
 mod fuse;
+mod norm;
 mod place;
 mod types;
 
@@ -95,11 +96,12 @@ impl Plan {
             zero_bytes: 0,
             arena_bytes: 0,
         };
-        let mut builder = Builder { graph, shapes: &shapes, plan, index: HashMap::new(), inside: Vec::new() };
+        let mut builder =
+            Builder { graph, shapes: &shapes, plan, index: HashMap::new(), inside: Vec::new(), measure: options.fuse };
         builder.begin();
         let nodes = fuse::nodes(graph, &shapes, options);
         for node in &nodes {
-            builder.add(node);
+            builder.add(node, &nodes);
         }
         builder.end();
         if options.fuse {
@@ -137,6 +139,8 @@ struct Builder<'a> {
     /// Tensors by name.
     index: HashMap<&'a str, usize>,
     inside: Vec<Option<Inside>>,
+    /// Convolutions measure what they make for the norm that reads it.
+    measure: bool,
 }
 
 impl<'a> Builder<'a> {
@@ -165,6 +169,7 @@ impl<'a> Builder<'a> {
             dropout: None,
             fold: None,
             output,
+            moments: None,
             flops: 0,
             traffic: 0,
             parameters: 0,
@@ -173,7 +178,10 @@ impl<'a> Builder<'a> {
 
     fn push(&mut self, mut step: Step) {
         let bytes = if self.plan.precision == Precision::F16 { 2 } else { 4 };
-        let moved = step.reads().chain([step.output]).map(|t| self.plan.tensors[t].bytes());
+        // Of the picture that was measured a merge wants the size alone.
+        let merge = matches!(step.kind, Kind::Merge { .. });
+        let read = step.reads().filter(|t| !merge || step.second != Some(*t));
+        let moved = read.chain([step.output]).map(|t| self.plan.tensors[t].bytes());
         step.traffic = moved.sum::<u64>() + bytes * step.parameters;
         let time = self.plan.steps.len() + 1;
         for read in step.reads() {
@@ -218,7 +226,7 @@ impl<'a> Builder<'a> {
         self.plan.tensors[at].last = self.plan.steps.len() + 1;
     }
 
-    fn add(&mut self, node: &Node) {
+    fn add(&mut self, node: &Node, nodes: &[Node]) {
         let ops = &self.graph.ops;
         let name = ops[node.op].name();
         let last = node.merged.iter().copied().max().unwrap_or(node.op);
@@ -245,7 +253,13 @@ impl<'a> Builder<'a> {
             Work::Norm { groups, eps } => Some(self.measure(node, inputs[0], groups, eps)),
             _ => None,
         };
-        let output = self.output(last, shape);
+        // What a batch norm of its own scales is rounded but once, after it, as if it had been folded into the weights.
+        let mut readers = nodes.iter().filter(|n| n.inputs.iter().chain(&n.skip).any(|t| *t == node.output));
+        let unrounded = node.is_conv()
+            && node.output != self.graph.output
+            && readers.next().is_some_and(|n| n.work == Work::Affine && n.skip.is_none())
+            && readers.next().is_none();
+        let output = self.output(last, shape, unrounded);
         let step = self.step(name, Some(node.op), kind, inputs[0], output);
         self.push(Step {
             second: measured,
@@ -269,32 +283,16 @@ impl<'a> Builder<'a> {
         })
     }
 
-    fn output(&mut self, op: usize, shape: Shape) -> usize {
+    fn output(&mut self, op: usize, shape: Shape, full: bool) -> usize {
         let name = self.graph.ops[op].output();
-        let output = self.tensor(name, shape, false);
+        let output = self.tensor(name, shape, full);
         self.index.insert(name, output);
         output
     }
 
-    /// The two steps that lead to each channel's scale and shift.
-    fn measure(&mut self, node: &Node, input: usize, groups: u32, eps: f32) -> usize {
-        let name = self.graph.ops[node.op].name();
-        let shape = self.plan.tensors[input].shape;
-        let tiles = shape.pixels().div_ceil(TILE.into()) as u32;
-        let pair = Shape { channels: shape.vectors() * 8, height: 1, width: tiles };
-        let moments = self.tensor(&format!("{name}.moments"), pair, true);
-        self.push(self.step(&format!("{name}.moments"), Some(node.op), Kind::Moments, input, moments));
-        // Mean, scale and shift of each channel.
-        let three = Shape { channels: shape.vectors() * 12, height: 1, width: 1 };
-        let scale = self.tensor(&format!("{name}.scale"), three, true);
-        let step = self.step(&format!("{name}.scale"), Some(node.op), Kind::Merge { groups, eps }, moments, scale);
-        self.push(Step { second: Some(input), ..step });
-        scale
-    }
-
     /// One copy for each input. [`Builder::slice`] takes away those that their makers can write in place.
     fn concat(&mut self, node: &Node, inputs: &[usize], shape: Shape) {
-        let output = self.output(node.op, shape);
+        let output = self.output(node.op, shape, false);
         let name = self.graph.ops[node.op].name();
         let mut channel = 0;
         for input in inputs {

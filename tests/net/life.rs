@@ -194,28 +194,6 @@ fn dropout_drops_the_same_values_everywhere() {
     }
 }
 
-/// Values far from zero, where a sum of squares in f32 has lost the variance.
-#[test]
-fn norms_of_large_means_are_sound() {
-    let norm = |groups: u32| json!([{"op": "group_norm", "name": "y", "input": "input", "output": "y", "channels": 6, "groups": groups}]);
-    let mut input = hashed::input("x", 6, [83, 59]);
-    input.data.iter_mut().for_each(|v| *v += 4000.0);
-    let n = input.data.len() as f32 / 2.0;
-    let group = &input.data[..n as usize];
-    let (sum, squares) = group.iter().fold((0f32, 0f32), |(s, q), v| (s + v, q + v * v));
-    let naive = squares / n - (sum / n) * (sum / n);
-    assert!((naive * 3.0 - 1.0).abs() > 0.1, "negative control: the variance, 1/3, comes out as {naive}");
-    let Some(gpu) = common::gpu() else { return };
-    for groups in [1, 2, 6] {
-        let weights = hashed::network(&graph(6, norm(groups)));
-        let twin = cpu::run(&weights, &input).unwrap();
-        let e = error(&run_gpu(&gpu, &weights, &input, Options::default()).data, &twin.data);
-        println!("{groups} groups: {e:.1e}");
-        // The mean itself, 4000, is known to a few 1e-4 only in f32.
-        assert!(e <= 2e-3, "{groups} groups: {e}");
-    }
-}
-
 /// Layers as wide as the paper's, whose weights fit no uniform binding: as chosen here, staged, and with their sums in parts.
 #[test]
 fn wide_layers_agree_with_the_cpu_twin() {

@@ -5,6 +5,7 @@
 mod common;
 mod hashed;
 mod life;
+mod norms;
 mod operators;
 mod tap;
 mod tune;

@@ -151,22 +151,30 @@ fn the_kernels_agree_in_every_way() {
     }
 }
 
-/// Groups of whole vectors read their own channels only, in every kind of kernel.
+/// Groups read the vectors that they touch only, in every kind of kernel: whole vectors, parts of them, and single channels.
 #[test]
 fn groups_read_their_own() {
     let Some(gpu) = common::gpu() else { return };
-    let conv = |groups: u32, kernel: u32, stride: u32| {
-        serde_json::json!({"op": "conv2d", "name": "c", "input": "input", "output": "y", "in_channels": 16, "out_channels": 24 * groups / 2,
-            "kernel": [kernel, kernel], "stride": stride, "padding": kernel / 2, "groups": groups, "activation": "none"})
-    };
-    for (groups, kernel, stride) in [(2, 3, 1), (4, 3, 2), (2, 1, 1)] {
+    let pipelines = Pipelines::default();
+    // Input and output channels, groups, kernel, stride; vectors that an output reads, and whether groups are whole vectors.
+    for ([inputs, outputs, groups, kernel, stride], read, whole) in [
+        ([16, 24, 2, 3, 1], 2, true),
+        ([16, 48, 4, 3, 2], 1, true),
+        ([16, 24, 2, 1, 1], 2, true),
+        ([22, 22, 22, 3, 1], 1, false),
+        ([22, 44, 22, 4, 2], 1, false),
+        ([30, 20, 10, 3, 1], 2, false),
+        ([36, 60, 12, 1, 1], 3, false),
+        // More than half of all: as one.
+        ([18, 18, 3, 3, 1], 5, false),
+    ] {
         let name = "grouped";
+        let ops = serde_json::json!([{"op": "conv2d", "name": "c", "input": "input", "output": "y", "in_channels": inputs,
+            "out_channels": outputs, "kernel": [kernel, kernel], "stride": stride, "padding": kernel / 2, "groups": groups}]);
         let graph =
-            hashed::graphs(&serde_json::json!({name: {"input_channels": 16, "ops": [conv(groups, kernel, stride)]}}))
-                [name]
-                .clone();
+            hashed::graphs(&serde_json::json!({name: {"input_channels": inputs, "ops": ops}})).remove(name).unwrap();
         let weights = hashed::network(&graph);
-        let input = hashed::input(name, 16, [7, 9]);
+        let input = hashed::input(name, inputs, [7, 9]);
         let twin = cpu::run(&weights, &input).unwrap();
         for variant in [
             fixed(Source::Lanes, true, 4),
@@ -177,14 +185,22 @@ fn groups_read_their_own() {
             Variant::Plain,
         ] {
             let options = Options { variant, ..FULL };
-            let network = Network::with_options(&gpu.device, &gpu.queue, &weights, [7, 9], options).unwrap();
-            let filter = network.kernels().find_map(|k| k.filter).unwrap();
+            let handles = (&gpu.device, &gpu.queue);
+            let network =
+                Network::sharing(handles, &weights, [7, 9], options, Arc::default(), pipelines.clone()).unwrap();
+            let kernel = network.kernels().find(|k| k.filter.is_some()).unwrap();
+            let filter = kernel.filter.unwrap();
             let dense = variant == Variant::Plain;
-            assert_eq!(filter.in_vectors, if dense { 4 } else { 4 / groups }, "{variant:?}");
+            assert_eq!(filter.in_vectors, if dense { inputs.div_ceil(4) } else { read }, "{variant:?}");
+            assert!(whole || dense || kernel.vectors == 1 || read == inputs.div_ceil(4), "{variant:?}");
             let found = run_network(&gpu, &network, &input);
             let e = hashed::error(&found.data, &twin.data);
             assert!(e <= TOLERANCE && found.shape == twin.shape, "{groups} groups, {variant:?}: relative error {e}");
         }
+        // Negative control: neighbours' channels moved by one group are not what is read.
+        let mut moved = input.clone();
+        moved.data.rotate_right((inputs / groups) as usize * 63);
+        assert!(hashed::error(&cpu::run(&weights, &moved).unwrap().data, &twin.data) > 100.0 * TOLERANCE);
     }
 }
 

@@ -7,7 +7,7 @@ use bouncelight::net::tune::{Cache, CacheError, MAX_TEXT, VERSION, tune};
 use bouncelight::wgpu::{AdapterInfo, Backend, DeviceType};
 use std::sync::Arc;
 
-const GOOD: &str = r#"{"version": 3, "devices": {"a | Vulkan | d 1": {"layer": {"permutation":
+const GOOD: &str = r#"{"version": 4, "devices": {"a | Vulkan | d 1": {"layer": {"permutation":
     {"weights": "uniform", "mirror": false, "vectors": 2}, "ms": 0.5}}}}"#;
 
 fn info(name: &str, driver_info: &str) -> AdapterInfo {
@@ -20,7 +20,7 @@ fn info(name: &str, driver_info: &str) -> AdapterInfo {
 fn a_cache_survives_its_text_and_knows_its_device() {
     let cache = Cache::parse(GOOD).unwrap();
     assert_eq!(Cache::parse(&cache.text()).unwrap(), cache);
-    assert_eq!(VERSION, 3, "adapt the texts here");
+    assert_eq!(VERSION, 4, "adapt the texts here");
     let known = cache.tuned(&info("a", "1"));
     assert_eq!(known["layer"], Permutation::new(Source::Uniform, false, 2));
     // Negative control: another adapter, another driver.
@@ -54,7 +54,7 @@ fn foreign_caches_are_refused() {
         assert!(matches!(Cache::parse(&GOOD.replace(from, to)), Err(CacheError::Numbers(_))), "{to}");
     }
     assert!(Cache::parse(&GOOD.replace("\"ms\": 0.5", "\"ms\": 1e999")).is_err());
-    assert!(matches!(Cache::parse(&GOOD.replace(": 3,", ": 2,")), Err(CacheError::Version { found: 2 })));
+    assert!(matches!(Cache::parse(&GOOD.replace(": 4,", ": 2,")), Err(CacheError::Version { found: 2 })));
     assert!(matches!(Cache::parse(&" ".repeat(MAX_TEXT + 1)), Err(CacheError::Long(_))));
 }
 
@@ -115,7 +115,7 @@ fn a_corrupt_cache_is_told_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let cache = folder.path().join("deep/tuned.json");
     std::fs::create_dir_all(cache.parent().unwrap()).unwrap();
-    std::fs::write(&cache, "{\"version\": 3, \"dev").unwrap();
+    std::fs::write(&cache, "{\"version\": 4, \"dev").unwrap();
     let run = || {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_bouncelight"));
         command.args(["weights", "tune", "--size", "8x8"]).arg(fixture("conv1x1.safetensors"));

@@ -38,6 +38,8 @@ pub struct StepUniform {
     epsilon: f32,
     channel: u32,
     tiles: u32,
+    moments: u32,
+    group_inputs: u32,
 }
 
 /// Distance of uniforms in their buffer, and alignment of weights: WebGPU's default alignment of bindings.
@@ -203,11 +205,10 @@ fn uniform(plan: &Plan, step: &Step, (numbers, part): (&Numbers, &Part), seed: O
     // An arena is one binding, so a place counted in its elements fits.
     let place = |t: usize| (plan.tensors[t].offset / element) as u32;
     let mut in_size = [input.shape.width, input.shape.height];
-    let (mut epsilon, mut channel, mut tiles) = (0.0, 0, output.shape.width);
+    let (mut epsilon, mut channel) = (0.0, 0);
     match step.kind {
         Kind::Merge { eps, .. } => {
-            // The moments' picture, and how many tiles it was cut into.
-            tiles = input.shape.width;
+            // The moments' picture.
             let picture = step.second.map_or(input.shape, |s| plan.tensors[s].shape);
             in_size = [picture.width, picture.height];
             epsilon = eps;
@@ -245,7 +246,9 @@ fn uniform(plan: &Plan, step: &Step, (numbers, part): (&Numbers, &Part), seed: O
         slope: step.activation.slope(),
         epsilon,
         channel,
-        tiles,
+        tiles: numbers.tiles,
+        moments: step.moments.map_or(0, place),
+        group_inputs: numbers.group_inputs,
     }
 }
 

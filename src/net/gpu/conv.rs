@@ -9,6 +9,8 @@ use super::kernels::{Bound, Choice, GROUP, Kernel, Part, Prelude, Sum, THREADS, 
 use super::permutation::{Layer, Permutation, Source, Variant};
 use crate::net::graph::Shape;
 
+/// Vectors side by side in a workgroup that adds up and measures, as in `sum_measured.wgsl`.
+const SUM_COLUMNS: u32 = 8;
 /// WebGPU's default limit of workgroups in one dimension.
 const MAX_DEPTH: u32 = 65535;
 
@@ -84,12 +86,16 @@ impl Kernel {
     ) -> String {
         let out = plan.tensors[step.output].shape;
         let Phases { filter, pad, base } = self.phases(step, plan, choice);
+        let group = channels_of_a_group(step.kind, plan.tensors[step.input].shape, out);
         let size = [out.width, out.height];
         let layer = Layer { filter, out_vectors: out.vectors(), size, precision: plan.precision };
         let permutation = layer.permutation(choice.variant, choice.tuned, plan, choice.facts);
         let row = matches!(step.kind, Kind::Conv { kernel: [3, 3], stride: 1, nearest: 1, padding, .. } if padding == Padding::all(1));
-        self.pairs = row && permutation.is_some_and(|p| p.weights == Source::Lanes);
-        let filter = if self.pairs { Filter { taps: [3, 4], ..filter } } else { filter };
+        if row && permutation.is_some_and(|p| p.weights == Source::Lanes) {
+            // In 16 bits the larger transform would cost accuracy.
+            self.winograd = if plan.precision == Precision::F16 { 2 } else { 4 };
+        }
+        let filter = if self.winograd > 0 { Filter { taps: [3, self.winograd + 2], ..filter } } else { filter };
         (self.filter, self.layer, self.permutation) = (Some(filter), Some(layer), permutation);
         let plain = Permutation::new(Source::Storage, false, out.vectors().min(2));
         let Permutation { weights, mirror, vectors, parts, half } = permutation.unwrap_or(plain);
@@ -118,14 +124,22 @@ impl Kernel {
         };
         self.parts = (0..all).step_by(self.blocks_per_part as usize).map(part).collect();
         (self.numbers.pad, self.numbers.base, self.numbers.blocks) = (pad, base, blocks);
-        (self.numbers.in_vectors, self.numbers.group) = (filter.in_vectors, filter.group_vectors);
+        self.numbers.in_vectors = filter.in_vectors;
+        [self.numbers.group_inputs, self.numbers.group] = group;
         self.numbers.parts = parts;
         if parts > 1 {
             let vectors = out.pixels() as u32 * out.vectors();
-            let [x, y] = in_rows(vectors.div_ceil(THREADS));
-            let shader = if plan.precision == Precision::F16 { "net.sum_half" } else { "net.sum" };
-            let bytes = layer.partial_bytes(parts);
-            self.sum = Some(Sum { shader: shader.into(), prelude: prelude.text(), groups: [x, y, 1], bytes });
+            let [mut x, mut y] = in_rows(vectors.div_ceil(THREADS));
+            let half = if plan.precision == Precision::F16 { "_half" } else { "" };
+            let mut text = prelude.text();
+            let mut measured = "";
+            if step.moments.is_some() {
+                (x, y) = ((out.pixels() as u32).div_ceil(THREADS), out.vectors().div_ceil(SUM_COLUMNS));
+                (self.numbers.tiles, measured) = (x, "_measured");
+                text += &format!("const THREADS = {THREADS}u;\nconst MADE = 1u;\n");
+            }
+            let (shader, bytes) = (format!("net.sum{half}{measured}"), layer.partial_bytes(parts));
+            self.sum = Some(Sum { shader, prelude: text, groups: [x, y, 1], bytes });
         }
         prelude.add("KERNEL_H", filter.taps[0]);
         prelude.add("KERNEL_W", filter.taps[1]);
@@ -138,16 +152,25 @@ impl Kernel {
         }
         let cut = if parts > 1 { "_parts" } else { "" };
         let [columns, rows] = size.map(|edge| edge.div_ceil(filter.spread));
+        // Each phase's workgroups in x and y measure what they make.
+        let phases = filter.spread * filter.spread;
+        let tiles =
+            |kernel: &Self| if parts > 1 { kernel.numbers.tiles } else { phases * kernel.groups[0] * kernel.groups[1] };
+        prelude.add("MADE", if permutation.is_none() { 1 } else { vectors });
         if permutation.is_none() {
+            prelude.add("THREADS", THREADS);
             self.groups = [columns.div_ceil(GROUP[0]), rows.div_ceil(GROUP[1])];
             self.parts.iter_mut().for_each(|p| p.depth *= vectors);
+            self.numbers.tiles = tiles(self);
             return "conv_plain".into();
         }
         if staged {
             let stage = Stage::of(&layer, vectors);
             prelude.add("COLUMNS", stage.columns);
             prelude.add("PIXELS", stage.pixels);
+            prelude.add("THREADS", THREADS);
             self.groups = in_rows(stage.groups(&layer));
+            self.numbers.tiles = tiles(self);
             // A workgroup makes several of the blocks as they are stored.
             self.numbers.blocks = out.vectors().div_ceil(stage.columns * vectors);
             self.parts[0].depth = self.numbers.blocks * filter.spread * filter.spread * parts;
@@ -155,11 +178,12 @@ impl Kernel {
             prelude.feature = if half { "enable f16;\n" } else { "" };
             return format!("conv_staged{arithmetic}{cut}");
         }
-        let [wide, high] = if self.pairs { [4, 4] } else { [2, 4] };
+        let [wide, high] = if self.winograd > 0 { [4, 4] } else { [2, 4] };
         // A processor needs no more threads than its vectors are wide, and smaller groups share small pictures out better.
         let threads = if choice.facts.software { THREADS / 4 } else { THREADS };
         prelude.add("THREADS", threads);
         self.groups = in_rows((columns.div_ceil(wide) * rows.div_ceil(high)).div_ceil(threads));
+        self.numbers.tiles = tiles(self);
         let family = if row { "conv3x3" } else { "conv_any" };
         let input = if mirror && self.bound != Bound::Texture { "_mirror" } else { "" };
         let weights = match self.bound {
@@ -181,10 +205,9 @@ impl Kernel {
                 Phases { filter, pad: [taps[1] as i32 - 1, taps[0] as i32 - 1], base: [padding as i32; 2] }
             }
             Kind::Conv { kernel, stride, padding, nearest, groups } => {
-                // Groups of whole vectors read their own; others run as one, with zeros for what they do not see.
-                let whole = [input.channels, out.channels].iter().all(|n| n.is_multiple_of(4 * groups));
-                let groups = if whole && choice.variant != Variant::Plain { groups } else { 1 };
-                let [in_vectors, group_vectors] = [input, out].map(|s| s.vectors() / groups);
+                let grouped = choice.variant != Variant::Plain;
+                let [in_vectors, group_vectors] =
+                    if grouped { read_of(input, out, groups) } else { read_of(input, out, 1) };
                 let pad = [padding.left as i32, padding.top as i32];
                 if nearest > 1 && stride == 1 && choice.variant != Variant::Plain {
                     self.enlarged = Some((nearest, pad));
@@ -202,6 +225,30 @@ impl Kernel {
                 Phases { filter, pad: [0, 0], base: [0, 0] }
             }
         }
+    }
+}
+
+/// Input and output channels of one of the groups that do not see each other.
+fn channels_of_a_group(kind: Kind, input: Shape, out: Shape) -> [u32; 2] {
+    let groups = if let Kind::Conv { groups, .. } = kind { groups.max(1) } else { 1 };
+    [input, out].map(|s| (s.channels / groups).max(1))
+}
+
+/// Vectors that an output reads, and how many output vectors read the same. Groups of whole vectors read their own. Where groups begin
+/// within vectors each output vector reads those that its groups touch; if these are more than half of all, every one reads all.
+fn read_of(input: Shape, out: Shape, groups: u32) -> [u32; 2] {
+    let all = [input, out].map(Shape::vectors);
+    let [inputs, outputs] = [input, out].map(|s| s.channels / groups);
+    if inputs.is_multiple_of(4) && outputs.is_multiple_of(4) {
+        return all.map(|n| n / groups);
+    }
+    let touched = |vector: u32| {
+        let [first, last] = [vector * 4, (vector * 4 + 3).min(out.channels - 1)].map(|channel| channel / outputs);
+        ((last + 1) * inputs).div_ceil(4) - first * inputs / 4
+    };
+    match (0..all[1]).map(touched).max() {
+        Some(most) if 2 * most <= all[0] => [most, 1],
+        _ => all,
     }
 }
 

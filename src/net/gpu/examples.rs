@@ -16,13 +16,16 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
             {
                 &[[0, 0, 0]]
             }
-            _ if ["_half", "_mirror", "_wide", "_parts", "_words"].iter().any(|s| shader.contains(s)) => {
+            _ if ["_half", "_mirror", "_wide", "_parts", "_words", "_measured"].iter().any(|s| shader.contains(s)) => {
                 &[[2, 0, 0], [3, 1, 0], [6, 2, 1]]
             }
             _ => &[[2, 0, 0], [2, 1, 0], [2, 2, 0], [3, 0, 1], [4, 1, 1], [5, 2, 0], [6, 0, 0], [7, 0, 0]],
         };
         for [activation, add, dropout] in epilogues {
-            let epilogue = lines(&[("ACTIVATION", *activation), ("ADD", *add), ("DROPOUT", *dropout)]);
+            let mut epilogue = lines(&[("ACTIVATION", *activation), ("ADD", *add), ("DROPOUT", *dropout)]);
+            if !shader.contains("window") {
+                epilogue += &lines(&[("OUT_FULL", *dropout)]);
+            }
             let kinds: Vec<String> = if shader.contains("conv3x3") {
                 (1..=4).map(|v| kernel([3, 1, 1, 1], v)).collect()
             } else if shader.contains("staged") {
@@ -38,6 +41,10 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
             } else if shader.contains("window") {
                 let kinds = [[0, 0], [1, 1], [0, 1]];
                 kinds.map(|[c, f]| lines(&[("CLAMP", c), ("IN_FULL", f), ("OUT_FULL", f)])).to_vec()
+            } else if shader.contains("norm") {
+                [0, 1].map(|full| lines(&[("IN_FULL", full)])).to_vec()
+            } else if shader.contains("sum") {
+                vec![lines(&[("MADE", 1)])]
             } else if shader.contains("upsample") {
                 [0, 1].map(|double| lines(&[("DOUBLE", double)])).to_vec()
             } else if shader.contains("shuffle") {
@@ -54,6 +61,6 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
 
 fn kernel([edge, stride, spread, nearest]: [u32; 4], vectors: u32) -> String {
     format!(
-        "const KERNEL_H = {edge}u;\nconst KERNEL_W = {edge}u;\nconst STRIDE = {stride}u;\nconst SPREAD = {spread}u;\nconst NEAREST = {nearest}u;\nconst VECTORS = {vectors}u;\n"
+        "const KERNEL_H = {edge}u;\nconst KERNEL_W = {edge}u;\nconst STRIDE = {stride}u;\nconst SPREAD = {spread}u;\nconst NEAREST = {nearest}u;\nconst VECTORS = {vectors}u;\nconst MADE = {vectors}u;\n"
     )
 }

@@ -70,6 +70,8 @@ pub struct Numbers {
     pub(super) out_pitch: u32,
     pub(super) skip_pitch: u32,
     pub(super) group: u32,
+    pub(super) tiles: u32,
+    pub(super) group_inputs: u32,
 }
 
 /// How one step runs.
@@ -87,8 +89,8 @@ pub struct Kernel {
     pub layer: Option<ConvLayer>,
     /// For convolutions of an enlarged input whose taps are merged: the factor and the padding before.
     pub enlarged: Option<(u32, [i32; 2])>,
-    /// Weights of 3×3 taps come transformed for Winograd's F(2, 3) along rows: 3×4 matrices.
-    pub pairs: bool,
+    /// Weights of 3×3 taps come transformed for Winograd's F(n, 3) along rows, 3×(n + 2) matrices: n, or 0 where they do not.
+    pub winograd: u32,
     /// For blocked convolutions.
     pub permutation: Option<Permutation>,
     /// It reads its input and its skip from the mirror.
@@ -122,6 +124,7 @@ impl Kernel {
             prelude.add("ACTIVATION", step.activation.code());
             prelude.add("ADD", add);
             prelude.add("DROPOUT", step.dropout.is_some().into());
+            prelude.add("OUT_FULL", (half && output.full).into());
         }
         let numbers = Numbers {
             pad: [0, 0],
@@ -136,6 +139,8 @@ impl Kernel {
             out_pitch: output.pitch,
             skip_pitch: step.skip.map_or(0, |s| plan.tensors[s].pitch),
             group: 1,
+            tiles: 0,
+            group_inputs: 0,
         };
         let mut kernel = Kernel {
             shader: String::new(),
@@ -144,7 +149,7 @@ impl Kernel {
             filter: None,
             layer: None,
             enlarged: None,
-            pairs: false,
+            winograd: 0,
             permutation: None,
             mirror: false,
             vectors: 0,
@@ -178,7 +183,8 @@ impl Kernel {
             }
             Kind::Moments => {
                 // At most 2^26 pixels and 1,024 vectors.
-                kernel.groups = in_rows((output.shape.width * input.shape.vectors()).div_ceil(THREADS));
+                kernel.numbers.tiles = out.width;
+                kernel.groups = in_rows((out.width * input.shape.vectors()).div_ceil(THREADS));
                 kernel.parts[0].depth = 1;
                 "moments".into()
             }
@@ -188,6 +194,8 @@ impl Kernel {
                 kernel.numbers.in_vectors = picture.vectors();
                 kernel.numbers.out_channels = picture.channels;
                 kernel.numbers.group = picture.channels / groups.max(1);
+                let maker = plan.steps.iter().find(|s| s.moments.unwrap_or(s.output) == step.input);
+                kernel.numbers.tiles = maker.map_or(0, |maker| Self::choose(plan, maker, choice).numbers.tiles);
                 kernel.groups = [groups, 1];
                 kernel.parts[0].depth = 1;
                 kernel.bound = Bound::Vectors(2 * picture.vectors());
@@ -205,6 +213,7 @@ impl Kernel {
             }
         };
         if matches!(step.kind, Kind::Scale { .. }) {
+            prelude.add("IN_FULL", (half && input.full).into());
             kernel.groups[1] = out.height.div_ceil(GROUP[1] * ROWS_OF_SCALE);
         }
         let light = matches!(step.kind, Kind::Upsample | Kind::Copy | Kind::Moments | Kind::Scale { .. });
@@ -218,7 +227,8 @@ impl Kernel {
             (false, true) => "_words",
             (false, false) => "",
         };
-        kernel.shader = format!("net.{shader}{mirror}{kind}");
+        let measured = if step.moments.is_some() && kernel.sum.is_none() { "_measured" } else { "" };
+        kernel.shader = format!("net.{shader}{mirror}{kind}{measured}");
         kernel.prelude = prelude.text();
         kernel
     }
@@ -226,6 +236,11 @@ impl Kernel {
     /// Workgroups of a dispatch.
     pub fn workgroups(&self, part: &Part) -> [u32; 3] {
         [self.groups[0], self.groups[1], part.depth]
+    }
+
+    /// Tiles of the moments that it writes or reads: of a convolution that measures what it makes one a workgroup and vector of channels.
+    pub fn tiles(&self) -> u32 {
+        self.numbers.tiles
     }
 
     /// Bytes of a texel of weights.

@@ -4,7 +4,7 @@
 //! each input vector, tap row, tap column and output vector of the block one 4×4 matrix, which takes four input channels to four
 //! output channels. (For staged kernels input vectors come within taps.) All blocks of one phase come before those of the next. Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
 //! of stride s is s² ordinary ones, each of which makes every s-th pixel (its phase) in both directions. Where the kernel works by
-//! Winograd's F(2, 3), three neighbouring taps become four.
+//! Winograd's F(n, 3), three neighbouring taps become n + 2.
 
 use super::conv::Filter;
 use super::kernels::{Bound, Kernel, Part};
@@ -55,6 +55,16 @@ fn fixed(weights: &Weights, op: &Op) -> Vec<Vec<f32>> {
     vec![weights.values(op.name(), "running_mean").to_vec(), scale.collect(), bias]
 }
 
+/// Three neighbouring taps as Winograd's F(2, 3) or F(4, 3) wants them (Lavin and Gray 2016).
+fn winograd(n: u32, left: f64, middle: f64, right: f64) -> [f64; 6] {
+    let (outer, far) = (left + right, left + 4.0 * right);
+    if n == 2 {
+        return [left, (outer + middle) / 2.0, (outer - middle) / 2.0, right, 0.0, 0.0];
+    }
+    let [near, wide] = [middle / 6.0, middle / 12.0];
+    [left / 4.0, -outer / 6.0 - near, near - outer / 6.0, far / 24.0 + wide, far / 24.0 - wide, right]
+}
+
 /// A convolution's numbers, a folded batch norm multiplied in.
 struct Layer<'a> {
     weight: &'a [f32],
@@ -73,7 +83,7 @@ struct Layer<'a> {
     pad: [i32; 2],
     base: [i32; 2],
     enlarged: Option<(u32, [i32; 2])>,
-    pairs: bool,
+    winograd: u32,
 }
 
 impl<'a> Layer<'a> {
@@ -105,7 +115,7 @@ impl<'a> Layer<'a> {
             pad: kernel_choice.numbers.pad,
             base: kernel_choice.numbers.base,
             enlarged: kernel_choice.enlarged,
-            pairs: kernel_choice.pairs,
+            winograd: kernel_choice.winograd,
         }
     }
 
@@ -121,9 +131,9 @@ impl<'a> Layer<'a> {
                 return 0.0;
             }
             let first = (o * inputs + i % inputs) * kh * kw;
-            if self.pairs {
+            if self.winograd > 0 {
                 let [left, middle, right] = [0, 1, 2].map(|x| f64::from(self.weight[first + ky * kw + x]));
-                let mixed = [left, (left + middle + right) / 2.0, (left - middle + right) / 2.0, right][kx];
+                let mixed = winograd(self.winograd, left, middle, right)[kx];
                 return (f64::from(self.scale[o]) * mixed) as f32;
             }
             let Some((factor, pad)) = self.enlarged else {
@@ -177,9 +187,9 @@ impl<'a> Layer<'a> {
             let first = block % blocks * 4 * vectors;
             let bias = |i: usize| if i < 4 * vectors { self.bias.get(first + i).copied().unwrap_or(0.0) } else { 0.0 };
             (0..16).for_each(|i| put(bias(i)));
-            // The channels that the block's group reads; all of them where groups run as one.
-            let grouped = self.filter.in_vectors as usize * 4 < self.in_channels;
-            let begin = if grouped { first / self.group[1] * self.group[0] } else { 0 };
+            // The first channel that the block reads, as in make.wgsl.
+            let own = first / self.group[1].max(1) * self.group[0] / 4;
+            let begin = 4 * own.min(self.in_channels.div_ceil(4) - self.filter.in_vectors as usize);
             // One tap of one input vector. Column-major: column k takes input channel k to the four outputs.
             let mut matrices = |c: usize, tap: usize| {
                 let (ky, kx) = (tap / self.filter.taps[1] as usize, tap % self.filter.taps[1] as usize);

@@ -235,8 +235,8 @@ impl Layer {
         let grouped = self.filter.group_vectors < self.out_vectors;
         let matrices = self.filter.matrices(vectors);
         let blocks = self.out_vectors.div_ceil(vectors) * self.filter.spread * self.filter.spread;
-        // Weights of 3×3 taps take a third more when they are transformed.
-        let texels = (matrices * u64::from(blocks) * 4).div_ceil(3) * 4;
+        // Weights of 3×3 taps take up to twice as much when they are transformed.
+        let texels = matrices * u64::from(blocks) * 4 * 2;
         let weights = match wanted.weights {
             Source::Lanes if facts.lanes && mirror && texels.div_ceil(ROW) <= MAX_ROWS => Source::Lanes,
             Source::Staged if !grouped && self.stored_blocks() <= self.storage_blocks(1).min(MAX_STAGED) => {

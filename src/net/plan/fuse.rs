@@ -127,7 +127,7 @@ impl Node {
         self.skip.is_none() && self.activation == Activation::None && self.dropout.is_none() && self.fold.is_none()
     }
 
-    fn is_conv(&self) -> bool {
+    pub(super) fn is_conv(&self) -> bool {
         matches!(self.work, Work::Conv { .. } | Work::Transposed { .. })
     }
 }

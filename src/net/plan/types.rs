@@ -109,7 +109,7 @@ pub enum Kind {
     },
     /// The input itself.
     Copy,
-    /// Mean and sum of squared deviations of each channel in tiles of [`TILE`] pixels; no epilogue.
+    /// Number, mean and sum of squared deviations of each channel's values in tiles of [`TILE`] pixels; no epilogue.
     Moments,
     /// From those to scale and shift of each channel; no epilogue.
     Merge {
@@ -157,6 +157,9 @@ pub struct Step {
     pub fold: Option<usize>,
     /// Index of the tensor written.
     pub output: usize,
+    /// Index of the tensor into which a convolution writes the moments of its output: for as many tiles as it takes workgroups, which
+    /// depends on the kernel; the tensor has room for the most.
+    pub moments: Option<usize>,
     /// Floating-point operations, those of fused operators included.
     pub flops: u64,
     /// Bytes moved at least once: input, skip, weights and output.
@@ -225,6 +228,9 @@ impl Row {
         }
         if step.dropout.is_some() {
             kind.push_str(", dropout");
+        }
+        if step.moments.is_some() {
+            kind.push_str(" + moments");
         }
         let (shape, offset, bytes) = (tensor.shape, tensor.offset, tensor.bytes());
         let Step { name, parameters, flops, traffic, .. } = step.clone();
