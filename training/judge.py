@@ -4,7 +4,9 @@
     python training/judge.py out/judge data/judge [../shared/reference/cycles] [--rooms 0,27,2200-2239] [--methods direct,ambient,...]
                              [--samples 4] [--constant 0.0592,0.0631,0.0570] [--csv out/judge.csv] [--bouncelight target/release/bouncelight]
 
-A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file.
+A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file. `apply:FILE` is a network on
+pictures (the paper's, pix2pix/): `bouncelight apply` on the four pictures of the raster; `dropout:FILE` is the same with dropout on,
+as the authors ran theirs. Both give 8-bit pictures, so they have no relmse and no light.
 
 A folder of references holds either roomIIII_view0.exr, as cycles/paper_rooms.py writes them, or one folder a scene with scene.glb,
 frame0000.exr and meta.json. Rooms are averaged into one row a method; other scenes get a row each. With --rooms only these are taken, and
@@ -13,7 +15,7 @@ if the same program drew it with the same weights and samples (stamps.json besid
 neither it nor the reference is newer, so a killed run goes on where it stopped.
 
 Rows that are no methods: with --constant, that one ambient light (E/pi; python -m bouncelight_training.baseline fits it to the
-training rooms), the floor that everything else has to pass; `best constant` is fitted to each picture itself, by least absolute error
+training rooms), the floor that everything else has to pass (0.0508761, the sky's radiance, is the raster picture that the paper's network starts from); `best constant` is fitted to each picture itself, by least absolute error
 before the view transform: nobody can know it, it is there for scale.
 
 `light` is the error of the diffuse light that direct lighting misses: mean |difference| / mean after 4x4 pooling, on pixels with
@@ -28,11 +30,14 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 
 import numpy as np
 import OpenEXR
+from PIL import Image
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from bouncelight_training.pix2pix.pairs import PICTURES, inputs_of  # noqa: E402
 from bouncelight_training.stream import indices  # noqa: E402
 
 METRICS = ["l1", "l2", "paper-ssim", "fid", "psnr", "ssim", "flip", "relmse", "light"]
@@ -146,6 +151,22 @@ def references(folder, rooms=None):
             yield name, name, [os.path.join(path, "scene.glb"), *flags], os.path.join(path, "frame0000.exr")
 
 
+def draw(program, scene, row, path, size, samples, inputs):
+    """Draws `row` = (kind, weights) of a scene into `path`. `inputs`: the raster's EXR, for networks on pictures."""
+    kind, weights = row
+    if kind in ("apply", "dropout"):
+        with tempfile.TemporaryDirectory() as folder:
+            flags = []
+            for name, picture in zip(PICTURES, inputs_of(inputs)):
+                flags += [f"--{name}", os.path.join(folder, f"{name}.png")]
+                Image.fromarray(picture).save(flags[-1])
+            command = [program, "apply", *flags, "--weights", weights, "-o", path, "-q"]
+            subprocess.run(command + (["--dropout", "1"] if kind == "dropout" else []), check=True)
+        return
+    command = [program, "render", *scene, "-o", path, "--size", size, "--method", kind, "--samples", str(samples), "--aov", "all", "-q"]
+    subprocess.run(command + (["--weights", weights] if weights else []), check=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", help="folder for our pictures")
@@ -169,7 +190,7 @@ def main():
     def compare(group, name, row, ours, reference, light=float("nan")):
         r = compared(a.bouncelight, ours, reference)
         paper, display, linear = r["paper"], r["display"], r["linear"]
-        values = [paper["l1"], paper["l2"], paper["ssim"], paper["fid"], display["psnr"], display["ssim"], r["flip"], linear["rel_mse"], light]
+        values = [paper["l1"], paper["l2"], paper["ssim"], paper["fid"], display["psnr"], display["ssim"], r["flip"], linear["rel_mse"] if linear else float("nan"), light]
         rows.setdefault(group, {}).setdefault(row, []).append(values)
         record.append([name, row, *values])
 
@@ -179,15 +200,15 @@ def main():
         for method in ["direct"] + [m for m in a.methods if m != "direct"]:
             kind, _, weights = method.partition(":")
             row = f"{kind} {os.path.splitext(os.path.basename(weights))[0]}".strip()
-            path = os.path.join(a.out, f"{name}_{row.replace(' ', '_')}.exr")
+            picture = kind in ("apply", "dropout")
+            path = os.path.join(a.out, f"{name}_{row.replace(' ', '_')}.{'png' if picture else 'exr'}")
             stamp = f"{program} {digest(weights) if os.path.exists(weights) else weights} {a.samples} {width}x{height}"
             if not stamps.fresh(path, stamp):
-                command = [a.bouncelight, "render", *scene, "-o", path, "--size", f"{width}x{height}", "--method", kind, "--samples", str(a.samples), "--aov", "all", "-q"]
-                subprocess.run(command + (["--weights", weights] if weights else []), check=True)
+                draw(a.bouncelight, scene, (kind, weights), path, f"{width}x{height}", a.samples, os.path.join(a.out, f"{name}_direct.exr"))
                 stamps.put(path, stamp)
-            drawn[method] = layers(path)
+            drawn[method] = None if picture else layers(path)
             if method in a.methods:
-                compare(group, name, row, path, reference, light_error(drawn[method], drawn["direct"], truth))
+                compare(group, name, row, path, reference, float("nan") if picture else light_error(drawn[method], drawn["direct"], truth))
         extra = [("constant", with_constant(drawn["direct"], a.constant))] if a.constant else []
         extra += [("best constant", with_constant(drawn["direct"], best_constant(drawn["direct"], truth)))]
         for row, picture in extra:
@@ -203,8 +224,8 @@ def main():
         print(f"\n| {group}{f' ({scenes})' if scenes > 1 else ''} | " + " | ".join(METRICS) + " |\n|" + "---|" * (len(METRICS) + 1))
         for row, values in methods.items():
             m = np.mean(values, 0)
-            light = "" if np.isnan(m[8]) else f"{100 * m[8]:.1f} %"
-            print(f"| {row} | {m[0]:,.0f} | {m[1]:,.0f} | {m[2]:.4f} | {m[3]:.4f} | {m[4]:.2f} | {m[5]:.4f} | {m[6]:.4f} | {m[7]:.4f} | {light} |")
+            linear, light = "" if np.isnan(m[7]) else f"{m[7]:.4f}", "" if np.isnan(m[8]) else f"{100 * m[8]:.1f} %"
+            print(f"| {row} | {m[0]:,.0f} | {m[1]:,.0f} | {m[2]:.4f} | {m[3]:.4f} | {m[4]:.2f} | {m[5]:.4f} | {m[6]:.4f} | {linear} | {light} |")
     if a.csv:
         with open(a.csv, "w", newline="") as f:
             csv.writer(f).writerows([["scene", "row", *METRICS], *record])

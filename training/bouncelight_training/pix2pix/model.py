@@ -9,8 +9,8 @@ from torch import nn
 
 from ..errors import TrainingError
 from ..weights import GraphNet
+from .pairs import PICTURES  # noqa: F401
 
-PICTURES = ("depth", "direct", "diffuse", "normal")
 INPUTS, OUTPUTS, LEAK, GROUPS, EPS = 12, 3, 0.2, 2, 1e-5
 NORMS = ("group", "instance", "batch")
 # In down4 to down8 and up1 to up4.

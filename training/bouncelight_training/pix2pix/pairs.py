@@ -29,6 +29,8 @@ NAME = re.compile(r"room(\d{4,})_view(\d+)\.exr")
 # Blender's Normalize node takes what is farther for background.
 FARTHEST = 1e4
 NORMALS = ("clamped", "halved")
+# In the order in which the network takes them.
+PICTURES = ("depth", "direct", "diffuse", "normal")
 # The project's validation rooms are nobody's training rooms.
 VALIDATION = {2, 3, 4, 5}
 SHARES = (0.7, 0.15, 0.15)
