@@ -2,6 +2,7 @@
 
     pip install bpy==4.5.15                                   # Python 3.11
     python training/cycles/paper_rooms.py OUT --rooms 6-9,13,15-26 [--views 8] [--size 256x128] [--spp 32]
+    python training/cycles/paper_rooms.py OUT --rooms 2200-2239 --views 1 --size 1024x512 --spp 64 --denoise --judge
 
 Room INDEX is scene INDEX of the stream that the paper's authors seeded with 0 (what `bouncelight` calls
 `paper-room:INDEX`); view V turns the camera by V * 360/views degrees about the vertical. Each view becomes
