@@ -4,8 +4,8 @@
                                             [--views 40] [--spp 64] [--minutes 5] [--size 1024x512] [--work DIR]
 
 `bouncelight dataset` scatters views through the scene and traces their light; the network starts from a weights file (the shipped
-`small` if none is named) and learns them. Other views, of another seed and with four times the samples, are held out; their error
-before and after is what is printed at the end. --views, --spp and --size are what time goes into: on a slow machine start with
+`small` if none is named) and learns them. A few views are learnt too well after a while, so the weights that did best on other views
+are kept; yet others are held out, and their error before and after is what is printed at the end. Both have four times the samples. --views, --spp and --size are what time goes into: on a slow machine start with
 `--views 12 --spp 32 --size 512x256`. Everything is kept in the work folder, and the same command goes on where it was stopped.
 """
 import argparse
@@ -30,8 +30,8 @@ from .weights import WeightsError, read, unet
 # |gain| and |rest| are kept below these when the program applies them (src/gi/reconstruct.rs); training has wider limits.
 APPLIED_GAIN, APPLIED_ADDED = 0.3, 0.1
 SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "assets", "weights", "small.safetensors")
-# Of the held-out views against those that are learnt.
-HELD_OUT, FINER = 0.2, 4
+# Views that choose, views that are held out, both against those that are learnt; and how much finer their light is traced.
+CHOOSING, HELD_OUT, FINER = 0.1, 0.2, 4
 
 
 def shape_of(path):
@@ -83,15 +83,17 @@ def finetune(program, scene, out, work, init=SHIPPED, views=40, spp=64, minutes=
     """Does it all; returns what is printed. With `epochs` these are counted instead of minutes (for tests)."""
     widths, pointwise, features = shape_of(init)
     paths = {}
-    for name, count, samples, drawn_by in (("train", views, spp, seed), ("held-out", max(round(HELD_OUT * views), 2), FINER * spp, seed + 1)):
+    others = [(name, max(round(share * views), 2), FINER * spp, seed + 1 + i) for i, (name, share) in enumerate((("choosing", CHOOSING), ("held-out", HELD_OUT)))]
+    for name, count, samples, drawn_by in [("train", views, spp, seed), *others]:
         folder = os.path.join(work, f"{name}-{count}-{samples}-{drawn_by}-{size}")
         draw(program, scene, folder, count, samples, drawn_by, size)
         paths[name] = os.path.join(work, f"{name}.npz")
         data.build(folder, None, paths[name])
-    config = train.Config(train=paths["train"], validation=paths["held-out"], widths=widths, pointwise=pointwise, features=features, init=init, apart="view",
+    config = train.Config(train=paths["train"], validation=paths["choosing"], keep_best=1, widths=widths, pointwise=pointwise, features=features, init=init, apart="view",
                           epochs=epochs or 1, minutes=0.0 if epochs else minutes, seed=seed,
                           **{"batch": 2, "learning_rate": 5e-4, "warmup_steps": 20, "ema": 0.99, "picture_l1": 0.1} | settings)
     held_out, channels = Split(paths["held-out"]), train.channels_of(features)
+    data.check_apart(Split(paths["train"]), held_out, "view")
     before = train.network(config)
     train.start_from(before, init)
     folder = os.path.join(work, "run")

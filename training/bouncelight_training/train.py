@@ -57,6 +57,7 @@ class Config:
     ema: float = 0.998
     epsilon: float = 0.05  # of the relative square, units of s
     picture_l1: float = 0.0  # weight in the last third of the L1 on the pooled picture (losses.picture_difference)
+    keep_best: int = 0  # 1: what is kept at the end is the average that did best on the validation views, the start included
     apart: str = "room"  # what the splits must not share: rooms, or views of one scene
     quantise: str = ""  # f16 or i8: learn for weights that are stored so (quantise.py)
     quantise_from: float = 0.8  # share of the run after which that begins
@@ -165,6 +166,7 @@ class Run:
         self.step, self.elapsed, self.rows, self.sums = 0, 0.0, [], [0.0, 0]
         self.batch = config.batch * self.world.size  # pictures of a step, over all processes
         self.steps_per_epoch = math.ceil(len(train) / self.batch)
+        self.best = None  # (validation error, weights) with --keep-best
         self.stopping = False  # somebody asked some process to end
 
     @property
@@ -179,7 +181,7 @@ class Run:
         """Writes checkpoint.pt whole: a kill leaves the old one or the new one."""
         if not self.world.first:
             return
-        state = {"processes": self.world.size, "config": dataclasses.asdict(self.config), "model": self.model.state_dict(), "average": self.average,
+        state = {"best": self.best, "processes": self.world.size, "config": dataclasses.asdict(self.config), "model": self.model.state_dict(), "average": self.average,
                  "optimiser": self.optimiser.state_dict(), "step": self.step, "elapsed": self.elapsed, "rows": self.rows, "sums": self.sums,
                  "samples": self.samples(), "command": command_of(self.config, self.folder, self.world.size), "commit": self.commit, "machine": machine_of(self.device), "train_report": self.train.report, "validation_report": self.validation.report}
         torch.save(state, self.checkpoint_path + ".part")
@@ -202,6 +204,7 @@ class Run:
         self.model.load_state_dict(state["model"])
         self.average = {name: p.to(self.device) for name, p in state["average"].items()}
         self.optimiser.load_state_dict(state["optimiser"])
+        self.best = state.get("best")
         self.step, self.elapsed, self.rows, self.sums = state["step"], state["elapsed"], state["rows"], state["sums"]
         print(f"continues at step {self.step} (epoch {self.epoch}, {self.elapsed / 60:.1f} min used)", file=sys.stderr)
 
@@ -274,11 +277,21 @@ class Run:
         model.load_state_dict(self.average)
         return quantise.round_(model, self.storage()).eval()
 
+    def note_best(self, scores):
+        """Keeps the average if no other did better; at the end it becomes the best one."""
+        if not self.config.keep_best:
+            return
+        if self.best is None or scores["validation_error"] < self.best[0]:
+            self.best = [scores["validation_error"], {name: values.clone() for name, values in self.average.items()}]
+        if self.progress() >= 1:
+            self.average = {name: values.to(self.device) for name, values in self.best[1].items()}
+
     def finish_epoch(self, draw):
         """Validates, logs and saves, all in the first process."""
         if not self.world.first:
             return
         scores, predicted = validate(self.averaged(), self.validation, self.config, self.device)
+        self.note_best(scores)
         row = {"epoch": self.epoch, "step": self.step, "samples": self.samples(), "seconds": round(self.elapsed, 1), "learning_rate": self.learning_rate(),
                "train_loss": self.sums[0] / max(self.sums[1], 1), **scores}
         self.rows.append(row)
@@ -352,6 +365,8 @@ def train(config, folder, stop_after=None):
     run.load()
     if run.world.first:
         introduce(run)
+        if run.step == 0 and config.keep_best:
+            run.note_best(validate(run.averaged(), validation, config, run.device)[0])
     saved, begun, drawn = time.monotonic(), run.step, 0.0
     while run.progress() < 1:
         run.train_step()

@@ -51,6 +51,9 @@ class Finetune(unittest.TestCase):
         out = os.path.join(self.folder, "toy.safetensors")
         told = finetune.finetune(self.program, "toy", out, self.folder, self.init, views=10, spp=16, epochs=12, learning_rate=5e-3, ema=0.9, threads=1)
         error = told["held_out_error"]
+        state = finetune.train.read_checkpoint(os.path.join(self.folder, "run", "checkpoint.pt"))
+        self.assertEqual(state["best"][0], min(state["best"][0], *[row["validation_error"] for row in state["rows"]]))
+        self.assertTrue(all(torch.equal(values, state["average"][name]) for name, values in state["best"][1].items()))
         # The network starts as the first guess and may change it by 30 %.
         self.assertEqual(error["before"], error["first guess"])
         self.assertLess(error["after"], 0.9 * error["before"])
