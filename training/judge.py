@@ -1,17 +1,21 @@
 """Pictures by every method against Cycles: the accuracy table of docs/accuracy.md.
 
     python training/cycles/paper_rooms.py data/judge --rooms 0,27,33,37,47 --views 1 --size 1024x512 --spp 64 --denoise --judge
-    python training/judge.py out/judge data/judge [../shared/reference/cycles] [--methods direct,ambient,...] [--samples 4]
-                             [--constant 0.0592,0.0631,0.0570] [--csv out/judge.csv] [--bouncelight target/release/bouncelight]
+    python training/judge.py out/judge data/judge [../shared/reference/cycles] [--rooms 0,27,2200-2239] [--methods direct,ambient,...]
+                             [--samples 4] [--constant 0.0592,0.0631,0.0570] [--csv out/judge.csv] [--bouncelight target/release/bouncelight]
 
-A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file.
+A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file. `apply:FILE` is a network on
+pictures (the paper's, pix2pix/): `bouncelight apply` on the four pictures of the raster; `dropout:FILE` is the same with dropout on,
+as the authors ran theirs. Both give 8-bit pictures, so they have no relmse and no light.
 
 A folder of references holds either roomIIII_view0.exr, as cycles/paper_rooms.py writes them, or one folder a scene with scene.glb,
-frame0000.exr and meta.json. Rooms are averaged into one row a method; other scenes get a row each. Pictures that exist
-are kept, so a killed run goes on where it stopped: empty the folder when the program changed.
+frame0000.exr and meta.json. Rooms are averaged into one row a method; other scenes get a row each. With --rooms only these are taken, and
+one without a reference is an error that gives the command which renders it. Our pictures have the reference's size. A picture that exists is kept
+if the same program drew it with the same weights and samples (stamps.json beside it; --keep: whoever drew it), and its comparison if
+neither it nor the reference is newer, so a killed run goes on where it stopped.
 
 Rows that are no methods: with --constant, that one ambient light (E/pi; python -m bouncelight_training.baseline fits it to the
-training rooms), the floor that everything else has to pass; `best constant` is fitted to each picture itself, by least absolute error
+training rooms), the floor that everything else has to pass (0.0508761, the sky's radiance, is the raster picture that the paper's network starts from); `best constant` is fitted to each picture itself, by least absolute error
 before the view transform: nobody can know it, it is there for scale.
 
 `light` is the error of the diffuse light that direct lighting misses: mean |difference| / mean after 4x4 pooling, on pixels with
@@ -20,14 +24,21 @@ noise is about 0.02 of it.
 """
 import argparse
 import csv
+import hashlib
 import json
 import os
 import re
 import subprocess
 import sys
+import tempfile
 
 import numpy as np
 import OpenEXR
+from PIL import Image
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from bouncelight_training.pix2pix.pairs import PICTURES, inputs_of  # noqa: E402
+from bouncelight_training.stream import indices  # noqa: E402
 
 METRICS = ["l1", "l2", "paper-ssim", "fid", "psnr", "ssim", "flip", "relmse", "light"]
 
@@ -43,8 +54,48 @@ def rgb(all_layers, name):
 
 
 def write(path, image):
+    """An EXR, whole or not at all."""
     channels = {c: np.ascontiguousarray(image[..., i]).astype(np.float32) for i, c in enumerate("RGB")}
-    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels).write(path)
+    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels).write(path + ".part.exr")
+    os.replace(path + ".part.exr", path)
+
+
+def digest(path):
+    with open(path, "rb") as f:
+        return hashlib.sha256(f.read()).hexdigest()[:16]
+
+
+class Stamps:
+    """What drew the pictures of a folder: a line of text for each, in stamps.json."""
+
+    def __init__(self, folder, keep):
+        self.path, self.keep, self.known = os.path.join(folder, "stamps.json"), keep, {}
+        if os.path.exists(self.path):
+            with open(self.path) as f:
+                self.known = json.load(f)
+
+    def fresh(self, picture, stamp):
+        return os.path.exists(picture) and (self.keep or self.known.get(os.path.basename(picture)) == stamp)
+
+    def put(self, picture, stamp):
+        self.known[os.path.basename(picture)] = stamp
+        with open(self.path + ".part", "w") as f:
+            json.dump(self.known, f, indent=0)
+        os.replace(self.path + ".part", self.path)
+
+
+def compared(program, ours, reference):
+    """The record of `bouncelight compare`, kept beside our picture."""
+    result = ours + ".json"
+    try:
+        if os.path.getmtime(result) >= max(os.path.getmtime(ours), os.path.getmtime(reference)):
+            with open(result) as f:
+                return json.load(f)
+    except (OSError, ValueError):
+        pass  # None yet, or one that a kill cut off.
+    subprocess.run([program, "compare", ours, reference, "--json", result, "-q"], check=True, stdout=subprocess.DEVNULL)
+    with open(result) as f:
+        return json.load(f)
 
 
 def with_constant(direct, light):
@@ -83,11 +134,13 @@ def light_error(ours, direct, reference):
     return float(np.abs(guess - truth)[full].mean() / truth[full].mean())
 
 
-def references(folder):
-    """(group, name, scene arguments, reference picture) of each scene in a folder of references."""
+def references(folder, rooms=None):
+    """(group, name, scene arguments, reference picture) of each scene in a folder of references, or of some rooms."""
     for name in sorted(os.listdir(folder)):
         path = os.path.join(folder, name)
         room = re.fullmatch(r"room(\d+)_view0\.exr", name)
+        if rooms is not None and (not room or int(room[1]) not in rooms):
+            continue
         if room:
             yield "paper rooms", name.removesuffix(".exr"), [f"paper-room:{int(room[1])}"], path
         elif os.path.exists(os.path.join(path, "scene.glb")):
@@ -98,57 +151,81 @@ def references(folder):
             yield name, name, [os.path.join(path, "scene.glb"), *flags], os.path.join(path, "frame0000.exr")
 
 
+def draw(program, scene, row, path, size, samples, inputs):
+    """Draws `row` = (kind, weights) of a scene into `path`. `inputs`: the raster's EXR, for networks on pictures."""
+    kind, weights = row
+    if kind in ("apply", "dropout"):
+        with tempfile.TemporaryDirectory() as folder:
+            flags = []
+            for name, picture in zip(PICTURES, inputs_of(inputs)):
+                flags += [f"--{name}", os.path.join(folder, f"{name}.png")]
+                Image.fromarray(picture).save(flags[-1])
+            command = [program, "apply", *flags, "--weights", weights, "-o", path, "-q"]
+            subprocess.run(command + (["--dropout", "1"] if kind == "dropout" else []), check=True)
+        return
+    command = [program, "render", *scene, "-o", path, "--size", size, "--method", kind, "--samples", str(samples), "--aov", "all", "-q"]
+    subprocess.run(command + (["--weights", weights] if weights else []), check=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", help="folder for our pictures")
     parser.add_argument("references", nargs="+", help="folders of Cycles' pictures")
     parser.add_argument("--methods", default="direct,ambient,ssgi,rsm,cache,probes,neural", type=lambda t: t.split(","))
     parser.add_argument("--constant", type=lambda t: [float(v) for v in t.split(",")])
+    parser.add_argument("--rooms", type=indices, help="take these rooms only, such as 0,27,2200-2239")
     parser.add_argument("--samples", type=int, default=4)
+    parser.add_argument("--keep", action="store_true", help="keep our pictures even if another program or other weights drew them")
     parser.add_argument("--csv", help="also write every scene's numbers here")
     parser.add_argument("--bouncelight", default="target/release/bouncelight")
     a = parser.parse_args()
+    found = [scene for folder in a.references for scene in references(folder, a.rooms)]
+    missing = sorted(set(a.rooms or []) - {int(name[4:8]) for _, name, _, _ in found})
+    if missing:
+        listed = ",".join(map(str, missing))
+        sys.exit(f"no reference of rooms {listed}; make them with\n  python training/cycles/paper_rooms.py {a.references[0]} --rooms {listed} --views 1 --size 1024x512 --spp 64 --denoise --judge")
     os.makedirs(a.out, exist_ok=True)
-    rows, record = {}, []
+    rows, record, program, stamps = {}, [], digest(a.bouncelight), Stamps(a.out, a.keep)
 
     def compare(group, name, row, ours, reference, light=float("nan")):
-        result = ours + ".json"
-        if not os.path.exists(result) or os.path.getmtime(result) < os.path.getmtime(ours):
-            subprocess.run([a.bouncelight, "compare", ours, reference, "--json", result, "-q"], check=True, stdout=subprocess.DEVNULL)
-        with open(result) as f:
-            r = json.load(f)
+        r = compared(a.bouncelight, ours, reference)
         paper, display, linear = r["paper"], r["display"], r["linear"]
-        values = [paper["l1"], paper["l2"], paper["ssim"], paper["fid"], display["psnr"], display["ssim"], r["flip"], linear["rel_mse"], light]
+        values = [paper["l1"], paper["l2"], paper["ssim"], paper["fid"], display["psnr"], display["ssim"], r["flip"], linear["rel_mse"] if linear else float("nan"), light]
         rows.setdefault(group, {}).setdefault(row, []).append(values)
         record.append([name, row, *values])
 
-    for folder in a.references:
-        for group, name, scene, reference in references(folder):
-            truth, drawn = layers(reference), {}
-            for method in ["direct"] + [m for m in a.methods if m != "direct"]:
-                kind, _, weights = method.partition(":")
-                row = f"{kind} {os.path.splitext(os.path.basename(weights))[0]}".strip()
-                path = os.path.join(a.out, f"{name}_{row.replace(' ', '_')}.exr")
-                if not os.path.exists(path):
-                    command = [a.bouncelight, "render", *scene, "-o", path, "--method", kind, "--samples", str(a.samples), "--aov", "all", "-q"]
-                    subprocess.run(command + (["--weights", weights] if weights else []), check=True)
-                drawn[method] = layers(path)
-                if method in a.methods:
-                    compare(group, name, row, path, reference, light_error(drawn[method], drawn["direct"], truth))
-            extra = [("constant", with_constant(drawn["direct"], a.constant))] if a.constant else []
-            extra += [("best constant", with_constant(drawn["direct"], best_constant(drawn["direct"], truth)))]
-            for row, picture in extra:
-                path = os.path.join(a.out, f"{name}_{row.replace(' ', '_')}.exr")
-                if not os.path.exists(path):
-                    write(path, picture)
-                compare(group, name, row, path, reference)
-            print(f"{name}: L1 " + ", ".join(f"{row} {values[-1][0]:,.0f}" for row, values in rows[group].items()), file=sys.stderr, flush=True)
+    for group, name, scene, reference in found:
+        truth, drawn = layers(reference), {}
+        height, width = truth["Combined.R"].shape
+        for method in ["direct"] + [m for m in a.methods if m != "direct"]:
+            kind, _, weights = method.partition(":")
+            row = f"{kind} {os.path.splitext(os.path.basename(weights))[0]}".strip()
+            picture = kind in ("apply", "dropout")
+            path = os.path.join(a.out, f"{name}_{row.replace(' ', '_')}.{'png' if picture else 'exr'}")
+            stamp = f"{program} {digest(weights) if os.path.exists(weights) else weights} {a.samples} {width}x{height}"
+            if not stamps.fresh(path, stamp):
+                draw(a.bouncelight, scene, (kind, weights), path, f"{width}x{height}", a.samples, os.path.join(a.out, f"{name}_direct.exr"))
+                stamps.put(path, stamp)
+            drawn[method] = None if picture else layers(path)
+            if method in a.methods:
+                compare(group, name, row, path, reference, float("nan") if picture else light_error(drawn[method], drawn["direct"], truth))
+        extra = [("constant", with_constant(drawn["direct"], a.constant))] if a.constant else []
+        extra += [("best constant", with_constant(drawn["direct"], best_constant(drawn["direct"], truth)))]
+        for row, picture in extra:
+            path = os.path.join(a.out, f"{name}_{row.replace(' ', '_')}.exr")
+            stamp = f"{program} {a.constant if row == 'constant' else ''} {a.samples} {width}x{height}"
+            if not stamps.fresh(path, stamp):
+                write(path, picture)
+                stamps.put(path, stamp)
+            compare(group, name, row, path, reference)
+        print(f"{name}: L1 " + ", ".join(f"{row} {values[-1][0]:,.0f}" for row, values in rows[group].items()), file=sys.stderr, flush=True)
     for group, methods in rows.items():
-        print(f"\n| {group} | " + " | ".join(METRICS) + " |\n|" + "---|" * (len(METRICS) + 1))
+        scenes = len(next(iter(methods.values())))
+        print(f"\n| {group}{f' ({scenes})' if scenes > 1 else ''} | " + " | ".join(METRICS) + " |\n|" + "---|" * (len(METRICS) + 1))
         for row, values in methods.items():
             m = np.mean(values, 0)
-            light = "" if np.isnan(m[8]) else f"{100 * m[8]:.1f} %"
-            print(f"| {row} | {m[0]:,.0f} | {m[1]:,.0f} | {m[2]:.4f} | {m[3]:.4f} | {m[4]:.2f} | {m[5]:.4f} | {m[6]:.4f} | {m[7]:.4f} | {light} |")
+            linear, light = "" if np.isnan(m[7]) else f"{m[7]:.4f}", "" if np.isnan(m[8]) else f"{100 * m[8]:.1f} %"
+            print(f"| {row} | {m[0]:,.0f} | {m[1]:,.0f} | {m[2]:.4f} | {m[3]:.4f} | {m[4]:.2f} | {m[5]:.4f} | {m[6]:.4f} | {linear} | {light} |")
     if a.csv:
         with open(a.csv, "w", newline="") as f:
             csv.writer(f).writerows([["scene", "row", *METRICS], *record])

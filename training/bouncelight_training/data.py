@@ -38,9 +38,8 @@ from safetensors.numpy import load_file
 
 from .errors import TrainingError, reported
 from .features import CHANNELS, LUMINANCE, SLICES
+from .stream import indices as indices_in_order, is_judged
 
-JUDGED = {0, 1, 10, 11, 12, 14, 27, 33, 37, 47}
-FIRST_JUDGED = 2200
 REASONS = ["background", "spread", "normal", "depth", "albedo", "shadow", "negative"]
 MAX_SPREAD, MIN_COSINE, MIN_LENGTH = 0.05, float(np.cos(np.radians(10))), 0.95
 MAX_DEPTH_RATIO, MAX_ALBEDO, MAX_VARIATION = 1.1, 0.05, 0.10
@@ -57,7 +56,7 @@ def number_of(match):
 
 def refuse_judged(rooms):
     """Raises TrainingError when a room is one that is kept for judging."""
-    kept = sorted(r for r in set(map(int, rooms)) if r in JUDGED or r >= FIRST_JUDGED)
+    kept = sorted(r for r in set(map(int, rooms)) if is_judged(r))
     if kept:
         raise TrainingError(f"rooms {kept} are kept for judging and must not be trained or tuned on; remove them from the folder or pass --rooms")
 
@@ -258,8 +257,15 @@ class Split:
         return len(self.mask)
 
 
-def check_apart(train, validation):
-    """Raises TrainingError when a room is in both splits."""
+def check_apart(train, validation, apart="room"):
+    """Raises TrainingError when a room is in both splits. With `apart` "view" they may share a scene, but no view of it."""
+    if apart not in ("room", "view"):
+        raise TrainingError(f"splits are apart by room or by view, not by {apart}")
+    if apart == "view":
+        same = [int(v) for i, v in enumerate(validation.view) if any(np.array_equal(validation.features[i], train.features[k]) for k in range(len(train)))]
+        if same:
+            raise TrainingError(f"views {same} of {validation.path} are in {train.path}, too; draw them with another seed")
+        return
     both = sorted(set(map(int, train.room)) & set(map(int, validation.room)))
     if both:
         raise TrainingError(f"rooms {both} are in {train.path} and in {validation.path}; split by room")
@@ -267,11 +273,7 @@ def check_apart(train, validation):
 
 def indices(text):
     """Room numbers of "6-9,13"."""
-    out = set()
-    for part in text.split(","):
-        low, _, high = part.partition("-")
-        out |= set(range(int(low), int(high or low) + 1))
-    return out
+    return set(indices_in_order(text))
 
 
 @reported

@@ -1,7 +1,8 @@
 """Writes a run's averaged weights as a weights file that bouncelight loads, and proves that it says the same.
 
-    python -m bouncelight_training.export --run runs/NAME --out NAME.safetensors [--validation val.npz] [--name TEXT] [--half]
+    python -m bouncelight_training.export --run runs/NAME --out NAME.safetensors [--validation val.npz] [--name TEXT] [--half | --bytes]
 
+A run with --quantise is stored as it was trained for.
 The file is read back, its own graph is run on validation views and on odd sizes, and the outputs are compared with the
 network in the checkpoint. Provenance stands in the file and, for people, beside it as NAME.json.
 """
@@ -13,12 +14,13 @@ import os
 import numpy as np
 import torch
 
+from . import quantise
 from .data import Split
 from .errors import TrainingError, reported
 from .features import TABLE, channels_of
 from .model import ANSWER, MEANING, flops, parameter_count
 from .train import Config, network, read_checkpoint, validate
-from .weights import GraphNet, WeightsError, document, read, write
+from .weights import GraphNet, WeightsError, document, quantised, read, write
 
 ODD_SIZES = [(37, 21), (5, 3), (1, 1)]
 # Sums in another order differ by about 1e-6 in y; half floats move y by a few thousandths.
@@ -31,6 +33,13 @@ def network_of(state):
     model = network(Config(**state["config"]))
     model.load_state_dict(state["average"])
     return model.eval()
+
+
+def stored(model, kind):
+    """The arrays of a file: f32, half floats, or bytes with scales."""
+    if kind == "i8":
+        return quantised({name: values.numpy() for name, values in model.state_dict().items()}, model.graph)
+    return {name: (values.half() if kind == "f16" else values).contiguous() for name, values in model.state_dict().items()}
 
 
 def provenance(state, error, targets):
@@ -80,26 +89,30 @@ def verify(path, model, tolerance, split=None):
     return worst, again
 
 
-def export(run, out, validation=None, name="", half=False, targets=TARGETS):
-    """Writes the file and its provenance; returns a summary."""
+def export(run, out, validation=None, name="", kind="", targets=TARGETS):
+    """Writes the file and its provenance; returns a summary. `kind`: how numbers are stored, "" (as the run was trained), "f32", "f16" or "i8"."""
     state = read_checkpoint(os.path.join(run, "checkpoint.pt"))
     model, config = network_of(state), Config(**state["config"])
-    split = Split(validation or config.validation)
+    split, kind = Split(validation or config.validation), kind or config.quantise or "f32"
+    exact = validate(model, split, config)[0]["validation_error"]
+    tensors = stored(model, kind)
+    # What the file says is compared with the network after the same rounding, except for half floats, whose file is held against the exact one.
+    if kind == "i8" or config.quantise:
+        quantise.round_(model, kind if kind != "f32" else "")
     error = validate(model, split, config)[0]["validation_error"]
     about = provenance(state, error, targets)
-    tensors = {k: (v.half() if half else v).contiguous() for k, v in model.state_dict().items()}
     try:
         write(out, tensors, document(model.graph, model.output, inputs=[(n, c) for n, c in TABLE if n in config.features], meaning=MEANING, output_channels=ANSWER,
                                      name=name or os.path.basename(os.path.normpath(run)), provenance=about))
     except (WeightsError, OSError) as problem:
         raise TrainingError(str(problem)) from problem
-    worst, again = verify(out, model, TOLERANCE_HALF if half else TOLERANCE, split)
+    worst, again = verify(out, model, TOLERANCE_HALF if kind == "f16" and not config.quantise else TOLERANCE, split)
     reread = validate(again, split, config)[0]["validation_error"]
     with open(os.path.splitext(out)[0] + ".json", "w") as file:
         json.dump(about, file, indent=1)
         file.write("\n")
     return {"file": out, "bytes": os.path.getsize(out), "parameters": parameter_count(model), "gflop": flops(model, 128, 256) / 1e9,
-            "largest_difference": worst, "validation_error": error, "validation_error_of_file": reread}
+            "largest_difference": worst, "stored": kind, "validation_error_unrounded": exact, "validation_error": error, "validation_error_of_file": reread}
 
 
 @reported
@@ -110,9 +123,11 @@ def main(arguments=None):
     parser.add_argument("--validation", help="default: the one the run used")
     parser.add_argument("--name", default="", help="a few words; default: the run's name")
     parser.add_argument("--targets", default=TARGETS, help="how the light was path-traced, in words, for the provenance")
-    parser.add_argument("--half", action="store_true", help="store half floats")
+    kinds = parser.add_mutually_exclusive_group()
+    kinds.add_argument("--half", dest="kind", action="store_const", const="f16", default="", help="store half floats")
+    kinds.add_argument("--bytes", dest="kind", action="store_const", const="i8", help="store convolutions' weights as bytes with a scale for each output channel")
     a = parser.parse_args(arguments)
-    print(json.dumps(export(a.run, a.out, a.validation, a.name, a.half, a.targets), indent=1))
+    print(json.dumps(export(a.run, a.out, a.validation, a.name, a.kind, a.targets), indent=1))
 
 
 if __name__ == "__main__":

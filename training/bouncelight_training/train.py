@@ -1,6 +1,7 @@
 """Trains the compact U-Net on the CPU (or a GPU, with --device cuda).
 
     python -m bouncelight_training.train --train train.npz --validation val.npz --run runs/NAME [--minutes 25]
+    torchrun --standalone --nproc_per_node=N -m bouncelight_training.train --folder runs/NAME …        on N processes, --batch pictures each
 
 Everything lands in the run's folder: config.json, checkpoint.pt, log.csv, loss.png, validation.png. The same command goes
 on where a killed run stopped; the order of pictures and their augmentation depend on the seed and the step alone, so without
@@ -23,8 +24,9 @@ import numpy as np
 import torch
 from torch import nn
 
-from . import augment, losses, pictures
+from . import augment, losses, pictures, quantise
 from .data import Split, check_apart
+from .distributed import World
 from .errors import TrainingError, reported
 from .features import NAMES, SLICES, channels_of, light_of
 from .model import compact_unet, flops, light, parameter_count
@@ -55,6 +57,10 @@ class Config:
     ema: float = 0.998
     epsilon: float = 0.05  # of the relative square, units of s
     picture_l1: float = 0.0  # weight in the last third of the L1 on the pooled picture (losses.picture_difference)
+    keep_best: int = 0  # 1: what is kept at the end is the average that did best on the validation views, the start included
+    apart: str = "room"  # what the splits must not share: rooms, or views of one scene
+    quantise: str = ""  # f16 or i8: learn for weights that are stored so (quantise.py)
+    quantise_from: float = 0.8  # share of the run after which that begins
     seed: int = 1
     threads: int = 0  # 0: torch's choice
     device: str = "cpu"
@@ -65,9 +71,10 @@ class Config:
 FREE = {"minutes", "threads", "device", "checkpoint_seconds", "train", "validation", "init"}
 
 
-def command_of(config, folder):
+def command_of(config, folder, processes=1):
     """The command that makes this run; of paths the last part only."""
-    words = ["python -m bouncelight_training.train", "--run", os.path.basename(os.path.normpath(folder))]
+    start = "python" if processes == 1 else f"torchrun --standalone --nproc_per_node={processes}"
+    words = [f"{start} -m bouncelight_training.train", "--run" if processes == 1 else "--folder", os.path.basename(os.path.normpath(folder))]
     for field in dataclasses.fields(Config):
         value = getattr(config, field.name)
         if value != field.default:
@@ -132,9 +139,9 @@ def start_from(model, path):
     model.load_state_dict(state)
 
 
-def batch_of(split, indices, rng, device, crop=0):
-    """Augmented pictures as tensors: features, target, mask."""
-    made = [augment.augmented(split.features[i], split.target[i], split.mask[i], rng, crop) for i in indices]
+def batch_of(split, indices, rngs, device, crop=0):
+    """Augmented pictures as tensors, each with random numbers of its own: features, target, mask."""
+    made = [augment.augmented(split.features[i], split.target[i], split.mask[i], rng, crop) for i, rng in zip(indices, rngs)]
     features, target, mask = (torch.from_numpy(np.stack([np.ascontiguousarray(m[k]) for m in made])) for k in range(3))
     return features.to(device, memory_format=torch.channels_last), target.to(device), mask.to(device)
 
@@ -147,15 +154,20 @@ class Run:
         torch.manual_seed(config.seed)
         if config.threads:
             torch.set_num_threads(config.threads)
-        self.device, self.commit = torch.device(config.device), commit()
+        self.world, self.commit = World(config.device), commit()
+        self.device = self.world.device
         self.channels = channels_of(config.features)
         self.model = network(config).to(self.device, memory_format=torch.channels_last)
         if config.init:
             start_from(self.model, config.init)
+        self.parallel = self.world.parallel(self.model)
         self.average = {name: p.detach().clone() for name, p in self.model.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step, self.elapsed, self.rows, self.sums = 0, 0.0, [], [0.0, 0]
-        self.steps_per_epoch = math.ceil(len(train) / config.batch)
+        self.batch = config.batch * self.world.size  # pictures of a step, over all processes
+        self.steps_per_epoch = math.ceil(len(train) / self.batch)
+        self.best = None  # (validation error, weights) with --keep-best
+        self.stopping = False  # somebody asked some process to end
 
     @property
     def checkpoint_path(self):
@@ -167,9 +179,11 @@ class Run:
 
     def save(self):
         """Writes checkpoint.pt whole: a kill leaves the old one or the new one."""
-        state = {"config": dataclasses.asdict(self.config), "model": self.model.state_dict(), "average": self.average,
+        if not self.world.first:
+            return
+        state = {"best": self.best, "processes": self.world.size, "config": dataclasses.asdict(self.config), "model": self.model.state_dict(), "average": self.average,
                  "optimiser": self.optimiser.state_dict(), "step": self.step, "elapsed": self.elapsed, "rows": self.rows, "sums": self.sums,
-                 "samples": self.samples(), "command": command_of(self.config, self.folder), "commit": self.commit, "machine": machine_of(self.device), "train_report": self.train.report, "validation_report": self.validation.report}
+                 "samples": self.samples(), "command": command_of(self.config, self.folder, self.world.size), "commit": self.commit, "machine": machine_of(self.device), "train_report": self.train.report, "validation_report": self.validation.report}
         torch.save(state, self.checkpoint_path + ".part")
         os.replace(self.checkpoint_path + ".part", self.checkpoint_path)
 
@@ -183,18 +197,21 @@ class Run:
         differ = [k for k in ours if k not in FREE and ours[k] != theirs.get(k)]
         if differ:
             raise TrainingError(f"{self.checkpoint_path} was made with another {differ[0]} ({theirs.get(differ[0])}, now {ours[differ[0]]}); use another --run")
+        if state.get("processes", 1) != self.world.size:
+            raise TrainingError(f"{self.checkpoint_path} was made by {state.get('processes', 1)} processes, now there are {self.world.size}; use as many, or another --run")
         if state["train_report"] != self.train.report:
             raise TrainingError(f"{self.checkpoint_path} was trained on other data than {self.train.path}; use another --run")
         self.model.load_state_dict(state["model"])
         self.average = {name: p.to(self.device) for name, p in state["average"].items()}
         self.optimiser.load_state_dict(state["optimiser"])
+        self.best = state.get("best")
         self.step, self.elapsed, self.rows, self.sums = state["step"], state["elapsed"], state["rows"], state["sums"]
         print(f"continues at step {self.step} (epoch {self.epoch}, {self.elapsed / 60:.1f} min used)", file=sys.stderr)
 
     def samples(self):
         """Pictures seen so far."""
         done, rest = divmod(self.step, self.steps_per_epoch)
-        return done * len(self.train) + min(rest * self.config.batch, len(self.train))
+        return done * len(self.train) + min(rest * self.batch, len(self.train))
 
     def progress(self):
         """0 at the start, 1 at the end."""
@@ -216,22 +233,26 @@ class Run:
         return loss
 
     def train_step(self):
-        """One batch; which one follows from seed and step alone."""
+        """One batch; which one follows from seed and step alone. Each process takes its share of it."""
         begun = time.monotonic()
         place = self.step % self.steps_per_epoch
         order = np.random.default_rng((self.config.seed, self.epoch)).permutation(len(self.train))
-        chosen = order[place * self.config.batch:(place + 1) * self.config.batch]
-        features, target, mask = batch_of(self.train, chosen, np.random.default_rng((self.config.seed, 1 << 20, self.step)), self.device, self.config.crop)
+        chosen = order[place * self.batch:(place + 1) * self.batch]
+        places, weight = self.world.share(chosen)
+        chosen = chosen[places]
+        rngs = [np.random.default_rng((self.config.seed, 1 << 20, self.step, place)) for place in places]
+        features, target, mask = batch_of(self.train, chosen, rngs, self.device, self.config.crop)
         for group in self.optimiser.param_groups:
             group["lr"] = self.learning_rate()
         self.model.train()
-        loss = self.loss(light(self.model(features[:, self.channels]), features), features, target, mask)
+        self.optimiser.zero_grad(set_to_none=True)
+        with quantise.rounding(self.model, self.storage()):
+            loss = self.loss(light(self.parallel(features[:, self.channels]), features), features, target, mask)
+            (weight * loss).backward()
         value = loss.item()
         views = ", ".join(f"room {self.train.room[i]} view {self.train.view[i]}" for i in chosen)
         if not math.isfinite(value):
             raise TrainingError(f"the loss is {value} at step {self.step} ({views}); the last checkpoint is kept; lower the learning rate or look at these views")
-        self.optimiser.zero_grad(set_to_none=True)
-        loss.backward()
         norm = torch.nn.utils.clip_grad_norm_(self.model.parameters(), self.config.clip)
         if not torch.isfinite(norm):
             raise TrainingError(f"the gradient is {norm.item()} at step {self.step} ({views}); the last checkpoint is kept")
@@ -241,18 +262,36 @@ class Run:
             for name, p in self.model.state_dict().items():
                 self.average[name].lerp_(p, 1 - decay)
         self.step += 1
-        self.sums = [self.sums[0] + value, self.sums[1] + 1]
-        self.elapsed += time.monotonic() - begun
+        # The clock decides on learning rate and end, so all processes must read the same one: the first's.
+        elapsed = (self.elapsed + time.monotonic() - begun) * self.world.size if self.world.first else 0.0
+        value, self.elapsed, stopping = self.world.agree(weight * value, elapsed, float(bool(STOPPING)))
+        self.sums, self.stopping = [self.sums[0] + value, self.sums[1] + 1], stopping > 0
+
+    def storage(self):
+        """How weights are rounded by now: "" while they are not."""
+        return self.config.quantise if self.progress() >= self.config.quantise_from else ""
 
     def averaged(self):
-        """The model with averaged weights."""
+        """The model with averaged weights, as they would be stored."""
         model = network(self.config).to(self.device, memory_format=torch.channels_last)
         model.load_state_dict(self.average)
-        return model.eval()
+        return quantise.round_(model, self.storage()).eval()
+
+    def note_best(self, scores):
+        """Keeps the average if no other did better; at the end it becomes the best one."""
+        if not self.config.keep_best:
+            return
+        if self.best is None or scores["validation_error"] < self.best[0]:
+            self.best = [scores["validation_error"], {name: values.clone() for name, values in self.average.items()}]
+        if self.progress() >= 1:
+            self.average = {name: values.to(self.device) for name, values in self.best[1].items()}
 
     def finish_epoch(self, draw):
-        """Validates, logs and saves."""
+        """Validates, logs and saves, all in the first process."""
+        if not self.world.first:
+            return
         scores, predicted = validate(self.averaged(), self.validation, self.config, self.device)
+        self.note_best(scores)
         row = {"epoch": self.epoch, "step": self.step, "samples": self.samples(), "seconds": round(self.elapsed, 1), "learning_rate": self.learning_rate(),
                "train_loss": self.sums[0] / max(self.sums[1], 1), **scores}
         self.rows.append(row)
@@ -320,16 +359,14 @@ def write_log(rows, path):
 def train(config, folder, stop_after=None):
     """Runs to the end (or for `stop_after` steps, for tests) and returns the Run."""
     train_split, validation = Split(config.train), Split(config.validation)
-    check_apart(train_split, validation)
+    check_apart(train_split, validation, config.apart)
     os.makedirs(folder, exist_ok=True)
     run = Run(config, folder, train_split, validation)
     run.load()
-    with open(os.path.join(folder, "config.json"), "w") as file:
-        json.dump(dataclasses.asdict(config), file, indent=1)
-    h, w = train_split.mask.shape[1:]
-    print(f"{parameter_count(run.model)} parameters, {flops(run.model, h, w) / 1e9:.2f} GFLOP at {w}x{h} cells; {len(train_split)} training and "
-          f"{len(validation)} validation views, {train_split.report['kept']:.0%} and {validation.report['kept']:.0%} of the cells kept; "
-          f"the first guess is wrong by {guess_error(validation):.2%}", file=sys.stderr, flush=True)
+    if run.world.first:
+        introduce(run)
+        if run.step == 0 and config.keep_best:
+            run.note_best(validate(run.averaged(), validation, config, run.device)[0])
     saved, begun, drawn = time.monotonic(), run.step, 0.0
     while run.progress() < 1:
         run.train_step()
@@ -343,10 +380,20 @@ def train(config, folder, stop_after=None):
             saved = time.monotonic()
         if stop_after is not None and run.step - begun >= stop_after:
             break
-        if STOPPING:
+        if run.stopping:
             run.save()
             raise Stop
     return run
+
+
+def introduce(run):
+    """Writes config.json and says what is to be trained on what."""
+    with open(os.path.join(run.folder, "config.json"), "w") as file:
+        json.dump(dataclasses.asdict(run.config), file, indent=1)
+    h, w = run.train.mask.shape[1:]
+    print(f"{parameter_count(run.model)} parameters, {flops(run.model, h, w) / 1e9:.2f} GFLOP at {w}x{h} cells; {len(run.train)} training and "
+          f"{len(run.validation)} validation views, {run.train.report['kept']:.0%} and {run.validation.report['kept']:.0%} of the cells kept; "
+          f"the first guess is wrong by {guess_error(run.validation):.2%}", file=sys.stderr, flush=True)
 
 
 STOPPING = []
@@ -355,7 +402,7 @@ STOPPING = []
 @reported
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--run", required=True, help="folder of the run; continued if it has a checkpoint")
+    parser.add_argument("--run", "--folder", dest="run", required=True, help="folder of the run; continued if it has a checkpoint (torchrun takes --folder only: it has options that begin with run)")
     parser.add_argument("--config", help="JSON with any of the settings below; flags win over it")
     for field in dataclasses.fields(Config):
         kind = {"widths": lambda t: tuple(int(n) for n in t.split(",")), "features": lambda t: tuple(t.split(","))}.get(field.name, type(field.default))
@@ -383,8 +430,9 @@ def main(arguments=None):
             raise TrainingError(f"--{name} is missing: the .npz of the split, made by python -m bouncelight_training.data")
     for s in (signal.SIGINT, signal.SIGTERM):
         signal.signal(s, lambda *_: STOPPING.append(True))
+    quantise.check(config.quantise)
     try:
-        train(config, folder)
+        train(config, folder).world.close()
     except Stop:
         print(f"stopped; the same command continues (state in {folder})", file=sys.stderr)
         sys.exit(130)

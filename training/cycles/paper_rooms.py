@@ -2,6 +2,7 @@
 
     pip install bpy==4.5.15                                   # Python 3.11
     python training/cycles/paper_rooms.py OUT --rooms 6-9,13,15-26 [--views 8] [--size 256x128] [--spp 32]
+    python training/cycles/paper_rooms.py OUT --rooms 2200-2239 --views 1 --size 1024x512 --spp 64 --denoise --judge
 
 Room INDEX is scene INDEX of the stream that the paper's authors seeded with 0 (what `bouncelight` calls
 `paper-room:INDEX`); view V turns the camera by V * 360/views degrees about the vertical. Each view becomes
@@ -15,36 +16,15 @@ of a second instead of ten; the geometry is the same as with one mesh each.
 import argparse
 import math
 import os
-import random
 import sys
 import time
 
 import bpy
 
-SHAPES = ["cube", "cylinder", "cone", "uv_sphere", "ico_sphere", "torus"]
-JUDGED = {0, 1, 10, 11, 12, 14, 27, 33, 37, 47}
-SKY_RADIANCE = 0.05087609
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+from bouncelight_training.stream import SHAPES, SKY_RADIANCE, indices, is_judged, rooms_of_stream  # noqa: E402
+
 SUN_EULER = (0.2844221, -0.1549496, -4.8111577)
-
-
-def draw_room(rng):
-    """One room's random numbers, in the order in which the authors' recipe draws them."""
-    objects = []
-    for _ in range(rng.randint(50, 250)):
-        location = (rng.randint(-50, 50), rng.randint(-50, 50), rng.randint(2, 15))
-        rotation = tuple(math.pi * rng.randint(0, 360) / 180 for _ in range(3))
-        colour = tuple(rng.uniform(0, 1) for _ in range(3))
-        objects.append((SHAPES[rng.randint(0, 5)], location, rotation, colour))
-    walls = [tuple(rng.uniform(0, 1) for _ in range(3)) for _ in range(5)]
-    pitch = math.pi / 2 - math.pi * rng.randint(0, 10) / 180
-    yaw = math.pi * rng.randint(0, 360) / 180
-    return objects, walls, pitch, yaw
-
-
-def rooms_of_stream(wanted):
-    """The rooms with the wanted indices; the stream has to be drawn from its start."""
-    rng = random.Random(0)
-    return {i: room for i in range(max(wanted) + 1) for room in [draw_room(rng)] if i in wanted}
 
 
 def principled(name, rgb):
@@ -123,14 +103,6 @@ def configure(scene, size, spp, bounces, denoise=False):
     settings.file_format, settings.color_depth, settings.exr_codec = "OPEN_EXR_MULTILAYER", "16", "ZIP"
 
 
-def indices(text):
-    out = []
-    for part in text.split(","):
-        low, _, high = part.partition("-")
-        out += range(int(low), int(high or low) + 1)
-    return out
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out")
@@ -144,7 +116,7 @@ def main():
     parser.add_argument("--denoise", action="store_true", help="denoise the Combined layer (no other)")
     parser.add_argument("--judge", action="store_true", help="allow the rooms kept for judging")
     a = parser.parse_args()
-    kept = [i for i in a.rooms if i in JUDGED or i >= 2200]
+    kept = [i for i in a.rooms if is_judged(i)]
     if kept and not a.judge:
         sys.exit(f"rooms {kept} are kept for judging; pass --judge if that is what they are rendered for")
     os.makedirs(a.out, exist_ok=True)

@@ -170,9 +170,9 @@ class Toy(unittest.TestCase):
         for name in ("config.json", "log.csv", "loss.png", "validation.png"):
             self.assertTrue(os.path.getsize(os.path.join(self.folder, "whole", name)), name)
         out = os.path.join(self.folder, "toy.safetensors")
-        for half in (False, True):
-            told = export.export(os.path.join(self.folder, "whole"), out, half=half)
-            self.assertAlmostEqual(told["validation_error"], told["validation_error_of_file"], delta=1e-2 if half else 1e-5)
+        for kind in ("i8", "", "f16"):
+            told = export.export(os.path.join(self.folder, "whole"), out, kind=kind)
+            self.assertAlmostEqual(told["validation_error"], told["validation_error_of_file"], delta=1e-2 if kind == "f16" else 1e-5)
         with open(os.path.join(self.folder, "toy.json")) as file:
             about = json.load(file)
         self.assertEqual(about["samples_seen"], 90)
@@ -180,6 +180,29 @@ class Toy(unittest.TestCase):
         wrong = export.network_of(train.read_checkpoint(os.path.join(self.folder, "other", "checkpoint.pt")))
         with self.assertRaisesRegex(TrainingError, "not what was trained"):
             export.verify(out, wrong, export.TOLERANCE_HALF)
+
+    def test_learns_for_bytes(self):
+        run = self.run_in("bytes", self.config(quantise="i8", quantise_from=0.5))
+        out = os.path.join(self.folder, "bytes.safetensors")
+        told = export.export(os.path.join(self.folder, "bytes"), out)
+        # What training last said is what the file gives.
+        self.assertEqual(told["stored"], "i8")
+        self.assertAlmostEqual(told["validation_error_of_file"], run.rows[-1]["validation_error"], places=6)
+        tensors, _ = export.read(out)
+        for name, values in run.averaged().state_dict().items():
+            self.assertTrue(np.array_equal(tensors[name], values.numpy()), name)
+        # Negative controls: rounding changes weights, and their true values are kept beside it.
+        self.assertGreater(np.abs(run.average["head.weight"].numpy() - tensors["head.weight"]).max(), 0)
+        self.assertLess(len(np.unique(tensors["head.weight"][0])), 256)
+        self.assertLess(os.path.getsize(out), 0.4 * 4 * model.parameter_count(run.model))
+        with self.assertRaisesRegex(TrainingError, "no such storage: i4"):
+            self.run_in("nibbles", self.config(quantise="i4", quantise_from=0.0))
+
+    def test_splits_by_view(self):
+        views = self.config(validation=self.train, apart="view")
+        with self.assertRaisesRegex(TrainingError, r"views \[0, 1, 0, 1, 0, 1\] .* another seed"):
+            self.run_in("same-views", views)
+        self.assertEqual(self.run_in("other-views", self.config(apart="view"), stop_after=1).step, 1)
 
     def test_not_finite_stops(self):
         folder = tempfile.mkdtemp(dir=self.folder)
