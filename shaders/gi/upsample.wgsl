@@ -14,7 +14,7 @@
 const STAGED = 8 / CELL_SIDE + 4;
 
 // A cell's surface point (a: 1, or 0 where there is none), normal and light, and the luminance of the vector that the light
-// is. 36 cells of 96 bytes at most.
+// is, in the cell's plane. 36 cells of 96 bytes at most.
 var<workgroup> points: array<vec4f, STAGED * STAGED>;
 var<workgroup> normals: array<vec3f, STAGED * STAGED>;
 var<workgroup> lights: array<CellLight, STAGED * STAGED>;
@@ -82,7 +82,9 @@ fn stage(index: u32, first: vec2i) {
     normals[index] = world_normal_at(pixel);
     let found = CellLight(light[3u * row], light[3u * row + 1u], light[3u * row + 2u]);
     lights[index] = found;
-    leanings[index] = mat3x3f(found.red.xyz, found.green.xyz, found.blue.xyz) * vec3f(0.2126, 0.7152, 0.0722);
+    let whole = mat3x3f(found.red.xyz, found.green.xyz, found.blue.xyz) * vec3f(0.2126, 0.7152, 0.0722);
+    // Without what points along the cell's own normal, which would count as a gradient on a surface that bends.
+    leanings[index] = whole - normals[index] * dot(whole, normals[index]);
 }
 
 // Share of the light's gradient that a lobe of roughness 0.5 sees (1 for a mirror), and the range of what is taken from it.

@@ -211,10 +211,10 @@ fn the_mirrored_direction_gets_the_lights_gradient() {
     };
     for side in SIDES {
         let (found, turned) = (run(side, 1.0), run(side, -1.0));
-        let (mut worst, mut control) = (0.0_f32, 0.0_f32);
+        let (mut off, mut control) = (Vec::new(), 0.0_f32);
         for i in (0..found.len()).filter(|i| surfaces[*i] == 0) {
             let n = normal(i);
-            // The sphere's middle is 3 m before the eye. Its rim's cells hold normals that are far from the pixel's own.
+            // The sphere's middle is 3 m before the eye.
             let from_eye = (Vec3::new(0.0, 0.0, -3.0) + n).normalize();
             if from_eye.dot(n) > -0.5 {
                 continue;
@@ -222,13 +222,16 @@ fn the_mirrored_direction_gets_the_lights_gradient() {
             let along = from_eye - n * from_eye.dot(n);
             let e = luminance(field.map(|(a, g)| a + 2.0 / 3.0 * g.dot(n)));
             let expected = 1.0 + 0.87 * luminance(field.map(|(_, g)| g.dot(along))) / e;
-            worst = worst.max((found[i][3] - expected).abs());
-            control = control.max((turned[i][3] - expected).abs());
+            off.push((found[i][3] - expected).abs());
+            control += (turned[i][3] - expected).abs();
         }
-        println!("{side:?}: off by {worst}, control {control}");
-        // Cells hold neighbours' normals, which turn 5° to 10° from one to the next, and those have a part along the pixel's plane.
-        assert!(worst < 0.1, "{side:?}: off by {worst}");
-        assert!(control > 0.2, "{side:?}: light from the other side must be off, but only by {control}");
+        // Towards the rim an eighth's cells turn so much from one to the next that none is of a pixel's own surface: nothing is
+        // claimed there.
+        let wrong = off.iter().filter(|d| **d > 0.02).count() as f32 / off.len() as f32;
+        let (mean, control) = (off.iter().sum::<f32>() / off.len() as f32, control / off.len() as f32);
+        println!("{side:?}: {wrong:.3} of the pixels off by more than 0.02, mean {mean:.4}, control {control:.3}");
+        assert!(mean < 0.03 && wrong < 0.25, "{side:?}: {wrong} of the pixels are off, mean {mean}");
+        assert!(control > 0.1, "{side:?}: light from the other side must be off, but only by {control}");
     }
     // Even light shows the same everywhere.
     let even = upsample_and_tilt(&gpu, &shot, CellSide::Eight, |pixel| [normal(pixel).extend(0.0).to_array(); 3]);

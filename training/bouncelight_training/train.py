@@ -56,6 +56,7 @@ class Config:
     clip: float = 1.0  # largest gradient norm
     ema: float = 0.998
     epsilon: float = 0.05  # of the relative square, units of s
+    outside: float = 0.0  # weight of staying with the first guess on surfaces whose target is not trusted (silhouettes, borders of shadows)
     picture_l1: float = 0.0  # weight in the last third of the L1 on the pooled picture (losses.picture_difference)
     keep_best: int = 0  # 1: what is kept at the end is the average that did best on the validation views, the start included
     apart: str = "room"  # what the splits must not share: rooms, or views of one scene
@@ -227,6 +228,10 @@ class Run:
 
     def loss(self, prediction, features, target, mask):
         loss = losses.relative_square(prediction, target, mask, self.config.epsilon)
+        if self.config.outside:
+            # Nothing else says what the network answers there, and the way back to full resolution reads those cells, too.
+            guess, hit = torch.expm1(features[:, SLICES["cache"]]), features[:, SLICES["hit"]][:, 0] > 0.5
+            loss = loss + self.config.outside * losses.relative_square(prediction, guess, hit & ~mask, self.config.epsilon)
         if self.config.picture_l1 and self.progress() > 2 / 3:
             direct = torch.expm1(features[:, SLICES["direct"]])
             loss = loss + self.config.picture_l1 * losses.picture_difference(prediction, target, mask, features[:, SLICES["albedo"]], direct)
