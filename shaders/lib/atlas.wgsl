@@ -23,7 +23,7 @@ struct AtlasView {
     first_block: u32,
     // Share of the specular lobes' light that counts as albedo.
     specular: f32,
-    pad: u32,
+    glow: f32,
 }
 
 // Texels seen at a slant are larger on the surface, up to so many times.

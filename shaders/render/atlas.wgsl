@@ -6,7 +6,7 @@ struct AtlasCamera {
     // Where the view stands (w = 1), or its unit direction (w = 0).
     place: vec4f,
     // Share of the specular lobe's light that counts as albedo. Below 0 marks a light's view: then the third field
-    // holds how much of its light the lobe reflects.
+    // holds how much of its light the lobe reflects. y: share of the surfaces' own glow that counts.
     specular: vec4f,
 }
 
@@ -51,7 +51,7 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     var out: Fields;
     out.albedo = vec4f(color * (1.0 - metallic) * (1.0 - share) + mirrored, 1.0);
     out.normal = oct_encode(select(-n, n, facing == (in.mirror > 0.0)));
-    out.emissive = vec4f(material.emissive * glow, 1.0);
+    out.emissive = vec4f(material.emissive * glow * camera.specular.y, 1.0);
     if camera.specular.x < 0.0 {
         let ray = normalize(select(camera.place.xyz, in.world - camera.place.xyz, camera.place.w > 0.5));
         out.emissive = vec4f(env_brdf(f0, roughness, abs(dot(n, ray))), 1.0);

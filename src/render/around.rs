@@ -36,11 +36,13 @@ impl Around {
         scene: &SceneGpu,
         eye: Vec3,
     ) {
+        // What a light stands in for must not shine twice.
+        let glow = if scene.lights.iter().any(|l| l.stands_in) { 0.0 } else { 1.0 };
         self.views.clear();
         self.views.extend((0..6).map(|i| {
             let tile = Tile { origin: [i * SIDE, 0], side: SIDE, light: 0, first_block: 0 };
             let view = atlas::perspective(eye, atlas::cube_axes(i as usize), 1.0, NEAR, tile);
-            AtlasViewGpu { specular: SPECULAR, ..view }
+            AtlasViewGpu { specular: SPECULAR, glow, ..view }
         }));
         pass.record(recorder, queue, "around", scene, &mut self.atlas, &self.views);
     }

@@ -44,8 +44,8 @@ pub struct AtlasViewGpu {
     pub first_block: u32,
     /// Share of the specular lobes' light that counts as albedo; below 0 in views of lights, whose emitters have lobes.
     pub specular: f32,
-    /// Unused.
-    pub pad: u32,
+    /// Share of surfaces' own glow that counts: 0 where lights stand in for it.
+    pub glow: f32,
 }
 
 /// A tile's place.
@@ -95,7 +95,7 @@ fn finish(clip: Mat4, axis: Vec3, texel: f32, eye: Vec3, near: f32, range: f32, 
         range,
         first_block: tile.first_block,
         specular: -1.0,
-        pad: 0,
+        glow: 1.0,
     }
 }
 
@@ -215,7 +215,7 @@ impl AtlasPass {
         for (view, bytes) in views.iter().zip(atlas.camera_bytes.chunks_exact_mut(CAMERA_STRIDE as usize)) {
             bytes[..64].copy_from_slice(bytemuck::bytes_of(&view.clip_from_world));
             let ([x, y, z], w) = if view.near > 0.0 { (view.eye, 1.0) } else { (view.axis, 0.0) };
-            bytes[64..96].copy_from_slice(bytemuck::bytes_of(&[x, y, z, w, view.specular, 0.0, 0.0, 0.0]));
+            bytes[64..96].copy_from_slice(bytemuck::bytes_of(&[x, y, z, w, view.specular, view.glow, 0.0, 0.0]));
         }
         queue.write_buffer(&atlas.cameras, 0, &atlas.camera_bytes);
         queue.write_buffer(&atlas.views, 0, bytemuck::cast_slice(views));

@@ -228,6 +228,23 @@ fn a_red_wall_behind_the_camera_tints_the_floor() {
 }
 
 #[test]
+fn what_a_light_stands_in_for_does_not_shine_twice() {
+    let Some(gpu) = common::gpu() else { return };
+    let run = |glow: f32, stands_in: bool| {
+        let mut scene = hall(GREY, &[sun(BACKWARDS, 2.0)], 0.0, 0.9);
+        let wall = scene.meshes[scene.instances[4].mesh].material;
+        scene.materials[wall].emissive = [glow; 3];
+        scene.lights[0].stands_in = stands_in;
+        let mut renderer = renderer(&gpu, [64, 48], Method::Cache);
+        lit(&gpu, &mut renderer, &scene).0.data
+    };
+    let (dark, stood_in, glowing) = (run(0.0, true), run(3.0, true), run(3.0, false));
+    assert!(mean(&dark) > 0.0 && difference(&stood_in, &dark) < 1e-3, "{} of {}", mean(&stood_in), mean(&dark));
+    // Negative control: without a light that stands in for it the wall shines.
+    assert!(mean(&glowing) > 1.5 * mean(&dark), "{} against {}", mean(&glowing), mean(&dark));
+}
+
+#[test]
 fn light_that_moves_slowly_does_not_jump() {
     let Some(gpu) = common::gpu() else { return };
     // Second difference of neighbouring steps over the picture's mean: mean of all patches of 8 × 8 pixels, and the worst.
