@@ -180,7 +180,7 @@ def main():
     parser.add_argument("--bouncelight", default="target/release/bouncelight")
     a = parser.parse_args()
     found = [scene for folder in a.references for scene in references(folder, a.rooms)]
-    missing = sorted(set(a.rooms or []) - {int(name[4:8]) for _, name, _, _ in found})
+    missing = sorted(set(a.rooms or []) - {int(name[4:8]) for _, name, _, _ in found if name.startswith("room")})
     if missing:
         listed = ",".join(map(str, missing))
         sys.exit(f"no reference of rooms {listed}; make them with\n  python training/cycles/paper_rooms.py {a.references[0]} --rooms {listed} --views 1 --size 1024x512 --spp 64 --denoise --judge")
