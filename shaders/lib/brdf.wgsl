@@ -56,11 +56,16 @@ fn regained(f0: vec3f, roughness: f32, kept: f32) -> vec3f {
     return 1.0 + fresnel * even / (1.0 - fresnel * (1.0 - even)) * (1.0 - kept) / kept;
 }
 
+// `env_brdf` of a dielectric. Without branches: a rasteriser on the CPU compiled a geometry pass with more of them anew for
+// each frame.
+fn dielectric_lobe(f0: vec3f, roughness: f32, n_dot_v: f32) -> vec3f {
+    let ab = split_sum(roughness, n_dot_v);
+    return f0 * ab.x + ab.y * saturate(50.0 * max(f0.x, max(f0.y, f0.z)));
+}
+
 // Directional albedo of the specular lobe: how much of an even environment it shows. 0 for F0 = 0, which marks unlit.
 fn env_brdf(f0: vec3f, roughness: f32, n_dot_v: f32) -> vec3f {
-    let ab = split_sum(roughness, n_dot_v);
-    let f90 = saturate(50.0 * max(f0.x, max(f0.y, f0.z)));
-    let dielectric = f0 * ab.x + ab.y * f90;
+    let dielectric = dielectric_lobe(f0, roughness, n_dot_v);
     let part = metal_part(f0);
     if part <= 0.0 { return dielectric; }
     let single = single_scattering(roughness, n_dot_v);

@@ -45,7 +45,7 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     let roughness = saturate(material.roughness * rough_metal.g);
     let color = saturate(base.rgb);
     let f0 = mix(vec3f(material.f0), color, metallic);
-    let share = env_brdf(vec3f(material.f0), roughness, MEAN_COSINE).x;
+    let share = dielectric_lobe(vec3f(material.f0), roughness, MEAN_COSINE).x;
     let mirrored = env_brdf(f0, roughness, MEAN_COSINE) * max(camera.specular.x, 0.0);
 
     var out: Fields;
