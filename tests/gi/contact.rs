@@ -40,7 +40,7 @@ fn a_plane_keeps_its_light() {
 #[test]
 fn contacts_darken_and_corners_as_rays_say() {
     let Some(gpu) = common::gpu() else { return };
-    for (name, trace, part) in [("corner", corner as Trace, 0.6), ("ball", ball, 0.95)] {
+    for (name, trace, part) in [("corner", corner as Trace, 0.7), ("ball", ball, 0.95)] {
         let (shot, surfaces) = shot(trace);
         let (found, width) = visibility(&gpu, &shot);
         let mut r = Random(3);
