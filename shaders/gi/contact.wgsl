@@ -8,11 +8,11 @@
 
 const PI = 3.14159265;
 
-// View space, metres, looking down -z.
+// View space, metres, looking down -z; the sums of constants are the compiler's to take out of loops.
 fn view_position(pixel: vec2i, distance: f32) -> vec3f {
-    let uv = (vec2f(pixel) + 0.5) / vec2f(params.size);
-    let ndc = vec2f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y);
-    return vec3f((ndc + params.unproject.zw) * params.unproject.xy, -1.0) * distance;
+    let scale = vec2f(2.0, -2.0) / vec2f(params.size) * params.unproject.xy;
+    let offset = (vec2f(-1.0, 1.0) + params.unproject.zw) * params.unproject.xy + 0.5 * scale;
+    return vec3f(vec2f(pixel) * scale + offset, -1.0) * distance;
 }
 
 // Pixel coordinates times distance, and distance.
@@ -72,10 +72,12 @@ fn contact(@builtin(global_invocation_id) id: vec3u) {
     for (var k = 0; k < AZIMUTHS / 2; k++) {
         let angle = 2.0 * PI * (f32(k) + phase) / f32(AZIMUTHS);
         let line = side * cos(angle) + up * sin(angle);
+        let step_line = project(line);
         var taken = 0.0;
         for (var h = 0; h < 2; h++) {
-            let along = select(line, -line, h > 0);
-            let step = project(along);
+            let sign = select(1.0, -1.0, h > 0);
+            let along = line * sign;
+            let step = step_line * sign;
             let first = fract(phase + 0.5 * f32(k + h * (AZIMUTHS / 2)) + 0.125);
             var most = 0.0;
             for (var j = 0; j < TAPS; j++) {

@@ -16,7 +16,7 @@ struct Emitter {
     haze: f32,
     // Where the light's rays go on to when the surface mirrors them: mean of unit vectors.
     mirror: vec3f,
-    // `least_facing` of a fine one, 0 for what is never seen from close by.
+    // `least_facing`, 0 for what is never seen from close by.
     least: f32,
     // Radiance by which the specular lobe around it would send the same power if it were diffuse, times LOBE · area/π.
     gloss: vec3f,

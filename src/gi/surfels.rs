@@ -197,13 +197,13 @@ impl SurfelsPass {
         let (n, rounds) = (f64::from(SURFELS), f64::from(self.rounds));
         [
             Cost::new("gi.surfels", n * 400.0, n * 140.0),
-            // As in gi.gather, 1.9 emitters a block.
-            Cost::new("gi.first", n * blocks * (1.9 * 92.0 + 0.25 * 9.0), 34.5 * 80.0 * blocks + n * 100.0),
-            // A surfel meets 0.52 discs a surfel, as cells do, shared by 64 invocations: 40 operations each, and 18 to ask
+            // As in gi.gather, 1.26 emitters a block.
+            Cost::new("gi.first", n * blocks * (1.26 * 92.0 + 0.5 * 9.0), 34.5 * 80.0 * blocks + n * 100.0),
+            // A surfel meets 0.51 discs a surfel, as cells do, shared by 64 invocations: 40 operations each, and 18 to ask
             // each square twice; joining a surfel takes 30. Buffers stay in cache.
             Cost::new(
                 "gi.exchange",
-                rounds * n * (64.0 * ((0.52 * n / 64.0).ceil() * 40.0 + (n / 256.0).ceil() * 18.0) + 30.0),
+                rounds * n * (64.0 * ((0.51 * n / 64.0).ceil() * 40.0 + (n / 256.0).ceil() * 18.0) + 30.0),
                 rounds * n * 200.0,
             ),
         ]

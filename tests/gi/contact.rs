@@ -1,11 +1,14 @@
 //! Contact shadows against rays, and what the way back to full resolution makes of them.
 
 use crate::common;
-use crate::screen::{EYE, FLOOR, SIZE, TARGET, Trace, at, ball, corner, flat, rays_within, shot, under};
+use crate::screen::{EYE, FLOOR, TARGET, Trace, ball, corner, flat, rays_within, shot, under};
 use crate::shot::{Random, Shot};
 use bouncelight::gi::contact::{ContactPass, RADIUS};
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
+
+/// Contacts are a few pixels wide where a picture is as large as people look at.
+const SIZE: [u32; 2] = [576, 384];
 
 /// Visibility at half resolution, and its width.
 fn visibility(gpu: &Gpu, shot: &Shot) -> (Vec<f32>, u32) {
@@ -40,13 +43,13 @@ fn a_plane_keeps_its_light() {
 #[test]
 fn contacts_darken_and_corners_as_rays_say() {
     let Some(gpu) = common::gpu() else { return };
-    for (name, trace, part) in [("corner", corner as Trace, 0.7), ("ball", ball, 0.95)] {
-        let (shot, surfaces) = shot(trace);
+    for (name, trace, part) in [("corner", corner as Trace, 0.6), ("ball", ball, 0.95)] {
+        let (shot, surfaces) = Shot::traced(SIZE, EYE, TARGET, trace);
         let (found, width) = visibility(&gpu, &shot);
         let mut r = Random(3);
         let (mut near, mut far) = ([0.0; 3], [0.0; 2]);
-        let pixels = (1..12).flat_map(|i| (1..SIZE[1] / 2 - 1).map(move |j| [16 * i, 2 * j]));
-        for pixel in pixels.filter(|p| at(&surfaces, *p) == FLOOR) {
+        let pixels = (1..12).flat_map(|i| (1..SIZE[1] / 2 - 1).map(move |j| [48 * i, 2 * j]));
+        for pixel in pixels.filter(|p| surfaces[(p[1] * SIZE[0] + p[0]) as usize] == FLOOR) {
             // The pass lets what is farther away than 0.7 of its radius fade, and sees nothing beyond it.
             let z = (under(&shot, trace, pixel).0 - EYE).dot((TARGET - EYE).normalize());
             let [open, _] = rays_within(&shot, trace, pixel, 0.85 * RADIUS * z, &mut r);

@@ -85,8 +85,8 @@ pub fn rays_within(shot: &Shot, trace: Trace, pixel: [u32; 2], reach: f32, r: &m
 pub fn under(shot: &Shot, trace: Trace, pixel: [u32; 2]) -> (Vec3, Vec3) {
     let world = glam::Mat4::from_cols_array_2d(&shot.camera.view_from_world).inverse();
     let p = shot.camera.clip_from_view;
-    let x = 2.0 * (pixel[0] as f32 + 0.5) / SIZE[0] as f32 - 1.0;
-    let y = 1.0 - 2.0 * (pixel[1] as f32 + 0.5) / SIZE[1] as f32;
+    let x = 2.0 * (pixel[0] as f32 + 0.5) / shot.size[0] as f32 - 1.0;
+    let y = 1.0 - 2.0 * (pixel[1] as f32 + 0.5) / shot.size[1] as f32;
     let ray = world.transform_vector3(Vec3::new(x / p[0][0], y / p[1][1], -1.0));
     let hit = trace(world.w_axis.truncate(), ray).expect("the pixel shows a surface");
     (hit.point, hit.normal)
