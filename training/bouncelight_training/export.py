@@ -19,7 +19,8 @@ from .data import Split
 from .errors import TrainingError, reported
 from .features import TABLE, channels_of
 from .model import ANSWER, MEANING, flops, parameter_count
-from .train import Config, network, read_checkpoint, validate
+from .train import Config, network, read_checkpoint
+from .validation import validate
 from .weights import GraphNet, WeightsError, document, quantised, read, write
 
 ODD_SIZES = [(37, 21), (5, 3), (1, 1)]

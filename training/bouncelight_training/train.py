@@ -14,9 +14,7 @@ import dataclasses
 import json
 import math
 import os
-import platform
 import signal
-import subprocess
 import sys
 import time
 
@@ -28,8 +26,10 @@ from . import augment, losses, pictures, quantise
 from .data import Split, check_apart
 from .distributed import World
 from .errors import TrainingError, reported
-from .features import NAMES, SLICES, channels_of, light_of
+from .features import NAMES, SLICES, channels_of
 from .model import compact_unet, flops, light, parameter_count
+from .provenance import command_of, commit, machine_of
+from .validation import guess_error, validate
 from .weights import WeightsError, read
 
 FIELDS = ["epoch", "step", "samples", "seconds", "learning_rate", "train_loss", "validation_loss", "validation_error"]
@@ -70,38 +70,6 @@ class Config:
 
 # What may differ between a run's first command and the one that continues it.
 FREE = {"minutes", "threads", "device", "checkpoint_seconds", "train", "validation", "init"}
-
-
-def command_of(config, folder, processes=1):
-    """The command that makes this run; of paths the last part only."""
-    start = "python" if processes == 1 else f"torchrun --standalone --nproc_per_node={processes}"
-    words = [f"{start} -m bouncelight_training.train", "--run" if processes == 1 else "--folder", os.path.basename(os.path.normpath(folder))]
-    for field in dataclasses.fields(Config):
-        value = getattr(config, field.name)
-        if value != field.default:
-            text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
-            words += ["--" + field.name.replace("_", "-"), os.path.basename(text)]
-    return " ".join(words)
-
-
-def machine_of(device):
-    """In words, what the network is trained on."""
-    if device.type == "cuda":
-        return f"{torch.cuda.get_device_name(device)}, torch {torch.__version__}"
-    return f"CPU ({platform.machine()}, {torch.get_num_threads()} threads), torch {torch.__version__}"
-
-
-def commit():
-    """The repository's commit, with a mark when tracked files differ from it."""
-    here = os.path.dirname(os.path.abspath(__file__))
-
-    def git(*arguments):
-        return subprocess.run(["git", "-C", here, *arguments], capture_output=True, text=True, check=True).stdout.strip()
-
-    try:
-        return git("rev-parse", "HEAD") + (" with local changes" if git("status", "--porcelain", "--untracked-files=no") else "")
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown"
 
 
 class Stop(Exception):
@@ -309,40 +277,6 @@ class Run:
             pictures.validation_views(self.validation, predicted, os.path.join(self.folder, "validation.png"), title)
         print(f"epoch {row['epoch']:4}  {row['seconds'] / 60:6.1f} min  train {row['train_loss']:.4f}  validation {row['validation_loss']:.4f}"
               f"  error {row['validation_error']:.2%}", file=sys.stderr, flush=True)
-
-
-def validate(model, split, config, device="cpu", draw=4):
-    """Loss and pooled error over a split, and the predictions of the views that are drawn (one a room first)."""
-    channels = channels_of(config.features)
-    loss = above = below = 0.0
-    first = {}
-    for i, room in enumerate(split.room):
-        first.setdefault(int(room), i)
-    drawn, predicted = list(first.values())[:draw], {}
-    with torch.no_grad():
-        for i in range(len(split)):
-            features, target, mask = (torch.from_numpy(a[i:i + 1]) for a in (split.features, split.target, split.mask))
-            features = features.float().to(device, memory_format=torch.channels_last)
-            prediction = light(model(features[:, channels]), features).clamp(min=0).cpu().contiguous()
-            target = target.float()
-            loss += losses.relative_square(prediction, target, mask, config.epsilon).item() / len(split)
-            # Back to E/pi: pictures are weighed by their light, as on a screen.
-            difference, light_sum = losses.pooled_error(prediction * float(split.scale[i]), target * float(split.scale[i]), mask)
-            above, below = above + difference, below + light_sum
-            if i in drawn:
-                predicted[i] = prediction[0].numpy()
-    return {"validation_loss": loss, "validation_error": above / max(below, 1e-20)}, predicted
-
-
-def guess_error(split):
-    """The pooled error of the first guess, which an untrained network has too."""
-    above = below = 0.0
-    for i in range(len(split)):
-        guess = torch.from_numpy(light_of(split.features[i], "cache"))[None]
-        difference, light_sum = losses.pooled_error(guess * float(split.scale[i]), torch.from_numpy(split.target[i:i + 1]).float() * float(split.scale[i]),
-                                                    torch.from_numpy(split.mask[i:i + 1]))
-        above, below = above + difference, below + light_sum
-    return above / max(below, 1e-20)
 
 
 def read_checkpoint(path):

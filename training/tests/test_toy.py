@@ -14,7 +14,7 @@ import torch
 from safetensors.numpy import load_file, save_file
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
-from bouncelight_training import augment, baseline, data, export, losses, model, train  # noqa: E402
+from bouncelight_training import augment, baseline, data, export, losses, model, train, validation  # noqa: E402
 from bouncelight_training.errors import TrainingError  # noqa: E402
 from bouncelight_training.features import CHANNELS, LUMINANCE, SLICES, channel_means  # noqa: E402
 
@@ -153,7 +153,7 @@ class Toy(unittest.TestCase):
         self.assertLess(whole.rows[-1]["train_loss"], 0.5 * whole.rows[0]["train_loss"])
         # Untrained the error is that of the first guess, about 0.45.
         untrained = model.compact_unet(whole.config.widths)
-        guessed = train.validate(untrained, data.Split(self.validation), whole.config)[0]["validation_error"]
+        guessed = validation.validate(untrained, data.Split(self.validation), whole.config)[0]["validation_error"]
         self.assertTrue(0.35 < guessed < 0.55, guessed)
         self.assertLess(whole.rows[-1]["validation_error"], 0.2)
         # Stopped at step 13, in the middle of an epoch, with a save as a signal makes it; then killed without one at step 20.

@@ -26,7 +26,8 @@ import torch
 from torch import nn
 
 from ..errors import TrainingError, reported
-from ..train import Stop, commit, machine_of, read_checkpoint
+from ..provenance import commit, machine_of
+from ..train import Stop, read_checkpoint
 from . import curves
 from .model import NORMS, Discriminator, first_numbers, generator
 from .pairs import Pairs
