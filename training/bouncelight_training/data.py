@@ -3,6 +3,7 @@
     python -m bouncelight_training.data --features DIR --out train.npz [--rooms 6-9,13]                 light traced by bouncelight
     python -m bouncelight_training.data --features DIR --cycles DIR --out train.npz [--rooms 6-9,13]    light rendered by Cycles
     ... --denoise                                                                                       and denoised (pip install pyoidn)
+    python -m bouncelight_training.data --join rooms.npz,varied.npz --out train.npz                     several of these as one
 
 FEATURES/roomIIII_viewV.safetensors (or variedIIII_viewV, or SCENE_viewV) is what `bouncelight dataset` writes. With `--spp N` it traces the
 light at the very points that the cells look at, and nothing has to be left out but the background.
@@ -215,11 +216,29 @@ def build(features_dir, cycles_dir, out, rooms=None, denoise=False):
             columns[key].append(value)
     kinds = {"scale": np.float32, "room": np.int32, "view": np.int32}
     arrays = {key: np.asarray(value, kinds.get(key)) for key, value in columns.items()}
-    report = summarise(arrays, totals) | {"denoised": denoise}
+    return save(out, arrays, summarise(arrays, totals) | {"denoised": denoise})
+
+
+def save(out, arrays, report):
     with open(out + ".part", "wb") as file:
         np.savez(file, report=json.dumps(report), **arrays)
     os.replace(out + ".part", out)
     return report
+
+
+def join(paths, out):
+    """Writes several splits as one and returns its report, which holds theirs as `parts`. No view may be in two of them."""
+    splits = [Split(path) for path in paths]
+    shapes = {split.features.shape[1:] for split in splits}
+    if len(shapes) > 1:
+        raise TrainingError(f"{', '.join(paths)}: views of different sizes: {sorted(shapes)}")
+    arrays = {key: np.concatenate([getattr(split, key) for split in splits]) for key in ("features", "target", "mask", "scale", "room", "view")}
+    views = list(zip(arrays["room"].tolist(), arrays["view"].tolist()))
+    twice = sorted({view for view in views if views.count(view) > 1})
+    if twice:
+        raise TrainingError(f"{', '.join(paths)}: room {twice[0][0]} view {twice[0][1]} is in two of them")
+    totals = {reason: sum(split.report["rejected"].get(reason, 0.0) * split.report["cells"] for split in splits) for reason in REASONS}
+    return save(out, arrays, summarise(arrays, totals) | {"parts": [split.report for split in splits]})
 
 
 def summarise(arrays, totals):
@@ -279,7 +298,9 @@ def indices(text):
 @reported
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--features", required=True, help="folder of `bouncelight dataset`")
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--features", help="folder of `bouncelight dataset`")
+    source.add_argument("--join", type=lambda text: text.split(","), help="files that this command made, with commas between")
     parser.add_argument("--cycles", help="folder of cycles/paper_rooms.py; absent: the light that `bouncelight dataset --spp` traced")
     parser.add_argument("--out", required=True, help="the .npz to write")
     parser.add_argument("--rooms", type=indices, help="take these rooms only")
@@ -289,7 +310,10 @@ def main(arguments=None):
         parser.error("--denoise is for Cycles' pictures; bouncelight traces light at sample points, which are no picture")
     if a.rooms:
         refuse_judged(a.rooms)
-    print(json.dumps(build(a.features, a.cycles, a.out, a.rooms, a.denoise), indent=1))
+    if a.join and (a.cycles or a.rooms):
+        parser.error("--join takes files as they are, without --cycles and --rooms")
+    report = join(a.join, a.out) if a.join else build(a.features, a.cycles, a.out, a.rooms, a.denoise)
+    print(json.dumps(report, indent=1))
 
 
 if __name__ == "__main__":

@@ -111,6 +111,20 @@ class Toy(unittest.TestCase):
         self.assertEqual((int(split.room[0]), float(split.mask.mean())), (-4, 1.0))
         np.testing.assert_allclose(split.target[0].astype(np.float32) * split.scale[0], 0.25, rtol=1e-3)
 
+    def test_splits_join(self):
+        out = os.path.join(self.folder, "joined.npz")
+        report = data.join([self.train, self.validation], out)
+        whole, first, second = data.Split(out), data.Split(self.train), data.Split(self.validation)
+        self.assertEqual(len(whole), len(first) + len(second))
+        self.assertTrue(np.array_equal(whole.target[:len(first)], first.target) and np.array_equal(whole.features[len(first):], second.features))
+        self.assertEqual(report["rooms"], [2, 6, 7, 8])
+        self.assertAlmostEqual(report["kept"], whole.mask.mean())
+        self.assertAlmostEqual(sum(report["rejected"].values()) + report["kept"], 1.0, places=6)
+        # No view twice.
+        with self.assertRaisesRegex(TrainingError, "room 6 view 0 is in two"):
+            data.join([self.train, out], os.path.join(self.folder, "twice.npz"))
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "twice.npz")))
+
     def test_masks_see_what_is_wrong(self):
         folder = tempfile.mkdtemp(dir=self.folder)
         write_views(folder, [6], 1)
