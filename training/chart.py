@@ -80,7 +80,7 @@ def main():
     for name, x, y in points:
         axes.scatter(x, y, color="C3" if name == PAPER[0] else "C0" if (name, x, y) in best + unbaked else "0.5", zorder=2)
         # Below its point where the one above would be written over.
-        crowded = any(0 < other / y - 1 < 0.1 and 0.5 < (across + 0.1) / (x + 0.1) < 2 for _, across, other in points)
+        crowded = any(0 < other / y - 1 < 0.1 and 0.65 < (across + 0.1) / (x + 0.1) < 1.5 for _, across, other in points)
         axes.annotate(name, (x, y), xytext=(5, -11 if crowded else 4), textcoords="offset points", fontsize=8)
     axes.set_xscale("symlog", linthresh=0.1)
     axes.set(yscale="log", xlabel="arithmetic for one picture of 1024×512, GFLOP (counted)", ylabel={"l1": "the paper's L1"}.get(a.metric, a.metric), xlim=(0, 1000))
