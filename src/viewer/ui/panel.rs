@@ -1,6 +1,6 @@
 //! The panel's controls.
 
-use super::{Facts, Memory, light, source_box, times};
+use super::{Facts, Memory, frontier, light, source_box, times};
 use crate::net::format::Weights;
 use crate::render::tonemap_curve::Tonemap;
 use crate::viewer::choice::{Side, Source, View};
@@ -21,7 +21,7 @@ pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
     room(ui, "Method", true, &mut |ui, memory| method(ui, state, memory, facts));
     room(ui, "Picture", true, &mut |ui, _| picture(ui, state));
     room(ui, "Times", true, &mut |ui, memory| times::times(ui, state, memory, facts));
-    room(ui, "Speed and accuracy", false, &mut |ui, memory| times::frontier(ui, state, memory, facts));
+    room(ui, "Speed and accuracy", false, &mut |ui, memory| frontier::frontier(ui, state, memory, facts));
     room(ui, "Camera", false, &mut |ui, _| camera(ui, state));
     room(ui, "Light", false, &mut |ui, _| light::lights(ui, state));
     room(ui, "Objects", false, &mut |ui, _| light::objects(ui, state));

@@ -1,11 +1,10 @@
-//! Where the time and the memory go, and what accuracy costs.
+//! Where the time and the memory go.
 
 use super::table::{Line, table};
-use super::{BLUE, Facts, Memory, ORANGE, SKY, VERMILLION};
-use crate::viewer::choice::{Side, Source};
-use crate::viewer::state::{Action, State};
+use super::{BLUE, Facts, Memory, ORANGE, SKY};
+use crate::viewer::state::State;
 use crate::viewer::stats::{CURVE, Row, Spread, Track};
-use egui::{Align2, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, Ui, Vec2};
+use egui::{Align2, FontId, Pos2, RichText, Sense, Shape, Stroke, Ui, Vec2};
 
 /// Passes, curve, CPU, and what the overlay itself costs.
 pub fn times(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
@@ -102,7 +101,7 @@ fn curve(ui: &mut Ui, gpu: &Track, cpu: &Track, facts: &Facts<'_>) {
 }
 
 /// Four digits that count, no more than three of them behind the point.
-fn number(v: f64) -> String {
+pub(super) fn number(v: f64) -> String {
     let places = if v < 10.0 { 3 } else { 3 - (v.log10() as usize).min(3) };
     format!("{v:.places$}")
 }
@@ -123,100 +122,4 @@ pub fn memory(ui: &mut Ui, facts: &Facts<'_>) {
         Some(i) => Line::new(&rows[i].0, [String::new(), megabytes(rows[i].1)], false),
         None => Line::new("all", [String::new(), megabytes(all)], true),
     });
-}
-
-/// Where a name of `size` stands beside the dot at `p`: the first of four places that nothing else has.
-fn free_place(p: Pos2, size: Vec2, taken: &[Rect], within: Rect) -> Rect {
-    let sides = [
-        (Align2::CENTER_BOTTOM, Vec2::new(0.0, -7.0)),
-        (Align2::CENTER_TOP, Vec2::new(0.0, 7.0)),
-        (Align2::LEFT_CENTER, Vec2::new(9.0, 0.0)),
-        (Align2::RIGHT_CENTER, Vec2::new(-9.0, 0.0)),
-    ];
-    let places = sides.map(|(align, by)| align.anchor_size(p + by, size));
-    let free = |r: &&Rect| within.contains_rect(**r) && !taken.iter().any(|t| t.intersects(**r));
-    *places.iter().find(free).unwrap_or(&places[0])
-}
-
-/// Error against time: what was measured here across, what docs/accuracy.md has up. A dot chooses its method.
-pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
-    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 150.0), Sense::hover());
-    let visuals = ui.visuals().clone();
-    ui.painter().rect_filled(rect, 2.0, visuals.extreme_bg_color);
-    let plot = Rect::from_min_max(rect.min + Vec2::new(34.0, 10.0), rect.max - Vec2::new(14.0, 24.0));
-    let most = facts.measured.values().copied().fold(1.0, f64::max);
-    let least = facts.measured.values().copied().fold(most, f64::min).max(1e-3);
-    let (low, high) = (0.6 * least, 1.7 * most);
-    let at = |ms: f64, error: f64| {
-        let x = (ms.max(low) / low).ln() / (high / low).ln();
-        let y = (error / 3.0).ln() / (130.0f64 / 3.0).ln();
-        Pos2::new(plot.left() + x as f32 * plot.width(), plot.bottom() - y as f32 * plot.height())
-    };
-    let font = FontId::proportional(11.0);
-    let weak = visuals.text_color();
-    for error in [3.0, 10.0, 30.0, 100.0] {
-        let y = at(low, error).y;
-        ui.painter().hline(plot.x_range(), y, Stroke::new(0.5, weak));
-        ui.painter().text(
-            Pos2::new(plot.left() - 4.0, y),
-            Align2::RIGHT_CENTER,
-            format!("{error} %"),
-            font.clone(),
-            weak,
-        );
-    }
-    let ticks = [(low, Align2::LEFT_TOP), ((low * high).sqrt(), Align2::CENTER_TOP), (high, Align2::RIGHT_TOP)];
-    for (ms, align) in ticks {
-        let text = format!("{} ms", number(ms));
-        ui.painter().text(at(ms, 3.0) + Vec2::new(0.0, 3.0), align, text, font.clone(), weak);
-    }
-    let mut missing = Vec::new();
-    let dots = Source::ALL.into_iter().filter_map(|s| Some(at(*facts.measured.get(&(s as usize))?, s.static_error()?)));
-    let mut taken: Vec<Rect> = dots.map(|p| Rect::from_center_size(p, Vec2::splat(12.0))).collect();
-    for source in Source::ALL {
-        let Some(error) = source.static_error() else { continue };
-        let Some(&ms) = facts.measured.get(&(source as usize)) else {
-            missing.push(source);
-            continue;
-        };
-        let p = at(ms, error);
-        let response = ui.interact(
-            Rect::from_center_size(p, Vec2::splat(16.0)),
-            ui.scope_id().with(source.name()),
-            Sense::click(),
-        );
-        memory.place(&format!("dot {}", source.name()), &response);
-        let now = source == state.settings.left;
-        let colour = if now {
-            VERMILLION
-        } else if visuals.dark_mode {
-            SKY
-        } else {
-            BLUE
-        };
-        ui.painter().circle_filled(p, if now { 6.0 } else { 4.5 }, colour);
-        if response.has_focus() || response.hovered() {
-            ui.painter().circle_stroke(p, 8.0, Stroke::new(1.5, visuals.text_color()));
-        }
-        let text = if now { visuals.strong_text_color() } else { visuals.text_color() };
-        let galley = ui.painter().layout_no_wrap(source.name().into(), font.clone(), text);
-        let name = free_place(p, galley.size(), &taken, rect);
-        taken.push(name);
-        ui.painter().rect_filled(name, 2.0, visuals.extreme_bg_color);
-        ui.painter().galley(name.min, galley, text);
-        if response.on_hover_text(format!("{}: {ms:.2} ms here, {error} % there", source.name())).clicked() {
-            state.apply(Action::Source(Side::Left, source));
-        }
-    }
-    ui.label(RichText::new("across: GPU ms measured in this window; up: mean error of indirect light on five judged rooms (docs/accuracy.md), not measured here").small());
-    if !missing.is_empty() {
-        ui.horizontal_wrapped(|ui| {
-            ui.label(RichText::new("not measured yet:").weak());
-            for source in missing {
-                if ui.small_button(source.name()).clicked() {
-                    state.apply(Action::Source(Side::Left, source));
-                }
-            }
-        });
-    }
 }
