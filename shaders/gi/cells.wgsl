@@ -31,12 +31,17 @@ fn unpack_pixel(packed: u32) -> vec2i {
     return vec2i(i32(packed & 0xffffu), i32(packed >> 16u));
 }
 
-// Metres, world space; `distance` is distance_at(pixel).
-fn world_position_at(pixel: vec2i, distance: f32) -> vec3f {
+// Metres from the eye, along the world's axes; `distance` is distance_at(pixel).
+fn offset_at(pixel: vec2i, distance: f32) -> vec3f {
     let uv = (vec2f(pixel) + 0.5) / vec2f(params.size);
     let ndc = vec2f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y);
     let ray = vec3f((ndc + params.unproject.zw) * params.unproject.xy, -1.0);
-    return params.world_from_view * (ray * distance) + params.eye.xyz;
+    return params.world_from_view * (ray * distance);
+}
+
+// Metres, world space.
+fn world_position_at(pixel: vec2i, distance: f32) -> vec3f {
+    return offset_at(pixel, distance) + params.eye.xyz;
 }
 
 // Unit normal, world space.

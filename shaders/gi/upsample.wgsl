@@ -9,6 +9,9 @@
 @group(1) @binding(2) var output: texture_storage_2d<rgba16float, write>;
 // What gi.contact found, half the picture's size.
 @group(1) @binding(3) var contact: texture_2d<f32>;
+// Which spheres it found near each tile.
+@group(1) @binding(4) var<storage, read> spheres: array<vec4f>;
+@group(1) @binding(5) var<storage, read> nearby: array<u32>;
 
 // Cells on a side of what a workgroup reads: its own 8 / CELL_SIDE and two on each side.
 const STAGED = 8 / CELL_SIDE + 4;
@@ -38,7 +41,7 @@ fn stage_contact(index: u32, first: vec2i) {
     let pixel = half_pixel(texel);
     let z = distance_at(pixel);
     if z > 0.0 {
-        halves[index] = vec4f(world_position_at(pixel, z), textureLoad(contact, texel, 0).x);
+        halves[index] = vec4f(offset_at(pixel, z), textureLoad(contact, texel, 0).x);
     }
 }
 
@@ -51,7 +54,7 @@ fn kept(here: Surface, base: vec2i) -> f32 {
     for (var i = 0; i < 4; i++) {
         let at = base + vec2i(i & 1, i >> 1u);
         let found = halves[at.y * HALVES + at.x];
-        let off_plane = dot(here.normal, found.xyz - here.position) * here.strictness;
+        let off_plane = (dot(here.normal, found.xyz) - here.plane) * here.strictness;
         let lorentz = 1.0 + min(off_plane * off_plane, 1e12);
         let w = select(0.0, 1.0 / (lorentz * lorentz), found.w >= 0.0);
         sum += w * found.w;
@@ -60,6 +63,23 @@ fn kept(here: Surface, base: vec2i) -> f32 {
     let open = sum / max(weight, 1e-30);
     let v = select(1.0, open, weight > 0.0);
     return max(v, ((v * (2.0404 * ALBEDO - 0.3324) + (0.6417 - 4.7951 * ALBEDO)) * v + (2.7552 * ALBEDO + 0.6903)) * v);
+}
+
+// The part of its light that the spheres near its tile leave. They and what the picture shows are two estimates of one
+// thing, of which the lower counts; what stands so near that a sphere takes all of the light has none to give back.
+fn left_by_spheres(here: Surface, tile: vec2u) -> f32 {
+    let count = sphere_words(arrayLength(&spheres));
+    let first = tile_start(tile, count);
+    var open = 1.0;
+    for (var w = 0u; w < count; w++) {
+        var bits = nearby[first + w];
+        while bits != 0u {
+            let s = spheres[32u * w + firstTrailingBit(bits)];
+            bits &= bits - 1u;
+            open *= left_by(s.xyz - params.eye.xyz - here.position, here.normal, s.w);
+        }
+    }
+    return open;
 }
 
 // Thread `index` brings one cell of the square that begins at cell `first`. Cells beyond the picture count as empty.
@@ -78,7 +98,7 @@ fn stage(index: u32, first: vec2i) {
         return;
     }
     let pixel = unpack_pixel(packed);
-    points[index] = vec4f(world_position_at(pixel, distance_at(pixel)), 1.0);
+    points[index] = vec4f(offset_at(pixel, distance_at(pixel)), 1.0);
     normals[index] = world_normal_at(pixel);
     let found = CellLight(light[3u * row], light[3u * row + 1u], light[3u * row + 2u]);
     lights[index] = found;
@@ -93,8 +113,11 @@ const LEAST_TILT = 0.3;
 const MOST_TILT = 2.0;
 
 struct Surface {
+    // Metres from the eye, as all places here.
     position: vec3f,
     normal: vec3f,
+    // How far in front of the eye its plane is, along the normal.
+    plane: f32,
     // One over the distance from its plane that counts as little, 1/m.
     strictness: f32,
     // The part of the mirrored view direction that lies in its plane.
@@ -114,7 +137,7 @@ struct Sum {
 // is taken for a direction between the two normals, `least_cosine` or more towards the cell's.
 fn tap(here: Surface, at: i32, spatial: f32, least_cosine: f32) -> Sum {
     let found = points[at];
-    let off_plane = dot(here.normal, found.xyz - here.position) * here.strictness;
+    let off_plane = (dot(here.normal, found.xyz) - here.plane) * here.strictness;
     let lorentz = 1.0 + min(off_plane * off_plane, 1e12);
     let cosine = dot(here.normal, normals[at]);
     let facing = max(pow(max(cosine, 0.0), NORMAL_POWER), NORMAL_FLOOR);
@@ -179,15 +202,17 @@ fn upsample(
     let z = distance_at(pixel);
     var result = vec4f(0.0, 0.0, 0.0, 1.0);
     if z > 0.0 {
-        let p = world_position_at(pixel, z);
+        let p = offset_at(pixel, z);
         let n = world_normal_at(pixel);
-        let from_eye = normalize(p - params.eye.xyz);
-        let here = Surface(p, n, 1.0 / (PLANE_TOLERANCE * z), from_eye - n * dot(from_eye, n));
+        let plane = dot(n, p);
+        let along = (p - n * plane) * inverseSqrt(dot(p, p));
+        let here = Surface(p, n, plane, 1.0 / (PLANE_TOLERANCE * z), along);
         // A cell counts as lying at its middle, whichever pixel stands for it.
         let place = (vec2f(pixel) - f32(CELL_SIDE / 2)) / f32(CELL_SIDE) - vec2f(first);
         let half_base = ((pixel - 1) >> vec2u(1u)) - (4 * vec2i(group.xy) - 1);
         result = light_of(here, place);
-        result = vec4f(min(result.rgb * kept(here, half_base), vec3f(LARGEST)), result.a);
+        let open = min(kept(here, half_base), left_by_spheres(here, id.xy / TILE));
+        result = vec4f(min(result.rgb * open, vec3f(LARGEST)), result.a);
     }
     textureStore(output, pixel, result);
 }

@@ -139,7 +139,9 @@ impl Rung for WorldGi {
         if fresh {
             self.surfels.forget();
         }
-        self.contact.fit(inputs.size);
+        if self.contact.fit(inputs.size, world.spheres) {
+            self.upsample.forget();
+        }
         if self.cells.fit(inputs.size) || fresh || self.light.is_none() {
             self.upsample.forget();
             self.light = Some(self.light(inputs.size));
@@ -159,7 +161,7 @@ impl Rung for WorldGi {
             pass.dispatch_workgroups(w.div_ceil(8), h.div_ceil(8), 1);
         });
         self.contact.record(recorder, &bound);
-        self.upsample.record(recorder, &bound, &self.cells, light, self.contact.visibility(), output)
+        self.upsample.record(recorder, &bound, &self.cells, light, self.contact.found(), output)
     }
 
     fn surroundings(&self) -> Option<&wgpu::TextureView> {
@@ -170,6 +172,7 @@ impl Rung for WorldGi {
         self.inputs.forget();
         self.emitters.forget();
         self.surfels.forget();
+        self.contact.forget();
         self.upsample.forget();
     }
 
@@ -199,8 +202,8 @@ impl Rung for WorldGi {
         costs.push(CellsPass::cost(self.options.side, size));
         let bytes = cells * (4.0 + 8.0 + 48.0) + 34.5 * 80.0 * blocks + surfels * 60.0;
         costs.push(Cost::new("gi.gather", cells * flops, bytes));
-        costs.push(ContactPass::cost(size));
-        costs.push(UpsamplePass::cost(self.options.side, size));
+        costs.push(ContactPass::cost(size, self.contact.sphere_count()));
+        costs.push(UpsamplePass::cost(self.options.side, size, self.contact.sphere_count()));
         costs
     }
 }

@@ -121,8 +121,11 @@ pub struct World<'a> {
     pub environment: &'a wgpu::TextureView,
     /// Lowest and highest corner of the scene, metres.
     pub bounds: [[f32; 3]; 2],
-    /// The scene's small objects.
+    /// The scene's small objects in the mean.
     pub clutter: crate::scene::upload::Clutter,
+    /// World-space centre and radius (`vec4f`, metres) of spheres that stand in for small objects, a storage buffer; those of
+    /// radius 0 do not count.
+    pub spheres: &'a wgpu::Buffer,
 }
 
 /// The analytic lights on the GPU.

@@ -11,6 +11,7 @@
 //! surface's plane gives g. It is what `gi.glossy` shows where a ray finds nothing.
 
 use super::cells::{CellSide, CellsPass};
+use super::contact::{self, Beside};
 use super::exposure::{output_entry, pipeline, storage_entry};
 use super::inputs::{BoundInputs, InputGroup, texture_entry};
 use super::reconstruct::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
@@ -42,7 +43,7 @@ pub fn prelude(side: CellSide) -> String {
     ] {
         text.push_str(&format!("const {name} = f32({value:?});\n"));
     }
-    text
+    text + &contact::sphere_prelude()
 }
 
 /// The pass.
@@ -58,15 +59,22 @@ impl UpsamplePass {
     pub fn new(device: &wgpu::Device, inputs: &InputGroup, side: CellSide) -> Self {
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("gi.upsample"),
-            entries: &[storage_entry(0, true), storage_entry(1, true), output_entry(2), texture_entry(3)],
+            entries: &[
+                storage_entry(0, true),
+                storage_entry(1, true),
+                output_entry(2),
+                texture_entry(3),
+                storage_entry(4, true),
+                storage_entry(5, true),
+            ],
         });
         let module = shaders::module_with(device, "gi.upsample", &prelude(side));
         let pipeline = pipeline(device, "gi.upsample", &module, "upsample", inputs, &layout);
         Self { device: device.clone(), pipeline, layout, outputs: ViewCache::new() }
     }
 
-    /// Records pass `gi.upsample`. `light` is laid out as [`cells`](super::cells) says; it and the cells' buffer must be
-    /// the same until [`forget`](Self::forget). `output` (`Rgba16Float`, storage, full size) becomes E/π, and in
+    /// Records pass `gi.upsample`. `light` is laid out as [`cells`](super::cells) says; it, the cells' buffer and those of `beside`
+    /// must be the same until [`forget`](Self::forget). `output` (`Rgba16Float`, storage, full size) becomes E/π, and in
     /// alpha how many times as bright the mirrored direction is.
     ///
     /// # Errors
@@ -77,11 +85,11 @@ impl UpsamplePass {
         inputs: &BoundInputs,
         cells: &CellsPass,
         light: &wgpu::Buffer,
-        contact: &wgpu::TextureView,
+        beside: Beside<'_>,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
         ambient::check_output(output, inputs.size)?;
-        let group = self.outputs.get([output, contact], || {
+        let group = self.outputs.get([output, beside.visibility], || {
             Ok::<_, GiError>(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("gi.upsample"),
                 layout: &self.layout,
@@ -89,7 +97,12 @@ impl UpsamplePass {
                     wgpu::BindGroupEntry { binding: 0, resource: cells.pixels().as_entire_binding() },
                     wgpu::BindGroupEntry { binding: 1, resource: light.as_entire_binding() },
                     wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(output) },
-                    wgpu::BindGroupEntry { binding: 3, resource: wgpu::BindingResource::TextureView(contact) },
+                    wgpu::BindGroupEntry {
+                        binding: 3,
+                        resource: wgpu::BindingResource::TextureView(beside.visibility),
+                    },
+                    wgpu::BindGroupEntry { binding: 4, resource: beside.spheres.as_entire_binding() },
+                    wgpu::BindGroupEntry { binding: 5, resource: beside.nearby.as_entire_binding() },
                 ],
             }))
         })?;
@@ -112,14 +125,16 @@ impl UpsamplePass {
         self.outputs.made()
     }
 
-    /// What the pass costs for a picture of `size` pixels. A pixel: 4 cells of 74 operations, its own place, normal and
-    /// mirrored direction 80, the means 30, visibility 4 × 20 and 20; a workgroup stages 25 or 36 cells of 75 operations and 64 bytes and 36 texels of 45 operations, most of which the chip's cache
-    /// has, so that each cell comes from memory once. Pixels at edges that ask 16 cells (about 3 % of a picture) are
-    /// counted with 1,000 more.
-    pub fn cost(side: CellSide, size: [u32; 2]) -> Cost {
+    /// What the pass costs for a picture of `size` pixels with `spheres` in the scene. A pixel: 4 cells of 72 operations, its
+    /// own place, normal and mirrored direction 72, the means 30, visibility 4 × 17 and 20, 2 for each word of a tile and 34
+    /// for each sphere near it, 0.4 in the mean of four training rooms; a workgroup stages 25 or 36 cells of 72 operations and 64 bytes and
+    /// 36 texels of 42 operations, most of which the chip's cache has, so that each cell comes from memory once. Pixels at edges that
+    /// ask 16 cells (about 3 % of a picture) are counted with 1,000 more.
+    pub fn cost(side: CellSide, size: [u32; 2], spheres: u32) -> Cost {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
-        let staged = f64::from(8 / side.pixels() + 4).powi(2) * 75.0 / 64.0;
-        let flops = pixels * (4.0 * 74.0 + 110.0 + 100.0 + staged + 36.0 * 45.0 / 64.0 + 30.0);
+        let staged = f64::from(8 / side.pixels() + 4).powi(2) * 72.0 / 64.0 + 36.0 * 42.0 / 64.0;
+        let beside = 4.0 * 17.0 + 20.0 + 2.0 * f64::from(spheres.div_ceil(32)) + 0.4 * 34.0;
+        let flops = pixels * (4.0 * 72.0 + 72.0 + 30.0 + beside + staged + 30.0);
         Cost::new("gi.upsample", flops, pixels * 17.0 + side.count(size) as f64 * 60.0)
     }
 }

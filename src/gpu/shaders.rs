@@ -118,11 +118,11 @@ pub const GI: &[Shader] = &[
     },
     Shader {
         name: "gi.contact",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/contact.wgsl"],
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/beside.wgsl", "gi/contact.wgsl"],
     },
     Shader {
         name: "gi.upsample",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/upsample.wgsl"],
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/beside.wgsl", "gi/upsample.wgsl"],
     },
     Shader {
         name: "gi.emitters",

@@ -67,6 +67,7 @@ impl World {
             environment: &scene.environment_view,
             bounds: scene.bounds.map_or([[0.0; 3]; 2], |(low, high)| [low, high]),
             clutter: scene.clutter,
+            spheres: &scene.spheres,
         }
     }
 

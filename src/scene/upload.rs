@@ -4,10 +4,12 @@
 //! attribute stream (normal 4, tangent 8, two texture coordinate sets 16, colour 8). An instance takes 48 bytes (three
 //! rows of the world-from-object matrix), a light 64, a material 256.
 
+mod bodies;
 mod clutter;
 mod environment;
 mod material;
 mod mesh;
+mod spheres;
 mod texture;
 
 pub use clutter::Clutter;
@@ -158,8 +160,11 @@ pub struct SceneGpu {
     pub environment_view: wgpu::TextureView,
     /// World-space bounds of all instances; `None` for a scene without triangles.
     pub bounds: Option<([f32; 3], [f32; 3])>,
-    /// Its small objects.
+    /// Its small objects in the mean.
     pub clutter: Clutter,
+    /// Those that are like balls: world-space centre and radius (`vec4f`, metres) of spheres that stand in for them; the rest
+    /// of the buffer is 0.
+    pub spheres: wgpu::Buffer,
     /// What was mended on the way, one sentence each.
     pub warnings: Vec<String>,
     bytes: u64,
@@ -175,7 +180,11 @@ impl SceneGpu {
         let lights: Vec<LightGpu> = scene.lights.iter().map(LightGpu::new).collect();
         let light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &lights);
         let (environment_view, sky_bytes) = environment::upload(device, queue, &scene.environment, &mut warnings)?;
-        let bytes = sky_bytes + geometry.bytes + textures.bytes + materials.bytes + light_buffer.size();
+        let small = bodies::small(scene);
+        let spheres = spheres::spheres(&small, scene.instances.len());
+        let spheres = filled(device, queue, "scene.spheres", wgpu::BufferUsages::STORAGE, &spheres);
+        let bytes =
+            sky_bytes + spheres.size() + geometry.bytes + textures.bytes + materials.bytes + light_buffer.size();
         for warning in &warnings {
             tracing::warn!("{warning}");
         }
@@ -192,7 +201,8 @@ impl SceneGpu {
             environment: scene.environment.clone(),
             environment_view,
             bounds: geometry.bounds,
-            clutter: clutter::clutter(scene),
+            clutter: clutter::clutter(&small),
+            spheres,
             warnings,
             bytes,
         })
@@ -242,7 +252,12 @@ impl SceneGpu {
             queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&rows));
         }
         self.bounds = self.draws.iter().map(|d| d.bounds).reduce(mesh::union);
-        self.clutter = clutter::clutter(scene);
+        let small = bodies::small(scene);
+        self.clutter = clutter::clutter(&small);
+        let spheres = spheres::spheres(&small, scene.instances.len());
+        if !spheres.is_empty() {
+            queue.write_buffer(&self.spheres, 0, bytemuck::cast_slice(&spheres));
+        }
     }
 
     /// What was bound of this scene is bound anew.

@@ -4,6 +4,7 @@ use crate::common;
 use crate::edges::{FLOOR, LIGHT, PLATE, POLE, SIZE, WALL, bleeding, room};
 use crate::shot::{Hit, Shot, output, texture_with, view};
 use bouncelight::gi::cells::{CellSide, CellsPass, NO_PIXEL};
+use bouncelight::gi::contact::Beside;
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gi::twin::oct_decode;
 use bouncelight::gi::upsample::UpsamplePass;
@@ -58,8 +59,14 @@ fn upsample_and_tilt(gpu: &Gpu, shot: &Shot, side: CellSide, light: impl Fn(usiz
     let mut encoder = device.create_command_encoder(&Default::default());
     let mut recorder = Recorder::new(&mut encoder);
     cells.record(&mut recorder, &bound);
-    let open = visibility(gpu, shot.size, 1.0);
-    pass.record(&mut recorder, &bound, &cells, &buffer, &view(&open), &view(&target)).expect("records");
+    let open = view(&visibility(gpu, shot.size, 1.0));
+    // No spheres.
+    let [spheres, nearby] = [64, 4 * u64::from(shot.size[0].div_ceil(16) * shot.size[1].div_ceil(16))].map(|size| {
+        let usage = wgpu::BufferUsages::STORAGE;
+        device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
+    });
+    let beside = Beside { visibility: &open, spheres: &spheres, nearby: &nearby };
+    pass.record(&mut recorder, &bound, &cells, &buffer, beside, &view(&target)).expect("records");
     queue.submit([encoder.finish()]);
     let texels = readback::texture(device, queue, &target).expect("readable");
     let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&texels);
@@ -245,7 +252,7 @@ fn the_mirrored_direction_gets_the_lights_gradient() {
 fn costs_are_counted_for_the_whole_picture() {
     let size = [1024, 512];
     for side in SIDES {
-        let (choose, bring) = (CellsPass::cost(side, size), UpsamplePass::cost(side, size));
+        let (choose, bring) = (CellsPass::cost(side, size), UpsamplePass::cost(side, size, 100));
         // 16 bytes a pixel have to move: depth, normal, result.
         assert!(bring.bytes > 16.0 * 524_288.0 && bring.bytes < 22.0 * 524_288.0, "{bring:?}");
         assert!(bring.flops > 300.0 * 524_288.0 && bring.flops < 700.0 * 524_288.0, "{bring:?}");

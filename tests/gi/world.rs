@@ -47,7 +47,7 @@ pub(crate) fn renderer(gpu: &Gpu, size: [u32; 2], method: Method) -> Renderer {
 }
 
 /// Indirect light and positions of the picture.
-fn lit(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene) -> (Picture, Picture) {
+pub(crate) fn lit(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene) -> (Picture, Picture) {
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the scene fits");
     let options = CaptureOptions { layers: &[Layer::DiffInd, Layer::Position], ..Default::default() };
     let frame = capture(gpu, renderer, &uploaded, &scene.cameras[0], options).expect("the frame is drawn");
