@@ -50,6 +50,10 @@ fn add_world(sum: ptr<function, Sum>, here: Place, i: u32) {
     (*sum).blue += sky.blue * gain.x + seen.blue * gain.y;
 }
 
+// How far above its surface a cell's light is gathered, as part of its distance from the camera: a sixth of a cell's width. (At
+// 0 light from inside a lamp's shade showed through it in spots; error on four rooms 4.35 % with 0, 4.36 with 0.002, 4.37 with 0.005.)
+const ABOVE = 0.002;
+
 @compute @workgroup_size(8, 8)
 fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) i: u32) {
     let grid = cell_grid();
@@ -59,8 +63,10 @@ fn gather(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
     var here = Place();
     if packed != NO_PIXEL {
         let pixel = unpack_pixel(packed);
-        here.p = world_position_at(pixel, distance_at(pixel));
+        let z = distance_at(pixel);
         here.n = world_normal_at(pixel);
+        // A little above the surface: shading normals lean, and a receiver would see emitters of its own surface's other side.
+        here.p = world_position_at(pixel, z) + here.n * (ABOVE * z);
     }
     here.haze = haze(counts, here.p);
     var sum = Sum();
