@@ -8,8 +8,9 @@ use bouncelight::gpu::timing::Recorder;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{RenderError, Renderer, View};
 use bouncelight::scene::environment::EnvironmentImage;
+use bouncelight::scene::shapes::{self, Shape};
 use bouncelight::scene::upload::{SceneGpu, UploadError};
-use bouncelight::scene::{AlphaMode, Environment, Light, Scene};
+use bouncelight::scene::{AlphaMode, Environment, Instance, Light, Scene};
 use build::*;
 use glam::{Mat4, Vec3};
 use std::f32::consts::PI;
@@ -231,4 +232,60 @@ fn many_lights_and_wrong_scenes() {
     s.instances[0].mesh = 0;
     s.meshes[1].indices[2] = 77;
     assert!(matches!(upload(&s), Some(UploadError::Mesh { .. })));
+}
+
+/// What is closed looks the same with both sides drawn as with one: no inner face wins at a silhouette. From inside it is seen;
+/// what is open shows its inner faces.
+#[test]
+fn inner_faces_of_closed_bodies_are_seen_from_inside_only() {
+    let Some(gpu) = common::gpu() else { return };
+    let body = |shape: Shape, places: &[Mat4]| {
+        let mut s = scene(vec![shapes::flat(shape)], vec![sun([0.2, -1.0, -0.4], 1.0, 0.0)]);
+        let one = s.instances[0].clone();
+        s.instances = places.iter().map(|m| Instance { transform: m.to_cols_array_2d(), ..one.clone() }).collect();
+        s
+    };
+    let normals = |s: &Scene, eye: [f32; 3], target: [f32; 3]| {
+        render(&gpu, s, &look_at(eye, target, 0.4), [320, 200], 1).layer(Layer::Normal).unwrap().data.clone()
+    };
+    let one_sided = |s: &Scene| {
+        let mut s = s.clone();
+        s.materials[0].double_sided = false;
+        s
+    };
+    let open = |s: &Scene| {
+        let mut s = s.clone();
+        s.meshes[0].indices.truncate(3);
+        s
+    };
+    let differ = |a: &[f32], b: &[f32]| a.chunks(3).zip(b.chunks(3)).filter(|(a, b)| a != b).count();
+    let (mut closed, mut any) = (0, 0);
+    let many: Vec<Mat4> = (0..400)
+        .map(|k| {
+            let at = Vec3::new((k % 20) as f32 - 9.5, (k / 20) as f32 - 9.5, -0.01 * k as f32) * 0.5;
+            let turn = Mat4::from_euler(glam::EulerRot::XYZ, 0.3 + k as f32, 0.7 * k as f32, 0.2);
+            Mat4::from_translation(at) * turn * Mat4::from_scale(Vec3::splat(0.2))
+        })
+        .collect();
+    for shape in [Shape::Cube, Shape::IcoSphere] {
+        let s = body(shape, &many);
+        // Without one triangle of many the mesh is an open one.
+        let mut ajar = s.clone();
+        ajar.meshes[0].indices.truncate(s.meshes[0].indices.len() - 3);
+        let [one, both, ajar, hole] =
+            [&one_sided(&s), &s, &ajar, &one_sided(&ajar)].map(|s| normals(s, [0.0, 0.0, 30.0], [0.0; 3]));
+        closed += differ(&both, &one);
+        any += differ(&ajar, &hole);
+    }
+    println!("{closed} pixels show an inner face of closed bodies, {any} of open ones");
+    // A driver may call a front face of next to no area an inner one.
+    assert!(closed <= 2, "{closed}");
+    // Negative control.
+    assert!(any > closed + 2, "{any}");
+    let s = body(Shape::Cube, &[Mat4::IDENTITY]);
+    assert!(normals(&s, [0.0, 0.0, 0.5], [0.0, 0.0, -1.0]).iter().any(|n| *n != 0.0), "a box is seen from inside");
+    assert!(normals(&one_sided(&s), [0.0, 0.0, 0.5], [0.0, 0.0, -1.0]).iter().all(|n| *n == 0.0));
+    let away = body(Shape::Cube, &[Mat4::from_rotation_x(PI)]);
+    let [both, one] = [&open(&away), &one_sided(&open(&away))].map(|s| normals(s, [1.0, 1.0, 9.0], [0.0; 3]));
+    assert!(differ(&both, &one) > 100, "a single triangle has two sides");
 }

@@ -279,7 +279,7 @@ impl Renderer {
             self.passes.shadow.record(recorder, queue, scene, view, &mut lighting.maps);
         }
         self.record_world(recorder, queue, scene, view, shadows, &mut lighting);
-        self.passes.gbuffer.record(recorder, scene, &self.targets);
+        self.passes.gbuffer.record(recorder, scene, view, &self.targets);
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
         self.passes.direct.record(recorder, inputs);
         let world = lighting.world.as_ref().map(|w| w.inputs(scene));

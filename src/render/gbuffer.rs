@@ -24,8 +24,10 @@
 
 use super::targets::Targets;
 use super::tool;
+use super::view::View;
 use crate::gpu::{shaders, timing::Recorder};
 use crate::scene::upload::{Draw, SceneGpu, attribute_layouts, material_layout};
+use glam::Vec3;
 
 /// Draws a scene into the G-buffer.
 pub struct GbufferPass {
@@ -49,8 +51,8 @@ impl GbufferPass {
         Self { pipelines, frame }
     }
 
-    /// Clears the G-buffer and draws `scene` into it.
-    pub fn record(&self, recorder: &mut Recorder<'_>, scene: &SceneGpu, targets: &Targets) {
+    /// Clears the G-buffer and draws `scene` into it, as `view` sees it.
+    pub fn record(&self, recorder: &mut Recorder<'_>, scene: &SceneGpu, view: &View, targets: &Targets) {
         let colors =
             [&targets.normal, &targets.albedo, &targets.specular, &targets.emissive, &targets.motion].map(|t| {
                 Some(wgpu::RenderPassColorAttachment {
@@ -76,8 +78,9 @@ impl GbufferPass {
             pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
             let (mut pipeline, mut material) = (usize::MAX, usize::MAX);
             for draw in &scene.draws {
-                if pipeline != variant(draw) {
-                    pipeline = variant(draw);
+                let wanted = variant(draw, view);
+                if pipeline != wanted {
+                    pipeline = wanted;
                     pass.set_pipeline(&self.pipelines[pipeline]);
                 }
                 if material != draw.material {
@@ -91,9 +94,21 @@ impl GbufferPass {
 }
 
 /// Which pipeline a draw needs: culling (back, front for mirrored, none) × coverage.
-fn variant(draw: &Draw) -> usize {
-    let cull = if draw.double_sided { 2 } else { usize::from(draw.mirrored) };
+///
+/// What is closed shows its outer faces alone from outside, whatever its material says: where an inner face meets an outer one at
+/// a silhouette, both cover a pixel at depths that only rounding tells apart, and the inner one would now and then win.
+fn variant(draw: &Draw, view: &View) -> usize {
+    let cull =
+        if draw.double_sided && !(draw.closed && is_outside(view, draw)) { 2 } else { usize::from(draw.mirrored) };
     cull + 3 * usize::from(draw.covered)
+}
+
+/// True where the eye is well outside a draw's bounds, so that its near plane cuts nothing open.
+fn is_outside(view: &View, draw: &Draw) -> bool {
+    let (low, high) = (Vec3::from(draw.bounds.0), Vec3::from(draw.bounds.1));
+    let eye = Vec3::from(view.eye());
+    let margin = 0.05 * (high - low).length() + 3.0 * view.near;
+    eye.cmplt(low - margin).any() || eye.cmpgt(high + margin).any()
 }
 
 fn pipeline(

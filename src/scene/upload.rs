@@ -5,6 +5,7 @@
 //! rows of the world-from-object matrix), a light 64, a material 256.
 
 mod bodies;
+mod closed;
 mod clutter;
 mod environment;
 mod material;
@@ -167,6 +168,8 @@ pub struct SceneGpu {
     pub spheres: wgpu::Buffer,
     /// What was mended on the way, one sentence each.
     pub warnings: Vec<String>,
+    /// Which meshes are closed.
+    closed: Vec<bool>,
     bytes: u64,
 }
 
@@ -203,6 +206,7 @@ impl SceneGpu {
             bounds: geometry.bounds,
             clutter: clutter::clutter(&small),
             spheres,
+            closed: geometry.closed,
             warnings,
             bytes,
         })
@@ -246,7 +250,7 @@ impl SceneGpu {
 
     /// Takes over the placements of `scene`, whose meshes and materials are those that were uploaded.
     pub fn set_placements(&mut self, queue: &wgpu::Queue, scene: &Scene) {
-        let (rows, draws) = mesh::placements(scene);
+        let (rows, draws) = mesh::placements(scene, &self.closed);
         self.draws = draws;
         if !rows.is_empty() {
             queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&rows));

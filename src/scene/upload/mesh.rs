@@ -1,5 +1,6 @@
 //! Meshes and instances: compact vertices, one set of buffers for the whole scene, draws grouped by material.
 
+use super::closed::is_closed;
 use super::{UploadError, filled, is_covered};
 use crate::scene::{Mesh, Scene};
 use bytemuck::{Pod, Zeroable};
@@ -38,6 +39,8 @@ pub struct Draw {
     pub mirrored: bool,
     /// Both faces are drawn.
     pub double_sided: bool,
+    /// Opaque and closed: from outside only outer faces are to be seen.
+    pub closed: bool,
     /// Masked or blended: needs the permutation that discards.
     pub covered: bool,
     /// World-space bounds of all its instances.
@@ -75,6 +78,7 @@ pub(super) struct Geometry {
     pub instances: wgpu::Buffer,
     pub draws: Vec<Draw>,
     pub bounds: Option<([f32; 3], [f32; 3])>,
+    pub closed: Vec<bool>,
     pub bytes: u64,
 }
 
@@ -106,7 +110,8 @@ pub(super) fn upload(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) 
             });
         }
     }
-    let (rows, draws) = placements(scene);
+    let closed: Vec<bool> = scene.meshes.iter().map(is_closed).collect();
+    let (rows, draws) = placements(scene, &closed);
     let bounds = draws.iter().map(|d| d.bounds).reduce(union);
     let vertex = wgpu::BufferUsages::VERTEX;
     let positions = filled(device, queue, "scene.positions", vertex, &positions);
@@ -114,12 +119,12 @@ pub(super) fn upload(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) 
     let indices = filled(device, queue, "scene.indices", wgpu::BufferUsages::INDEX, &indices);
     let instances = filled(device, queue, "scene.instances", vertex, &rows);
     let bytes = positions.size() + attributes.size() + indices.size() + instances.size();
-    Ok(Geometry { positions, attributes, indices, instances, draws, bounds, bytes })
+    Ok(Geometry { positions, attributes, indices, instances, draws, bounds, closed, bytes })
 }
 
 /// Rows of the world-from-object matrices in the order of the instance buffer, and the draws that refer to them, for a
-/// scene whose instances name meshes that exist.
-pub(super) fn placements(scene: &Scene) -> (Vec<[[f32; 4]; 3]>, Vec<Draw>) {
+/// scene whose instances name meshes that exist; which of these are `closed` is known.
+pub(super) fn placements(scene: &Scene, closed: &[bool]) -> (Vec<[[f32; 4]; 3]>, Vec<Draw>) {
     // Where each mesh begins in the shared buffers.
     let (mut vertex, mut index) = (0, 0);
     let mut ranges = Vec::with_capacity(scene.meshes.len());
@@ -161,6 +166,7 @@ pub(super) fn placements(scene: &Scene) -> (Vec<[[f32; 4]; 3]>, Vec<Draw>) {
             instances: at..at + 1,
             mirrored,
             double_sided: m.double_sided,
+            closed: closed.get(mesh) == Some(&true) && !is_covered(m.alpha_mode),
             covered: is_covered(m.alpha_mode),
             bounds,
         });

@@ -1,0 +1,66 @@
+//! Which meshes are closed: from outside nobody sees the inner side of their faces.
+
+use crate::scene::Mesh;
+use glam::Vec3;
+use std::collections::HashMap;
+
+/// Larger meshes are not asked: the answer saves them nothing that anybody would see.
+const MOST: usize = 200_000;
+
+/// True where every edge of `mesh` borders exactly two triangles that wind the same way, and these face outwards. Vertices of one
+/// place are one.
+pub(super) fn is_closed(mesh: &Mesh) -> bool {
+    if mesh.indices.is_empty() || mesh.indices.len() > 3 * MOST {
+        return false;
+    }
+    let mut places = HashMap::new();
+    // 0.0 also for -0.0.
+    let bits = |p: &[f32; 3]| p.map(|c| (c + 0.0).to_bits());
+    let ids: Vec<usize> = mesh
+        .positions
+        .iter()
+        .map(|p| {
+            let next = places.len();
+            *places.entry(bits(p)).or_insert(next)
+        })
+        .collect();
+    let mut edges = HashMap::new();
+    let mut volume = 0.0;
+    for t in mesh.indices.chunks_exact(3) {
+        let [a, b, c] = [t[0], t[1], t[2]].map(|i| i as usize);
+        let [i, j, k] = [a, b, c].map(|v| ids.get(v).copied().unwrap_or(usize::MAX));
+        if i == j || j == k || k == i {
+            continue;
+        }
+        for edge in [(i, j), (j, k), (k, i)] {
+            *edges.entry(edge).or_insert(0u32) += 1;
+        }
+        let [a, b, c] = [a, b, c].map(|v| mesh.positions.get(v).map_or(Vec3::NAN, |p| Vec3::from(*p)));
+        volume += f64::from(a.dot(b.cross(c)));
+    }
+    volume > 0.0 && edges.iter().all(|(&(a, b), &n)| n == 1 && edges.get(&(b, a)) == Some(&1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::shapes::{self, Shape};
+
+    #[test]
+    fn bodies_are_closed_and_what_is_open_or_turned_inside_out_is_not() {
+        for shape in [Shape::Cube, Shape::Cylinder, Shape::Cone, Shape::UvSphere, Shape::IcoSphere, Shape::Torus] {
+            let mesh = shapes::flat(shape);
+            assert!(is_closed(&mesh), "{shape:?}");
+            let mut open = mesh.clone();
+            open.indices.truncate(mesh.indices.len() - 3);
+            assert!(!is_closed(&open), "{shape:?} without a triangle");
+            let mut inverted = mesh.clone();
+            inverted.indices.reverse();
+            assert!(!is_closed(&inverted), "{shape:?} inside out");
+            let mut twice = mesh.clone();
+            twice.indices.extend_from_slice(&mesh.indices);
+            assert!(!is_closed(&twice), "{shape:?} twice");
+        }
+        assert!(!is_closed(&Mesh::default()));
+    }
+}
