@@ -27,7 +27,7 @@ pub struct Args {
     /// Real-time method to measure, or `all` of them. (`render --method reference` tells its own samples per second.)
     #[arg(long, default_value = "all", value_parser = parse_methods)]
     method: Methods,
-    /// Weights of `neural`: a file, or the name of shipped ones (small, medium); `small` when absent.
+    /// Weights of `neural`: a file, or the name of shipped ones (small, medium, large); `small` when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
     #[command(flatten)]

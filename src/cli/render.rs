@@ -34,7 +34,7 @@ pub struct Args {
     /// How indirect light is found; `reference` traces paths until the light is right. `neural` when absent.
     #[arg(long, value_enum)]
     method: Option<MethodName>,
-    /// Weights of `neural`: a file, or the name of shipped ones (small, medium); `small` when absent.
+    /// Weights of `neural`: a file, or the name of shipped ones (small, medium, large); `small` when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
     /// Jittered frames that are averaged through Cycles' pixel filter; 1 (the default) is the raw frame.

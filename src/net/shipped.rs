@@ -3,9 +3,10 @@
 use super::format::{Weights, WeightsError};
 
 /// Name and file of each, smallest first.
-static FILES: [(&str, &[u8]); 2] = [
+static FILES: [(&str, &[u8]); 3] = [
     ("small", include_bytes!("../../assets/weights/small.safetensors")),
     ("medium", include_bytes!("../../assets/weights/medium.safetensors")),
+    ("large", include_bytes!("../../assets/weights/large.safetensors")),
 ];
 
 /// The one that is taken where nobody chose.
