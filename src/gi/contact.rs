@@ -155,13 +155,14 @@ impl ContactPass {
         self.bound.as_ref().map_or(0, |b| (b.spheres.size() / 16).min(u64::from(MOST_SPHERES)) as u32)
     }
 
-    /// What the pass costs for a picture of `size` pixels: 70 operations a texel, 20 a direction, 55 a point; 30 for the
-    /// tile's corners and range, and each texel of a tile's 64 asks a part of the `spheres` with 42 each.
+    /// What the pass costs for a picture of `size` pixels: 70 operations a texel, 20 a direction, 50 a point, 5 for each of the distances
+    /// of points, of which there are two sets; 30 for the tile's corners and range, and each texel of a tile's 64 asks a part of the `spheres` with 42 each.
     pub fn cost(size: [u32; 2], spheres: u32) -> Cost {
         let [w, h] = half_of(size);
         let texels = f64::from(w) * f64::from(h);
         let tiles = 30.0 + 42.0 * f64::from(spheres) / 64.0;
-        let flops = 70.0 + f64::from(AZIMUTHS) * (20.0 + f64::from(TAPS) * 55.0) + tiles;
+        let points = f64::from(TAPS);
+        let flops = 70.0 + f64::from(AZIMUTHS) * (20.0 + points * 50.0) + 2.0 * points * 5.0 + tiles;
         Cost::new("gi.contact", texels * flops, texels * (4.0 * 4.0 + 4.0 + 4.0))
     }
 }
