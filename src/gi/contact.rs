@@ -155,8 +155,9 @@ impl ContactPass {
         self.bound.as_ref().map_or(0, |b| (b.spheres.size() / 16).min(u64::from(MOST_SPHERES)) as u32)
     }
 
-    /// What the pass costs for a picture of `size` pixels: 70 operations a texel, 20 a direction, 50 a point, 5 for each of the distances
-    /// of points, of which there are two sets; 30 for the tile's corners and range, and each texel of a tile's 64 asks a part of the `spheres` with 42 each.
+    /// What the pass costs for a picture of `size` pixels: 70 operations a texel, 20 a direction, 50 a point, 5 for each of the
+    /// distances of points, of which there are two sets; 30 for the tile's corners and range, and each texel of a tile's 64
+    /// asks a part of the `spheres` with 42 each.
     pub fn cost(size: [u32; 2], spheres: u32) -> Cost {
         let [w, h] = half_of(size);
         let texels = f64::from(w) * f64::from(h);

@@ -127,9 +127,9 @@ impl UpsamplePass {
 
     /// What the pass costs for a picture of `size` pixels with `spheres` in the scene. A pixel: 4 cells of 72 operations, its
     /// own place, normal and mirrored direction 72, the means 30, visibility 4 × 17 and 20, 2 for each word of a tile and 34
-    /// for each sphere near it, 0.4 in the mean of four training rooms; a workgroup stages 25 or 36 cells of 72 operations and 64 bytes and
-    /// 36 texels of 42 operations, most of which the chip's cache has, so that each cell comes from memory once. Pixels at edges that
-    /// ask 16 cells (about 3 % of a picture) are counted with 1,000 more.
+    /// for each sphere near it, 0.4 in the mean of four training rooms; a workgroup stages 25 or 36 cells of 72 operations
+    /// and 64 bytes and 36 texels of 42 operations, most of which the chip's cache has, so that each cell comes from memory
+    /// once. Pixels at edges that ask 16 cells (about 3 % of a picture) are counted with 1,000 more.
     pub fn cost(side: CellSide, size: [u32; 2], spheres: u32) -> Cost {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let staged = f64::from(8 / side.pixels() + 4).powi(2) * 72.0 / 64.0 + 36.0 * 42.0 / 64.0;

@@ -5,6 +5,7 @@ mod build;
 #[path = "../common/mod.rs"]
 mod common;
 mod contact;
+mod corrected;
 mod edges;
 mod glossy;
 #[cfg(feature = "reference")]
