@@ -18,6 +18,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
+from matplotlib.transforms import Bbox  # noqa: E402
 
 PAPER = ("the paper's network\n(its own pictures)", 104.0, 45178.0)
 NOT_SHOWN = {"constant", "best constant"}
@@ -59,6 +60,23 @@ def frontier(points):
     return out
 
 
+def label(axes, points):
+    """Each point's name (of networks, the size) beside it, at the first of seven places where it covers no point and no other name."""
+    figure = axes.get_figure()
+    figure.canvas.draw()
+    places = [(5, 4, "left"), (5, -11, "left"), (8, -3, "left"), (-5, 4, "right"), (-5, -11, "right"), (0, 8, "center"), (0, -16, "center")]
+    dots = [axes.transData.transform(point[1:]) for point in points]
+    taken = [Bbox.from_bounds(x - 3, y - 3, 6, 6) for x, y in dots]
+    for name, x, y in sorted(points, key=lambda point: -point[1]):
+        for dx, dy, side in places:
+            text = axes.annotate(name.removeprefix("neural "), (x, y), xytext=(dx, dy), textcoords="offset points", fontsize=8, ha=side)
+            box = text.get_window_extent(figure.canvas.get_renderer()).padded(3)
+            if not any(box.overlaps(other) for other in taken) or (dx, dy, side) == places[-1]:
+                taken.append(box)
+                break
+            text.remove()
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("csv")
@@ -79,13 +97,11 @@ def main():
     axes.plot([p[1] for p in unbaked], [p[2] for p in unbaked], color="C0", alpha=0.5, ls="--", drawstyle="steps-post", zorder=1, label="… without a bake")
     for name, x, y in points:
         axes.scatter(x, y, color="C3" if name == PAPER[0] else "C0" if (name, x, y) in best + unbaked else "0.5", zorder=2)
-        # Below its point where the one above would be written over.
-        crowded = any(0 < other / y - 1 < 0.1 and 0.65 < (across + 0.1) / (x + 0.1) < 1.5 for _, across, other in points)
-        axes.annotate(name, (x, y), xytext=(5, -11 if crowded else 4), textcoords="offset points", fontsize=8)
     axes.set_xscale("symlog", linthresh=0.1)
     axes.set(yscale="log", xlabel="arithmetic for one picture of 1024×512, GFLOP (counted)", ylabel={"l1": "the paper's L1"}.get(a.metric, a.metric), xlim=(0, 1000))
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=8)
+    label(axes, points)
     for ending in ("png", "svg"):
         figure.savefig(f"{a.out}.{ending}", dpi=120)
     for name, line in [("frontier", best), ("frontier without a bake", unbaked)]:
