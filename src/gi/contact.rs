@@ -11,6 +11,7 @@ use super::exposure::storage_entry;
 use super::inputs::{BoundInputs, InputGroup};
 use super::rung::Cost;
 use crate::gpu::timing::Recorder;
+use crate::scene::upload::MOST_SPHERES;
 
 /// Directions in the tangent plane. (6 instead of 4 would take 0.03 points of the light's error, of 4.4 %, and half as much
 /// time again.)
@@ -29,8 +30,6 @@ const BIAS: f32 = 0.03;
 /// How far a sphere counts, in its radii. (Farther ones are in the light's dimming by small objects already: error on the same
 /// rooms with 2, 3, 4 and 6 radii 4.36, 4.35, 4.38 and 4.45 %.)
 const SPHERE_REACH: f32 = 2.0;
-/// Most spheres that are looked at.
-const MOST_SPHERES: u32 = 1024;
 /// Pixels on a side of the squares that know which spheres are near them.
 const TILE: u32 = 16;
 
@@ -61,11 +60,15 @@ pub fn prelude() -> String {
     text + &sphere_prelude()
 }
 
-/// Bytes of [`Beside::nearby`] for pictures of `size` pixels and `spheres`, a buffer of them.
+/// How many spheres of a buffer are looked at, those of radius 0 included.
+fn count(spheres: &wgpu::Buffer) -> u32 {
+    (spheres.size() / 16).min(u64::from(MOST_SPHERES)) as u32
+}
+
+/// Bytes of [`Beside::nearby`] for pictures of `size` pixels; never 0, so that it can be bound.
 fn nearby_bytes(size: [u32; 2], spheres: &wgpu::Buffer) -> u64 {
-    let words = (spheres.size() / 16).min(u64::from(MOST_SPHERES)).div_ceil(32);
     let [w, h] = size.map(|n| u64::from(n.div_ceil(TILE)));
-    4 * w * h * words
+    (4 * w * h * u64::from(count(spheres).div_ceil(32))).max(4)
 }
 
 /// What is bound.
@@ -150,9 +153,9 @@ impl ContactPass {
         self.made
     }
 
-    /// Spheres of radius 0 included.
+    /// How many spheres it looks at, those of radius 0 included.
     pub fn sphere_count(&self) -> u32 {
-        self.bound.as_ref().map_or(0, |b| (b.spheres.size() / 16).min(u64::from(MOST_SPHERES)) as u32)
+        self.bound.as_ref().map_or(0, |b| count(&b.spheres))
     }
 
     /// What the pass costs for a picture of `size` pixels: 70 operations a texel, 20 a direction, 50 a point, 5 for each of the

@@ -16,6 +16,7 @@ mod texture;
 pub use clutter::Clutter;
 pub use material::{MaterialGpu, TextureUse, material_layout};
 pub use mesh::{AttributeVertex, Draw, attribute_layouts, position_layouts};
+pub use spheres::MOST_SPHERES;
 
 use super::{AlphaMode, Environment, Light, LightKind, Scene};
 use bytemuck::{Pod, Zeroable};

@@ -6,8 +6,8 @@ use super::bodies::Body;
 /// Of the shapes in paper rooms: balls 0.03 to 0.05, cylinders 0.10, cubes 0.12, cones 0.16; rings, which have 0.23, are not
 /// like a ball.
 const MISFIT: f32 = 0.2;
-/// More spheres than this are not looked at (`shaders/gi/contact.wgsl` has a bit for each); the largest count.
-pub(super) const MOST: usize = 1024;
+/// More spheres than this are not looked at (`gi::contact` has a bit for each in every tile); the largest count.
+pub const MOST_SPHERES: u32 = 1024;
 
 /// World-space centre and radius, metres, of the sphere for each of the `small` objects that are like one, largest first; as
 /// many as `count`, with spheres of radius 0 at the end.
@@ -16,7 +16,7 @@ pub(super) fn spheres(small: &[Body], count: usize) -> Vec<[f32; 4]> {
     let mut all: Vec<[f32; 4]> =
         like.map(|b| b.centre.extend(b.radius()).to_array()).filter(|s| s.iter().all(|n| n.is_finite())).collect();
     all.sort_by(|a, b| b[3].total_cmp(&a[3]));
-    all.resize(count.min(MOST), [0.0; 4]);
+    all.resize(count.min(MOST_SPHERES as usize), [0.0; 4]);
     all
 }
 

@@ -139,21 +139,7 @@ mod tests {
         let frame = |events: Vec<Event>, memory: &mut Memory, state: &mut State| {
             let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(300.0, 400.0)));
             let input = egui::RawInput { screen_rect, events, focused: true, ..Default::default() };
-            let facts = Facts {
-                adapter: "none",
-                software: true,
-                timestamps: true,
-                times: &times,
-                memory: &[],
-                jobs: &[],
-                reference: None,
-                verdict: None,
-                measured: &measured,
-                still: 1,
-                feature: None,
-                layers: &[],
-                flicker: None,
-            };
+            let facts = Facts::bare(&times, &measured);
             context.run_ui(input, |ui| frontier(ui, state, memory, &facts)).textures_delta.clear();
         };
         frame(vec![], &mut memory, &mut state);

@@ -45,6 +45,28 @@ pub struct Facts<'a> {
     pub flicker: Option<f64>,
 }
 
+#[cfg(test)]
+impl<'a> Facts<'a> {
+    /// Of a window that knows next to nothing.
+    fn bare(times: &'a Times, measured: &'a BTreeMap<usize, f64>) -> Self {
+        Facts {
+            adapter: "none",
+            software: true,
+            timestamps: false,
+            times,
+            memory: &[],
+            jobs: &[],
+            reference: None,
+            verdict: None,
+            measured,
+            still: 1,
+            feature: None,
+            layers: &[],
+            flicker: None,
+        }
+    }
+}
+
 /// How far the live reference is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceFacts {
@@ -182,21 +204,7 @@ mod tests {
         for events in frames {
             let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 500.0)));
             let input = egui::RawInput { screen_rect, events, focused: true, ..Default::default() };
-            let facts = Facts {
-                adapter: "none",
-                software: true,
-                timestamps: false,
-                times: &times,
-                memory: &[],
-                jobs: &[],
-                reference: None,
-                verdict: None,
-                measured: &measured,
-                still: 1,
-                feature: None,
-                layers: &[],
-                flicker: None,
-            };
+            let facts = Facts::bare(&times, &measured);
             let mut output = context.run_ui(input, |ui| place = show(ui, state, &mut memory, &facts));
             output.textures_delta.clear();
         }
