@@ -371,7 +371,7 @@ def main(arguments=None):
         signal.signal(s, lambda *_: STOPPING.append(True))
     quantise.check(config.quantise)
     try:
-        train(config, folder).world.close()
+        train(config, folder).world.leave()
     except Stop:
         print(f"stopped; the same command continues (state in {folder})", file=sys.stderr)
         sys.exit(130)

@@ -16,7 +16,7 @@ def main(config, folder, steps, out):
     run = train.train(train.Config(**config), folder, stop_after=steps)
     if run.world.first:
         torch.save({"gradient": {n: p.grad for n, p in run.model.named_parameters()}, "model": dict(run.model.state_dict()), "samples": run.samples()}, out)
-    run.world.close()
+    run.world.leave()
 
 
 if __name__ == "__main__":
