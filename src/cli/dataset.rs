@@ -65,6 +65,10 @@ pub struct Args {
     /// Folder for the samples; those that exist are kept, so a stopped run goes on where it was.
     #[arg(long)]
     out: PathBuf,
+    /// Also write each room as a `.glb` with a `_views.json` beside it, for targets from Cycles (recipes paper-room and
+    /// paper-room-varied; recipe scene always writes the views, and the scene is there).
+    #[arg(long)]
+    export: bool,
     /// Allow rooms that are kept for judging.
     #[arg(long)]
     judge: bool,
@@ -240,7 +244,18 @@ fn many_rooms(global: &Global, writer: &mut Writer, Rooms(rooms): &Rooms, args: 
     let mut progress = Progress::new(global, "views", mine.len() as u64 * u64::from(args.views));
     let varied = args.recipe == Recipe::PaperRoomVaried;
     for room in mine {
-        let stem = |view: u32| format!("{}{room:04}_view{view}", if varied { "varied" } else { "room" });
+        let name = format!("{}{room:04}", if varied { "varied" } else { "room" });
+        let stem = |view: u32| format!("{name}_view{view}");
+        let views_of = |scene: &Scene| -> Vec<Camera> {
+            (0..args.views).map(|view| turned(&scene.cameras[0], view as f32 / args.views as f32)).collect()
+        };
+        let build = || if varied { varied::scene(room) } else { paper_room::scene(room) };
+        let exported = writer.out.join(format!("{name}.glb"));
+        if args.export && !(exported.exists() && views_path(&writer.out, &name).exists()) {
+            let scene = build();
+            scene::export::write_glb(&scene, &exported)?;
+            record_views(writer, &name, &scene.name, u64::from(room), &views_of(&scene), &scene)?;
+        }
         let mut missing = Vec::new();
         for view in 0..args.views {
             if writer.has(&stem(view))? {
@@ -252,11 +267,12 @@ fn many_rooms(global: &Global, writer: &mut Writer, Rooms(rooms): &Rooms, args: 
         if missing.is_empty() {
             continue;
         }
-        let scene = if varied { varied::scene(room) } else { paper_room::scene(room) };
+        let scene = build();
         let uploaded = writer.upload(&scene)?;
+        let cameras = views_of(&scene);
         for view in missing {
-            let camera = turned(&scene.cameras[0], view as f32 / args.views as f32);
-            writer.write(&stem(view), &uploaded, &camera, room.wrapping_mul(10_007).wrapping_add(view))?;
+            let camera = &cameras[view as usize];
+            writer.write(&stem(view), &uploaded, camera, room.wrapping_mul(10_007).wrapping_add(view))?;
             progress.step();
         }
     }
@@ -289,20 +305,30 @@ fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> R
         if view % of == shard && !writer.has(&name)? {
             writer.complete(&name, &uploaded, &camera, view, sample)?;
         }
-        cameras.push(json!({ "world_from_camera": camera.transform, "yfov": camera.yfov }));
+        cameras.push(camera);
         progress.step();
     }
     progress.finish();
-    // glTF has no field for these, so whoever renders the targets needs them from here.
-    let radius = |l: &crate::scene::Light| match l.kind {
+    record_views(writer, &stem, spec, args.seed, &cameras, &scene)
+}
+
+fn views_path(out: &Path, stem: &str) -> PathBuf {
+    out.join(format!("{stem}_views.json"))
+}
+
+/// Writes where the cameras stand, and what glTF has no field for, so whoever renders the targets needs it from here.
+fn record_views(writer: &Writer, stem: &str, spec: &str, seed: u64, cameras: &[Camera], scene: &Scene) -> Result<()> {
+    let size = |l: &scene::Light| match l.kind {
         LightKind::Directional { angle, .. } => json!({ "name": l.name, "angle": angle }),
         LightKind::Point { radius, .. } | LightKind::Spot { radius, .. } => json!({ "name": l.name, "radius": radius }),
     };
+    let view = |c: &Camera| json!({ "world_from_camera": c.transform, "yfov": c.yfov });
     let record = json!({
-        "schema": 1, "scene": spec, "seed": args.seed, "size": writer.renderer.size(), "views": cameras,
-        "environment": scene.environment.radiance, "lights": scene.lights.iter().map(radius).collect::<Vec<_>>(),
+        "schema": 1, "scene": spec, "seed": seed, "size": writer.renderer.size(),
+        "views": cameras.iter().map(view).collect::<Vec<_>>(),
+        "environment": scene.environment.radiance, "lights": scene.lights.iter().map(size).collect::<Vec<_>>(),
     });
-    write_whole(&writer.out.join(format!("{stem}_views.json")), format!("{record:#}\n").as_bytes())?;
+    write_whole(&views_path(&writer.out, stem), format!("{record:#}\n").as_bytes())?;
     Ok(())
 }
 
