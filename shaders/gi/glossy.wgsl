@@ -36,6 +36,10 @@ const LOOKS = 2;
 // What a rough surface's ray that finds something counts, where the method knows the light along the mirrored direction, too: one
 // ray is not the lobe. Measured (docs/gi.md): 1 and 0.5 are worse by 9 and 1 %, 0 by half. Without that knowledge 1 is best.
 const ONE_RAY = 0.6;
+// What stands right beside a surface fills the lobe and counts as a whole; as far away as this part of the view distance it is
+// ONE_RAY again. (Gloss of the darkest 3 % of rooms 2 to 5: error 25.7 to 24.3 %, bias +11.7 to +8.0 %; with 0.3 the same
+// error, and L1 as good.)
+const BESIDE = 0.1;
 
 // A ray on the screen: pixel position and 1/distance are linear between its ends.
 struct Track {
@@ -115,20 +119,29 @@ fn blurred_at(place: vec2f, level: f32) -> vec4f {
     return textureSampleLevel(lit_picture, blurred, place / vec2f(frame.size), level);
 }
 
-// What a ray finds: radiance (rgb) and how far to trust it (a).
-fn found(track: Track, u: f32, p: vec3f, r: vec3f, cone: f32) -> vec4f {
+// What a ray finds.
+struct Hit {
+    radiance: vec3f,
+    // How far to trust it.
+    trust: f32,
+    // Metres from the ray's start.
+    away: f32,
+}
+
+fn found(track: Track, u: f32, p: vec3f, r: vec3f, cone: f32) -> Hit {
     let place = mix(track.start, track.end, u);
     let pixel = pixel_of(place);
     let depth = textureLoad(depth_texture, pixel, 0).x;
-    if depth <= 0.0 || dot(normal_of(pixel), r) >= 0.0 { return vec4f(0.0); }
+    if depth <= 0.0 || dot(normal_of(pixel), r) >= 0.0 { return Hit(); }
+    let away = distance(world_position(frame, pixel, depth), p);
     // The lobe's radius at the hit, in pixels.
     let pixels_per_metre = f32(frame.size.y) * 0.5 / frame.tan_half.y * place.z;
-    let radius = cone * distance(world_position(frame, pixel, depth), p) * pixels_per_metre;
+    let radius = cone * away * pixels_per_metre;
     let margin = min(place.xy, vec2f(frame.size) - place.xy);
     let trust = saturate(min(margin.x, margin.y) / max(radius, 8.0));
-    if radius < 1.0 { return vec4f(outgoing(pixel), trust); }
+    if radius < 1.0 { return Hit(outgoing(pixel), trust, away); }
     let color = blurred_at(place.xy, log2(radius) - 1.0);
-    return vec4f(color.rgb / max(color.a, 1e-3), trust);
+    return Hit(color.rgb / max(color.a, 1e-3), trust, away);
 }
 
 // What a ray that found nothing may see beyond the picture's border (rgb), and how likely (a): the surroundings where
@@ -178,9 +191,10 @@ fn reflected(pixel: vec2u, depth: f32, n: vec3f, roughness: f32) -> vec3f {
     // The widest lobes lean towards the viewer as much as away.
     let around = side.rgb * mix(side.a, 1.0, smoothstep(0.5, 1.0, roughness));
     let cone = roughness * roughness;
-    let track = track_of(p + n * (LIFT * linear_depth(frame, depth)), r);
+    let z = linear_depth(frame, depth);
+    let track = track_of(p + n * (LIFT * z), r);
     let u = march(track, r, select(STEPS_SMOOTH, STEPS_ROUGH, roughness > 0.35));
-    var hit = vec4f(0.0);
+    var hit = Hit();
     if u >= 0.0 { hit = found(track, u, p, r, cone); }
     // A lobe that fills the hemisphere shows what the surface's own side receives, and no ray tells it better.
     let narrow = 1.0 - smoothstep(0.6, 1.0, roughness);
@@ -192,8 +206,9 @@ fn reflected(pixel: vec2u, depth: f32, n: vec3f, roughness: f32) -> vec3f {
         let cube = elsewhere(p, r);
         guess = mix(guess, vec4f(cube.rgb, 1.0), sharp * cube.a);
     }
-    let trust = select(1.0, mix(ONE_RAY, 1.0, sharp), known);
-    return mix(mix(around, guess.rgb, narrow * guess.a), hit.rgb, narrow * trust * hit.a);
+    let one = mix(1.0, ONE_RAY, smoothstep(0.0, BESIDE, hit.away / z));
+    let trust = select(1.0, mix(one, 1.0, sharp), known);
+    return mix(mix(around, guess.rgb, narrow * guess.a), hit.radiance, narrow * trust * hit.trust);
 }
 
 @compute @workgroup_size(8, 8)

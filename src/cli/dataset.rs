@@ -17,8 +17,8 @@ use crate::{
     render::{Renderer, RendererOptions},
     scene::{self, Camera, LightKind, Scene, paper_room, upload::SceneGpu},
     study::{
-        dataset::{Sample, sample},
-        target, varied,
+        dataset::{Next, Sample, sample},
+        motion, target, varied,
         views::{around, turned},
     },
 };
@@ -65,6 +65,9 @@ pub struct Args {
     /// Folder for the samples; those that exist are kept, so a stopped run goes on where it was.
     #[arg(long)]
     out: PathBuf,
+    /// Also draw a second frame of each view from a camera that has moved a little, for training's temporal term.
+    #[arg(long)]
+    motion: bool,
     /// Also write each room as a `.glb` with a `_views.json` beside it, for targets from Cycles (recipes paper-room and
     /// paper-room-varied; recipe scene always writes the views, and the scene is there).
     #[arg(long)]
@@ -123,7 +126,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let options = RendererOptions { method: Method::Cache, ..Default::default() };
     let renderer = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
     let kernel = (args.spp > 0).then(|| Kernel::new(&gpu.device));
-    let mut writer = Writer { gpu, renderer, kernel, spp: args.spp, out: args.out.clone(), listed: HashSet::new() };
+    let (spp, motion, out) = (args.spp, args.motion, args.out.clone());
+    let mut writer = Writer { gpu, renderer, kernel, spp, motion, out, listed: HashSet::new() };
     writer.open_list()?;
     match (args.recipe, &args.rooms, &args.scene) {
         (Recipe::PaperRoom | Recipe::PaperRoomVaried, Some(rooms), _) => many_rooms(global, &mut writer, rooms, &args)?,
@@ -137,7 +141,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 fn announce(global: &Global, args: &Args, samples: usize) {
     let [w, h] = cells_of(args.size).map(u64::from);
     // Features, direct light, albedo, normal, depth, and the light to be learnt; about 1 KB of header.
-    let planes = u64::from(FeatureSet::all().channels()) + 10 + if args.spp > 0 { 3 } else { 0 };
+    let features = u64::from(FeatureSet::all().channels());
+    let planes = features + 10 + if args.spp > 0 { 3 } else { 0 } + if args.motion { features + 2 } else { 0 };
     let bytes = samples as u64 * (w * h * planes * 4 + 1024);
     if !global.quiet {
         eprintln!("{samples} samples, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
@@ -154,6 +159,7 @@ struct Writer {
     /// The path tracer, if it makes the targets.
     kernel: Option<Kernel>,
     spp: u32,
+    motion: bool,
     out: PathBuf,
     /// Names in the list of checksums.
     listed: HashSet<String>,
@@ -182,8 +188,15 @@ impl Writer {
         self.complete(stem, scene, camera, seed, sample)
     }
 
-    /// Traces and writes a sample that is drawn already.
+    /// Completes a sample that is drawn already, by its next frame and its traced light where they are wanted, and writes it.
     fn complete(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32, mut sample: Sample) -> Result<()> {
+        if self.motion {
+            let size = self.renderer.size();
+            let moved = motion::stepped(camera, size, motion::median_distance(&sample), u64::from(seed));
+            let next = self.sample(&scene.raster, &moved)?;
+            let flow = motion::flow((&sample, camera), (&next, &moved), size);
+            sample.next = Some(Next { inputs: next.inputs, flow });
+        }
         if let (Some(kernel), Some(traced)) = (&self.kernel, &scene.traced) {
             let options = target::options(self.spp, seed);
             let go_on = || !interrupt::requested();

@@ -48,9 +48,20 @@ pub struct Sample {
     pub normal: Vec<f32>,
     /// Distance along the view axis, metres, one plane; 0 on background.
     pub depth: Vec<f32>,
+    /// The view a moment later, if it was drawn.
+    pub next: Option<Next>,
     /// The light to be learnt, if it was traced.
     #[cfg(feature = "reference")]
     pub target: Option<super::target::Target>,
+}
+
+/// A frame of the same scene from a camera that has moved a little.
+#[derive(Debug, Clone)]
+pub struct Next {
+    /// What the network is given for it.
+    pub inputs: NetworkInputs,
+    /// Where it shows each cell's surface: `super::motion::flow`.
+    pub flow: Vec<f32>,
 }
 
 /// Draws `camera`'s view once, unjittered, and reads what training needs of it. `renderer`'s method is `cache`, whose answer is
@@ -75,6 +86,7 @@ pub fn sample(gpu: &Gpu, renderer: &mut Renderer, scene: &SceneGpu, camera: &Cam
         normal: cells.pick(&read(&targets.normal.texture)?, |b: [u8; 4]| octahedral(half(&b), half(&b[2..]))),
         depth: depth.into_iter().map(|d| if d > 0.0 { camera.near / d } else { 0.0 }).collect(),
         inputs,
+        next: None,
         #[cfg(feature = "reference")]
         target: None,
     })
@@ -88,7 +100,8 @@ impl Sample {
     }
 
     /// The sample as a safetensors file: `features` [channels, h, w], `scale` (the exposure s, one value), `direct`, `albedo` and
-    /// `normal` [3, h, w], `depth` [h, w], and, where it was traced, `light` [3, h, w] and its `noise` (one value), all f32.
+    /// `normal` [3, h, w], `depth` [h, w]; where it was drawn, `next_features`, `next_scale` and `flow` [2, h, w] of the next frame; and, where
+    /// it was traced, `light` [3, h, w] and its `noise` (one value); all f32.
     pub fn to_bytes(&self) -> Result<Vec<u8>, DatasetError> {
         let [w, h] = self.inputs.cells.map(|n| n as usize);
         let channels = self.inputs.features.len() / (w * h);
@@ -101,6 +114,14 @@ impl Sample {
             ("normal", vec![3, h, w], &self.normal),
             ("depth", vec![h, w], &self.depth),
         ];
+        let next_scale = [self.next.as_ref().map_or(0.0, |n| n.inputs.exposure.s)];
+        let next = self.next.iter().flat_map(|n| {
+            [
+                ("next_features", vec![channels, h, w], n.inputs.features.as_slice()),
+                ("next_scale", vec![1], next_scale.as_slice()),
+                ("flow", vec![2, h, w], n.flow.as_slice()),
+            ]
+        });
         #[cfg(feature = "reference")]
         let traced = self.target.iter().flat_map(|t| {
             [("light", vec![3, h, w], t.light.as_slice()), ("noise", vec![1], std::slice::from_ref(&t.noise))]
@@ -110,6 +131,7 @@ impl Sample {
         let failed = |e: safetensors::SafeTensorError| DatasetError::Serialize(e.to_string());
         let views = own
             .into_iter()
+            .chain(next)
             .chain(traced)
             .map(|(name, shape, values)| {
                 TensorView::new(Dtype::F32, shape, bytemuck::cast_slice(values)).map(|view| (name, view))

@@ -2,6 +2,8 @@
 
 pub mod bench;
 pub mod dataset;
+#[cfg(feature = "io")]
+pub mod motion;
 pub mod projection;
 #[cfg(feature = "reference")]
 pub mod target;

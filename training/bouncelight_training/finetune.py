@@ -22,13 +22,11 @@ from . import data, train
 from .data import Split
 from .errors import TrainingError, reported
 from .export import export
-from .features import SLICES
+from .features import APPLIED_ADDED, APPLIED_GAIN, SLICES
 from .losses import pooled_error
 from .model import ANSWER, LEAK
 from .weights import WeightsError, read, unet
 
-# |gain| and |rest| are kept below these when the program applies them (src/gi/reconstruct.rs); training has wider limits.
-APPLIED_GAIN, APPLIED_ADDED = 0.3, 0.1
 SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "assets", "weights", "small.safetensors")
 # Views that choose, views that are held out, both against those that are learnt; and how much finer their light is traced.
 CHOOSING, HELD_OUT, FINER = 0.1, 0.2, 4

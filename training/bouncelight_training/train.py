@@ -22,7 +22,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from . import augment, losses, pictures, quantise
+from . import augment, losses, motion, pictures, quantise
 from .data import Split, check_apart
 from .distributed import World
 from .errors import TrainingError, reported
@@ -58,6 +58,9 @@ class Config:
     epsilon: float = 0.05  # of the relative square, units of s
     outside: float = 0.0  # weight of staying with the first guess on surfaces whose target is not trusted (silhouettes, borders of shadows)
     picture_l1: float = 0.0  # weight in the last third of the L1 on the pooled picture (losses.picture_difference)
+    motion: str = ""  # pairs of frames (motion.py), for:
+    temporal: float = 0.0  # weight of what changes along motion vectors, in the last part of a run
+    temporal_from: float = 0.5  # share of the run after which that begins
     keep_best: int = 0  # 1: what is kept at the end is the average that did best on the validation views, the start included
     apart: str = "room"  # what the splits must not share: rooms, or views of one scene
     quantise: str = ""  # f16 or i8: learn for weights that are stored so (quantise.py)
@@ -69,7 +72,7 @@ class Config:
 
 
 # What may differ between a run's first command and the one that continues it.
-FREE = {"minutes", "threads", "device", "checkpoint_seconds", "train", "validation", "init"}
+FREE = {"minutes", "threads", "device", "checkpoint_seconds", "train", "validation", "motion", "init"}
 
 
 class Stop(Exception):
@@ -135,6 +138,11 @@ class Run:
         self.step, self.elapsed, self.rows, self.sums = 0, 0.0, [], [0.0, 0]
         self.batch = config.batch * self.world.size  # pictures of a step, over all processes
         self.steps_per_epoch = math.ceil(len(train) / self.batch)
+        if bool(config.motion) != bool(config.temporal):
+            raise TrainingError("--motion and --temporal go together: a file of pairs, and what they weigh")
+        self.pairs = motion.Pairs(config.motion) if config.motion else None
+        if self.pairs and self.pairs.flow.shape[2:] != train.mask.shape[1:]:
+            raise TrainingError(f"{config.motion}: frames of {self.pairs.flow.shape[:1:-1]} cells, the views of {train.path} have {train.mask.shape[:0:-1]}; draw both in one size")
         self.best = None  # (validation error, weights) with --keep-best
         self.stopping = False  # somebody asked some process to end
 
@@ -205,6 +213,12 @@ class Run:
             loss = loss + self.config.picture_l1 * losses.picture_difference(prediction, target, mask, features[:, SLICES["albedo"]], direct)
         return loss
 
+    def pair(self):
+        """The two frames of this step's temporal term, if it has one; which they are follows from seed, step and process alone."""
+        if not self.pairs or self.progress() <= self.config.temporal_from:
+            return None
+        return self.pairs.draw(np.random.default_rng((self.config.seed, 1 << 21, self.step, self.world.rank)), self.config.crop, self.device)
+
     def train_step(self):
         """One batch; which one follows from seed and step alone. Each process takes its share of it."""
         begun = time.monotonic()
@@ -215,12 +229,17 @@ class Run:
         chosen = chosen[places]
         rngs = [np.random.default_rng((self.config.seed, 1 << 20, self.step, place)) for place in places]
         features, target, mask = batch_of(self.train, chosen, rngs, self.device, self.config.crop)
+        pair = self.pair()
         for group in self.optimiser.param_groups:
             group["lr"] = self.learning_rate()
         self.model.train()
         self.optimiser.zero_grad(set_to_none=True)
         with quantise.rounding(self.model, self.storage()):
-            loss = self.loss(light(self.parallel(features[:, self.channels]), features), features, target, mask)
+            answer = self.parallel((torch.cat([features, pair.frames]) if pair else features)[:, self.channels])
+            loss = self.loss(light(answer[:len(features)], features), features, target, mask)
+            if pair:
+                frames = light(answer[-2:], pair.frames)
+                loss = loss + self.config.temporal * motion.flicker_loss(frames[:1], frames[1:], pair, self.config.epsilon)
             (weight * loss).backward()
         value = loss.item()
         views = ", ".join(f"room {self.train.room[i]} view {self.train.view[i]}" for i in chosen)
