@@ -114,6 +114,7 @@ def main():
     parser.add_argument("--sky", type=float, default=SKY_RADIANCE, help="world radiance")
     parser.add_argument("--bounces", type=int, default=12, help="0 leaves direct light only")
     parser.add_argument("--denoise", action="store_true", help="denoise the Combined layer (no other)")
+    parser.add_argument("--seed", type=int, default=0, help="added to the seed of Cycles' random numbers: another one gives the same picture with other noise")
     parser.add_argument("--judge", action="store_true", help="allow the rooms kept for judging")
     a = parser.parse_args()
     kept = [i for i in a.rooms if is_judged(i)]
@@ -128,7 +129,7 @@ def main():
             continue
         scene, camera, yaw = build(room, a.sky, 1.0)
         configure(scene, a.size, a.spp, a.bounces, a.denoise)
-        scene.cycles.seed = index
+        scene.cycles.seed = index + a.seed
         for view in todo:
             start = time.time()
             camera.rotation_euler[2] = yaw + 2 * math.pi * view / a.views
