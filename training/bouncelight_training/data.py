@@ -47,6 +47,10 @@ MAX_DEPTH_RATIO, MAX_ALBEDO, MAX_VARIATION = 1.1, 0.05, 0.10
 NAME = re.compile(r"(?:(room|varied)(\d{4,})|(.+))_view(\d+)\.(safetensors|exr)$")
 
 
+class Dark(TrainingError):
+    """A view without any light."""
+
+
 def number_of(match):
     """A number for the room or scene of a file's name, so that splits hold for all of them: rooms of the stream have their own, all
     others one below zero."""
@@ -118,7 +122,7 @@ def read_features(path):
     if "light" in tensors and (tensors["light"].shape != (3, h, w) or not np.isfinite(tensors["light"]).all()):
         raise TrainingError(f"{path}: tensor light has shape {tensors['light'].shape} or values that are not finite; make the sample again")
     if tensors["scale"][0] <= 0:
-        raise TrainingError(f"{path}: scale is {tensors['scale'][0]}; a picture without any light teaches nothing, leave it out")
+        raise Dark(f"{path}: scale is {tensors['scale'][0]}; a picture without any light teaches nothing, leave it out")
     return tensors
 
 
@@ -200,7 +204,11 @@ def build(features_dir, cycles_dir, out, rooms=None, denoise=False):
     columns = {key: [] for key in ("features", "target", "mask", "scale", "room", "view")}
     totals = dict.fromkeys(REASONS, 0)
     for room, view, feature_path, exr_path in pairs:
-        raster = read_features(feature_path)
+        try:
+            raster = read_features(feature_path)
+        except Dark as error:
+            print(f"left out: {error}", file=sys.stderr)
+            continue
         if exr_path is None and "light" not in raster:
             raise TrainingError(f"{feature_path} holds no traced light; make it with --spp, or pass --cycles")
         cycles = exr_path and read_cycles(exr_path, denoise)
@@ -214,6 +222,8 @@ def build(features_dir, cycles_dir, out, rooms=None, denoise=False):
         values = (raster["features"].astype(np.float16), target.astype(np.float16), mask, raster["scale"][0], room, view)
         for key, value in zip(columns, values):
             columns[key].append(value)
+    if not columns["room"]:
+        raise TrainingError(f"{features_dir}: no view in it has any light")
     kinds = {"scale": np.float32, "room": np.int32, "view": np.int32}
     arrays = {key: np.asarray(value, kinds.get(key)) for key, value in columns.items()}
     return save(out, arrays, summarise(arrays, totals) | {"denoised": denoise})

@@ -13,13 +13,14 @@ import argparse
 import dataclasses
 import json
 import os
+import sys
 import zipfile
 
 import numpy as np
 import torch
 import torch.nn.functional as F
 
-from .data import NAME, indices, number_of, read_features, refuse_judged, save
+from .data import NAME, Dark, indices, number_of, read_features, refuse_judged, save
 from .errors import TrainingError, reported
 from .features import APPLIED_ADDED, APPLIED_GAIN, CHANNELS, SLICES, channels_of
 from .losses import relative_square
@@ -40,7 +41,7 @@ def read_pair(path):
         if tensors[name].shape != shape or not np.isfinite(tensors[name]).all():
             raise TrainingError(f"{path}: tensor {name} has shape {tensors[name].shape}, expected {shape}, or values that are not finite")
     if tensors["next_scale"][0] <= 0:
-        raise TrainingError(f"{path}: its second frame has no light; leave it out")
+        raise Dark(f"{path}: its second frame has no light; leave it out")
     return tensors
 
 
@@ -58,13 +59,19 @@ def build(folder, out, rooms=None):
     refuse_judged(room for room, *_ in found)
     columns = {key: [] for key in KEYS}
     for room, view, path in found:
-        t = read_pair(path)
+        try:
+            t = read_pair(path)
+        except Dark as error:
+            print(f"left out: {error}", file=sys.stderr)
+            continue
         values = (t["features"].astype(np.float16), t["next_features"].astype(np.float16), t["scale"][0], t["next_scale"][0], t["flow"], room, view)
         for key, value in zip(KEYS, values):
             columns[key].append(value)
+    if not columns["room"]:
+        raise TrainingError(f"{folder}: no view in it has any light")
     kinds = {"scale": np.float32, "next_scale": np.float32, "room": np.int32, "view": np.int32}
     arrays = {key: np.asarray(value, kinds.get(key)) for key, value in columns.items()}
-    return save(out, arrays, {"views": len(found), "rooms": sorted(map(int, set(arrays["room"]))), "seen": float((arrays["flow"][:, 0] > UNSEEN / 2).mean())})
+    return save(out, arrays, {"views": len(columns["room"]), "rooms": sorted(map(int, set(arrays["room"]))), "seen": float((arrays["flow"][:, 0] > UNSEEN / 2).mean())})
 
 
 @dataclasses.dataclass

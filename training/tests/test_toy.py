@@ -111,6 +111,22 @@ class Toy(unittest.TestCase):
         self.assertEqual((int(split.room[0]), float(split.mask.mean())), (-4, 1.0))
         np.testing.assert_allclose(split.target[0].astype(np.float32) * split.scale[0], 0.25, rtol=1e-3)
 
+    def test_views_without_light_are_left_out(self):
+        folder = tempfile.mkdtemp(dir=self.folder)
+        write_views(folder, [6, 7], 1)
+        for room, left in ((6, 1), (7, 0)):
+            path = os.path.join(folder, "features", f"room{room:04}_view0.safetensors")
+            tensors = load_file(path)
+            tensors["scale"] = np.zeros(1, np.float32)
+            os.remove(path)
+            save_file(tensors, path)
+            if left:
+                build(folder, None, "lit.npz")
+                self.assertEqual(list(data.Split(os.path.join(folder, "lit.npz")).room), [7])
+            else:
+                with self.assertRaisesRegex(TrainingError, "no view in it has any light"):
+                    build(folder, None, "dark.npz")
+
     def test_splits_join(self):
         out = os.path.join(self.folder, "joined.npz")
         report = data.join([self.train, self.validation], out)
