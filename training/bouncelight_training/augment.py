@@ -10,14 +10,15 @@ COLOURED = ["direct", "outgoing", "albedo", "sky", "cache"]
 LIGHTS = ["direct", "outgoing", "sky", "cache"]
 
 
-def permute_colours(features, target, order):
+def permute_colours(features, target, order, means=None):
     """Exchanges red, green and blue of lights, albedo and target together. The exposure is a luminance, so with coloured
-    light it changes; everything in units of it is brought to the new one."""
+    light it changes; everything in units of it is brought to the new one. `means`: channel_means of the whole picture, where the
+    features are a window of it."""
+    means = channel_means(features) if means is None else means
     features, target = features.copy(), target[list(order)]
     for name in COLOURED:
         features[SLICES[name]] = features[SLICES[name]][list(order)]
-    before, means = float(LUMINANCE @ channel_means(features)[np.argsort(order)]), channel_means(features)
-    ratio = float(LUMINANCE @ means) / max(before, 1e-20)
+    ratio = float(LUMINANCE @ means[list(order)]) / max(float(LUMINANCE @ means), 1e-20)
     if abs(ratio - 1) > 1e-3:
         for name in LIGHTS:
             features[SLICES[name]] = np.log1p(np.expm1(features[SLICES[name]]) / ratio)
@@ -42,10 +43,11 @@ def cropped(features, target, mask, width, rng):
 
 def augmented(features, target, mask, rng, crop=0):
     """One of the twelve versions of a picture, or of a window `crop` cells wide (0: of all of it), float32."""
+    means = channel_means(features)
     if crop:
         features, target, mask = cropped(features, target, mask, crop, rng)
     features, target = features.astype(np.float32), target.astype(np.float32)
-    features, target = permute_colours(features, target, rng.permutation(3))
+    features, target = permute_colours(features, target, rng.permutation(3), means)
     if rng.random() < 0.5:
         features, target, mask = mirror(features, target, mask)
     return features, target, mask

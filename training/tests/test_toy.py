@@ -276,6 +276,14 @@ class Toy(unittest.TestCase):
         np.testing.assert_allclose(target, t[[2, 0, 1]] * ratio, rtol=1e-2)
         # Negative control: in this coloured light the exposure does change.
         self.assertGreater(abs(ratio - 1), 0.01)
+        # A window has the exposure of its picture, even one without any light.
+        dark = f.copy()
+        for name in ("direct", "outgoing", "sky"):
+            dark[SLICES[name]][..., W // 2:] = 0
+        whole, target = augment.permute_colours(dark, t, [2, 0, 1])
+        part, some = augment.permute_colours(dark[..., W // 2:], t[..., W // 2:], [2, 0, 1], channel_means(dark))
+        np.testing.assert_array_equal(part, whole[..., W // 2:])
+        np.testing.assert_array_equal(some, target[..., W // 2:])
 
     def test_loss_has_its_minimum_at_the_mean(self):
         rng = np.random.default_rng(0)
