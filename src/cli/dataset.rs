@@ -18,6 +18,7 @@ use crate::{
     scene::{self, Camera, LightKind, Scene, paper_room, upload::SceneGpu},
     study::{
         dataset::{Next, Sample, sample},
+        guides::Guides,
         motion, target, varied,
         views::{around, turned},
     },
@@ -68,6 +69,10 @@ pub struct Args {
     /// Also draw a second frame of each view from a camera that has moved a little, for training's temporal term.
     #[arg(long)]
     motion: bool,
+    /// Also keep the picture at full resolution: guides for the way back from cells to pixels, and what puts the picture together
+    /// again (32 bytes a pixel).
+    #[arg(long)]
+    guides: bool,
     /// Also write each room as a `.glb` with a `_views.json` beside it, for targets from Cycles (recipes paper-room and
     /// paper-room-varied; recipe scene always writes the views, and the scene is there).
     #[arg(long)]
@@ -126,8 +131,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let options = RendererOptions { method: Method::Cache, ..Default::default() };
     let renderer = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
     let kernel = (args.spp > 0).then(|| Kernel::new(&gpu.device));
-    let (spp, motion, out) = (args.spp, args.motion, args.out.clone());
-    let mut writer = Writer { gpu, renderer, kernel, spp, motion, out, listed: HashSet::new() };
+    let (spp, motion, guides, out) = (args.spp, args.motion, args.guides, args.out.clone());
+    let mut writer = Writer { gpu, renderer, kernel, spp, motion, guides, out, listed: HashSet::new() };
     writer.open_list()?;
     match (args.recipe, &args.rooms, &args.scene) {
         (Recipe::PaperRoom | Recipe::PaperRoomVaried, Some(rooms), _) => many_rooms(global, &mut writer, rooms, &args)?,
@@ -143,7 +148,8 @@ fn announce(global: &Global, args: &Args, samples: usize) {
     // Features, direct light, albedo, normal, depth, and the light to be learnt; about 1 KB of header.
     let features = u64::from(FeatureSet::all().channels());
     let planes = features + 10 + if args.spp > 0 { 3 } else { 0 } + if args.motion { features + 2 } else { 0 };
-    let bytes = samples as u64 * (w * h * planes * 4 + 1024);
+    let guides = if args.guides { Guides::bytes(args.size) } else { 0 };
+    let bytes = samples as u64 * (w * h * planes * 4 + guides + 1024);
     if !global.quiet {
         eprintln!("{samples} samples, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
     }
@@ -160,6 +166,7 @@ struct Writer {
     kernel: Option<Kernel>,
     spp: u32,
     motion: bool,
+    guides: bool,
     out: PathBuf,
     /// Names in the list of checksums.
     listed: HashSet<String>,
@@ -188,8 +195,11 @@ impl Writer {
         self.complete(stem, scene, camera, seed, sample)
     }
 
-    /// Completes a sample that is drawn already, by its next frame and its traced light where they are wanted, and writes it.
+    /// Completes the sample that was drawn last, by what else of it is wanted, and writes it.
     fn complete(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32, mut sample: Sample) -> Result<()> {
+        if self.guides {
+            sample.guides = Some(Guides::read(&self.gpu, self.renderer.targets(), camera.near)?);
+        }
         if self.motion {
             let size = self.renderer.size();
             let moved = motion::stepped(camera, size, motion::median_distance(&sample), u64::from(seed));

@@ -1,5 +1,6 @@
 //! One training sample: what the network is fed for a view, with the raw G-buffer values at the same sample points.
 
+use super::guides::Guides;
 use crate::{
     gi::{
         features::FeatureSet,
@@ -48,6 +49,8 @@ pub struct Sample {
     pub normal: Vec<f32>,
     /// Distance along the view axis, metres, one plane; 0 on background.
     pub depth: Vec<f32>,
+    /// The picture at full resolution, if it was read.
+    pub guides: Option<Guides>,
     /// The view a moment later, if it was drawn.
     pub next: Option<Next>,
     /// The light to be learnt, if it was traced.
@@ -86,6 +89,7 @@ pub fn sample(gpu: &Gpu, renderer: &mut Renderer, scene: &SceneGpu, camera: &Cam
         normal: cells.pick(&read(&targets.normal.texture)?, |b: [u8; 4]| octahedral(half(&b), half(&b[2..]))),
         depth: depth.into_iter().map(|d| if d > 0.0 { camera.near / d } else { 0.0 }).collect(),
         inputs,
+        guides: None,
         next: None,
         #[cfg(feature = "reference")]
         target: None,
@@ -100,8 +104,8 @@ impl Sample {
     }
 
     /// The sample as a safetensors file: `features` [channels, h, w], `scale` (the exposure s, one value), `direct`, `albedo` and
-    /// `normal` [3, h, w], `depth` [h, w]; where it was drawn, `next_features`, `next_scale` and `flow` [2, h, w] of the next frame; and, where
-    /// it was traced, `light` [3, h, w] and its `noise` (one value); all f32.
+    /// `normal` [3, h, w], `depth` [h, w]; where it was drawn, `next_features`, `next_scale` and `flow` [2, h, w] of the next frame; where
+    /// it was traced, `light` [3, h, w] and its `noise` (one value); all f32; and, where they were read, the [`Guides`].
     pub fn to_bytes(&self) -> Result<Vec<u8>, DatasetError> {
         let [w, h] = self.inputs.cells.map(|n| n as usize);
         let channels = self.inputs.features.len() / (w * h);
@@ -129,7 +133,7 @@ impl Sample {
         #[cfg(not(feature = "reference"))]
         let traced = std::iter::empty();
         let failed = |e: safetensors::SafeTensorError| DatasetError::Serialize(e.to_string());
-        let views = own
+        let mut views = own
             .into_iter()
             .chain(next)
             .chain(traced)
@@ -138,6 +142,9 @@ impl Sample {
             })
             .collect::<Result<Vec<_>, _>>()
             .map_err(failed)?;
+        if let Some(guides) = &self.guides {
+            views.extend(guides.tensors()?);
+        }
         safetensors::serialize(views, None).map_err(failed)
     }
 }
@@ -173,7 +180,7 @@ fn srgb(byte: u8) -> f32 {
 }
 
 /// Unit vector from octahedral coordinates, as `oct_decode` in shaders/lib/octahedral.wgsl.
-fn octahedral(x: f32, y: f32) -> [f32; 3] {
+pub(super) fn octahedral(x: f32, y: f32) -> [f32; 3] {
     let z = 1.0 - x.abs() - y.abs();
     let t = (-z).max(0.0);
     let fold = |v: f32| if v >= 0.0 { v - t } else { v + t };

@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod dataset;
+pub mod guides;
 #[cfg(feature = "io")]
 pub mod motion;
 pub mod projection;

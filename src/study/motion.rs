@@ -141,6 +141,7 @@ mod tests {
             albedo: vec![0.0; 3 * n],
             normal: [normal.x, normal.y, normal.z].iter().flat_map(|v| vec![*v; n]).collect(),
             depth: vec![away; n],
+            guides: None,
             next: None,
             #[cfg(feature = "reference")]
             target: None,

@@ -6,6 +6,8 @@ mod build;
 mod common;
 mod contact;
 mod corrected;
+#[cfg(feature = "io")]
+mod dataset;
 mod edges;
 mod glossy;
 #[cfg(feature = "reference")]
