@@ -19,6 +19,11 @@ const REACH: f32 = 7.0;
 // Part of the area that has to be left of the sum of areas as vectors, or else the four face too many ways to be one.
 const FLAT: f32 = 0.9;
 
+// A texel's area is not that of a small thing which it hit and its neighbours did not: from close by it would be a wall of that
+// thing's light. So it counts as seen from no nearer than this part of its area, squared. (Without: a spot of six times the light
+// inside a ring of room 5. Error on four rooms 4.36 % without, 4.32 with 0.25 and with 1, 4.33 with 4.)
+const VAGUE: f32 = 0.25;
+
 fn join_square(square_at: u32) {
     var square: Disc;
     var weight = 0.0;
@@ -27,7 +32,8 @@ fn join_square(square_at: u32) {
     for (var k = 4u * square_at; k < 4u * square_at + 4u; k++) {
         let s = surfels[k];
         let radiance = sent[k].rgb;
-        discs[SQUARES + k] = Disc(s.position, s.window, s.back, 0.0, radiance, least_facing(s.area));
+        let vague = s.alone * VAGUE * s.area * s.area;
+        discs[SQUARES + k] = Disc(s.position, s.window, s.back, vague, radiance, least_facing(s.area));
         weight += s.area;
         places += s.position * s.area;
         light += radiance * s.area;

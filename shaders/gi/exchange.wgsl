@@ -18,7 +18,7 @@ fn arrived(disc: Disc, p: vec3f, n: vec3f) -> vec4f {
     let v = disc.position - p;
     let a = at_least(dot(disc.back, v), disc.least);
     let r = dot(n, v);
-    return vec4f(disc.radiance, 1.0) * (a * r * nearness(a, r, squared(v)));
+    return vec4f(disc.radiance, 1.0) * (a * r * nearness(a, r, squared(v), 0.0));
 }
 
 fn is_far(square: u32, p: vec3f) -> bool {

@@ -14,10 +14,10 @@ var<workgroup> emitters: array<Emitter, 64>;
 var<workgroup> squares: array<Disc, 64>;
 
 // Nothing is taken for what stands between: that is surfels too, and they fill the hemisphere together.
-fn add_disc(sum: ptr<function, Sum>, disc: Disc, v: vec3f, here: Place) {
+fn add_disc(sum: ptr<function, Sum>, disc: Disc, vague: f32, v: vec3f, here: Place) {
     let a = at_least(dot(disc.back, v), disc.least);
     let r = dot(here.n, v);
-    let w = a * nearness(a, r, squared(v));
+    let w = a * nearness(a, r, squared(v), vague);
     (*sum).share += w * r;
     add(sum, v, disc.radiance * w);
 }
@@ -33,12 +33,13 @@ fn add_world(sum: ptr<function, Sum>, here: Place, i: u32) {
         for (var k = 0u; k < 64u; k++) {
             let v = squares[k].position - here.p;
             if dot(v, v) >= squares[k].reach2 {
-                if squares[k].window > 0.0 { add_disc(&sky, squares[k], v, here); } else { add_disc(&seen, squares[k], v, here); }
+                if squares[k].window > 0.0 { add_disc(&sky, squares[k], 0.0, v, here); } else { add_disc(&seen, squares[k], 0.0, v, here); }
             } else {
                 let start = SQUARES + 4u * (first + k);
                 for (var f = start; f < start + 4u; f++) {
                     let w = discs[f].position - here.p;
-                    if discs[f].window > 0.0 { add_disc(&sky, discs[f], w, here); } else { add_disc(&seen, discs[f], w, here); }
+                    let one = discs[f];
+                    if one.window > 0.0 { add_disc(&sky, one, 0.0, w, here); } else { add_disc(&seen, one, one.reach2, w, here); }
                 }
             }
         }

@@ -15,7 +15,8 @@ struct Surfel {
     // What it sends by itself: emission, the light of lamps without a map, and the first bounce; the sky's radiance through a
     // window.
     own: vec3f,
-    pad1: f32,
+    // 1 where no surfel beside it lies on the same surface.
+    alone: f32,
     // What it sends on of light that reflective shadow maps hold; it counts in reflections only.
     mapped: vec3f,
     pad2: f32,
@@ -26,7 +27,7 @@ struct Disc {
     position: vec3f,
     window: f32,
     back: vec3f,
-    // Four are opened within the square root of this, metres.
+    // Of four: opened within the square root of this, metres. Of one: what `nearness` adds, m⁴.
     reach2: f32,
     // What it sends beyond what reflective shadow maps hold.
     radiance: vec3f,

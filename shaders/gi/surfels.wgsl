@@ -68,6 +68,26 @@ fn window_at(eye: vec3f, ray: vec3f) -> vec4f {
     return vec4f(normalize(-sign(ray) * vec3f(abs(t) <= vec3f(least))), least);
 }
 
+// Another texel shows the same surface if it lies this near its plane, in squared widths of a texel, and faces as much the same way.
+const SAME_PLANE2: f32 = 0.05;
+const SAME_WAY: f32 = 0.7;
+
+// 1 where no texel beside this one shows its surface: what it hit is smaller than what it stands for.
+fn alone(face: AtlasView, texel: vec2u, p: vec3f, n: vec3f, area: f32) -> f32 {
+    var beside = array<vec2i, 4>(vec2i(-1, 0), vec2i(1, 0), vec2i(0, -1), vec2i(0, 1));
+    for (var i = 0; i < 4; i++) {
+        let next = vec2i(texel) + beside[i];
+        if any(next < vec2i(0)) || any(next >= vec2i(i32(SIDE))) { continue; }
+        let at = face.origin + vec2u(next);
+        let depth = textureLoad(around_depth, at, 0).x;
+        if depth <= 0.0 { continue; }
+        let off = dot(n, atlas_position(face, vec2u(next), depth) - p);
+        let same = dot(n, oct_decode(textureLoad(around_normal, at, 0).xy));
+        if off * off < SAME_PLANE2 * area && same > SAME_WAY { return 0.0; }
+    }
+    return 1.0;
+}
+
 @compute @workgroup_size(64)
 fn light_up(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= SURFELS { return; }
@@ -84,6 +104,7 @@ fn light_up(@builtin(global_invocation_id) id: vec3u) {
         let n = oct_decode(textureLoad(around_normal, at, 0).xy);
         s.area = atlas_area(face, s.position, n).y;
         s.back = n * (-s.area / PI);
+        s.alone = alone(face, texel, s.position, n, s.area);
         s.albedo = textureLoad(around_albedo, at, 0).rgb;
         s.own = textureLoad(around_emissive, at, 0).rgb;
         for (var i = 0u; i < counts.lights; i++) {

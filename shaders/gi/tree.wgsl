@@ -38,7 +38,7 @@ fn add_emitter(sum: ptr<function, Sum>, e: Emitter, v: vec3f, here: Place) {
     let a = at_least(facing, e.least) + e.rest * d;
     let through = exp(-max(e.haze + here.haze, 0.0) * d) * min(d2 * e.closeness, 1.0);
     let mirrored = select(0.0, d * lobe(-dot(e.mirror, v) * inverse), facing > 0.0);
-    add(sum, v * (through * nearness(a, dot(here.n, v), d2)), e.radiance * a + e.gloss * mirrored);
+    add(sum, v * (through * nearness(a, dot(here.n, v), d2, 0.0)), e.radiance * a + e.gloss * mirrored);
 }
 
 // True where an emitter at `v` is farther away than the root of `reach2`, m².

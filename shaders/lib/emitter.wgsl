@@ -93,6 +93,7 @@ fn squared(v: vec3f) -> f32 {
 // The term behind the plus keeps the form factor below 1 close up: a disc seen from its
 // axis is exactly that, and with both cosines in it a wall cut into discs gives the floor beside it what it should (with
 // 4.4 m discs 2 m away 0.473 of 0.475; without them 0.406).
-fn nearness(a: f32, r: f32, d2: f32) -> f32 {
-    return select(0.0, 1.0 / (d2 * d2 + a * r), r > 0.0);
+// `vague`, m⁴: what is added where a disc's area is not to be believed close up.
+fn nearness(a: f32, r: f32, d2: f32, vague: f32) -> f32 {
+    return select(0.0, 1.0 / (d2 * d2 + a * r + vague), r > 0.0);
 }

@@ -171,6 +171,17 @@ fn small_objects_take_light_by_their_mean_projection() {
     assert!(expected > 0.03 && (loss - expected).abs() < 0.15 * expected, "{loss}, {expected}");
 }
 
+/// Rings are thinner than a texel of the cube around the camera, which takes what it hits for as large as itself; close by it must
+/// not be believed. In this room the brightest indirect light is 0.3 by Cycles; inside one ring it was 0.67.
+#[test]
+fn rings_do_not_light_themselves_in_spots() {
+    let Some(gpu) = common::gpu() else { return };
+    let room = bouncelight::scene::load("paper-room:5").expect("a room");
+    let found = light(&gpu, &mut renderer(&gpu, [1024, 512], Method::Cache), &room);
+    let most = found.iter().fold(0.0f32, |m, v| m.max(*v));
+    assert!((0.1..0.32).contains(&most), "{most}");
+}
+
 #[test]
 fn light_scales_and_no_light_gives_none() {
     let Some(gpu) = common::gpu() else { return };
