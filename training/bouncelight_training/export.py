@@ -43,11 +43,25 @@ def stored(model, kind):
     return {name: (values.half() if kind == "f16" else values).contiguous() for name, values in model.state_dict().items()}
 
 
+def drawn_halfway(model, path):
+    """The network half-way between it and that of a weights file, weight by weight: a network that has learnt something new and the one it started
+    from often lie in one valley, and between them is better at both (Wortsman et al. 2022). Whether it is must be measured."""
+    try:
+        tensors, doc = read(path)
+    except (OSError, WeightsError) as error:
+        raise TrainingError(f"{path}: {error}") from error
+    state = model.state_dict()
+    if {name: tuple(v.shape) for name, v in state.items()} != {name: tuple(v.shape) for name, v in tensors.items()}:
+        raise TrainingError(f"{path}: its network is another one; only two of the same shape have a middle")
+    model.load_state_dict({name: 0.5 * (values + torch.from_numpy(tensors[name].astype(np.float32))) for name, values in state.items()})
+    return {"halfway_to": {"file": os.path.basename(path), "command": doc.get("provenance", {}).get("command", ""), "commit": doc.get("provenance", {}).get("commit", "")}}
+
+
 def provenance(state, error, targets):
     """Where the numbers come from; paths are reduced to file names. `targets` says in words how the light was path-traced."""
     config = dict(state["config"])
-    for name in ("train", "validation", "init"):
-        config[name] = os.path.basename(config[name])
+    for name in ("train", "validation", "motion", "init"):
+        config[name] = os.path.basename(config.get(name, ""))
     last = state["rows"][-10:]
     before = {}
     if state["config"].get("init"):
@@ -60,7 +74,7 @@ def provenance(state, error, targets):
         "device": state["machine"], "seed": config["seed"], "config": config, "samples_seen": state["samples"],
         "training_minutes": round(state["elapsed"] / 60, 1),
         "data": {"targets": f"{targets}: DiffDir + DiffInd minus our direct light, as E/pi",
-                 "train": state["train_report"], "validation": state["validation_report"]},
+                 "train": state["train_report"], "validation": state["validation_report"], **({"motion": state["motion_report"]} if state.get("motion_report") else {})},
         "validation_error": {"measure": "mean |dE| / mean E after 4x4 pooling", "value": round(error, 5)},
         "last_epochs": [{k: (round(v, 6) if isinstance(v, float) else v) for k, v in row.items()} for row in last],
     }
@@ -90,10 +104,12 @@ def verify(path, model, tolerance, split=None):
     return worst, again
 
 
-def export(run, out, validation=None, name="", kind="", targets=TARGETS):
-    """Writes the file and its provenance; returns a summary. `kind`: how numbers are stored, "" (as the run was trained), "f32", "f16" or "i8"."""
+def export(run, out, validation=None, name="", kind="", targets=TARGETS, halfway_to=""):
+    """Writes the file and its provenance; returns a summary. `kind`: how numbers are stored, "" (as the run was trained), "f32", "f16" or "i8".
+    `halfway_to`: a weights file, see `drawn_halfway`."""
     state = read_checkpoint(os.path.join(run, "checkpoint.pt"))
     model, config = network_of(state), Config(**state["config"])
+    middle = drawn_halfway(model, halfway_to) if halfway_to else {}
     split, kind = Split(validation or config.validation), kind or config.quantise or "f32"
     exact = validate(model, split, config)[0]["validation_error"]
     tensors = stored(model, kind)
@@ -101,7 +117,7 @@ def export(run, out, validation=None, name="", kind="", targets=TARGETS):
     if kind == "i8" or config.quantise:
         quantise.round_(model, kind if kind != "f32" else "")
     error = validate(model, split, config)[0]["validation_error"]
-    about = provenance(state, error, targets)
+    about = middle | provenance(state, error, targets)
     try:
         write(out, tensors, document(model.graph, model.output, inputs=[(n, c) for n, c in TABLE if n in config.features], meaning=MEANING, output_channels=ANSWER,
                                      name=name or os.path.basename(os.path.normpath(run)), provenance=about))
@@ -124,11 +140,12 @@ def main(arguments=None):
     parser.add_argument("--validation", help="default: the one the run used")
     parser.add_argument("--name", default="", help="a few words; default: the run's name")
     parser.add_argument("--targets", default=TARGETS, help="how the light was path-traced, in words, for the provenance")
+    parser.add_argument("--halfway-to", default="", help="a weights file of the same network: write the middle between it and the run's")
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("--half", dest="kind", action="store_const", const="f16", default="", help="store half floats")
     kinds.add_argument("--bytes", dest="kind", action="store_const", const="i8", help="store convolutions' weights as bytes with a scale for each output channel")
     a = parser.parse_args(arguments)
-    print(json.dumps(export(a.run, a.out, a.validation, a.name, a.kind, a.targets), indent=1))
+    print(json.dumps(export(a.run, a.out, a.validation, a.name, a.kind, a.targets, a.halfway_to), indent=1))
 
 
 if __name__ == "__main__":

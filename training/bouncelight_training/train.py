@@ -160,7 +160,8 @@ class Run:
             return
         state = {"best": self.best, "processes": self.world.size, "config": dataclasses.asdict(self.config), "model": self.model.state_dict(), "average": self.average,
                  "optimiser": self.optimiser.state_dict(), "step": self.step, "elapsed": self.elapsed, "rows": self.rows, "sums": self.sums,
-                 "samples": self.samples(), "command": command_of(self.config, self.folder, self.world.size), "commit": self.commit, "machine": machine_of(self.device), "train_report": self.train.report, "validation_report": self.validation.report}
+                 "samples": self.samples(), "command": command_of(self.config, self.folder, self.world.size), "commit": self.commit, "machine": machine_of(self.device), "train_report": self.train.report, "validation_report": self.validation.report,
+                 "motion_report": self.pairs.report if self.pairs else None}
         torch.save(state, self.checkpoint_path + ".part")
         os.replace(self.checkpoint_path + ".part", self.checkpoint_path)
 

@@ -12,6 +12,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 from bouncelight_training import export, motion, train  # noqa: E402
 from bouncelight_training.errors import TrainingError  # noqa: E402
 from bouncelight_training.features import SLICES  # noqa: E402
+from bouncelight_training.weights import read  # noqa: E402
 from tests import test_toy  # noqa: E402
 from tests.test_toy import H, W  # noqa: E402
 
@@ -97,6 +98,22 @@ class Motion(unittest.TestCase):
         out = self.place("out.safetensors")
         export.export(self.place("with"), out)
         self.assertAlmostEqual(motion.flicker(pairs, motion.network_of(out)), found["with"][0], delta=0.2 * found["with"][0] + 1e-3)
+
+    def test_a_file_can_lie_halfway_to_another(self):
+        ends = [self.place(f"end{i}.safetensors") for i in (1, 2)]
+        for i, out in enumerate(ends):
+            train.train(self.config(epochs=2, seed=i + 1), self.place(f"end{i}"))
+            export.export(self.place(f"end{i}"), out)
+        middle = self.place("middle.safetensors")
+        told = export.export(self.place("end0"), middle, halfway_to=ends[1])
+        a, b, m = (read(path) for path in (*ends, middle))
+        for name, values in m[0].items():
+            np.testing.assert_allclose(values, 0.5 * (a[0][name] + b[0][name]), atol=1e-6)
+        self.assertEqual(m[1]["provenance"]["halfway_to"]["file"], "end2.safetensors")
+        self.assertAlmostEqual(m[1]["provenance"]["validation_error"]["value"], told["validation_error_of_file"], places=4)
+        train.train(self.config(epochs=1, widths=(8, 16)), self.place("wider"))
+        with self.assertRaisesRegex(TrainingError, "another one"):
+            export.export(self.place("wider"), middle, halfway_to=ends[1])
 
     def test_a_killed_run_goes_on_with_the_same_pairs(self):
         path = write(self.place("resumed"), [6, 7])
