@@ -6,7 +6,7 @@
         --weights "neural large"=large.safetensors --weights "apply paper"=assets/weights/paper.safetensors [--group room] [--bouncelight target/release/bouncelight]
 
 Errors are means over the scenes whose name begins with --group. GFLOP and MB are what `bench` counts for all indirect light of one picture (of a network on pictures: what `weights info` counts); "GTX 1050" is a
-projection from these counts (src/study/projection.rs: a roofline with an efficiency of 0.35), never a measurement; "GPU" is measured, and empty where the record comes from a software adapter.
+projection from these counts (src/study/projection.rs: a roofline with an efficiency of 0.35), never a measurement; "GPU" is measured, and left out where all records come from software adapters.
 The paper's own row holds its authors' means over their 375 pictures, and what `weights info` counts for its layers.
 """
 import argparse
@@ -87,10 +87,11 @@ def main():
             found = of_weights(a.bouncelight, path)
             # A network that corrects a method has its layers in the bench's counts.
             rows[row].update(found if "gflop" not in rows[row] else {"parameters": found["parameters"]})
-    columns = ERRORS + COSTS
+    # What nobody measured gets no column.
+    columns = [c for c in COSTS + ERRORS if any(c[0] in values for values in rows.values())]
     print("| | " + " | ".join(title for _, title, _ in columns) + " |\n|" + "---|" * (len(columns) + 1))
     for row, values in rows.items():
-        if "gflop" in values and "projected" not in values:
+        if values.get("gflop") and "projected" not in values:
             values["projected"] = projected([(1e9 * values["gflop"], 1e6 * values["mb"])])
         cells = [form.format(values[key]) if key in values and values[key] == values[key] else "" for key, _, form in columns]
         print(f"| {row} | " + " | ".join(cells) + " |")

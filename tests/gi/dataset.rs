@@ -37,13 +37,13 @@ fn guides_put_the_picture_together() {
         let value = |v: &[f16], i: usize| v[i].to_f32();
         let (mut wrong, mut sum) = (0.0, 0.0);
         for (i, pixel) in hdr.iter().enumerate() {
-            for c in 0..3 {
+            for (c, drawn) in pixel.iter().enumerate() {
                 let at = c * n + i;
                 let occlusion = f32::from(guides.albedo[3 * n + i]) / 255.0;
                 let diffuse = value(&guides.direct, at) + occlusion * light(at);
                 let made = linear(guides.albedo[at]) * diffuse + value(&guides.rest, at);
-                wrong += (made - pixel[c]).abs();
-                sum += pixel[c];
+                wrong += (made - drawn).abs();
+                sum += drawn;
             }
         }
         wrong / sum
