@@ -1,8 +1,8 @@
 """Error against cost, with the Pareto frontier: a chart of what training/judge.py measured.
 
     python training/judge.py out/judge data/judge --csv out/judge.csv
-    bouncelight bench paper-room:0 --method rsm,cache,neural --json out/bench.json
-    python training/chart.py out/judge.csv out/error_over_cost --bench out/bench.json [--bench out/large.json=neural large] [--group room]
+    bouncelight bench paper-room:0 --method all --json out/bench.json
+    python training/chart.py out/judge.csv out/error_over_cost --bench out/bench.json [--bench out/large.json=neural large] [--weights "apply paper"=assets/weights/paper.safetensors] [--group room]
 
 Writes out/error_over_cost.png and .svg. Across: arithmetic that finds and adds indirect light for one picture, GFLOP, as bounce-
 light counts it (docs/performance.md); up: the paper's L1, mean over the rows whose scene begins with --group. A record of the
@@ -16,11 +16,14 @@ import json
 
 import matplotlib
 
+from table import of_weights
+
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.transforms import Bbox  # noqa: E402
 
 PAPER = ("the paper's network\n(its own pictures)", 104.0, 45178.0)
+NAMES = {"apply paper": "the paper's recipe, our small run"}
 NOT_SHOWN = {"constant", "best constant"}
 # Needs a bake, which holds for static geometry only: a frontier without it is drawn too.
 BAKED = {"probes"}
@@ -69,7 +72,7 @@ def label(axes, points):
     taken = [Bbox.from_bounds(x - 3, y - 3, 6, 6) for x, y in dots]
     for name, x, y in sorted(points, key=lambda point: -point[1]):
         for dx, dy, side in places:
-            text = axes.annotate(name.removeprefix("neural "), (x, y), xytext=(dx, dy), textcoords="offset points", fontsize=8, ha=side)
+            text = axes.annotate(NAMES.get(name, name.removeprefix("neural ")), (x, y), xytext=(dx, dy), textcoords="offset points", fontsize=8, ha=side)
             box = text.get_window_extent(figure.canvas.get_renderer()).padded(3)
             if not any(box.overlaps(other) for other in taken) or (dx, dy, side) == places[-1]:
                 taken.append(box)
@@ -82,10 +85,13 @@ def main():
     parser.add_argument("csv")
     parser.add_argument("out", help="without the ending")
     parser.add_argument("--bench", action="append", required=True, metavar="FILE[=ROW]")
+    parser.add_argument("--weights", action="append", default=[], metavar="ROW=FILE", help="a network on pictures, which has no record: the arithmetic of its layers")
+    parser.add_argument("--bouncelight", default="target/release/bouncelight")
     parser.add_argument("--group", default="room")
     parser.add_argument("--metric", default="l1")
     a = parser.parse_args()
     error, cost = errors(a.csv, a.group, a.metric), costs(a.bench)
+    cost |= {row: of_weights(a.bouncelight, path)["gflop"] for row, _, path in (entry.partition("=") for entry in a.weights)}
     ours = [(row, cost[row], error[row]) for row in error if row in cost]
     for row in sorted(set(error) - set(cost)):
         print(f"{row}: no bench record, left out")

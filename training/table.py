@@ -1,7 +1,7 @@
 """The table of docs/accuracy.md: errors, costs and sizes of every row in one place.
 
     python training/judge.py out/judge data/judge --csv out/judge.csv …
-    bouncelight bench paper-room:0 --method ambient,cache,neural --json out/bench.json
+    bouncelight bench paper-room:0 --method all --json out/bench.json
     python training/table.py out/judge.csv --bench out/bench.json [--bench out/large.json="neural large"] \\
         --weights "neural large"=large.safetensors --weights "apply paper"=assets/weights/paper.safetensors [--group room] [--bouncelight target/release/bouncelight]
 
