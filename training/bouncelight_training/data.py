@@ -30,13 +30,13 @@ import json
 import os
 import re
 import sys
-import zipfile
 import zlib
 
 import numpy as np
 import OpenEXR
 from safetensors.numpy import load_file
 
+from .archive import load, save
 from .errors import TrainingError, reported
 from .features import CHANNELS, LUMINANCE, SLICES
 from .stream import indices as indices_in_order, is_judged
@@ -44,6 +44,7 @@ from .stream import indices as indices_in_order, is_judged
 REASONS = ["background", "spread", "normal", "depth", "albedo", "shadow", "negative"]
 MAX_SPREAD, MIN_COSINE, MIN_LENGTH = 0.05, float(np.cos(np.radians(10))), 0.95
 MAX_DEPTH_RATIO, MAX_ALBEDO, MAX_VARIATION = 1.1, 0.05, 0.10
+COLUMNS = ("features", "target", "mask", "scale", "room", "view")
 NAME = re.compile(r"(?:(room|varied)(\d{4,})|(.+))_view(\d+)\.(safetensors|exr)$")
 
 
@@ -201,7 +202,7 @@ def build(features_dir, cycles_dir, out, rooms=None, denoise=False):
     """Writes the split's cache and returns the mask report. Arrays: features f16 [n,24,h,w], target f16 [n,3,h,w] in units
     of s, mask bool [n,h,w], scale f32 [n], room and view i32 [n], report (JSON text)."""
     pairs = pairs_of(features_dir, cycles_dir, rooms)
-    columns = {key: [] for key in ("features", "target", "mask", "scale", "room", "view")}
+    columns = {key: [] for key in COLUMNS}
     totals = dict.fromkeys(REASONS, 0)
     for room, view, feature_path, exr_path in pairs:
         try:
@@ -229,20 +230,13 @@ def build(features_dir, cycles_dir, out, rooms=None, denoise=False):
     return save(out, arrays, summarise(arrays, totals) | {"denoised": denoise})
 
 
-def save(out, arrays, report):
-    with open(out + ".part", "wb") as file:
-        np.savez(file, report=json.dumps(report), **arrays)
-    os.replace(out + ".part", out)
-    return report
-
-
 def join(paths, out):
     """Writes several splits as one and returns its report, which holds theirs as `parts`. No view may be in two of them."""
     splits = [Split(path) for path in paths]
     shapes = {split.features.shape[1:] for split in splits}
     if len(shapes) > 1:
         raise TrainingError(f"{', '.join(paths)}: views of different sizes: {sorted(shapes)}")
-    arrays = {key: np.concatenate([getattr(split, key) for split in splits]) for key in ("features", "target", "mask", "scale", "room", "view")}
+    arrays = {key: np.concatenate([getattr(split, key) for split in splits]) for key in COLUMNS}
     views = list(zip(arrays["room"].tolist(), arrays["view"].tolist()))
     twice = sorted({view for view in views if views.count(view) > 1})
     if twice:
@@ -265,15 +259,8 @@ class Split:
     """A split in memory: the arrays of `build`, and the report as a dictionary."""
 
     def __init__(self, path):
-        try:
-            with np.load(path) as file:
-                arrays = {name: file[name] for name in file.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise TrainingError(f"{path}: not a readable split: {error}; make it with python -m bouncelight_training.data") from error
-        missing = {"features", "target", "mask", "scale", "room", "view", "report"} - set(arrays)
-        if missing:
-            raise TrainingError(f"{path}: no array {sorted(missing)}; make it again with python -m bouncelight_training.data")
-        self.path, self.report = path, json.loads(str(arrays.pop("report")))
+        arrays, self.report = load(path, COLUMNS, "data")
+        self.path = path
         self.features, self.target, self.mask = arrays["features"], arrays["target"], arrays["mask"]
         self.scale, self.room, self.view = arrays["scale"], arrays["room"], arrays["view"]
         refuse_judged(self.room)

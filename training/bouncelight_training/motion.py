@@ -14,13 +14,13 @@ import dataclasses
 import json
 import os
 import sys
-import zipfile
 
 import numpy as np
 import torch
 import torch.nn.functional as F
 
-from .data import NAME, Dark, indices, number_of, read_features, refuse_judged, save
+from .archive import load, save
+from .data import NAME, Dark, indices, number_of, read_features, refuse_judged
 from .errors import TrainingError, reported
 from .features import APPLIED_ADDED, APPLIED_GAIN, CHANNELS, SLICES, channels_of
 from .losses import relative_square
@@ -87,16 +87,11 @@ class Pairs:
     """Such a file in memory."""
 
     def __init__(self, path):
-        try:
-            with np.load(path) as file:
-                arrays = {name: file[name] for name in file.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise TrainingError(f"{path}: not a readable file of pairs: {error}; make it with python -m bouncelight_training.motion") from error
-        missing = (set(KEYS) | {"report"}) - set(arrays)
-        if missing:
-            raise TrainingError(f"{path}: no array {sorted(missing)[0]}; make it again with python -m bouncelight_training.motion")
-        self.path, self.report = path, json.loads(str(arrays.pop("report")))
+        arrays, self.report = load(path, KEYS, "motion")
+        self.path = path
         for name, values in arrays.items():
+            if not all(np.isfinite(part).all() for part in values):
+                raise TrainingError(f"{path}: {name} holds values that are not finite")
             setattr(self, name, values)
         refuse_judged(self.room)
 

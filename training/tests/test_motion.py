@@ -142,7 +142,7 @@ class Motion(unittest.TestCase):
             train.train(self.config(motion=self.place("x")), self.place("alone"))
         with open(self.place("text.npz"), "w") as file:
             file.write("no archive")
-        with self.assertRaisesRegex(TrainingError, "not a readable file of pairs"):
+        with self.assertRaisesRegex(TrainingError, "not readable.*bouncelight_training.motion"):
             motion.Pairs(self.place("text.npz"))
 
 

@@ -128,7 +128,7 @@ class Toy(unittest.TestCase):
         write_exr(os.path.join(folder, "cycles", "room0033_view0.exr"), {"Y": np.zeros((H, W))})
         with self.assertRaisesRegex(TrainingError, "no channel Combined.R"):
             pairs.target_of(os.path.join(folder, "cycles", "room0033_view0.exr"))
-        with self.assertRaisesRegex(TrainingError, "not readable pairs"):
+        with self.assertRaisesRegex(TrainingError, "not readable.*pix2pix.pairs"):
             pairs.Pairs(os.path.join(folder, "none.npz"))
 
     def test_only_the_described_step_has_an_adversarial_gradient(self):

@@ -16,11 +16,11 @@ import json
 import os
 import re
 import sys
-import zipfile
 
 import numpy as np
 import OpenEXR
 
+from ..archive import load
 from ..errors import TrainingError, reported
 from ..filmic import filmic
 from ..stream import SKY_RADIANCE, indices, is_judged
@@ -133,15 +133,8 @@ class Pairs:
     """The arrays of `build` in memory."""
 
     def __init__(self, path):
-        try:
-            with np.load(path) as file:
-                arrays = {name: file[name] for name in file.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise TrainingError(f"{path}: not readable pairs: {error}; make them with python -m bouncelight_training.pix2pix.pairs") from error
-        missing = {"pictures", "target", "room", "view", "report"} - set(arrays)
-        if missing:
-            raise TrainingError(f"{path}: no array {sorted(missing)}; make it again with python -m bouncelight_training.pix2pix.pairs")
-        self.path, self.report = path, json.loads(str(arrays["report"]))
+        arrays, self.report = load(path, ("pictures", "target", "room", "view"), "pix2pix.pairs")
+        self.path = path
         self.pictures, self.target, self.room, self.view = (arrays[n] for n in ("pictures", "target", "room", "view"))
         refuse_judged(self.room)
 
