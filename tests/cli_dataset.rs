@@ -60,13 +60,14 @@ fn samples_hold_a_second_frame_guides_and_the_room_on_request() {
     let dir = tempfile::tempdir().unwrap();
     let make = |name: &str, more: &[&str]| {
         let out = dir.path().join(name);
-        let args = ["dataset", "--recipe", "paper-room-varied", "--rooms", "7", "--views", "1", "--size", "64x32"];
+        let args = ["dataset", "--recipe", "paper-room-varied", "--rooms", "7", "--size", "64x32"];
         let folder = ["--out", out.to_str().expect("a temporary path is text")];
         let done = bouncelight(&[&args[..], more, &folder].concat());
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
         out
     };
-    let (plain, whole) = (make("plain", &[]), make("whole", &["--motion", "--guides", "--export"]));
+    let (plain, whole) =
+        (make("plain", &["--views", "1"]), make("whole", &["--views", "1", "--motion", "--guides", "--export"]));
     let read = |folder: &Path| std::fs::read(folder.join("varied0007_view0.safetensors")).unwrap();
     let (few, all) = (read(&plain), read(&whole));
     let few = safetensors::SafeTensors::deserialize(&few).unwrap();
@@ -91,9 +92,15 @@ fn samples_hold_a_second_frame_guides_and_the_room_on_request() {
     let exported = bouncelight::scene::load(whole.join("varied0007.glb").to_str().unwrap()).unwrap();
     let own = bouncelight::study::varied::scene(7);
     assert_eq!(exported.instances.len(), own.instances.len());
-    let record = std::fs::read_to_string(whole.join("varied0007_views.json")).unwrap();
-    let record: serde_json::Value = serde_json::from_str(&record).unwrap();
-    assert_eq!(record["views"].as_array().map(Vec::len), Some(1));
+    let record = || -> serde_json::Value {
+        let text = std::fs::read_to_string(whole.join("varied0007_views.json")).unwrap();
+        serde_json::from_str(&text).unwrap()
+    };
+    let views = |r: serde_json::Value| r["views"].as_array().map(Vec::len);
+    assert_eq!(views(record()), Some(1));
+    make("whole", &["--views", "2", "--export"]);
+    assert_eq!(views(record()), Some(2), "more views were asked for");
+    let record = record();
     let sky = record["environment"].as_array().unwrap();
     assert!((sky[0].as_f64().unwrap() as f32 - own.environment.radiance[0]).abs() < 1e-6);
     assert!(!plain.join("varied0007.glb").exists());

@@ -273,10 +273,10 @@ fn many_rooms(global: &Global, writer: &mut Writer, Rooms(rooms): &Rooms, args: 
             (0..args.views).map(|view| turned(&scene.cameras[0], view as f32 / args.views as f32)).collect()
         };
         let build = || if varied { varied::scene(room) } else { paper_room::scene(room) };
-        let exported = writer.out.join(format!("{name}.glb"));
-        if args.export && !(exported.exists() && views_path(&writer.out, &name).exists()) {
+        if args.export {
+            // Written again by every run: the next one may ask for more views.
             let scene = build();
-            scene::export::write_glb(&scene, &exported)?;
+            scene::export::write_glb(&scene, &writer.out.join(format!("{name}.glb")))?;
             record_views(writer, &name, &scene.name, u64::from(room), &views_of(&scene), &scene)?;
         }
         let mut missing = Vec::new();
@@ -335,10 +335,6 @@ fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> R
     record_views(writer, &stem, spec, args.seed, &cameras, &scene)
 }
 
-fn views_path(out: &Path, stem: &str) -> PathBuf {
-    out.join(format!("{stem}_views.json"))
-}
-
 /// Writes where the cameras stand, and what glTF has no field for, so whoever renders the targets needs it from here.
 fn record_views(writer: &Writer, stem: &str, spec: &str, seed: u64, cameras: &[Camera], scene: &Scene) -> Result<()> {
     let size = |l: &scene::Light| match l.kind {
@@ -351,7 +347,7 @@ fn record_views(writer: &Writer, stem: &str, spec: &str, seed: u64, cameras: &[C
         "views": cameras.iter().map(view).collect::<Vec<_>>(),
         "environment": scene.environment.radiance, "lights": scene.lights.iter().map(size).collect::<Vec<_>>(),
     });
-    write_whole(&views_path(&writer.out, stem), format!("{record:#}\n").as_bytes())?;
+    write_whole(&writer.out.join(format!("{stem}_views.json")), format!("{record:#}\n").as_bytes())?;
     Ok(())
 }
 
