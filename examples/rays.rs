@@ -6,7 +6,7 @@
 //! the time is that of the processor, not the clock on the wall, so that other work on the machine does not count.
 
 use bouncelight::gpu::{Gpu, GpuOptions};
-use bouncelight::reference::accel::{Accel, AccelGpu, RayBatch, RayCaster, RayGpu};
+use bouncelight::accel::{Accel, AccelGpu, RayBatch, RayCaster, RayGpu};
 use bouncelight::scene::{LightKind, Scene};
 use glam::{Mat4, Vec3};
 use std::f32::consts::{PI, TAU};

@@ -12,6 +12,7 @@
 //!
 //! Module map, in the direction of the data:
 //! - [`scene`]: what is drawn, without any wgpu type except in `scene::upload`.
+//! - [`accel`]: triangles in trees, on the CPU and the GPU, and what rays hit of them.
 //! - [`gpu`]: device choice, shader sources, readback, pass timing.
 //! - [`render`]: the rasteriser, one file a pass.
 //! - [`net`]: weights file, graph, plan, the slow CPU twin and the WGSL kernels' host side.
@@ -23,6 +24,7 @@
 //!
 //! Conventions (units, spaces, encodings) stand in `docs/architecture.md`.
 
+pub mod accel;
 pub mod gi;
 pub mod gpu;
 #[cfg(feature = "io")]

@@ -1,7 +1,8 @@
 // Direct light at the surfels by shadow rays, and what surfels and sky shine by themselves.
-// `reference/traverse.wgsl` brings the acceleration structure (group 0, binding 1).
+// `accel/traverse.wgsl` brings the acceleration structure (group 0, binding 1).
 
 @group(0) @binding(0) var<uniform> probes: ProbeParams;
+@group(0) @binding(1) var accel_blocks: texture_2d<u32>;
 @group(0) @binding(2) var<storage, read> lights: array<Light>;
 // Place (xyz as bits) and normal (two signed 16-bit numbers, octahedral) of the sample points, SAMPLES a surfel.
 @group(0) @binding(3) var<storage, read> samples: array<vec4u>;

@@ -19,7 +19,9 @@ struct Light {
     // The cone's ramp: saturate(cos * scale + offset)², the form that KHR_lights_punctual recommends.
     cone_scale: f32,
     cone_offset: f32,
-    pad: vec2u,
+    // 1 for a light that stands for a surface that glows: rays meet the surface itself.
+    stands_in: u32,
+    pad: u32,
 }
 
 struct LightSample {

@@ -14,13 +14,13 @@ fn light_at(i: u32) -> Light {
     let d = lights[4u * i + 3u];
     return Light(
         bitcast<vec3f>(a.xyz), a.w, bitcast<vec3f>(b.xyz), bitcast<f32>(b.w), bitcast<vec3f>(c.xyz), bitcast<f32>(c.w),
-        bitcast<f32>(d.x), bitcast<f32>(d.y), d.zw
+        bitcast<f32>(d.x), bitcast<f32>(d.y), d.z, d.w
     );
 }
 
 // Chance that a light sample goes to analytic light i; 0 for one that only stands in.
 fn chance_of(i: u32) -> f32 {
-    return bitcast<f32>(lights[4u * i + 3u].z) * (1.0 - environment_share());
+    return bitcast<f32>(lights[4u * i + 3u].w) * (1.0 - environment_share());
 }
 
 fn environment_share() -> f32 {

@@ -109,6 +109,7 @@ struct MaterialStore {
 }
 
 @group(0) @binding(0) var<uniform> scene: SceneInfo;
+@group(0) @binding(1) var accel_blocks: texture_2d<u32>;
 // Four vectors a triangle, then six for each triangle that has texture coordinates or colours; `surface.wgsl` reads them.
 @group(0) @binding(3) var<storage, read> triangles: array<vec4u>;
 @group(0) @binding(4) var<storage, read> materials: MaterialStore;

@@ -104,7 +104,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let scene = args.scene.load(global.quiet)?;
     let camera = args.scene.camera(&scene)?;
     let gpu = global.open_gpu()?;
-    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
+    let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
+    uploaded.trace(&gpu.device, &gpu.queue, &scene)?;
     let options = BenchOptions { frames: args.frames, warmup: args.warmup };
     let mut methods = Vec::new();
     for name in &args.method.0 {

@@ -24,6 +24,9 @@ use crate::{
 use anyhow::Result;
 use std::path::{Path, PathBuf};
 
+/// Frames that a method with history gets to settle, where nothing else is asked for.
+const GI_FRAMES: u32 = 32;
+
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -43,6 +46,9 @@ pub struct Args {
     /// Real-time anti-aliasing over this many frames before the one that is written.
     #[arg(long, conflicts_with = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     taa: Option<u32>,
+    /// Frames of a still camera up to the one that is written, for methods that settle (`gather`): 1 is the first after a cut. 32 when absent.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    gi_frames: Option<u32>,
     /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
     #[arg(long, value_name = "LAYERS")]
     aov: Option<String>,
@@ -184,6 +190,8 @@ struct Raster<'a> {
     renderer: Renderer,
     layers: Vec<Layer>,
     weights: String,
+    /// The method's answer settles over frames.
+    settles: bool,
 }
 
 impl<'a> Raster<'a> {
@@ -192,15 +200,26 @@ impl<'a> Raster<'a> {
             Method::Neural(neural) => neural.weights.hash_text(),
             _ => "none".into(),
         };
-        let scene = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
+        let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
+        if method.needs_rays() {
+            uploaded.trace(&gpu.device, &gpu.queue, scene)?;
+        }
+        let scene = uploaded;
+        let settles = method.has_history();
         let options = RendererOptions { method, taa: args.taa.is_some(), ..Default::default() };
         let renderer = Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options)?;
-        Ok(Self { gpu, scene, renderer, layers, weights })
+        Ok(Self { gpu, scene, renderer, layers, weights, settles })
+    }
+
+    /// Frames before the first sample: the method's and anti-aliasing's go on at once.
+    fn warmup(&self, args: &Args) -> u32 {
+        let settle = if self.settles { args.gi_frames.unwrap_or(GI_FRAMES) - 1 } else { 0 };
+        args.taa.unwrap_or(0).max(settle)
     }
 
     /// A picture, with progress of its own.
     fn draw(&mut self, global: &Global, args: &Args, camera: &Camera) -> Result<Drawn> {
-        let count = args.samples.unwrap_or(1) + args.taa.unwrap_or(0);
+        let count = args.samples.unwrap_or(1) + self.warmup(args);
         let mut progress = Progress::new(global, "samples", count.into());
         let drawn = self.picture(args, camera, &mut || progress.step())?;
         progress.finish();
@@ -208,7 +227,7 @@ impl<'a> Raster<'a> {
     }
 
     fn picture(&mut self, args: &Args, camera: &Camera, step: &mut dyn FnMut()) -> Result<Drawn> {
-        let warmup = args.taa.unwrap_or(0);
+        let warmup = self.warmup(args);
         let options =
             CaptureOptions { samples: args.samples.unwrap_or(1), seed: args.seed, layers: &self.layers, warmup };
         let frame = capture_with(self.gpu, &mut self.renderer, &self.scene, camera, options, &mut || {

@@ -161,7 +161,7 @@ impl Rung for WorldGi {
             pass.dispatch_workgroups(w.div_ceil(8), h.div_ceil(8), 1);
         });
         self.contact.record(recorder, &bound);
-        self.upsample.record(recorder, &bound, &self.cells, light, self.contact.found(), output)
+        self.upsample.record(recorder, &bound, &self.cells, light, Some(self.contact.found()), output)
     }
 
     fn surroundings(&self) -> Option<&wgpu::TextureView> {

@@ -147,6 +147,11 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.discs", super::surfels::prelude(super::surfels::SURFELS)),
         ("gi.exchange", super::surfels::prelude(super::surfels::SURFELS)),
         ("gi.contact", super::contact::prelude()),
+        ("gi.rays", super::gather::prelude()),
+        ("gi.renew", super::gather::prelude()),
+        ("gi.settle", super::gather::prelude()),
+        ("gi.blur", super::gather::prelude()),
+        ("gi.bring", super::upsample::prelude(super::cells::CellSide::Four)),
         ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Four)),
         ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Eight)),
     ]

@@ -93,6 +93,13 @@ impl Params {
     }
 }
 
+impl Params {
+    /// The eye in world space.
+    pub fn eye_position(&self) -> [f32; 3] {
+        [self.eye[0], self.eye[1], self.eye[2]]
+    }
+}
+
 fn columns(m: Mat3) -> [[f32; 4]; 3] {
     [m.x_axis, m.y_axis, m.z_axis].map(|c| c.extend(0.0).to_array())
 }

@@ -14,6 +14,9 @@
 //! [`cache`] holds two methods that gather what the rasterised world beyond the picture sends: `rsm` one bounce of the
 //! lights, `cache` all bounces, emission and the sky. They do not know what stands between.
 //!
+//! [`gather`] sends one ray a cell and frame into the scene's triangles and reads a cache of light in the world where it ends. It
+//! asks what stands between; what is left is noise, which frames and neighbours average away.
+//!
 //! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]), what `cache` says among them, go through a U-Net,
 //! and its gain and rest are applied to `cache`'s answer at full resolution, guided by depth and normal
 //! ([`reconstruct`]). It learns where that answer errs: missing occlusion, light that the cube does not see. It knows
@@ -31,6 +34,7 @@ pub mod contact;
 pub mod emitters;
 pub mod exposure;
 pub mod features;
+pub mod gather;
 pub mod glossy;
 pub mod inputs;
 pub mod name;
@@ -85,6 +89,26 @@ pub struct Inputs<'a> {
     pub world: Option<World<'a>>,
     /// The analytic lights, for methods that light more than the picture; `None` counts as no lights there.
     pub lights: Option<Lights<'a>>,
+    /// The scene as rays meet it, for methods that ask it ([`Method::needs_rays`]).
+    pub rays: Option<Rays<'a>>,
+    /// Where each pixel's surface was in the frame before: texture coordinates then minus now, y down, free of jitter, `Rg16Float`;
+    /// for methods that remember frames. `None` counts as everything at rest.
+    pub motion: Option<&'a wgpu::TextureView>,
+}
+
+/// The scene as rays meet it.
+#[derive(Clone, Copy)]
+pub struct Rays<'a> {
+    /// Its triangles.
+    pub scene: &'a crate::accel::SceneRays,
+    /// Lat-long picture of the surroundings, `Rgba32Float`; one texel for a constant sky.
+    pub environment: &'a wgpu::TextureView,
+}
+
+impl std::fmt::Debug for Rays<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Rays").field("scene", &self.scene.counts()).finish_non_exhaustive()
+    }
 }
 
 /// Tiny G-buffers, several views in one atlas; `render::atlas` says what the texels mean.
@@ -135,6 +159,8 @@ pub struct Lights<'a> {
     pub buffer: &'a wgpu::Buffer,
     /// How many.
     pub count: u32,
+    /// Some of them stand for surfaces that glow.
+    pub stand_in: bool,
 }
 
 /// Which method fills the `indirect` texture of a frame.
@@ -153,6 +179,8 @@ pub enum Method {
     Cache,
     /// Either of the two with other options.
     World(cache::Options),
+    /// Rays into the scene's triangles and a cache of light in the world, see [`gather`].
+    Gather(gather::Options),
     /// Surfels that a bake has linked, see [`probes`]. The bake must be of the scene that is drawn.
     #[cfg(feature = "reference")]
     Probes(std::sync::Arc<probes::Bake>),
@@ -170,10 +198,21 @@ impl Method {
             Method::Rsm => "rsm",
             Method::Cache => "cache",
             Method::World(options) => ["rsm", "cache"][usize::from(options.around)],
+            Method::Gather(_) => "gather",
             #[cfg(feature = "reference")]
             Method::Probes(_) => "probes",
             Method::Neural(_) => "neural",
         }
+    }
+
+    /// Whether the method asks rays ([`Inputs::rays`]).
+    pub fn needs_rays(&self) -> bool {
+        matches!(self, Method::Gather(_))
+    }
+
+    /// Whether the method's answer settles over frames.
+    pub fn has_history(&self) -> bool {
+        matches!(self, Method::Gather(_))
     }
 
     /// What of the world beyond the screen the method reads.
@@ -217,6 +256,9 @@ pub enum GiError {
     /// The method reads [`Inputs::world`], which is not there.
     #[error("this method needs the world beyond the screen (`Inputs::world`), which the host did not supply")]
     World,
+    /// The method reads [`Inputs::rays`], which is not there.
+    #[error("this method sends rays into the scene's triangles (`Inputs::rays`), which the host did not supply")]
+    Rays,
     /// A texture view has another format, size or usage than [`Inputs`] says.
     #[error("texture `{name}` has {found}, but needs {expected}")]
     Texture {

@@ -30,7 +30,7 @@ mod surface;
 pub use gpu::{ProbeParams, ProbesGi};
 use spread::Spread;
 
-use crate::reference::accel::{Accel, AccelError};
+use crate::accel::{Accel, AccelError};
 use crate::scene::Scene;
 use field::Field;
 use glam::{Vec2, Vec3};

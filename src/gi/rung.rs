@@ -2,6 +2,7 @@
 
 use super::ambient::AmbientGi;
 use super::cache::{self, WorldGi};
+use super::gather::GatherGi;
 use super::pass::{NeuralGi, Options};
 use super::ssgi::{SsgiGi, SsgiOptions};
 use super::{GiError, Inputs, Method};
@@ -44,6 +45,9 @@ pub trait Rung: Send {
 
     /// Number of the frame for methods that may vary their patterns because a history averages frames; 0 without one.
     fn set_frame(&mut self, _queue: &wgpu::Queue, _frame: u32) {}
+
+    /// The next frame has nothing to do with the last: what is remembered of pixels is of no use.
+    fn cut(&mut self) {}
 
     /// What the camera's surroundings send to it, if the method knows, for reflections of what is off the screen. The
     /// same view for the method's whole life, `Rgba16Float`: faces +X, −X, +Y, −Y, +Z, −Z of a cube side by side; on the
@@ -90,6 +94,7 @@ pub fn build(
         Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
         Method::Rsm => Some(Box::new(WorldGi::new(device, size, cache::Options::RSM))),
         Method::Cache => Some(Box::new(WorldGi::new(device, size, cache::Options::CACHE))),
+        Method::Gather(options) => Some(Box::new(GatherGi::new(device, size, *options))),
         Method::World(options) => Some(Box::new(WorldGi::new(device, size, *options))),
         #[cfg(feature = "reference")]
         Method::Probes(bake) => Some(Box::new(super::probes::ProbesGi::new(device, queue, bake)?)),

@@ -12,13 +12,13 @@
 
 use super::cells::{CellSide, CellsPass};
 use super::contact::{self, Beside};
-use super::exposure::{output_entry, pipeline, storage_entry};
-use super::inputs::{BoundInputs, InputGroup, texture_entry};
+use super::inputs::{BoundInputs, InputGroup};
 use super::reconstruct::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
 use super::rung::Cost;
-use super::{GiError, ambient, view_cache::ViewCache};
-use crate::gpu::shaders;
-use crate::gpu::timing::Recorder;
+use super::{GiError, ambient};
+use crate::gpu::bind::{self, Binder};
+use crate::gpu::{shaders, timing::Recorder};
+use crate::render::tool::{LOAD, READ, STORE_HALF};
 
 /// Sum of the four weights below which the 4×4 cells around are blended in.
 pub const TRUST: f32 = 0.3;
@@ -48,34 +48,38 @@ pub fn prelude(side: CellSide) -> String {
 
 /// The pass.
 pub struct UpsamplePass {
-    device: wgpu::Device,
+    name: &'static str,
     pipeline: wgpu::ComputePipeline,
-    layout: wgpu::BindGroupLayout,
-    outputs: ViewCache<2>,
+    binder: Binder,
 }
 
 impl UpsamplePass {
-    /// Compiles the shader.
+    /// Compiles the shader that takes away what stands right beside surfaces.
     pub fn new(device: &wgpu::Device, inputs: &InputGroup, side: CellSide) -> Self {
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("gi.upsample"),
-            entries: &[
-                storage_entry(0, true),
-                storage_entry(1, true),
-                output_entry(2),
-                texture_entry(3),
-                storage_entry(4, true),
-                storage_entry(5, true),
-            ],
-        });
-        let module = shaders::module_with(device, "gi.upsample", &prelude(side));
-        let pipeline = pipeline(device, "gi.upsample", &module, "upsample", inputs, &layout);
-        Self { device: device.clone(), pipeline, layout, outputs: ViewCache::new() }
+        Self::with(device, inputs, side, "gi.upsample", &[READ, READ, STORE_HALF, LOAD, READ, READ])
     }
 
-    /// Records pass `gi.upsample`. `light` is laid out as [`cells`](super::cells) says; it, the cells' buffer and those of `beside`
-    /// must be the same until [`forget`](Self::forget). `output` (`Rgba16Float`, storage, full size) becomes E/π, and in
-    /// alpha how many times as bright the mirrored direction is.
+    /// Compiles the shader for light that knows what stands beside surfaces.
+    pub fn plain(device: &wgpu::Device, inputs: &InputGroup, side: CellSide) -> Self {
+        Self::with(device, inputs, side, "gi.bring", &[READ, READ, STORE_HALF])
+    }
+
+    fn with(
+        device: &wgpu::Device,
+        inputs: &InputGroup,
+        side: CellSide,
+        name: &'static str,
+        types: &[wgpu::BindingType],
+    ) -> Self {
+        let binder = Binder::new(device, name, types);
+        let module = shaders::module_with(device, name, &prelude(side));
+        let pipeline = bind::pipeline(device, name, &module, "upsample", &[inputs.layout(), binder.layout()]);
+        Self { name, pipeline, binder }
+    }
+
+    /// Records pass `gi.upsample` (with `beside`, which a pass made by [`new`](Self::new) gets) or `gi.bring`. `light` is laid out as
+    /// [`cells`](super::cells) says. `output` (`Rgba16Float`, storage, full size) becomes E/π, and in alpha how many times as
+    /// bright the mirrored direction is.
     ///
     /// # Errors
     /// [`GiError::Texture`] when `output` does not fit.
@@ -85,28 +89,18 @@ impl UpsamplePass {
         inputs: &BoundInputs,
         cells: &CellsPass,
         light: &wgpu::Buffer,
-        beside: Beside<'_>,
+        beside: Option<Beside<'_>>,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
         ambient::check_output(output, inputs.size)?;
-        let group = self.outputs.get([output, beside.visibility], || {
-            Ok::<_, GiError>(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("gi.upsample"),
-                layout: &self.layout,
-                entries: &[
-                    wgpu::BindGroupEntry { binding: 0, resource: cells.pixels().as_entire_binding() },
-                    wgpu::BindGroupEntry { binding: 1, resource: light.as_entire_binding() },
-                    wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(output) },
-                    wgpu::BindGroupEntry {
-                        binding: 3,
-                        resource: wgpu::BindingResource::TextureView(beside.visibility),
-                    },
-                    wgpu::BindGroupEntry { binding: 4, resource: beside.spheres.as_entire_binding() },
-                    wgpu::BindGroupEntry { binding: 5, resource: beside.nearby.as_entire_binding() },
-                ],
-            }))
-        })?;
-        recorder.compute("gi.upsample", |pass| {
+        let (pixels, light, output) = (cells.pixels().into(), light.into(), output.into());
+        let group = match beside {
+            Some(b) => {
+                self.binder.group([pixels, light, output, b.visibility.into(), b.spheres.into(), b.nearby.into()])
+            }
+            None => self.binder.group([pixels, light, output]),
+        };
+        recorder.compute(self.name, |pass| {
             inputs.set(pass);
             pass.set_bind_group(1, &group, &[]);
             pass.set_pipeline(&self.pipeline);
@@ -117,12 +111,12 @@ impl UpsamplePass {
 
     /// Lets go of output views and of the buffers bound with them.
     pub fn forget(&mut self) {
-        self.outputs.clear();
+        self.binder.forget();
     }
 
     /// Bind groups made so far.
     pub fn made(&self) -> u64 {
-        self.outputs.made()
+        self.binder.made()
     }
 
     /// What the pass costs for a picture of `size` pixels with `spheres` in the scene. A pixel: 4 cells of 72 operations, its

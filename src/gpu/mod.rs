@@ -1,5 +1,6 @@
-//! The GPU as the rest of the house sees it: a chosen device, shader sources, readback, timing.
+//! The GPU as the rest of the house sees it: a chosen device, shader sources, bind groups, readback, timing.
 
+pub mod bind;
 mod choose;
 pub mod readback;
 pub mod shaders;

@@ -122,7 +122,7 @@ pub const GI: &[Shader] = &[
     },
     Shader {
         name: "gi.upsample",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/beside.wgsl", "gi/upsample.wgsl"],
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/beside.wgsl", "gi/bring.wgsl", "gi/upsample.wgsl"],
     },
     Shader {
         name: "gi.emitters",
@@ -170,6 +170,26 @@ pub const GI: &[Shader] = &[
             "gi/gather.wgsl"
         ],
     },
+    Shader {
+        name: "gi.rays",
+        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "lib/lights.wgsl", "lib/environment.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "accel/traverse.wgsl", "accel/surface.wgsl", "gi/gather/types.wgsl", "gi/gather/entries.wgsl", "gi/gather/look.wgsl", "gi/gather/rays.wgsl"],
+    },
+    Shader {
+        name: "gi.renew",
+        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "lib/lights.wgsl", "lib/environment.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "accel/traverse.wgsl", "accel/surface.wgsl", "gi/gather/types.wgsl", "gi/gather/entries.wgsl", "gi/gather/look.wgsl", "gi/gather/renew.wgsl"],
+    },
+    Shader {
+        name: "gi.settle",
+        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "lib/lights.wgsl", "lib/environment.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "accel/traverse.wgsl", "accel/surface.wgsl", "gi/gather/types.wgsl", "gi/gather/past.wgsl", "gi/gather/settle.wgsl"],
+    },
+    Shader {
+        name: "gi.blur",
+        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "lib/lights.wgsl", "lib/environment.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "accel/traverse.wgsl", "accel/surface.wgsl", "gi/gather/types.wgsl", "gi/gather/past.wgsl", "gi/gather/blur.wgsl"],
+    },
+    Shader {
+        name: "gi.bring",
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/bring.wgsl", "gi/gather/upsample.wgsl"],
+    },
     Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
     Shader {
         name: "gi.probes_light",
@@ -177,7 +197,7 @@ pub const GI: &[Shader] = &[
             "lib/octahedral.wgsl",
             "lib/brdf.wgsl",
             "lib/lights.wgsl",
-            "reference/traverse.wgsl",
+            "accel/traverse.wgsl",
             "gi/probes_types.wgsl",
             "gi/probes_light.wgsl"
         ],
@@ -199,9 +219,12 @@ pub const GI: &[Shader] = &[
     Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },
 ];
 
+/// Shaders of `accel/`.
+pub const ACCEL: &[Shader] =
+    &[Shader { name: "accel.rays", files: wgsl!["accel/traverse.wgsl", "accel/rays.wgsl"] }];
+
 /// Shaders of `reference/`.
 pub const REFERENCE: &[Shader] = &[
-    Shader { name: "reference.rays", files: wgsl!["reference/traverse.wgsl", "reference/rays.wgsl"] },
     Shader {
         name: "reference.path",
         files: wgsl![
@@ -209,7 +232,7 @@ pub const REFERENCE: &[Shader] = &[
             "lib/brdf.wgsl",
             "lib/lights.wgsl",
             "reference/types.wgsl",
-            "reference/traverse.wgsl",
+            "accel/traverse.wgsl",
             "reference/random.wgsl",
             "reference/surface.wgsl",
             "reference/camera.wgsl",
@@ -229,7 +252,7 @@ pub const REFERENCE: &[Shader] = &[
             "lib/brdf.wgsl",
             "lib/lights.wgsl",
             "reference/types.wgsl",
-            "reference/traverse.wgsl",
+            "accel/traverse.wgsl",
             "reference/random.wgsl",
             "reference/surface.wgsl",
             "reference/camera.wgsl",
@@ -256,7 +279,7 @@ pub const VIEWER: &[Shader] = &[
 
 /// Every shader there is.
 pub fn all() -> impl Iterator<Item = &'static Shader> {
-    RENDER.iter().chain(GI).chain(NET).chain(REFERENCE).chain(VIEWER)
+    RENDER.iter().chain(ACCEL).chain(GI).chain(NET).chain(REFERENCE).chain(VIEWER)
 }
 
 /// Where [`source`] reads files instead of what was compiled in; nothing by default.

@@ -16,7 +16,7 @@ mod triangles;
 
 pub use materials::{ImageUse, RefMaterial};
 
-use super::accel::{self, Accel, AccelGpu};
+use crate::accel::{self, Accel, AccelGpu};
 use crate::scene::Scene;
 use bytemuck::{Pod, Zeroable};
 use thiserror::Error;

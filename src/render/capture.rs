@@ -124,7 +124,7 @@ pub struct CaptureOptions<'a> {
     pub seed: u32,
     /// Layers beside the picture.
     pub layers: &'a [Layer],
-    /// Frames drawn before the first sample, for a renderer with temporal anti-aliasing.
+    /// Frames drawn before the first sample, for temporal anti-aliasing and methods that settle.
     pub warmup: u32,
 }
 

@@ -162,6 +162,9 @@ impl Renderer {
         if let Some(taa) = &mut self.taa {
             taa.cut();
         }
+        if let Some(indirect) = &mut self.indirect {
+            indirect.cut();
+        }
     }
 
     /// Name of the method that finds indirect light, as on the command line.
@@ -350,7 +353,13 @@ fn gi_inputs<'a>(
         camera: view.matrices(),
         environment,
         world,
-        lights: scene.map(|s| gi::Lights { buffer: &s.light_buffer, count: s.lights.len() as u32 }),
+        lights: scene.map(|s| gi::Lights {
+            buffer: &s.light_buffer,
+            count: s.lights.len() as u32,
+            stand_in: s.lights.iter().any(|l| l.stands_in),
+        }),
+        rays: scene.and_then(|s| Some(gi::Rays { scene: s.rays.as_ref()?, environment: &s.environment_view })),
+        motion: Some(&targets.motion.view),
     }
 }
 

@@ -19,6 +19,7 @@ pub use mesh::{AttributeVertex, Draw, attribute_layouts, position_layouts};
 pub use spheres::MOST_SPHERES;
 
 use super::{AlphaMode, Environment, Light, LightKind, Scene};
+use crate::accel::{AccelError, SceneRays};
 use bytemuck::{Pod, Zeroable};
 use std::sync::atomic::{AtomicU64, Ordering};
 use thiserror::Error;
@@ -96,8 +97,10 @@ pub struct LightGpu {
     pub cone_scale: f32,
     /// Offset of the cone's ramp.
     pub cone_offset: f32,
+    /// 1 for a light that stands for a surface that glows: rays meet the surface itself.
+    pub stands_in: u32,
     /// Unused.
-    pub pad: [u32; 2],
+    pub pad: u32,
 }
 
 impl LightGpu {
@@ -105,7 +108,7 @@ impl LightGpu {
     pub fn new(light: &Light) -> Self {
         let tint = |strength: f32| light.color.map(|c| c * strength);
         let unit = |v: [f32; 3]| glam::Vec3::from(v).try_normalize().unwrap_or(glam::Vec3::NEG_Y).to_array();
-        let zero = Self::zeroed();
+        let zero = Self { stands_in: light.stands_in.into(), ..Self::zeroed() };
         match light.kind {
             LightKind::Directional { direction, irradiance, angle } => Self {
                 direction: unit(direction),
@@ -167,6 +170,8 @@ pub struct SceneGpu {
     /// Those that are like balls: world-space centre and radius (`vec4f`, metres) of spheres that stand in for them; the rest
     /// of the buffer is 0.
     pub spheres: wgpu::Buffer,
+    /// The triangles as rays meet them, once [`SceneGpu::trace`] has made them.
+    pub rays: Option<SceneRays>,
     /// What was mended on the way, one sentence each.
     pub warnings: Vec<String>,
     /// Which meshes are closed.
@@ -208,9 +213,19 @@ impl SceneGpu {
             clutter: clutter::clutter(&small),
             spheres,
             closed: geometry.closed,
+            rays: None,
             warnings,
             bytes,
         })
+    }
+
+    /// Makes [`SceneGpu::rays`] for methods that need them ([`crate::gi::Method::needs_rays`]). `scene` is what this was made of.
+    ///
+    /// # Errors
+    /// [`AccelError`] when the scene has more triangles than rays can have.
+    pub fn trace(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<(), AccelError> {
+        self.rays = Some(SceneRays::new(device, queue, scene)?);
+        Ok(())
     }
 
     /// Takes over the lights of `scene`. In place where their kinds stay, so that shadow maps stay, too.
@@ -256,6 +271,9 @@ impl SceneGpu {
         if !rows.is_empty() {
             queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&rows));
         }
+        if let Some(rays) = &mut self.rays {
+            rays.place(queue, scene);
+        }
         self.bounds = self.draws.iter().map(|d| d.bounds).reduce(mesh::union);
         let small = bodies::small(scene);
         self.clutter = clutter::clutter(&small);
@@ -272,7 +290,7 @@ impl SceneGpu {
 
     /// Bytes of all buffers and textures.
     pub fn bytes(&self) -> u64 {
-        self.bytes
+        self.bytes + self.rays.as_ref().map_or(0, |r| r.counts().bytes)
     }
 }
 

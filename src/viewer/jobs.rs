@@ -171,6 +171,7 @@ fn method(
         Source::Ssgi => Method::Ssgi,
         Source::Rsm => Method::Rsm,
         Source::Cache => Method::Cache,
+        Source::Gather => Method::Gather(Default::default()),
         Source::Neural => {
             let weights = Weights::find(weights).map_err(|e| e.to_string())?;
             let mut neural = Neural::from(weights);

@@ -8,7 +8,7 @@ use crate::gi::rung::{Cost, Rung};
 use crate::gi::view_cache::ViewCache;
 use crate::gi::{GiError, Inputs, ambient::check_output};
 use crate::gpu::{shaders, timing::Recorder};
-use crate::reference::accel::AccelGpu;
+use crate::accel::AccelGpu;
 use crate::render::tool::{self, READ, READ_WRITE, UNIFORM};
 use glam::Vec3;
 use wgpu::util::DeviceExt;

@@ -1,7 +1,7 @@
 //! The scene's surfaces for the bake: world-space triangles, and what stands at a point of one.
 
 use super::BakeError;
-use crate::reference::accel::{Accel, AccelHit};
+use crate::accel::{Accel, AccelHit};
 use crate::scene::{AlphaMode, ColorSpace, Image, Material, Mesh, Scene, TextureRef, Wrap};
 use glam::{Mat4, Vec2, Vec3};
 
@@ -138,7 +138,7 @@ impl<'a> Surfaces<'a> {
 
     /// Largest coordinate of a box around all triangles that can be hit, and the box.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        let most = crate::reference::accel::MAX_COORDINATE;
+        let most = crate::accel::MAX_COORDINATE;
         let usable = self.corners.iter().filter(|t| t.iter().flatten().all(|x| x.abs() <= most));
         usable.flatten().map(|&p| Vec3::from(p)).fold(None, |b, p| {
             let (low, high) = b.unwrap_or((p, p));

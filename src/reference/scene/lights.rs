@@ -6,6 +6,7 @@
 use super::sky;
 use super::triangles::Flat;
 use super::{ANALYTIC_APART, SceneInfo};
+use crate::accel::alias::alias;
 use crate::scene::defaults::mean_emission;
 use crate::scene::upload::LightGpu;
 use crate::scene::{AlphaMode, LightKind, Scene};
@@ -76,7 +77,7 @@ pub(super) fn pack(scene: &Scene, flat: &Flat) -> Lights {
     for (id, light) in (0u32..).zip(&scene.lights) {
         let mut gpu = LightGpu::new(light);
         // Rays that hit a light want to know how it would have been sampled; 0 tells that it is not there in truth.
-        gpu.pad[0] = truth.iter().find(|t| t.0 == id).map_or(0, |t| (t.1 as f32).to_bits());
+        gpu.pad = truth.iter().find(|t| t.0 == id).map_or(0, |t| (t.1 as f32).to_bits());
         vectors.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&gpu)));
     }
     let truth_table = vectors.len() as u32;
@@ -172,49 +173,4 @@ fn chances(groups: &[Vec<(u32, f64)>]) -> Vec<f64> {
     let total: f64 = powers.iter().sum();
     let even = 1.0 / powers.len().max(1) as f64;
     powers.iter().map(|p| if total > 0.0 { (1.0 - EVEN) * p / total + EVEN * even } else { even }).collect()
-}
-
-/// Entries (threshold, other entry, chance, id), the integers as bits: entry i with a second number below the threshold
-/// gives i, else the other entry.
-fn alias(choices: &[(u32, f64)]) -> Vec<[f32; 4]> {
-    let n = choices.len();
-    let mut scaled: Vec<f64> = choices.iter().map(|c| c.1 * n as f64).collect();
-    let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..n).partition(|&i| scaled[i] < 1.0);
-    let mut other: Vec<usize> = (0..n).collect();
-    let mut threshold = vec![1.0; n];
-    while let (Some(&s), Some(&l)) = (small.last(), large.last()) {
-        small.pop();
-        threshold[s] = scaled[s];
-        other[s] = l;
-        scaled[l] -= 1.0 - scaled[s];
-        if scaled[l] < 1.0 {
-            large.pop();
-            small.push(l);
-        }
-    }
-    (0..n)
-        .map(|i| {
-            [threshold[i] as f32, f32::from_bits(other[i] as u32), choices[i].1 as f32, f32::from_bits(choices[i].0)]
-        })
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn alias_tables_hold_the_chances() {
-        let chances = [0.5, 0.25, 0.125, 0.1, 0.025, 0.0];
-        let table = alias(&chances.iter().enumerate().map(|(i, &p)| (i as u32, p)).collect::<Vec<_>>());
-        let mut got = [0.0; 6];
-        for (i, entry) in table.iter().enumerate() {
-            got[i] += f64::from(entry[0]) / 6.0;
-            got[entry[1].to_bits() as usize] += (1.0 - f64::from(entry[0])) / 6.0;
-        }
-        for (g, p) in got.iter().zip(chances) {
-            assert!((g - p).abs() < 1e-6, "{got:?}");
-        }
-        assert!(alias(&[]).is_empty());
-    }
 }

@@ -58,11 +58,27 @@ pub(super) fn build(triangles: &[Triangle]) -> Accel {
     let boxes: Vec<Aabb> = pairs.iter().map(Pair::aabb).collect();
     // Clustering makes chains of boxes that are all alike, such as many copies of a mesh in one place, in quadratic time.
     let chained = most_alike(&boxes) > MOST_ALIKE;
-    accel.blocks = wide::blocks(&if chained { halved(&boxes) } else { clustered(&boxes) }, &pairs);
+    let leaf = |i: usize| wide::leaf_block(&pairs[i]);
+    accel.blocks = wide::blocks(&if chained { halved(&boxes) } else { clustered(&boxes) }, leaf);
     if wide::depth(&accel.blocks) > STACK_SIZE {
-        accel.blocks = wide::blocks(&halved(&boxes), &pairs);
+        accel.blocks = wide::blocks(&halved(&boxes), leaf);
     }
     accel
+}
+
+/// Blocks of a tree over `boxes`, whose leaves `leaf` makes: for a few thousand things that move, so it is quick to build and no
+/// deeper than `levels`.
+pub(super) fn over_boxes(boxes: &[Aabb], levels: usize, leaf: impl Fn(usize) -> wide::Block) -> Vec<wide::Block> {
+    if boxes.is_empty() {
+        return vec![[0; wide::WORDS]];
+    }
+    if most_alike(boxes) <= MOST_ALIKE {
+        let blocks = wide::blocks(&clustered(boxes), &leaf);
+        if wide::depth(&blocks) <= levels {
+            return blocks;
+        }
+    }
+    wide::blocks(&halved(boxes), leaf)
 }
 
 fn clustered(boxes: &[Aabb]) -> Bvh2 {

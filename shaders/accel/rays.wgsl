@@ -9,6 +9,7 @@ struct Ray {
 }
 
 @group(0) @binding(0) var<storage, read> rays: array<Ray>;
+@group(0) @binding(1) var accel_blocks: texture_2d<u32>;
 @group(0) @binding(3) var<storage, read_write> hits: array<Hit>;
 
 @compute @workgroup_size(64)

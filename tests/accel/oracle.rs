@@ -1,7 +1,7 @@
 //! Triangles, rays, and brute force in double precision as the oracle.
 
 use crate::common;
-use bouncelight::reference::accel::{Accel, AccelGpu, HitGpu, RayCaster, RayGpu};
+use bouncelight::accel::{Accel, AccelGpu, HitGpu, RayCaster, RayGpu};
 
 pub type Point = [f32; 3];
 pub type Triangle = [Point; 3];
@@ -159,9 +159,9 @@ pub fn random_rays(count: usize, reach: f32, seed: u64) -> Vec<RayGpu> {
 }
 
 pub fn on_cpu(accel: &Accel, rays: &[RayGpu]) -> Vec<HitGpu> {
-    let none = |t| HitGpu { t, triangle: NONE, uv: [0.0; 2] };
+    let none = |t| HitGpu { t, triangle: NONE, uv: [0.0; 2], instance: NONE, leaf: 0 };
     let hit = |r: &RayGpu| match accel.closest(r.origin, r.direction, r.t_max) {
-        Some(h) => HitGpu { t: h.t, triangle: h.triangle, uv: h.uv },
+        Some(h) => HitGpu { t: h.t, triangle: h.triangle, uv: h.uv, instance: NONE, leaf: 0 },
         None => none(r.t_max),
     };
     rays.iter().map(hit).collect()

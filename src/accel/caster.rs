@@ -1,4 +1,4 @@
-//! Lists of rays through the traversal, for tests and for measuring its speed: shader `reference.rays`.
+//! Lists of rays through the traversal, for tests and for measuring its speed: shader `accel.rays`.
 
 use bytemuck::{Pod, Zeroable};
 use wgpu::util::DeviceExt;
@@ -30,6 +30,10 @@ pub struct HitGpu {
     pub triangle: u32,
     /// Barycentric weights of the second and third corner.
     pub uv: [f32; 2],
+    /// Block of the instance, `u32::MAX` outside of instances.
+    pub instance: u32,
+    /// Block of the leaf; the highest bit marks its second triangle.
+    pub leaf: u32,
 }
 
 /// Rays of a workgroup.
@@ -64,18 +68,18 @@ impl RayCaster {
             count: None,
         };
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("reference.rays"),
+            label: Some("accel.rays"),
             entries: &[storage(0, true), AccelGpu::layout_entry(), storage(3, false)],
         });
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("reference.rays"),
+            label: Some("accel.rays"),
             bind_group_layouts: &[Some(&layout)],
             immediate_size: 0,
         });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("reference.rays"),
+            label: Some("accel.rays"),
             layout: Some(&pipeline_layout),
-            module: &shaders::module(device, "reference.rays"),
+            module: &shaders::module(device, "accel.rays"),
             entry_point: Some("main"),
             compilation_options: Default::default(),
             cache: None,
@@ -97,7 +101,7 @@ impl RayCaster {
             mapped_at_creation: false,
         });
         let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("reference.rays"),
+            label: Some("accel.rays"),
             layout: &self.layout,
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() },

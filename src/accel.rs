@@ -1,20 +1,29 @@
-//! The acceleration structure of the path tracer: built on the CPU, traversed in `shaders/reference/traverse.wgsl`.
+//! Triangles in trees, for rays: built on the CPU, traversed in `shaders/accel/traverse.wgsl`. [`Accel`] is one tree over triangles
+//! of the world, as the path tracer has it; [`SceneRays`] has a tree for each mesh and one over instances, which may move.
 //!
 //! An eight-wide tree with quantised child boxes, after Ylitie, Karras and Laine ("Efficient Incoherent Ray Traversal on
 //! GPUs Through Compressed Wide BVHs", HPG 2017), collapsed from a binary one by obvhs (PLOC and reinsertion). Nodes and
 //! leaves are blocks of 64 bytes in one texture; a leaf is a pair of triangles that share an edge. What was tried
 //! and measured stands in `docs/performance.md`. [`Accel::closest`] is the same walk on the CPU.
 
+pub(crate) mod alias;
 mod build;
 mod caster;
 mod cpu;
+mod emitters;
 mod gpu;
+mod image;
 mod pairs;
+mod scene;
+mod surfaces;
+mod threads;
 mod wide;
 
 pub use caster::{HitGpu, RayBatch, RayCaster, RayGpu};
 pub use cpu::AccelHit;
+pub use emitters::EmitterGpu;
 pub use gpu::AccelGpu;
+pub use scene::{RayCounts, SceneRays};
 
 use thiserror::Error;
 
@@ -24,8 +33,12 @@ pub const MAX_TRIANGLES: u64 = 1 << 23;
 /// Coordinates farther from the origin than this (metres) are left out like non-finite ones: their products overflow.
 pub const MAX_COORDINATE: f32 = 1e12;
 
-/// Entries of the traversal stack, one a level; `STACK_SIZE` in `traverse.wgsl`.
+/// Levels that a tree of triangles has at most.
 pub const STACK_SIZE: usize = 24;
+
+/// Levels that a tree of instances has at most, where it can be helped. With those of a mesh's tree they are `STACK_SIZE` in `traverse.wgsl`, the entries of
+/// the traversal's stack.
+pub const TOP_LEVELS: usize = 8;
 
 /// Why there is no acceleration structure.
 #[derive(Debug, Error)]

@@ -1,21 +1,32 @@
-// What a ray hits: walk of the eight-wide tree that src/reference/accel builds; wide.rs there has the table of a block's words.
+// What a ray hits: walk of the eight-wide trees that src/accel builds; wide.rs there has the table of a block's words. A leaf
+// may be an instance: the walk then goes on in that mesh's own tree, in the mesh's own space, and comes back.
 
-@group(0) @binding(1) var accel_blocks: texture_2d<u32>;
+// Whoever joins this file binds the blocks as `accel_blocks: texture_2d<u32>`.
 
-const STACK_SIZE = 24u;
+const STACK_SIZE = 32u;
 const NO_TRIANGLE = 0xffffffffu;
 // Components of a direction closer to zero than this are moved away from it, so that their inverse is finite.
 const TINY = 1e-18;
 // Units in the last place by which a box's far end is moved away, against rounding.
 const SLACK = 8;
 
+// Marks in a block's fourth word: a node, an instance.
+const INSTANCE = 0x40000000u;
+const BLOCK = 0x00ffffffu;
+const SECOND = 0x80000000u;
+
 struct Hit {
     // Distance in lengths of the direction.
     t: f32,
-    // Index in the order in which triangles were given, NO_TRIANGLE where nothing was hit.
+    // Index in the order in which triangles were given (of all meshes, one after the other, where there are instances);
+    // NO_TRIANGLE where nothing was hit.
     triangle: u32,
     // Barycentric weights of the second and third corner.
     uv: vec2f,
+    // Block of the instance that it belongs to, NO_TRIANGLE outside of instances; and block of the leaf, with the leaf's
+    // second triangle marked by the highest bit.
+    instance: u32,
+    leaf: u32,
 }
 
 // What is the same for all boxes and triangles that a ray meets.
@@ -68,13 +79,41 @@ fn or_all(x: vec4u) -> u32 {
     return (x.x | x.y) | (x.z | x.w);
 }
 
+fn trace_word(block: u32, word: u32) -> vec4u {
+    return textureLoad(accel_blocks, vec2u(((block & 2047u) << 2u) + word, block >> 11u), 0);
+}
+
+// A number of [0, 1) for whether a ray with `seed` goes through a triangle that lets a share of all rays through.
+fn trace_chance(triangle: u32, seed: u32) -> f32 {
+    var v = (triangle ^ seed) * 747796405u + 2891336453u;
+    v = ((v >> ((v >> 28u) + 4u)) ^ v) * 277803737u;
+    return f32(((v >> 22u) ^ v) >> 8u) / 16777216.0;
+}
+
+// Whether a triangle that lets 1/255 `open` of all rays through stops this one.
+fn trace_stops(open: u32, triangle: u32, seed: u32) -> bool {
+    return open == 0u || trace_chance(triangle, seed) * 255.0 >= f32(open);
+}
+
 // The first hit found (`any`) or the nearest one (otherwise) with 0 < t < t_max. Both sides of triangles are hit.
 fn trace(origin: vec3f, direction: vec3f, t_max: f32, any: bool) -> Hit {
-    let ray = trace_ray(origin, direction);
+    return trace_seeded(origin, direction, t_max, any, 0u);
+}
+
+// As `trace`; triangles that let a share of rays through do so by `seed`.
+fn trace_seeded(origin: vec3f, direction: vec3f, t_max: f32, any: bool, seed: u32) -> Hit {
+    var ray = trace_ray(origin, direction);
     // Bits of the ranks of children 0 to 3, within their half.
-    let rank_bits = vec4u(1u) << (vec4u(0u, 1u, 2u, 3u) ^ vec4u(ray.octant & 3u));
-    let low_half = select(0u, 4u, (ray.octant & 4u) != 0u);
+    var rank_bits = vec4u(1u) << (vec4u(0u, 1u, 2u, 3u) ^ vec4u(ray.octant & 3u));
+    var low_half = select(0u, 4u, (ray.octant & 4u) != 0u);
     var t = t_max;
+    // Inside an instance: its block, the number of its mesh's first triangle, and what was on the stack before.
+    var instance = NO_TRIANGLE;
+    var first_triangle = 0u;
+    var floor_depth = 0u;
+    var found_instance = NO_TRIANGLE;
+    var found_leaf = 0u;
+    var found_first = 0u;
     // Number and place of the triangle hit, and the weights of its corners as they lie in the block.
     var found = NO_TRIANGLE;
     var weights = vec2f(0.0);
@@ -92,6 +131,22 @@ fn trace(origin: vec3f, direction: vec3f, t_max: f32, any: bool) -> Hit {
         let x = textureLoad(accel_blocks, at + vec2u(1u, 0u), 0);
         let y = textureLoad(accel_blocks, at + vec2u(2u, 0u), 0);
         let z = textureLoad(accel_blocks, at + vec2u(3u, 0u), 0);
+        if (head.w & INSTANCE) != 0u {
+            if (group & 255u) != 0u {
+                stack[depth] = group;
+                depth += 1u;
+            }
+            floor_depth = depth;
+            instance = block;
+            first_triangle = x.w;
+            let rows = mat3x3f(bitcast<vec3f>(head.xyz), bitcast<vec3f>(x.xyz), bitcast<vec3f>(y.xyz));
+            // Lengths of the direction stay what they are, so t goes on.
+            ray = trace_ray(origin * rows + bitcast<vec3f>(z.xyz), direction * rows);
+            rank_bits = vec4u(1u) << (vec4u(0u, 1u, 2u, 3u) ^ vec4u(ray.octant & 3u));
+            low_half = select(0u, 4u, (ray.octant & 4u) != 0u);
+            group = ((head.w & BLOCK) << 8u) | (1u << ray.octant);
+            continue;
+        }
         if head.w != 0u {
             let step = bitcast<vec3f>((head.xyz & vec3u(255u)) << vec3u(23u));
             let corner = vec3f(bitcast<vec3i>(head.xyz) >> vec3u(8u)) * step;
@@ -135,17 +190,23 @@ fn trace(origin: vec3f, direction: vec3f, t_max: f32, any: bool) -> Hit {
             let sum1 = bc + ca + ab;
             let t1 = (bc * depths.x + ca * depths.y + ab * depths.z) / sum1;
             let inside1 = (bc >= 0.0 && ca >= 0.0 && ab >= 0.0) || (bc <= 0.0 && ca <= 0.0 && ab <= 0.0);
-            if inside1 && t1 > 0.0 && t1 < t {
+            if inside1 && t1 > 0.0 && t1 < t && trace_stops(z.w & 255u, first_triangle + (x.w & BLOCK), seed) {
                 t = t1;
                 found = x.w;
+                found_leaf = block;
+                found_instance = instance;
+                found_first = first_triangle;
                 weights = vec2f(ca, ab) / sum1;
             }
             let sum2 = cd + da - ca;
             let t2 = (cd * depths.x + da * depths.z - ca * depths.w) / sum2;
             let inside2 = (cd >= 0.0 && da >= 0.0 && ca <= 0.0) || (cd <= 0.0 && da <= 0.0 && ca >= 0.0);
-            if inside2 && t2 > 0.0 && t2 < t {
+            if inside2 && t2 > 0.0 && t2 < t && trace_stops((z.w >> 8u) & 255u, first_triangle + (y.w & BLOCK), seed) {
                 t = t2;
                 found = y.w;
+                found_leaf = block | SECOND;
+                found_instance = instance;
+                found_first = first_triangle;
                 weights = vec2f(da, -ca) / sum2;
             }
             if any && found != NO_TRIANGLE {
@@ -153,6 +214,14 @@ fn trace(origin: vec3f, direction: vec3f, t_max: f32, any: bool) -> Hit {
             }
         }
         if (group & 255u) == 0u {
+            if depth == floor_depth && instance != NO_TRIANGLE {
+                instance = NO_TRIANGLE;
+                first_triangle = 0u;
+                floor_depth = 0u;
+                ray = trace_ray(origin, direction);
+                rank_bits = vec4u(1u) << (vec4u(0u, 1u, 2u, 3u) ^ vec4u(ray.octant & 3u));
+                low_half = select(0u, 4u, (ray.octant & 4u) != 0u);
+            }
             if depth == 0u {
                 break;
             }
@@ -161,11 +230,29 @@ fn trace(origin: vec3f, direction: vec3f, t_max: f32, any: bool) -> Hit {
         }
     }
     if found == NO_TRIANGLE {
-        return Hit(t, NO_TRIANGLE, vec2f(0.0));
+        return Hit(t, NO_TRIANGLE, vec2f(0.0), NO_TRIANGLE, 0u);
     }
     // Back to the triangle's own order of corners.
     let place = found >> 24u;
     let first = 1.0 - weights.x - weights.y;
     let uv = select(select(weights, vec2f(weights.y, first), place == 1u), vec2f(first, weights.x), place == 2u);
-    return Hit(t, found & 0x00ffffffu, uv);
+    return Hit(t, found_first + (found & BLOCK), uv, found_instance, found_leaf);
+}
+
+// Unit normal of what was hit, in the space of the ray, on the side that the triangle's winding says; 0 where it has no area.
+fn trace_normal(hit: Hit) -> vec3f {
+    let leaf = hit.leaf & BLOCK;
+    let a = bitcast<vec3f>(trace_word(leaf, 0u).xyz);
+    let c = bitcast<vec3f>(trace_word(leaf, 2u).xyz);
+    let other = bitcast<vec3f>(trace_word(leaf, select(1u, 3u, (hit.leaf & SECOND) != 0u)).xyz);
+    var n = select(cross(other - a, c - a), cross(c - a, other - a), (hit.leaf & SECOND) != 0u);
+    if hit.instance != NO_TRIANGLE {
+        // Columns of the transposed inverse are the rows of what brings the ray into the mesh's space.
+        let r0 = bitcast<vec3f>(trace_word(hit.instance, 0u).xyz);
+        let r1 = bitcast<vec3f>(trace_word(hit.instance, 1u).xyz);
+        let r2 = bitcast<vec3f>(trace_word(hit.instance, 2u).xyz);
+        n = r0 * n.x + r1 * n.y + r2 * n.z;
+    }
+    let l = length(n);
+    return select(vec3f(0.0), n / l, l > 0.0);
 }

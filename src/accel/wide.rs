@@ -9,7 +9,11 @@
 //! | 3 | first child's block; bit 31 is set | 0 |
 //! | 4–7 | along x: low planes of children 0–3, 4–7, then high ones; a byte each, in steps | corner 1; number (24 bits) and place of the first triangle |
 //! | 8–11 | along y | corner 2; the same of the second triangle |
-//! | 12–15 | along z | corner 3; 0 |
+//! | 12–15 | along z | corner 3; which share of all rays the triangles let through, in 1/255: the first's in the low byte, the second's above it |
+//!
+//! A third kind of leaf is an instance of a mesh: words 0–2, 4–6 and 8–10 are the rows of what brings directions from the world
+//! into the mesh's space, 12–14 what is then added to places; word 3 is the root of the mesh's tree with bit 30 set, word 7 the
+//! number of the mesh's first triangle among those of all meshes, word 11 the number of the instance.
 
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
@@ -25,6 +29,9 @@ pub(crate) type Block = [u32; WORDS];
 
 /// Marks a node.
 pub(crate) const NODE: u32 = 1 << 31;
+
+/// Marks an instance.
+pub(crate) const INSTANCE: u32 = 1 << 30;
 
 /// Share of a step by which children's boxes grow at least, against rounding in the slab test.
 const PAD: f32 = 0.02;
@@ -136,7 +143,7 @@ fn node_block(tree: &Bvh2, node: u32, placed: &[Option<u32>; 8], first: usize) -
     block
 }
 
-fn leaf_block(pair: &Pair) -> Block {
+pub(super) fn leaf_block(pair: &Pair) -> Block {
     let mut block = [0; WORDS];
     for (corner, words) in pair.corners.iter().zip(block.chunks_exact_mut(4)) {
         words[..3].copy_from_slice(&corner.map(f32::to_bits));
@@ -146,8 +153,8 @@ fn leaf_block(pair: &Pair) -> Block {
     block
 }
 
-/// The blocks of `tree` over `pairs`; the first one is the root.
-pub(super) fn blocks(tree: &Bvh2, pairs: &[Pair]) -> Vec<Block> {
+/// The blocks of `tree`, whose leaves `leaf` makes of the number of what is in them; the first one is the root.
+pub(super) fn blocks(tree: &Bvh2, leaf: impl Fn(usize) -> Block) -> Vec<Block> {
     // Parents before their children.
     let mut order = vec![0u32];
     let mut at = 0;
@@ -166,7 +173,7 @@ pub(super) fn blocks(tree: &Bvh2, pairs: &[Pair]) -> Vec<Block> {
     while let Some((index, block)) = open.pop() {
         let node = &tree.nodes[index as usize];
         if node.is_leaf() {
-            blocks[block] = leaf_block(&pairs[tree.primitive_indices[node.first_index as usize] as usize]);
+            blocks[block] = leaf(tree.primitive_indices[node.first_index as usize] as usize);
             continue;
         }
         let placed = places(tree, index, &children(tree, &covers, index));

@@ -5,7 +5,7 @@
 mod common;
 mod oracle;
 
-use bouncelight::reference::accel::{Accel, AccelError, HitGpu, MAX_TRIANGLES, RayGpu};
+use bouncelight::accel::{Accel, AccelError, HitGpu, MAX_TRIANGLES, RayGpu};
 use oracle::*;
 
 #[test]
@@ -280,7 +280,7 @@ fn the_tree_is_never_deeper_than_the_stack() {
     let alike = vec![[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]; 1000];
     for triangles in [nested, alike] {
         let accel = Accel::build(&triangles).unwrap();
-        assert!(accel.depth() <= bouncelight::reference::accel::STACK_SIZE, "{} levels", accel.depth());
+        assert!(accel.depth() <= bouncelight::accel::STACK_SIZE, "{} levels", accel.depth());
         let hit = accel.closest([0.1e-13, 0.1e-13, 0.0], [0.0, 0.0, 1.0], f32::INFINITY).expect("they are in the way");
         assert!(hit.t > 0.0);
     }

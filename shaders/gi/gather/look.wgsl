@@ -1,0 +1,167 @@
+// What a ray finds: the sky, or a surface with the light of lamps and of what glows that it sends back, and the entry that knows
+// the rest of its light.
+
+struct Found {
+    // Radiance that is known at once.
+    radiance: vec3f,
+    // Entry whose irradiance times `back` is to be added; NONE for none.
+    slot: u32,
+    back: vec3f,
+    // FAR where nothing was met.
+    distance: f32,
+}
+
+// A light that a shadow ray is sent to, chosen among all by what it would give.
+struct Chosen {
+    // Unit vector, and how far.
+    l: vec3f,
+    reach: f32,
+    // What arrives along it, cosine and brdf multiplied in, over the chance of the choice.
+    radiance: vec3f,
+    // Irradiance over π, likewise.
+    even: vec3f,
+}
+
+// A place that is lit: with the side that it shows, and what it sends back towards v.
+struct Place {
+    x: vec3f,
+    n: vec3f,
+    v: vec3f,
+    diffuse: vec3f,
+    f0: vec3f,
+    roughness: f32,
+}
+
+// Power of a lobe below this roughness is spread as if by this one: rays that happen to meet a mirrored lamp are not averaged
+// enough to show it as anything but a spark.
+const LEAST_ROUGHNESS = 0.3;
+
+fn weight_of(c: vec3f) -> f32 {
+    return dot(c, vec3f(0.2126, 0.7152, 0.0722));
+}
+
+fn sends_back(p: Place, l: vec3f, n_l: f32, irradiance: vec3f) -> vec3f {
+    return irradiance * n_l * (p.diffuse / PI + ggx(p.n, p.v, l, p.f0, max(p.roughness, LEAST_ROUGHNESS)));
+}
+
+// One of the analytic lights (where `lamps`) and of one point of what glows, by how bright the place would be without shadow.
+// `u` decides, `seed` gives further numbers.
+fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
+    let u = unit_floats(seed);
+    var chosen = Chosen(vec3f(0.0), 0.0, vec3f(0.0), vec3f(0.0));
+    var total = 0.0;
+    var best = 0.0;
+    var lot = u.x;
+    if lamps {
+        for (var i = 0u; i < gather.light_count; i++) {
+            let light = lights[i];
+            if light.stands_in != 0u { continue; }
+            let s = sample_light(light, p.x);
+            let n_l = dot(p.n, s.l);
+            if n_l <= 0.0 { continue; }
+            let value = sends_back(p, s.l, n_l, s.irradiance);
+            let w = weight_of(value);
+            if !(w > 0.0) { continue; }
+            total += w;
+            // Weighted reservoir of one, with one random number that is used up bit by bit.
+            let take = w / total;
+            if lot < take {
+                lot /= take;
+                best = w;
+                chosen = Chosen(s.l, f32(i), value, s.irradiance * (n_l / PI));
+            } else {
+                lot = (lot - take) / max(1.0 - take, 1e-7);
+            }
+        }
+    }
+    var towards_light = best > 0.0;
+    if gather.emitter_count > 0u {
+        let more = unit_floats(pcg3(seed ^ vec3u(0x68bc21ebu)));
+        let scaled = u.y * f32(gather.emitter_count);
+        let first = min(u32(scaled), gather.emitter_count - 1u);
+        let at = select(emitters[first].other, first, more.z < emitters[first].threshold);
+        let e = emitters[at];
+        let r = sqrt(more.x);
+        let y = e.origin + e.edge1 * (r * (1.0 - more.y)) + e.edge2 * (r * more.y);
+        let across = cross(e.edge1, e.edge2);
+        let to = y - p.x;
+        let d2 = max(dot(to, to), 1e-20);
+        let l = to * inverseSqrt(d2);
+        let facing = -dot(across, l) * inverseSqrt(max(dot(across, across), 1e-38));
+        let n_l = dot(p.n, l);
+        if n_l > 0.0 && (facing > 0.0 || ((e.flags & MET_DOUBLE_SIDED) != 0u && facing != 0.0)) {
+            let density = emission_density(e.radiance, e.flags, gather.inverse_power) * d2 / abs(facing);
+            // Against cosine-distributed rays that meet the same surface (balance heuristic; Veach 1997).
+            let irradiance = e.radiance / (density + n_l / PI);
+            let value = sends_back(p, l, n_l, irradiance);
+            let w = weight_of(value);
+            if w > 0.0 {
+                total += w;
+                if lot * total < w {
+                    best = w;
+                    towards_light = false;
+                    // Short of the surface itself.
+                    chosen = Chosen(l, sqrt(d2) * 0.999, value, irradiance * (n_l / PI));
+                }
+            }
+        }
+    }
+    if best <= 0.0 { return Chosen(vec3f(0.0), 0.0, vec3f(0.0), vec3f(0.0)); }
+    if towards_light {
+        // A point of the light's disc.
+        let light = lights[u32(chosen.reach)];
+        let a = 2.0 * PI * u.y;
+        let disc = light.radius * sqrt(u.z) * vec3f(cos(a), sin(a), 0.0);
+        if light.kind == LIGHT_SUN {
+            chosen.l = normalize(frame_around(-light.direction) * (disc + vec3f(0.0, 0.0, 1.0)));
+            chosen.reach = FAR;
+        } else {
+            let to = light.position + frame_around(chosen.l) * disc - p.x;
+            chosen.reach = length(to);
+            chosen.l = to / max(chosen.reach, 1e-20);
+        }
+    }
+    let gain = total / best;
+    chosen.radiance *= gain;
+    chosen.even *= gain;
+    return chosen;
+}
+
+// Whether nothing stands between x and what was chosen.
+fn is_lit(x: vec3f, chosen: Chosen, seed: u32) -> bool {
+    return chosen.reach > 0.0
+        && trace_seeded(x, chosen.l, chosen.reach, true, seed).triangle == NO_TRIANGLE;
+}
+
+// What the ray from o, where a surface faces n_o, finds in direction d. `query` is its number among all rays of the frame, `round` that
+// which will update the entry, `glows`: whether what glows counts where the ray meets it.
+fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, round: u32, glows: bool) -> Found {
+    let seed = pcg3(vec3u(query, gather.round, 0x9e3779b9u));
+    let hit = trace_seeded(o, d, FAR, false, seed.x);
+    if hit.triangle == NO_TRIANGLE {
+        return Found(finite3(environment_radiance(d)), NONE, vec3f(0.0), FAR);
+    }
+    let surface = met(hit.triangle);
+    let front = trace_normal(hit);
+    let facing = -dot(front, d);
+    let n = select(-front, front, facing > 0.0);
+    var radiance = vec3f(0.0);
+    if glows && any(surface.emission > vec3f(0.0)) && (facing > 0.0 || (surface.flags & MET_DOUBLE_SIDED) != 0u) {
+        let density = emission_density(surface.emission, surface.flags, gather.inverse_power) * hit.t * hit.t
+            / max(abs(facing), 1e-6);
+        radiance = surface.emission * (n_d / PI) / (n_d / PI + density);
+    }
+    let n_v = abs(facing);
+    let dielectric = dielectric_lobe(surface.f0, surface.roughness, n_v);
+    let lobe = env_brdf(surface.f0, surface.roughness, n_v);
+    let diffuse = surface.diffuse * (1.0 - dielectric.x);
+    let back = diffuse + lobe;
+    if all(back <= vec3f(0.0)) || (surface.flags & MET_UNLIT) != 0u {
+        return Found(radiance, NONE, vec3f(0.0), hit.t);
+    }
+    let x = off(o + d * hit.t, n, hit.t);
+    let place = Place(x, n, -d, diffuse, surface.f0, surface.roughness);
+    let chosen = choose_light(place, true, pcg3(seed));
+    if is_lit(x, chosen, seed.y) { radiance += chosen.radiance; }
+    return Found(radiance, ask_entry(x, n, query, round), back, hit.t);
+}

@@ -1,0 +1,53 @@
+// One ray for each entry of the cache, whose find is mixed into the entry's mean. The finds' own entries are read as they
+// were after the round before, so the order of threads does not matter.
+
+// Two vectors a slot: where its rays start and the round in which it was last asked for (from 1; 0 for never); packed normal.
+@group(2) @binding(3) var<storage, read_write> entry_points: array<vec4u>;
+// Two halves, for even and odd rounds: irradiance over π, and rays in it.
+@group(2) @binding(4) var<storage, read_write> entry_light: array<vec4f>;
+
+// Rounds after which an entry that no ray has met leaves.
+const ENTRY_AGE = 32u;
+
+@compute @workgroup_size(64)
+fn renew(@builtin(global_invocation_id) id: vec3u) {
+    let slots = gather.mask + 1u;
+    let slot = id.x;
+    if slot >= slots { return; }
+    let odd = (gather.round & 1u) * slots;
+    let even = slots - odd;
+    let key = atomicLoad(&entry_keys[slot]);
+    let lot = atomicLoad(&entry_lots[odd + slot]);
+    if key == 0u { return; }
+    var place = entry_points[2u * slot];
+    var side = entry_points[2u * slot + 1u].x;
+    let now = gather.round + 1u;
+    if lot != NONE {
+        let query = entry_queries[lot & ((1u << LOT_BITS) - 1u)];
+        place = vec4u(query.xyz, now);
+        side = query.w;
+        atomicStore(&entry_lots[odd + slot], NONE);
+    } else if place.w == 0u {
+        // Made in this very round.
+        return;
+    } else if now - place.w > ENTRY_AGE {
+        entry_points[2u * slot] = vec4u(0u);
+        entry_light[slot] = vec4f(0.0);
+        entry_light[slots + slot] = vec4f(0.0);
+        atomicStore(&entry_keys[slot], 0u);
+        return;
+    }
+    entry_points[2u * slot] = place;
+    entry_points[2u * slot + 1u].x = side;
+    let before = entry_light[even + slot];
+    let x = bitcast<vec3f>(place.xyz);
+    let n = unpack_normal(side);
+    let count = u32(before.a);
+    let shift = pcg3(vec3u(key, 0x7f4a7c15u, 3u));
+    let d = cosine_direction(n, lattice(gather.round, shift.xy));
+    let found = look(x, d, max(dot(n, d), 1e-4), gather.cells + even + slot, gather.round + 1u, true);
+    var light = found.radiance;
+    if found.slot != NONE { light += found.back * entry_light[even + found.slot].rgb; }
+    let n_rays = min(before.a + 1.0, gather.entry_frames);
+    entry_light[odd + slot] = vec4f(mix(before.rgb, finite3(light), 1.0 / n_rays), n_rays);
+}

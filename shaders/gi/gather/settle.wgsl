@@ -1,0 +1,103 @@
+// What a cell's ray found, with the light of its entry, mixed into the mean over the frames before, which is looked up where the
+// surface was then.
+
+@group(2) @binding(0) var<storage, read> cell_pixels: array<u32>;
+@group(2) @binding(1) var<storage, read> records: array<vec4f>;
+@group(2) @binding(2) var<storage, read> entry_light: array<vec4f>;
+// `Past` of the frame before and of this one, three vectors a cell.
+@group(2) @binding(3) var<storage, read> before: array<vec4f>;
+@group(2) @binding(4) var<storage, read_write> after: array<vec4f>;
+@group(2) @binding(5) var motion_map: texture_2d<f32>;
+
+// Least sum of bilinear weights of cells that show the same surface.
+const LEAST_PAST = 0.05;
+// Cosine between normals and distance from the plane, in cells, up to which a cell shows the same surface.
+const SAME_NORMAL = 0.8;
+const SAME_PLANE = 0.75;
+
+fn from_shared_exponent(code: u32) -> vec3f {
+    return vec3f(vec3u(code, code >> 9u, code >> 18u) & vec3u(511u)) * exp2(f32(i32(code >> 27u) - 24));
+}
+
+// The mean where the surface at x, which faces n, was in the frame before; 0 frames where it was not to be seen.
+fn past_of(cell: vec2u, pixel: vec2i, x: vec3f, n: vec3f, foot: f32) -> Past {
+    var past = Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n);
+    if (gather.flags & GATHER_CUT) != 0u { return past; }
+    let motion = finite3(vec3f(textureLoad(motion_map, pixel, 0).xy, 0.0)).xy * vec2f(params.size);
+    if all(abs(motion) < vec2f(0.02)) {
+        // At rest a cell stays what it is, whichever of its pixels stands for it.
+        let same = past_at(cell_index(cell));
+        if same.frames > 0.0 && shows(same, x, n, foot) { return same; }
+        return past;
+    }
+    let place = (vec2f(pixel) + motion - f32(CELL_SIDE / 2)) / f32(CELL_SIDE);
+    let low = vec2i(floor(place));
+    let t = place - vec2f(low);
+    var total = 0.0;
+    for (var i = 0; i < 4; i++) {
+        let step = vec2i(i & 1, i >> 1u);
+        let at = low + step;
+        if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
+        let one = past_at(cell_index(vec2u(at)));
+        let sides = select(1.0 - t, t, step == vec2i(1));
+        let w = sides.x * sides.y;
+        if one.frames <= 0.0 || !shows(one, x, n, foot) { continue; }
+        past.light += w * one.light;
+        past.frames += w * one.frames;
+        past.vector += w * one.vector;
+        past.square += w * one.square;
+        total += w;
+    }
+    if total < LEAST_PAST { return Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n); }
+    past.light /= total;
+    past.frames /= total;
+    past.vector /= total;
+    past.square /= total;
+    return past;
+}
+
+fn past_at(cell: u32) -> Past {
+    return past_from(before[3u * cell], before[3u * cell + 1u], before[3u * cell + 2u]);
+}
+
+fn shows(past: Past, x: vec3f, n: vec3f, foot: f32) -> bool {
+    return dot(past.n, n) > SAME_NORMAL && abs(dot(past.x - x, n)) < SAME_PLANE * foot;
+}
+
+@compute @workgroup_size(8, 8)
+fn settle(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= cell_grid()) { return; }
+    let cell = cell_index(id.xy);
+    let packed = cell_pixels[cell];
+    if packed == NO_PIXEL {
+        after[3u * cell] = vec4f(0.0);
+        return;
+    }
+    let a = records[3u * cell];
+    let b = records[3u * cell + 1u];
+    let c = records[3u * cell + 2u];
+    var light = a.rgb;
+    let slot = bitcast<u32>(a.w);
+    if slot != NONE {
+        light += from_shared_exponent(bitcast<u32>(b.x)) * entry_light[(gather.round & 1u) * (gather.mask + 1u) + slot].rgb;
+    }
+    light = finite3(light);
+    let vector = luminance(light) * unpack_normal(bitcast<u32>(b.y))
+        + luminance(c.rgb) * unpack_normal(bitcast<u32>(c.w));
+    light += c.rgb;
+
+    let pixel = unpack_pixel(packed);
+    let z = distance_at(pixel);
+    let x = world_position_at(pixel, z);
+    let n = world_normal_at(pixel);
+    let past = past_of(id.xy, pixel, x, n, cell_foot(z));
+    let frames = min(past.frames + 1.0, gather.cell_frames);
+    let share = 1.0 / frames;
+    let l = luminance(light);
+    let now = Past(
+        mix(past.light, light, share), frames, mix(past.vector, vector, share), mix(past.square, l * l, share), x, n
+    );
+    after[3u * cell] = vec4f(now.light, now.frames);
+    after[3u * cell + 1u] = vec4f(now.vector, now.square);
+    after[3u * cell + 2u] = vec4f(now.x, bitcast<f32>(pack_normal(now.n)));
+}

@@ -1,0 +1,95 @@
+// What the passes of `gather` share: their parameters and the scene as rays meet it (group 1).
+
+// `gi::gather::Params` is the Rust side.
+struct Gather {
+    // World space; the eye of the view that is drawn.
+    eye: vec3f,
+    // Frames since the last cut; the first is 0.
+    frame: u32,
+    light_count: u32,
+    emitter_count: u32,
+    // One over what all that glows sends, as `emission_density` takes it.
+    inverse_power: f32,
+    // Entries of the cache minus one; a power of two minus one.
+    mask: u32,
+    // Size of an entry's cell over its distance from the eye.
+    entry_scale: f32,
+    // Number of the round of entries, which never begins anew.
+    round: u32,
+    // Most frames that a cell's mean and an entry's remember.
+    cell_frames: f32,
+    entry_frames: f32,
+    // Lights of this list stand for surfaces that glow: these light no cell a second time.
+    flags: u32,
+    // Cells of the picture; queries of entries come after theirs.
+    cells: u32,
+    pad0: u32,
+    pad1: u32,
+}
+
+const GATHER_STANDS_IN = 1u;
+const GATHER_CUT = 2u;
+const GATHER_NO_BLUR = 4u;
+const GATHER_STILL = 8u;
+
+@group(1) @binding(0) var<uniform> gather: Gather;
+@group(1) @binding(1) var accel_blocks: texture_2d<u32>;
+@group(1) @binding(2) var<storage, read> surfaces: array<vec4u>;
+@group(1) @binding(3) var<storage, read> emitters: array<Emitter>;
+@group(1) @binding(4) var<storage, read> lights: array<Light>;
+@group(1) @binding(5) var environment_picture: texture_2d<f32>;
+
+const NONE = 0xffffffffu;
+const FAR = 1e30;
+
+fn pack_normal(n: vec3f) -> u32 {
+    return pack2x16snorm(oct_encode(n));
+}
+
+fn unpack_normal(code: u32) -> vec3f {
+    return oct_decode(unpack2x16snorm(code));
+}
+
+// A frame around unit vector n (Duff et al. 2017): columns tangent, bitangent, n.
+fn frame_around(n: vec3f) -> mat3x3f {
+    let s = select(-1.0, 1.0, n.z >= 0.0);
+    let a = -1.0 / (s + n.z);
+    let b = n.x * n.y * a;
+    return mat3x3f(vec3f(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3f(b, s + n.y * n.y * a, -n.y), n);
+}
+
+// Cosine-distributed about n from two numbers of [0, 1).
+fn cosine_direction(n: vec3f, u: vec2f) -> vec3f {
+    let r = sqrt(u.x);
+    let a = 2.0 * PI * u.y;
+    return frame_around(n) * vec3f(r * cos(a), r * sin(a), sqrt(max(1.0 - u.x, 0.0)));
+}
+
+// Point `i` of the rank-1 lattice of the plastic number (Roberts 2018), shifted; whole numbers lose no digits.
+fn lattice(i: u32, shift: vec2u) -> vec2f {
+    return vec2f((vec2u(3242174889u, 2447445414u) * i + shift) >> vec2u(8u)) / 16777216.0;
+}
+
+// Three hashes of three numbers (Jarzynski and Olano 2020, pcg3d).
+fn pcg3(seed: vec3u) -> vec3u {
+    var v = seed * 1664525u + 1013904223u;
+    v.x += v.y * v.z;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v ^= v >> vec3u(16u);
+    v.x += v.y * v.z;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    return v;
+}
+
+fn unit_floats(bits: vec3u) -> vec3f {
+    return vec3f(bits >> vec3u(8u)) / 16777216.0;
+}
+
+// Off a surface at p, which a ray of length t found, on the side of n: further than rounding on the way there and in an
+// instance's space can be wrong.
+fn off(p: vec3f, n: vec3f, t: f32) -> vec3f {
+    let a = abs(p);
+    return p + n * (max(max(a.x, a.y), a.z) * 4e-6 + t * 1e-5);
+}

@@ -1,0 +1,193 @@
+//! What a ray needs to know of a triangle that it meets: colours averaged over it, 16 bytes. A ray of light carries no detail,
+//! so textures are read once, when the scene is loaded, and a scene's 4k pictures cost the rays nothing.
+
+use super::image::{Reduced, Reductions};
+use crate::scene::{AlphaMode, Material, Mesh, Scene};
+use glam::{Vec2, Vec3};
+
+/// `Surface` of `shaders/accel/surface.wgsl`, packed: diffuse base colour and roughness, reflectance at normal incidence and
+/// flags, emitted radiance, unused.
+pub type Packed = [u32; 4];
+
+/// Glows on both of its sides, and is drawn from both.
+pub const DOUBLE_SIDED: u32 = 1;
+/// Shows its colour to the camera, and takes and sends no light.
+pub const UNLIT: u32 = 2;
+
+/// Points of a triangle at which its textures are read, first the middle.
+const POINTS: [[f32; 2]; 7] =
+    [[0.3333, 0.3333], [0.1, 0.1], [0.8, 0.1], [0.1, 0.8], [0.45, 0.1], [0.1, 0.45], [0.45, 0.45]];
+
+/// A triangle that covers more texels of the reduced picture than this is read at more points.
+const FEW_TEXELS: f32 = 16.0;
+
+/// Sides of the lattice of points of such a triangle.
+const LATTICE: usize = 12;
+
+/// What is known of a triangle before it is packed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// Base colour of the diffuse part, metals' share taken out.
+    pub diffuse: Vec3,
+    /// Reflectance at normal incidence.
+    pub f0: Vec3,
+    /// Perceptual roughness.
+    pub roughness: f32,
+    /// Emitted radiance, W/(m²·sr).
+    pub emission: Vec3,
+    /// Share of rays that it stops.
+    pub coverage: f32,
+    /// [`DOUBLE_SIDED`] and [`UNLIT`].
+    pub flags: u32,
+}
+
+impl Surface {
+    /// What the shader reads; colours by their square roots in 8 bits, emission with 9 bits a channel and one exponent.
+    pub fn packed(&self) -> Packed {
+        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
+        let root = |c: Vec3| byte(c.x.sqrt()) | byte(c.y.sqrt()) << 8 | byte(c.z.sqrt()) << 16;
+        [root(self.diffuse) | byte(self.roughness) << 24, root(self.f0) | self.flags << 24, shared_exponent(self.emission), 0]
+    }
+
+    /// How many of 255 rays it lets through.
+    pub fn open(&self) -> u32 {
+        255 - (self.coverage.clamp(0.0, 1.0) * 255.0 + 0.5) as u32
+    }
+}
+
+/// Red, green and blue with 9 bits each and one exponent of 5, as `Rgb9e5Ufloat` (Vulkan's specification) has them.
+pub fn shared_exponent(c: Vec3) -> u32 {
+    let c = c.max(Vec3::ZERO).min(Vec3::splat(65408.0));
+    let c = if c.is_finite() { c } else { Vec3::ZERO };
+    let most = c.max_element();
+    let mut exponent = (most.max(1e-9).log2().floor() as i32).max(-16) + 16;
+    let scale = |e: i32| 2f32.powi(e - 24);
+    if (most / scale(exponent) + 0.5).floor() >= 512.0 {
+        exponent += 1;
+    }
+    let code = |v: f32| ((v / scale(exponent) + 0.5) as u32).min(511);
+    code(c.x) | code(c.y) << 9 | code(c.z) << 18 | (exponent as u32) << 27
+}
+
+/// What [`shared_exponent`] made of a colour.
+pub fn from_shared_exponent(code: u32) -> Vec3 {
+    let scale = 2f32.powi((code >> 27) as i32 - 24);
+    Vec3::new((code & 511) as f32, (code >> 9 & 511) as f32, (code >> 18 & 511) as f32) * scale
+}
+
+/// The triangles of `mesh`, which names a material that exists.
+pub fn of_mesh(scene: &Scene, mesh: &Mesh, reductions: &Reductions) -> Vec<Surface> {
+    let material = &scene.materials[mesh.material];
+    let textures = Textures::new(material, reductions);
+    let plain = textures.is_plain() && mesh.colors.is_empty();
+    let same = plain.then(|| surface(material, &textures, mesh, [0; 3]));
+    let one = |t: &[u32]| same.unwrap_or_else(|| surface(material, &textures, mesh, [t[0], t[1], t[2]].map(|i| i as usize)));
+    mesh.indices.chunks_exact(3).map(one).collect()
+}
+
+/// The pictures of a material, made small.
+struct Textures<'a> {
+    base: Option<&'a Reduced>,
+    rough: Option<&'a Reduced>,
+    glow: Option<&'a Reduced>,
+}
+
+impl<'a> Textures<'a> {
+    fn new(material: &Material, reductions: &'a Reductions) -> Self {
+        let find = |t, cutoff| Option::and_then(t, |t| reductions.find(&t, cutoff));
+        Self {
+            base: find(material.base_color_texture, super::image::cutoff(material)),
+            rough: find(material.metallic_roughness_texture, None),
+            glow: find(material.emissive_texture, None),
+        }
+    }
+
+    fn is_plain(&self) -> bool {
+        self.base.is_none() && self.rough.is_none() && self.glow.is_none()
+    }
+}
+
+fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 3]) -> Surface {
+    let uv = |set: u8| {
+        let from = if set == 0 { &mesh.uv0 } else { &mesh.uv1 };
+        corners.map(|i| from.get(i).copied().map_or(Vec2::ZERO, Vec2::from))
+    };
+    let use_of = |reduced: Option<&'_ Reduced>, texture: Option<crate::scene::TextureRef>| {
+        let (Some(reduced), Some(texture)) = (reduced, texture) else { return None };
+        let at = uv(texture.uv_set).map(|p| {
+            let [u, v] = texture.transform.map(|r| r[0] * p.x + r[1] * p.y + r[2]);
+            Vec2::new(u, v)
+        });
+        Some((reduced.clone(), texture.sampler, at))
+    };
+    let base_use = use_of(textures.base, m.base_color_texture);
+    let rough_use = use_of(textures.rough, m.metallic_roughness_texture);
+    let glow_use = use_of(textures.glow, m.emissive_texture);
+    let texels = [&base_use, &rough_use, &glow_use].into_iter().flatten().map(|(r, _, at)| r.texels_in(at));
+    let many = texels.fold(0.0, f32::max) > FEW_TEXELS;
+    let lattice = |i: usize| {
+        let (a, b) = ((i % LATTICE) as f32 + 0.5, (i / LATTICE) as f32 + 0.5);
+        let (u, v) = (a / LATTICE as f32, b / LATTICE as f32);
+        if u + v < 1.0 { [u, v] } else { [1.0 - u, 1.0 - v] }
+    };
+    let count = if many { LATTICE * LATTICE } else { POINTS.len() };
+    let colors = corners.map(|i| mesh.colors.get(i).copied().unwrap_or([1.0; 4]));
+
+    let (mut diffuse, mut f0, mut emission) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+    let (mut roughness, mut coverage, mut weight) = (0.0, 0.0, 0.0);
+    for i in 0..count {
+        let [v, w] = if many { lattice(i) } else { POINTS[i] };
+        let weights = [1.0 - v - w, v, w];
+        let read = |u: &Option<(Reduced, crate::scene::Sampler, [Vec2; 3])>| match u {
+            Some((reduced, sampler, at)) => {
+                reduced.read(at[0] * weights[0] + at[1] * weights[1] + at[2] * weights[2], sampler)
+            }
+            None => [1.0; 4],
+        };
+        let color = |c: usize| (0..3).map(|k| colors[k][c] * weights[k]).sum::<f32>();
+        let base = read(&base_use);
+        let rgb = Vec3::from(std::array::from_fn(|c| (base[c] * m.base_color[c] * color(c)).clamp(0.0, 1.0)));
+        let alpha = match m.alpha_mode {
+            AlphaMode::Opaque => 1.0,
+            // The reduced picture's alpha is the share of texels above the cutoff, vertex colours aside.
+            AlphaMode::Mask { .. } => base[3],
+            AlphaMode::Blend => (base[3] * m.base_color[3] * color(3)).clamp(0.0, 1.0),
+        };
+        let rough = read(&rough_use);
+        let metallic = (m.metallic * rough[2]).clamp(0.0, 1.0);
+        let glow = read(&glow_use);
+        let counts = alpha.max(1e-3);
+        weight += counts;
+        coverage += alpha;
+        diffuse += counts * rgb * (1.0 - metallic);
+        f0 += counts * Vec3::splat(m.f0).lerp(rgb, metallic);
+        roughness += counts * (m.roughness * rough[1]).clamp(0.0, 1.0);
+        emission += counts * Vec3::from(m.emissive) * Vec3::new(glow[0], glow[1], glow[2]);
+    }
+    let flags = u32::from(m.double_sided) * DOUBLE_SIDED | u32::from(m.unlit) * UNLIT;
+    let dark = if m.unlit { 0.0 } else { 1.0 / weight };
+    Surface {
+        diffuse: diffuse * dark,
+        f0: f0 * dark,
+        roughness: roughness / weight,
+        emission: emission * dark,
+        coverage: coverage / count as f32,
+        flags,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shared_exponents_keep_nine_bits() {
+        for c in [[0.0, 0.0, 0.0], [1.0, 0.5, 0.25], [300.0, 2.0, 0.1], [1e-3, 2e-3, 3e-3], [65408.0, 1.0, 0.0], [511.9, 0.0, 1.0]] {
+            let back = from_shared_exponent(shared_exponent(c.into()));
+            let most = Vec3::from(c).max_element();
+            assert!((back - Vec3::from(c)).abs().max_element() <= most / 511.0 + 1e-8, "{c:?} {back}");
+        }
+        assert_eq!(shared_exponent(Vec3::NAN), shared_exponent(Vec3::ZERO));
+        assert_eq!(from_shared_exponent(shared_exponent(Vec3::splat(-1.0))), Vec3::ZERO);
+    }
+}

@@ -1,0 +1,306 @@
+//! The method `gather`: one ray a cell and frame into the scene's triangles, lit where it ends by the lights (a shadow ray each)
+//! and by a cache of light in the world; averaged over frames, blurred over neighbours, brought to full resolution.
+//!
+//! ```text
+//! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.bring ─► E/π
+//!                          │  ▲ who was met       ▲   mean of the frames before
+//!                          ▼  │                   │
+//!                    table of entries ─► gi.renew ┘   one ray an entry, several rounds in a first frame
+//! ```
+//!
+//! It asks what stands between, so it needs no constant for that. What it knows of a surface that a ray meets is one colour a
+//! triangle; how finely it knows the light between surfaces is the size of an entry's cell; the rest is noise, which frames and
+//! neighbours average away. `docs/gi.md` says what it cannot do.
+
+mod params;
+mod store;
+
+pub use params::Params;
+
+use super::cells::{CellSide, CellsPass};
+use super::inputs::{BoundInputs, InputGroup};
+use super::rung::{Cost, Rung};
+use super::upsample::UpsamplePass;
+use super::{GiError, Inputs, Rays};
+use crate::gpu::bind::{self, Binder, Bound};
+use crate::gpu::{shaders, timing::Recorder};
+use crate::render::tool::{LOAD, READ, READ_WRITE};
+use params::ParamsRing;
+use store::Store;
+
+/// How light is gathered. The numbers that are choices stand in the table of `docs/gi.md`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Frames that a cell's mean remembers.
+    pub cell_frames: f32,
+    /// Rays that an entry's mean remembers.
+    pub entry_frames: f32,
+    /// Slots of the table of entries, a power of two.
+    pub slots: u32,
+    /// Size of an entry's cell over its distance from the eye, before it is rounded up to a power of two.
+    pub entry_scale: f32,
+    /// Rounds of entries in the first frame after a cut.
+    pub first_rounds: u32,
+    /// Whether means are blurred over neighbours.
+    pub blur: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { cell_frames: 64.0, entry_frames: 16.0, slots: 1 << 15, entry_scale: 1.0 / 16.0, first_rounds: 4, blur: true }
+    }
+}
+
+impl Options {
+    /// Nothing is forgotten and nothing blurred: for asking what the method converges to.
+    pub const PLAIN: Self = Self {
+        cell_frames: 1e9,
+        entry_frames: 1e9,
+        slots: 1 << 16,
+        entry_scale: 1.0 / 16.0,
+        first_rounds: 4,
+        blur: false,
+    };
+}
+
+/// A ray begins this share of the view distance off its surface: half along the way to the eye, half along the normal. A
+/// hundredth of a cell's width at 1024 × 512.
+const LIFT: f32 = 3e-4;
+
+/// Constants of the shaders as WGSL.
+pub fn prelude() -> String {
+    format!("{}const LIFT = f32({LIFT:?});\n", CellSide::Four.prelude())
+}
+
+/// Vectors of a cell's record and of its past.
+const RECORD: u64 = 48;
+
+/// The method at work.
+pub struct GatherGi {
+    device: wgpu::Device,
+    options: Options,
+    inputs: InputGroup,
+    params: ParamsRing,
+    scene: Binder,
+    cells: CellsPass,
+    rays: Pass,
+    renew: Pass,
+    settle: Pass,
+    blur: Pass,
+    upsample: UpsamplePass,
+    store: Store,
+    /// Bound where the host names no lights or no motion.
+    no_lights: wgpu::Buffer,
+    no_motion: wgpu::TextureView,
+    /// Frames since the last cut, rounds since the beginning.
+    frame: u32,
+    round: u32,
+}
+
+/// A pipeline with group 2 of its own.
+struct Pass {
+    pipeline: wgpu::ComputePipeline,
+    binder: Binder,
+}
+
+impl Pass {
+    fn new(
+        device: &wgpu::Device,
+        (inputs, scene): (&InputGroup, &Binder),
+        (name, entry): (&'static str, &str),
+        types: &[wgpu::BindingType],
+    ) -> Self {
+        let binder = Binder::new(device, name, types);
+        let module = shaders::module_with(device, name, &prelude());
+        let layouts = [inputs.layout(), scene.layout(), binder.layout()];
+        Self { pipeline: bind::pipeline(device, name, &module, entry, &layouts), binder }
+    }
+}
+
+impl GatherGi {
+    /// Makes pipelines, and buffers for pictures of `size` pixels.
+    pub fn new(device: &wgpu::Device, size: [u32; 2], options: Options) -> Self {
+        let inputs = InputGroup::new(device);
+        let params = ParamsRing::new(device);
+        let blocks = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Uint,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
+        let scene = Binder::new(device, "gi.gather", &[ParamsRing::TYPE, blocks, READ, READ, READ, LOAD]);
+        let shared = (&inputs, &scene);
+        let new = |name, entry, types: &[wgpu::BindingType]| Pass::new(device, shared, (name, entry), types);
+        let rw = READ_WRITE;
+        let motion = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("gi.no_motion"),
+            size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rg16Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        Self {
+            cells: CellsPass::new(device, &inputs, CellSide::Four, size),
+            rays: new("gi.rays", "rays", &[rw, rw, rw, READ, rw]),
+            renew: new("gi.renew", "renew", &[rw, rw, rw, rw, rw]),
+            settle: new("gi.settle", "settle", &[READ, READ, READ, READ, rw, LOAD]),
+            blur: new("gi.blur", "blur", &[READ, rw]),
+            upsample: UpsamplePass::plain(device, &inputs, CellSide::Four),
+            store: Store::new(device, size, options.slots),
+            no_lights: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("gi.no_lights"),
+                size: size_of::<crate::scene::upload::LightGpu>() as u64,
+                usage: wgpu::BufferUsages::STORAGE,
+                mapped_at_creation: false,
+            }),
+            no_motion: motion.create_view(&Default::default()),
+            device: device.clone(),
+            options,
+            inputs,
+            params,
+            scene,
+            frame: 0,
+            round: 0,
+        }
+    }
+
+    /// Frames in the longest-lived means: 0 before the first, and 1 after it and after a cut.
+    pub fn frames(&self) -> u32 {
+        self.frame
+    }
+
+    fn params(&self, inputs: &Inputs<'_>, rays: &Rays<'_>) -> Result<Params, GiError> {
+        let counts = rays.scene.counts();
+        let flags = [
+            (inputs.lights.is_some_and(|l| l.stand_in), params::STANDS_IN),
+            (self.frame == 0, params::CUT),
+            (!self.options.blur, params::NO_BLUR),
+        ];
+        Ok(Params {
+            eye: super::inputs::Params::new(inputs.size, &inputs.camera, inputs.environment)?.eye_position(),
+            frame: self.frame,
+            light_count: inputs.lights.map_or(0, |l| l.count),
+            emitter_count: counts.emitters as u32,
+            inverse_power: rays.scene.inverse_power(),
+            mask: self.options.slots - 1,
+            entry_scale: self.options.entry_scale,
+            round: self.round,
+            cell_frames: self.options.cell_frames,
+            entry_frames: self.options.entry_frames,
+            flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
+            cells: CellSide::Four.count(inputs.size) as u32,
+            pad: [0; 2],
+        })
+    }
+
+    fn run(recorder: &mut Recorder<'_>, label: &str, pass: &wgpu::ComputePipeline, groups: Groups<'_>, size: [u32; 2]) {
+        recorder.compute(label, |p| {
+            groups.inputs.set(p);
+            p.set_bind_group(1, groups.scene, &[groups.offset]);
+            p.set_bind_group(2, groups.own, &[]);
+            p.set_pipeline(pass);
+            p.dispatch_workgroups(size[0], size[1], 1);
+        });
+    }
+}
+
+/// What a pass is bound to.
+struct Groups<'a> {
+    inputs: &'a BoundInputs,
+    scene: &'a wgpu::BindGroup,
+    offset: u32,
+    own: &'a wgpu::BindGroup,
+}
+
+impl Rung for GatherGi {
+    fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError> {
+        super::ambient::check_output(output, inputs.size)?;
+        let rays = inputs.rays.as_ref().ok_or(GiError::Rays)?;
+        let bound = self.inputs.bind(queue, inputs)?;
+        if self.cells.fit(inputs.size) {
+            self.store = Store::new(&self.device, inputs.size, self.options.slots);
+            self.upsample.forget();
+            self.frame = 0;
+        }
+        let lights = inputs.lights.map_or(&self.no_lights, |l| l.buffer);
+        let scene = self.scene.group([
+            self.params.bound(),
+            rays.scene.accel().view().into(),
+            rays.scene.surfaces().into(),
+            rays.scene.emitters().into(),
+            lights.into(),
+            rays.environment.into(),
+        ]);
+        let store = &self.store;
+        let table = || [&store.keys, &store.lots, &store.queries].map(Bound::from);
+        let [keys, lots, queries] = table();
+        let rays_group = self.rays.binder.group([keys, lots, queries, self.cells.pixels().into(), (&store.records).into()]);
+        let [keys, lots, queries] = table();
+        let renew_group = self.renew.binder.group([keys, lots, queries, (&store.points).into(), (&store.light).into()]);
+        let [before, after] = [self.frame & 1, 1 - (self.frame & 1)].map(|i| &store.pasts[i as usize]);
+        let settle_group = self.settle.binder.group([
+            self.cells.pixels().into(),
+            (&store.records).into(),
+            (&store.light).into(),
+            before.into(),
+            after.into(),
+            inputs.motion.unwrap_or(&self.no_motion).into(),
+        ]);
+        let blur_group = self.blur.binder.group([after.into(), (&store.cell_light).into()]);
+
+        let mut params = self.params(inputs, rays)?;
+        let [w, h] = CellSide::Four.grid(inputs.size).map(|n| n.div_ceil(8));
+        let mut offset = self.params.write(queue, &params);
+        let groups = |offset, own| Groups { inputs: &bound, scene: &scene, offset, own };
+
+        self.cells.record(recorder, &bound);
+        Self::run(recorder, "gi.rays", &self.rays.pipeline, groups(offset, &rays_group), [w, h]);
+        let rounds = if self.frame == 0 { self.options.first_rounds.max(1) } else { 1 };
+        let slots = self.options.slots.div_ceil(64);
+        for round in 0..rounds {
+            if round > 0 {
+                params.round += 1;
+                offset = self.params.write(queue, &params);
+            }
+            Self::run(recorder, "gi.renew", &self.renew.pipeline, groups(offset, &renew_group), [slots, 1]);
+        }
+        Self::run(recorder, "gi.settle", &self.settle.pipeline, groups(offset, &settle_group), [w, h]);
+        Self::run(recorder, "gi.blur", &self.blur.pipeline, groups(offset, &blur_group), [w, h]);
+        self.round = params.round + 1;
+        self.frame += 1;
+        self.upsample.record(recorder, &bound, &self.cells, &store.cell_light, None, output)
+    }
+
+    fn cut(&mut self) {
+        self.frame = 0;
+    }
+
+    fn forget(&mut self) {
+        self.inputs.forget();
+        self.scene.forget();
+        self.settle.binder.forget();
+        self.upsample.forget();
+    }
+
+    fn bytes(&self) -> u64 {
+        self.inputs.bytes() + self.cells.bytes() + self.store.bytes()
+    }
+
+    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
+        let cells = CellSide::Four.count(size) as f64;
+        vec![
+            CellsPass::cost(CellSide::Four, size),
+            Cost::new("gi.settle", cells * 150.0, cells * (2.0 * RECORD as f64 + 100.0)),
+            Cost::new("gi.blur", cells * 25.0 * 45.0, cells * 2.0 * RECORD as f64),
+            UpsamplePass::cost(CellSide::Four, size, 0),
+        ]
+    }
+}

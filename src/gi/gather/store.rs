@@ -1,0 +1,60 @@
+//! What `gather` keeps from frame to frame, and between the passes of one.
+
+use super::RECORD;
+use crate::gi::cells::CellSide;
+
+pub(super) struct Store {
+    /// Of the table of entries, by slot: key; lots of both halves; queries of cells and of both halves' entries; where rays
+    /// begin; light of both halves.
+    pub keys: wgpu::Buffer,
+    pub lots: wgpu::Buffer,
+    pub queries: wgpu::Buffer,
+    pub points: wgpu::Buffer,
+    pub light: wgpu::Buffer,
+    /// Of cells: what rays found; what is remembered, before and after this frame in turns; the light that is shown.
+    pub records: wgpu::Buffer,
+    pub pasts: [wgpu::Buffer; 2],
+    pub cell_light: wgpu::Buffer,
+}
+
+impl Store {
+    pub fn new(device: &wgpu::Device, size: [u32; 2], slots: u32) -> Self {
+        let cells = CellSide::Four.count(size).max(1);
+        let slots = u64::from(slots);
+        let buffer = |label, size| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            })
+        };
+        // The least number wins a lot, so none is the greatest.
+        let lots = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("gi.entry_lots"),
+            size: 8 * slots,
+            usage: wgpu::BufferUsages::STORAGE,
+            mapped_at_creation: true,
+        });
+        if let Ok(mut range) = lots.get_mapped_range_mut(..) {
+            range.slice(..).fill(0xff);
+        }
+        lots.unmap();
+        let past = || buffer("gi.pasts", RECORD * cells);
+        Self {
+            keys: buffer("gi.entry_keys", 4 * slots),
+            lots,
+            queries: buffer("gi.entry_queries", 16 * (cells + 2 * slots)),
+            points: buffer("gi.entry_points", 32 * slots),
+            light: buffer("gi.entry_light", 32 * slots),
+            records: buffer("gi.records", RECORD * cells),
+            pasts: [past(), past()],
+            cell_light: buffer("gi.light", CellSide::Four.light_bytes(size)),
+        }
+    }
+
+    pub fn bytes(&self) -> u64 {
+        let Self { keys, lots, queries, points, light, records, pasts: [a, b], cell_light } = self;
+        [keys, lots, queries, points, light, records, a, b, cell_light].iter().map(|b| b.size()).sum()
+    }
+}

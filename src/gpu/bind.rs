@@ -1,0 +1,135 @@
+//! Bind groups, kept as long as everything in them stays the same: every bound resource is part of the key, so a host that hands
+//! over another light buffer gets another group, and one that hands over the same things every frame makes each group once.
+
+/// Something that is bound.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Bound {
+    /// A whole buffer.
+    Buffer(wgpu::Buffer),
+    /// The first so many bytes of a buffer, from a dynamic offset on.
+    Slot(wgpu::Buffer, u64),
+    /// A texture.
+    View(wgpu::TextureView),
+}
+
+impl From<&wgpu::Buffer> for Bound {
+    fn from(buffer: &wgpu::Buffer) -> Self {
+        Self::Buffer(buffer.clone())
+    }
+}
+
+impl From<&wgpu::TextureView> for Bound {
+    fn from(view: &wgpu::TextureView) -> Self {
+        Self::View(view.clone())
+    }
+}
+
+impl Bound {
+    fn resource(&self) -> wgpu::BindingResource<'_> {
+        match self {
+            Bound::Buffer(buffer) => buffer.as_entire_binding(),
+            Bound::Slot(buffer, size) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                buffer,
+                offset: 0,
+                size: wgpu::BufferSize::new(*size),
+            }),
+            Bound::View(view) => wgpu::BindingResource::TextureView(view),
+        }
+    }
+}
+
+/// Groups that are kept: enough for both halves of a ping-pong under triple buffering.
+const CAPACITY: usize = 8;
+
+/// A layout and the groups made of it.
+pub struct Binder {
+    device: wgpu::Device,
+    label: &'static str,
+    layout: wgpu::BindGroupLayout,
+    groups: Vec<(Vec<Bound>, wgpu::BindGroup)>,
+    next: usize,
+    made: u64,
+}
+
+impl Binder {
+    /// A layout for compute shaders whose bindings are numbered by the list.
+    pub fn new(device: &wgpu::Device, label: &'static str, types: &[wgpu::BindingType]) -> Self {
+        let entries: Vec<_> = (0u32..)
+            .zip(types)
+            .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty,
+                count: None,
+            })
+            .collect();
+        let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries };
+        let layout = device.create_bind_group_layout(&descriptor);
+        Self { device: device.clone(), label, layout, groups: Vec::with_capacity(CAPACITY), next: 0, made: 0 }
+    }
+
+    /// The layout.
+    pub fn layout(&self) -> &wgpu::BindGroupLayout {
+        &self.layout
+    }
+
+    /// The group of these resources, in the order of the bindings.
+    pub fn group<const N: usize>(&mut self, resources: [Bound; N]) -> wgpu::BindGroup {
+        if let Some((_, group)) = self.groups.iter().find(|(kept, _)| kept[..] == resources[..]) {
+            return group.clone();
+        }
+        let entries: Vec<_> = (0u32..)
+            .zip(&resources)
+            .map(|(binding, bound)| wgpu::BindGroupEntry { binding, resource: bound.resource() })
+            .collect();
+        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(self.label),
+            layout: &self.layout,
+            entries: &entries,
+        });
+        self.made += 1;
+        let entry = (resources.to_vec(), group.clone());
+        if self.groups.len() < CAPACITY {
+            self.groups.push(entry);
+        } else {
+            self.groups[self.next] = entry;
+            self.next = (self.next + 1) % CAPACITY;
+        }
+        group
+    }
+
+    /// Lets go of all groups, and so of what is bound in them.
+    pub fn forget(&mut self) {
+        self.groups.clear();
+        self.next = 0;
+    }
+
+    /// Groups made so far; stands still in steady frames.
+    pub fn made(&self) -> u64 {
+        self.made
+    }
+}
+
+/// A compute pipeline of a shader module with these groups.
+pub fn pipeline(
+    device: &wgpu::Device,
+    label: &str,
+    module: &wgpu::ShaderModule,
+    entry: &str,
+    layouts: &[&wgpu::BindGroupLayout],
+) -> wgpu::ComputePipeline {
+    let layouts: Vec<_> = layouts.iter().map(|&l| Some(l)).collect();
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(label),
+        bind_group_layouts: &layouts,
+        immediate_size: 0,
+    });
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(label),
+        layout: Some(&layout),
+        module,
+        entry_point: Some(entry),
+        compilation_options: Default::default(),
+        cache: None,
+    })
+}
