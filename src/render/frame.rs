@@ -309,7 +309,7 @@ impl Renderer {
         }
         self.passes.composite.record(recorder, &self.picture.composite, &lighting.sky, size);
         if let Some(taa) = &mut self.taa {
-            taa.record(recorder, queue, scene.id, view);
+            taa.record(recorder, queue, scene, view);
         }
         self.lighting = Some(lighting);
         Ok(())
