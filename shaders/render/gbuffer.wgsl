@@ -2,9 +2,20 @@
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 
+// Rows of the world-from-object matrix in the frame before.
+struct Before {
+    @location(9) row0: vec4f,
+    @location(10) row1: vec4f,
+    @location(11) row2: vec4f,
+}
+
 @vertex
-fn vertex(v: Vertex) -> Varying {
-    return placed(v, frame.clip_from_world);
+fn vertex(v: Vertex, before: Before) -> Varying {
+    var out = placed(v, frame.clip_from_world);
+    // Differences of rows first: exactly 0 for what has not moved, whatever the compiler fuses.
+    let p = vec4f(v.position, 1.0);
+    out.back = vec3f(dot(before.row0 - v.row0, p), dot(before.row1 - v.row1, p), dot(before.row2 - v.row2, p));
+    return out;
 }
 
 struct Fields {
@@ -47,7 +58,7 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     let v = -(frame.world_from_view * vec4f(view_ray_at(in.position.xy), 0.0)).xyz;
     let n_v = dot(n, normalize(v));
     let share = dielectric_lobe(vec3f(material.f0), roughness, max(n_v, 0.0)).x;
-    let previous = frame.previous_clip_from_world * vec4f(in.world, 1.0);
+    let previous = frame.previous_clip_from_world * vec4f(in.world + in.back, 1.0);
     let current = frame.clip_from_world_unjittered * vec4f(in.world, 1.0);
 
     var out: Fields;

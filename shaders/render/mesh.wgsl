@@ -22,6 +22,8 @@ struct Varying {
     @location(4) world: vec3f,
     // Sign of the transform's determinant: a mirrored object turns its front faces round.
     @location(5) @interpolate(flat) mirror: f32,
+    // Where the surface was in the frame before, minus where it is, metres; 0 in passes that do not ask.
+    @location(6) back: vec3f,
 }
 
 // The vertex in the world, and where `clip_from_world` shows it.
@@ -43,5 +45,6 @@ fn placed(v: Vertex, clip_from_world: mat4x4f) -> Varying {
     out.color = v.color;
     out.world = world;
     out.mirror = mirror;
+    out.back = vec3f(0.0);
     return out;
 }

@@ -1,6 +1,7 @@
 // Temporal anti-aliasing: each frame samples its pixels somewhere else; the 3x3 samples around a pixel's centre, weighted
-// by the pixel filter, are this frame's value, and the mean over frames is the filtered picture. A camera that stands still averages without end. One that moves fetches the mean from where the surface
-// was, drops it where the surface was hidden, and holds it within what the pixel's neighbourhood shows now.
+// by the pixel filter, are this frame's value, and the mean over frames is the filtered picture. A still camera before
+// objects that are still averages without end. Where either moves, the mean is fetched from where the surface was, dropped
+// where the surface was hidden, and held within what the pixel's neighbourhood shows now.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var depth_texture: texture_2d<f32>;

@@ -34,6 +34,9 @@ pub struct Global {
     /// More log lines; twice for yet more.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
+    /// Reads shaders from this folder where it has them: for who works on them.
+    #[arg(long, global = true, value_name = "DIR", hide = true)]
+    pub shaders: Option<PathBuf>,
     /// How progress is shown on standard error.
     #[arg(long, global = true, value_enum, default_value = "auto")]
     pub progress: ProgressKind,

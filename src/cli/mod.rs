@@ -81,6 +81,9 @@ pub fn main() -> ExitCode {
         }
     };
     init_logging(&cli.global);
+    if let Some(folder) = &cli.global.shaders {
+        crate::gpu::shaders::read_from(Some(folder.clone()));
+    }
     let done = match cli.command {
         command if cli.global.precision != args::PrecisionName::F32 && !command.runs_network() => {
             Err(args::usage("--precision f16 is for networks, and none runs here; leave it out".into()))

@@ -49,6 +49,9 @@ pub struct Args {
     /// Frames of a still camera up to the one that is written, for methods that settle (`gather`): 1 is the first after a cut. 32 when absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     gi_frames: Option<u32>,
+    /// Numbers of `gather` other than its own, such as `blur=0,cell_frames=256`; `plain` forgets and blurs nothing.
+    #[arg(long, value_name = "NAME=VALUE,...")]
+    gather: Option<crate::gi::gather::Options>,
     /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
     #[arg(long, value_name = "LAYERS")]
     aov: Option<String>,
@@ -139,6 +142,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
             // Probes are baked once the scene is there.
             let method = match name {
                 MethodName::Probes => None,
+                MethodName::Gather => Some(Method::Gather(args.gather.unwrap_or_default())),
                 _ => Some(name.method(global, args.weights.as_ref())?),
             };
             Task::Rasterise(method, layers.unwrap_or_default())

@@ -12,7 +12,7 @@
 use super::gbuffer::mesh_pipeline;
 use super::tool;
 use crate::gpu::{shaders, timing::Recorder};
-use crate::scene::upload::{Draw, SceneGpu, material_layout};
+use crate::scene::upload::{Draw, SceneGpu, attribute_layouts, material_layout};
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, Mat4, Vec3, Vec4};
 
@@ -154,8 +154,9 @@ impl AtlasPass {
         use wgpu::TextureFormat as F;
         let formats = [F::Rgba8UnormSrgb, F::Rg16Float, F::Rgba16Float];
         // Both faces, as in the shadow maps: a single-sided wall stops light from behind, too.
+        let drawn = (&attribute_layouts()[..], &formats[..]);
         let [opaque, covered] = [false, true]
-            .map(|covered| mesh_pipeline(device, "render.atlas", (&pipeline_layout, &module), &formats, None, covered));
+            .map(|covered| mesh_pipeline(device, "render.atlas", (&pipeline_layout, &module), drawn, None, covered));
         Self { layout, opaque, covered }
     }
 

@@ -4,7 +4,8 @@
 use super::RenderError;
 use super::composite::CompositePass;
 use super::direct::{DirectInputs, DirectPass};
-use super::gbuffer::GbufferPass;
+use super::gbuffer::{GbufferInputs, GbufferPass};
+use super::moved::Moved;
 use super::shadow::{ShadowMaps, ShadowOptions, ShadowPass};
 use super::taa::TaaPass;
 use super::targets::Targets;
@@ -66,6 +67,8 @@ pub struct Renderer {
     /// The world's passes, once a method needed them.
     world: Option<WorldPass>,
     taa: Option<TaaPass>,
+    /// Where objects were in the frame before.
+    moved: Moved,
 }
 
 /// The passes that every method shares.
@@ -129,7 +132,8 @@ impl Renderer {
         let method = options.method.name();
         let needs = options.method.needs_world();
         let device = device.clone();
-        Ok(Self { device, frame, targets, picture, lighting: None, method, indirect, passes, needs, world: None, taa })
+        let (lighting, world, moved) = (None, None, Moved::default());
+        Ok(Self { device, frame, targets, picture, lighting, method, indirect, passes, needs, world, taa, moved })
     }
 
     /// New targets of `size` pixels; the views of the old ones are of no use any more.
@@ -157,8 +161,10 @@ impl Renderer {
         Ok(())
     }
 
-    /// The next frame has nothing to do with the last (a cut): temporal anti-aliasing starts anew. Without it, nothing.
+    /// The next frame has nothing to do with the last (a cut): no object has moved since, and temporal anti-aliasing starts
+    /// anew.
     pub fn cut(&mut self) {
+        self.moved.cut();
         if let Some(taa) = &mut self.taa {
             taa.cut();
         }
@@ -241,12 +247,14 @@ impl Renderer {
         rows.extend(self.lighting.iter().flat_map(|l| l.maps.bytes()));
         rows.extend(self.lighting.iter().flat_map(|l| &l.world).flat_map(World::bytes));
         rows.push(("gi.lit", self.picture.glossy.bytes()));
+        rows.push(("moved", self.moved.bytes()));
         rows.extend(self.taa.iter().flat_map(TaaPass::bytes));
         rows.push((self.method, self.indirect.as_ref().map_or(0, |i| i.bytes())));
         rows
     }
 
-    /// Records one frame of `scene` as `view` sees it into [`Renderer::targets`]. `view.size` is the targets' size.
+    /// Records one frame of `scene` as `view` sees it into [`Renderer::targets`]. `view.size` is the targets' size. What was
+    /// placed elsewhere in the frame recorded before has motion vectors that point there.
     ///
     /// # Errors
     /// [`RenderError::Gi`] when the GI method cannot work with this camera; the encoder then holds half a frame.
@@ -261,7 +269,8 @@ impl Renderer {
     }
 
     /// As [`Renderer::record`]; without `shadows` the maps stay as the previous frame left them, which is right for
-    /// further samples of one picture.
+    /// further samples of one picture; without temporal anti-aliasing, to which each sample is a frame, so do motion vectors
+    /// of objects.
     pub(crate) fn record_frame(
         &mut self,
         recorder: &mut Recorder<'_>,
@@ -282,7 +291,11 @@ impl Renderer {
             self.passes.shadow.record(recorder, queue, scene, view, &mut lighting.maps);
         }
         self.record_world(recorder, queue, scene, view, shadows, &mut lighting);
-        self.passes.gbuffer.record(recorder, scene, view, &self.targets);
+        if shadows || self.taa.is_some() || !self.moved.knows(scene) {
+            self.moved.follow(&self.device, queue, scene);
+        }
+        let inputs = GbufferInputs { scene, before: self.moved.before(scene), view };
+        self.passes.gbuffer.record(recorder, inputs, &self.targets);
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
         self.passes.direct.record(recorder, inputs);
         let world = lighting.world.as_ref().map(|w| w.inputs(scene));
@@ -299,7 +312,7 @@ impl Renderer {
         }
         self.passes.composite.record(recorder, &self.picture.composite, &lighting.sky, size);
         if let Some(taa) = &mut self.taa {
-            taa.record(recorder, queue, scene.id, view);
+            taa.record(recorder, queue, scene, view);
         }
         self.lighting = Some(lighting);
         Ok(())

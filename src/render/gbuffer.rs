@@ -20,14 +20,28 @@
 //! | `hdr` | `Rgba16Float` | the picture: radiance, W/(m²·sr); a: 1 | the environment |
 //!
 //! The five colour attachments take exactly the 32 bytes a sample that WebGPU grants by default. Unlit materials have
-//! albedo and F0 of 0 and their colour in `emissive`. Objects do not move, so motion vectors come from the camera.
+//! albedo and F0 of 0 and their colour in `emissive`. Motion vectors know where the camera was and where each object was
+//! ([`moved`](super::moved)); they do not know of lights, nor of textures that move. The background's are 0 whatever the
+//! camera does: it follows from the view alone.
 
 use super::targets::Targets;
 use super::tool;
 use super::view::View;
 use crate::gpu::{shaders, timing::Recorder};
-use crate::scene::upload::{Draw, SceneGpu, attribute_layouts, material_layout};
+use crate::scene::upload::{Draw, SceneGpu, material_layout, motion_layouts};
 use glam::Vec3;
+
+/// What [`GbufferPass`] draws.
+#[derive(Clone, Copy)]
+pub struct GbufferInputs<'a> {
+    /// The scene.
+    pub scene: &'a SceneGpu,
+    /// Its instances as they were in the frame before ([`Moved::before`](super::moved::Moved::before)); `scene.instances`
+    /// where nothing moves.
+    pub before: &'a wgpu::Buffer,
+    /// Who sees it.
+    pub view: &'a View,
+}
 
 /// Draws a scene into the G-buffer.
 pub struct GbufferPass {
@@ -51,8 +65,9 @@ impl GbufferPass {
         Self { pipelines, frame }
     }
 
-    /// Clears the G-buffer and draws `scene` into it, as `view` sees it.
-    pub fn record(&self, recorder: &mut Recorder<'_>, scene: &SceneGpu, view: &View, targets: &Targets) {
+    /// Clears the G-buffer and draws a scene into it.
+    pub fn record(&self, recorder: &mut Recorder<'_>, inputs: GbufferInputs<'_>, targets: &Targets) {
+        let GbufferInputs { scene, before, view } = inputs;
         let colors =
             [&targets.normal, &targets.albedo, &targets.specular, &targets.emissive, &targets.motion].map(|t| {
                 Some(wgpu::RenderPassColorAttachment {
@@ -75,6 +90,7 @@ impl GbufferPass {
             pass.set_vertex_buffer(0, scene.positions.slice(..));
             pass.set_vertex_buffer(1, scene.instances.slice(..));
             pass.set_vertex_buffer(2, scene.attributes.slice(..));
+            pass.set_vertex_buffer(3, before.slice(..));
             pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
             let (mut pipeline, mut material) = (usize::MAX, usize::MAX);
             for draw in &scene.draws {
@@ -120,16 +136,17 @@ fn pipeline(
     use wgpu::TextureFormat as F;
     let formats = [F::Rg16Float, F::Rgba8UnormSrgb, F::Rgba8UnormSrgb, F::Rgba16Float, F::Rg16Float];
     let cull = [Some(wgpu::Face::Back), Some(wgpu::Face::Front), None][variant % 3];
-    mesh_pipeline(device, "render.gbuffer", (layout, module), &formats, cull, variant >= 3)
+    let drawn = (&motion_layouts()[..], &formats[..]);
+    mesh_pipeline(device, "render.gbuffer", (layout, module), drawn, cull, variant >= 3)
 }
 
-/// A pipeline that draws a scene's meshes with reversed depth into targets of these `formats`; `covered`: alpha decides
-/// which fragments there are.
+/// A pipeline that draws a scene's meshes, from vertex `buffers`, with reversed depth into targets of these `formats`;
+/// `covered`: alpha decides which fragments there are.
 pub(super) fn mesh_pipeline(
     device: &wgpu::Device,
     label: &str,
     (layout, module): (&wgpu::PipelineLayout, &wgpu::ShaderModule),
-    formats: &[wgpu::TextureFormat],
+    (buffers, formats): (&[Option<wgpu::VertexBufferLayout<'_>>], &[wgpu::TextureFormat]),
     cull_mode: Option<wgpu::Face>,
     covered: bool,
 ) -> wgpu::RenderPipeline {
@@ -142,7 +159,7 @@ pub(super) fn mesh_pipeline(
             module,
             entry_point: Some("vertex"),
             compilation_options: Default::default(),
-            buffers: &attribute_layouts(),
+            buffers,
         },
         primitive: wgpu::PrimitiveState { cull_mode, ..Default::default() },
         depth_stencil: Some(wgpu::DepthStencilState {

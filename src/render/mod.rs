@@ -7,6 +7,7 @@ pub mod composite;
 pub mod direct;
 pub mod frame;
 pub mod gbuffer;
+pub mod moved;
 pub mod rsm;
 pub mod sampling;
 pub mod shadow;

@@ -7,7 +7,8 @@
 //! ([`sampling`]), whatever the jitter, so the mean over frames is the filtered picture.
 //!
 //! What it cannot do: tell a changed light from noise faster than the neighbourhood's colours allow; reflections move
-//! with their surfaces; things thinner than a pixel lose brightness while the camera moves.
+//! with their surfaces; things thinner than a pixel lose brightness while the camera moves. What an object's distance was
+//! is guessed from where it is now, so one that comes or goes by more than a few percent of it in a frame starts anew.
 
 use super::sampling;
 use super::targets::{Target, Targets};
@@ -15,15 +16,16 @@ use super::tool;
 use super::view::View;
 use crate::gi::rung::Cost;
 use crate::gpu::timing::Recorder;
+use crate::scene::upload::SceneGpu;
 
 /// What history is worth in a frame; `mode` in the shader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {
     /// First frame, new size, another scene, or a cut.
     Fresh = 0,
-    /// The very view of the frame before.
+    /// The very view of the frame before, of objects where they were.
     Still = 1,
-    /// Another view of the same scene.
+    /// Another view of the same scene, or objects elsewhere.
     Moving = 2,
 }
 
@@ -60,8 +62,15 @@ pub struct TaaPass {
     layout: wgpu::BindGroupLayout,
     mode: wgpu::Buffer,
     textures: Option<Textures>,
-    last: Option<(u64, View)>,
+    last: Option<Last>,
     frames: u32,
+}
+
+/// What the frame before showed.
+struct Last {
+    scene: u64,
+    placement: u64,
+    view: View,
 }
 
 struct Textures {
@@ -134,18 +143,18 @@ impl TaaPass {
 
     /// `view` with motion vectors that point to the frame recorded before it.
     pub fn follow(&self, view: &View) -> View {
-        self.last.as_ref().map_or(*view, |(_, last)| view.after(last))
+        self.last.as_ref().map_or(*view, |last| view.after(&last.view))
     }
 
     /// Records the pass: `hdr` of the targets becomes the mean of this frame ([`current`](Self::current)) and history.
-    /// `scene` tells scenes apart.
-    pub fn record(&mut self, recorder: &mut Recorder<'_>, queue: &wgpu::Queue, scene: u64, view: &View) {
+    /// `scene` is what the frame shows.
+    pub fn record(&mut self, recorder: &mut Recorder<'_>, queue: &wgpu::Queue, scene: &SceneGpu, view: &View) {
         let Some(textures) = &self.textures else { return };
         let mode = match &self.last {
-            Some((id, last)) if *id == scene => match last.clip_from_world_unjittered {
-                same if same == view.clip_from_world_unjittered => Mode::Still,
-                _ => Mode::Moving,
-            },
+            Some(last) if last.scene == scene.id => {
+                let same_view = last.view.clip_from_world_unjittered == view.clip_from_world_unjittered;
+                if same_view && last.placement == scene.placement { Mode::Still } else { Mode::Moving }
+            }
             _ => Mode::Fresh,
         };
         queue.write_buffer(&self.mode, 0, bytemuck::bytes_of(&Blend::new(mode, view.jitter)));
@@ -155,7 +164,7 @@ impl TaaPass {
             pass.set_bind_group(0, group, &[]);
             tool::dispatch(pass, view.size);
         });
-        self.last = Some((scene, *view));
+        self.last = Some(Last { scene: scene.id, placement: scene.placement, view: *view });
         self.frames = self.frames.wrapping_add(1);
     }
 

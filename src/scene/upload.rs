@@ -15,7 +15,7 @@ mod texture;
 
 pub use clutter::Clutter;
 pub use material::{MaterialGpu, TextureUse, material_layout};
-pub use mesh::{AttributeVertex, Draw, attribute_layouts, position_layouts};
+pub use mesh::{AttributeVertex, Draw, Rows, attribute_layouts, motion_layouts, position_layouts};
 pub use spheres::MOST_SPHERES;
 
 use super::{AlphaMode, Environment, Light, LightKind, Scene};
@@ -151,6 +151,8 @@ pub struct SceneGpu {
     pub indices: wgpu::Buffer,
     /// Rows of the world-from-object matrices, grouped by draw.
     pub instances: wgpu::Buffer,
+    /// Number of the placements: another one whenever an instance has moved or taken another's slot in `instances`.
+    pub placement: u64,
     /// What to draw, sorted by material.
     pub draws: Vec<Draw>,
     /// One bind group a material, of [`material_layout`].
@@ -176,6 +178,8 @@ pub struct SceneGpu {
     pub warnings: Vec<String>,
     /// Which meshes are closed.
     closed: Vec<bool>,
+    /// What `instances` holds, with the index of each one's instance in the scene.
+    placed: Vec<(u32, Rows)>,
     bytes: u64,
 }
 
@@ -203,6 +207,7 @@ impl SceneGpu {
             attributes: geometry.attributes,
             indices: geometry.indices,
             instances: geometry.instances,
+            placement: 0,
             draws: geometry.draws,
             material_groups: materials.groups,
             light_buffer,
@@ -214,6 +219,7 @@ impl SceneGpu {
             spheres,
             closed: geometry.closed,
             rays: None,
+            placed: geometry.placed,
             warnings,
             bytes,
         })
@@ -264,12 +270,15 @@ impl SceneGpu {
         Ok(())
     }
 
-    /// Takes over the placements of `scene`, whose meshes and materials are those that were uploaded.
+    /// Takes over the placements of `scene`, whose instances, meshes and materials are those that were uploaded. The next
+    /// frame of each renderer has motion vectors for what is elsewhere than in its last one.
     pub fn set_placements(&mut self, queue: &wgpu::Queue, scene: &Scene) {
-        let (rows, draws) = mesh::placements(scene, &self.closed);
+        let (placed, draws) = mesh::placements(scene, &self.closed);
         self.draws = draws;
-        if !rows.is_empty() {
-            queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&rows));
+        if placed != self.placed {
+            self.placement += 1;
+            queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&mesh::rows(&placed)));
+            self.placed = placed;
         }
         if let Some(rays) = &mut self.rays {
             rays.place(queue, scene);
@@ -281,6 +290,11 @@ impl SceneGpu {
         if !spheres.is_empty() {
             queue.write_buffer(&self.spheres, 0, bytemuck::cast_slice(&spheres));
         }
+    }
+
+    /// Rows of the world-from-object matrices in the order of `instances`, each with its instance's index in the scene.
+    pub fn placed(&self) -> &[(u32, Rows)] {
+        &self.placed
     }
 
     /// What was bound of this scene is bound anew.

@@ -34,7 +34,7 @@ struct Place {
 
 // Power of a lobe below this roughness is spread as if by this one: rays that happen to meet a mirrored lamp are not averaged
 // enough to show it as anything but a spark.
-const LEAST_ROUGHNESS = 0.3;
+const LEAST_ROUGHNESS = 0.2;
 
 fn weight_of(c: vec3f) -> f32 {
     return dot(c, vec3f(0.2126, 0.7152, 0.0722));

@@ -12,9 +12,11 @@
 //! triangle; how finely it knows the light between surfaces is the size of an entry's cell; the rest is noise, which frames and
 //! neighbours average away. `docs/gi.md` says what it cannot do.
 
+mod options;
 mod params;
 mod store;
 
+pub use options::{Options, OptionsError};
 pub use params::Params;
 
 use super::cells::{CellSide, CellsPass};
@@ -28,44 +30,9 @@ use crate::render::tool::{LOAD, READ, READ_WRITE};
 use params::ParamsRing;
 use store::Store;
 
-/// How light is gathered. The numbers that are choices stand in the table of `docs/gi.md`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
-    /// Frames that a cell's mean remembers.
-    pub cell_frames: f32,
-    /// Rays that an entry's mean remembers.
-    pub entry_frames: f32,
-    /// Slots of the table of entries, a power of two.
-    pub slots: u32,
-    /// Size of an entry's cell over its distance from the eye, before it is rounded up to a power of two.
-    pub entry_scale: f32,
-    /// Rounds of entries in the first frame after a cut.
-    pub first_rounds: u32,
-    /// Whether means are blurred over neighbours.
-    pub blur: bool,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { cell_frames: 64.0, entry_frames: 16.0, slots: 1 << 15, entry_scale: 1.0 / 16.0, first_rounds: 4, blur: true }
-    }
-}
-
-impl Options {
-    /// Nothing is forgotten and nothing blurred: for asking what the method converges to.
-    pub const PLAIN: Self = Self {
-        cell_frames: 1e9,
-        entry_frames: 1e9,
-        slots: 1 << 16,
-        entry_scale: 1.0 / 16.0,
-        first_rounds: 4,
-        blur: false,
-    };
-}
-
 /// A ray begins this share of the view distance off its surface: half along the way to the eye, half along the normal. A
 /// hundredth of a cell's width at 1024 × 512.
-const LIFT: f32 = 3e-4;
+const LIFT: f32 = 3e-5;
 
 /// Constants of the shaders as WGSL.
 pub fn prelude() -> String {

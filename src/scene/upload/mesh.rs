@@ -24,6 +24,9 @@ pub struct AttributeVertex {
     pub color: [f16; 4],
 }
 
+/// Rows of a world-from-object matrix, metres; the fourth is 0, 0, 0, 1.
+pub type Rows = [[f32; 4]; 3];
+
 /// All instances of one mesh that share a winding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draw {
@@ -51,6 +54,7 @@ const POSITION: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float
 const ATTRIBUTES: [wgpu::VertexAttribute; 5] =
     wgpu::vertex_attr_array![1 => Snorm16x2, 2 => Snorm16x4, 3 => Float32x2, 4 => Float32x2, 5 => Float16x4];
 const ROWS: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![6 => Float32x4, 7 => Float32x4, 8 => Float32x4];
+const BEFORE: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![9 => Float32x4, 10 => Float32x4, 11 => Float32x4];
 
 fn layout(
     array_stride: u64,
@@ -71,11 +75,18 @@ pub fn attribute_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 3] {
     [positions, instances, layout(36, wgpu::VertexStepMode::Vertex, &ATTRIBUTES)]
 }
 
+/// As [`attribute_layouts`], for passes that write motion vectors: slot 3 has the instances as they were in the frame before.
+pub fn motion_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 4] {
+    let [positions, instances, attributes] = attribute_layouts();
+    [positions, instances, attributes, layout(48, wgpu::VertexStepMode::Instance, &BEFORE)]
+}
+
 pub(super) struct Geometry {
     pub positions: wgpu::Buffer,
     pub attributes: wgpu::Buffer,
     pub indices: wgpu::Buffer,
     pub instances: wgpu::Buffer,
+    pub placed: Vec<(u32, Rows)>,
     pub draws: Vec<Draw>,
     pub bounds: Option<([f32; 3], [f32; 3])>,
     pub closed: Vec<bool>,
@@ -111,20 +122,25 @@ pub(super) fn upload(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) 
         }
     }
     let closed: Vec<bool> = scene.meshes.iter().map(is_closed).collect();
-    let (rows, draws) = placements(scene, &closed);
+    let (placed, draws) = placements(scene, &closed);
     let bounds = draws.iter().map(|d| d.bounds).reduce(union);
     let vertex = wgpu::BufferUsages::VERTEX;
     let positions = filled(device, queue, "scene.positions", vertex, &positions);
     let attributes = filled(device, queue, "scene.attributes", vertex, &attributes);
     let indices = filled(device, queue, "scene.indices", wgpu::BufferUsages::INDEX, &indices);
-    let instances = filled(device, queue, "scene.instances", vertex, &rows);
+    let instances = filled(device, queue, "scene.instances", vertex, &rows(&placed));
     let bytes = positions.size() + attributes.size() + indices.size() + instances.size();
-    Ok(Geometry { positions, attributes, indices, instances, draws, bounds, closed, bytes })
+    Ok(Geometry { positions, attributes, indices, instances, placed, draws, bounds, closed, bytes })
 }
 
-/// Rows of the world-from-object matrices in the order of the instance buffer, and the draws that refer to them, for a
-/// scene whose instances name meshes that exist; which of these are `closed` is known.
-pub(super) fn placements(scene: &Scene, closed: &[bool]) -> (Vec<[[f32; 4]; 3]>, Vec<Draw>) {
+/// What the instance buffer holds.
+pub(super) fn rows(placed: &[(u32, Rows)]) -> Vec<Rows> {
+    placed.iter().map(|p| p.1).collect()
+}
+
+/// Rows of the world-from-object matrices in the order of the instance buffer, each with its instance's index, and the
+/// draws that refer to them, for a scene whose instances name meshes that exist; which of these are `closed` is known.
+pub(super) fn placements(scene: &Scene, closed: &[bool]) -> (Vec<(u32, Rows)>, Vec<Draw>) {
     // Where each mesh begins in the shared buffers.
     let (mut vertex, mut index) = (0, 0);
     let mut ranges = Vec::with_capacity(scene.meshes.len());
@@ -137,18 +153,18 @@ pub(super) fn placements(scene: &Scene, closed: &[bool]) -> (Vec<[[f32; 4]; 3]>,
 
     // Grouped by material, then by mesh and winding, so that instances of one mesh become one draw.
     let mut order = Vec::with_capacity(scene.instances.len());
-    for instance in &scene.instances {
+    for (i, instance) in scene.instances.iter().enumerate() {
         let Some(mesh) = scene.meshes.get(instance.mesh).filter(|m| !m.indices.is_empty()) else { continue };
         let transform = Mat4::from_cols_array_2d(&instance.transform);
-        order.push((mesh.material, instance.mesh, transform.determinant() < 0.0, transform));
+        order.push((mesh.material, instance.mesh, transform.determinant() < 0.0, i as u32, transform));
     }
     order.sort_by_key(|o| (o.0, o.1, o.2));
-    let mut rows = Vec::with_capacity(order.len());
+    let mut placed = Vec::with_capacity(order.len());
     let mut draws: Vec<Draw> = Vec::new();
     let mut last = None;
-    for (material, mesh, mirrored, transform) in order {
-        let at = rows.len() as u32;
-        rows.push([transform.row(0).to_array(), transform.row(1).to_array(), transform.row(2).to_array()]);
+    for (material, mesh, mirrored, instance, transform) in order {
+        let at = placed.len() as u32;
+        placed.push((instance, [0, 1, 2].map(|row| transform.row(row).to_array())));
         let bounds = world_bounds(&scene.meshes[mesh], &transform);
         if last == Some((mesh, mirrored)) {
             let draw = draws.last_mut().expect("the previous instance made a draw");
@@ -171,7 +187,7 @@ pub(super) fn placements(scene: &Scene, closed: &[bool]) -> (Vec<[[f32; 4]; 3]>,
             bounds,
         });
     }
-    (rows, draws)
+    (placed, draws)
 }
 
 fn attribute(mesh: &Mesh, i: usize) -> AttributeVertex {

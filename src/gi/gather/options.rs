@@ -1,0 +1,98 @@
+//! The free numbers of `gather`.
+
+use std::str::FromStr;
+use thiserror::Error;
+
+/// How light is gathered. The numbers that are choices stand in the table of `docs/gi.md`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Frames that a cell's mean remembers.
+    pub cell_frames: f32,
+    /// Rays that an entry's mean remembers.
+    pub entry_frames: f32,
+    /// Slots of the table of entries, a power of two.
+    pub slots: u32,
+    /// Size of an entry's cell over its distance from the eye, before it is rounded up to a power of two.
+    pub entry_scale: f32,
+    /// Rounds of entries in the first frame after a cut.
+    pub first_rounds: u32,
+    /// Whether means are blurred over neighbours.
+    pub blur: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { cell_frames: 64.0, entry_frames: 16.0, slots: 1 << 15, entry_scale: 1.0 / 16.0, first_rounds: 4, blur: true }
+    }
+}
+
+impl Options {
+    /// Nothing is forgotten and nothing blurred: for asking what the method converges to.
+    pub const PLAIN: Self = Self {
+        cell_frames: 1e9,
+        entry_frames: 1e9,
+        slots: 1 << 16,
+        entry_scale: 1.0 / 16.0,
+        first_rounds: 4,
+        blur: false,
+    };
+}
+
+/// Why a list of numbers cannot be read.
+#[derive(Debug, Error, PartialEq)]
+pub enum OptionsError {
+    /// No such number.
+    #[error("`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, blur=0|1")]
+    Unknown(String),
+    /// A value that cannot be.
+    #[error("`{0}`: {1}")]
+    Value(String, &'static str),
+}
+
+/// Words between commas: `plain` ([`Options::PLAIN`]) or `name=value`, each over the ones before.
+impl FromStr for Options {
+    type Err = OptionsError;
+
+    fn from_str(text: &str) -> Result<Self, OptionsError> {
+        let mut options = Self::default();
+        for word in text.split(',') {
+            if word == "plain" {
+                options = Self::PLAIN;
+                continue;
+            }
+            let Some((name, value)) = word.split_once('=') else { return Err(OptionsError::Unknown(word.into())) };
+            let wrong = |why| OptionsError::Value(word.into(), why);
+            let number: f32 = value.parse().map_err(|_| wrong("is no number"))?;
+            let at_least_one = if number >= 1.0 { Ok(number) } else { Err(wrong("must be at least 1")) };
+            match name {
+                "cell_frames" => options.cell_frames = at_least_one?,
+                "entry_frames" => options.entry_frames = at_least_one?,
+                "first_rounds" => options.first_rounds = at_least_one?.min(64.0) as u32,
+                "slots" if (64.0..=1_048_576.0).contains(&number) && (number as u32).is_power_of_two() => {
+                    options.slots = number as u32;
+                }
+                "slots" => return Err(wrong("must be a power of two from 64 to 1048576")),
+                "entry_scale" if number > 1e-4 && number <= 4.0 => options.entry_scale = number,
+                "entry_scale" => return Err(wrong("must be above 0.0001 and at most 4")),
+                "blur" => options.blur = number != 0.0,
+                _ => return Err(OptionsError::Unknown(word.into())),
+            }
+        }
+        Ok(options)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_read_and_wrong_ones_named() {
+        let read: Options = "plain,blur=1,slots=4096".parse().unwrap();
+        assert_eq!(read, Options { blur: true, slots: 4096, ..Options::PLAIN });
+        for bad in ["", "rays=3", "slots=1000", "cell_frames=0", "cell_frames=nan", "entry_scale=-1", "blur"] {
+            let error = bad.parse::<Options>().unwrap_err().to_string();
+            assert!(error.contains(bad), "{error}");
+        }
+    }
+}
