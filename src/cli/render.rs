@@ -196,6 +196,8 @@ struct Raster<'a> {
     weights: String,
     /// The method's answer settles over frames.
     settles: bool,
+    /// A frame of a sequence has been drawn: the next goes on from it, as in a viewer.
+    running: bool,
 }
 
 impl<'a> Raster<'a> {
@@ -212,11 +214,14 @@ impl<'a> Raster<'a> {
         let settles = method.has_history();
         let options = RendererOptions { method, taa: args.taa.is_some(), ..Default::default() };
         let renderer = Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options)?;
-        Ok(Self { gpu, scene, renderer, layers, weights, settles })
+        Ok(Self { gpu, scene, renderer, layers, weights, settles, running: false })
     }
 
     /// Frames before the first sample: the method's and anti-aliasing's go on at once.
     fn warmup(&self, args: &Args) -> u32 {
+        if self.running {
+            return 0;
+        }
         let settle = if self.settles { args.gi_frames.unwrap_or(GI_FRAMES) - 1 } else { 0 };
         args.taa.unwrap_or(0).max(settle)
     }
@@ -255,6 +260,7 @@ fn film(global: &Global, args: &Args, format: Format, mut raster: Raster, sequen
         let drawn = raster.picture(args, &camera, &mut || ())?;
         let metadata = metadata(raster.gpu, &drawn);
         write(args, &sequence::name(&args.output, number), format, &drawn, &metadata)?;
+        raster.running = true;
         progress.step();
     }
     progress.finish();

@@ -69,6 +69,8 @@ pub struct Renderer {
     taa: Option<TaaPass>,
     /// Where objects were in the frame before.
     moved: Moved,
+    /// What the frame before was seen with, for motion vectors.
+    last: Option<View>,
 }
 
 /// The passes that every method shares.
@@ -133,7 +135,7 @@ impl Renderer {
         let needs = options.method.needs_world();
         let device = device.clone();
         let (lighting, world, moved) = (None, None, Moved::default());
-        Ok(Self { device, frame, targets, picture, lighting, method, indirect, passes, needs, world, taa, moved })
+        Ok(Self { device, frame, targets, picture, lighting, method, indirect, passes, needs, world, taa, moved, last: None })
     }
 
     /// New targets of `size` pixels; the views of the old ones are of no use any more.
@@ -171,6 +173,7 @@ impl Renderer {
         if let Some(indirect) = &mut self.indirect {
             indirect.cut();
         }
+        self.last = None;
     }
 
     /// Name of the method that finds indirect light, as on the command line.
@@ -283,7 +286,12 @@ impl Renderer {
         let known = self.lighting.take().filter(|l| l.scene == scene.id);
         let fresh = known.is_none();
         let mut lighting = known.unwrap_or_else(|| self.lighting(queue, scene));
-        let view = &self.taa.as_ref().map_or(*view, |taa| taa.follow(view));
+        let last = self.last.filter(|last| last.size == view.size);
+        let view = &match &self.taa {
+            Some(taa) => taa.follow(view),
+            None => last.map_or(*view, |last| view.after(&last)),
+        };
+        self.last = Some(*view);
         let uniform = view.uniform(&scene.environment, scene.lights.len() as u32);
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 

@@ -2,6 +2,8 @@
 
 @group(2) @binding(0) var<storage, read> pasts: array<vec4f>;
 @group(2) @binding(1) var<storage, read_write> light: array<vec4f>;
+// Where light has changed: what it is now (rgb; a: 1), else 0.
+@group(2) @binding(2) var<storage, read_write> changes: array<vec4f>;
 
 // Frames from which on the narrow blur is enough, and the radii of both in cells.
 const SETTLED = 6.0;
@@ -9,9 +11,14 @@ const NARROW = 2;
 const WIDE = 4;
 // Distance from the plane, in cells, that counts as nothing.
 const BLUR_PLANE = 0.5;
+// A change of light is one that is beyond so many deviations of noise and this share of the light; younger means than this many
+// frames follow by themselves.
+const SIGMAS = 4.0;
+const LEAST_CHANGE = 0.1;
+const LEAST_KNOWN = 5.0;
 
 fn past_at(cell: u32) -> Past {
-    return past_from(pasts[3u * cell], pasts[3u * cell + 1u], pasts[3u * cell + 2u]);
+    return past_from(pasts[4u * cell], pasts[4u * cell + 1u], pasts[4u * cell + 2u], pasts[4u * cell + 3u]);
 }
 
 @compute @workgroup_size(8, 8)
@@ -19,6 +26,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= cell_grid()) { return; }
     let cell = cell_index(id.xy);
     let here = past_at(cell);
+    changes[cell] = vec4f(0.0);
     if here.frames <= 0.0 {
         light[3u * cell] = vec4f(0.0);
         light[3u * cell + 1u] = vec4f(0.0);
@@ -33,6 +41,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u) {
     var sum = vec3f(0.0);
     var vector = vec3f(0.0);
     var total = 0.0;
+    var lately = vec3f(0.0);
+    var noise = 0.0;
     for (var y = -radius; y <= radius; y++) {
         for (var x = -radius; x <= radius; x++) {
             let at = vec2i(id.xy) + vec2i(x, y);
@@ -47,9 +57,22 @@ fn blur(@builtin(global_invocation_id) id: vec3u) {
             sum += w * there.light;
             vector += w * there.vector;
             total += w;
+            lately += w * there.lately;
+            let l = luminance(there.light);
+            noise += w * w * max(there.square - l * l, 0.0);
         }
     }
-    let mean = sum / max(total, 1e-30);
+    var mean = sum / max(total, 1e-30);
+    // The mean of lately against that of all frames: its own noise, from that of single frames, allows for so much.
+    if here.frames > LEAST_KNOWN && (gather.flags & GATHER_EVEN) == 0u {
+        let now = lately / max(total, 1e-30);
+        let off = abs(luminance(now) - luminance(mean));
+        let sigma = sqrt(noise * (LATELY / (2.0 - LATELY))) / max(total, 1e-30);
+        if off > SIGMAS * sigma + LEAST_CHANGE * max(luminance(mean), luminance(now)) {
+            changes[cell] = vec4f(now, 1.0);
+            mean = now;
+        }
+    }
     vector /= max(total, 1e-30);
     // Radiance a + g·ω over the hemisphere has these moments; on a surface tilted by little it gives `mean` along the normal and
     // 8/3 of the vector's part across it.

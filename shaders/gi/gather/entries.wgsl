@@ -10,7 +10,8 @@
 @group(2) @binding(0) var<storage, read_write> entry_keys: array<atomic<u32>>;
 // Two halves, for even and odd rounds: the winner's lot. Its low bits are an index into `entry_queries`.
 @group(2) @binding(1) var<storage, read_write> entry_lots: array<atomic<u32>>;
-// Where rays met a cell: position, and the packed normal of the side that they met.
+// Where rays met a cell: position, and the packed normal of the side that they met. First those of the picture's cells, then of
+// entries' own rays for even and odd rounds, then where the entries' rays began in even and odd rounds (last word 0: nowhere yet).
 @group(2) @binding(2) var<storage, read_write> entry_queries: array<vec4u>;
 
 // Slots that are looked at before a place goes without an entry.
@@ -18,21 +19,27 @@ const ENTRY_PROBES = 12u;
 // Bits of a lot that are the query's index.
 const LOT_BITS = 22u;
 
-fn entry_hash(x: vec3f, n: vec3f) -> vec2u {
+// Hash of the cell around x for the side n, and the cell's size.
+struct EntryCell {
+    hash: vec2u,
+    size: f32,
+}
+
+fn entry_cell(x: vec3f, n: vec3f) -> EntryCell {
     let d = max(distance(x, gather.eye) * gather.entry_scale, 1e-20);
     // The power of two above.
     let exponent = (bitcast<u32>(d) >> 23u) + 1u;
-    let q = vec3i(floor(x / bitcast<f32>(exponent << 23u)));
+    let size = bitcast<f32>(exponent << 23u);
+    let q = vec3i(floor(x / size));
     let a = abs(n);
     let axis = select(select(2u, 1u, a.y > a.z), 0u, a.x > a.y && a.x > a.z);
     let side = 2u * axis + select(0u, 1u, n[axis] < 0.0);
     let h = pcg3(bitcast<vec3u>(q) ^ vec3u(exponent, side * 0x9e3779b9u, exponent * 0x85ebca6bu));
-    return vec2u(h.x, h.y | 1u);
+    return EntryCell(vec2u(h.x, h.y | 1u), size);
 }
 
-// The slot of the place x that faces n; a new one where there is none yet. NONE where the table is full around there.
-fn entry_of(x: vec3f, n: vec3f) -> u32 {
-    let hash = entry_hash(x, n);
+// The slot with this hash; a new one where there is none yet. NONE where the table is full around there.
+fn entry_slot(hash: vec2u) -> u32 {
     for (var i = 0u; i < ENTRY_PROBES; i++) {
         let slot = (hash.x + i) & gather.mask;
         for (var again = 0u; again < 4u; again++) {
@@ -42,6 +49,32 @@ fn entry_of(x: vec3f, n: vec3f) -> u32 {
             let taken = atomicCompareExchangeWeak(&entry_keys[slot], 0u, hash.y);
             if taken.exchanged || taken.old_value == hash.y { return slot; }
         }
+    }
+    return NONE;
+}
+
+// Entries that one cell has at most, for places that do not see each other: both sides of a wall that stands on a floor, the
+// inside of a box.
+const ENTRY_ROOMS = 3u;
+// Both ends of the line that asks this are lifted by this share of the cell, so that it goes over what merely lies there.
+const ENTRY_LIFT = 0.02;
+
+// Whether nothing stands between x and where the rays of slot's entry began. An entry without rays is everybody's.
+fn sees_entry(slot: u32, x: vec3f, n: vec3f, size: f32) -> bool {
+    let slots = gather.mask + 1u;
+    let begin = entry_queries[gather.cells + 2u * slots + (1u - (gather.round & 1u)) * slots + slot];
+    if begin.w == 0u { return true; }
+    let start = x + n * (ENTRY_LIFT * size);
+    let to = bitcast<vec3f>(begin.xyz) + unpack_normal(begin.w) * (ENTRY_LIFT * size) - start;
+    return dot(to, to) < 1e-6 * size * size || trace(start, to, 1.0, true).triangle == NO_TRIANGLE;
+}
+
+// The entry of place x that faces n: of its cell the first whose place sees this one.
+fn entry_of(x: vec3f, n: vec3f) -> u32 {
+    let cell = entry_cell(x, n);
+    for (var room = 0u; room < ENTRY_ROOMS; room++) {
+        let slot = entry_slot(vec2u(cell.hash.x + room * 0x9e3779b9u, (cell.hash.y + room * 0x7f4a7c16u) | 1u));
+        if slot == NONE || sees_entry(slot, x, n, cell.size) { return slot; }
     }
     return NONE;
 }

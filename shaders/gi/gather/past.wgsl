@@ -1,4 +1,4 @@
-// What a cell remembers, 48 bytes.
+// What a cell remembers, 64 bytes.
 struct Past {
     // Irradiance over π on the cell's surface; frames in it.
     light: vec3f,
@@ -9,11 +9,16 @@ struct Past {
     // World space.
     x: vec3f,
     n: vec3f,
+    // The same light as a mean that forgets within a few frames, which tells when light has changed.
+    lately: vec3f,
 }
 
-fn past_from(a: vec4f, b: vec4f, c: vec4f) -> Past {
-    return Past(a.rgb, a.a, b.xyz, b.w, c.xyz, unpack_normal(bitcast<u32>(c.w)));
+fn past_from(a: vec4f, b: vec4f, c: vec4f, d: vec4f) -> Past {
+    return Past(a.rgb, a.a, b.xyz, b.w, c.xyz, unpack_normal(bitcast<u32>(c.w)), d.rgb);
 }
+
+// Weight of a new frame in `lately`: nine tenths of a change are there after six frames.
+const LATELY = 1.0 / 3.0;
 
 // Width of a cell at view distance z.
 fn cell_foot(z: f32) -> f32 {

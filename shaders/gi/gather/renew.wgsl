@@ -1,8 +1,8 @@
 // One ray for each entry of the cache, whose find is mixed into the entry's mean. The finds' own entries are read as they
 // were after the round before, so the order of threads does not matter.
 
-// Two vectors a slot: where its rays start and the round in which it was last asked for (from 1; 0 for never); packed normal.
-@group(2) @binding(3) var<storage, read_write> entry_points: array<vec4u>;
+// The round in which an entry was last asked for, from 1; 0 for never.
+@group(2) @binding(3) var<storage, read_write> entry_asked: array<u32>;
 // Two halves, for even and odd rounds: irradiance over π, and rays in it.
 @group(2) @binding(4) var<storage, read_write> entry_light: array<vec4f>;
 
@@ -19,29 +19,32 @@ fn renew(@builtin(global_invocation_id) id: vec3u) {
     let key = atomicLoad(&entry_keys[slot]);
     let lot = atomicLoad(&entry_lots[odd + slot]);
     if key == 0u { return; }
-    var place = entry_points[2u * slot];
-    var side = entry_points[2u * slot + 1u].x;
+    // Where rays begin, then and now.
+    let begins = gather.cells + 2u * slots + slot;
+    var begin = entry_queries[begins + even];
+    var asked = entry_asked[slot];
     let now = gather.round + 1u;
     if lot != NONE {
-        let query = entry_queries[lot & ((1u << LOT_BITS) - 1u)];
-        place = vec4u(query.xyz, now);
-        side = query.w;
+        begin = entry_queries[lot & ((1u << LOT_BITS) - 1u)];
+        asked = now;
         atomicStore(&entry_lots[odd + slot], NONE);
-    } else if place.w == 0u {
+    } else if asked == 0u {
         // Made in this very round.
         return;
-    } else if now - place.w > ENTRY_AGE {
-        entry_points[2u * slot] = vec4u(0u);
+    } else if now - asked > ENTRY_AGE {
+        entry_asked[slot] = 0u;
+        entry_queries[begins] = vec4u(0u);
+        entry_queries[begins + slots] = vec4u(0u);
         entry_light[slot] = vec4f(0.0);
         entry_light[slots + slot] = vec4f(0.0);
         atomicStore(&entry_keys[slot], 0u);
         return;
     }
-    entry_points[2u * slot] = place;
-    entry_points[2u * slot + 1u].x = side;
+    entry_asked[slot] = asked;
+    entry_queries[begins + odd] = begin;
     let before = entry_light[even + slot];
-    let x = bitcast<vec3f>(place.xyz);
-    let n = unpack_normal(side);
+    let x = bitcast<vec3f>(begin.xyz);
+    let n = unpack_normal(begin.w);
     let count = u32(before.a);
     let shift = pcg3(vec3u(key, 0x7f4a7c15u, 3u));
     let d = cosine_direction(n, lattice(gather.round, shift.xy));

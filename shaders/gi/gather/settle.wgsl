@@ -4,10 +4,12 @@
 @group(2) @binding(0) var<storage, read> cell_pixels: array<u32>;
 @group(2) @binding(1) var<storage, read> records: array<vec4f>;
 @group(2) @binding(2) var<storage, read> entry_light: array<vec4f>;
-// `Past` of the frame before and of this one, three vectors a cell.
+// `Past` of the frame before and of this one, four vectors a cell.
 @group(2) @binding(3) var<storage, read> before: array<vec4f>;
 @group(2) @binding(4) var<storage, read_write> after: array<vec4f>;
-@group(2) @binding(5) var motion_map: texture_2d<f32>;
+// Where blur.wgsl found that light had changed: what it is now (rgb; a: 1), else 0.
+@group(2) @binding(5) var<storage, read> changes: array<vec4f>;
+@group(2) @binding(6) var motion_map: texture_2d<f32>;
 
 // Least sum of bilinear weights of cells that show the same surface.
 const LEAST_PAST = 0.05;
@@ -21,7 +23,8 @@ fn from_shared_exponent(code: u32) -> vec3f {
 
 // The mean where the surface at x, which faces n, was in the frame before; 0 frames where it was not to be seen.
 fn past_of(cell: vec2u, pixel: vec2i, x: vec3f, n: vec3f, foot: f32) -> Past {
-    var past = Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n);
+    let none = Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n, vec3f(0.0));
+    var past = none;
     if (gather.flags & GATHER_CUT) != 0u { return past; }
     let motion = finite3(vec3f(textureLoad(motion_map, pixel, 0).xy, 0.0)).xy * vec2f(params.size);
     if all(abs(motion) < vec2f(0.02)) {
@@ -46,18 +49,32 @@ fn past_of(cell: vec2u, pixel: vec2i, x: vec3f, n: vec3f, foot: f32) -> Past {
         past.frames += w * one.frames;
         past.vector += w * one.vector;
         past.square += w * one.square;
+        past.lately += w * one.lately;
         total += w;
     }
-    if total < LEAST_PAST { return Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n); }
+    if total < LEAST_PAST { return none; }
     past.light /= total;
     past.frames /= total;
     past.vector /= total;
     past.square /= total;
+    past.lately /= total;
     return past;
 }
 
+// Frames that the mean of lately counts for where light has changed.
+const AFTER_CHANGE = 4.0;
+
 fn past_at(cell: u32) -> Past {
-    return past_from(before[3u * cell], before[3u * cell + 1u], before[3u * cell + 2u]);
+    var past = past_from(before[4u * cell], before[4u * cell + 1u], before[4u * cell + 2u], before[4u * cell + 3u]);
+    let change = changes[cell];
+    if change.a > 0.0 {
+        let gain = luminance(change.rgb) / max(luminance(past.light), 1e-20);
+        past.light = change.rgb;
+        past.vector *= gain;
+        past.square = luminance(change.rgb) * luminance(change.rgb) * 2.0;
+        past.frames = min(past.frames, AFTER_CHANGE);
+    }
+    return past;
 }
 
 fn shows(past: Past, x: vec3f, n: vec3f, foot: f32) -> bool {
@@ -70,7 +87,7 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let cell = cell_index(id.xy);
     let packed = cell_pixels[cell];
     if packed == NO_PIXEL {
-        after[3u * cell] = vec4f(0.0);
+        after[4u * cell] = vec4f(0.0);
         return;
     }
     let a = records[3u * cell];
@@ -92,12 +109,15 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let n = world_normal_at(pixel);
     let past = past_of(id.xy, pixel, x, n, cell_foot(z));
     let frames = min(past.frames + 1.0, gather.cell_frames);
-    let share = 1.0 / frames;
+    // Later frames count for more, each for its number: the first ones know least of the light between surfaces.
+    let share = select(2.0 / (frames + 1.0), 1.0 / frames, (gather.flags & GATHER_EVEN) != 0u);
     let l = luminance(light);
     let now = Past(
-        mix(past.light, light, share), frames, mix(past.vector, vector, share), mix(past.square, l * l, share), x, n
+        mix(past.light, light, share), frames, mix(past.vector, vector, share), mix(past.square, l * l, share), x, n,
+        mix(past.lately, light, max(LATELY, 1.0 / frames))
     );
-    after[3u * cell] = vec4f(now.light, now.frames);
-    after[3u * cell + 1u] = vec4f(now.vector, now.square);
-    after[3u * cell + 2u] = vec4f(now.x, bitcast<f32>(pack_normal(now.n)));
+    after[4u * cell] = vec4f(now.light, now.frames);
+    after[4u * cell + 1u] = vec4f(now.vector, now.square);
+    after[4u * cell + 2u] = vec4f(now.x, bitcast<f32>(pack_normal(now.n)));
+    after[4u * cell + 3u] = vec4f(now.lately, 0.0);
 }

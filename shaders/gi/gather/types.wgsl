@@ -30,7 +30,8 @@ struct Gather {
 const GATHER_STANDS_IN = 1u;
 const GATHER_CUT = 2u;
 const GATHER_NO_BLUR = 4u;
-const GATHER_STILL = 8u;
+// All frames of a mean count the same.
+const GATHER_EVEN = 8u;
 
 @group(1) @binding(0) var<uniform> gather: Gather;
 @group(1) @binding(1) var accel_blocks: texture_2d<u32>;
@@ -42,8 +43,9 @@ const GATHER_STILL = 8u;
 const NONE = 0xffffffffu;
 const FAR = 1e30;
 
+// Never 0.
 fn pack_normal(n: vec3f) -> u32 {
-    return pack2x16snorm(oct_encode(n));
+    return pack2x16snorm(oct_encode(n)) | 1u;
 }
 
 fn unpack_normal(code: u32) -> vec3f {

@@ -39,8 +39,11 @@ pub fn prelude() -> String {
     format!("{}const LIFT = f32({LIFT:?});\n", CellSide::Four.prelude())
 }
 
-/// Vectors of a cell's record and of its past.
+/// Bytes of what a cell's ray found.
 const RECORD: u64 = 48;
+
+/// Bytes of what a cell remembers.
+const PAST: u64 = 64;
 
 /// The method at work.
 pub struct GatherGi {
@@ -49,6 +52,8 @@ pub struct GatherGi {
     inputs: InputGroup,
     params: ParamsRing,
     scene: Binder,
+    /// Group 1 of passes that send no rays: the parameters alone.
+    frame_params: Binder,
     cells: CellsPass,
     rays: Pass,
     renew: Pass,
@@ -95,8 +100,9 @@ impl GatherGi {
             multisampled: false,
         };
         let scene = Binder::new(device, "gi.gather", &[ParamsRing::TYPE, blocks, READ, READ, READ, LOAD]);
-        let shared = (&inputs, &scene);
-        let new = |name, entry, types: &[wgpu::BindingType]| Pass::new(device, shared, (name, entry), types);
+        let frame_params = Binder::new(device, "gi.gather", &[ParamsRing::TYPE]);
+        let (shared, alone) = ((&inputs, &scene), (&inputs, &frame_params));
+        let new = |groups, name, entry, types: &[wgpu::BindingType]| Pass::new(device, groups, (name, entry), types);
         let rw = READ_WRITE;
         let motion = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("gi.no_motion"),
@@ -110,10 +116,10 @@ impl GatherGi {
         });
         Self {
             cells: CellsPass::new(device, &inputs, CellSide::Four, size),
-            rays: new("gi.rays", "rays", &[rw, rw, rw, READ, rw]),
-            renew: new("gi.renew", "renew", &[rw, rw, rw, rw, rw]),
-            settle: new("gi.settle", "settle", &[READ, READ, READ, READ, rw, LOAD]),
-            blur: new("gi.blur", "blur", &[READ, rw]),
+            rays: new(shared, "gi.rays", "rays", &[rw, rw, rw, READ, rw]),
+            renew: new(shared, "gi.renew", "renew", &[rw, rw, rw, rw, rw]),
+            settle: new(alone, "gi.settle", "settle", &[READ, READ, READ, READ, rw, READ, LOAD]),
+            blur: new(alone, "gi.blur", "blur", &[READ, rw, rw]),
             upsample: UpsamplePass::plain(device, &inputs, CellSide::Four),
             store: Store::new(device, size, options.slots),
             no_lights: device.create_buffer(&wgpu::BufferDescriptor {
@@ -128,6 +134,7 @@ impl GatherGi {
             inputs,
             params,
             scene,
+            frame_params,
             frame: 0,
             round: 0,
         }
@@ -144,6 +151,7 @@ impl GatherGi {
             (inputs.lights.is_some_and(|l| l.stand_in), params::STANDS_IN),
             (self.frame == 0, params::CUT),
             (!self.options.blur, params::NO_BLUR),
+            (self.options.even, params::EVEN),
         ];
         Ok(Params {
             eye: super::inputs::Params::new(inputs.size, &inputs.camera, inputs.environment)?.eye_position(),
@@ -211,7 +219,7 @@ impl Rung for GatherGi {
         let [keys, lots, queries] = table();
         let rays_group = self.rays.binder.group([keys, lots, queries, self.cells.pixels().into(), (&store.records).into()]);
         let [keys, lots, queries] = table();
-        let renew_group = self.renew.binder.group([keys, lots, queries, (&store.points).into(), (&store.light).into()]);
+        let renew_group = self.renew.binder.group([keys, lots, queries, (&store.asked).into(), (&store.light).into()]);
         let [before, after] = [self.frame & 1, 1 - (self.frame & 1)].map(|i| &store.pasts[i as usize]);
         let settle_group = self.settle.binder.group([
             self.cells.pixels().into(),
@@ -219,14 +227,17 @@ impl Rung for GatherGi {
             (&store.light).into(),
             before.into(),
             after.into(),
+            (&store.changes).into(),
             inputs.motion.unwrap_or(&self.no_motion).into(),
         ]);
-        let blur_group = self.blur.binder.group([after.into(), (&store.cell_light).into()]);
+        let blur_group = self.blur.binder.group([after.into(), (&store.cell_light).into(), (&store.changes).into()]);
 
         let mut params = self.params(inputs, rays)?;
         let [w, h] = CellSide::Four.grid(inputs.size).map(|n| n.div_ceil(8));
         let mut offset = self.params.write(queue, &params);
+        let frame_params = self.frame_params.group([self.params.bound()]);
         let groups = |offset, own| Groups { inputs: &bound, scene: &scene, offset, own };
+        let alone = |offset, own| Groups { scene: &frame_params, ..groups(offset, own) };
 
         self.cells.record(recorder, &bound);
         Self::run(recorder, "gi.rays", &self.rays.pipeline, groups(offset, &rays_group), [w, h]);
@@ -239,8 +250,8 @@ impl Rung for GatherGi {
             }
             Self::run(recorder, "gi.renew", &self.renew.pipeline, groups(offset, &renew_group), [slots, 1]);
         }
-        Self::run(recorder, "gi.settle", &self.settle.pipeline, groups(offset, &settle_group), [w, h]);
-        Self::run(recorder, "gi.blur", &self.blur.pipeline, groups(offset, &blur_group), [w, h]);
+        Self::run(recorder, "gi.settle", &self.settle.pipeline, alone(offset, &settle_group), [w, h]);
+        Self::run(recorder, "gi.blur", &self.blur.pipeline, alone(offset, &blur_group), [w, h]);
         self.round = params.round + 1;
         self.frame += 1;
         self.upsample.record(recorder, &bound, &self.cells, &store.cell_light, None, output)
@@ -265,8 +276,8 @@ impl Rung for GatherGi {
         let cells = CellSide::Four.count(size) as f64;
         vec![
             CellsPass::cost(CellSide::Four, size),
-            Cost::new("gi.settle", cells * 150.0, cells * (2.0 * RECORD as f64 + 100.0)),
-            Cost::new("gi.blur", cells * 25.0 * 45.0, cells * 2.0 * RECORD as f64),
+            Cost::new("gi.settle", cells * 150.0, cells * (2.0 * PAST as f64 + 112.0)),
+            Cost::new("gi.blur", cells * 25.0 * 45.0, cells * (PAST as f64 + 64.0)),
             UpsamplePass::cost(CellSide::Four, size, 0),
         ]
     }

@@ -18,11 +18,14 @@ pub struct Options {
     pub first_rounds: u32,
     /// Whether means are blurred over neighbours.
     pub blur: bool,
+    /// Whether all frames of a mean count the same, however early, and a change of light shortens none: for asking what the
+    /// method converges to.
+    pub even: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { cell_frames: 64.0, entry_frames: 16.0, slots: 1 << 15, entry_scale: 1.0 / 16.0, first_rounds: 4, blur: true }
+        Self { cell_frames: 64.0, entry_frames: 8.0, slots: 1 << 15, entry_scale: 1.0 / 16.0, first_rounds: 4, blur: true, even: false }
     }
 }
 
@@ -35,6 +38,7 @@ impl Options {
         entry_scale: 1.0 / 16.0,
         first_rounds: 4,
         blur: false,
+        even: true,
     };
 }
 
@@ -42,7 +46,7 @@ impl Options {
 #[derive(Debug, Error, PartialEq)]
 pub enum OptionsError {
     /// No such number.
-    #[error("`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, blur=0|1")]
+    #[error("`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, blur=0|1, even=0|1")]
     Unknown(String),
     /// A value that cannot be.
     #[error("`{0}`: {1}")]
@@ -75,6 +79,7 @@ impl FromStr for Options {
                 "entry_scale" if number > 1e-4 && number <= 4.0 => options.entry_scale = number,
                 "entry_scale" => return Err(wrong("must be above 0.0001 and at most 4")),
                 "blur" => options.blur = number != 0.0,
+                "even" => options.even = number != 0.0,
                 _ => return Err(OptionsError::Unknown(word.into())),
             }
         }

@@ -10,6 +10,9 @@ pub(super) const CUT: u32 = 2;
 /// Cells are shown as they are.
 pub(super) const NO_BLUR: u32 = 4;
 
+/// All frames of a mean count the same.
+pub(super) const EVEN: u32 = 8;
+
 /// `Gather` of `shaders/gi/gather/types.wgsl`, which documents the fields.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]

@@ -1,20 +1,22 @@
 //! What `gather` keeps from frame to frame, and between the passes of one.
 
-use super::RECORD;
+use super::{PAST, RECORD};
 use crate::gi::cells::CellSide;
 
 pub(super) struct Store {
-    /// Of the table of entries, by slot: key; lots of both halves; queries of cells and of both halves' entries; where rays
-    /// begin; light of both halves.
+    /// Of the table of entries, by slot: key; lots of both halves; queries of cells and of both halves' entries, and where both
+    /// halves' rays begin; when it was asked for; light of both halves.
     pub keys: wgpu::Buffer,
     pub lots: wgpu::Buffer,
     pub queries: wgpu::Buffer,
-    pub points: wgpu::Buffer,
+    pub asked: wgpu::Buffer,
     pub light: wgpu::Buffer,
     /// Of cells: what rays found; what is remembered, before and after this frame in turns; the light that is shown.
     pub records: wgpu::Buffer,
     pub pasts: [wgpu::Buffer; 2],
     pub cell_light: wgpu::Buffer,
+    /// Of cells: what light has changed to.
+    pub changes: wgpu::Buffer,
 }
 
 impl Store {
@@ -40,21 +42,22 @@ impl Store {
             range.slice(..).fill(0xff);
         }
         lots.unmap();
-        let past = || buffer("gi.pasts", RECORD * cells);
+        let past = || buffer("gi.pasts", PAST * cells);
         Self {
             keys: buffer("gi.entry_keys", 4 * slots),
             lots,
-            queries: buffer("gi.entry_queries", 16 * (cells + 2 * slots)),
-            points: buffer("gi.entry_points", 32 * slots),
+            queries: buffer("gi.entry_queries", 16 * (cells + 4 * slots)),
+            asked: buffer("gi.entry_asked", 4 * slots),
             light: buffer("gi.entry_light", 32 * slots),
             records: buffer("gi.records", RECORD * cells),
             pasts: [past(), past()],
             cell_light: buffer("gi.light", CellSide::Four.light_bytes(size)),
+            changes: buffer("gi.changes", 16 * cells),
         }
     }
 
     pub fn bytes(&self) -> u64 {
-        let Self { keys, lots, queries, points, light, records, pasts: [a, b], cell_light } = self;
-        [keys, lots, queries, points, light, records, a, b, cell_light].iter().map(|b| b.size()).sum()
+        let Self { keys, lots, queries, asked, light, records, pasts: [a, b], cell_light, changes } = self;
+        [keys, lots, queries, asked, light, records, a, b, cell_light, changes].iter().map(|b| b.size()).sum()
     }
 }
