@@ -107,6 +107,27 @@ fn an_index_of_one_leaves_a_diffuse_surface() {
     assert!(glass[2].0 > 0.0 && apart(&glass, &lambert) > 8.0, "an index of 1.5 reflects");
 }
 
+/// A coloured reflectance (KHR_materials_specular) reaches the specular layers and nothing else.
+#[test]
+fn a_tinted_dielectric_reflects_its_colour() {
+    let Some(gpu) = common::gpu() else { return };
+    let camera = look_at([0.5, 1.6, 4.0], [0.0, 0.7, 0.0], 0.8);
+    let base = Job { sample_count: 16, bounces: 1, ..Job::new(&camera, [32, 24]) };
+    let run = |f0, tint| {
+        let mut s = everything_shines();
+        s.materials.iter_mut().for_each(|m| (m.f0, m.metallic, m.specular_tint) = (f0, 0.0, tint));
+        estimate(&gpu, &Tracer::new(&gpu, &s), base, 6)
+    };
+    // A dielectric's reflectance, and one beyond any dielectric's, which has a metal's curve.
+    for f0 in [0.08, 0.5] {
+        let (white, red) = (run(f0, [1.0; 3]), run(f0, [1.0, 0.0, 0.0]));
+        println!("f0 {f0}: {:.5?} {:.5?}", &white[..4], &red[..4]);
+        assert!(apart(&white, &red) > 8.0, "the colour goes unnoticed");
+        assert!(red[2].0 < 0.95 * white[2].0, "less light is reflected");
+        assert!((white[0].0 - red[0].0).abs() < 4.0 * white[0].1.hypot(red[0].1), "diffuse light is the same");
+    }
+}
+
 #[test]
 fn all_strategies_agree() {
     let Some(gpu) = common::gpu() else { return };

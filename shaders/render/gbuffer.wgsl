@@ -53,7 +53,7 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     var out: Fields;
     out.normal = oct_encode(n);
     out.albedo = vec4f(color * (1.0 - metallic) * (1.0 - share), mix(1.0, occlusion, material.occlusion_strength));
-    out.specular = vec4f(mix(vec3f(material.f0), color, metallic), roughness);
+    out.specular = vec4f(mix(material.f0 * material.specular_tint.rgb, color, metallic), roughness);
     out.emissive = vec4f(material.emissive * glow, 1.0);
     if material.unlit != 0u {
         out.albedo = vec4f(0.0, 0.0, 0.0, 1.0);

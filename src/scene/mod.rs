@@ -163,8 +163,12 @@ pub struct Material {
     /// Perceptual roughness; GGX α is its square.
     pub roughness: f32,
     /// Reflectance of a dielectric at normal incidence: 0.04 for index 1.5; 0 leaves a purely diffuse surface
-    /// (KHR_materials_ior). Metals take their base colour instead.
+    /// (KHR_materials_ior, KHR_materials_specular). Metals take their base colour instead. Where it is coloured, the
+    /// largest of the three, which is what the diffuse light loses.
     pub f0: f32,
+    /// Colour of that reflectance, the largest component 1: `f0 · specular_tint` at normal incidence, white at grazing
+    /// angles. White but for files with KHR_materials_specular or KHR_materials_pbrSpecularGlossiness.
+    pub specular_tint: [f32; 3],
     /// Green multiplies roughness, blue multiplies metallic (linear image).
     pub metallic_roughness_texture: Option<TextureRef>,
     /// Tangent-space normal map (linear image).
@@ -196,6 +200,7 @@ impl Default for Material {
             metallic: 1.0,
             roughness: 1.0,
             f0: DIELECTRIC_F0,
+            specular_tint: [1.0; 3],
             metallic_roughness_texture: None,
             normal_texture: None,
             normal_scale: 1.0,
