@@ -18,6 +18,8 @@ mod error;
 #[cfg(feature = "io")]
 pub mod export;
 #[cfg(feature = "io")]
+mod files;
+#[cfg(feature = "io")]
 mod geometry;
 #[cfg(feature = "io")]
 pub mod gltf;
@@ -32,13 +34,17 @@ pub mod path;
 pub mod rig;
 pub mod shapes;
 #[cfg(feature = "io")]
+pub mod sound;
+#[cfg(feature = "io")]
 mod texture;
 
 pub use environment::Environment;
 #[cfg(feature = "io")]
 pub use error::SceneError;
 #[cfg(feature = "io")]
-pub use load::load;
+pub use files::LoadOptions;
+#[cfg(feature = "io")]
+pub use load::{load, load_with};
 
 /// A whole scene, ready to be uploaded.
 #[derive(Debug, Clone, Default)]
