@@ -145,7 +145,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let judged = |path| Shown::reference(path, args.tonemap, args.exposure, args.scene.size, &args.metric);
     let reference = args.reference.as_deref().map(judged).transpose()?;
     let sequence = args.sequence.sequence(&args.output)?;
-    let scene = args.scene.load(global.quiet)?;
+    let scene = args.scene.load(global)?;
     let camera = match sequence.as_ref().and_then(|s| s.frames().next()) {
         Some((_, camera)) => camera,
         None => args.scene.camera(&scene)?,

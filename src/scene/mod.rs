@@ -69,6 +69,8 @@ pub struct Scene {
     pub variants: Vec<String>,
     /// How the objects move, if they do; see [`Scene::pose`].
     pub rig: Option<rig::Rig>,
+    /// The sun and the sky are those that the loader adds where a file has no light; see [`Scene::surround`].
+    pub default_light: bool,
     /// What was mended or left out while loading, one plain sentence each, naming the file and place.
     pub warnings: Vec<String>,
 }

@@ -139,9 +139,14 @@ pub fn spawn(
 }
 
 /// Reads and uploads a scene.
-pub fn scene(handles: &Handles, spec: String, progress: &Progress) -> Result<Product, String> {
+pub fn scene(
+    handles: &Handles,
+    spec: String,
+    options: scene::LoadOptions,
+    progress: &Progress,
+) -> Result<Product, String> {
     progress.stage(&format!("reading {spec}"));
-    let scene = scene::load(&spec).map_err(|e| e.to_string())?;
+    let scene = scene::load_with(&spec, options).map_err(|e| e.to_string())?;
     if progress.stopped() {
         return Err("cancelled".into());
     }

@@ -19,12 +19,14 @@ impl App {
         match request {
             Request::Load(spec) => {
                 let name = format!("load {spec}");
-                self.spawn(name, Kind::Scene, move |p| jobs::scene(&handles, spec, p));
+                let options = self.options.load;
+                self.spawn(name, Kind::Scene, move |p| jobs::scene(&handles, spec, options, p));
             }
             Request::Surroundings(path) => {
                 let name = format!("load {}", path.display());
                 self.spawn(name, Kind::Surroundings, move |_| {
-                    let environment = crate::scene::Environment::load(&path).map_err(|e| e.to_string())?;
+                    let (environment, mended) = crate::scene::Environment::load(&path).map_err(|e| e.to_string())?;
+                    mended.iter().for_each(|m| tracing::warn!("{m}"));
                     Ok(Product::Surroundings { path, environment })
                 });
             }
