@@ -224,13 +224,15 @@ impl Textures<'_> {
         let name = name.replace('\\', "/");
         let key = (name.clone(), usage);
         let image = *self.known.entry(key).or_insert_with(|| {
-            let image = self.folder.read(&name).and_then(|bytes| texture::decode(&name, &bytes, usage)).unwrap_or_else(
-                |problem| {
-                    let what = format!("texture '{name}': {problem}; a checker stands in for it");
-                    scene.warnings.push(format!("{}: {what}", self.path.display()));
-                    texture::stand_in(&name, usage)
-                },
-            );
+            let decoded = self.folder.read(&name).and_then(|bytes| {
+                texture::room(&scene.images, texture::MAX_TOTAL)?;
+                texture::decode(&name, &bytes, usage)
+            });
+            let image = decoded.unwrap_or_else(|problem| {
+                let what = format!("texture '{name}': {problem}; a checker stands in for it");
+                scene.warnings.push(format!("{}: {what}", self.path.display()));
+                texture::stand_in(&name, usage)
+            });
             scene.images.push(image);
             scene.images.len() - 1
         });

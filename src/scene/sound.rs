@@ -12,7 +12,7 @@ pub const MAX_DISTANCE: f32 = 1e12;
 /// # Errors
 /// [`SceneError::NothingToDraw`] where no triangle is left that has an area.
 pub(crate) fn settle(scene: &mut Scene, path: &Path) -> Result<(), SceneError> {
-    let far = |v: f32| !(v.abs() <= MAX_DISTANCE);
+    let far = |v: f32| !v.is_finite() || v.abs() > MAX_DISTANCE;
     let lost: Vec<bool> = scene
         .instances
         .iter()

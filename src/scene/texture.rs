@@ -26,6 +26,18 @@ impl Use {
 /// No side of a texture may be longer; WebGPU grants 8192 by default and larger ones are scaled at upload or refused.
 const MAX_SIDE: u32 = 16_384;
 
+/// Bytes of all decoded images of a scene together: thousands of small files can hold large pictures.
+pub(crate) const MAX_TOTAL: u64 = 4 << 30;
+
+/// Whether a scene that has `images` may have another.
+///
+/// # Errors
+/// A sentence without subject.
+pub(crate) fn room(images: &[Image], most: u64) -> Result<(), String> {
+    let taken: u64 = images.iter().map(|i| i.rgba.len() as u64).sum();
+    if taken < most { Ok(()) } else { Err(format!("is left out: the scene's images already take {taken} bytes")) }
+}
+
 /// Decodes PNG, JPEG, WebP, BMP, TGA or HDR bytes (told apart by content, then by the name's ending).
 ///
 /// # Errors
@@ -92,4 +104,28 @@ pub(crate) fn mean(image: &Image) -> [f32; 4] {
         sum[3] += f64::from(linear[usize::from(pixel[3])]);
     }
     sum.map(|s| (s / (image.rgba.len() / 4).max(1) as f64) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_share_a_bound() {
+        let images = [stand_in("a", Use::Color), stand_in("b", Use::Data)];
+        assert!(room(&images, 513).is_ok());
+        let told = room(&images, 512).unwrap_err();
+        assert!(told.contains("512 bytes"), "{told}");
+    }
+
+    #[test]
+    fn srgb_bytes_survive_a_round_trip_and_means_are_of_light() {
+        let table = srgb_table();
+        assert!((0..=255u8).all(|b| to_srgb(table[usize::from(b)]) == b));
+        // Magenta and black: half of the light, not of the bytes.
+        let [r, g, b, a] = mean(&stand_in("a", Use::Color));
+        assert_eq!([r, g, b, a], [0.5, 0.0, 0.5, 1.0]);
+        let half = Image { rgba: [188; 4].to_vec(), width: 1, height: 1, ..stand_in("a", Use::Color) };
+        assert!((mean(&half)[0] - 0.503).abs() < 1e-3, "188 is one half in sRGB: {}", mean(&half)[0]);
+    }
 }

@@ -81,7 +81,10 @@ impl Loader<'_> {
                     },
                     (None, None) => Err("it has neither a URI nor a buffer view".to_owned()),
                 };
-                let decoded = bytes.and_then(|bytes| texture::decode(&label, &bytes, usage));
+                let decoded = bytes.and_then(|bytes| {
+                    texture::room(&self.scene.images, texture::MAX_TOTAL)?;
+                    texture::decode(&label, &bytes, usage)
+                });
                 (label, decoded)
             }
         };

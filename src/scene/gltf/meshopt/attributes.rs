@@ -26,7 +26,7 @@ pub(super) fn unpack(data: &[u8], count: usize, stride: usize) -> Result<Vec<u8>
     if let Some(bad) = channels.iter().find(|&&c| c & 15 > 2 || (c & 15 != 2 && c >> 4 != 0)) {
         return Err(format!("has the unknown channel mode {bad:#04x}"));
     }
-    let most = (8192 / stride & !(GROUP - 1)).min(256);
+    let most = ((8192 / stride) & !(GROUP - 1)).min(256);
     let mut out = Vec::new();
     let mut left = count;
     while left > 0 {
