@@ -196,7 +196,7 @@ fn surface_at(hit: Hit, direction: vec3f) -> Surface {
         s.albedo = s.base;
         return s;
     }
-    s.albedo = s.base * (1.0 - s.metallic) * (1.0 - dielectric_lobe(vec3f(s.f0), s.roughness, max(n_v, 0.0)).x);
+    s.albedo = s.base * (1.0 - s.metallic) * (1.0 - diffuse_loss(s.f0, s.roughness, max(n_v, 0.0)));
     s.gloss = env_brdf(mix(s.f0_color, s.base, s.metallic), s.roughness, max(n_v, 0.0));
     s.alpha = max(s.roughness * s.roughness, 1e-3);
     let kept = energy(s.roughness, s.n_v);

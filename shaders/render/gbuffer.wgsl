@@ -46,7 +46,7 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     let color = saturate(base.rgb);
     let v = -(frame.world_from_view * vec4f(view_ray_at(in.position.xy), 0.0)).xyz;
     let n_v = dot(n, normalize(v));
-    let share = dielectric_lobe(vec3f(material.f0), roughness, max(n_v, 0.0)).x;
+    let share = diffuse_loss(material.f0, roughness, max(n_v, 0.0));
     let previous = frame.previous_clip_from_world * vec4f(in.world, 1.0);
     let current = frame.clip_from_world_unjittered * vec4f(in.world, 1.0);
 
