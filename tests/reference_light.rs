@@ -107,6 +107,49 @@ fn an_index_of_one_leaves_a_diffuse_surface() {
     assert!(glass[2].0 > 0.0 && apart(&glass, &lambert) > 8.0, "an index of 1.5 reflects");
 }
 
+/// Under an even sky a surface shows no more light than the sky, whatever its reflectance.
+#[test]
+fn no_reflectance_makes_light() {
+    let Some(gpu) = common::gpu() else { return };
+    let camera = look_at([0.0, 3.0, 0.0], [0.0, 0.0, 0.0], 0.8);
+    let base = Job { sample_count: 64, bounces: 1, ..Job::new(&camera, [16, 16]) };
+    let shown = |f0, roughness| {
+        let mut s = scene(vec![floor(20.0, 0.0)], vec![]);
+        s.environment = environment(1.0);
+        s.materials[0] = Material { f0, roughness, ..material([0.5; 3]) };
+        let e = estimate(&gpu, &Tracer::new(&gpu, &s), base, 4);
+        (0..4).map(|k| e[k].0).sum::<f64>()
+    };
+    for roughness in [0.2, 1.0] {
+        let light: Vec<f64> = [0.0, 0.04, 0.3, 0.7, 0.996].map(|f0| shown(f0, roughness)).into();
+        println!("roughness {roughness}: {light:.3?}");
+        assert!((light[0] - 0.5).abs() < 0.01, "the diffuse surface alone");
+        assert!(light.iter().all(|l| *l < 1.02), "{light:?}");
+        assert!(light[4] > 0.9, "nearly a mirror");
+    }
+}
+
+/// A coloured reflectance (KHR_materials_specular) reaches the specular layers and nothing else.
+#[test]
+fn a_tinted_dielectric_reflects_its_colour() {
+    let Some(gpu) = common::gpu() else { return };
+    let camera = look_at([0.5, 1.6, 4.0], [0.0, 0.7, 0.0], 0.8);
+    let base = Job { sample_count: 16, bounces: 1, ..Job::new(&camera, [32, 24]) };
+    let run = |f0, tint| {
+        let mut s = everything_shines();
+        s.materials.iter_mut().for_each(|m| (m.f0, m.metallic, m.specular_tint) = (f0, 0.0, tint));
+        estimate(&gpu, &Tracer::new(&gpu, &s), base, 6)
+    };
+    // A dielectric's reflectance, and one beyond any dielectric's, which has a metal's curve.
+    for f0 in [0.08, 0.5] {
+        let (white, red) = (run(f0, [1.0; 3]), run(f0, [1.0, 0.0, 0.0]));
+        println!("f0 {f0}: {:.5?} {:.5?}", &white[..4], &red[..4]);
+        assert!(apart(&white, &red) > 8.0, "the colour goes unnoticed");
+        assert!(red[2].0 < 0.95 * white[2].0, "less light is reflected");
+        assert!((white[0].0 - red[0].0).abs() < 4.0 * white[0].1.hypot(red[0].1), "diffuse light is the same");
+    }
+}
+
 #[test]
 fn all_strategies_agree() {
     let Some(gpu) = common::gpu() else { return };

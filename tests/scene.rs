@@ -7,10 +7,18 @@ mod bad_input;
 mod bundled;
 #[path = "scene/defaults.rs"]
 mod defaults;
+#[path = "scene/extensions.rs"]
+mod extensions;
 #[path = "scene/glb.rs"]
 mod glb;
 #[path = "scene/gltf_features.rs"]
 mod gltf_features;
+#[path = "scene/limits.rs"]
+mod limits;
+#[path = "scene/meshopt.rs"]
+mod meshopt;
+#[path = "scene/nothing.rs"]
+mod nothing;
 #[path = "scene/obj.rs"]
 mod obj;
 #[path = "scene/paper_room.rs"]
@@ -19,3 +27,5 @@ mod paper_room;
 mod real_files;
 #[path = "scene/shared.rs"]
 mod shared;
+#[path = "scene/specular.rs"]
+mod specular;

@@ -134,7 +134,7 @@ fn structs_lie_in_memory_as_their_rust_twins() {
     // The Rust struct ends with padding to the alignment of uniform offsets.
     same_layout!("render.gbuffer", "Material", MaterialGpu, size std::mem::offset_of!(MaterialGpu, tail), [
         base_color, emissive, unlit, metallic, roughness, normal_scale, occlusion_strength, alpha_cutoff,
-        f0, uses as "base_use",
+        f0, uses as "base_use", specular_tint,
     ]);
     assert_eq!(size_of::<MaterialGpu>(), 256);
 }
@@ -159,8 +159,8 @@ fn the_path_tracers_structs_lie_in_memory_as_their_rust_twins() {
     ]);
     same_layout!("reference.path", "ImageUse", ImageUse, size size_of::<ImageUse>(), [row0, texel, row1, bits, size]);
     same_layout!("reference.path", "RefMaterial", RefMaterial, size size_of::<RefMaterial>(), [
-        base_color, emissive, flags, metallic, roughness, normal_scale, alpha_cutoff, f0, base_use, rough_use,
-        normal_use, emissive_use,
+        base_color, emissive, flags, metallic, roughness, normal_scale, alpha_cutoff, specular_tint, f0,
+        base_use, rough_use, normal_use, emissive_use,
     ]);
 }
 

@@ -63,6 +63,12 @@ fn dielectric_lobe(f0: vec3f, roughness: f32, n_dot_v: f32) -> vec3f {
     return f0 * ab.x + ab.y * saturate(50.0 * max(f0.x, max(f0.y, f0.z)));
 }
 
+// What a dielectric's lobe takes from its diffuse light. Above any dielectric's reflectance the lobe is a metal's, which keeps
+// all of f0 at every roughness; without branches for the same reason.
+fn diffuse_loss(f0: f32, roughness: f32, n_dot_v: f32) -> f32 {
+    return max(dielectric_lobe(vec3f(f0), roughness, n_dot_v).x, f0 * metal_part(vec3f(f0)));
+}
+
 // Directional albedo of the specular lobe: how much of an even environment it shows. 0 for F0 = 0, which marks unlit.
 fn env_brdf(f0: vec3f, roughness: f32, n_dot_v: f32) -> vec3f {
     let dielectric = dielectric_lobe(f0, roughness, n_dot_v);

@@ -25,6 +25,8 @@ struct Material {
     normal_use: TextureUse,
     occlusion_use: TextureUse,
     emissive_use: TextureUse,
+    // Colour of f0, the largest component 1.
+    specular_tint: vec4f,
 }
 
 @group(1) @binding(0) var<uniform> material: Material;

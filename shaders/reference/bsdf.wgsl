@@ -7,19 +7,26 @@ fn mean_fresnel(index: f32) -> f32 {
     return min(1.0258 * (index - 1.0) / (4.08567 + 1.00071 * index), 1.0);
 }
 
-// Fresnel term with the factor for the lost light.
+// Schlick's curve from a metal's colour, with the factor for the lost light; q5: 1 - v.h to the fifth.
+fn fresnel_metal(s: Surface, f0: vec3f, q5: f32) -> vec3f {
+    let mean = f0 + (1.0 - f0) / 21.0;
+    let again = mean * s.mean / (1.0 - mean * (1.0 - s.mean));
+    return (f0 + (1.0 - f0) * q5) * (1.0 + again * s.missing);
+}
+
+// Fresnel term with the factor for the lost light. A coloured dielectric rises to white as its index's curve rises to 1;
+// one that reflects more than any (KHR_materials_specular allows it) has a metal's curve, as in the rasteriser.
 fn fresnel(s: Surface, v_h: f32) -> vec3f {
-    let mean_metal = s.base + (1.0 - s.base) / 21.0;
-    let again_metal = mean_metal * s.mean / (1.0 - mean_metal * (1.0 - s.mean));
+    let q = 1.0 - v_h;
+    let q2 = q * q;
+    let q5 = q2 * q2 * q;
     let index = index_of(s.f0);
     let mean = mean_fresnel(index);
     let again = mean * s.mean / (1.0 - mean * (1.0 - s.mean));
-    let q = 1.0 - v_h;
-    let q2 = q * q;
-    let metal = s.base + (1.0 - s.base) * (q2 * q2 * q);
-    return mix(
-        vec3f(fresnel_dielectric(index, v_h) * (1.0 + again * s.missing)), metal * (1.0 + again_metal * s.missing), s.metallic
-    );
+    let risen = (fresnel_dielectric(index, v_h) - s.f0) / max(1.0 - s.f0, 1e-2);
+    let dielectric = (s.f0_color + (1.0 - s.f0_color) * risen) * (1.0 + again * s.missing);
+    let part = metal_part(vec3f(s.f0));
+    return mix(mix(dielectric, fresnel_metal(s, s.f0_color, q5), part), fresnel_metal(s, s.base, q5), s.metallic);
 }
 
 struct Lobe {

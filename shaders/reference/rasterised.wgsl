@@ -9,7 +9,7 @@ struct Rasterised {
 fn rasterised(s: Surface, light: Light) -> Rasterised {
     let lit_by = sample_light(light, s.position);
     let e = lit_by.irradiance * max(dot(s.n, lit_by.l), 0.0);
-    let f0 = mix(vec3f(s.f0), s.base, s.metallic);
+    let f0 = mix(s.f0_color, s.base, s.metallic);
     let lit = any(e > vec3f(0.0)) && any(s.gloss > vec3f(0.0));
     var out = Rasterised(s.albedo * e / PI, vec3f(0.0));
     if lit { out.glossy = e * ggx(s.n, s.v, lit_by.l, f0, s.roughness); }

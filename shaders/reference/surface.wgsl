@@ -110,8 +110,9 @@ struct Surface {
     base: vec3f,
     metallic: f32,
     roughness: f32,
-    // Reflectance of the dielectric at normal incidence.
+    // Reflectance of the dielectric at normal incidence: the largest of the three colours', and all three.
     f0: f32,
+    f0_color: vec3f,
     // Directional albedo of the specular lobe.
     gloss: vec3f,
     // What the single-scattering lobe loses over what it keeps, and the mean of what it keeps over directions.
@@ -182,6 +183,7 @@ fn surface_at(hit: Hit, direction: vec3f) -> Surface {
     s.roughness = saturate(materials.items[m].roughness * rough_metal.g);
     s.base = saturate(base);
     s.f0 = materials.items[m].f0;
+    s.f0_color = s.f0 * materials.items[m].specular_tint;
     let n_v = dot(s.n, -direction);
     s.v = select(normalize(-direction + s.n * (1e-4 - n_v)), -direction, n_v > 1e-4);
     s.n_v = max(n_v, 1e-4);
@@ -194,8 +196,8 @@ fn surface_at(hit: Hit, direction: vec3f) -> Surface {
         s.albedo = s.base;
         return s;
     }
-    s.albedo = s.base * (1.0 - s.metallic) * (1.0 - dielectric_lobe(vec3f(s.f0), s.roughness, max(n_v, 0.0)).x);
-    s.gloss = env_brdf(mix(vec3f(s.f0), s.base, s.metallic), s.roughness, max(n_v, 0.0));
+    s.albedo = s.base * (1.0 - s.metallic) * (1.0 - diffuse_loss(s.f0, s.roughness, max(n_v, 0.0)));
+    s.gloss = env_brdf(mix(s.f0_color, s.base, s.metallic), s.roughness, max(n_v, 0.0));
     s.alpha = max(s.roughness * s.roughness, 1e-3);
     let kept = energy(s.roughness, s.n_v);
     s.missing = (1.0 - kept) / kept;

@@ -82,11 +82,10 @@ struct RefMaterial {
     normal_scale: f32,
     // 0 opaque, the mask's cutoff, or 2 for stochastic coverage.
     alpha_cutoff: f32,
+    // Colour of f0, the largest component 1.
+    specular_tint: vec3f,
     // Reflectance of the dielectric at normal incidence.
     f0: f32,
-    pad0: f32,
-    pad1: f32,
-    pad2: f32,
     base_use: ImageUse,
     rough_use: ImageUse,
     normal_use: ImageUse,

@@ -44,8 +44,8 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     let metallic = saturate(material.metallic * rough_metal.b);
     let roughness = saturate(material.roughness * rough_metal.g);
     let color = saturate(base.rgb);
-    let f0 = mix(vec3f(material.f0), color, metallic);
-    let share = dielectric_lobe(vec3f(material.f0), roughness, MEAN_COSINE).x;
+    let f0 = mix(material.f0 * material.specular_tint.rgb, color, metallic);
+    let share = diffuse_loss(material.f0, roughness, MEAN_COSINE);
     let mirrored = env_brdf(f0, roughness, MEAN_COSINE) * max(camera.specular.x, 0.0);
 
     var out: Fields;

@@ -57,14 +57,14 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     let color = saturate(base.rgb);
     let v = -(frame.world_from_view * vec4f(view_ray_at(in.position.xy), 0.0)).xyz;
     let n_v = dot(n, normalize(v));
-    let share = dielectric_lobe(vec3f(material.f0), roughness, max(n_v, 0.0)).x;
+    let share = diffuse_loss(material.f0, roughness, max(n_v, 0.0));
     let previous = frame.previous_clip_from_world * vec4f(in.world + in.back, 1.0);
     let current = frame.clip_from_world_unjittered * vec4f(in.world, 1.0);
 
     var out: Fields;
     out.normal = oct_encode(n);
     out.albedo = vec4f(color * (1.0 - metallic) * (1.0 - share), mix(1.0, occlusion, material.occlusion_strength));
-    out.specular = vec4f(mix(vec3f(material.f0), color, metallic), roughness);
+    out.specular = vec4f(mix(material.f0 * material.specular_tint.rgb, color, metallic), roughness);
     out.emissive = vec4f(material.emissive * glow, 1.0);
     if material.unlit != 0u {
         out.albedo = vec4f(0.0, 0.0, 0.0, 1.0);

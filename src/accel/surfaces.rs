@@ -160,7 +160,7 @@ fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 
         weight += counts;
         coverage += alpha;
         diffuse += counts * rgb * (1.0 - metallic);
-        f0 += counts * Vec3::splat(m.f0).lerp(rgb, metallic);
+        f0 += counts * (m.f0 * Vec3::from(m.specular_tint)).lerp(rgb, metallic);
         roughness += counts * (m.roughness * rough[1]).clamp(0.0, 1.0);
         emission += counts * Vec3::from(m.emissive) * Vec3::new(glow[0], glow[1], glow[2]);
     }

@@ -7,7 +7,7 @@ use crate::{
     gpu::{Backend, Gpu, GpuOptions},
     net::format::Weights,
     scene::{
-        self, Camera, Environment, LightKind, Scene,
+        self, Camera, Environment, LightKind, LoadOptions, Scene,
         edit::{LightEdit, ObjectEdit},
     },
 };
@@ -31,6 +31,9 @@ pub struct Global {
     /// Only errors.
     #[arg(short, long, global = true)]
     pub quiet: bool,
+    /// Buffers, textures and material libraries may lie outside the folder of the scene file that names them.
+    #[arg(long, global = true)]
+    pub allow_outside: bool,
     /// More log lines; twice for yet more.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
@@ -88,6 +91,11 @@ pub enum ProgressKind {
 }
 
 impl Global {
+    /// What a scene file may do.
+    pub fn load_options(&self) -> LoadOptions {
+        LoadOptions { allow_outside: self.allow_outside }
+    }
+
     /// What is asked of the device.
     pub fn gpu_options(&self) -> GpuOptions {
         let backend = match self.backend {
@@ -184,17 +192,21 @@ pub struct SceneArgs {
 
 impl SceneArgs {
     /// Loads the scene, tells its warnings, and applies the flags about light.
-    pub fn load(&self, quiet: bool) -> Result<Scene> {
-        let mut scene = scene::load(&self.scene)?;
-        if !quiet {
+    pub fn load(&self, global: &Global) -> Result<Scene> {
+        let mut scene = scene::load_with(&self.scene, global.load_options())?;
+        match &self.environment {
+            Some(Surroundings::Constant(radiance)) => scene.surround(Environment::constant(*radiance)),
+            Some(Surroundings::Picture(path)) => {
+                let (environment, mended) = Environment::load(path)?;
+                scene.surround(environment);
+                scene.warnings.extend(mended);
+            }
+            None => {}
+        }
+        if !global.quiet {
             for warning in &scene.warnings {
                 eprintln!("warning: {warning}");
             }
-        }
-        match &self.environment {
-            Some(Surroundings::Constant(radiance)) => scene.environment = Environment::constant(*radiance),
-            Some(Surroundings::Picture(path)) => scene.environment = Environment::load(path)?,
-            None => {}
         }
         for light in &mut scene.lights {
             match &mut light.kind {

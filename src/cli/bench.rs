@@ -101,7 +101,7 @@ impl Args {
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
     let base = args.compare.as_ref().map(read_record).transpose()?;
-    let scene = args.scene.load(global.quiet)?;
+    let scene = args.scene.load(global)?;
     let camera = args.scene.camera(&scene)?;
     let gpu = global.open_gpu()?;
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;

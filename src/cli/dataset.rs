@@ -307,7 +307,7 @@ fn many_rooms(global: &Global, writer: &mut Writer, Rooms(rooms): &Rooms, args: 
 const TOO_CLOSE: f32 = 0.03;
 
 fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> Result<()> {
-    let scene = scene::load(spec)?;
+    let scene = scene::load_with(spec, global.load_options())?;
     let uploaded = writer.upload(&scene)?;
     let stem = Path::new(spec).file_stem().map_or(spec.into(), |s| s.to_string_lossy().into_owned());
     let [shard, of] = args.shard;

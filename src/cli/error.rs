@@ -1,6 +1,7 @@
 //! Exit codes: every error that reaches `main` is sorted here, once.
 
 use crate::{
+    accel::AccelError,
     gi::GiError,
     gi::probes::BakeError,
     gpu::GpuError,
@@ -92,6 +93,7 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
             || cause.is::<WeightsError>()
             || cause.is::<EnvironmentError>()
             || cause.is::<PackError>()
+            || cause.is::<AccelError>()
             || cause.is::<BakeError>()
         {
             return INVALID_INPUT;

@@ -155,7 +155,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let judged = |path| Shown::reference(path, args.tonemap, args.exposure, args.scene.size, &args.metric);
     let reference = args.reference.as_deref().map(judged).transpose()?;
     let sequence = args.sequence.sequence(&args.output)?;
-    let scene = args.scene.load(global.quiet)?;
+    let scene = args.scene.load(global)?;
     let camera = match sequence.as_ref().and_then(|s| s.frames().next()) {
         Some((_, camera)) => camera,
         None => args.scene.camera(&scene)?,
@@ -249,7 +249,9 @@ impl<'a> Raster<'a> {
             image_io::Layer::new(layer.name(), &layer.channels().concat(), &picture.data)
         };
         let layers = frame.layers.iter().map(layer).collect();
-        Ok(Drawn { frame, layers, facts: vec![("Weights".into(), self.weights.clone())] })
+        let mut facts = vec![("Weights".into(), self.weights.clone())];
+        facts.extend(self.renderer.settled().map(|frames| ("GiFrames".into(), frames.to_string())));
+        Ok(Drawn { frame, layers, facts })
     }
 }
 

@@ -41,6 +41,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     }
     let options = Options {
         scene: args.scene,
+        load: global.load_options(),
         weights: args.weights,
         method: args.method,
         watch: args.watch,

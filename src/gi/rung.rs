@@ -49,6 +49,11 @@ pub trait Rung: Send {
     /// The next frame has nothing to do with the last: what is remembered of pixels is of no use.
     fn cut(&mut self) {}
 
+    /// Frames since the last cut, for methods whose answer settles over frames.
+    fn settled(&self) -> Option<u32> {
+        None
+    }
+
     /// What the camera's surroundings send to it, if the method knows, for reflections of what is off the screen. The
     /// same view for the method's whole life, `Rgba16Float`: faces +X, −X, +Y, −Y, +Z, −Z of a cube side by side; on the
     /// face along ±axis k columns follow ±axis k + 2 and rows fall along axis k + 1. rgb is radiance, a the

@@ -176,6 +176,11 @@ impl Renderer {
         self.last = None;
     }
 
+    /// Frames that the method's answer has settled over since the last cut; `None` where it does not settle.
+    pub fn settled(&self) -> Option<u32> {
+        self.indirect.as_ref().and_then(|i| i.settled())
+    }
+
     /// Name of the method that finds indirect light, as on the command line.
     pub fn method_name(&self) -> &'static str {
         self.method

@@ -2,8 +2,14 @@
 //!
 //! Camera: looks at the whole scene from the front (+Z) and a little above, unless another side lets one look deeper
 //! into it, as the open side of a box does.
-//! Light: where surfaces emit, up to four spot or point lights stand in for the strongest, because direct light is
-//! computed for analytic lights only. Where nothing emits either, a sun behind the camera's shoulder and a dim grey sky.
+//! Light: where surfaces emit enough for a picture, up to four spot or point lights stand in for the strongest, because
+//! direct light is computed for analytic lights only. Else a sun behind the camera's shoulder and a dim grey sky, unless
+//! the surroundings are given. Fainter glow shines beside them where a method or the path tracer finds it.
+//!
+//! Enough is [`ENOUGH`]: the flux of all emitters (π · radiance · area) over the area of the box around the scene is the
+//! irradiance that they would give to its walls. A light grey wall under less is darker than a dark grey of 12 in 255 at
+//! exposure 0, where a file's maker cannot have meant it to be the only light. It is a ratio of areas, so that it does
+//! not matter whether the file counts in metres or millimetres.
 
 use glam::{Mat4, Vec3};
 
@@ -21,6 +27,10 @@ pub const DEFAULT_SUN: f32 = 1.0;
 /// Radiance of the sky that comes with the default sun, W/(m²·sr).
 pub const DEFAULT_SKY: f32 = 0.05;
 
+/// Irradiance by emitters, averaged over the box around the scene, from which on they are its light, W/m². A diffuse
+/// surface of albedo 0.8 then has the radiance 0.005, a 200th of what the view transform shows as white.
+pub const ENOUGH: f32 = 0.02;
+
 /// How many emitters at most get a light.
 const MAX_PROXIES: usize = 4;
 
@@ -32,22 +42,59 @@ pub fn complete(scene: &mut Scene) {
     if !scene.lights.is_empty() {
         return;
     }
-    let proxies = proxy_lights(scene);
-    if !proxies.is_empty() {
-        let n = proxies.len();
+    let own_sky = scene.environment != Environment::default();
+    let emitters = emitters(scene);
+    if own_sky || irradiance(scene, &emitters) >= ENOUGH {
+        stand_in(scene, emitters);
+    } else {
+        scene.lights.push(default_sun(&scene.cameras[0]));
+        scene.environment = Environment::constant([DEFAULT_SKY; 3]);
+        scene.default_light = true;
+        scene.warnings.push(sun_added(scene, !emitters.is_empty()));
+    }
+}
+
+/// Lights for glowing surfaces, with a warning, where there are any.
+fn stand_in(scene: &mut Scene, emitters: Vec<Emitter>) {
+    scene.lights = lights(scene, emitters);
+    if !scene.lights.is_empty() {
+        let n = scene.lights.len();
         scene.warnings.push(format!(
             "'{}' has no lights, but glowing surfaces; lights stand in for the {n} strongest of them",
             scene.name
         ));
-        scene.lights = proxies;
-    } else if scene.environment == Environment::default() {
-        scene.lights.push(default_sun(&scene.cameras[0]));
-        scene.environment = Environment::constant([DEFAULT_SKY; 3]);
-        scene.warnings.push(format!(
-            "'{}' has no light; a sun of {DEFAULT_SUN} W/m² and a grey sky of {DEFAULT_SKY} W/(m²·sr) were added",
-            scene.name
-        ));
     }
+}
+
+fn sun_added(scene: &Scene, glows: bool) -> String {
+    let lacks = if glows { "no light but a faint glow" } else { "no light" };
+    format!(
+        "'{}' has {lacks}; a sun of {DEFAULT_SUN} W/m² and a grey sky of {DEFAULT_SKY} W/(m²·sr) were added",
+        scene.name
+    )
+}
+
+impl Scene {
+    /// Takes surroundings that somebody gives. They replace the default sky and with it the default sun, which are there
+    /// only as long as nobody says where light comes from.
+    pub fn surround(&mut self, environment: Environment) {
+        if std::mem::take(&mut self.default_light) {
+            let told = [true, false].map(|glows| sun_added(self, glows));
+            self.warnings.retain(|w| !told.contains(w));
+            stand_in(self, emitters(self));
+        }
+        self.environment = environment;
+    }
+}
+
+/// Irradiance that the glowing surfaces would give to the walls of the box around the scene, W/m².
+fn irradiance(scene: &Scene, emitters: &[Emitter]) -> f32 {
+    let Some((low, high)) = world_bounds(scene) else { return 0.0 };
+    let size = Vec3::from(high) - Vec3::from(low);
+    // A flat scene has two sides.
+    let walls = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    let flux: f32 = emitters.iter().map(|e| std::f32::consts::PI * e.area * luminance(e.radiance)).sum();
+    if walls > 0.0 { flux / walls } else { 0.0 }
 }
 
 /// A camera that sees all of the scene in any picture at least as wide as high.
@@ -179,7 +226,10 @@ fn luminance(rgb: Vec3) -> f32 {
 /// radiance times area. A surface that faces all ways becomes a point light with a quarter of that, the mean of any
 /// convex body.
 pub fn proxy_lights(scene: &Scene) -> Vec<Light> {
-    let mut emitters: Vec<Emitter> = scene.instances.iter().filter_map(|i| emitter(scene, i)).collect();
+    lights(scene, emitters(scene))
+}
+
+fn lights(scene: &Scene, mut emitters: Vec<Emitter>) -> Vec<Light> {
     emitters.sort_by(|a, b| (b.area * luminance(b.radiance)).total_cmp(&(a.area * luminance(a.radiance))));
     emitters.truncate(MAX_PROXIES);
     let Some((low, high)) = world_bounds(scene) else { return Vec::new() };
@@ -188,11 +238,18 @@ pub fn proxy_lights(scene: &Scene) -> Vec<Light> {
     emitters.iter().map(|e| e.light(center, size)).collect()
 }
 
-fn emitter(scene: &Scene, instance: &Instance) -> Option<Emitter> {
+/// Everything that glows.
+fn emitters(scene: &Scene) -> Vec<Emitter> {
+    let radiance = |m: &Material| if m.unlit { Vec3::ZERO } else { Vec3::from(m.emissive) * mean_emission(scene, m) };
+    let radiances: Vec<Vec3> = scene.materials.iter().map(radiance).collect();
+    scene.instances.iter().filter_map(|i| emitter(scene, i, &radiances)).collect()
+}
+
+/// `radiances`: mean of each material's emission.
+fn emitter(scene: &Scene, instance: &Instance, radiances: &[Vec3]) -> Option<Emitter> {
     let mesh = scene.meshes.get(instance.mesh)?;
-    let material = scene.materials.get(mesh.material)?;
-    let radiance = Vec3::from(material.emissive) * mean_emission(scene, material);
-    if luminance(radiance) <= 0.0 || material.unlit {
+    let (material, &radiance) = scene.materials.get(mesh.material).zip(radiances.get(mesh.material))?;
+    if luminance(radiance) <= 0.0 {
         return None;
     }
     let world = Mat4::from_cols_array_2d(&instance.transform);
@@ -225,6 +282,9 @@ fn emitter(scene: &Scene, instance: &Instance) -> Option<Emitter> {
 
 /// Mean of the emission texture, linear; 1 where there is none.
 pub(crate) fn mean_emission(scene: &Scene, material: &Material) -> Vec3 {
+    if material.emissive == [0.0; 3] {
+        return Vec3::ZERO;
+    }
     let Some(image) = material.emissive_texture.and_then(|t| scene.images.get(t.image)) else { return Vec3::ONE };
     let decode = |byte: u8| {
         let v = f32::from(byte) / 255.0;

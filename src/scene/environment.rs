@@ -66,18 +66,19 @@ impl Environment {
         Ok(Self { radiance: image.mean(), image: Some(Arc::new(image)) })
     }
 
-    /// Reads a Radiance HDR or an EXR picture.
+    /// Reads a Radiance HDR or an EXR picture. Single texels that no light can have are mended, which is told in a
+    /// sentence: overflown ones get the largest radiance that there is, negative ones and such that are no numbers none.
     ///
     /// # Errors
-    /// [`EnvironmentError`]: not such a file, or a radiance that is negative or not finite.
+    /// [`EnvironmentError`]: not such a file, or more than a hundredth of its radiances is negative or not finite.
     #[cfg(feature = "io")]
-    pub fn load(path: &std::path::Path) -> Result<Self, EnvironmentError> {
+    pub fn load(path: &std::path::Path) -> Result<(Self, Option<String>), EnvironmentError> {
         let shown = path.display().to_string();
         let file = |reason: String| EnvironmentError::File { path: shown.clone(), reason };
         if path.is_dir() {
             return Err(file("is a folder; name an .hdr or .exr picture".into()));
         }
-        let bytes = std::fs::read(path).map_err(|e| file(format!("cannot be read: {e}")))?;
+        let bytes = super::files::read_regular(path).map_err(|e| file(format!("cannot be read: {e}")))?;
         let (width, height, rgb) = if bytes.starts_with(b"#?") {
             let reader = image::ImageReader::with_format(std::io::Cursor::new(&bytes), image::ImageFormat::Hdr);
             let picture = reader.decode().map_err(|e| file(format!("damaged or truncated HDR picture: {e}")))?;
@@ -94,11 +95,38 @@ impl Environment {
         } else {
             return Err(file("neither a Radiance HDR nor an EXR picture (its first bytes say otherwise)".into()));
         };
-        Self::from_image(EnvironmentImage { name: shown, width, height, rgb })
+        let mut image = EnvironmentImage { name: shown, width, height, rgb };
+        let mended = image.mend();
+        Ok((Self::from_image(image)?, mended))
     }
 }
 
+/// What an overflown half float is taken for, at least: the largest of them.
+const BRIGHTEST_HALF: f32 = 65_504.0;
+
+/// Brightest radiance of a texel, as of a glowing material; squares of it are finite.
+const BRIGHTEST: f32 = 1e9;
+
 impl EnvironmentImage {
+    /// Mends up to a hundredth of the radiances and tells how many; a picture with more is left for others to refuse.
+    pub fn mend(&mut self) -> Option<String> {
+        let bad = |v: f32| !(0.0..=BRIGHTEST).contains(&v);
+        let count = self.rgb.iter().filter(|v| bad(**v)).count();
+        // One texel is always forgiven.
+        if count == 0 || count > (self.rgb.len() / 100).max(3) {
+            return None;
+        }
+        let largest = self.rgb.iter().copied().filter(|v| !bad(*v)).fold(BRIGHTEST_HALF, f32::max);
+        for v in self.rgb.iter_mut().filter(|v| bad(**v)) {
+            *v = match *v {
+                v if v == f32::INFINITY => largest,
+                v if v > 0.0 => BRIGHTEST,
+                _ => 0.0,
+            };
+        }
+        Some(format!("{}: {count} radiances are negative or not finite and were clamped", self.name))
+    }
+
     /// Mean over the sphere of directions: rows weighted with the solid angle they cover.
     pub fn mean(&self) -> [f32; 3] {
         let mut sum = [0.0f64; 3];
@@ -198,5 +226,19 @@ mod tests {
         short.rgb.pop();
         assert!(Environment::from_image(short).is_err());
         assert!(Environment::from_image(image(1, 1, |_, _| [-1.0; 3])).is_err());
+    }
+
+    #[test]
+    fn single_bad_texels_are_mended() {
+        let mut spoilt = image(40, 20, |_, _| [1.0; 3]);
+        (spoilt.rgb[7], spoilt.rgb[8], spoilt.rgb[100], spoilt.rgb[101]) = (f32::INFINITY, -1.0, f32::NAN, 2e38);
+        let told = spoilt.mend().expect("a sentence");
+        assert!(told.contains("test: 4 radiances"), "{told}");
+        assert_eq!((spoilt.rgb[7], spoilt.rgb[8], spoilt.rgb[100], spoilt.rgb[101]), (65_504.0, 0.0, 0.0, 1e9));
+        assert!(spoilt.rgb.iter().filter(|v| **v == 1.0).count() == spoilt.rgb.len() - 4);
+        assert!(spoilt.mend().is_none() && Environment::from_image(spoilt).is_ok());
+        // Negative control: where much is bad, something else is wrong with the picture.
+        let mut broken = image(40, 20, |x, _| [if x == 3 { -1.0 } else { 1.0 }; 3]);
+        assert!(broken.mend().is_none() && Environment::from_image(broken).is_err());
     }
 }

@@ -1,5 +1,6 @@
 //! What can go wrong while a scene is found, read or written. Every variant names the file and, inside it, the place.
 
+use super::files;
 use std::path::{Path, PathBuf};
 
 /// Why a scene could not be loaded or written.
@@ -51,12 +52,22 @@ pub enum SceneError {
         problem: String,
     },
     /// A glTF file cannot be shown without an extension that is not implemented.
-    #[error("{}: extensionsRequired: {extension} is not supported; export the file without it", path.display())]
+    #[error("{}: extensionsRequired: not supported: {extension}; {advice}", path.display())]
     RequiresExtension {
         /// The file.
         path: PathBuf,
-        /// The extension's name.
+        /// The names of all such extensions, comma separated.
         extension: String,
+        /// What can be done about it.
+        advice: String,
+    },
+    /// No triangle of it can be seen from anywhere.
+    #[error("{}: there is nothing to draw: {reason}", path.display())]
+    NothingToDraw {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        reason: String,
     },
     /// Neither a file nor a bundled scene.
     #[error("{name}: neither a file (.gltf, .glb, .obj) nor a bundled scene ({known}) nor paper-room:INDEX")]
@@ -100,7 +111,7 @@ pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, SceneError> {
     if path.is_dir() {
         return Err(SceneError::IsFolder { path: path.to_owned() });
     }
-    match std::fs::read(path) {
+    match files::read_regular(path) {
         Ok(bytes) if bytes.is_empty() => Err(SceneError::Empty { path: path.to_owned() }),
         Ok(bytes) => Ok(bytes),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Err(SceneError::NotFound { path: path.to_owned() }),

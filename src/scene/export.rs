@@ -65,8 +65,13 @@ pub fn to_glb(scene: &Scene) -> Result<Vec<u8>, String> {
             "extras": {"bouncelight": {"environment": scene.environment.radiance}},
         }],
     });
-    let mut used =
-        vec!["KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_unlit", "KHR_texture_transform"];
+    let mut used = vec![
+        "KHR_materials_emissive_strength",
+        "KHR_materials_ior",
+        "KHR_materials_specular",
+        "KHR_materials_unlit",
+        "KHR_texture_transform",
+    ];
     if !lights.is_empty() {
         used.push("KHR_lights_punctual");
         root["extensions"] = json!({"KHR_lights_punctual": {"lights": lights}});
@@ -250,6 +255,9 @@ impl Writer {
             AlphaMode::Blend => out["alphaMode"] = json!("BLEND"),
         }
         let mut extensions = serde_json::Map::new();
+        if m.specular_tint != [1.0; 3] {
+            extensions.insert("KHR_materials_specular".to_owned(), json!({"specularColorFactor": m.specular_tint}));
+        }
         if m.f0 != DIELECTRIC_F0 {
             let root = m.f0.clamp(0.0, 0.99).sqrt();
             extensions.insert("KHR_materials_ior".to_owned(), json!({"ior": (1.0 + root) / (1.0 - root)}));

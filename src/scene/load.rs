@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Scene, SceneError, bundled, gltf, obj, paper_room};
+use super::{LoadOptions, Scene, SceneError, bundled, gltf, obj, paper_room};
 
 /// Loads what `spec` names: a `.gltf`, `.glb` or `.obj` path, `paper-room:INDEX` (see [`paper_room`]), or one of
 /// [`bundled::NAMES`]. The result has at least one camera and one source of light; see [`super::defaults`].
@@ -10,6 +10,14 @@ use super::{Scene, SceneError, bundled, gltf, obj, paper_room};
 /// # Errors
 /// [`SceneError`], which names the file and the place in it.
 pub fn load(spec: &str) -> Result<Scene, SceneError> {
+    load_with(spec, LoadOptions::default())
+}
+
+/// As [`load`], with limits of one's own on what the file may name.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(spec: &str, options: LoadOptions) -> Result<Scene, SceneError> {
     if let Some(index) = spec.strip_prefix("paper-room:") {
         return match index.parse::<u32>() {
             Ok(index) if index <= paper_room::MAX_INDEX => Ok(paper_room::scene(index)),
@@ -28,8 +36,8 @@ pub fn load(spec: &str) -> Result<Scene, SceneError> {
         return Err(SceneError::IsFolder { path: path.to_owned() });
     }
     match extension.as_str() {
-        "gltf" | "glb" => gltf::load(path),
-        "obj" => obj::load(path),
+        "gltf" | "glb" => gltf::load_with(path, options),
+        "obj" => obj::load_with(path, options),
         _ if path.is_file() => Err(SceneError::UnsupportedExtension { path: path.to_owned(), extension }),
         _ if extension.is_empty() && !spec.contains(std::path::is_separator) => {
             Err(SceneError::UnknownName { name: spec.to_owned(), known: bundled::NAMES.join(", ") })

@@ -18,6 +18,8 @@ mod error;
 #[cfg(feature = "io")]
 pub mod export;
 #[cfg(feature = "io")]
+mod files;
+#[cfg(feature = "io")]
 mod geometry;
 #[cfg(feature = "io")]
 pub mod gltf;
@@ -32,13 +34,17 @@ pub mod path;
 pub mod rig;
 pub mod shapes;
 #[cfg(feature = "io")]
+pub mod sound;
+#[cfg(feature = "io")]
 mod texture;
 
 pub use environment::Environment;
 #[cfg(feature = "io")]
 pub use error::SceneError;
 #[cfg(feature = "io")]
-pub use load::load;
+pub use files::LoadOptions;
+#[cfg(feature = "io")]
+pub use load::{load, load_with};
 
 /// A whole scene, ready to be uploaded.
 #[derive(Debug, Clone, Default)]
@@ -63,6 +69,8 @@ pub struct Scene {
     pub variants: Vec<String>,
     /// How the objects move, if they do; see [`Scene::pose`].
     pub rig: Option<rig::Rig>,
+    /// The sun and the sky are those that the loader adds where a file has no light; see [`Scene::surround`].
+    pub default_light: bool,
     /// What was mended or left out while loading, one plain sentence each, naming the file and place.
     pub warnings: Vec<String>,
 }
@@ -163,8 +171,12 @@ pub struct Material {
     /// Perceptual roughness; GGX α is its square.
     pub roughness: f32,
     /// Reflectance of a dielectric at normal incidence: 0.04 for index 1.5; 0 leaves a purely diffuse surface
-    /// (KHR_materials_ior). Metals take their base colour instead.
+    /// (KHR_materials_ior, KHR_materials_specular). Metals take their base colour instead. Where it is coloured, the
+    /// largest of the three, which is what the diffuse light loses.
     pub f0: f32,
+    /// Colour of that reflectance, the largest component 1: `f0 · specular_tint` at normal incidence, white at grazing
+    /// angles. White but for files with KHR_materials_specular or KHR_materials_pbrSpecularGlossiness.
+    pub specular_tint: [f32; 3],
     /// Green multiplies roughness, blue multiplies metallic (linear image).
     pub metallic_roughness_texture: Option<TextureRef>,
     /// Tangent-space normal map (linear image).
@@ -196,6 +208,7 @@ impl Default for Material {
             metallic: 1.0,
             roughness: 1.0,
             f0: DIELECTRIC_F0,
+            specular_tint: [1.0; 3],
             metallic_roughness_texture: None,
             normal_texture: None,
             normal_scale: 1.0,

@@ -9,8 +9,11 @@ use std::collections::HashMap;
 use std::io::Cursor;
 use std::path::Path;
 
+use super::files::{self, Folder, LoadOptions};
 use super::texture::{self, Use};
-use super::{AlphaMode, Instance, Material, Mesh, Sampler, Scene, SceneError, TextureRef, defaults, error, geometry};
+use super::{
+    AlphaMode, Instance, Material, Mesh, Sampler, Scene, SceneError, TextureRef, defaults, error, geometry, sound,
+};
 
 /// Loads an OBJ file, its material libraries and textures, and fills in what is missing, as [`super::defaults`] says.
 /// A missing library, material or texture is a warning.
@@ -18,10 +21,18 @@ use super::{AlphaMode, Instance, Material, Mesh, Sampler, Scene, SceneError, Tex
 /// # Errors
 /// [`SceneError`] naming the file and the line.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
+    load_with(path, LoadOptions::default())
+}
+
+/// As [`load`], with limits of one's own.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError> {
     let bytes = error::read_file(path)?;
-    let text = String::from_utf8_lossy(&bytes);
+    let text = String::from_utf8_lossy(files::without_mark(&bytes));
     check(path, &text)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = &Folder::of(path, options);
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let mut scene = Scene { name, ..Scene::default() };
 
@@ -29,14 +40,13 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
     let warn = |what: String| warnings.borrow_mut().push(format!("{}: {what}", path.display()));
     let options = tobj::LoadOptions { single_index: true, triangulate: true, ..tobj::LoadOptions::default() };
     let read_library = |library: &Path| {
-        let read = std::fs::read(folder.join(library)).map_err(|e| e.to_string());
-        let parsed = read.and_then(|bytes| {
-            let text = String::from_utf8_lossy(&bytes).into_owned();
+        let parsed = folder.read(&library.to_string_lossy()).and_then(|bytes| {
+            let text = String::from_utf8_lossy(files::without_mark(&bytes)).into_owned();
             tobj::load_mtl_buf(&mut Cursor::new(text.as_bytes())).map_err(|e| e.to_string())
         });
         // An empty library instead of an error keeps the other libraries of the file.
         Ok(parsed.unwrap_or_else(|problem| {
-            warn(format!("material library '{}' cannot be read: {problem}", library.display()));
+            warn(format!("material library '{}': {problem}", library.display()));
             Default::default()
         }))
     };
@@ -77,6 +87,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
         });
         scene.meshes.push(mesh);
     }
+    sound::settle(&mut scene, path)?;
     defaults::complete(&mut scene);
     Ok(scene)
 }
@@ -158,7 +169,7 @@ fn mesh(model: tobj::Model, material: usize, normal_map: Option<TextureRef>) -> 
 }
 
 struct Textures<'a> {
-    folder: &'a Path,
+    folder: &'a Folder,
     path: &'a Path,
     known: HashMap<(String, Use), usize>,
 }
@@ -213,8 +224,11 @@ impl Textures<'_> {
         let name = name.replace('\\', "/");
         let key = (name.clone(), usage);
         let image = *self.known.entry(key).or_insert_with(|| {
-            let read = std::fs::read(self.folder.join(&name)).map_err(|e| format!("cannot be read: {e}"));
-            let image = read.and_then(|bytes| texture::decode(&name, &bytes, usage)).unwrap_or_else(|problem| {
+            let decoded = self.folder.read(&name).and_then(|bytes| {
+                texture::room(&scene.images, texture::MAX_TOTAL)?;
+                texture::decode(&name, &bytes, usage)
+            });
+            let image = decoded.unwrap_or_else(|problem| {
                 let what = format!("texture '{name}': {problem}; a checker stands in for it");
                 scene.warnings.push(format!("{}: {what}", self.path.display()));
                 texture::stand_in(&name, usage)

@@ -13,16 +13,30 @@ pub(crate) enum Use {
     Data,
     /// Normal map: linear.
     Normal,
+    /// Specular colour and glossiness: sRGB with linear alpha.
+    Specular,
 }
 
 impl Use {
     fn color_space(self) -> ColorSpace {
-        if self == Use::Color { ColorSpace::Srgb } else { ColorSpace::Linear }
+        if matches!(self, Use::Color | Use::Specular) { ColorSpace::Srgb } else { ColorSpace::Linear }
     }
 }
 
 /// No side of a texture may be longer; WebGPU grants 8192 by default and larger ones are scaled at upload or refused.
 const MAX_SIDE: u32 = 16_384;
+
+/// Bytes of all decoded images of a scene together: thousands of small files can hold large pictures.
+pub(crate) const MAX_TOTAL: u64 = 4 << 30;
+
+/// Whether a scene that has `images` may have another.
+///
+/// # Errors
+/// A sentence without subject.
+pub(crate) fn room(images: &[Image], most: u64) -> Result<(), String> {
+    let taken: u64 = images.iter().map(|i| i.rgba.len() as u64).sum();
+    if taken < most { Ok(()) } else { Err(format!("is left out: the scene's images already take {taken} bytes")) }
+}
 
 /// Decodes PNG, JPEG, WebP, BMP, TGA or HDR bytes (told apart by content, then by the name's ending).
 ///
@@ -58,8 +72,60 @@ pub(crate) fn stand_in(name: &str, usage: Use) -> Image {
     let tiles: [[u8; 4]; 2] = match usage {
         Use::Color => [[255, 0, 255, 255], [0, 0, 0, 255]],
         Use::Data => [[255, 40, 255, 255], [255, 255, 255, 255]],
+        Use::Specular => [[60, 60, 60, 215], [60, 60, 60, 0]],
         Use::Normal => [[64, 128, 238, 255], [192, 128, 238, 255]],
     };
     let rgba = (0..64).flat_map(|i| tiles[(i % 8 + i / 8) % 2]).collect();
     Image { name: format!("{name} (stand-in)"), width: 8, height: 8, rgba, color_space: usage.color_space() }
+}
+
+/// Radiometric value of each byte under the sRGB transfer function.
+pub(crate) fn srgb_table() -> [f32; 256] {
+    std::array::from_fn(|byte| {
+        let v = byte as f32 / 255.0;
+        if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+    })
+}
+
+/// The nearest byte under the sRGB transfer function to a value in [0, 1].
+pub(crate) fn to_srgb(v: f32) -> u8 {
+    let v = v.clamp(0.0, 1.0);
+    let encoded = if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    (encoded * 255.0 + 0.5) as u8
+}
+
+/// Mean of an image's colour (linear) and alpha.
+pub(crate) fn mean(image: &Image) -> [f32; 4] {
+    let linear: [f32; 256] = std::array::from_fn(|b| b as f32 / 255.0);
+    let table = if image.color_space == ColorSpace::Srgb { srgb_table() } else { linear };
+    let mut sum = [0.0f64; 4];
+    for pixel in image.rgba.chunks_exact(4) {
+        (0..3).for_each(|c| sum[c] += f64::from(table[usize::from(pixel[c])]));
+        sum[3] += f64::from(linear[usize::from(pixel[3])]);
+    }
+    sum.map(|s| (s / (image.rgba.len() / 4).max(1) as f64) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_share_a_bound() {
+        let images = [stand_in("a", Use::Color), stand_in("b", Use::Data)];
+        assert!(room(&images, 513).is_ok());
+        let told = room(&images, 512).unwrap_err();
+        assert!(told.contains("512 bytes"), "{told}");
+    }
+
+    #[test]
+    fn srgb_bytes_survive_a_round_trip_and_means_are_of_light() {
+        let table = srgb_table();
+        assert!((0..=255u8).all(|b| to_srgb(table[usize::from(b)]) == b));
+        // Magenta and black: half of the light, not of the bytes.
+        let [r, g, b, a] = mean(&stand_in("a", Use::Color));
+        assert_eq!([r, g, b, a], [0.5, 0.0, 0.5, 1.0]);
+        let half = Image { rgba: [188; 4].to_vec(), width: 1, height: 1, ..stand_in("a", Use::Color) };
+        assert!((mean(&half)[0] - 0.503).abs() < 1e-3, "188 is one half in sRGB: {}", mean(&half)[0]);
+    }
 }

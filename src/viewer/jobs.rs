@@ -139,14 +139,21 @@ pub fn spawn(
 }
 
 /// Reads and uploads a scene.
-pub fn scene(handles: &Handles, spec: String, progress: &Progress) -> Result<Product, String> {
+pub fn scene(
+    handles: &Handles,
+    spec: String,
+    options: scene::LoadOptions,
+    progress: &Progress,
+) -> Result<Product, String> {
     progress.stage(&format!("reading {spec}"));
-    let scene = scene::load(&spec).map_err(|e| e.to_string())?;
+    let scene = scene::load_with(&spec, options).map_err(|e| e.to_string())?;
     if progress.stopped() {
         return Err("cancelled".into());
     }
     progress.stage(&format!("uploading {spec}"));
-    let gpu = SceneGpu::new(&handles.device, &handles.queue, &scene).map_err(|e| e.to_string())?;
+    let mut gpu = SceneGpu::new(&handles.device, &handles.queue, &scene).map_err(|e| e.to_string())?;
+    progress.stage(&format!("building trees for the rays of {spec}"));
+    gpu.trace(&handles.device, &handles.queue, &scene).map_err(|e| e.to_string())?;
     Ok(Product::Scene { spec, scene: Box::new(scene), gpu: Box::new(gpu) })
 }
 

@@ -45,6 +45,8 @@ use thiserror::Error;
 pub struct Options {
     /// A file, a bundled scene or `paper-room:INDEX`; the bundled interior when absent.
     pub scene: Option<String>,
+    /// What scene files may name.
+    pub load: crate::scene::LoadOptions,
     /// The network's weights; the shipped ones when absent.
     pub weights: Option<PathBuf>,
     /// The method on the left.

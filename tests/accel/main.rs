@@ -3,6 +3,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod instances;
 mod oracle;
 
 use bouncelight::accel::{Accel, AccelError, HitGpu, MAX_TRIANGLES, RayGpu};

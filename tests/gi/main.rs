@@ -9,6 +9,7 @@ mod corrected;
 #[cfg(feature = "io")]
 mod dataset;
 mod edges;
+mod gather;
 mod glossy;
 #[cfg(feature = "reference")]
 mod probes;

@@ -177,14 +177,12 @@ fn references() {
     glb.json["extensions"] = punctual(json!({"type": "point"}));
     glb.json["nodes"] = json!([{"extensions": uses(9)}]);
     refused(glb.load(), &["nodes[0]", "light"]);
-    glb.json["nodes"] = json!([{"extensions": uses(0)}]);
+    glb.json["nodes"] = json!([{"mesh": 0, "extensions": uses(0)}]);
     assert!(glb.load().is_ok());
     glb.json["extensions"] = punctual(json!({"type": "spot"}));
     refused(glb.load(), &["lights[0]", "spot"]);
-    glb.json["extensions"] = punctual(json!({"type": "laser"}));
-    refused(glb.load(), &["lights[0]", "type"]);
     let mut glb = Glb::triangle();
-    glb.json["nodes"] = json!([{"camera": 0}]);
+    glb.json["nodes"] = json!([{"mesh": 0, "camera": 0}]);
     refused(glb.load(), &["nodes[0].camera"]);
     for camera in [json!({"type": "perspective"}), json!({"type": "orthographic"}), json!({"type": "fisheye"})] {
         glb.json["cameras"] = json!([camera]);
@@ -219,7 +217,14 @@ fn required_extensions() {
     let about = |word: &str| scene.warnings.iter().filter(|w| w.contains(word)).count();
     assert_eq!((about("KHR_materials_clearcoat"), about("KHR_texture_transform")), (1, 0), "{:?}", scene.warnings);
     glb.json["extensionsRequired"] = json!(["KHR_mesh_quantization", "KHR_draco_mesh_compression"]);
-    refused(glb.load(), &["made.glb", "KHR_draco_mesh_compression", "not supported"]);
+    let draco = "npx @gltf-transform/cli copy made.glb";
+    refused(glb.load(), &["made.glb", "not supported: KHR_draco_mesh_compression;", draco]);
+    // All of them in one message.
+    glb.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression", "KHR_texture_basisu", "ACME_secret"]);
+    let all = "KHR_draco_mesh_compression, KHR_texture_basisu, ACME_secret";
+    refused(glb.load(), &[all, "npx @gltf-transform/cli ktxdecompress made.glb", "without the others"]);
+    glb.json["extensionsRequired"] = json!(["ACME_secret"]);
+    refused(glb.load(), &["ACME_secret; export the file without"]);
 }
 
 #[test]
@@ -232,10 +237,9 @@ fn obj_files() {
     refused(load_bytes("a.obj", b"v 0 0 0\nf 1/1 1 1\n"), &["line 2", "'1/1'"]);
     refused(load_bytes("a.obj", b"v 0 0 0\nf 99999999999999999999 1 1\n"), &["line 2"]);
     refused(load_bytes("a.obj", b"v 0 0 0\nusemtl\n"), &["line 2", "usemtl"]);
-    // Not text at all, and text without a face: nothing to draw, but a picture of nothing.
-    let _ = load_bytes("a.obj", &[0xff, 0xfe, 0x00, 0x80]);
-    let scene = load_bytes("a.obj", b"v 0 0 0\nv 1 0 0\n").expect("an empty scene");
-    assert!(scene.instances.is_empty() && !scene.cameras.is_empty());
+    // Not text at all, and text without a face.
+    refused(load_bytes("a.obj", &[0xff, 0xfe, 0x00, 0x80]), &["a.obj", "nothing to draw", "no triangle is placed"]);
+    refused(load_bytes("a.obj", b"v 0 0 0\nv 1 0 0\n"), &["nothing to draw"]);
 }
 
 #[test]

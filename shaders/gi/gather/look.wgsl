@@ -152,9 +152,9 @@ fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, round: u32, glows: bool) -> Fo
         radiance = surface.emission * (n_d / PI) / (n_d / PI + density);
     }
     let n_v = abs(facing);
-    let dielectric = dielectric_lobe(surface.f0, surface.roughness, n_v);
     let lobe = env_brdf(surface.f0, surface.roughness, n_v);
-    let diffuse = surface.diffuse * (1.0 - dielectric.x);
+    let most = max(surface.f0.x, max(surface.f0.y, surface.f0.z));
+    let diffuse = surface.diffuse * (1.0 - diffuse_loss(most, surface.roughness, n_v));
     let back = diffuse + lobe;
     if all(back <= vec3f(0.0)) || (surface.flags & MET_UNLIT) != 0u {
         return Found(radiance, NONE, vec3f(0.0), hit.t);

@@ -145,6 +145,12 @@ impl GatherGi {
         self.frame
     }
 
+    /// Bind groups made since the start; stands still in steady frames.
+    pub fn allocations(&self) -> u64 {
+        let passes = [&self.rays, &self.renew, &self.settle, &self.blur].map(|p| p.binder.made());
+        self.inputs.made() + self.scene.made() + self.frame_params.made() + self.upsample.made() + passes.iter().sum::<u64>()
+    }
+
     fn params(&self, inputs: &Inputs<'_>, rays: &Rays<'_>) -> Result<Params, GiError> {
         let counts = rays.scene.counts();
         let flags = [
@@ -255,6 +261,10 @@ impl Rung for GatherGi {
         self.round = params.round + 1;
         self.frame += 1;
         self.upsample.record(recorder, &bound, &self.cells, &store.cell_light, None, output)
+    }
+
+    fn settled(&self) -> Option<u32> {
+        Some(self.frame)
     }
 
     fn cut(&mut self) {

@@ -122,7 +122,7 @@ impl<'a> Surfaces<'a> {
         let [r, g, b, _] = texel(material.base_color_texture);
         let base = Vec3::from_slice(&material.base_color[..3]) * Vec3::new(r, g, b) * tint;
         let metallic = (material.metallic * texel(material.metallic_roughness_texture)[2]).clamp(0.0, 1.0);
-        let f0 = Vec3::splat(material.f0).lerp(base, metallic);
+        let f0 = (material.f0 * Vec3::from(material.specular_tint)).lerp(base, metallic);
         let lit = if material.unlit { 0.0 } else { 1.0 };
         // As the G-buffer has it, seen head-on: what the specular lobe takes is not there for the diffuse share.
         let albedo = base * ((1.0 - metallic) * (1.0 - material.f0));

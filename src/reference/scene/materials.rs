@@ -40,10 +40,10 @@ pub struct RefMaterial {
     pub normal_scale: f32,
     /// 0 opaque, the mask's cutoff, or 2 for stochastic coverage.
     pub alpha_cutoff: f32,
+    /// Colour of `f0`.
+    pub specular_tint: [f32; 3],
     /// Reflectance of the dielectric at normal incidence.
     pub f0: f32,
-    /// Unused.
-    pub pad: [f32; 3],
     /// Base colour.
     pub base_use: ImageUse,
     /// Roughness (green) and metallic (blue).
@@ -115,8 +115,8 @@ pub(super) fn pack(scene: &Scene, limits: &Limits) -> Result<(Vec<RefMaterial>, 
                 AlphaMode::Mask { cutoff } => cutoff.min(1.0),
                 AlphaMode::Blend => 2.0,
             },
+            specular_tint: m.specular_tint,
             f0: m.f0,
-            pad: [0.0; 3],
             base_use,
             rough_use,
             normal_use,

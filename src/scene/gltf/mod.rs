@@ -5,11 +5,17 @@
 //! leaves a picture (a missing texture, a line primitive, a skin) becomes a warning; the rest is a [`SceneError`].
 
 mod accessor;
+mod extensions;
+mod instancing;
 mod light;
 mod material;
+mod mend;
 mod mesh;
+mod meshopt;
 mod motion;
 mod source;
+mod specular;
+mod texture;
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -17,22 +23,9 @@ use std::path::Path;
 use glam::Mat4;
 use gltf::json::validation::{Error as Invalid, Validate};
 
-use super::{Camera, Environment, Instance, Scene, SceneError, defaults, error};
+use super::files::{self, LoadOptions};
+use super::{Camera, Environment, Instance, Scene, SceneError, defaults, error, sound};
 use source::Source;
-
-/// Extensions that this loader has.
-const SUPPORTED: [&str; 7] = [
-    "KHR_lights_punctual",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_unlit",
-    "KHR_materials_variants",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-];
-
-/// Extensions without which a file still looks much as it should, even where it says that it requires them.
-const IGNORED: [&str; 1] = ["KHR_materials_specular"];
 
 /// Loads the file's default scene (else its first, else every root node) and fills in what is missing, as
 /// [`super::defaults`] says. What was mended or left out stands in [`Scene::warnings`].
@@ -40,29 +33,35 @@ const IGNORED: [&str; 1] = ["KHR_materials_specular"];
 /// # Errors
 /// [`SceneError`] naming the file and the place in it, never a panic.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
+    load_with(path, LoadOptions::default())
+}
+
+/// As [`load`], with limits of one's own.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError> {
     let bytes = error::read_file(path)?;
     let (json, blob) = source::split(path, &bytes)?;
-    let root: gltf::json::Root =
+    let json = files::without_mark(json);
+    let mut root: gltf::json::Root =
         gltf::json::deserialize::from_slice(json).map_err(|e| SceneError::broken(path, "JSON", e.to_string()))?;
-    if let Some(extension) = root.extensions_required.iter().find(|e| !has(&SUPPORTED, e) && !has(&IGNORED, e)) {
-        return Err(SceneError::RequiresExtension { path: path.to_owned(), extension: extension.clone() });
-    }
+    extensions::check_required(path, &root)?;
+    let mended = mend::mend(&mut root);
     validate(path, &root)?;
     let document = gltf::Document::from_json_without_validation(root);
-    let source = Source::open(path, &document, blob)?;
+    let source = Source::open(path, &document, blob, options)?;
     let mut loader = Loader::new(path, &source, &document);
-    for extension in document.extensions_used().filter(|e| !has(&SUPPORTED, e)) {
+    mended.iter().for_each(|(place, what)| loader.warn(place, what));
+    for extension in document.extensions_used().filter(|e| !extensions::is_known(e)) {
         loader.warn("extensionsUsed", &format!("{extension} is not supported; the file is shown without it"));
     }
     loader.walk()?;
     loader.variants(json);
     let mut scene = loader.scene;
+    sound::settle(&mut scene, path)?;
     defaults::complete(&mut scene);
     Ok(scene)
-}
-
-fn has(list: &[&str], extension: &str) -> bool {
-    list.contains(&extension)
 }
 
 /// Runs the crate's own validation, which later code relies on not to panic, but forgives what this loader can handle.
@@ -122,6 +121,10 @@ pub(super) struct Loader<'a> {
     materials: HashMap<Option<usize>, usize>,
     /// glTF image index and use → scene image.
     images: HashMap<(usize, super::texture::Use), usize>,
+    /// Specular-glossiness textures with their factors → scene images of base colour and surface, mean of the texture.
+    converted: HashMap<String, (usize, usize, [f32; 4])>,
+    /// How each instance stands to its node.
+    placed: Vec<instancing::Copy>,
 }
 
 impl<'a> Loader<'a> {
@@ -136,6 +139,8 @@ impl<'a> Loader<'a> {
             meshes: HashMap::new(),
             materials: HashMap::new(),
             images: HashMap::new(),
+            converted: HashMap::new(),
+            placed: Vec::new(),
         }
     }
 
@@ -198,9 +203,13 @@ impl<'a> Loader<'a> {
             if node.skin().is_some() {
                 self.warn(&format!("{place} '{name}'"), "its skin is ignored; the mesh stands in its bind pose");
             }
+            let copies = self.copies(node, &place)?;
             for mesh in self.mesh(&mesh)? {
-                let transform = world.to_cols_array_2d();
-                self.scene.instances.push(Instance { name: name.clone(), mesh, transform });
+                for copy in &copies {
+                    let transform = (world * copy.matrix()).to_cols_array_2d();
+                    self.scene.instances.push(Instance { name: name.clone(), mesh, transform });
+                    self.placed.push(*copy);
+                }
             }
         }
         if let Some(camera) = node.camera() {

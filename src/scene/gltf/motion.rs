@@ -41,7 +41,9 @@ impl<'a> Loader<'a> {
             let (translation, rotation, scale) = node.transform().decomposed();
             RigNode { parent: *parent, translation, rotation, scale }
         };
-        self.scene.rig = Some(Rig { nodes: nodes.iter().map(rest).collect(), instances, animations });
+        let mut nodes = nodes.iter().map(rest).collect();
+        let instances = self.with_copies(&mut nodes, instances);
+        self.scene.rig = Some(Rig { nodes, instances, animations });
     }
 
     /// A channel; nothing for a node of another scene.

@@ -1,9 +1,12 @@
 //! Bytes of a glTF file: the GLB container, buffers and images behind URIs.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::path::Path;
 
+use super::meshopt::Packed;
 use crate::scene::SceneError;
+use crate::scene::files::{self, Folder, LoadOptions};
 
 /// JSON and, for a GLB, the binary chunk.
 type Split<'a> = (&'a [u8], Option<&'a [u8]>);
@@ -50,19 +53,47 @@ pub(super) fn split<'a>(path: &Path, bytes: &'a [u8]) -> Result<Split<'a>, Scene
     }
 }
 
-/// All buffers of a document.
+/// All buffers of a document, and what was packed in them.
 pub(super) struct Source<'a> {
     path: &'a Path,
+    folder: Folder,
     buffers: Vec<Cow<'a, [u8]>>,
+    /// Bytes of the buffer views that are compressed.
+    unpacked: HashMap<usize, Vec<u8>>,
 }
 
 impl<'a> Source<'a> {
-    /// Reads every buffer; each must have at least its declared length.
-    pub(super) fn open(path: &'a Path, document: &gltf::Document, blob: Option<&'a [u8]>) -> Result<Self, SceneError> {
-        let mut source = Self { path, buffers: Vec::new() };
-        for (i, buffer) in document.as_json().buffers.iter().enumerate() {
+    /// Reads every buffer that is needed, each of which must have at least its declared length, and unpacks
+    /// compressed views.
+    pub(super) fn open(
+        path: &'a Path,
+        document: &gltf::Document,
+        blob: Option<&'a [u8]>,
+        options: LoadOptions,
+    ) -> Result<Self, SceneError> {
+        let root = document.as_json();
+        let mut packed = Vec::new();
+        for (i, view) in root.buffer_views.iter().enumerate() {
+            let read = Packed::of(view).map_err(|e| SceneError::broken(path, format!("bufferViews[{i}]"), e))?;
+            packed.extend(read.map(|p| (i, p)));
+        }
+        // A buffer to which only compressed views refer is there for loaders that cannot unpack them, if at all.
+        let mut needed = vec![true; root.buffers.len()];
+        let mut mark = |buffer: usize, value: bool| needed.get_mut(buffer).into_iter().for_each(|n| *n = value);
+        packed.iter().for_each(|(i, _)| mark(root.buffer_views[*i].buffer.value(), false));
+        let views = root.buffer_views.iter().enumerate();
+        views.filter(|(i, _)| !packed.iter().any(|(p, _)| p == i)).for_each(|(_, v)| mark(v.buffer.value(), true));
+        packed.iter().for_each(|(_, p)| mark(p.buffer, true));
+
+        let folder = Folder::of(path, options);
+        let mut source = Self { path, folder, buffers: Vec::new(), unpacked: HashMap::new() };
+        for (i, buffer) in root.buffers.iter().enumerate() {
             let place = format!("buffers[{i}]");
             let data = match (&buffer.uri, blob) {
+                _ if !needed[i] => {
+                    source.buffers.push(Cow::Borrowed(&[]));
+                    continue;
+                }
                 (Some(uri), _) => source.fetch(uri).map_err(|e| SceneError::broken(path, &*place, e))?,
                 (None, Some(blob)) if i == 0 => Cow::Borrowed(blob),
                 _ => return Err(SceneError::broken(path, place, "has neither a URI nor a binary chunk")),
@@ -74,16 +105,48 @@ impl<'a> Source<'a> {
             }
             source.buffers.push(data);
         }
+        let mut total = 0;
+        for (i, view) in packed {
+            let bytes = source.unpack(&view, root.buffer_views[i].byte_length.0);
+            let bytes = bytes.map_err(|e| SceneError::broken(path, format!("bufferViews[{i}]"), e))?;
+            total += bytes.len() as u64;
+            if total > files::MAX_BYTES {
+                let problem = format!("the compressed views unpack to more than {} bytes", files::MAX_BYTES);
+                return Err(SceneError::broken(path, format!("bufferViews[{i}]"), problem));
+            }
+            source.unpacked.insert(i, bytes);
+        }
         Ok(source)
+    }
+
+    /// A compressed view's bytes, `length` at least.
+    fn unpack(&self, view: &Packed, length: u64) -> Result<Vec<u8>, String> {
+        let data = self.buffers.get(view.buffer).ok_or("its compressed bytes are in a buffer that does not exist")?;
+        let data = data.get(view.byte_offset..).and_then(|rest| rest.get(..view.byte_length)).ok_or_else(|| {
+            format!(
+                "its {} compressed bytes from byte {} reach beyond the buffer's {}",
+                view.byte_length,
+                view.byte_offset,
+                data.len()
+            )
+        })?;
+        let bytes = view.unpack(data)?;
+        if (bytes.len() as u64) < length {
+            return Err(format!("unpacks to {} bytes of {length}", bytes.len()));
+        }
+        Ok(bytes)
     }
 
     /// Bytes of all buffers together: no accessor can honestly need more.
     pub(super) fn total(&self) -> usize {
-        self.buffers.iter().map(|b| b.len()).sum()
+        self.buffers.iter().map(|b| b.len()).sum::<usize>() + self.unpacked.values().map(Vec::len).sum::<usize>()
     }
 
     /// The bytes of a buffer view.
     pub(super) fn view(&self, view: &gltf::buffer::View) -> Result<&[u8], SceneError> {
+        if let Some(bytes) = self.unpacked.get(&view.index()) {
+            return Ok(&bytes[..view.length().min(bytes.len())]);
+        }
         let (offset, length) = (view.offset(), view.length());
         let data = self.buffers.get(view.buffer().index()).map_or(&[][..], |b| b);
         data.get(offset..).and_then(|rest| rest.get(..length)).ok_or_else(|| {
@@ -98,12 +161,24 @@ impl<'a> Source<'a> {
             let (_, text) = data.split_once(";base64,").ok_or("is a data URI without base64")?;
             return decode_base64(text).map(Cow::Owned);
         }
-        if uri.contains("://") {
-            return Err(format!("'{}' is on a network; only files are read", shorten(uri)));
-        }
-        let relative = decode_percent(uri);
-        let file = self.path.parent().unwrap_or(Path::new("")).join(&relative);
-        std::fs::read(&file).map(Cow::Owned).map_err(|e| format!("'{relative}' cannot be read: {e}"))
+        let name = match uri.split_once(':') {
+            // As RFC 8089 has them, with no host or this one.
+            Some((scheme, rest)) if scheme.eq_ignore_ascii_case("file") => match rest.strip_prefix("//") {
+                Some(rest) => {
+                    let (host, path) = rest.split_at(rest.find('/').unwrap_or(rest.len()));
+                    if !host.is_empty() && !host.eq_ignore_ascii_case("localhost") {
+                        return Err(format!("'{}' is on another machine; only files here are read", shorten(uri)));
+                    }
+                    path
+                }
+                None => rest,
+            },
+            Some((_, rest)) if rest.starts_with("//") => {
+                return Err(format!("'{}' is on a network; only files are read", shorten(uri)));
+            }
+            _ => uri,
+        };
+        self.folder.read(&decode_percent(name)).map(Cow::Owned)
     }
 }
 
@@ -113,7 +188,7 @@ pub(super) fn shorten(uri: &str) -> String {
 }
 
 /// RFC 4648 base64; padding and line breaks are optional.
-fn decode_base64(text: &str) -> Result<Vec<u8>, String> {
+pub(super) fn decode_base64(text: &str) -> Result<Vec<u8>, String> {
     let mut out = Vec::with_capacity(text.len() / 4 * 3 + 3);
     let (mut bits, mut count) = (0u32, 0);
     for (at, c) in text.bytes().enumerate() {

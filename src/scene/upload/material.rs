@@ -42,8 +42,10 @@ pub struct MaterialGpu {
     pub pad: [f32; 2],
     /// Base colour, metallic-roughness, normal, occlusion, emissive.
     pub uses: [TextureUse; 5],
+    /// Colour of `f0`; w is unused.
+    pub specular_tint: [f32; 4],
     /// To 256 bytes.
-    pub tail: [f32; 8],
+    pub tail: [f32; 4],
 }
 
 pub(super) struct Materials {
@@ -129,7 +131,8 @@ fn uniform(m: &Material) -> MaterialGpu {
         f0: m.f0,
         pad: [0.0; 2],
         uses,
-        tail: [0.0; 8],
+        specular_tint: [m.specular_tint[0], m.specular_tint[1], m.specular_tint[2], 0.0],
+        tail: [0.0; 4],
     }
 }
 

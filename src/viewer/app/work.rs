@@ -19,12 +19,14 @@ impl App {
         match request {
             Request::Load(spec) => {
                 let name = format!("load {spec}");
-                self.spawn(name, Kind::Scene, move |p| jobs::scene(&handles, spec, p));
+                let options = self.options.load;
+                self.spawn(name, Kind::Scene, move |p| jobs::scene(&handles, spec, options, p));
             }
             Request::Surroundings(path) => {
                 let name = format!("load {}", path.display());
                 self.spawn(name, Kind::Surroundings, move |_| {
-                    let environment = crate::scene::Environment::load(&path).map_err(|e| e.to_string())?;
+                    let (environment, mended) = crate::scene::Environment::load(&path).map_err(|e| e.to_string())?;
+                    mended.iter().for_each(|m| tracing::warn!("{m}"));
                     Ok(Product::Surroundings { path, environment })
                 });
             }
@@ -62,7 +64,9 @@ impl App {
                 let Some(scene) = self.state.shown.as_ref().map(|s| s.scene.clone()) else { return };
                 self.spawn("upload the scene again".into(), Kind::Scene, move |_| {
                     let gpu = crate::scene::upload::SceneGpu::new(&handles.device, &handles.queue, &scene);
-                    Ok(Product::Uploaded(Box::new(gpu.map_err(|e| e.to_string())?)))
+                    let mut gpu = gpu.map_err(|e| e.to_string())?;
+                    gpu.trace(&handles.device, &handles.queue, &scene).map_err(|e| e.to_string())?;
+                    Ok(Product::Uploaded(Box::new(gpu)))
                 });
             }
             Request::Path(path) => match CameraPath::load(&path) {

@@ -13,9 +13,9 @@ impl State {
     /// Takes a picture of the surroundings from `path`.
     pub fn surround(&mut self, path: &std::path::Path, environment: Environment) {
         let Some(shown) = &mut self.shown else { return };
-        Arc::make_mut(&mut shown.scene).environment = environment;
+        Arc::make_mut(&mut shown.scene).surround(environment);
         shown.environment = Some(path.display().to_string());
-        self.stale.environment = true;
+        (self.stale.environment, self.stale.lights) = (true, true);
         self.version += 1;
     }
 
@@ -23,9 +23,9 @@ impl State {
     pub(super) fn set_sky(&mut self, radiance: f32) {
         let Some(shown) = &mut self.shown else { return };
         let radiance = radiance.clamp(0.0, 1e4);
-        Arc::make_mut(&mut shown.scene).environment = Environment::constant([radiance; 3]);
+        Arc::make_mut(&mut shown.scene).surround(Environment::constant([radiance; 3]));
         shown.environment = Some(radiance.to_string());
-        self.stale.environment = true;
+        (self.stale.environment, self.stale.lights) = (true, true);
         self.version += 1;
     }
 
@@ -150,6 +150,8 @@ impl State {
     pub fn light_edits(&self) -> Vec<LightEdit> {
         let Some(shown) = &self.shown else { return Vec::new() };
         let pairs = shown.original.lights.iter().zip(&shown.scene.lights).enumerate();
+        // Surroundings replace a default sun, and what stands there then is another light.
+        let pairs = pairs.filter(|(_, (from, to))| from.name == to.name);
         pairs.filter_map(|(i, (from, to))| LightEdit::between(i, from, to)).collect()
     }
 }

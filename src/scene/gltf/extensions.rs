@@ -1,0 +1,57 @@
+//! Which extensions are understood, and what to do about a file that requires others.
+
+use crate::scene::SceneError;
+use std::path::Path;
+
+/// Extensions that this loader has.
+const SUPPORTED: [&str; 13] = [
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_specular",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_transform",
+];
+
+pub(super) fn is_known(extension: &str) -> bool {
+    SUPPORTED.contains(&extension)
+}
+
+/// Refuses a file that requires what is not understood, with one sentence about all of it.
+pub(super) fn check_required(path: &Path, root: &gltf::json::Root) -> Result<(), SceneError> {
+    let missing: Vec<&str> = root.extensions_required.iter().map(String::as_str).filter(|e| !is_known(e)).collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    let advice = advice(path, &missing);
+    Err(SceneError::RequiresExtension { path: path.to_owned(), extension: missing.join(", "), advice })
+}
+
+/// What makes a file of it that can be read: commands of gltf-transform (npm), which knows these formats.
+fn advice(path: &Path, missing: &[&str]) -> String {
+    let has = |name: &str| missing.contains(&name);
+    let mut steps = Vec::new();
+    if has("KHR_texture_basisu") {
+        steps.push("ktxdecompress");
+    } else if has("KHR_draco_mesh_compression") {
+        // Any command of it writes geometry without Draco; this one does nothing else.
+        steps.push("copy");
+    }
+    let convertible = ["KHR_texture_basisu", "KHR_draco_mesh_compression"];
+    let others = missing.iter().any(|e| !convertible.contains(e));
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    match (steps.first(), others) {
+        (Some(step), false) => format!("`npx @gltf-transform/cli {step} {name} converted.glb` writes a file without"),
+        (Some(step), true) => format!(
+            "`npx @gltf-transform/cli {step} {name} converted.glb` unpacks what is compressed; export the file without the others"
+        ),
+        (None, _) => "export the file without".to_owned(),
+    }
+}

@@ -1,0 +1,83 @@
+//! Trees of meshes under a tree of instances: rays must meet what they meet where all triangles stand in one list.
+
+use crate::oracle::*;
+use bouncelight::accel::{Accel, RayCaster, SceneRays};
+use bouncelight::scene::{Instance, Material, Mesh, Scene};
+use glam::{Mat4, Quat, Vec3};
+
+fn mesh(triangles: &[Triangle]) -> Mesh {
+    let positions: Vec<[f32; 3]> = triangles.iter().flatten().copied().collect();
+    let normals = vec![[0.0, 1.0, 0.0]; positions.len()];
+    Mesh { indices: (0..positions.len() as u32).collect(), positions, normals, ..Default::default() }
+}
+
+/// Meshes of a few triangles, each placed several times: turned, stretched, mirrored.
+fn placed() -> (Scene, Vec<Triangle>) {
+    let mut scene = Scene { materials: vec![Material::default()], ..Default::default() };
+    for (i, count) in [1usize, 40, 300].into_iter().enumerate() {
+        scene.meshes.push(mesh(&soup(count, 0.4, i as u64 + 5)));
+    }
+    for k in 0..60u32 {
+        let f = k as f32;
+        let scale = Vec3::new(0.1 + 0.3 * (f * 0.7).sin().abs(), 0.2, if k % 3 == 0 { -0.2 } else { 0.3 });
+        let turn = Quat::from_axis_angle(Vec3::new(f.sin(), f.cos(), 0.3).normalize(), f);
+        let at = Vec3::new((f * 1.3).sin(), (f * 2.1).sin(), (f * 3.7).sin());
+        let transform = Mat4::from_scale_rotation_translation(scale, turn, at).to_cols_array_2d();
+        scene.instances.push(Instance { name: String::new(), mesh: k as usize % 3, transform });
+    }
+    let world = world_triangles(&scene);
+    (scene, world)
+}
+
+fn world_triangles(scene: &Scene) -> Vec<Triangle> {
+    let of = |i: &Instance| {
+        let m = Mat4::from_cols_array_2d(&i.transform);
+        let p = &scene.meshes[i.mesh].positions;
+        scene.meshes[i.mesh].indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| m.transform_point3(p[t[k] as usize].into()).to_array())).collect::<Vec<_>>()
+    };
+    scene.instances.iter().flat_map(of).collect()
+}
+
+/// Share of rays that meet something else, or at another distance, than in the one list.
+fn different(gpu: &bouncelight::gpu::Gpu, caster: &RayCaster, rays: &SceneRays, world: &[Triangle]) -> f64 {
+    let accel = Accel::build(world).unwrap();
+    let sent = random_rays(4000, 1.5, 3);
+    let hits = caster.trace(&gpu.device, &gpu.queue, rays.accel(), &sent).unwrap();
+    let wrong = sent.iter().zip(&hits).filter(|(ray, hit)| {
+        let expected = accel.closest(ray.origin, ray.direction, ray.t_max);
+        match expected {
+            None => hit.triangle != u32::MAX,
+            Some(e) => hit.triangle == u32::MAX || (e.t - hit.t).abs() > 1e-4 * (1.0 + e.t),
+        }
+    });
+    let met = hits.iter().filter(|h| h.triangle != u32::MAX).count();
+    assert!(met > 500 && met < 3900, "{met} rays met something");
+    wrong.count() as f64 / sent.len() as f64
+}
+
+#[test]
+fn instances_are_met_where_they_stand_and_where_they_go() {
+    let Some(gpu) = crate::common::gpu() else { return };
+    let (mut scene, world) = placed();
+    let mut rays = SceneRays::new(&gpu.device, &gpu.queue, &scene).expect("they fit");
+    let caster = RayCaster::new(&gpu.device);
+    // A ray along an edge may find either side's triangle, or a neighbour's.
+    assert!(different(&gpu, &caster, &rays, &world) < 1e-3);
+    for i in &mut scene.instances {
+        i.transform[3][0] += 0.4;
+    }
+    let moved = world_triangles(&scene);
+    // Negative control: nobody has told the rays yet.
+    assert!(different(&gpu, &caster, &rays, &moved) > 0.1);
+    rays.place(&gpu.queue, &scene);
+    assert!(different(&gpu, &caster, &rays, &moved) < 1e-3);
+}
+
+#[test]
+fn nothing_to_meet_is_no_error() {
+    let Some(gpu) = crate::common::gpu() else { return };
+    let rays = SceneRays::new(&gpu.device, &gpu.queue, &Scene::default()).expect("nothing fits");
+    let hits = RayCaster::new(&gpu.device).trace(&gpu.device, &gpu.queue, rays.accel(), &random_rays(64, 1.0, 1)).unwrap();
+    assert!(hits.iter().all(|h| h.triangle == u32::MAX));
+    assert_eq!(rays.counts().instances, 0);
+}

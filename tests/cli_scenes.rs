@@ -1,0 +1,100 @@
+//! Scenes as the command line meets them: what they may name, scenes of nothing, surroundings that replace default light.
+
+use assert_cmd::Command;
+use std::path::Path;
+
+fn bouncelight(args: &[&str]) -> std::process::Output {
+    Command::new(env!("CARGO_BIN_EXE_bouncelight")).args(args).output().expect("the program starts")
+}
+
+/// Runs and checks the exit code and that standard error holds every one of `words`; never a panic message.
+#[track_caller]
+fn fails(args: &[&str], code: i32, words: &[&str]) {
+    let out = bouncelight(args);
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(code), "{args:?}: {text}");
+    assert!(!text.contains("panicked"), "{args:?}: {text}");
+    for word in words {
+        assert!(text.contains(word), "{args:?}: `{word}` is missing in: {text}");
+    }
+}
+
+fn path(dir: &tempfile::TempDir, name: &str) -> String {
+    dir.path().join(name).to_str().expect("a temporary path is text").into()
+}
+
+/// Three positions, a triangle; whatever else a test needs comes in `more`.
+fn triangle(dir: &tempfile::TempDir, name: &str, more: &str) -> String {
+    let scene = path(dir, name);
+    let data = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
+    let text = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"material":0}}]}}],
+        "buffers":[{{"byteLength":36,"uri":"data:application/octet-stream;base64,{data}"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}}],
+        {more}}}"#
+    );
+    std::fs::write(&scene, text).unwrap();
+    scene
+}
+
+/// What is told before a usage error ends the run: the scene's warnings, without a GPU.
+fn warnings(args: &[&str]) -> String {
+    let out = bouncelight(&[&["render"], args, &["-o", "never.png", "--camera", "99"]].concat());
+    let text = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(text.contains("--camera 99"), "{text}");
+    text
+}
+
+#[test]
+fn scenes_of_nothing_exit_with_4() {
+    let dir = tempfile::tempdir().unwrap();
+    let (noise, out) = (path(&dir, "noise.obj"), path(&dir, "out.png"));
+    std::fs::write(&noise, [7, 200, 13, 10, 0, 255]).unwrap();
+    fails(&["render", &noise, "-o", &out], 4, &["noise.obj", "nothing to draw"]);
+    let empty = path(&dir, "empty.gltf");
+    std::fs::write(&empty, r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[]}]}"#).unwrap();
+    fails(&["render", &empty, "-o", &out, "--method", "reference"], 4, &["empty.gltf", "nothing to draw"]);
+    assert!(!Path::new(&out).exists());
+}
+
+#[test]
+fn what_a_scene_names_stays_in_its_folder_unless_allowed() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir(dir.path().join("scene")).unwrap();
+    let more =
+        r#""materials":[{"emissiveTexture":{"index":0}}],"textures":[{"source":0}],"images":[{"uri":"../x.png"}]"#;
+    let scene = triangle(&dir, "scene/a.gltf", more);
+    let told = warnings(&[&scene]);
+    assert!(told.contains("'../x.png' lies outside") && told.contains("--allow-outside"), "{told}");
+    let told = warnings(&[&scene, "--allow-outside"]);
+    assert!(!told.contains("lies outside") && told.contains("'../x.png' cannot be read"), "{told}");
+}
+
+#[test]
+fn given_surroundings_replace_the_default_sun() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = triangle(&dir, "a.gltf", r#""materials":[{}]"#);
+    assert!(warnings(&[&scene]).contains("a sun of 1 W/m²"));
+    assert!(!warnings(&[&scene, "--environment", "0.5"]).contains("sun"));
+    // There is no light to change any more, where without surroundings there is one.
+    let light = ["--light", "0 strength=2", "--camera", "99", "-o", "never.png"];
+    fails(&[&["render", &scene], &light[..]].concat(), 2, &["--camera 99"]);
+    fails(&[&["render", &scene, "--environment", "0.5"], &light[..]].concat(), 2, &["--light"]);
+
+    // A picture with one overflown texel is used, and told.
+    let sky = path(&dir, "sky.exr");
+    let mut rgb = vec![0.5f32; 3 * 16 * 8];
+    (rgb[30], rgb[31]) = (f32::INFINITY, -1.0);
+    let layer = bouncelight::image_io::Layer::new("", "RGB", &rgb);
+    bouncelight::image_io::write_exr(Path::new(&sky), 16, 8, &[layer], &[]).unwrap();
+    let told = warnings(&[&scene, "--environment", &sky]);
+    assert!(told.contains("sky.exr: 2 radiances") && told.contains("clamped"), "{told}");
+    assert!(!told.contains("a sun of"), "{told}");
+    // Negative control: a picture full of them is none.
+    rgb[..60].fill(f32::NAN);
+    let layer = bouncelight::image_io::Layer::new("", "RGB", &rgb);
+    bouncelight::image_io::write_exr(Path::new(&sky), 16, 8, &[layer], &[]).unwrap();
+    fails(&["render", &scene, "-o", "never.png", "--environment", &sky], 4, &["sky.exr", "finite"]);
+}

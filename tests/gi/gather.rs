@@ -1,0 +1,239 @@
+//! `gather` against arithmetic, and against the laws it promises.
+
+use crate::common;
+use crate::world::{self, GREY, difference, hall, mean, scene, sun};
+use bouncelight::gi::gather::Options;
+use bouncelight::gi::{GiError, Method};
+use bouncelight::gpu::{Gpu, timing::Recorder};
+use bouncelight::render::capture::{CaptureOptions, Layer, Picture, capture};
+use bouncelight::render::{RenderError, Renderer, View};
+use bouncelight::scene::upload::SceneGpu;
+use bouncelight::scene::{Camera, LightKind, Scene};
+
+const PLAIN: Method = Method::Gather(Options::PLAIN);
+
+fn method() -> Method {
+    Method::Gather(Options::default())
+}
+
+fn uploaded(gpu: &Gpu, scene: &Scene) -> SceneGpu {
+    let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the scene fits");
+    uploaded.trace(&gpu.device, &gpu.queue, scene).expect("its rays fit");
+    uploaded
+}
+
+/// Indirect light and positions after so many frames.
+fn lit(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, frames: u32) -> (Picture, Picture) {
+    let layers = &[Layer::DiffInd, Layer::Position];
+    let options = CaptureOptions { layers, warmup: frames - 1, ..Default::default() };
+    let frame = capture(gpu, renderer, &uploaded(gpu, scene), &scene.cameras[0], options).expect("the frame is drawn");
+    let layer = |l| frame.layer(l).expect("it was asked for").clone();
+    (layer(Layer::DiffInd), layer(Layer::Position))
+}
+
+fn light(gpu: &Gpu, method: Method, size: [u32; 2], scene: &Scene, frames: u32) -> Vec<f32> {
+    lit(gpu, &mut world::renderer(gpu, size, method), scene, frames).0.data
+}
+
+/// Draws frames one after the other; what the last one has.
+fn go_on(gpu: &Gpu, renderer: &mut Renderer, uploaded: &SceneGpu, camera: &Camera, frames: u32) -> Vec<f32> {
+    let size = renderer.size();
+    for i in 0..frames {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let view = View::new(camera, size, [0.0; 2]).with_seed(i);
+        renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, uploaded, &view).expect("the frame is drawn");
+        gpu.queue.submit([encoder.finish()]);
+    }
+    let texture = &renderer.targets().indirect.texture;
+    let bytes = bouncelight::gpu::readback::texture(&gpu.device, &gpu.queue, texture).expect("reading back works");
+    let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
+    halves.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]].map(f32::from)).collect()
+}
+
+#[test]
+fn a_lit_panel_sends_what_its_form_factor_says() {
+    let Some(gpu) = common::gpu() else { return };
+    let build = |panel: f32| {
+        let blocks =
+            [([-5.0, -0.2, -5.0], [5.0, 0.0, 5.0], [0.0; 3]), ([-4.2, 0.0, -2.0], [-4.0, 4.0, 2.0], [panel; 3])];
+        scene(&blocks, &[sun([-1.0, 0.0, 0.0], 2.0)], 0.0, Camera::look_at([0.0, 6.0, 0.001], [0.0, 0.0, 0.0], 1.2))
+    };
+    let mut renderer = world::renderer(&gpu, [64, 64], PLAIN);
+    let (light, places) = lit(&gpu, &mut renderer, &build(0.6), 400);
+    let (mut error, mut sum, mut all) = (0.0, 0.0, 0.0);
+    for (e, p) in light.data.chunks_exact(3).zip(places.data.chunks_exact(3)) {
+        if p[1].abs() > 1e-3 || p[0] < -3.2 {
+            continue;
+        }
+        // E/π of a panel of radiance 0.6 · 2/π, by the midpoints of 40 × 40 squares.
+        let mut expected = 0.0;
+        for k in 0..1600 {
+            let (y, z) = (0.1 * ((k / 40) as f32 + 0.5), 0.1 * ((k % 40) as f32 + 0.5) - 2.0);
+            let v = [p[0] + 4.0, y - p[1], z - p[2]];
+            let d2 = v.iter().map(|x| x * x).sum::<f32>();
+            expected += 0.01 * v[0] * v[1] / (d2 * d2);
+        }
+        expected *= 0.6 * 2.0 / std::f32::consts::PI.powi(2);
+        error += f64::from((e[0] - expected).abs());
+        all += f64::from(e[0] - expected);
+        sum += f64::from(expected);
+    }
+    println!("a panel's light on the floor: {:.2} % off, {:+.2} % in all", 100.0 * error / sum, 100.0 * all / sum);
+    assert!(error / sum < 0.08 && (all / sum).abs() < 0.015, "{} {}", error / sum, all / sum);
+    // Negative control: a black panel sends nothing.
+    assert_eq!(mean(&lit(&gpu, &mut renderer, &build(0.0), 2).0.data), 0.0);
+}
+
+/// In a closed room whose walls all glow and send back ρ of what they get, there is glow / (1 − ρ) everywhere.
+#[test]
+fn a_glowing_room_is_the_series_of_its_albedo() {
+    let Some(gpu) = common::gpu() else { return };
+    for albedo in [0.0, 0.5, 0.8f32] {
+        // Six slabs about a room of 4 m.
+        let slab = |axis: usize, side: f32| {
+            let (mut low, mut high) = ([-2.2; 3], [2.2; 3]);
+            (low[axis], high[axis]) = if side < 0.0 { (-2.2, -2.0) } else { (2.0, 2.2) };
+            (low, high, [albedo; 3])
+        };
+        let blocks: Vec<_> = (0..3).flat_map(|a| [slab(a, -1.0), slab(a, 1.0)]).collect();
+        let camera = Camera::look_at([-1.5, 0.3, 1.2], [1.0, -0.4, -1.0], 1.2);
+        let mut room = scene(&blocks, &[], 0.0, camera);
+        room.materials.iter_mut().for_each(|m| m.emissive = [0.5, 1.0, 0.25]);
+        let light = light(&gpu, PLAIN, [48, 48], &room, 200);
+        for (c, glow) in [0.5, 1.0, 0.25].into_iter().enumerate() {
+            let channel: Vec<f32> = light.chunks_exact(3).map(|p| p[c]).collect();
+            let expected = f64::from(glow / (1.0 - albedo));
+            let off = mean(&channel) / expected - 1.0;
+            println!("albedo {albedo}, channel {c}: {:+.2} %", 100.0 * off);
+            assert!(off.abs() < 0.015, "{off}");
+        }
+    }
+}
+
+/// A lamp in one of two closed rooms under one roof leaves the other dark.
+#[test]
+fn no_light_goes_through_an_inner_wall() {
+    let Some(gpu) = common::gpu() else { return };
+    let rooms = |wall: bool, x: f32| {
+        let mut blocks = vec![
+            ([-4.2, -0.2, -2.2], [4.2, 0.0, 2.2], GREY),
+            ([-4.2, 3.0, -2.2], [4.2, 3.2, 2.2], GREY),
+            ([-4.2, 0.0, -2.2], [-4.0, 3.0, 2.2], GREY),
+            ([4.0, 0.0, -2.2], [4.2, 3.0, 2.2], GREY),
+            ([-4.0, 0.0, -2.2], [4.0, 3.0, -2.0], GREY),
+            ([-4.0, 0.0, 2.0], [4.0, 3.0, 2.2], GREY),
+        ];
+        if wall {
+            // Two centimetres thick, and no plane of any grid.
+            blocks.push(([0.13, 0.0, -2.0], [0.15, 3.0, 2.0], GREY));
+        }
+        let lamp = LightKind::Point { position: [-2.0, 2.2, 0.3], intensity: 10.0, radius: 0.02, range: None };
+        scene(&blocks, &[lamp], 0.0, Camera::look_at([x, 1.6, 1.6], [x - 1.0, 0.6, -1.0], 1.2))
+    };
+    let at = |wall, x| mean(&light(&gpu, method(), [96, 64], &rooms(wall, x), 32));
+    let (dark, bright, open) = (at(true, 1.6), at(true, -2.0), at(false, 1.6));
+    println!("behind the wall {:.4} %, without it {:.1} %", 100.0 * dark / bright, 100.0 * open / bright);
+    assert!(dark / bright < 1e-3, "{}", dark / bright);
+    // Negative control: without the wall it is bright there.
+    assert!(open / bright > 0.1);
+}
+
+#[test]
+fn twice_the_light_is_twice_the_answer_and_none_is_none() {
+    let Some(gpu) = common::gpu() else { return };
+    let build = |f: f32| hall(GREY, &[sun(world::BACKWARDS, 2.0 * f)], 0.3 * f, 1.0);
+    let once = light(&gpu, method(), [64, 48], &build(1.0), 6);
+    let twice = light(&gpu, method(), [64, 48], &build(2.0), 6);
+    let half: Vec<f32> = twice.iter().map(|v| 0.5 * v).collect();
+    assert!(mean(&once) > 0.01 && difference(&half, &once) < 1e-3, "{}", difference(&half, &once));
+    assert!(light(&gpu, method(), [64, 48], &build(0.0), 3).iter().all(|v| *v == 0.0));
+    // The same frames once more are the same to the last bit.
+    assert_eq!(once, light(&gpu, method(), [64, 48], &build(1.0), 6));
+}
+
+/// A lamp that is switched: nine tenths of the change within six frames, less than 2 % of the old light after thirty.
+#[test]
+fn light_follows_a_switch() {
+    let Some(gpu) = common::gpu() else { return };
+    let lamp = |w: f32| LightKind::Point { position: [1.5, 3.0, 0.5], intensity: w, radius: 0.05, range: None };
+    let (on, off) = (hall(GREY, &[lamp(20.0)], 0.02, 1.0), hall(GREY, &[lamp(0.0)], 0.02, 1.0));
+    let settled = |s: &Scene| mean(&light(&gpu, method(), [96, 64], s, 64));
+    let (bright, dark) = (settled(&on), settled(&off));
+    let mut renderer = world::renderer(&gpu, [96, 64], method());
+    let mut uploaded = uploaded(&gpu, &on);
+    let mut frames = |uploaded: &SceneGpu, n| mean(&go_on(&gpu, &mut renderer, uploaded, &on.cameras[0], n));
+    let before = frames(&uploaded, 64);
+    assert!((before / bright - 1.0).abs() < 0.03, "{before} {bright}");
+    uploaded.set_lights(&gpu.device, &gpu.queue, &off);
+    let (soon, late) = (frames(&uploaded, 6), frames(&uploaded, 24));
+    let left = |v: f64| (v - dark) / (bright - dark);
+    println!("left after 6 frames {:.1} %, after 30 {:.2} %", 100.0 * left(soon), 100.0 * left(late));
+    assert!(left(soon) < 0.1 && left(late).abs() < 0.02);
+    uploaded.set_lights(&gpu.device, &gpu.queue, &on);
+    let (soon, late) = (frames(&uploaded, 6), frames(&uploaded, 24));
+    println!("there after 6 frames {:.1} %, after 30 {:.1} %", 100.0 * left(soon), 100.0 * left(late));
+    assert!(left(soon) > 0.9 && (left(late) - 1.0).abs() < 0.05);
+}
+
+/// A dark room at rest does not boil: from frame to frame less than 0.5 % of its light changes.
+#[test]
+fn a_room_at_rest_is_quiet() {
+    let Some(gpu) = common::gpu() else { return };
+    let room = hall(GREY, &[sun(world::BACKWARDS, 2.0)], 0.02, 1.0);
+    let mut renderer = world::renderer(&gpu, [96, 64], method());
+    let uploaded = uploaded(&gpu, &room);
+    let camera = &room.cameras[0];
+    let first = go_on(&gpu, &mut renderer, &uploaded, camera, 1);
+    let second = go_on(&gpu, &mut renderer, &uploaded, camera, 1);
+    let a = go_on(&gpu, &mut renderer, &uploaded, camera, 70);
+    let b = go_on(&gpu, &mut renderer, &uploaded, camera, 1);
+    println!("from frame to frame {:.3} %, at first {:.1} %", 100.0 * difference(&b, &a), 100.0 * difference(&second, &first));
+    assert!(difference(&b, &a) < 0.005);
+    // Negative control: the first frames do change.
+    assert!(difference(&second, &first) > 0.01);
+}
+
+#[test]
+fn what_is_missing_or_broken_is_said_or_left_out() {
+    let Some(gpu) = common::gpu() else { return };
+    let room = hall(GREY, &[sun(world::BACKWARDS, 2.0)], 0.1, 1.0);
+    // Nobody made the rays.
+    let plain = SceneGpu::new(&gpu.device, &gpu.queue, &room).expect("the scene fits");
+    let mut renderer = world::renderer(&gpu, [32, 32], method());
+    let options = CaptureOptions::default();
+    let error = capture(&gpu, &mut renderer, &plain, &room.cameras[0], options).unwrap_err();
+    assert!(matches!(error, RenderError::Gi(GiError::Rays)), "{error}");
+
+    // Objects that are nowhere, flat, mirrored or broken; a list of lights that empties.
+    let mut odd = room.clone();
+    let count = odd.instances.len();
+    for k in 0..4 {
+        let mut copy = odd.instances[k].clone();
+        match k {
+            0 => copy.transform[0][0] = 0.0,
+            1 => copy.transform[1][1] = f32::NAN,
+            2 => copy.transform[0] = copy.transform[0].map(|v| -v),
+            _ => copy.mesh = odd.meshes.len(),
+        }
+        odd.instances.push(copy);
+    }
+    let mut broken = odd.meshes[0].clone();
+    broken.positions.iter_mut().for_each(|p| p[0] = f32::NAN);
+    odd.meshes.push(broken);
+    let mut uploaded = uploaded(&gpu, &odd);
+    let counts = uploaded.rays.as_ref().expect("they were made").counts();
+    assert_eq!((counts.instances, counts.left_out), (count + 1, 3), "{counts:?}");
+    let first = go_on(&gpu, &mut renderer, &uploaded, &room.cameras[0], 3);
+    assert!(first.iter().all(|v| v.is_finite()) && mean(&first) > 0.0);
+    uploaded.set_lights(&gpu.device, &gpu.queue, &Scene { lights: vec![], ..room.clone() });
+    let dark = go_on(&gpu, &mut renderer, &uploaded, &room.cameras[0], 40);
+    assert!(dark.iter().all(|v| v.is_finite()) && mean(&dark) < mean(&first));
+
+    // Nothing at all, then a triangle of no area.
+    let mut nothing = Scene { cameras: room.cameras.clone(), ..Default::default() };
+    nothing.environment = room.environment.clone();
+    assert!(light(&gpu, method(), [17, 13], &nothing, 2).iter().all(|v| *v == 0.0));
+    let mut flat = room.clone();
+    flat.meshes.iter_mut().for_each(|m| m.positions.iter_mut().for_each(|p| *p = [1.0; 3]));
+    assert!(light(&gpu, method(), [1, 1], &flat, 2).iter().all(|v| v.is_finite()));
+}
