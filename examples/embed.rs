@@ -59,6 +59,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         environment: [0.05; 3],
         lights: None,
         world: None,
+        rays: None,
+        motion: None,
     };
 
     // One frame: the host's passes, then ours, then the host submits.

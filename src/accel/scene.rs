@@ -11,6 +11,10 @@ use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, threads};
 use crate::scene::Scene;
 use glam::{Mat4, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Number of the next scene.
+static NEXT: AtomicU64 = AtomicU64::new(1);
 
 /// Blocks that the tree over `count` instances can need: a node has a family of eight, and there are fewer nodes than instances.
 fn top_blocks(count: usize) -> usize {
@@ -43,6 +47,8 @@ pub struct RayCounts {
 
 /// A scene's triangles on the GPU. Instances may move ([`SceneRays::place`]); after any other change it is made again.
 pub struct SceneRays {
+    /// Tells scenes apart.
+    id: u64,
     device: wgpu::Device,
     accel: AccelGpu,
     surfaces: wgpu::Buffer,
@@ -97,7 +103,8 @@ impl SceneRays {
         let counts = RayCounts { triangles: triangles as usize, ..RayCounts::default() };
         let emitters = filled(device, queue, "accel.emitters", &[]);
         let device = device.clone();
-        let mut rays = Self { device, accel, surfaces, emitters, inverse_power: 0.0, meshes, top_room, counts };
+        let id = NEXT.fetch_add(1, Ordering::Relaxed);
+        let mut rays = Self { id, device, accel, surfaces, emitters, inverse_power: 0.0, meshes, top_room, counts };
         rays.counts.bytes = 64 * (blocks.len() as u64).next_multiple_of(u64::from(ROW)) + rays.surfaces.size();
         rays.place(queue, scene);
         Ok(rays)
@@ -140,6 +147,11 @@ impl SceneRays {
             queue.write_buffer(&self.emitters, 0, bytes);
         }
         false
+    }
+
+    /// Another number for each scene that was made.
+    pub fn id(&self) -> u64 {
+        self.id
     }
 
     /// Nodes and leaves.

@@ -161,6 +161,8 @@ pub struct Lights<'a> {
     pub count: u32,
     /// Some of them stand for surfaces that glow.
     pub stand_in: bool,
+    /// Another number whenever a light is another than before, so that what is remembered of their light is forgotten sooner.
+    pub epoch: u64,
 }
 
 /// Which method fills the `indirect` texture of a frame.

@@ -383,6 +383,7 @@ fn gi_inputs<'a>(
             buffer: &s.light_buffer,
             count: s.lights.len() as u32,
             stand_in: s.lights.iter().any(|l| l.stands_in),
+            epoch: s.lights_epoch,
         }),
         rays: scene.and_then(|s| Some(gi::Rays { scene: s.rays.as_ref()?, environment: &s.environment_view })),
         motion: Some(&targets.motion.view),

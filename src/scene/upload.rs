@@ -161,6 +161,8 @@ pub struct SceneGpu {
     pub light_buffer: wgpu::Buffer,
     /// The lights, for shadow fitting.
     pub lights: Vec<Light>,
+    /// Another number whenever one of them is another than before.
+    pub lights_epoch: u64,
     /// What rays see that hit nothing.
     pub environment: Environment,
     /// The same as a lat-long `Rgba32Float` picture; one texel for a constant.
@@ -212,6 +214,7 @@ impl SceneGpu {
             material_groups: materials.groups,
             light_buffer,
             lights: scene.lights.clone(),
+            lights_epoch: 0,
             environment: scene.environment.clone(),
             environment_view,
             bounds: geometry.bounds,
@@ -242,6 +245,7 @@ impl SceneGpu {
         // A spot's maps depend on how wide it is.
         let kind = |l: &Light| (std::mem::discriminant(&l.kind), crate::render::shadow::is_flat(&l.kind));
         let same = self.lights.iter().map(kind).eq(scene.lights.iter().map(kind));
+        self.lights_epoch += 1;
         self.lights = scene.lights.clone();
         if same {
             queue.write_buffer(&self.light_buffer, 0, bytemuck::cast_slice(&lights));

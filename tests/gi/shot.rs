@@ -204,6 +204,8 @@ impl Textures {
             environment: shot.environment,
             world: None,
             lights: None,
+            rays: None,
+            motion: None,
         }
     }
 }

@@ -66,7 +66,7 @@ fn upsample_and_tilt(gpu: &Gpu, shot: &Shot, side: CellSide, light: impl Fn(usiz
         device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
     });
     let beside = Beside { visibility: &open, spheres: &spheres, nearby: &nearby };
-    pass.record(&mut recorder, &bound, &cells, &buffer, beside, &view(&target)).expect("records");
+    pass.record(&mut recorder, &bound, &cells, &buffer, Some(beside), &view(&target)).expect("records");
     queue.submit([encoder.finish()]);
     let texels = readback::texture(device, queue, &target).expect("readable");
     let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&texels);

@@ -15,17 +15,48 @@ const BLUR_PLANE = 0.5;
 // frames follow by themselves.
 const SIGMAS = 4.0;
 const LEAST_CHANGE = 0.1;
+// The same for the sum over the cells of a workgroup, which knows more surely that a lamp was switched.
+const LEAST_REGION = 0.05;
 const LEAST_KNOWN = 5.0;
 
 fn past_at(cell: u32) -> Past {
     return past_from(pasts[4u * cell], pasts[4u * cell + 1u], pasts[4u * cell + 2u], pasts[4u * cell + 3u]);
 }
 
+// Of the cells of a workgroup: luminance of all frames, of lately, and its noise.
+var<workgroup> of_cells: array<vec3f, 64>;
+var<workgroup> region: vec3f;
+
+fn tells(here: Past) -> vec3f {
+    if here.frames <= LEAST_KNOWN { return vec3f(0.0); }
+    let l = luminance(here.light);
+    return vec3f(l, luminance(here.lately), max(here.square - l * l, 0.0) * (LATELY / (2.0 - LATELY)));
+}
+
+// Whether the mean of lately differs from that of all frames by more than its noise.
+fn differs(all: f32, lately: f32, variance: f32, least: f32) -> bool {
+    let hurried = (gather.flags & GATHER_LIGHTS_CHANGED) != 0u;
+    let sure = select(1.0, 0.2, hurried);
+    return abs(lately - all) > sure * (SIGMAS * sqrt(variance) + least * max(all, lately));
+}
+
 @compute @workgroup_size(8, 8)
-fn blur(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= cell_grid()) { return; }
-    let cell = cell_index(id.xy);
+fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) index: u32) {
+    let inside = all(id.xy < cell_grid());
+    var cell = 0u;
+    if inside { cell = cell_index(id.xy); }
     let here = past_at(cell);
+    of_cells[index] = vec3f(0.0);
+    if inside { of_cells[index] = tells(here); }
+    workgroupBarrier();
+    if index == 0u {
+        var sum = vec3f(0.0);
+        for (var i = 0u; i < 64u; i++) { sum += of_cells[i]; }
+        region = sum;
+    }
+    workgroupBarrier();
+    if !inside { return; }
+    let region_differs = differs(region.x, region.y, region.z, LEAST_REGION);
     changes[cell] = vec4f(0.0);
     if here.frames <= 0.0 {
         light[3u * cell] = vec4f(0.0);
@@ -66,9 +97,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u) {
     // The mean of lately against that of all frames: its own noise, from that of single frames, allows for so much.
     if here.frames > LEAST_KNOWN && (gather.flags & GATHER_EVEN) == 0u {
         let now = lately / max(total, 1e-30);
-        let off = abs(luminance(now) - luminance(mean));
-        let sigma = sqrt(noise * (LATELY / (2.0 - LATELY))) / max(total, 1e-30);
-        if off > SIGMAS * sigma + LEAST_CHANGE * max(luminance(mean), luminance(now)) {
+        let variance = noise * (LATELY / (2.0 - LATELY)) / max(total * total, 1e-30);
+        if region_differs || differs(luminance(mean), luminance(now), variance, LEAST_CHANGE) {
             changes[cell] = vec4f(now, 1.0);
             mean = now;
         }

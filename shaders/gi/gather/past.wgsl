@@ -17,8 +17,8 @@ fn past_from(a: vec4f, b: vec4f, c: vec4f, d: vec4f) -> Past {
     return Past(a.rgb, a.a, b.xyz, b.w, c.xyz, unpack_normal(bitcast<u32>(c.w)), d.rgb);
 }
 
-// Weight of a new frame in `lately`: nine tenths of a change are there after six frames.
-const LATELY = 1.0 / 3.0;
+// Weight of a new frame in `lately`: 95 % of a change are there after six frames.
+const LATELY = 0.4;
 
 // Width of a cell at view distance z.
 fn cell_foot(z: f32) -> f32 {

@@ -51,6 +51,8 @@ fn renew(@builtin(global_invocation_id) id: vec3u) {
     let found = look(x, d, max(dot(n, d), 1e-4), gather.cells + even + slot, gather.round + 1u, true);
     var light = found.radiance;
     if found.slot != NONE { light += found.back * entry_light[even + found.slot].rgb; }
-    let n_rays = min(before.a + 1.0, gather.entry_frames);
-    entry_light[odd + slot] = vec4f(mix(before.rgb, finite3(light), 1.0 / n_rays), n_rays);
+    // Each of the first rays counts for its number: the earlier ones met entries that knew nothing yet.
+    let n_rays = min(before.a + 1.0, 2.0 * gather.entry_frames);
+    let share = max(2.0 / (n_rays + 1.0), 1.0 / gather.entry_frames);
+    entry_light[odd + slot] = vec4f(mix(before.rgb, finite3(light), share), n_rays);
 }

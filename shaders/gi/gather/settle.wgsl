@@ -61,6 +61,8 @@ fn past_of(cell: vec2u, pixel: vec2i, x: vec3f, n: vec3f, foot: f32) -> Past {
     return past;
 }
 
+// Frames in which the light between surfaces settles.
+const YOUNG = 16.0;
 // Frames that the mean of lately counts for where light has changed.
 const AFTER_CHANGE = 4.0;
 
@@ -109,8 +111,10 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let n = world_normal_at(pixel);
     let past = past_of(id.xy, pixel, x, n, cell_foot(z));
     let frames = min(past.frames + 1.0, gather.cell_frames);
-    // Later frames count for more, each for its number: the first ones know least of the light between surfaces.
-    let share = select(2.0 / (frames + 1.0), 1.0 / frames, (gather.flags & GATHER_EVEN) != 0u);
+    // The first frames count for less, each for its number, since they know least of the light between surfaces; from YOUNG on all
+    // count the same.
+    var share = select(1.0 / (frames - 0.5 * (YOUNG - 1.0)), 2.0 / (frames + 1.0), frames <= YOUNG);
+    if (gather.flags & GATHER_EVEN) != 0u { share = 1.0 / frames; }
     let l = luminance(light);
     let now = Past(
         mix(past.light, light, share), frames, mix(past.vector, vector, share), mix(past.square, l * l, share), x, n,

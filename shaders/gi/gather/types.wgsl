@@ -30,6 +30,8 @@ struct Gather {
 const GATHER_STANDS_IN = 1u;
 const GATHER_CUT = 2u;
 const GATHER_NO_BLUR = 4u;
+// The lights are not what they were a few frames ago.
+const GATHER_LIGHTS_CHANGED = 16u;
 // All frames of a mean count the same.
 const GATHER_EVEN = 8u;
 

@@ -34,6 +34,11 @@ use store::Store;
 /// hundredth of a cell's width at 1024 × 512.
 const LIFT: f32 = 3e-5;
 
+/// Frames after a change of the lights for which entries get two rays each and remember no more than [`HURRIED`]: nothing is left of the
+/// old light then, and they settle anew.
+const HURRY: u32 = 8;
+const HURRIED: f32 = 2.5;
+
 /// Constants of the shaders as WGSL.
 pub fn prelude() -> String {
     format!("{}const LIFT = f32({LIFT:?});\n", CellSide::Four.prelude())
@@ -67,6 +72,10 @@ pub struct GatherGi {
     /// Frames since the last cut, rounds since the beginning.
     frame: u32,
     round: u32,
+    /// The lights' state in the last frame, and frames for which entries forget quickly because it was another before.
+    lights_epoch: u64,
+    hurry: u32,
+    scene_id: u64,
 }
 
 /// A pipeline with group 2 of its own.
@@ -137,6 +146,9 @@ impl GatherGi {
             frame_params,
             frame: 0,
             round: 0,
+            lights_epoch: 0,
+            hurry: 0,
+            scene_id: 0,
         }
     }
 
@@ -158,6 +170,7 @@ impl GatherGi {
             (self.frame == 0, params::CUT),
             (!self.options.blur, params::NO_BLUR),
             (self.options.even, params::EVEN),
+            (self.hurry > 0, params::LIGHTS_CHANGED),
         ];
         Ok(Params {
             eye: super::inputs::Params::new(inputs.size, &inputs.camera, inputs.environment)?.eye_position(),
@@ -169,7 +182,7 @@ impl GatherGi {
             entry_scale: self.options.entry_scale,
             round: self.round,
             cell_frames: self.options.cell_frames,
-            entry_frames: self.options.entry_frames,
+            entry_frames: if self.hurry > 0 { self.options.entry_frames.min(HURRIED) } else { self.options.entry_frames },
             flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
             cells: CellSide::Four.count(inputs.size) as u32,
             pad: [0; 2],
@@ -206,7 +219,10 @@ impl Rung for GatherGi {
         super::ambient::check_output(output, inputs.size)?;
         let rays = inputs.rays.as_ref().ok_or(GiError::Rays)?;
         let bound = self.inputs.bind(queue, inputs)?;
-        if self.cells.fit(inputs.size) {
+        // Another scene's light is nobody's past.
+        let another = rays.scene.id() != self.scene_id;
+        self.scene_id = rays.scene.id();
+        if self.cells.fit(inputs.size) || another {
             self.store = Store::new(&self.device, inputs.size, self.options.slots);
             self.upsample.forget();
             self.frame = 0;
@@ -238,6 +254,11 @@ impl Rung for GatherGi {
         ]);
         let blur_group = self.blur.binder.group([after.into(), (&store.cell_light).into(), (&store.changes).into()]);
 
+        let epoch = inputs.lights.map_or(0, |l| l.epoch);
+        if epoch != self.lights_epoch && self.frame > 0 && !self.options.even {
+            self.hurry = HURRY;
+        }
+        self.lights_epoch = epoch;
         let mut params = self.params(inputs, rays)?;
         let [w, h] = CellSide::Four.grid(inputs.size).map(|n| n.div_ceil(8));
         let mut offset = self.params.write(queue, &params);
@@ -247,7 +268,11 @@ impl Rung for GatherGi {
 
         self.cells.record(recorder, &bound);
         Self::run(recorder, "gi.rays", &self.rays.pipeline, groups(offset, &rays_group), [w, h]);
-        let rounds = if self.frame == 0 { self.options.first_rounds.max(1) } else { 1 };
+        let rounds = match (self.frame, self.hurry) {
+            (0, _) => self.options.first_rounds.max(1),
+            (_, 0) => 1,
+            _ => 2,
+        };
         let slots = self.options.slots.div_ceil(64);
         for round in 0..rounds {
             if round > 0 {
@@ -260,6 +285,7 @@ impl Rung for GatherGi {
         Self::run(recorder, "gi.blur", &self.blur.pipeline, alone(offset, &blur_group), [w, h]);
         self.round = params.round + 1;
         self.frame += 1;
+        self.hurry = self.hurry.saturating_sub(1);
         self.upsample.record(recorder, &bound, &self.cells, &store.cell_light, None, output)
     }
 

@@ -25,18 +25,19 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { cell_frames: 64.0, entry_frames: 8.0, slots: 1 << 15, entry_scale: 1.0 / 16.0, first_rounds: 4, blur: true, even: false }
+        Self { cell_frames: 128.0, entry_frames: 8.0, slots: 1 << 15, entry_scale: 1.0 / 16.0, first_rounds: 4, blur: true, even: false }
     }
 }
 
 impl Options {
-    /// Nothing is forgotten and nothing blurred: for asking what the method converges to.
+    /// Cells forget nothing and nothing is blurred: for asking what the method converges to. (Entries that remember
+    /// n rays take n / (1 − albedo) rounds to forget that they once knew nothing of each other.)
     pub const PLAIN: Self = Self {
         cell_frames: 1e9,
-        entry_frames: 1e9,
+        entry_frames: 8.0,
         slots: 1 << 16,
         entry_scale: 1.0 / 16.0,
-        first_rounds: 4,
+        first_rounds: 64,
         blur: false,
         even: true,
     };

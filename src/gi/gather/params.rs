@@ -10,6 +10,8 @@ pub(super) const CUT: u32 = 2;
 /// Cells are shown as they are.
 pub(super) const NO_BLUR: u32 = 4;
 
+/// The lights are not what they were a few frames ago.
+pub(super) const LIGHTS_CHANGED: u32 = 16;
 /// All frames of a mean count the same.
 pub(super) const EVEN: u32 = 8;
 
