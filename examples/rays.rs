@@ -5,8 +5,8 @@
 //! Rays are read from and hits written to buffers, which counts; the row `nothing` says how much that is. On a CPU driver
 //! the time is that of the processor, not the clock on the wall, so that other work on the machine does not count.
 
-use bouncelight::gpu::{Gpu, GpuOptions};
 use bouncelight::accel::{Accel, AccelGpu, RayBatch, RayCaster, RayGpu};
+use bouncelight::gpu::{Gpu, GpuOptions};
 use bouncelight::scene::{LightKind, Scene};
 use glam::{Mat4, Vec3};
 use std::f32::consts::{PI, TAU};

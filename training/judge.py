@@ -4,7 +4,8 @@
     python training/judge.py out/judge data/judge [../shared/reference/cycles] [--rooms 0,27,2200-2239] [--methods direct,ambient,...]
                              [--samples 4] [--constant 0.0592,0.0631,0.0570] [--csv out/judge.csv] [--bouncelight target/release/bouncelight]
 
-A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file. `apply:FILE` is a network on
+A method `gather@N` is drawn after N frames of a still camera (1: the first after a cut), `gather@pan` after sixteen frames in which the
+camera, settled before, turned by 1 degree each; one without says nothing of frames and has the program's own default. A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file. `apply:FILE` is a network on
 pictures (the paper's, pix2pix/): `bouncelight apply` on the four pictures of the raster; `dropout:FILE` is the same with dropout on,
 as the authors ran theirs. Both give 8-bit pictures, so they have no relmse and no light.
 
@@ -20,7 +21,7 @@ before the view transform: nobody can know it, it is there for scale.
 
 `light` is the error of the diffuse light that direct lighting misses: mean |difference| / mean after 4x4 pooling, on pixels with
 a surface, against Cycles' DiffInd + DiffDir - our DiffDir (Cycles counts the sky into DiffDir). With 64 samples a pixel Cycles' own
-noise is about 0.02 of it.
+noise is about 0.02 of it. Pixels where Cycles has less than 2 % of its median light are left out: coincident faces, which it shows black.
 """
 import argparse
 import csv
@@ -28,6 +29,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -128,7 +130,9 @@ def pooled(light, weight):
 
 def light_error(ours, direct, reference):
     """The error of the light itself, see above."""
-    weight = ((direct["Depth.Z"] < 1e9) & (rgb(direct, "DiffCol").min(-1) > 0.01)).astype(np.float32)
+    surface = (direct["Depth.Z"] < 1e9) & (rgb(direct, "DiffCol").min(-1) > 0.01)
+    all_light = (rgb(reference, "DiffInd") + rgb(reference, "DiffDir")).mean(-1)
+    weight = (surface & (all_light >= 0.02 * np.median(all_light[surface]))).astype(np.float32)
     truth, full = pooled(rgb(reference, "DiffInd") + rgb(reference, "DiffDir") - rgb(direct, "DiffDir"), weight)
     guess, _ = pooled(rgb(ours, "DiffInd"), weight)
     return float(np.abs(guess - truth)[full].mean() / truth[full].mean())
@@ -146,8 +150,10 @@ def references(folder, rooms=None):
         elif os.path.exists(os.path.join(path, "scene.glb")):
             with open(os.path.join(path, "meta.json")) as f:
                 meta = json.load(f)
-            # Cycles' point light has a radius of 0.5 m, which glTF cannot say.
-            flags = ["--environment", str(meta["world"])] + (["--light-radius", "0.5"] if meta["light"] == "point" else [])
+            # glTF cannot say a point light's radius; the older files' is 0.5 m.
+            points = meta.get("point") or [[0, 0, 0, 0, 0.5]]
+            flags = ["--environment", str(meta["world"])]
+            flags += ["--light-radius", str(points[0][4])] if meta["light"] == "point" else []
             yield name, name, [os.path.join(path, "scene.glb"), *flags], os.path.join(path, "frame0000.exr")
 
 
@@ -163,8 +169,35 @@ def draw(program, scene, row, path, size, samples, inputs):
             command = [program, "apply", *flags, "--weights", weights, "-o", path, "-q"]
             subprocess.run(command + (["--dropout", "1"] if kind == "dropout" else []), check=True)
         return
-    command = [program, "render", *scene, "-o", path, "--size", size, "--method", kind, "--samples", str(samples), "--aov", "all", "-q"]
-    subprocess.run(command + (["--weights", weights] if weights else []), check=True)
+    kind, _, state = kind.partition("@")
+    command = [program, "render", *scene, "--size", size, "--method", kind, "--samples", str(samples), "--aov", "all", "-q"]
+    command += ["--weights", weights] if weights else []
+    if state == "pan":
+        with tempfile.TemporaryDirectory() as folder:
+            keys = os.path.join(folder, "pan.json")
+            with open(keys, "w") as f:
+                json.dump(pan_to(os.path.join(os.path.dirname(scene[0]), "meta.json")), f)
+            subprocess.run([*command, "--path", keys, "-o", os.path.join(folder, "{frame}.exr")], check=True)
+            shutil.move(os.path.join(folder, f"{PAN_FRAMES}.exr"), path)
+        return
+    subprocess.run([*command, "-o", path] + (["--gi-frames", state] if state else []), check=True)
+
+
+PAN_FRAMES = 16
+
+
+def pan_to(meta):
+    """A path of PAN_FRAMES frames at 1/60 s that turns by 1 degree each and ends as a reference's meta.json says."""
+    with open(meta) as f:
+        meta = json.load(f)
+    eye, target = np.array(meta["eye"]), np.array(meta["target"])
+    keys = []
+    for frame in range(PAN_FRAMES + 1):
+        a = np.radians(PAN_FRAMES - frame)
+        x, y, z = target - eye
+        turned = eye + [np.cos(a) * x + np.sin(a) * z, y, -np.sin(a) * x + np.cos(a) * z]
+        keys.append({"time": frame / 60, "eye": eye.tolist(), "look_at": turned.tolist(), "fov": meta["fov"]})
+    return {"schema": 1, "keys": keys}
 
 
 def main():

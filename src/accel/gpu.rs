@@ -47,9 +47,7 @@ impl AccelGpu {
         write(queue, &texture, 0, all);
         let blocks = texture.create_view(&Default::default());
         match pollster::block_on(scope.pop()) {
-            Some(error) => {
-                Err(AccelError::OutOfMemory { bytes: size_of_val(all) as u64, message: error.to_string() })
-            }
+            Some(error) => Err(AccelError::OutOfMemory { bytes: size_of_val(all) as u64, message: error.to_string() }),
             None => Ok(Self { blocks }),
         }
     }

@@ -68,17 +68,21 @@ impl SceneRays {
         let triangles: u64 = scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum();
         Accel::check_count(triangles)?;
         let reductions = Reductions::new(scene);
-        let parts = threads::map(&scene.meshes, |m| m.indices.len(), |mesh| {
-            // What disagrees in itself is refused by the upload of the picture's part; here it is not met.
-            if mesh.check(scene.materials.len()).is_err() {
-                return (Accel::default(), Vec::new(), Vec::new());
-            }
-            let surfaces = surfaces::of_mesh(scene, mesh, &reductions);
-            let corners: Vec<_> =
-                mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize])).collect();
-            let glows = emitters::glowing(&surfaces, &corners);
-            (build::build(&corners), surfaces, glows)
-        });
+        let parts = threads::map(
+            &scene.meshes,
+            |m| m.indices.len(),
+            |mesh| {
+                // What disagrees in itself is refused by the upload of the picture's part; here it is not met.
+                if mesh.check(scene.materials.len()).is_err() {
+                    return (Accel::default(), Vec::new(), Vec::new());
+                }
+                let surfaces = surfaces::of_mesh(scene, mesh, &reductions);
+                let corners: Vec<_> =
+                    mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize])).collect();
+                let glows = emitters::glowing(&surfaces, &corners);
+                (build::build(&corners), surfaces, glows)
+            },
+        );
         drop(reductions);
 
         let top_room = top_blocks(scene.instances.len());

@@ -46,7 +46,12 @@ impl Surface {
     pub fn packed(&self) -> Packed {
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
         let root = |c: Vec3| byte(c.x.sqrt()) | byte(c.y.sqrt()) << 8 | byte(c.z.sqrt()) << 16;
-        [root(self.diffuse) | byte(self.roughness) << 24, root(self.f0) | self.flags << 24, shared_exponent(self.emission), 0]
+        [
+            root(self.diffuse) | byte(self.roughness) << 24,
+            root(self.f0) | self.flags << 24,
+            shared_exponent(self.emission),
+            0,
+        ]
     }
 
     /// How many of 255 rays it lets through.
@@ -81,7 +86,8 @@ pub fn of_mesh(scene: &Scene, mesh: &Mesh, reductions: &Reductions) -> Vec<Surfa
     let textures = Textures::new(material, reductions);
     let plain = textures.is_plain() && mesh.colors.is_empty();
     let same = plain.then(|| surface(material, &textures, mesh, [0; 3]));
-    let one = |t: &[u32]| same.unwrap_or_else(|| surface(material, &textures, mesh, [t[0], t[1], t[2]].map(|i| i as usize)));
+    let one =
+        |t: &[u32]| same.unwrap_or_else(|| surface(material, &textures, mesh, [t[0], t[1], t[2]].map(|i| i as usize)));
     mesh.indices.chunks_exact(3).map(one).collect()
 }
 
@@ -131,12 +137,13 @@ fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 
         if u + v < 1.0 { [u, v] } else { [1.0 - u, 1.0 - v] }
     };
     let count = if many { LATTICE * LATTICE } else { POINTS.len() };
+    let point = |i: usize| if many { lattice(i) } else { POINTS[i] };
     let colors = corners.map(|i| mesh.colors.get(i).copied().unwrap_or([1.0; 4]));
 
     let (mut diffuse, mut f0, mut emission) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
     let (mut roughness, mut coverage, mut weight) = (0.0, 0.0, 0.0);
     for i in 0..count {
-        let [v, w] = if many { lattice(i) } else { POINTS[i] };
+        let [v, w] = point(i);
         let weights = [1.0 - v - w, v, w];
         let read = |u: &Option<(Reduced, crate::scene::Sampler, [Vec2; 3])>| match u {
             Some((reduced, sampler, at)) => {
@@ -164,7 +171,7 @@ fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 
         roughness += counts * (m.roughness * rough[1]).clamp(0.0, 1.0);
         emission += counts * Vec3::from(m.emissive) * Vec3::new(glow[0], glow[1], glow[2]);
     }
-    let flags = u32::from(m.double_sided) * DOUBLE_SIDED | u32::from(m.unlit) * UNLIT;
+    let flags = (u32::from(m.double_sided) * DOUBLE_SIDED) | (u32::from(m.unlit) * UNLIT);
     let dark = if m.unlit { 0.0 } else { 1.0 / weight };
     Surface {
         diffuse: diffuse * dark,
@@ -182,7 +189,14 @@ mod tests {
 
     #[test]
     fn shared_exponents_keep_nine_bits() {
-        for c in [[0.0, 0.0, 0.0], [1.0, 0.5, 0.25], [300.0, 2.0, 0.1], [1e-3, 2e-3, 3e-3], [65408.0, 1.0, 0.0], [511.9, 0.0, 1.0]] {
+        for c in [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.5, 0.25],
+            [300.0, 2.0, 0.1],
+            [1e-3, 2e-3, 3e-3],
+            [65408.0, 1.0, 0.0],
+            [511.9, 0.0, 1.0],
+        ] {
             let back = from_shared_exponent(shared_exponent(c.into()));
             let most = Vec3::from(c).max_element();
             assert!((back - Vec3::from(c)).abs().max_element() <= most / 511.0 + 1e-8, "{c:?} {back}");

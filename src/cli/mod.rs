@@ -35,6 +35,7 @@ struct Cli {
 }
 
 #[derive(Debug, Subcommand)]
+#[allow(clippy::large_enum_variant, reason = "there is one in a run of the program")]
 enum Command {
     /// Open a window: see a scene, measure it, compare methods with the live reference.
     #[cfg(feature = "viewer")]

@@ -35,7 +35,8 @@ impl MethodName {
         [M::Direct, M::Ambient, M::Ssgi, M::Rsm, M::Cache, M::Gather, M::Probes, M::Neural, M::Reference];
 
     /// All real-time methods, cheapest first.
-    pub const REAL_TIME: [MethodName; 8] = [M::Direct, M::Ambient, M::Ssgi, M::Rsm, M::Cache, M::Gather, M::Probes, M::Neural];
+    pub const REAL_TIME: [MethodName; 8] =
+        [M::Direct, M::Ambient, M::Ssgi, M::Rsm, M::Cache, M::Gather, M::Probes, M::Neural];
 
     /// Name on the command line, in records and in the window.
     pub fn name(self) -> &'static str {

@@ -122,7 +122,14 @@ pub const GI: &[Shader] = &[
     },
     Shader {
         name: "gi.upsample",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/beside.wgsl", "gi/bring.wgsl", "gi/upsample.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "gi/inputs.wgsl",
+            "gi/cells.wgsl",
+            "gi/beside.wgsl",
+            "gi/bring.wgsl",
+            "gi/upsample.wgsl"
+        ],
     },
     Shader {
         name: "gi.emitters",
@@ -172,23 +179,79 @@ pub const GI: &[Shader] = &[
     },
     Shader {
         name: "gi.rays",
-        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "lib/lights.wgsl", "lib/environment.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "accel/traverse.wgsl", "accel/surface.wgsl", "gi/gather/types.wgsl", "gi/gather/entries.wgsl", "gi/gather/look.wgsl", "gi/gather/rays.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "lib/environment.wgsl",
+            "gi/inputs.wgsl",
+            "gi/cells.wgsl",
+            "accel/traverse.wgsl",
+            "accel/surface.wgsl",
+            "gi/gather/types.wgsl",
+            "gi/gather/entries.wgsl",
+            "gi/gather/look.wgsl",
+            "gi/gather/rays.wgsl"
+        ],
     },
     Shader {
         name: "gi.renew",
-        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "lib/lights.wgsl", "lib/environment.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "accel/traverse.wgsl", "accel/surface.wgsl", "gi/gather/types.wgsl", "gi/gather/entries.wgsl", "gi/gather/look.wgsl", "gi/gather/renew.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "lib/environment.wgsl",
+            "gi/inputs.wgsl",
+            "gi/cells.wgsl",
+            "accel/traverse.wgsl",
+            "accel/surface.wgsl",
+            "gi/gather/types.wgsl",
+            "gi/gather/entries.wgsl",
+            "gi/gather/look.wgsl",
+            "gi/gather/renew.wgsl"
+        ],
     },
     Shader {
         name: "gi.settle",
-        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "lib/lights.wgsl", "lib/environment.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "accel/traverse.wgsl", "accel/surface.wgsl", "gi/gather/types.wgsl", "gi/gather/past.wgsl", "gi/gather/settle.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "lib/environment.wgsl",
+            "gi/inputs.wgsl",
+            "gi/cells.wgsl",
+            "accel/traverse.wgsl",
+            "accel/surface.wgsl",
+            "gi/gather/types.wgsl",
+            "gi/gather/past.wgsl",
+            "gi/gather/settle.wgsl"
+        ],
     },
     Shader {
         name: "gi.blur",
-        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "lib/lights.wgsl", "lib/environment.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "accel/traverse.wgsl", "accel/surface.wgsl", "gi/gather/types.wgsl", "gi/gather/past.wgsl", "gi/gather/blur.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "lib/environment.wgsl",
+            "gi/inputs.wgsl",
+            "gi/cells.wgsl",
+            "accel/traverse.wgsl",
+            "accel/surface.wgsl",
+            "gi/gather/types.wgsl",
+            "gi/gather/past.wgsl",
+            "gi/gather/blur.wgsl"
+        ],
     },
     Shader {
         name: "gi.bring",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/bring.wgsl", "gi/gather/upsample.wgsl"],
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "gi/inputs.wgsl",
+            "gi/cells.wgsl",
+            "gi/bring.wgsl",
+            "gi/gather/upsample.wgsl"
+        ],
     },
     Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
     Shader {
@@ -220,8 +283,7 @@ pub const GI: &[Shader] = &[
 ];
 
 /// Shaders of `accel/`.
-pub const ACCEL: &[Shader] =
-    &[Shader { name: "accel.rays", files: wgsl!["accel/traverse.wgsl", "accel/rays.wgsl"] }];
+pub const ACCEL: &[Shader] = &[Shader { name: "accel.rays", files: wgsl!["accel/traverse.wgsl", "accel/rays.wgsl"] }];
 
 /// Shaders of `reference/`.
 pub const REFERENCE: &[Shader] = &[

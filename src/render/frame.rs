@@ -135,7 +135,21 @@ impl Renderer {
         let needs = options.method.needs_world();
         let device = device.clone();
         let (lighting, world, moved) = (None, None, Moved::default());
-        Ok(Self { device, frame, targets, picture, lighting, method, indirect, passes, needs, world, taa, moved, last: None })
+        Ok(Self {
+            device,
+            frame,
+            targets,
+            picture,
+            lighting,
+            method,
+            indirect,
+            passes,
+            needs,
+            world,
+            taa,
+            moved,
+            last: None,
+        })
     }
 
     /// New targets of `size` pixels; the views of the old ones are of no use any more.

@@ -33,7 +33,11 @@ fn world_triangles(scene: &Scene) -> Vec<Triangle> {
     let of = |i: &Instance| {
         let m = Mat4::from_cols_array_2d(&i.transform);
         let p = &scene.meshes[i.mesh].positions;
-        scene.meshes[i.mesh].indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| m.transform_point3(p[t[k] as usize].into()).to_array())).collect::<Vec<_>>()
+        scene.meshes[i.mesh]
+            .indices
+            .chunks_exact(3)
+            .map(|t| [0, 1, 2].map(|k| m.transform_point3(p[t[k] as usize].into()).to_array()))
+            .collect::<Vec<_>>()
     };
     scene.instances.iter().flat_map(of).collect()
 }
@@ -77,7 +81,8 @@ fn instances_are_met_where_they_stand_and_where_they_go() {
 fn nothing_to_meet_is_no_error() {
     let Some(gpu) = crate::common::gpu() else { return };
     let rays = SceneRays::new(&gpu.device, &gpu.queue, &Scene::default()).expect("nothing fits");
-    let hits = RayCaster::new(&gpu.device).trace(&gpu.device, &gpu.queue, rays.accel(), &random_rays(64, 1.0, 1)).unwrap();
+    let hits =
+        RayCaster::new(&gpu.device).trace(&gpu.device, &gpu.queue, rays.accel(), &random_rays(64, 1.0, 1)).unwrap();
     assert!(hits.iter().all(|h| h.triangle == u32::MAX));
     assert_eq!(rays.counts().instances, 0);
 }

@@ -187,7 +187,11 @@ fn a_room_at_rest_is_quiet() {
     let second = go_on(&gpu, &mut renderer, &uploaded, camera, 1);
     let a = go_on(&gpu, &mut renderer, &uploaded, camera, 70);
     let b = go_on(&gpu, &mut renderer, &uploaded, camera, 1);
-    println!("from frame to frame {:.3} %, at first {:.1} %", 100.0 * difference(&b, &a), 100.0 * difference(&second, &first));
+    println!(
+        "from frame to frame {:.3} %, at first {:.1} %",
+        100.0 * difference(&b, &a),
+        100.0 * difference(&second, &first)
+    );
     assert!(difference(&b, &a) < 0.005);
     // Negative control: the first frames do change.
     assert!(difference(&second, &first) > 0.01);

@@ -160,7 +160,11 @@ impl GatherGi {
     /// Bind groups made since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
         let passes = [&self.rays, &self.renew, &self.settle, &self.blur].map(|p| p.binder.made());
-        self.inputs.made() + self.scene.made() + self.frame_params.made() + self.upsample.made() + passes.iter().sum::<u64>()
+        self.inputs.made()
+            + self.scene.made()
+            + self.frame_params.made()
+            + self.upsample.made()
+            + passes.iter().sum::<u64>()
     }
 
     fn params(&self, inputs: &Inputs<'_>, rays: &Rays<'_>) -> Result<Params, GiError> {
@@ -182,7 +186,11 @@ impl GatherGi {
             entry_scale: self.options.entry_scale,
             round: self.round,
             cell_frames: self.options.cell_frames,
-            entry_frames: if self.hurry > 0 { self.options.entry_frames.min(HURRIED) } else { self.options.entry_frames },
+            entry_frames: if self.hurry > 0 {
+                self.options.entry_frames.min(HURRIED)
+            } else {
+                self.options.entry_frames
+            },
             flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
             cells: CellSide::Four.count(inputs.size) as u32,
             pad: [0; 2],
@@ -239,7 +247,8 @@ impl Rung for GatherGi {
         let store = &self.store;
         let table = || [&store.keys, &store.lots, &store.queries].map(Bound::from);
         let [keys, lots, queries] = table();
-        let rays_group = self.rays.binder.group([keys, lots, queries, self.cells.pixels().into(), (&store.records).into()]);
+        let rays_group =
+            self.rays.binder.group([keys, lots, queries, self.cells.pixels().into(), (&store.records).into()]);
         let [keys, lots, queries] = table();
         let renew_group = self.renew.binder.group([keys, lots, queries, (&store.asked).into(), (&store.light).into()]);
         let [before, after] = [self.frame & 1, 1 - (self.frame & 1)].map(|i| &store.pasts[i as usize]);

@@ -25,7 +25,15 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { cell_frames: 128.0, entry_frames: 8.0, slots: 1 << 15, entry_scale: 1.0 / 16.0, first_rounds: 4, blur: true, even: false }
+        Self {
+            cell_frames: 128.0,
+            entry_frames: 8.0,
+            slots: 1 << 15,
+            entry_scale: 1.0 / 16.0,
+            first_rounds: 4,
+            blur: true,
+            even: false,
+        }
     }
 }
 
@@ -47,7 +55,9 @@ impl Options {
 #[derive(Debug, Error, PartialEq)]
 pub enum OptionsError {
     /// No such number.
-    #[error("`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, blur=0|1, even=0|1")]
+    #[error(
+        "`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, blur=0|1, even=0|1"
+    )]
     Unknown(String),
     /// A value that cannot be.
     #[error("`{0}`: {1}")]

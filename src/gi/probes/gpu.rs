@@ -1,6 +1,7 @@
 //! The frame's share of `gi.probes`: buffers of a bake, and the passes over them.
 
 use super::{Bake, SAMPLES, SKY, random};
+use crate::accel::AccelGpu;
 use crate::gi::cells::CellSide;
 use crate::gi::exposure::{self, output_entry, storage_entry};
 use crate::gi::inputs::InputGroup;
@@ -8,7 +9,6 @@ use crate::gi::rung::{Cost, Rung};
 use crate::gi::view_cache::ViewCache;
 use crate::gi::{GiError, Inputs, ambient::check_output};
 use crate::gpu::{shaders, timing::Recorder};
-use crate::accel::AccelGpu;
 use crate::render::tool::{self, READ, READ_WRITE, UNIFORM};
 use glam::Vec3;
 use wgpu::util::DeviceExt;
