@@ -304,6 +304,11 @@ fn check(args: &Args) -> Result<Format> {
     } else if let Some(flag) = args.tracing.given() {
         return Err(usage(format!("{flag} belongs to --method reference; `{name}` traces no paths")));
     }
+    for (flag, given) in [("--gi-frames", args.gi_frames.is_some()), ("--gather", args.gather.is_some())] {
+        if given && args.method() != MethodName::Gather {
+            return Err(usage(format!("{flag} belongs to --method gather; `{name}` does not settle over frames")));
+        }
+    }
     if let Some(flag) = args.bake.given().filter(|_| args.method() != MethodName::Probes) {
         return Err(usage(format!("{flag} belongs to --method probes; `{name}` has no bake")));
     }
