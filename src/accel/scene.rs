@@ -1,6 +1,6 @@
 //! The triangles of a scene as rays meet them: a tree for each mesh, made once and on all of the machine's threads, and a tree
 //! over the instances, made anew whenever something moves. One texture holds both; what a ray needs to know of a triangle
-//! ([`surfaces`](super::surfaces)) and the triangles that glow ([`emitters`](super::emitters)) are storage buffers.
+//! (`surfaces`) and the triangles that glow (`emitters`) are storage buffers.
 
 use super::emitters::{self, EmitterGpu, Glow};
 use super::gpu::ROW;
@@ -163,7 +163,7 @@ impl SceneRays {
         &self.accel
     }
 
-    /// One [`surfaces::Packed`] for each triangle of each mesh.
+    /// One `surfaces::Packed` for each triangle of each mesh.
     pub fn surfaces(&self) -> &wgpu::Buffer {
         &self.surfaces
     }
