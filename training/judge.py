@@ -170,17 +170,17 @@ def draw(program, scene, row, path, size, samples, inputs):
             subprocess.run(command + (["--dropout", "1"] if kind == "dropout" else []), check=True)
         return
     kind, _, state = kind.partition("@")
-    command = [program, "render", *scene, "--size", size, "--method", kind, "--samples", str(samples), "--aov", "all", "-q"]
+    command = [program, "render", *scene, "--size", size, "--method", kind, "--samples", str(samples), "--aov", "all"]
     command += ["--weights", weights] if weights else []
     if state == "pan":
         with tempfile.TemporaryDirectory() as folder:
             keys = os.path.join(folder, "pan.json")
             with open(keys, "w") as f:
                 json.dump(pan_to(os.path.join(os.path.dirname(scene[0]), "meta.json")), f)
-            subprocess.run([*command, "--path", keys, "-o", os.path.join(folder, "{frame}.exr")], check=True)
+            subprocess.run([*command, "--path", keys, "-o", os.path.join(folder, "{frame}.exr"), "-q"], check=True)
             shutil.move(os.path.join(folder, f"{PAN_FRAMES}.exr"), path)
         return
-    subprocess.run([*command, "-o", path] + (["--gi-frames", state] if state else []), check=True)
+    subprocess.run([*command, "-o", path] + (["--gi-frames", state] if state else []) + ["-q"], check=True)
 
 
 PAN_FRAMES = 16
