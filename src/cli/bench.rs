@@ -105,7 +105,9 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let camera = args.scene.camera(&scene)?;
     let gpu = global.open_gpu()?;
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
-    uploaded.trace(&gpu.device, &gpu.queue, &scene)?;
+    if args.method.0.contains(&MethodName::Gather) {
+        uploaded.trace(&gpu.device, &gpu.queue, &scene)?;
+    }
     let options = BenchOptions { frames: args.frames, warmup: args.warmup };
     let mut methods = Vec::new();
     for name in &args.method.0 {

@@ -289,7 +289,7 @@ pub struct Image {
 }
 
 /// A light. `color` is a linear tint that multiplies the kind's strength.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Light {
     /// Name in the file.
     pub name: String,

@@ -161,7 +161,7 @@ pub struct SceneGpu {
     pub light_buffer: wgpu::Buffer,
     /// The lights, for shadow fitting.
     pub lights: Vec<Light>,
-    /// Another number whenever one of them is another than before.
+    /// Another number whenever one of them, or the surroundings, is another than before.
     pub lights_epoch: u64,
     /// What rays see that hit nothing.
     pub environment: Environment,
@@ -245,7 +245,7 @@ impl SceneGpu {
         // A spot's maps depend on how wide it is.
         let kind = |l: &Light| (std::mem::discriminant(&l.kind), crate::render::shadow::is_flat(&l.kind));
         let same = self.lights.iter().map(kind).eq(scene.lights.iter().map(kind));
-        self.lights_epoch += 1;
+        self.lights_epoch += u64::from(self.lights != scene.lights);
         self.lights = scene.lights.clone();
         if same {
             queue.write_buffer(&self.light_buffer, 0, bytemuck::cast_slice(&lights));
@@ -267,6 +267,7 @@ impl SceneGpu {
     ) -> Result<(), UploadError> {
         let mut warnings = Vec::new();
         let (view, _) = environment::upload(device, queue, &scene.environment, &mut warnings)?;
+        self.lights_epoch += 1;
         self.environment = scene.environment.clone();
         self.environment_view = view;
         self.warnings.extend(warnings);

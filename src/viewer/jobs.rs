@@ -153,7 +153,10 @@ pub fn scene(
     progress.stage(&format!("uploading {spec}"));
     let mut gpu = SceneGpu::new(&handles.device, &handles.queue, &scene).map_err(|e| e.to_string())?;
     progress.stage(&format!("building trees for the rays of {spec}"));
-    gpu.trace(&handles.device, &handles.queue, &scene).map_err(|e| e.to_string())?;
+    // A scene that rays cannot have is still drawn by the methods that send none.
+    if let Err(e) = gpu.trace(&handles.device, &handles.queue, &scene) {
+        tracing::warn!("{spec}: `gather` cannot be chosen: {e}");
+    }
     Ok(Product::Scene { spec, scene: Box::new(scene), gpu: Box::new(gpu) })
 }
 

@@ -65,7 +65,9 @@ impl App {
                 self.spawn("upload the scene again".into(), Kind::Scene, move |_| {
                     let gpu = crate::scene::upload::SceneGpu::new(&handles.device, &handles.queue, &scene);
                     let mut gpu = gpu.map_err(|e| e.to_string())?;
-                    gpu.trace(&handles.device, &handles.queue, &scene).map_err(|e| e.to_string())?;
+                    if let Err(e) = gpu.trace(&handles.device, &handles.queue, &scene) {
+                        tracing::warn!("`gather` cannot be chosen: {e}");
+                    }
                     Ok(Product::Uploaded(Box::new(gpu)))
                 });
             }
