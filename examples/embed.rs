@@ -61,6 +61,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         world: None,
         rays: None,
         motion: None,
+        specular: None,
     };
 
     // One frame: the host's passes, then ours, then the host submits.

@@ -53,16 +53,6 @@ fn gloss_lobe(s: Surface, l: vec3f) -> Lobe {
     return Lobe(fresnel(s, saturate(dot(s.v, h))) * (d * visible * n_l), d * 0.5 / (s.n_v + g_v));
 }
 
-// A normal of the microsurface that v (local, z up) sees (Dupuy and Benyoub 2023, spherical caps).
-fn sample_visible_normal(v: vec3f, alpha: f32, u: vec2f) -> vec3f {
-    let w = normalize(vec3f(v.xy * alpha, v.z));
-    let phi = 2.0 * PI * u.x;
-    let z = (1.0 - u.y) * (1.0 + w.z) - w.z;
-    let r = sqrt(saturate(1.0 - z * z));
-    let c = vec3f(r * cos(phi), r * sin(phi), z) + w;
-    return normalize(vec3f(c.xy * alpha, c.z));
-}
-
 struct Scatter {
     l: vec3f,
     // Value times n.l over the density.

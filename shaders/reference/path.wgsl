@@ -39,6 +39,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
     var glossy: bool;
     var bounces: vec2u;
     var last: bool;
+    // The last scattering was diffuse.
+    var after_diffuse: bool;
     // What starts at the last vertex: the next ray, and shadow rays with what arrives by them (diffuse or all, glossy, as
     // the rasteriser has it).
     var base: vec3f;
@@ -96,6 +98,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                         least_pdf = FAR;
                         bounces = vec2u(0u);
                         last = false;
+                        after_diffuse = false;
                         sums = Sums();
                     }
                     goes_on = false;
@@ -155,6 +158,11 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
         }
         if last || rays >= MOST_RAYS { continue; }
         var s = surface_at(hit, direction);
+        if after_diffuse && (job.flags & JOB_NO_CAUSTICS) != 0u {
+            // Cycles lays the lobe over the diffuse part where there is one only.
+            s.albedo = select(s.albedo, s.base * (1.0 - s.metallic), any(s.gloss > vec3f(0.0)));
+            s.gloss = vec3f(0.0);
+        }
         // Cycles' "Filter Glossy".
         if least_pdf < job.filter_glossy {
             s.alpha = max(s.alpha, 0.5 * sqrt(1.0 - least_pdf / job.filter_glossy));
@@ -207,6 +215,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
             if is_gloss { next = sample_gloss(s, u); } else { next = sample_diffuse(s, u); }
             let chance = select(1.0 - gloss_chance, gloss_chance, is_gloss);
             if vertex == 0u { glossy = is_gloss; }
+            after_diffuse = !is_gloss;
             bounces += select(vec2u(1u, 0u), vec2u(0u, 1u), is_gloss);
             last = vertex + 1u > job.bounces || bounces.x > job.diffuse_bounces || bounces.y > job.glossy_bounces;
             beta *= next.weight / chance;

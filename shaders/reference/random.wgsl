@@ -14,23 +14,6 @@ const PAIR_ANALYTIC: u32 = 5u;
 const PAIR_ANALYTIC_POINT: u32 = 6u;
 const PAIRS: u32 = 6u;
 
-// Three hashes of three numbers (Jarzynski and Olano 2020, pcg3d).
-fn pcg3(seed: vec3u) -> vec3u {
-    var v = seed * 1664525u + 1013904223u;
-    v.x += v.y * v.z;
-    v.y += v.z * v.x;
-    v.z += v.x * v.y;
-    v ^= v >> vec3u(16u);
-    v.x += v.y * v.z;
-    v.y += v.z * v.x;
-    v.z += v.x * v.y;
-    return v;
-}
-
-fn unit_float(bits: u32) -> f32 {
-    return f32(bits >> 8u) / 16777216.0;
-}
-
 fn start_random(point: u32, sample: u32) {
     random_point = pcg3(vec3u(point, job.seed, job.half)).x;
     random_sample = sample;
@@ -80,14 +63,6 @@ fn in_disc(u: vec2f) -> vec2f {
     let r = select(p.y, p.x, wide);
     let angle = select(0.5 * PI - 0.25 * PI * (p.x / p.y), 0.25 * PI * (p.y / p.x), wide);
     return r * vec2f(cos(angle), sin(angle));
-}
-
-// A right-handed frame around unit vector n (Duff et al. 2017): columns tangent, bitangent, n.
-fn frame_around(n: vec3f) -> mat3x3f {
-    let s = select(-1.0, 1.0, n.z >= 0.0);
-    let a = -1.0 / (s + n.z);
-    let b = n.x * n.y * a;
-    return mat3x3f(vec3f(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3f(b, s + n.y * n.y * a, -n.y), n);
 }
 
 // A point off the surface at p on the side of n, so that rays from there do not meet the surface again: steps in units of

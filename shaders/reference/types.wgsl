@@ -59,6 +59,7 @@ const JOB_LIGHTS_ONLY: u32 = 8u;
 const JOB_HITS_ONLY: u32 = 16u;
 const JOB_COUNT_TWICE: u32 = 32u;
 const JOB_PLAIN_RANDOM: u32 = 64u;
+const JOB_NO_CAUSTICS: u32 = 128u;
 
 // Rust twin: `reference::scene::ImageUse`. Rows of uv' = M (u, v, 1).
 struct ImageUse {

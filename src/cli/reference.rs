@@ -47,6 +47,10 @@ pub struct Flags {
     /// of light that reflections focus away, and changes where it lands.
     #[arg(long, value_name = "F", value_parser = parse_limit, allow_hyphen_values = true)]
     filter_glossy: Option<f32>,
+    /// As Cycles without "Reflective Caustics": surfaces seen by a diffusely scattered ray show no gloss. Takes light away; for
+    /// comparisons with such pictures.
+    #[arg(long)]
+    no_caustics: bool,
     /// Trace one point for each cell of NxN pixels, the pixel centre that the network samples (N/2, N/2 in the cell), without
     /// pixel filter; the picture has a pixel for each cell.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -78,6 +82,7 @@ impl Flags {
             ("--diffuse-bounces", self.diffuse_bounces.is_some()),
             ("--glossy-bounces", self.glossy_bounces.is_some()),
             ("--filter-glossy", self.filter_glossy.is_some()),
+            ("--no-caustics", self.no_caustics),
             ("--cells", self.cells.is_some()),
         ]
         .into_iter()
@@ -101,6 +106,7 @@ impl Flags {
             glossy_bounces: self.glossy_bounces.unwrap_or(job::UNLIMITED),
             clamp: self.clamp.unwrap_or(0.0),
             filter_glossy: self.filter_glossy.unwrap_or(0.0),
+            flags: if self.no_caustics { job::NO_CAUSTICS } else { 0 },
             layers,
             ..Default::default()
         };
@@ -194,6 +200,7 @@ impl Task {
             ("ReferenceBounces", [o.bounces, o.diffuse_bounces, o.glossy_bounces].map(limit).join(" ")),
             ("ReferenceClamp", o.clamp.to_string()),
             ("ReferenceFilterGlossy", o.filter_glossy.to_string()),
+            ("ReferenceCaustics", (o.flags & job::NO_CAUSTICS == 0).to_string()),
             ("ReferenceCells", self.cells.map_or("none".into(), |n| n.to_string())),
             ("ReferenceSeconds", format!("{:.3}", traced.seconds)),
             ("ReferenceSamplesPerSecond", format!("{:.0}", rate(traced))),

@@ -1,6 +1,9 @@
 //! Specular light of sky and bounces: the split sum's share of what one ray along the mirrored direction finds on the
 //! screen, blurred by the lobe's width.
 //!
+//! Where the method has sent rays into lobes ([`Rung::gloss`](super::rung::Rung::gloss)), what they found is shown, and the screen is
+//! asked by smooth surfaces only, for sharpness.
+//!
 //! `gi.lit` makes a half-size picture of the light that all surfaces send out, and blurs it in steps of two; `gi.glossy`
 //! marches one ray a pixel through the depth texture (16 steps, 48 for smooth surfaces) and looks the picture up where
 //! it hits, sharp for smooth surfaces. A ray that finds nothing takes the diffuse light of the surface's own side, mixed
@@ -11,6 +14,7 @@
 //! mean.
 
 use super::rung::Cost;
+use crate::gpu::bind::Binder;
 use crate::gpu::timing::Recorder;
 use crate::render::{Targets, tool};
 
@@ -25,9 +29,9 @@ pub struct GlossyPass {
     surfaces: wgpu::BindGroupLayout,
     level: wgpu::BindGroupLayout,
     trace: wgpu::BindGroupLayout,
-    sky: wgpu::BindGroupLayout,
+    sky: Binder,
     sampler: wgpu::Sampler,
-    /// One texel: bound where the method knows of no surroundings.
+    /// One texel: bound where the method has sent no rays into lobes.
     nothing: wgpu::TextureView,
 }
 
@@ -40,6 +44,16 @@ pub struct GlossyPicture {
     /// while another of its levels is bound for reading.
     chain: wgpu::Texture,
     trace: wgpu::BindGroup,
+}
+
+/// What the passes read.
+pub struct GlossyInputs<'a> {
+    /// The targets.
+    pub picture: &'a GlossyPicture,
+    /// Radiance of the surroundings, for rays that leave the picture.
+    pub sky: &'a wgpu::TextureView,
+    /// [`Rung::gloss`](super::rung::Rung::gloss).
+    pub found: Option<&'a wgpu::TextureView>,
 }
 
 impl GlossyPicture {
@@ -58,11 +72,11 @@ impl GlossyPass {
         let surfaces = layout(&[UNIFORM, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD]);
         let level = layout(&[LOAD, STORE_HALF]);
         let trace = layout(&[SAMPLE, SAMPLER, STORE_HALF]);
-        let sky = layout(&[LOAD, SAMPLE]);
+        let sky = Binder::new(device, "gi.glossy", &[LOAD, LOAD]);
         Self {
             lit: tool::compute(device, "gi.lit", "lit", &[&surfaces, &level]),
             halve: tool::compute(device, "gi.lit", "halve", &[&surfaces, &level]),
-            glossy: tool::compute(device, "gi.glossy", "glossy", &[&surfaces, &trace, &sky]),
+            glossy: tool::compute(device, "gi.glossy", "glossy", &[&surfaces, &trace, sky.layout()]),
             surfaces,
             level,
             trace,
@@ -131,20 +145,10 @@ impl GlossyPass {
         GlossyPicture { surfaces, levels, chain, trace }
     }
 
-    /// Binds the environment and what the method knows of the camera's surroundings ([`super::rung::Rung::surroundings`]);
-    /// rebuilt when the scene changes.
-    pub fn sky(
-        &self,
-        device: &wgpu::Device,
-        environment: &wgpu::TextureView,
-        surroundings: Option<&wgpu::TextureView>,
-    ) -> wgpu::BindGroup {
-        let views = [environment, surroundings.unwrap_or(&self.nothing)].map(wgpu::BindingResource::TextureView);
-        tool::group(device, "gi.glossy", &self.sky, &views)
-    }
-
     /// Records passes `gi.lit` and `gi.glossy` for targets of `size` pixels.
-    pub fn record(&self, recorder: &mut Recorder<'_>, picture: &GlossyPicture, sky: &wgpu::BindGroup, size: [u32; 2]) {
+    pub fn record(&mut self, recorder: &mut Recorder<'_>, inputs: GlossyInputs<'_>, size: [u32; 2]) {
+        let picture = inputs.picture;
+        let sky = self.sky.group([inputs.sky.into(), inputs.found.unwrap_or(&self.nothing).into()]);
         recorder.compute("gi.lit", |pass| {
             pass.set_bind_group(0, &picture.surfaces, &[]);
             for (i, (group, level)) in picture.levels.iter().enumerate() {
@@ -161,7 +165,7 @@ impl GlossyPass {
             pass.set_pipeline(&self.glossy);
             pass.set_bind_group(0, &picture.surfaces, &[]);
             pass.set_bind_group(1, &picture.trace, &[]);
-            pass.set_bind_group(2, sky, &[]);
+            pass.set_bind_group(2, &sky, &[]);
             tool::dispatch(pass, size);
         });
     }

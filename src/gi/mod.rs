@@ -94,6 +94,8 @@ pub struct Inputs<'a> {
     /// Where each pixel's surface was in the frame before: texture coordinates then minus now, y down, free of jitter, `Rg16Float`;
     /// for methods that remember frames. `None` counts as everything at rest.
     pub motion: Option<&'a wgpu::TextureView>,
+    /// `Rgba8Unorm(Srgb)`: F0 and perceptual roughness, for methods that find what lobes show ([`Rung::gloss`](rung::Rung::gloss)).
+    pub specular: Option<&'a wgpu::TextureView>,
 }
 
 /// The scene as rays meet it.

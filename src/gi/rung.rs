@@ -54,6 +54,12 @@ pub trait Rung: Send {
         None
     }
 
+    /// What the specular lobe of each pixel's surface shows, divided by its directional albedo (`env_brdf`): radiance, W/(m²·sr), where
+    /// the method knows it. `Rgba16Float` of the picture's size; another view after a change of size.
+    fn gloss(&self) -> Option<&wgpu::TextureView> {
+        None
+    }
+
     /// What the camera's surroundings send to it, if the method knows, for reflections of what is off the screen. The
     /// same view for the method's whole life, `Rgba16Float`: faces +X, −X, +Y, −Y, +Z, −Z of a cube side by side; on the
     /// face along ±axis k columns follow ±axis k + 2 and rows fall along axis k + 1. rgb is radiance, a the

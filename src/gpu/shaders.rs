@@ -188,7 +188,9 @@ pub const GI: &[Shader] = &[
             "gi/cells.wgsl",
             "accel/traverse.wgsl",
             "accel/surface.wgsl",
+            "lib/sampling.wgsl",
             "gi/gather/types.wgsl",
+            "gi/gather/gloss.wgsl",
             "gi/gather/entries.wgsl",
             "gi/gather/look.wgsl",
             "gi/gather/rays.wgsl"
@@ -205,6 +207,7 @@ pub const GI: &[Shader] = &[
             "gi/cells.wgsl",
             "accel/traverse.wgsl",
             "accel/surface.wgsl",
+            "lib/sampling.wgsl",
             "gi/gather/types.wgsl",
             "gi/gather/entries.wgsl",
             "gi/gather/look.wgsl",
@@ -222,7 +225,9 @@ pub const GI: &[Shader] = &[
             "gi/cells.wgsl",
             "accel/traverse.wgsl",
             "accel/surface.wgsl",
+            "lib/sampling.wgsl",
             "gi/gather/types.wgsl",
+            "gi/gather/gloss.wgsl",
             "gi/gather/past.wgsl",
             "gi/gather/settle.wgsl"
         ],
@@ -238,7 +243,9 @@ pub const GI: &[Shader] = &[
             "gi/cells.wgsl",
             "accel/traverse.wgsl",
             "accel/surface.wgsl",
+            "lib/sampling.wgsl",
             "gi/gather/types.wgsl",
+            "gi/gather/gloss.wgsl",
             "gi/gather/past.wgsl",
             "gi/gather/blur.wgsl"
         ],
@@ -249,8 +256,7 @@ pub const GI: &[Shader] = &[
             "lib/octahedral.wgsl",
             "gi/inputs.wgsl",
             "gi/cells.wgsl",
-            "gi/bring.wgsl",
-            "gi/gather/upsample.wgsl"
+            "gi/gather/bring.wgsl"
         ],
     },
     Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
@@ -295,6 +301,7 @@ pub const REFERENCE: &[Shader] = &[
             "lib/lights.wgsl",
             "reference/types.wgsl",
             "accel/traverse.wgsl",
+            "lib/sampling.wgsl",
             "reference/random.wgsl",
             "reference/surface.wgsl",
             "reference/camera.wgsl",
@@ -315,6 +322,7 @@ pub const REFERENCE: &[Shader] = &[
             "lib/lights.wgsl",
             "reference/types.wgsl",
             "accel/traverse.wgsl",
+            "lib/sampling.wgsl",
             "reference/random.wgsl",
             "reference/surface.wgsl",
             "reference/camera.wgsl",

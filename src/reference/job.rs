@@ -69,6 +69,9 @@ pub const HITS_ONLY: u32 = 16;
 pub const COUNT_TWICE: u32 = 32;
 /// Flag: plain hashed random numbers in place of Owen-scrambled Sobol points. For measuring what the latter gain.
 pub const PLAIN_RANDOM: u32 = 64;
+/// Flag: surfaces that are met by a diffusely scattered ray show no specular lobe, as in Cycles without "Reflective Caustics" (metals
+/// are black there, and nothing is taken from the diffuse part). For comparisons with such pictures.
+pub const NO_CAUSTICS: u32 = 128;
 
 impl Job {
     /// A job for `camera` on a picture of `size` pixels: no points yet, one sample, seed 0, filter of 1.5 pixels, no limits.

@@ -14,7 +14,7 @@ use super::world::{World, WorldPass};
 use crate::gi::{
     self,
     features::FeatureSet,
-    glossy::{GlossyPass, GlossyPicture},
+    glossy::{GlossyInputs, GlossyPass, GlossyPicture},
     pack,
     rung::{self, Cost, Rung},
 };
@@ -49,7 +49,6 @@ struct Lighting {
     world: Option<World>,
     group: wgpu::BindGroup,
     sky: wgpu::BindGroup,
-    glossy_sky: wgpu::BindGroup,
 }
 
 /// The rasteriser. The host owns device, queue and encoder; a steady frame allocates nothing on the GPU.
@@ -333,7 +332,8 @@ impl Renderer {
         match &mut self.indirect {
             Some(indirect) => {
                 indirect.record(recorder, queue, &inputs, &self.targets.indirect.view)?;
-                self.passes.glossy.record(recorder, &self.picture.glossy, &lighting.glossy_sky, size);
+                let lit = GlossyInputs { picture: &self.picture.glossy, sky: &scene.environment_view, found: indirect.gloss() };
+                self.passes.glossy.record(recorder, lit, size);
             }
             None => clear(recorder, &self.targets),
         }
@@ -349,12 +349,7 @@ impl Renderer {
         let maps = self.passes.shadow.maps(&self.device, queue, scene);
         let group = self.passes.direct.lights(&self.device, scene, &maps);
         let sky = self.passes.composite.sky(&self.device, &scene.environment_view);
-        let glossy_sky = self.passes.glossy.sky(
-            &self.device,
-            &scene.environment_view,
-            self.indirect.as_ref().and_then(|i| i.surroundings()),
-        );
-        Lighting { scene: scene.id, maps, world: None, group, sky, glossy_sky }
+        Lighting { scene: scene.id, maps, world: None, group, sky }
     }
 
     /// Draws what lies beyond the screen, if the method reads it; without `again` only where it was not drawn yet.
@@ -401,6 +396,7 @@ fn gi_inputs<'a>(
         }),
         rays: scene.and_then(|s| Some(gi::Rays { scene: s.rays.as_ref()?, environment: &s.environment_view })),
         motion: Some(&targets.motion.view),
+        specular: Some(&targets.specular.view),
     }
 }
 

@@ -95,7 +95,7 @@ impl Plan {
             views += maps;
         }
         let sun_size = options.sun_size.clamp(64, 4096) >> u32::from(suns > 1);
-        let local_size = options.local_size.clamp(64, 2048) >> u32::from(local_layers > 12);
+        let local_size = options.local_size.clamp(64, 2048) >> u32::from(local_layers > 24);
         Self { of_light, views, sun_size, sun_layers: suns * cascades, local_size, local_layers, unshadowed }
     }
 }

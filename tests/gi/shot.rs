@@ -206,6 +206,7 @@ impl Textures {
             lights: None,
             rays: None,
             motion: None,
+            specular: None,
         }
     }
 }

@@ -5,6 +5,9 @@
 // Where light has changed: what it is now (rgb; a: 1), else 0.
 @group(2) @binding(2) var<storage, read_write> changes: array<vec4f>;
 
+// What lobes show over `env_brdf` (a: 1), 0 on surfaces without.
+@group(2) @binding(3) var<storage, read_write> glosses: array<vec4f>;
+
 // Frames from which on the narrow blur is enough, and the radii of both in cells.
 const SETTLED = 6.0;
 const NARROW = 2;
@@ -20,7 +23,8 @@ const LEAST_REGION = 0.05;
 const LEAST_KNOWN = 5.0;
 
 fn past_at(cell: u32) -> Past {
-    return past_from(pasts[4u * cell], pasts[4u * cell + 1u], pasts[4u * cell + 2u], pasts[4u * cell + 3u]);
+    let i = 5u * cell;
+    return past_from(pasts[i], pasts[i + 1u], pasts[i + 2u], pasts[i + 3u], pasts[i + 4u]);
 }
 
 // Of the cells of a workgroup: luminance of all frames, of lately, and its noise.
@@ -38,6 +42,56 @@ fn differs(all: f32, lately: f32, variance: f32, least: f32) -> bool {
     let hurried = (gather.flags & GATHER_LIGHTS_CHANGED) != 0u;
     let sure = select(1.0, 0.2, hurried);
     return abs(lately - all) > sure * (SIGMAS * sqrt(variance) + least * max(all, lately));
+}
+
+// One over the difference of roughness from which on two lobes show different things.
+const ALIKE = 5.0;
+// Share of the light's gradient that a lobe of roughness 0.5 sees (1 for a mirror), and the range of what is taken from it.
+const SEEN = 0.87;
+const LEAST_TILT = 0.3;
+const MOST_TILT = 2.0;
+// From here to ROUGHEST the light's gradient takes over from rays.
+const ROUGH = 0.7;
+
+// How much of a neighbour counts: that it lies in the same plane and faces the same way.
+fn alike(here: Past, there: Past, plane: f32) -> f32 {
+    let off_plane = dot(there.x - here.x, here.n) * plane;
+    let facing = saturate(dot(there.n, here.n));
+    let f2 = facing * facing;
+    let f8 = f2 * f2 * f2 * f2;
+    return exp(-off_plane * off_plane) * f8 * f8;
+}
+
+// What rays into lobes around have found, times weight (a). Over a wide lobe's breadth every second cell is asked.
+fn gloss_around(id: vec2u, here: Past, plane: f32) -> vec4f {
+    if here.roughness >= ROUGHEST { return vec4f(0.0); }
+    let breadth = lobe_cells(here.roughness);
+    let sharp = 0.5 / max(breadth * breadth, 1e-3);
+    let stride = select(1, 2, breadth >= f32(2 * NARROW));
+    var sum = vec4f(0.0);
+    for (var i = 0; i < 25; i++) {
+        let step = stride * vec2i(i % 5 - 2, i / 5 - 2);
+        let at = vec2i(id) + step;
+        if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
+        let there = past_at(cell_index(vec2u(at)));
+        if there.frames <= 0.0 { continue; }
+        let same = saturate(1.0 - ALIKE * abs(there.roughness - here.roughness));
+        let w = alike(here, there, plane) * same * exp(-min(sharp * f32(step.x * step.x + step.y * step.y), 60.0));
+        sum += w * there.gloss.a * vec4f(there.gloss.rgb, 1.0);
+    }
+    return sum;
+}
+
+// What the cell's lobe shows: what its rays have found (`gloss`, times weight), or for wide lobes, and where no ray was sent yet, the
+// cell's light with its gradient `across` towards the mirrored direction. Radiance a + 3/2 b·ω over the hemisphere has vector a n + b
+// where b lies in the plane.
+fn shown(here: Past, mean: vec3f, across: vec3f, gloss: vec4f) -> vec4f {
+    if here.roughness >= NO_LOBE { return vec4f(0.0); }
+    let towards = normalize(here.x - params.eye.xyz);
+    let along = dot(across, towards - here.n * dot(here.n, towards));
+    let around = mean * clamp(1.0 + 1.5 * SEEN * along, LEAST_TILT, MOST_TILT);
+    if gloss.a <= 0.0 { return vec4f(around, 1.0); }
+    return vec4f(mix(gloss.rgb / gloss.a, around, smoothstep(ROUGH, ROUGHEST, here.roughness)), 1.0);
 }
 
 @compute @workgroup_size(8, 8)
@@ -62,6 +116,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
         light[3u * cell] = vec4f(0.0);
         light[3u * cell + 1u] = vec4f(0.0);
         light[3u * cell + 2u] = vec4f(0.0);
+        glosses[cell] = vec4f(0.0);
         return;
     }
     let z = dot(here.x - params.eye.xyz, -vec3f(params.world_from_view[2]));
@@ -79,13 +134,9 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
             let there = past_at(cell_index(vec2u(at)));
             if there.frames <= 0.0 { continue; }
-            let off_plane = dot(there.x - here.x, here.n) * plane;
-            let facing = saturate(dot(there.n, here.n));
-            let f2 = facing * facing;
-            let f8 = f2 * f2 * f2 * f2;
             // Half at the rim: then each of the sixteen places of the rays' lattice counts the same.
             let rim = select(1.0, 0.5, abs(x) == radius && radius > 0) * select(1.0, 0.5, abs(y) == radius && radius > 0);
-            let w = rim * exp(-off_plane * off_plane) * f8 * f8 * min(there.frames, 16.0);
+            let w = rim * alike(here, there, plane) * min(there.frames, 16.0);
             sum += w * there.light;
             vector += w * there.vector;
             total += w;
@@ -109,6 +160,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     // 8/3 of the vector's part across it.
     let across = (8.0 / 3.0) * (vector - here.n * dot(vector, here.n)) / max(luminance(mean), 1e-30);
     let whole = here.n + across;
+    glosses[cell] = shown(here, mean, across, gloss_around(id.xy, here, plane));
     light[3u * cell] = vec4f(mean.r * whole, 0.0);
     light[3u * cell + 1u] = vec4f(mean.g * whole, 0.0);
     light[3u * cell + 2u] = vec4f(mean.b * whole, 0.0);

@@ -62,7 +62,7 @@ const ENTRY_LIFT = 0.02;
 // Whether nothing stands between x and where the rays of slot's entry began. An entry without rays is everybody's.
 fn sees_entry(slot: u32, x: vec3f, n: vec3f, size: f32) -> bool {
     let slots = gather.mask + 1u;
-    let begin = entry_queries[gather.cells + 2u * slots + (1u - (gather.round & 1u)) * slots + slot];
+    let begin = entry_queries[gather.rays + 2u * slots + (1u - (gather.round & 1u)) * slots + slot];
     if begin.w == 0u { return true; }
     let start = x + n * (ENTRY_LIFT * size);
     let to = bitcast<vec3f>(begin.xyz) + unpack_normal(begin.w) * (ENTRY_LIFT * size) - start;

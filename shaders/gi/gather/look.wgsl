@@ -36,6 +36,9 @@ struct Place {
 // enough to show it as anything but a spark.
 const LEAST_ROUGHNESS = 0.2;
 
+// Cosine of rays that alone find what glows: greater than any density of shadow rays.
+const ALONE = 1e12;
+
 fn weight_of(c: vec3f) -> f32 {
     return dot(c, vec3f(0.2126, 0.7152, 0.0722));
 }
@@ -133,15 +136,17 @@ fn is_lit(x: vec3f, chosen: Chosen, seed: u32) -> bool {
         && trace_seeded(x, chosen.l, chosen.reach, true, seed).triangle == NO_TRIANGLE;
 }
 
-// What the ray from o, where a surface faces n_o, finds in direction d. `query` is its number among all rays of the frame, `round` that
-// which will update the entry, `glows`: whether what glows counts where the ray meets it.
+// What the ray from o finds in direction d. n_d: cosine by which shadow rays to what glows were weighted there, ALONE where none were
+// sent. `query` is the ray's number among all of the frame, `round` that which will update the entry, `glows`: whether what glows counts
+// where the ray meets it.
 fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, round: u32, glows: bool) -> Found {
     let seed = pcg3(vec3u(query, gather.round, 0x9e3779b9u));
     let hit = trace_seeded(o, d, FAR, false, seed.x);
     if hit.triangle == NO_TRIANGLE {
         return Found(finite3(environment_radiance(d)), NONE, vec3f(0.0), FAR);
     }
-    let surface = met(hit.triangle);
+    var surface = met(hit.triangle);
+    if (gather.flags & GATHER_NO_CAUSTICS) != 0u { surface.f0 = vec3f(0.0); }
     let front = trace_normal(hit);
     let facing = -dot(front, d);
     let n = select(-front, front, facing > 0.0);

@@ -1,4 +1,4 @@
-// What a cell remembers, 64 bytes.
+// What a cell remembers, 80 bytes.
 struct Past {
     // Irradiance over π on the cell's surface; frames in it.
     light: vec3f,
@@ -11,10 +11,16 @@ struct Past {
     n: vec3f,
     // The same light as a mean that forgets within a few frames, which tells when light has changed.
     lately: vec3f,
+    // Of the cell's surface now; NO_LOBE where it mirrors nothing.
+    roughness: f32,
+    // What the lobe shows over `env_brdf`, and rays in it.
+    gloss: vec4f,
 }
 
-fn past_from(a: vec4f, b: vec4f, c: vec4f, d: vec4f) -> Past {
-    return Past(a.rgb, a.a, b.xyz, b.w, c.xyz, unpack_normal(bitcast<u32>(c.w)), d.rgb);
+const NO_LOBE = 2.0;
+
+fn past_from(a: vec4f, b: vec4f, c: vec4f, d: vec4f, e: vec4f) -> Past {
+    return Past(a.rgb, a.a, b.xyz, b.w, c.xyz, unpack_normal(bitcast<u32>(c.w)), d.rgb, d.w, e);
 }
 
 // Weight of a new frame in `lately`: 95 % of a change are there after six frames.
@@ -23,4 +29,9 @@ const LATELY = 0.4;
 // Width of a cell at view distance z.
 fn cell_foot(z: f32) -> f32 {
     return 2.0 * params.unproject.y * z * f32(CELL_SIDE) / f32(params.size.y);
+}
+
+// Cells across which what a lobe shows changes little: its width at what is as far from the mirror as the mirror from the eye.
+fn lobe_cells(roughness: f32) -> f32 {
+    return 0.5 * roughness * roughness / cell_foot(1.0);
 }

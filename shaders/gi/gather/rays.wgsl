@@ -1,9 +1,12 @@
-// One ray from each cell of the picture into the half space above it, and where surfaces glow one shadow ray to a point of them.
+// One ray from each cell of the picture into the half space above it, and where surfaces glow one shadow ray to a point of them. Of each
+// square of 2×2 cells one in turn sends a second ray into its lobe, if its surface has one.
 
 @group(2) @binding(3) var<storage, read> cell_pixels: array<u32>;
-// Three vectors a cell: radiance found and the entry's slot; what the entry's light is multiplied by (shared exponent), direction,
-// distance; light of what glows, and its direction.
+// Three vectors a ray: radiance found and the entry's slot; what the entry's light is multiplied by (shared exponent), direction,
+// distance (0: none was sent); light of what glows, and its direction. First those of cells, then those into lobes.
 @group(2) @binding(4) var<storage, read_write> records: array<vec4f>;
+// F0 and roughness.
+@group(2) @binding(5) var specular_map: texture_2d<f32>;
 
 // Places of a 4×4 square of cells in the order in which the lattice's points go to them: any order without pattern.
 const ORDER = array<u32, 16>(0u, 11u, 6u, 13u, 9u, 2u, 15u, 4u, 7u, 12u, 1u, 10u, 14u, 5u, 8u, 3u);
@@ -24,30 +27,93 @@ fn shared_exponent(c: vec3f) -> u32 {
     return code.x | (code.y << 9u) | (code.z << 18u) | (exponent << 27u);
 }
 
-@compute @workgroup_size(8, 8)
-fn rays(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= cell_grid()) { return; }
-    let cell = cell_index(id.xy);
-    let packed = cell_pixels[cell];
-    if packed == NO_PIXEL { return; }
-    let pixel = unpack_pixel(packed);
+// A place of the picture from which a ray is sent.
+struct Start {
+    x: vec3f,
+    n: vec3f,
+    // Unit vector to the eye.
+    v: vec3f,
+}
+
+fn start_at(pixel: vec2i) -> Start {
     let z = distance_at(pixel);
     let n = world_normal_at(pixel);
     let from_eye = offset_at(pixel, z);
     // Above the surface, and towards the eye, where nothing is in between whatever the normal says.
-    let x = params.eye.xyz + from_eye * (1.0 - LIFT) + n * (LIFT * z);
-    let d = cosine_direction(n, numbers(id.xy));
-    let n_d = max(dot(n, d), 1e-4);
+    return Start(params.eye.xyz + from_eye * (1.0 - LIFT) + n * (LIFT * z), n, -normalize(from_eye));
+}
+
+fn record(ray: u32, found: Found, weight: vec3f, d: vec3f, glow: vec4f) {
+    records[3u * ray] = vec4f(found.radiance * weight, bitcast<f32>(found.slot));
+    records[3u * ray + 1u] =
+        vec4f(bitcast<f32>(shared_exponent(found.back * weight)), bitcast<f32>(pack_normal(d)), found.distance, 0.0);
+    records[3u * ray + 2u] = glow;
+}
+
+@compute @workgroup_size(8, 8)
+fn rays(@builtin(global_invocation_id) id: vec3u) {
+    if id.z == 1u {
+        gloss_ray(id.xy);
+        return;
+    }
+    if any(id.xy >= cell_grid()) { return; }
+    let cell = cell_index(id.xy);
+    let packed = cell_pixels[cell];
+    if packed == NO_PIXEL { return; }
+    let at = start_at(unpack_pixel(packed));
+    let d = cosine_direction(at.n, numbers(id.xy));
     let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
-    let found = look(x, d, n_d, cell, gather.round, !stands_in);
-    records[3u * cell] = vec4f(found.radiance, bitcast<f32>(found.slot));
-    records[3u * cell + 1u] = vec4f(bitcast<f32>(shared_exponent(found.back)), bitcast<f32>(pack_normal(d)), found.distance, 0.0);
+    let found = look(at.x, d, max(dot(at.n, d), 1e-4), cell, gather.round, !stands_in);
     var glow = vec4f(0.0);
     if gather.emitter_count > 0u && !stands_in {
         let seed = pcg3(vec3u(cell, gather.round, 0x51ed270bu));
         // Of an even white surface without gloss.
-        let chosen = choose_light(Place(x, n, n, vec3f(1.0), vec3f(0.0), 1.0), false, seed);
-        if is_lit(x, chosen, seed.z) { glow = vec4f(chosen.even, bitcast<f32>(pack_normal(chosen.l))); }
+        let chosen = choose_light(Place(at.x, at.n, at.n, vec3f(1.0), vec3f(0.0), 1.0), false, seed);
+        if is_lit(at.x, chosen, seed.z) { glow = vec4f(chosen.even, bitcast<f32>(pack_normal(chosen.l))); }
     }
-    records[3u * cell + 2u] = glow;
+    record(cell, found, vec3f(1.0), d, glow);
+}
+
+// The two numbers of a ray into a lobe. Each square has a lattice of its own: lobes are narrower than the hemisphere, a few rays fill
+// them, and what a blur of few cells leaves is noise, not a pattern.
+fn gloss_numbers(square: vec2u) -> vec2f {
+    return lattice(gather.frame >> 2u, pcg3(vec3u(square, 2u * (gather.frame & 3u) + 1u)).xy);
+}
+
+// The ray of a square of cells into the lobe of this frame's cell. What it finds is weighted so that its mean over the lobe is what
+// `env_brdf` has to be multiplied by.
+fn gloss_ray(square: vec2u) {
+    if any(square >= gloss_grid()) { return; }
+    let ray = gloss_record(square);
+    records[3u * ray + 1u].z = 0.0;
+    if (gather.flags & GATHER_NO_GLOSS) != 0u { return; }
+    let cell = gloss_cell(square);
+    if any(cell >= cell_grid()) { return; }
+    let packed = cell_pixels[cell_index(cell)];
+    if packed == NO_PIXEL { return; }
+    let pixel = unpack_pixel(packed);
+    let surface = textureLoad(specular_map, pixel, 0);
+    if !has_lobe(surface) { return; }
+    let at = start_at(pixel);
+    let n_v = max(dot(at.n, at.v), 1e-4);
+    let frame = frame_around(at.n);
+    let v = at.v * frame;
+    let alpha = max(surface.a * surface.a, 1e-3);
+    let h = sample_visible_normal(vec3f(v.xy, max(v.z, 1e-4)), alpha, gloss_numbers(square));
+    let l = reflect(-v, h);
+    let share = env_brdf(surface.rgb, surface.a, n_v);
+    var found = Found(vec3f(0.0), NONE, vec3f(0.0), FAR);
+    var weight = vec3f(0.0);
+    if l.z > 0.0 {
+        // Masking of both directions over that of v: height-correlated Smith.
+        let a2 = alpha * alpha;
+        let g_v = sqrt(n_v * n_v * (1.0 - a2) + a2);
+        let g_l = sqrt(l.z * l.z * (1.0 - a2) + a2);
+        let kept = l.z * (n_v + g_v) / (l.z * g_v + n_v * g_l);
+        weight = fresnel_of(surface.rgb, saturate(dot(v, h))) * lobe_gain(surface.rgb, surface.a, n_v) * kept
+            / max(share, vec3f(1e-4));
+        let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
+        found = look(at.x, frame * l, ALONE, ray, gather.round, !stands_in);
+    }
+    record(ray, found, weight, frame * l, vec4f(0.0));
 }

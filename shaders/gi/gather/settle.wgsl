@@ -4,12 +4,14 @@
 @group(2) @binding(0) var<storage, read> cell_pixels: array<u32>;
 @group(2) @binding(1) var<storage, read> records: array<vec4f>;
 @group(2) @binding(2) var<storage, read> entry_light: array<vec4f>;
-// `Past` of the frame before and of this one, four vectors a cell.
+// `Past` of the frame before and of this one, five vectors a cell.
 @group(2) @binding(3) var<storage, read> before: array<vec4f>;
 @group(2) @binding(4) var<storage, read_write> after: array<vec4f>;
 // Where blur.wgsl found that light had changed: what it is now (rgb; a: 1), else 0.
 @group(2) @binding(5) var<storage, read> changes: array<vec4f>;
 @group(2) @binding(6) var motion_map: texture_2d<f32>;
+// F0 and roughness.
+@group(2) @binding(7) var specular_map: texture_2d<f32>;
 
 // Least sum of bilinear weights of cells that show the same surface.
 const LEAST_PAST = 0.05;
@@ -21,12 +23,17 @@ fn from_shared_exponent(code: u32) -> vec3f {
     return vec3f(vec3u(code, code >> 9u, code >> 18u) & vec3u(511u)) * exp2(f32(i32(code >> 27u) - 24));
 }
 
+// Where the surface at this pixel was in the frame before, from here, in pixels.
+fn motion_of(pixel: vec2i) -> vec2f {
+    return finite3(vec3f(textureLoad(motion_map, pixel, 0).xy, 0.0)).xy * vec2f(params.size);
+}
+
 // The mean where the surface at x, which faces n, was in the frame before; 0 frames where it was not to be seen.
 fn past_of(cell: vec2u, pixel: vec2i, x: vec3f, n: vec3f, foot: f32) -> Past {
-    let none = Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n, vec3f(0.0));
+    let none = Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n, vec3f(0.0), NO_LOBE, vec4f(0.0));
     var past = none;
     if (gather.flags & GATHER_CUT) != 0u { return past; }
-    let motion = finite3(vec3f(textureLoad(motion_map, pixel, 0).xy, 0.0)).xy * vec2f(params.size);
+    let motion = motion_of(pixel);
     if all(abs(motion) < vec2f(0.02)) {
         // At rest a cell stays what it is, whichever of its pixels stands for it.
         let same = past_at(cell_index(cell));
@@ -50,6 +57,7 @@ fn past_of(cell: vec2u, pixel: vec2i, x: vec3f, n: vec3f, foot: f32) -> Past {
         past.vector += w * one.vector;
         past.square += w * one.square;
         past.lately += w * one.lately;
+        past.gloss += w * one.gloss;
         total += w;
     }
     if total < LEAST_PAST { return none; }
@@ -58,6 +66,7 @@ fn past_of(cell: vec2u, pixel: vec2i, x: vec3f, n: vec3f, foot: f32) -> Past {
     past.vector /= total;
     past.square /= total;
     past.lately /= total;
+    past.gloss /= total;
     return past;
 }
 
@@ -67,7 +76,8 @@ const YOUNG = 16.0;
 const AFTER_CHANGE = 4.0;
 
 fn past_at(cell: u32) -> Past {
-    var past = past_from(before[4u * cell], before[4u * cell + 1u], before[4u * cell + 2u], before[4u * cell + 3u]);
+    let i = 5u * cell;
+    var past = past_from(before[i], before[i + 1u], before[i + 2u], before[i + 3u], before[i + 4u]);
     let change = changes[cell];
     if change.a > 0.0 {
         let gain = luminance(change.rgb) / max(luminance(past.light), 1e-20);
@@ -83,27 +93,56 @@ fn shows(past: Past, x: vec3f, n: vec3f, foot: f32) -> bool {
     return dot(past.n, n) > SAME_NORMAL && abs(dot(past.x - x, n)) < SAME_PLANE * foot;
 }
 
+// Radiance of a record with the light of the entry that its ray has met.
+fn found_by(ray: u32) -> vec3f {
+    let a = records[3u * ray];
+    let slot = bitcast<u32>(a.w);
+    if slot == NONE { return finite3(a.rgb); }
+    let back = from_shared_exponent(bitcast<u32>(records[3u * ray + 1u].x));
+    return finite3(a.rgb + back * entry_light[(gather.round & 1u) * (gather.mask + 1u) + slot].rgb);
+}
+
+// Most rays into a lobe that are remembered: at rest, and while the lights settle.
+const GLOSS_RAYS = 32.0;
+const GLOSS_HURRIED = 4.0;
+
+// The mean of what rays into the cell's lobe have found, with this frame's, if it is the cell's turn. What a lobe shows slides over a
+// surface that moves on the screen, by half of its way where the mirrored is as far as the mirror; so many frames count as slide
+// across the lobe.
+fn gloss_of(cell: vec2u, past: vec4f, roughness: f32, motion: vec2f) -> vec4f {
+    if roughness >= ROUGHEST { return vec4f(0.0); }
+    var most = select(GLOSS_RAYS, GLOSS_HURRIED, (gather.flags & GATHER_LIGHTS_CHANGED) != 0u);
+    let slides = 0.5 * length(motion) / f32(CELL_SIDE);
+    most = clamp(lobe_cells(roughness) / max(slides, 1e-6), 1.0, most);
+    var gloss = vec4f(past.rgb, min(past.a, most));
+    let square = cell / 2u;
+    if all(gloss_cell(square) == cell) {
+        let ray = gloss_record(square);
+        if records[3u * ray + 1u].z > 0.0 {
+            gloss.a = min(gloss.a + 1.0, most);
+            // Each ray counts for its number, as below.
+            let share = select(2.0, 1.0, (gather.flags & GATHER_EVEN) != 0u) / (gloss.a + 1.0);
+            gloss = vec4f(mix(gloss.rgb, found_by(ray), min(share, 1.0)), gloss.a);
+        }
+    }
+    return gloss;
+}
+
 @compute @workgroup_size(8, 8)
 fn settle(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= cell_grid()) { return; }
     let cell = cell_index(id.xy);
     let packed = cell_pixels[cell];
     if packed == NO_PIXEL {
-        after[4u * cell] = vec4f(0.0);
+        after[5u * cell] = vec4f(0.0);
         return;
     }
-    let a = records[3u * cell];
-    let b = records[3u * cell + 1u];
-    let c = records[3u * cell + 2u];
-    var light = a.rgb;
-    let slot = bitcast<u32>(a.w);
-    if slot != NONE {
-        light += from_shared_exponent(bitcast<u32>(b.x)) * entry_light[(gather.round & 1u) * (gather.mask + 1u) + slot].rgb;
-    }
-    light = finite3(light);
-    let vector = luminance(light) * unpack_normal(bitcast<u32>(b.y))
-        + luminance(c.rgb) * unpack_normal(bitcast<u32>(c.w));
-    light += c.rgb;
+    let arrived = records[3u * cell + 1u];
+    let glow = records[3u * cell + 2u];
+    var light = found_by(cell);
+    let vector = luminance(light) * unpack_normal(bitcast<u32>(arrived.y))
+        + luminance(glow.rgb) * unpack_normal(bitcast<u32>(glow.w));
+    light += glow.rgb;
 
     let pixel = unpack_pixel(packed);
     let z = distance_at(pixel);
@@ -116,12 +155,17 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     var share = select(1.0 / (frames - 0.5 * (YOUNG - 1.0)), 2.0 / (frames + 1.0), frames <= YOUNG);
     if (gather.flags & GATHER_EVEN) != 0u { share = 1.0 / frames; }
     let l = luminance(light);
+    let surface = textureLoad(specular_map, pixel, 0);
+    let roughness = select(NO_LOBE, surface.a, any(surface.rgb > vec3f(0.0)));
     let now = Past(
         mix(past.light, light, share), frames, mix(past.vector, vector, share), mix(past.square, l * l, share), x, n,
-        mix(past.lately, light, max(LATELY, 1.0 / frames))
+        mix(past.lately, light, max(LATELY, 1.0 / frames)), roughness,
+        gloss_of(id.xy, past.gloss, roughness, motion_of(pixel))
     );
-    after[4u * cell] = vec4f(now.light, now.frames);
-    after[4u * cell + 1u] = vec4f(now.vector, now.square);
-    after[4u * cell + 2u] = vec4f(now.x, bitcast<f32>(pack_normal(now.n)));
-    after[4u * cell + 3u] = vec4f(now.lately, 0.0);
+    let i = 5u * cell;
+    after[i] = vec4f(now.light, now.frames);
+    after[i + 1u] = vec4f(now.vector, now.square);
+    after[i + 2u] = vec4f(now.x, bitcast<f32>(pack_normal(now.n)));
+    after[i + 3u] = vec4f(now.lately, now.roughness);
+    after[i + 4u] = now.gloss;
 }

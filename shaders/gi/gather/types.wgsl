@@ -21,19 +21,24 @@ struct Gather {
     entry_frames: f32,
     // Lights of this list stand for surfaces that glow: these light no cell a second time.
     flags: u32,
-    // Cells of the picture; queries of entries come after theirs.
+    // Cells of the picture. Queries and records of rays into lobes come after theirs, queries of entries after both.
     cells: u32,
-    pad0: u32,
-    pad1: u32,
+    // Rays of cells and into lobes.
+    rays: u32,
+    pad: u32,
 }
 
 const GATHER_STANDS_IN = 1u;
 const GATHER_CUT = 2u;
 const GATHER_NO_BLUR = 4u;
-// The lights are not what they were a few frames ago.
-const GATHER_LIGHTS_CHANGED = 16u;
 // All frames of a mean count the same.
 const GATHER_EVEN = 8u;
+// The lights are not what they were a few frames ago.
+const GATHER_LIGHTS_CHANGED = 16u;
+// Surfaces that rays meet show no gloss.
+const GATHER_NO_CAUSTICS = 32u;
+// Surfaces of the picture show none that rays would have to find.
+const GATHER_NO_GLOSS = 64u;
 
 @group(1) @binding(0) var<uniform> gather: Gather;
 @group(1) @binding(1) var accel_blocks: texture_2d<u32>;
@@ -54,14 +59,6 @@ fn unpack_normal(code: u32) -> vec3f {
     return oct_decode(unpack2x16snorm(code));
 }
 
-// A frame around unit vector n (Duff et al. 2017): columns tangent, bitangent, n.
-fn frame_around(n: vec3f) -> mat3x3f {
-    let s = select(-1.0, 1.0, n.z >= 0.0);
-    let a = -1.0 / (s + n.z);
-    let b = n.x * n.y * a;
-    return mat3x3f(vec3f(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3f(b, s + n.y * n.y * a, -n.y), n);
-}
-
 // Cosine-distributed about n from two numbers of [0, 1).
 fn cosine_direction(n: vec3f, u: vec2f) -> vec3f {
     let r = sqrt(u.x);
@@ -72,19 +69,6 @@ fn cosine_direction(n: vec3f, u: vec2f) -> vec3f {
 // Point `i` of the rank-1 lattice of the plastic number (Roberts 2018), shifted; whole numbers lose no digits.
 fn lattice(i: u32, shift: vec2u) -> vec2f {
     return vec2f((vec2u(3242174889u, 2447445414u) * i + shift) >> vec2u(8u)) / 16777216.0;
-}
-
-// Three hashes of three numbers (Jarzynski and Olano 2020, pcg3d).
-fn pcg3(seed: vec3u) -> vec3u {
-    var v = seed * 1664525u + 1013904223u;
-    v.x += v.y * v.z;
-    v.y += v.z * v.x;
-    v.z += v.x * v.y;
-    v ^= v >> vec3u(16u);
-    v.x += v.y * v.z;
-    v.y += v.z * v.x;
-    v.z += v.x * v.y;
-    return v;
 }
 
 fn unit_floats(bits: vec3u) -> vec3f {

@@ -2,31 +2,36 @@
 //! and by a cache of light in the world; averaged over frames, blurred over neighbours, brought to full resolution.
 //!
 //! ```text
-//! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.bring ─► E/π
+//! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.bring ─► E/π, gloss
 //!                          │  ▲ who was met       ▲   mean of the frames before
 //!                          ▼  │                   │
 //!                    table of entries ─► gi.renew ┘   one ray an entry, several rounds in a first frame
 //! ```
 //!
+//! Of each 2×2 cells one in turn sends a second ray, into its surface's lobe: what lobes show goes the same way beside the light
+//! ([`Rung::gloss`]).
+//!
 //! It asks what stands between, so it needs no constant for that. What it knows of a surface that a ray meets is one colour a
 //! triangle; how finely it knows the light between surfaces is the size of an entry's cell; the rest is noise, which frames and
 //! neighbours average away. `docs/gi.md` says what it cannot do.
 
+mod bring;
 mod options;
 mod params;
 mod store;
 
+pub use bring::prelude as bring_prelude;
 pub use options::{Options, OptionsError};
 pub use params::Params;
 
 use super::cells::{CellSide, CellsPass};
 use super::inputs::{BoundInputs, InputGroup};
 use super::rung::{Cost, Rung};
-use super::upsample::UpsamplePass;
 use super::{GiError, Inputs, Rays};
 use crate::gpu::bind::{self, Binder, Bound};
 use crate::gpu::{shaders, timing::Recorder};
 use crate::render::tool::{LOAD, READ, READ_WRITE};
+use bring::{BringPass, Brought};
 use params::ParamsRing;
 use store::Store;
 
@@ -38,6 +43,10 @@ const LIFT: f32 = 3e-5;
 /// old light then, and they settle anew.
 const HURRY: u32 = 8;
 const HURRIED: f32 = 2.5;
+
+/// After the first frame entries get so many rays each for so many frames: light between surfaces has come round by then.
+const YOUNG: u32 = 8;
+const ROUNDS_YOUNG: u32 = 4;
 
 /// Blocks that rays visit in the mean, for [`Rung::costs`]: 8 to 20 for the nearest hit and half as many for any, by
 /// `examples/rays` on rooms, a flat, a hotel and a street; short lines meet few. A block is 64 bytes and eight boxes (170
@@ -57,7 +66,7 @@ pub fn prelude() -> String {
 const RECORD: u64 = 48;
 
 /// Bytes of what a cell remembers.
-const PAST: u64 = 64;
+const PAST: u64 = 80;
 
 /// The method at work.
 pub struct GatherGi {
@@ -73,11 +82,13 @@ pub struct GatherGi {
     renew: Pass,
     settle: Pass,
     blur: Pass,
-    upsample: UpsamplePass,
+    bring: BringPass,
     store: Store,
     /// Bound where the host names no lights or no motion.
     no_lights: wgpu::Buffer,
     no_motion: wgpu::TextureView,
+    /// Bound where the host names no specular reflectance: there is none.
+    no_specular: wgpu::TextureView,
     /// Frames since the last cut, rounds since the beginning.
     frame: u32,
     round: u32,
@@ -122,23 +133,26 @@ impl GatherGi {
         let (shared, alone) = ((&inputs, &scene), (&inputs, &frame_params));
         let new = |groups, name, entry, types: &[wgpu::BindingType]| Pass::new(device, groups, (name, entry), types);
         let rw = READ_WRITE;
-        let motion = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("gi.no_motion"),
-            size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rg16Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
+        let nothing = |label, format| {
+            let texture = device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            });
+            texture.create_view(&Default::default())
+        };
         Self {
             cells: CellsPass::new(device, &inputs, CellSide::Four, size),
-            rays: new(shared, "gi.rays", "rays", &[rw, rw, rw, READ, rw]),
+            rays: new(shared, "gi.rays", "rays", &[rw, rw, rw, READ, rw, LOAD]),
             renew: new(shared, "gi.renew", "renew", &[rw, rw, rw, rw, rw]),
-            settle: new(alone, "gi.settle", "settle", &[READ, READ, READ, READ, rw, READ, LOAD]),
-            blur: new(alone, "gi.blur", "blur", &[READ, rw, rw]),
-            upsample: UpsamplePass::plain(device, &inputs, CellSide::Four),
+            settle: new(alone, "gi.settle", "settle", &[READ, READ, READ, READ, rw, READ, LOAD, LOAD]),
+            blur: new(alone, "gi.blur", "blur", &[READ, rw, rw, rw]),
+            bring: BringPass::new(device, &inputs),
             store: Store::new(device, size, options.slots),
             no_lights: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("gi.no_lights"),
@@ -146,7 +160,8 @@ impl GatherGi {
                 usage: wgpu::BufferUsages::STORAGE,
                 mapped_at_creation: false,
             }),
-            no_motion: motion.create_view(&Default::default()),
+            no_motion: nothing("gi.no_motion", wgpu::TextureFormat::Rg16Float),
+            no_specular: nothing("gi.no_specular", wgpu::TextureFormat::Rgba8Unorm),
             device: device.clone(),
             options,
             inputs,
@@ -172,7 +187,7 @@ impl GatherGi {
         self.inputs.made()
             + self.scene.made()
             + self.frame_params.made()
-            + self.upsample.made()
+            + self.bring.made()
             + passes.iter().sum::<u64>()
     }
 
@@ -184,6 +199,8 @@ impl GatherGi {
             (!self.options.blur, params::NO_BLUR),
             (self.options.even, params::EVEN),
             (self.hurry > 0, params::LIGHTS_CHANGED),
+            (!self.options.caustics, params::NO_CAUSTICS),
+            (inputs.specular.is_none(), params::NO_GLOSS),
         ];
         Ok(Params {
             eye: super::inputs::Params::new(inputs.size, &inputs.camera, inputs.environment)?.eye_position(),
@@ -202,17 +219,18 @@ impl GatherGi {
             },
             flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
             cells: CellSide::Four.count(inputs.size) as u32,
-            pad: [0; 2],
+            rays: (CellSide::Four.count(inputs.size) + store::squares(inputs.size)) as u32,
+            pad: 0,
         })
     }
 
-    fn run(recorder: &mut Recorder<'_>, label: &str, pass: &wgpu::ComputePipeline, groups: Groups<'_>, size: [u32; 2]) {
+    fn run(recorder: &mut Recorder<'_>, label: &str, pass: &wgpu::ComputePipeline, groups: Groups<'_>, size: [u32; 3]) {
         recorder.compute(label, |p| {
             groups.inputs.set(p);
             p.set_bind_group(1, groups.scene, &[groups.offset]);
             p.set_bind_group(2, groups.own, &[]);
             p.set_pipeline(pass);
-            p.dispatch_workgroups(size[0], size[1], 1);
+            p.dispatch_workgroups(size[0], size[1], size[2]);
         });
     }
 }
@@ -241,7 +259,7 @@ impl Rung for GatherGi {
         self.scene_id = rays.scene.id();
         if self.cells.fit(inputs.size) || another {
             self.store = Store::new(&self.device, inputs.size, self.options.slots);
-            self.upsample.forget();
+            self.bring.forget();
             self.frame = 0;
         }
         let lights = inputs.lights.map_or(&self.no_lights, |l| l.buffer);
@@ -256,8 +274,10 @@ impl Rung for GatherGi {
         let store = &self.store;
         let table = || [&store.keys, &store.lots, &store.queries].map(Bound::from);
         let [keys, lots, queries] = table();
-        let rays_group =
-            self.rays.binder.group([keys, lots, queries, self.cells.pixels().into(), (&store.records).into()]);
+        let specular = Bound::from(inputs.specular.unwrap_or(&self.no_specular));
+        let pixels = Bound::from(self.cells.pixels());
+        let records = Bound::from(&store.records);
+        let rays_group = self.rays.binder.group([keys, lots, queries, pixels, records, specular.clone()]);
         let [keys, lots, queries] = table();
         let renew_group = self.renew.binder.group([keys, lots, queries, (&store.asked).into(), (&store.light).into()]);
         let [before, after] = [self.frame & 1, 1 - (self.frame & 1)].map(|i| &store.pasts[i as usize]);
@@ -269,8 +289,10 @@ impl Rung for GatherGi {
             after.into(),
             (&store.changes).into(),
             inputs.motion.unwrap_or(&self.no_motion).into(),
+            specular,
         ]);
-        let blur_group = self.blur.binder.group([after.into(), (&store.cell_light).into(), (&store.changes).into()]);
+        let [light, changes, glosses] = [&store.cell_light, &store.changes, &store.glosses].map(Bound::from);
+        let blur_group = self.blur.binder.group([after.into(), light, changes, glosses]);
 
         let epoch = inputs.lights.map_or(0, |l| l.epoch);
         if epoch != self.lights_epoch && self.frame > 0 && !self.options.even {
@@ -285,9 +307,12 @@ impl Rung for GatherGi {
         let alone = |offset, own| Groups { scene: &frame_params, ..groups(offset, own) };
 
         self.cells.record(recorder, &bound);
-        Self::run(recorder, "gi.rays", &self.rays.pipeline, groups(offset, &rays_group), [w, h]);
+        // The second layer of workgroups sends rays into lobes.
+        let layers = 1 + u32::from(inputs.specular.is_some());
+        Self::run(recorder, "gi.rays", &self.rays.pipeline, groups(offset, &rays_group), [w, h, layers]);
         let rounds = match (self.frame, self.hurry) {
             (0, _) => self.options.first_rounds.max(1),
+            (1..=YOUNG, _) => ROUNDS_YOUNG,
             (_, 0) => 1,
             _ => 2,
         };
@@ -297,14 +322,21 @@ impl Rung for GatherGi {
                 params.round += 1;
                 offset = self.params.write(queue, &params);
             }
-            Self::run(recorder, "gi.renew", &self.renew.pipeline, groups(offset, &renew_group), [slots, 1]);
+            Self::run(recorder, "gi.renew", &self.renew.pipeline, groups(offset, &renew_group), [slots, 1, 1]);
         }
-        Self::run(recorder, "gi.settle", &self.settle.pipeline, alone(offset, &settle_group), [w, h]);
-        Self::run(recorder, "gi.blur", &self.blur.pipeline, alone(offset, &blur_group), [w, h]);
+        Self::run(recorder, "gi.settle", &self.settle.pipeline, alone(offset, &settle_group), [w, h, 1]);
+        Self::run(recorder, "gi.blur", &self.blur.pipeline, alone(offset, &blur_group), [w, h, 1]);
         self.round = params.round + 1;
         self.frame += 1;
         self.hurry = self.hurry.saturating_sub(1);
-        self.upsample.record(recorder, &bound, &self.cells, &store.cell_light, None, output)
+        let brought =
+            Brought { light: &store.cell_light, glosses: &store.glosses, output, gloss: &store.gloss };
+        self.bring.record(recorder, &bound, &self.cells, brought);
+        Ok(())
+    }
+
+    fn gloss(&self) -> Option<&wgpu::TextureView> {
+        Some(&self.store.gloss)
     }
 
     fn settled(&self) -> Option<u32> {
@@ -319,7 +351,7 @@ impl Rung for GatherGi {
         self.inputs.forget();
         self.scene.forget();
         self.settle.binder.forget();
-        self.upsample.forget();
+        self.bring.forget();
     }
 
     fn bytes(&self) -> u64 {
@@ -328,6 +360,7 @@ impl Rung for GatherGi {
 
     fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
         let cells = CellSide::Four.count(size) as f64;
+        let squares = store::squares(size) as f64;
         let entries = ENTRIES_MET;
         // A ray, the shadow ray of what it meets, the line to its entry's beginning; 300 operations and 150 bytes of shading.
         let look = BLOCKS_NEAREST + BLOCKS_ANY + BLOCKS_SHORT;
@@ -335,11 +368,12 @@ impl Rung for GatherGi {
         let bytes = look * 64.0 + 150.0;
         vec![
             CellsPass::cost(CellSide::Four, size),
-            Cost::new("gi.rays", cells * flops, cells * bytes),
+            // With the rays into lobes.
+            Cost::new("gi.rays", (cells + squares) * flops, (cells + squares) * bytes),
             Cost::new("gi.renew", entries * flops, entries * bytes + f64::from(self.options.slots) * 8.0),
             Cost::new("gi.settle", cells * 150.0, cells * (2.0 * PAST as f64 + 112.0)),
-            Cost::new("gi.blur", cells * 25.0 * 45.0, cells * (PAST as f64 + 64.0)),
-            UpsamplePass::cost(CellSide::Four, size, 0),
+            Cost::new("gi.blur", cells * 25.0 * 65.0, cells * (PAST as f64 + 80.0)),
+            BringPass::cost(size),
         ]
     }
 }

@@ -21,6 +21,9 @@ pub struct Options {
     /// Whether all frames of a mean count the same, however early, and a change of light shortens none: for asking what the
     /// method converges to.
     pub even: bool,
+    /// Whether surfaces that rays meet show their gloss. Pictures made by Cycles without "Reflective Caustics" are compared with those
+    /// made without it; light is missing then.
+    pub caustics: bool,
 }
 
 impl Default for Options {
@@ -30,9 +33,10 @@ impl Default for Options {
             entry_frames: 8.0,
             slots: 1 << 15,
             entry_scale: 1.0 / 16.0,
-            first_rounds: 4,
+            first_rounds: 8,
             blur: true,
             even: false,
+            caustics: true,
         }
     }
 }
@@ -48,6 +52,7 @@ impl Options {
         first_rounds: 64,
         blur: false,
         even: true,
+        caustics: true,
     };
 }
 
@@ -56,7 +61,7 @@ impl Options {
 pub enum OptionsError {
     /// No such number.
     #[error(
-        "`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, blur=0|1, even=0|1"
+        "`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, blur=0|1, even=0|1, caustics=0|1"
     )]
     Unknown(String),
     /// A value that cannot be.
@@ -91,6 +96,7 @@ impl FromStr for Options {
                 "entry_scale" => return Err(wrong("must be above 0.0001 and at most 4")),
                 "blur" => options.blur = number != 0.0,
                 "even" => options.even = number != 0.0,
+                "caustics" => options.caustics = number != 0.0,
                 _ => return Err(OptionsError::Unknown(word.into())),
             }
         }

@@ -9,11 +9,14 @@ pub(super) const STANDS_IN: u32 = 1;
 pub(super) const CUT: u32 = 2;
 /// Cells are shown as they are.
 pub(super) const NO_BLUR: u32 = 4;
-
-/// The lights are not what they were a few frames ago.
-pub(super) const LIGHTS_CHANGED: u32 = 16;
 /// All frames of a mean count the same.
 pub(super) const EVEN: u32 = 8;
+/// The lights are not what they were a few frames ago.
+pub(super) const LIGHTS_CHANGED: u32 = 16;
+/// Surfaces that rays meet show no gloss.
+pub(super) const NO_CAUSTICS: u32 = 32;
+/// The host does not say what surfaces mirror.
+pub(super) const NO_GLOSS: u32 = 64;
 
 /// `Gather` of `shaders/gi/gather/types.wgsl`, which documents the fields.
 #[repr(C)]
@@ -32,7 +35,8 @@ pub struct Params {
     pub entry_frames: f32,
     pub flags: u32,
     pub cells: u32,
-    pub pad: [u32; 2],
+    pub rays: u32,
+    pub pad: u32,
 }
 
 /// Uniform offsets are multiples of this under WebGPU's default limits.

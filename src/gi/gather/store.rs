@@ -3,6 +3,11 @@
 use super::{PAST, RECORD};
 use crate::gi::cells::CellSide;
 
+/// Squares of 2×2 cells, each of which sends one ray a frame into a lobe.
+pub(super) fn squares(size: [u32; 2]) -> u64 {
+    CellSide::Four.grid(size).map(|n| u64::from(n.div_ceil(2))).iter().product()
+}
+
 pub(super) struct Store {
     /// Of the table of entries, by slot: key; lots of both halves; queries of cells and of both halves' entries, and where both
     /// halves' rays begin; when it was asked for; light of both halves.
@@ -17,11 +22,15 @@ pub(super) struct Store {
     pub cell_light: wgpu::Buffer,
     /// Of cells: what light has changed to.
     pub changes: wgpu::Buffer,
+    /// What lobes show, of cells and of pixels.
+    pub glosses: wgpu::Buffer,
+    pub gloss: wgpu::TextureView,
 }
 
 impl Store {
     pub fn new(device: &wgpu::Device, size: [u32; 2], slots: u32) -> Self {
         let cells = CellSide::Four.count(size).max(1);
+        let rays = cells + squares(size);
         let slots = u64::from(slots);
         let buffer = |label, size| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -46,18 +55,38 @@ impl Store {
         Self {
             keys: buffer("gi.entry_keys", 4 * slots),
             lots,
-            queries: buffer("gi.entry_queries", 16 * (cells + 4 * slots)),
+            queries: buffer("gi.entry_queries", 16 * (rays + 4 * slots)),
             asked: buffer("gi.entry_asked", 4 * slots),
             light: buffer("gi.entry_light", 32 * slots),
-            records: buffer("gi.records", RECORD * cells),
+            records: buffer("gi.records", RECORD * rays),
             pasts: [past(), past()],
             cell_light: buffer("gi.light", CellSide::Four.light_bytes(size)),
             changes: buffer("gi.changes", 16 * cells),
+            glosses: buffer("gi.glosses", 16 * cells),
+            gloss: gloss(device, size),
         }
     }
 
     pub fn bytes(&self) -> u64 {
-        let Self { keys, lots, queries, asked, light, records, pasts: [a, b], cell_light, changes } = self;
-        [keys, lots, queries, asked, light, records, a, b, cell_light, changes].iter().map(|b| b.size()).sum()
+        let Self { keys, lots, queries, asked, light, records, pasts: [a, b], cell_light, changes, glosses, gloss } = self;
+        let texels = u64::from(gloss.texture().width()) * u64::from(gloss.texture().height());
+        let buffers = [keys, lots, queries, asked, light, records, a, b, cell_light, changes, glosses];
+        8 * texels + buffers.iter().map(|b| b.size()).sum::<u64>()
     }
+}
+
+fn gloss(device: &wgpu::Device, size: [u32; 2]) -> wgpu::TextureView {
+    let [width, height] = size.map(|n| n.max(1));
+    device
+        .create_texture(&wgpu::TextureDescriptor {
+            label: Some("gi.gloss"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba16Float,
+            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        })
+        .create_view(&Default::default())
 }

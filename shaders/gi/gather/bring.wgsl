@@ -1,0 +1,145 @@
+// Directional light of the cells, and what their lobes show, brought to every pixel: bilinear where the surface goes on, and only from
+// cells of the pixel's own surface where it does not, the light evaluated for the pixel's own normal. All of it in f32.
+// A workgroup reads the cells around its 8x8 pixels once. The prelude holds CELL_SIDE and the tolerances
+// (gi::gather::bring documents them).
+
+@group(1) @binding(0) var<storage, read> cell_pixels: array<u32>;
+@group(1) @binding(1) var<storage, read> light: array<vec4f>;
+// What lobes show over `env_brdf`; a: 1, or 0 without a lobe.
+@group(1) @binding(2) var<storage, read> glosses: array<vec4f>;
+@group(1) @binding(3) var output: texture_storage_2d<rgba16float, write>;
+@group(1) @binding(4) var gloss_output: texture_storage_2d<rgba16float, write>;
+// Cells on a side of what a workgroup reads: its own 8 / CELL_SIDE and two on each side.
+const STAGED = 8 / CELL_SIDE + 4;
+
+// A cell's surface point (a: 1, or 0 where there is none), normal, light and gloss. 36 cells of 96 bytes at most.
+var<workgroup> points: array<vec4f, STAGED * STAGED>;
+var<workgroup> normals: array<vec3f, STAGED * STAGED>;
+var<workgroup> lights: array<CellLight, STAGED * STAGED>;
+var<workgroup> gleams: array<vec4f, STAGED * STAGED>;
+
+// Thread `index` brings one cell of the square that begins at cell `first`. Cells beyond the picture count as empty.
+fn stage(index: u32, first: vec2i) {
+    if index >= u32(STAGED * STAGED) {
+        return;
+    }
+    let cell = first + vec2i(i32(index) % STAGED, i32(index) / STAGED);
+    points[index] = vec4f(0.0);
+    if any(cell < vec2i(0)) || any(cell >= vec2i(cell_grid())) {
+        return;
+    }
+    let row = cell_index(vec2u(cell));
+    let packed = cell_pixels[row];
+    if packed == NO_PIXEL {
+        return;
+    }
+    let pixel = unpack_pixel(packed);
+    points[index] = vec4f(offset_at(pixel, distance_at(pixel)), 1.0);
+    normals[index] = world_normal_at(pixel);
+    lights[index] = CellLight(light[3u * row], light[3u * row + 1u], light[3u * row + 2u]);
+    gleams[index] = glosses[row];
+}
+
+struct Surface {
+    // Metres from the eye, as all places here.
+    position: vec3f,
+    normal: vec3f,
+    // How far in front of the eye its plane is, along the normal.
+    plane: f32,
+    // One over the distance from its plane that counts as little, 1/m.
+    strictness: f32,
+}
+
+fn surface_of(pixel: vec2i, z: f32) -> Surface {
+    let p = offset_at(pixel, z);
+    let n = world_normal_at(pixel);
+    let plane = dot(n, p);
+    return Surface(p, n, plane, 1.0 / (PLANE_TOLERANCE * z));
+}
+
+// Of cells: light times weight (rgb) and weight (a), and the same of gloss.
+struct Sum {
+    light: vec4f,
+    gloss: vec4f,
+}
+
+// What one staged cell adds. A point of the same surface weighs 1. The tails are heavy on
+// purpose: where nothing agrees the least bad cell wins by ratio, without a branch and without a division by zero.
+//
+// A cell knows the light above its own horizon only. Where a pixel that looks elsewhere has nothing better, the cell's light
+// is taken for a direction between the two normals, `least_cosine` or more towards the cell's.
+fn tap(here: Surface, at: i32, spatial: f32, least_cosine: f32) -> Sum {
+    let found = points[at];
+    let off_plane = (dot(here.normal, found.xyz) - here.plane) * here.strictness;
+    let lorentz = 1.0 + min(off_plane * off_plane, 1e12);
+    let cosine = dot(here.normal, normals[at]);
+    let facing = max(pow(max(cosine, 0.0), NORMAL_POWER), NORMAL_FLOOR);
+    let weight = found.w * spatial * max(facing / (lorentz * lorentz), WEIGHT_FLOOR);
+    var direction = here.normal;
+    if least_cosine > 0.0 { direction += max(least_cosine - cosine, 0.0) * normals[at]; }
+    let arrives = finite3(light_towards(lights[at], direction));
+    return Sum(vec4f(arrives, 1.0) * weight, vec4f(finite3(gleams[at].rgb), 1.0) * (gleams[at].a * weight));
+}
+
+// Tent-weighted sum over the 2r x 2r cells around `place` (in cells, from the first staged one).
+fn gather(here: Surface, place: vec2f, radius: i32, least_cosine: f32) -> Sum {
+    let base = vec2i(floor(place)) - (radius - 1);
+    var sum = Sum();
+    for (var i = 0; i < 4 * radius * radius; i++) {
+        let cell = base + vec2i(i % (2 * radius), i / (2 * radius));
+        let tent = 1.0 - abs(vec2f(cell) - place) / f32(radius);
+        let one = tap(here, cell.y * STAGED + cell.x, tent.x * tent.y, least_cosine);
+        sum.light += one.light;
+        sum.gloss += one.gloss;
+    }
+    return sum;
+}
+
+// Of a pixel.
+struct Brought {
+    light: vec3f,
+    gloss: vec3f,
+}
+
+// Where no cell has a lobe but the pixel may, it shows the light of its side.
+fn mean(sum: Sum) -> Brought {
+    let e = sum.light.rgb / max(sum.light.a, 1e-30);
+    if sum.gloss.a <= 1e-3 * sum.light.a { return Brought(e, e); }
+    return Brought(e, sum.gloss.rgb / sum.gloss.a);
+}
+
+fn light_of(here: Surface, place: vec2f) -> Brought {
+    let near = gather(here, place, 1, 0.0);
+    if near.light.a >= TRUST {
+        return mean(near);
+    }
+    // The four cells around this pixel lie on other surfaces: look further out, and blend so that no seam shows.
+    let far = mean(gather(here, place, 2, LEAST_COSINE));
+    let close = mean(near);
+    let share = near.light.a / TRUST;
+    return Brought(mix(far.light, close.light, share), mix(far.gloss, close.gloss, share));
+}
+
+@compute @workgroup_size(8, 8)
+fn bring(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_index) index: u32,
+) {
+    let first = vec2i(group.xy) * (8 / CELL_SIDE) - 2;
+    stage(index, first);
+    workgroupBarrier();
+    if any(id.xy >= params.size) {
+        return;
+    }
+    let pixel = vec2i(id.xy);
+    let z = distance_at(pixel);
+    var result = Brought();
+    if z > 0.0 {
+        // A cell counts as lying at its middle, whichever pixel stands for it.
+        let place = (vec2f(pixel) - f32(CELL_SIDE / 2)) / f32(CELL_SIDE) - vec2f(first);
+        result = light_of(surface_of(pixel, z), place);
+    }
+    textureStore(output, pixel, vec4f(min(result.light, vec3f(LARGEST)), 1.0));
+    textureStore(gloss_output, pixel, vec4f(min(result.gloss, vec3f(LARGEST)), 1.0));
+}
