@@ -34,7 +34,7 @@ struct Place {
 
 // Power of a lobe below this roughness is spread as if by this one: rays that happen to meet a mirrored lamp are not averaged
 // enough to show it as anything but a spark.
-const LEAST_ROUGHNESS = 0.2;
+const LEAST_ROUGHNESS = 0.5;
 
 // Cosine of rays that alone find what glows: greater than any density of shadow rays.
 const ALONE = 1e12;
@@ -44,7 +44,7 @@ fn weight_of(c: vec3f) -> f32 {
 }
 
 fn sends_back(p: Place, l: vec3f, n_l: f32, irradiance: vec3f) -> vec3f {
-    return irradiance * n_l * (p.diffuse / PI + ggx(p.n, p.v, l, p.f0, max(p.roughness, LEAST_ROUGHNESS)));
+    return irradiance * n_l * (p.diffuse / PI + ggx(p.n, p.v, l, p.f0, p.roughness));
 }
 
 // One of the analytic lights (where `lamps`) and of one point of what glows, by how bright the place would be without shadow.
@@ -165,7 +165,7 @@ fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, round: u32, glows: bool) -> Fo
         return Found(radiance, NONE, vec3f(0.0), hit.t);
     }
     let x = off(o + d * hit.t, n, hit.t);
-    let place = Place(x, n, -d, diffuse, surface.f0, surface.roughness);
+    let place = Place(x, n, -d, diffuse, surface.f0, max(surface.roughness, LEAST_ROUGHNESS));
     let chosen = choose_light(place, true, pcg3(seed));
     if is_lit(x, chosen, seed.y) { radiance += chosen.radiance; }
     return Found(radiance, ask_entry(x, n, query, round), back, hit.t);

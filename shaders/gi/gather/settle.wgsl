@@ -106,10 +106,15 @@ fn found_by(ray: u32) -> vec3f {
 const GLOSS_RAYS = 32.0;
 const GLOSS_HURRIED = 4.0;
 
+// A ray into a lobe that is wider than this (roughness) counts no more than so many times the light on the surface or the mean of the
+// rays before: few rays fill such a lobe, and one spark would stay for seconds.
+const SPARKS = 0.3;
+const BRIGHTEST = 12.0;
+
 // The mean of what rays into the cell's lobe have found, with this frame's, if it is the cell's turn. What a lobe shows slides over a
 // surface that moves on the screen, by half of its way where the mirrored is as far as the mirror; so many frames count as slide
 // across the lobe.
-fn gloss_of(cell: vec2u, past: vec4f, roughness: f32, motion: vec2f) -> vec4f {
+fn gloss_of(cell: vec2u, past: vec4f, roughness: f32, motion: vec2f, light: vec3f) -> vec4f {
     if roughness >= ROUGHEST { return vec4f(0.0); }
     var most = select(GLOSS_RAYS, GLOSS_HURRIED, (gather.flags & GATHER_LIGHTS_CHANGED) != 0u);
     let slides = 0.5 * length(motion) / f32(CELL_SIDE);
@@ -122,7 +127,12 @@ fn gloss_of(cell: vec2u, past: vec4f, roughness: f32, motion: vec2f) -> vec4f {
             gloss.a = min(gloss.a + 1.0, most);
             // Each ray counts for its number, as below.
             let share = select(2.0, 1.0, (gather.flags & GATHER_EVEN) != 0u) / (gloss.a + 1.0);
-            gloss = vec4f(mix(gloss.rgb, found_by(ray), min(share, 1.0)), gloss.a);
+            var found = found_by(ray);
+            if roughness > SPARKS {
+                let most = BRIGHTEST * max(luminance(light), luminance(gloss.rgb));
+                found *= min(1.0, most / max(luminance(found), 1e-20));
+            }
+            gloss = vec4f(mix(gloss.rgb, found, min(share, 1.0)), gloss.a);
         }
     }
     return gloss;
@@ -157,10 +167,11 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let l = luminance(light);
     let surface = textureLoad(specular_map, pixel, 0);
     let roughness = select(NO_LOBE, surface.a, any(surface.rgb > vec3f(0.0)));
+    let mean = mix(past.light, light, share);
     let now = Past(
-        mix(past.light, light, share), frames, mix(past.vector, vector, share), mix(past.square, l * l, share), x, n,
+        mean, frames, mix(past.vector, vector, share), mix(past.square, l * l, share), x, n,
         mix(past.lately, light, max(LATELY, 1.0 / frames)), roughness,
-        gloss_of(id.xy, past.gloss, roughness, motion_of(pixel))
+        gloss_of(id.xy, past.gloss, roughness, motion_of(pixel), mean)
     );
     let i = 5u * cell;
     after[i] = vec4f(now.light, now.frames);
