@@ -1,6 +1,5 @@
 // Specular light of sky and bounces: the split sum's share times what one ray along the mirrored direction finds on the
-// screen, blurred by the lobe's width there. Where the ray finds nothing: what the cube around the camera shows, if the surface
-// is smooth and the method has one; else the light that the surface's own side receives, by the mirrored direction where the
+// screen, blurred by the lobe's width there. Where the ray finds nothing: the light that the surface's own side receives, by the mirrored direction where the
 // method knows more of it (alpha of `indirect`), mixed with the picture's colour where the ray leaves it, or the
 // surroundings where only they are there.
 
@@ -8,8 +7,6 @@
 @group(1) @binding(1) var blurred: sampler;
 @group(1) @binding(2) var indirect_specular: texture_storage_2d<rgba16float, write>;
 @group(2) @binding(0) var environment_picture: texture_2d<f32>;
-// What the cube around the camera shows (`Rung::surroundings`); one texel where the method has none.
-@group(2) @binding(1) var surroundings: texture_2d<f32>;
 
 // The largest finite half: brighter light is held there instead of becoming infinite.
 const HALF_MAX: f32 = 65504.0;
@@ -26,20 +23,6 @@ const NEXT_PIXEL = 1.5;
 const FAR = 1e9;
 // Level of the lit picture (pixels: 2^(level + 1)) that guesses what lies beyond its border.
 const BORDER_LEVEL = 4.0;
-// Roughness up to which the cube is all that is asked, and from which on nothing: it holds a mirror's ray, not a lobe.
-const CUBE_SHARP = 0.2;
-const CUBE_BLUNT = 0.5;
-// Two of the cube's texels, in shares of the distance from the camera.
-const CUBE_NEAR = 0.2;
-// Times that a ray's way out of the cube around the camera is looked up again.
-const LOOKS = 2;
-// What a rough surface's ray that finds something counts, where the method knows the light along the mirrored direction, too: one
-// ray is not the lobe. Measured (docs/gi.md): 1 and 0.5 are worse by 9 and 1 %, 0 by half. Without that knowledge 1 is best.
-const ONE_RAY = 0.6;
-// What stands right beside a surface fills the lobe and counts as a whole; as far away as this part of the view distance it is
-// ONE_RAY again. (Gloss of the darkest 3 % of rooms 2 to 5: error 25.7 to 24.3 %, bias +11.7 to +8.0 %; with 0.3 the same
-// error, and L1 as good.)
-const BESIDE = 0.1;
 
 // A ray on the screen: pixel position and 1/distance are linear between its ends.
 struct Track {
@@ -124,8 +107,6 @@ struct Hit {
     radiance: vec3f,
     // How far to trust it.
     trust: f32,
-    // Metres from the ray's start.
-    away: f32,
 }
 
 fn found(track: Track, u: f32, p: vec3f, r: vec3f, cone: f32) -> Hit {
@@ -139,9 +120,9 @@ fn found(track: Track, u: f32, p: vec3f, r: vec3f, cone: f32) -> Hit {
     let radius = cone * away * pixels_per_metre;
     let margin = min(place.xy, vec2f(frame.size) - place.xy);
     let trust = saturate(min(margin.x, margin.y) / max(radius, 8.0));
-    if radius < 1.0 { return Hit(outgoing(pixel), trust, away); }
+    if radius < 1.0 { return Hit(outgoing(pixel), trust); }
     let color = blurred_at(place.xy, log2(radius) - 1.0);
-    return Hit(color.rgb / max(color.a, 1e-3), trust, away);
+    return Hit(color.rgb / max(color.a, 1e-3), trust);
 }
 
 // What a ray that found nothing may see beyond the picture's border (rgb), and how likely (a): the surroundings where
@@ -155,33 +136,6 @@ fn beyond(track: Track, r: vec3f) -> vec4f {
     let length = distance(track.start.xy, track.end.xy) / (0.25 * f32(frame.size.y));
     let ahead = saturate(2.0 * dot(r, -frame.world_from_view[2].xyz)) * saturate(length);
     return vec4f(color.rgb + open * environment_radiance(r), ahead * (0.5 + 0.5 * open));
-}
-
-// The cube's radiance (rgb) and distance (a) in this direction.
-fn cube_at(d: vec3f) -> vec4f {
-    let size = vec2f(textureDimensions(surroundings));
-    let a = abs(d);
-    let k = select(select(2u, 1u, a.y >= a.z), 0u, a.x >= a.y && a.x >= a.z);
-    let away = d[k] < 0.0;
-    let ndc = vec2f(select(1.0, -1.0, away) * d[(k + 2u) % 3u], d[(k + 1u) % 3u]) / max(a[k], 1e-9);
-    let at = clamp((0.5 + ndc * vec2f(0.5, -0.5)) * size.y, vec2f(0.5), vec2f(size.y - 0.5));
-    let corner = vec2f(f32(2u * k + u32(away)) * size.y, 0.0);
-    return textureSampleLevel(surroundings, blurred, (corner + at) / size, 0.0);
-}
-
-// What a ray from `p` finds beyond the screen: where it leaves the sphere about the camera whose radius the cube knows in
-// the direction of where it leaves it. a: how far to trust it; what is nearer than a few of the cube's texels may be the
-// surface itself.
-fn elsewhere(p: vec3f, r: vec3f) -> vec4f {
-    let o = p - frame.world_from_view[3].xyz;
-    let along = dot(o, r);
-    var seen = cube_at(r);
-    var way = 0.0;
-    for (var i = 0; i < LOOKS; i++) {
-        way = max(sqrt(max(along * along - dot(o, o) + seen.a * seen.a, 0.0)) - along, 0.0);
-        seen = cube_at(o + way * r);
-    }
-    return vec4f(seen.rgb, smoothstep(CUBE_NEAR, 2.0 * CUBE_NEAR, way / max(length(o), 1e-6)));
 }
 
 fn reflected(pixel: vec2u, depth: f32, n: vec3f, roughness: f32) -> vec3f {
@@ -198,17 +152,8 @@ fn reflected(pixel: vec2u, depth: f32, n: vec3f, roughness: f32) -> vec3f {
     if u >= 0.0 { hit = found(track, u, p, r, cone); }
     // A lobe that fills the hemisphere shows what the surface's own side receives, and no ray tells it better.
     let narrow = 1.0 - smoothstep(0.6, 1.0, roughness);
-    var guess = beyond(track, r);
-    let sharp = 1.0 - smoothstep(CUBE_SHARP, CUBE_BLUNT, roughness);
-    // Who knows the cube knows the light's vector at every cell.
-    let known = textureDimensions(surroundings).x > 1u;
-    if sharp > 0.0 && known {
-        let cube = elsewhere(p, r);
-        guess = mix(guess, vec4f(cube.rgb, 1.0), sharp * cube.a);
-    }
-    let one = mix(1.0, ONE_RAY, smoothstep(0.0, BESIDE, hit.away / z));
-    let trust = select(1.0, mix(one, 1.0, sharp), known);
-    return mix(mix(around, guess.rgb, narrow * guess.a), hit.radiance, narrow * trust * hit.trust);
+    let guess = beyond(track, r);
+    return mix(mix(around, guess.rgb, narrow * guess.a), hit.radiance, narrow * hit.trust);
 }
 
 @compute @workgroup_size(8, 8)

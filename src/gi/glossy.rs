@@ -27,8 +27,6 @@ pub struct GlossyPass {
     trace: wgpu::BindGroupLayout,
     sky: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
-    /// One texel: bound where the method knows of no surroundings.
-    nothing: wgpu::TextureView,
 }
 
 /// The lit picture and all bindings of one set of targets.
@@ -58,7 +56,7 @@ impl GlossyPass {
         let surfaces = layout(&[UNIFORM, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD]);
         let level = layout(&[LOAD, STORE_HALF]);
         let trace = layout(&[SAMPLE, SAMPLER, STORE_HALF]);
-        let sky = layout(&[LOAD, SAMPLE]);
+        let sky = layout(&[LOAD]);
         Self {
             lit: tool::compute(device, "gi.lit", "lit", &[&surfaces, &level]),
             halve: tool::compute(device, "gi.lit", "halve", &[&surfaces, &level]),
@@ -67,18 +65,6 @@ impl GlossyPass {
             level,
             trace,
             sky,
-            nothing: device
-                .create_texture(&wgpu::TextureDescriptor {
-                    label: Some("gi.nothing"),
-                    size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
-                    mip_level_count: 1,
-                    sample_count: 1,
-                    dimension: wgpu::TextureDimension::D2,
-                    format: wgpu::TextureFormat::Rgba16Float,
-                    usage: wgpu::TextureUsages::TEXTURE_BINDING,
-                    view_formats: &[],
-                })
-                .create_view(&Default::default()),
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("gi.glossy"),
                 mag_filter: wgpu::FilterMode::Linear,
@@ -131,16 +117,9 @@ impl GlossyPass {
         GlossyPicture { surfaces, levels, chain, trace }
     }
 
-    /// Binds the environment and what the method knows of the camera's surroundings ([`super::rung::Rung::surroundings`]);
-    /// rebuilt when the scene changes.
-    pub fn sky(
-        &self,
-        device: &wgpu::Device,
-        environment: &wgpu::TextureView,
-        surroundings: Option<&wgpu::TextureView>,
-    ) -> wgpu::BindGroup {
-        let views = [environment, surroundings.unwrap_or(&self.nothing)].map(wgpu::BindingResource::TextureView);
-        tool::group(device, "gi.glossy", &self.sky, &views)
+    /// Binds the environment; rebuilt when the scene changes.
+    pub fn sky(&self, device: &wgpu::Device, environment: &wgpu::TextureView) -> wgpu::BindGroup {
+        tool::group(device, "gi.glossy", &self.sky, &[wgpu::BindingResource::TextureView(environment)])
     }
 
     /// Records passes `gi.lit` and `gi.glossy` for targets of `size` pixels.

@@ -11,23 +11,19 @@
 //! surface's plane gives g. It is what `gi.glossy` shows where a ray finds nothing.
 
 use super::cells::{CellSide, CellsPass};
-use super::contact::{self, Beside};
 use super::inputs::{BoundInputs, InputGroup};
 use super::reconstruct::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
 use super::rung::Cost;
 use super::{GiError, ambient};
 use crate::gpu::bind::{self, Binder};
 use crate::gpu::{shaders, timing::Recorder};
-use crate::render::tool::{LOAD, READ, STORE_HALF};
+use crate::render::tool::{READ, STORE_HALF};
 
 /// Sum of the four weights below which the 4×4 cells around are blended in.
 pub const TRUST: f32 = 0.3;
 
 /// Least cosine to a cell's own normal for which its light is evaluated where no cell agrees with a pixel.
 pub const LEAST_COSINE: f32 = 0.5;
-
-/// Albedo of what stands beside a surface, for the light that it gives back.
-pub const ALBEDO: f32 = 0.5;
 
 /// The constants as WGSL.
 pub fn prelude(side: CellSide) -> String {
@@ -39,46 +35,28 @@ pub fn prelude(side: CellSide) -> String {
         ("WEIGHT_FLOOR", WEIGHT_FLOOR),
         ("TRUST", TRUST),
         ("LEAST_COSINE", LEAST_COSINE),
-        ("ALBEDO", ALBEDO),
     ] {
         text.push_str(&format!("const {name} = f32({value:?});\n"));
     }
-    text + &contact::sphere_prelude()
+    text
 }
 
 /// The pass.
 pub struct UpsamplePass {
-    name: &'static str,
     pipeline: wgpu::ComputePipeline,
     binder: Binder,
 }
 
 impl UpsamplePass {
-    /// Compiles the shader that takes away what stands right beside surfaces.
+    /// Compiles the shader.
     pub fn new(device: &wgpu::Device, inputs: &InputGroup, side: CellSide) -> Self {
-        Self::with(device, inputs, side, "gi.upsample", &[READ, READ, STORE_HALF, LOAD, READ, READ])
+        let binder = Binder::new(device, "gi.bring", &[READ, READ, STORE_HALF]);
+        let module = shaders::module_with(device, "gi.bring", &prelude(side));
+        let pipeline = bind::pipeline(device, "gi.bring", &module, "upsample", &[inputs.layout(), binder.layout()]);
+        Self { pipeline, binder }
     }
 
-    /// Compiles the shader for light that knows what stands beside surfaces.
-    pub fn plain(device: &wgpu::Device, inputs: &InputGroup, side: CellSide) -> Self {
-        Self::with(device, inputs, side, "gi.bring", &[READ, READ, STORE_HALF])
-    }
-
-    fn with(
-        device: &wgpu::Device,
-        inputs: &InputGroup,
-        side: CellSide,
-        name: &'static str,
-        types: &[wgpu::BindingType],
-    ) -> Self {
-        let binder = Binder::new(device, name, types);
-        let module = shaders::module_with(device, name, &prelude(side));
-        let pipeline = bind::pipeline(device, name, &module, "upsample", &[inputs.layout(), binder.layout()]);
-        Self { name, pipeline, binder }
-    }
-
-    /// Records pass `gi.upsample` (with `beside`, which a pass made by [`new`](Self::new) gets) or `gi.bring`. `light` is laid out as
-    /// [`cells`](super::cells) says. `output` (`Rgba16Float`, storage, full size) becomes E/π, and in alpha how many times as
+    /// Records pass `gi.bring`. `light` is laid out as [`cells`](super::cells) says. `output` (`Rgba16Float`, storage, full size) becomes E/π, and in alpha how many times as
     /// bright the mirrored direction is.
     ///
     /// # Errors
@@ -89,18 +67,12 @@ impl UpsamplePass {
         inputs: &BoundInputs,
         cells: &CellsPass,
         light: &wgpu::Buffer,
-        beside: Option<Beside<'_>>,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
         ambient::check_output(output, inputs.size)?;
         let (pixels, light, output) = (cells.pixels().into(), light.into(), output.into());
-        let group = match beside {
-            Some(b) => {
-                self.binder.group([pixels, light, output, b.visibility.into(), b.spheres.into(), b.nearby.into()])
-            }
-            None => self.binder.group([pixels, light, output]),
-        };
-        recorder.compute(self.name, |pass| {
+        let group = self.binder.group([pixels, light, output]);
+        recorder.compute("gi.bring", |pass| {
             inputs.set(pass);
             pass.set_bind_group(1, &group, &[]);
             pass.set_pipeline(&self.pipeline);
@@ -119,16 +91,16 @@ impl UpsamplePass {
         self.binder.made()
     }
 
-    /// What the pass costs for a picture of `size` pixels with `spheres` in the scene. A pixel: 4 cells of 72 operations, its
-    /// own place, normal and mirrored direction 72, the means 30, visibility 4 × 17 and 20, 2 for each word of a tile and 34
-    /// for each sphere near it, 0.4 in the mean of four training rooms; a workgroup stages 25 or 36 cells of 72 operations
-    /// and 64 bytes and 36 texels of 42 operations, most of which the chip's cache has, so that each cell comes from memory
-    /// once. Pixels at edges that ask 16 cells (about 3 % of a picture) are counted with 1,000 more.
-    pub fn cost(side: CellSide, size: [u32; 2], spheres: u32) -> Cost {
+    /// What the pass costs for a picture of `size` pixels. A pixel: 4 cells of 72 operations, its own place, normal and mirrored
+    /// direction 72, the means 30; a workgroup stages 36 cells of 72 operations and 64 bytes, most of which the chip's cache has, so
+    /// that each cell comes from memory once. Pixels at edges that ask 16 cells (about 3 % of a picture) are counted with 1,000 more.
+    pub fn cost(side: CellSide, size: [u32; 2]) -> Cost {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
-        let staged = f64::from(8 / side.pixels() + 4).powi(2) * 72.0 / 64.0 + 36.0 * 42.0 / 64.0;
-        let beside = 4.0 * 17.0 + 20.0 + 2.0 * f64::from(spheres.div_ceil(32)) + 0.4 * 34.0;
-        let flops = pixels * (4.0 * 72.0 + 72.0 + 30.0 + beside + staged + 30.0);
-        Cost::new("gi.upsample", flops, pixels * 17.0 + side.count(size) as f64 * 60.0)
+        let staged = f64::from(8 / side.pixels() + 4).powi(2) * 72.0 / 64.0;
+        Cost::new(
+            "gi.bring",
+            pixels * (4.0 * 72.0 + 72.0 + 30.0 + staged + 30.0),
+            pixels * 16.0 + side.count(size) as f64 * 60.0,
+        )
     }
 }

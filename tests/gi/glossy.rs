@@ -40,7 +40,7 @@ fn shine(
     let given = texture_with(device, queue, size, wgpu::TextureFormat::Rgba16Float, bytemuck::cast_slice(&texels));
     let pass = GlossyPass::new(device);
     let picture = pass.picture(device, renderer.frame(), renderer.targets());
-    let sky = pass.sky(device, &uploaded.environment_view, None);
+    let sky = pass.sky(device, &uploaded.environment_view);
     let mut encoder = device.create_command_encoder(&Default::default());
     let mut recorder = Recorder::new(&mut encoder);
     renderer.record(&mut recorder, queue, &uploaded, &View::new(camera, size, [0.0; 2])).expect("draws");

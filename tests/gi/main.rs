@@ -4,15 +4,12 @@
 mod build;
 #[path = "../common/mod.rs"]
 mod common;
-mod contact;
 mod corrected;
 #[cfg(feature = "io")]
 mod dataset;
 mod edges;
 mod gather;
 mod glossy;
-#[cfg(feature = "reference")]
-mod probes;
 mod screen;
 mod shot;
 mod stages;

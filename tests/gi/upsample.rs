@@ -2,9 +2,8 @@
 
 use crate::common;
 use crate::edges::{FLOOR, LIGHT, PLATE, POLE, SIZE, WALL, bleeding, room};
-use crate::shot::{Hit, Shot, output, texture_with, view};
+use crate::shot::{Hit, Shot, output, view};
 use bouncelight::gi::cells::{CellSide, CellsPass, NO_PIXEL};
-use bouncelight::gi::contact::Beside;
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gi::twin::oct_decode;
 use bouncelight::gi::upsample::UpsamplePass;
@@ -59,30 +58,11 @@ fn upsample_and_tilt(gpu: &Gpu, shot: &Shot, side: CellSide, light: impl Fn(usiz
     let mut encoder = device.create_command_encoder(&Default::default());
     let mut recorder = Recorder::new(&mut encoder);
     cells.record(&mut recorder, &bound);
-    let open = view(&visibility(gpu, shot.size, 1.0));
-    // No spheres.
-    let [spheres, nearby] = [64, 4 * u64::from(shot.size[0].div_ceil(16) * shot.size[1].div_ceil(16))].map(|size| {
-        let usage = wgpu::BufferUsages::STORAGE;
-        device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
-    });
-    let beside = Beside { visibility: &open, spheres: &spheres, nearby: &nearby };
-    pass.record(&mut recorder, &bound, &cells, &buffer, Some(beside), &view(&target)).expect("records");
+    pass.record(&mut recorder, &bound, &cells, &buffer, &view(&target)).expect("records");
     queue.submit([encoder.finish()]);
     let texels = readback::texture(device, queue, &target).expect("readable");
     let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&texels);
     halves.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]].map(half::f16::to_f32)).collect()
-}
-
-/// The same visibility everywhere, as `gi.contact` would write it.
-fn visibility(gpu: &Gpu, size: [u32; 2], value: f32) -> wgpu::Texture {
-    let half = size.map(|n| n.div_ceil(2));
-    texture_with(
-        &gpu.device,
-        &gpu.queue,
-        half,
-        wgpu::TextureFormat::R32Float,
-        bytemuck::cast_slice(&vec![value; (half[0] * half[1]) as usize]),
-    )
 }
 
 fn even(value: f32) -> [Channel; 3] {
@@ -252,7 +232,7 @@ fn the_mirrored_direction_gets_the_lights_gradient() {
 fn costs_are_counted_for_the_whole_picture() {
     let size = [1024, 512];
     for side in SIDES {
-        let (choose, bring) = (CellsPass::cost(side, size), UpsamplePass::cost(side, size, 100));
+        let (choose, bring) = (CellsPass::cost(side, size), UpsamplePass::cost(side, size));
         // 16 bytes a pixel have to move: depth, normal, result.
         assert!(bring.bytes > 16.0 * 524_288.0 && bring.bytes < 22.0 * 524_288.0, "{bring:?}");
         assert!(bring.flops > 300.0 * 524_288.0 && bring.flops < 700.0 * 524_288.0, "{bring:?}");

@@ -138,7 +138,7 @@ impl GatherGi {
             renew: new(shared, "gi.renew", "renew", &[rw, rw, rw, rw, rw]),
             settle: new(alone, "gi.settle", "settle", &[READ, READ, READ, READ, rw, READ, LOAD]),
             blur: new(alone, "gi.blur", "blur", &[READ, rw, rw]),
-            upsample: UpsamplePass::plain(device, &inputs, CellSide::Four),
+            upsample: UpsamplePass::new(device, &inputs, CellSide::Four),
             store: Store::new(device, size, options.slots),
             no_lights: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("gi.no_lights"),
@@ -304,7 +304,7 @@ impl Rung for GatherGi {
         self.round = params.round + 1;
         self.frame += 1;
         self.hurry = self.hurry.saturating_sub(1);
-        self.upsample.record(recorder, &bound, &self.cells, &store.cell_light, None, output)
+        self.upsample.record(recorder, &bound, &self.cells, &store.cell_light, output)
     }
 
     fn settled(&self) -> Option<u32> {
@@ -339,7 +339,7 @@ impl Rung for GatherGi {
             Cost::new("gi.renew", entries * flops, entries * bytes + f64::from(self.options.slots) * 8.0),
             Cost::new("gi.settle", cells * 150.0, cells * (2.0 * PAST as f64 + 112.0)),
             Cost::new("gi.blur", cells * 25.0 * 45.0, cells * (PAST as f64 + 64.0)),
-            UpsamplePass::cost(CellSide::Four, size, 0),
+            UpsamplePass::cost(CellSide::Four, size),
         ]
     }
 }
