@@ -30,14 +30,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let gpu = Gpu::open(&GpuOptions::default())?;
     println!("{}", gpu.sentence());
     let scene = scene::load("interior")?;
-    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
+    let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
+    uploaded.trace(&gpu.device, &gpu.queue, &scene)?;
     let neural = || Weights::shipped().map(|w| Method::Neural(Box::new(w.into())));
 
     let mut pictures = Vec::new();
-    for method in [Method::Direct, Method::Cache, neural()?] {
+    for method in [Method::Direct, Method::Gather(Default::default()), neural()?] {
+        let warmup = if method.has_history() { Method::SETTLED - 1 } else { 0 };
         let options = RendererOptions { method, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, SIZE, options)?;
-        let options = CaptureOptions { samples: 8, ..Default::default() };
+        let options = CaptureOptions { samples: 8, warmup, ..Default::default() };
         let frame = capture(&gpu, &mut renderer, &uploaded, &scene.cameras[0], options)?;
         let rgb: Vec<f32> = frame.beauty.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
         pictures.push(Tonemap::Filmic.apply_to_bytes(&rgb));
@@ -63,10 +65,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         &sheet,
         &[("Adapter".into(), gpu.sentence())],
     )?;
-    println!("raster | cache above, neural | reference below: {}\n", out.display());
+    println!("raster | gather above, neural | reference below: {}\n", out.display());
 
     println!("interior at {}x{}, one frame:", TIMED_SIZE[0], TIMED_SIZE[1]);
-    for method in [Method::Direct, Method::Ambient, Method::Cache, neural()?] {
+    for method in [Method::Direct, Method::Ambient, Method::Gather(Default::default()), neural()?] {
         let options = RendererOptions { method, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, TIMED_SIZE, options)?;
         let options = BenchOptions { frames: 5, warmup: 2 };

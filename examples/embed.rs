@@ -58,7 +58,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         camera: CameraMatrices { view_from_world: identity, clip_from_view: projection },
         environment: [0.05; 3],
         lights: None,
-        world: None,
         rays: None,
         motion: None,
         specular: None,

@@ -40,8 +40,8 @@ fn usage_errors_exit_with_2() {
     fails(&["render", "interior", "-o", &out, "--camera", "99"], 2, &["--camera 99"]);
     // 16 bits are for networks: where none runs, nothing can be had of them.
     let word = &["--precision", "network"];
-    fails(&["render", "interior", "--method", "cache", "-o", &out, "--precision", "f16"], 2, word);
-    fails(&["bench", "interior", "--method", "cache", "--precision", "f16"], 2, word);
+    fails(&["render", "interior", "--method", "ssgi", "-o", &out, "--precision", "f16"], 2, word);
+    fails(&["bench", "interior", "--method", "ssgi", "--precision", "f16"], 2, word);
     fails(&["doctor", "--precision", "f16"], 2, word);
     fails(&["render", "interior", "-o", &out, "--precision", "f8"], 2, &["f16"]);
     fails(&["render", "interior", "-o", &out, "--fov", "180"], 2, &["--fov"]);
@@ -50,6 +50,10 @@ fn usage_errors_exit_with_2() {
     fails(&["render", "interior", "-o", &path(&dir, "x.bmp")], 2, &[".png", ".exr"]);
     fails(&["render", "interior"], 2, &["--output"]);
     fails(&["paint"], 2, &["paint"]);
+    for method in ["rsm", "cache", "probes"] {
+        fails(&["render", "interior", "-o", &out, "--method", method], 2, &[method, "replaced by `gather`"]);
+        fails(&["bench", "interior", "--method", method], 2, &[method, "replaced by `gather`"]);
+    }
     fails(&["dataset", "--rooms", "5-47", "--out", &path(&dir, "d")], 2, &["judging", "47"]);
     fails(&["dataset", "--rooms", "5", "--shard", "4/4", "--out", &path(&dir, "d")], 2, &["4/4", "n-1"]);
     assert!(is_empty(dir.path()), "a usage error leaves nothing behind");
@@ -112,7 +116,7 @@ fn invalid_weights_exit_with_4_and_name_the_tensor() {
     let dir = tempfile::tempdir().unwrap();
     let out = path(&dir, "out.png");
     let shipped =
-        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/weights/compact.safetensors")).unwrap();
+        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/weights/small.safetensors")).unwrap();
     let text = path(&dir, "text.safetensors");
     std::fs::write(&text, b"these are no weights").unwrap();
     fails(&["render", "interior", "-o", &out, "--weights", &text], 4, &["text.safetensors"]);
@@ -306,7 +310,7 @@ fn bench_prints_passes_and_writes_a_record_that_it_can_compare_with() {
     }
     let record: serde_json::Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
     assert_eq!(record["schema"], 1);
-    assert_eq!(record["methods"].as_array().unwrap().len(), 8);
+    assert_eq!(record["methods"].as_array().unwrap().len(), 5);
     // Against a base that was a thousand times faster, it is too slow.
     let mut fast = record.clone();
     for m in fast["methods"].as_array_mut().unwrap() {

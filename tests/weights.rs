@@ -160,6 +160,8 @@ fn documents() {
     one(&["version 3", "up to version 2"], set("/version", json!(3)));
     one(&["table `screen`", "version 7"], set("/table/version", json!(7)));
     one(&["table `probe` is unknown"], set("/table/name", json!("probe")));
+    one(&["`cache`", "`gather` has replaced", "anew"], set("/inputs/0/name", json!("cache")));
+    one(&["gain_and_rest_on_cache", "`gather` has replaced"], set("/output/meaning", json!("gain_and_rest_on_cache")));
     one(&["`glow`", "no such feature"], set("/inputs/0/name", json!("glow")));
     one(&["`direct`", "3 channels"], |f| {
         f.document["inputs"] = json!([{"name": "direct", "channels": 4}]);

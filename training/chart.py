@@ -2,13 +2,12 @@
 
     python training/judge.py out/judge data/judge --csv out/judge.csv
     bouncelight bench paper-room:0 --method all --json out/bench.json
-    python training/chart.py out/judge.csv out/error_over_cost --bench out/bench.json [--bench out/large.json=neural large] [--weights "apply paper"=assets/weights/paper.safetensors] [--group room]
+    python training/chart.py out/judge.csv out/error_over_cost --bench out/bench.json [--weights "apply paper"=assets/weights/paper.safetensors] [--group room]
 
 Writes out/error_over_cost.png and .svg. Across: arithmetic that finds and adds indirect light for one picture, GFLOP, as bounce-
 light counts it (docs/performance.md); up: the paper's L1, mean over the rows whose scene begins with --group. A record of the
 bench names methods; FILE=ROW says which row of the CSV its method `neural` is. The paper's own network stands where its
-authors' table and its layers put it. The frontier joins the rows that nothing beats in both,
-a second one those that nothing without a bake beats.
+authors' table and its layers put it. The frontier joins the rows that nothing beats in both.
 """
 import argparse
 import csv
@@ -25,8 +24,6 @@ from matplotlib.transforms import Bbox  # noqa: E402
 PAPER = ("the paper's network\n(its own pictures)", 104.0, 45178.0)
 NAMES = {"apply paper": "the paper's recipe, our small run"}
 NOT_SHOWN = {"constant", "best constant"}
-# Needs a bake, which holds for static geometry only: a frontier without it is drawn too.
-BAKED = {"probes"}
 
 
 def errors(path, group, metric):
@@ -99,10 +96,8 @@ def main():
     best = frontier(points)
     figure, axes = plt.subplots(figsize=(8, 5), constrained_layout=True)
     axes.plot([p[1] for p in best], [p[2] for p in best], color="0.7", drawstyle="steps-post", zorder=1, label="nothing is cheaper and better")
-    unbaked = frontier([p for p in points if p[0] not in BAKED])
-    axes.plot([p[1] for p in unbaked], [p[2] for p in unbaked], color="C0", alpha=0.5, ls="--", drawstyle="steps-post", zorder=1, label="… without a bake")
     for name, x, y in points:
-        axes.scatter(x, y, color="C3" if name == PAPER[0] else "C0" if (name, x, y) in best + unbaked else "0.5", zorder=2)
+        axes.scatter(x, y, color="C3" if name == PAPER[0] else "C0" if (name, x, y) in best else "0.5", zorder=2)
     axes.set_xscale("symlog", linthresh=0.1)
     axes.set(yscale="log", xlabel="arithmetic for one picture of 1024×512, GFLOP (counted)", ylabel={"l1": "the paper's L1"}.get(a.metric, a.metric), xlim=(0, 1000))
     axes.grid(alpha=0.3, which="both")
@@ -110,8 +105,7 @@ def main():
     label(axes, points)
     for ending in ("png", "svg"):
         figure.savefig(f"{a.out}.{ending}", dpi=120)
-    for name, line in [("frontier", best), ("frontier without a bake", unbaked)]:
-        print(f"{name}: " + ", ".join(p[0].replace("\n", " ") for p in line))
+    print("frontier: " + ", ".join(p[0].replace("\n", " ") for p in best))
 
 
 if __name__ == "__main__":

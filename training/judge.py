@@ -204,7 +204,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", help="folder for our pictures")
     parser.add_argument("references", nargs="+", help="folders of Cycles' pictures")
-    parser.add_argument("--methods", default="direct,ambient,ssgi,rsm,cache,probes,neural", type=lambda t: t.split(","))
+    parser.add_argument("--methods", default="direct,ambient,ssgi,gather,neural", type=lambda t: t.split(","))
     parser.add_argument("--constant", type=lambda t: [float(v) for v in t.split(",")])
     parser.add_argument("--rooms", type=indices, help="take these rooms only, such as 0,27,2200-2239")
     parser.add_argument("--samples", type=int, default=4)

@@ -1,7 +1,7 @@
 """Reflections by roughness against the path tracer: the roughness table of docs/accuracy.md.
 
     python training/roughness.py out/roughness ../shared/reference/cycles/metal_301/scene.glb --environment 0.0508761
-                                 [--methods direct,cache] [--roughness 0.05,0.15,0.3,0.5,0.7,1] [--spp 256] [--size 256x128]
+                                 [--methods direct,gather] [--roughness 0.05,0.15,0.3,0.5,0.7,1] [--spp 256] [--size 256x128]
 
 Every metal of the scene, then every dielectric, is given each roughness in turn, the rest stays as it is. Judged are only the pixels of the materials that
 were changed, after 2x2 pooling: `error` is the mean |difference| / mean of the radiance they reflect from sky and bounces (GlossInd x GlossCol, for the
@@ -64,7 +64,7 @@ def main():
     parser.add_argument("out", help="folder for pictures")
     parser.add_argument("scene", help="a .glb with metals")
     parser.add_argument("--environment", default="0.0508761")
-    parser.add_argument("--methods", default="cache", type=lambda t: t.split(","))
+    parser.add_argument("--methods", default="gather", type=lambda t: t.split(","))
     parser.add_argument("--roughness", default="0.05,0.15,0.3,0.5,0.7,1", type=lambda t: [float(v) for v in t.split(",")])
     parser.add_argument("--spp", type=int, default=256)
     parser.add_argument("--size", default="256x128")

@@ -2,8 +2,8 @@
 
     python training/judge.py out/judge data/judge --csv out/judge.csv …
     bouncelight bench paper-room:0 --method all --json out/bench.json
-    python training/table.py out/judge.csv --bench out/bench.json [--bench out/large.json="neural large"] \\
-        --weights "neural large"=large.safetensors --weights "apply paper"=assets/weights/paper.safetensors [--group room] [--bouncelight target/release/bouncelight]
+    python training/table.py out/judge.csv --bench out/bench.json \\
+        --weights neural=assets/weights/small.safetensors --weights "apply paper"=assets/weights/paper.safetensors [--group room] [--bouncelight target/release/bouncelight]
 
 Errors are means over the scenes whose name begins with --group. GFLOP and MB are what `bench` counts for all indirect light of one picture (of a network on pictures: what `weights info` counts); "GTX 1050" is a
 projection from these counts (src/study/projection.rs: a roofline with an efficiency of 0.35), never a measurement; "GPU" is measured, and left out where all records come from software adapters.

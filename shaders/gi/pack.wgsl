@@ -3,7 +3,7 @@
 
 @group(1) @binding(0) var<storage, read> exposure: Exposure;
 @group(1) @binding(1) var<storage, read_write> features: array<vec4f>;
-// The answer of method `cache`; one texel where the weights do not use it.
+// The answer of method `gather`; one texel where the weights do not use it.
 @group(1) @binding(2) var guess_map: texture_2d<f32>;
 
 fn put(row: ptr<function, array<f32, PADDED>>, at: i32, value: f32) {
@@ -63,8 +63,8 @@ fn pack(@builtin(global_invocation_id) id: vec3u) {
             put(&row, SPREAD, spread_of(cell, z));
         }
         put(&row, HIT, 1.0);
-        if CACHE >= 0 {
-            put3(&row, CACHE, compress(max(finite3(textureLoad(guess_map, pixel, 0).rgb), vec3f(0.0))));
+        if GUESS >= 0 {
+            put3(&row, GUESS, compress(max(finite3(textureLoad(guess_map, pixel, 0).rgb), vec3f(0.0))));
         }
     }
     let first = (id.y * params.cells.x + id.x) * (PADDED / 4u);

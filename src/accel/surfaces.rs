@@ -157,7 +157,8 @@ fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 
         let alpha = match m.alpha_mode {
             AlphaMode::Opaque => 1.0,
             // The reduced picture's alpha is the share of texels above the cutoff, vertex colours aside.
-            AlphaMode::Mask { .. } => base[3],
+            AlphaMode::Mask { .. } if base_use.is_some() => base[3],
+            AlphaMode::Mask { cutoff } => f32::from(u8::from(m.base_color[3] * color(3) >= cutoff)),
             AlphaMode::Blend => (base[3] * m.base_color[3] * color(3)).clamp(0.0, 1.0),
         };
         let rough = read(&rough_use);

@@ -12,9 +12,11 @@ use crate::{
     },
 };
 use anyhow::{Context, Result};
-use clap::{Args, ValueEnum};
+use clap::builder::{EnumValueParser, PossibleValue, TypedValueParser};
+use clap::error::ErrorKind;
+use clap::{Arg, Args, Command, ValueEnum};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::{ffi::OsStr, path::PathBuf};
 
 /// Flags every subcommand takes.
 #[derive(Debug, Args)]
@@ -123,6 +125,33 @@ impl Global {
     }
 }
 
+/// Methods that there were.
+const REPLACED: [&str; 3] = ["rsm", "cache", "probes"];
+
+/// What is said to who asks for one of them.
+pub fn replaced(text: &str) -> Option<String> {
+    REPLACED.contains(&text).then(|| format!("method `{text}` was replaced by `gather`"))
+}
+
+/// Parses a method's name, as clap does it but for the names of methods that there were.
+#[derive(Debug, Clone)]
+pub struct MethodParser;
+
+impl TypedValueParser for MethodParser {
+    type Value = MethodName;
+
+    fn parse_ref(&self, cmd: &Command, arg: Option<&Arg>, value: &OsStr) -> Result<MethodName, clap::Error> {
+        if let Some(reason) = value.to_str().and_then(replaced) {
+            return Err(clap::Error::raw(ErrorKind::InvalidValue, reason).with_cmd(cmd));
+        }
+        EnumValueParser::new().parse_ref(cmd, arg, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(MethodName::value_variants().iter().filter_map(ValueEnum::to_possible_value)))
+    }
+}
+
 impl MethodName {
     /// The real-time method with its weights: `weights`, or the shipped ones. `tuned` adds what a device is needed for.
     pub fn method(self, global: &Global, weights: Option<&PathBuf>) -> Result<Method> {
@@ -133,7 +162,6 @@ impl MethodName {
                 neural.network.precision = global.precision.precision();
                 Ok(Method::Neural(Box::new(neural)))
             }
-            (None, MethodName::Probes) => Err(usage("`probes` needs a bake, which this command does not make".into())),
             (None, _) => Err(usage(format!("`{}` is no real-time method", self.name()))),
         }
     }

@@ -2,9 +2,8 @@
 
 use super::layers::Layers;
 use super::{
-    args::{Global, MethodName, PrecisionName, SceneArgs, usage},
+    args::{Global, MethodName, PrecisionName, SceneArgs, replaced, usage},
     error::CliError,
-    probes::BakeArgs,
 };
 use crate::{
     gi::rung::Cost,
@@ -27,11 +26,9 @@ pub struct Args {
     /// Real-time method to measure, or `all` of them. (`render --method reference` tells its own samples per second.)
     #[arg(long, default_value = "all", value_parser = parse_methods)]
     method: Methods,
-    /// Weights of `neural`: a file, or the name of shipped ones (small, medium, large); `small` when absent.
+    /// Weights of `neural`; the shipped ones (`small`) when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
-    #[command(flatten)]
-    bake: BakeArgs,
     /// Frames that count.
     #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
@@ -61,6 +58,7 @@ fn parse_methods(text: &str) -> Result<Methods, String> {
         "reference" => {
             Err("bench measures frames of real-time methods; `render --method reference` tells its speed".into())
         }
+        one if replaced(one).is_some() => Err(replaced(one).unwrap_or_default()),
         one => <MethodName as clap::ValueEnum>::from_str(one, false).map(|m| Methods(vec![m])),
     }
 }
@@ -105,16 +103,13 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let camera = args.scene.camera(&scene)?;
     let gpu = global.open_gpu()?;
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
-    if args.method.0.contains(&MethodName::Gather) {
-        uploaded.trace(&gpu.device, &gpu.queue, &scene)?;
-    }
     let options = BenchOptions { frames: args.frames, warmup: args.warmup };
     let mut methods = Vec::new();
     for name in &args.method.0 {
-        let method = match name {
-            MethodName::Probes => args.bake.bake(global, &scene, &camera)?,
-            name => super::tuned::tuned(name.method(global, args.weights.as_ref())?, &gpu, global.quiet),
-        };
+        let method = super::tuned::tuned(name.method(global, args.weights.as_ref())?, &gpu, global.quiet);
+        if method.needs_rays() && uploaded.rays.is_none() {
+            uploaded.trace(&gpu.device, &gpu.queue, &scene)?;
+        }
         let mut renderer =
             Renderer::new(&gpu.device, &gpu.queue, args.scene.size, RendererOptions { method, ..Default::default() })?;
         methods.push(measure(&gpu, &mut renderer, &uploaded, &camera, options)?);

@@ -10,14 +10,14 @@ use super::{
     progress::Progress,
 };
 use crate::{
-    gi::{Method, features::FeatureSet, inputs::cells_of},
+    gi::{Method, features::FeatureSet, gather, inputs::cells_of},
     gpu::Gpu,
     image_io::write_whole,
     reference::{Kernel, ReferenceScene},
     render::{Renderer, RendererOptions},
     scene::{self, Camera, LightKind, Scene, paper_room, upload::SceneGpu},
     study::{
-        dataset::{Next, Sample, sample},
+        dataset::{Next, Sample, frame, sample},
         guides::Guides,
         motion, target, varied,
         views::{around, turned},
@@ -60,6 +60,9 @@ pub struct Args {
     /// Path-trace the light to be learnt with so many samples for each cell; 0 leaves it out, for targets from Cycles.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=65_536), value_name = "N")]
     spp: u32,
+    /// Frames of a still camera that method `gather`, the first guess, settles over before it is read: 1 is the first after a cut.
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=65_536), value_name = "N")]
+    gi_frames: u32,
     /// Only every n-th room (or view of a scene), beginning with the i-th: 0/4, 1/4 … for four machines that share the work.
     #[arg(long, default_value = "0/1", value_parser = parse_shard, value_name = "I/N")]
     shard: [u32; 2],
@@ -128,11 +131,12 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make the folder {}", args.out.display()))?;
     interrupt::install()?;
     let gpu = global.open_gpu()?;
-    let options = RendererOptions { method: Method::Cache, ..Default::default() };
+    let options = RendererOptions { method: Method::Gather(gather::Options::default()), ..Default::default() };
     let renderer = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
     let kernel = (args.spp > 0).then(|| Kernel::new(&gpu.device));
-    let (spp, motion, guides, out) = (args.spp, args.motion, args.guides, args.out.clone());
-    let mut writer = Writer { gpu, renderer, kernel, spp, motion, guides, out, listed: HashSet::new() };
+    let Args { spp, motion, guides, gi_frames, ref out, .. } = args;
+    let (out, listed) = (out.clone(), HashSet::new());
+    let mut writer = Writer { gpu, renderer, kernel, spp, motion, guides, gi_frames, out, listed };
     writer.open_list()?;
     match (args.recipe, &args.rooms, &args.scene) {
         (Recipe::PaperRoom | Recipe::PaperRoomVaried, Some(rooms), _) => many_rooms(global, &mut writer, rooms, &args)?,
@@ -167,6 +171,7 @@ struct Writer {
     spp: u32,
     motion: bool,
     guides: bool,
+    gi_frames: u32,
     out: PathBuf,
     /// Names in the list of checksums.
     listed: HashSet<String>,
@@ -180,7 +185,8 @@ struct Uploaded {
 
 impl Writer {
     fn upload(&self, scene: &Scene) -> Result<Uploaded> {
-        let raster = SceneGpu::new(&self.gpu.device, &self.gpu.queue, scene)?;
+        let mut raster = SceneGpu::new(&self.gpu.device, &self.gpu.queue, scene)?;
+        raster.trace(&self.gpu.device, &self.gpu.queue, scene)?;
         let trace = |_| ReferenceScene::new(&self.gpu.device, &self.gpu.queue, scene);
         Ok(Uploaded { raster, traced: self.kernel.as_ref().map(trace).transpose()? })
     }
@@ -203,7 +209,9 @@ impl Writer {
         if self.motion {
             let size = self.renderer.size();
             let moved = motion::stepped(camera, size, motion::median_distance(&sample), u64::from(seed));
-            let next = self.sample(&scene.raster, &moved)?;
+            // The guess goes on, as it does when a camera moves.
+            interrupt::check()?;
+            let next = frame(&self.gpu, &mut self.renderer, &scene.raster, &moved, 1)?;
             let flow = motion::flow((&sample, camera), (&next, &moved), size);
             sample.next = Some(Next { inputs: next.inputs, flow });
         }
@@ -224,7 +232,7 @@ impl Writer {
 
     fn sample(&mut self, scene: &SceneGpu, camera: &Camera) -> Result<Sample> {
         interrupt::check()?;
-        Ok(sample(&self.gpu, &mut self.renderer, scene, camera)?)
+        Ok(sample(&self.gpu, &mut self.renderer, scene, camera, self.gi_frames)?)
     }
 
     fn open_list(&mut self) -> Result<()> {

@@ -3,7 +3,6 @@
 use crate::{
     accel::AccelError,
     gi::GiError,
-    gi::probes::BakeError,
     gpu::GpuError,
     net::{convert::ConvertError, format::WeightsError, pictures::PicturesError},
     reference::PackError,
@@ -94,7 +93,6 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
             || cause.is::<EnvironmentError>()
             || cause.is::<PackError>()
             || cause.is::<AccelError>()
-            || cause.is::<BakeError>()
         {
             return INVALID_INPUT;
         }

@@ -11,7 +11,6 @@ mod doctor;
 pub mod error;
 mod interrupt;
 mod layers;
-mod probes;
 mod progress;
 mod reference;
 mod render;

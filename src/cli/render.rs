@@ -1,11 +1,10 @@
 //! `bouncelight render`: one picture of a scene, as PNG through a view transform or as EXR with layers.
 
 use super::{
-    args::{Global, MethodName, SceneArgs, usage},
+    args::{Global, MethodName, MethodParser, SceneArgs, usage},
     compare::{Heat, Shown, shown_bytes},
     error::CliError,
     interrupt,
-    probes::BakeArgs,
     progress::Progress,
     reference, sequence,
 };
@@ -24,9 +23,6 @@ use crate::{
 use anyhow::Result;
 use std::path::{Path, PathBuf};
 
-/// Frames that a method with history gets to settle, where nothing else is asked for.
-const GI_FRAMES: u32 = 32;
-
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -35,9 +31,9 @@ pub struct Args {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// How indirect light is found; `reference` traces paths until the light is right. `neural` when absent.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = MethodParser)]
     method: Option<MethodName>,
-    /// Weights of `neural`: a file, or the name of shipped ones (small, medium, large); `small` when absent.
+    /// Weights of `neural`; the shipped ones (`small`) when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
     /// Jittered frames that are averaged through Cycles' pixel filter; 1 (the default) is the raw frame.
@@ -46,7 +42,7 @@ pub struct Args {
     /// Real-time anti-aliasing over this many frames before the one that is written.
     #[arg(long, conflicts_with = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     taa: Option<u32>,
-    /// Frames of a still camera up to the one that is written, for methods that settle (`gather`): 1 is the first after a cut. 32 when absent.
+    /// Frames of a still camera up to the one that is written, for methods that settle (`gather`, `neural`): 1 is the first after a cut. 32 when absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     gi_frames: Option<u32>,
     /// Numbers of `gather` other than its own, such as `blur=0,cell_frames=256`; `plain` forgets and blurs nothing.
@@ -78,8 +74,6 @@ pub struct Args {
     diff: Option<PathBuf>,
     #[command(flatten)]
     sequence: sequence::SequenceFlags,
-    #[command(flatten)]
-    bake: BakeArgs,
     // Last, since its heading would go on to what follows.
     #[command(flatten)]
     tracing: reference::Flags,
@@ -139,11 +133,9 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
         MethodName::Reference => Task::Trace(args.tracing.task(args.scene.size, args.seed, args.aov.as_deref())?),
         name => {
             let layers = args.aov.as_deref().map(|text| parse_layers(text, &Layer::ALL, Layer::name)).transpose()?;
-            // Probes are baked once the scene is there.
             let method = match name {
-                MethodName::Probes => None,
-                MethodName::Gather => Some(Method::Gather(args.gather.unwrap_or_default())),
-                _ => Some(name.method(global, args.weights.as_ref())?),
+                MethodName::Gather => Method::Gather(args.gather.unwrap_or_default()),
+                _ => name.method(global, args.weights.as_ref())?,
             };
             Task::Rasterise(method, layers.unwrap_or_default())
         }
@@ -165,7 +157,6 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let drawn = match task {
         Task::Trace(task) => task.run(global, &gpu, &scene, &camera)?,
         Task::Rasterise(method, layers) => {
-            let method = method.map_or_else(|| args.bake.bake(global, &scene, &camera), Ok)?;
             let method = super::tuned::tuned(method, &gpu, global.quiet);
             let mut raster = Raster::new(&args, &gpu, &scene, method, layers)?;
             if let Some(sequence) = sequence {
@@ -183,7 +174,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
 
 /// What is to be done, with everything that only flags decide.
 enum Task {
-    Rasterise(Option<Method>, Vec<Layer>),
+    Rasterise(Method, Vec<Layer>),
     Trace(reference::Task),
 }
 
@@ -222,7 +213,7 @@ impl<'a> Raster<'a> {
         if self.running {
             return 0;
         }
-        let settle = if self.settles { args.gi_frames.unwrap_or(GI_FRAMES) - 1 } else { 0 };
+        let settle = if self.settles { args.gi_frames.unwrap_or(Method::SETTLED) - 1 } else { 0 };
         args.taa.unwrap_or(0).max(settle)
     }
 
@@ -304,13 +295,14 @@ fn check(args: &Args) -> Result<Format> {
     } else if let Some(flag) = args.tracing.given() {
         return Err(usage(format!("{flag} belongs to --method reference; `{name}` traces no paths")));
     }
-    for (flag, given) in [("--gi-frames", args.gi_frames.is_some()), ("--gather", args.gather.is_some())] {
-        if given && args.method() != MethodName::Gather {
-            return Err(usage(format!("{flag} belongs to --method gather; `{name}` does not settle over frames")));
-        }
+    let settles = [MethodName::Gather, MethodName::Neural].contains(&args.method());
+    if args.gi_frames.is_some() && !settles {
+        return Err(usage(format!(
+            "--gi-frames belongs to methods gather and neural; `{name}` does not settle over frames"
+        )));
     }
-    if let Some(flag) = args.bake.given().filter(|_| args.method() != MethodName::Probes) {
-        return Err(usage(format!("{flag} belongs to --method probes; `{name}` has no bake")));
+    if args.gather.is_some() && args.method() != MethodName::Gather {
+        return Err(usage(format!("--gather belongs to --method gather, not to `{name}`")));
     }
     image_io::check_writable(path)?;
     if let Some(diff) = &args.diff {

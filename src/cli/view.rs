@@ -1,6 +1,6 @@
 //! `bouncelight view`: the window.
 
-use super::args::{Global, MethodName, parse_size};
+use super::args::{Global, MethodName, MethodParser, parse_size};
 use crate::viewer::{self, Options};
 use anyhow::Result;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ pub struct Args {
     #[arg(long, value_name = "W")]
     weights: Option<PathBuf>,
     /// How indirect light is found at first.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = MethodParser)]
     method: Option<MethodName>,
     /// Load scene and weights again when their files change; in a checkout, shaders, too.
     #[arg(long)]

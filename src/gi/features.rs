@@ -36,7 +36,7 @@ pub const FEATURES: [FeatureInfo; 10] = [
     },
     FeatureInfo { name: "hit", channels: 1, doc: "1 where the sample hit something, else 0" },
     FeatureInfo { name: "sky", channels: 3, doc: "ln(1 + environment radiance/s)" },
-    FeatureInfo { name: "cache", channels: 3, doc: "ln(1 + C/s), C = what method `cache` answers at the pixel, E/π" },
+    FeatureInfo { name: "guess", channels: 3, doc: "ln(1 + C/s), C = what method `gather` answers at the pixel, E/π" },
 ];
 
 /// The features that one network uses, in table order.
@@ -54,9 +54,9 @@ impl FeatureSet {
         Self::new(names).expect("the table agrees with itself")
     }
 
-    /// The features that the G-buffer alone gives, all but `cache`: 21 channels.
+    /// The features that the G-buffer alone gives, all but `guess`: 21 channels.
     pub fn screen() -> Self {
-        let names = FEATURES.iter().filter(|f| f.name != "cache").map(|f| (f.name, f.channels));
+        let names = FEATURES.iter().filter(|f| f.name != "guess").map(|f| (f.name, f.channels));
         Self::new(names).expect("the table agrees with itself")
     }
 
@@ -133,27 +133,17 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.occlusion", super::bitmask::March::NEAR.prelude()),
         ("gi.radiance", super::ssgi::SsgiOptions::default().prelude()),
         ("gi.ssgi", super::ssgi::SsgiOptions::default().prelude()),
-        ("gi.probes_apply", super::cells::CellSide::Four.prelude()),
         ("gi.pack", FeatureSet::all().prelude()),
         ("gi.pack", few.prelude()),
         ("gi.reconstruct", super::reconstruct::prelude(super::reconstruct::Answer::Light)),
         ("gi.reconstruct", super::reconstruct::prelude(super::reconstruct::Answer::Gain)),
         ("gi.cells", super::cells::CellSide::Four.prelude()),
         ("gi.cells", super::cells::CellSide::Eight.prelude()),
-        ("gi.gather", super::cache::prelude(super::cache::Options::RSM)),
-        ("gi.gather", super::cache::prelude(super::cache::Options::CACHE)),
-        ("gi.surfels", super::surfels::prelude(super::surfels::SURFELS)),
-        ("gi.first", super::surfels::prelude(super::surfels::SURFELS)),
-        ("gi.discs", super::surfels::prelude(super::surfels::SURFELS)),
-        ("gi.exchange", super::surfels::prelude(super::surfels::SURFELS)),
-        ("gi.contact", super::contact::prelude()),
         ("gi.rays", super::gather::prelude()),
         ("gi.renew", super::gather::prelude()),
         ("gi.settle", super::gather::prelude()),
         ("gi.blur", super::gather::prelude()),
-        ("gi.bring", super::upsample::prelude(super::cells::CellSide::Four)),
-        ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Four)),
-        ("gi.upsample", super::upsample::prelude(super::cells::CellSide::Eight)),
+        ("gi.bring", super::gather::bring::prelude()),
     ]
 }
 
@@ -165,7 +155,7 @@ mod tests {
     fn offsets_follow_the_table() {
         let all = FeatureSet::all();
         assert_eq!((all.channels(), all.padded()), (24, 24));
-        assert_eq!((FeatureSet::screen().channels(), FeatureSet::screen().offset("cache")), (21, None));
+        assert_eq!((FeatureSet::screen().channels(), FeatureSet::screen().offset("guess")), (21, None));
         assert_eq!(all.offset("depth"), Some(15));
         let few = FeatureSet::new([("albedo", 3), ("hit", 1)]).unwrap();
         assert_eq!((few.offset("albedo"), few.offset("hit"), few.offset("sky")), (Some(0), Some(3), None));

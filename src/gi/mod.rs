@@ -11,16 +11,13 @@
 //! [`ssgi`] gathers what the pixels around a pixel send on, by visibility bitmask ([`bitmask`]), and `ambient`'s light
 //! through what nothing blocks. It cannot do anything off the screen or hidden in it.
 //!
-//! [`cache`] holds two methods that gather what the rasterised world beyond the picture sends: `rsm` one bounce of the
-//! lights, `cache` all bounces, emission and the sky. They do not know what stands between.
-//!
 //! [`gather`] sends one ray a cell and frame into the scene's triangles and reads a cache of light in the world where it ends. It
 //! asks what stands between; what is left is noise, which frames and neighbours average away.
 //!
-//! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]), what `cache` says among them, go through a U-Net,
-//! and its gain and rest are applied to `cache`'s answer at full resolution, guided by depth and normal
-//! ([`reconstruct`]). It learns where that answer errs: missing occlusion, light that the cube does not see. It knows
-//! no more of the world than `cache` and the picture show, corrects nothing finer than a cell (4 pixels), and adds no
+//! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]), what `gather` says among them, go through a U-Net,
+//! and its gain and rest are applied to `gather`'s answer at full resolution, guided by depth and normal
+//! ([`reconstruct`]). It learns where that answer errs: noise that is left, light that the cache of light blurs. It knows
+//! no more of the world than `gather` and the picture show, corrects nothing finer than a cell (4 pixels), and adds no
 //! specular light beyond what `composite` derives from E.
 //!
 //! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
@@ -28,10 +25,7 @@
 
 pub mod ambient;
 pub mod bitmask;
-pub mod cache;
 pub mod cells;
-pub mod contact;
-pub mod emitters;
 pub mod exposure;
 pub mod features;
 pub mod gather;
@@ -41,14 +35,10 @@ pub mod name;
 pub mod occlusion;
 pub mod pack;
 pub mod pass;
-#[cfg(feature = "reference")]
-pub mod probes;
 pub mod reconstruct;
 pub mod rung;
 pub mod ssgi;
-pub mod surfels;
 pub mod twin;
-pub mod upsample;
 mod view_cache;
 
 pub use exposure::ExposurePass;
@@ -85,8 +75,6 @@ pub struct Inputs<'a> {
     pub camera: CameraMatrices,
     /// Radiance of the constant environment, W/(m²·sr).
     pub environment: [f32; 3],
-    /// What lies beyond the picture, for methods that need it ([`Method::needs_world`]).
-    pub world: Option<World<'a>>,
     /// The analytic lights, for methods that light more than the picture; `None` counts as no lights there.
     pub lights: Option<Lights<'a>>,
     /// The scene as rays meet it, for methods that ask it ([`Method::needs_rays`]).
@@ -113,47 +101,6 @@ impl std::fmt::Debug for Rays<'_> {
     }
 }
 
-/// Tiny G-buffers, several views in one atlas; `render::atlas` says what the texels mean.
-#[derive(Debug, Clone, Copy)]
-pub struct Atlas<'a> {
-    /// Reversed-Z depth, `Depth32Float`.
-    pub depth: &'a wgpu::TextureView,
-    /// Diffuse reflectance, `Rgba8UnormSrgb`.
-    pub albedo: &'a wgpu::TextureView,
-    /// Octahedral world normal, `Rg16Float`.
-    pub normal: &'a wgpu::TextureView,
-    /// Emitted radiance, `Rgba16Float`.
-    pub emissive: &'a wgpu::TextureView,
-    /// `render::atlas::AtlasViewGpu` of each view, a storage buffer.
-    pub views: &'a wgpu::Buffer,
-}
-
-/// The rasterised world beyond the screen.
-#[derive(Debug, Clone, Copy)]
-pub struct World<'a> {
-    /// What each light sees.
-    pub rsm: Atlas<'a>,
-    /// First view and number of views for each light, `vec2u`; none for lights without a map.
-    pub rsm_of_light: &'a wgpu::Buffer,
-    /// Views in `rsm`.
-    pub rsm_views: u32,
-    /// Blocks of 8×8 texels in all views of `rsm`.
-    pub rsm_blocks: u32,
-    /// Blocks of the largest view.
-    pub rsm_most_blocks: u32,
-    /// The cube around the camera: faces +X, −X, +Y, −Y, +Z, −Z side by side.
-    pub around: Atlas<'a>,
-    /// Lat-long picture of the surroundings, `Rgba32Float`; one texel for a constant sky.
-    pub environment: &'a wgpu::TextureView,
-    /// Lowest and highest corner of the scene, metres.
-    pub bounds: [[f32; 3]; 2],
-    /// The scene's small objects in the mean.
-    pub clutter: crate::scene::upload::Clutter,
-    /// World-space centre and radius (`vec4f`, metres) of spheres that stand in for small objects, a storage buffer; those of
-    /// radius 0 do not count.
-    pub spheres: &'a wgpu::Buffer,
-}
-
 /// The analytic lights on the GPU.
 #[derive(Debug, Clone, Copy)]
 pub struct Lights<'a> {
@@ -177,70 +124,40 @@ pub enum Method {
     Ambient,
     /// One bounce in screen space, see [`ssgi`].
     Ssgi,
-    /// One bounce from reflective shadow maps, see [`cache`].
-    Rsm,
-    /// All bounces and the sky from shadow maps and a cube around the camera, see [`cache`].
-    Cache,
-    /// Either of the two with other options.
-    World(cache::Options),
     /// Rays into the scene's triangles and a cache of light in the world, see [`gather`].
     Gather(gather::Options),
-    /// Surfels that a bake has linked, see [`probes`]. The bake must be of the scene that is drawn.
-    #[cfg(feature = "reference")]
-    Probes(std::sync::Arc<probes::Bake>),
     /// A network, see [`pass`]; `weights.into()` runs it with defaults.
     Neural(Box<pass::Neural>),
 }
 
 impl Method {
+    /// Frames of a still camera after which a picture counts as settled, for methods with a history.
+    pub const SETTLED: u32 = 32;
+
     /// The method's name on the command line.
     pub fn name(&self) -> &'static str {
         match self {
             Method::Direct => "direct",
             Method::Ambient => "ambient",
             Method::Ssgi => "ssgi",
-            Method::Rsm => "rsm",
-            Method::Cache => "cache",
-            Method::World(options) => ["rsm", "cache"][usize::from(options.around)],
             Method::Gather(_) => "gather",
-            #[cfg(feature = "reference")]
-            Method::Probes(_) => "probes",
             Method::Neural(_) => "neural",
         }
     }
 
     /// Whether the method asks rays ([`Inputs::rays`]).
     pub fn needs_rays(&self) -> bool {
-        matches!(self, Method::Gather(_))
+        match self {
+            Method::Gather(_) => true,
+            Method::Neural(neural) => pass::needs_guess(&neural.weights),
+            _ => false,
+        }
     }
 
     /// Whether the method's answer settles over frames.
     pub fn has_history(&self) -> bool {
-        matches!(self, Method::Gather(_))
+        self.needs_rays()
     }
-
-    /// What of the world beyond the screen the method reads.
-    pub fn needs_world(&self) -> NeedsWorld {
-        match self {
-            Method::Rsm => NeedsWorld::Lights,
-            Method::Cache => NeedsWorld::Around,
-            Method::World(options) if options.around => NeedsWorld::Around,
-            Method::World(_) => NeedsWorld::Lights,
-            Method::Neural(neural) if pass::needs_guess(&neural.weights) => NeedsWorld::Around,
-            _ => NeedsWorld::Nothing,
-        }
-    }
-}
-
-/// What of [`World`] the host has to draw.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NeedsWorld {
-    /// Nothing: [`Inputs::world`] may be `None`.
-    Nothing,
-    /// What the lights see.
-    Lights,
-    /// That and the cube around the camera.
-    Around,
 }
 
 /// Why a method could not be made or recorded.
@@ -257,9 +174,6 @@ pub enum GiError {
     /// The camera is not a finite reversed-Z perspective camera.
     #[error("the camera cannot be used: {0}")]
     Camera(&'static str),
-    /// The method reads [`Inputs::world`], which is not there.
-    #[error("this method needs the world beyond the screen (`Inputs::world`), which the host did not supply")]
-    World,
     /// The method reads [`Inputs::rays`], which is not there.
     #[error("this method sends rays into the scene's triangles (`Inputs::rays`), which the host did not supply")]
     Rays,
@@ -292,9 +206,6 @@ pub enum GiError {
         /// The network's own reason.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// A bake that the device cannot hold.
-    #[error("the bake cannot be used: {0}")]
-    Bake(String),
     /// Reading back failed.
     #[error(transparent)]
     Readback(#[from] ReadbackError),

@@ -13,14 +13,8 @@ pub enum MethodName {
     Ambient,
     /// One bounce in screen space.
     Ssgi,
-    /// One bounce of the lights from reflective shadow maps.
-    Rsm,
-    /// All bounces and the sky from what lights and a cube around the camera see.
-    Cache,
     /// Rays into the scene's triangles, and a cache of light in the world; settles over frames.
     Gather,
-    /// Surfels that a bake has linked; holds for static geometry.
-    Probes,
     /// The network.
     Neural,
     /// The path tracer, which converges to the truth.
@@ -31,16 +25,14 @@ use MethodName as M;
 
 impl MethodName {
     /// All of them, cheapest first, the truth last.
-    pub const ALL: [MethodName; 9] =
-        [M::Direct, M::Ambient, M::Ssgi, M::Rsm, M::Cache, M::Gather, M::Probes, M::Neural, M::Reference];
+    pub const ALL: [MethodName; 6] = [M::Direct, M::Ambient, M::Ssgi, M::Gather, M::Neural, M::Reference];
 
     /// All real-time methods, cheapest first.
-    pub const REAL_TIME: [MethodName; 8] =
-        [M::Direct, M::Ambient, M::Ssgi, M::Rsm, M::Cache, M::Gather, M::Probes, M::Neural];
+    pub const REAL_TIME: [MethodName; 5] = [M::Direct, M::Ambient, M::Ssgi, M::Gather, M::Neural];
 
     /// Name on the command line, in records and in the window.
     pub fn name(self) -> &'static str {
-        ["direct", "ambient", "ssgi", "rsm", "cache", "gather", "probes", "neural", "reference"][self as usize]
+        ["direct", "ambient", "ssgi", "gather", "neural", "reference"][self as usize]
     }
 
     /// What lists say beside the name.
@@ -49,25 +41,20 @@ impl MethodName {
             "Analytic lights only",
             "Sky and mean light from all around, times ambient occlusion",
             "One bounce in screen space",
-            "One bounce of the lights from reflective shadow maps",
-            "All bounces and the sky from what lights and a cube around the camera see",
             "Rays into the scene's triangles, and a cache of light in the world; settles over frames",
-            "Surfels that a bake has linked; holds for static geometry",
             "The network",
             "The path tracer, which converges to the truth",
         ][self as usize]
     }
 
-    /// The method, where its name says all that it needs: not `probes` (a bake), `neural` (weights) and `reference`.
+    /// The method, where its name says all that it needs: not `neural` (weights) and `reference`.
     pub fn plain(self) -> Option<Method> {
         Some(match self {
             M::Direct => Method::Direct,
             M::Ambient => Method::Ambient,
             M::Ssgi => Method::Ssgi,
-            M::Rsm => Method::Rsm,
-            M::Cache => Method::Cache,
             M::Gather => Method::Gather(super::gather::Options::default()),
-            M::Probes | M::Neural | M::Reference => return None,
+            M::Neural | M::Reference => return None,
         })
     }
 
@@ -100,8 +87,8 @@ mod tests {
             assert_eq!(serde_json::to_value(method).unwrap(), method.name());
         }
         let plain: Vec<_> = MethodName::ALL.into_iter().filter_map(|m| Some((m.name(), m.plain()?.name()))).collect();
-        assert!(plain.len() == 6 && plain.iter().all(|(ours, theirs)| ours == theirs), "{plain:?}");
+        assert!(plain.len() == 4 && plain.iter().all(|(ours, theirs)| ours == theirs), "{plain:?}");
         assert_eq!(MethodName::from_name("magic"), None);
-        assert_eq!(MethodName::REAL_TIME[..], MethodName::ALL[..8]);
+        assert_eq!(MethodName::REAL_TIME[..], MethodName::ALL[..5]);
     }
 }

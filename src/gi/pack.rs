@@ -15,7 +15,7 @@ pub struct PackPass {
 
 impl PackPass {
     /// Compiles the shader for `features` and binds `target` (NHWC f32, `features.padded()` channels a cell) and `guess`,
-    /// what method `cache` answers (`Rgba16Float`, of the picture's size; any texture if `features` has no `cache`).
+    /// what method `gather` answers (`Rgba16Float`, of the picture's size; any texture if `features` has no `guess`).
     pub fn new(
         device: &wgpu::Device,
         inputs: &InputGroup,
@@ -67,8 +67,8 @@ pub struct NetworkInputs {
     pub exposure: super::exposure::Exposure,
 }
 
-/// Computes and reads back the features of one picture, without any network. `guess` is what method `cache` made of the same
-/// inputs, not read if `features` has no `cache`. Makes its own buffers, submits and waits: for the `dataset` command and
+/// Computes and reads back the features of one picture, without any network. `guess` is what method `gather` made of the same
+/// inputs, not read if `features` has no `guess`. Makes its own buffers, submits and waits: for the `dataset` command and
 /// tests, not for frames.
 ///
 /// # Errors
@@ -81,7 +81,7 @@ pub fn read_features(
     guess: &wgpu::TextureView,
 ) -> Result<NetworkInputs, GiError> {
     let size = inputs.size;
-    if features.offset("cache").is_some() {
+    if features.offset("guess").is_some() {
         check("guess", guess, size, wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::TEXTURE_BINDING)?;
     }
     let cells = cells_of(size);

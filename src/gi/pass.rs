@@ -7,17 +7,17 @@
 //!  albedo ──────┼──────────────┤                              │   │
 //!  emissive ────┼─► exposure ─┬┴► pack ─► U-Net (net.*) ─► reconstruct ─► E/π
 //!  direct ──────┘      s      ├──►│                           │
-//!  world ──► cache ─► guess ──┴───┴──────────────────────────►┘
+//!  rays ──► gather ─► guess ──┴───┴──────────────────────────►┘
 //! ```
 //!
-//! Weights whose answer is a gain on the first guess ([`Answer::Gain`]) have method `cache` run before them, and need the world
-//! beyond the picture as it does; weights that answer light itself need the G-buffer alone.
+//! Weights whose answer is a gain on the first guess ([`Answer::Gain`]) have method `gather` run before them, need the scene's
+//! triangles as it does, and settle over frames as it does; weights that answer light itself need the G-buffer alone.
 //!
 //! What the method cannot do: see [`crate::gi`].
 
-use super::cache::{self, WorldGi};
 use super::exposure::ExposurePass;
 use super::features::FeatureSet;
+use super::gather::{self, GatherGi};
 use super::inputs::{CELL, InputGroup, cells_of};
 use super::pack::{self, NetworkInputs, PackPass};
 use super::reconstruct::{Answer, ReconstructPass};
@@ -35,9 +35,9 @@ pub struct Options {
     pub size: [u32; 2],
 }
 
-/// Whether weights have method `cache` run before them, and so need [`Inputs::world`].
+/// Whether weights have method `gather` run before them, and so need [`Inputs::rays`].
 pub fn needs_guess(weights: &Weights) -> bool {
-    weights.output.meaning == Answer::Gain.name() || weights.inputs.iter().any(|f| f.name == "cache")
+    weights.output.meaning == Answer::Gain.name() || weights.inputs.iter().any(|f| f.name == "guess")
 }
 
 /// A network as a frame's method: what was trained, and how it runs.
@@ -69,7 +69,7 @@ pub struct NeuralGi {
     exposure: ExposurePass,
     reconstruct: ReconstructPass,
     /// The method whose answer the network corrects.
-    cache: Option<WorldGi>,
+    gather: Option<GatherGi>,
     rebuilt: Rebuilt,
     rebuilds: u64,
 }
@@ -79,7 +79,7 @@ struct Rebuilt {
     size: [u32; 2],
     network: Network,
     pack: PackPass,
-    /// What `cache` answers; one texel where nobody asks it.
+    /// What `gather` answers; one texel where nobody asks it.
     guess: wgpu::TextureView,
 }
 
@@ -132,7 +132,8 @@ impl NeuralGi {
             inputs,
             exposure,
             reconstruct,
-            cache: needs_guess(&neural.weights).then(|| WorldGi::new(device, options.size, cache::Options::CACHE)),
+            gather: needs_guess(&neural.weights)
+                .then(|| GatherGi::new(device, options.size, gather::Options::default())),
             rebuilt,
             rebuilds: 0,
         })
@@ -169,8 +170,8 @@ impl NeuralGi {
         }
         let bound = self.inputs.bind(&self.queue, inputs)?;
         let Rebuilt { network, pack, guess, .. } = &self.rebuilt;
-        if let Some(cache) = &mut self.cache {
-            cache.record(recorder, &self.queue, inputs, guess)?;
+        if let Some(gather) = &mut self.gather {
+            gather.record(recorder, &self.queue, inputs, guess)?;
         }
         self.exposure.record(recorder, &bound);
         pack.record(recorder, &bound);
@@ -218,22 +219,29 @@ impl NeuralGi {
         Ok(Some(self.rebuilt.network.read_tap(&self.device, &self.queue, step)?))
     }
 
-    /// What method `cache` answered in the last recording, where the network builds on it.
+    /// What method `gather` answered in the last recording, where the network builds on it.
     pub fn guess(&self) -> Option<&wgpu::TextureView> {
-        self.cache.as_ref().map(|_| &self.rebuilt.guess)
+        self.gather.as_ref().map(|_| &self.rebuilt.guess)
     }
 
-    /// What the first guess knows of the camera's surroundings: [`Rung::surroundings`].
-    pub fn surroundings(&self) -> Option<&wgpu::TextureView> {
-        self.cache.as_ref().and_then(|cache| cache.surroundings())
+    /// The next recording has nothing to do with the last (a cut of the camera): the first guess settles anew.
+    pub fn cut(&mut self) {
+        if let Some(gather) = &mut self.gather {
+            gather.cut();
+        }
+    }
+
+    /// Recordings that the first guess has settled over since the last cut; `None` for weights without one.
+    pub fn settled(&self) -> Option<u32> {
+        self.gather.as_ref().and_then(|gather| gather.settled())
     }
 
     /// Lets go of the remembered texture views, and so of the textures; call it when targets are rebuilt.
     pub fn forget(&mut self) {
         self.inputs.forget();
         self.reconstruct.forget();
-        if let Some(cache) = &mut self.cache {
-            cache.forget();
+        if let Some(gather) = &mut self.gather {
+            gather.forget();
         }
     }
 
@@ -254,8 +262,8 @@ impl NeuralGi {
 
     /// GPU memory of all buffers and weights, bytes.
     pub fn bytes(&self) -> u64 {
-        let cache = self.cache.as_ref().map_or(0, |cache| cache.bytes() + guess_bytes(self.rebuilt.size));
-        self.inputs.bytes() + self.exposure.bytes() + self.rebuilt.network.bytes() + cache
+        let gather = self.gather.as_ref().map_or(0, |gather| gather.bytes() + guess_bytes(self.rebuilt.size));
+        self.inputs.bytes() + self.exposure.bytes() + self.rebuilt.network.bytes() + gather
     }
 
     /// What each pass costs for a picture of the present size; for another one the network's layers are scaled by the
@@ -266,9 +274,9 @@ impl NeuralGi {
         let scale = cells / area(cells_of(self.rebuilt.size));
         let plan = self.rebuilt.network.plan();
         let features = f64::from(4 * self.features.padded());
-        let mut costs = self.cache.as_ref().map(|cache| cache.costs(size)).unwrap_or_default();
+        let mut costs = self.gather.as_ref().map(|gather| gather.costs(size)).unwrap_or_default();
         // With a first guess: 8 bytes more a pixel and a cell, and twice the numbers of a cell.
-        let guess = f64::from(8 * u8::from(self.cache.is_some()));
+        let guess = f64::from(8 * u8::from(self.gather.is_some()));
         costs.push(super::exposure::cost(size));
         costs.push(Cost::new("gi.pack", cells * 300.0, cells * (features + guess + 28.0 + 64.0)));
         costs.extend(plan.steps.iter().map(|step| {
@@ -281,8 +289,8 @@ impl NeuralGi {
 
     /// Bind groups and rebuilds since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
-        let cache = self.cache.as_ref().map_or(0, WorldGi::allocations);
-        self.inputs.made() + self.reconstruct.made() + self.rebuilds + cache
+        let gather = self.gather.as_ref().map_or(0, GatherGi::allocations);
+        self.inputs.made() + self.reconstruct.made() + self.rebuilds + gather
     }
 }
 
@@ -298,8 +306,16 @@ impl Rung for NeuralGi {
         self.record_stages(recorder, inputs, output)
     }
 
-    fn surroundings(&self) -> Option<&wgpu::TextureView> {
-        self.surroundings()
+    fn cut(&mut self) {
+        self.cut();
+    }
+
+    fn settled(&self) -> Option<u32> {
+        self.settled()
+    }
+
+    fn gloss(&self) -> Option<&wgpu::TextureView> {
+        self.gather.as_ref().and_then(|gather| gather.gloss())
     }
 
     fn neural(&self) -> Option<&NeuralGi> {

@@ -31,7 +31,7 @@ pub enum Answer {
     /// Three numbers y: E/π = s·exp(y), y clamped to [−10, 6].
     Light,
     /// Six numbers g, r: E/π = guess·exp(g) + s·r at the pixel, not below 0; g clamped to ±[`MOST_GAIN`], r to ±[`MOST_ADDED`].
-    /// The guess is what method `cache` answers at that pixel, so its detail stays.
+    /// The guess is what method `gather` answers at that pixel, so its detail stays.
     Gain,
 }
 
@@ -46,7 +46,7 @@ impl Answer {
     pub fn name(self) -> &'static str {
         match self {
             Answer::Light => "log_irradiance_over_exposure",
-            Answer::Gain => "gain_and_rest_on_cache",
+            Answer::Gain => "gain_and_rest_on_guess",
         }
     }
 

@@ -1,7 +1,6 @@
 //! What all methods share: the trait that a frame drives them by, and what a pass costs by count.
 
 use super::ambient::AmbientGi;
-use super::cache::{self, WorldGi};
 use super::gather::GatherGi;
 use super::pass::{NeuralGi, Options};
 use super::ssgi::{SsgiGi, SsgiOptions};
@@ -60,14 +59,6 @@ pub trait Rung: Send {
         None
     }
 
-    /// What the camera's surroundings send to it, if the method knows, for reflections of what is off the screen. The
-    /// same view for the method's whole life, `Rgba16Float`: faces +X, −X, +Y, −Y, +Z, −Z of a cube side by side; on the
-    /// face along ±axis k columns follow ±axis k + 2 and rows fall along axis k + 1. rgb is radiance, a the
-    /// distance from the camera in metres.
-    fn surroundings(&self) -> Option<&wgpu::TextureView> {
-        None
-    }
-
     /// The network, if the method is one.
     fn neural(&self) -> Option<&NeuralGi> {
         None
@@ -103,12 +94,7 @@ pub fn build(
         Method::Direct => None,
         Method::Ambient => Some(Box::new(AmbientGi::new(device))),
         Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
-        Method::Rsm => Some(Box::new(WorldGi::new(device, size, cache::Options::RSM))),
-        Method::Cache => Some(Box::new(WorldGi::new(device, size, cache::Options::CACHE))),
         Method::Gather(options) => Some(Box::new(GatherGi::new(device, size, *options))),
-        Method::World(options) => Some(Box::new(WorldGi::new(device, size, *options))),
-        #[cfg(feature = "reference")]
-        Method::Probes(bake) => Some(Box::new(super::probes::ProbesGi::new(device, queue, bake)?)),
         Method::Neural(neural) => Some(Box::new(NeuralGi::with(device, queue, neural, Options { size })?)),
     })
 }

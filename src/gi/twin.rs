@@ -24,7 +24,7 @@ pub struct GBuffer {
     pub emissive: Vec<[f32; 3]>,
     /// Direct diffuse light, E/π.
     pub direct: Vec<[f32; 3]>,
-    /// What method `cache` answers, E/π.
+    /// What method `gather` answers, E/π.
     pub guess: Vec<[f32; 3]>,
 }
 
@@ -216,7 +216,7 @@ impl<'a> Picture<'a> {
         put("depth", &[(z.ln() - exposure.ln_m).clamp(-4.0, 4.0)]);
         put("spread", &[self.spread_of(cell, z)]);
         put("hit", &[1.0]);
-        put("cache", &compress(self.guess_at(pixel)));
+        put("guess", &compress(self.guess_at(pixel)));
     }
 
     fn spread_of(&self, cell: IVec2, z: f32) -> f32 {

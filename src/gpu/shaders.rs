@@ -51,17 +51,6 @@ pub const RENDER: &[Shader] = &[
         name: "render.composite",
         files: wgsl!["lib/frame.wgsl", "lib/brdf.wgsl", "lib/environment.wgsl", "render/composite.wgsl"],
     },
-    Shader {
-        name: "render.atlas",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/hash.wgsl",
-            "lib/brdf.wgsl",
-            "lib/material.wgsl",
-            "render/mesh.wgsl",
-            "render/atlas.wgsl"
-        ],
-    },
     Shader { name: "render.taa", files: wgsl!["lib/frame.wgsl", "render/taa.wgsl"] },
     Shader { name: "render.tonemap", files: wgsl!["lib/screen.wgsl", "lib/tonemap.wgsl", "render/tonemap.wgsl"] },
     Shader {
@@ -115,67 +104,6 @@ pub const GI: &[Shader] = &[
     Shader {
         name: "gi.cells",
         files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/choose.wgsl"],
-    },
-    Shader {
-        name: "gi.contact",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/beside.wgsl", "gi/contact.wgsl"],
-    },
-    Shader {
-        name: "gi.upsample",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "gi/inputs.wgsl",
-            "gi/cells.wgsl",
-            "gi/beside.wgsl",
-            "gi/bring.wgsl",
-            "gi/upsample.wgsl"
-        ],
-    },
-    Shader {
-        name: "gi.emitters",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/brdf.wgsl",
-            "lib/lights.wgsl",
-            "lib/atlas.wgsl",
-            "lib/emitter.wgsl",
-            "gi/emitters.wgsl"
-        ],
-    },
-    Shader {
-        name: "gi.surfels",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/brdf.wgsl",
-            "lib/lights.wgsl",
-            "lib/environment.wgsl",
-            "lib/atlas.wgsl",
-            "lib/emitter.wgsl",
-            "gi/surfel.wgsl",
-            "gi/surfels.wgsl"
-        ],
-    },
-    Shader {
-        name: "gi.first",
-        files: wgsl!["lib/brdf.wgsl", "lib/emitter.wgsl", "gi/surfel.wgsl", "gi/tree.wgsl", "gi/first.wgsl"],
-    },
-    Shader { name: "gi.discs", files: wgsl!["lib/brdf.wgsl", "lib/emitter.wgsl", "gi/surfel.wgsl", "gi/discs.wgsl"] },
-    Shader {
-        name: "gi.exchange",
-        files: wgsl!["lib/brdf.wgsl", "lib/emitter.wgsl", "gi/surfel.wgsl", "gi/exchange.wgsl"],
-    },
-    Shader {
-        name: "gi.gather",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/brdf.wgsl",
-            "lib/emitter.wgsl",
-            "gi/inputs.wgsl",
-            "gi/cells.wgsl",
-            "gi/surfel.wgsl",
-            "gi/tree.wgsl",
-            "gi/gather.wgsl"
-        ],
     },
     Shader {
         name: "gi.rays",
@@ -252,39 +180,9 @@ pub const GI: &[Shader] = &[
     },
     Shader {
         name: "gi.bring",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "gi/inputs.wgsl",
-            "gi/cells.wgsl",
-            "gi/gather/bring.wgsl"
-        ],
+        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/gather/bring.wgsl"],
     },
     Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
-    Shader {
-        name: "gi.probes_light",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/brdf.wgsl",
-            "lib/lights.wgsl",
-            "accel/traverse.wgsl",
-            "gi/probes_types.wgsl",
-            "gi/probes_light.wgsl"
-        ],
-    },
-    Shader {
-        name: "gi.probes_bounce",
-        files: wgsl!["lib/octahedral.wgsl", "lib/brdf.wgsl", "gi/probes_types.wgsl", "gi/probes_bounce.wgsl"],
-    },
-    Shader {
-        name: "gi.probes_apply",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "gi/inputs.wgsl",
-            "gi/cells.wgsl",
-            "gi/probes_types.wgsl",
-            "gi/probes_apply.wgsl"
-        ],
-    },
     Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },
 ];
 

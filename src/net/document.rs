@@ -139,10 +139,15 @@ pub(super) fn parse<'a>(
     sized.then_some((document, graph))
 }
 
+/// What is said of networks that correct a method which is gone.
+const REPLACED: &str = "it builds on method `cache`, which `gather` has replaced; a network has to be trained anew";
+
 fn check_fields(document: &Document<'_>, problems: &mut Vec<Problem>) {
     let mut fault = |text: String| problems.push(Problem::Document(text));
     let meaning = &document.output.meaning;
-    if !MEANINGS.contains(&meaning.as_str()) {
+    if meaning == "gain_and_rest_on_cache" {
+        fault(format!("output meaning `{meaning}`: {REPLACED} with meaning `gain_and_rest_on_guess`"));
+    } else if !MEANINGS.contains(&meaning.as_str()) {
         fault(format!("output meaning `{meaning}` is unknown; known: {}", MEANINGS.join(", ")));
     }
     if !(1..=64).contains(&document.cell) {
@@ -189,7 +194,10 @@ fn check_inputs(document: &mut Document<'_>, problems: &mut Vec<Problem>) {
             continue;
         }
         let Some(at) = table.features.iter().position(|f| f.name == name.as_str()) else {
-            fault(format!("table `{}` version 1 has no such feature", table.name));
+            fault(match (table.name, name.as_str()) {
+                ("screen", "cache") => format!("{REPLACED} with feature `guess`"),
+                (table, _) => format!("table `{table}` version 1 has no such feature"),
+            });
             continue;
         };
         let row = &table.features[at];

@@ -25,7 +25,7 @@ pub const MAX_FILE: u64 = 1 << 30;
 /// Most operators of a graph.
 pub const MAX_OPS: usize = 1024;
 /// Meanings of the output that exist. `plain` is for tests: numbers without a unit.
-pub const MEANINGS: &[&str] = &["log_irradiance_over_exposure", "gain_and_rest_on_cache", "display_signed", "plain"];
+pub const MEANINGS: &[&str] = &["log_irradiance_over_exposure", "gain_and_rest_on_guess", "display_signed", "plain"];
 
 /// One row of a feature table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,7 +64,7 @@ pub const SCREEN_V1: &[FeatureRow] = &[
     row("spread", 1, &["log_ratio"]),
     row("hit", 1, &["flag"]),
     row("sky", 3, &["log1p_over_exposure"]),
-    row("cache", 3, &["log1p_over_exposure"]),
+    row("guess", 3, &["log1p_over_exposure"]),
 ];
 
 /// `v` = value of an 8-bit picture / 255. `signed`: 2v − 1. `signed_stretched`: 2(v − min)/(max − min) − 1 with the

@@ -2,42 +2,28 @@
 
 use super::format::{Weights, WeightsError};
 
-/// Name and file of each, smallest first.
-static FILES: [(&str, &[u8]); 3] = [
-    ("small", include_bytes!("../../assets/weights/small.safetensors")),
-    ("medium", include_bytes!("../../assets/weights/medium.safetensors")),
-    ("large", include_bytes!("../../assets/weights/large.safetensors")),
-];
+static FILE: &[u8] = include_bytes!("../../assets/weights/small.safetensors");
 
-/// The one that is taken where nobody chose.
-const DEFAULT: &str = "small";
+/// What `--weights` may call them.
+const NAME: &str = "small";
 
 impl Weights {
-    /// The shipped network that is used by default. It corrects what method `cache` answers.
+    /// The shipped network. It corrects what method `gather` answers.
     ///
     /// # Errors
     /// Never for an unmodified build; the file is checked as any other.
     pub fn shipped() -> Result<Self, WeightsError> {
-        Self::shipped_as(DEFAULT).expect("the default is one of the files")
+        Self::from_bytes(FILE)
     }
 
-    /// The shipped network of that name, see [`Weights::shipped_names`].
-    pub fn shipped_as(name: &str) -> Option<Result<Self, WeightsError>> {
-        FILES.iter().find(|(n, _)| *n == name).map(|(_, bytes)| Self::from_bytes(bytes))
-    }
-
-    /// The weights in `path`, or the shipped ones of that name where there is no such file; without a path the default.
+    /// The weights in `path`; the shipped ones without a path, and for `small` where there is no such file.
     ///
     /// # Errors
     /// As [`Weights::load`].
     pub fn find(path: Option<&std::path::Path>) -> Result<Self, WeightsError> {
-        let Some(path) = path else { return Self::shipped() };
-        let named = path.to_str().filter(|_| !path.exists()).and_then(Self::shipped_as);
-        named.unwrap_or_else(|| Self::load(path))
-    }
-
-    /// Names of the shipped networks, smallest first.
-    pub fn shipped_names() -> impl Iterator<Item = &'static str> {
-        FILES.iter().map(|(name, _)| *name)
+        match path.filter(|path| path.to_str() != Some(NAME) || path.exists()) {
+            Some(path) => Self::load(path),
+            None => Self::shipped(),
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The frame, told in order: shadow → (rsm → around) → gbuffer → direct → indirect → glossy → composite (→ taa). A display adds
+//! The frame, told in order: shadow → gbuffer → direct → indirect → glossy → composite (→ taa). A display adds
 //! `tonemap` after it.
 
 use super::RenderError;
@@ -10,7 +10,6 @@ use super::shadow::{ShadowMaps, ShadowOptions, ShadowPass};
 use super::taa::TaaPass;
 use super::targets::Targets;
 use super::view::{FrameUniform, View};
-use super::world::{World, WorldPass};
 use crate::gi::{
     self,
     features::FeatureSet,
@@ -45,8 +44,6 @@ struct Picture {
 struct Lighting {
     scene: u64,
     maps: ShadowMaps,
-    /// What lies beyond the screen, once a method needed it.
-    world: Option<World>,
     group: wgpu::BindGroup,
     sky: wgpu::BindGroup,
 }
@@ -62,9 +59,6 @@ pub struct Renderer {
     /// What fills `indirect`; nothing for direct light alone.
     indirect: Option<Box<dyn Rung>>,
     passes: Passes,
-    needs: gi::NeedsWorld,
-    /// The world's passes, once a method needed them.
-    world: Option<WorldPass>,
     taa: Option<TaaPass>,
     /// Where objects were in the frame before.
     moved: Moved,
@@ -131,24 +125,9 @@ impl Renderer {
         let picture = passes.bind(device, &frame, &targets, &mut taa);
         let indirect = rung::build(device, queue, size, &options.method)?;
         let method = options.method.name();
-        let needs = options.method.needs_world();
         let device = device.clone();
-        let (lighting, world, moved) = (None, None, Moved::default());
-        Ok(Self {
-            device,
-            frame,
-            targets,
-            picture,
-            lighting,
-            method,
-            indirect,
-            passes,
-            needs,
-            world,
-            taa,
-            moved,
-            last: None,
-        })
+        let (lighting, moved) = (None, Moved::default());
+        Ok(Self { device, frame, targets, picture, lighting, method, indirect, passes, taa, moved, last: None })
     }
 
     /// New targets of `size` pixels; the views of the old ones are of no use any more.
@@ -167,12 +146,7 @@ impl Renderer {
     pub fn set_method(&mut self, queue: &wgpu::Queue, method: &gi::Method) -> Result<(), RenderError> {
         self.indirect = rung::build(&self.device, queue, self.targets.size, method)?;
         self.method = method.name();
-        self.needs = method.needs_world();
         self.cut();
-        // Drawn anew in the next frame, whatever samples it is.
-        if let Some(lighting) = &mut self.lighting {
-            lighting.world = None;
-        }
         Ok(())
     }
 
@@ -216,11 +190,11 @@ impl Renderer {
 
     /// What a GI method reads of the frame that was drawn with `view` and `environment`.
     pub fn gi_inputs(&self, view: &View, environment: [f32; 3]) -> gi::Inputs<'_> {
-        gi_inputs(&self.targets, view, environment, None, None)
+        gi_inputs(&self.targets, view, environment, None)
     }
 
     /// All that a network can be given of the last frame, which `view` drew, read back: the G-buffer's features and, where the
-    /// method has computed it, what `cache` answers. Waits for the GPU.
+    /// method has computed it, what `gather` answers. Waits for the GPU.
     ///
     /// # Errors
     /// As [`pack::read_features`].
@@ -230,7 +204,7 @@ impl Renderer {
         view: &View,
         environment: [f32; 3],
     ) -> Result<pack::NetworkInputs, gi::GiError> {
-        let own = (self.method == "cache").then_some(&self.targets.indirect.view);
+        let own = (self.method == "gather").then_some(&self.targets.indirect.view);
         let guess = self.indirect.as_ref().and_then(|i| i.neural()?.guess()).or(own);
         let set = if guess.is_some() { FeatureSet::all() } else { FeatureSet::screen() };
         let inputs = self.gi_inputs(view, environment);
@@ -249,7 +223,7 @@ impl Renderer {
     /// As [`NeuralGi::read_layer`](gi::pass::NeuralGi::read_layer).
     pub fn read_layer(&mut self, view: &View, environment: [f32; 3], layer: usize) -> Result<Option<Tap>, gi::GiError> {
         let Some(neural) = self.indirect.as_mut().and_then(|i| i.neural_mut()) else { return Ok(None) };
-        neural.read_layer(&gi_inputs(&self.targets, view, environment, None, None), layer)
+        neural.read_layer(&gi_inputs(&self.targets, view, environment, None), layer)
     }
 
     /// The textures that [`Renderer::record`] fills.
@@ -266,7 +240,6 @@ impl Renderer {
     pub fn bytes(&self) -> Vec<(&'static str, u64)> {
         let mut rows = self.targets.bytes();
         rows.extend(self.lighting.iter().flat_map(|l| l.maps.bytes()));
-        rows.extend(self.lighting.iter().flat_map(|l| &l.world).flat_map(World::bytes));
         rows.push(("gi.lit", self.picture.glossy.bytes()));
         rows.push(("moved", self.moved.bytes()));
         rows.extend(self.taa.iter().flat_map(TaaPass::bytes));
@@ -316,7 +289,6 @@ impl Renderer {
         if shadows || fresh {
             self.passes.shadow.record(recorder, queue, scene, view, &mut lighting.maps);
         }
-        self.record_world(recorder, queue, scene, view, shadows, &mut lighting);
         if shadows || self.taa.is_some() || !self.moved.knows(scene) {
             self.moved.follow(&self.device, queue, scene);
         }
@@ -324,15 +296,18 @@ impl Renderer {
         self.passes.gbuffer.record(recorder, inputs, &self.targets);
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
         self.passes.direct.record(recorder, inputs);
-        let world = lighting.world.as_ref().map(|w| w.inputs(scene));
-        let inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene), world);
+        let inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene));
         if let (Some(indirect), Some(taa)) = (&mut self.indirect, &self.taa) {
             indirect.set_frame(queue, taa.frames());
         }
         match &mut self.indirect {
             Some(indirect) => {
                 indirect.record(recorder, queue, &inputs, &self.targets.indirect.view)?;
-                let lit = GlossyInputs { picture: &self.picture.glossy, sky: &scene.environment_view, found: indirect.gloss() };
+                let lit = GlossyInputs {
+                    picture: &self.picture.glossy,
+                    sky: &scene.environment_view,
+                    found: indirect.gloss(),
+                };
                 self.passes.glossy.record(recorder, lit, size);
             }
             None => clear(recorder, &self.targets),
@@ -349,25 +324,7 @@ impl Renderer {
         let maps = self.passes.shadow.maps(&self.device, queue, scene);
         let group = self.passes.direct.lights(&self.device, scene, &maps);
         let sky = self.passes.composite.sky(&self.device, &scene.environment_view);
-        Lighting { scene: scene.id, maps, world: None, group, sky }
-    }
-
-    /// Draws what lies beyond the screen, if the method reads it; without `again` only where it was not drawn yet.
-    fn record_world(
-        &mut self,
-        recorder: &mut Recorder<'_>,
-        queue: &wgpu::Queue,
-        scene: &SceneGpu,
-        view: &View,
-        again: bool,
-        lighting: &mut Lighting,
-    ) {
-        if self.needs == gi::NeedsWorld::Nothing || (lighting.world.is_some() && !again) {
-            return;
-        }
-        let pass = self.world.get_or_insert_with(|| WorldPass::new(&self.device));
-        let world = lighting.world.get_or_insert_with(|| pass.world(&self.device, queue, scene));
-        pass.record(recorder, queue, scene, view, world, self.needs == gi::NeedsWorld::Around);
+        Lighting { scene: scene.id, maps, group, sky }
     }
 }
 
@@ -376,7 +333,6 @@ fn gi_inputs<'a>(
     view: &View,
     environment: [f32; 3],
     scene: Option<&'a SceneGpu>,
-    world: Option<gi::World<'a>>,
 ) -> gi::Inputs<'a> {
     gi::Inputs {
         size: targets.size,
@@ -387,7 +343,6 @@ fn gi_inputs<'a>(
         direct: &targets.direct_diffuse.view,
         camera: view.matrices(),
         environment,
-        world,
         lights: scene.map(|s| gi::Lights {
             buffer: &s.light_buffer,
             count: s.lights.len() as u32,

@@ -1,14 +1,11 @@
 //! The rasteriser: one pass, one file; [`frame`] tells the order.
 
-pub mod around;
-pub mod atlas;
 pub mod capture;
 pub mod composite;
 pub mod direct;
 pub mod frame;
 pub mod gbuffer;
 pub mod moved;
-pub mod rsm;
 pub mod sampling;
 pub mod shadow;
 mod shadow_local;
@@ -19,7 +16,6 @@ pub mod tonemap;
 pub mod tonemap_curve;
 pub(crate) mod tool;
 pub mod view;
-pub mod world;
 
 pub use frame::{Renderer, RendererOptions};
 pub use targets::Targets;

@@ -4,19 +4,14 @@
 //! attribute stream (normal 4, tangent 8, two texture coordinate sets 16, colour 8). An instance takes 48 bytes (three
 //! rows of the world-from-object matrix), a light 64, a material 256.
 
-mod bodies;
 mod closed;
-mod clutter;
 mod environment;
 mod material;
 mod mesh;
-mod spheres;
 mod texture;
 
-pub use clutter::Clutter;
 pub use material::{MaterialGpu, TextureUse, material_layout};
 pub use mesh::{AttributeVertex, Draw, Rows, attribute_layouts, motion_layouts, position_layouts};
-pub use spheres::MOST_SPHERES;
 
 use super::{AlphaMode, Environment, Light, LightKind, Scene};
 use crate::accel::{AccelError, SceneRays};
@@ -169,11 +164,6 @@ pub struct SceneGpu {
     pub environment_view: wgpu::TextureView,
     /// World-space bounds of all instances; `None` for a scene without triangles.
     pub bounds: Option<([f32; 3], [f32; 3])>,
-    /// Its small objects in the mean.
-    pub clutter: Clutter,
-    /// Those that are like balls: world-space centre and radius (`vec4f`, metres) of spheres that stand in for them; the rest
-    /// of the buffer is 0.
-    pub spheres: wgpu::Buffer,
     /// The triangles as rays meet them, once [`SceneGpu::trace`] has made them.
     pub rays: Option<SceneRays>,
     /// What was mended on the way, one sentence each.
@@ -195,11 +185,7 @@ impl SceneGpu {
         let lights: Vec<LightGpu> = scene.lights.iter().map(LightGpu::new).collect();
         let light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &lights);
         let (environment_view, sky_bytes) = environment::upload(device, queue, &scene.environment, &mut warnings)?;
-        let small = bodies::small(scene);
-        let spheres = spheres::spheres(&small, scene.instances.len());
-        let spheres = filled(device, queue, "scene.spheres", wgpu::BufferUsages::STORAGE, &spheres);
-        let bytes =
-            sky_bytes + spheres.size() + geometry.bytes + textures.bytes + materials.bytes + light_buffer.size();
+        let bytes = sky_bytes + geometry.bytes + textures.bytes + materials.bytes + light_buffer.size();
         for warning in &warnings {
             tracing::warn!("{warning}");
         }
@@ -218,8 +204,6 @@ impl SceneGpu {
             environment: scene.environment.clone(),
             environment_view,
             bounds: geometry.bounds,
-            clutter: clutter::clutter(&small),
-            spheres,
             closed: geometry.closed,
             rays: None,
             placed: geometry.placed,
@@ -289,12 +273,6 @@ impl SceneGpu {
             rays.place(queue, scene);
         }
         self.bounds = self.draws.iter().map(|d| d.bounds).reduce(mesh::union);
-        let small = bodies::small(scene);
-        self.clutter = clutter::clutter(&small);
-        let spheres = spheres::spheres(&small, scene.instances.len());
-        if !spheres.is_empty() {
-            queue.write_buffer(&self.spheres, 0, bytemuck::cast_slice(&spheres));
-        }
     }
 
     /// Rows of the world-from-object matrices in the order of `instances`, each with its instance's index in the scene.

@@ -67,13 +67,33 @@ pub struct Next {
     pub flow: Vec<f32>,
 }
 
-/// Draws `camera`'s view once, unjittered, and reads what training needs of it. `renderer`'s method is `cache`, whose answer is
-/// one of the network's inputs. Blocks.
-pub fn sample(gpu: &Gpu, renderer: &mut Renderer, scene: &SceneGpu, camera: &Camera) -> Result<Sample, DatasetError> {
+/// Draws `camera`'s view for `frames` frames after a cut, unjittered, and reads what training needs of the last. `renderer`'s method is
+/// `gather`, whose answer is one of the network's inputs. Blocks.
+pub fn sample(
+    gpu: &Gpu,
+    renderer: &mut Renderer,
+    scene: &SceneGpu,
+    camera: &Camera,
+    frames: u32,
+) -> Result<Sample, DatasetError> {
+    renderer.cut();
+    frame(gpu, renderer, scene, camera, frames)
+}
+
+/// As [`sample`], going on from the frame drawn before.
+pub fn frame(
+    gpu: &Gpu,
+    renderer: &mut Renderer,
+    scene: &SceneGpu,
+    camera: &Camera,
+    frames: u32,
+) -> Result<Sample, DatasetError> {
     let view = View::new(camera, renderer.size(), [0.0; 2]);
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view)?;
-    gpu.queue.submit([encoder.finish()]);
+    for _ in 0..frames.max(1) {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view)?;
+        gpu.queue.submit([encoder.finish()]);
+    }
     let gi_inputs = renderer.gi_inputs(&view, scene.environment.radiance);
     let guess = &renderer.targets().indirect.view;
     let inputs = read_features(&gpu.device, &gpu.queue, &FeatureSet::all(), &gi_inputs, guess)?;

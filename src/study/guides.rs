@@ -24,7 +24,7 @@ pub struct Guides {
     pub albedo: Vec<u8>,
     /// Direct diffuse light, E/π, three planes.
     pub direct: Vec<f16>,
-    /// What method `cache` adds, E/π, three planes.
+    /// What method `gather` adds, E/π, three planes.
     pub guess: Vec<f16>,
     /// Specular light of all kinds and emission; on background the surroundings. Radiance, three planes.
     pub rest: Vec<f16>,

@@ -1,14 +1,10 @@
-//! Long work on threads of its own: loading, building, baking, capturing. Each job tells how far it is and can be cancelled;
+//! Long work on threads of its own: loading, building, capturing. Each job tells how far it is and can be cancelled;
 //! what it has made comes back to the window as an event.
 
 use super::choice::Source;
 use super::command;
 use super::state::State;
-use crate::gi::{
-    Method,
-    pass::Neural,
-    probes::{Bake, BakeOptions},
-};
+use crate::gi::{Method, pass::Neural};
 use crate::image_io;
 use crate::net::{format::Weights, gpu::Tuned, plan::Precision};
 use crate::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
@@ -167,20 +163,12 @@ pub struct Network {
     pub tuned: Arc<Tuned>,
 }
 
-/// The method behind a source; bakes and reads weights.
-fn method(
-    source: Source,
-    (weights, network): (Option<&Path>, &Network),
-    scene: &Scene,
-    eye: [f32; 3],
-    progress: &Progress,
-) -> Result<Method, String> {
+/// The method behind a source; reads weights.
+fn method(source: Source, weights: Option<&Path>, network: &Network) -> Result<Method, String> {
     Ok(match source {
         Source::Direct | Source::Reference => Method::Direct,
         Source::Ambient => Method::Ambient,
         Source::Ssgi => Method::Ssgi,
-        Source::Rsm => Method::Rsm,
-        Source::Cache => Method::Cache,
         Source::Gather => Method::Gather(Default::default()),
         Source::Neural => {
             let weights = Weights::find(weights).map_err(|e| e.to_string())?;
@@ -188,14 +176,6 @@ fn method(
             neural.network.precision = network.precision;
             neural.tuned = network.tuned.clone();
             Method::Neural(Box::new(neural))
-        }
-        Source::Probes => {
-            progress.stage("baking surfels");
-            // As the command line bakes.
-            let seen_from = scene.cameras.iter().map(Camera::eye).chain([eye]).collect();
-            let options = BakeOptions { seen_from, ..BakeOptions::default() };
-            let bake = Bake::new(scene, &options, &|share| progress.at(f64::from(share))).map_err(|e| e.to_string())?;
-            Method::Probes(Arc::new(bake))
         }
     })
 }
@@ -207,13 +187,11 @@ pub struct Plan {
     pub size: [u32; 2],
     pub weights: Option<PathBuf>,
     pub network: Network,
-    pub scene: Arc<Scene>,
-    pub eye: [f32; 3],
 }
 
 /// Builds a renderer. Shaders or weights that the driver refuses are an error, not the end.
 pub fn renderer(handles: &Handles, plan: Plan, progress: &Progress) -> Result<Product, String> {
-    let method = method(plan.key.0, (plan.weights.as_deref(), &plan.network), &plan.scene, plan.eye, progress)?;
+    let method = method(plan.key.0, plan.weights.as_deref(), &plan.network)?;
     progress.stage(&format!("building {}", plan.key.0.name()));
     let scope = handles.device.push_error_scope(wgpu::ErrorFilter::Validation);
     let options = RendererOptions { method, ..Default::default() };
@@ -276,18 +254,21 @@ pub fn capture(gpu: &crate::gpu::Gpu, shot: &Shot, progress: &Progress) -> Resul
         let Some(traced) = trace(gpu, shot, progress)? else { return cancelled() };
         traced
     } else {
-        let method =
-            method(shot.source, (shot.weights.as_deref(), &shot.network), &shot.scene, shot.camera.eye(), progress)?;
+        let method = method(shot.source, shot.weights.as_deref(), &shot.network)?;
         progress.stage("capturing");
-        let scene = SceneGpu::new(&gpu.device, &gpu.queue, &shot.scene).map_err(|e| e.to_string())?;
+        let mut scene = SceneGpu::new(&gpu.device, &gpu.queue, &shot.scene).map_err(|e| e.to_string())?;
+        if method.needs_rays() {
+            scene.trace(&gpu.device, &gpu.queue, &shot.scene).map_err(|e| e.to_string())?;
+        }
+        let warmup = if method.has_history() { Method::SETTLED - 1 } else { 0 };
         let options = RendererOptions { method, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, shot.size, options).map_err(|e| e.to_string())?;
         let layers: &[Layer] = if shot.is_exr() { &Layer::ALL } else { &[] };
-        let options = CaptureOptions { samples: shot.samples, layers, ..Default::default() };
+        let options = CaptureOptions { samples: shot.samples, layers, warmup, ..Default::default() };
         let mut done = 0;
         let frame = capture_with(gpu, &mut renderer, &scene, &shot.camera, options, &mut || {
             done += 1;
-            progress.at(f64::from(done) / f64::from(shot.samples))
+            progress.at(f64::from(done) / f64::from(shot.samples + warmup))
         });
         let Some(frame) = frame.map_err(|e| e.to_string())? else { return cancelled() };
         let layer = |(layer, picture): &(Layer, crate::render::capture::Picture)| {

@@ -149,7 +149,7 @@ mod tests {
         let row = |key| current(BINDINGS.iter().find(|b| b.key == key).unwrap(), &state);
         assert_eq!(
             (row(Key::Period).as_str(), row(Key::M).as_str(), row(Key::Num2).as_str()),
-            ("+0.50 EV", "rsm", "shown")
+            ("+0.50 EV", "ssgi", "shown")
         );
         assert_eq!(action(Key::W, Modifiers::NONE, &state), None);
         assert_eq!(action(Key::Q, Modifiers::NONE, &state), None);

@@ -46,7 +46,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             schema: 1,
-            left: Source::Cache,
+            left: Source::Gather,
             right: Source::Reference,
             split: false,
             line: 0.5,

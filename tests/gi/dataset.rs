@@ -25,11 +25,12 @@ fn linear(byte: u8) -> f32 {
 fn guides_put_the_picture_together() {
     let Some(gpu) = common::gpu() else { return };
     let room = scene::load("cornell").expect("bundled");
-    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &room).expect("uploads");
-    let options = RendererOptions { method: Method::Cache, ..Default::default() };
+    let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &room).expect("uploads");
+    uploaded.trace(&gpu.device, &gpu.queue, &room).expect("its rays fit");
+    let options = RendererOptions { method: Method::Gather(Default::default()), ..Default::default() };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, SIZE, options).expect("a renderer");
     let camera = &room.cameras[0];
-    sample(&gpu, &mut renderer, &uploaded, camera).expect("a sample");
+    sample(&gpu, &mut renderer, &uploaded, camera, 2).expect("a sample");
     let guides = Guides::read(&gpu, renderer.targets(), camera.near).expect("guides");
     let hdr = crate::read_light(&gpu, &renderer.targets().hdr.texture);
     let n = hdr.len();
@@ -81,13 +82,14 @@ fn change(first: &Sample, second: &Sample, plane: usize, flow: &[f32]) -> f32 {
 fn the_next_frame_shows_the_same_surfaces_where_flow_says() {
     let Some(gpu) = common::gpu() else { return };
     let room = scene::load("paper-room:3").expect("a room");
-    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &room).expect("uploads");
-    let options = RendererOptions { method: Method::Cache, ..Default::default() };
+    let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &room).expect("uploads");
+    uploaded.trace(&gpu.device, &gpu.queue, &room).expect("its rays fit");
+    let options = RendererOptions { method: Method::Gather(Default::default()), ..Default::default() };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, SIZE, options).expect("a renderer");
     let camera = &room.cameras[0];
-    let first = sample(&gpu, &mut renderer, &uploaded, camera).expect("a sample");
+    let first = sample(&gpu, &mut renderer, &uploaded, camera, 2).expect("a sample");
     let moved = stepped(camera, SIZE, median_distance(&first), 5);
-    let second = sample(&gpu, &mut renderer, &uploaded, &moved).expect("a sample");
+    let second = sample(&gpu, &mut renderer, &uploaded, &moved, 2).expect("a sample");
     let found = flow((&first, camera), (&second, &moved), SIZE);
     let cells = found.len() / 2;
     let seen = found[..cells].iter().filter(|x| **x != UNSEEN).count();

@@ -3,7 +3,8 @@
 use crate::build::{floor, look_at, material, quad, scene};
 use crate::shot::{Write, texture_with};
 use crate::{common, read_light};
-use bouncelight::gi::{Method, glossy::GlossyPass};
+use bouncelight::gi::Method;
+use bouncelight::gi::glossy::{GlossyInputs, GlossyPass};
 use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{Renderer, RendererOptions, View};
@@ -38,14 +39,14 @@ fn shine(
     let texels: Vec<f16> =
         (0..(size[0] * size[1]) as usize).flat_map(|i| light(i).into_iter().chain([1.0]).map(f16::from_f32)).collect();
     let given = texture_with(device, queue, size, wgpu::TextureFormat::Rgba16Float, bytemuck::cast_slice(&texels));
-    let pass = GlossyPass::new(device);
+    let mut pass = GlossyPass::new(device);
     let picture = pass.picture(device, renderer.frame(), renderer.targets());
-    let sky = pass.sky(device, &uploaded.environment_view, None);
     let mut encoder = device.create_command_encoder(&Default::default());
     let mut recorder = Recorder::new(&mut encoder);
     renderer.record(&mut recorder, queue, &uploaded, &View::new(camera, size, [0.0; 2])).expect("draws");
     give(gpu, &mut recorder, &given, &renderer.targets().indirect.view);
-    pass.record(&mut recorder, &picture, &sky, size);
+    let inputs = GlossyInputs { picture: &picture, sky: &uploaded.environment_view, found: None };
+    pass.record(&mut recorder, inputs, size);
     queue.submit([encoder.finish()]);
     (read_light(gpu, &renderer.targets().indirect_specular.texture), color)
 }

@@ -1,24 +1,21 @@
 //! `gi/` against its CPU twin, against arithmetic and against the laws it promises, on hand-made G-buffers.
 
+mod bring;
 #[path = "../common/build.rs"]
 mod build;
 #[path = "../common/mod.rs"]
 mod common;
-mod contact;
 mod corrected;
 #[cfg(feature = "io")]
 mod dataset;
 mod edges;
 mod gather;
 mod glossy;
-#[cfg(feature = "reference")]
-mod probes;
 mod screen;
 mod shot;
 mod stages;
 mod surroundings;
 mod taa;
-mod upsample;
 mod weights;
 mod whole;
 mod world;

@@ -187,7 +187,7 @@ pub struct Textures {
     albedo: wgpu::TextureView,
     emissive: wgpu::TextureView,
     direct: wgpu::TextureView,
-    /// What method `cache` would answer.
+    /// What method `gather` would answer.
     pub guess: wgpu::TextureView,
 }
 
@@ -202,7 +202,6 @@ impl Textures {
             direct: &self.direct,
             camera: shot.camera,
             environment: shot.environment,
-            world: None,
             lights: None,
             rays: None,
             motion: None,

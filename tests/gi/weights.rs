@@ -47,7 +47,7 @@ pub fn weights() -> bouncelight::net::format::Weights {
     bouncelight::net::format::Weights::from_bytes(&bytes(None)).expect("a sound file")
 }
 
-/// Weights that answer the same six numbers everywhere: a gain and a rest on what method `cache` says.
+/// Weights that answer the same six numbers everywhere: a gain and a rest on what method `gather` says.
 pub fn constant_gain(answer: [f32; 6]) -> bouncelight::net::format::Weights {
     let inputs: Vec<String> = FEATURES
         .iter()
@@ -58,7 +58,7 @@ pub fn constant_gain(answer: [f32; 6]) -> bouncelight::net::format::Weights {
         .collect();
     let document = format!(
         r#"{{"version": 2, "licence": "CC0-1.0", "table": {{"name": "screen", "version": 1}}, "inputs": [{}],
-            "cell": 4, "output": {{"tensor": "y", "meaning": "gain_and_rest_on_cache", "channels": 6}},
+            "cell": 4, "output": {{"tensor": "y", "meaning": "gain_and_rest_on_guess", "channels": 6}},
             "graph": [{{"op": "conv2d", "name": "a", "input": "input", "output": "y", "in_channels": 24,
                 "out_channels": 6, "kernel": [1, 1]}}]}}"#,
         inputs.join(", ")

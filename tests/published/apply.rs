@@ -167,8 +167,8 @@ fn what_cannot_be_applied() {
     encoder.write_header().unwrap().write_image_data(&[100; 1200]).unwrap();
     check("--depth", &path("deep.png"), 2, &["deep.png", "16 bits"]);
     check("-o", &path("out.exr"), 2, &["out.exr", ".png"]);
-    let compact = root("assets/weights/compact.safetensors");
-    check("--weights", compact.to_str().unwrap(), 4, &["albedo", "screen", "four pictures", "exposure"]);
+    let screen = root("weights-format/fixtures/unet.safetensors");
+    check("--weights", screen.to_str().unwrap(), 4, &["albedo", "screen", "four pictures", "exposure"]);
     let free = root("weights-format/fixtures/add.safetensors");
     check("--weights", free.to_str().unwrap(), 4, &["free", "nothing says what they are"]);
     if common::gpu().is_some() {

@@ -5,8 +5,13 @@ use super::session::{mean, printed, session, session_with, succeeds};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/weights").join(format!("{name}.safetensors"))
+fn shipped() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/weights/small.safetensors")
+}
+
+/// A network that answers light itself, from the G-buffer alone.
+fn other() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("weights-format/fixtures/unet.safetensors")
 }
 
 /// A sky of one colour as Radiance .hdr without run lengths: 8×4 pixels of (mantissa, exponent).
@@ -16,14 +21,13 @@ fn sky(rgbe: [u8; 4]) -> Vec<u8> {
     file
 }
 
-/// Weights by file, by name and broken; the network's layers and inputs as pictures; a split between two raster methods; the
+/// Weights by file and broken; the network's layers and inputs as pictures; a split between two raster methods; the
 /// frontier's dots; the flicker meter; light theme.
 #[test]
 fn methods_weights_and_views_switch_at_run_time() {
     let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("bad.safetensors"), b"not at all").unwrap();
-    let medium = shipped("medium");
     let script = json!([
         { "wait": "loaded" }, { "wait": "idle" },
         // The frontier: a dot for each method that was drawn, and a click on it chooses the method.
@@ -44,15 +48,15 @@ fn methods_weights_and_views_switch_at_run_time() {
         { "drop": "bad.safetensors" }, { "wait": "idle" },
         { "expect": { "/left": "ambient", "/weights": null, "/errors": 1, "/messages": { "contains": "bad.safetensors" } } },
         { "key": "Escape" }, { "wait": 2 },
-        { "drop": medium }, { "wait": "idle" },
-        { "expect": { "/left": "neural", "/drawn/left": "neural", "/weights": { "contains": "medium" }, "/errors": 0 } },
+        { "drop": shipped() }, { "wait": "idle" },
+        { "expect": { "/left": "neural", "/drawn/left": "neural", "/weights": { "contains": "small" }, "/errors": 0 } },
         { "save": { "passes": "/passes" } },
-        // What goes in, what `cache` makes of it, and what layers make of that.
+        // What goes in, what `gather` makes of it, and what layers make of that.
         { "key": "0" }, { "wait": "idle" }, { "expect": { "/feature": { "contains": "of 24" } } },
         { "key": "L" }, { "wait": "idle" }, { "expect": { "/view": "layer", "/feature": { "contains": "layer 1 of" } } },
         { "key": "L" }, { "wait": "idle" }, { "expect": { "/feature": { "contains": "layer 2 of" } } },
         { "screenshot": "layer.png" }, { "key": "1" },
-        { "drop": shipped("small") }, { "wait": "idle" }, { "expect": { "/weights": { "contains": "small" } } },
+        { "drop": other() }, { "wait": "idle" }, { "expect": { "/weights": { "contains": "unet" } } },
         { "expect_not_saved": { "passes": "/passes" } }
     ]);
     let out = session(&display, dir.path(), script, &["cornell", "--method", "ambient", "--size", "640x560"]);
@@ -112,8 +116,8 @@ fn watched_files_are_loaded_again_and_broken_ones_told() {
     std::fs::write(at("scene.obj"), quad(0.0)).unwrap();
     std::fs::write(at("two.obj"), quad(0.0) + "o more\n" + &quad(-1.0).replace("1 2 3", "4 5 6")).unwrap();
     std::fs::write(at("bad.obj"), "v 0 0 0\nf 1 2 99\n").unwrap();
-    std::fs::copy(shipped("small"), at("net.safetensors")).unwrap();
-    std::fs::copy(shipped("medium"), at("medium.safetensors")).unwrap();
+    std::fs::copy(shipped(), at("net.safetensors")).unwrap();
+    std::fs::copy(other(), at("other.safetensors")).unwrap();
     std::fs::write(at("junk"), "junk").unwrap();
     let gi = at("shaders").join("gi");
     std::fs::create_dir_all(&gi).unwrap();
@@ -136,7 +140,7 @@ fn watched_files_are_loaded_again_and_broken_ones_told() {
         { "save": { "passes": "/passes", "built": "/built" } }, { "copy": ["junk", "net.safetensors"] }, { "until": { "/errors": 1 } },
         { "wait": "idle" }, { "expect": { "/drawn/left": "neural", "/messages": { "contains": "net.safetensors" } } },
         { "expect_saved": { "built": "/built" } }, { "key": "Escape" },
-        { "copy": ["medium.safetensors", "net.safetensors"] }, { "wait": 80 }, { "wait": "idle" }, { "expect": { "/errors": 0 } },
+        { "copy": ["other.safetensors", "net.safetensors"] }, { "wait": 80 }, { "wait": "idle" }, { "expect": { "/errors": 0 } },
         { "expect_not_saved": { "built": "/built", "passes": "/passes" } }
     ]);
     let args = ["scene.obj", "--watch", "--method", "ambient", "--size", "220x160"];

@@ -6,8 +6,8 @@ import numpy as np
 
 from .features import LUMINANCE, SLICES, channel_means
 
-COLOURED = ["direct", "outgoing", "albedo", "sky", "cache"]
-LIGHTS = ["direct", "outgoing", "sky", "cache"]
+COLOURED = ["direct", "outgoing", "albedo", "sky", "guess"]
+LIGHTS = ["direct", "outgoing", "sky", "guess"]
 
 
 def permute_colours(features, target, order, means=None):

@@ -5,7 +5,7 @@ the network's input nor its output: what it makes of s and of the first guess is
 """
 import numpy as np
 
-TABLE = [("direct", 3), ("outgoing", 3), ("albedo", 3), ("normal", 3), ("position", 3), ("depth", 1), ("spread", 1), ("hit", 1), ("sky", 3), ("cache", 3)]
+TABLE = [("direct", 3), ("outgoing", 3), ("albedo", 3), ("normal", 3), ("position", 3), ("depth", 1), ("spread", 1), ("hit", 1), ("sky", 3), ("guess", 3)]
 NAMES = tuple(n for n, _ in TABLE)
 CHANNELS = sum(n for _, n in TABLE)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -27,7 +27,7 @@ def channels_of(names):
 
 
 def light_of(features, name):
-    """A light feature ("direct", "outgoing", "sky" or "cache") in units of s: float32 [3,h,w]."""
+    """A light feature ("direct", "outgoing", "sky" or "guess") in units of s: float32 [3,h,w]."""
     return np.expm1(features[SLICES[name]].astype(np.float32))
 
 

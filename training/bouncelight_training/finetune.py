@@ -67,7 +67,7 @@ def applied_error(model, split, channels):
     with torch.no_grad():
         for i in range(len(split)):
             features = torch.from_numpy(split.features[i:i + 1].astype(np.float32))
-            light = torch.expm1(features[:, SLICES["cache"]])
+            light = torch.expm1(features[:, SLICES["guess"]])
             if model is not None:
                 answer = model(features[:, channels])
                 light = light * torch.exp(answer[:, :3].clamp(-APPLIED_GAIN, APPLIED_GAIN)) + answer[:, 3:].clamp(-APPLIED_ADDED, APPLIED_ADDED)

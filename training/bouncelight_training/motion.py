@@ -3,7 +3,7 @@
     bouncelight dataset --recipe paper-room --rooms 6-9,13,15-26 --views 1 --motion --out data/motion
     python -m bouncelight_training.motion --features data/motion --out data/motion.npz
     python -m bouncelight_training.train … --motion data/motion.npz --temporal 0.5
-    python -m bouncelight_training.motion --pairs data/motion-2-5.npz --weights small.safetensors,medium.safetensors
+    python -m bouncelight_training.motion --pairs data/motion-2-5.npz --weights small.safetensors,other.safetensors
 
 Each sample holds two frames of a camera that takes a small step, and for each cell of the first the place where the second shows the
 same surface. Diffuse light does not depend on where it is looked at from, so the reference's own change along these motion vectors is
@@ -141,7 +141,7 @@ def flicker(pairs, answer=None):
     with torch.no_grad():
         for i in range(len(pairs)):
             pair = pairs.pair(i)
-            lit = light(answer(pair.frames), pair.frames) if answer else torch.expm1(pair.frames[:, SLICES["cache"]])
+            lit = light(answer(pair.frames), pair.frames) if answer else torch.expm1(pair.frames[:, SLICES["guess"]])
             lit = lit.clamp(min=0)
             first, there, inside = change(lit[:1], lit[1:], pair)
             weight = inside[:, None] * float(pairs.scale[i])
@@ -180,7 +180,7 @@ def main(arguments=None):
         return
     pairs = Pairs(a.pairs)
     print(f"{len(pairs)} pairs; mean |change of E| along motion vectors over mean E")
-    print(f"{flicker(pairs):8.3%}  cache")
+    print(f"{flicker(pairs):8.3%}  gather")
     for path in a.weights:
         print(f"{flicker(pairs, network_of(path)):8.3%}  {path}")
 

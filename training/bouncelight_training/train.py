@@ -207,7 +207,7 @@ class Run:
         loss = losses.relative_square(prediction, target, mask, self.config.epsilon)
         if self.config.outside:
             # Nothing else says what the network answers there, and the way back to full resolution reads those cells, too.
-            guess, hit = torch.expm1(features[:, SLICES["cache"]]), features[:, SLICES["hit"]][:, 0] > 0.5
+            guess, hit = torch.expm1(features[:, SLICES["guess"]]), features[:, SLICES["hit"]][:, 0] > 0.5
             loss = loss + self.config.outside * losses.relative_square(prediction, guess, hit & ~mask, self.config.epsilon)
         if self.config.picture_l1 and self.progress() > 2 / 3:
             direct = torch.expm1(features[:, SLICES["direct"]])

@@ -33,7 +33,7 @@ def guess_error(split):
     """The pooled error of the first guess, which an untrained network has too."""
     above = below = 0.0
     for i in range(len(split)):
-        guess = torch.from_numpy(light_of(split.features[i], "cache"))[None]
+        guess = torch.from_numpy(light_of(split.features[i], "guess"))[None]
         difference, light_sum = losses.pooled_error(guess * float(split.scale[i]), torch.from_numpy(split.target[i:i + 1]).float() * float(split.scale[i]),
                                                     torch.from_numpy(split.mask[i:i + 1]))
         above, below = above + difference, below + light_sum

@@ -58,7 +58,7 @@ class Judge(unittest.TestCase):
         """The command's output, and what the program was asked for by it."""
         if os.path.exists(self.log):
             os.remove(self.log)
-        done = subprocess.run([sys.executable, JUDGE, self.out, self.references, "--methods", "direct,cache", "--bouncelight", self.program, *words], capture_output=True, text=True)
+        done = subprocess.run([sys.executable, JUDGE, self.out, self.references, "--methods", "direct,gather", "--bouncelight", self.program, *words], capture_output=True, text=True)
         self.assertEqual(done.returncode, code, done.stderr)
         if not os.path.exists(self.log):
             return done.stdout + done.stderr, []
@@ -71,13 +71,13 @@ class Judge(unittest.TestCase):
         self.assertEqual(asked, [])
         text, asked = self.judge("--rooms", "2200,2239")
         self.assertIn("| paper rooms (2) |", text)
-        # Half of the light that direct lighting misses: cache has an error of a half.
-        self.assertRegex(text, r"\| cache \| .*\| 50.0 % \|")
+        # Half of the light that direct lighting misses: gather has an error of a half.
+        self.assertRegex(text, r"\| gather \| .*\| 50.0 % \|")
         self.assertEqual(sorted(a for a in asked if a.startswith("render")), [f"render paper-room:{room} {W}x{H}" for room in (2200, 2239) for _ in range(2)])
         # Everything is kept; what a kill left out or cut off is made.
         self.assertEqual(self.judge("--rooms", "2200,2239")[1], [])
-        os.remove(os.path.join(self.out, "room2239_view0_cache.exr"))
-        with open(os.path.join(self.out, "room2200_view0_cache.exr.json"), "w") as file:
+        os.remove(os.path.join(self.out, "room2239_view0_gather.exr"))
+        with open(os.path.join(self.out, "room2200_view0_gather.exr.json"), "w") as file:
             file.write('{"paper": ')
         asked = self.judge("--rooms", "2200,2239")[1]
         self.assertEqual(len([a for a in asked if a.startswith("render")]), 1)
@@ -97,14 +97,14 @@ class Table(unittest.TestCase):
             place = lambda name: os.path.join(folder, name)
             metrics = "l1,l2,paper-ssim,fid,psnr,ssim,flip,relmse,light"
             with open(place("a.csv"), "w") as f:
-                f.write(f"scene,row,{metrics}\n" + "".join(f"room{i},cache,{1000 * i},1,.9,.1,40,.9,.1,.01,.05\n" for i in (1, 3)) + "metal,cache,9,9,9,9,9,9,9,9,9\n")
-            record = {"software": True, "methods": [{"method": "cache", "gpu_ms": {"median": 5.0}, "costs": [{"flops": 1.86e9, "bytes": 1.0}, {"flops": 1.0, "bytes": 112e6}]}]}
+                f.write(f"scene,row,{metrics}\n" + "".join(f"room{i},gather,{1000 * i},1,.9,.1,40,.9,.1,.01,.05\n" for i in (1, 3)) + "metal,gather,9,9,9,9,9,9,9,9,9\n")
+            record = {"software": True, "methods": [{"method": "gather", "gpu_ms": {"median": 5.0}, "costs": [{"flops": 1.86e9, "bytes": 1.0}, {"flops": 1.0, "bytes": 112e6}]}]}
             with open(place("b.json"), "w") as f:
                 json.dump(record, f)
             run = lambda *more: subprocess.run([sys.executable, TABLE, place("a.csv"), "--bench", place("b.json"), *more], capture_output=True, text=True)
             done = run()
             self.assertEqual(done.returncode, 0, done.stderr)
-            row = next(line for line in done.stdout.splitlines() if line.startswith("| cache"))
+            row = next(line for line in done.stdout.splitlines() if line.startswith("| gather"))
             # Mean of both rooms and not of the metal; a millisecond of arithmetic and one of traffic at full efficiency; no time of a software adapter.
             self.assertIn("| 2,000 |", row)
             self.assertIn(f"| {2 / 0.35:.2f} |", row)

@@ -21,7 +21,7 @@ def frames(room, brighter=2.0):
     """A sample whose second frame is the first moved one cell to the left, under an exposure `brighter` times as large."""
     raster, _ = test_toy.view(np.random.default_rng((3, room)))
     following = np.roll(raster["features"], -1, 2)
-    for name in ("direct", "outgoing", "sky", "cache"):
+    for name in ("direct", "outgoing", "sky", "guess"):
         following[SLICES[name]] = np.log1p(np.expm1(following[SLICES[name]]) / brighter)
     x, y = np.meshgrid(np.arange(W, dtype=np.float32), np.arange(H, dtype=np.float32))
     flow = np.stack([np.where(x > 0, x - 1, motion.UNSEEN), np.where(x > 0, y, motion.UNSEEN)])
@@ -64,7 +64,7 @@ class Motion(unittest.TestCase):
 
         def stay(sample):
             sample["flow"][0] = np.where(sample["flow"][0] >= 0, sample["flow"][0] + 1, motion.UNSEEN)
-            sample["next_features"][SLICES["cache"]] *= 1.1
+            sample["next_features"][SLICES["guess"]] *= 1.1
             return sample
 
         # Light that is another in the second frame, and an exposure that is not brought to the first's.
@@ -75,7 +75,7 @@ class Motion(unittest.TestCase):
     def test_a_window_shows_what_the_whole_shows(self):
         pairs = motion.Pairs(write(self.place("window"), [6]))
         cut = pairs.pair(0, 4, 8)
-        light = torch.expm1(cut.frames[:, SLICES["cache"]])
+        light = torch.expm1(cut.frames[:, SLICES["guess"]])
         first, there, inside = motion.change(light[:1], light[1:], cut)
         self.assertEqual(inside[0].sum().item(), 7 * H, "all but its left column")
         self.assertLess(((first - there).abs() * inside[:, None]).max().item(), 2e-3)

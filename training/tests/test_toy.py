@@ -309,7 +309,7 @@ class Toy(unittest.TestCase):
             self.assertEqual(y.abs().max().item(), 0)
             # Untrained, the light is the first guess.
             features = torch.rand(2, CHANNELS, h, w)
-            guess = torch.expm1(features[:, SLICES["cache"]])
+            guess = torch.expm1(features[:, SLICES["guess"]])
             torch.testing.assert_close(model.light(y, features), guess, rtol=0, atol=0)
             self.assertFalse(torch.equal(model.light(y + 0.01, features), guess))
 

@@ -37,22 +37,25 @@ pub fn prelude() -> String {
 }
 
 /// The pass.
-pub(super) struct BringPass {
+pub struct BringPass {
     pipeline: wgpu::ComputePipeline,
     binder: Binder,
 }
 
 /// What the pass reads and writes.
-pub(super) struct Brought<'a> {
-    /// Of cells: directional light, as [`cells`](crate::gi::cells) says, and what lobes show.
+pub struct Brought<'a> {
+    /// Of cells: directional light, as [`cells`](crate::gi::cells) says.
     pub light: &'a wgpu::Buffer,
+    /// Of cells: what lobes show over their directional albedo (rgb); a: 1, or 0 without a lobe.
     pub glosses: &'a wgpu::Buffer,
-    /// `Rgba16Float`, storage, full size: E/π, and what lobes show over their directional albedo.
+    /// `Rgba16Float`, storage, full size: E/π.
     pub output: &'a wgpu::TextureView,
+    /// The same: what lobes show over their directional albedo.
     pub gloss: &'a wgpu::TextureView,
 }
 
 impl BringPass {
+    /// Compiles the shader.
     pub fn new(device: &wgpu::Device, inputs: &InputGroup) -> Self {
         let binder = Binder::new(device, "gi.bring", &[READ, READ, READ, STORE_HALF, STORE_HALF]);
         let module = shaders::module_with(device, "gi.bring", &prelude());
@@ -61,7 +64,13 @@ impl BringPass {
     }
 
     /// Records pass `gi.bring`.
-    pub fn record(&mut self, recorder: &mut Recorder<'_>, inputs: &BoundInputs, cells: &CellsPass, brought: Brought<'_>) {
+    pub fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        inputs: &BoundInputs,
+        cells: &CellsPass,
+        brought: Brought<'_>,
+    ) {
         let Brought { light, glosses, output, gloss } = brought;
         let group =
             self.binder.group([cells.pixels().into(), light.into(), glosses.into(), output.into(), gloss.into()]);

@@ -15,12 +15,11 @@
 //! triangle; how finely it knows the light between surfaces is the size of an entry's cell; the rest is noise, which frames and
 //! neighbours average away. `docs/gi.md` says what it cannot do.
 
-mod bring;
+pub mod bring;
 mod options;
 mod params;
 mod store;
 
-pub use bring::prelude as bring_prelude;
 pub use options::{Options, OptionsError};
 pub use params::Params;
 
@@ -329,8 +328,7 @@ impl Rung for GatherGi {
         self.round = params.round + 1;
         self.frame += 1;
         self.hurry = self.hurry.saturating_sub(1);
-        let brought =
-            Brought { light: &store.cell_light, glosses: &store.glosses, output, gloss: &store.gloss };
+        let brought = Brought { light: &store.cell_light, glosses: &store.glosses, output, gloss: &store.gloss };
         self.bring.record(recorder, &bound, &self.cells, brought);
         Ok(())
     }

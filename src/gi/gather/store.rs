@@ -68,7 +68,8 @@ impl Store {
     }
 
     pub fn bytes(&self) -> u64 {
-        let Self { keys, lots, queries, asked, light, records, pasts: [a, b], cell_light, changes, glosses, gloss } = self;
+        let Self { keys, lots, queries, asked, light, records, pasts: [a, b], cell_light, changes, glosses, gloss } =
+            self;
         let texels = u64::from(gloss.texture().width()) * u64::from(gloss.texture().height());
         let buffers = [keys, lots, queries, asked, light, records, a, b, cell_light, changes, glosses];
         8 * texels + buffers.iter().map(|b| b.size()).sum::<u64>()

@@ -58,8 +58,8 @@ pub struct App {
     building: [Option<Key>; 2],
     /// What could not be built; it is not tried again until something changes.
     failed: HashSet<Key>,
-    /// How often weights, scene and shaders were replaced.
-    stamps: [u64; 3],
+    /// How often weights and shaders were replaced.
+    stamps: [u64; 2],
     network: jobs::Network,
     pub tracing: Tracing,
     pub meter: Meter,
@@ -132,7 +132,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         jobs: Vec::new(),
         building: [None; 2],
         failed: HashSet::new(),
-        stamps: [0; 3],
+        stamps: [0; 2],
         network: jobs::Network::default(),
         tracing: Tracing::default(),
         meter: Meter::default(),

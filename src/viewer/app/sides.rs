@@ -8,12 +8,8 @@ use std::time::Instant;
 impl App {
     /// What decides how a source is built.
     pub(super) fn key(&self, source: Source) -> Key {
-        let [weights, scene, shaders] = self.stamps;
-        let own = match source {
-            Source::Neural => weights,
-            Source::Probes => scene,
-            _ => 0,
-        };
+        let [weights, shaders] = self.stamps;
+        let own = if source == Source::Neural { weights } else { 0 };
         (source, shaders << 32 | own)
     }
 
@@ -28,7 +24,7 @@ impl App {
     }
 
     pub(super) fn reconcile_renderers(&mut self) {
-        let (Some(stage), Some(shown)) = (&mut self.stage, &self.state.shown) else { return };
+        let (Some(stage), Some(_)) = (&mut self.stage, &self.state.shown) else { return };
         let s = &self.state.settings;
         let left = match s.left {
             // Somebody has to draw the G-buffer.
@@ -40,7 +36,6 @@ impl App {
             stage.drop_right();
             self.building[1] = None;
         }
-        let scene = shown.scene.clone();
         let wanted = [Some(left), two.then_some(s.right)];
         for (side, source) in wanted.into_iter().enumerate() {
             let Some(key) = source.map(|s| self.key(s)) else { continue };
@@ -59,8 +54,6 @@ impl App {
                 size: self.state.size,
                 weights: self.state.settings.weights.clone(),
                 network: self.network.clone(),
-                scene: scene.clone(),
-                eye: self.state.navigator.camera(&scene).eye(),
             };
             let handles = stage.handles();
             let name = format!("build {}", key.0.name());

@@ -124,7 +124,6 @@ impl App {
         match done.product {
             Ok(Product::Scene { spec, scene, gpu }) => {
                 stage.set_scene(*gpu);
-                self.stamps[1] += 1;
                 self.tracing.forget();
                 if let Some(screen) = &self.screen {
                     screen.window.set_title(&format!("{spec} – bouncelight"));
@@ -133,8 +132,7 @@ impl App {
             }
             Ok(Product::Uploaded(gpu)) => {
                 stage.set_scene(*gpu);
-                // A bake has the materials it was made with; and hands may have changed something meanwhile.
-                self.stamps[1] += 1;
+                // Hands may have changed something meanwhile.
                 self.state.stale = Stale { lights: true, placements: true, environment: true };
             }
             Ok(Product::Surroundings { path, environment }) => self.state.surround(&path, environment),
@@ -181,7 +179,7 @@ impl App {
                 Changed::Scene => self.start(Request::Load(spec.clone().unwrap_or_default())),
                 Changed::Weights => self.start(Request::Weights(weights.clone())),
                 Changed::Shaders => {
-                    self.stamps[2] += 1;
+                    self.stamps[1] += 1;
                     self.redraw = true;
                 }
             }

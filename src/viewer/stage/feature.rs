@@ -148,7 +148,7 @@ mod tests {
     fn channels_have_the_names_of_the_table() {
         let names: Vec<_> = (0..24).map(channel_name).collect();
         let some = [0, 5, 15, 20, 23].map(|i: usize| names[i].as_str());
-        assert_eq!(some, ["direct.0", "outgoing.2", "depth", "sky.2", "cache.2"]);
+        assert_eq!(some, ["direct.0", "outgoing.2", "depth", "sky.2", "guess.2"]);
     }
 
     #[test]

@@ -334,11 +334,11 @@ mod tests {
     #[test]
     fn the_error_view_finds_itself_a_truth() {
         let mut state = state();
-        assert_eq!(state.sources(), [Source::Cache]);
+        assert_eq!(state.sources(), [Source::Gather]);
         assert!(!state.wants_reference());
-        state.settings.right = Source::Cache;
+        state.settings.right = Source::Gather;
         state.apply(Action::View(View::Error));
-        assert_eq!(state.sources(), [Source::Cache, Source::Reference]);
+        assert_eq!(state.sources(), [Source::Gather, Source::Reference]);
         assert!(state.wants_reference());
         state.apply(Action::Escape);
         assert_eq!(state.requests, [Request::Cancel]);

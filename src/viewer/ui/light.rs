@@ -161,9 +161,6 @@ pub fn objects(ui: &mut Ui, state: &mut State) {
                 state.apply(Action::Move(Vec3::from(moved) - by));
             }
         });
-        if state.sources().contains(&crate::viewer::choice::Source::Probes) && by != Vec3::ZERO {
-            ui.label(RichText::new("`probes` were baked with the object in its old place").color(ORANGE));
-        }
     } else {
         ui.label(RichText::new("click an object in the picture, or here").weak());
     }

@@ -1,14 +1,12 @@
 //! The panel's controls.
 
 use super::{Facts, Memory, frontier, light, source_box, times};
-use crate::net::format::Weights;
 use crate::render::tonemap_curve::Tonemap;
 use crate::viewer::choice::{Side, Source, View};
 use crate::viewer::film::Film;
 use crate::viewer::navigate::Preset;
 use crate::viewer::state::{Action, State};
 use egui::{RichText, Ui};
-use std::path::PathBuf;
 
 /// All of it, from top to bottom.
 pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
@@ -179,20 +177,14 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
     }
 }
 
-/// Which network: one of those that come with the program, or a file.
+/// Which network: the one that comes with the program, or a file.
 fn weights(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
     let now = state.settings.weights.clone();
     let text = now.as_ref().map_or("weights: default".into(), |p| format!("weights: {}", p.display()));
-    let list = egui::ComboBox::from_id_salt("weights").selected_text(text).width(240.0).truncate();
-    list.show_ui(ui, |ui| {
-        if ui.selectable_label(now.is_none(), "default").clicked() {
+    ui.horizontal(|ui| {
+        ui.add(egui::Label::new(text).truncate());
+        if now.is_some() && ui.button("Default").clicked() {
             state.apply(Action::Weights(None));
-        }
-        for name in Weights::shipped_names() {
-            let path = PathBuf::from(name);
-            if ui.selectable_label(now.as_ref() == Some(&path), name).clicked() {
-                state.apply(Action::Weights(Some(path)));
-            }
         }
     });
     ui.horizontal(|ui| {

@@ -10,14 +10,16 @@ VERSION = 2
 KNOWN_VERSIONS = (1, 2)
 KEY = "bouncelight"
 MAX_OPS = 1024
-MEANINGS = ("log_irradiance_over_exposure", "gain_and_rest_on_cache", "display_signed", "plain")
+MEANINGS = ("log_irradiance_over_exposure", "gain_and_rest_on_guess", "display_signed", "plain")
+# What is said of networks that correct a method which is gone.
+REPLACED = "it builds on method `cache`, which `gather` has replaced; a network has to be trained anew"
 _PICTURE = ("signed", "signed_stretched", "unit")
 # Feature: (channels, encodings); files of version 1 mean the first encoding.
 SCREEN_V1 = {
     "direct": (3, ("log1p_over_exposure",)), "outgoing": (3, ("log1p_over_exposure",)), "albedo": (3, ("linear",)),
     "normal": (3, ("gravity_frame",)), "position": (3, ("gravity_frame_squashed",)), "depth": (1, ("log_over_mean",)),
     "spread": (1, ("log_ratio",)), "hit": (1, ("flag",)), "sky": (3, ("log1p_over_exposure",)),
-    "cache": (3, ("log1p_over_exposure",)),
+    "guess": (3, ("log1p_over_exposure",)),
 }
 IMAGES_V1 = {name: (3, _PICTURE) for name in ("depth", "direct", "diffuse", "normal")}
 # Table: (features, whether a network uses them in the table's order).
@@ -69,7 +71,9 @@ def check(doc):
     def fault(sentence):
         problems.append(Problem("document", "", f"metadata `{KEY}`: {sentence}"))
 
-    if doc["output"]["meaning"] not in MEANINGS:
+    if doc["output"]["meaning"] == "gain_and_rest_on_cache":
+        fault(f"output meaning `gain_and_rest_on_cache`: {REPLACED} with meaning `gain_and_rest_on_guess`")
+    elif doc["output"]["meaning"] not in MEANINGS:
         fault(f"output meaning `{doc['output']['meaning']}` is unknown; known: {', '.join(MEANINGS)}")
     if not 1 <= doc["cell"] <= 64:
         fault(f"cell is {doc['cell']}, allowed are 1 to 64")
@@ -137,7 +141,7 @@ def _inputs(doc):
         if not rows:
             continue
         if own not in rows:
-            fault(f"table `{name}` version 1 has no such feature")
+            fault(f"{REPLACED} with feature `guess`" if (name, own) == ("screen", "cache") else f"table `{name}` version 1 has no such feature")
             continue
         channels, encodings = rows[own]
         if feature["channels"] != channels:
