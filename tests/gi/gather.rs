@@ -84,6 +84,66 @@ fn a_lit_panel_sends_what_its_form_factor_says() {
     assert_eq!(mean(&lit(&gpu, &mut renderer, &build(0.0), 2).0.data), 0.0);
 }
 
+/// Of even light 1 on a wall at z = -4 that is 2 m high, the share that a white metal's lobe on the floor shows at p to an eye: GGX with
+/// height-correlated Smith, by the midpoints of 300 × 600 directions. Light that is scattered more than once cancels out.
+fn share_of_wall(p: [f32; 3], eye: [f32; 3], roughness: f32) -> f64 {
+    let to = glam::DVec3::from_array([0, 1, 2].map(|i| f64::from(eye[i] - p[i])));
+    let (v, a2) = (to.normalize(), f64::from(roughness).powi(4));
+    let (mut on, mut all) = (0.0, 0.0);
+    for i in 0..300 {
+        let theta = (f64::from(i) + 0.5) / 300.0 * std::f64::consts::FRAC_PI_2;
+        for j in 0..600 {
+            let phi = (f64::from(j) + 0.5) / 600.0 * std::f64::consts::TAU;
+            let l = glam::DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+            let h = (v + l).normalize();
+            let d = a2 / (h.y * h.y * (a2 - 1.0) + 1.0).powi(2);
+            let masked = l.y * (v.y * v.y * (1.0 - a2) + a2).sqrt() + v.y * (l.y * l.y * (1.0 - a2) + a2).sqrt();
+            let seen = d / masked * l.y * theta.sin();
+            // Where the direction meets the wall's plane.
+            let t = (-4.0 - f64::from(p[2])) / l.z;
+            let (x, y) = (f64::from(p[0]) + t * l.x, t * l.y);
+            all += seen;
+            on += if t > 0.0 && y < 2.0 && x.abs() < 4.0 { seen } else { 0.0 };
+        }
+    }
+    on / all
+}
+
+/// What a lobe shows of a wall that is not in the picture.
+#[test]
+fn lobes_show_what_is_off_the_screen() {
+    let Some(gpu) = common::gpu() else { return };
+    let eye = [0.0, 2.0, 0.0];
+    for (roughness, worst) in [(0.1, 0.1), (0.5, 0.06), (0.75, 0.12)] {
+        let blocks =
+            [([-4.0, -0.2, -4.0], [4.0, 0.0, 4.0], [1.0; 3]), ([-4.0, 0.0, -4.2], [4.0, 2.0, -4.0], [0.02; 3])];
+        let mut room = scene(&blocks, &[], 0.0, Camera::look_at(eye, [0.0, 0.0, -1.5], 0.6));
+        (room.materials[0].metallic, room.materials[0].roughness) = (1.0, roughness);
+        room.materials[1].emissive = [1.0; 3];
+        let off = |method: Method| {
+            let mut renderer = world::renderer(&gpu, [96, 64], method);
+            let layers = &[Layer::GlossInd, Layer::Position];
+            let options = CaptureOptions { layers, warmup: 95, ..Default::default() };
+            let frame = capture(&gpu, &mut renderer, &uploaded(&gpu, &room), &room.cameras[0], options).expect("drawn");
+            let layer = |l| &frame.layer(l).expect("it was asked for").data;
+            let (mut error, mut bias, mut sum) = (0.0, 0.0, 0.0);
+            let pixels = layer(Layer::GlossInd).chunks_exact(3).zip(layer(Layer::Position).chunks_exact(3));
+            for (found, p) in pixels.step_by(37) {
+                let expected = share_of_wall([p[0], p[1], p[2]], eye, roughness);
+                error += (f64::from(found[0]) - expected).abs();
+                bias += f64::from(found[0]) - expected;
+                sum += expected;
+            }
+            (error / sum, bias / sum)
+        };
+        let (error, bias) = off(method());
+        println!("roughness {roughness}: {:.1} % off, {:+.1} % in all", 100.0 * error, 100.0 * bias);
+        assert!(error < worst && bias.abs() < 0.03, "roughness {roughness}: {error} {bias}");
+        // Negative control: the screen alone knows nothing of the wall.
+        assert!(off(Method::Ssgi).0 > 0.5);
+    }
+}
+
 /// In a closed room whose walls all glow and send back ρ of what they get, there is glow / (1 − ρ) everywhere.
 #[test]
 fn a_glowing_room_is_the_series_of_its_albedo() {
