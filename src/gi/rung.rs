@@ -1,6 +1,7 @@
 //! What all methods share: the trait that a frame drives them by, and what a pass costs by count.
 
 use super::ambient::AmbientGi;
+use super::below::OrBelow;
 use super::cache::{self, WorldGi};
 use super::gather::GatherGi;
 use super::pass::{NeuralGi, Options};
@@ -27,6 +28,15 @@ impl Cost {
     }
 }
 
+/// What draws in a method's place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instead<'a> {
+    /// Its name on the command line.
+    pub method: &'static str,
+    /// What is missing for the method that was asked for, one sentence without a full stop.
+    pub why: &'a str,
+}
+
 /// A method at work: G-buffer in, indirect diffuse light (E/π) out. Allocates only when size or views are new.
 /// `Send`, so that a viewer can build one on another thread.
 pub trait Rung: Send {
@@ -51,6 +61,17 @@ pub trait Rung: Send {
 
     /// Frames since the last cut, for methods whose answer settles over frames.
     fn settled(&self) -> Option<u32> {
+        None
+    }
+
+    /// Whether it finds the direct light of what glows, so that lights that stand for glowing surfaces
+    /// ([`Light::stands_in`](crate::scene::Light::stands_in)) are not drawn. `rays`: whether there are any.
+    fn finds_glow(&self, _rays: bool) -> bool {
+        false
+    }
+
+    /// The method that drew the last frame in this one's place, and why; `None` where it drew itself.
+    fn instead(&self) -> Option<Instead<'_>> {
         None
     }
 
@@ -99,7 +120,11 @@ pub fn build(
         Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
         Method::Rsm => Some(Box::new(WorldGi::new(device, size, cache::Options::RSM))),
         Method::Cache => Some(Box::new(WorldGi::new(device, size, cache::Options::CACHE))),
-        Method::Gather(options) => Some(Box::new(GatherGi::new(device, size, *options))),
+        Method::Gather(options) => {
+            let above = GatherGi::check(&device.limits(), size, options);
+            let above = above.map(|()| Box::new(GatherGi::new(device, size, *options)) as Box<dyn Rung>);
+            Some(Box::new(OrBelow::new(device, above.map_err(|e| e.to_string()))))
+        }
         Method::World(options) => Some(Box::new(WorldGi::new(device, size, *options))),
         #[cfg(feature = "reference")]
         Method::Probes(bake) => Some(Box::new(super::probes::ProbesGi::new(device, queue, bake)?)),

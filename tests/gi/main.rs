@@ -1,5 +1,6 @@
 //! `gi/` against its CPU twin, against arithmetic and against the laws it promises, on hand-made G-buffers.
 
+mod below;
 #[path = "../common/build.rs"]
 mod build;
 #[path = "../common/mod.rs"]
@@ -11,10 +12,13 @@ mod dataset;
 mod edges;
 mod gather;
 mod glossy;
+mod glow;
+mod lamps;
 #[cfg(feature = "reference")]
 mod probes;
 mod screen;
 mod shot;
+mod sky_sun;
 mod stages;
 mod surroundings;
 mod taa;
