@@ -10,7 +10,7 @@ use super::{
     reference, sequence,
 };
 use crate::{
-    gi::Method,
+    gi::{Method, gather::FRAMES},
     gpu::Gpu,
     image_io::{self, Metadata},
     metrics,
@@ -26,9 +26,6 @@ use crate::{
 };
 use anyhow::Result;
 use std::path::{Path, PathBuf};
-
-/// Frames that a method with history gets to settle, where nothing else is asked for.
-const GI_FRAMES: u32 = 32;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -236,7 +233,7 @@ impl<'a> Raster<'a> {
         if self.running {
             return 0;
         }
-        let settle = if self.settles { args.gi_frames.unwrap_or(GI_FRAMES) - 1 } else { 0 };
+        let settle = if self.settles { args.gi_frames.unwrap_or(FRAMES) - 1 } else { 0 };
         args.taa.unwrap_or(0).max(settle)
     }
 

@@ -7,6 +7,7 @@ use super::state::State;
 use crate::accel::{AccelError, SceneRays};
 use crate::gi::{
     Method,
+    gather::FRAMES,
     pass::Neural,
     probes::{Bake, BakeOptions},
 };
@@ -300,14 +301,15 @@ pub fn capture(gpu: &crate::gpu::Gpu, shot: &Shot, progress: &Progress) -> Resul
             let _ = scene.trace(&gpu.device, &gpu.queue, &shot.scene);
         }
         progress.stage("capturing");
+        let warmup = if method.has_history() { FRAMES - 1 } else { 0 };
         let options = RendererOptions { method, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, shot.size, options).map_err(|e| e.to_string())?;
         let layers: &[Layer] = if shot.is_exr() { &Layer::ALL } else { &[] };
-        let options = CaptureOptions { samples: shot.samples, layers, ..Default::default() };
+        let options = CaptureOptions { samples: shot.samples, layers, warmup, ..Default::default() };
         let mut done = 0;
         let frame = capture_with(gpu, &mut renderer, &scene, &shot.camera, options, &mut || {
             done += 1;
-            progress.at(f64::from(done) / f64::from(shot.samples))
+            progress.at(f64::from(done) / f64::from(shot.samples + warmup))
         });
         let Some(frame) = frame.map_err(|e| e.to_string())? else { return cancelled() };
         let layer = |(layer, picture): &(Layer, crate::render::capture::Picture)| {

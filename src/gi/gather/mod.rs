@@ -16,7 +16,7 @@ mod options;
 mod params;
 mod store;
 
-pub use options::{Options, OptionsError};
+pub use options::{FRAMES, Options, OptionsError};
 pub use params::Params;
 
 use super::cells::{CellSide, CellsPass};
