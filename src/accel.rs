@@ -12,11 +12,13 @@ mod caster;
 mod cpu;
 mod emitters;
 mod gpu;
+pub(crate) mod hash;
 mod image;
 mod pairs;
 mod scene;
 mod surfaces;
 mod threads;
+mod trees;
 mod wide;
 
 pub use caster::{HitGpu, RayBatch, RayCaster, RayGpu};
@@ -45,10 +47,10 @@ pub const TOP_LEVELS: usize = 8;
 pub enum AccelError {
     /// More triangles than can be built within reasonable memory.
     #[error(
-        "the scene has {triangles} triangles, but the path tracer takes {MAX_TRIANGLES} at most; use fewer instances or simpler meshes"
+        "the scene has {triangles} triangles, but rays take {MAX_TRIANGLES} at most; use fewer instances or simpler meshes"
     )]
     TooManyTriangles {
-        /// Triangles of the scene, all instances counted.
+        /// Triangles of the scene.
         triangles: u64,
     },
     /// The device's textures are too small.
@@ -63,6 +65,21 @@ pub enum AccelError {
         /// `max_texture_dimension_2d` of the device.
         side: u32,
     },
+    /// The device's bindings are too small.
+    #[error(
+        "what rays know of {triangles} triangles needs {bytes} bytes, but this device binds {limit} at once; use a simpler scene"
+    )]
+    Binding {
+        /// Triangles of all meshes.
+        triangles: u64,
+        /// Bytes that are needed.
+        bytes: u64,
+        /// `max_storage_buffer_binding_size` of the device, or the size of its largest buffer.
+        limit: u64,
+    },
+    /// Whoever waited does not any more.
+    #[error("building the trees was stopped")]
+    Stopped,
     /// The device has not enough memory.
     #[error("the device has no memory for the acceleration structure of {bytes} bytes: {message}")]
     OutOfMemory {

@@ -119,11 +119,11 @@ fn structs_lie_in_memory_as_their_rust_twins() {
     use bouncelight::scene::upload::{LightGpu, MaterialGpu, TextureUse};
     for shader in ["render.gbuffer", "render.direct", "render.composite", "render.layers"] {
         let (members, _) = members(shader, "Frame");
-        assert_eq!(members.len(), 12, "Frame has gained or lost a member");
+        assert_eq!(members.len(), 13, "Frame has gained or lost a member");
     }
     same_layout!("render.gbuffer", "Frame", FrameUniform, size size_of::<FrameUniform>(), [
         view_from_world, world_from_view, clip_from_world, clip_from_world_unjittered, previous_clip_from_world,
-        tan_half, jitter, size, near, seed, environment, light_count,
+        tan_half, jitter, size, near, seed, environment, light_count, stand_ins,
     ]);
     same_layout!("render.direct", "Light", LightGpu, size size_of::<LightGpu>(), [
         position, kind, direction, range, color, radius, cone_scale, cone_offset,

@@ -1,8 +1,18 @@
 // Radiance from beyond the scene by direction: a lat-long picture, one texel for a constant sky. The Rust twin is
-// `scene::environment`. Expects `environment_picture` in the module.
+// `scene::environment`. Expects `environment_picture` in the module. A sun in the picture is one of the lights, so it is not
+// among what lights the scene from here; alpha is how many times the rest it adds for the eye.
 
 // `direction`: unit vector away from the eye, world space.
 fn environment_radiance(direction: vec3f) -> vec3f {
+    return environment_with(direction, 0.0);
+}
+
+// As the eye sees it, with the sun.
+fn environment_seen(direction: vec3f) -> vec3f {
+    return environment_with(direction, 1.0);
+}
+
+fn environment_with(direction: vec3f, sun: f32) -> vec3f {
     let size = vec2i(textureDimensions(environment_picture));
     if all(size == vec2i(1)) { return textureLoad(environment_picture, vec2i(0), 0).rgb; }
     let uv = vec2f(atan2(direction.z, direction.x) / (2.0 * PI) + 0.5, acos(clamp(direction.y, -1.0, 1.0)) / PI);
@@ -14,7 +24,8 @@ fn environment_radiance(direction: vec3f) -> vec3f {
         let step = vec2i(i & 1, i >> 1);
         let at = vec2i((low.x + step.x + size.x) % size.x, clamp(low.y + step.y, 0, size.y - 1));
         let w = select(1.0 - t, t, step == vec2i(1));
-        sum += w.x * w.y * textureLoad(environment_picture, at, 0).rgb;
+        let texel = textureLoad(environment_picture, at, 0);
+        sum += w.x * w.y * texel.rgb * (1.0 + sun * texel.a);
     }
     return sum;
 }

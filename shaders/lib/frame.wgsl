@@ -17,6 +17,8 @@ struct Frame {
     seed: u32,
     environment: vec3f,
     light_count: u32,
+    // 0 where the method finds the light of what glows by itself: lights that stand for glowing surfaces are left out then.
+    stand_ins: u32,
 }
 
 // Direction in view space of the ray through the sample point of `pixel`, scaled to z = -1.

@@ -21,7 +21,8 @@ struct Light {
     cone_offset: f32,
     // 1 for a light that stands for a surface that glows: rays meet the surface itself.
     stands_in: u32,
-    pad: u32,
+    // For whoever draws lights by lot: see `LightGpu`.
+    chance: f32,
 }
 
 struct LightSample {

@@ -14,7 +14,7 @@ fn light_at(i: u32) -> Light {
     let d = lights[4u * i + 3u];
     return Light(
         bitcast<vec3f>(a.xyz), a.w, bitcast<vec3f>(b.xyz), bitcast<f32>(b.w), bitcast<vec3f>(c.xyz), bitcast<f32>(c.w),
-        bitcast<f32>(d.x), bitcast<f32>(d.y), d.z, d.w
+        bitcast<f32>(d.x), bitcast<f32>(d.y), d.z, bitcast<f32>(d.w)
     );
 }
 

@@ -28,7 +28,7 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
             + textureLoad(indirect_specular, id.xy, 0).rgb * albedo.a
             + textureLoad(emissive_texture, id.xy, 0).rgb;
     } else {
-        radiance = environment_radiance(-to_eye(frame, id.xy));
+        radiance = environment_seen(-to_eye(frame, id.xy));
     }
     textureStore(hdr, id.xy, vec4f(min(radiance, vec3f(HALF_MAX)), 1.0));
 }

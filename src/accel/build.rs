@@ -36,6 +36,11 @@ fn kind(triangle: &Triangle) -> Kind {
     if area > 0.0 { Kind::Good } else { Kind::Degenerate }
 }
 
+/// Whether rays can meet it.
+pub(super) fn is_good(triangle: &Triangle) -> bool {
+    matches!(kind(triangle), Kind::Good)
+}
+
 /// See [`Accel::build`].
 pub(super) fn build(triangles: &[Triangle]) -> Accel {
     let mut accel = Accel::default();

@@ -1,7 +1,8 @@
 //! Triangles that glow, in the world, with a table from which a light sample chooses one by its power.
 
 use super::alias::alias;
-use super::surfaces::{DOUBLE_SIDED, Surface, from_shared_exponent, shared_exponent};
+use super::build;
+use super::surfaces::Surface;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
 
@@ -19,9 +20,9 @@ pub struct EmitterGpu {
     pub other: u32,
     /// From the first corner to the third.
     pub edge2: [f32; 3],
-    /// Unused.
-    pub pad: f32,
-    /// W/(m²·sr).
+    /// Luminance of the radiance times sides.
+    pub by_area: f32,
+    /// W/(m²·sr), coverage multiplied in.
     pub radiance: [f32; 3],
     /// As of its surface.
     pub flags: u32,
@@ -32,58 +33,60 @@ pub struct EmitterGpu {
 pub struct Glow {
     /// Corners.
     pub corners: [[f32; 3]; 3],
-    /// Radiance as the rays read it, and flags.
-    pub surface: (Vec3, u32),
+    /// As of its surface.
+    pub radiance: Vec3,
+    /// Luminance of that times sides: what chooses it, times its area.
+    pub by_area: f32,
+    /// As of its surface.
+    pub flags: u32,
 }
 
-/// What of a mesh's triangles glows.
+/// What of a mesh's triangles glows and can be met.
 pub fn glowing(surfaces: &[Surface], corners: &[[[f32; 3]; 3]]) -> Vec<Glow> {
     let glow = |(s, corners): (&Surface, &[[f32; 3]; 3])| {
-        let radiance = from_shared_exponent(shared_exponent(s.emission)) * s.coverage;
-        (luminance(radiance) > 0.0).then_some(Glow { corners: *corners, surface: (radiance, s.flags) })
+        let by_area = s.glow_by_area();
+        (by_area > 0.0 && build::is_good(corners)).then_some(Glow {
+            corners: *corners,
+            radiance: s.glow(),
+            by_area,
+            flags: s.flags,
+        })
     };
     surfaces.iter().zip(corners).filter_map(glow).collect()
 }
 
-/// What chooses a glowing triangle for its power; `emission_density` of `shaders/accel/surface.wgsl` says the same.
-pub fn luminance(c: Vec3) -> f32 {
-    c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
-}
-
-/// The table, and one over the sum of luminance × area × sides of everything in it (0 for nothing). At most `most` of the strongest.
+/// The table, and one over the sum of luminance × area × sides of everything in it (0 for nothing). Empty where there are more than
+/// `most`: then only rays that happen to meet them find them, which is right in the mean.
 pub fn table<'a>(placed: impl Iterator<Item = (&'a [Glow], Mat4)>, most: usize) -> (Vec<EmitterGpu>, f32) {
     let mut all = Vec::new();
     for (glows, world) in placed {
         for glow in glows {
             let [a, b, c] = glow.corners.map(|p| world.transform_point3(p.into()));
-            let (radiance, flags) = glow.surface;
-            let sides = if flags & DOUBLE_SIDED != 0 { 2.0 } else { 1.0 };
             let area = 0.5 * (b - a).as_dvec3().cross((c - a).as_dvec3()).length();
-            let power = area * f64::from(luminance(radiance) * sides);
+            let power = area * f64::from(glow.by_area);
             if power > 0.0 && power.is_finite() {
                 // A mirrored instance turns the winding round, but not which side is the front.
                 let (b, c) = if world.determinant() < 0.0 { (c, b) } else { (b, c) };
-                all.push((power, a, b - a, c - a, radiance, flags));
+                all.push((power, a, b - a, c - a, *glow));
             }
         }
     }
     if all.len() > most {
-        all.sort_by(|x, y| y.0.total_cmp(&x.0));
-        tracing::warn!("of {} glowing triangles the strongest {most} light the scene", all.len());
-        all.truncate(most);
+        tracing::warn!("{} glowing triangles are more than the {most} that this device binds: noise", all.len());
+        all.clear();
     }
     let total: f64 = all.iter().map(|e| e.0).sum();
     let choices: Vec<(u32, f64)> = (0u32..).zip(&all).map(|(i, e)| (i, e.0 / total)).collect();
     let entries = alias(&choices);
-    let emitters = all.iter().zip(entries).map(|((_, origin, edge1, edge2, radiance, flags), entry)| EmitterGpu {
+    let emitters = all.iter().zip(entries).map(|((_, origin, edge1, edge2, glow), entry)| EmitterGpu {
         origin: origin.to_array(),
         threshold: entry[0],
         edge1: edge1.to_array(),
         other: entry[1].to_bits(),
         edge2: edge2.to_array(),
-        pad: 0.0,
-        radiance: radiance.to_array(),
-        flags: *flags,
+        by_area: glow.by_area,
+        radiance: glow.radiance.to_array(),
+        flags: glow.flags,
     });
     (emitters.collect(), if total > 0.0 { (1.0 / total) as f32 } else { 0.0 })
 }

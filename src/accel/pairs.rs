@@ -1,11 +1,10 @@
 //! Triangles that share an edge, joined two by two: a leaf of the tree is one such pair.
 
-use std::collections::HashMap;
-
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
 
 use super::build::Triangle;
+use super::hash::{self, Map};
 
 /// One triangle, or two that share the edge from the first corner to the third.
 #[derive(Debug, Clone, Copy)]
@@ -56,7 +55,7 @@ fn half_area(triangles: &[&Triangle]) -> f32 {
 /// Joins the triangles `kept`. Each takes the free neighbour with which it fills the smallest box, if visiting that box
 /// costs less than visiting both triangles' own.
 pub(super) fn join(triangles: &[Triangle], kept: &[u32]) -> Vec<Pair> {
-    let mut owners: HashMap<Edge, (u32, usize)> = HashMap::with_capacity(kept.len() * 3);
+    let mut owners: Map<Edge, (u32, usize)> = hash::map(kept.len() * 3);
     for &index in kept {
         for start in 0..3 {
             owners.insert(edge(&triangles[index as usize], start), (index, start));

@@ -2,12 +2,11 @@
 //! over the instances, made anew whenever something moves. One texture holds both; what a ray needs to know of a triangle
 //! (`surfaces`) and the triangles that glow (`emitters`) are storage buffers.
 
-use super::emitters::{self, EmitterGpu, Glow};
+use super::emitters::{self, EmitterGpu};
 use super::gpu::ROW;
-use super::image::Reductions;
-use super::surfaces;
-use super::wide::{Block, INSTANCE, NODE, WORDS};
-use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, threads};
+use super::trees::{MeshTree, SceneTrees};
+use super::wide::{Block, INSTANCE, WORDS};
+use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, surfaces};
 use crate::scene::Scene;
 use glam::{Mat4, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -15,20 +14,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Number of the next scene.
 static NEXT: AtomicU64 = AtomicU64::new(1);
-
-/// Blocks that the tree over `count` instances can need: a node has a family of eight, and there are fewer nodes than instances.
-fn top_blocks(count: usize) -> usize {
-    (8 * count + 16).next_multiple_of(ROW as usize)
-}
-
-/// A mesh's tree, where it lies in the texture, and what of it glows.
-struct MeshTree {
-    root: u32,
-    first_triangle: u32,
-    /// Object space; `None` for a mesh that nothing can hit.
-    bounds: Option<(Vec3, Vec3)>,
-    glows: Vec<Glow>,
-}
 
 /// What [`SceneRays`] holds, for overlays and tests.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -65,51 +50,44 @@ impl SceneRays {
     /// # Errors
     /// [`AccelError`] when the scene has too many triangles for the device or for any.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Self, AccelError> {
+        Self::with_progress(device, queue, scene, &|_, _| true)
+    }
+
+    /// As [`SceneRays::new`]; `progress` hears from any thread how many meshes of how many have their trees, and ends the work by
+    /// answering false.
+    ///
+    /// # Errors
+    /// [`AccelError`] as above, and [`AccelError::Stopped`].
+    pub fn with_progress(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        scene: &Scene,
+        progress: &(dyn Fn(usize, usize) -> bool + Sync),
+    ) -> Result<Self, AccelError> {
+        // What cannot fit is not built first.
         let triangles: u64 = scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum();
         Accel::check_count(triangles)?;
-        let reductions = Reductions::new(scene);
-        let parts = threads::map(
-            &scene.meshes,
-            |m| m.indices.len(),
-            |mesh| {
-                // What disagrees in itself is refused by the upload of the picture's part; here it is not met.
-                if mesh.check(scene.materials.len()).is_err() {
-                    return (Accel::default(), Vec::new(), Vec::new());
-                }
-                let surfaces = surfaces::of_mesh(scene, mesh, &reductions);
-                let corners: Vec<_> =
-                    mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize])).collect();
-                let glows = emitters::glowing(&surfaces, &corners);
-                (build::build(&corners), surfaces, glows)
-            },
-        );
-        drop(reductions);
-
-        let top_room = top_blocks(scene.instances.len());
-        let mut blocks = Vec::with_capacity(top_room + parts.iter().map(|p| p.0.block_count() + 8).sum::<usize>());
-        blocks.resize(top_room, [0; WORDS]);
-        let mut packed = Vec::with_capacity(triangles as usize);
-        let mut meshes = Vec::with_capacity(parts.len());
-        for (accel, surfaces, glows) in parts {
-            let root = blocks.len().next_multiple_of(8);
-            blocks.resize(root, [0; WORDS]);
-            meshes.push(MeshTree {
-                root: root as u32,
-                first_triangle: packed.len() as u32,
-                bounds: bounds(&accel),
-                glows,
-            });
-            blocks.extend(accel.blocks.iter().map(|b| moved(b, root as u32, &surfaces)));
-            packed.extend(surfaces.iter().map(surfaces::Surface::packed));
+        let limits = device.limits();
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let bytes = triangles * size_of::<surfaces::Packed>() as u64;
+        if bytes > limit {
+            return Err(AccelError::Binding { triangles, bytes, limit });
         }
-        let accel = AccelGpu::of_blocks(device, queue, &blocks)?;
-        let surfaces = filled(device, queue, "accel.surfaces", bytemuck::cast_slice(&packed));
-        let counts = RayCounts { triangles: triangles as usize, ..RayCounts::default() };
-        let emitters = filled(device, queue, "accel.emitters", &[]);
-        let device = device.clone();
-        let id = NEXT.fetch_add(1, Ordering::Relaxed);
-        let mut rays = Self { id, device, accel, surfaces, emitters, inverse_power: 0.0, meshes, top_room, counts };
-        rays.counts.bytes = 64 * (blocks.len() as u64).next_multiple_of(u64::from(ROW)) + rays.surfaces.size();
+        let trees = SceneTrees::build(scene, progress)?;
+        let accel = AccelGpu::of_blocks(device, queue, &trees.blocks)?;
+        let surfaces = filled(device, queue, "accel.surfaces", bytemuck::cast_slice(&trees.surfaces));
+        let bytes = 64 * (trees.blocks.len() as u64).next_multiple_of(u64::from(ROW)) + surfaces.size();
+        let mut rays = Self {
+            id: NEXT.fetch_add(1, Ordering::Relaxed),
+            accel,
+            surfaces,
+            emitters: filled(device, queue, "accel.emitters", &[]),
+            inverse_power: 0.0,
+            meshes: trees.meshes,
+            top_room: trees.top_room,
+            counts: RayCounts { triangles: triangles as usize, bytes, ..RayCounts::default() },
+            device: device.clone(),
+        };
         rays.place(queue, scene);
         Ok(rays)
     }
@@ -182,30 +160,6 @@ impl SceneRays {
     pub fn counts(&self) -> RayCounts {
         RayCounts { bytes: self.counts.bytes + self.emitters.size(), ..self.counts }
     }
-}
-
-/// A block of a mesh's tree at its place in the texture.
-fn moved(block: &Block, root: u32, surfaces: &[surfaces::Surface]) -> Block {
-    let mut block = *block;
-    if block[3] & NODE != 0 {
-        block[3] += root;
-    } else if block.iter().any(|w| *w != 0) {
-        let open = |word: u32| surfaces[(word & 0x00ff_ffff) as usize].open();
-        block[15] = open(block[7]) | open(block[11]) << 8;
-    }
-    block
-}
-
-/// Corners of all that is in a tree; `None` for an empty one.
-fn bounds(accel: &Accel) -> Option<(Vec3, Vec3)> {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for block in accel.blocks.iter().filter(|b| b[3] & NODE == 0 && b.iter().any(|w| *w != 0)) {
-        for corner in block.chunks_exact(4) {
-            let p = Vec3::new(f32::from_bits(corner[0]), f32::from_bits(corner[1]), f32::from_bits(corner[2]));
-            (low, high) = (low.min(p), high.max(p));
-        }
-    }
-    (low.x <= high.x).then_some((low, high))
 }
 
 /// The leaf of an instance and its box in the world; `None` where no ray can meet it.

@@ -6,7 +6,7 @@ use crate::scene::{AlphaMode, Material, Mesh, Scene};
 use glam::{Vec2, Vec3};
 
 /// `Surface` of `shaders/accel/surface.wgsl`, packed: diffuse base colour and roughness, reflectance at normal incidence and
-/// flags, emitted radiance, unused.
+/// flags, emitted radiance, what a light sample's choice of it goes by.
 pub type Packed = [u32; 4];
 
 /// Glows on both of its sides, and is drawn from both.
@@ -50,8 +50,19 @@ impl Surface {
             root(self.diffuse) | byte(self.roughness) << 24,
             root(self.f0) | self.flags << 24,
             shared_exponent(self.emission),
-            0,
+            self.glow_by_area().to_bits(),
         ]
+    }
+
+    /// Radiance that reaches those who look at it, as the shader knows it: what lets a share of all rays through sends the rest.
+    pub fn glow(&self) -> Vec3 {
+        from_shared_exponent(shared_exponent(self.emission)) * ((255 - self.open()) as f32 / 255.0)
+    }
+
+    /// Luminance of that times sides, by which light samples choose among glowing triangles of one area.
+    pub fn glow_by_area(&self) -> f32 {
+        let sides = if self.flags & DOUBLE_SIDED != 0 { 2.0 } else { 1.0 };
+        luminance(self.glow()) * sides
     }
 
     /// How many of 255 rays it lets through.
@@ -78,6 +89,11 @@ pub fn shared_exponent(c: Vec3) -> u32 {
 pub fn from_shared_exponent(code: u32) -> Vec3 {
     let scale = 2f32.powi((code >> 27) as i32 - 24);
     Vec3::new((code & 511) as f32, (code >> 9 & 511) as f32, (code >> 18 & 511) as f32) * scale
+}
+
+/// Rec. 709.
+pub fn luminance(c: Vec3) -> f32 {
+    c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
 /// The triangles of `mesh`, which names a material that exists.

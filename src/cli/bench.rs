@@ -103,13 +103,21 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let camera = args.scene.camera(&scene)?;
     let gpu = global.open_gpu()?;
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
+    let mut names = args.method.0.clone();
+    if names.iter().any(|n| n.needs_rays())
+        && let Err(e) = uploaded.trace(&gpu.device, &gpu.queue, &scene)
+    {
+        // Asked for alone it is an error; among others it is left out, as numbers of another method would be no answer.
+        names.retain(|n| !n.needs_rays());
+        if names.is_empty() {
+            return Err(e.into());
+        }
+        eprintln!("warning: methods that send rays are not measured: {e}");
+    }
     let options = BenchOptions { frames: args.frames, warmup: args.warmup };
     let mut methods = Vec::new();
-    for name in &args.method.0 {
+    for name in &names {
         let method = super::tuned::tuned(name.method(global, args.weights.as_ref())?, &gpu, global.quiet);
-        if method.needs_rays() && uploaded.rays.is_none() {
-            uploaded.trace(&gpu.device, &gpu.queue, &scene)?;
-        }
         let mut renderer =
             Renderer::new(&gpu.device, &gpu.queue, args.scene.size, RendererOptions { method, ..Default::default() })?;
         methods.push(measure(&gpu, &mut renderer, &uploaded, &camera, options)?);

@@ -18,7 +18,10 @@ use crate::{
         capture::{CaptureOptions, CapturedFrame, Layer, Picture, capture_with},
         tonemap_curve::Tonemap,
     },
-    scene::{Camera, Scene, upload::SceneGpu},
+    scene::{
+        Camera, Scene,
+        upload::{SceneGpu, UploadError},
+    },
 };
 use anyhow::Result;
 use std::path::{Path, PathBuf};
@@ -185,6 +188,8 @@ struct Raster<'a> {
     renderer: Renderer,
     layers: Vec<Layer>,
     weights: String,
+    /// Name of the method that is asked for.
+    asked: &'static str,
     /// The method's answer settles over frames.
     settles: bool,
     /// A frame of a sequence has been drawn: the next goes on from it, as in a viewer.
@@ -197,15 +202,24 @@ impl<'a> Raster<'a> {
             Method::Neural(neural) => neural.weights.hash_text(),
             _ => "none".into(),
         };
-        let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
-        if method.needs_rays() {
-            uploaded.trace(&gpu.device, &gpu.queue, scene)?;
-        }
-        let scene = uploaded;
-        let settles = method.has_history();
+        let (asked, settles, needs_rays) = (method.name(), method.has_history(), method.needs_rays());
         let options = RendererOptions { method, taa: args.taa.is_some(), ..Default::default() };
-        let renderer = Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options)?;
-        Ok(Self { gpu, scene, renderer, layers, weights, settles, running: false })
+        // Trees are built while the driver compiles shaders.
+        let upload = || {
+            let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
+            if needs_rays {
+                // Where they cannot be had, the rung below draws, and `picture` says so.
+                let _ = uploaded.trace(&gpu.device, &gpu.queue, scene);
+            }
+            Ok::<_, UploadError>(uploaded)
+        };
+        let (scene, renderer) = std::thread::scope(|scope| {
+            let uploading = scope.spawn(upload);
+            let renderer = Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options);
+            (uploading.join().unwrap_or_else(|e| std::panic::resume_unwind(e)), renderer)
+        });
+        let (scene, renderer) = (scene?, renderer?);
+        Ok(Self { gpu, scene, renderer, layers, weights, asked, settles, running: false })
     }
 
     /// Frames before the first sample: the method's and anti-aliasing's go on at once.
@@ -240,7 +254,12 @@ impl<'a> Raster<'a> {
             image_io::Layer::new(layer.name(), &layer.channels().concat(), &picture.data)
         };
         let layers = frame.layers.iter().map(layer).collect();
-        let mut facts = vec![("Weights".into(), self.weights.clone())];
+        let mut facts =
+            vec![("Method".into(), self.renderer.drawn_by().into()), ("Weights".into(), self.weights.clone())];
+        if let Some(instead) = self.renderer.instead().filter(|_| !self.running) {
+            let why = self.scene.no_rays.as_deref().unwrap_or(instead.why);
+            eprintln!("warning: `{}` cannot draw this, so `{}` did: {why}", self.asked, instead.method);
+        }
         facts.extend(self.renderer.settled().map(|frames| ("GiFrames".into(), frames.to_string())));
         Ok(Drawn { frame, layers, facts })
     }

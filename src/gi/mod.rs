@@ -24,6 +24,7 @@
 //! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
 
 pub mod ambient;
+mod below;
 pub mod bitmask;
 pub mod cells;
 pub mod exposure;
@@ -108,7 +109,7 @@ pub struct Lights<'a> {
     pub buffer: &'a wgpu::Buffer,
     /// How many.
     pub count: u32,
-    /// Some of them stand for surfaces that glow.
+    /// Some of them stand for surfaces that glow, and their light is in [`Inputs::direct`].
     pub stand_in: bool,
     /// Another number whenever a light is another than before, so that what is remembered of their light is forgotten sooner.
     pub epoch: u64,
@@ -177,6 +178,9 @@ pub enum GiError {
     /// The method reads [`Inputs::rays`], which is not there.
     #[error("this method sends rays into the scene's triangles (`Inputs::rays`), which the host did not supply")]
     Rays,
+    /// The device is too small for the method.
+    #[error("this device {0}")]
+    Device(String),
     /// A texture view has another format, size or usage than [`Inputs`] says.
     #[error("texture `{name}` has {found}, but needs {expected}")]
     Texture {

@@ -58,6 +58,11 @@ impl MethodName {
         })
     }
 
+    /// Whether it asks rays ([`Method::needs_rays`]).
+    pub fn needs_rays(self) -> bool {
+        self == M::Gather
+    }
+
     /// The one called `name`.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|m| m.name() == name)

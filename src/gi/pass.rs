@@ -314,6 +314,10 @@ impl Rung for NeuralGi {
         self.settled()
     }
 
+    fn finds_glow(&self, rays: bool) -> bool {
+        self.gather.as_ref().is_some_and(|gather| gather.finds_glow(rays))
+    }
+
     fn gloss(&self) -> Option<&wgpu::TextureView> {
         self.gather.as_ref().and_then(|gather| gather.gloss())
     }

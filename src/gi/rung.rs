@@ -1,6 +1,7 @@
 //! What all methods share: the trait that a frame drives them by, and what a pass costs by count.
 
 use super::ambient::AmbientGi;
+use super::below::OrBelow;
 use super::gather::GatherGi;
 use super::pass::{NeuralGi, Options};
 use super::ssgi::{SsgiGi, SsgiOptions};
@@ -24,6 +25,15 @@ impl Cost {
     pub fn new(pass: &str, flops: f64, bytes: f64) -> Self {
         Self { pass: pass.into(), flops, bytes }
     }
+}
+
+/// What draws in a method's place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instead<'a> {
+    /// Its name on the command line.
+    pub method: &'static str,
+    /// What is missing for the method that was asked for, one sentence without a full stop.
+    pub why: &'a str,
 }
 
 /// A method at work: G-buffer in, indirect diffuse light (E/π) out. Allocates only when size or views are new.
@@ -50,6 +60,17 @@ pub trait Rung: Send {
 
     /// Frames since the last cut, for methods whose answer settles over frames.
     fn settled(&self) -> Option<u32> {
+        None
+    }
+
+    /// Whether it finds the direct light of what glows, so that lights that stand for glowing surfaces
+    /// ([`Light::stands_in`](crate::scene::Light::stands_in)) are not drawn. `rays`: whether there are any.
+    fn finds_glow(&self, _rays: bool) -> bool {
+        false
+    }
+
+    /// The method that drew the last frame in this one's place, and why; `None` where it drew itself.
+    fn instead(&self) -> Option<Instead<'_>> {
         None
     }
 
@@ -94,7 +115,18 @@ pub fn build(
         Method::Direct => None,
         Method::Ambient => Some(Box::new(AmbientGi::new(device))),
         Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
-        Method::Gather(options) => Some(Box::new(GatherGi::new(device, size, *options))),
+        Method::Gather(options) => {
+            let above = GatherGi::check(&device.limits(), size, options);
+            let above = above.map(|()| Box::new(GatherGi::new(device, size, *options)) as Box<dyn Rung>);
+            Some(Box::new(OrBelow::new(device, above.map_err(|e| e.to_string()))))
+        }
+        Method::Neural(neural) if method.needs_rays() => {
+            let above = match GatherGi::check(&device.limits(), size, &Default::default()) {
+                Ok(()) => Ok(Box::new(NeuralGi::with(device, queue, neural, Options { size })?) as Box<dyn Rung>),
+                Err(lacks) => Err(lacks.to_string()),
+            };
+            Some(Box::new(OrBelow::new(device, above)))
+        }
         Method::Neural(neural) => Some(Box::new(NeuralGi::with(device, queue, neural, Options { size })?)),
     })
 }

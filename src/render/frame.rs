@@ -168,6 +168,16 @@ impl Renderer {
         self.indirect.as_ref().and_then(|i| i.settled())
     }
 
+    /// What drew the last frame in the method's place, and why; `None` where it drew itself.
+    pub fn instead(&self) -> Option<rung::Instead<'_>> {
+        self.indirect.as_ref()?.instead()
+    }
+
+    /// Name of the method that found the last frame's indirect light, as on the command line.
+    pub fn drawn_by(&self) -> &'static str {
+        self.instead().map_or(self.method, |i| i.method)
+    }
+
     /// Name of the method that finds indirect light, as on the command line.
     pub fn method_name(&self) -> &'static str {
         self.method
@@ -283,7 +293,8 @@ impl Renderer {
             None => last.map_or(*view, |last| view.after(&last)),
         };
         self.last = Some(*view);
-        let uniform = view.uniform(&scene.environment, scene.lights.len() as u32);
+        let stand_ins = !self.indirect.as_ref().is_some_and(|i| i.finds_glow(scene.rays.is_some()));
+        let uniform = view.uniform(&scene.environment, scene.lights.len() as u32, stand_ins);
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 
         if shadows || fresh {
@@ -296,7 +307,10 @@ impl Renderer {
         self.passes.gbuffer.record(recorder, inputs, &self.targets);
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
         self.passes.direct.record(recorder, inputs);
-        let inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene));
+        let mut inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene));
+        if let Some(lights) = &mut inputs.lights {
+            lights.stand_in &= stand_ins;
+        }
         if let (Some(indirect), Some(taa)) = (&mut self.indirect, &self.taa) {
             indirect.set_frame(queue, taa.frames());
         }

@@ -4,6 +4,10 @@
 //! from +Y, the column the turn about it; the middle column looks along +X and columns to its right turn towards +Z.
 //! Blender (whose +X is the same axis) and three.js read such pictures in the same way.
 
+mod sun;
+
+pub use sun::SkySun;
+
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 use thiserror::Error;

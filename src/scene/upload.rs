@@ -6,16 +6,18 @@
 
 mod closed;
 mod environment;
+mod light;
 mod material;
 mod mesh;
 mod texture;
 
+pub use light::{CANDIDATES, LightGpu};
 pub use material::{MaterialGpu, TextureUse, material_layout};
 pub use mesh::{AttributeVertex, Draw, Rows, attribute_layouts, motion_layouts, position_layouts};
 
-use super::{AlphaMode, Environment, Light, LightKind, Scene};
+use super::{AlphaMode, Environment, Light, Scene};
 use crate::accel::{AccelError, SceneRays};
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Pod;
 use std::sync::atomic::{AtomicU64, Ordering};
 use thiserror::Error;
 
@@ -72,67 +74,6 @@ pub enum UploadError {
     },
 }
 
-/// A light as `shaders/lib/lights.wgsl` reads it.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct LightGpu {
-    /// World position (point, spot).
-    pub position: [f32; 3],
-    /// 0 sun, 1 point, 2 spot.
-    pub kind: u32,
-    /// Unit vector along which light travels (sun, spot).
-    pub direction: [f32; 3],
-    /// Cut-off distance, metres; 0 for none.
-    pub range: f32,
-    /// Irradiance in W/m² (sun) or radiant intensity in W/sr (point, spot), tint multiplied in.
-    pub color: [f32; 3],
-    /// Metres (point, spot), or the tangent of half the angular diameter (sun).
-    pub radius: f32,
-    /// Scale of the cone's ramp.
-    pub cone_scale: f32,
-    /// Offset of the cone's ramp.
-    pub cone_offset: f32,
-    /// 1 for a light that stands for a surface that glows: rays meet the surface itself.
-    pub stands_in: u32,
-    /// Unused.
-    pub pad: u32,
-}
-
-impl LightGpu {
-    /// The shader's form of `light`.
-    pub fn new(light: &Light) -> Self {
-        let tint = |strength: f32| light.color.map(|c| c * strength);
-        let unit = |v: [f32; 3]| glam::Vec3::from(v).try_normalize().unwrap_or(glam::Vec3::NEG_Y).to_array();
-        let zero = Self { stands_in: light.stands_in.into(), ..Self::zeroed() };
-        match light.kind {
-            LightKind::Directional { direction, irradiance, angle } => Self {
-                direction: unit(direction),
-                color: tint(irradiance),
-                radius: (angle.clamp(0.0, 3.0) * 0.5).tan(),
-                ..zero
-            },
-            LightKind::Point { position, intensity, radius, range } => {
-                Self { position, kind: 1, range: range.unwrap_or(0.0), color: tint(intensity), radius, ..zero }
-            }
-            LightKind::Spot { position, direction, intensity, radius, range, inner_angle, outer_angle } => {
-                let (inner, outer) = (inner_angle.cos(), outer_angle.cos());
-                let cone_scale = 1.0 / (inner - outer).max(1e-3);
-                Self {
-                    position,
-                    kind: 2,
-                    direction: unit(direction),
-                    range: range.unwrap_or(0.0),
-                    color: tint(intensity),
-                    radius,
-                    cone_scale,
-                    cone_offset: -outer * cone_scale,
-                    ..zero
-                }
-            }
-        }
-    }
-}
-
 /// A scene on the GPU. Lights, the surroundings and placements can be changed in place; upload again after any other
 /// change.
 pub struct SceneGpu {
@@ -154,20 +95,24 @@ pub struct SceneGpu {
     pub material_groups: Vec<wgpu::BindGroup>,
     /// [`LightGpu`] for each light; at least one entry, so that it can be bound.
     pub light_buffer: wgpu::Buffer,
-    /// The lights, for shadow fitting.
+    /// The lights, for shadow fitting; a sun that a picture of the surroundings holds is the last.
     pub lights: Vec<Light>,
     /// Another number whenever one of them, or the surroundings, is another than before.
     pub lights_epoch: u64,
-    /// What rays see that hit nothing.
+    /// What lights the scene from beyond it: `radiance` is the mean without that sun.
     pub environment: Environment,
-    /// The same as a lat-long `Rgba32Float` picture; one texel for a constant.
+    /// The same as a lat-long `Rgba32Float` picture; one texel for a constant. rgb is without the sun, rgb · (1 + a) with it.
     pub environment_view: wgpu::TextureView,
     /// World-space bounds of all instances; `None` for a scene without triangles.
     pub bounds: Option<([f32; 3], [f32; 3])>,
     /// The triangles as rays meet them, once [`SceneGpu::trace`] has made them.
     pub rays: Option<SceneRays>,
+    /// Why there can be none, once [`SceneGpu::trace`] has found out: one sentence without a full stop.
+    pub no_rays: Option<String>,
     /// What was mended on the way, one sentence each.
     pub warnings: Vec<String>,
+    /// The sun of the surroundings.
+    sky_sun: Option<Light>,
     /// Which meshes are closed.
     closed: Vec<bool>,
     /// What `instances` holds, with the index of each one's instance in the scene.
@@ -182,10 +127,11 @@ impl SceneGpu {
         let geometry = mesh::upload(device, queue, scene)?;
         let textures = texture::upload(device, queue, &scene.images, &mut warnings)?;
         let materials = material::upload(device, queue, scene, &textures)?;
-        let lights: Vec<LightGpu> = scene.lights.iter().map(LightGpu::new).collect();
-        let light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &lights);
-        let (environment_view, sky_bytes) = environment::upload(device, queue, &scene.environment, &mut warnings)?;
-        let bytes = sky_bytes + geometry.bytes + textures.bytes + materials.bytes + light_buffer.size();
+        let sky = environment::upload(device, queue, &scene.environment, &mut warnings)?;
+        let lights: Vec<Light> = scene.lights.iter().chain(&sky.sun).cloned().collect();
+        let list = LightGpu::list(&lights);
+        let light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &list);
+        let bytes = sky.bytes + geometry.bytes + textures.bytes + materials.bytes + light_buffer.size();
         for warning in &warnings {
             tracing::warn!("{warning}");
         }
@@ -199,13 +145,15 @@ impl SceneGpu {
             draws: geometry.draws,
             material_groups: materials.groups,
             light_buffer,
-            lights: scene.lights.clone(),
+            lights,
             lights_epoch: 0,
-            environment: scene.environment.clone(),
-            environment_view,
+            environment: sky.environment,
+            environment_view: sky.view,
+            sky_sun: sky.sun,
             bounds: geometry.bounds,
             closed: geometry.closed,
             rays: None,
+            no_rays: None,
             placed: geometry.placed,
             warnings,
             bytes,
@@ -213,33 +161,52 @@ impl SceneGpu {
     }
 
     /// Makes [`SceneGpu::rays`] for methods that need them ([`crate::gi::Method::needs_rays`]). `scene` is what this was made of.
+    /// Without them the rung below draws in those methods' place.
     ///
     /// # Errors
-    /// [`AccelError`] when the scene has more triangles than rays can have.
+    /// [`AccelError`] when the scene has more triangles than rays can have; [`SceneGpu::no_rays`] says the same.
     pub fn trace(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<(), AccelError> {
-        self.rays = Some(SceneRays::new(device, queue, scene)?);
+        match SceneRays::new(device, queue, scene) {
+            Ok(rays) => self.rays = Some(rays),
+            Err(e) => {
+                self.no_rays = Some(e.to_string());
+                return Err(e);
+            }
+        }
         Ok(())
+    }
+
+    /// Takes over rays that were made apart, or why there can be none. `scene` is as it is drawn now: instances may have moved since.
+    pub fn set_rays(&mut self, queue: &wgpu::Queue, scene: &Scene, rays: Result<SceneRays, String>) {
+        match rays {
+            Ok(mut rays) => {
+                rays.place(queue, scene);
+                self.rays = Some(rays);
+            }
+            Err(why) => self.no_rays = Some(why),
+        }
     }
 
     /// Takes over the lights of `scene`. In place where their kinds stay, so that shadow maps stay, too.
     ///
     /// Whatever else of `scene` has changed is left as it is here.
     pub fn set_lights(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) {
-        let lights: Vec<LightGpu> = scene.lights.iter().map(LightGpu::new).collect();
+        let lights: Vec<Light> = scene.lights.iter().chain(&self.sky_sun).cloned().collect();
+        let list = LightGpu::list(&lights);
         // A spot's maps depend on how wide it is.
         let kind = |l: &Light| (std::mem::discriminant(&l.kind), crate::render::shadow::is_flat(&l.kind));
-        let same = self.lights.iter().map(kind).eq(scene.lights.iter().map(kind));
-        self.lights_epoch += u64::from(self.lights != scene.lights);
-        self.lights = scene.lights.clone();
+        let same = self.lights.iter().map(kind).eq(lights.iter().map(kind));
+        self.lights_epoch += u64::from(self.lights != lights);
+        self.lights = lights;
         if same {
-            queue.write_buffer(&self.light_buffer, 0, bytemuck::cast_slice(&lights));
+            queue.write_buffer(&self.light_buffer, 0, bytemuck::cast_slice(&list));
         } else {
-            self.light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &lights);
+            self.light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &list);
             self.renew();
         }
     }
 
-    /// Takes over the surroundings of `scene`.
+    /// Takes over the surroundings and the lights of `scene`.
     ///
     /// # Errors
     /// A picture that does not fit in itself; then nothing has changed.
@@ -250,11 +217,13 @@ impl SceneGpu {
         scene: &Scene,
     ) -> Result<(), UploadError> {
         let mut warnings = Vec::new();
-        let (view, _) = environment::upload(device, queue, &scene.environment, &mut warnings)?;
+        let sky = environment::upload(device, queue, &scene.environment, &mut warnings)?;
         self.lights_epoch += 1;
-        self.environment = scene.environment.clone();
-        self.environment_view = view;
+        self.environment = sky.environment;
+        self.environment_view = sky.view;
         self.warnings.extend(warnings);
+        self.sky_sun = sky.sun;
+        self.set_lights(device, queue, scene);
         self.renew();
         Ok(())
     }

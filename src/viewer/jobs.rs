@@ -4,6 +4,7 @@
 use super::choice::Source;
 use super::command;
 use super::state::State;
+use crate::accel::{AccelError, SceneRays};
 use crate::gi::{Method, pass::Neural};
 use crate::image_io;
 use crate::net::{format::Weights, gpu::Tuned, plan::Precision};
@@ -69,6 +70,7 @@ pub struct Job {
 pub enum Kind {
     Scene,
     Surroundings,
+    Rays,
     Weights,
     Renderer(usize),
     Capture,
@@ -83,6 +85,11 @@ pub enum Product {
         spec: String,
         scene: Box<Scene>,
         gpu: Box<SceneGpu>,
+    },
+    /// Rays into the scene that was uploaded as number `stamp`, or why it can have none.
+    Rays {
+        stamp: u64,
+        rays: Result<Box<SceneRays>, String>,
     },
     /// The scene on show, on a new device.
     Uploaded(Box<SceneGpu>),
@@ -147,13 +154,21 @@ pub fn scene(
         return Err("cancelled".into());
     }
     progress.stage(&format!("uploading {spec}"));
-    let mut gpu = SceneGpu::new(&handles.device, &handles.queue, &scene).map_err(|e| e.to_string())?;
-    progress.stage(&format!("building trees for the rays of {spec}"));
-    // A scene that rays cannot have is still drawn by the methods that send none.
-    if let Err(e) = gpu.trace(&handles.device, &handles.queue, &scene) {
-        tracing::warn!("{spec}: `gather` cannot be chosen: {e}");
-    }
+    let gpu = SceneGpu::new(&handles.device, &handles.queue, &scene).map_err(|e| e.to_string())?;
     Ok(Product::Scene { spec, scene: Box::new(scene), gpu: Box::new(gpu) })
+}
+
+/// Builds the trees that rays need, while the rung below draws.
+pub fn rays(handles: &Handles, stamp: u64, scene: &Scene, progress: &Progress) -> Result<Product, String> {
+    let told = |done: usize, all: usize| {
+        progress.stage(&format!("rays: {done} of {all} meshes"));
+        progress.at(done as f64 / all.max(1) as f64)
+    };
+    let rays = match SceneRays::with_progress(&handles.device, &handles.queue, scene, &told) {
+        Err(AccelError::Stopped) => return Err("cancelled".into()),
+        made => made.map(Box::new).map_err(|e| e.to_string()),
+    };
+    Ok(Product::Rays { stamp, rays })
 }
 
 /// How networks are run.
@@ -255,11 +270,13 @@ pub fn capture(gpu: &crate::gpu::Gpu, shot: &Shot, progress: &Progress) -> Resul
         traced
     } else {
         let method = method(shot.source, shot.weights.as_deref(), &shot.network)?;
-        progress.stage("capturing");
         let mut scene = SceneGpu::new(&gpu.device, &gpu.queue, &shot.scene).map_err(|e| e.to_string())?;
         if method.needs_rays() {
-            scene.trace(&gpu.device, &gpu.queue, &shot.scene).map_err(|e| e.to_string())?;
+            progress.stage("building trees for rays");
+            // Where they cannot be had, the rung below draws.
+            let _ = scene.trace(&gpu.device, &gpu.queue, &shot.scene);
         }
+        progress.stage("capturing");
         let warmup = if method.has_history() { Method::SETTLED - 1 } else { 0 };
         let options = RendererOptions { method, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, shot.size, options).map_err(|e| e.to_string())?;

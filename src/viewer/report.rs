@@ -28,6 +28,7 @@ pub fn report(app: &App) -> Value {
         "idle": app.is_idle(),
         "frames": app.frames, "layouts": app.overlay.layouts, "built": app.built, "places": app.overlay.memory.places, "density_drawn": app.overlay.density, "scene_frames": app.scene_frames,
         "view": s.view.name(), "left": s.left.name(), "right": s.right.name(), "split": s.split, "line": s.line,
+        "instead": stage.and_then(|st| st.instead()).map(|(method, why)| format!("{method}: {why}")),
         "drawn": { "left": key(Side::Left), "right": key(Side::Right) },
         "exposure": s.exposure, "tonemap": s.tonemap.name(), "samples": s.samples,
         "still": stage.map_or(0, |st| st.still()),

@@ -1,5 +1,6 @@
 //! `gi/` against its CPU twin, against arithmetic and against the laws it promises, on hand-made G-buffers.
 
+mod below;
 mod bring;
 #[path = "../common/build.rs"]
 mod build;
@@ -11,8 +12,11 @@ mod dataset;
 mod edges;
 mod gather;
 mod glossy;
+mod glow;
+mod lamps;
 mod screen;
 mod shot;
+mod sky_sun;
 mod stages;
 mod surroundings;
 mod taa;

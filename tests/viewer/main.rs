@@ -3,6 +3,7 @@
 #![recursion_limit = "512"]
 
 mod display;
+mod rays;
 mod session;
 mod switches;
 

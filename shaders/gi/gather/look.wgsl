@@ -47,6 +47,26 @@ fn sends_back(p: Place, l: vec3f, n_l: f32, irradiance: vec3f) -> vec3f {
     return irradiance * n_l * (p.diffuse / PI + ggx(p.n, p.v, l, p.f0, p.roughness));
 }
 
+// Lights of a long list that are looked at; `scene::upload::CANDIDATES`.
+const CANDIDATES = 8u;
+
+// The light that number `at` of [0, 1) draws.
+fn drawn_light(at: f32) -> u32 {
+    var low = 0u;
+    var high = gather.light_count - 1u;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if at < lights[middle].chance { high = middle; } else { low = middle + 1u; }
+    }
+    return low;
+}
+
+fn chance_of(i: u32) -> f32 {
+    var below = 0.0;
+    if i > 0u { below = lights[i - 1u].chance; }
+    return max(lights[i].chance - below, 1e-9);
+}
+
 // One of the analytic lights (where `lamps`) and of one point of what glows, by how bright the place would be without shadow.
 // `u` decides, `seed` gives further numbers.
 fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
@@ -56,21 +76,31 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
     var best = 0.0;
     var lot = u.x;
     if lamps {
-        for (var i = 0u; i < gather.light_count; i++) {
+        // A long list is looked at in places only, evenly spread over the lights' chances, and what is found there stands for
+        // the rest: resampled importance sampling (Talbot et al. 2005), right in the mean whatever the chances are.
+        let all = gather.light_count;
+        let few = all <= CANDIDATES || lights[all - 1u].chance <= 0.0;
+        let shift = unit_floats(pcg3(seed ^ vec3u(0x2c1b3c6du))).x;
+        let looks = select(CANDIDATES, all, few);
+        for (var k = 0u; k < looks; k++) {
+            var i = k;
+            if !few { i = drawn_light((f32(k) + shift) / f32(CANDIDATES)); }
             let light = lights[i];
             if light.stands_in != 0u { continue; }
             let s = sample_light(light, p.x);
             let n_l = dot(p.n, s.l);
             if n_l <= 0.0 { continue; }
             let value = sends_back(p, s.l, n_l, s.irradiance);
-            let w = weight_of(value);
+            var w = weight_of(value);
             if !(w > 0.0) { continue; }
+            let bright = w;
+            if !few { w /= f32(CANDIDATES) * chance_of(i); }
             total += w;
             // Weighted reservoir of one, with one random number that is used up bit by bit.
             let take = w / total;
             if lot < take {
                 lot /= take;
-                best = w;
+                best = bright;
                 chosen = Chosen(s.l, f32(i), value, s.irradiance * (n_l / PI));
             } else {
                 lot = (lot - take) / max(1.0 - take, 1e-7);
@@ -93,7 +123,7 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
         let facing = -dot(across, l) * inverseSqrt(max(dot(across, across), 1e-38));
         let n_l = dot(p.n, l);
         if n_l > 0.0 && (facing > 0.0 || ((e.flags & MET_DOUBLE_SIDED) != 0u && facing != 0.0)) {
-            let density = emission_density(e.radiance, e.flags, gather.inverse_power) * d2 / abs(facing);
+            let density = e.by_area * gather.inverse_power * d2 / abs(facing);
             // Against cosine-distributed rays that meet the same surface (balance heuristic; Veach 1997).
             let irradiance = e.radiance / (density + n_l / PI);
             let value = sends_back(p, l, n_l, irradiance);
@@ -152,8 +182,7 @@ fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, round: u32, glows: bool) -> Fo
     let n = select(-front, front, facing > 0.0);
     var radiance = vec3f(0.0);
     if glows && any(surface.emission > vec3f(0.0)) && (facing > 0.0 || (surface.flags & MET_DOUBLE_SIDED) != 0u) {
-        let density = emission_density(surface.emission, surface.flags, gather.inverse_power) * hit.t * hit.t
-            / max(abs(facing), 1e-6);
+        let density = surface.by_area * gather.inverse_power * hit.t * hit.t / max(abs(facing), 1e-6);
         radiance = surface.emission * (n_d / PI) / (n_d / PI + density);
     }
     let n_v = abs(facing);

@@ -8,7 +8,7 @@ struct Gather {
     frame: u32,
     light_count: u32,
     emitter_count: u32,
-    // One over what all that glows sends, as `emission_density` takes it.
+    // One over the sum of `by_area` times area of all that glows.
     inverse_power: f32,
     // Entries of the cache minus one; a power of two minus one.
     mask: u32,

@@ -61,6 +61,12 @@ pub fn prelude() -> String {
     format!("{}const LIFT = f32({LIFT:?});\n", CellSide::Four.prelude())
 }
 
+/// As in `entries.wgsl`.
+const LOT_BITS: u32 = 22;
+
+/// Storage buffers that `gi.rays` and `gi.renew` bind: as many as every WebGPU device has.
+const STORAGE_BUFFERS: u32 = 8;
+
 /// Bytes of what a cell's ray found.
 const RECORD: u64 = 48;
 
@@ -83,6 +89,8 @@ pub struct GatherGi {
     blur: Pass,
     bring: BringPass,
     store: Store,
+    /// Size of pictures that the device is known to have room for.
+    checked: [u32; 2],
     /// Bound where the host names no lights or no motion.
     no_lights: wgpu::Buffer,
     no_motion: wgpu::TextureView,
@@ -118,6 +126,36 @@ impl Pass {
 }
 
 impl GatherGi {
+    /// Whether a device with `limits` can have the method for pictures of `size` pixels.
+    ///
+    /// # Errors
+    /// [`GiError::Device`], which says what is too small.
+    pub fn check(limits: &wgpu::Limits, size: [u32; 2], options: &Options) -> Result<(), GiError> {
+        let has = limits.max_storage_buffers_per_shader_stage;
+        if has < STORAGE_BUFFERS {
+            return Err(GiError::Device(format!(
+                "binds {has} storage buffers to a shader stage, but rays need {STORAGE_BUFFERS}"
+            )));
+        }
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let bytes = Store::largest(size, options.slots);
+        if bytes > limit {
+            let [w, h] = size;
+            return Err(GiError::Device(format!(
+                "binds {limit} bytes at once, but a picture of {w}x{h} pixels by rays needs {bytes}"
+            )));
+        }
+        // A lot's low bits name a query.
+        let queries = CellSide::Four.count(size) + 4 * u64::from(options.slots);
+        if queries >= 1 << LOT_BITS {
+            return Err(GiError::Device(format!(
+                "is asked for {queries} rays a frame, but they are numbered up to {}",
+                1 << LOT_BITS
+            )));
+        }
+        Ok(())
+    }
+
     /// Makes pipelines, and buffers for pictures of `size` pixels.
     pub fn new(device: &wgpu::Device, size: [u32; 2], options: Options) -> Self {
         let inputs = InputGroup::new(device);
@@ -153,6 +191,7 @@ impl GatherGi {
             blur: new(alone, "gi.blur", "blur", &[READ, rw, rw, rw]),
             bring: BringPass::new(device, &inputs),
             store: Store::new(device, size, options.slots),
+            checked: size,
             no_lights: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("gi.no_lights"),
                 size: size_of::<crate::scene::upload::LightGpu>() as u64,
@@ -252,6 +291,10 @@ impl Rung for GatherGi {
     ) -> Result<(), GiError> {
         super::ambient::check_output(output, inputs.size)?;
         let rays = inputs.rays.as_ref().ok_or(GiError::Rays)?;
+        if inputs.size != self.checked {
+            Self::check(&self.device.limits(), inputs.size, &self.options)?;
+            self.checked = inputs.size;
+        }
         let bound = self.inputs.bind(queue, inputs)?;
         // Another scene's light is nobody's past.
         let another = rays.scene.id() != self.scene_id;
@@ -335,6 +378,10 @@ impl Rung for GatherGi {
 
     fn gloss(&self) -> Option<&wgpu::TextureView> {
         Some(&self.store.gloss)
+    }
+
+    fn finds_glow(&self, rays: bool) -> bool {
+        rays
     }
 
     fn settled(&self) -> Option<u32> {

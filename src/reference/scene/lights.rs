@@ -77,7 +77,7 @@ pub(super) fn pack(scene: &Scene, flat: &Flat) -> Lights {
     for (id, light) in (0u32..).zip(&scene.lights) {
         let mut gpu = LightGpu::new(light);
         // Rays that hit a light want to know how it would have been sampled; 0 tells that it is not there in truth.
-        gpu.pad = truth.iter().find(|t| t.0 == id).map_or(0, |t| (t.1 as f32).to_bits());
+        gpu.chance = truth.iter().find(|t| t.0 == id).map_or(0.0, |t| t.1 as f32);
         vectors.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&gpu)));
     }
     let truth_table = vectors.len() as u32;

@@ -1,8 +1,8 @@
 //! Which meshes are closed: from outside nobody sees the inner side of their faces.
 
+use crate::accel::hash;
 use crate::scene::Mesh;
 use glam::Vec3;
-use std::collections::HashMap;
 
 /// Larger meshes are not asked: the answer saves them nothing that anybody would see.
 const MOST: usize = 200_000;
@@ -14,7 +14,7 @@ pub(super) fn is_closed(mesh: &Mesh) -> bool {
         return false;
     }
     let reach = mesh.positions.iter().flatten().fold(0.0f32, |m, c| m.max(c.abs()));
-    let mut places = HashMap::new();
+    let mut places = hash::map(mesh.positions.len());
     // To five digits: where a surface meets itself, a file's or a sine's last digits differ.
     let bits = |p: &[f32; 3]| p.map(|c| (c / (1e-5 * reach)).round() as i32);
     let ids: Vec<usize> = mesh
@@ -25,7 +25,7 @@ pub(super) fn is_closed(mesh: &Mesh) -> bool {
             *places.entry(bits(p)).or_insert(next)
         })
         .collect();
-    let mut edges = HashMap::new();
+    let mut edges = hash::map(mesh.indices.len());
     let mut volume = 0.0;
     for t in mesh.indices.chunks_exact(3) {
         let [a, b, c] = [t[0], t[1], t[2]].map(|i| i as usize);

@@ -1,24 +1,58 @@
 //! The environment as a lat-long texture.
 
 use super::UploadError;
-use crate::scene::Environment;
+use crate::scene::environment::{Environment, EnvironmentImage};
+use crate::scene::{Light, LightKind};
+
+/// The surroundings on the GPU.
+pub(super) struct Sky {
+    /// A picture's rest, once its sun is taken out; alpha is what the eye sees beside that, as a multiple: 0 but for the sun's texels.
+    pub view: wgpu::TextureView,
+    pub bytes: u64,
+    /// With the rest's mean.
+    pub environment: Environment,
+    /// A sun that the picture held.
+    pub sun: Option<Light>,
+}
+
+/// Texels, with what is taken out of each as a multiple of what is left.
+fn texels(image: &EnvironmentImage, rest: Option<&EnvironmentImage>) -> Vec<[f32; 4]> {
+    let rest = rest.map_or(&image.rgb, |r| &r.rgb);
+    let both = image.rgb.chunks_exact(3).zip(rest.chunks_exact(3));
+    both.map(|(whole, left)| {
+        let (all, kept) = (whole.iter().sum::<f32>(), left.iter().sum::<f32>());
+        let more = if all > kept && kept > 0.0 { all / kept - 1.0 } else { 0.0 };
+        [left[0], left[1], left[2], more]
+    })
+    .collect()
+}
 
 /// `Rgba32Float`, without mip levels: nothing filters it but `shaders/lib/environment.wgsl`. Pictures larger than the
-/// device allows are halved until they fit, with a warning. Returns the view and its bytes.
+/// device allows are halved until they fit, with a warning.
 pub(super) fn upload(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
     environment: &Environment,
     warnings: &mut Vec<String>,
-) -> Result<(wgpu::TextureView, u64), UploadError> {
+) -> Result<Sky, UploadError> {
     let [r, g, b] = environment.radiance;
+    let (mut own, mut light) = (environment.clone(), None);
     let (mut width, mut height, mut texels) = (1, 1, vec![[r, g, b, 0.0]]);
     if let Some(image) = &environment.image {
         (width, height) = (image.width, image.height);
-        texels = image.rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2], 0.0]).collect();
-        if texels.len() as u64 != u64::from(width) * u64::from(height) || texels.is_empty() {
+        if image.rgb.len() as u64 != 3 * u64::from(width) * u64::from(height) || image.rgb.is_empty() {
             let reason = format!("{} values for {width}×{height} pixels", image.rgb.len());
             return Err(UploadError::Image { image: image.name.clone(), reason });
+        }
+        let sun = image.sun();
+        texels = self::texels(image, sun.as_ref().map(|s| &s.rest));
+        if let Some(sun) = sun {
+            if let LightKind::Directional { irradiance, angle, .. } = sun.light.kind {
+                let wide = angle.to_degrees();
+                tracing::info!("{}: {irradiance:.3} W/m² from {wide:.2}° of it are a light of their own", image.name);
+            }
+            own.radiance = sun.rest.mean();
+            light = Some(sun.light);
         }
         let limit = device.limits().max_texture_dimension_2d;
         while width > limit || height > limit {
@@ -48,7 +82,8 @@ pub(super) fn upload(
         wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(16 * width), rows_per_image: None },
         size,
     );
-    Ok((texture.create_view(&Default::default()), std::mem::size_of_val(texels.as_slice()) as u64))
+    let bytes = std::mem::size_of_val(texels.as_slice()) as u64;
+    Ok(Sky { view: texture.create_view(&Default::default()), bytes, environment: own, sun: light })
 }
 
 /// Averages of 2×2 pixels; an odd last row or column is dropped.
@@ -59,7 +94,12 @@ fn halved(width: u32, height: u32, texels: &[[f32; 4]]) -> (u32, u32, Vec<[f32; 
     for y in 0..h {
         for x in 0..w {
             let taps = [at(2 * x, 2 * y), at(2 * x + 1, 2 * y), at(2 * x, 2 * y + 1), at(2 * x + 1, 2 * y + 1)];
-            out.push(std::array::from_fn(|c| taps.iter().map(|t| 0.25 * t[c]).sum()));
+            let mut texel: [f32; 4] = std::array::from_fn(|c| taps.iter().map(|t| 0.25 * t[c]).sum());
+            // What is seen beside the rest is a multiple of it.
+            let sum = |t: &[f32; 4]| t[0] + t[1] + t[2];
+            let seen = taps.iter().map(|t| 0.25 * t[3] * sum(t)).sum::<f32>();
+            texel[3] = if seen > 0.0 { seen / sum(&texel) } else { 0.0 };
+            out.push(texel);
         }
     }
     (w, h, out)

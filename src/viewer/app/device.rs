@@ -72,6 +72,7 @@ impl App {
         self.tracing.facts = None;
         self.tracing.kept = Kept::default();
         self.building = [None; 2];
+        self.rays_of = None;
         self.meter.timed_frames = 0;
         self.meter.discard = 0;
         self.requested = false;

@@ -56,6 +56,8 @@ pub struct App {
     pub stage: Option<Stage>,
     pub jobs: Vec<Job>,
     building: [Option<Key>; 2],
+    /// Number of the uploaded scene whose trees are built or were given up.
+    rays_of: Option<u64>,
     /// What could not be built; it is not tried again until something changes.
     failed: HashSet<Key>,
     /// How often weights and shaders were replaced.
@@ -131,6 +133,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         stage: None,
         jobs: Vec::new(),
         building: [None; 2],
+        rays_of: None,
         failed: HashSet::new(),
         stamps: [0; 2],
         network: jobs::Network::default(),

@@ -217,6 +217,7 @@ impl App {
     /// The overlay's layout, with what it tells.
     fn show(&mut self, ui: &mut egui::Ui) -> Rect {
         let Some(stage) = &self.stage else { return Rect::NOTHING };
+        let instead = stage.instead();
         let facts = ui::Facts {
             adapter: &stage.gpu.info.name,
             software: stage.gpu.is_software(),
@@ -231,6 +232,7 @@ impl App {
             feature: stage.feature(),
             layers: &stage.layers(),
             flicker: self.meter.flicker,
+            instead: instead.as_ref(),
         };
         ui::show(ui, &mut self.state, &mut self.overlay.memory, &facts)
     }

@@ -37,6 +37,9 @@ impl App {
             self.building[1] = None;
         }
         let wanted = [Some(left), two.then_some(s.right)];
+        if wanted.into_iter().flatten().any(Source::needs_rays) && stage.wants_rays() {
+            self.reconcile_rays();
+        }
         for (side, source) in wanted.into_iter().enumerate() {
             let Some(key) = source.map(|s| self.key(s)) else { continue };
             let Some(stage) = &self.stage else { return };
@@ -59,6 +62,18 @@ impl App {
             let name = format!("build {}", key.0.name());
             self.spawn(name, Kind::Renderer(side), move |p| jobs::renderer(&handles, plan, p));
         }
+    }
+
+    /// Begins to build the trees of the scene on show, unless somebody is at it.
+    fn reconcile_rays(&mut self) {
+        let stamp = self.stamps[1];
+        let (Some(stage), Some(shown)) = (&self.stage, &self.state.shown) else { return };
+        if self.rays_of == Some(stamp) {
+            return;
+        }
+        self.rays_of = Some(stamp);
+        let (handles, scene) = (stage.handles(), shown.scene.clone());
+        self.spawn("trees for rays".into(), Kind::Rays, move |p| jobs::rays(&handles, stamp, &scene, p));
     }
 
     /// A source that cannot be had: the side keeps what it has.

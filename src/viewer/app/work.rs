@@ -52,6 +52,11 @@ impl App {
                 for job in std::mem::take(&mut self.jobs) {
                     job.progress.cancel();
                     self.state.tell(format!("cancelled: {}", job.name), false);
+                    if job.kind == Kind::Rays
+                        && let (Some(stage), Some(shown)) = (&mut self.stage, &self.state.shown)
+                    {
+                        stage.set_rays(&shown.scene, Err("their trees were cancelled".into()));
+                    }
                     if let Kind::Renderer(side) = job.kind
                         && let Some(key) = self.building[side].take()
                     {
@@ -64,11 +69,7 @@ impl App {
                 let Some(scene) = self.state.shown.as_ref().map(|s| s.scene.clone()) else { return };
                 self.spawn("upload the scene again".into(), Kind::Scene, move |_| {
                     let gpu = crate::scene::upload::SceneGpu::new(&handles.device, &handles.queue, &scene);
-                    let mut gpu = gpu.map_err(|e| e.to_string())?;
-                    if let Err(e) = gpu.trace(&handles.device, &handles.queue, &scene) {
-                        tracing::warn!("`gather` cannot be chosen: {e}");
-                    }
-                    Ok(Product::Uploaded(Box::new(gpu)))
+                    Ok(Product::Uploaded(Box::new(gpu.map_err(|e| e.to_string())?)))
                 });
             }
             Request::Path(path) => match CameraPath::load(&path) {
@@ -134,6 +135,14 @@ impl App {
                 stage.set_scene(*gpu);
                 // Hands may have changed something meanwhile.
                 self.state.stale = Stale { lights: true, placements: true, environment: true };
+            }
+            Ok(Product::Rays { stamp, rays }) => {
+                let shown = self.state.shown.as_ref().filter(|_| stamp == self.stamps[1]);
+                let Some(scene) = shown.map(|s| s.scene.clone()) else { return };
+                if let Err(why) = &rays {
+                    self.state.tell(format!("`gather` cannot draw this, so `ssgi` does: {why}"), true);
+                }
+                stage.set_rays(&scene, rays.map(|r| *r));
             }
             Ok(Product::Surroundings { path, environment }) => self.state.surround(&path, environment),
             Ok(Product::Weights(path)) => {

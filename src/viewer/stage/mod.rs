@@ -10,6 +10,7 @@ use super::jobs::{Handles, Key};
 use super::navigate::sphere;
 use super::show::{ShowInputs, ShowPass, SumPass, Sums};
 use super::state::{Stale, State};
+use crate::accel::SceneRays;
 use crate::gpu::{Gpu, readback, timing::Recorder};
 use crate::render::{RenderError, Renderer, View as Eye, sampling};
 use crate::scene::{Camera, Scene, upload::SceneGpu};
@@ -81,6 +82,31 @@ impl Stage {
         self.scene = Some(scene);
         self.reference = None;
         self.sight = None;
+    }
+
+    /// Rays into the scene on show, as it is now, or why it can have none.
+    pub fn set_rays(&mut self, scene: &Scene, rays: Result<SceneRays, String>) {
+        if let Some(gpu) = &mut self.scene {
+            gpu.set_rays(&self.gpu.queue, scene, rays);
+            self.sight = None;
+        }
+    }
+
+    /// True where nobody has said yet whether there can be rays.
+    pub fn wants_rays(&self) -> bool {
+        self.scene.as_ref().is_some_and(|s| s.rays.is_none() && s.no_rays.is_none())
+    }
+
+    /// What draws in the place of the method of the left side, and why.
+    pub fn instead(&self) -> Option<(&'static str, String)> {
+        let instead = self.slots[0].as_ref()?.renderer.instead()?;
+        let scene = self.scene.as_ref()?;
+        let why = match &scene.no_rays {
+            Some(why) => why.clone(),
+            None if scene.rays.is_none() => "until there are rays".into(),
+            None => instead.why.into(),
+        };
+        Some((instead.method, why))
     }
 
     /// True once there is a scene to draw.

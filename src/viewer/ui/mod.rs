@@ -43,6 +43,8 @@ pub struct Facts<'a> {
     /// Names of the network's layers.
     pub layers: &'a [&'a str],
     pub flicker: Option<f64>,
+    /// What draws in the place of the left side's method, and why.
+    pub instead: Option<&'a (&'static str, String)>,
 }
 
 #[cfg(test)]
@@ -63,6 +65,7 @@ impl<'a> Facts<'a> {
             feature: None,
             layers: &[],
             flicker: None,
+            instead: None,
         }
     }
 }

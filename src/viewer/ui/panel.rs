@@ -129,6 +129,10 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
         }
         ui.end_row();
     });
+    if let Some((method, why)) = facts.instead {
+        let asked = state.settings.left.name();
+        ui.label(RichText::new(format!("`{method}` draws in the place of `{asked}`: {why}")).color(super::ORANGE));
+    }
     if state.settings.view == View::Feature {
         ui.horizontal(|ui| {
             let (less, more) = (ui.button("<").clicked(), ui.button(">").clicked());

@@ -1,0 +1,122 @@
+//! The CPU's part of [`SceneRays`](super::SceneRays): a tree for each mesh, and what rays know of its triangles.
+
+use super::emitters::{self, Glow};
+use super::gpu::ROW;
+use super::image::Reductions;
+use super::wide::{Block, NODE, WORDS};
+use super::{Accel, AccelError, build, surfaces, threads};
+use crate::scene::{Mesh, Scene};
+use glam::Vec3;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// A mesh's tree, where it lies in the texture, and what of it glows.
+pub(super) struct MeshTree {
+    pub root: u32,
+    pub first_triangle: u32,
+    /// Object space; `None` for a mesh that nothing can hit.
+    pub bounds: Option<(Vec3, Vec3)>,
+    pub glows: Vec<Glow>,
+}
+
+/// All that is uploaded once.
+pub(super) struct SceneTrees {
+    /// Room for the tree over the instances, then the meshes' trees.
+    pub blocks: Vec<Block>,
+    pub surfaces: Vec<surfaces::Packed>,
+    pub meshes: Vec<MeshTree>,
+    /// Blocks of that room.
+    pub top_room: usize,
+}
+
+/// Blocks that the tree over `count` instances can need: a node has a family of eight, and there are fewer nodes than instances.
+fn top_blocks(count: usize) -> usize {
+    (8 * count + 16).next_multiple_of(ROW as usize)
+}
+
+/// What one mesh becomes on a thread.
+#[derive(Default)]
+struct Part {
+    accel: Accel,
+    surfaces: Vec<surfaces::Surface>,
+    glows: Vec<Glow>,
+}
+
+impl Part {
+    fn new(scene: &Scene, mesh: &Mesh, reductions: &Reductions) -> Self {
+        // What disagrees in itself is refused by the upload of the picture's part; here it is not met.
+        if mesh.check(scene.materials.len()).is_err() {
+            return Self::default();
+        }
+        let surfaces = surfaces::of_mesh(scene, mesh, reductions);
+        let corners: Vec<_> =
+            mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize])).collect();
+        let glows = emitters::glowing(&surfaces, &corners);
+        Self { accel: build::build(&corners), surfaces, glows }
+    }
+}
+
+impl SceneTrees {
+    /// Builds them on all of the machine's threads. `progress` as in [`SceneRays::with_progress`](super::SceneRays::with_progress).
+    pub fn build(scene: &Scene, progress: &(dyn Fn(usize, usize) -> bool + Sync)) -> Result<Self, AccelError> {
+        let reductions = Reductions::new(scene);
+        let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(!progress(0, scene.meshes.len())));
+        let part = |mesh: &Mesh| {
+            if stopped.load(Ordering::Relaxed) {
+                return Part::default();
+            }
+            let part = Part::new(scene, mesh, &reductions);
+            if !progress(done.fetch_add(1, Ordering::Relaxed) + 1, scene.meshes.len()) {
+                stopped.store(true, Ordering::Relaxed);
+            }
+            part
+        };
+        let parts = threads::map(&scene.meshes, |m| m.indices.len(), part);
+        if stopped.into_inner() {
+            return Err(AccelError::Stopped);
+        }
+        drop(reductions);
+
+        let top_room = top_blocks(scene.instances.len());
+        let mut blocks = Vec::with_capacity(top_room + parts.iter().map(|p| p.accel.block_count() + 8).sum::<usize>());
+        blocks.resize(top_room, [0; WORDS]);
+        let mut surfaces = Vec::with_capacity(parts.iter().map(|p| p.surfaces.len()).sum());
+        let mut meshes = Vec::with_capacity(parts.len());
+        for part in parts {
+            let root = blocks.len().next_multiple_of(8);
+            blocks.resize(root, [0; WORDS]);
+            meshes.push(MeshTree {
+                root: root as u32,
+                first_triangle: surfaces.len() as u32,
+                bounds: bounds(&part.accel),
+                glows: part.glows,
+            });
+            blocks.extend(part.accel.blocks.iter().map(|b| moved(b, root as u32, &part.surfaces)));
+            surfaces.extend(part.surfaces.iter().map(surfaces::Surface::packed));
+        }
+        Ok(Self { blocks, surfaces, meshes, top_room })
+    }
+}
+
+/// A block of a mesh's tree at its place in the texture.
+fn moved(block: &Block, root: u32, surfaces: &[surfaces::Surface]) -> Block {
+    let mut block = *block;
+    if block[3] & NODE != 0 {
+        block[3] += root;
+    } else if block.iter().any(|w| *w != 0) {
+        let open = |word: u32| surfaces[(word & 0x00ff_ffff) as usize].open();
+        block[15] = open(block[7]) | open(block[11]) << 8;
+    }
+    block
+}
+
+/// Corners of all that is in a tree; `None` for an empty one.
+fn bounds(accel: &Accel) -> Option<(Vec3, Vec3)> {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for block in accel.blocks.iter().filter(|b| b[3] & NODE == 0 && b.iter().any(|w| *w != 0)) {
+        for corner in block.chunks_exact(4) {
+            let p = Vec3::new(f32::from_bits(corner[0]), f32::from_bits(corner[1]), f32::from_bits(corner[2]));
+            (low, high) = (low.min(p), high.max(p));
+        }
+    }
+    (low.x <= high.x).then_some((low, high))
+}

@@ -1,0 +1,119 @@
+//! A method that needs rays, and the rung below it, which draws where there are none: while trees are built, in a scene or on a
+//! device that is too large or too small for them.
+
+use super::pass::NeuralGi;
+use super::rung::{Cost, Instead, Rung};
+use super::ssgi::{SsgiGi, SsgiOptions};
+use super::{GiError, Inputs};
+use crate::gpu::timing::Recorder;
+
+/// The method, or why the device cannot have it, with what draws instead.
+pub(super) struct OrBelow {
+    device: wgpu::Device,
+    above: Result<Box<dyn Rung>, String>,
+    /// Made when it is first needed.
+    below: Option<SsgiGi>,
+    /// Why the last frame is of the rung below.
+    why: Option<String>,
+    /// That is for the size of the picture.
+    too_small: bool,
+}
+
+impl OrBelow {
+    /// `above`: the method, or one sentence that says what the device lacks for it.
+    pub fn new(device: &wgpu::Device, above: Result<Box<dyn Rung>, String>) -> Self {
+        let why = above.as_ref().err().cloned();
+        Self { device: device.clone(), above, below: None, why, too_small: false }
+    }
+
+    /// What drew the last frame.
+    fn drew(&self) -> Option<&dyn Rung> {
+        match (&self.why, &self.above) {
+            (None, Ok(above)) => Some(above.as_ref()),
+            _ => self.below.as_ref().map(|b| b as &dyn Rung),
+        }
+    }
+}
+
+impl Rung for OrBelow {
+    fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError> {
+        if let Ok(above) = &mut self.above {
+            match above.record(recorder, queue, inputs, output) {
+                // Nothing was recorded.
+                Err(lacks @ (GiError::Rays | GiError::Device(_))) => {
+                    above.cut();
+                    self.too_small = matches!(lacks, GiError::Device(_));
+                    self.why = Some(lacks.to_string());
+                }
+                recorded => {
+                    (self.why, self.too_small) = (None, false);
+                    return recorded;
+                }
+            }
+        }
+        let below = self.below.get_or_insert_with(|| SsgiGi::new(&self.device, SsgiOptions::default()));
+        below.record(recorder, queue, inputs, output)
+    }
+
+    fn instead(&self) -> Option<Instead<'_>> {
+        Some(Instead { method: "ssgi", why: self.why.as_deref()? })
+    }
+
+    fn gloss(&self) -> Option<&wgpu::TextureView> {
+        self.drew()?.gloss()
+    }
+
+    fn neural(&self) -> Option<&NeuralGi> {
+        self.above.as_ref().ok()?.neural()
+    }
+
+    fn neural_mut(&mut self) -> Option<&mut NeuralGi> {
+        self.above.as_mut().ok()?.neural_mut()
+    }
+
+    fn finds_glow(&self, rays: bool) -> bool {
+        self.above.as_ref().is_ok_and(|a| a.finds_glow(rays)) && !self.too_small
+    }
+
+    fn set_frame(&mut self, queue: &wgpu::Queue, frame: u32) {
+        if let Ok(above) = &mut self.above {
+            above.set_frame(queue, frame);
+        }
+        if let Some(below) = &mut self.below {
+            below.set_frame(queue, frame);
+        }
+    }
+
+    fn cut(&mut self) {
+        if let Ok(above) = &mut self.above {
+            above.cut();
+        }
+    }
+
+    fn settled(&self) -> Option<u32> {
+        self.drew()?.settled()
+    }
+
+    fn forget(&mut self) {
+        if let Ok(above) = &mut self.above {
+            above.forget();
+        }
+        if let Some(below) = &mut self.below {
+            below.forget();
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        self.above.as_ref().map_or(0, |a| a.bytes()) + self.below.as_ref().map_or(0, |b| b.bytes())
+    }
+
+    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
+        self.drew().map(|d| d.costs(size)).unwrap_or_default()
+    }
+}

@@ -1,0 +1,202 @@
+//! What glows lights each place exactly once in `gather`: seen through holes, mirrored, and with lights that stand in for it.
+
+use crate::build::{look_at, material, quad};
+use crate::common;
+use crate::gather::uploaded;
+use crate::world::{self, difference, mean};
+use bouncelight::gi::{Method, gather::Options};
+use bouncelight::gpu::Gpu;
+use bouncelight::render::capture::{CaptureOptions, CapturedFrame, Layer, capture};
+use bouncelight::scene::{AlphaMode, Camera, Material, Mesh, Scene, defaults, upload::SceneGpu};
+
+const PLAIN: Method = Method::Gather(Options::PLAIN);
+
+fn matte(albedo: f32) -> Material {
+    Material { f0: 0.0, roughness: 1.0, double_sided: false, ..material([albedo; 3]) }
+}
+
+/// Meshes with a material each.
+fn of_parts(parts: Vec<(Mesh, Material)>, camera: Camera) -> Scene {
+    let (mut meshes, mut materials) = (Vec::new(), Vec::new());
+    for (i, (mut mesh, material)) in parts.into_iter().enumerate() {
+        mesh.material = i;
+        meshes.push(mesh);
+        materials.push(material);
+    }
+    let mut scene = crate::build::scene(meshes, Vec::new());
+    scene.materials = materials;
+    scene.cameras = vec![camera];
+    scene
+}
+
+fn frame(gpu: &Gpu, method: Method, scene: &Scene, uploaded: &SceneGpu, frames: u32) -> CapturedFrame {
+    sized(gpu, [32, 24], method, scene, uploaded, frames)
+}
+
+fn sized(gpu: &Gpu, size: [u32; 2], method: Method, scene: &Scene, uploaded: &SceneGpu, frames: u32) -> CapturedFrame {
+    let layers = &[Layer::DiffDir, Layer::DiffInd, Layer::Position];
+    let options = CaptureOptions { layers, warmup: frames - 1, ..Default::default() };
+    let mut renderer = world::renderer(gpu, size, method);
+    capture(gpu, &mut renderer, uploaded, &scene.cameras[0], options).expect("the frame is drawn")
+}
+
+fn layer(frame: &CapturedFrame, layer: Layer) -> &[f32] {
+    &frame.layer(layer).expect("it was asked for").data
+}
+
+/// A wide sheet close above a floor, so that light samples and rays that happen to meet it share the work.
+#[test]
+fn a_sheet_with_holes_sends_what_its_coverage_says() {
+    let Some(gpu) = common::gpu() else { return };
+    let (half, height, glow) = (1.5f32, 0.9f32, 2.0f32);
+    let build = |coverage: f32| {
+        let (base_color, alpha_mode) = ([0.0, 0.0, 0.0, coverage], AlphaMode::Blend);
+        let sheet = Material { emissive: [glow; 3], base_color, alpha_mode, ..matte(0.0) };
+        let floor = quad([-4.0, 0.0, -4.0], [0.0, 0.0, 8.0], [8.0, 0.0, 0.0]);
+        let down = quad([-half, height, -half], [2.0 * half, 0.0, 0.0], [0.0, 0.0, 2.0 * half]);
+        of_parts(vec![(floor, matte(0.02)), (down, sheet)], look_at([0.0, 0.8, 2.6], [0.0, 0.0, -0.2], 0.8))
+    };
+    // Mean over what is in view of the light, over that by arithmetic for a sheet without holes.
+    let share = |coverage: f32| {
+        let scene = build(coverage);
+        let frame = sized(&gpu, [96, 72], PLAIN, &scene, &uploaded(&gpu, &scene), 100);
+        let (mut found, mut expected) = (0.0, 0.0);
+        for (e, p) in layer(&frame, Layer::DiffInd).chunks_exact(3).zip(layer(&frame, Layer::Position).chunks_exact(3))
+        {
+            // The background is said to be at the origin.
+            if p[1].abs() > 1e-3 || *p == [0.0; 3] {
+                continue;
+            }
+            found += f64::from(e[0]);
+            // E/π, by the midpoints of 60 × 60 squares.
+            let side = 2.0 * half / 60.0;
+            for k in 0..3600 {
+                let [x, z] = [k / 60, k % 60].map(|i| side * (i as f32 + 0.5) - half);
+                let d2 = (x - p[0]).powi(2) + height * height + (z - p[2]).powi(2);
+                expected += f64::from(side * side * glow * height * height / (d2 * d2)) / std::f64::consts::PI;
+            }
+        }
+        found / expected
+    };
+    let (whole, holes, few) = (share(1.0), share(128.0 / 255.0), share(26.0 / 255.0));
+    println!("a sheet's light: whole {whole:.4}, half {holes:.4}, a tenth {few:.4}");
+    assert!((whole - 1.0).abs() < 0.015, "{whole}");
+    assert!((holes / (128.0 / 255.0) - 1.0).abs() < 0.02, "{holes}");
+    assert!((few / (26.0 / 255.0) - 1.0).abs() < 0.04, "{few}");
+}
+
+/// A closed room of 4 m with six glowing panels, of which four have lights that stand in for them.
+fn six_panels() -> Scene {
+    let wall = |c: [f32; 3], u: [f32; 3], v: [f32; 3]| (quad(c, u, v), matte(0.5));
+    let (x, y, z) = ([4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]);
+    let mut parts = vec![
+        wall([-2.0, 0.0, -2.0], z, x),
+        wall([-2.0, 4.0, -2.0], x, z),
+        wall([-2.0, 0.0, -2.0], x, y),
+        wall([-2.0, 0.0, 2.0], y, x),
+        wall([-2.0, 0.0, -2.0], y, z),
+        wall([2.0, 0.0, -2.0], z, y),
+    ];
+    for i in 0..6 {
+        let at = [-1.6 + 1.2 * (i % 3) as f32, 3.6, -1.4 + 1.8 * (i / 3) as f32];
+        let panel = quad(at, [0.5, 0.0, 0.0], [0.0, 0.0, 0.4 + 0.02 * i as f32]);
+        parts.push((panel, Material { emissive: [3.0, 2.0, 1.0], ..matte(0.3) }));
+    }
+    let mut scene = of_parts(parts, look_at([1.7, 1.5, 1.7], [-0.8, 0.8, -1.0], 1.2));
+    defaults::complete(&mut scene);
+    assert_eq!(scene.lights.iter().filter(|l| l.stands_in).count(), 4);
+    scene
+}
+
+#[cfg(feature = "reference")]
+#[test]
+fn six_panels_light_a_room_once_each() {
+    use bouncelight::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
+    let Some(gpu) = common::gpu() else { return };
+    let scene = six_panels();
+    let sum = |f: &CapturedFrame| mean(layer(f, Layer::DiffDir)) + mean(layer(f, Layer::DiffInd));
+    let gathered = frame(&gpu, PLAIN, &scene, &uploaded(&gpu, &scene), 200);
+    let packed = ReferenceScene::new(&gpu.device, &gpu.queue, &scene).expect("it fits");
+    let kernel = Kernel::new(&gpu.device);
+    let subject = Subject { camera: &scene.cameras[0], size: [32, 24], points: None };
+    let options = TracerOptions { samples: 256, layers: vec![Traced::DiffDir, Traced::DiffInd], ..Default::default() };
+    let mut tracer = Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options).expect("it fits");
+    while tracer.step().expect("it traces") {}
+    let traced = tracer.finish().expect("it traces");
+    let truth: f64 = traced.layers.iter().map(|(_, data)| mean(data)).sum();
+    println!("six panels: {:.4}, traced {truth:.4}", sum(&gathered));
+    assert!((sum(&gathered) / truth - 1.0).abs() < 0.02, "{} {truth}", sum(&gathered));
+    assert!(layer(&gathered, Layer::DiffDir).iter().all(|v| *v == 0.0), "no lamp is left");
+    // Negative control: lamps that are lamps shine beside the panels.
+    let mut both = scene.clone();
+    both.lights.iter_mut().for_each(|l| l.stands_in = false);
+    assert!(sum(&frame(&gpu, PLAIN, &both, &uploaded(&gpu, &both), 60)) > 1.3 * truth);
+    // Where there are no rays, the lamps stand in.
+    let plain = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("it fits");
+    assert!(mean(layer(&frame(&gpu, PLAIN, &scene, &plain, 1), Layer::DiffDir)) > 0.2 * truth);
+}
+
+/// A glowing wedge as `turn` changes its corners, as geometry or by its instance's transform.
+fn wedge(turn: [f32; 3], by_instance: bool, reversed: bool) -> Scene {
+    let floor = quad([-4.0, 0.0, -4.0], [0.0, 0.0, 8.0], [8.0, 0.0, 0.0]);
+    let mut panel = quad([0.3, 0.4, -0.8], [0.2, 1.3, 0.1], [0.3, 0.1, 1.7]);
+    let glow = Material { emissive: [4.0, 2.0, 1.0], ..matte(0.4) };
+    if !by_instance {
+        panel.positions.iter_mut().for_each(|p| (0..3).for_each(|k| p[k] *= turn[k]));
+        panel.normals.iter_mut().for_each(|n| (0..3).for_each(|k| n[k] *= turn[k]));
+        if reversed {
+            panel.indices.chunks_exact_mut(3).for_each(|t| t.swap(1, 2));
+        }
+    }
+    let mut scene = of_parts(vec![(floor, matte(0.5)), (panel, glow)], look_at([0.0, 3.0, 3.0], [0.0; 3], 1.0));
+    if by_instance {
+        (0..3).for_each(|k| scene.instances[1].transform[k][k] = turn[k]);
+    }
+    scene
+}
+
+#[test]
+fn a_mirrored_instance_lights_as_its_mirrored_geometry() {
+    let Some(gpu) = common::gpu() else { return };
+    let light = |scene: &Scene| layer(&frame(&gpu, PLAIN, scene, &uploaded(&gpu, scene), 60), Layer::DiffInd).to_vec();
+    for turn in [[-1.0, 1.0, 1.0], [-1.0, 1.0, -0.7], [1.0, 1.0, -1.3]] {
+        let mirrored = turn.iter().product::<f32>() < 0.0;
+        let (instance, geometry) = (light(&wedge(turn, true, false)), light(&wedge(turn, false, mirrored)));
+        println!("{turn:?}: {:.4} apart", difference(&instance, &geometry));
+        assert!(mean(&geometry) > 0.01 && difference(&instance, &geometry) < 0.02);
+        // Negative control: the other side glows where the corners' order is not what it should be.
+        assert!(difference(&light(&wedge(turn, false, !mirrored)), &geometry) > 0.2);
+    }
+}
+
+#[test]
+fn triangles_that_cannot_be_are_not_there() {
+    let Some(gpu) = common::gpu() else { return };
+    let good = wedge([1.0; 3], true, false);
+    let mut bad = good.clone();
+    // Of the floor and of the panel: triangles with NaN, with infinity, far out, and without area.
+    for mesh in &mut bad.meshes {
+        let odd = |v: f32| [[v, 1.0, 0.0], [1.0, v, 0.0], [0.0, 1.0, v]];
+        for corners in [odd(f32::NAN), odd(f32::INFINITY), odd(1e30), [[0.5; 3]; 3]] {
+            let first = mesh.positions.len() as u32;
+            mesh.positions.extend(corners);
+            mesh.normals.extend([[0.0, 1.0, 0.0]; 3]);
+            if !mesh.uv0.is_empty() {
+                mesh.uv0.extend([[0.0; 2]; 3]);
+            }
+            mesh.indices.extend([first, first + 1, first + 2]);
+        }
+    }
+    // The picture's part may clip what is far out in its own way, so both are drawn with the good one's.
+    let light = |rays_of: &Scene| {
+        let mut scene = uploaded(&gpu, &good);
+        scene.trace(&gpu.device, &gpu.queue, rays_of).expect("the rest fits");
+        let frame = frame(&gpu, PLAIN, &good, &scene, 40);
+        (layer(&frame, Layer::DiffInd).to_vec(), scene.rays.as_ref().expect("it was made").counts())
+    };
+    let ((clean, _), (light, counts)) = (light(&good), light(&bad));
+    assert!(light.iter().all(|v| v.is_finite()) && mean(&clean) > 0.01);
+    assert_eq!((counts.instances, counts.left_out, counts.emitters), (2, 0, 2), "{counts:?}");
+    println!("{:.4} apart", difference(&light, &clean));
+    assert!(difference(&light, &clean) < 0.02);
+}
