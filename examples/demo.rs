@@ -1,4 +1,4 @@
-//! What `cargo xtask demo` runs: the bundled interior in out/demo.png (above raster | cache, below
+//! What `cargo xtask demo` runs: the bundled interior in out/demo.png (above raster | gather, below
 //! neural | reference), then the timing table.
 //!
 //! It is also the shortest tour of the library: load a scene, open a device, draw with three methods, write a picture.

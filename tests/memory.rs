@@ -23,9 +23,8 @@ fn resident() -> u64 {
 fn frames_take_no_memory() {
     let Some(gpu) = common::gpu() else { return };
     let scene = scene::load("paper-room:60").expect("the room is made by code");
-    let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("the scene fits");
-    uploaded.trace(&gpu.device, &gpu.queue, &scene).expect("its rays fit");
-    for method in [Method::Direct, Method::Gather(Default::default())] {
+    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("the scene fits");
+    for method in [Method::Direct, Method::Ssgi] {
         let shadow = ShadowOptions { sun_size: 512, ..Default::default() };
         let options = RendererOptions { method: method.clone(), taa: true, shadow };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, [64, 32], options).expect("the size fits");

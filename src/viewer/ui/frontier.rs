@@ -160,8 +160,7 @@ mod tests {
     #[test]
     fn a_dot_can_be_hit_beside_another_of_the_same_time() {
         for ssgi in [300.0, 299.0, 301.0, 500.0] {
-            let measured =
-                [(Source::Ambient, 300.0), (Source::Ssgi, ssgi), (Source::Gather, 300.0), (Source::Neural, 300.1)];
+            let measured = [(Source::Ambient, 300.0), (Source::Ssgi, ssgi), (Source::Direct, 300.1)];
             for source in measured.map(|m| m.0) {
                 assert_eq!(chosen(&measured, source.name()), source, "ssgi takes {ssgi} ms");
             }
