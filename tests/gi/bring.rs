@@ -202,7 +202,7 @@ fn what_lobes_show_stays_on_surfaces_with_lobes() {
     let found = off(&shows);
     assert!(found < 0.02, "{found} of the floor's and the plate's pixels show another surface's lobe");
     // Negative control: one lobe for all.
-    assert!(off(&|_| shows(FLOOR)) > 0.05);
+    assert!(off(&|_| shows(PLATE)) > 0.05);
     // Far from any lobe the light of the surface's own side stands in.
     let (_, gloss) = bring_both(&gpu, &shot, |_| even(0.25), |_| [0.0; 4]);
     assert!((0..gloss.len()).filter(|i| surfaces[*i] == WALL).all(|i| (gloss[i][0] - 0.25).abs() < 1e-3));

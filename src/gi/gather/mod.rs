@@ -146,7 +146,7 @@ impl GatherGi {
             )));
         }
         // A lot's low bits name a query.
-        let queries = CellSide::Four.count(size) + 4 * u64::from(options.slots);
+        let queries = CellSide::Four.count(size) + store::squares(size) + 4 * u64::from(options.slots);
         if queries >= 1 << LOT_BITS {
             return Err(GiError::Device(format!(
                 "is asked for {queries} rays a frame, but they are numbered up to {}",

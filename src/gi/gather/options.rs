@@ -3,8 +3,6 @@
 use std::str::FromStr;
 use thiserror::Error;
 
-/// Frames of a still camera, the last one written, where nobody says otherwise.
-
 /// How light is gathered. The numbers that are choices stand in the table of `docs/gi.md`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {

@@ -70,7 +70,8 @@ impl Store {
     /// Bytes of the largest buffer.
     pub fn largest(size: [u32; 2], slots: u32) -> u64 {
         let (cells, slots) = (CellSide::Four.count(size).max(1), u64::from(slots));
-        [16 * (cells + 4 * slots), 32 * slots, PAST * cells, RECORD * cells, CellSide::Four.light_bytes(size)]
+        let rays = cells + squares(size);
+        [16 * (rays + 4 * slots), 32 * slots, PAST * cells, RECORD * rays, CellSide::Four.light_bytes(size)]
             .into_iter()
             .max()
             .unwrap_or(0)
