@@ -226,6 +226,12 @@ impl Limits {
         }
     }
 
+    /// Texels that images may have beside the picture of the surroundings.
+    fn texels(&self, scene: &Scene) -> u64 {
+        let sky = scene.environment.image.as_ref().map_or(0, |image| image.rgb.len() as u64);
+        (self.binding.min(self.buffer) / 4).saturating_sub(sky)
+    }
+
     fn check(&self, what: &str, bytes: u64) -> Result<(), PackError> {
         let (limit, name) = if self.binding <= self.buffer {
             (self.binding, "maxStorageBufferBindingSize")

@@ -25,6 +25,7 @@ mod geometry;
 pub mod gltf;
 #[cfg(feature = "io")]
 mod load;
+pub(crate) mod mips;
 #[cfg(feature = "io")]
 pub mod obj;
 #[cfg(feature = "io")]

@@ -167,10 +167,11 @@ fn is_lit(x: vec3f, chosen: Chosen, seed: u32) -> bool {
 }
 
 // What the ray from o finds in direction d. n_d: cosine by which shadow rays to what glows were weighted there, ALONE where none were
-// sent. `query` is the ray's number among all of the frame, `round` that which will update the entry, `glows`: whether what glows counts
+// sent. `query` is the ray's number among all of the frame, `name` what its random numbers are drawn by, which slots of the table must
+// not decide, since they go to who comes first; `round` is that which will update the entry, `glows`: whether what glows counts
 // where the ray meets it.
-fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, round: u32, glows: bool) -> Found {
-    let seed = pcg3(vec3u(query, gather.round, 0x9e3779b9u));
+fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, name: u32, round: u32, glows: bool) -> Found {
+    let seed = pcg3(vec3u(name, gather.round, 0x9e3779b9u));
     let hit = trace_seeded(o, d, FAR, false, seed.x);
     if hit.triangle == NO_TRIANGLE {
         return Found(finite3(environment_radiance(d)), NONE, vec3f(0.0), FAR);
@@ -197,5 +198,5 @@ fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, round: u32, glows: bool) -> Fo
     let place = Place(x, n, -d, diffuse, surface.f0, max(surface.roughness, LEAST_ROUGHNESS));
     let chosen = choose_light(place, true, pcg3(seed));
     if is_lit(x, chosen, seed.y) { radiance += chosen.radiance; }
-    return Found(radiance, ask_entry(x, n, query, round), back, hit.t);
+    return Found(radiance, ask_entry(x, n, query, name, round), back, hit.t);
 }

@@ -63,7 +63,7 @@ fn rays(@builtin(global_invocation_id) id: vec3u) {
     let at = start_at(unpack_pixel(packed));
     let d = cosine_direction(at.n, numbers(id.xy));
     let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
-    let found = look(at.x, d, max(dot(at.n, d), 1e-4), cell, gather.round, !stands_in);
+    let found = look(at.x, d, max(dot(at.n, d), 1e-4), cell, cell, gather.round, !stands_in);
     var glow = vec4f(0.0);
     if gather.emitter_count > 0u && !stands_in {
         let seed = pcg3(vec3u(cell, gather.round, 0x51ed270bu));
@@ -113,7 +113,7 @@ fn gloss_ray(square: vec2u) {
         weight = fresnel_of(surface.rgb, saturate(dot(v, h))) * lobe_gain(surface.rgb, surface.a, n_v) * kept
             / max(share, vec3f(1e-4));
         let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
-        found = look(at.x, frame * l, ALONE, ray, gather.round, !stands_in);
+        found = look(at.x, frame * l, ALONE, ray, ray, gather.round, !stands_in);
     }
     record(ray, found, weight, frame * l, vec4f(0.0));
 }

@@ -1,8 +1,10 @@
 //! Materials and their images as the path tracer reads them.
 
 use super::{Limits, PackError};
-use crate::scene::{AlphaMode, ColorSpace, Material, Scene, TextureRef, Wrap};
+use crate::scene::mips::Level;
+use crate::scene::{AlphaMode, ColorSpace, Image, Material, Scene, TextureRef, Wrap};
 use bytemuck::{Pod, Zeroable};
+use std::borrow::Cow;
 
 /// A use of an image; the twin of `ImageUse` in `shaders/reference/types.wgsl`.
 #[repr(C)]
@@ -57,7 +59,6 @@ pub struct RefMaterial {
 /// The scene's materials, and the texels of all images that they use (RGBA, 8 bits each, red lowest).
 pub(super) fn pack(scene: &Scene, limits: &Limits) -> Result<(Vec<RefMaterial>, Vec<u32>), PackError> {
     let mut first = vec![None; scene.images.len()];
-    let mut total = 0u64;
     for use_ in scene.materials.iter().flat_map(uses).flatten() {
         let image = scene.images.get(use_.image).ok_or_else(|| PackError::Image {
             image: use_.image,
@@ -69,19 +70,14 @@ pub(super) fn pack(scene: &Scene, limits: &Limits) -> Result<(Vec<RefMaterial>, 
             let reason = format!("{} bytes for {}×{} pixels", image.rgba.len(), image.width, image.height);
             return Err(PackError::Image { image: use_.image, name: image.name.clone(), reason });
         }
-        if first[use_.image].is_none() {
-            first[use_.image] = Some(total);
-            total += pixels;
-        }
+        first[use_.image] = Some(0);
     }
-    limits.check("the texels of all images", 4 * total)?;
-    let mut texels = vec![0u32; total as usize];
-    for (image, at) in scene.images.iter().zip(&first) {
+    let levels = fitting(scene, &first, limits.texels(scene))?;
+    let mut texels = Vec::new();
+    for (level, at) in levels.iter().zip(&mut first) {
         if let Some(at) = at {
-            let out = &mut texels[*at as usize..][..image.rgba.len() / 4];
-            for (word, p) in out.iter_mut().zip(image.rgba.chunks_exact(4)) {
-                *word = u32::from_le_bytes([p[0], p[1], p[2], p[3]]);
-            }
+            *at = texels.len() as u64;
+            texels.extend(level.rgba.chunks_exact(4).map(|p| u32::from_le_bytes([p[0], p[1], p[2], p[3]])));
         }
     }
     let image_use = |r: Option<TextureRef>| {
@@ -99,7 +95,8 @@ pub(super) fn pack(scene: &Scene, limits: &Limits) -> Result<(Vec<RefMaterial>, 
             | u32::from(!r.sampler.mag_linear) << 6;
         let [row0, row1] = r.transform;
         let texel = first[r.image].unwrap_or_default() as u32;
-        ImageUse { row0, texel, row1, bits, size: [image.width, image.height], pad: [0; 2] }
+        let level = &levels[r.image];
+        ImageUse { row0, texel, row1, bits, size: [level.width, level.height], pad: [0; 2] }
     };
     let items = scene.materials.iter().map(|m| {
         let [base_use, rough_use, normal_use, emissive_use] = uses(m).map(image_use);
@@ -124,6 +121,38 @@ pub(super) fn pack(scene: &Scene, limits: &Limits) -> Result<(Vec<RefMaterial>, 
         }
     });
     Ok((items.collect(), texels))
+}
+
+/// The images, those that some material uses halved, the largest first, until all have no more than `limit` texels.
+fn fitting<'a>(scene: &'a Scene, used: &[Option<u64>], limit: u64) -> Result<Vec<Level<'a>>, PackError> {
+    let level = |i: &'a Image| Level { width: i.width, height: i.height, rgba: Cow::Borrowed(i.rgba.as_slice()) };
+    let mut levels: Vec<_> = scene.images.iter().map(level).collect();
+    let texels = |l: &Level<'_>| u64::from(l.width) * u64::from(l.height);
+    loop {
+        let all = || levels.iter().enumerate().filter(|(i, _)| used[*i].is_some());
+        let total: u64 = all().map(|(_, l)| texels(l)).sum();
+        let Some((largest, most)) = all().map(|(i, l)| (i, texels(l))).max_by_key(|(_, n)| *n) else { break };
+        if total <= limit {
+            break;
+        }
+        if most <= 1 {
+            return Err(PackError::Image {
+                image: largest,
+                name: scene.images[largest].name.clone(),
+                reason: format!("is one of so many that the device holds no texel of each ({limit} in all)"),
+            });
+        }
+        levels[largest] = levels[largest].halved(scene.images[largest].color_space);
+    }
+    let smaller = levels.iter().zip(&scene.images).filter(|(l, i)| l.width != i.width || l.height != i.height).count();
+    if smaller > 0 {
+        tracing::warn!(
+            "{smaller} of {} images are traced at a lower resolution: the device binds {} MB of texels at once",
+            scene.images.len(),
+            limit * 4 / 1_000_000
+        );
+    }
+    Ok(levels)
 }
 
 /// In the order of [`RefMaterial`].
