@@ -5,7 +5,8 @@
                              [--samples 4] [--constant 0.0592,0.0631,0.0570] [--csv out/judge.csv] [--bouncelight target/release/bouncelight]
 
 A method `gather@N` is drawn after N frames of a still camera (1: the first after a cut), `gather@pan` after sixteen frames in which the
-camera, settled before, turned by 1 degree each; one without says nothing of frames and has the program's own default. A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file. `apply:FILE` is a network on
+camera, settled before, turned by 1 degree each; one without says nothing of frames and has the program's own default. `gather+caustics=0`
+(or another of its numbers) is drawn with `render --gather caustics=0`, for references made without Cycles' "Reflective Caustics". A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file. `apply:FILE` is a network on
 pictures (the paper's, pix2pix/): `bouncelight apply` on the four pictures of the raster; `dropout:FILE` is the same with dropout on,
 as the authors ran theirs. Both give 8-bit pictures, so they have no relmse and no light.
 
@@ -170,8 +171,10 @@ def draw(program, scene, row, path, size, samples, inputs):
             subprocess.run(command + (["--dropout", "1"] if kind == "dropout" else []), check=True)
         return
     kind, _, state = kind.partition("@")
+    kind, *options = kind.split("+")
     command = [program, "render", *scene, "--size", size, "--method", kind, "--samples", str(samples), "--aov", "all"]
     command += ["--weights", weights] if weights else []
+    command += ["--gather", ",".join(options)] if options else []
     if state == "pan":
         with tempfile.TemporaryDirectory() as folder:
             keys = os.path.join(folder, "pan.json")

@@ -186,8 +186,8 @@ impl Renderer {
     /// Counted cost of the passes that find and add indirect light.
     pub fn costs(&self) -> Vec<Cost> {
         let mut costs = self.indirect.as_ref().map(|i| i.costs(self.targets.size)).unwrap_or_default();
-        if self.indirect.is_some() {
-            costs.extend(GlossyPass::costs(self.targets.size));
+        if let Some(indirect) = &self.indirect {
+            costs.extend(GlossyPass::costs(self.targets.size, indirect.gloss().is_some()));
         }
         costs.extend(self.taa.as_ref().map(|_| TaaPass::cost(self.targets.size)));
         costs

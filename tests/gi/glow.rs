@@ -115,7 +115,7 @@ fn six_panels_light_a_room_once_each() {
     let Some(gpu) = common::gpu() else { return };
     let scene = six_panels();
     let sum = |f: &CapturedFrame| mean(layer(f, Layer::DiffDir)) + mean(layer(f, Layer::DiffInd));
-    let gathered = frame(&gpu, PLAIN, &scene, &uploaded(&gpu, &scene), 200);
+    let gathered = frame(&gpu, PLAIN, &scene, &uploaded(&gpu, &scene), 600);
     let packed = ReferenceScene::new(&gpu.device, &gpu.queue, &scene).expect("it fits");
     let kernel = Kernel::new(&gpu.device);
     let subject = Subject { camera: &scene.cameras[0], size: [32, 24], points: None };
