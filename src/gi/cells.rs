@@ -4,7 +4,7 @@
 //! middle. A cell that shows any surface has a pixel on one.
 //!
 //! A method at low resolution records [`CellsPass`], then its own gather, which joins `gi/cells.wgsl` behind
-//! `gi/inputs.wgsl`, reads [`CellsPass::pixels`] and writes its light buffer ([`CellSide::light_bytes`]), then
+//! `gi/inputs.wgsl`, reads [`CellsPass::pixels`] and writes its light buffer ([`light_bytes`]), then
 //! [`UpsamplePass`](super::gather::bring::BringPass).
 //!
 //! # The light buffer
@@ -22,49 +22,32 @@ use crate::gpu::timing::Recorder;
 pub const NO_PIXEL: u32 = u32::MAX;
 
 /// Pixels on a side of a cell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CellSide {
-    /// Quarter resolution.
-    Four,
-    /// Eighth resolution.
-    Eight,
+pub const SIDE: u32 = 4;
+
+/// Columns and rows of cells of a picture of `size` pixels.
+pub fn grid(size: [u32; 2]) -> [u32; 2] {
+    size.map(|n| n.div_ceil(SIDE))
 }
 
-impl CellSide {
-    /// The number.
-    pub fn pixels(self) -> u32 {
-        match self {
-            CellSide::Four => 4,
-            CellSide::Eight => 8,
-        }
-    }
+/// Cells of a picture of `size` pixels.
+pub fn count(size: [u32; 2]) -> u64 {
+    let [w, h] = grid(size).map(u64::from);
+    w * h
+}
 
-    /// Columns and rows of cells of a picture of `size` pixels.
-    pub fn grid(self, size: [u32; 2]) -> [u32; 2] {
-        size.map(|n| n.div_ceil(self.pixels()))
-    }
+/// Size of the light buffer of a picture of `size` pixels, bytes: 48 a cell.
+pub fn light_bytes(size: [u32; 2]) -> u64 {
+    count(size) * 48
+}
 
-    /// Cells of a picture of `size` pixels.
-    pub fn count(self, size: [u32; 2]) -> u64 {
-        let [w, h] = self.grid(size).map(u64::from);
-        w * h
-    }
-
-    /// Size of the light buffer of a picture of `size` pixels, bytes: 48 a cell.
-    pub fn light_bytes(self, size: [u32; 2]) -> u64 {
-        self.count(size) * 48
-    }
-
-    /// `CELL_SIDE` as WGSL, for every shader that joins `gi/cells.wgsl`.
-    pub fn prelude(self) -> String {
-        format!("const CELL_SIDE = {}i;\n", self.pixels())
-    }
+/// `CELL_SIDE` as WGSL, for every shader that joins `gi/cells.wgsl`.
+pub fn prelude() -> String {
+    format!("const CELL_SIDE = {SIDE}i;\n")
 }
 
 /// The pass that chooses, and the buffer it fills.
 pub struct CellsPass {
     device: wgpu::Device,
-    side: CellSide,
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
     size: [u32; 2],
@@ -74,15 +57,15 @@ pub struct CellsPass {
 
 impl CellsPass {
     /// Compiles the shader and makes the buffer for pictures of `size` pixels.
-    pub fn new(device: &wgpu::Device, inputs: &InputGroup, side: CellSide, size: [u32; 2]) -> Self {
+    pub fn new(device: &wgpu::Device, inputs: &InputGroup, size: [u32; 2]) -> Self {
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("gi.cells"),
             entries: &[storage_entry(0, false)],
         });
-        let module = shaders::module_with(device, "gi.cells", &side.prelude());
+        let module = shaders::module_with(device, "gi.cells", &prelude());
         let pipeline = pipeline(device, "gi.cells", &module, "choose", inputs, &layout);
-        let (pixels, group) = buffer(device, &layout, side, size);
-        Self { device: device.clone(), side, pipeline, layout, size, pixels, group }
+        let (pixels, group) = buffer(device, &layout, size);
+        Self { device: device.clone(), pipeline, layout, size, pixels, group }
     }
 
     /// Makes the buffer anew when `size` is another; then (true) whoever bound [`pixels`](Self::pixels) binds it again.
@@ -90,14 +73,14 @@ impl CellsPass {
         if size == self.size {
             return false;
         }
-        (self.pixels, self.group) = buffer(&self.device, &self.layout, self.side, size);
+        (self.pixels, self.group) = buffer(&self.device, &self.layout, size);
         self.size = size;
         true
     }
 
     /// Records pass `gi.cells` for inputs of the size that was last given to [`new`](Self::new) or [`fit`](Self::fit).
     pub fn record(&self, recorder: &mut Recorder<'_>, inputs: &BoundInputs) {
-        let [w, h] = self.side.grid(inputs.size);
+        let [w, h] = grid(inputs.size);
         recorder.compute("gi.cells", |pass| {
             inputs.set(pass);
             pass.set_bind_group(1, &self.group, &[]);
@@ -111,32 +94,22 @@ impl CellsPass {
         &self.pixels
     }
 
-    /// Pixels on a side of a cell.
-    pub fn side(&self) -> CellSide {
-        self.side
-    }
-
     /// GPU memory, bytes.
     pub fn bytes(&self) -> u64 {
         self.pixels.size()
     }
 
     /// What the pass costs for a picture of `size` pixels: 45 operations and one depth a pixel.
-    pub fn cost(side: CellSide, size: [u32; 2]) -> Cost {
+    pub fn cost(size: [u32; 2]) -> Cost {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
-        Cost::new("gi.cells", pixels * 45.0, pixels * 4.0 + side.count(size) as f64 * 8.0)
+        Cost::new("gi.cells", pixels * 45.0, pixels * 4.0 + count(size) as f64 * 8.0)
     }
 }
 
-fn buffer(
-    device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-    side: CellSide,
-    size: [u32; 2],
-) -> (wgpu::Buffer, wgpu::BindGroup) {
+fn buffer(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, size: [u32; 2]) -> (wgpu::Buffer, wgpu::BindGroup) {
     let pixels = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("gi.cell_pixels"),
-        size: (side.count(size) * 4).max(4),
+        size: (count(size) * 4).max(4),
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     });

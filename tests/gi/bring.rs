@@ -3,7 +3,7 @@
 use crate::common;
 use crate::edges::{FLOOR, LIGHT, PLATE, POLE, SIZE, WALL, bleeding, room};
 use crate::shot::{Hit, Shot, output, view};
-use bouncelight::gi::cells::{CellSide, CellsPass, NO_PIXEL};
+use bouncelight::gi::cells::{self, CellsPass, NO_PIXEL};
 use bouncelight::gi::gather::bring::{BringPass, Brought};
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gi::twin::oct_decode;
@@ -13,8 +13,6 @@ use bouncelight::gpu::timing::Recorder;
 use glam::Vec3;
 use wgpu::util::DeviceExt;
 
-const SIDE: CellSide = CellSide::Four;
-
 /// One colour channel of a cell's light: (bx, by, bz, a).
 type Channel = [f32; 4];
 
@@ -22,12 +20,12 @@ type Channel = [f32; 4];
 fn choose(gpu: &Gpu, shot: &Shot) -> Vec<Option<usize>> {
     let (device, queue) = (&gpu.device, &gpu.queue);
     let mut group = InputGroup::new(device);
-    let cells = CellsPass::new(device, &group, SIDE, shot.size);
+    let cells = CellsPass::new(device, &group, shot.size);
     let bound = group.bind(queue, &shot.upload(device, queue).inputs(shot)).expect("binds");
     let mut encoder = device.create_command_encoder(&Default::default());
     cells.record(&mut Recorder::new(&mut encoder), &bound);
     queue.submit([encoder.finish()]);
-    let bytes = readback::buffer(device, queue, cells.pixels(), 0, SIDE.count(shot.size) * 4).expect("readable");
+    let bytes = readback::buffer(device, queue, cells.pixels(), 0, cells::count(shot.size) * 4).expect("readable");
     let packed: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
     let place = |p: u32| (p != NO_PIXEL).then(|| ((p >> 16) * shot.size[0] + (p & 0xffff)) as usize);
     packed.into_iter().map(place).collect()
@@ -55,11 +53,11 @@ fn bring_both(
         device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
     };
     let (rows, lobes) = (buffer(bytemuck::cast_slice(&rows)), buffer(bytemuck::cast_slice(&lobes)));
-    assert_eq!(rows.size(), SIDE.light_bytes(shot.size));
+    assert_eq!(rows.size(), cells::light_bytes(shot.size));
     let targets = [output(device, shot.size), output(device, shot.size)];
     let [light, gloss] = [view(&targets[0]), view(&targets[1])];
     let mut group = InputGroup::new(device);
-    let cells = CellsPass::new(device, &group, SIDE, shot.size);
+    let cells = CellsPass::new(device, &group, shot.size);
     let mut pass = BringPass::new(device, &group);
     let bound = group.bind(queue, &shot.upload(device, queue).inputs(shot)).expect("binds");
     let mut encoder = device.create_command_encoder(&Default::default());
@@ -104,7 +102,7 @@ fn light_stays_on_its_surface() {
     let light = bring(&gpu, &shot, |pixel| even(LIGHT[surfaces[pixel]]));
     let light: Vec<f32> = light.iter().map(|c| c[0]).collect();
     // Negative control: the nearest cell's middle, whatever it shows.
-    let n = SIDE.pixels();
+    let n = cells::SIDE;
     let naive: Vec<f32> = (0..SIZE[0] * SIZE[1])
         .map(|i| [i % SIZE[0], i / SIZE[0]].map(|k| k / n * n + n / 2))
         .map(|[x, y]| LIGHT.get(surfaces[(y * SIZE[0] + x) as usize]).copied().unwrap_or(0.0))
@@ -124,8 +122,8 @@ fn light_stays_on_its_surface() {
 fn a_cell_that_shows_a_surface_has_a_pixel_on_the_one_in_front() {
     let Some(gpu) = common::gpu() else { return };
     let (shot, surfaces) = the_room();
-    let n = SIDE.pixels() as usize;
-    let (width, [columns, _]) = (SIZE[0] as usize, SIDE.grid(SIZE));
+    let n = cells::SIDE as usize;
+    let (width, [columns, _]) = (SIZE[0] as usize, cells::grid(SIZE));
     let mut fronts = 0;
     for (i, pixel) in choose(&gpu, &shot).into_iter().enumerate() {
         let (cx, cy) = (i % columns as usize, i / columns as usize);
@@ -211,7 +209,7 @@ fn what_lobes_show_stays_on_surfaces_with_lobes() {
 #[test]
 fn costs_are_counted_for_the_whole_picture() {
     let size = [1024, 512];
-    let (choose, bring) = (CellsPass::cost(SIDE, size), BringPass::cost(size));
+    let (choose, bring) = (CellsPass::cost(size), BringPass::cost(size));
     // 24 bytes a pixel have to move: depth, normal, both results.
     assert!(bring.bytes > 24.0 * 524_288.0 && bring.bytes < 32.0 * 524_288.0, "{bring:?}");
     assert!(bring.flops > 300.0 * 524_288.0 && bring.flops < 700.0 * 524_288.0, "{bring:?}");

@@ -6,7 +6,7 @@
 //! [`reconstruct`](crate::gi::reconstruct)'s). Where those four mostly disagree the 4×4 cells around are blended in. Background pixels
 //! get 0. A workgroup reads each cell around its 8×8 pixels once, into its shared memory.
 
-use crate::gi::cells::{CellSide, CellsPass};
+use crate::gi::cells::{self, CellsPass};
 use crate::gi::inputs::{BoundInputs, InputGroup};
 use crate::gi::reconstruct::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
 use crate::gi::rung::Cost;
@@ -22,7 +22,7 @@ const LEAST_COSINE: f32 = 0.5;
 
 /// The constants as WGSL.
 pub fn prelude() -> String {
-    let mut text = CellSide::Four.prelude();
+    let mut text = cells::prelude();
     for (name, value) in [
         ("PLANE_TOLERANCE", PLANE_TOLERANCE),
         ("NORMAL_POWER", NORMAL_POWER),
@@ -99,6 +99,6 @@ impl BringPass {
     pub fn cost(size: [u32; 2]) -> Cost {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let flops = pixels * (4.0 * 72.0 + 60.0 + 36.0 + 36.0 * 60.0 / 64.0 + 30.0);
-        Cost::new("gi.bring", flops, pixels * 24.0 + CellSide::Four.count(size) as f64 * 76.0)
+        Cost::new("gi.bring", flops, pixels * 24.0 + cells::count(size) as f64 * 76.0)
     }
 }

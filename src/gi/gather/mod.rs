@@ -16,6 +16,7 @@
 //! neighbours average away. `docs/gi.md` says what it cannot do.
 
 pub mod bring;
+mod cost;
 mod options;
 mod params;
 mod store;
@@ -23,7 +24,7 @@ mod store;
 pub use options::{Options, OptionsError};
 pub use params::Params;
 
-use super::cells::{CellSide, CellsPass};
+use super::cells::{self, CellsPass};
 use super::inputs::{BoundInputs, InputGroup};
 use super::rung::{Cost, Rung};
 use super::{GiError, Inputs, Rays};
@@ -47,18 +48,9 @@ const HURRIED: f32 = 2.5;
 const YOUNG: u32 = 8;
 const ROUNDS_YOUNG: u32 = 4;
 
-/// Blocks that rays visit in the mean, for [`Rung::costs`]: 8 to 20 for the nearest hit and half as many for any, by
-/// `examples/rays` on rooms, a flat, a hotel and a street; short lines meet few. A block is 64 bytes and eight boxes (170
-/// operations) or two triangles.
-const BLOCKS_NEAREST: f64 = 14.0;
-const BLOCKS_ANY: f64 = 7.0;
-const BLOCKS_SHORT: f64 = 6.0;
-/// Entries in use, for the same: rooms and flats have 1,000 to 6,000.
-const ENTRIES_MET: f64 = 4000.0;
-
 /// Constants of the shaders as WGSL.
 pub fn prelude() -> String {
-    format!("{}const LIFT = f32({LIFT:?});\n", CellSide::Four.prelude())
+    format!("{}const LIFT = f32({LIFT:?});\n", cells::prelude())
 }
 
 /// As in `entries.wgsl`.
@@ -146,7 +138,7 @@ impl GatherGi {
             )));
         }
         // A lot's low bits name a query.
-        let queries = CellSide::Four.count(size) + store::squares(size) + 4 * u64::from(options.slots);
+        let queries = cells::count(size) + store::squares(size) + 4 * u64::from(options.slots);
         if queries >= 1 << LOT_BITS {
             return Err(GiError::Device(format!(
                 "is asked for {queries} rays a frame, but they are numbered up to {}",
@@ -184,7 +176,7 @@ impl GatherGi {
             texture.create_view(&Default::default())
         };
         Self {
-            cells: CellsPass::new(device, &inputs, CellSide::Four, size),
+            cells: CellsPass::new(device, &inputs, size),
             rays: new(shared, "gi.rays", "rays", &[rw, rw, rw, READ, rw, LOAD]),
             renew: new(shared, "gi.renew", "renew", &[rw, rw, rw, rw, rw]),
             settle: new(alone, "gi.settle", "settle", &[READ, READ, READ, READ, rw, READ, LOAD, LOAD]),
@@ -256,8 +248,8 @@ impl GatherGi {
                 self.options.entry_frames
             },
             flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
-            cells: CellSide::Four.count(inputs.size) as u32,
-            rays: (CellSide::Four.count(inputs.size) + store::squares(inputs.size)) as u32,
+            cells: cells::count(inputs.size) as u32,
+            rays: (cells::count(inputs.size) + store::squares(inputs.size)) as u32,
             pad: 0,
         })
     }
@@ -342,7 +334,7 @@ impl Rung for GatherGi {
         }
         self.lights_epoch = epoch;
         let mut params = self.params(inputs, rays)?;
-        let [w, h] = CellSide::Four.grid(inputs.size).map(|n| n.div_ceil(8));
+        let [w, h] = cells::grid(inputs.size).map(|n| n.div_ceil(8));
         let mut offset = self.params.write(queue, &params);
         let frame_params = self.frame_params.group([self.params.bound()]);
         let groups = |offset, own| Groups { inputs: &bound, scene: &scene, offset, own };
@@ -404,21 +396,6 @@ impl Rung for GatherGi {
     }
 
     fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
-        let cells = CellSide::Four.count(size) as f64;
-        let squares = store::squares(size) as f64;
-        let entries = ENTRIES_MET;
-        // A ray, the shadow ray of what it meets, the line to its entry's beginning; 300 operations and 150 bytes of shading.
-        let look = BLOCKS_NEAREST + BLOCKS_ANY + BLOCKS_SHORT;
-        let flops = look * 170.0 + 300.0;
-        let bytes = look * 64.0 + 150.0;
-        vec![
-            CellsPass::cost(CellSide::Four, size),
-            // With the rays into lobes.
-            Cost::new("gi.rays", (cells + squares) * flops, (cells + squares) * bytes),
-            Cost::new("gi.renew", entries * flops, entries * bytes + f64::from(self.options.slots) * 8.0),
-            Cost::new("gi.settle", cells * 150.0, cells * (2.0 * PAST as f64 + 112.0)),
-            Cost::new("gi.blur", cells * 25.0 * 65.0, cells * (PAST as f64 + 80.0)),
-            BringPass::cost(size),
-        ]
+        cost::costs(size, self.options.slots)
     }
 }

@@ -1,11 +1,11 @@
 //! What `gather` keeps from frame to frame, and between the passes of one.
 
 use super::{PAST, RECORD};
-use crate::gi::cells::CellSide;
+use crate::gi::cells;
 
 /// Squares of 2×2 cells, each of which sends one ray a frame into a lobe.
 pub(super) fn squares(size: [u32; 2]) -> u64 {
-    CellSide::Four.grid(size).map(|n| u64::from(n.div_ceil(2))).iter().product()
+    cells::grid(size).map(|n| u64::from(n.div_ceil(2))).iter().product()
 }
 
 pub(super) struct Store {
@@ -29,7 +29,7 @@ pub(super) struct Store {
 
 impl Store {
     pub fn new(device: &wgpu::Device, size: [u32; 2], slots: u32) -> Self {
-        let cells = CellSide::Four.count(size).max(1);
+        let cells = cells::count(size).max(1);
         let rays = cells + squares(size);
         let slots = u64::from(slots);
         let buffer = |label, size| {
@@ -60,7 +60,7 @@ impl Store {
             light: buffer("gi.entry_light", 32 * slots),
             records: buffer("gi.records", RECORD * rays),
             pasts: [past(), past()],
-            cell_light: buffer("gi.light", CellSide::Four.light_bytes(size)),
+            cell_light: buffer("gi.light", cells::light_bytes(size)),
             changes: buffer("gi.changes", 16 * cells),
             glosses: buffer("gi.glosses", 16 * cells),
             gloss: gloss(device, size),
@@ -69,9 +69,9 @@ impl Store {
 
     /// Bytes of the largest buffer.
     pub fn largest(size: [u32; 2], slots: u32) -> u64 {
-        let (cells, slots) = (CellSide::Four.count(size).max(1), u64::from(slots));
+        let (cells, slots) = (cells::count(size).max(1), u64::from(slots));
         let rays = cells + squares(size);
-        [16 * (rays + 4 * slots), 32 * slots, PAST * cells, RECORD * rays, CellSide::Four.light_bytes(size)]
+        [16 * (rays + 4 * slots), 32 * slots, PAST * cells, RECORD * rays, cells::light_bytes(size)]
             .into_iter()
             .max()
             .unwrap_or(0)
