@@ -44,7 +44,7 @@ pub struct BringPass {
 
 /// What the pass reads and writes.
 pub struct Brought<'a> {
-    /// Of cells: directional light, as [`cells`](crate::gi::cells) says.
+    /// Of cells: directional light, as [`cells`] says.
     pub light: &'a wgpu::Buffer,
     /// Of cells: what lobes show over their directional albedo (rgb); a: 1, or 0 without a lobe.
     pub glosses: &'a wgpu::Buffer,

@@ -60,6 +60,8 @@ pub struct App {
     rays_of: Option<u64>,
     /// What could not be built; it is not tried again until something changes.
     failed: HashSet<Key>,
+    /// How often a scene was uploaded.
+    uploads: u64,
     /// How often weights and shaders were replaced.
     stamps: [u64; 2],
     network: jobs::Network,
@@ -135,6 +137,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         building: [None; 2],
         rays_of: None,
         failed: HashSet::new(),
+        uploads: 0,
         stamps: [0; 2],
         network: jobs::Network::default(),
         tracing: Tracing::default(),
@@ -203,6 +206,7 @@ impl App {
             || tracing
             || self.tracing.is_judging()
             || building
+            || self.will_build_rays()
             || self.redraw
             || self.again
             || self.overlay.is_stale()

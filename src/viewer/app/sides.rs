@@ -64,9 +64,16 @@ impl App {
         }
     }
 
+    /// True while a method on show waits for trees that nobody has begun to build.
+    pub(super) fn will_build_rays(&self) -> bool {
+        let Some(stage) = &self.stage else { return false };
+        let sources = self.state.sources();
+        sources.iter().any(|s| s.needs_rays()) && stage.wants_rays() && self.rays_of != Some(self.uploads)
+    }
+
     /// Begins to build the trees of the scene on show, unless somebody is at it.
     fn reconcile_rays(&mut self) {
-        let stamp = self.stamps[1];
+        let stamp = self.uploads;
         let (Some(stage), Some(shown)) = (&self.stage, &self.state.shown) else { return };
         if self.rays_of == Some(stamp) {
             return;

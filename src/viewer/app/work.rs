@@ -125,6 +125,7 @@ impl App {
         match done.product {
             Ok(Product::Scene { spec, scene, gpu }) => {
                 stage.set_scene(*gpu);
+                self.uploads += 1;
                 self.tracing.forget();
                 if let Some(screen) = &self.screen {
                     screen.window.set_title(&format!("{spec} – bouncelight"));
@@ -133,11 +134,12 @@ impl App {
             }
             Ok(Product::Uploaded(gpu)) => {
                 stage.set_scene(*gpu);
+                self.uploads += 1;
                 // Hands may have changed something meanwhile.
                 self.state.stale = Stale { lights: true, placements: true, environment: true };
             }
             Ok(Product::Rays { stamp, rays }) => {
-                let shown = self.state.shown.as_ref().filter(|_| stamp == self.stamps[1]);
+                let shown = self.state.shown.as_ref().filter(|_| stamp == self.uploads);
                 let Some(scene) = shown.map(|s| s.scene.clone()) else { return };
                 if let Err(why) = &rays {
                     self.state.tell(format!("`gather` cannot draw this, so `ssgi` does: {why}"), true);
