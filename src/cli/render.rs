@@ -33,7 +33,7 @@ pub struct Args {
     /// Where the picture goes: .png, .exr, or `-` for a PNG on standard output.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How indirect light is found; `reference` traces paths until the light is right. `neural` when absent.
+    /// How indirect light is found; `reference` traces paths until the light is right. `gather` when absent, `neural` with --weights.
     #[arg(long, value_parser = MethodParser)]
     method: Option<MethodName>,
     /// Weights of `neural`; the shipped ones (`small`) when absent.
@@ -119,9 +119,9 @@ pub(super) struct Drawn {
 }
 
 impl Args {
-    /// The method asked for, or the best that needs nothing but the scene.
+    /// The method asked for, or the best that needs nothing but the scene; weights are a network's.
     fn method(&self) -> MethodName {
-        self.method.unwrap_or(MethodName::Neural)
+        self.method.unwrap_or(if self.weights.is_some() { MethodName::Neural } else { MethodName::Gather })
     }
 
     /// It runs a network on a device.
