@@ -293,6 +293,8 @@ impl Rung for GatherGi {
         self.scene_id = rays.scene.id();
         if self.cells.fit(inputs.size) || another {
             self.store = Store::new(&self.device, inputs.size, self.options.slots);
+            // The same scene gets the same rays, whatever was drawn before.
+            self.round = 0;
             self.bring.forget();
             self.frame = 0;
         }
