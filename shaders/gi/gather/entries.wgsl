@@ -6,7 +6,7 @@
 // is drawn by lot (the lowest number wins, so that the same frame always has the same winner), so that its mean is one over the
 // cell's places as rays meet them, and no ray starts where none was: inside a wall, in the air, behind a corner.
 
-// 0 for a free slot.
+// 0 for a free slot, LEFT for one whose entry has left while others that were put further on for it are still there.
 @group(2) @binding(0) var<storage, read_write> entry_keys: array<atomic<u32>>;
 // Two halves, for even and odd rounds: the winner's lot. Its low bits are an index into `entry_queries`.
 @group(2) @binding(1) var<storage, read_write> entry_lots: array<atomic<u32>>;
@@ -16,8 +16,13 @@
 
 // Slots that are looked at before a place goes without an entry.
 const ENTRY_PROBES = 12u;
-// Bits of a lot that are the query's index.
-const LOT_BITS = 22u;
+// No entry's key, which are all odd.
+const LEFT = 2u;
+
+// Bits of a lot that are the query's index: no more than needed, since the rest of the bits decide.
+fn lot_bits() -> u32 {
+    return 32u - countLeadingZeros(gather.rays + 4u * (gather.mask + 1u));
+}
 
 // Hash of the cell around x for the side n, and the cell's size.
 struct EntryCell {
@@ -84,7 +89,7 @@ fn ask_entry(x: vec3f, n: vec3f, query: u32, name: u32, round: u32) -> u32 {
     let slot = entry_of(x, n);
     if slot != NONE {
         entry_queries[query] = vec4u(bitcast<vec3u>(x), pack_normal(n));
-        let lot = (pcg3(vec3u(name, round, 0x2545f491u)).x << LOT_BITS) | query;
+        let lot = (pcg3(vec3u(name, round, 0x2545f491u)).x << lot_bits()) | query;
         atomicMin(&entry_lots[(round & 1u) * (gather.mask + 1u) + slot], lot);
     }
     return slot;

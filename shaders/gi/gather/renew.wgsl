@@ -9,6 +9,31 @@
 // Rounds after which an entry that no ray has met leaves.
 const ENTRY_AGE = 32u;
 
+// Before the rays of a frame, so that none of them looks up what is about to leave: two runs would not agree on who came first.
+@compute @workgroup_size(64)
+fn evict(@builtin(global_invocation_id) id: vec3u) {
+    let slots = gather.mask + 1u;
+    let slot = id.x;
+    if slot >= slots { return; }
+    let key = atomicLoad(&entry_keys[slot]);
+    if key == 0u { return; }
+    let asked = entry_asked[slot];
+    // The last round's rays may have asked for this one.
+    let is_asked = atomicLoad(&entry_lots[(gather.round & 1u) * slots + slot]) != NONE;
+    if key != LEFT {
+        if asked == 0u || is_asked || gather.round + 1u - asked <= ENTRY_AGE { return; }
+        let begins = gather.rays + 2u * slots + slot;
+        entry_asked[slot] = 0u;
+        entry_queries[begins] = vec4u(0u);
+        entry_queries[begins + slots] = vec4u(0u);
+        entry_light[slot] = vec4f(0.0);
+        entry_light[slots + slot] = vec4f(0.0);
+    }
+    // Free if nobody can have been put further on for it. A neighbour that becomes free now frees this one a frame later.
+    let next = atomicLoad(&entry_keys[(slot + 1u) & gather.mask]);
+    atomicStore(&entry_keys[slot], select(LEFT, 0u, next == 0u));
+}
+
 @compute @workgroup_size(64)
 fn renew(@builtin(global_invocation_id) id: vec3u) {
     let slots = gather.mask + 1u;
@@ -18,26 +43,18 @@ fn renew(@builtin(global_invocation_id) id: vec3u) {
     let even = slots - odd;
     let key = atomicLoad(&entry_keys[slot]);
     let lot = atomicLoad(&entry_lots[odd + slot]);
-    if key == 0u { return; }
+    if key == 0u || key == LEFT { return; }
     // Where rays begin, then and now.
     let begins = gather.rays + 2u * slots + slot;
     var begin = entry_queries[begins + even];
     var asked = entry_asked[slot];
     let now = gather.round + 1u;
     if lot != NONE {
-        begin = entry_queries[lot & ((1u << LOT_BITS) - 1u)];
+        begin = entry_queries[lot & ((1u << lot_bits()) - 1u)];
         asked = now;
         atomicStore(&entry_lots[odd + slot], NONE);
     } else if asked == 0u {
         // Made in this very round.
-        return;
-    } else if now - asked > ENTRY_AGE {
-        entry_asked[slot] = 0u;
-        entry_queries[begins] = vec4u(0u);
-        entry_queries[begins + slots] = vec4u(0u);
-        entry_light[slot] = vec4f(0.0);
-        entry_light[slots + slot] = vec4f(0.0);
-        atomicStore(&entry_keys[slot], 0u);
         return;
     }
     entry_asked[slot] = asked;

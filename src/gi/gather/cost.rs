@@ -25,6 +25,7 @@ pub(super) fn costs(size: [u32; 2], slots: u32) -> Vec<Cost> {
     let bytes = look * 64.0 + 150.0;
     vec![
         CellsPass::cost(size),
+        Cost::new("gi.evict", f64::from(slots) * 10.0, f64::from(slots) * 16.0),
         // With the rays into lobes.
         Cost::new("gi.rays", (cells + squares) * flops, (cells + squares) * bytes),
         Cost::new("gi.renew", entries * flops, entries * bytes + f64::from(slots) * 8.0),

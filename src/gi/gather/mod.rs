@@ -5,7 +5,7 @@
 //! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.bring ─► E/π, gloss
 //!                          │  ▲ who was met       ▲   mean of the frames before
 //!                          ▼  │                   │
-//!                    table of entries ─► gi.renew ┘   one ray an entry, several rounds in a first frame
+//!        gi.evict ─► table of entries ─► gi.renew ┘   one ray an entry, several rounds in a first frame
 //! ```
 //!
 //! Of each 2×2 cells one in turn sends a second ray, into its surface's lobe: what lobes show goes the same way beside the light
@@ -53,7 +53,7 @@ pub fn prelude() -> String {
     format!("{}const LIFT = f32({LIFT:?});\n", cells::prelude())
 }
 
-/// As in `entries.wgsl`.
+/// Most bits of a lot that may name a query (`lot_bits` of `entries.wgsl`): ten are left to draw by.
 const LOT_BITS: u32 = 22;
 
 /// Storage buffers that `gi.rays` and `gi.renew` bind: as many as every WebGPU device has.
@@ -76,6 +76,8 @@ pub struct GatherGi {
     frame_params: Binder,
     cells: CellsPass,
     rays: Pass,
+    /// Frees entries that no ray has met for long; binds what `renew` binds.
+    evict: wgpu::ComputePipeline,
     renew: Pass,
     settle: Pass,
     blur: Pass,
@@ -111,9 +113,19 @@ impl Pass {
         types: &[wgpu::BindingType],
     ) -> Self {
         let binder = Binder::new(device, name, types);
+        let pipeline = Self::pipeline(device, (inputs, scene), (name, entry), &binder);
+        Self { pipeline, binder }
+    }
+
+    fn pipeline(
+        device: &wgpu::Device,
+        (inputs, scene): (&InputGroup, &Binder),
+        (name, entry): (&'static str, &str),
+        own: &Binder,
+    ) -> wgpu::ComputePipeline {
         let module = shaders::module_with(device, name, &prelude());
-        let layouts = [inputs.layout(), scene.layout(), binder.layout()];
-        Self { pipeline: bind::pipeline(device, name, &module, entry, &layouts), binder }
+        let layouts = [inputs.layout(), scene.layout(), own.layout()];
+        bind::pipeline(device, name, &module, entry, &layouts)
     }
 }
 
@@ -162,6 +174,7 @@ impl GatherGi {
         let (shared, alone) = ((&inputs, &scene), (&inputs, &frame_params));
         let new = |groups, name, entry, types: &[wgpu::BindingType]| Pass::new(device, groups, (name, entry), types);
         let rw = READ_WRITE;
+        let renew = new(shared, "gi.renew", "renew", &[rw, rw, rw, rw, rw]);
         let nothing = |label, format| {
             let texture = device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
@@ -178,7 +191,8 @@ impl GatherGi {
         Self {
             cells: CellsPass::new(device, &inputs, size),
             rays: new(shared, "gi.rays", "rays", &[rw, rw, rw, READ, rw, LOAD]),
-            renew: new(shared, "gi.renew", "renew", &[rw, rw, rw, rw, rw]),
+            evict: Pass::pipeline(device, shared, ("gi.renew", "evict"), &renew.binder),
+            renew,
             settle: new(alone, "gi.settle", "settle", &[READ, READ, READ, READ, rw, READ, LOAD, LOAD]),
             blur: new(alone, "gi.blur", "blur", &[READ, rw, rw, rw]),
             bring: BringPass::new(device, &inputs),
@@ -343,6 +357,8 @@ impl Rung for GatherGi {
         let alone = |offset, own| Groups { scene: &frame_params, ..groups(offset, own) };
 
         self.cells.record(recorder, &bound);
+        let slots = self.options.slots.div_ceil(64);
+        Self::run(recorder, "gi.evict", &self.evict, groups(offset, &renew_group), [slots, 1, 1]);
         // The second layer of workgroups sends rays into lobes.
         let layers = 1 + u32::from(inputs.specular.is_some());
         Self::run(recorder, "gi.rays", &self.rays.pipeline, groups(offset, &rays_group), [w, h, layers]);
@@ -352,7 +368,6 @@ impl Rung for GatherGi {
             (_, 0) => 1,
             _ => 2,
         };
-        let slots = self.options.slots.div_ceil(64);
         for round in 0..rounds {
             if round > 0 {
                 params.round += 1;
