@@ -142,6 +142,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.renew", super::gather::prelude()),
         ("gi.settle", super::gather::prelude()),
         ("gi.blur", super::gather::prelude()),
+        ("gi.smooth", super::gather::prelude()),
         ("gi.bring", super::gather::bring::prelude()),
     ]
 }

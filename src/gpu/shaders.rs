@@ -179,6 +179,24 @@ pub const GI: &[Shader] = &[
         ],
     },
     Shader {
+        name: "gi.smooth",
+        files: wgsl![
+            "lib/octahedral.wgsl",
+            "lib/brdf.wgsl",
+            "lib/lights.wgsl",
+            "lib/environment.wgsl",
+            "gi/inputs.wgsl",
+            "gi/cells.wgsl",
+            "accel/traverse.wgsl",
+            "accel/surface.wgsl",
+            "lib/sampling.wgsl",
+            "gi/gather/types.wgsl",
+            "gi/gather/gloss.wgsl",
+            "gi/gather/past.wgsl",
+            "gi/gather/smooth.wgsl"
+        ],
+    },
+    Shader {
         name: "gi.bring",
         files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/gather/bring.wgsl"],
     },

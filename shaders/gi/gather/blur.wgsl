@@ -1,6 +1,7 @@
 // Means of cells blurred over neighbours on the same surface, as directional light (`CellLight`).
 
 @group(2) @binding(0) var<storage, read> pasts: array<vec4f>;
+// First word's a: the variance of the mean's luminance.
 @group(2) @binding(1) var<storage, read_write> light: array<vec4f>;
 // Where light has changed: what it is now (rgb; a: 1), else 0.
 @group(2) @binding(2) var<storage, read_write> changes: array<vec4f>;
@@ -12,8 +13,6 @@
 const SETTLED = 6.0;
 const NARROW = 2;
 const WIDE = 4;
-// Distance from the plane, in cells, that counts as nothing.
-const BLUR_PLANE = 0.5;
 // A change of light is one that is beyond so many deviations of noise and this share of the light; younger means than this many
 // frames follow by themselves.
 const SIGMAS = 4.0;
@@ -55,11 +54,7 @@ const ROUGH = 0.7;
 
 // How much of a neighbour counts: that it lies in the same plane and faces the same way.
 fn alike(here: Past, there: Past, plane: f32) -> f32 {
-    let off_plane = dot(there.x - here.x, here.n) * plane;
-    let facing = saturate(dot(there.n, here.n));
-    let f2 = facing * facing;
-    let f8 = f2 * f2 * f2 * f2;
-    return exp(-off_plane * off_plane) * f8 * f8;
+    return same_surface(there.x - here.x, here.n, there.n, plane);
 }
 
 // What rays into lobes around have found, times weight (a). Over a wide lobe's breadth every second cell is asked.
@@ -119,8 +114,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
         glosses[cell] = vec4f(0.0);
         return;
     }
-    let z = dot(here.x - params.eye.xyz, -vec3f(params.world_from_view[2]));
-    let plane = 1.0 / (BLUR_PLANE * cell_foot(max(z, 1e-9)));
+    let plane = strictness_at(here.x);
     var radius = select(WIDE, NARROW, here.frames >= SETTLED);
     if (gather.flags & GATHER_NO_BLUR) != 0u { radius = 0; }
     var sum = vec3f(0.0);
@@ -128,6 +122,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     var total = 0.0;
     var lately = vec3f(0.0);
     var noise = 0.0;
+    var squares = 0.0;
+    var parts = 0.0;
     for (var y = -radius; y <= radius; y++) {
         for (var x = -radius; x <= radius; x++) {
             let at = vec2i(id.xy) + vec2i(x, y);
@@ -143,6 +139,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             lately += w * there.lately;
             let l = luminance(there.light);
             noise += w * w * max(there.square - l * l, 0.0);
+            squares += w * there.square;
+            parts += w * w / there.frames;
         }
     }
     var mean = sum / max(total, 1e-30);
@@ -155,13 +153,16 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             mean = now;
         }
     }
+    // Variance of the mean: that of single rays here and around, over how many they are.
+    let bright = luminance(sum) / max(total, 1e-30);
+    let variance = max(squares / max(total, 1e-30) - bright * bright, 0.0) * parts / max(total * total, 1e-30);
     vector /= max(total, 1e-30);
     // Radiance a + g·ω over the hemisphere has these moments; on a surface tilted by little it gives `mean` along the normal and
     // 8/3 of the vector's part across it.
     let across = (8.0 / 3.0) * (vector - here.n * dot(vector, here.n)) / max(luminance(mean), 1e-30);
     let whole = here.n + across;
     glosses[cell] = shown(here, mean, across, gloss_around(id.xy, here, plane));
-    light[3u * cell] = vec4f(mean.r * whole, 0.0);
+    light[3u * cell] = vec4f(mean.r * whole, variance);
     light[3u * cell + 1u] = vec4f(mean.g * whole, 0.0);
     light[3u * cell + 2u] = vec4f(mean.b * whole, 0.0);
 }

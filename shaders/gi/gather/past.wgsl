@@ -31,6 +31,24 @@ fn cell_foot(z: f32) -> f32 {
     return 2.0 * params.unproject.y * z * f32(CELL_SIDE) / f32(params.size.y);
 }
 
+// Distance from the plane, in cells, that counts as nothing.
+const BLUR_PLANE = 0.5;
+
+// One over the distance from its plane that counts as nothing for the cell at x.
+fn strictness_at(x: vec3f) -> f32 {
+    let z = dot(x - params.eye.xyz, -vec3f(params.world_from_view[2]));
+    return 1.0 / (BLUR_PLANE * cell_foot(max(z, 1e-9)));
+}
+
+// How much a place counts that lies `to` away and faces `there`: that it is in the plane that faces n, and looks the same way.
+fn same_surface(to: vec3f, n: vec3f, there: vec3f, strictness: f32) -> f32 {
+    let off_plane = dot(to, n) * strictness;
+    let facing = saturate(dot(there, n));
+    let f2 = facing * facing;
+    let f8 = f2 * f2 * f2 * f2;
+    return exp(-off_plane * off_plane) * f8 * f8;
+}
+
 // Cells across which what a lobe shows changes little: its width at what is as far from the mirror as the mirror from the eye.
 fn lobe_cells(roughness: f32) -> f32 {
     return 0.5 * roughness * roughness / cell_foot(1.0);

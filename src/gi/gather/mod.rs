@@ -81,6 +81,7 @@ pub struct GatherGi {
     renew: Pass,
     settle: Pass,
     blur: Pass,
+    smooth: Pass,
     bring: BringPass,
     store: Store,
     /// Size of pictures that the device is known to have room for.
@@ -195,6 +196,7 @@ impl GatherGi {
             renew,
             settle: new(alone, "gi.settle", "settle", &[READ, READ, READ, READ, rw, READ, LOAD, LOAD]),
             blur: new(alone, "gi.blur", "blur", &[READ, rw, rw, rw]),
+            smooth: new(alone, "gi.smooth", "smooth_light", &[READ, READ, rw]),
             bring: BringPass::new(device, &inputs),
             store: Store::new(device, size, options.slots),
             checked: size,
@@ -227,7 +229,7 @@ impl GatherGi {
 
     /// Bind groups made since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
-        let passes = [&self.rays, &self.renew, &self.settle, &self.blur].map(|p| p.binder.made());
+        let passes = [&self.rays, &self.renew, &self.settle, &self.blur, &self.smooth].map(|p| p.binder.made());
         self.inputs.made()
             + self.scene.made()
             + self.frame_params.made()
@@ -341,8 +343,10 @@ impl Rung for GatherGi {
             inputs.motion.unwrap_or(&self.no_motion).into(),
             specular,
         ]);
-        let [light, changes, glosses] = [&store.cell_light, &store.changes, &store.glosses].map(Bound::from);
-        let blur_group = self.blur.binder.group([after.into(), light, changes, glosses]);
+        let [changes, glosses] = [&store.changes, &store.glosses].map(Bound::from);
+        let blur_group = self.blur.binder.group([after.into(), (&store.blurred).into(), changes, glosses]);
+        let smooth_group =
+            self.smooth.binder.group([after.into(), (&store.blurred).into(), (&store.cell_light).into()]);
 
         let epoch = inputs.lights.map_or(0, |l| l.epoch);
         if epoch != self.lights_epoch && self.frame > 0 && !self.options.even {
@@ -377,6 +381,7 @@ impl Rung for GatherGi {
         }
         Self::run(recorder, "gi.settle", &self.settle.pipeline, alone(offset, &settle_group), [w, h, 1]);
         Self::run(recorder, "gi.blur", &self.blur.pipeline, alone(offset, &blur_group), [w, h, 1]);
+        Self::run(recorder, "gi.smooth", &self.smooth.pipeline, alone(offset, &smooth_group), [w, h, 1]);
         self.round = params.round + 1;
         self.frame += 1;
         self.hurry = self.hurry.saturating_sub(1);

@@ -20,6 +20,8 @@ pub(super) struct Store {
     pub records: wgpu::Buffer,
     pub pasts: [wgpu::Buffer; 2],
     pub cell_light: wgpu::Buffer,
+    /// The same as blurred over neighbours, before what lies further away is asked.
+    pub blurred: wgpu::Buffer,
     /// Of cells: what light has changed to.
     pub changes: wgpu::Buffer,
     /// What lobes show, of cells and of pixels.
@@ -61,6 +63,7 @@ impl Store {
             records: buffer("gi.records", RECORD * rays),
             pasts: [past(), past()],
             cell_light: buffer("gi.light", cells::light_bytes(size)),
+            blurred: buffer("gi.blurred", cells::light_bytes(size)),
             changes: buffer("gi.changes", 16 * cells),
             glosses: buffer("gi.glosses", 16 * cells),
             gloss: gloss(device, size),
@@ -78,10 +81,10 @@ impl Store {
     }
 
     pub fn bytes(&self) -> u64 {
-        let Self { keys, lots, queries, asked, light, records, pasts: [a, b], cell_light, changes, glosses, gloss } =
+        let Self { keys, lots, queries, asked, light, records, pasts: [a, b], cell_light, blurred, changes, glosses, gloss } =
             self;
         let texels = u64::from(gloss.texture().width()) * u64::from(gloss.texture().height());
-        let buffers = [keys, lots, queries, asked, light, records, a, b, cell_light, changes, glosses];
+        let buffers = [keys, lots, queries, asked, light, records, a, b, cell_light, blurred, changes, glosses];
         8 * texels + buffers.iter().map(|b| b.size()).sum::<u64>()
     }
 }
