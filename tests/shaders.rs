@@ -58,11 +58,11 @@ fn every_shader_validates_in_every_permutation() {
     assert_eq!(seen.len(), shaders::all().count(), "every row of the table was seen");
     assert_eq!(
         (shaders::RENDER.len(), shaders::GI.len(), shaders::NET.len(), shaders::REFERENCE.len()),
-        (7, 17, 94, 2)
+        (7, 18, 94, 2)
     );
     assert_eq!(shaders::VIEWER.len(), 3);
     assert_eq!(shaders::ACCEL.len(), 1);
-    assert_eq!(permutations.len(), 1039);
+    assert_eq!(permutations.len(), 1040);
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn structs_lie_in_memory_as_their_rust_twins() {
     }
     same_layout!("render.gbuffer", "Frame", FrameUniform, size size_of::<FrameUniform>(), [
         view_from_world, world_from_view, clip_from_world, clip_from_world_unjittered, previous_clip_from_world,
-        tan_half, jitter, size, near, seed, environment, light_count, stand_ins,
+        tan_half, jitter, size, near, seed, environment, light_count, picture_only,
     ]);
     same_layout!("render.direct", "Light", LightGpu, size size_of::<LightGpu>(), [
         position, kind, direction, range, color, radius, cone_scale, cone_offset,

@@ -17,8 +17,9 @@ struct Frame {
     seed: u32,
     environment: vec3f,
     light_count: u32,
-    // 0 where the method finds the light of what glows by itself: lights that stand for glowing surfaces are left out then.
-    stand_ins: u32,
+    // 0 where the method asks the scene what glows and what stands between. Else lights that stand for glowing surfaces are drawn, and
+    // occlusion maps darken the light from all around.
+    picture_only: u32,
 }
 
 // Direction in view space of the ray through the sample point of `pixel`, scaled to z = -1.

@@ -35,7 +35,7 @@ fn direct(@builtin(global_invocation_id) id: vec3u) {
         let pattern = Pattern(6.2831853 * hash01(id.x, id.y, frame.seed, 1u), hash01(id.x, id.y, frame.seed, 2u));
         for (var i = 0u; i < frame.light_count; i++) {
             let light = lights[i];
-            if light.stands_in != 0u && frame.stand_ins == 0u { continue; }
+            if light.stands_in != 0u && frame.picture_only == 0u { continue; }
             let s = sample_light(light, p);
             let n_l = dot(n, s.l);
             if n_l <= 0.0 || all(s.irradiance <= vec3f(0.0)) { continue; }

@@ -63,7 +63,8 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
 
     var out: Fields;
     out.normal = oct_encode(n);
-    out.albedo = vec4f(color * (1.0 - metallic) * (1.0 - share), mix(1.0, occlusion, material.occlusion_strength));
+    let darkened = select(0.0, material.occlusion_strength, frame.picture_only != 0u);
+    out.albedo = vec4f(color * (1.0 - metallic) * (1.0 - share), mix(1.0, occlusion, darkened));
     out.specular = vec4f(mix(material.f0 * material.specular_tint.rgb, color, metallic), roughness);
     out.emissive = vec4f(material.emissive * glow, 1.0);
     if material.unlit != 0u {

@@ -77,8 +77,8 @@ impl Rung for OrBelow {
         self.above.as_mut().ok()?.neural_mut()
     }
 
-    fn finds_glow(&self, rays: bool) -> bool {
-        self.above.as_ref().is_ok_and(|a| a.finds_glow(rays)) && !self.too_small
+    fn knows_scene(&self, rays: bool) -> bool {
+        self.above.as_ref().is_ok_and(|a| a.knows_scene(rays)) && !self.too_small
     }
 
     fn set_frame(&mut self, queue: &wgpu::Queue, frame: u32) {

@@ -314,8 +314,8 @@ impl Rung for NeuralGi {
         self.settled()
     }
 
-    fn finds_glow(&self, rays: bool) -> bool {
-        self.gather.as_ref().is_some_and(|gather| gather.finds_glow(rays))
+    fn knows_scene(&self, rays: bool) -> bool {
+        self.gather.as_ref().is_some_and(|gather| gather.knows_scene(rays))
     }
 
     fn gloss(&self) -> Option<&wgpu::TextureView> {

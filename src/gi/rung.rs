@@ -63,9 +63,9 @@ pub trait Rung: Send {
         None
     }
 
-    /// Whether it finds the direct light of what glows, so that lights that stand for glowing surfaces
-    /// ([`Light::stands_in`](crate::scene::Light::stands_in)) are not drawn. `rays`: whether there are any.
-    fn finds_glow(&self, _rays: bool) -> bool {
+    /// Whether it asks the scene what glows and what stands between, so that lights that stand for glowing surfaces
+    /// ([`Light::stands_in`](crate::scene::Light::stands_in)) and occlusion maps would count twice. `rays`: whether there are any.
+    fn knows_scene(&self, _rays: bool) -> bool {
         false
     }
 

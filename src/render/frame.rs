@@ -293,8 +293,8 @@ impl Renderer {
             None => last.map_or(*view, |last| view.after(&last)),
         };
         self.last = Some(*view);
-        let stand_ins = !self.indirect.as_ref().is_some_and(|i| i.finds_glow(scene.rays.is_some()));
-        let uniform = view.uniform(&scene.environment, scene.lights.len() as u32, stand_ins);
+        let picture_only = !self.indirect.as_ref().is_some_and(|i| i.knows_scene(scene.rays.is_some()));
+        let uniform = view.uniform(&scene.environment, scene.lights.len() as u32, picture_only);
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 
         if shadows || fresh {
@@ -309,7 +309,7 @@ impl Renderer {
         self.passes.direct.record(recorder, inputs);
         let mut inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene));
         if let Some(lights) = &mut inputs.lights {
-            lights.stand_in &= stand_ins;
+            lights.stand_in &= picture_only;
         }
         if let (Some(indirect), Some(taa)) = (&mut self.indirect, &self.taa) {
             indirect.set_frame(queue, taa.frames());

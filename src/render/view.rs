@@ -102,7 +102,7 @@ impl View {
         -Mat4::from_cols_array_2d(&self.view_from_world).transform_point3(p).z
     }
 
-    pub(crate) fn uniform(&self, environment: &Environment, light_count: u32, stand_ins: bool) -> FrameUniform {
+    pub(crate) fn uniform(&self, environment: &Environment, light_count: u32, picture_only: bool) -> FrameUniform {
         FrameUniform {
             view_from_world: self.view_from_world,
             world_from_view: self.world_from_view,
@@ -116,7 +116,7 @@ impl View {
             seed: self.seed,
             environment: environment.radiance,
             light_count,
-            stand_ins: stand_ins.into(),
+            picture_only: picture_only.into(),
             pad: [0; 3],
         }
     }
@@ -149,6 +149,6 @@ pub struct FrameUniform {
     pub seed: u32,
     pub environment: [f32; 3],
     pub light_count: u32,
-    pub stand_ins: u32,
+    pub picture_only: u32,
     pub pad: [u32; 3],
 }

@@ -31,6 +31,7 @@ pub(super) fn costs(size: [u32; 2], slots: u32) -> Vec<Cost> {
         Cost::new("gi.renew", entries * flops, entries * bytes + f64::from(slots) * 8.0),
         Cost::new("gi.settle", cells * 150.0, cells * (2.0 * PAST as f64 + 112.0)),
         Cost::new("gi.blur", cells * 25.0 * 65.0, cells * (PAST as f64 + 80.0)),
+        Cost::new("gi.smooth", cells * 25.0 * 60.0, cells * (24.0 + 3.0 * 48.0)),
         BringPass::cost(size),
     ]
 }

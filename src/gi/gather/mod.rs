@@ -2,7 +2,7 @@
 //! and by a cache of light in the world; averaged over frames, blurred over neighbours, brought to full resolution.
 //!
 //! ```text
-//! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.bring ─► E/π, gloss
+//! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.smooth ─► gi.bring ─► E/π, gloss
 //!                          │  ▲ who was met       ▲   mean of the frames before
 //!                          ▼  │                   │
 //!        gi.evict ─► table of entries ─► gi.renew ┘   one ray an entry, several rounds in a first frame
@@ -394,7 +394,7 @@ impl Rung for GatherGi {
         Some(&self.store.gloss)
     }
 
-    fn finds_glow(&self, rays: bool) -> bool {
+    fn knows_scene(&self, rays: bool) -> bool {
         rays
     }
 
