@@ -1,5 +1,6 @@
 // What rays know of triangles: colours averaged over each, and the triangles that glow. `accel::surfaces` and `accel::emitters`
-// are the Rust side. Whoever joins this file binds `surfaces: array<vec4u>` and `emitters: array<Emitter>`.
+// are the Rust side. Whoever joins this file binds `surfaces: array<vec4u>`, `emitters: array<Emitter>` and
+// `corner_normals: texture_2d<u32>`, a texel for each triangle.
 
 struct Emitter {
     origin: vec3f,
@@ -33,4 +34,15 @@ fn met(triangle: u32) -> Met {
     let scale = exp2(f32(i32(packed.z >> 27u) - 24));
     let e = vec3f(vec3u(packed.z, packed.z >> 9u, packed.z >> 18u) & vec3u(511u)) * scale;
     return Met(d.rgb * d.rgb, f.rgb * f.rgb, e, d.a, packed.y >> 24u, bitcast<f32>(packed.w));
+}
+
+// Unit normal that the mesh gives the place of the hit, in the space of the ray, on the given side of the triangle.
+fn met_normal(hit: Hit, side: vec3f) -> vec3f {
+    let corners = textureLoad(corner_normals, vec2u(hit.triangle & 8191u, hit.triangle >> 13u), 0);
+    var n = (1.0 - hit.uv.x - hit.uv.y) * oct_decode(unpack2x16snorm(corners.x)) + hit.uv.x * oct_decode(unpack2x16snorm(corners.y))
+        + hit.uv.y * oct_decode(unpack2x16snorm(corners.z));
+    n = trace_turned(hit.instance, n);
+    let l = length(n);
+    if !(l > 1e-6) { return side; }
+    return select(n, -n, dot(n, side) < 0.0) / l;
 }

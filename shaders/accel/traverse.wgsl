@@ -239,6 +239,16 @@ fn trace_seeded(origin: vec3f, direction: vec3f, t_max: f32, any: bool, seed: u3
     return Hit(t, found_first + (found & BLOCK), uv, found_instance, found_leaf);
 }
 
+// A normal of the instance's mesh in the space of the ray, of any length.
+fn trace_turned(instance: u32, n: vec3f) -> vec3f {
+    if instance == NO_TRIANGLE { return n; }
+    // Columns of the transposed inverse are the rows of what brings the ray into the mesh's space.
+    let r0 = bitcast<vec3f>(trace_word(instance, 0u).xyz);
+    let r1 = bitcast<vec3f>(trace_word(instance, 1u).xyz);
+    let r2 = bitcast<vec3f>(trace_word(instance, 2u).xyz);
+    return r0 * n.x + r1 * n.y + r2 * n.z;
+}
+
 // Unit normal of what was hit, in the space of the ray, on the side that the triangle's winding says; 0 where it has no area.
 fn trace_normal(hit: Hit) -> vec3f {
     let leaf = hit.leaf & BLOCK;
@@ -246,13 +256,7 @@ fn trace_normal(hit: Hit) -> vec3f {
     let c = bitcast<vec3f>(trace_word(leaf, 2u).xyz);
     let other = bitcast<vec3f>(trace_word(leaf, select(1u, 3u, (hit.leaf & SECOND) != 0u)).xyz);
     var n = select(cross(other - a, c - a), cross(c - a, other - a), (hit.leaf & SECOND) != 0u);
-    if hit.instance != NO_TRIANGLE {
-        // Columns of the transposed inverse are the rows of what brings the ray into the mesh's space.
-        let r0 = bitcast<vec3f>(trace_word(hit.instance, 0u).xyz);
-        let r1 = bitcast<vec3f>(trace_word(hit.instance, 1u).xyz);
-        let r2 = bitcast<vec3f>(trace_word(hit.instance, 2u).xyz);
-        n = r0 * n.x + r1 * n.y + r2 * n.z;
-    }
+    n = trace_turned(hit.instance, n);
     let l = length(n);
     return select(vec3f(0.0), n / l, l > 0.0);
 }

@@ -12,6 +12,9 @@ pub(super) const ROW: u32 = 2048;
 /// Texels of a block, 16 bytes each.
 const TEXELS: u32 = WORDS as u32 / 4;
 
+/// Texels in a row.
+pub(super) const WIDTH: u32 = ROW * TEXELS;
+
 /// A block's number has 24 bits in the traversal's stack.
 const MOST: u64 = 1 << 24;
 
@@ -37,24 +40,16 @@ impl AccelGpu {
     pub(super) fn of_blocks(device: &wgpu::Device, queue: &wgpu::Queue, all: &[Block]) -> Result<Self, AccelError> {
         let side = device.limits().max_texture_dimension_2d;
         let blocks = all.len() as u64;
-        let rows = blocks.div_ceil(u64::from(ROW));
-        let limit = if side < ROW * TEXELS { 0 } else { (u64::from(ROW) * u64::from(side)).min(MOST) };
+        let limit = if side < WIDTH { 0 } else { (u64::from(ROW) * u64::from(side)).min(MOST) };
         if blocks > limit {
             return Err(AccelError::TooLarge { blocks, limit, side });
         }
-        let scope = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let texture = texture(device, rows as u32);
-        write(queue, &texture, 0, all);
-        let blocks = texture.create_view(&Default::default());
-        match pollster::block_on(scope.pop()) {
-            Some(error) => Err(AccelError::OutOfMemory { bytes: size_of_val(all) as u64, message: error.to_string() }),
-            None => Ok(Self { blocks }),
-        }
+        Ok(Self { blocks: texels(device, queue, "accel.blocks", bytemuck::cast_slice(all))? })
     }
 
     /// Overwrites blocks from the start of row `row` on.
     pub(super) fn write(&self, queue: &wgpu::Queue, row: u32, blocks: &[Block]) {
-        write(queue, self.blocks.texture(), row, blocks);
+        write(queue, self.blocks.texture(), row, bytemuck::cast_slice(blocks));
     }
 
     /// The texture.
@@ -82,24 +77,44 @@ impl AccelGpu {
     }
 }
 
-fn texture(device: &wgpu::Device, rows: u32) -> wgpu::Texture {
-    device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("accel blocks"),
-        size: wgpu::Extent3d { width: ROW * TEXELS, height: rows, depth_or_array_layers: 1 },
+/// A texture of `texels`, [`WIDTH`] to a row, the device's textures being wide and high enough.
+///
+/// # Errors
+/// [`AccelError::OutOfMemory`].
+pub(super) fn texels(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    label: &'static str,
+    texels: &[[u32; 4]],
+) -> Result<wgpu::TextureView, AccelError> {
+    let scope = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d {
+            width: WIDTH,
+            height: (texels.len() as u32).div_ceil(WIDTH).max(1),
+            depth_or_array_layers: 1,
+        },
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format: wgpu::TextureFormat::Rgba32Uint,
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
-    })
+    });
+    write(queue, &texture, 0, texels);
+    let view = texture.create_view(&Default::default());
+    match pollster::block_on(scope.pop()) {
+        Some(error) => Err(AccelError::OutOfMemory { bytes: size_of_val(texels) as u64, message: error.to_string() }),
+        None => Ok(view),
+    }
 }
 
 /// Whole rows at once, then the last one: no padded copy of everything is made.
-fn write(queue: &wgpu::Queue, texture: &wgpu::Texture, row: u32, blocks: &[Block]) {
-    let whole = blocks.len() as u32 / ROW;
-    let (body, tail) = blocks.split_at((whole * ROW) as usize);
-    for (data, y, width, height) in [(body, 0, ROW, whole), (tail, whole, tail.len() as u32, 1)] {
+fn write(queue: &wgpu::Queue, texture: &wgpu::Texture, row: u32, texels: &[[u32; 4]]) {
+    let whole = texels.len() as u32 / WIDTH;
+    let (body, tail) = texels.split_at((whole * WIDTH) as usize);
+    for (data, y, width, height) in [(body, 0, WIDTH, whole), (tail, whole, tail.len() as u32, 1)] {
         if data.is_empty() {
             continue;
         }
@@ -111,12 +126,8 @@ fn write(queue: &wgpu::Queue, texture: &wgpu::Texture, row: u32, blocks: &[Block
                 aspect: wgpu::TextureAspect::All,
             },
             bytemuck::cast_slice(data),
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(ROW * WORDS as u32 * 4),
-                rows_per_image: None,
-            },
-            wgpu::Extent3d { width: width * TEXELS, height, depth_or_array_layers: 1 },
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(WIDTH * 16), rows_per_image: None },
+            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
         );
     }
 }

@@ -3,7 +3,7 @@
 //! (`surfaces`) and the triangles that glow (`emitters`) are storage buffers.
 
 use super::emitters::{self, EmitterGpu};
-use super::gpu::ROW;
+use super::gpu::{self, ROW};
 use super::trees::{MeshTree, SceneTrees};
 use super::wide::{Block, INSTANCE, WORDS};
 use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, surfaces};
@@ -37,6 +37,7 @@ pub struct SceneRays {
     device: wgpu::Device,
     accel: AccelGpu,
     surfaces: wgpu::Buffer,
+    normals: wgpu::TextureView,
     emitters: wgpu::Buffer,
     inverse_power: f32,
     meshes: Vec<MeshTree>,
@@ -76,11 +77,14 @@ impl SceneRays {
         let trees = SceneTrees::build(scene, progress)?;
         let accel = AccelGpu::of_blocks(device, queue, &trees.blocks)?;
         let surfaces = filled(device, queue, "accel.surfaces", bytemuck::cast_slice(&trees.surfaces));
-        let bytes = 64 * (trees.blocks.len() as u64).next_multiple_of(u64::from(ROW)) + surfaces.size();
+        let normals = gpu::texels(device, queue, "accel.normals", &trees.normals)?;
+        let of_normals = 16 * (trees.normals.len() as u64).next_multiple_of(u64::from(gpu::WIDTH));
+        let bytes = 64 * (trees.blocks.len() as u64).next_multiple_of(u64::from(ROW)) + surfaces.size() + of_normals;
         let mut rays = Self {
             id: NEXT.fetch_add(1, Ordering::Relaxed),
             accel,
             surfaces,
+            normals,
             emitters: filled(device, queue, "accel.emitters", &[]),
             inverse_power: 0.0,
             meshes: trees.meshes,
@@ -144,6 +148,11 @@ impl SceneRays {
     /// One `surfaces::Packed` for each triangle of each mesh.
     pub fn surfaces(&self) -> &wgpu::Buffer {
         &self.surfaces
+    }
+
+    /// Of each triangle of each mesh the octahedral normals of its corners in object space, a texel each, 8192 to a row.
+    pub fn normals(&self) -> &wgpu::TextureView {
+        &self.normals
     }
 
     /// [`EmitterGpu`] for each glowing triangle.

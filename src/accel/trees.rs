@@ -5,7 +5,7 @@ use super::gpu::ROW;
 use super::image::Reductions;
 use super::wide::{Block, NODE, WORDS};
 use super::{Accel, AccelError, build, surfaces, threads};
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Mesh, Scene, geometry::octahedral};
 use glam::Vec3;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -23,6 +23,8 @@ pub(super) struct SceneTrees {
     /// Room for the tree over the instances, then the meshes' trees.
     pub blocks: Vec<Block>,
     pub surfaces: Vec<surfaces::Packed>,
+    /// Of each triangle the normals of its corners, octahedral, object space.
+    pub normals: Vec<[u32; 4]>,
     pub meshes: Vec<MeshTree>,
     /// Blocks of that room.
     pub top_room: usize,
@@ -38,6 +40,7 @@ fn top_blocks(count: usize) -> usize {
 struct Part {
     accel: Accel,
     surfaces: Vec<surfaces::Surface>,
+    normals: Vec<[u32; 4]>,
     glows: Vec<Glow>,
 }
 
@@ -51,7 +54,12 @@ impl Part {
         let corners: Vec<_> =
             mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize])).collect();
         let glows = emitters::glowing(&surfaces, &corners);
-        Self { accel: build::build(&corners), surfaces, glows }
+        let normal = |i: u32| {
+            let [x, y] = octahedral(mesh.normals[i as usize]).map(|v| u32::from(v as u16));
+            x | y << 16
+        };
+        let normals = mesh.indices.chunks_exact(3).map(|t| [normal(t[0]), normal(t[1]), normal(t[2]), 0]).collect();
+        Self { accel: build::build(&corners), surfaces, normals, glows }
     }
 }
 
@@ -80,6 +88,7 @@ impl SceneTrees {
         let mut blocks = Vec::with_capacity(top_room + parts.iter().map(|p| p.accel.block_count() + 8).sum::<usize>());
         blocks.resize(top_room, [0; WORDS]);
         let mut surfaces = Vec::with_capacity(parts.iter().map(|p| p.surfaces.len()).sum());
+        let mut normals = Vec::with_capacity(surfaces.capacity());
         let mut meshes = Vec::with_capacity(parts.len());
         for part in parts {
             let root = blocks.len().next_multiple_of(8);
@@ -92,8 +101,9 @@ impl SceneTrees {
             });
             blocks.extend(part.accel.blocks.iter().map(|b| moved(b, root as u32, &part.surfaces)));
             surfaces.extend(part.surfaces.iter().map(surfaces::Surface::packed));
+            normals.extend(part.normals);
         }
-        Ok(Self { blocks, surfaces, meshes, top_room })
+        Ok(Self { blocks, surfaces, normals, meshes, top_room })
     }
 }
 

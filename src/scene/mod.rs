@@ -20,7 +20,7 @@ pub mod export;
 #[cfg(feature = "io")]
 mod files;
 #[cfg(feature = "io")]
-mod geometry;
+pub(crate) mod geometry;
 #[cfg(feature = "io")]
 pub mod gltf;
 #[cfg(feature = "io")]

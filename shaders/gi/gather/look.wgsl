@@ -180,13 +180,14 @@ fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, name: u32, round: u32, glows: 
     if (gather.flags & GATHER_NO_CAUSTICS) != 0u { surface.f0 = vec3f(0.0); }
     let front = trace_normal(hit);
     let facing = -dot(front, d);
-    let n = select(-front, front, facing > 0.0);
+    let side = select(-front, front, facing > 0.0);
+    let n = met_normal(hit, side);
     var radiance = vec3f(0.0);
     if glows && any(surface.emission > vec3f(0.0)) && (facing > 0.0 || (surface.flags & MET_DOUBLE_SIDED) != 0u) {
         let density = surface.by_area * gather.inverse_power * hit.t * hit.t / max(abs(facing), 1e-6);
         radiance = surface.emission * (n_d / PI) / (n_d / PI + density);
     }
-    let n_v = abs(facing);
+    let n_v = max(-dot(n, d), 1e-4);
     let lobe = env_brdf(surface.f0, surface.roughness, n_v);
     let most = max(surface.f0.x, max(surface.f0.y, surface.f0.z));
     let diffuse = surface.diffuse * (1.0 - diffuse_loss(most, surface.roughness, n_v));
@@ -194,7 +195,7 @@ fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, name: u32, round: u32, glows: 
     if all(back <= vec3f(0.0)) || (surface.flags & MET_UNLIT) != 0u {
         return Found(radiance, NONE, vec3f(0.0), hit.t);
     }
-    let x = off(o + d * hit.t, n, hit.t);
+    let x = off(o + d * hit.t, side, hit.t);
     let place = Place(x, n, -d, diffuse, surface.f0, max(surface.roughness, LEAST_ROUGHNESS));
     let chosen = choose_light(place, true, pcg3(seed));
     if is_lit(x, chosen, seed.y) { radiance += chosen.radiance; }

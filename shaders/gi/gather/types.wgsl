@@ -46,6 +46,7 @@ const GATHER_NO_GLOSS = 64u;
 @group(1) @binding(3) var<storage, read> emitters: array<Emitter>;
 @group(1) @binding(4) var<storage, read> lights: array<Light>;
 @group(1) @binding(5) var environment_picture: texture_2d<f32>;
+@group(1) @binding(6) var corner_normals: texture_2d<u32>;
 
 const NONE = 0xffffffffu;
 const FAR = 1e30;

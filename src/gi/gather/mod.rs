@@ -165,12 +165,12 @@ impl GatherGi {
     pub fn new(device: &wgpu::Device, size: [u32; 2], options: Options) -> Self {
         let inputs = InputGroup::new(device);
         let params = ParamsRing::new(device);
-        let blocks = wgpu::BindingType::Texture {
+        let texels = wgpu::BindingType::Texture {
             sample_type: wgpu::TextureSampleType::Uint,
             view_dimension: wgpu::TextureViewDimension::D2,
             multisampled: false,
         };
-        let scene = Binder::new(device, "gi.gather", &[ParamsRing::TYPE, blocks, READ, READ, READ, LOAD]);
+        let scene = Binder::new(device, "gi.gather", &[ParamsRing::TYPE, texels, READ, READ, READ, LOAD, texels]);
         let frame_params = Binder::new(device, "gi.gather", &[ParamsRing::TYPE]);
         let (shared, alone) = ((&inputs, &scene), (&inputs, &frame_params));
         let new = |groups, name, entry, types: &[wgpu::BindingType]| Pass::new(device, groups, (name, entry), types);
@@ -322,6 +322,7 @@ impl Rung for GatherGi {
             rays.scene.emitters().into(),
             lights.into(),
             rays.environment.into(),
+            rays.scene.normals().into(),
         ]);
         let store = &self.store;
         let table = || [&store.keys, &store.lots, &store.queries].map(Bound::from);

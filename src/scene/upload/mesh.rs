@@ -2,7 +2,7 @@
 
 use super::closed::is_closed;
 use super::{UploadError, filled, is_covered};
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Mesh, Scene, geometry::octahedral};
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
 use half::f16;
@@ -202,17 +202,6 @@ fn attribute(mesh: &Mesh, i: usize) -> AttributeVertex {
         uv1: mesh.uv1.get(i).copied().unwrap_or_default(),
         color: mesh.colors.get(i).copied().unwrap_or([1.0; 4]).map(f16::from_f32),
     }
-}
-
-/// The twin of `oct_encode` in `shaders/lib/octahedral.wgsl`, signed normalised.
-fn octahedral(v: [f32; 3]) -> [i16; 2] {
-    let sum = v.iter().map(|c| c.abs()).sum::<f32>();
-    let v = if sum > 0.0 && sum.is_finite() { v.map(|c| c / sum) } else { [0.0, 0.0, 1.0] };
-    let (mut x, mut y) = (v[0], v[1]);
-    if v[2] < 0.0 {
-        (x, y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
-    }
-    [x, y].map(|c| (c * f32::from(i16::MAX)).round() as i16)
 }
 
 fn world_bounds(mesh: &Mesh, transform: &Mat4) -> ([f32; 3], [f32; 3]) {
