@@ -4,7 +4,7 @@ use bouncelight::gpu::shaders;
 
 /// Every permutation of every shader: (shader, its prelude of `const` lines). Shaders without numbers from outside have one.
 fn permutations() -> Vec<(&'static str, String)> {
-    let mut all = bouncelight::gi::features::example_preludes();
+    let mut all = bouncelight::gi::example_preludes();
     all.extend(bouncelight::net::gpu::example_preludes());
     let plain = shaders::all().map(|s| s.name).filter(|name| !all.iter().any(|(n, _)| n == name)).collect::<Vec<_>>();
     all.extend(plain.into_iter().map(|name| (name, String::new())));

@@ -1,6 +1,7 @@
 //! The GPU as the rest of the house sees it: a chosen device, shader sources, bind groups, readback, timing.
 
 pub mod bind;
+pub(crate) mod binding;
 mod choose;
 pub mod readback;
 pub mod shaders;

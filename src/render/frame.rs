@@ -5,6 +5,7 @@ use super::RenderError;
 use super::composite::CompositePass;
 use super::direct::{DirectInputs, DirectPass};
 use super::gbuffer::{GbufferInputs, GbufferPass};
+use super::glossy::{GlossyInputs, GlossyPass, GlossyPicture};
 use super::moved::Moved;
 use super::shadow::{ShadowMaps, ShadowOptions, ShadowPass};
 use super::taa::TaaPass;
@@ -13,8 +14,7 @@ use super::view::{FrameUniform, View};
 use crate::gi::{
     self,
     features::FeatureSet,
-    glossy::{GlossyInputs, GlossyPass, GlossyPicture},
-    pack,
+    method, pack,
     rung::{self, Cost, Rung},
 };
 use crate::gpu::timing::Recorder;
@@ -123,7 +123,7 @@ impl Renderer {
         let passes = Passes::new(device, &frame, options.shadow);
         let mut taa = options.taa.then(|| TaaPass::new(device));
         let picture = passes.bind(device, &frame, &targets, &mut taa);
-        let indirect = rung::build(device, queue, size, &options.method)?;
+        let indirect = method::build(device, queue, size, &options.method)?;
         let method = options.method.name();
         let device = device.clone();
         let (lighting, moved) = (None, Moved::default());
@@ -144,7 +144,7 @@ impl Renderer {
 
     /// Changes how indirect light is found; builds the new method's pipelines and buffers.
     pub fn set_method(&mut self, queue: &wgpu::Queue, method: &gi::Method) -> Result<(), RenderError> {
-        self.indirect = rung::build(&self.device, queue, self.targets.size, method)?;
+        self.indirect = method::build(&self.device, queue, self.targets.size, method)?;
         self.method = method.name();
         self.cut();
         Ok(())
@@ -215,7 +215,7 @@ impl Renderer {
         environment: [f32; 3],
     ) -> Result<pack::NetworkInputs, gi::GiError> {
         let own = (self.method == "gather").then_some(&self.targets.indirect.view);
-        let guess = self.indirect.as_ref().and_then(|i| i.neural()?.guess()).or(own);
+        let guess = self.indirect.as_ref().and_then(|i| i.guess()).or(own);
         let set = if guess.is_some() { FeatureSet::all() } else { FeatureSet::screen() };
         let inputs = self.gi_inputs(view, environment);
         pack::read_features(&self.device, queue, &set, &inputs, guess.unwrap_or(&self.targets.indirect.view))
@@ -223,7 +223,7 @@ impl Renderer {
 
     /// Names of the network's layers; none without a network.
     pub fn layers(&self) -> Vec<&str> {
-        self.indirect.as_ref().and_then(|i| i.neural()).map(|n| n.layers()).unwrap_or_default()
+        self.indirect.as_ref().map(|i| i.layers()).unwrap_or_default()
     }
 
     /// What a layer of the network made of the last frame, which `view` drew; `None` where there is no such layer. Runs the
@@ -232,8 +232,8 @@ impl Renderer {
     /// # Errors
     /// As [`NeuralGi::read_layer`](gi::pass::NeuralGi::read_layer).
     pub fn read_layer(&mut self, view: &View, environment: [f32; 3], layer: usize) -> Result<Option<Tap>, gi::GiError> {
-        let Some(neural) = self.indirect.as_mut().and_then(|i| i.neural_mut()) else { return Ok(None) };
-        neural.read_layer(&gi_inputs(&self.targets, view, environment, None), layer)
+        let Some(indirect) = &mut self.indirect else { return Ok(None) };
+        indirect.read_layer(&gi_inputs(&self.targets, view, environment, None), layer)
     }
 
     /// The textures that [`Renderer::record`] fills.

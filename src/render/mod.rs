@@ -5,6 +5,7 @@ pub mod composite;
 pub mod direct;
 pub mod frame;
 pub mod gbuffer;
+pub mod glossy;
 pub mod moved;
 pub mod sampling;
 pub mod shadow;

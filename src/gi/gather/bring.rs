@@ -6,13 +6,13 @@
 //! [`reconstruct`](crate::gi::reconstruct)'s). Where those four mostly disagree the 4×4 cells around are blended in. Background pixels
 //! get 0. A workgroup reads each cell around its 8×8 pixels once, into its shared memory.
 
-use crate::gi::cells::{self, CellsPass};
-use crate::gi::inputs::{BoundInputs, InputGroup};
-use crate::gi::reconstruct::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
-use crate::gi::rung::Cost;
+use crate::gi::interface::rung::Cost;
+use crate::gi::stage::cells::{self, CellsPass};
+use crate::gi::stage::inputs::{BoundInputs, InputGroup};
+use crate::gi::stage::weights::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
 use crate::gpu::bind::{self, Binder};
+use crate::gpu::binding::{READ, STORE_HALF};
 use crate::gpu::{shaders, timing::Recorder};
-use crate::render::tool::{READ, STORE_HALF};
 
 /// Sum of the four weights below which the 4×4 cells around are blended in.
 const TRUST: f32 = 0.3;

@@ -2,8 +2,8 @@
 
 use super::bring::BringPass;
 use super::{PAST, store};
-use crate::gi::cells::{self, CellsPass};
-use crate::gi::rung::Cost;
+use crate::gi::interface::rung::Cost;
+use crate::gi::stage::cells::{self, CellsPass};
 
 /// Blocks that rays visit in the mean, for the count: 8 to 20 for the nearest hit and half as many for any, by
 /// `examples/rays` on rooms, a flat, a hotel and a street; short lines meet few. A block is 64 bytes and eight boxes (170

@@ -19,20 +19,22 @@ pub mod bring;
 mod cost;
 mod options;
 mod params;
+mod pass;
 mod store;
 
 pub use options::{Options, OptionsError};
 pub use params::Params;
 
-use super::cells::{self, CellsPass};
-use super::inputs::{BoundInputs, InputGroup};
-use super::rung::{Cost, Rung};
-use super::{GiError, Inputs, Rays};
-use crate::gpu::bind::{self, Binder, Bound};
-use crate::gpu::{shaders, timing::Recorder};
-use crate::render::tool::{LOAD, READ, READ_WRITE};
+use crate::gi::interface::rung::{Cost, Rung};
+use crate::gi::interface::{GiError, Inputs, Rays};
+use crate::gi::stage::cells::{self, CellsPass};
+use crate::gi::stage::inputs::InputGroup;
+use crate::gpu::bind::{Binder, Bound};
+use crate::gpu::binding::{LOAD, READ, READ_WRITE};
+use crate::gpu::timing::Recorder;
 use bring::{BringPass, Brought};
 use params::ParamsRing;
+use pass::{Groups, Pass};
 use store::Store;
 
 /// A ray begins this share of the view distance off its surface: half along the way to the eye, half along the normal. At
@@ -77,7 +79,7 @@ pub struct GatherGi {
     cells: CellsPass,
     rays: Pass,
     /// Frees entries that no ray has met for long; binds what `renew` binds.
-    evict: wgpu::ComputePipeline,
+    evict: Pass,
     renew: Pass,
     settle: Pass,
     blur: Pass,
@@ -98,36 +100,6 @@ pub struct GatherGi {
     lights_epoch: u64,
     hurry: u32,
     scene_id: u64,
-}
-
-/// A pipeline with group 2 of its own.
-struct Pass {
-    pipeline: wgpu::ComputePipeline,
-    binder: Binder,
-}
-
-impl Pass {
-    fn new(
-        device: &wgpu::Device,
-        (inputs, scene): (&InputGroup, &Binder),
-        (name, entry): (&'static str, &str),
-        types: &[wgpu::BindingType],
-    ) -> Self {
-        let binder = Binder::new(device, name, types);
-        let pipeline = Self::pipeline(device, (inputs, scene), (name, entry), &binder);
-        Self { pipeline, binder }
-    }
-
-    fn pipeline(
-        device: &wgpu::Device,
-        (inputs, scene): (&InputGroup, &Binder),
-        (name, entry): (&'static str, &str),
-        own: &Binder,
-    ) -> wgpu::ComputePipeline {
-        let module = shaders::module_with(device, name, &prelude());
-        let layouts = [inputs.layout(), scene.layout(), own.layout()];
-        bind::pipeline(device, name, &module, entry, &layouts)
-    }
 }
 
 impl GatherGi {
@@ -173,9 +145,9 @@ impl GatherGi {
         let scene = Binder::new(device, "gi.gather", &[ParamsRing::TYPE, texels, READ, READ, READ, LOAD, texels]);
         let frame_params = Binder::new(device, "gi.gather", &[ParamsRing::TYPE]);
         let (shared, alone) = ((&inputs, &scene), (&inputs, &frame_params));
-        let new = |groups, name, entry, types: &[wgpu::BindingType]| Pass::new(device, groups, (name, entry), types);
+        let new = |groups, names, types: &[wgpu::BindingType]| Pass::new(device, groups, names, types);
         let rw = READ_WRITE;
-        let renew = new(shared, "gi.renew", "renew", &[rw, rw, rw, rw, rw]);
+        let table = [rw, rw, rw, rw, rw];
         let nothing = |label, format| {
             let texture = device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
@@ -191,12 +163,12 @@ impl GatherGi {
         };
         Self {
             cells: CellsPass::new(device, &inputs, size),
-            rays: new(shared, "gi.rays", "rays", &[rw, rw, rw, READ, rw, LOAD]),
-            evict: Pass::pipeline(device, shared, ("gi.renew", "evict"), &renew.binder),
-            renew,
-            settle: new(alone, "gi.settle", "settle", &[READ, READ, READ, READ, rw, READ, LOAD, LOAD]),
-            blur: new(alone, "gi.blur", "blur", &[READ, rw, rw, rw]),
-            smooth: new(alone, "gi.smooth", "smooth_light", &[READ, READ, rw]),
+            evict: new(shared, ("gi.evict", "gi.renew", "evict"), &table),
+            rays: new(shared, ("gi.rays", "gi.rays", "rays"), &[rw, rw, rw, READ, rw, LOAD]),
+            renew: new(shared, ("gi.renew", "gi.renew", "renew"), &table),
+            settle: new(alone, ("gi.settle", "gi.settle", "settle"), &[READ, READ, READ, READ, rw, READ, LOAD, LOAD]),
+            blur: new(alone, ("gi.blur", "gi.blur", "blur"), &[READ, rw, rw, rw]),
+            smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), &[READ, READ, rw]),
             bring: BringPass::new(device, &inputs),
             store: Store::new(device, size, options.slots),
             checked: size,
@@ -229,7 +201,7 @@ impl GatherGi {
 
     /// Bind groups made since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
-        let passes = [&self.rays, &self.renew, &self.settle, &self.blur, &self.smooth].map(|p| p.binder.made());
+        let passes = [&self.evict, &self.rays, &self.renew, &self.settle, &self.blur, &self.smooth].map(Pass::made);
         self.inputs.made()
             + self.scene.made()
             + self.frame_params.made()
@@ -249,7 +221,7 @@ impl GatherGi {
             (inputs.specular.is_none(), params::NO_GLOSS),
         ];
         Ok(Params {
-            eye: super::inputs::Params::new(inputs.size, &inputs.camera, inputs.environment)?.eye_position(),
+            eye: crate::gi::stage::inputs::Params::new(inputs.size, &inputs.camera, inputs.environment)?.eye_position(),
             frame: self.frame,
             light_count: inputs.lights.map_or(0, |l| l.count),
             emitter_count: counts.emitters as u32,
@@ -269,24 +241,6 @@ impl GatherGi {
             pad: 0,
         })
     }
-
-    fn run(recorder: &mut Recorder<'_>, label: &str, pass: &wgpu::ComputePipeline, groups: Groups<'_>, size: [u32; 3]) {
-        recorder.compute(label, |p| {
-            groups.inputs.set(p);
-            p.set_bind_group(1, groups.scene, &[groups.offset]);
-            p.set_bind_group(2, groups.own, &[]);
-            p.set_pipeline(pass);
-            p.dispatch_workgroups(size[0], size[1], size[2]);
-        });
-    }
-}
-
-/// What a pass is bound to.
-struct Groups<'a> {
-    inputs: &'a BoundInputs,
-    scene: &'a wgpu::BindGroup,
-    offset: u32,
-    own: &'a wgpu::BindGroup,
 }
 
 impl Rung for GatherGi {
@@ -297,7 +251,7 @@ impl Rung for GatherGi {
         inputs: &Inputs<'_>,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
-        super::ambient::check_output(output, inputs.size)?;
+        crate::gi::stage::inputs::check_output(output, inputs.size)?;
         let rays = inputs.rays.as_ref().ok_or(GiError::Rays)?;
         if inputs.size != self.checked {
             Self::check(&self.device.limits(), inputs.size, &self.options)?;
@@ -325,29 +279,13 @@ impl Rung for GatherGi {
             rays.scene.normals().into(),
         ]);
         let store = &self.store;
-        let table = || [&store.keys, &store.lots, &store.queries].map(Bound::from);
-        let [keys, lots, queries] = table();
+        let [keys, lots, queries, asked, entry_light] =
+            [&store.keys, &store.lots, &store.queries, &store.asked, &store.light].map(Bound::from);
         let specular = Bound::from(inputs.specular.unwrap_or(&self.no_specular));
-        let pixels = Bound::from(self.cells.pixels());
-        let records = Bound::from(&store.records);
-        let rays_group = self.rays.binder.group([keys, lots, queries, pixels, records, specular.clone()]);
-        let [keys, lots, queries] = table();
-        let renew_group = self.renew.binder.group([keys, lots, queries, (&store.asked).into(), (&store.light).into()]);
-        let [before, after] = [self.frame & 1, 1 - (self.frame & 1)].map(|i| &store.pasts[i as usize]);
-        let settle_group = self.settle.binder.group([
-            self.cells.pixels().into(),
-            (&store.records).into(),
-            (&store.light).into(),
-            before.into(),
-            after.into(),
-            (&store.changes).into(),
-            inputs.motion.unwrap_or(&self.no_motion).into(),
-            specular,
-        ]);
-        let [changes, glosses] = [&store.changes, &store.glosses].map(Bound::from);
-        let blur_group = self.blur.binder.group([after.into(), (&store.blurred).into(), changes, glosses]);
-        let smooth_group =
-            self.smooth.binder.group([after.into(), (&store.blurred).into(), (&store.cell_light).into()]);
+        let [pixels, records] = [self.cells.pixels(), &store.records].map(Bound::from);
+        let [before, after] = [self.frame & 1, 1 - (self.frame & 1)].map(|i| Bound::from(&store.pasts[i as usize]));
+        let [changes, blurred, light] = [&store.changes, &store.blurred, &store.cell_light].map(Bound::from);
+        let table = || [&keys, &lots, &queries, &asked, &entry_light].map(Clone::clone);
 
         let epoch = inputs.lights.map_or(0, |l| l.epoch);
         if epoch != self.lights_epoch && self.frame > 0 && !self.options.even {
@@ -358,15 +296,16 @@ impl Rung for GatherGi {
         let [w, h] = cells::grid(inputs.size).map(|n| n.div_ceil(8));
         let mut offset = self.params.write(queue, &params);
         let frame_params = self.frame_params.group([self.params.bound()]);
-        let groups = |offset, own| Groups { inputs: &bound, scene: &scene, offset, own };
-        let alone = |offset, own| Groups { scene: &frame_params, ..groups(offset, own) };
+        let groups = |offset| Groups { inputs: &bound, scene: &scene, offset };
+        let alone = |offset| Groups { scene: &frame_params, ..groups(offset) };
 
         self.cells.record(recorder, &bound);
-        let slots = self.options.slots.div_ceil(64);
-        Self::run(recorder, "gi.evict", &self.evict, groups(offset, &renew_group), [slots, 1, 1]);
+        let slots = [self.options.slots.div_ceil(64), 1, 1];
+        self.evict.record(recorder, groups(offset), table(), slots);
         // The second layer of workgroups sends rays into lobes.
         let layers = 1 + u32::from(inputs.specular.is_some());
-        Self::run(recorder, "gi.rays", &self.rays.pipeline, groups(offset, &rays_group), [w, h, layers]);
+        let own = [&keys, &lots, &queries, &pixels, &records, &specular].map(Clone::clone);
+        self.rays.record(recorder, groups(offset), own, [w, h, layers]);
         let rounds = match (self.frame, self.hurry) {
             (0, _) => self.options.first_rounds.max(1),
             (1..=YOUNG, _) => ROUNDS_YOUNG,
@@ -378,11 +317,14 @@ impl Rung for GatherGi {
                 params.round += 1;
                 offset = self.params.write(queue, &params);
             }
-            Self::run(recorder, "gi.renew", &self.renew.pipeline, groups(offset, &renew_group), [slots, 1, 1]);
+            self.renew.record(recorder, groups(offset), table(), slots);
         }
-        Self::run(recorder, "gi.settle", &self.settle.pipeline, alone(offset, &settle_group), [w, h, 1]);
-        Self::run(recorder, "gi.blur", &self.blur.pipeline, alone(offset, &blur_group), [w, h, 1]);
-        Self::run(recorder, "gi.smooth", &self.smooth.pipeline, alone(offset, &smooth_group), [w, h, 1]);
+        let motion = Bound::from(inputs.motion.unwrap_or(&self.no_motion));
+        let own = [&pixels, &records, &entry_light, &before, &after, &changes, &motion, &specular].map(Clone::clone);
+        self.settle.record(recorder, alone(offset), own, [w, h, 1]);
+        let own = [&after, &blurred, &changes, &Bound::from(&store.glosses)].map(Clone::clone);
+        self.blur.record(recorder, alone(offset), own, [w, h, 1]);
+        self.smooth.record(recorder, alone(offset), [after, blurred, light], [w, h, 1]);
         self.round = params.round + 1;
         self.frame += 1;
         self.hurry = self.hurry.saturating_sub(1);
@@ -410,7 +352,7 @@ impl Rung for GatherGi {
     fn forget(&mut self) {
         self.inputs.forget();
         self.scene.forget();
-        self.settle.binder.forget();
+        self.settle.forget();
         self.bring.forget();
     }
 

@@ -1,7 +1,7 @@
 //! What `gather` keeps from frame to frame, and between the passes of one.
 
 use super::{PAST, RECORD};
-use crate::gi::cells;
+use crate::gi::stage::cells;
 
 /// Squares of 2×2 cells, each of which sends one ray a frame into a lobe.
 pub(super) fn squares(size: [u32; 2]) -> u64 {
@@ -81,8 +81,20 @@ impl Store {
     }
 
     pub fn bytes(&self) -> u64 {
-        let Self { keys, lots, queries, asked, light, records, pasts: [a, b], cell_light, blurred, changes, glosses, gloss } =
-            self;
+        let Self {
+            keys,
+            lots,
+            queries,
+            asked,
+            light,
+            records,
+            pasts: [a, b],
+            cell_light,
+            blurred,
+            changes,
+            glosses,
+            gloss,
+        } = self;
         let texels = u64::from(gloss.texture().width()) * u64::from(gloss.texture().height());
         let buffers = [keys, lots, queries, asked, light, records, a, b, cell_light, blurred, changes, glosses];
         8 * texels + buffers.iter().map(|b| b.size()).sum::<u64>()

@@ -6,12 +6,13 @@
 //! roof that is not in view is sky; the back of a lamp shade is dark. Thickness is assumed, so light passes behind thick
 //! things. Surfaces finer than two pixels send and receive through their neighbours.
 
+use super::ambient;
 use super::bitmask::{self, Kernel, March, Pattern, Stage, bind, half_of, pattern_entry, write_entry};
-use super::exposure::{self, ExposurePass, output_entry, storage_entry};
-use super::inputs::{InputGroup, texture_entry};
-use super::rung::{Cost, Rung};
-use super::view_cache::ViewCache;
-use super::{GiError, Inputs, ambient};
+use crate::gi::interface::rung::{Cost, Rung};
+use crate::gi::interface::{GiError, Inputs};
+use crate::gi::stage::ViewCache;
+use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry};
+use crate::gi::stage::inputs::{InputGroup, texture_entry};
 use crate::gpu::timing::Recorder;
 
 /// What the method may be told.
@@ -113,7 +114,7 @@ impl Rung for SsgiGi {
         inputs: &Inputs<'_>,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
-        ambient::check_output(output, inputs.size)?;
+        crate::gi::stage::inputs::check_output(output, inputs.size)?;
         let bound = self.inputs.bind(queue, inputs)?;
         self.fit(inputs.size);
         let full = self.outputs.get([output], || {

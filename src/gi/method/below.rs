@@ -1,11 +1,11 @@
 //! A method that needs rays, and the rung below it, which draws where there are none: while trees are built, in a scene or on a
 //! device that is too large or too small for them.
 
-use super::pass::NeuralGi;
-use super::rung::{Cost, Instead, Rung};
-use super::ssgi::{SsgiGi, SsgiOptions};
-use super::{GiError, Inputs};
+use crate::gi::interface::rung::{Cost, Instead, Rung};
+use crate::gi::interface::{GiError, Inputs};
+use crate::gi::screen::ssgi::{SsgiGi, SsgiOptions};
 use crate::gpu::timing::Recorder;
+use crate::net::gpu::Tap;
 
 /// The method, or why the device cannot have it, with what draws instead.
 pub(super) struct OrBelow {
@@ -69,12 +69,16 @@ impl Rung for OrBelow {
         self.drew()?.gloss()
     }
 
-    fn neural(&self) -> Option<&NeuralGi> {
-        self.above.as_ref().ok()?.neural()
+    fn guess(&self) -> Option<&wgpu::TextureView> {
+        self.above.as_ref().ok()?.guess()
     }
 
-    fn neural_mut(&mut self) -> Option<&mut NeuralGi> {
-        self.above.as_mut().ok()?.neural_mut()
+    fn layers(&self) -> Vec<&str> {
+        self.above.as_ref().map(|a| a.layers()).unwrap_or_default()
+    }
+
+    fn read_layer(&mut self, inputs: &Inputs<'_>, layer: usize) -> Result<Option<Tap>, GiError> {
+        self.above.as_mut().map_or(Ok(None), |a| a.read_layer(inputs, layer))
     }
 
     fn knows_scene(&self, rays: bool) -> bool {

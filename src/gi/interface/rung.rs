@@ -1,12 +1,8 @@
 //! What all methods share: the trait that a frame drives them by, and what a pass costs by count.
 
-use super::ambient::AmbientGi;
-use super::below::OrBelow;
-use super::gather::GatherGi;
-use super::pass::{NeuralGi, Options};
-use super::ssgi::{SsgiGi, SsgiOptions};
-use super::{GiError, Inputs, Method};
+use super::{GiError, Inputs};
 use crate::gpu::timing::Recorder;
+use crate::net::gpu::Tap;
 use serde::{Deserialize, Serialize};
 
 /// Arithmetic and memory traffic of one pass, counted by hand from its loops and formats.
@@ -80,14 +76,22 @@ pub trait Rung: Send {
         None
     }
 
-    /// The network, if the method is one.
-    fn neural(&self) -> Option<&NeuralGi> {
+    /// What method `gather` answered in the last recording, where this one builds on it.
+    fn guess(&self) -> Option<&wgpu::TextureView> {
         None
     }
 
-    /// As [`Rung::neural`], to look into it.
-    fn neural_mut(&mut self) -> Option<&mut NeuralGi> {
-        None
+    /// Names of the network's layers; none without a network.
+    fn layers(&self) -> Vec<&str> {
+        Vec::new()
+    }
+
+    /// What a layer of the network makes of `inputs`, which must be those of the last recording; `None` where there is no such layer.
+    ///
+    /// # Errors
+    /// [`GiError`] when the inputs do not fit or reading back fails.
+    fn read_layer(&mut self, _inputs: &Inputs<'_>, _layer: usize) -> Result<Option<Tap>, GiError> {
+        Ok(None)
     }
 
     /// The targets are new: lets go of the texture views it remembers.
@@ -98,35 +102,4 @@ pub trait Rung: Send {
 
     /// What each pass costs for a picture of `size` pixels, in frame order.
     fn costs(&self, size: [u32; 2]) -> Vec<Cost>;
-}
-
-/// Makes the method that `method` names, for pictures of `size` pixels; `None` for [`Method::Direct`], which adds no
-/// light.
-///
-/// # Errors
-/// [`GiError`] when a network does not fit this program or the device.
-pub fn build(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    size: [u32; 2],
-    method: &Method,
-) -> Result<Option<Box<dyn Rung>>, GiError> {
-    Ok(match method {
-        Method::Direct => None,
-        Method::Ambient => Some(Box::new(AmbientGi::new(device))),
-        Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
-        Method::Gather(options) => {
-            let above = GatherGi::check(&device.limits(), size, options);
-            let above = above.map(|()| Box::new(GatherGi::new(device, size, *options)) as Box<dyn Rung>);
-            Some(Box::new(OrBelow::new(device, above.map_err(|e| e.to_string()))))
-        }
-        Method::Neural(neural) if method.needs_rays() => {
-            let above = match GatherGi::check(&device.limits(), size, &Default::default()) {
-                Ok(()) => Ok(Box::new(NeuralGi::with(device, queue, neural, Options { size })?) as Box<dyn Rung>),
-                Err(lacks) => Err(lacks.to_string()),
-            };
-            Some(Box::new(OrBelow::new(device, above)))
-        }
-        Method::Neural(neural) => Some(Box::new(NeuralGi::with(device, queue, neural, Options { size })?)),
-    })
 }

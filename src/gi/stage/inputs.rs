@@ -3,8 +3,8 @@
 //! Parameters go into a ring of uniform slots, one slot a recording, so that a host may record several views into one
 //! submission; up to [`SLOTS`] recordings between two submissions keep their own parameters.
 
-use super::view_cache::ViewCache;
-use super::{CameraMatrices, GiError, Inputs};
+use crate::gi::interface::{CameraMatrices, GiError, Inputs};
+use crate::gi::stage::ViewCache;
 use glam::{Mat3, Mat4, Vec3};
 
 /// Pixels on a side of a cell; `CELL` in `shaders/gi/inputs.wgsl`.
@@ -280,4 +280,9 @@ pub(crate) fn check(
         return wrong(format!("{}x{} pixels", size[0], size[1]), format!("{}x{} pixels", found[0], found[1]));
     }
     Ok(())
+}
+
+/// The output of every method.
+pub(crate) fn check_output(output: &wgpu::TextureView, size: [u32; 2]) -> Result<(), GiError> {
+    check("output", output, size, wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::STORAGE_BINDING)
 }

@@ -4,12 +4,12 @@
 //! What it cannot do: see [`crate::gi`].
 
 use super::bitmask::{March, bind};
-use super::exposure::{self, ExposurePass, output_entry, storage_entry};
-use super::inputs::{InputGroup, check, texture_entry};
 use super::occlusion::OcclusionPass;
-use super::rung::{Cost, Rung};
-use super::view_cache::ViewCache;
-use super::{GiError, Inputs};
+use crate::gi::interface::rung::{Cost, Rung};
+use crate::gi::interface::{GiError, Inputs};
+use crate::gi::stage::ViewCache;
+use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry};
+use crate::gi::stage::inputs::{InputGroup, check_output, texture_entry};
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
 
@@ -142,9 +142,4 @@ impl Rung for AmbientGi {
     fn bytes(&self) -> u64 {
         self.inputs.bytes() + self.exposure.bytes() + self.occlusion.bytes()
     }
-}
-
-/// The output of every method.
-pub(crate) fn check_output(output: &wgpu::TextureView, size: [u32; 2]) -> Result<(), GiError> {
-    check("output", output, size, wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::STORAGE_BINDING)
 }

@@ -1,7 +1,7 @@
 //! The network's input features as data: table `screen`, version 1. Weights name the ones they use; the pack shader
 //! gets their channel offsets as a generated prelude.
 
-use super::GiError;
+use crate::gi::interface::GiError;
 
 /// One row of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub struct FeatureInfo {
 }
 
 /// Table `screen` v1, in channel order. A cell is 4×4 pixels; cell (i, j) samples pixel (4i+2, 4j+2), or the last row or
-/// column where that lies outside. `s` and `m` (e^ln_m) are [`Exposure`](super::exposure::Exposure)'s. Texels that are
+/// column where that lies outside. `s` and `m` (e^ln_m) are [`Exposure`](crate::gi::stage::exposure::Exposure)'s. Texels that are
 /// NaN or infinite read as 0, radiances below 0 too. Where the sample is background all but `hit` and `sky` are 0, and
 /// `hit` says so.
 pub const FEATURES: [FeatureInfo; 10] = [
@@ -123,28 +123,6 @@ impl FeatureSet {
         text.push_str(&format!("const PADDED = {}u;\n", self.padded()));
         text
     }
-}
-
-/// Each shader of `gi/` that needs a prelude, with examples of it, for the validation of every permutation.
-pub fn example_preludes() -> Vec<(&'static str, String)> {
-    let few = FeatureSet::new([("direct", 3), ("depth", 1), ("hit", 1)]).expect("rows of the table in order");
-    vec![
-        ("gi.ambient", super::ambient::unseen_prelude(1.0, 0.5)),
-        ("gi.occlusion", super::bitmask::March::NEAR.prelude()),
-        ("gi.radiance", super::ssgi::SsgiOptions::default().prelude()),
-        ("gi.ssgi", super::ssgi::SsgiOptions::default().prelude()),
-        ("gi.pack", FeatureSet::all().prelude()),
-        ("gi.pack", few.prelude()),
-        ("gi.reconstruct", super::reconstruct::prelude(super::reconstruct::Answer::Light)),
-        ("gi.reconstruct", super::reconstruct::prelude(super::reconstruct::Answer::Gain)),
-        ("gi.cells", super::cells::prelude()),
-        ("gi.rays", super::gather::prelude()),
-        ("gi.renew", super::gather::prelude()),
-        ("gi.settle", super::gather::prelude()),
-        ("gi.blur", super::gather::prelude()),
-        ("gi.smooth", super::gather::prelude()),
-        ("gi.bring", super::gather::bring::prelude()),
-    ]
 }
 
 #[cfg(test)]

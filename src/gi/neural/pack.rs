@@ -1,9 +1,9 @@
 //! G-buffer to network input: one thread a cell writes the features that the weights name.
 
-use super::exposure::{ExposurePass, pipeline, storage_entry};
 use super::features::FeatureSet;
-use super::inputs::{BoundInputs, InputGroup, cells_of, check, texture_entry};
-use super::{GiError, Inputs};
+use crate::gi::interface::{GiError, Inputs};
+use crate::gi::stage::exposure::{ExposurePass, pipeline, storage_entry};
+use crate::gi::stage::inputs::{BoundInputs, InputGroup, cells_of, check, texture_entry};
 use crate::gpu::timing::Recorder;
 use crate::gpu::{readback, shaders};
 
@@ -64,7 +64,7 @@ pub struct NetworkInputs {
     /// CHW: `channels × cells[1] × cells[0]` values.
     pub features: Vec<f32>,
     /// The exposure that radiances were divided by and that the answer is to be multiplied by.
-    pub exposure: super::exposure::Exposure,
+    pub exposure: crate::gi::stage::exposure::Exposure,
 }
 
 /// Computes and reads back the features of one picture, without any network. `guess` is what method `gather` made of the same
@@ -111,7 +111,7 @@ pub fn read_features(
         names: features.names().collect(),
         channels,
         features: chw,
-        exposure: super::exposure::read(device, queue, exposure.buffer())?,
+        exposure: crate::gi::stage::exposure::read(device, queue, exposure.buffer())?,
     })
 }
 

@@ -15,14 +15,14 @@
 //!
 //! What the method cannot do: see [`crate::gi`].
 
-use super::exposure::ExposurePass;
 use super::features::FeatureSet;
-use super::gather::{self, GatherGi};
-use super::inputs::{CELL, InputGroup, cells_of};
 use super::pack::{self, NetworkInputs, PackPass};
 use super::reconstruct::{Answer, ReconstructPass};
-use super::rung::{Cost, Rung};
-use super::{GiError, Inputs};
+use crate::gi::gather::{self, GatherGi};
+use crate::gi::interface::rung::{Cost, Rung};
+use crate::gi::interface::{GiError, Inputs};
+use crate::gi::stage::exposure::ExposurePass;
+use crate::gi::stage::inputs::{CELL, InputGroup, cells_of};
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
 use crate::net::gpu::{self, Network, Tap, Tuned};
@@ -59,7 +59,7 @@ impl From<Weights> for Neural {
 
 /// The embeddable pass. Keeps clones of device and queue (both are handles) to rebuild on a change of size and to
 /// write its parameters; parameters become visible to the GPU with the host's next submission, and up to
-/// [`SLOTS`](super::inputs::SLOTS) recordings may go into one submission.
+/// [`SLOTS`](crate::gi::stage::inputs::SLOTS) recordings may go into one submission.
 pub struct NeuralGi {
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -164,7 +164,7 @@ impl NeuralGi {
         inputs: &Inputs<'_>,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
-        super::ambient::check_output(output, inputs.size)?;
+        crate::gi::stage::inputs::check_output(output, inputs.size)?;
         if inputs.size != self.rebuilt.size {
             self.resize(inputs.size)?;
         }
@@ -245,7 +245,7 @@ impl NeuralGi {
         }
     }
 
-    /// The exposure of the last recording, see [`super::exposure::read`].
+    /// The exposure of the last recording, see [`crate::gi::stage::exposure::read`].
     pub fn exposure_buffer(&self) -> &wgpu::Buffer {
         self.exposure.buffer()
     }
@@ -277,7 +277,7 @@ impl NeuralGi {
         let mut costs = self.gather.as_ref().map(|gather| gather.costs(size)).unwrap_or_default();
         // With a first guess: 8 bytes more a pixel and a cell, and twice the numbers of a cell.
         let guess = f64::from(8 * u8::from(self.gather.is_some()));
-        costs.push(super::exposure::cost(size));
+        costs.push(crate::gi::stage::exposure::cost(size));
         costs.push(Cost::new("gi.pack", cells * 300.0, cells * (features + guess + 28.0 + 64.0)));
         costs.extend(plan.steps.iter().map(|step| {
             Cost::new(&format!("net.{}", step.name), scale * step.flops as f64, scale * step.traffic as f64)
@@ -322,12 +322,16 @@ impl Rung for NeuralGi {
         self.gather.as_ref().and_then(|gather| gather.gloss())
     }
 
-    fn neural(&self) -> Option<&NeuralGi> {
-        Some(self)
+    fn guess(&self) -> Option<&wgpu::TextureView> {
+        self.guess()
     }
 
-    fn neural_mut(&mut self) -> Option<&mut NeuralGi> {
-        Some(self)
+    fn layers(&self) -> Vec<&str> {
+        self.layers()
+    }
+
+    fn read_layer(&mut self, inputs: &Inputs<'_>, layer: usize) -> Result<Option<Tap>, GiError> {
+        self.read_layer(inputs, layer)
     }
 
     fn forget(&mut self) {

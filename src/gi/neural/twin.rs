@@ -1,11 +1,12 @@
 //! The slow, obvious CPU twin of `gi/`'s shaders, function by function under the same names. No wgpu. Tests compare
 //! the shaders with it; nothing else uses it. Formulas are documented in the shaders and in `gi::features`.
 
-use super::ambient::{BOUNCE, SKY};
-use super::exposure::Exposure;
 use super::features::FeatureSet;
-use super::inputs::{CELL, Params};
-use super::reconstruct::{Answer, LOST, MOST_ADDED, NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, TRUST, WEIGHT_FLOOR};
+use super::reconstruct::{Answer, LOST, MOST_ADDED, TRUST};
+use crate::gi::screen::ambient::{BOUNCE, SKY};
+use crate::gi::stage::exposure::Exposure;
+use crate::gi::stage::inputs::{CELL, Params};
+use crate::gi::stage::weights::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
 use glam::{IVec2, Mat3, Vec2, Vec3, Vec3Swizzles};
 
 /// Largest value that is stored in the half-float output.

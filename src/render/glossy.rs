@@ -1,7 +1,7 @@
 //! Specular light of sky and bounces: the split sum's share of what one ray along the mirrored direction finds on the
 //! screen, blurred by the lobe's width.
 //!
-//! Where the method has sent rays into lobes ([`Rung::gloss`](super::rung::Rung::gloss)), what they found is shown, and the screen is
+//! Where the method has sent rays into lobes ([`Rung::gloss`](crate::gi::rung::Rung::gloss)), what they found is shown, and the screen is
 //! asked by smooth surfaces only, for sharpness.
 //!
 //! `gi.lit` makes a half-size picture of the light that all surfaces send out, and blurs it in steps of two; `gi.glossy`
@@ -13,10 +13,10 @@
 //! spread a rough lobe over a corner (it looks along one direction), and show reflections in reflections but for their
 //! mean.
 
-use super::rung::Cost;
+use super::{Targets, tool};
+use crate::gi::rung::Cost;
 use crate::gpu::bind::Binder;
 use crate::gpu::timing::Recorder;
-use crate::render::{Targets, tool};
 
 /// Levels of the lit picture, at most: half size down to 1/128.
 const LEVELS: u32 = 7;
@@ -52,7 +52,7 @@ pub struct GlossyInputs<'a> {
     pub picture: &'a GlossyPicture,
     /// Radiance of the surroundings, for rays that leave the picture.
     pub sky: &'a wgpu::TextureView,
-    /// [`Rung::gloss`](super::rung::Rung::gloss).
+    /// [`Rung::gloss`](crate::gi::rung::Rung::gloss).
     pub found: Option<&'a wgpu::TextureView>,
 }
 

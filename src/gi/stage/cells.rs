@@ -14,7 +14,7 @@
 
 use super::exposure::{pipeline, storage_entry};
 use super::inputs::{BoundInputs, InputGroup};
-use super::rung::Cost;
+use crate::gi::interface::rung::Cost;
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
 

@@ -1,9 +1,9 @@
 //! One exposure for the picture: the scalar that makes the network's inputs free of units and its answer linear in
 //! the light. A two-level reduction of fixed order over the low-resolution cells.
 
-use super::GiError;
 use super::inputs::{BoundInputs, InputGroup};
-use super::rung::Cost;
+use crate::gi::interface::GiError;
+use crate::gi::interface::rung::Cost;
 use crate::gpu::readback;
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;

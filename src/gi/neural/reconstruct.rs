@@ -5,21 +5,14 @@
 //! disagree (an edge, something thin) the 4×4 cells around are asked, then 8×8; where even those show only background
 //! the first guess stays, or the ambient constant answers. Background pixels get 0. Cells whose sample is background never give light.
 
-use super::exposure::{ExposurePass, output_entry, pipeline, storage_entry};
-use super::inputs::{BoundInputs, InputGroup, texture_entry};
-use super::{GiError, ambient, view_cache::ViewCache};
+use crate::gi::interface::GiError;
+use crate::gi::stage::ViewCache;
+use crate::gi::stage::exposure::{ExposurePass, output_entry, pipeline, storage_entry};
+use crate::gi::stage::inputs::{BoundInputs, InputGroup, texture_entry};
+use crate::gi::stage::weights::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
 
-/// Distance from the pixel's plane, relative to the view distance, at which a tap's weight has fallen to a quarter.
-/// About half a cell's footprint at 1024×512 and 60°: nothing closer can be told apart at this resolution anyway.
-pub const PLANE_TOLERANCE: f32 = 0.004;
-/// Power of the cosine between normals: 10° keeps 78 %, 30° keeps 10 %, 60° nothing.
-pub const NORMAL_POWER: f32 = 16.0;
-/// Least factor by normals, so that a wrong normal in the right plane still beats a wrong plane.
-pub const NORMAL_FLOOR: f32 = 1e-5;
-/// Least weight, so that no sum over hit cells is 0.
-pub const WEIGHT_FLOOR: f32 = 1e-15;
 /// Sum of the four weights below which more cells are asked.
 pub const TRUST: f32 = 0.1;
 /// Sum over the 4×4 cells below which 8×8 are asked.
@@ -69,7 +62,7 @@ impl Answer {
     /// The factor where no cell can answer: the guess stays, or the constant ambient.
     pub fn fallback(self) -> [f32; 3] {
         match self {
-            Answer::Light => ambient::AMBIENT,
+            Answer::Light => crate::gi::screen::ambient::AMBIENT,
             Answer::Gain => [1.0; 3],
         }
     }
@@ -132,7 +125,7 @@ impl ReconstructPass {
         guess: &wgpu::TextureView,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
-        ambient::check_output(output, inputs.size)?;
+        crate::gi::stage::inputs::check_output(output, inputs.size)?;
         let group = self.outputs.get([output], || {
             Ok::<_, GiError>(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("gi.reconstruct"),

@@ -1,0 +1,58 @@
+//! What can go wrong.
+
+use crate::gpu::readback::ReadbackError;
+use thiserror::Error;
+
+/// Why a method could not be made or recorded.
+#[derive(Debug, Error)]
+pub enum GiError {
+    /// A width or height of 0, or more pixels than the device's textures hold.
+    #[error("a picture of {}x{} pixels cannot be lit: {reason}", size[0], size[1])]
+    Size {
+        /// Width and height, pixels.
+        size: [u32; 2],
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The camera is not a finite reversed-Z perspective camera.
+    #[error("the camera cannot be used: {0}")]
+    Camera(&'static str),
+    /// The method reads [`Inputs::rays`], which is not there.
+    #[error("this method sends rays into the scene's triangles (`Inputs::rays`), which the host did not supply")]
+    Rays,
+    /// The device is too small for the method.
+    #[error("this device {0}")]
+    Device(String),
+    /// A texture view has another format, size or usage than [`Inputs`] says.
+    #[error("texture `{name}` has {found}, but needs {expected}")]
+    Texture {
+        /// Field of [`Inputs`], or `output`.
+        name: &'static str,
+        /// What is needed.
+        expected: String,
+        /// What it has.
+        found: String,
+    },
+    /// The weights name an input feature that this program does not have, or in another shape or order.
+    #[error("the weights' input feature `{name}` {reason}")]
+    Feature {
+        /// The feature's name in the weights file.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The weights' output is no light and no gain on a first guess.
+    #[error("the weights' output is {0}; this program needs 3 channels of light, or 6 of gain and rest")]
+    Output(String),
+    /// The network could not be built.
+    #[error("the network could not be built for {}x{} cells: {source}", cells[0], cells[1])]
+    Network {
+        /// Low resolution, cells.
+        cells: [u32; 2],
+        /// The network's own reason.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// Reading back failed.
+    #[error(transparent)]
+    Readback(#[from] ReadbackError),
+}

@@ -1,0 +1,90 @@
+//! The list of methods, and how one is made: nothing below knows it.
+
+mod below;
+pub mod name;
+
+use super::gather::{self, GatherGi};
+use super::interface::{GiError, rung::Rung};
+use super::neural::pass::{self, NeuralGi, Options};
+use super::screen::{
+    ambient::AmbientGi,
+    ssgi::{SsgiGi, SsgiOptions},
+};
+use below::OrBelow;
+
+/// Which method fills the `indirect` texture of a frame.
+#[derive(Debug, Clone, Default)]
+pub enum Method {
+    /// None: `indirect` is 0. Shows what direct light alone gives.
+    Direct,
+    /// Even light times occlusion, see [`ambient`].
+    #[default]
+    Ambient,
+    /// One bounce in screen space, see [`ssgi`].
+    Ssgi,
+    /// Rays into the scene's triangles and a cache of light in the world, see [`gather`].
+    Gather(gather::Options),
+    /// A network, see [`pass`]; `weights.into()` runs it with defaults.
+    Neural(Box<pass::Neural>),
+}
+
+impl Method {
+    /// Frames of a still camera after which a picture counts as settled, for methods with a history.
+    pub const SETTLED: u32 = 32;
+
+    /// The method's name on the command line.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Method::Direct => "direct",
+            Method::Ambient => "ambient",
+            Method::Ssgi => "ssgi",
+            Method::Gather(_) => "gather",
+            Method::Neural(_) => "neural",
+        }
+    }
+
+    /// Whether the method asks rays ([`Inputs::rays`]).
+    pub fn needs_rays(&self) -> bool {
+        match self {
+            Method::Gather(_) => true,
+            Method::Neural(neural) => pass::needs_guess(&neural.weights),
+            _ => false,
+        }
+    }
+
+    /// Whether the method's answer settles over frames.
+    pub fn has_history(&self) -> bool {
+        self.needs_rays()
+    }
+}
+
+/// Makes the method that `method` names, for pictures of `size` pixels; `None` for [`Method::Direct`], which adds no
+/// light.
+///
+/// # Errors
+/// [`GiError`] when a network does not fit this program or the device.
+pub fn build(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    size: [u32; 2],
+    method: &Method,
+) -> Result<Option<Box<dyn Rung>>, GiError> {
+    Ok(match method {
+        Method::Direct => None,
+        Method::Ambient => Some(Box::new(AmbientGi::new(device))),
+        Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
+        Method::Gather(options) => {
+            let above = GatherGi::check(&device.limits(), size, options);
+            let above = above.map(|()| Box::new(GatherGi::new(device, size, *options)) as Box<dyn Rung>);
+            Some(Box::new(OrBelow::new(device, above.map_err(|e| e.to_string()))))
+        }
+        Method::Neural(neural) if method.needs_rays() => {
+            let above = match GatherGi::check(&device.limits(), size, &Default::default()) {
+                Ok(()) => Ok(Box::new(NeuralGi::with(device, queue, neural, Options { size })?) as Box<dyn Rung>),
+                Err(lacks) => Err(lacks.to_string()),
+            };
+            Some(Box::new(OrBelow::new(device, above)))
+        }
+        Method::Neural(neural) => Some(Box::new(NeuralGi::with(device, queue, neural, Options { size })?)),
+    })
+}
