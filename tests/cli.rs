@@ -355,3 +355,18 @@ fn gl_draws_the_same_picture_as_vulkan() {
         assert!(control < 50.0, "{scene}: {control} dB for another exposure");
     }
 }
+
+#[test]
+#[cfg(unix)]
+fn results_may_be_read_in_part_and_a_full_disk_is_said() {
+    let run = |more: &str| {
+        let shell = format!("{} weights info assets/weights/small.safetensors {more}", env!("CARGO_BIN_EXE_bouncelight"));
+        std::process::Command::new("bash").args(["-c", &format!("set -o pipefail; {shell}")]).output().expect("bash runs")
+    };
+    let part = run("| head -1");
+    let said = String::from_utf8_lossy(&part.stderr).into_owned();
+    assert!(part.status.success() && !part.stdout.is_empty() && said.is_empty(), "{:?} {said}", part.status);
+    let full = run("> /dev/full");
+    assert_eq!(full.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&full.stderr).starts_with("error: cannot write to standard output"));
+}

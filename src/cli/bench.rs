@@ -1,6 +1,7 @@
 //! `bouncelight bench`: GPU time per pass, wall clock per frame, resident bytes; against a saved base if asked.
 
 use super::layers::Layers;
+use super::stdout::say;
 use super::{
     args::{Global, MethodName, PrecisionName, SceneArgs, replaced, usage},
     error::CliError,
@@ -157,22 +158,22 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 }
 
 fn print(record: &Record, gpu: &Gpu, layers: bool) {
-    println!("{} at {}x{} on {}", record.scene, record.size[0], record.size[1], gpu.sentence());
+    say!("{} at {}x{} on {}", record.scene, record.size[0], record.size[1], gpu.sentence());
     for m in &record.methods {
-        println!("\n{:<28}{:>10}{:>10}", m.method, "median ms", "p95 ms");
+        say!("\n{:<28}{:>10}{:>10}", m.method, "median ms", "p95 ms");
         for (pass, median, p95) in rows(m, layers) {
-            println!("  {pass:<26}{median:>10.3}{p95:>10.3}");
+            say!("  {pass:<26}{median:>10.3}{p95:>10.3}");
         }
         match m.gpu_ms {
-            Some(t) => println!("  {:<26}{:>10.3}{:>10.3}", "GPU, all passes", t.median, t.p95),
-            None => println!("  no GPU timestamps on this adapter: wall clock only"),
+            Some(t) => say!("  {:<26}{:>10.3}{:>10.3}", "GPU, all passes", t.median, t.p95),
+            None => say!("  no GPU timestamps on this adapter: wall clock only"),
         }
-        println!("  {:<26}{:>10.3}{:>10.3}", "wall clock, synchronised", m.wall_ms.median, m.wall_ms.p95);
+        say!("  {:<26}{:>10.3}{:>10.3}", "wall clock, synchronised", m.wall_ms.median, m.wall_ms.p95);
         if let Some(apart) = m.disagreement() {
-            println!("  GPU time and wall clock are {:.0}% apart: trust the wall clock on this adapter", apart * 100.0);
+            say!("  GPU time and wall clock are {:.0}% apart: trust the wall clock on this adapter", apart * 100.0);
         }
         let sum = |part: fn(&Cost) -> f64| m.costs.iter().map(part).sum::<f64>();
-        println!(
+        say!(
             "  indirect light by count: {:.3} GFLOP, {:.1} MB; projected, not measured: {:.2} ms on a {} at {:.0}% of its peaks",
             sum(|c| c.flops) / 1e9,
             sum(|c| c.bytes) / 1e6,
@@ -182,7 +183,7 @@ fn print(record: &Record, gpu: &Gpu, layers: bool) {
         );
         let mib = |b: u64| b as f64 / (1 << 20) as f64;
         let parts = m.bytes.iter().filter(|(_, b)| *b > 0).map(|(n, b)| format!("{n} {:.1}", mib(*b)));
-        println!("  {:.1} MiB of GPU memory: {}", mib(m.total_bytes()), parts.collect::<Vec<_>>().join(", "));
+        say!("  {:.1} MiB of GPU memory: {}", mib(m.total_bytes()), parts.collect::<Vec<_>>().join(", "));
     }
 }
 

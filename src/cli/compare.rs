@@ -1,6 +1,7 @@
 //! `bouncelight compare A B`: the paper's four metrics and today's, a heat map, a JSON record; or one layer of two EXR.
 
 use super::args::usage;
+use super::stdout::say;
 use crate::{
     image_io::{self, Decoded, ImageError, Layers},
     metrics::{self, Comparison, FlipMaps, LayerComparison, MetricError, Options, Picture, Views, flip},
@@ -133,7 +134,7 @@ fn report(args: &Args, record: &impl Serialize, rows: &[(&str, f64)]) -> Result<
         image_io::write_whole(path, format!("{}\n", serde_json::to_string_pretty(record)?).as_bytes())?;
     }
     if args.json.as_deref() != Some(Path::new("-")) {
-        rows.iter().for_each(|(name, value)| println!("{name:<12}{value:.6}"));
+        rows.iter().for_each(|(name, value)| say!("{name:<12}{value:.6}"));
     }
     Ok(())
 }

@@ -8,6 +8,7 @@ use super::{
     args::{Global, usage},
     interrupt,
     progress::Progress,
+    stdout::say,
 };
 use crate::{
     gi::{Method, features::FeatureSet, gather, inputs::cells_of},
@@ -366,6 +367,6 @@ fn scene_size(scene: &Scene) -> f32 {
 fn report(out: &Path) -> Result<()> {
     let files = std::fs::read_dir(out).with_context(|| format!("cannot read {}", out.display()))?;
     let sizes: Vec<u64> = files.flatten().flat_map(|f| f.metadata()).filter(|m| m.is_file()).map(|m| m.len()).collect();
-    println!("{} files, {:.1} MB in {}", sizes.len(), sizes.iter().sum::<u64>() as f64 / 1e6, out.display());
+    say!("{} files, {:.1} MB in {}", sizes.len(), sizes.iter().sum::<u64>() as f64 / 1e6, out.display());
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! `bouncelight doctor`: which adapter, what it can do, and the fix when there is none.
 
 use super::args::Global;
+use super::stdout::say;
 use crate::gpu::{self, Gpu};
 use anyhow::Result;
 use serde_json::json;
@@ -44,17 +45,17 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
             "limits": have.into_iter().collect::<std::collections::BTreeMap<_, _>>(), "limits_below_default": short,
             "features_used": names(used), "features_missing": names(missing), "adapters": found,
         });
-        println!("{record:#}");
+        say!("{record:#}");
         return Ok(());
     }
-    println!("adapter   {}", gpu.sentence());
-    println!("others    {}", found.iter().skip(1).cloned().collect::<Vec<_>>().join(", "));
-    println!("features  used: {}; missing: {}", list(&names(used)), list(&names(missing)));
+    say!("adapter   {}", gpu.sentence());
+    say!("others    {}", found.iter().skip(1).cloned().collect::<Vec<_>>().join(", "));
+    say!("features  used: {}; missing: {}", list(&names(used)), list(&names(missing)));
     for (name, value) in have {
-        println!("limit     {name} = {value}{}", if short.contains(&name) { "  (below WebGPU's default)" } else { "" });
+        say!("limit     {name} = {value}{}", if short.contains(&name) { "  (below WebGPU's default)" } else { "" });
     }
     if !missing.is_empty() {
-        println!("note      without timestamp_query, bench shows synchronised wall-clock time only");
+        say!("note      without timestamp_query, bench shows synchronised wall-clock time only");
     }
     Ok(())
 }

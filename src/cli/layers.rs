@@ -1,6 +1,7 @@
 //! `bench --layers`: each step of the network alone, against what the device can do at best.
 
 use super::args::Global;
+use super::stdout::say;
 use crate::gi::inputs::cells_of;
 use crate::gpu::Gpu;
 use crate::net::format::Weights;
@@ -67,17 +68,17 @@ pub fn measure(global: &Global, gpu: &Gpu, weights: &Weights, size: [u32; 2]) ->
 impl Layers {
     /// The table.
     pub fn print(&self) {
-        println!("\nnetwork's layers, {}", self.timing);
+        say!("\nnetwork's layers, {}", self.timing);
         let (flops, bytes) = (self.peak_flops / 1e9, self.peak_bytes / 1e9);
-        println!(
+        say!(
             "peak of this device, measured: {flops:.1} GFLOP/s of multiplications and additions, {bytes:.1} GB/s copied"
         );
         let head = ["ms", "GFLOP", "GFLOP/s", "GB/s", "of peak"].map(|h| format!("{h:>10}")).concat();
-        println!("  {:<16}{:<28}{:<16}{head}  kernel", "layer", "kind", "shape");
+        say!("  {:<16}{:<28}{:<16}{head}  kernel", "layer", "kind", "shape");
         for l in &self.layers {
             let s = l.ms * 1e-3;
             let (flops, bytes) = (l.flops as f64 / 1e9, l.bytes as f64 / 1e9);
-            println!(
+            say!(
                 "  {:<16}{:<28}{:<16}{:>10.3}{flops:>10.3}{:>10.2}{:>10.2}{:>9.0}%  {}",
                 l.name,
                 l.kind,
@@ -90,6 +91,6 @@ impl Layers {
             );
         }
         let (ms, flops) = self.layers.iter().fold((0.0, 0), |(m, f), l| (m + l.ms, f + l.flops));
-        println!("  {:<60}{ms:>10.3}{:>10.3}{:>10.2}", "all", flops as f64 / 1e9, flops as f64 / ms / 1e6);
+        say!("  {:<60}{ms:>10.3}{:>10.3}{:>10.2}", "all", flops as f64 / 1e9, flops as f64 / ms / 1e6);
     }
 }

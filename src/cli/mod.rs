@@ -15,6 +15,7 @@ mod progress;
 mod reference;
 mod render;
 mod sequence;
+mod stdout;
 mod tuned;
 #[cfg(feature = "viewer")]
 mod view;

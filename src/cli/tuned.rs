@@ -1,6 +1,7 @@
 //! The tuner on the command line: `weights tune`, and where its cache lies.
 
 use super::args::Global;
+use super::stdout::say;
 use crate::gi::Method;
 use crate::gpu::Gpu;
 use crate::image_io;
@@ -87,11 +88,11 @@ pub fn run(
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     }
     image_io::write_whole(&path, cache.text().as_bytes())?;
-    println!("{:<54}{:<22}{:>9}  {:<22}{:>9}", "layer", "guess", "ms", "fastest", "ms");
+    say!("{:<54}{:<22}{:>9}  {:<22}{:>9}", "layer", "guess", "ms", "fastest", "ms");
     for r in &reports {
         let [guess, best] = [r.guess.0, r.best.0].map(|p| p.to_string());
-        println!("{:<54}{guess:<22}{:>9.3}  {best:<22}{:>9.3}", r.layer.to_string(), r.guess.1, r.best.1);
+        say!("{:<54}{guess:<22}{:>9.3}  {best:<22}{:>9.3}", r.layer.to_string(), r.guess.1, r.best.1);
     }
-    println!("{} layers tuned, remembered in {}", reports.len(), path.display());
+    say!("{} layers tuned, remembered in {}", reports.len(), path.display());
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! `bouncelight weights info | verify | convert | tune`: what a weights file holds, whether it is sound, and one from a published network.
 
 use super::args::{Global, parse_size};
+use super::stdout::say;
 use crate::image_io;
 use crate::net::convert::{Arch, Norm, Recipe, convert};
 use crate::net::{
@@ -102,7 +103,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     match args.command {
         Command::Verify { file } => {
             let weights = Weights::load(&file)?;
-            println!("ok: {} parameters in {}", weights.graph.parameters(), file.display());
+            say!("ok: {} parameters in {}", weights.graph.parameters(), file.display());
         }
         Command::Info { file, size } => info(&Weights::load(&file)?, size)?,
         Command::Convert(args) => convert_file(&args)?,
@@ -164,13 +165,13 @@ fn info(weights: &Weights, size: [u32; 2]) -> Result<()> {
     let [width, height] = plan.inner;
     let features: Vec<_> =
         weights.inputs.iter().map(|f| format!("{} {} ({})", f.name, f.channels, f.encoding)).collect();
-    println!("name       {}", weights.name);
-    println!("file       {}, hash {}", weights.path.display(), weights.hash_text());
-    println!("licence    {}", weights.licence);
-    println!("inputs     {} (table {} {})", features.join(", "), weights.table.name, weights.table.version);
-    println!("output     {}, {} channels", weights.output.meaning, weights.output.channels);
-    println!("parameters {}, stored as {}", weights.graph.parameters(), stored(weights));
-    println!(
+    say!("name       {}", weights.name);
+    say!("file       {}, hash {}", weights.path.display(), weights.hash_text());
+    say!("licence    {}", weights.licence);
+    say!("inputs     {} (table {} {})", features.join(", "), weights.table.name, weights.table.version);
+    say!("output     {}, {} channels", weights.output.meaning, weights.output.channels);
+    say!("parameters {}, stored as {}", weights.graph.parameters(), stored(weights));
+    say!(
         "at {}x{} pixels ({}x{} cells, {width}x{height} inside): {:.3} GFLOP, {:.1} MB moved at least, arena of {:.1} MB\n",
         size[0],
         size[1],
@@ -183,20 +184,21 @@ fn info(weights: &Weights, size: [u32; 2]) -> Result<()> {
     let rows = plan.rows();
     let wide = rows.iter().map(|row| row.name.len()).max().unwrap_or(0).max("layer".len()) + 2;
     let head = ["result", "parameters", "MFLOP", "bytes", "offset"];
-    println!(
-        "{:<wide$}{:<28}{:>16}{:>12}{:>10}{:>12}{:>12}",
-        "layer", "kind", head[0], head[1], head[2], head[3], head[4]
-    );
+    say!("{:<wide$}{:<28}{:>16}{:>12}{:>10}{:>12}{:>12}", "layer", "kind", head[0], head[1], head[2], head[3], head[4]);
     for row in rows {
         let shape = format!("{}x{}x{}", row.shape.channels, row.shape.height, row.shape.width);
         let mflop = row.flops as f64 / 1e6;
-        println!(
+        say!(
             "{:<wide$}{:<28}{shape:>16}{:>12}{mflop:>10.1}{:>12}{:>12}",
-            row.name, row.kind, row.parameters, row.bytes, row.offset
+            row.name,
+            row.kind,
+            row.parameters,
+            row.bytes,
+            row.offset
         );
     }
     if !weights.provenance.is_empty() {
-        println!("\nprovenance {}", serde_json::to_string_pretty(&weights.provenance)?);
+        say!("\nprovenance {}", serde_json::to_string_pretty(&weights.provenance)?);
     }
     Ok(())
 }

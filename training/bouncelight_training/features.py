@@ -9,7 +9,7 @@ TABLE = [("direct", 3), ("outgoing", 3), ("albedo", 3), ("normal", 3), ("positio
 NAMES = tuple(n for n, _ in TABLE)
 CHANNELS = sum(n for _, n in TABLE)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
-# Of the answer, |g| and |r|, while it is learnt: wider than the program keeps them (src/gi/reconstruct.rs), since a number at its limit has no slope.
+# Of the answer, |g| and |r|, while it is learnt: wider than the program keeps them (src/gi/neural/reconstruct.rs), since a number at its limit has no slope.
 MOST_GAIN, MOST_ADDED = 2.0, 1.0
 # And as the program keeps them.
 APPLIED_GAIN, APPLIED_ADDED = 0.3, 0.1
