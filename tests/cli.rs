@@ -360,8 +360,12 @@ fn gl_draws_the_same_picture_as_vulkan() {
 #[cfg(unix)]
 fn results_may_be_read_in_part_and_a_full_disk_is_said() {
     let run = |more: &str| {
-        let shell = format!("{} weights info assets/weights/small.safetensors {more}", env!("CARGO_BIN_EXE_bouncelight"));
-        std::process::Command::new("bash").args(["-c", &format!("set -o pipefail; {shell}")]).output().expect("bash runs")
+        let shell =
+            format!("{} weights info assets/weights/small.safetensors {more}", env!("CARGO_BIN_EXE_bouncelight"));
+        std::process::Command::new("bash")
+            .args(["-c", &format!("set -o pipefail; {shell}")])
+            .output()
+            .expect("bash runs")
     };
     let part = run("| head -1");
     let said = String::from_utf8_lossy(&part.stderr).into_owned();
