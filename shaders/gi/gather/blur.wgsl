@@ -123,7 +123,6 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     var lately = vec3f(0.0);
     var noise = 0.0;
     var squares = 0.0;
-    var singles = 0.0;
     var parts = 0.0;
     for (var y = -radius; y <= radius; y++) {
         for (var x = -radius; x <= radius; x++) {
@@ -141,7 +140,6 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             let l = luminance(there.light);
             noise += w * w * max(there.square - l * l, 0.0);
             squares += w * there.square;
-            singles += w * max(there.square - l * l, 0.0);
             parts += w * w / there.frames;
         }
     }
@@ -155,10 +153,9 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             mean = now;
         }
     }
-    // Variance of the mean: that of single rays over how many they are. What cells remember tells it, in first frames what is around.
+    // Variance of the mean: that of single rays here and around, over how many they are.
     let bright = luminance(sum) / max(total, 1e-30);
-    let around = max(squares / max(total, 1e-30) - bright * bright, 0.0);
-    let variance = select(singles / max(total, 1e-30), around, here.frames < LEAST_KNOWN) * parts / max(total * total, 1e-30);
+    let variance = max(squares / max(total, 1e-30) - bright * bright, 0.0) * parts / max(total * total, 1e-30);
     vector /= max(total, 1e-30);
     // Radiance a + g·ω over the hemisphere has these moments; on a surface tilted by little it gives `mean` along the normal and
     // 8/3 of the vector's part across it.
