@@ -5,7 +5,7 @@ use super::gpu::ROW;
 use super::image::Reductions;
 use super::wide::{Block, NODE, WORDS};
 use super::{Accel, AccelError, build, surfaces, threads};
-use crate::scene::{Mesh, Scene, geometry::octahedral};
+use crate::scene::{Mesh, Scene, octahedral::octahedral_word};
 use glam::Vec3;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -54,10 +54,7 @@ impl Part {
         let corners: Vec<_> =
             mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize])).collect();
         let glows = emitters::glowing(&surfaces, &corners);
-        let normal = |i: u32| {
-            let [x, y] = octahedral(mesh.normals[i as usize]).map(|v| u32::from(v as u16));
-            x | y << 16
-        };
+        let normal = |i: u32| octahedral_word(mesh.normals[i as usize]);
         let normals = mesh.indices.chunks_exact(3).map(|t| [normal(t[0]), normal(t[1]), normal(t[2]), 0]).collect();
         Self { accel: build::build(&corners), surfaces, normals, glows }
     }

@@ -5,17 +5,6 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::Mesh;
 
-/// A unit vector as `oct_encode` of `shaders/lib/octahedral.wgsl` has it, signed normalised; +Z for one without length.
-pub(crate) fn octahedral(v: [f32; 3]) -> [i16; 2] {
-    let sum = v.iter().map(|c| c.abs()).sum::<f32>();
-    let v = if sum > 0.0 && sum.is_finite() { v.map(|c| c / sum) } else { [0.0, 0.0, 1.0] };
-    let (mut x, mut y) = (v[0], v[1]);
-    if v[2] < 0.0 {
-        (x, y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
-    }
-    [x, y].map(|c| (c * f32::from(i16::MAX)).round() as i16)
-}
-
 /// How a list of vertex indices forms triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Topology {

@@ -20,7 +20,7 @@ pub mod export;
 #[cfg(feature = "io")]
 mod files;
 #[cfg(feature = "io")]
-pub(crate) mod geometry;
+mod geometry;
 #[cfg(feature = "io")]
 pub mod gltf;
 #[cfg(feature = "io")]
@@ -28,6 +28,7 @@ mod load;
 pub(crate) mod mips;
 #[cfg(feature = "io")]
 pub mod obj;
+pub(crate) mod octahedral;
 #[cfg(feature = "io")]
 pub mod paper_room;
 #[cfg(feature = "io")]

@@ -1,6 +1,7 @@
 //! Instances flattened to world-space triangles with what shading reads of them.
 
 use super::{Limits, PackError};
+use crate::scene::octahedral::octahedral_word;
 use crate::scene::{Mesh, Scene};
 use glam::{Mat4, Vec3};
 use half::f16;
@@ -87,7 +88,7 @@ fn add(flat: &mut Flat, mesh: &Mesh, world: Mat4) {
     let (ca, cb, cc) = (b.cross(c), c.cross(a), a.cross(b));
     let mirrored = a.dot(ca) < 0.0;
     let sign = if mirrored { -1.0 } else { 1.0 };
-    let normal = |n: [f32; 3]| octahedral((ca * n[0] + cb * n[1] + cc * n[2]) * sign);
+    let normal = |n: [f32; 3]| octahedral_word(((ca * n[0] + cb * n[1] + cc * n[2]) * sign).into());
     let attributes = has_attributes(mesh);
     for triangle in mesh.indices.chunks_exact(3) {
         let order = if mirrored { [0, 2, 1] } else { [0, 1, 2] };
@@ -114,7 +115,7 @@ fn extra(data: &mut Vec<[u32; 4]>, mesh: &Mesh, corners: [usize; 3], world: Mat4
     let mut tangents = [0; 4];
     for (k, &i) in corners.iter().enumerate() {
         if let Some(t) = mesh.tangents.get(i) {
-            tangents[k] = octahedral(world.transform_vector3(Vec3::new(t[0], t[1], t[2])));
+            tangents[k] = octahedral_word(world.transform_vector3(Vec3::new(t[0], t[1], t[2])).into());
             tangents[3] |= 8 | (u32::from(t[3] * sign < 0.0) << k);
         }
     }
@@ -127,17 +128,4 @@ fn extra(data: &mut Vec<[u32; 4]>, mesh: &Mesh, corners: [usize; 3], world: Mat4
     let [a, b, c] = corners.map(color);
     data.push([a[0], a[1], b[0], b[1]]);
     data.push([c[0], c[1], 0, 0]);
-}
-
-/// Two signed normalised 16-bit numbers, as `oct_decode` and `unpack2x16snorm` read them.
-fn octahedral(v: Vec3) -> u32 {
-    let v = v.as_dvec3();
-    let sum = v.abs().element_sum();
-    let v = if sum > 0.0 && sum.is_finite() { v / sum } else { glam::DVec3::Z };
-    let (mut x, mut y) = (v.x, v.y);
-    if v.z < 0.0 {
-        (x, y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
-    }
-    let code = |c: f64| u32::from((c * 32767.0).round() as i16 as u16);
-    code(x) | code(y) << 16
 }

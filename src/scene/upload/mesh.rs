@@ -2,7 +2,7 @@
 
 use super::closed::is_closed;
 use super::{UploadError, filled, is_covered};
-use crate::scene::{Mesh, Scene, geometry::octahedral};
+use crate::scene::{Mesh, Scene, octahedral::octahedral};
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
 use half::f16;
