@@ -17,16 +17,16 @@ pub enum GiError {
     /// The camera is not a finite reversed-Z perspective camera.
     #[error("the camera cannot be used: {0}")]
     Camera(&'static str),
-    /// The method reads [`Inputs::rays`], which is not there.
+    /// The method reads [`Inputs::rays`](super::Inputs::rays), which is not there.
     #[error("this method sends rays into the scene's triangles (`Inputs::rays`), which the host did not supply")]
     Rays,
     /// The device is too small for the method.
     #[error("this device {0}")]
     Device(String),
-    /// A texture view has another format, size or usage than [`Inputs`] says.
+    /// A texture view has another format, size or usage than [`Inputs`](super::Inputs) says.
     #[error("texture `{name}` has {found}, but needs {expected}")]
     Texture {
-        /// Field of [`Inputs`], or `output`.
+        /// Field of [`Inputs`](super::Inputs), or `output`.
         name: &'static str,
         /// What is needed.
         expected: String,

@@ -36,7 +36,7 @@ pub struct Inputs<'a> {
     pub environment: [f32; 3],
     /// The analytic lights, for methods that light more than the picture; `None` counts as no lights there.
     pub lights: Option<Lights<'a>>,
-    /// The scene as rays meet it, for methods that ask it ([`Method::needs_rays`]).
+    /// The scene as rays meet it, for methods that ask it ([`Method::needs_rays`](super::Method::needs_rays)).
     pub rays: Option<Rays<'a>>,
     /// Where each pixel's surface was in the frame before: texture coordinates then minus now, y down, free of jitter, `Rg16Float`;
     /// for methods that remember frames. `None` counts as everything at rest.

@@ -17,10 +17,10 @@ use below::OrBelow;
 pub enum Method {
     /// None: `indirect` is 0. Shows what direct light alone gives.
     Direct,
-    /// Even light times occlusion, see [`ambient`].
+    /// Even light times occlusion, see [`ambient`](super::ambient).
     #[default]
     Ambient,
-    /// One bounce in screen space, see [`ssgi`].
+    /// One bounce in screen space, see [`ssgi`](super::ssgi).
     Ssgi,
     /// Rays into the scene's triangles and a cache of light in the world, see [`gather`].
     Gather(gather::Options),
@@ -43,7 +43,7 @@ impl Method {
         }
     }
 
-    /// Whether the method asks rays ([`Inputs::rays`]).
+    /// Whether the method asks rays ([`Inputs::rays`](super::Inputs::rays)).
     pub fn needs_rays(&self) -> bool {
         match self {
             Method::Gather(_) => true,

@@ -5,7 +5,7 @@
 //!
 //! A method at low resolution records [`CellsPass`], then its own gather, which joins `gi/cells.wgsl` behind
 //! `gi/inputs.wgsl`, reads [`CellsPass::pixels`] and writes its light buffer ([`light_bytes`]), then
-//! [`UpsamplePass`](super::gather::bring::BringPass).
+//! `gi.bring` of the method `gather`.
 //!
 //! # The light buffer
 //! Three `vec4f` a cell, one a colour channel: `(bx, by, bz, a)` means E/π(n) = max(0, a + b·n) for a world-space unit
