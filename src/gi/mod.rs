@@ -21,7 +21,8 @@
 //! specular light beyond what `composite` derives from E.
 //!
 //! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
-//! `docs/gi.md` tells the same with pictures of the data flow and how to embed [`pass::NeuralGi`].
+//! `docs/gi.md` tells the same with a picture of the data flow and the table of constants; `docs/embedding.md` how another renderer
+//! records [`pass::NeuralGi`].
 //!
 //! # Floors
 //! `interface` ← `stage` ← `screen`, `gather` ← `neural` ← `method`: each imports only what stands before it, and nothing here
