@@ -3,8 +3,8 @@
 //!
 //! An eight-wide tree with quantised child boxes, after Ylitie, Karras and Laine ("Efficient Incoherent Ray Traversal on
 //! GPUs Through Compressed Wide BVHs", HPG 2017), collapsed from a binary one by obvhs (PLOC and reinsertion). Nodes and
-//! leaves are blocks of 64 bytes in one texture; a leaf is a pair of triangles that share an edge. What was tried
-//! and measured stands in `docs/performance.md`. [`Accel::closest`] is the same walk on the CPU.
+//! leaves are blocks of 64 bytes in one texture; a leaf is a pair of triangles that share an edge. How fast it is stands in
+//! `docs/performance.md`, what was tried in `docs/log/2026-11-rays.md`. [`Accel::closest`] is the same walk on the CPU.
 
 pub(crate) mod alias;
 mod build;

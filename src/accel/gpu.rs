@@ -1,7 +1,7 @@
 //! The structure in a texture.
 //!
 //! Why a texture: drivers read it at scattered places at least as fast as a storage buffer, and Mesa's CPU driver does so
-//! about three times as fast (`docs/performance.md`).
+//! about three times as fast (`docs/log/2026-11-rays.md`).
 
 use super::wide::{Block, WORDS};
 use super::{Accel, AccelError};
