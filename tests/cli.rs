@@ -35,6 +35,7 @@ fn usage_errors_exit_with_2() {
     let out = path(&dir, "x.png");
     fails(&["render", "interior", "-o", &out, "--size", "0x0"], 2, &["--size", "at least 1"]);
     fails(&["render", "interior", "-o", &out, "--size", "12"], 2, &["1024x512"]);
+    fails(&["render", "interior", "-o", &out, "--size", "-1x5"], 2, &["--size", "-1x5"]);
     fails(&["render", "interior", "-o", &out, "--eye", "1,2,3"], 2, &["--look-at"]);
     fails(&["render", "interior", "-o", &out, "--eye", "1,2,3", "--look-at", "1,2,3"], 2, &["same point"]);
     fails(&["render", "interior", "-o", &out, "--camera", "99"], 2, &["--camera 99"]);
@@ -373,4 +374,22 @@ fn results_may_be_read_in_part_and_a_full_disk_is_said() {
     let full = run("> /dev/full");
     assert_eq!(full.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&full.stderr).starts_with("error: cannot write to standard output"));
+}
+
+#[test]
+fn the_shipped_network_has_a_name() {
+    for command in ["info", "verify"] {
+        let out = bouncelight(&["weights", command, "small"]);
+        assert!(out.status.success(), "{command}: {}", String::from_utf8_lossy(&out.stderr));
+    }
+    fails(&["weights", "verify", "smal"], 4, &["smal"]);
+}
+
+#[test]
+#[cfg(unix)]
+fn what_never_ends_is_not_read_and_a_reason_is_said_once() {
+    fails(&["compare", "/dev/zero", "/dev/zero"], 1, &["/dev/zero", "no regular file"]);
+    let out = bouncelight(&["compare", "no-such.png", "no-such.png"]);
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(said.matches("os error 2").count(), 1, "{said}");
 }

@@ -178,7 +178,7 @@ pub struct SceneArgs {
     /// A .gltf, .glb or .obj file, `paper-room:INDEX`, or a bundled scene (interior, cornell).
     pub scene: String,
     /// Width and height in pixels.
-    #[arg(long, default_value = "1024x512", value_parser = parse_size, value_name = "WxH")]
+    #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH")]
     pub size: [u32; 2],
     /// Camera of the file, from 0.
     #[arg(long, default_value_t = 0, conflicts_with_all = ["eye", "look_at"], value_name = "N")]

@@ -50,6 +50,19 @@ pub enum CliError {
     Interrupted,
 }
 
+/// `error` and its causes as one sentence. A cause whose words the one before has said already is left out.
+pub fn sentence(error: &anyhow::Error) -> String {
+    let mut words = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if words.is_empty() {
+            words = cause;
+        } else if !words.ends_with(&cause) {
+            words = format!("{words}: {cause}");
+        }
+    }
+    words
+}
+
 /// The exit code for `error`, found from the innermost typed cause.
 pub fn exit_code(error: &anyhow::Error) -> u8 {
     for cause in error.chain() {
@@ -98,4 +111,18 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
         }
     }
     RUNTIME
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cause_is_said_once() {
+        let system = std::io::Error::other("disk full");
+        let said = crate::image_io::ImageError::Write { path: "a.png".into(), source: system };
+        assert_eq!(sentence(&said.into()), "a.png: cannot be written: disk full");
+        let other = anyhow::Error::msg("disk full").context("cannot start");
+        assert_eq!(sentence(&other), "cannot start: disk full");
+    }
 }

@@ -7,10 +7,12 @@ mod args;
 mod bench;
 mod compare;
 mod dataset;
+mod demo;
 mod doctor;
 pub mod error;
 mod interrupt;
 mod layers;
+mod log;
 mod progress;
 mod reference;
 mod render;
@@ -52,6 +54,8 @@ enum Command {
     Apply(apply::Args),
     /// Look into a weights file, check it, or make one from a published generator's state.
     Weights(weights::Args),
+    /// Draw the bundled interior by three methods beside Cycles' picture, and say where the time goes.
+    Demo(demo::Args),
     /// Say which adapter is used, what it can do, and what to install when there is none.
     Doctor(doctor::Args),
 }
@@ -64,7 +68,7 @@ impl Command {
             Command::View(_) => true,
             Command::Render(a) => a.runs_network(),
             Command::Bench(a) => a.runs_network(),
-            Command::Apply(_) => true,
+            Command::Apply(_) | Command::Demo(_) => true,
             Command::Weights(a) => a.runs_network(),
             Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) => false,
         }
@@ -97,12 +101,13 @@ pub fn main() -> ExitCode {
         Command::Dataset(a) => dataset::run(&cli.global, a),
         Command::Apply(a) => apply::run(&cli.global, a),
         Command::Weights(a) => weights::run(&cli.global, a),
+        Command::Demo(a) => demo::run(&cli.global, a),
         Command::Doctor(a) => doctor::run(&cli.global, a),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
-            eprintln!("error: {e:#}");
+            eprintln!("error: {}", error::sentence(&e));
             ExitCode::from(error::exit_code(&e))
         }
     }
@@ -118,7 +123,6 @@ fn init_logging(global: &args::Global) {
     tracing_subscriber::fmt()
         .with_max_level(level)
         .with_writer(std::io::stderr)
-        .with_target(global.verbose > 1)
-        .without_time()
+        .event_format(log::Line { target: global.verbose > 1 })
         .init();
 }

@@ -4,6 +4,7 @@ use super::args::{Global, ProgressKind};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::{
     io::IsTerminal,
+    sync::mpsc::{self, RecvTimeoutError, Sender},
     time::{Duration, Instant},
 };
 
@@ -17,6 +18,24 @@ pub struct Progress {
     bar: ProgressBar,
     started: Instant,
     last_line: Instant,
+    /// Says what the program does until the first step is done; ends when this is dropped.
+    first: Option<Sender<()>>,
+}
+
+/// What there is to say before the first step: a driver without a shader cache compiles for half a minute.
+fn compiling() -> String {
+    format!("compiling shaders ({} so far)", crate::gpu::shaders::compiled())
+}
+
+/// A plain line every [`PLAIN_INTERVAL`] until the sender is dropped.
+fn say_compiling() -> Sender<()> {
+    let (sender, receiver) = mpsc::channel();
+    std::thread::spawn(move || {
+        while receiver.recv_timeout(PLAIN_INTERVAL) == Err(RecvTimeoutError::Timeout) {
+            eprintln!("{}", compiling());
+        }
+    });
+    sender
 }
 
 impl Progress {
@@ -36,8 +55,17 @@ impl Progress {
         bar.set_style(
             ProgressStyle::with_template(template).expect("the template is a constant").progress_chars("█▌ "),
         );
-        bar.set_message(what);
-        Self { what, kind, bar, started: Instant::now(), last_line: Instant::now() }
+        bar.set_message("compiling shaders");
+        let first = (kind == ProgressKind::Plain).then(say_compiling);
+        if kind == ProgressKind::Bar {
+            bar.enable_steady_tick(PLAIN_INTERVAL);
+        }
+        Self { what, kind, bar, started: Instant::now(), last_line: Instant::now(), first }
+    }
+
+    /// There are `total` steps, as is known by now.
+    pub fn expect(&self, total: u64) {
+        self.bar.set_length(total);
     }
 
     /// One more step is done.
@@ -48,9 +76,14 @@ impl Progress {
 
     /// `done` of `total` steps are done; the total may have become another.
     pub fn at(&mut self, done: f64, total: u64) {
+        if self.bar.position() == 0 {
+            self.first = None;
+            self.bar.set_message(self.what);
+        }
         self.bar.set_length(total);
         self.bar.set_position(done as u64);
-        if self.kind == ProgressKind::Plain && self.last_line.elapsed() >= PLAIN_INTERVAL {
+        let waited = self.last_line.elapsed() >= PLAIN_INTERVAL;
+        if self.kind == ProgressKind::Plain && waited && done < total as f64 {
             self.last_line = Instant::now();
             let left = self.started.elapsed().as_secs_f64() / done * (total as f64 - done).max(0.0);
             let left = if done > 0.0 { format!("about {left:.0} s left") } else { "no guess yet".into() };

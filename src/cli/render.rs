@@ -161,11 +161,13 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
         Task::Trace(task) => task.run(global, &gpu, &scene, &camera)?,
         Task::Rasterise(method, layers) => {
             let method = super::tuned::tuned(method, &gpu, global.quiet);
+            // Says from here on what the program does: without a shader cache nothing is drawn for half a minute.
+            let progress = Progress::new(global, if sequence.is_some() { "frames" } else { "samples" }, 1);
             let mut raster = Raster::new(&args, &gpu, &scene, method, layers)?;
             if let Some(sequence) = sequence {
-                return film(global, &args, format, raster, &sequence);
+                return film(progress, &args, format, raster, &sequence);
             }
-            raster.draw(global, &args, &camera)?
+            raster.draw(progress, &args, &camera)?
         }
     };
     write(&args, &args.output, format, &drawn, &metadata(&gpu, &drawn))?;
@@ -231,10 +233,9 @@ impl<'a> Raster<'a> {
         args.taa.unwrap_or(0).max(settle)
     }
 
-    /// A picture, with progress of its own.
-    fn draw(&mut self, global: &Global, args: &Args, camera: &Camera) -> Result<Drawn> {
-        let count = args.samples.unwrap_or(1) + self.warmup(args);
-        let mut progress = Progress::new(global, "samples", count.into());
+    /// A picture.
+    fn draw(&mut self, mut progress: Progress, args: &Args, camera: &Camera) -> Result<Drawn> {
+        progress.expect((args.samples.unwrap_or(1) + self.warmup(args)).into());
         let drawn = self.picture(args, camera, &mut || progress.step())?;
         progress.finish();
         Ok(drawn)
@@ -266,8 +267,14 @@ impl<'a> Raster<'a> {
 }
 
 /// A picture for each frame of a camera path.
-fn film(global: &Global, args: &Args, format: Format, mut raster: Raster, sequence: &sequence::Sequence) -> Result<()> {
-    let mut progress = Progress::new(global, "frames", sequence.count());
+fn film(
+    mut progress: Progress,
+    args: &Args,
+    format: Format,
+    mut raster: Raster,
+    sequence: &sequence::Sequence,
+) -> Result<()> {
+    progress.expect(sequence.count());
     for (number, camera) in sequence.frames() {
         let drawn = raster.picture(args, &camera, &mut || ())?;
         let metadata = metadata(raster.gpu, &drawn);

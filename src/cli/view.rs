@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(long, value_name = "JSON")]
     settings: Option<PathBuf>,
     /// Width and height of the window, points.
-    #[arg(long, value_parser = parse_size, value_name = "WxH")]
+    #[arg(long, value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH")]
     size: Option<[u32; 2]>,
     /// Folder for captures; the current one when absent.
     #[arg(long, value_name = "FOLDER")]

@@ -23,18 +23,22 @@ pub struct Args {
 enum Command {
     /// Layers with shapes, FLOPs, bytes and places in memory, for a picture of a given size.
     Info {
+        /// A weights file, or `small`, the shipped one.
         file: PathBuf,
         /// Width and height of the picture in pixels.
-        #[arg(long, default_value = "1024x512", value_parser = parse_size, value_name = "WxH")]
+        #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH")]
         size: [u32; 2],
     },
     /// Check everything a reader can check; says `ok` or lists every fault.
-    Verify { file: PathBuf },
+    Verify {
+        /// A weights file, or `small`, the shipped one.
+        file: PathBuf,
+    },
     /// Time the ways in which each convolution can run on this device, and remember the fastest for later runs.
     Tune {
         file: PathBuf,
         /// Width and height of the picture in pixels.
-        #[arg(long, default_value = "1024x512", value_parser = parse_size, value_name = "WxH")]
+        #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH")]
         size: [u32; 2],
         /// Where to remember it; by default the user's cache folder, or $BOUNCELIGHT_TUNED.
         #[arg(long, value_name = "F")]
@@ -102,10 +106,10 @@ impl Args {
 pub fn run(global: &Global, args: Args) -> Result<()> {
     match args.command {
         Command::Verify { file } => {
-            let weights = Weights::load(&file)?;
+            let weights = Weights::find(Some(&file))?;
             say!("ok: {} parameters in {}", weights.graph.parameters(), file.display());
         }
-        Command::Info { file, size } => info(&Weights::load(&file)?, size)?,
+        Command::Info { file, size } => info(&Weights::find(Some(&file))?, size)?,
         Command::Convert(args) => convert_file(&args)?,
         Command::Tune { file, size, cache, again } => {
             let options = crate::net::gpu::Options { precision: global.precision.precision(), ..Default::default() };

@@ -307,8 +307,17 @@ pub fn module(device: &wgpu::Device, name: &str) -> wgpu::ShaderModule {
     module_with(device, name, "")
 }
 
+/// Shaders that this process has compiled.
+static COMPILED: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(0);
+
+/// How many shaders this process has compiled so far, for saying so while it takes long.
+pub fn compiled() -> u32 {
+    COMPILED.load(std::sync::atomic::Ordering::Relaxed)
+}
+
 /// Compiles shader `name` behind a generated prelude of `const` lines.
 pub fn module_with(device: &wgpu::Device, name: &str, prelude: &str) -> wgpu::ShaderModule {
+    COMPILED.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
     device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(name),
         source: wgpu::ShaderSource::Wgsl(source(name, prelude).into()),

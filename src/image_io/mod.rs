@@ -11,11 +11,12 @@ mod whole;
 
 pub use error::ImageError;
 pub use exr::{read_exr, write_exr};
-pub use png::{read_png, read_png_with_metadata, write_png};
+pub use png::{decode_png, read_png, read_png_with_metadata, write_png};
 pub use whole::{check_writable, write_whole};
 
 use std::path::{Path, PathBuf};
 use whole::read_all;
+pub(crate) use whole::{MAX_BYTES, read_regular};
 
 /// Most pixels that a file may claim: 16384 × 8192.
 pub const MAX_PIXELS: u64 = 1 << 27;

@@ -61,13 +61,20 @@ pub fn read_png(path: &Path) -> Result<Image, ImageError> {
 /// # Errors
 /// As [`read_png`].
 pub fn read_png_with_metadata(path: &Path) -> Result<(Image, Metadata), ImageError> {
-    let bytes = read_all(path)?;
+    decode_png(path, &read_all(path)?)
+}
+
+/// [`read_png_with_metadata`] of a file that is in memory; errors name `path`.
+///
+/// # Errors
+/// As [`read_png`].
+pub fn decode_png(path: &Path, bytes: &[u8]) -> Result<(Image, Metadata), ImageError> {
     if !bytes.starts_with(SIGNATURE) {
         return Err(ImageError::NotThisFormat { path: path.into(), expected: "a PNG" });
     }
     let broken = |e: png::DecodingError| ImageError::broken(path, "PNG", e);
     // Size is checked from the header alone; the limit holds for what compressed text and profiles unpack to.
-    let mut decoder = png::Decoder::new(Cursor::new(&bytes));
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
     let (width, height) = decoder.read_header_info().map_err(broken)?.size();
     check_size(path, u64::from(width), u64::from(height), 4)?;
     decoder.set_limits(png::Limits { bytes: super::MAX_PIXELS as usize * 8 });

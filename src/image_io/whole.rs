@@ -1,7 +1,7 @@
 //! Files are written whole or not at all: into a temporary file in the same folder, which then takes the name.
 
 use super::ImageError;
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes `bytes` to `path`, replacing what was there only when every byte has arrived; `-` is standard output.
@@ -63,6 +63,32 @@ pub fn check_writable(path: &Path) -> Result<(), ImageError> {
     Ok(())
 }
 
+/// Largest file that is read, bytes: what a GLB can hold.
+pub(crate) const MAX_BYTES: u64 = u32::MAX as u64;
+
+/// Reads a regular file of at most [`MAX_BYTES`].
+///
+/// # Errors
+/// The system's, or one of kind `InvalidInput` with a sentence.
+pub(crate) fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
+    let told = |text: String| std::io::Error::new(std::io::ErrorKind::InvalidInput, text);
+    // Asked before it is opened: opening a pipe waits for a writer.
+    let about = std::fs::metadata(path)?;
+    if !about.is_file() {
+        return Err(told("is no regular file but a folder, device or pipe".to_owned()));
+    }
+    if about.len() > MAX_BYTES {
+        return Err(told(format!("has {} bytes; at most {MAX_BYTES} are read", about.len())));
+    }
+    let mut bytes = Vec::with_capacity(about.len() as usize);
+    // Files that grow while they are read, and some that have no honest size.
+    std::fs::File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(told(format!("has more than {MAX_BYTES} bytes")));
+    }
+    Ok(bytes)
+}
+
 /// The bytes of `path`.
 ///
 /// # Errors
@@ -71,7 +97,7 @@ pub(super) fn read_all(path: &Path) -> Result<Vec<u8>, ImageError> {
     if path.is_dir() {
         return Err(ImageError::IsFolder { path: path.into() });
     }
-    let bytes = std::fs::read(path).map_err(|source| ImageError::Read { path: path.into(), source })?;
+    let bytes = read_regular(path).map_err(|source| ImageError::Read { path: path.into(), source })?;
     if bytes.is_empty() {
         return Err(ImageError::Empty { path: path.into() });
     }

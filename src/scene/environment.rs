@@ -82,7 +82,7 @@ impl Environment {
         if path.is_dir() {
             return Err(file("is a folder; name an .hdr or .exr picture".into()));
         }
-        let bytes = super::files::read_regular(path).map_err(|e| file(format!("cannot be read: {e}")))?;
+        let bytes = crate::image_io::read_regular(path).map_err(|e| file(format!("cannot be read: {e}")))?;
         let (width, height, rgb) = if bytes.starts_with(b"#?") {
             let reader = image::ImageReader::with_format(std::io::Cursor::new(&bytes), image::ImageFormat::Hdr);
             let picture = reader.decode().map_err(|e| file(format!("damaged or truncated HDR picture: {e}")))?;

@@ -1,6 +1,5 @@
 //! What can go wrong while a scene is found, read or written. Every variant names the file and, inside it, the place.
 
-use super::files;
 use std::path::{Path, PathBuf};
 
 /// Why a scene could not be loaded or written.
@@ -111,7 +110,7 @@ pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, SceneError> {
     if path.is_dir() {
         return Err(SceneError::IsFolder { path: path.to_owned() });
     }
-    match files::read_regular(path) {
+    match crate::image_io::read_regular(path) {
         Ok(bytes) if bytes.is_empty() => Err(SceneError::Empty { path: path.to_owned() }),
         Ok(bytes) => Ok(bytes),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Err(SceneError::NotFound { path: path.to_owned() }),

@@ -4,7 +4,7 @@
 //! scene file's folder unless the user allows more ([`LoadOptions::allow_outside`]), only regular files are read (a
 //! device or pipe may never end), and sizes are known to fit before memory is taken.
 
-use std::io::Read;
+use crate::image_io::read_regular;
 use std::path::{Component, Path, PathBuf};
 
 /// What a loader may do on behalf of a file.
@@ -12,32 +12,6 @@ use std::path::{Component, Path, PathBuf};
 pub struct LoadOptions {
     /// Buffers, textures and material libraries may lie outside the folder of the file that names them.
     pub allow_outside: bool,
-}
-
-/// Largest file that is read, bytes: what a GLB can hold.
-pub(crate) const MAX_BYTES: u64 = u32::MAX as u64;
-
-/// Reads a regular file of at most [`MAX_BYTES`].
-///
-/// # Errors
-/// The system's, or one of kind `InvalidInput` with a sentence.
-pub(crate) fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
-    let told = |text: String| std::io::Error::new(std::io::ErrorKind::InvalidInput, text);
-    // Asked before it is opened: opening a pipe waits for a writer.
-    let about = std::fs::metadata(path)?;
-    if !about.is_file() {
-        return Err(told("is no regular file but a folder, device or pipe".to_owned()));
-    }
-    if about.len() > MAX_BYTES {
-        return Err(told(format!("has {} bytes; at most {MAX_BYTES} are read", about.len())));
-    }
-    let mut bytes = Vec::with_capacity(about.len() as usize);
-    // Files that grow while they are read, and some that have no honest size.
-    std::fs::File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(told(format!("has more than {MAX_BYTES} bytes")));
-    }
-    Ok(bytes)
 }
 
 /// The folder of a scene file, from which the names in it count.

@@ -59,9 +59,10 @@ impl CameraPath {
     /// # Errors
     /// [`PathError`] naming the file and what is wrong in it.
     pub fn load(path: &Path) -> Result<Self, PathError> {
-        let text = std::fs::read_to_string(path).map_err(|source| PathError::Read { path: path.to_owned(), source })?;
+        let bytes =
+            crate::image_io::read_regular(path).map_err(|source| PathError::Read { path: path.to_owned(), source })?;
         let broken = |reason| PathError::Broken { path: path.to_owned(), reason };
-        let read: Self = serde_json::from_str(&text).map_err(|e| broken(e.to_string()))?;
+        let read: Self = serde_json::from_slice(&bytes).map_err(|e| broken(e.to_string()))?;
         read.check().map_err(broken)?;
         Ok(read)
     }

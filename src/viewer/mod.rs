@@ -69,6 +69,15 @@ pub struct Options {
     pub tuned: Option<fn(&wgpu::Device) -> Arc<Tuned>>,
 }
 
+/// What the window system says, without where in its library's sources it says so.
+fn window_reason(error: &impl std::fmt::Display) -> String {
+    let text = error.to_string();
+    match text.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")) {
+        Some((line, reason)) if line.bytes().all(|b| b.is_ascii_digit()) => reason.to_owned(),
+        _ => text,
+    }
+}
+
 /// Why the window cannot be, or ended badly.
 #[derive(Debug, Error)]
 pub enum ViewError {
@@ -102,4 +111,14 @@ pub enum ViewError {
 /// [`ViewError`]. Bad scenes and weights are told in the window instead.
 pub fn run(options: Options) -> Result<(), ViewError> {
     app::run(options)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn reasons_name_no_source_file() {
+        let said = "os error at /home/a/winit-0.30.13/src/platform_impl/linux/mod.rs:765: neither is set.";
+        assert_eq!(super::window_reason(&said), "neither is set.");
+        assert_eq!(super::window_reason(&"file a.rs: no"), "file a.rs: no");
+    }
 }

@@ -36,12 +36,14 @@ fn main() -> ExitCode {
 }
 
 fn demo() -> Result<(), String> {
-    cargo(&["build", "--release", "--bin", "bouncelight", "--example", "demo"])?;
+    let program = ["--release", "--bin", "bouncelight"];
+    cargo(&[["build"].as_slice(), &program].concat())?;
     see_to_adapter(&["--release"])?;
-    cargo(&["run", "--quiet", "--release", "--example", "demo"])
+    cargo(&[["run", "--quiet"].as_slice(), &program, &["--", "demo"]].concat())
 }
 
 fn test() -> Result<(), String> {
+    cargo(&["build", "--bin", "bouncelight"])?;
     see_to_adapter(&[])?;
     see_to_display()?;
     cargo(&["test", "--workspace"])

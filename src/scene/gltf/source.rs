@@ -5,8 +5,9 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::meshopt::Packed;
+use crate::image_io;
 use crate::scene::SceneError;
-use crate::scene::files::{self, Folder, LoadOptions};
+use crate::scene::files::{Folder, LoadOptions};
 
 /// JSON and, for a GLB, the binary chunk.
 type Split<'a> = (&'a [u8], Option<&'a [u8]>);
@@ -110,8 +111,8 @@ impl<'a> Source<'a> {
             let bytes = source.unpack(&view, root.buffer_views[i].byte_length.0);
             let bytes = bytes.map_err(|e| SceneError::broken(path, format!("bufferViews[{i}]"), e))?;
             total += bytes.len() as u64;
-            if total > files::MAX_BYTES {
-                let problem = format!("the compressed views unpack to more than {} bytes", files::MAX_BYTES);
+            if total > image_io::MAX_BYTES {
+                let problem = format!("the compressed views unpack to more than {} bytes", image_io::MAX_BYTES);
                 return Err(SceneError::broken(path, format!("bufferViews[{i}]"), problem));
             }
             source.unpacked.insert(i, bytes);

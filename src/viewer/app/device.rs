@@ -7,7 +7,7 @@ use crate::viewer::live::Kept;
 use crate::viewer::screen::Screen;
 use crate::viewer::stage::Stage;
 use crate::viewer::state::Request;
-use crate::viewer::{ViewError, saved};
+use crate::viewer::{ViewError, saved, window_reason};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
@@ -22,7 +22,7 @@ impl App {
         let attributes = Window::default_attributes()
             .with_title("bouncelight")
             .with_inner_size(winit::dpi::LogicalSize::new(width, height));
-        let window = event_loop.create_window(attributes).map_err(|e| ViewError::NoDisplay(e.to_string()))?;
+        let window = event_loop.create_window(attributes).map_err(|e| ViewError::NoDisplay(window_reason(&e)))?;
         self.connect(Arc::new(window))?;
         let fresh =
             self.options.settings.is_none() && (self.script.is_some() || saved::path().is_none_or(|p| !p.exists()));

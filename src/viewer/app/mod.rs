@@ -20,7 +20,7 @@ use super::script::Script;
 use super::stage::Stage;
 use super::state::{Action, State};
 use super::watch::{self, Watch};
-use super::{Options, ViewError};
+use super::{Options, ViewError, window_reason};
 use meter::Meter;
 use overlay::Overlay;
 use reference::Tracing;
@@ -121,7 +121,8 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         settings.weights.clone_from(&options.weights);
     }
     settings.window = options.size.unwrap_or(settings.window);
-    let event_loop = EventLoop::<Event>::with_user_event().build().map_err(|e| ViewError::NoDisplay(e.to_string()))?;
+    let event_loop =
+        EventLoop::<Event>::with_user_event().build().map_err(|e| ViewError::NoDisplay(window_reason(&e)))?;
     let mut state = State::new(settings);
     if let Some(text) = trouble {
         state.tell(text, true);
@@ -165,7 +166,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         end: None,
         options,
     };
-    event_loop.run_app(&mut app).map_err(|e| ViewError::NoDisplay(e.to_string()))?;
+    event_loop.run_app(&mut app).map_err(|e| ViewError::NoDisplay(window_reason(&e)))?;
     if app.script.is_none()
         && app.options.settings.is_none()
         && app.stage.is_some()
