@@ -1,3 +1,5 @@
+//#import accel/traverse.wgsl
+
 // Traces a list of rays: for tests of the traversal and for measuring its speed.
 
 struct Ray {

@@ -1,3 +1,6 @@
+//#import gi/inputs.wgsl
+//#import gi/unseen.wgsl
+
 // The simplest method: every surface receives the same light from all around, as far as what stands near lets it.
 
 // SKY and BOUNCE come from the prelude (gi::ambient documents them).

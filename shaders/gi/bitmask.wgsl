@@ -1,3 +1,5 @@
+//#import gi/inputs.wgsl
+
 // Which directions over a surface point the depth buffer blocks: a visibility bitmask (Therrien, Levesque and Gilet
 // 2023). The hemisphere is cut into slices through the eye's ray; a slice is walked to both sides in the depth
 // buffer, and every texel there blocks the angles between its front and a back that is assumed THICKNESS behind it.

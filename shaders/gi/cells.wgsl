@@ -1,5 +1,8 @@
+//#import lib/octahedral.wgsl
+//#import gi/inputs.wgsl
+
 // Low-resolution directional light: which pixel stands for a cell, where that pixel is, and what a cell's light says
-// about a direction. A gather joins this file behind gi/inputs.wgsl; the prelude (`CellSide::prelude`) holds
+// about a direction. A gather joins this file behind gi/inputs.wgsl; the prelude (`gi::stage::cells::prelude`) holds
 // CELL_SIDE, the pixels on a side of a cell.
 
 // A cell without any surface, in `cell_pixels`.

@@ -1,3 +1,6 @@
+//#import gi/inputs.wgsl
+//#import gi/cells.wgsl
+
 // Which pixel stands for each cell: its middle one, unless another surface stands before the middle's (or the middle
 // shows the background): then that surface's pixel nearest to the middle. What is in front is small and would often go
 // without any cell of its own; what is behind it is mostly seen by the cells around.

@@ -1,3 +1,5 @@
+//#import gi/inputs.wgsl
+
 // One exposure for the picture: what light there is on average, by which every radiance that the network sees is
 // divided and every light it answers is multiplied. Two levels of fixed order, so that the same picture gives the same
 // bits: up to 256 groups sum strided cells, one group sums the groups. At 8K a thread adds 32 numbers and the trees

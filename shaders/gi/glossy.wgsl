@@ -1,3 +1,7 @@
+//#import lib/frame.wgsl
+//#import lib/environment.wgsl
+//#import gi/outgoing.wgsl
+
 // Specular light of sky and bounces: the split sum's share of what rays into the lobe have found, where the method sends some; smooth
 // surfaces then ask the screen, too, which is sharper. Without such rays: of what one ray along the mirrored direction finds on the
 // screen, blurred by the lobe's width there, and where it finds nothing of the light that the surface's own side receives, mixed with

@@ -1,3 +1,5 @@
+//#import gi/inputs.wgsl
+
 // From half resolution to a pixel: the mean of the 4x4 texels around it, weighted by how much they lie on the pixel's
 // own plane. The 4x4 texels hold every phase of the gather's pattern once, so on a plane its noise cancels exactly;
 // that is why the weights fall off with the plane's distance only.

@@ -1,3 +1,5 @@
+//#import lib/octahedral.wgsl
+
 // What every stage of gi/ reads: the G-buffer, the direct light and the camera (group 0), and how texels become
 // numbers. Everything that leaves this file is finite, whatever the textures hold.
 

@@ -1,3 +1,5 @@
+//#import gi/outgoing.wgsl
+
 // The lit picture at half size, then half of that and so on, for blurred look-ups: radiance times coverage (rgb) and the
 // share of the texel that shows a surface (a).
 

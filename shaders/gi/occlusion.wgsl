@@ -1,3 +1,6 @@
+//#import gi/inputs.wgsl
+//#import gi/bitmask.wgsl
+
 // How much of the near field's light reaches a surface: cosine-weighted visibility at half resolution.
 // r: visibility, 0 to 1; a: distance along the view axis in metres, 0 on the background.
 

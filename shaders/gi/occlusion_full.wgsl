@@ -1,3 +1,6 @@
+//#import gi/inputs.wgsl
+//#import gi/half.wgsl
+
 // Visibility of the near field at full resolution; 1 on the background.
 
 @group(1) @binding(1) var output: texture_storage_2d<r32float, write>;

@@ -1,3 +1,7 @@
+//#import lib/frame.wgsl
+//#import lib/octahedral.wgsl
+//#import lib/brdf.wgsl
+
 // What both stages of gi/glossy read (group 0), and the light that a pixel's surface sends out.
 
 @group(0) @binding(0) var<uniform> frame: Frame;

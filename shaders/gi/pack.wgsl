@@ -1,3 +1,5 @@
+//#import gi/inputs.wgsl
+
 // G-buffer to network input: one thread writes all features of one cell, NHWC, padded with zeros to whole vec4.
 // The prelude gives each feature its first channel (-1 when the weights do not use it) and PADDED.
 

@@ -1,3 +1,5 @@
+//#import gi/inputs.wgsl
+
 // The network's answers, one per 4x4 cell, brought to every pixel: bilinear where the surface goes on, and only from cells
 // of the pixel's own surface where it does not. All of it in f32; factors are averaged, not their logarithms.
 //     light = base * exp(y.rgb) + s * (the three numbers after them)

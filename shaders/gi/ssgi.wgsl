@@ -1,3 +1,7 @@
+//#import gi/inputs.wgsl
+//#import gi/bitmask.wgsl
+//#import gi/unseen.wgsl
+
 // One bounce in screen space at half resolution: what each step's surface sends on, weighted by the sectors that it is
 // the first to block; through sectors that nothing blocks comes unseen light. Because the sectors hold equal shares of
 // cosine-weighted light, counting bits gives E/pi. a: distance along the view axis in metres, 0 on the background.

@@ -1,3 +1,6 @@
+//#import gi/inputs.wgsl
+//#import gi/half.wgsl
+
 // Light of the screen at full resolution, E/pi; 0 on the background.
 
 @group(1) @binding(1) var output: texture_storage_2d<rgba16float, write>;

@@ -1,3 +1,5 @@
+//#import gi/inputs.wgsl
+
 // What stands in for light from where the screen does not show: the sky, and what the picture's surfaces send on.
 // Expects `exposure` in the module, and SKY and BOUNCE from the prelude (gi::ambient documents them).
 

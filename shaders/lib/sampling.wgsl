@@ -1,3 +1,5 @@
+//#import lib/brdf.wgsl
+
 // Random numbers and directions, for whoever sends rays.
 
 // Three hashes of three numbers (Jarzynski and Olano 2020, pcg3d).

@@ -1,3 +1,8 @@
+//#import lib/brdf.wgsl
+//#import lib/sampling.wgsl
+//#import reference/random.wgsl
+//#import reference/surface.wgsl
+
 // The specular lobe: GGX with the light that single scattering loses given back (Kulla and Conty 2017 as in Cycles'
 // Principled): white metal keeps all light at every roughness. Its dielectric part has the true Fresnel curve of the
 // material's index, as the rasteriser's `ggx` and Cycles have it and as `env_brdf` was fitted to. Metal has Schlick's.

@@ -1,3 +1,8 @@
+//#import accel/traverse.wgsl
+//#import reference/types.wgsl
+//#import reference/random.wgsl
+//#import reference/surface.wgsl
+
 // Points of the picture and the rays through them.
 
 // Picture coordinates of point number `point`, pixels: x right, y down, pixel centres at +0.5.

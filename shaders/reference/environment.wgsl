@@ -1,3 +1,8 @@
+//#import lib/brdf.wgsl
+//#import reference/types.wgsl
+//#import lib/sampling.wgsl
+//#import reference/random.wgsl
+
 // What rays see that hit nothing: one radiance, or a lat-long picture (`scene::environment` says how it lies) with a table
 // of cells, even in solid angle, from which light samples choose.
 

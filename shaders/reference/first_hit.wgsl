@@ -1,3 +1,9 @@
+//#import accel/traverse.wgsl
+//#import reference/types.wgsl
+//#import reference/random.wgsl
+//#import reference/surface.wgsl
+//#import reference/camera.wgsl
+
 // Position and depth of what is seen through exact points of the picture.
 
 // World position (metres; zero where nothing was hit), distance along the view axis (metres; 1e10 where nothing was hit).

@@ -1,3 +1,11 @@
+//#import lib/brdf.wgsl
+//#import lib/lights.wgsl
+//#import reference/types.wgsl
+//#import lib/sampling.wgsl
+//#import reference/random.wgsl
+//#import reference/surface.wgsl
+//#import reference/environment.wgsl
+
 // Light samples. Suns are discs at infinity, point and spot lights discs that face the shaded point (as Cycles' soft
 // falloff has them), glowing triangles themselves, the surroundings a sphere at infinity. Densities are in 1/sr and
 // contain the chance of having chosen the light; 0 stands for a light without size, which no ray can hit.

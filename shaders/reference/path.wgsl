@@ -1,3 +1,15 @@
+//#import accel/traverse.wgsl
+//#import lib/brdf.wgsl
+//#import reference/types.wgsl
+//#import reference/random.wgsl
+//#import reference/surface.wgsl
+//#import reference/camera.wgsl
+//#import reference/bsdf.wgsl
+//#import reference/lights.wgsl
+//#import reference/environment.wgsl
+//#import reference/rasterised.wgsl
+//#import reference/sums.wgsl
+
 // The path tracer. One invocation advances one point of the picture by `sample_count` samples. The loop runs over
 // vertices, not over samples: a path that has ended starts the next sample at once, so that invocations side by side stay
 // busy. There is one place where rays are traced, whatever they are for.

@@ -1,3 +1,7 @@
+//#import lib/brdf.wgsl
+//#import reference/types.wgsl
+//#import lib/sampling.wgsl
+
 // Random numbers: Owen-scrambled Sobol points, two dimensions at a time (Burley 2020, "Practical Hash-based Owen
 // Scrambling"). Each pair of dimensions has its own scrambling and its own order of the points, both from a hash of seed,
 // half, point and dimension; so the halves are independent, and so are different points of the picture.

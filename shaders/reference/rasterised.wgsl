@@ -1,3 +1,11 @@
+//#import lib/brdf.wgsl
+//#import lib/lights.wgsl
+//#import reference/types.wgsl
+//#import lib/sampling.wgsl
+//#import reference/random.wgsl
+//#import reference/surface.wgsl
+//#import reference/lights.wgsl
+
 // Direct light as the rasteriser reckons it: from the light's centre, with its shadow by a point of its disc.
 
 struct Rasterised {

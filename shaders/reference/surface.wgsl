@@ -1,3 +1,8 @@
+//#import accel/traverse.wgsl
+//#import lib/octahedral.wgsl
+//#import lib/brdf.wgsl
+//#import reference/types.wgsl
+
 // What is at a hit: geometry, textures, material. Follows `gbuffer.wgsl` in every step.
 
 struct Corners {

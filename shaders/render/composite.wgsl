@@ -1,3 +1,6 @@
+//#import lib/frame.wgsl
+//#import lib/environment.wgsl
+
 // Puts light and surface together: hdr = albedo (direct + indirect) + direct and indirect specular + emissive.
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -1,3 +1,10 @@
+//#import lib/frame.wgsl
+//#import lib/hash.wgsl
+//#import lib/octahedral.wgsl
+//#import lib/brdf.wgsl
+//#import lib/lights.wgsl
+//#import lib/shadow_maps.wgsl
+
 // Direct light of the analytic lights: E/π without albedo, and the radiance of the specular lobe.
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -1,3 +1,10 @@
+//#import lib/frame.wgsl
+//#import lib/hash.wgsl
+//#import lib/octahedral.wgsl
+//#import lib/brdf.wgsl
+//#import lib/material.wgsl
+//#import render/mesh.wgsl
+
 // One geometry pass: depth, normal, diffuse albedo, specular, emissive, motion. `render/gbuffer.rs` documents each field.
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -1,3 +1,7 @@
+//#import lib/frame.wgsl
+//#import lib/octahedral.wgsl
+//#import lib/brdf.wgsl
+
 // Decodes one layer of the G-buffer for a band of rows into linear floats, for capture. Which layer: `options.layer`,
 // numbered as `render::capture::Layer`. Light layers leave as products with the surface colour; the division, which
 // Blender makes after filtering, happens on the CPU.

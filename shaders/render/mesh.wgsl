@@ -1,3 +1,5 @@
+//#import lib/octahedral.wgsl
+
 // The vertex stage of everything that draws surfaces with their materials: gbuffer.wgsl and atlas.wgsl.
 
 struct Vertex {

@@ -1,3 +1,6 @@
+//#import lib/hash.wgsl
+//#import lib/material.wgsl
+
 // Depth from a light, reversed: 1 at the near plane, 0 where there is nothing.
 
 struct ShadowCamera {

@@ -1,3 +1,5 @@
+//#import lib/frame.wgsl
+
 // Temporal anti-aliasing: each frame samples its pixels somewhere else; the 3x3 samples around a pixel's centre, weighted
 // by the pixel filter, are this frame's value, and the mean over frames is the filtered picture. A still camera before
 // objects that are still averages without end. Where either moves, the mean is fetched from where the surface was, dropped

@@ -1,3 +1,6 @@
+//#import lib/screen.wgsl
+//#import lib/tonemap.wgsl
+
 // From scene-linear radiance to a display target.
 
 struct Tonemap {

@@ -1,3 +1,5 @@
+//#import lib/tonemap.wgsl
+
 // How much two frames differ as they are shown: one sum for each 8×8 pixels.
 
 struct Flicker {

@@ -1,3 +1,8 @@
+//#import lib/frame.wgsl
+//#import lib/octahedral.wgsl
+//#import lib/screen.wgsl
+//#import lib/tonemap.wgsl
+
 // What the window shows: a picture or one of the things it was made from, on both sides of a line that can be dragged.
 
 struct Show {

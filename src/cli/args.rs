@@ -115,7 +115,10 @@ impl Global {
         let gpu = Gpu::open(&self.gpu_options())?;
         // Whatever the driver refuses later is no fault of the user's, but it deserves a sentence, not a stack trace.
         gpu.device.on_uncaptured_error(std::sync::Arc::new(|e| {
-            eprintln!("error: the GPU driver refused a command; `bouncelight doctor` lists other adapters\n{e}");
+            eprintln!(
+                "error: the GPU driver refused a command; `bouncelight doctor` lists other adapters\n{}",
+                crate::gpu::shaders::located(&e.to_string())
+            );
             std::process::exit(super::error::RUNTIME.into());
         }));
         if !self.quiet {

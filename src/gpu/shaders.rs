@@ -1,305 +1,80 @@
-//! The one table of shaders: each is a list of plain WGSL files joined in order.
+//! The one table of shaders: each is a plain WGSL file, and those that it imports ([`join`]).
 //!
 //! Numbers come in as `override` constants or as a generated prelude of `const` lines ([`module_with`]), never by
 //! templates inside a body.
 
+mod join;
 mod net;
-pub use net::NET;
 
-/// One shader module: its name (`room.stage`) and the files that make it up, libraries first.
-#[derive(Debug, Clone, Copy)]
-pub struct Shader {
-    /// `room.stage`, also the wgpu label.
-    pub name: &'static str,
-    /// File name and contents in joining order.
-    pub files: &'static [(&'static str, &'static str)],
-}
+pub use join::{Joined, folder, read_from};
 
-/// Names a file under `shaders/` and embeds it.
-macro_rules! wgsl {
-    ($($path:literal),+ $(,)?) => { &[$(($path, include_str!(concat!("../../shaders/", $path)))),+] };
-}
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Shaders of `render/`.
-pub const RENDER: &[Shader] = &[
-    Shader { name: "render.shadow", files: wgsl!["lib/hash.wgsl", "lib/material.wgsl", "render/shadow.wgsl"] },
-    Shader {
-        name: "render.gbuffer",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/hash.wgsl",
-            "lib/frame.wgsl",
-            "lib/brdf.wgsl",
-            "lib/material.wgsl",
-            "render/mesh.wgsl",
-            "render/gbuffer.wgsl"
-        ],
-    },
-    Shader {
-        name: "render.direct",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/hash.wgsl",
-            "lib/frame.wgsl",
-            "lib/brdf.wgsl",
-            "lib/lights.wgsl",
-            "lib/shadow_maps.wgsl",
-            "render/direct.wgsl"
-        ],
-    },
-    Shader {
-        name: "render.composite",
-        files: wgsl!["lib/frame.wgsl", "lib/brdf.wgsl", "lib/environment.wgsl", "render/composite.wgsl"],
-    },
-    Shader { name: "render.taa", files: wgsl!["lib/frame.wgsl", "render/taa.wgsl"] },
-    Shader { name: "render.tonemap", files: wgsl!["lib/screen.wgsl", "lib/tonemap.wgsl", "render/tonemap.wgsl"] },
-    Shader {
-        name: "render.layers",
-        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "render/layers.wgsl"],
-    },
+/// Name (`room.stage`, also the wgpu label) and file of each shader but the network's.
+const FILES: &[(&str, &str)] = &[
+    ("render.shadow", "render/shadow.wgsl"),
+    ("render.gbuffer", "render/gbuffer.wgsl"),
+    ("render.direct", "render/direct.wgsl"),
+    ("render.composite", "render/composite.wgsl"),
+    ("render.taa", "render/taa.wgsl"),
+    ("render.tonemap", "render/tonemap.wgsl"),
+    ("render.layers", "render/layers.wgsl"),
+    ("accel.rays", "accel/rays.wgsl"),
+    ("gi.exposure", "gi/exposure.wgsl"),
+    ("gi.ambient", "gi/ambient.wgsl"),
+    ("gi.occlusion", "gi/occlusion.wgsl"),
+    ("gi.occlusion_full", "gi/occlusion_full.wgsl"),
+    ("gi.radiance", "gi/radiance.wgsl"),
+    ("gi.ssgi", "gi/ssgi.wgsl"),
+    ("gi.ssgi_full", "gi/ssgi_full.wgsl"),
+    ("gi.lit", "gi/lit.wgsl"),
+    ("gi.glossy", "gi/glossy.wgsl"),
+    ("gi.cells", "gi/choose.wgsl"),
+    ("gi.rays", "gi/gather/rays.wgsl"),
+    ("gi.renew", "gi/gather/renew.wgsl"),
+    ("gi.settle", "gi/gather/settle.wgsl"),
+    ("gi.blur", "gi/gather/blur.wgsl"),
+    ("gi.smooth", "gi/gather/smooth.wgsl"),
+    ("gi.bring", "gi/gather/bring.wgsl"),
+    ("gi.pack", "gi/pack.wgsl"),
+    ("gi.reconstruct", "gi/reconstruct.wgsl"),
+    ("reference.path", "reference/path.wgsl"),
+    ("reference.first_hit", "reference/first_hit.wgsl"),
+    ("viewer.sum", "viewer/sum.wgsl"),
+    ("viewer.flicker", "viewer/flicker.wgsl"),
+    ("viewer.show", "viewer/show.wgsl"),
 ];
 
-/// Shaders of `gi/`.
-pub const GI: &[Shader] = &[
-    Shader { name: "gi.exposure", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/exposure.wgsl"] },
-    Shader {
-        name: "gi.ambient",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/unseen.wgsl", "gi/ambient.wgsl"],
-    },
-    Shader {
-        name: "gi.occlusion",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/bitmask.wgsl", "gi/occlusion.wgsl"],
-    },
-    Shader {
-        name: "gi.occlusion_full",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/half.wgsl", "gi/occlusion_full.wgsl"],
-    },
-    Shader {
-        name: "gi.radiance",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/unseen.wgsl", "gi/radiance.wgsl"],
-    },
-    Shader {
-        name: "gi.ssgi",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/bitmask.wgsl", "gi/unseen.wgsl", "gi/ssgi.wgsl"],
-    },
-    Shader {
-        name: "gi.ssgi_full",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/half.wgsl", "gi/ssgi_full.wgsl"],
-    },
-    Shader {
-        name: "gi.lit",
-        files: wgsl!["lib/octahedral.wgsl", "lib/frame.wgsl", "lib/brdf.wgsl", "gi/outgoing.wgsl", "gi/lit.wgsl"],
-    },
-    Shader {
-        name: "gi.glossy",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/frame.wgsl",
-            "lib/brdf.wgsl",
-            "lib/environment.wgsl",
-            "gi/outgoing.wgsl",
-            "gi/glossy.wgsl"
-        ],
-    },
-    Shader {
-        name: "gi.cells",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/choose.wgsl"],
-    },
-    Shader {
-        name: "gi.rays",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/brdf.wgsl",
-            "lib/lights.wgsl",
-            "lib/environment.wgsl",
-            "gi/inputs.wgsl",
-            "gi/cells.wgsl",
-            "accel/traverse.wgsl",
-            "accel/surface.wgsl",
-            "lib/sampling.wgsl",
-            "gi/gather/types.wgsl",
-            "gi/gather/gloss.wgsl",
-            "gi/gather/entries.wgsl",
-            "gi/gather/look.wgsl",
-            "gi/gather/rays.wgsl"
-        ],
-    },
-    Shader {
-        name: "gi.renew",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/brdf.wgsl",
-            "lib/lights.wgsl",
-            "lib/environment.wgsl",
-            "gi/inputs.wgsl",
-            "gi/cells.wgsl",
-            "accel/traverse.wgsl",
-            "accel/surface.wgsl",
-            "lib/sampling.wgsl",
-            "gi/gather/types.wgsl",
-            "gi/gather/entries.wgsl",
-            "gi/gather/look.wgsl",
-            "gi/gather/renew.wgsl"
-        ],
-    },
-    Shader {
-        name: "gi.settle",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/brdf.wgsl",
-            "lib/lights.wgsl",
-            "lib/environment.wgsl",
-            "gi/inputs.wgsl",
-            "gi/cells.wgsl",
-            "accel/traverse.wgsl",
-            "accel/surface.wgsl",
-            "lib/sampling.wgsl",
-            "gi/gather/types.wgsl",
-            "gi/gather/gloss.wgsl",
-            "gi/gather/past.wgsl",
-            "gi/gather/settle.wgsl"
-        ],
-    },
-    Shader {
-        name: "gi.blur",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/brdf.wgsl",
-            "lib/lights.wgsl",
-            "lib/environment.wgsl",
-            "gi/inputs.wgsl",
-            "gi/cells.wgsl",
-            "accel/traverse.wgsl",
-            "accel/surface.wgsl",
-            "lib/sampling.wgsl",
-            "gi/gather/types.wgsl",
-            "gi/gather/gloss.wgsl",
-            "gi/gather/past.wgsl",
-            "gi/gather/blur.wgsl"
-        ],
-    },
-    Shader {
-        name: "gi.smooth",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/brdf.wgsl",
-            "lib/lights.wgsl",
-            "lib/environment.wgsl",
-            "gi/inputs.wgsl",
-            "gi/cells.wgsl",
-            "accel/traverse.wgsl",
-            "accel/surface.wgsl",
-            "lib/sampling.wgsl",
-            "gi/gather/types.wgsl",
-            "gi/gather/gloss.wgsl",
-            "gi/gather/past.wgsl",
-            "gi/gather/smooth.wgsl"
-        ],
-    },
-    Shader {
-        name: "gi.bring",
-        files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/cells.wgsl", "gi/gather/bring.wgsl"],
-    },
-    Shader { name: "gi.pack", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/pack.wgsl"] },
-    Shader { name: "gi.reconstruct", files: wgsl!["lib/octahedral.wgsl", "gi/inputs.wgsl", "gi/reconstruct.wgsl"] },
-];
-
-/// Shaders of `accel/`.
-pub const ACCEL: &[Shader] = &[Shader { name: "accel.rays", files: wgsl!["accel/traverse.wgsl", "accel/rays.wgsl"] }];
-
-/// Shaders of `reference/`.
-pub const REFERENCE: &[Shader] = &[
-    Shader {
-        name: "reference.path",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/brdf.wgsl",
-            "lib/lights.wgsl",
-            "reference/types.wgsl",
-            "accel/traverse.wgsl",
-            "lib/sampling.wgsl",
-            "reference/random.wgsl",
-            "reference/surface.wgsl",
-            "reference/camera.wgsl",
-            "reference/bsdf.wgsl",
-            "reference/lights.wgsl",
-            "reference/environment.wgsl",
-            "reference/rasterised.wgsl",
-            "reference/film.wgsl",
-            "reference/sums.wgsl",
-            "reference/path.wgsl",
-        ],
-    },
-    Shader {
-        name: "reference.first_hit",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/brdf.wgsl",
-            "lib/lights.wgsl",
-            "reference/types.wgsl",
-            "accel/traverse.wgsl",
-            "lib/sampling.wgsl",
-            "reference/random.wgsl",
-            "reference/surface.wgsl",
-            "reference/camera.wgsl",
-            "reference/first_hit.wgsl",
-        ],
-    },
-];
-
-/// Shaders of `viewer/`.
-pub const VIEWER: &[Shader] = &[
-    Shader { name: "viewer.sum", files: wgsl!["viewer/sum.wgsl"] },
-    Shader { name: "viewer.flicker", files: wgsl!["lib/tonemap.wgsl", "viewer/flicker.wgsl"] },
-    Shader {
-        name: "viewer.show",
-        files: wgsl![
-            "lib/octahedral.wgsl",
-            "lib/frame.wgsl",
-            "lib/screen.wgsl",
-            "lib/tonemap.wgsl",
-            "viewer/show.wgsl"
-        ],
-    },
-];
-
-/// Every shader there is.
-pub fn all() -> impl Iterator<Item = &'static Shader> {
-    RENDER.iter().chain(ACCEL).chain(GI).chain(NET).chain(REFERENCE).chain(VIEWER)
+/// Names of all shaders that there are.
+pub fn names() -> impl Iterator<Item = String> {
+    FILES.iter().map(|(name, _)| (*name).to_owned()).chain(net::names())
 }
 
-/// Where [`source`] reads files instead of what was compiled in; nothing by default.
-static FOLDER: std::sync::RwLock<Option<std::path::PathBuf>> = std::sync::RwLock::new(None);
-
-/// Reads shaders from `folder` from now on, where it has them, so that they can be edited while a program runs. `None` goes back to
-/// what was compiled in.
-pub fn read_from(folder: Option<std::path::PathBuf>) {
-    if let Ok(mut place) = FOLDER.write() {
-        *place = folder;
-    }
+/// Names of the network's shaders.
+pub fn net_names() -> impl Iterator<Item = String> {
+    net::names()
 }
 
-/// The folder that shaders are read from, if any.
-pub fn folder() -> Option<std::path::PathBuf> {
-    FOLDER.read().ok().and_then(|f| f.clone())
-}
-
-/// The WGSL text of shader `name` with `prelude` (lines of `const`) in front.
+/// Shader `name` behind `prelude` (lines of `const`), and where its lines come from.
 ///
 /// # Panics
-/// If no row of the table has that name, which is a mistake in the code that asks.
+/// If there is no shader of that name, or none of a file that is imported: mistakes in the code that asks.
+pub fn joined(name: &str, prelude: &str) -> Joined {
+    let file = FILES.iter().find(|(n, _)| *n == name).map(|(_, file)| vec![(*file).to_owned()]);
+    let files = file.or_else(|| net::files(name)).unwrap_or_else(|| panic!("no shader named {name}"));
+    let joined = Joined::new(prelude, files.iter().map(String::as_str));
+    // A file that is being edited may name anything; the compiler then says what is missing.
+    assert!(joined.missing.is_empty() || folder().is_some(), "{name}: no such files: {:?}", joined.missing);
+    joined
+}
+
+/// The WGSL text of shader `name` with `prelude` in front.
+///
+/// # Panics
+/// As [`joined`].
 pub fn source(name: &str, prelude: &str) -> String {
-    let shader = all().find(|s| s.name == name).unwrap_or_else(|| panic!("no shader named {name}"));
-    let mut text = String::from(prelude);
-    let folder = folder();
-    for (file, body) in shader.files {
-        match folder.as_ref().and_then(|f| std::fs::read_to_string(f.join(file)).ok()) {
-            Some(edited) => text.push_str(&edited),
-            None => text.push_str(body),
-        }
-        text.push('\n');
-    }
-    text
+    joined(name, prelude).text
 }
 
 /// Compiles shader `name`.
@@ -308,18 +83,34 @@ pub fn module(device: &wgpu::Device, name: &str) -> wgpu::ShaderModule {
 }
 
 /// Shaders that this process has compiled.
-static COMPILED: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(0);
+static COMPILED: AtomicU32 = AtomicU32::new(0);
 
 /// How many shaders this process has compiled so far, for saying so while it takes long.
 pub fn compiled() -> u32 {
-    COMPILED.load(std::sync::atomic::Ordering::Relaxed)
+    COMPILED.load(Ordering::Relaxed)
+}
+
+/// Shaders compiled while files were read from a folder, by name: whoever edits them wants to know where a mistake is.
+static EDITED: Mutex<Vec<(String, Joined)>> = Mutex::new(Vec::new());
+
+/// A driver's `message` about a shader, with file and line where a shader from a folder is meant.
+pub fn located(message: &str) -> String {
+    let edited = EDITED.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    match edited.iter().rev().find(|(name, _)| message.contains(&format!("'{name}'"))) {
+        Some((_, joined)) => joined.located(message),
+        None => message.to_owned(),
+    }
 }
 
 /// Compiles shader `name` behind a generated prelude of `const` lines.
 pub fn module_with(device: &wgpu::Device, name: &str, prelude: &str) -> wgpu::ShaderModule {
-    COMPILED.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-    device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(name),
-        source: wgpu::ShaderSource::Wgsl(source(name, prelude).into()),
-    })
+    COMPILED.fetch_add(1, Ordering::Relaxed);
+    let joined = joined(name, prelude);
+    let source = wgpu::ShaderSource::Wgsl(joined.text.clone().into());
+    if folder().is_some() {
+        let mut edited = EDITED.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        edited.retain(|(other, _)| other != name);
+        edited.push((name.to_owned(), Joined { text: String::new(), ..joined }));
+    }
+    device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source })
 }

@@ -212,7 +212,7 @@ pub fn renderer(handles: &Handles, plan: Plan, progress: &Progress) -> Result<Pr
     let options = RendererOptions { method, ..Default::default() };
     let built = Renderer::new(&handles.device, &handles.queue, plan.size, options);
     if let Some(e) = pollster::block_on(scope.pop()) {
-        return Err(e.to_string());
+        return Err(crate::gpu::shaders::located(&e.to_string()));
     }
     let renderer = Box::new(built.map_err(|e| e.to_string())?);
     Ok(Product::Renderer { side: plan.side, key: plan.key, renderer })

@@ -1,3 +1,9 @@
+//#import gi/inputs.wgsl
+//#import gi/cells.wgsl
+//#import gi/gather/types.wgsl
+//#import gi/gather/gloss.wgsl
+//#import gi/gather/past.wgsl
+
 // Means of cells blurred over neighbours on the same surface, as directional light (`CellLight`).
 
 @group(2) @binding(0) var<storage, read> pasts: array<vec4f>;

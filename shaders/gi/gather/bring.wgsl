@@ -1,3 +1,6 @@
+//#import gi/inputs.wgsl
+//#import gi/cells.wgsl
+
 // Directional light of the cells, and what their lobes show, brought to every pixel: bilinear where the surface goes on, and only from
 // cells of the pixel's own surface where it does not, the light evaluated for the pixel's own normal. All of it in f32.
 // A workgroup reads the cells around its 8x8 pixels once. The prelude holds CELL_SIDE and the tolerances

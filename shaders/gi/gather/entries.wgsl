@@ -1,3 +1,7 @@
+//#import accel/traverse.wgsl
+//#import lib/sampling.wgsl
+//#import gi/gather/types.wgsl
+
 // The cache of light between surfaces: entries of a hash table, each for the places of one cell of a grid in the world that face
 // one of six ways. The grid's cells grow with the distance from the eye in powers of two. What an entry knows is irradiance
 // over π of everything but the lights, which whoever reads an entry adds at the place itself.

@@ -1,3 +1,6 @@
+//#import gi/cells.wgsl
+//#import gi/gather/types.wgsl
+
 // Rays into lobes: which cells send one, and when.
 
 // Lobes of this roughness and more show what the cell's directional light tells, and get no rays of their own.

@@ -1,3 +1,13 @@
+//#import accel/traverse.wgsl
+//#import gi/inputs.wgsl
+//#import lib/brdf.wgsl
+//#import lib/environment.wgsl
+//#import lib/lights.wgsl
+//#import lib/sampling.wgsl
+//#import accel/surface.wgsl
+//#import gi/gather/types.wgsl
+//#import gi/gather/entries.wgsl
+
 // What a ray finds: the sky, or a surface with the light of lamps and of what glows that it sends back, and the entry that knows
 // the rest of its light.
 

@@ -1,3 +1,6 @@
+//#import gi/inputs.wgsl
+//#import gi/gather/types.wgsl
+
 // What a cell remembers, 80 bytes.
 struct Past {
     // Irradiance over π on the cell's surface; frames in it.

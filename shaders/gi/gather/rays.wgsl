@@ -1,3 +1,11 @@
+//#import gi/inputs.wgsl
+//#import lib/brdf.wgsl
+//#import gi/cells.wgsl
+//#import lib/sampling.wgsl
+//#import gi/gather/types.wgsl
+//#import gi/gather/gloss.wgsl
+//#import gi/gather/look.wgsl
+
 // One ray from each cell of the picture into the half space above it, and where surfaces glow one shadow ray to a point of them. Of each
 // square of 2×2 cells one in turn sends a second ray into its lobe, if its surface has one.
 

@@ -1,3 +1,9 @@
+//#import gi/inputs.wgsl
+//#import lib/sampling.wgsl
+//#import gi/gather/types.wgsl
+//#import gi/gather/entries.wgsl
+//#import gi/gather/look.wgsl
+
 // One ray for each entry of the cache, whose find is mixed into the entry's mean. The finds' own entries are read as they
 // were after the round before, so the order of threads does not matter.
 

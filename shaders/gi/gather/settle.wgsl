@@ -1,3 +1,9 @@
+//#import gi/inputs.wgsl
+//#import gi/cells.wgsl
+//#import gi/gather/types.wgsl
+//#import gi/gather/gloss.wgsl
+//#import gi/gather/past.wgsl
+
 // What a cell's ray found, with the light of its entry, mixed into the mean over the frames before, which is looked up where the
 // surface was then.
 

@@ -1,3 +1,8 @@
+//#import gi/inputs.wgsl
+//#import gi/cells.wgsl
+//#import gi/gather/types.wgsl
+//#import gi/gather/past.wgsl
+
 // Light of cells averaged with that of cells further away that differ by no more than noise: one à-trous step (Dammertz et al. 2010) whose
 // tolerance is the noise itself. Where means are known well it does nothing.
 

@@ -1,3 +1,9 @@
+//#import lib/octahedral.wgsl
+//#import lib/brdf.wgsl
+//#import lib/lights.wgsl
+//#import lib/sampling.wgsl
+//#import accel/surface.wgsl
+
 // What the passes of `gather` share: their parameters and the scene as rays meet it (group 1).
 
 // `gi::gather::Params` is the Rust side.

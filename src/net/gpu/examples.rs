@@ -1,12 +1,13 @@
 //! Preludes for tests.
 
 /// One prelude of each kind with the shader it belongs to, so that a test can validate every permutation without a GPU.
-pub fn example_preludes() -> Vec<(&'static str, String)> {
+pub fn example_preludes() -> Vec<(String, String)> {
     let mut examples = Vec::new();
     let lines =
         |pairs: &[(&str, u32)]| -> String { pairs.iter().map(|(n, v)| format!("const {n} = {v}u;\n")).collect() };
     let common = lines(&[("MATRICES", 256), ("THREADS", 64)]);
-    for shader in crate::gpu::shaders::NET.iter().map(|s| s.name) {
+    for shader in crate::gpu::shaders::net_names() {
+        let shader = shader.as_str();
         let convolution = shader.contains("conv");
         let epilogues: &[[u32; 3]] = match shader {
             _ if shader.contains("window")
@@ -53,7 +54,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
                 vec![String::new()]
             };
             let feature = if shader.contains("_arithmetic") { "enable f16;\n" } else { "" };
-            examples.extend(kinds.iter().map(|kind| (shader, format!("{feature}{common}{epilogue}{kind}"))));
+            examples.extend(kinds.iter().map(|kind| (shader.to_owned(), format!("{feature}{common}{epilogue}{kind}"))));
         }
     }
     examples

@@ -45,7 +45,7 @@ pub struct Part {
 /// A second dispatch, which adds up what the first has made in parts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Sum {
-    /// Name in `gpu::shaders::NET`.
+    /// Name, one of `gpu::shaders::net_names`.
     pub shader: String,
     /// Generated `const` lines.
     pub prelude: String,
@@ -77,7 +77,7 @@ pub struct Numbers {
 /// How one step runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Kernel {
-    /// Name in `gpu::shaders::NET`.
+    /// Name, one of `gpu::shaders::net_names`.
     pub shader: String,
     /// Generated `const` lines.
     pub prelude: String,
