@@ -97,7 +97,7 @@ impl FrameChange {
 #[derive(Debug, Clone)]
 pub struct Shot {
     /// The picture (linear radiance) and the layers that were asked for. `DiffInd` is what the method added, E/π, without
-    /// albedo, as in `render --aov`.
+    /// albedo, as in `render --aov`; [`Shot::added`] is what to compare.
     pub frame: CapturedFrame,
     /// Number of the frame in its sequence, from 0.
     pub number: u32,
@@ -111,6 +111,9 @@ pub struct Shot {
     pub costs: Vec<Cost>,
     /// GPU memory of everything, bytes.
     pub bytes: u64,
+    /// DiffDir of `direct` where this picture's is another: methods that know the scene leave lights out that stand in for glowing
+    /// surfaces, and find these themselves.
+    without: Option<Vec<f32>>,
 }
 
 impl Shot {
@@ -125,6 +128,19 @@ impl Shot {
     /// If the trial's options do not name it.
     pub fn layer(&self, layer: Layer) -> &Picture {
         self.frame.layer(layer).unwrap_or_else(|| panic!("layer {} was not asked for", layer.name()))
+    }
+
+    /// The light that was added to what `direct` draws, rgb a pixel, E/π: what a reference's `Gi` is compared with. `DiffInd`, but
+    /// in scenes with lights that stand in for glowing surfaces, whose direct light is not in every method's DiffDir. There it may
+    /// be below 0.
+    ///
+    /// # Panics
+    /// If the trial's options do not name DiffInd and DiffDir.
+    pub fn added(&self) -> Vec<f32> {
+        let found = &self.layer(Layer::DiffInd).data;
+        let Some(without) = &self.without else { return found.clone() };
+        let own = &self.layer(Layer::DiffDir).data;
+        found.iter().zip(own).zip(without).map(|((found, own), without)| found + own - without).collect()
     }
 
     /// What a GTX 1050 would take for the method by count, milliseconds: a projection, never a measurement.
@@ -255,7 +271,21 @@ impl<'a> Trial<'a> {
     pub fn picture(&mut self, method: &Method, camera: &Camera, settling: Settling) -> Result<Shot, TrialError> {
         let mut renderer = self.renderer(method)?;
         let warmup = if method.has_history() || self.options.taa { settling.frames.max(1) - 1 } else { 0 };
-        self.shoot(&mut renderer, camera, settling.samples, warmup, 0)
+        let mut shot = self.shoot(&mut renderer, camera, settling.samples, warmup, 0)?;
+        if method.needs_rays() {
+            shot.without = self.direct(camera, settling.samples)?;
+        }
+        Ok(shot)
+    }
+
+    /// DiffDir as `direct` draws it, where that is another than with methods that know the scene.
+    fn direct(&mut self, camera: &Camera, samples: u32) -> Result<Option<Vec<f32>>, TrialError> {
+        if !self.scene.lights.iter().any(|l| l.stands_in) || !self.options.layers.contains(&Layer::DiffDir) {
+            return Ok(None);
+        }
+        let mut renderer = self.renderer(&Method::Direct)?;
+        let shot = self.shoot(&mut renderer, camera, samples, 0, 0)?;
+        Ok(Some(shot.layer(Layer::DiffDir).data.clone()))
     }
 
     /// `frames` pictures one after the other by one renderer, which keeps its history; `change` says what each frame shows. Each
@@ -301,7 +331,11 @@ impl<'a> Trial<'a> {
                     renderer.cut();
                 }
                 if wanted {
-                    take(self.shoot(&mut renderer, &camera, 1, 0, number)?);
+                    let mut shot = self.shoot(&mut renderer, &camera, 1, 0, number)?;
+                    if method.needs_rays() {
+                        shot.without = self.direct(&camera, 1)?;
+                    }
+                    take(shot);
                 } else {
                     self.draw(&mut renderer, &camera)?;
                 }
@@ -416,6 +450,7 @@ impl<'a> Trial<'a> {
             settled: renderer.settled(),
             costs: renderer.costs(),
             bytes,
+            without: None,
         })
     }
 
