@@ -12,7 +12,7 @@ const PLAIN_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Counts steps towards a known total.
 pub struct Progress {
-    what: &'static str,
+    what: String,
     kind: ProgressKind,
     bar: ProgressBar,
     started: Instant,
@@ -37,13 +37,19 @@ impl Progress {
             ProgressStyle::with_template(template).expect("the template is a constant").progress_chars("█▌ "),
         );
         bar.set_message(what);
-        Self { what, kind, bar, started: Instant::now(), last_line: Instant::now() }
+        Self { what: what.into(), kind, bar, started: Instant::now(), last_line: Instant::now() }
     }
 
     /// One more step is done.
     pub fn step(&mut self) {
         let (done, total) = (self.bar.position() + 1, self.bar.length().unwrap_or(0));
         self.at(done as f64, total);
+    }
+
+    /// What is being done now.
+    pub fn tell(&mut self, what: &str) {
+        self.bar.set_message(what.to_owned());
+        self.what = what.to_owned();
     }
 
     /// `done` of `total` steps are done; the total may have become another.

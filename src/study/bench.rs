@@ -67,6 +67,14 @@ impl Measurement {
         (apart > AGREEMENT).then_some(apart)
     }
 
+    /// GPU milliseconds of the passes that find and add indirect light (medians, added up); none where there are no timestamps or
+    /// they do not agree with the clock.
+    pub fn own_ms(&self) -> Option<f64> {
+        self.gpu_ms.filter(|_| self.disagreement().is_none())?;
+        let counted = |pass: &str| self.costs.iter().any(|c| c.pass == pass);
+        Some(self.passes.iter().filter(|p| counted(&p.pass)).map(|p| p.ms.median).sum())
+    }
+
     /// Resident GPU bytes in all.
     pub fn total_bytes(&self) -> u64 {
         self.bytes.iter().map(|(_, b)| b).sum()
@@ -94,12 +102,40 @@ pub enum BenchError {
 }
 
 /// Draws `options.warmup + options.frames` frames of the same view, waiting for each, and measures the latter.
+///
+/// # Errors
+/// [`BenchError`].
 pub fn measure(
     gpu: &Gpu,
     renderer: &mut Renderer,
     scene: &SceneGpu,
     camera: &Camera,
     options: BenchOptions,
+) -> Result<Measurement, BenchError> {
+    measure_frames(gpu, renderer, scene, camera, options, false)
+}
+
+/// As [`measure`], but each frame is the first after a cut, on which methods with a history may spend more.
+///
+/// # Errors
+/// [`BenchError`].
+pub fn measure_cuts(
+    gpu: &Gpu,
+    renderer: &mut Renderer,
+    scene: &SceneGpu,
+    camera: &Camera,
+    options: BenchOptions,
+) -> Result<Measurement, BenchError> {
+    measure_frames(gpu, renderer, scene, camera, options, true)
+}
+
+fn measure_frames(
+    gpu: &Gpu,
+    renderer: &mut Renderer,
+    scene: &SceneGpu,
+    camera: &Camera,
+    options: BenchOptions,
+    cuts: bool,
 ) -> Result<Measurement, BenchError> {
     if options.frames == 0 {
         return Err(BenchError::NoFrames);
@@ -112,6 +148,9 @@ pub fn measure(
     let mut frames: Vec<Vec<(String, f64)>> = Vec::new();
     let mut wall = Vec::new();
     for frame in 0..options.warmup + options.frames {
+        if cuts {
+            renderer.cut();
+        }
         let start = Instant::now();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         renderer.record(&mut Recorder::timed(&mut encoder, &profiler), &gpu.queue, scene, &view)?;
@@ -159,7 +198,7 @@ fn per_pass(frames: &[Vec<(String, f64)>]) -> Vec<PassTime> {
 }
 
 /// Median and nearest-rank 95th percentile of a non-empty list.
-fn spread(mut values: Vec<f64>) -> Spread {
+pub(super) fn spread(mut values: Vec<f64>) -> Spread {
     values.sort_by(f64::total_cmp);
     let at = |q: f64| values[((values.len() as f64 * q).ceil() as usize).clamp(1, values.len()) - 1];
     Spread { median: at(0.5), p95: at(0.95) }

@@ -2,12 +2,26 @@
 
 pub mod bench;
 pub mod dataset;
+#[cfg(all(feature = "io", feature = "reference"))]
+pub mod fit;
 pub mod guides;
+#[cfg(feature = "reference")]
+pub mod hardware;
+#[cfg(feature = "io")]
+pub mod hash;
+#[cfg(all(feature = "io", feature = "reference"))]
+pub mod judge;
+pub mod layers;
 #[cfg(feature = "io")]
 pub mod motion;
 pub mod projection;
+pub mod rays;
 #[cfg(feature = "reference")]
 pub mod target;
+#[cfg(all(feature = "io", feature = "reference"))]
+pub mod trial;
+#[cfg(all(feature = "io", feature = "reference"))]
+pub mod truth;
 #[cfg(feature = "io")]
 pub mod varied;
 pub mod views;
