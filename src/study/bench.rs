@@ -15,7 +15,7 @@ use thiserror::Error;
 use wgpu_profiler::{GpuProfiler, GpuProfilerSettings};
 
 /// How long to measure.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BenchOptions {
     /// Frames that are counted, at least 1.
     pub frames: u32,

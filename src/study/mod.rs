@@ -1,6 +1,8 @@
 //! What is measured over methods and scenes.
 
 pub mod bench;
+#[cfg(feature = "chart")]
+pub mod chart;
 pub mod dataset;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod fit;
@@ -15,6 +17,7 @@ pub mod layers;
 #[cfg(feature = "io")]
 pub mod motion;
 pub mod projection;
+pub mod ratios;
 pub mod rays;
 #[cfg(feature = "reference")]
 pub mod target;
