@@ -72,7 +72,8 @@ impl Measurement {
     pub fn own_ms(&self) -> Option<f64> {
         self.gpu_ms.filter(|_| self.disagreement().is_none())?;
         let counted = |pass: &str| self.costs.iter().any(|c| c.pass == pass);
-        Some(self.passes.iter().filter(|p| counted(&p.pass)).map(|p| p.ms.median).sum())
+        // A sum of nothing is -0.
+        Some(self.passes.iter().filter(|p| counted(&p.pass)).map(|p| p.ms.median).sum::<f64>() + 0.0)
     }
 
     /// Resident GPU bytes in all.

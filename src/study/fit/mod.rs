@@ -30,7 +30,7 @@ use crate::{
 };
 use std::path::PathBuf;
 
-/// Sizes of `gather`'s entries over their distance, coarser and finer than its own, each half the cost or twice.
+/// Sizes of `gather`'s entries over their distance, coarser and finer than its own, of which half the size is four times as many.
 const COARSER: [f32; 3] = [1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
 const FINER: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
 
@@ -123,7 +123,8 @@ pub fn fit(
     options: &FitOptions,
     told: &mut dyn FnMut(&str, u32, u32),
 ) -> Result<Fit, FitError> {
-    let mut search = Search { trial, options, views: Vec::new(), rows: Vec::new(), told, done: 0, expected: 0 };
+    let mut search =
+        Search { trial, options, views: Vec::new(), rows: Vec::new(), costs: Vec::new(), told, done: 0, expected: 0 };
     search.expected = search.guess(cameras.len());
     search.trace(cameras)?;
     let found = search.climb()?;
@@ -140,6 +141,8 @@ struct Search<'a, 'b> {
     options: &'a FitOptions,
     views: Vec<Seen>,
     rows: Vec<Row>,
+    /// What rungs were found to cost.
+    costs: Vec<(Rung, Option<f64>)>,
     told: &'a mut dyn FnMut(&str, u32, u32),
     done: u32,
     expected: u32,
@@ -265,7 +268,7 @@ impl Search<'_, '_> {
             return Ok(());
         }
         let (mut low, mut high) = (0, most);
-        // Frames from powers of two: a finer answer would be noise.
+        // To an eighth: noise would make a finer answer.
         while high - low > (high / 8).max(1) {
             let middle = (low + high) / 2;
             let errors = self.errors(&rung, middle.max(1))?.map(|(errors, _)| errors);
@@ -338,6 +341,15 @@ impl Search<'_, '_> {
         if *rung == Rung::Direct {
             return Ok(Some(0.0));
         }
+        if let Some((_, known)) = self.costs.iter().find(|(r, _)| r == rung) {
+            return Ok(*known);
+        }
+        let cost = self.find_cost(rung)?;
+        self.costs.push((rung.clone(), cost));
+        Ok(cost)
+    }
+
+    fn find_cost(&mut self, rung: &Rung) -> Result<Option<f64>, FitError> {
         let method = rung.method(&self.options.networks);
         let camera = self.views[0].camera.clone();
         if self.options.timed {

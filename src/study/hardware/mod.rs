@@ -61,6 +61,9 @@ pub struct HardwareReport {
     pub timestamps: bool,
     /// The program was built without optimisation for release: what runs on the processor is slower than it need be.
     pub debug_build: bool,
+    /// Other work before the beginning, in busy threads, where Linux tells: where it is near the number of cores, clocks count it, too.
+    #[serde(default)]
+    pub load: Option<f64>,
     /// How long the measurement took, seconds.
     pub seconds: f64,
     /// Operations a second, multiplications and additions without a load between them, measured.
@@ -139,6 +142,7 @@ pub fn measure(
         return Err(HardwareError::Nothing);
     };
     let weights = Weights::shipped()?;
+    let load = std::fs::read_to_string("/proc/loadavg").ok().and_then(|t| t.split(' ').next()?.parse().ok());
     told("the device's peaks");
     let peak = peak::measure(&gpu.device, &gpu.queue);
     let card = Card { name: "this device", flops: peak.flops, bandwidth: peak.bytes };
@@ -170,6 +174,7 @@ pub fn measure(
         software: gpu.is_software(),
         timestamps: gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY),
         debug_build: cfg!(debug_assertions),
+        load,
         seconds: started.elapsed().as_secs_f64(),
         peak_flops: peak.flops,
         peak_bytes: peak.bytes,

@@ -38,6 +38,10 @@ impl HardwareReport {
                 "**Built without optimisation for release**, so clocks count slow code on the processor, too."
             )?;
         }
+        let cores = std::thread::available_parallelism().map_or(1, usize::from) as f64;
+        if let Some(load) = self.load.filter(|load| *load > 0.5 * cores) {
+            writeln!(out, "**A busy machine**: load {load:.1} before the beginning.")?;
+        }
         writeln!(
             out,
             "\nPeaks, measured: {:.1} GFLOP/s of multiplications and additions, {:.1} GB/s copied (32 MiB: on a device with a larger cache that is the cache's rate).\n",
