@@ -1,18 +1,18 @@
 //! `bouncelight bench`: GPU time per pass, wall clock per frame, resident bytes; against a saved base if asked.
 
-use super::layers::Layers;
 use super::stdout::say;
 use super::{
     args::{Global, MethodName, PrecisionName, SceneArgs, replaced, usage},
     error::CliError,
 };
 use crate::{
-    gi::rung::Cost,
+    gi::{Method, rung::Cost},
     gpu::Gpu,
     render::{Renderer, RendererOptions},
     scene::upload::SceneGpu,
     study::{
         bench::{BenchOptions, Measurement, measure},
+        layers::Layers,
         projection::{self, EFFICIENCY, GTX_1050},
         ratios::{self, Ratios},
     },
@@ -25,9 +25,11 @@ use std::path::PathBuf;
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Real-time method to measure, or `all` of them. (`render --method reference` tells its own samples per second.)
-    #[arg(long, default_value = "all", value_parser = parse_methods)]
-    method: Methods,
+    /// Real-time method to measure, or `all` of them; what `fit` found for the scene when absent, else all. (`render --method reference` tells its own samples per second.)
+    #[arg(long, value_parser = parse_methods)]
+    method: Option<Methods>,
+    #[command(flatten)]
+    fitted: super::fitted::Flag,
     /// Weights of `neural`; the shipped ones (`small`) when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
@@ -109,7 +111,7 @@ struct Record {
 impl Args {
     /// It runs a network on a device.
     pub fn runs_network(&self) -> bool {
-        self.method.0.contains(&MethodName::Neural)
+        self.method.as_ref().is_none_or(|m| m.0.contains(&MethodName::Neural))
     }
 }
 
@@ -120,9 +122,16 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     }
     let scene = args.scene.load(global)?;
     let camera = args.scene.camera(&scene)?;
+    let asked = args.method.is_some() || args.weights.is_some();
+    let fitted = if asked { None } else { args.fitted.read(&args.scene.scene)? };
+    let fitted = fitted.map(|f| super::fitted::fresh(f, &scene)).transpose()?.flatten();
     let gpu = global.open_gpu()?;
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
-    let mut names = args.method.0.clone();
+    let all = || args.method.as_ref().map_or(MethodName::REAL_TIME.to_vec(), |m| m.0.clone());
+    let mut names = fitted.as_ref().map_or_else(all, |f| vec![f.method]);
+    if let (Some(f), false) = (&fitted, global.quiet) {
+        eprintln!("method `{}`, as fitted to {}; --method all measures all", f.method.name(), args.scene.scene);
+    }
     if names.iter().any(|n| n.needs_rays())
         && let Err(e) = uploaded.trace(&gpu.device, &gpu.queue, &scene)
     {
@@ -136,7 +145,14 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let options = BenchOptions { frames: args.frames, warmup: args.warmup };
     let mut renderers = Vec::new();
     for name in &names {
-        let method = super::tuned::tuned(name.method(global, args.weights.as_ref())?, &gpu, global.quiet);
+        let mut method = match &fitted {
+            Some(fitted) => fitted.method()?,
+            None => name.method(global, args.weights.as_ref())?,
+        };
+        if let Method::Neural(neural) = &mut method {
+            neural.network.precision = global.precision.precision();
+        }
+        let method = super::tuned::tuned(method, &gpu, global.quiet);
         let options = RendererOptions { method, ..Default::default() };
         renderers.push(Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options)?);
     }
@@ -157,8 +173,9 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         ratios: ratios::of(&rounds),
     };
     let methods = rounds.pop().unwrap_or_default();
-    let network = if args.layers && args.runs_network() {
-        let weights = super::args::load_weights(args.weights.as_ref())?;
+    let network = if args.layers && names.contains(&MethodName::Neural) {
+        let fitted = fitted.as_ref().and_then(|f| f.weights.as_ref()).map(|w| w.file.clone());
+        let weights = super::args::load_weights(args.weights.as_ref().or(fitted.as_ref()))?;
         Some(super::layers::measure(global, &gpu, &weights, args.scene.size)?)
     } else {
         None
@@ -180,7 +197,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     };
     print(&record, &gpu, args.layers);
     if let Some(layers) = &record.network {
-        layers.print();
+        super::layers::print(layers);
     }
     if let Some(path) = &args.json {
         crate::image_io::write_whole(path, format!("{}\n", serde_json::to_string_pretty(&record)?).as_bytes())?;

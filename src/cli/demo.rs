@@ -57,7 +57,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     interrupt::install()?;
     let (shown, timed) = methods()?;
     let frames = |m: &Method| SAMPLES + if m.has_history() { Method::SETTLED - 1 } else { 0 };
-    let mut progress = Progress::new(global, "frames", shown.iter().map(|m| u64::from(frames(m))).sum());
+    let mut progress = Progress::compiling(global, "frames", shown.iter().map(|m| u64::from(frames(m))).sum());
     let gpu = global.open_gpu()?;
     let scene = scene::load("interior")?;
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;

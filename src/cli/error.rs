@@ -2,7 +2,7 @@
 
 use crate::{
     accel::AccelError,
-    gi::GiError,
+    gi::{GiError, fitted::FittedError},
     gpu::GpuError,
     net::{convert::ConvertError, format::WeightsError, pictures::PicturesError},
     reference::PackError,
@@ -98,6 +98,10 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
             return USAGE;
         }
         if cause.is::<ConvertError>() || cause.is::<PicturesError>() {
+            return INVALID_INPUT;
+        }
+        // Sound or not, the file is what is wrong.
+        if cause.is::<FittedError>() {
             return INVALID_INPUT;
         }
         if cause.is::<SceneError>()

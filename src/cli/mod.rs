@@ -11,6 +11,8 @@ mod dataset;
 mod demo;
 mod doctor;
 pub mod error;
+mod fit;
+mod fitted;
 mod interrupt;
 mod layers;
 mod log;
@@ -53,6 +55,8 @@ enum Command {
     Compare(compare::Args),
     /// Write network inputs of the paper's rooms, for training.
     Dataset(dataset::Args),
+    /// Find the cheapest method that is good enough for a scene, and keep it beside the scene.
+    Fit(fit::Args),
     /// Run a network on G-buffer pictures from elsewhere.
     Apply(apply::Args),
     /// Look into a weights file, check it, or make one from a published generator's state.
@@ -71,7 +75,7 @@ impl Command {
             Command::View(_) => true,
             Command::Render(a) => a.runs_network(),
             Command::Bench(a) => a.runs_network(),
-            Command::Apply(_) | Command::Demo(_) => true,
+            Command::Apply(_) | Command::Demo(_) | Command::Fit(_) => true,
             Command::Chart(a) => a.runs_network(),
             Command::Weights(a) => a.runs_network(),
             Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) => false,
@@ -104,6 +108,7 @@ pub fn main() -> ExitCode {
         Command::Chart(a) => chart::run(&cli.global, a),
         Command::Compare(a) => compare::run(a),
         Command::Dataset(a) => dataset::run(&cli.global, a),
+        Command::Fit(a) => fit::run(&cli.global, a),
         Command::Apply(a) => apply::run(&cli.global, a),
         Command::Weights(a) => weights::run(&cli.global, a),
         Command::Demo(a) => demo::run(&cli.global, a),

@@ -13,7 +13,7 @@ const PLAIN_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Counts steps towards a known total.
 pub struct Progress {
-    what: &'static str,
+    what: String,
     kind: ProgressKind,
     bar: ProgressBar,
     started: Instant,
@@ -55,12 +55,22 @@ impl Progress {
         bar.set_style(
             ProgressStyle::with_template(template).expect("the template is a constant").progress_chars("█▌ "),
         );
-        bar.set_message("compiling shaders");
-        let first = (kind == ProgressKind::Plain).then(say_compiling);
-        if kind == ProgressKind::Bar {
-            bar.enable_steady_tick(PLAIN_INTERVAL);
+        bar.set_message(what);
+        Self { what: what.into(), kind, bar, started: Instant::now(), last_line: Instant::now(), first: None }
+    }
+
+    /// As [`new`](Self::new) before anything is compiled; until the first step it says that this goes on.
+    pub fn compiling(global: &Global, what: &'static str, total: u64) -> Self {
+        let mut progress = Self::new(global, what, total);
+        match progress.kind {
+            ProgressKind::Plain => progress.first = Some(say_compiling()),
+            ProgressKind::Bar => {
+                progress.bar.set_message("compiling shaders");
+                progress.bar.enable_steady_tick(PLAIN_INTERVAL);
+            }
+            _ => (),
         }
-        Self { what, kind, bar, started: Instant::now(), last_line: Instant::now(), first }
+        progress
     }
 
     /// There are `total` steps, as is known by now.
@@ -74,11 +84,17 @@ impl Progress {
         self.at(done as f64, total);
     }
 
+    /// What is being done now.
+    pub fn tell(&mut self, what: &str) {
+        self.bar.set_message(what.to_owned());
+        self.what = what.to_owned();
+    }
+
     /// `done` of `total` steps are done; the total may have become another.
     pub fn at(&mut self, done: f64, total: u64) {
         if self.bar.position() == 0 {
             self.first = None;
-            self.bar.set_message(self.what);
+            self.bar.set_message(self.what.clone());
         }
         self.bar.set_length(total);
         self.bar.set_position(done as u64);

@@ -33,12 +33,15 @@ pub struct Args {
     /// Where the picture goes: .png, .exr, or `-` for a PNG on standard output.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How indirect light is found; `reference` traces paths until the light is right. `gather` when absent, `neural` with --weights.
+    /// How indirect light is found; `reference` traces paths until the light is right. When absent: what `fit` found for the scene, else
+    /// `gather`, `neural` with --weights.
     #[arg(long, value_parser = MethodParser)]
     method: Option<MethodName>,
     /// Weights of `neural`; the shipped ones (`small`) when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
+    #[command(flatten)]
+    fitted: super::fitted::Flag,
     /// Jittered frames that are averaged through Cycles' pixel filter; 1 (the default) is the raw frame.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     samples: Option<u32>,
@@ -51,6 +54,9 @@ pub struct Args {
     /// Numbers of `gather` other than its own, such as `blur=0,cell_frames=256`; `plain` forgets and blurs nothing.
     #[arg(long, value_name = "NAME=VALUE,...")]
     gather: Option<crate::gi::gather::Options>,
+    /// Light of what the picture does not show, for `ambient` and `ssgi`: shares of the sky's and of its surfaces' light.
+    #[arg(long, value_name = "sky=X,bounce=Y")]
+    unseen: Option<crate::gi::ambient::Unseen>,
     /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
     #[arg(long, value_name = "LAYERS")]
     aov: Option<String>,
@@ -124,13 +130,37 @@ impl Args {
         self.method.unwrap_or(if self.weights.is_some() { MethodName::Neural } else { MethodName::Gather })
     }
 
-    /// It runs a network on a device.
+    /// It may run a network on a device: what was fitted is not known yet.
     pub fn runs_network(&self) -> bool {
-        self.method() == MethodName::Neural
+        self.method() == MethodName::Neural || self.asks_fit()
+    }
+
+    /// No flag says how light is found.
+    fn asks_fit(&self) -> bool {
+        self.method.is_none() && self.weights.is_none() && self.gather.is_none() && self.unseen.is_none()
+    }
+
+    /// Takes what was fitted for the scene, which is returned where it had to be loaded for that.
+    fn obey(&mut self, global: &Global) -> Result<Option<Scene>> {
+        let fitted = if self.asks_fit() { self.fitted.read(&self.scene.scene)? } else { None };
+        let Some(fitted) = fitted else { return Ok(None) };
+        let scene = self.scene.load(global)?;
+        if let Some(fitted) = super::fitted::fresh(fitted, &scene)? {
+            if !global.quiet {
+                eprintln!("method `{}`, as fitted to {}", fitted.method.name(), self.scene.scene);
+            }
+            let settles = fitted.method()?.has_history();
+            self.gi_frames = self.gi_frames.or(settles.then_some(fitted.frames));
+            (self.gather, self.unseen) = (fitted.gather(), fitted.unseen());
+            self.weights = fitted.weights.map(|w| w.file);
+            self.method = Some(fitted.method);
+        }
+        Ok(Some(scene))
     }
 }
 
 pub fn run(global: &Global, mut args: Args) -> Result<()> {
+    let loaded = args.obey(global)?;
     let format = check(&args)?;
     let task = match args.method() {
         MethodName::Reference => Task::Trace(args.tracing.task(args.scene.size, args.seed, args.aov.as_deref())?),
@@ -138,6 +168,8 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
             let layers = args.aov.as_deref().map(|text| parse_layers(text, &Layer::ALL, Layer::name)).transpose()?;
             let method = match name {
                 MethodName::Gather => Method::Gather(args.gather.unwrap_or_default()),
+                MethodName::Ambient => args.unseen.map_or(Method::Ambient, Method::AmbientWith),
+                MethodName::Ssgi => args.unseen.map_or(Method::Ssgi, Method::SsgiWith),
                 _ => name.method(global, args.weights.as_ref())?,
             };
             Task::Rasterise(method, layers.unwrap_or_default())
@@ -150,7 +182,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let judged = |path| Shown::reference(path, args.tonemap, args.exposure, args.scene.size, &args.metric);
     let reference = args.reference.as_deref().map(judged).transpose()?;
     let sequence = args.sequence.sequence(&args.output)?;
-    let scene = args.scene.load(global)?;
+    let scene = loaded.map_or_else(|| args.scene.load(global), Ok)?;
     let camera = match sequence.as_ref().and_then(|s| s.frames().next()) {
         Some((_, camera)) => camera,
         None => args.scene.camera(&scene)?,
@@ -162,7 +194,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
         Task::Rasterise(method, layers) => {
             let method = super::tuned::tuned(method, &gpu, global.quiet);
             // Says from here on what the program does: without a shader cache nothing is drawn for half a minute.
-            let progress = Progress::new(global, if sequence.is_some() { "frames" } else { "samples" }, 1);
+            let progress = Progress::compiling(global, if sequence.is_some() { "frames" } else { "samples" }, 1);
             let mut raster = Raster::new(&args, &gpu, &scene, method, layers)?;
             if let Some(sequence) = sequence {
                 return film(progress, &args, format, raster, &sequence);
@@ -329,6 +361,9 @@ fn check(args: &Args) -> Result<Format> {
     }
     if args.gather.is_some() && args.method() != MethodName::Gather {
         return Err(usage(format!("--gather belongs to --method gather, not to `{name}`")));
+    }
+    if args.unseen.is_some() && ![MethodName::Ambient, MethodName::Ssgi].contains(&args.method()) {
+        return Err(usage(format!("--unseen belongs to methods ambient and ssgi, not to `{name}`")));
     }
     image_io::check_writable(path)?;
     if let Some(diff) = &args.diff {

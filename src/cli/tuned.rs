@@ -82,6 +82,7 @@ pub fn run(
         if !global.quiet {
             eprintln!("tuning: round {round} of {}", rounds - 1);
         }
+        true
     };
     let reports = tune::tune((&gpu.device, &gpu.queue), &weights, cells, options, &mut cache, again, told)?;
     if let Some(folder) = path.parent() {

@@ -37,7 +37,7 @@ pub mod screen;
 pub mod stage;
 
 pub use interface::{CameraMatrices, GiError, Inputs, Lights, Rays, rung};
-pub use method::{Method, name};
+pub use method::{Method, fitted, name};
 pub use neural::{features, pack, pass, reconstruct, twin};
 pub use preludes::example_preludes;
 pub use screen::{ambient, bitmask, occlusion, ssgi};

@@ -131,8 +131,9 @@ pub struct Report {
 }
 
 /// Times the permutations of every convolution of a network at one input size that `cache` does not know yet (or of all, if
-/// `again`), and puts the fastest into `cache`. Rivals take turns, so that other work on the machine hits both. `told` hears how
-/// many rounds of how many are done.
+/// `again`), and puts the fastest into `cache`. Rivals take turns, so that other work on the machine hits both. `go_on` hears how
+/// many rounds of how many are done; where it says no, the fastest so
+/// far is remembered of those that have had a rival.
 ///
 /// # Errors
 /// [`NetError`] when the network does not run on this device.
@@ -143,7 +144,7 @@ pub fn tune(
     options: Options,
     cache: &mut Cache,
     again: bool,
-    mut told: impl FnMut(usize, usize),
+    mut go_on: impl FnMut(usize, usize) -> bool,
 ) -> Result<Vec<Report>, NetError> {
     let (info, facts) = (device.adapter_info(), Facts::of(device));
     let known = if again { Tuned::new() } else { cache.tuned(&info) };
@@ -164,8 +165,12 @@ pub fn tune(
     best.extend(rivals.iter().map(|(name, (_, _, candidates))| (name.clone(), candidates[0])));
     let mut times: BTreeMap<&String, (f64, f64)> = BTreeMap::new();
     let rounds = rivals.values().map(|(_, _, candidates)| candidates.len()).max().unwrap_or(0);
+    let mut stopped = false;
     for round in 1..rounds {
-        told(round, rounds);
+        if !go_on(round, rounds) {
+            stopped = true;
+            break;
+        }
         let rival = |name: &String, now: &Permutation| {
             let candidates = rivals.get(name).map(|(_, _, candidates)| candidates);
             (name.clone(), candidates.and_then(|c| c.get(round)).copied().unwrap_or(*now))
@@ -189,7 +194,7 @@ pub fn tune(
         cache.insert(&info, layer, Found { permutation, ms });
         Report { layer: *layer, guess: (candidates[0], guess), best: (permutation, ms), tried: candidates.len() }
     };
-    Ok(rivals.iter().map(report).collect())
+    Ok(rivals.iter().filter(|(name, _)| !stopped || times.contains_key(name)).map(report).collect())
 }
 
 /// Milliseconds of one step of two networks, taking turns.

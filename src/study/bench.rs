@@ -67,6 +67,15 @@ impl Measurement {
         (apart > AGREEMENT).then_some(apart)
     }
 
+    /// GPU milliseconds of the passes that find and add indirect light (medians, added up); none where there are no timestamps or
+    /// they do not agree with the clock.
+    pub fn own_ms(&self) -> Option<f64> {
+        self.gpu_ms.filter(|_| self.disagreement().is_none())?;
+        let counted = |pass: &str| self.costs.iter().any(|c| c.pass == pass);
+        // A sum of nothing is -0.
+        Some(self.passes.iter().filter(|p| counted(&p.pass)).map(|p| p.ms.median).sum::<f64>() + 0.0)
+    }
+
     /// Resident GPU bytes in all.
     pub fn total_bytes(&self) -> u64 {
         self.bytes.iter().map(|(_, b)| b).sum()

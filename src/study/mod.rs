@@ -4,15 +4,21 @@ pub mod bench;
 #[cfg(feature = "chart")]
 pub mod chart;
 pub mod dataset;
+#[cfg(all(feature = "io", feature = "reference"))]
+pub mod fit;
 pub mod guides;
+#[cfg(feature = "reference")]
+pub mod hardware;
 #[cfg(feature = "io")]
 pub mod hash;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod judge;
+pub mod layers;
 #[cfg(feature = "io")]
 pub mod motion;
 pub mod projection;
 pub mod ratios;
+pub mod rays;
 #[cfg(feature = "reference")]
 pub mod target;
 #[cfg(all(feature = "io", feature = "reference"))]

@@ -37,6 +37,12 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     if let (Source::Neural, Some(weights)) = (s.left, &s.weights) {
         flag("weights", weights.display().to_string());
     }
+    if let (Source::Gather, Some(numbers)) = (s.left, &state.gather) {
+        flag("gather", numbers.clone());
+    }
+    if let (Source::Ambient | Source::Ssgi, Some(numbers)) = (s.left, &state.unseen) {
+        flag("unseen", numbers.clone());
+    }
     if s.left == Source::Neural && state.half {
         flag("precision", "f16".into());
     }
@@ -98,6 +104,8 @@ mod tests {
         {
             assert!(text.contains(word), "{word} is missing in {text}");
         }
+        (state.settings.left, state.gather) = (Source::Gather, Some("entry_scale=0.25".into()));
+        assert!(line(&state, None).contains("--gather=entry_scale=0.25"));
         state.apply(Action::Undo);
         assert!(!line(&state, None).contains("--object"));
     }

@@ -5,13 +5,14 @@ use super::choice::Source;
 use super::command;
 use super::state::State;
 use crate::accel::{AccelError, SceneRays};
-use crate::gi::{Method, pass::Neural};
+use crate::gi::{Method, ambient::Unseen, fitted::Fitted, gather, pass::Neural};
 use crate::image_io;
 use crate::net::{format::Weights, gpu::Tuned, plan::Precision};
 use crate::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
 use crate::render::capture::{CaptureOptions, Layer, capture_with};
 use crate::render::{Renderer, RendererOptions};
 use crate::scene::{self, Camera, Environment, Scene, upload::SceneGpu};
+use crate::study::hash;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
@@ -85,6 +86,8 @@ pub enum Product {
         spec: String,
         scene: Box<Scene>,
         gpu: Box<SceneGpu>,
+        /// What was fitted for it, or why that is not obeyed; none where nobody has asked.
+        fitted: Option<Result<Fitted, String>>,
     },
     /// Rays into the scene that was uploaded as number `stamp`, or why it can have none.
     Rays {
@@ -141,11 +144,12 @@ pub fn spawn(
     Job { name, kind, started: Instant::now(), progress }
 }
 
-/// Reads and uploads a scene.
+/// Reads and uploads a scene; `obey` looks for what `fit` found for it.
 pub fn scene(
     handles: &Handles,
     spec: String,
     options: scene::LoadOptions,
+    obey: bool,
     progress: &Progress,
 ) -> Result<Product, String> {
     progress.stage(&format!("reading {spec}"));
@@ -155,7 +159,21 @@ pub fn scene(
     }
     progress.stage(&format!("uploading {spec}"));
     let gpu = SceneGpu::new(&handles.device, &handles.queue, &scene).map_err(|e| e.to_string())?;
-    Ok(Product::Scene { spec, scene: Box::new(scene), gpu: Box::new(gpu) })
+    let fitted = if obey { fitted(&spec, &scene) } else { None };
+    Ok(Product::Scene { spec, scene: Box::new(scene), gpu: Box::new(gpu), fitted })
+}
+
+/// What lies beside the scene, or why it is not obeyed.
+fn fitted(spec: &str, scene: &Scene) -> Option<Result<Fitted, String>> {
+    match Fitted::load(&Fitted::path(spec)) {
+        Ok(None) => None,
+        Ok(Some(found)) => Some(match found.stale(&hash::of_scene(scene)) {
+            Ok(None) => Ok(found),
+            Ok(Some(why)) => Err(why),
+            Err(e) => Err(e.to_string()),
+        }),
+        Err(e) => Some(Err(e.to_string())),
+    }
 }
 
 /// Builds the trees that rays need, while the rung below draws.
@@ -171,20 +189,24 @@ pub fn rays(handles: &Handles, stamp: u64, scene: &Scene, progress: &Progress) -
     Ok(Product::Rays { stamp, rays })
 }
 
-/// How networks are run.
+/// How networks are run, and rays.
 #[derive(Debug, Clone, Default)]
 pub struct Network {
     pub precision: Precision,
     pub tuned: Arc<Tuned>,
+    /// Numbers of `gather` that were fitted to the scene.
+    pub gather: gather::Options,
+    /// Numbers of unseen light that were.
+    pub unseen: Unseen,
 }
 
 /// The method behind a source; reads weights.
 fn method(source: Source, weights: Option<&Path>, network: &Network) -> Result<Method, String> {
     Ok(match source {
         Source::Direct | Source::Reference => Method::Direct,
-        Source::Ambient => Method::Ambient,
-        Source::Ssgi => Method::Ssgi,
-        Source::Gather => Method::Gather(Default::default()),
+        Source::Ambient => Method::AmbientWith(network.unseen),
+        Source::Ssgi => Method::SsgiWith(network.unseen),
+        Source::Gather => Method::Gather(network.gather),
         Source::Neural => {
             let weights = Weights::find(weights).map_err(|e| e.to_string())?;
             let mut neural = Neural::from(weights);

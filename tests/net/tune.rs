@@ -65,12 +65,12 @@ fn what_is_tuned_is_remembered_and_right() {
     let (input, reference) = cases("conv1x1").pop().unwrap();
     let size = [input.shape.width, input.shape.height];
     let (mut cache, handles) = (Cache::default(), (&gpu.device, &gpu.queue));
-    let reports = tune(handles, &weights, size, Options::default(), &mut cache, false, |_, _| {}).unwrap();
+    let reports = tune(handles, &weights, size, Options::default(), &mut cache, false, |_, _| true).unwrap();
     assert_eq!(reports.len(), 1);
     let report = &reports[0];
     assert!(report.tried > 2 && report.best.1 > 0.0 && report.guess.1 > 0.0, "{report:?}");
     // The second time nothing is left to do, and the choice stands.
-    let again = tune(handles, &weights, size, Options::default(), &mut cache, false, |_, _| {}).unwrap();
+    let again = tune(handles, &weights, size, Options::default(), &mut cache, false, |_, _| true).unwrap();
     assert!(again.is_empty());
     let tuned = Arc::new(cache.tuned(&gpu.info));
     assert_eq!(tuned.len(), 1);

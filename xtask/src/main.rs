@@ -1,4 +1,4 @@
-//! `cargo xtask demo | test | ci`: set-up and checks; no product code.
+//! `cargo xtask demo | test | gpu-report | ci`: set-up and checks; no product code.
 //!
 //! Every command first sees to a wgpu adapter: it asks `bouncelight doctor`, and on Debian or Ubuntu without any adapter
 //! it installs Mesa's CPU driver, saying so before it does.
@@ -10,6 +10,9 @@ usage: cargo xtask COMMAND
 
   demo   draw the bundled interior with the shipped weights: out/demo.png and a timing table
   test   every test (an adapter is seen to first; REQUIRE_GPU=1 makes a missing one an error)
+  gpu-report [--dev] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] [--triangles N,...] [--out FOLDER] [--no-pytorch]
+         measures on this device all that docs/ projects: docs/measured/DEVICE.json and DEVICE.md, in less than eight minutes
+         (--dev builds without release's optimisation: for rehearsals)
   ci     what continuous integration runs (.ci/run)";
 
 /// Exit code with which `bouncelight doctor` says that there is no usable adapter.
@@ -20,6 +23,7 @@ fn main() -> ExitCode {
     let done = match command.as_str() {
         "demo" => demo(),
         "test" => test(),
+        "gpu-report" => gpu_report(std::env::args().skip(2).collect()),
         "ci" => ci(),
         _ => {
             eprintln!("{USAGE}");
@@ -47,6 +51,24 @@ fn test() -> Result<(), String> {
     see_to_adapter(&[])?;
     see_to_display()?;
     cargo(&["test", "--workspace"])
+}
+
+/// Everything that the documentation projects, measured on the device at hand.
+fn gpu_report(mut args: Vec<String>) -> Result<(), String> {
+    let profile: &[&str] = if args.iter().any(|a| a == "--dev") { &[] } else { &["--release"] };
+    args.retain(|a| a != "--dev");
+    let build = ["build", "--bin", "bouncelight", "--example", "gpu_report"];
+    cargo(&[&build, profile].concat())?;
+    see_to_adapter(profile)?;
+    // A source that is not committed has no name that others could find.
+    let git = |words: &[&str]| command("git", words).output().ok().filter(|o| o.status.success());
+    let clean = git(&["status", "--porcelain", "--untracked-files=no"]).is_some_and(|o| o.stdout.is_empty());
+    if let Some(head) = git(&["rev-parse", "--short=12", "HEAD"]) {
+        let hash = String::from_utf8_lossy(&head.stdout).trim().to_owned();
+        args.extend(["--commit".into(), if clean { hash } else { format!("{hash} with changes") }]);
+    }
+    let words: Vec<&str> = args.iter().map(String::as_str).collect();
+    cargo(&[&["run", "--quiet", "--example", "gpu_report"], profile, &["--"], &words].concat())
 }
 
 fn ci() -> Result<(), String> {

@@ -1,7 +1,7 @@
 //! What the passes cost by count.
 
 use super::bring::BringPass;
-use super::{PAST, store};
+use super::{Options, PAST, store};
 use crate::gi::interface::rung::Cost;
 use crate::gi::stage::cells::{self, CellsPass};
 
@@ -16,11 +16,14 @@ const RAYS: f64 = 3.0;
 /// Entries in use, for the same: rooms and flats have 1,000 to 6,000.
 const ENTRIES_MET: f64 = 4000.0;
 
-/// Of each pass for a picture of `size` pixels and a table of `slots`, in frame order.
-pub(super) fn costs(size: [u32; 2], slots: u32) -> Vec<Cost> {
+/// Of each pass for a picture of `size` pixels, in frame order.
+pub(super) fn costs(size: [u32; 2], options: &Options) -> Vec<Cost> {
+    let slots = options.slots;
     let cells = cells::count(size) as f64;
     let squares = store::squares(size) as f64;
-    let entries = ENTRIES_MET;
+    // Entries lie on surfaces: of half the edge there are four times as many, as far as the table holds them.
+    let finer = Options::default().entry_scale / options.entry_scale;
+    let entries = (ENTRIES_MET * f64::from(finer * finer)).min(f64::from(slots));
     // A ray, the shadow ray of what it meets, the line to its entry's beginning; 300 operations and 150 bytes of shading.
     let look = BLOCKS_NEAREST + BLOCKS_ANY + BLOCKS_SHORT;
     let flops = look * 170.0 + 300.0;

@@ -361,6 +361,6 @@ impl Rung for GatherGi {
     }
 
     fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
-        cost::costs(size, self.options.slots)
+        cost::costs(size, &self.options)
     }
 }

@@ -56,6 +56,29 @@ impl Options {
     };
 }
 
+impl Options {
+    /// The words that [`FromStr`] makes the same numbers of; none where all are gather's own.
+    pub fn words(&self) -> Option<String> {
+        let own = Self::default();
+        let flag = |v: bool| f32::from(u8::from(v));
+        let numbers = |o: &Self| {
+            [
+                ("cell_frames", o.cell_frames),
+                ("entry_frames", o.entry_frames),
+                ("slots", o.slots as f32),
+                ("entry_scale", o.entry_scale),
+                ("first_rounds", o.first_rounds as f32),
+                ("blur", flag(o.blur)),
+                ("even", flag(o.even)),
+                ("caustics", flag(o.caustics)),
+            ]
+        };
+        let other = numbers(self).into_iter().zip(numbers(&own)).filter(|(ours, own)| ours != own);
+        let words: Vec<String> = other.map(|((name, value), _)| format!("{name}={value}")).collect();
+        (!words.is_empty()).then(|| words.join(","))
+    }
+}
+
 /// Why a list of numbers cannot be read.
 #[derive(Debug, Error, PartialEq)]
 pub enum OptionsError {
@@ -112,6 +135,10 @@ mod tests {
     fn words_are_read_and_wrong_ones_named() {
         let read: Options = "plain,blur=1,slots=4096".parse().unwrap();
         assert_eq!(read, Options { blur: true, slots: 4096, ..Options::PLAIN });
+        for options in [read, Options::PLAIN, Options { caustics: false, entry_scale: 0.1, ..Default::default() }] {
+            assert_eq!(options.words().unwrap().parse(), Ok(options));
+        }
+        assert_eq!(Options::default().words(), None);
         for bad in ["", "rays=3", "slots=1000", "cell_frames=0", "cell_frames=nan", "entry_scale=-1", "blur"] {
             let error = bad.parse::<Options>().unwrap_err().to_string();
             assert!(error.contains(bad), "{error}");

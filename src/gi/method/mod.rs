@@ -1,13 +1,14 @@
 //! The list of methods, and how one is made: nothing below knows it.
 
 mod below;
+pub mod fitted;
 pub mod name;
 
 use super::gather::{self, GatherGi};
 use super::interface::{GiError, rung::Rung};
 use super::neural::pass::{self, NeuralGi, Options};
 use super::screen::{
-    ambient::AmbientGi,
+    ambient::{AmbientGi, Unseen},
     ssgi::{SsgiGi, SsgiOptions},
 };
 use below::OrBelow;
@@ -20,8 +21,12 @@ pub enum Method {
     /// Even light times occlusion, see [`ambient`](super::ambient).
     #[default]
     Ambient,
+    /// The same with a scene's own numbers of unseen light.
+    AmbientWith(Unseen),
     /// One bounce in screen space, see [`ssgi`](super::ssgi).
     Ssgi,
+    /// The same with a scene's own numbers of unseen light.
+    SsgiWith(Unseen),
     /// Rays into the scene's triangles and a cache of light in the world, see [`gather`].
     Gather(gather::Options),
     /// A network, see [`pass`]; `weights.into()` runs it with defaults.
@@ -36,8 +41,8 @@ impl Method {
     pub fn name(&self) -> &'static str {
         match self {
             Method::Direct => "direct",
-            Method::Ambient => "ambient",
-            Method::Ssgi => "ssgi",
+            Method::Ambient | Method::AmbientWith(_) => "ambient",
+            Method::Ssgi | Method::SsgiWith(_) => "ssgi",
             Method::Gather(_) => "gather",
             Method::Neural(_) => "neural",
         }
@@ -72,7 +77,12 @@ pub fn build(
     Ok(match method {
         Method::Direct => None,
         Method::Ambient => Some(Box::new(AmbientGi::new(device))),
+        Method::AmbientWith(unseen) => Some(Box::new(AmbientGi::with(device, *unseen))),
         Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
+        Method::SsgiWith(Unseen { sky, bounce }) => {
+            let options = SsgiOptions { sky: *sky, bounce: *bounce, ..SsgiOptions::default() };
+            Some(Box::new(SsgiGi::new(device, options)))
+        }
         Method::Gather(options) => {
             let above = GatherGi::check(&device.limits(), size, options);
             let above = above.map(|()| Box::new(GatherGi::new(device, size, *options)) as Box<dyn Rung>);

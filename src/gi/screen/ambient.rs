@@ -12,6 +12,7 @@ use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry
 use crate::gi::stage::inputs::{InputGroup, check_output, texture_entry};
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
+use std::str::FromStr;
 
 /// Light where a network's cells cannot answer (E/π, linear Rec.709), as a multiple of the exposure `s`: what
 /// `reconstruct` falls back to. It was the whole of this method once.
@@ -27,6 +28,48 @@ pub const SKY: f32 = 0.83;
 /// What the picture's surfaces send on (mean of albedo · direct light + emission), as a multiple of it: stands for
 /// all bounces.
 pub const BOUNCE: f32 = 0.56;
+
+/// The two numbers of unseen light. Light is linear in both, so a scene's own can be found from pictures of each alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unseen {
+    /// The environment's share.
+    pub sky: f32,
+    /// The share of what the picture's surfaces send on.
+    pub bounce: f32,
+}
+
+impl Default for Unseen {
+    fn default() -> Self {
+        Self { sky: SKY, bounce: BOUNCE }
+    }
+}
+
+impl Unseen {
+    /// As [`FromStr`] reads them.
+    pub fn words(&self) -> String {
+        format!("sky={},bounce={}", self.sky, self.bounce)
+    }
+}
+
+/// `sky=X,bounce=Y`, either of which may be left out.
+impl FromStr for Unseen {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut unseen = Self::default();
+        for word in text.split(',') {
+            let (name, value) = word.split_once('=').ok_or_else(|| format!("`{word}` is none of: sky=X, bounce=Y"))?;
+            let number = value.parse::<f32>().ok().filter(|v| (0.0..=16.0).contains(v));
+            let number = number.ok_or_else(|| format!("`{word}`: must be a number from 0 to 16"))?;
+            match name {
+                "sky" => unseen.sky = number,
+                "bounce" => unseen.bounce = number,
+                _ => return Err(format!("`{word}` is none of: sky=X, bounce=Y")),
+            }
+        }
+        Ok(unseen)
+    }
+}
 
 /// The constants of unseen light as WGSL (`shaders/gi/unseen.wgsl`).
 pub fn unseen_prelude(sky: f32, bounce: f32) -> String {
@@ -48,6 +91,11 @@ pub struct AmbientGi {
 impl AmbientGi {
     /// Makes pipelines and buffers of a few kilobytes; works for every picture size.
     pub fn new(device: &wgpu::Device) -> Self {
+        Self::with(device, Unseen::default())
+    }
+
+    /// As [`AmbientGi::new`], with a scene's own numbers.
+    pub fn with(device: &wgpu::Device, unseen: Unseen) -> Self {
         let inputs = InputGroup::new(device);
         let exposure = ExposurePass::new(device, &inputs);
         let occlusion = OcclusionPass::new(device, &inputs, March::NEAR);
@@ -55,7 +103,7 @@ impl AmbientGi {
             label: Some("gi.ambient"),
             entries: &[storage_entry(0, true), texture_entry(1), output_entry(2)],
         });
-        let module = shaders::module_with(device, "gi.ambient", &unseen_prelude(SKY, BOUNCE));
+        let module = shaders::module_with(device, "gi.ambient", &unseen_prelude(unseen.sky, unseen.bounce));
         let pipeline = exposure::pipeline(device, "gi.ambient", &module, "ambient", &inputs, &layout);
         Self {
             device: device.clone(),
@@ -141,5 +189,19 @@ impl Rung for AmbientGi {
 
     fn bytes(&self) -> u64 {
         self.inputs.bytes() + self.exposure.bytes() + self.occlusion.bytes()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_read_and_wrong_ones_named() {
+        let unseen = Unseen { sky: 1.0, bounce: 0.25 };
+        assert_eq!((unseen.words().parse(), "sky=0.83".parse()), (Ok(unseen), Ok(Unseen::default())));
+        for bad in ["", "sky", "sky=-1", "sky=nan", "bounce=17", "moon=1"] {
+            assert!(bad.parse::<Unseen>().unwrap_err().contains(bad), "{bad}");
+        }
     }
 }

@@ -52,7 +52,8 @@ impl App {
             let _ = proxy.send_event(Event::GpuError(e.to_string()));
         }));
         let tuned = self.options.tuned.map(|of| of(&gpu.device)).unwrap_or_default();
-        self.network = jobs::Network { precision: self.options.precision, tuned };
+        let precision = self.options.precision;
+        self.network = jobs::Network { precision, tuned, ..self.network.clone() };
         self.state.half = self.options.precision == crate::net::plan::Precision::F16;
         self.stage = Some(Stage::new(gpu, screen.format()));
         self.screen = Some(screen);

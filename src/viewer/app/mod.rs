@@ -62,8 +62,8 @@ pub struct App {
     failed: HashSet<Key>,
     /// How often a scene was uploaded.
     uploads: u64,
-    /// How often weights and shaders were replaced.
-    stamps: [u64; 2],
+    /// How often weights, shaders and methods' numbers were replaced.
+    stamps: [u64; 3],
     network: jobs::Network,
     pub tracing: Tracing,
     pub meter: Meter,
@@ -139,7 +139,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         rays_of: None,
         failed: HashSet::new(),
         uploads: 0,
-        stamps: [0; 2],
+        stamps: [0; 3],
         network: jobs::Network::default(),
         tracing: Tracing::default(),
         meter: Meter::default(),

@@ -8,8 +8,12 @@ use std::time::Instant;
 impl App {
     /// What decides how a source is built.
     pub(super) fn key(&self, source: Source) -> Key {
-        let [weights, shaders] = self.stamps;
-        let own = if source == Source::Neural { weights } else { 0 };
+        let [weights, shaders, numbers] = self.stamps;
+        let own = match source {
+            Source::Neural => weights,
+            Source::Ambient | Source::Ssgi | Source::Gather => numbers,
+            Source::Direct | Source::Reference => 0,
+        };
         (source, shaders << 32 | own)
     }
 

@@ -1,6 +1,7 @@
 //! Work on threads: begun when the state or a file asks for it, taken in when it is done.
 
 use super::{App, Event};
+use crate::gi::fitted::Fitted;
 use crate::image_io;
 use crate::scene::path::CameraPath;
 use crate::viewer::choice::Source;
@@ -20,7 +21,8 @@ impl App {
             Request::Load(spec) => {
                 let name = format!("load {spec}");
                 let options = self.options.load;
-                self.spawn(name, Kind::Scene, move |p| jobs::scene(&handles, spec, options, p));
+                let obey = self.options.method.is_none() && self.options.weights.is_none();
+                self.spawn(name, Kind::Scene, move |p| jobs::scene(&handles, spec, options, obey, p));
             }
             Request::Surroundings(path) => {
                 let name = format!("load {}", path.display());
@@ -123,7 +125,7 @@ impl App {
         self.redraw = true;
         let Some(stage) = &mut self.stage else { return };
         match done.product {
-            Ok(Product::Scene { spec, scene, gpu }) => {
+            Ok(Product::Scene { spec, scene, gpu, fitted }) => {
                 stage.set_scene(*gpu);
                 self.uploads += 1;
                 self.tracing.forget();
@@ -131,6 +133,7 @@ impl App {
                     screen.window.set_title(&format!("{spec} – bouncelight"));
                 }
                 self.state.show(spec, Arc::from(scene));
+                self.obey(fitted);
             }
             Ok(Product::Uploaded(gpu)) => {
                 stage.set_scene(*gpu);
@@ -178,6 +181,32 @@ impl App {
                     self.give_up(side, key);
                 }
             }
+        }
+    }
+
+    /// Takes the method that was fitted to the scene on show; where there is none, methods have their own numbers again.
+    fn obey(&mut self, fitted: Option<Result<Fitted, String>>) {
+        let fitted = match fitted {
+            Some(Err(why)) => {
+                self.state.tell(format!("what was fitted is not obeyed: {why}"), true);
+                None
+            }
+            found => found.and_then(Result::ok),
+        };
+        let gather = fitted.as_ref().and_then(Fitted::gather);
+        let unseen = fitted.as_ref().and_then(Fitted::unseen);
+        let now = (gather.unwrap_or_default(), unseen.unwrap_or_default());
+        if now != (self.network.gather, self.network.unseen) {
+            (self.network.gather, self.network.unseen) = now;
+            (self.state.gather, self.state.unseen) = (now.0.words(), unseen.map(|u| u.words()));
+            self.stamps[2] += 1;
+        }
+        let Some(fitted) = fitted else { return };
+        self.state.tell(format!("method `{}`, as fitted to the scene", fitted.method.name()), false);
+        self.state.settings.left = fitted.method;
+        if let Some(weights) = fitted.weights {
+            self.state.settings.weights = Some(weights.file);
+            self.stamps[0] += 1;
         }
     }
 

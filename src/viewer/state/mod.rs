@@ -72,6 +72,10 @@ pub struct State {
     pub preset: Option<Preset>,
     /// Networks store their numbers in 16 bits.
     pub half: bool,
+    /// Numbers of `gather` that were fitted to the scene, where they are not its own.
+    pub gather: Option<String>,
+    /// Numbers of unseen light that were.
+    pub unseen: Option<String>,
     /// The camera path that was recorded or dropped last.
     pub path: Option<CameraPath>,
     /// What is done with it.
