@@ -15,6 +15,7 @@ mod progress;
 mod reference;
 mod render;
 mod sequence;
+mod stability;
 mod stdout;
 mod tuned;
 #[cfg(feature = "viewer")]
@@ -46,6 +47,8 @@ enum Command {
     Bench(bench::Args),
     /// Compare two pictures with the paper's metrics and the usual ones.
     Compare(compare::Args),
+    /// Test methods where they are known to fail: light switched, doors shut, walls of 2 cm, and so on.
+    Stability(stability::Args),
     /// Write network inputs of the paper's rooms, for training.
     Dataset(dataset::Args),
     /// Run a network on G-buffer pictures from elsewhere.
@@ -65,6 +68,7 @@ impl Command {
             Command::Render(a) => a.runs_network(),
             Command::Bench(a) => a.runs_network(),
             Command::Apply(_) => true,
+            Command::Stability(a) => a.runs_network(),
             Command::Weights(a) => a.runs_network(),
             Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) => false,
         }
@@ -95,6 +99,7 @@ pub fn main() -> ExitCode {
         Command::Bench(a) => bench::run(&cli.global, a),
         Command::Compare(a) => compare::run(a),
         Command::Dataset(a) => dataset::run(&cli.global, a),
+        Command::Stability(a) => stability::run(&cli.global, a),
         Command::Apply(a) => apply::run(&cli.global, a),
         Command::Weights(a) => weights::run(&cli.global, a),
         Command::Doctor(a) => doctor::run(&cli.global, a),
