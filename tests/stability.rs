@@ -30,12 +30,13 @@ fn gather_passes_what_ambient_fails_and_every_control_fails() {
         method("direct", Method::Direct),
     ];
     let tests = stability::named("sealed,thin-wall,saturated,half").expect("they are there");
-    let suite = Suite::new(&gpu, SuiteOptions { tests, subjects, kept: None });
+    let suite = Suite::new(&gpu, SuiteOptions { tests, subjects, kept: None, resume: None });
     let mut begun = 0;
     let record: Record = suite
         .run(&|| true, &mut |event| -> Result<(), StabilityError> {
             match event {
                 Event::Begun { .. } => begun += 1,
+                Event::Known { .. } => panic!("nothing was kept"),
                 Event::Done { finding, sheet } => {
                     sheet.write(&folder.path().join(format!("{}.png", finding.name)))?;
                     assert!(!sheet.write_film(&folder.path().join("none.png"))?, "nothing moves here");
@@ -75,7 +76,7 @@ fn a_run_can_be_stopped_and_goes_on_after_what_cannot_be_drawn() {
     let Some(gpu) = common::gpu() else { return };
     let tests = || stability::named("sealed").expect("it is there");
     let run = |subjects: Vec<Subject>, go_on: &dyn Fn() -> bool| {
-        let suite = Suite::new(&gpu, SuiteOptions { tests: tests(), subjects, kept: None });
+        let suite = Suite::new(&gpu, SuiteOptions { tests: tests(), subjects, kept: None, resume: None });
         suite.run(go_on, &mut |_| -> Result<(), StabilityError> { Ok(()) })
     };
     let stopped = run(vec![method("direct", Method::Direct)], &|| false).expect_err("nobody may draw");

@@ -47,6 +47,9 @@ pub struct Args {
     /// Folder for contact sheets (NAME.png), short sequences (NAME.apng.png), the record and references that were traced.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Tests whose findings are in --out already, of the same program, device and weights, are not run again.
+    #[arg(long, requires = "out")]
+    resume: bool,
     /// Write the record to this file, too; `-` is standard output, which then holds nothing else.
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
@@ -94,15 +97,28 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         }
     }
     let kept = args.out.as_ref().map(|out| out.join("references"));
-    let suite = Suite::new(&gpu, SuiteOptions { tests, subjects, kept });
+    let resume = args.out.clone();
+    if !args.resume {
+        // What lies there is another run's.
+        let stale = |t: &&stability::Test| resume.as_ref().map(|out| out.join(format!("{}.json", t.name)));
+        tests.iter().filter_map(stale).for_each(|path| _ = std::fs::remove_file(path));
+    }
+    let steps_of_test = subjects.len() as u32 + 2;
+    let suite = Suite::new(&gpu, SuiteOptions { tests, subjects, kept, resume });
     let quiet = args.json.as_deref().is_some_and(|p| p.as_os_str() == "-");
     let mut progress = Progress::new(global, "tests", suite.steps());
-    let mut begun = 0;
+    let mut begun = 0u32;
     let record = suite.run(&|| !interrupt::requested(), &mut |event| -> Result<()> {
         match event {
             Event::Begun { .. } => {
                 progress.at(f64::from(begun), suite.steps());
                 begun += 1;
+            }
+            Event::Known { finding } => {
+                begun += steps_of_test;
+                if !quiet {
+                    tell(finding);
+                }
             }
             Event::Done { finding, sheet } => {
                 if let Some(out) = &args.out {
@@ -172,12 +188,17 @@ fn tell(finding: &Finding) {
         say!("  this test says nothing here: {why}");
     }
     for (i, criterion) in finding.criteria.iter().enumerate() {
-        let text = |v: Option<f64>| v.map_or("none".into(), |v| criterion.shown_in.text(v));
-        let at_most = criterion.shown_in.text(criterion.at_most);
-        say!("  {} (at most {at_most}; truth {}, control {})", criterion.name, text(criterion.truth), text(criterion.control));
+        let text = |v: Option<f64>| v.map_or("none".into(), |v| criterion.unit.text(v));
+        let at_most = criterion.unit.text(criterion.at_most);
+        say!(
+            "  {} (at most {at_most}; truth {}, control {})",
+            criterion.name,
+            text(criterion.truth),
+            text(criterion.control)
+        );
         for found in finding.found.iter().filter(|f| f.values.len() > i) {
             let mark = if found.values[i] <= criterion.at_most { "pass" } else { "FAIL" };
-            say!("    {:<10}{:>12}  {mark}", found.subject, criterion.shown_in.text(found.values[i]));
+            say!("    {:<10}{:>12}  {mark}", found.subject, criterion.unit.text(found.values[i]));
         }
     }
     for found in finding.found.iter().filter(|f| f.values.is_empty()) {

@@ -34,10 +34,12 @@ pub use tests::{all, named};
 use super::trial::TrialError;
 use crate::metrics::MetricError;
 use crate::net::{gpu::NetError, pictures::PicturesError};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// What a number means, and how it is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Unit {
     /// A share, shown in per cent.
     Share,
@@ -59,16 +61,6 @@ impl Unit {
             Unit::Share => format!("{:.0} %", 100.0 * value),
             Unit::Frames | Unit::Count => format!("{value:.0}"),
             Unit::Flip => format!("{value:.3}"),
-        }
-    }
-
-    /// Its name in records.
-    pub fn name(self) -> &'static str {
-        match self {
-            Unit::Share => "share",
-            Unit::Frames => "frames",
-            Unit::Count => "count",
-            Unit::Flip => "flip",
         }
     }
 }

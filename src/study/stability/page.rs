@@ -48,7 +48,8 @@ fn table(w: &mut String, record: &Record) -> std::fmt::Result {
         writeln!(w, "| {} | {} | {} |", finding.name, cells.join(" | "), finding.question)?;
     }
     let passed = record.subjects.iter().map(|s| {
-        let taken: Vec<&Found> = record.tests.iter().filter_map(|t| of(t, &s.name)).filter(|f| f.pass.is_some()).collect();
+        let taken: Vec<&Found> =
+            record.tests.iter().filter_map(|t| of(t, &s.name)).filter(|f| f.pass.is_some()).collect();
         format!("{} of {}", taken.iter().filter(|f| f.pass == Some(true)).count(), taken.len())
     });
     writeln!(w, "| *passed* | {} | |\n", passed.collect::<Vec<_>>().join(" | "))
@@ -93,7 +94,7 @@ fn numbers(w: &mut String, record: &Record) -> std::fmt::Result {
         writeln!(w, "| | at most | truth | control | {} | threshold |", names.join(" | "))?;
         writeln!(w, "|---|---|---|---|{}---|", "---|".repeat(names.len()))?;
         for (i, criterion) in finding.criteria.iter().enumerate() {
-            let text = |v: f64| criterion.shown_in.text(v);
+            let text = |v: f64| criterion.unit.text(v);
             let some = |v: Option<f64>| v.map_or("–".into(), text);
             let values = names.iter().map(|n| some(of(finding, n).and_then(|f| f.values.get(i)).copied()));
             writeln!(
@@ -125,5 +126,9 @@ fn tail(w: &mut String, record: &Record) -> std::fmt::Result {
     if unsound.is_empty() {
         return Ok(());
     }
-    writeln!(w, "- Tests that the truth does not pass, or that its spoilt twin does, and that say nothing: {}.", unsound.join(", "))
+    writeln!(
+        w,
+        "- Tests that the truth does not pass, or that its spoilt twin does, and that say nothing: {}.",
+        unsound.join(", ")
+    )
 }

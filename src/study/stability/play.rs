@@ -315,10 +315,15 @@ fn four_pictures(shot: &Shot, sky: [f32; 3]) -> [Vec<f32>; 4] {
     let grey: Vec<f32> = depth.iter().flat_map(|z| [scaled(*z); 3]).collect();
     let (diffuse, glossy) = (&shot.layer(Layer::DiffCol).data, &shot.layer(Layer::GlossCol).data);
     // The sky without occlusion, as Eevee counts it to direct light.
-    let direct: Vec<f32> = shot.rgb().iter().enumerate().map(|(i, v)| {
-        let surface = if depth[i / 3] < NOTHING { 1.0 } else { 0.0 };
-        v + surface * sky[i % 3] * (diffuse[i] + glossy[i])
-    }).collect();
+    let direct: Vec<f32> = shot
+        .rgb()
+        .iter()
+        .enumerate()
+        .map(|(i, v)| {
+            let surface = if depth[i / 3] < NOTHING { 1.0 } else { 0.0 };
+            v + surface * sky[i % 3] * (diffuse[i] + glossy[i])
+        })
+        .collect();
     let normals = shot.layer(Layer::Normal).data.chunks_exact(3);
     let normal: Vec<f32> = normals.flat_map(|n| [n[0].max(0.0), (-n[2]).max(0.0), n[1].max(0.0)]).collect();
     [shown(&grey), shown(&direct), shown(diffuse), shown(&normal)]

@@ -1,7 +1,7 @@
 //! What a run of the tests has found, as JSON holds it.
 
 use super::{Test, Unit};
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Version of the record's form.
 pub const SCHEMA: u32 = 1;
@@ -28,17 +28,17 @@ pub struct Record {
 }
 
 /// Who was tested.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SubjectRecord {
     /// Name in tables.
     pub name: String,
     /// Hash of its weights.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<String>,
 }
 
 /// What one test has found.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Finding {
     /// Its name.
     pub name: String,
@@ -55,19 +55,19 @@ pub struct Finding {
     /// The truth passes and its spoilt twin does not: the test measures what it says.
     pub sound: bool,
     /// Why the truth could not be had, if it could not.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unsound: Option<String>,
     /// One entry a subject.
     pub found: Vec<Found>,
 }
 
 /// A number with its threshold.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Criterion {
     /// What is measured.
     pub name: String,
-    /// `share`, `frames`, `count` or `flip`.
-    pub unit: &'static str,
+    /// In which unit.
+    pub unit: Unit,
     /// The largest value that passes.
     pub at_most: f64,
     /// Where that comes from.
@@ -76,30 +76,28 @@ pub struct Criterion {
     pub truth: Option<f64>,
     /// That of the spoilt truth.
     pub control: Option<f64>,
-    /// For text.
-    #[serde(skip)]
-    pub shown_in: Unit,
 }
 
 /// One subject's answer.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Found {
     /// Its name.
     pub subject: String,
     /// Values in the order of the criteria; not finite ones are null, and fail. Empty where the test has no meaning for it.
+    #[serde(deserialize_with = "values")]
     pub values: Vec<f64>,
     /// Every value is within its limit; absent where the test has no meaning for it.
     pub pass: Option<bool>,
     /// Seconds that drawing and measuring took.
     pub seconds: f64,
     /// Why there are no values.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// Another method drew in its place, and why.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instead: Option<String>,
     /// Why it fails, where that is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
 }
 
@@ -108,12 +106,11 @@ impl Finding {
     pub(super) fn new(test: &Test) -> Self {
         let criterion = |limit: &super::Limit| Criterion {
             name: limit.name.into(),
-            unit: limit.unit.name(),
+            unit: limit.unit,
             at_most: limit.at_most,
             source: limit.source.into(),
             truth: None,
             control: None,
-            shown_in: limit.unit,
         };
         Self {
             name: test.name.into(),
@@ -146,7 +143,7 @@ impl Finding {
         let Some(worst) = self.worst(found) else {
             return if found.pass == Some(false) { "**no answer**".into() } else { "–".into() };
         };
-        let text = self.criteria[worst].shown_in.text(found.values[worst]);
+        let text = self.criteria[worst].unit.text(found.values[worst]);
         if found.pass == Some(true) { text } else { format!("**{text}**") }
     }
 }
@@ -162,4 +159,37 @@ impl Record {
 /// Whether every value is within its limit.
 pub(super) fn passes(test: &Test, values: &[f64]) -> bool {
     values.len() == test.limits.len() && values.iter().zip(test.limits).all(|(v, l)| *v <= l.at_most)
+}
+
+/// JSON has no infinity, and writes null.
+fn values<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+    let values = Vec::<Option<f64>>::deserialize(from)?;
+    Ok(values.into_iter().map(|v| v.unwrap_or(f64::INFINITY)).collect())
+}
+
+/// A finding with what it depends on, as it is kept for a later run.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Kept {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// Version of the program.
+    pub version: String,
+    /// Adapter and driver.
+    pub device: String,
+    /// Who was tested.
+    pub subjects: Vec<SubjectRecord>,
+    /// What was found.
+    pub finding: Finding,
+}
+
+impl Kept {
+    /// Whether `other`, whose finding is that of a test that has not been run yet, would find the same again.
+    pub fn is_of(&self, other: &Self) -> bool {
+        let plain = |f: &Finding| {
+            let limits = f.criteria.iter().map(|c| Criterion { truth: None, control: None, ..c.clone() });
+            (f.name.clone(), f.size, f.paths, f.control.clone(), limits.collect::<Vec<_>>())
+        };
+        let key = |k: &Self| (k.schema, k.version.clone(), k.device.clone(), plain(&k.finding));
+        key(self) == key(other) && self.subjects == other.subjects
+    }
 }

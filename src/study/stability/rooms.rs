@@ -88,7 +88,11 @@ pub fn shell(low: [f32; 3], high: [f32; 3], colour: [f32; 3]) -> Vec<Block> {
     for axis in 0..3 {
         for side in 0..2 {
             let (mut from, mut to) = (low.map(|v| v - 0.2), high.map(|v| v + 0.2));
-            if side == 0 { to[axis] = low[axis] } else { from[axis] = high[axis] }
+            if side == 0 {
+                to[axis] = low[axis]
+            } else {
+                from[axis] = high[axis]
+            }
             blocks.push((from, to, colour));
         }
     }

@@ -106,7 +106,8 @@ impl Sheet {
         let size = self.rows.iter().flat_map(|r| &r.moments).map(|m| m.size).next()?;
         let zoom = WIDE.div_ceil(size[0]).clamp(1, 4);
         let cell = [size[0] * zoom + GAP, size[1] * zoom + 2 * LINE];
-        let mut canvas = Canvas::new((columns * cell[0] + GAP).max(8 * self.title.len() + 8), self.rows.len() * cell[1] + 2 * LINE);
+        let mut canvas =
+            Canvas::new((columns * cell[0] + GAP).max(8 * self.title.len() + 8), self.rows.len() * cell[1] + 2 * LINE);
         canvas.text(GAP, GAP, &self.title);
         for (r, row) in self.rows.iter().enumerate() {
             let y = 2 * LINE + r * cell[1];

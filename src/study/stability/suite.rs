@@ -3,10 +3,11 @@
 use super::{
     Finding, Found, Play, Record, Sheet, StabilityError, Subject, Test, explain,
     play::Stage,
-    record::{SCHEMA, SubjectRecord, passes},
+    record::{Kept, SCHEMA, SubjectRecord, passes},
     sheet::Row,
 };
 use crate::gpu::Gpu;
+use crate::image_io;
 use crate::study::trial::TrialError;
 use std::{path::PathBuf, time::Instant};
 
@@ -18,6 +19,9 @@ pub struct SuiteOptions {
     pub subjects: Vec<Subject>,
     /// Folder of references that were traced before.
     pub kept: Option<PathBuf>,
+    /// Folder of findings, one file a test; a test whose finding is there and of the same program, device and subjects is not run
+    /// again. Without one nothing is kept.
+    pub resume: Option<PathBuf>,
 }
 
 /// What is told while it runs.
@@ -28,6 +32,11 @@ pub enum Event<'a> {
         test: &'static Test,
         /// Who takes it.
         subject: &'a str,
+    },
+    /// A test that had been run before.
+    Known {
+        /// What was found then.
+        finding: &'a Finding,
     },
     /// A test is over.
     Done {
@@ -67,13 +76,22 @@ impl<'a> Suite<'a> {
         let stage = Stage::new(self.gpu, self.options.kept.clone(), go_on);
         let mut tests = Vec::new();
         for test in &self.options.tests {
+            if let Some(mut finding) = self.known(test) {
+                // Sentences are the program's, not the run's.
+                for found in finding.found.iter_mut().filter(|f| f.pass == Some(false)) {
+                    found.why = explain::why(test.name, &found.subject).map(Into::into);
+                }
+                told(Event::Known { finding: &finding })?;
+                tests.push(finding);
+                continue;
+            }
             let (finding, sheet) = self.test(&stage, test, told)?;
             told(Event::Done { finding: &finding, sheet: &sheet })?;
+            self.keep(&finding)?;
             tests.push(finding);
             stage.forget();
         }
         let info = &self.gpu.info;
-        let subject = |s: &Subject| SubjectRecord { name: s.name().into(), weights: s.weights_hash() };
         Ok(Record {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION").into(),
@@ -81,9 +99,33 @@ impl<'a> Suite<'a> {
             backend: format!("{:?}", info.backend).to_lowercase(),
             driver: format!("{} {}", info.driver, info.driver_info).trim().into(),
             software: self.gpu.is_software(),
-            subjects: self.options.subjects.iter().map(subject).collect(),
+            subjects: self.subjects(),
             tests,
         })
+    }
+
+    fn subjects(&self) -> Vec<SubjectRecord> {
+        let subject = |s: &Subject| SubjectRecord { name: s.name().into(), weights: s.weights_hash() };
+        self.options.subjects.iter().map(subject).collect()
+    }
+
+    fn kept(&self, finding: Finding) -> Kept {
+        let (version, device) = (env!("CARGO_PKG_VERSION").into(), self.gpu.sentence());
+        Kept { schema: SCHEMA, version, device, subjects: self.subjects(), finding }
+    }
+
+    /// What was found before, if that can be read and nothing it depends on has changed.
+    fn known(&self, test: &Test) -> Option<Finding> {
+        let text = std::fs::read_to_string(self.options.resume.as_ref()?.join(format!("{}.json", test.name))).ok()?;
+        let kept: Kept = serde_json::from_str(&text).ok()?;
+        kept.is_of(&self.kept(Finding::new(test))).then_some(kept.finding)
+    }
+
+    fn keep(&self, finding: &Finding) -> Result<(), StabilityError> {
+        let Some(folder) = &self.options.resume else { return Ok(()) };
+        let path = folder.join(format!("{}.json", finding.name));
+        let text = serde_json::to_string_pretty(&self.kept(finding.clone())).expect("plain data can be written");
+        Ok(image_io::write_whole(&path, text.as_bytes())?)
     }
 
     fn test<E: From<StabilityError>>(
@@ -153,12 +195,7 @@ impl<'a> Suite<'a> {
             if found.pass == Some(false) {
                 found.why = explain::why(test.name, subject.name()).map(Into::into);
             }
-            sheet.push(Row {
-                name: subject.name().into(),
-                verdict: shown,
-                moments: kept.moments,
-                rolls: kept.rolls,
-            });
+            sheet.push(Row { name: subject.name().into(), verdict: shown, moments: kept.moments, rolls: kept.rolls });
             finding.found.push(found);
         }
         Ok((finding, sheet))
@@ -166,9 +203,7 @@ impl<'a> Suite<'a> {
 }
 
 /// An interruption ends everything; any other failure is an answer of its own.
-fn keep_going(
-    values: Result<Vec<f64>, StabilityError>,
-) -> Result<Result<Vec<f64>, StabilityError>, StabilityError> {
+fn keep_going(values: Result<Vec<f64>, StabilityError>) -> Result<Result<Vec<f64>, StabilityError>, StabilityError> {
     match values {
         Err(StabilityError::Trial(TrialError::Stopped)) => Err(TrialError::Stopped.into()),
         values => Ok(values),

@@ -12,9 +12,19 @@ pub static SWITCH: Test = Test {
     question: "Does light follow a lamp that is switched off and on?",
     limits: &[
         Limit { name: "frames until nine tenths are gone", unit: Unit::Frames, at_most: 6.0, source: SOON },
-        Limit { name: "old light that is left after 30 frames", unit: Unit::Share, at_most: 0.02, source: "twice the least contrast that an eye sees" },
+        Limit {
+            name: "old light that is left after 30 frames",
+            unit: Unit::Share,
+            at_most: 0.02,
+            source: "twice the least contrast that an eye sees",
+        },
         Limit { name: "frames until nine tenths are back", unit: Unit::Frames, at_most: 6.0, source: SOON },
-        Limit { name: "light that is missing after 30 frames", unit: Unit::Share, at_most: 0.05, source: "a fourteenth of a stop" },
+        Limit {
+            name: "light that is missing after 30 frames",
+            unit: Unit::Share,
+            at_most: 0.05,
+            source: "a fourteenth of a stop",
+        },
     ],
     control: Fault::Late(0.93),
     size: SMALL,
@@ -100,20 +110,32 @@ pub static DOOR: Test = Test {
     name: "door",
     question: "Does a room go dark when the door to the lit room next to it is shut, and bright when it is opened?",
     limits: &[
-        Limit { name: "frames until nine tenths are gone", unit: Unit::Frames, at_most: 12.0, source: "a fifth of a second; a hand needs longer for the door" },
-        Limit { name: "light that is left after 30 frames", unit: Unit::Share, at_most: 0.02, source: "twice the least contrast that an eye sees" },
-        Limit { name: "change of the open room's light after shutting and opening", unit: Unit::Share, at_most: 0.1, source: "a seventh of a stop" },
+        Limit {
+            name: "frames until nine tenths are gone",
+            unit: Unit::Frames,
+            at_most: 12.0,
+            source: "a fifth of a second; a hand needs longer for the door",
+        },
+        Limit {
+            name: "light that is left after 30 frames",
+            unit: Unit::Share,
+            at_most: 0.02,
+            source: "twice the least contrast that an eye sees",
+        },
+        Limit {
+            name: "change of the open room's light after shutting and opening",
+            unit: Unit::Share,
+            at_most: 0.1,
+            source: "a seventh of a stop",
+        },
     ],
     control: Fault::Late(0.95),
     size: SMALL,
     paths: 1024,
     pictures: false,
     run: |play| {
-        let mut rooms_ = rooms::scene(
-            &rooms::two_rooms(0.2, true, rooms::WHITE),
-            &[rooms::lamp([-2.5, 2.4, 0.6], 20.0)],
-            0.0,
-        );
+        let mut rooms_ =
+            rooms::scene(&rooms::two_rooms(0.2, true, rooms::WHITE), &[rooms::lamp([-2.5, 2.4, 0.6], 20.0)], 0.0);
         // It slides into the wall.
         let door = rooms::block(&mut rooms_, [0.18, -0.05, 0.6], [0.28, 2.05, 1.75], rooms::WHITE);
         let open = rooms_.instances[door].transform;
@@ -134,7 +156,8 @@ pub static DOOR: Test = Test {
         }
         let looks = play.film(&rooms_, script.rest(&camera, 29).look(&camera))?;
         play.roll(&looks);
-        let kept = [(0, "open"), (1, "just shut"), (12, "12 frames later"), (17, "30 frames later"), (18, "open again")];
+        let kept =
+            [(0, "open"), (1, "just shut"), (12, "12 frames later"), (17, "30 frames later"), (18, "open again")];
         kept.into_iter().for_each(|(i, name)| play.keep(name, &looks[i]));
         let means: Vec<f64> = looks.iter().map(Look::mean).collect();
         let gone = measures::frames_to_ninety(&means[1..17], means[0], 0.0);

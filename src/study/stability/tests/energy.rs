@@ -8,8 +8,18 @@ pub static ALBEDO: Test = Test {
     name: "albedo",
     question: "Is a room of surfaces that send nothing back, or everything, as bright as paths say?",
     limits: &[
-        Limit { name: "all light, albedo 0.001, against what the sky gives an open floor", unit: Unit::Share, at_most: 0.05, source: "physics: no place gets more than the sky's radiance" },
-        Limit { name: "all light, albedo 1, against the truth", unit: Unit::Share, at_most: 0.1, source: "a seventh of a stop" },
+        Limit {
+            name: "all light, albedo 0.001, against what the sky gives an open floor",
+            unit: Unit::Share,
+            at_most: 0.05,
+            source: "physics: no place gets more than the sky's radiance",
+        },
+        Limit {
+            name: "all light, albedo 1, against the truth",
+            unit: Unit::Share,
+            at_most: 0.1,
+            source: "a seventh of a stop",
+        },
     ],
     control: Fault::Gain(1.5),
     size: SMALL,
@@ -32,8 +42,18 @@ pub static FURNACE: Test = Test {
     name: "furnace",
     question: "Is there glow / (1 - albedo) everywhere in a closed room whose walls glow?",
     limits: &[
-        Limit { name: "all light against the series, albedo 0.5", unit: Unit::Share, at_most: 0.02, source: "physics: exact; 2 % for the last bounces" },
-        Limit { name: "all light against the series, albedo 0.8", unit: Unit::Share, at_most: 0.05, source: "physics: exact; at 0.8 the twentieth bounce still has 1 %" },
+        Limit {
+            name: "all light against the series, albedo 0.5",
+            unit: Unit::Share,
+            at_most: 0.02,
+            source: "physics: exact; 2 % for the last bounces",
+        },
+        Limit {
+            name: "all light against the series, albedo 0.8",
+            unit: Unit::Share,
+            at_most: 0.05,
+            source: "physics: exact; at 0.8 the twentieth bounce still has 1 %",
+        },
     ],
     control: Fault::Gain(1.1),
     size: SMALL,
@@ -61,7 +81,12 @@ fn furnace(albedo: f32) -> Scene {
 pub static SEALED: Test = Test {
     name: "sealed",
     question: "Does a closed room stay dark under a bright sky and sun?",
-    limits: &[Limit { name: "light inside over light outside", unit: Unit::Share, at_most: 0.001, source: "physics: none; 0.1 % is ten stops below" }],
+    limits: &[Limit {
+        name: "light inside over light outside",
+        unit: Unit::Share,
+        at_most: 0.001,
+        source: "physics: none; 0.1 % is ten stops below",
+    }],
     control: Fault::Leak(0.01),
     size: SMALL,
     paths: 64,
@@ -79,17 +104,19 @@ pub static SEALED: Test = Test {
 pub static THIN_WALL: Test = Test {
     name: "thin-wall",
     question: "Does a wall of 2 cm keep the light of the next room out?",
-    limits: &[Limit { name: "light behind the wall over light before it", unit: Unit::Share, at_most: 0.001, source: "physics: none; 0.1 % is ten stops below" }],
+    limits: &[Limit {
+        name: "light behind the wall over light before it",
+        unit: Unit::Share,
+        at_most: 0.001,
+        source: "physics: none; 0.1 % is ten stops below",
+    }],
     control: Fault::Leak(0.01),
     size: SMALL,
     paths: 64,
     pictures: false,
     run: |play| {
-        let rooms = rooms::scene(
-            &rooms::two_rooms(0.02, false, rooms::GREY),
-            &[rooms::lamp([-2.0, 2.2, 0.3], 10.0)],
-            0.0,
-        );
+        let rooms =
+            rooms::scene(&rooms::two_rooms(0.02, false, rooms::GREY), &[rooms::lamp([-2.0, 2.2, 0.3], 10.0)], 0.0);
         let at = |x: f32| Camera::look_at([x, 1.6, 1.6], [x - 1.0, 0.6, -1.0], 1.2);
         let (dark, bright) = (play.settled(&rooms, &at(1.6), 32)?, play.settled(&rooms, &at(-2.0), 32)?);
         play.keep("lit room", &bright);
@@ -103,7 +130,12 @@ pub static CORNER: Test = Test {
     question: "Does a lamp around the corner light a corridor as paths say?",
     limits: &[
         Limit { name: "all light against the truth", unit: Unit::Share, at_most: 0.1, source: "a seventh of a stop" },
-        Limit { name: "light near the corner over light at the end, against the same", unit: Unit::Share, at_most: 0.2, source: "a quarter of a stop" },
+        Limit {
+            name: "light near the corner over light at the end, against the same",
+            unit: Unit::Share,
+            at_most: 0.2,
+            source: "a quarter of a stop",
+        },
     ],
     control: Fault::Screen(1.0),
     size: SMALL,

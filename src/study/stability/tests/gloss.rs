@@ -12,8 +12,18 @@ pub static METAL: Test = Test {
     name: "metal",
     question: "Do metals of roughness 0.3 to 1 show what is around them?",
     limits: &[
-        Limit { name: "HDR-FLIP on the metal against the truth", unit: Unit::Flip, at_most: 0.25, source: "FLIP of `ssgi`'s whole pictures is 0.15 to 0.34 (docs/accuracy.md); HDR-FLIP takes the worst exposure" },
-        Limit { name: "all light from the metal against the truth", unit: Unit::Share, at_most: 0.15, source: "a fifth of a stop" },
+        Limit {
+            name: "HDR-FLIP on the metal against the truth",
+            unit: Unit::Flip,
+            at_most: 0.25,
+            source: "FLIP of `ssgi`'s whole pictures is 0.15 to 0.34 (docs/accuracy.md); HDR-FLIP takes the worst exposure",
+        },
+        Limit {
+            name: "all light from the metal against the truth",
+            unit: Unit::Share,
+            at_most: 0.15,
+            source: "a fifth of a stop",
+        },
     ],
     control: Fault::Gain(2.0),
     size: SIZE,
@@ -26,8 +36,18 @@ pub static MIRROR: Test = Test {
     name: "mirror",
     question: "Do mirrors (roughness 0 to 0.15) show what is around them?",
     limits: &[
-        Limit { name: "HDR-FLIP on the mirror against the truth", unit: Unit::Flip, at_most: 0.25, source: "as for rough metal" },
-        Limit { name: "all light from the mirror against the truth", unit: Unit::Share, at_most: 0.15, source: "a fifth of a stop" },
+        Limit {
+            name: "HDR-FLIP on the mirror against the truth",
+            unit: Unit::Flip,
+            at_most: 0.25,
+            source: "as for rough metal",
+        },
+        Limit {
+            name: "all light from the mirror against the truth",
+            unit: Unit::Share,
+            at_most: 0.15,
+            source: "a fifth of a stop",
+        },
     ],
     control: Fault::Gain(2.0),
     size: SIZE,

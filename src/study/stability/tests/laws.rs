@@ -5,7 +5,7 @@ use super::SMALL;
 use crate::scene::{Camera, Environment, LightKind, Scene};
 
 /// Frames of each picture.
-const FRAMES: usize = 24;
+const FRAMES: usize = 20;
 
 const LINEAR: &str = "physics: light is linear; half floats have steps of 0.05 %";
 
@@ -32,7 +32,12 @@ pub static TWICE: Test = Test {
     name: "twice",
     question: "Is twice the light exactly twice the answer, and no light none?",
     limits: &[
-        Limit { name: "difference of half the answer to twice the light", unit: Unit::Share, at_most: 0.001, source: LINEAR },
+        Limit {
+            name: "difference of half the answer to twice the light",
+            unit: Unit::Share,
+            at_most: 0.001,
+            source: LINEAR,
+        },
         Limit { name: "values above 0 without any light", unit: Unit::Count, at_most: 0.0, source: "physics" },
     ],
     control: Fault::Curve(0.9),
@@ -83,7 +88,12 @@ pub static SUM: Test = Test {
 pub static EXPOSURE: Test = Test {
     name: "exposure",
     question: "Is the answer the same, but for its scale, in light 64 times as weak and as strong?",
-    limits: &[Limit { name: "largest difference of the scaled answers", unit: Unit::Share, at_most: 0.005, source: "physics; ten steps of a half float" }],
+    limits: &[Limit {
+        name: "largest difference of the scaled answers",
+        unit: Unit::Share,
+        at_most: 0.005,
+        source: "physics; ten steps of a half float",
+    }],
     control: Fault::Curve(0.99),
     size: SMALL,
     paths: 64,
@@ -109,7 +119,12 @@ fn scaled_back(look: &Look, factor: f32) -> Look {
 pub static SATURATED: Test = Test {
     name: "saturated",
     question: "Does pure red light stay pure red?",
-    limits: &[Limit { name: "green and blue over red", unit: Unit::Share, at_most: 0.0, source: "physics: a channel without light has none" }],
+    limits: &[Limit {
+        name: "green and blue over red",
+        unit: Unit::Share,
+        at_most: 0.0,
+        source: "physics: a channel without light has none",
+    }],
     control: Fault::Grey(0.01),
     size: SMALL,
     paths: 64,
@@ -129,8 +144,18 @@ pub static UNITS: Test = Test {
     name: "units",
     question: "Is the light the same in a file whose unit is a thousand times too large or too small?",
     limits: &[
-        Limit { name: "in millimetres taken for metres (1000 times as large)", unit: Unit::Share, at_most: 0.05, source: "physics: the picture is the same; 5 % for noise" },
-        Limit { name: "in kilometres taken for metres (1000 times as small)", unit: Unit::Share, at_most: 0.05, source: "physics: the picture is the same; 5 % for noise" },
+        Limit {
+            name: "in millimetres taken for metres (1000 times as large)",
+            unit: Unit::Share,
+            at_most: 0.05,
+            source: "physics: the picture is the same; 5 % for noise",
+        },
+        Limit {
+            name: "in kilometres taken for metres (1000 times as small)",
+            unit: Unit::Share,
+            at_most: 0.05,
+            source: "physics: the picture is the same; 5 % for noise",
+        },
     ],
     control: Fault::Metres(0.5),
     size: SMALL,

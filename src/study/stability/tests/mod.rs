@@ -19,7 +19,7 @@ const SMALL: [u32; 2] = [96, 64];
 const PAPER: [u32; 2] = [256, 128];
 
 /// Frames after which a method's history is long enough to show what it does.
-const LONG: usize = 64;
+const LONG: usize = 40;
 
 /// All tests, in the order in which they run.
 pub fn all() -> Vec<&'static Test> {

@@ -13,7 +13,12 @@ const WARPED: &str = "change of light at the same places from frame to frame";
 pub static JITTER: Test = Test {
     name: "jitter",
     question: "Does light keep still where the camera trembles by less than a pixel?",
-    limits: &[Limit { name: WARPED, unit: Unit::Share, at_most: 0.02, source: "twice the least contrast that an eye sees" }],
+    limits: &[Limit {
+        name: WARPED,
+        unit: Unit::Share,
+        at_most: 0.02,
+        source: "twice the least contrast that an eye sees",
+    }],
     control: Fault::Noise(0.2),
     size: SMALL,
     paths: 1024,
@@ -28,7 +33,12 @@ pub static JITTER: Test = Test {
 pub static SLOW_PAN: Test = Test {
     name: "slow-pan",
     question: "Does light keep still on its surfaces in a pan of 0.1 degrees a frame?",
-    limits: &[Limit { name: WARPED, unit: Unit::Share, at_most: 0.02, source: "twice the least contrast that an eye sees" }],
+    limits: &[Limit {
+        name: WARPED,
+        unit: Unit::Share,
+        at_most: 0.02,
+        source: "twice the least contrast that an eye sees",
+    }],
     control: Fault::Noise(0.2),
     size: SMALL,
     paths: 1024,
@@ -105,7 +115,12 @@ pub static TELEPORT: Test = Test {
     name: "teleport",
     question: "Does a room that was never seen before show its own light in the first frame after a jump?",
     limits: &[
-        Limit { name: "the old room's light in the new one, method not told", unit: Unit::Share, at_most: 0.01, source: "1 % (Weber)" },
+        Limit {
+            name: "the old room's light in the new one, method not told",
+            unit: Unit::Share,
+            at_most: 0.01,
+            source: "1 % (Weber)",
+        },
         Limit { name: "the same, method told (a cut)", unit: Unit::Share, at_most: 0.01, source: "1 % (Weber)" },
         Limit {
             name: "first frame after a cut against the settled one",

@@ -4,7 +4,7 @@ use super::super::{Fault, Limit, Look, StabilityError, Subject, Test, Unit, meas
 use super::{LONG, PAPER, SMALL};
 use crate::gi::Method;
 use crate::net::plan::Precision;
-use crate::scene::{Camera, Image, ColorSpace, Sampler, Scene, TextureRef, shapes::Shape};
+use crate::scene::{Camera, ColorSpace, Image, Sampler, Scene, TextureRef, shapes::Shape};
 use glam::{Quat, Vec3};
 
 pub static FLAT: Test = Test {
@@ -39,7 +39,8 @@ pub static HALF: Test = Test {
     paths: 16,
     pictures: false,
     run: |play| {
-        let (scene, camera) = (rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.1), rooms::hall_camera());
+        let (scene, camera) =
+            (rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.1), rooms::hall_camera());
         let of = |precision| match play.subject() {
             Subject::Method { name, method: Method::Neural(neural) } => {
                 let mut neural = neural.clone();
@@ -90,7 +91,8 @@ fn still_life() -> (Scene, Camera) {
     let rgba = (0..64).flat_map(|y| (0..64).flat_map(move |x| checks(x, y))).collect();
     scene.images.push(Image { name: "checks".into(), width: 64, height: 64, rgba, color_space: ColorSpace::Srgb });
     let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    scene.materials[0].base_color_texture = Some(TextureRef { image: 0, sampler: Sampler::default(), uv_set: 0, transform });
+    scene.materials[0].base_color_texture =
+        Some(TextureRef { image: 0, sampler: Sampler::default(), uv_set: 0, transform });
     // The box's places seen from above, in metres over four.
     let floor = &mut scene.meshes[0];
     floor.uv0 = floor.positions.iter().map(|p| [0.5 + 0.5 * p[0], 0.5 + 0.5 * p[2]]).collect();

@@ -23,7 +23,9 @@ pub static FROZEN: Test = Test {
     size: SMALL,
     paths: 32,
     pictures: false,
-    run: |play| at_rest(play, &rooms::hall(rooms::GREY, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.02), &rooms::hall_camera(), 100),
+    run: |play| {
+        at_rest(play, &rooms::hall(rooms::GREY, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.02), &rooms::hall_camera(), 100)
+    },
 };
 
 pub static DARK_ROOM: Test = Test {
@@ -84,7 +86,9 @@ pub(super) fn dark_room() -> (Scene, Camera) {
     // The wall at +X, with a window of 0.8×0.8 m.
     blocks.remove(1);
     let x = [3.0, 3.2];
-    for (y, z) in [([-0.2, 1.2], [-3.2, 3.2]), ([2.0, 3.2], [-3.2, 3.2]), ([1.2, 2.0], [-3.2, -0.4]), ([1.2, 2.0], [0.4, 3.2])] {
+    for (y, z) in
+        [([-0.2, 1.2], [-3.2, 3.2]), ([2.0, 3.2], [-3.2, 3.2]), ([1.2, 2.0], [-3.2, -0.4]), ([1.2, 2.0], [0.4, 3.2])]
+    {
         blocks.push(([x[0], y[0], z[0]], [x[1], y[1], z[1]], rooms::GREY));
     }
     let room = rooms::scene(&blocks, &[rooms::sun([-0.8, -0.6, 0.0], 10.0)], 0.1);

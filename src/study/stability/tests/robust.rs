@@ -76,8 +76,18 @@ pub static BROKEN: Test = Test {
     name: "broken-input",
     question: "Do normals, glow and lights that are no numbers leave the rest of the picture alone?",
     limits: &[
-        Limit { name: "pixels that are no numbers", unit: Unit::Count, at_most: 0.0, source: "one NaN spreads to everything that reads it" },
-        Limit { name: "change of the light elsewhere", unit: Unit::Share, at_most: 0.1, source: "the broken box and lamp take part of the room's light with them" },
+        Limit {
+            name: "pixels that are no numbers",
+            unit: Unit::Count,
+            at_most: 0.0,
+            source: "one NaN spreads to everything that reads it",
+        },
+        Limit {
+            name: "change of the light elsewhere",
+            unit: Unit::Share,
+            at_most: 0.1,
+            source: "the broken box and lamp take part of the room's light with them",
+        },
     ],
     control: Fault::Broken,
     size: SMALL,
@@ -88,14 +98,14 @@ pub static BROKEN: Test = Test {
         let mut hall = rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.1);
         let at = ([1.8, 0.0, -2.2], [2.2, 0.4, -1.8]);
         let number = rooms::block(&mut hall, at.0, at.1, rooms::GREY);
-        let sane = play.settled(&hall, &camera, 24)?;
+        let sane = play.settled(&hall, &camera, 20)?;
         let mesh = hall.instances[number].mesh;
         hall.meshes[mesh].normals.iter_mut().for_each(|n| *n = [f32::NAN; 3]);
         hall.materials[number].emissive = [f32::INFINITY, f32::NAN, 1.0];
         let lamp = LightKind::Point { position: [0.0, f32::NAN, 0.0], intensity: f32::NAN, radius: 0.1, range: None };
         hall.lights.push(rooms::light(lamp, [1.0; 3]));
         play.keep("sound", &sane);
-        match play.settled(&hall, &camera, 24) {
+        match play.settled(&hall, &camera, 20) {
             Ok(look) => {
                 play.keep("broken", &look);
                 Ok(vec![broken(&look) as f64, change_elsewhere(&sane, &look, at)])

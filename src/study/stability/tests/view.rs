@@ -11,7 +11,12 @@ pub static RED_WALL: Test = Test {
     question: "Does a sunlit red wall still light the floor when it has left the picture?",
     limits: &[
         Limit { name: "change of light at the same places", unit: Unit::Share, at_most: 0.05, source: SAME },
-        Limit { name: "change of red over green there", unit: Unit::Share, at_most: 0.02, source: "twice the least contrast that an eye sees" },
+        Limit {
+            name: "change of red over green there",
+            unit: Unit::Share,
+            at_most: 0.02,
+            source: "twice the least contrast that an eye sees",
+        },
     ],
     control: Fault::Screen(0.5),
     size: PAPER,
