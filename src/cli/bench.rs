@@ -14,6 +14,7 @@ use crate::{
     study::{
         bench::{BenchOptions, Measurement, measure},
         projection::{self, EFFICIENCY, GTX_1050},
+        ratios::{self, Ratios},
     },
 };
 use anyhow::{Context, Result};
@@ -42,10 +43,16 @@ pub struct Args {
     /// Write the record to this file.
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
-    /// A record written earlier, on this device, to compare with.
+    /// Take turns: every method so many times, which makes ratios of times that hold on a busy machine.
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    rounds: u32,
+    /// Write the ratios of method to method and pass to pass to this file, a base for --compare on other machines.
+    #[arg(long, value_name = "F")]
+    ratios: Option<PathBuf>,
+    /// A record written earlier, on this device, to compare with; or ratios, on a device of that kind.
     #[arg(long, value_name = "BASE", requires = "fail_over")]
     compare: Option<PathBuf>,
-    /// How much slower than the base is still allowed, such as 5%.
+    /// How much slower than the base is still allowed, such as 5%. (Ratios state what they vary by, and are allowed that at least.)
     #[arg(long, value_parser = parse_percent, value_name = "P%")]
     fail_over: Option<f64>,
 }
@@ -67,6 +74,14 @@ fn parse_methods(text: &str) -> Result<Methods, String> {
 fn parse_percent(text: &str) -> Result<f64, String> {
     let number = text.trim_end_matches('%').parse::<f64>().map_err(|e| format!("{text}: {e}"))?;
     if number.is_finite() && number >= 0.0 { Ok(number / 100.0) } else { Err(format!("{text} is not a percentage")) }
+}
+
+/// What `--compare` reads.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum Base {
+    Ratios(Ratios),
+    Times(Box<Record>),
 }
 
 /// What `--json` writes and `--compare` reads.
@@ -99,7 +114,10 @@ impl Args {
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
-    let base = args.compare.as_ref().map(read_record).transpose()?;
+    let base = args.compare.as_ref().map(read_base).transpose()?;
+    for path in args.json.iter().chain(&args.ratios) {
+        crate::image_io::check_writable(path)?;
+    }
     let scene = args.scene.load(global)?;
     let camera = args.scene.camera(&scene)?;
     let gpu = global.open_gpu()?;
@@ -116,13 +134,29 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         eprintln!("warning: methods that send rays are not measured: {e}");
     }
     let options = BenchOptions { frames: args.frames, warmup: args.warmup };
-    let mut methods = Vec::new();
+    let mut renderers = Vec::new();
     for name in &names {
         let method = super::tuned::tuned(name.method(global, args.weights.as_ref())?, &gpu, global.quiet);
-        let mut renderer =
-            Renderer::new(&gpu.device, &gpu.queue, args.scene.size, RendererOptions { method, ..Default::default() })?;
-        methods.push(measure(&gpu, &mut renderer, &uploaded, &camera, options)?);
+        let options = RendererOptions { method, ..Default::default() };
+        renderers.push(Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options)?);
     }
+    let mut rounds = Vec::new();
+    for _ in 0..args.rounds {
+        let turn = |renderer| measure(&gpu, renderer, &uploaded, &camera, options);
+        rounds.push(renderers.iter_mut().map(turn).collect::<Result<Vec<Measurement>, _>>()?);
+    }
+    let ratios = Ratios {
+        schema: 1,
+        command: format!("bouncelight {}", std::env::args().skip(1).collect::<Vec<_>>().join(" ")),
+        scene: args.scene.scene.clone(),
+        size: args.scene.size,
+        adapter: gpu.info.name.clone(),
+        software: gpu.is_software(),
+        rounds: args.rounds,
+        frames: args.frames,
+        ratios: ratios::of(&rounds),
+    };
+    let methods = rounds.pop().unwrap_or_default();
     let network = if args.layers && args.runs_network() {
         let weights = super::args::load_weights(args.weights.as_ref())?;
         Some(super::layers::measure(global, &gpu, &weights, args.scene.size)?)
@@ -151,10 +185,36 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     if let Some(path) = &args.json {
         crate::image_io::write_whole(path, format!("{}\n", serde_json::to_string_pretty(&record)?).as_bytes())?;
     }
+    if args.rounds > 1 {
+        say!("\nratios, medians of {} rounds:", args.rounds);
+        ratios
+            .ratios
+            .iter()
+            .for_each(|r| say!("  {:<44}{:>9.3}  may grow by {:.0} %", r.of, r.value, 100.0 * r.allowed));
+    }
+    if let Some(path) = &args.ratios {
+        crate::image_io::write_whole(path, format!("{}\n", serde_json::to_string_pretty(&ratios)?).as_bytes())?;
+    }
     match (base, args.fail_over) {
-        (Some(base), Some(allowed)) => compare(&base, &record, allowed),
+        (Some(Base::Times(base)), Some(allowed)) => compare(&base, &record, allowed),
+        (Some(Base::Ratios(base)), Some(allowed)) => compare_ratios(&base, &ratios, allowed),
         _ => Ok(()),
     }
+}
+
+fn compare_ratios(base: &Ratios, now: &Ratios, allowed: f64) -> Result<()> {
+    if (&base.scene, base.size) != (&now.scene, now.size) {
+        let [w, h] = base.size;
+        return Err(usage(format!("the base's ratios are of {} at {w}x{h}: measure the same", base.scene)));
+    }
+    if base.software != now.software || (!base.software && base.adapter != now.adapter) {
+        return Err(usage(format!("the base's ratios are of {}; they say nothing of {}", base.adapter, now.adapter)));
+    }
+    let (slower, faster) = ratios::compare(&base.ratios, &now.ratios, allowed);
+    for words in &faster {
+        eprintln!("note: {words}: faster than the base by more than it varies; make the base anew to keep that");
+    }
+    if slower.is_empty() { Ok(()) } else { Err(CliError::TooSlow(slower.join("; ")).into()) }
 }
 
 fn print(record: &Record, gpu: &Gpu, layers: bool) {
@@ -203,14 +263,18 @@ fn rows(m: &Measurement, layers: bool) -> Vec<(String, f64, f64)> {
     rows
 }
 
-fn read_record(path: &PathBuf) -> Result<Record> {
+fn read_base(path: &PathBuf) -> Result<Base> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let record: Record =
-        serde_json::from_str(&text).with_context(|| format!("{} is no bench record", path.display()))?;
-    if record.schema != 1 {
-        return Err(usage(format!("{}: schema {} is not known", path.display(), record.schema)));
+    let base: Base = serde_json::from_str(&text)
+        .with_context(|| format!("{} is no record of `bench --json` or `--ratios`", path.display()))?;
+    let schema = match &base {
+        Base::Ratios(ratios) => ratios.schema,
+        Base::Times(record) => record.schema,
+    };
+    if schema != 1 {
+        return Err(usage(format!("{}: schema {schema} is not known", path.display())));
     }
-    Ok(record)
+    Ok(base)
 }
 
 fn compare(base: &Record, now: &Record, allowed: f64) -> Result<()> {

@@ -5,6 +5,7 @@
 mod apply;
 mod args;
 mod bench;
+mod chart;
 mod compare;
 mod dataset;
 mod doctor;
@@ -45,6 +46,8 @@ enum Command {
     Render(render::Args),
     /// Measure GPU time per pass, wall-clock time per frame and memory.
     Bench(bench::Args),
+    /// Chart speed against accuracy: every method over a set of scenes, measured and judged.
+    Chart(chart::Args),
     /// Compare two pictures with the paper's metrics and the usual ones.
     Compare(compare::Args),
     /// Test methods where they are known to fail: light switched, doors shut, walls of 2 cm, and so on.
@@ -69,6 +72,7 @@ impl Command {
             Command::Bench(a) => a.runs_network(),
             Command::Apply(_) => true,
             Command::Stability(a) => a.runs_network(),
+            Command::Chart(a) => a.runs_network(),
             Command::Weights(a) => a.runs_network(),
             Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) => false,
         }
@@ -97,6 +101,7 @@ pub fn main() -> ExitCode {
         Command::View(a) => view::run(&cli.global, a),
         Command::Render(a) => render::run(&cli.global, a),
         Command::Bench(a) => bench::run(&cli.global, a),
+        Command::Chart(a) => chart::run(&cli.global, a),
         Command::Compare(a) => compare::run(a),
         Command::Dataset(a) => dataset::run(&cli.global, a),
         Command::Stability(a) => stability::run(&cli.global, a),

@@ -129,6 +129,39 @@ pub fn convert(path: &Path, bytes: &[u8], recipe: &Recipe) -> Result<Vec<u8>, Co
     Ok(bytes)
 }
 
+/// A published generator whose numbers nobody trained: small hashed ones, for what it costs to run.
+///
+/// # Panics
+/// For a base width that makes no graph.
+pub fn untrained(arch: Arch, norm: Norm, width: u32) -> Weights {
+    let graph = published::graph(arch, norm, width, true);
+    assert!(graph.check().is_empty(), "a generator of base width {width}");
+    let mut tensors = BTreeMap::new();
+    for (name, shape) in graph.ops.iter().flat_map(Op::tensors) {
+        let shape: Vec<usize> = shape.iter().map(|n| *n as usize).collect();
+        let (count, fan) = (shape.iter().product::<usize>(), shape.iter().skip(1).product::<usize>().max(1));
+        let scale = if shape.len() == 4 { (3.0 / fan as f32).sqrt() } else { 0.0 };
+        let offset = if shape.len() == 4 || name.ends_with("bias") || name.ends_with("mean") { 0.0 } else { 1.0 };
+        // Weyl's sequence: uniform, and different for each output.
+        let uniform = |i: usize| (i as u32).wrapping_mul(0x9e37_79b9) as f32 / u32::MAX as f32 * 2.0 - 1.0;
+        let data = (0..count).map(|i| offset + scale * uniform(i)).collect();
+        tensors.insert(name, WeightTensor { shape, stored: Dtype::F32, data });
+    }
+    Weights {
+        path: PathBuf::from("(untrained)"),
+        name: "a published generator, untrained".into(),
+        licence: "CC0-1.0".into(),
+        table: Table { name: "images".into(), version: 1 },
+        inputs: inputs(arch),
+        cell: 1,
+        output: Output { tensor: graph.output.clone(), meaning: "display_signed".into(), channels: published::OUTPUTS },
+        graph,
+        provenance: Provenance::default(),
+        content_hash: 0,
+        tensors,
+    }
+}
+
 /// The pictures in the published order, with the published normalisation.
 fn inputs(arch: Arch) -> Vec<Feature> {
     let (names, encoding) = match arch {

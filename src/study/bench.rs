@@ -15,7 +15,7 @@ use thiserror::Error;
 use wgpu_profiler::{GpuProfiler, GpuProfilerSettings};
 
 /// How long to measure.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BenchOptions {
     /// Frames that are counted, at least 1.
     pub frames: u32,
@@ -94,12 +94,40 @@ pub enum BenchError {
 }
 
 /// Draws `options.warmup + options.frames` frames of the same view, waiting for each, and measures the latter.
+///
+/// # Errors
+/// [`BenchError`].
 pub fn measure(
     gpu: &Gpu,
     renderer: &mut Renderer,
     scene: &SceneGpu,
     camera: &Camera,
     options: BenchOptions,
+) -> Result<Measurement, BenchError> {
+    measure_frames(gpu, renderer, scene, camera, options, false)
+}
+
+/// As [`measure`], but each frame is the first after a cut, on which methods with a history may spend more.
+///
+/// # Errors
+/// [`BenchError`].
+pub fn measure_cuts(
+    gpu: &Gpu,
+    renderer: &mut Renderer,
+    scene: &SceneGpu,
+    camera: &Camera,
+    options: BenchOptions,
+) -> Result<Measurement, BenchError> {
+    measure_frames(gpu, renderer, scene, camera, options, true)
+}
+
+fn measure_frames(
+    gpu: &Gpu,
+    renderer: &mut Renderer,
+    scene: &SceneGpu,
+    camera: &Camera,
+    options: BenchOptions,
+    cuts: bool,
 ) -> Result<Measurement, BenchError> {
     if options.frames == 0 {
         return Err(BenchError::NoFrames);
@@ -112,6 +140,9 @@ pub fn measure(
     let mut frames: Vec<Vec<(String, f64)>> = Vec::new();
     let mut wall = Vec::new();
     for frame in 0..options.warmup + options.frames {
+        if cuts {
+            renderer.cut();
+        }
         let start = Instant::now();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         renderer.record(&mut Recorder::timed(&mut encoder, &profiler), &gpu.queue, scene, &view)?;
@@ -159,7 +190,7 @@ fn per_pass(frames: &[Vec<(String, f64)>]) -> Vec<PassTime> {
 }
 
 /// Median and nearest-rank 95th percentile of a non-empty list.
-fn spread(mut values: Vec<f64>) -> Spread {
+pub(super) fn spread(mut values: Vec<f64>) -> Spread {
     values.sort_by(f64::total_cmp);
     let at = |q: f64| values[((values.len() as f64 * q).ceil() as usize).clamp(1, values.len()) - 1];
     Spread { median: at(0.5), p95: at(0.95) }

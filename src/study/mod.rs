@@ -1,13 +1,26 @@
 //! What is measured over methods and scenes.
 
 pub mod bench;
+#[cfg(feature = "chart")]
+pub mod chart;
 pub mod dataset;
 pub mod guides;
 #[cfg(feature = "io")]
+pub mod hash;
+#[cfg(all(feature = "io", feature = "reference"))]
+pub mod judge;
+#[cfg(feature = "io")]
 pub mod motion;
 pub mod projection;
+pub mod ratios;
+#[cfg(all(feature = "io", feature = "reference"))]
+pub mod stability;
 #[cfg(feature = "reference")]
 pub mod target;
+#[cfg(all(feature = "io", feature = "reference"))]
+pub mod trial;
+#[cfg(all(feature = "io", feature = "reference"))]
+pub mod truth;
 #[cfg(feature = "io")]
 pub mod varied;
 pub mod views;

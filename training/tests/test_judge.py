@@ -11,7 +11,7 @@ import numpy as np
 import OpenEXR
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-JUDGE, TABLE = (os.path.join(HERE, "..", name) for name in ("judge.py", "table.py"))
+JUDGE = os.path.join(HERE, "..", "judge.py")
 H, W = 8, 16
 
 # `render` and `compare` of the program, which write down that they were called.
@@ -89,36 +89,6 @@ class Judge(unittest.TestCase):
         self.assertEqual(len([a for a in self.judge()[1] if a.startswith("render")]), 6)
         with open(os.path.join(self.out, "stamps.json")) as file:
             self.assertEqual(len(json.load(file)), 9)
-
-
-class Table(unittest.TestCase):
-    def test_errors_and_costs_stand_in_one_row(self):
-        with tempfile.TemporaryDirectory() as folder:
-            place = lambda name: os.path.join(folder, name)
-            metrics = "l1,l2,paper-ssim,fid,psnr,ssim,flip,relmse,light"
-            with open(place("a.csv"), "w") as f:
-                f.write(f"scene,row,{metrics}\n" + "".join(f"room{i},gather,{1000 * i},1,.9,.1,40,.9,.1,.01,.05\n" for i in (1, 3)) + "metal,gather,9,9,9,9,9,9,9,9,9\n")
-            record = {"software": True, "methods": [{"method": "gather", "gpu_ms": {"median": 5.0}, "costs": [{"flops": 1.86e9, "bytes": 1.0}, {"flops": 1.0, "bytes": 112e6}]}]}
-            with open(place("b.json"), "w") as f:
-                json.dump(record, f)
-            run = lambda *more: subprocess.run([sys.executable, TABLE, place("a.csv"), "--bench", place("b.json"), *more], capture_output=True, text=True)
-            done = run()
-            self.assertEqual(done.returncode, 0, done.stderr)
-            row = next(line for line in done.stdout.splitlines() if line.startswith("| gather"))
-            # Mean of both rooms and not of the metal; a millisecond of arithmetic and one of traffic at full efficiency; no time of a software adapter.
-            self.assertIn("| 2,000 |", row)
-            self.assertIn(f"| {2 / 0.35:.2f} |", row)
-            self.assertNotIn("5.00", row)
-            self.assertIn("| the paper's network, its own pictures | 104.02 | 781 | 54,423,171 |", done.stdout)
-            record["software"] = False
-            with open(place("b.json"), "w") as f:
-                json.dump(record, f)
-            self.assertIn("| 5.00 |", run().stdout, "a measured time is shown")
-            with open(place("a.csv"), "a") as f:
-                f.write("room1,direct,1,1,1,1,1,1,1,1,1\n")
-            refused = run()
-            self.assertNotEqual(refused.returncode, 0)
-            self.assertIn("direct has 1 scenes, others have 2", refused.stderr)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,8 @@ use crate::gi::stage::cells::{self, CellsPass};
 const BLOCKS_NEAREST: f64 = 14.0;
 const BLOCKS_ANY: f64 = 7.0;
 const BLOCKS_SHORT: f64 = 6.0;
+/// Rays of a look: the nearest hit, the light's, the line to the entry's beginning.
+const RAYS: f64 = 3.0;
 /// Entries in use, for the same: rooms and flats have 1,000 to 6,000.
 const ENTRIES_MET: f64 = 4000.0;
 
@@ -27,8 +29,8 @@ pub(super) fn costs(size: [u32; 2], slots: u32) -> Vec<Cost> {
         CellsPass::cost(size),
         Cost::new("gi.evict", f64::from(slots) * 10.0, f64::from(slots) * 16.0),
         // With the rays into lobes.
-        Cost::new("gi.rays", (cells + squares) * flops, (cells + squares) * bytes),
-        Cost::new("gi.renew", entries * flops, entries * bytes + f64::from(slots) * 8.0),
+        Cost::new("gi.rays", (cells + squares) * flops, (cells + squares) * bytes).with_rays((cells + squares) * RAYS),
+        Cost::new("gi.renew", entries * flops, entries * bytes + f64::from(slots) * 8.0).with_rays(entries * RAYS),
         Cost::new("gi.settle", cells * 150.0, cells * (2.0 * PAST as f64 + 112.0)),
         Cost::new("gi.blur", cells * 25.0 * 65.0, cells * (PAST as f64 + 80.0)),
         Cost::new("gi.smooth", cells * 25.0 * 60.0, cells * (24.0 + 3.0 * 48.0)),

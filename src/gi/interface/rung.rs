@@ -14,12 +14,20 @@ pub struct Cost {
     pub flops: f64,
     /// Bytes that have to move between memory and the chip at least once.
     pub bytes: f64,
+    /// Rays into the scene's triangles, those that only ask whether something stands between included.
+    #[serde(default)]
+    pub rays: f64,
 }
 
 impl Cost {
     /// A row of the table.
     pub fn new(pass: &str, flops: f64, bytes: f64) -> Self {
-        Self { pass: pass.into(), flops, bytes }
+        Self { pass: pass.into(), flops, bytes, rays: 0.0 }
+    }
+
+    /// The same with so many rays.
+    pub fn with_rays(self, rays: f64) -> Self {
+        Self { rays, ..self }
     }
 }
 

@@ -1,0 +1,433 @@
+//! One scene, any method: pictures with their layers in linear light, sequences that keep their history, what it costs, and the
+//! path-traced picture beside it. The one place where studies draw.
+
+use super::{
+    bench::{self, BenchError, BenchOptions, Measurement},
+    hash, projection, truth,
+    truth::Reference,
+};
+use crate::{
+    gi::{Method, rung::Cost},
+    gpu::Gpu,
+    image_io::ImageError,
+    reference::{Kernel, PackError, ReferenceScene, TracerError, TracerOptions},
+    render::{
+        RenderError, Renderer, RendererOptions,
+        capture::{CaptureOptions, CapturedFrame, Layer, Picture, capture_with},
+    },
+    scene::{
+        Camera, Environment, Light, Scene,
+        upload::{SceneGpu, UploadError},
+    },
+};
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Layers of every [`Shot`] unless others are asked for.
+pub const LAYERS: [Layer; 6] =
+    [Layer::DiffDir, Layer::DiffInd, Layer::DiffCol, Layer::Normal, Layer::Depth, Layer::Emit];
+
+/// How a trial draws.
+#[derive(Debug, Clone)]
+pub struct TrialOptions {
+    /// Layers beside the picture.
+    pub layers: Vec<Layer>,
+    /// Temporal anti-aliasing.
+    pub taa: bool,
+    /// Seed of offsets and stochastic patterns.
+    pub seed: u32,
+    /// Folder of references that were traced before; made when it is needed. Without one nothing is kept.
+    pub kept: Option<PathBuf>,
+}
+
+impl Default for TrialOptions {
+    fn default() -> Self {
+        Self { layers: LAYERS.to_vec(), taa: false, seed: 0, kept: None }
+    }
+}
+
+/// How long a still camera looks, and how finely.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settling {
+    /// Frames up to and including the one that is taken, for methods with a history: 1 is the first after a cut.
+    pub frames: u32,
+    /// Jittered frames that are averaged, at least 1.
+    pub samples: u32,
+}
+
+impl Settling {
+    /// The first frame after a cut.
+    pub const COLD: Self = Self { frames: 1, samples: 1 };
+    /// What counts as settled.
+    pub const SETTLED: Self = Self { frames: Method::SETTLED, samples: 1 };
+}
+
+/// What a scene can be changed by without a new upload. Nothing by default.
+#[derive(Debug, Clone, Default)]
+pub struct Edits {
+    /// All lights anew.
+    pub lights: Option<Vec<Light>>,
+    /// Other surroundings.
+    pub environment: Option<Environment>,
+    /// Index of an instance and its new world-from-object matrix.
+    pub placements: Vec<(usize, [[f32; 4]; 4])>,
+}
+
+/// One frame of a sequence.
+#[derive(Debug, Clone)]
+pub struct FrameChange {
+    /// From where it is seen.
+    pub camera: Camera,
+    /// What changes in the scene before it is drawn.
+    pub edits: Edits,
+    /// It has nothing to do with the frame before, and the program says so ([`Renderer::cut`]).
+    pub cut: bool,
+    /// Whether its picture is wanted; one that is not is drawn all the same, but its layers are not read back.
+    pub wanted: bool,
+}
+
+impl FrameChange {
+    /// A frame of an unchanged scene.
+    pub fn still(camera: &Camera) -> Self {
+        Self { camera: camera.clone(), edits: Edits::default(), cut: false, wanted: true }
+    }
+}
+
+/// A picture and what is known of it.
+#[derive(Debug, Clone)]
+pub struct Shot {
+    /// The picture (linear radiance) and the layers that were asked for. `DiffInd` is what the method added, E/π, without
+    /// albedo, as in `render --aov`.
+    pub frame: CapturedFrame,
+    /// Number of the frame in its sequence, from 0.
+    pub number: u32,
+    /// Method that drew, as on the command line.
+    pub drawn_by: &'static str,
+    /// Why another than the one asked for did.
+    pub instead: Option<String>,
+    /// Frames that the answer has settled over, for methods with a history.
+    pub settled: Option<u32>,
+    /// Counted cost of the passes that find and add indirect light.
+    pub costs: Vec<Cost>,
+    /// GPU memory of everything, bytes.
+    pub bytes: u64,
+}
+
+impl Shot {
+    /// The picture as linear red, green and blue.
+    pub fn rgb(&self) -> Vec<f32> {
+        self.frame.beauty.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
+    }
+
+    /// The layer.
+    ///
+    /// # Panics
+    /// If the trial's options do not name it.
+    pub fn layer(&self, layer: Layer) -> &Picture {
+        self.frame.layer(layer).unwrap_or_else(|| panic!("layer {} was not asked for", layer.name()))
+    }
+
+    /// What a GTX 1050 would take for the method by count, milliseconds: a projection, never a measurement.
+    pub fn projected_ms(&self) -> f64 {
+        projection::total_ms(&self.costs, &projection::GTX_1050, projection::EFFICIENCY)
+    }
+}
+
+/// Why a trial failed.
+#[derive(Debug, Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum TrialError {
+    /// The scene does not fit.
+    #[error(transparent)]
+    Upload(#[from] UploadError),
+    /// The path tracer cannot have the scene.
+    #[error(transparent)]
+    Pack(#[from] PackError),
+    /// The path tracer failed.
+    #[error(transparent)]
+    Tracer(#[from] TracerError),
+    /// A frame could not be drawn.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// A measurement failed.
+    #[error(transparent)]
+    Bench(#[from] BenchError),
+    /// A file could not be written.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// A reference could not be kept.
+    #[error("{}: the reference cannot be kept: {reason}", path.display())]
+    Kept { path: PathBuf, reason: String },
+    /// An edit of what is not there.
+    #[error("the scene has {count} instances, so there is no number {index}")]
+    Instance { index: usize, count: usize },
+    /// Whoever watches said so.
+    #[error("stopped")]
+    Stopped,
+}
+
+/// Told the share that is done of a picture or tracing, and asked whether to go on.
+pub type Watch<'a> = Box<dyn Fn(f64) -> bool + 'a>;
+
+/// A scene on a device, ready to be drawn by any method.
+pub struct Trial<'a> {
+    gpu: &'a Gpu,
+    scene: Scene,
+    uploaded: SceneGpu,
+    size: [u32; 2],
+    options: TrialOptions,
+    watch: Watch<'a>,
+    kernel: Option<Kernel>,
+    packed: Option<ReferenceScene>,
+    hash: Option<String>,
+}
+
+impl<'a> Trial<'a> {
+    /// Uploads the scene; pictures will have `size` pixels.
+    ///
+    /// # Errors
+    /// A scene that does not fit on the device.
+    pub fn new(gpu: &'a Gpu, scene: Scene, size: [u32; 2], options: TrialOptions) -> Result<Self, TrialError> {
+        let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
+        let watch: Watch = Box::new(|_| true);
+        Ok(Self { gpu, scene, uploaded, size, options, watch, kernel: None, packed: None, hash: None })
+    }
+
+    /// From now on `watch` is told how far a picture or tracing is, and may stop it.
+    pub fn watched(mut self, watch: impl Fn(f64) -> bool + 'a) -> Self {
+        self.watch = Box::new(watch);
+        self
+    }
+
+    /// References are traced with a kernel that is compiled already: compiling takes longer than a small picture.
+    pub fn share_kernel(&mut self, kernel: Kernel) {
+        self.kernel = Some(kernel);
+    }
+
+    /// The scene as it is drawn now.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Pixels of the pictures.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// The scene's name by content ([`hash::of_scene`]) as it is now.
+    pub fn hash(&mut self) -> &str {
+        self.hash.get_or_insert_with(|| hash::of_scene(&self.scene))
+    }
+
+    /// Changes the scene, for all that is drawn and traced from now on.
+    ///
+    /// # Errors
+    /// An instance that is not there (then nothing has changed); surroundings that do not fit.
+    pub fn edit(&mut self, edits: &Edits) -> Result<(), TrialError> {
+        let Edits { lights, environment, placements } = edits;
+        let count = self.scene.instances.len();
+        if let Some(&(index, _)) = placements.iter().find(|(i, _)| *i >= count) {
+            return Err(TrialError::Instance { index, count });
+        }
+        if lights.is_none() && environment.is_none() && placements.is_empty() {
+            return Ok(());
+        }
+        (self.packed, self.hash) = (None, None);
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        if !placements.is_empty() {
+            placements.iter().for_each(|(i, transform)| self.scene.instances[*i].transform = *transform);
+            self.uploaded.set_placements(queue, &self.scene);
+        }
+        if let Some(lights) = lights {
+            self.scene.lights.clone_from(lights);
+        }
+        match environment {
+            Some(environment) => {
+                self.scene.environment = environment.clone();
+                self.uploaded.set_environment(device, queue, &self.scene)?;
+            }
+            None if lights.is_some() => self.uploaded.set_lights(device, queue, &self.scene),
+            None => {}
+        }
+        Ok(())
+    }
+
+    /// One picture of a still camera, from a renderer that knows nothing yet. Where the scene can have no rays, the rung below
+    /// draws, and [`Shot::instead`] says so.
+    ///
+    /// # Errors
+    /// [`TrialError`].
+    pub fn picture(&mut self, method: &Method, camera: &Camera, settling: Settling) -> Result<Shot, TrialError> {
+        let mut renderer = self.renderer(method)?;
+        let warmup = if method.has_history() || self.options.taa { settling.frames.max(1) - 1 } else { 0 };
+        self.shoot(&mut renderer, camera, settling.samples, warmup, 0)
+    }
+
+    /// `frames` pictures one after the other by one renderer, which keeps its history; `change` says what each frame shows. Each
+    /// is sampled through the pixels' centres. The scene is afterwards as it was before. Only wanted frames are returned.
+    ///
+    /// # Errors
+    /// [`TrialError`].
+    pub fn sequence(
+        &mut self,
+        method: &Method,
+        change: &mut dyn FnMut(u32) -> FrameChange,
+        frames: u32,
+    ) -> Result<Vec<Shot>, TrialError> {
+        let mut shots = Vec::new();
+        self.film(method, change, frames, &mut |shot| shots.push(shot))?;
+        Ok(shots)
+    }
+
+    /// As [`Self::sequence`], handing each wanted picture over as soon as it is there: nothing but one is in memory.
+    ///
+    /// # Errors
+    /// [`TrialError`].
+    pub fn film(
+        &mut self,
+        method: &Method,
+        change: &mut dyn FnMut(u32) -> FrameChange,
+        frames: u32,
+        take: &mut dyn FnMut(Shot),
+    ) -> Result<(), TrialError> {
+        let before = Edits {
+            lights: Some(self.scene.lights.clone()),
+            environment: Some(self.scene.environment.clone()),
+            placements: self.scene.instances.iter().map(|i| i.transform).enumerate().collect(),
+        };
+        let mut edited = false;
+        let mut draw = || -> Result<(), TrialError> {
+            let mut renderer = self.renderer(method)?;
+            for number in 0..frames {
+                let FrameChange { camera, edits, cut, wanted } = change(number);
+                edited |= edits.lights.is_some() || edits.environment.is_some() || !edits.placements.is_empty();
+                self.edit(&edits)?;
+                if cut {
+                    renderer.cut();
+                }
+                if wanted {
+                    take(self.shoot(&mut renderer, &camera, 1, 0, number)?);
+                } else {
+                    self.draw(&mut renderer, &camera)?;
+                }
+                if !(self.watch)(f64::from(number + 1) / f64::from(frames)) {
+                    return Err(TrialError::Stopped);
+                }
+            }
+            Ok(())
+        };
+        let drawn = draw();
+        if edited {
+            self.edit(&before)?;
+        }
+        drawn
+    }
+
+    /// The path-traced picture of `camera`, from the folder of references if it was traced before; `options` from
+    /// [`truth::samples`] or [`truth::until`], with limits of bounces where a comparison needs them.
+    ///
+    /// # Errors
+    /// [`TrialError`].
+    pub fn reference(&mut self, camera: &Camera, options: &TracerOptions) -> Result<Reference, TrialError> {
+        let Some(folder) = self.options.kept.clone() else { return self.trace(camera, options) };
+        let size = self.size;
+        let path = folder.join(truth::file_name(self.hash(), camera, size, options));
+        if let Some(reference) = truth::kept(&path) {
+            return Ok(reference);
+        }
+        let reference = self.trace(camera, options)?;
+        let broken = |e: std::io::Error| TrialError::Kept { path: folder.clone(), reason: e.to_string() };
+        std::fs::create_dir_all(&folder).map_err(broken)?;
+        truth::keep(&path, &reference, &self.gpu.sentence())?;
+        Ok(reference)
+    }
+
+    /// As [`Self::reference`], traced now and not kept: for its seconds.
+    ///
+    /// # Errors
+    /// [`TrialError`].
+    pub fn trace(&mut self, camera: &Camera, options: &TracerOptions) -> Result<Reference, TrialError> {
+        let gpu = self.gpu;
+        let kernel = self.kernel.get_or_insert_with(|| Kernel::new(&gpu.device));
+        if self.packed.is_none() {
+            self.packed = Some(ReferenceScene::new(&gpu.device, &gpu.queue, &self.scene)?);
+        }
+        let packed = self.packed.as_ref().expect("it was made above");
+        truth::trace(gpu, kernel, packed, (camera, self.size), options, &self.watch)
+    }
+
+    /// What the method costs here, frame after frame of a still camera.
+    ///
+    /// # Errors
+    /// [`TrialError`].
+    pub fn measure(
+        &mut self,
+        method: &Method,
+        camera: &Camera,
+        options: BenchOptions,
+    ) -> Result<Measurement, TrialError> {
+        let mut renderer = self.renderer(method)?;
+        Ok(bench::measure(self.gpu, &mut renderer, &self.uploaded, camera, options)?)
+    }
+
+    /// The same where each frame is the first after a cut.
+    ///
+    /// # Errors
+    /// [`TrialError`].
+    pub fn measure_cuts(
+        &mut self,
+        method: &Method,
+        camera: &Camera,
+        options: BenchOptions,
+    ) -> Result<Measurement, TrialError> {
+        let mut renderer = self.renderer(method)?;
+        Ok(bench::measure_cuts(self.gpu, &mut renderer, &self.uploaded, camera, options)?)
+    }
+
+    /// A renderer that knows nothing yet; rays are made when the first method asks for them.
+    fn renderer(&mut self, method: &Method) -> Result<Renderer, TrialError> {
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        if method.needs_rays() && self.uploaded.rays.is_none() && self.uploaded.no_rays.is_none() {
+            // Where they cannot be had, the rung below draws, and each shot says so.
+            let _ = self.uploaded.trace(device, queue, &self.scene);
+        }
+        let options = RendererOptions { method: method.clone(), taa: self.options.taa, ..Default::default() };
+        Ok(Renderer::new(device, queue, self.size, options)?)
+    }
+
+    fn shoot(
+        &self,
+        renderer: &mut Renderer,
+        camera: &Camera,
+        samples: u32,
+        warmup: u32,
+        number: u32,
+    ) -> Result<Shot, TrialError> {
+        let options = CaptureOptions { samples, seed: self.options.seed, layers: &self.options.layers, warmup };
+        let (mut done, all) = (0, f64::from(samples + warmup));
+        let alone = all > 1.0;
+        let frame = capture_with(self.gpu, renderer, &self.uploaded, camera, options, &mut || {
+            done += 1;
+            // A single frame is a step of a sequence, which tells of itself.
+            !alone || (self.watch)(f64::from(done) / all)
+        })?;
+        let instead = renderer.instead().map(|i| self.uploaded.no_rays.clone().unwrap_or_else(|| i.why.to_owned()));
+        let bytes = renderer.bytes().iter().map(|(_, b)| b).sum::<u64>() + self.uploaded.bytes();
+        Ok(Shot {
+            frame: frame.ok_or(TrialError::Stopped)?,
+            number,
+            drawn_by: renderer.drawn_by(),
+            instead,
+            settled: renderer.settled(),
+            costs: renderer.costs(),
+            bytes,
+        })
+    }
+
+    /// A frame whose layers nobody reads, but waited for: drivers let thousands of them pile up otherwise.
+    fn draw(&self, renderer: &mut Renderer, camera: &Camera) -> Result<(), TrialError> {
+        let options = CaptureOptions { samples: 1, seed: self.options.seed, layers: &[], warmup: 0 };
+        capture_with(self.gpu, renderer, &self.uploaded, camera, options, &mut || true)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,99 @@
+//! `bouncelight chart` from the command line: a small chart, taken up again, with a scene that fails.
+#![cfg(feature = "cli")]
+
+use assert_cmd::Command;
+use std::path::Path;
+
+fn chart(out: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
+    let mut command = Command::cargo_bin("bouncelight").expect("it was built");
+    command.args(["chart", "--out"]).arg(out).args([
+        "--methods",
+        "direct,ambient",
+        "--size",
+        "64x32",
+        "--samples",
+        "1",
+        "--frames",
+        "1",
+        "--warmup",
+        "1",
+        "--error",
+        "0.5",
+        "--most-samples",
+        "32",
+        "--paths",
+        "4",
+        "--no-generator",
+    ]);
+    command.args(more).assert()
+}
+
+fn json(out: &Path) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(out.join("chart.json")).expect("written")).expect("JSON")
+}
+
+#[test]
+fn a_small_chart_is_made_and_taken_up_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let page = folder.path().join("results.md");
+    let scenes = ["--scenes", "cornell,paper-room:7", "--page", page.to_str().expect("a plain path")];
+    let done = chart(&out, &scenes).success();
+    let said = String::from_utf8_lossy(&done.get_output().stdout).into_owned();
+    assert!(said.contains("projected") && said.contains("never measured") && said.contains("ambient"), "{said}");
+    let record = json(&out);
+    assert_eq!(record["schema"], 1);
+    // Two methods and two counts of paths in two scenes.
+    let units = record["units"].as_array().expect("a list");
+    assert_eq!(units.len(), 8);
+    let light = |entry: &str, scene: &str| {
+        let unit = units.iter().find(|u| u["entry"] == entry && u["scene"] == scene).expect("it is there");
+        unit["scores"]["light"].as_f64().expect("a number")
+    };
+    assert!((light("direct", "paper-room:7") - 1.0).abs() < 1e-6, "no light is all of it missing");
+    assert!(light("ambient", "paper-room:7") < 0.8);
+    assert!(light("4 paths", "paper-room:7") < light("1 path", "paper-room:7"));
+    for text in ["device", "provenance", "scenes"] {
+        assert!(!record[text].is_null(), "{text}");
+    }
+    let csv = std::fs::read_to_string(out.join("chart.csv")).expect("written");
+    let columns = csv.lines().next().expect("a head").split(',').count();
+    assert_eq!(csv.lines().count(), 9);
+    assert!(csv.lines().all(|l| l.split(',').count() >= columns), "{csv}");
+    let svg = std::fs::read_to_string(out.join("chart.svg")).expect("written");
+    assert!(svg.contains("PROJECTED, NOT MEASURED") && svg.contains("<desc>") && svg.contains("ambient"));
+    let png = bouncelight::image_io::read_png(&out.join("chart.png")).expect("a picture");
+    assert!(png.width == 2560 && png.pixels.iter().any(|v| *v < 0.5));
+    let words = std::fs::read_to_string(&page).expect("written");
+    assert!(words.contains("(out/chart.svg)") && words.contains("Frontier as measured here"), "{words}");
+    // Again: everything is kept, times to the last digit.
+    let again = chart(&out, &scenes).success();
+    assert_eq!(json(&out)["units"], record["units"]);
+    assert!(String::from_utf8_lossy(&again.get_output().stderr).find("warning").is_none());
+    // One more method leaves the others alone; a scene that cannot be read fails at the end and loses nothing.
+    let broken = folder.path().join("broken.glb");
+    std::fs::write(&broken, "no scene").expect("writable");
+    let scenes = format!("cornell,paper-room:7,{}", broken.display());
+    let failed = chart(&out, &["--scenes", &scenes]).code(1);
+    let said = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
+    assert!(said.contains("broken") && said.contains("the others are charted"), "{said}");
+    assert_eq!(json(&out)["units"].as_array().map(Vec::len), Some(8));
+    assert_eq!(json(&out)["scenes"].as_array().map(Vec::len), Some(3));
+}
+
+#[test]
+fn what_cannot_be_is_refused_before_the_work() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let empty = folder.path().join("empty");
+    std::fs::create_dir(&empty).expect("a folder");
+    let out = folder.path().join("out");
+    let refused = chart(&out, &["--scenes", empty.to_str().expect("plain")]).code(2);
+    assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("no references here"));
+    chart(&out, &["--weights", "/nowhere/w.safetensors"]).code(4);
+    std::fs::create_dir_all(&out).expect("a folder");
+    std::fs::write(out.join("chart.json"), "{}").expect("writable");
+    let refused = chart(&out, &["--scenes", "cornell"]).code(1);
+    assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("no record of `chart`"));
+    let mut command = Command::cargo_bin("bouncelight").expect("it was built");
+    command.args(["chart", "--out", "x", "--methods", "magic"]).assert().code(2);
+}
