@@ -28,7 +28,7 @@ pub static SWITCH: Test = Test {
     ],
     control: Fault::Late(0.93),
     size: SMALL,
-    paths: 256,
+    paths: 16,
     pictures: false,
     run: |play| {
         let lamp = |w: f32| rooms::lamp([1.5, 3.0, 0.5], w);
@@ -77,7 +77,7 @@ pub static SWEEP: Test = Test {
     ],
     control: Fault::Late(0.93),
     size: SMALL,
-    paths: 512,
+    paths: 16,
     pictures: false,
     run: |play| {
         let lamp = |i: usize| rooms::lamp([-3.0 + 0.25 * i as f32, 2.5, 1.5], 10.0);
@@ -131,7 +131,7 @@ pub static DOOR: Test = Test {
     ],
     control: Fault::Late(0.95),
     size: SMALL,
-    paths: 1024,
+    paths: 16,
     pictures: false,
     run: |play| {
         let mut rooms_ =

@@ -23,7 +23,7 @@ pub static ALBEDO: Test = Test {
     ],
     control: Fault::Gain(1.5),
     size: SMALL,
-    paths: 256,
+    paths: 48,
     pictures: false,
     run: |play| {
         let camera = rooms::hall_camera();
@@ -57,7 +57,7 @@ pub static FURNACE: Test = Test {
     ],
     control: Fault::Gain(1.1),
     size: SMALL,
-    paths: 64,
+    paths: 16,
     pictures: false,
     run: |play| {
         let camera = Camera::look_at([-1.5, 1.8, 1.2], [1.0, 1.1, -1.0], 1.2);
@@ -89,7 +89,7 @@ pub static SEALED: Test = Test {
     }],
     control: Fault::Leak(0.01),
     size: SMALL,
-    paths: 64,
+    paths: 16,
     pictures: false,
     run: |play| {
         let blocks = rooms::shell([-3.0, 0.0, -3.0], [3.0, 3.0, 3.0], rooms::GREY);
@@ -112,7 +112,7 @@ pub static THIN_WALL: Test = Test {
     }],
     control: Fault::Leak(0.01),
     size: SMALL,
-    paths: 64,
+    paths: 16,
     pictures: false,
     run: |play| {
         let rooms =
@@ -139,7 +139,7 @@ pub static CORNER: Test = Test {
     ],
     control: Fault::Screen(1.0),
     size: SMALL,
-    paths: 1024,
+    paths: 64,
     pictures: false,
     run: |play| {
         let (scene, camera) = corridor();

@@ -27,7 +27,7 @@ pub static METAL: Test = Test {
     ],
     control: Fault::Gain(2.0),
     size: SIZE,
-    paths: 256,
+    paths: 128,
     pictures: false,
     run: |play| against_truth(play, [0.3, 0.5, 0.75, 1.0]),
 };
@@ -51,7 +51,7 @@ pub static MIRROR: Test = Test {
     ],
     control: Fault::Gain(2.0),
     size: SIZE,
-    paths: 256,
+    paths: 128,
     pictures: false,
     run: |play| against_truth(play, [0.0, 0.05, 0.1, 0.15]),
 };

@@ -18,7 +18,7 @@ pub static FLAT: Test = Test {
     }],
     control: Fault::Screen(0.5),
     size: PAPER,
-    paths: 64,
+    paths: 8,
     pictures: true,
     run: |play| {
         // Nothing but a floor under the sky and a sun: the same light everywhere.
@@ -36,7 +36,7 @@ pub static HALF: Test = Test {
     limits: &[Limit { name: "difference", unit: Unit::Share, at_most: 0.005, source: "ten steps of a half float" }],
     control: Fault::Noise(0.1),
     size: SMALL,
-    paths: 16,
+    paths: 8,
     pictures: false,
     run: |play| {
         let (scene, camera) =
@@ -69,7 +69,7 @@ pub static UNSEEN: Test = Test {
     }],
     control: Fault::Gain(1.3),
     size: [128, 64],
-    paths: 512,
+    paths: 128,
     pictures: false,
     run: |play| {
         let (scene, camera) = still_life();

@@ -21,7 +21,7 @@ pub static FROZEN: Test = Test {
     ],
     control: Fault::Noise(0.1),
     size: SMALL,
-    paths: 32,
+    paths: 16,
     pictures: false,
     run: |play| {
         at_rest(play, &rooms::hall(rooms::GREY, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.02), &rooms::hall_camera(), 100)
@@ -48,7 +48,7 @@ pub static DARK_ROOM: Test = Test {
     ],
     control: Fault::Noise(0.1),
     size: SMALL,
-    paths: 256,
+    paths: 16,
     pictures: false,
     run: |play| {
         let (room, camera) = dark_room();
@@ -67,7 +67,7 @@ pub static REPEAT: Test = Test {
     }],
     control: Fault::Noise(0.01),
     size: PAPER,
-    paths: 16,
+    paths: 4,
     pictures: true,
     run: |play| {
         let hall = rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.05);

@@ -91,7 +91,7 @@ pub static BROKEN: Test = Test {
     ],
     control: Fault::Broken,
     size: SMALL,
-    paths: 64,
+    paths: 16,
     pictures: false,
     run: |play| {
         let camera = rooms::hall_camera();

@@ -10,7 +10,12 @@ pub static RED_WALL: Test = Test {
     name: "red-wall",
     question: "Does a sunlit red wall still light the floor when it has left the picture?",
     limits: &[
-        Limit { name: "change of light at the same places", unit: Unit::Share, at_most: 0.05, source: SAME },
+        Limit {
+            name: "change of light at the same places, over 4×4 pixels",
+            unit: Unit::Share,
+            at_most: 0.05,
+            source: SAME,
+        },
         Limit {
             name: "change of red over green there",
             unit: Unit::Share,
@@ -20,7 +25,7 @@ pub static RED_WALL: Test = Test {
     ],
     control: Fault::Screen(0.5),
     size: PAPER,
-    paths: 256,
+    paths: 24,
     pictures: true,
     run: |play| {
         let hall = rooms::hall(rooms::RED, &[rooms::sun([0.0, -0.6, 0.8], 3.0)], 0.05);
@@ -44,10 +49,15 @@ pub static RED_WALL: Test = Test {
 pub static CROP: Test = Test {
     name: "crop",
     question: "Do the same pixels show the same light in a narrower picture?",
-    limits: &[Limit { name: "change of light at the same places", unit: Unit::Share, at_most: 0.05, source: SAME }],
+    limits: &[Limit {
+        name: "change of light at the same places, over 4×4 pixels",
+        unit: Unit::Share,
+        at_most: 0.05,
+        source: SAME,
+    }],
     control: Fault::Screen(0.5),
     size: PAPER,
-    paths: 512,
+    paths: 24,
     pictures: true,
     run: |play| {
         let hall = rooms::hall([0.9, 0.1, 0.1], &[rooms::sun(rooms::BACKWARDS, 3.0)], 0.05);
@@ -63,10 +73,15 @@ pub static CROP: Test = Test {
 pub static TWO_PLACES: Test = Test {
     name: "two-places",
     question: "Are the same surfaces equally bright from two places?",
-    limits: &[Limit { name: "change of light at the same places", unit: Unit::Share, at_most: 0.05, source: SAME }],
+    limits: &[Limit {
+        name: "change of light at the same places, over 4×4 pixels",
+        unit: Unit::Share,
+        at_most: 0.05,
+        source: SAME,
+    }],
     control: Fault::Screen(0.5),
     size: SMALL,
-    paths: 1024,
+    paths: 96,
     pictures: false,
     run: |play| {
         let hall = rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 3.0)], 0.05);
