@@ -42,6 +42,9 @@ pub enum CliError {
         /// What was allowed.
         threshold: f64,
     },
+    /// A method fails tests that it has to pass.
+    #[error("above the threshold: {0}")]
+    Unstable(String),
     /// A benchmark came out slower than its base by more than allowed.
     #[error("{0}")]
     TooSlow(String),
@@ -69,7 +72,7 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
         if let Some(e) = cause.downcast_ref::<CliError>() {
             return match e {
                 CliError::Usage(_) => USAGE,
-                CliError::AboveThreshold { .. } => ABOVE_THRESHOLD,
+                CliError::AboveThreshold { .. } | CliError::Unstable(_) => ABOVE_THRESHOLD,
                 CliError::TooSlow(_) => TOO_SLOW,
                 CliError::Interrupted => INTERRUPTED,
             };

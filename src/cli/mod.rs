@@ -20,6 +20,7 @@ mod progress;
 mod reference;
 mod render;
 mod sequence;
+mod stability;
 mod stdout;
 mod tuned;
 #[cfg(feature = "viewer")]
@@ -53,6 +54,8 @@ enum Command {
     Chart(chart::Args),
     /// Compare two pictures with the paper's metrics and the usual ones.
     Compare(compare::Args),
+    /// Test methods where they are known to fail: light switched, doors shut, walls of 2 cm, and so on.
+    Stability(stability::Args),
     /// Write network inputs of the paper's rooms, for training.
     Dataset(dataset::Args),
     /// Find the cheapest method that is good enough for a scene, and keep it beside the scene.
@@ -76,6 +79,7 @@ impl Command {
             Command::Render(a) => a.runs_network(),
             Command::Bench(a) => a.runs_network(),
             Command::Apply(_) | Command::Demo(_) | Command::Fit(_) => true,
+            Command::Stability(a) => a.runs_network(),
             Command::Chart(a) => a.runs_network(),
             Command::Weights(a) => a.runs_network(),
             Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) => false,
@@ -109,6 +113,7 @@ pub fn main() -> ExitCode {
         Command::Compare(a) => compare::run(a),
         Command::Dataset(a) => dataset::run(&cli.global, a),
         Command::Fit(a) => fit::run(&cli.global, a),
+        Command::Stability(a) => stability::run(&cli.global, a),
         Command::Apply(a) => apply::run(&cli.global, a),
         Command::Weights(a) => weights::run(&cli.global, a),
         Command::Demo(a) => demo::run(&cli.global, a),

@@ -11,7 +11,7 @@ mod whole;
 
 pub use error::ImageError;
 pub use exr::{read_exr, write_exr};
-pub use png::{decode_png, read_png, read_png_with_metadata, write_png};
+pub use png::{decode_png, read_png, read_png_with_metadata, write_apng, write_png};
 pub use whole::{check_writable, write_whole};
 
 use std::path::{Path, PathBuf};

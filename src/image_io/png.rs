@@ -47,6 +47,34 @@ fn encode(path: &Path, w: u32, h: u32, rgb: &[u8], metadata: &[(String, String)]
     Ok(bytes)
 }
 
+/// Writes frames of one size (display-encoded sRGB bytes, rows from the top) as an animated PNG that repeats for ever. Programs that
+/// know no animation show the first. The file appears whole or not at all.
+///
+/// # Errors
+/// No frame, no pixels, a frame of wrong length, or a failed write.
+pub fn write_apng(path: &Path, size: [u32; 2], frames: &[&[u8]], frame_ms: u16) -> Result<(), ImageError> {
+    let failed = |e: png::EncodingError| ImageError::shape(path, e.to_string());
+    let [width, height] = size;
+    let bytes = 3 * u64::from(width) * u64::from(height);
+    if let Some(wrong) = frames.iter().find(|f| f.len() as u64 != bytes) {
+        return Err(ImageError::shape(path, format!("{} bytes are not {width}×{height} RGB pixels", wrong.len())));
+    }
+    let count = u32::try_from(frames.len()).unwrap_or(u32::MAX);
+    let mut file = Vec::new();
+    let mut encoder = Encoder::new(&mut file, width, height);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    encoder.set_animated(count, 0).map_err(failed)?;
+    encoder.set_frame_delay(frame_ms, 1000).map_err(failed)?;
+    let mut writer = encoder.write_header().map_err(failed)?;
+    for frame in frames {
+        writer.write_image_data(frame).map_err(failed)?;
+    }
+    writer.finish().map_err(failed)?;
+    write_whole(path, &file)
+}
+
 /// Reads a PNG of any kind as f32 in [0, 1], display-encoded as stored: 3 channels, or 4 where it has transparency.
 /// Grey and palette pictures are widened to RGB; 8 bits divide by 255, 16 bits by 65535.
 ///

@@ -19,6 +19,8 @@ pub mod motion;
 pub mod projection;
 pub mod ratios;
 pub mod rays;
+#[cfg(all(feature = "io", feature = "reference"))]
+pub mod stability;
 #[cfg(feature = "reference")]
 pub mod target;
 #[cfg(all(feature = "io", feature = "reference"))]

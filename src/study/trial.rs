@@ -215,6 +215,11 @@ impl<'a> Trial<'a> {
         self
     }
 
+    /// References are traced with a kernel that is compiled already: compiling takes longer than a small picture.
+    pub fn share_kernel(&mut self, kernel: Kernel) {
+        self.kernel = Some(kernel);
+    }
+
     /// The scene as it is drawn now.
     pub fn scene(&self) -> &Scene {
         &self.scene

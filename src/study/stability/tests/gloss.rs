@@ -1,0 +1,91 @@
+//! Metal and mirrors: pictures, since what they show is no diffuse light.
+
+use super::super::{Fault, Limit, Look, Play, StabilityError, Test, Unit, measures, rooms};
+use super::LONG;
+use crate::metrics::{Picture, flip};
+use crate::scene::{Camera, Material, Scene, shapes::Shape};
+use glam::{Quat, Vec3};
+
+const SIZE: [u32; 2] = [128, 64];
+
+pub static METAL: Test = Test {
+    name: "metal",
+    question: "Do metals of roughness 0.3 to 1 show what is around them?",
+    limits: &[
+        Limit {
+            name: "HDR-FLIP on the metal against the truth",
+            unit: Unit::Flip,
+            at_most: 0.25,
+            source: "FLIP of `ssgi`'s whole pictures is 0.15 to 0.34 (docs/accuracy.md); HDR-FLIP takes the worst exposure",
+        },
+        Limit {
+            name: "all light from the metal against the truth",
+            unit: Unit::Share,
+            at_most: 0.15,
+            source: "a fifth of a stop",
+        },
+    ],
+    control: Fault::Gain(2.0),
+    size: SIZE,
+    paths: 128,
+    pictures: false,
+    run: |play| against_truth(play, [0.3, 0.5, 0.75, 1.0]),
+};
+
+pub static MIRROR: Test = Test {
+    name: "mirror",
+    question: "Do mirrors (roughness 0 to 0.15) show what is around them?",
+    limits: &[
+        Limit {
+            name: "HDR-FLIP on the mirror against the truth",
+            unit: Unit::Flip,
+            at_most: 0.25,
+            source: "as for rough metal",
+        },
+        Limit {
+            name: "all light from the mirror against the truth",
+            unit: Unit::Share,
+            at_most: 0.15,
+            source: "a fifth of a stop",
+        },
+    ],
+    control: Fault::Gain(2.0),
+    size: SIZE,
+    paths: 128,
+    pictures: false,
+    run: |play| against_truth(play, [0.0, 0.05, 0.1, 0.15]),
+};
+
+/// Four metal balls in a sunlit hall, one material each; the red wall that they mirror is behind the camera.
+fn balls(roughness: [f32; 4]) -> (Scene, Camera) {
+    let mut hall = rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 3.0)], 0.3);
+    for (i, roughness) in roughness.into_iter().enumerate() {
+        let material = Material { base_color: [0.9, 0.9, 0.9, 1.0], metallic: 1.0, roughness, ..Material::default() };
+        let at = Vec3::new(-1.65 + 1.1 * i as f32, 0.5, 0.8);
+        rooms::body(&mut hall, Shape::UvSphere, at, Vec3::splat(0.5), Quat::IDENTITY, material);
+    }
+    (hall, Camera::look_at([0.0, 1.1, 4.0], [0.0, 0.5, 0.8], 0.5))
+}
+
+fn against_truth(play: &Play<'_>, roughness: [f32; 4]) -> Result<Vec<f64>, StabilityError> {
+    let (scene, camera) = balls(roughness);
+    let look = play.settled(&scene, &camera, LONG)?;
+    let truth = play.truth(&scene, &camera)?;
+    play.keep("settled", &look);
+    // The balls are nearer than all else in the picture.
+    let mask: Vec<bool> = ball_pixels(&truth);
+    let [w, h] = look.size.map(|n| n as usize);
+    let (ours, theirs) = (Picture::new("picture", w, h, &look.rgb)?, Picture::new("truth", w, h, &truth.rgb)?);
+    let (map, _) = flip::hdr_flip(ours, theirs, flip::PIXELS_PER_DEGREE)?;
+    let sum = |look: &Look| -> f64 {
+        let inside = look.rgb.chunks_exact(3).zip(&mask).filter(|(_, m)| **m);
+        inside.map(|(p, _)| f64::from(p.iter().sum::<f32>())).sum()
+    };
+    Ok(vec![measures::masked_mean(&map.values, &mask), (sum(&look) / sum(&truth) - 1.0).abs()])
+}
+
+/// Pixels within the balls, by place.
+fn ball_pixels(look: &Look) -> Vec<bool> {
+    let within = |p: Vec3| (0..4).any(|i| p.distance(Vec3::new(-1.65 + 1.1 * i as f32, 0.5, 0.8)) < 0.505);
+    look.positions().into_iter().map(|p| p.is_some_and(within)).collect()
+}
