@@ -35,6 +35,7 @@ pub mod net;
 pub mod reference;
 pub mod render;
 pub mod scene;
+mod srgb;
 pub mod study;
 
 #[cfg(feature = "cli")]

@@ -1,29 +1,12 @@
 //! The program as a user meets it: exit codes, messages, files that appear or do not.
 
 mod common;
+#[path = "common/program.rs"]
+mod program;
 
 use assert_cmd::Command;
+use program::{bouncelight, fails, path};
 use std::path::Path;
-
-fn bouncelight(args: &[&str]) -> std::process::Output {
-    Command::new(env!("CARGO_BIN_EXE_bouncelight")).args(args).output().expect("the program starts")
-}
-
-/// Runs and checks the exit code and that standard error holds every one of `words`; never a panic message.
-#[track_caller]
-fn fails(args: &[&str], code: i32, words: &[&str]) {
-    let out = bouncelight(args);
-    let text = String::from_utf8_lossy(&out.stderr);
-    assert_eq!(out.status.code(), Some(code), "{args:?}: {text}");
-    assert!(!text.contains("panicked"), "{args:?}: {text}");
-    for word in words {
-        assert!(text.contains(word), "{args:?}: `{word}` is missing in: {text}");
-    }
-}
-
-fn path(dir: &tempfile::TempDir, name: &str) -> String {
-    dir.path().join(name).to_str().expect("a temporary path is text").into()
-}
 
 fn is_empty(dir: &Path) -> bool {
     std::fs::read_dir(dir).expect("the folder exists").next().is_none()

@@ -1,13 +1,11 @@
 //! `dataset` as a user meets it: shards, checksums, what a sample's file holds.
 
 mod common;
+#[path = "common/program.rs"]
+mod program;
 
-use assert_cmd::Command;
+use program::bouncelight;
 use std::path::Path;
-
-fn bouncelight(args: &[&str]) -> std::process::Output {
-    Command::new(env!("CARGO_BIN_EXE_bouncelight")).args(args).output().expect("the program starts")
-}
 
 #[test]
 fn a_dataset_is_made_in_shards_with_its_light_and_checksums() {

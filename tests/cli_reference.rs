@@ -1,25 +1,13 @@
 //! `render --method reference` as a user meets it: flags, metadata, exit codes, files that appear or do not.
 
 mod common;
+#[path = "common/program.rs"]
+mod program;
 
 use assert_cmd::Command;
 use bouncelight::image_io::{Layers, read_exr};
+use program::{bouncelight, fails};
 use std::path::Path;
-
-fn bouncelight(args: &[&str]) -> std::process::Output {
-    Command::new(env!("CARGO_BIN_EXE_bouncelight")).args(args).output().expect("the program starts")
-}
-
-#[track_caller]
-fn fails(args: &[&str], code: i32, words: &[&str]) {
-    let out = bouncelight(args);
-    let text = String::from_utf8_lossy(&out.stderr);
-    assert_eq!(out.status.code(), Some(code), "{args:?}: {text}");
-    assert!(!text.contains("panicked"), "{args:?}: {text}");
-    for word in words {
-        assert!(text.contains(word), "{args:?}: `{word}` is missing in: {text}");
-    }
-}
 
 /// Renders the Cornell box with `flags` into `name`; gives the file and what was said.
 #[track_caller]

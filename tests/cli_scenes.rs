@@ -1,27 +1,10 @@
 //! Scenes as the command line meets them: what they may name, scenes of nothing, surroundings that replace default light.
 
-use assert_cmd::Command;
+#[path = "common/program.rs"]
+mod program;
+
+use program::{bouncelight, fails, path};
 use std::path::Path;
-
-fn bouncelight(args: &[&str]) -> std::process::Output {
-    Command::new(env!("CARGO_BIN_EXE_bouncelight")).args(args).output().expect("the program starts")
-}
-
-/// Runs and checks the exit code and that standard error holds every one of `words`; never a panic message.
-#[track_caller]
-fn fails(args: &[&str], code: i32, words: &[&str]) {
-    let out = bouncelight(args);
-    let text = String::from_utf8_lossy(&out.stderr);
-    assert_eq!(out.status.code(), Some(code), "{args:?}: {text}");
-    assert!(!text.contains("panicked"), "{args:?}: {text}");
-    for word in words {
-        assert!(text.contains(word), "{args:?}: `{word}` is missing in: {text}");
-    }
-}
-
-fn path(dir: &tempfile::TempDir, name: &str) -> String {
-    dir.path().join(name).to_str().expect("a temporary path is text").into()
-}
 
 /// Three positions, a triangle; whatever else a test needs comes in `more`.
 fn triangle(dir: &tempfile::TempDir, name: &str, more: &str) -> String {

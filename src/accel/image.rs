@@ -1,7 +1,7 @@
 //! Pictures made small, for what rays see of them: linear colours, and for cut-out materials the share of each texel that is
 //! above the cutoff.
 
-use crate::scene::{AlphaMode, ColorSpace, Image, Material, Sampler, Scene, TextureRef, Wrap};
+use crate::scene::{AlphaMode, Image, Material, Sampler, Scene, TextureRef, Wrap};
 use glam::Vec2;
 use std::{collections::HashMap, sync::Arc};
 
@@ -24,7 +24,7 @@ impl Reduced {
         }
         let step = width.max(height).div_ceil(SIDE).max(1);
         let size = [width.div_ceil(step), height.div_ceil(step)];
-        let linear: Vec<f32> = (0..256).map(|b| decoded(b as f32 / 255.0, image.color_space)).collect();
+        let linear: Vec<f32> = (0..256).map(|b| image.color_space.decode(b as f32 / 255.0)).collect();
         let mut texels = Vec::with_capacity(size[0] * size[1]);
         for y in 0..size[1] {
             for x in 0..size[0] {
@@ -65,14 +65,6 @@ impl Reduced {
         };
         let [x, y] = [0, 1].map(|i| place([at.x, at.y][i], sampler.wrap[i], self.size[i]));
         self.texels[y * self.size[0] + x]
-    }
-}
-
-fn decoded(v: f32, space: ColorSpace) -> f32 {
-    match space {
-        ColorSpace::Linear => v,
-        ColorSpace::Srgb if v <= 0.040_45 => v / 12.92,
-        ColorSpace::Srgb => ((v + 0.055) / 1.055).powf(2.4),
     }
 }
 

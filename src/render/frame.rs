@@ -142,14 +142,6 @@ impl Renderer {
         Ok(())
     }
 
-    /// Changes how indirect light is found; builds the new method's pipelines and buffers.
-    pub fn set_method(&mut self, queue: &wgpu::Queue, method: &gi::Method) -> Result<(), RenderError> {
-        self.indirect = method::build(&self.device, queue, self.targets.size, method)?;
-        self.method = method.name();
-        self.cut();
-        Ok(())
-    }
-
     /// The next frame has nothing to do with the last (a cut): no object has moved since, and temporal anti-aliasing starts
     /// anew.
     pub fn cut(&mut self) {

@@ -15,6 +15,7 @@
 //! the mean; between nodes the darkest channel of saturated colours goes astray there. Blender's Neutral is a table, too.
 //! Negative components count as zero (Blender bends them into the gamut), NaN as zero, light above 65504 as 65504.
 
+use crate::srgb;
 use std::fmt;
 use std::str::FromStr;
 
@@ -54,7 +55,7 @@ impl Tonemap {
             Tonemap::Filmic => filmic(light),
             Tonemap::Agx => agx(light),
             Tonemap::Neutral => neutral(light),
-            Tonemap::None => light.map(srgb_oetf),
+            Tonemap::None => light.map(srgb::encode),
         }
     }
 
@@ -87,12 +88,6 @@ impl FromStr for Tonemap {
 
 /// Largest half float: what a picture can hold.
 const LIGHT_MAX: f32 = 65504.0;
-
-/// sRGB's transfer function (IEC 61966-2-1), clamped to [0, 1].
-pub fn srgb_oetf(linear: f32) -> f32 {
-    let v = linear.clamp(0.0, 1.0);
-    if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
-}
 
 /// Black lies at 2^-12.47, white 16.5 stops above. Far above white Blender's table desaturates: the darker channels are
 /// drawn towards the brightest. Then one curve for each channel over the logarithm, here a fitted rational function.
@@ -143,7 +138,7 @@ fn agx(light: [f32; 3]) -> [f32; 3] {
     let raise = (-min3(out)).max(0.0);
     let raised = out.map(|v| v + raise);
     let scale = (agx_weight(out) / agx_weight(raised).max(1e-9)).min(1.0);
-    raised.map(|v| srgb_oetf(v * scale))
+    raised.map(|v| srgb::encode(v * scale))
 }
 
 /// Hyperbolas of power 1.5 below and above middle grey, where display value and slope are given (0.18^(1/2.4), 2.4);
@@ -173,11 +168,11 @@ fn neutral(light: [f32; 3]) -> [f32; 3] {
     let base = light.map(|v| v - offset);
     let peak = max3(base);
     if peak < 0.76 {
-        return base.map(srgb_oetf);
+        return base.map(srgb::encode);
     }
     let top = 1.0 - 0.0576 / (peak - 0.52);
     let keep = 1.0 / (0.15 * (peak - top) + 1.0);
-    base.map(|v| srgb_oetf(top + (v * top / peak - top) * keep))
+    base.map(|v| srgb::encode(top + (v * top / peak - top) * keep))
 }
 
 fn mul(m: [[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {

@@ -14,8 +14,7 @@
 use glam::{Mat4, Vec3};
 
 use super::{
-    AlphaMode, Camera, ColorSpace, Environment, Instance, Light, LightKind, Material, SUN_ANGLE, Scene,
-    bounds::world_bounds,
+    AlphaMode, Camera, Environment, Instance, Light, LightKind, Material, SUN_ANGLE, Scene, bounds::world_bounds,
 };
 
 /// Vertical field of view of the framing camera, radians (45°).
@@ -286,15 +285,7 @@ pub(crate) fn mean_emission(scene: &Scene, material: &Material) -> Vec3 {
         return Vec3::ZERO;
     }
     let Some(image) = material.emissive_texture.and_then(|t| scene.images.get(t.image)) else { return Vec3::ONE };
-    let decode = |byte: u8| {
-        let v = f32::from(byte) / 255.0;
-        match image.color_space {
-            ColorSpace::Linear => v,
-            ColorSpace::Srgb if v <= 0.040_45 => v / 12.92,
-            ColorSpace::Srgb => ((v + 0.055) / 1.055).powf(2.4),
-        }
-    };
-    let table: Vec<f64> = (0..=255).map(|b| f64::from(decode(b))).collect();
+    let table: Vec<f64> = (0..=255u8).map(|b| f64::from(image.color_space.decode(f32::from(b) / 255.0))).collect();
     let mut sum = [0.0f64; 3];
     for pixel in image.rgba.chunks_exact(4) {
         (0..3).for_each(|c| sum[c] += table[usize::from(pixel[c])]);

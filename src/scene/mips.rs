@@ -38,19 +38,13 @@ impl Level<'_> {
 }
 
 fn decode(byte: u8, space: ColorSpace) -> f32 {
-    let x = f32::from(byte) / 255.0;
-    match space {
-        ColorSpace::Linear => x,
-        ColorSpace::Srgb if x <= 0.04045 => x / 12.92,
-        ColorSpace::Srgb => ((x + 0.055) / 1.055).powf(2.4),
-    }
+    space.decode(f32::from(byte) / 255.0)
 }
 
 fn encode(x: f32, space: ColorSpace) -> u8 {
     let y = match space {
         ColorSpace::Linear => x,
-        ColorSpace::Srgb if x <= 0.003_130_8 => x * 12.92,
-        ColorSpace::Srgb => 1.055 * x.powf(1.0 / 2.4) - 0.055,
+        ColorSpace::Srgb => crate::srgb::encode(x),
     };
     (y * 255.0).round().clamp(0.0, 255.0) as u8
 }

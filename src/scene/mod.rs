@@ -275,6 +275,16 @@ pub enum ColorSpace {
     Linear,
 }
 
+impl ColorSpace {
+    /// Linear value of red, green or blue, in [0, 1] both.
+    pub fn decode(self, v: f32) -> f32 {
+        match self {
+            ColorSpace::Srgb => crate::srgb::decode(v),
+            ColorSpace::Linear => v,
+        }
+    }
+}
+
 /// A decoded texture image: 8-bit RGBA, rows from the top.
 #[derive(Debug, Clone)]
 pub struct Image {

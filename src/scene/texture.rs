@@ -81,17 +81,12 @@ pub(crate) fn stand_in(name: &str, usage: Use) -> Image {
 
 /// Radiometric value of each byte under the sRGB transfer function.
 pub(crate) fn srgb_table() -> [f32; 256] {
-    std::array::from_fn(|byte| {
-        let v = byte as f32 / 255.0;
-        if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
-    })
+    std::array::from_fn(|byte| crate::srgb::decode(byte as f32 / 255.0))
 }
 
 /// The nearest byte under the sRGB transfer function to a value in [0, 1].
 pub(crate) fn to_srgb(v: f32) -> u8 {
-    let v = v.clamp(0.0, 1.0);
-    let encoded = if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-    (encoded * 255.0 + 0.5) as u8
+    (crate::srgb::encode(v) * 255.0 + 0.5) as u8
 }
 
 /// Mean of an image's colour (linear) and alpha.

@@ -195,8 +195,7 @@ impl Cells {
 
 /// Linear value of an sRGB byte (IEC 61966-2-1).
 fn srgb(byte: u8) -> f32 {
-    let v = f32::from(byte) / 255.0;
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+    crate::srgb::decode(f32::from(byte) / 255.0)
 }
 
 /// Unit vector from octahedral coordinates, as `oct_decode` in shaders/lib/octahedral.wgsl.

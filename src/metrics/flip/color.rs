@@ -25,11 +25,6 @@ fn product(m: &[[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
     [0, 1, 2].map(|i| m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2])
 }
 
-/// Linear value of a display-encoded sRGB value.
-pub fn linear_from_srgb(v: f32) -> f32 {
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
-}
-
 /// YCxCz of linear Rec.709: L*a*b* without its cube roots, so that it can be filtered.
 pub fn opponent_from_linear(rgb: [f32; 3]) -> [f32; 3] {
     let [x, y, z] = product(&XYZ_FROM_RGB, rgb);

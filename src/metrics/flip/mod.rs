@@ -57,7 +57,7 @@ pub struct Exposures {
 /// Different sizes; `pixels_per_degree` that is not above 0 and at most [`MAX_PIXELS_PER_DEGREE`].
 pub fn flip(a: Picture<'_>, b: Picture<'_>, pixels_per_degree: f32) -> Result<FlipMap, MetricError> {
     let eye = Eye::new(&a, &b, pixels_per_degree)?;
-    let linear = |v: f32| color::linear_from_srgb(v.clamp(0.0, 1.0));
+    let linear = |v: f32| crate::srgb::decode(v.clamp(0.0, 1.0));
     Ok(FlipMap { values: eye.difference(&eye.see(a.pixels(), linear), &eye.see(b.pixels(), linear)) })
 }
 
