@@ -182,7 +182,6 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         save: &|record| Ok(image_io::write_whole(&place("chart.json"), json(record)?.as_bytes())?),
     };
     let record = run::run(&gpu, &plan, before, provenance, &hooks);
-    drop(hooks);
     progress.into_inner().finish();
     let record = match record {
         Err(ChartError::Stopped) => {
