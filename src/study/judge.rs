@@ -46,8 +46,7 @@ pub fn light_error(light: &[f32], reference: &Reference) -> Option<LightError> {
         }
         // Half a block at least: the rim of an object is no place to judge light at.
         if count > (BLOCK * BLOCK / 2) as f64 {
-            for c in 0..3 {
-                let (ours, theirs) = (sums[0][c] / count, sums[1][c] / count);
+            for (ours, theirs) in sums[0].iter().zip(sums[1]).map(|(ours, theirs)| (ours / count, theirs / count)) {
                 apart += (ours - theirs).abs();
                 signed += ours - theirs;
                 all += theirs.abs();
