@@ -163,7 +163,7 @@ fn what_cannot_be_is_told() {
     {
         ends(&run(&["fit", "cornell", "--target", target]), 2, &[told]);
     }
-    ends(&run(&["fit", "cornell", "--budget-ms", "-1"]), 2, &["budget"]);
+    ends(&run(&["fit", "cornell", "--budget-ms=-1"]), 2, &["budget"]);
     ends(&run(&["fit", "nowhere.glb"]), 4, &["nowhere.glb"]);
     ends(&run(&["render", "cornell", "-o", "a.png", "--gi", "nowhere.toml"]), 2, &["nowhere.toml"]);
     for (text, told) in
