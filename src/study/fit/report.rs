@@ -157,6 +157,11 @@ impl Fit {
         if self.floor() > 0.0 {
             let _ = write!(text, " The reference's own noise makes up to {} of each number.", y.show(self.floor()));
         }
+        // The bound is for noise that is surely below it, so a reference that reached it is a little better than that.
+        if self.floor() > 1.05 * y.noise_allowed() {
+            text += " That is more than a quarter of the target, as --spp allowed no more samples: raise it before you \
+                     trust this.";
+        }
         text
     }
 }

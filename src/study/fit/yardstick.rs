@@ -103,6 +103,11 @@ impl Yardstick {
         }
     }
 
+    /// How much of the target the reference's own noise may make, in the metric's unit.
+    pub(super) fn noise_allowed(&self) -> f64 {
+        NOISE * self.target
+    }
+
     /// Frames that are averaged for a picture.
     pub(super) fn samples(&self) -> u32 {
         if self.metric == Metric::Light { 1 } else { SHOWN_SAMPLES }
