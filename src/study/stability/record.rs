@@ -131,7 +131,7 @@ impl Finding {
             let (value, at_most) = (found.values[i], self.criteria[i].at_most);
             match value {
                 v if !v.is_finite() => f64::INFINITY,
-                v if v == 0.0 => 0.0,
+                0.0 => 0.0,
                 v => v / at_most.max(1e-12),
             }
         };
