@@ -186,7 +186,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         crate::image_io::write_whole(path, format!("{}\n", serde_json::to_string_pretty(&record)?).as_bytes())?;
     }
     if args.rounds > 1 {
-        say!("\nratios, medians of {} rounds:", args.rounds);
+        say!("\nratios, of the fastest of {} rounds:", args.rounds);
         ratios
             .ratios
             .iter()

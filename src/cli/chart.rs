@@ -48,10 +48,10 @@ pub struct Args {
     /// What is up: light (error of the light that is added), flip, l1 (the paper's). All are in the records.
     #[arg(long, value_enum, default_value = "light")]
     metric: MetricName,
-    /// Folder for chart.svg, chart.png, chart.csv, chart.json and results.md. What is in chart.json already is not done again.
+    /// Folder for chart.svg, chart.png, chart.csv, chart.json. What is in chart.json already is not done again.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Also write the page here, such as docs/results.md.
+    /// Where the page goes, such as docs/results.md; DIR/results.md when absent.
     #[arg(long, value_name = "MD")]
     page: Option<PathBuf>,
     /// Width and height of the pictures; a reference from elsewhere has its own.
@@ -182,7 +182,6 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         save: &|record| Ok(image_io::write_whole(&place("chart.json"), json(record)?.as_bytes())?),
     };
     let record = run::run(&gpu, &plan, before, provenance, &hooks);
-    drop(hooks);
     progress.into_inner().finish();
     let record = match record {
         Err(ChartError::Stopped) => {
@@ -290,6 +289,8 @@ fn provenance(before: Option<&Record>) -> Provenance {
     let changed =
         git(&["status", "--porcelain", "--untracked-files=no", "--", "src", "shaders", "assets", "Cargo.toml"]);
     let commit = commit.map(|c| if changed.is_some_and(|c| !c.is_empty()) { format!("{c}+") } else { c });
+    // What is kept was measured by the program of then.
+    let commit = before.map(|b| b.provenance.commit.clone()).or(commit);
     Provenance {
         command: format!("bouncelight {}", std::env::args().skip(1).collect::<Vec<_>>().join(" ")),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -316,11 +317,9 @@ fn write(args: &Args, record: &Record, metric: Metric) -> Result<()> {
     image_io::write_whole(&place("chart.json"), json(record)?.as_bytes())?;
     image_io::write_whole(&place("chart.csv"), report::csv(record).as_bytes())?;
     let drawn = plot::write(record, metric, &place("chart.svg"), &place("chart.png"));
-    image_io::write_whole(&place("results.md"), report::page(record, metric, "chart.svg").as_bytes())?;
-    if let Some(page) = &args.page {
-        let picture = relative(page, &place("chart.svg"));
-        image_io::write_whole(page, report::page(record, metric, &picture).as_bytes())?;
-    }
+    let page = args.page.clone().unwrap_or_else(|| place("results.md"));
+    let picture = relative(&page, &place("chart.svg"));
+    image_io::write_whole(&page, report::page(record, metric, &picture).as_bytes())?;
     Ok(drawn?)
 }
 

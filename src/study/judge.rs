@@ -23,7 +23,7 @@ pub struct LightError {
     pub floor: f64,
 }
 
-/// Compares `light` (rgb a pixel, E/π: our DiffInd, or another tracing's [`Layer::Gi`]) with the reference's [`Layer::Gi`] as
+/// Compares `light` (rgb a pixel, E/π: [`Shot::added`](super::trial::Shot::added), or another tracing's [`Layer::Gi`]) with the reference's [`Layer::Gi`] as
 /// docs/accuracy.md says: on pixels with a surface, diffuse reflectance above 0.01 and at least 2 % of the reference's median
 /// light, pooled over blocks of 4×4. `None` where no block is left or the reference has no light there.
 pub fn light_error(light: &[f32], reference: &Reference) -> Option<LightError> {
@@ -46,8 +46,7 @@ pub fn light_error(light: &[f32], reference: &Reference) -> Option<LightError> {
         }
         // Half a block at least: the rim of an object is no place to judge light at.
         if count > (BLOCK * BLOCK / 2) as f64 {
-            for c in 0..3 {
-                let (ours, theirs) = (sums[0][c] / count, sums[1][c] / count);
+            for (ours, theirs) in sums[0].iter().zip(sums[1]).map(|(ours, theirs)| (ours / count, theirs / count)) {
                 apart += (ours - theirs).abs();
                 signed += ours - theirs;
                 all += theirs.abs();

@@ -1,5 +1,5 @@
-//! Times as ratios: method to method and pass to pass, taken in turns, so that a busy machine slows both alike and a baseline can be
-//! committed where seconds could not.
+//! Times as ratios: method to method and pass to pass, so that a baseline can be committed where seconds could not. Methods take turns,
+//! and the fastest turn of each counts, which other programs have disturbed least.
 
 use super::bench::Measurement;
 use serde::{Deserialize, Serialize};
@@ -17,10 +17,10 @@ const PASS: &str = "direct";
 pub struct Ratio {
     /// What is divided by what, as in `gather / direct` or `gather: gi.rays / direct`.
     pub of: String,
-    /// Median over the rounds.
+    /// Of the fastest turns.
     pub value: f64,
-    /// How much larger it may be before that is a fault, as a share: twice what it varied by when the baseline was made, and at
-    /// least [`LEAST_ALLOWED`].
+    /// How much larger it may be before that is a fault, as a share: twice what one half of the rounds was off when the baseline
+    /// was made, and at least [`LEAST_ALLOWED`].
     pub allowed: f64,
 }
 
@@ -62,27 +62,33 @@ pub fn of(rounds: &[Vec<Measurement>]) -> Vec<Ratio> {
     for measured in first {
         let name = &measured.method;
         if name != METHOD {
-            let values = rounds.iter().filter_map(|r| Some(method(r, name)? / method(r, METHOD)?));
-            ratios.extend(ratio(format!("{name} / {METHOD}"), values.collect()));
+            ratios.extend(ratio(format!("{name} / {METHOD}"), rounds, &|r| method(r, name), &|r| method(r, METHOD)));
         }
         let frame: f64 = measured.passes.iter().map(|p| p.ms.median).sum();
         // A network's layers run on past their timestamps on some drivers: the method's own ratio holds them.
         let heavy =
             measured.passes.iter().filter(|p| p.ms.median >= LEAST_SHARE * frame && !p.pass.starts_with("net."));
         for p in heavy.filter(|p| p.pass != PASS) {
-            let values = rounds.iter().filter_map(|r| Some(pass(r, name, &p.pass)? / pass(r, name, PASS)?));
-            ratios.extend(ratio(format!("{name}: {} / {PASS}", p.pass), values.collect()));
+            let of = format!("{name}: {} / {PASS}", p.pass);
+            ratios.extend(ratio(of, rounds, &|r| pass(r, name, &p.pass), &|r| pass(r, name, PASS)));
         }
     }
     ratios
 }
 
-fn ratio(of: String, mut values: Vec<f64>) -> Option<Ratio> {
-    values.retain(|v| v.is_finite() && *v > 0.0);
-    values.sort_by(f64::total_cmp);
-    let value = *values.get(values.len() / 2)?;
-    let most = values.last()? / value - 1.0;
-    Some(Ratio { of, value, allowed: (2.0 * most).max(LEAST_ALLOWED) })
+/// Finds a time in a round.
+type Time<'a> = &'a dyn Fn(&[Measurement]) -> Option<f64>;
+
+fn ratio(of: String, rounds: &[Vec<Measurement>], above: Time<'_>, below: Time<'_>) -> Option<Ratio> {
+    let of_every = |first: usize, step: usize| {
+        let least = |time: Time<'_>| rounds.iter().skip(first).step_by(step).filter_map(|r| time(r)).reduce(f64::min);
+        let value = least(above)? / least(below)?;
+        (value.is_finite() && value > 0.0).then_some(value)
+    };
+    let value = of_every(0, 1)?;
+    let halves = [of_every(0, 2), of_every(1, 2)];
+    let off = halves.into_iter().flatten().map(|half| (half / value - 1.0).abs()).fold(0.0, f64::max);
+    Some(Ratio { of, value, allowed: (2.0 * off).max(LEAST_ALLOWED) })
 }
 
 /// What became slower than `base` says by more than it or `allowed` permits, and what became as much faster, which asks for a new

@@ -1,25 +1,28 @@
 //! One scene, any method: pictures with their layers in linear light, sequences that keep their history, what it costs, and the
 //! path-traced picture beside it. The one place where studies draw.
 
+mod shot;
+
 use super::{
     bench::{self, BenchError, BenchOptions, Measurement},
-    hash, projection, truth,
+    hash, truth,
     truth::Reference,
 };
 use crate::{
-    gi::{Method, rung::Cost},
+    gi::Method,
     gpu::Gpu,
     image_io::ImageError,
     reference::{Kernel, PackError, ReferenceScene, TracerError, TracerOptions},
     render::{
         RenderError, Renderer, RendererOptions,
-        capture::{CaptureOptions, CapturedFrame, Layer, Picture, capture_with},
+        capture::{CaptureOptions, Layer, capture_with},
     },
     scene::{
-        Camera, Environment, Light, Scene,
+        Camera, Scene,
         upload::{SceneGpu, UploadError},
     },
 };
+pub use shot::{Edits, FrameChange, Settling, Shot};
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -43,93 +46,6 @@ pub struct TrialOptions {
 impl Default for TrialOptions {
     fn default() -> Self {
         Self { layers: LAYERS.to_vec(), taa: false, seed: 0, kept: None }
-    }
-}
-
-/// How long a still camera looks, and how finely.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Settling {
-    /// Frames up to and including the one that is taken, for methods with a history: 1 is the first after a cut.
-    pub frames: u32,
-    /// Jittered frames that are averaged, at least 1.
-    pub samples: u32,
-}
-
-impl Settling {
-    /// The first frame after a cut.
-    pub const COLD: Self = Self { frames: 1, samples: 1 };
-    /// What counts as settled.
-    pub const SETTLED: Self = Self { frames: Method::SETTLED, samples: 1 };
-}
-
-/// What a scene can be changed by without a new upload. Nothing by default.
-#[derive(Debug, Clone, Default)]
-pub struct Edits {
-    /// All lights anew.
-    pub lights: Option<Vec<Light>>,
-    /// Other surroundings.
-    pub environment: Option<Environment>,
-    /// Index of an instance and its new world-from-object matrix.
-    pub placements: Vec<(usize, [[f32; 4]; 4])>,
-}
-
-/// One frame of a sequence.
-#[derive(Debug, Clone)]
-pub struct FrameChange {
-    /// From where it is seen.
-    pub camera: Camera,
-    /// What changes in the scene before it is drawn.
-    pub edits: Edits,
-    /// It has nothing to do with the frame before, and the program says so ([`Renderer::cut`]).
-    pub cut: bool,
-    /// Whether its picture is wanted; one that is not is drawn all the same, but its layers are not read back.
-    pub wanted: bool,
-}
-
-impl FrameChange {
-    /// A frame of an unchanged scene.
-    pub fn still(camera: &Camera) -> Self {
-        Self { camera: camera.clone(), edits: Edits::default(), cut: false, wanted: true }
-    }
-}
-
-/// A picture and what is known of it.
-#[derive(Debug, Clone)]
-pub struct Shot {
-    /// The picture (linear radiance) and the layers that were asked for. `DiffInd` is what the method added, E/π, without
-    /// albedo, as in `render --aov`.
-    pub frame: CapturedFrame,
-    /// Number of the frame in its sequence, from 0.
-    pub number: u32,
-    /// Method that drew, as on the command line.
-    pub drawn_by: &'static str,
-    /// Why another than the one asked for did.
-    pub instead: Option<String>,
-    /// Frames that the answer has settled over, for methods with a history.
-    pub settled: Option<u32>,
-    /// Counted cost of the passes that find and add indirect light.
-    pub costs: Vec<Cost>,
-    /// GPU memory of everything, bytes.
-    pub bytes: u64,
-}
-
-impl Shot {
-    /// The picture as linear red, green and blue.
-    pub fn rgb(&self) -> Vec<f32> {
-        self.frame.beauty.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
-    }
-
-    /// The layer.
-    ///
-    /// # Panics
-    /// If the trial's options do not name it.
-    pub fn layer(&self, layer: Layer) -> &Picture {
-        self.frame.layer(layer).unwrap_or_else(|| panic!("layer {} was not asked for", layer.name()))
-    }
-
-    /// What a GTX 1050 would take for the method by count, milliseconds: a projection, never a measurement.
-    pub fn projected_ms(&self) -> f64 {
-        projection::total_ms(&self.costs, &projection::GTX_1050, projection::EFFICIENCY)
     }
 }
 
@@ -260,7 +176,21 @@ impl<'a> Trial<'a> {
     pub fn picture(&mut self, method: &Method, camera: &Camera, settling: Settling) -> Result<Shot, TrialError> {
         let mut renderer = self.renderer(method)?;
         let warmup = if method.has_history() || self.options.taa { settling.frames.max(1) - 1 } else { 0 };
-        self.shoot(&mut renderer, camera, settling.samples, warmup, 0)
+        let mut shot = self.shoot(&mut renderer, camera, settling.samples, warmup, 0)?;
+        if method.needs_rays() {
+            shot.without = self.direct(camera, settling.samples)?;
+        }
+        Ok(shot)
+    }
+
+    /// DiffDir as `direct` draws it, where that is another than with methods that know the scene.
+    fn direct(&mut self, camera: &Camera, samples: u32) -> Result<Option<Vec<f32>>, TrialError> {
+        if !self.scene.lights.iter().any(|l| l.stands_in) || !self.options.layers.contains(&Layer::DiffDir) {
+            return Ok(None);
+        }
+        let mut renderer = self.renderer(&Method::Direct)?;
+        let shot = self.shoot(&mut renderer, camera, samples, 0, 0)?;
+        Ok(Some(shot.layer(Layer::DiffDir).data.clone()))
     }
 
     /// `frames` pictures one after the other by one renderer, which keeps its history; `change` says what each frame shows. Each
@@ -306,7 +236,11 @@ impl<'a> Trial<'a> {
                     renderer.cut();
                 }
                 if wanted {
-                    take(self.shoot(&mut renderer, &camera, 1, 0, number)?);
+                    let mut shot = self.shoot(&mut renderer, &camera, 1, 0, number)?;
+                    if method.needs_rays() {
+                        shot.without = self.direct(&camera, 1)?;
+                    }
+                    take(shot);
                 } else {
                     self.draw(&mut renderer, &camera)?;
                 }
@@ -421,6 +355,7 @@ impl<'a> Trial<'a> {
             settled: renderer.settled(),
             costs: renderer.costs(),
             bytes,
+            without: None,
         })
     }
 

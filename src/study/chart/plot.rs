@@ -23,7 +23,7 @@ use std::path::Path;
 
 const SIZE: [f64; 2] = [1280.0, 660.0];
 const INK: RGBColor = RGBColor(30, 30, 30);
-const GREY: RGBColor = RGBColor(120, 120, 120);
+const GREY: RGBColor = RGBColor(90, 90, 90);
 const FAINT: RGBColor = RGBColor(225, 225, 225);
 const STEPS: RGBColor = RGBColor(190, 190, 190);
 /// Okabe and Ito, without yellow, which is too pale on paper.

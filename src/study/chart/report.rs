@@ -54,7 +54,8 @@ pub fn csv(record: &Record) -> String {
                 Some(unit.bytes as f64),
                 projected,
             ];
-            let numbers: Vec<String> = numbers.iter().map(|n| n.map_or(String::new(), |v| v.to_string())).collect();
+            let numbers: Vec<String> =
+                numbers.iter().map(|n| n.map_or(String::new(), |v| (v + 0.0).to_string())).collect();
             let [w, h] = size;
             let words =
                 [unit.entry.as_str(), kind, weights, &unit.scene, scene.map_or("", |s| s.hash.as_str())].map(quoted);
@@ -117,6 +118,7 @@ pub fn table(record: &Record, metric: Metric) -> String {
 fn standing(row: &Row) -> String {
     let mut words = Vec::new();
     match (row.kind, row.whole) {
+        (Kind::Pictures, _) if row.scenes == 0 => words.push("this metric does not judge it".into()),
         (_, false) => words.push(format!("judged in {} scenes only", row.scenes)),
         (Kind::Paths, _) => {}
         _ => {
@@ -182,7 +184,7 @@ fn how(record: &Record, metric: Metric) -> String {
     let what = match metric {
         Metric::Light => {
             "Error: Σ|ours − reference| / Σ reference of the diffuse light that a method has to add (E/π), after pooling over 4×4 \
-             pixels, on surfaces with albedo above 0.01 and light above 2 % of the median ([accuracy.md](accuracy.md))."
+             pixels, on surfaces with albedo above 0.01 and light above 2 % of the median (docs/accuracy.md)."
         }
         Metric::Flip => "Error: FLIP of the finished picture through Filmic, in 8 bits.",
         Metric::L1 => "Error: the paper's L1 (each channel stretched on its own), scaled to the pixels of 1024×512.",
@@ -221,7 +223,7 @@ fn main_table(record: &Record, metric: Metric) -> String {
             (true, _) => format!("**{}**", row.name),
             _ => row.name.clone(),
         };
-        let name = if row.whole { name } else { format!("{name} (in {} scenes)", row.scenes) };
+        let name = if row.whole || row.scenes == 0 { name } else { format!("{name} (in {} scenes)", row.scenes) };
         let counted = row.kind != Kind::Paths;
         let count = |v: f64, digits: usize| if counted { format!("{v:.digits$}") } else { String::new() };
         let against = row

@@ -1,7 +1,7 @@
 //! The work, piece by piece: what is done stays done, what fails loses nothing else.
 
 use super::{
-    ChartError, Device, Metric, Provenance, Record, SceneFacts, Unit,
+    ChartError, Device, Kind, Metric, Provenance, Record, SceneFacts, Unit,
     entries::Entry,
     published,
     scenes::{self, Source},
@@ -383,8 +383,12 @@ impl<'a> Work<'a> {
 pub fn missing(record: &Record, metric: Metric) -> Vec<String> {
     let scenes = record.scenes.iter().filter_map(|s| Some(format!("scene {}: {}", s.name, s.failed.as_ref()?)));
     let units = record.units.iter().filter_map(|u| Some(format!("{} in {}: {}", u.entry, u.scene, u.failed.as_ref()?)));
-    let unjudged =
-        record.units.iter().filter(|u| u.failed.is_none() && u.scores.as_ref().is_some_and(|s| metric.of(s).is_none()));
+    // A network on pictures has no light of its own, which is no failure.
+    let unjudged = record.units.iter().filter(|u| {
+        u.failed.is_none()
+            && record.kind(&u.entry) != Some(Kind::Pictures)
+            && u.scores.as_ref().is_some_and(|s| metric.of(s).is_none())
+    });
     let unjudged = unjudged.map(|u| format!("{} in {}: has no {} to compare", u.entry, u.scene, metric.name()));
     scenes.chain(units).chain(unjudged).collect()
 }

@@ -12,7 +12,6 @@ use crate::{
     gpu::Gpu,
     metrics::{Comparison, MetricError},
     reference,
-    render::capture::Layer,
     scene::Camera,
     study::{
         bench::{Measurement, Spread},
@@ -104,7 +103,7 @@ impl Stage<'_> {
     }
 
     fn judged(&self, shot: &Shot) -> Result<Scores, MetricError> {
-        let light = judge::light_error(&shot.layer(Layer::DiffInd).data, &self.reference);
+        let light = judge::light_error(&shot.added(), &self.reference);
         Ok(self.scores(light, &judge::compare(&shot.rgb(), &self.reference, true)?))
     }
 

@@ -145,8 +145,11 @@ impl<D: DrawingBackend> Canvas<D> {
         let xs = xs.chain(panel.curve.iter().map(|c| c.1)).chain(panel.lines.iter().map(|l| l.0));
         let across = range(xs.chain(panel.printed.iter().map(|p| p.0)));
         let share = |v: f64, (low, high): (f64, f64)| (v.max(low) / low).ln() / (high / low).ln();
-        let place =
-            |x: f64, y: f64| (left + share(x, across) * (right - left), bottom - share(y * scale, up) * (bottom - top));
+        let place = |x: f64, y: f64| {
+            // What takes no time stands at the axis, where a logarithm has no place for it.
+            let across = if x > 0.0 { left + share(x, across) * (right - left) } else { left + 9.0 };
+            (across, bottom - share(y * scale, up) * (bottom - top))
+        };
         let centre = |v| Pos::new(HPos::Center, v);
         for x in ticks(across) {
             let at = place(x, 0.0).0;
@@ -175,10 +178,10 @@ impl<D: DrawingBackend> Canvas<D> {
         for (x, words) in &panel.lines {
             let at = place(*x, 1.0).0;
             self.dashed(((at, top), (at, bottom)), GREY, 6.0)?;
-            // Beside the line, read upwards, from its lower end.
+            // Beside the line, read upwards, up to its upper end.
             let (inside, pos) = if at - 18.0 > left { (at - 4.0, VPos::Bottom) } else { (at + 4.0, VPos::Top) };
-            self.text(words, (inside, bottom - 8.0), 11.0, Pos::new(HPos::Left, pos), GREY, true)?;
-            names.taken.push([at - 18.0, bottom - 330.0, at + 2.0, bottom]);
+            self.text(words, (inside, top + 8.0), 11.0, Pos::new(HPos::Right, pos), GREY, true)?;
+            names.taken.push([at - 18.0, top, at + 2.0, top + 330.0]);
         }
         if let Some(first) = panel.frontier.first() {
             let mut steps = vec![(place(first.0, first.1).0, top), place(first.0, first.1)];
@@ -198,6 +201,8 @@ impl<D: DrawingBackend> Canvas<D> {
                 let p = place(x, y);
                 [p.0 - 7.0, p.1 - 7.0, p.0 + 7.0, p.1 + 7.0]
             }));
+            let (high, low) = (place(mark.x, mark.y.high), place(mark.x, mark.y.low));
+            names.taken.push([high.0 - 3.0, high.1, low.0 + 3.0, low.1]);
         }
         for (count, at) in &curve {
             let dot = Circle::new(self.px(*at), (3.0 * self.scale) as i32, INK.filled());
