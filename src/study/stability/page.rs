@@ -122,13 +122,16 @@ fn tail(w: &mut String, record: &Record) -> std::fmt::Result {
          - InstanceNorm: the published generator's weights are not here. `paper` is our small run of its recipe, with group norms and dropout as published.\n\
          - Temporal anti-aliasing: `tests/gi/taa.rs`."
     )?;
-    let unsound: Vec<&str> = record.tests.iter().filter(|t| !t.sound).map(|t| t.name.as_str()).collect();
-    if unsound.is_empty() {
-        return Ok(());
+    let names = |of: Vec<&str>| of.join(", ");
+    let missing: Vec<&str> =
+        super::all().iter().map(|t| t.name).filter(|n| !record.tests.iter().any(|t| t.name == *n)).collect();
+    if !missing.is_empty() {
+        writeln!(w, "- Not measured yet: {}.", names(missing))?;
     }
-    writeln!(
-        w,
-        "- Tests that the truth does not pass, or that its spoilt twin does, and that say nothing: {}.",
-        unsound.join(", ")
-    )
+    let unsound: Vec<&str> = record.tests.iter().filter(|t| !t.sound).map(|t| t.name.as_str()).collect();
+    if !unsound.is_empty() {
+        let why = "Tests that the truth does not pass, or that its spoilt twin does, and that say nothing";
+        writeln!(w, "- {why}: {}.", names(unsound))?;
+    }
+    Ok(())
 }

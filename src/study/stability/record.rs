@@ -131,7 +131,7 @@ impl Finding {
             let (value, at_most) = (found.values[i], self.criteria[i].at_most);
             match value {
                 v if !v.is_finite() => f64::INFINITY,
-                v if v == 0.0 => 0.0,
+                0.0 => 0.0,
                 v => v / at_most.max(1e-12),
             }
         };
@@ -191,5 +191,78 @@ impl Kept {
         };
         let key = |k: &Self| (k.schema, k.version.clone(), k.device.clone(), plain(&k.finding));
         key(self) == key(other) && self.subjects == other.subjects
+    }
+}
+
+#[cfg(test)]
+mod unit {
+    use super::super::{all, page};
+    use super::*;
+
+    fn found(subject: &str, values: Vec<f64>, test: &Test) -> Found {
+        let pass = Some(passes(test, &values));
+        Found { subject: subject.into(), values, pass, seconds: 1.0, reason: None, instead: None, why: None }
+    }
+
+    #[test]
+    fn the_worst_number_is_shown_and_infinity_survives_json() {
+        let test = all().into_iter().find(|t| t.name == "switch").expect("it is there");
+        let mut finding = Finding::new(test);
+        finding.found = vec![
+            found("good", vec![3.0, 0.001, 2.0, 0.04], test),
+            found("late", vec![f64::INFINITY, 0.5, 2.0, 0.04], test),
+            found("short", vec![1.0], test),
+        ];
+        let passed: Vec<_> = finding.found.iter().map(|f| f.pass).collect();
+        assert_eq!(passed, [Some(true), Some(false), Some(false)]);
+        assert_eq!(
+            (finding.cell(&finding.found[0]), finding.cell(&finding.found[1])),
+            ("4.00 %".into(), "**none**".into())
+        );
+        let kept = Kept {
+            schema: SCHEMA,
+            version: "0".into(),
+            device: "d".into(),
+            subjects: vec![SubjectRecord { name: "late".into(), weights: None }],
+            finding,
+        };
+        let text = serde_json::to_string(&kept).expect("plain data");
+        let back: Kept = serde_json::from_str(&text).expect("the same data");
+        assert!(back.is_of(&kept) && back.finding.found[1].values[0].is_infinite());
+        let fresh = |name: &str, device: &str| Kept {
+            finding: Finding::new(all().into_iter().find(|t| t.name == name).expect("it is there")),
+            device: device.into(),
+            version: "0".into(),
+            schema: SCHEMA,
+            subjects: vec![SubjectRecord { name: "late".into(), weights: None }],
+        };
+        // What was found does not count, all that it depends on does.
+        assert!(back.is_of(&fresh("switch", "d")));
+        assert!(!back.is_of(&fresh("sweep", "d")) && !back.is_of(&fresh("switch", "e")));
+    }
+
+    #[test]
+    fn a_page_has_a_sentence_on_every_failure() {
+        let test = all().into_iter().find(|t| t.name == "sealed").expect("it is there");
+        let mut finding = Finding::new(test);
+        finding.found = vec![found("gather", vec![0.0], test), found("odd", vec![0.7], test)];
+        let subject = |name: &str| SubjectRecord { name: name.into(), weights: None };
+        let record = Record {
+            schema: SCHEMA,
+            version: "0".into(),
+            adapter: "a".into(),
+            backend: "b".into(),
+            driver: "d".into(),
+            software: true,
+            subjects: vec![subject("gather"), subject("odd")],
+            tests: vec![finding],
+        };
+        assert_eq!((record.failures("odd"), record.failures("gather")), (vec!["sealed"], vec![]));
+        let text = page(&record, "the command");
+        assert!(text.contains("| sealed | 0.00 % | **70 %** |"), "{text}");
+        assert!(text.contains("- **sealed**, `odd`: not explained yet") && text.contains("the command"), "{text}");
+        assert!(text.contains("| *passed* | 1 of 1 | 0 of 1 |"), "{text}");
+        // The truth was not asked here, so the test proves nothing, which is said.
+        assert!(text.contains("say nothing: sealed"), "{text}");
     }
 }

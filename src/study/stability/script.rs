@@ -79,3 +79,22 @@ fn merge(edits: &mut Edits, later: &Edits) {
     }
     edits.placements.extend(later.placements.iter().copied());
 }
+
+#[cfg(test)]
+mod unit {
+    use super::*;
+
+    #[test]
+    fn who_has_no_history_gets_all_changes_with_the_next_wanted_frame() {
+        let camera = Camera::look_at([0.0; 3], [0.0, 0.0, -1.0], 1.0);
+        let moved = |x: f32| Edits { placements: vec![(0, [[x; 4]; 4])], ..Edits::default() };
+        let dark = Edits { lights: Some(Vec::new()), ..Edits::default() };
+        let script = Script::new().rest(&camera, 3).edit(moved(1.0)).edit(dark).rest(&camera, 2);
+        let script = script.edit(moved(2.0)).cut().look(&camera).looks(&camera, 1);
+        assert_eq!((script.0.len(), script.0[3].edits.placements.len(), script.0[4].cut), (7, 1, false));
+        let wanted = script.wanted_only();
+        assert_eq!((wanted.0.len(), wanted.0[0].cut), (2, true));
+        assert_eq!(wanted.0[0].edits.placements, [moved(1.0).placements, moved(2.0).placements].concat());
+        assert!(wanted.0[0].edits.lights.is_some() && wanted.0[1].edits.placements.is_empty());
+    }
+}

@@ -87,7 +87,8 @@ fn still_life() -> (Scene, Camera) {
         ([-4.2, 0.0, -4.0], [-4.0, 4.0, 4.0], [0.8, 0.6, 0.2]),
     ];
     let mut scene = rooms::scene(&blocks, &[rooms::lamp([1.5, 3.0, 1.0], 12.0)], 0.25);
-    let checks = |x: u32, y: u32| if (x / 8 + y / 8) % 2 == 0 { [230, 220, 200, 255] } else { [60, 80, 60, 255] };
+    let checks =
+        |x: u32, y: u32| if (x / 8 + y / 8).is_multiple_of(2) { [230, 220, 200, 255] } else { [60, 80, 60, 255] };
     let rgba = (0..64).flat_map(|y| (0..64).flat_map(move |x| checks(x, y))).collect();
     scene.images.push(Image { name: "checks".into(), width: 64, height: 64, rgba, color_space: ColorSpace::Srgb });
     let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
