@@ -87,7 +87,7 @@ pub enum Product {
         scene: Box<Scene>,
         gpu: Box<SceneGpu>,
         /// What was fitted for it, or why that is not obeyed; none where nobody has asked.
-        fitted: Option<Result<Fitted, String>>,
+        fitted: Option<Result<Box<Fitted>, String>>,
     },
     /// Rays into the scene that was uploaded as number `stamp`, or why it can have none.
     Rays {
@@ -164,11 +164,11 @@ pub fn scene(
 }
 
 /// What lies beside the scene, or why it is not obeyed.
-fn fitted(spec: &str, scene: &Scene) -> Option<Result<Fitted, String>> {
+fn fitted(spec: &str, scene: &Scene) -> Option<Result<Box<Fitted>, String>> {
     match Fitted::load(&Fitted::path(spec)) {
         Ok(None) => None,
         Ok(Some(found)) => Some(match found.stale(&hash::of_scene(scene)) {
-            Ok(None) => Ok(found),
+            Ok(None) => Ok(Box::new(found)),
             Ok(Some(why)) => Err(why),
             Err(e) => Err(e.to_string()),
         }),

@@ -113,7 +113,8 @@ impl Run<'_> {
 
     /// Whether there is time for something that takes about `seconds`; where not, `what` is listed as left out.
     fn affords(&mut self, what: &str, seconds: f64) -> bool {
-        let enough = seconds <= self.left();
+        // Nothing is begun once the time is up, however short it is.
+        let enough = seconds < self.left();
         if enough {
             (self.told)(what);
         } else {

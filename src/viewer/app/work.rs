@@ -185,7 +185,7 @@ impl App {
     }
 
     /// Takes the method that was fitted to the scene on show; where there is none, methods have their own numbers again.
-    fn obey(&mut self, fitted: Option<Result<Fitted, String>>) {
+    fn obey(&mut self, fitted: Option<Result<Box<Fitted>, String>>) {
         let fitted = match fitted {
             Some(Err(why)) => {
                 self.state.tell(format!("what was fitted is not obeyed: {why}"), true);
@@ -193,8 +193,8 @@ impl App {
             }
             found => found.and_then(Result::ok),
         };
-        let gather = fitted.as_ref().and_then(Fitted::gather);
-        let unseen = fitted.as_ref().and_then(Fitted::unseen);
+        let gather = fitted.as_deref().and_then(Fitted::gather);
+        let unseen = fitted.as_deref().and_then(Fitted::unseen);
         let now = (gather.unwrap_or_default(), unseen.unwrap_or_default());
         if now != (self.network.gather, self.network.unseen) {
             (self.network.gather, self.network.unseen) = now;
