@@ -25,7 +25,7 @@ pub static RED_WALL: Test = Test {
     ],
     control: Fault::Screen(0.5),
     size: PAPER,
-    paths: 24,
+    paths: 128,
     pictures: true,
     run: |play| {
         let hall = rooms::hall(rooms::RED, &[rooms::sun([0.0, -0.6, 0.8], 3.0)], 0.05);
@@ -55,9 +55,9 @@ pub static CROP: Test = Test {
         at_most: 0.05,
         source: SAME,
     }],
-    control: Fault::Screen(0.5),
+    control: Fault::Screen(1.0),
     size: PAPER,
-    paths: 24,
+    paths: 160,
     pictures: true,
     run: |play| {
         let hall = rooms::hall([0.9, 0.1, 0.1], &[rooms::sun(rooms::BACKWARDS, 3.0)], 0.05);
