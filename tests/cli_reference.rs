@@ -4,7 +4,6 @@ mod common;
 #[path = "common/program.rs"]
 mod program;
 
-use assert_cmd::Command;
 use bouncelight::image_io::{Layers, read_exr};
 use program::{bouncelight, fails};
 use std::path::Path;
