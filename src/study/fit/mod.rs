@@ -136,6 +136,9 @@ pub fn fit(
     Ok(Fit { rows: search.rows, chosen, reached, views: search.views })
 }
 
+/// The metric in each view, and the pictures.
+type Judged = (Vec<f64>, Vec<Shot>);
+
 struct Search<'a, 'b> {
     trial: &'a mut Trial<'b>,
     options: &'a FitOptions,
@@ -319,7 +322,7 @@ impl Search<'_, '_> {
     }
 
     /// The metric in every view, and the pictures; `None` where another method drew in its place.
-    fn errors(&mut self, rung: &Rung, frames: u32) -> Result<Option<(Vec<f64>, Vec<Shot>)>, FitError> {
+    fn errors(&mut self, rung: &Rung, frames: u32) -> Result<Option<Judged>, FitError> {
         let method = rung.method(&self.options.networks);
         let settling = Settling { frames, samples: self.options.yardstick.samples() };
         let (mut errors, mut shots) = (Vec::new(), Vec::new());
