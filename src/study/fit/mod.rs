@@ -30,9 +30,6 @@ use crate::{
 };
 use std::path::PathBuf;
 
-/// Errors of the views, and their pictures.
-type Drawn = (Vec<f64>, Vec<Shot>);
-
 /// Sizes of `gather`'s entries over their distance, coarser and finer than its own, of which half the size is four times as many.
 const COARSER: [f32; 3] = [1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
 const FINER: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
@@ -138,6 +135,9 @@ pub fn fit(
     search.settle(chosen, reached)?;
     Ok(Fit { rows: search.rows, chosen, reached, views: search.views })
 }
+
+/// The metric in each view, and the pictures.
+type Judged = (Vec<f64>, Vec<Shot>);
 
 struct Search<'a, 'b> {
     trial: &'a mut Trial<'b>,
@@ -322,7 +322,7 @@ impl Search<'_, '_> {
     }
 
     /// The metric in every view, and the pictures; `None` where another method drew in its place.
-    fn errors(&mut self, rung: &Rung, frames: u32) -> Result<Option<Drawn>, FitError> {
+    fn errors(&mut self, rung: &Rung, frames: u32) -> Result<Option<Judged>, FitError> {
         let method = rung.method(&self.options.networks);
         let settling = Settling { frames, samples: self.options.yardstick.samples() };
         let (mut errors, mut shots) = (Vec::new(), Vec::new());
