@@ -71,6 +71,19 @@ fn gather_passes_what_ambient_fails_and_every_control_fails() {
     assert!(sheet.height > 4 * 128 && sheet.pixels.iter().any(|v| *v > 0.5));
 }
 
+/// Objects that move change the light between surfaces that stand still (half a minute: 150 frames of white rooms).
+#[test]
+fn a_door_that_is_shut_leaves_a_dark_room() {
+    let Some(gpu) = common::gpu() else { return };
+    let subjects = vec![method("gather", Method::Gather(Default::default()))];
+    let tests = stability::named("door").expect("it is there");
+    let suite = Suite::new(&gpu, SuiteOptions { tests, subjects, kept: None, resume: None });
+    let record = suite.run(&|| true, &mut |_| -> Result<(), StabilityError> { Ok(()) }).expect("it runs");
+    let door = &record.tests[0];
+    assert!(door.sound, "{:?}", door.criteria);
+    assert_eq!(found(door, "gather").pass, Some(true), "{:?}", found(door, "gather").values);
+}
+
 #[test]
 fn a_run_can_be_stopped_and_goes_on_after_what_cannot_be_drawn() {
     let Some(gpu) = common::gpu() else { return };

@@ -43,6 +43,9 @@ pub struct SceneRays {
     meshes: Vec<MeshTree>,
     top_room: usize,
     counts: RayCounts,
+    /// Where each instance is.
+    placed: Vec<[[f32; 4]; 4]>,
+    moves: u64,
 }
 
 impl SceneRays {
@@ -90,6 +93,8 @@ impl SceneRays {
             meshes: trees.meshes,
             top_room: trees.top_room,
             counts: RayCounts { triangles: triangles as usize, bytes, ..RayCounts::default() },
+            placed: Vec::new(),
+            moves: 0,
             device: device.clone(),
         };
         rays.place(queue, scene);
@@ -98,6 +103,10 @@ impl SceneRays {
 
     /// Takes over where the instances of `scene` are; its meshes are those that this was made of. True when buffers were made anew and have to be bound again.
     pub fn place(&mut self, queue: &wgpu::Queue, scene: &Scene) -> bool {
+        if !self.placed.iter().eq(scene.instances.iter().map(|i| &i.transform)) {
+            self.placed = scene.instances.iter().map(|i| i.transform).collect();
+            self.moves += 1;
+        }
         let mut boxes = Vec::with_capacity(scene.instances.len());
         let mut leaves = Vec::with_capacity(scene.instances.len());
         let mut placed = Vec::new();
@@ -138,6 +147,11 @@ impl SceneRays {
     /// Another number for each scene that was made.
     pub fn id(&self) -> u64 {
         self.id
+    }
+
+    /// Another number whenever an instance is elsewhere than before.
+    pub fn moves(&self) -> u64 {
+        self.moves
     }
 
     /// Nodes and leaves.

@@ -41,9 +41,13 @@ use store::Store;
 /// 1024 × 512 and 60° a three-hundredth of a cell's width, and 500 times the rounding of the depth.
 const LIFT: f32 = 3e-5;
 
-/// Frames after a change of the lights for which entries get two rays each and remember no more than [`HURRIED`]: nothing is left of the
-/// old light then, and they settle anew.
+/// Frames after a change of the lights for which cells let go of what they remember at less evidence.
 const HURRY: u32 = 8;
+
+/// Frames after the first, after a change of the lights, or after an object has moved, for which entries get two rays each and remember
+/// no more than [`HURRIED`]. Light between surfaces of albedo ρ goes with exp(−t (1 − ρ) 2 / HURRIED) then, by frames: of white ones' (0.8) 2 % are
+/// left after so many. With one ray a frame and a memory of eight it would take 160.
+const STIR: u32 = 24;
 const HURRIED: f32 = 2.5;
 
 /// After the first frame entries get so many rays each for so many frames: light between surfaces has come round by then.
@@ -96,9 +100,12 @@ pub struct GatherGi {
     /// Frames since the last cut, rounds since the beginning.
     frame: u32,
     round: u32,
-    /// The lights' state in the last frame, and frames for which entries forget quickly because it was another before.
+    /// The lights' state in the last frame, and frames for which cells forget at less evidence because it was another before.
     lights_epoch: u64,
     hurry: u32,
+    /// Where objects were in the last frame, and frames for which entries forget quickly because lights or objects changed before.
+    moves: u64,
+    stir: u32,
     scene_id: u64,
 }
 
@@ -190,6 +197,8 @@ impl GatherGi {
             round: 0,
             lights_epoch: 0,
             hurry: 0,
+            moves: 0,
+            stir: 0,
             scene_id: 0,
         }
     }
@@ -230,7 +239,7 @@ impl GatherGi {
             entry_scale: self.options.entry_scale,
             round: self.round,
             cell_frames: self.options.cell_frames,
-            entry_frames: if self.hurry > 0 {
+            entry_frames: if self.stir > 0 {
                 self.options.entry_frames.min(HURRIED)
             } else {
                 self.options.entry_frames
@@ -287,11 +296,17 @@ impl Rung for GatherGi {
         let [changes, blurred, light] = [&store.changes, &store.blurred, &store.cell_light].map(Bound::from);
         let table = || [&keys, &lots, &queries, &asked, &entry_light].map(Clone::clone);
 
-        let epoch = inputs.lights.map_or(0, |l| l.epoch);
-        if epoch != self.lights_epoch && self.frame > 0 && !self.options.even {
-            self.hurry = HURRY;
+        let (epoch, moves) = (inputs.lights.map_or(0, |l| l.epoch), rays.scene.moves());
+        if self.frame > 0 && !self.options.even {
+            if epoch != self.lights_epoch {
+                self.hurry = HURRY;
+            }
+            // After the first frame, too: entries have to come to know each other.
+            if self.frame == 1 || epoch != self.lights_epoch || moves != self.moves {
+                self.stir = STIR;
+            }
         }
-        self.lights_epoch = epoch;
+        (self.lights_epoch, self.moves) = (epoch, moves);
         let mut params = self.params(inputs, rays)?;
         let [w, h] = cells::grid(inputs.size).map(|n| n.div_ceil(8));
         let mut offset = self.params.write(queue, &params);
@@ -306,7 +321,7 @@ impl Rung for GatherGi {
         let layers = 1 + u32::from(inputs.specular.is_some());
         let own = [&keys, &lots, &queries, &pixels, &records, &specular].map(Clone::clone);
         self.rays.record(recorder, groups(offset), own, [w, h, layers]);
-        let rounds = match (self.frame, self.hurry) {
+        let rounds = match (self.frame, self.stir) {
             (0, _) => self.options.first_rounds.max(1),
             (1..=YOUNG, _) => ROUNDS_YOUNG,
             (_, 0) => 1,
@@ -328,6 +343,7 @@ impl Rung for GatherGi {
         self.round = params.round + 1;
         self.frame += 1;
         self.hurry = self.hurry.saturating_sub(1);
+        self.stir = self.stir.saturating_sub(1);
         let brought = Brought { light: &store.cell_light, glosses: &store.glosses, output, gloss: &store.gloss };
         self.bring.record(recorder, &bound, &self.cells, brought);
         Ok(())

@@ -36,11 +36,6 @@ pub fn why(test: &str, subject: &str) -> Option<&'static str> {
             "rays into lobes are one a cell of 4×4 pixels and blurred over cells; only what is on the screen is sharp, and the mirrored \
              wall is not (docs/gi.md: \"mirrors\" stands among what it cannot do)"
         }
-        ("door", "gather" | "neural") => {
-            "a quarter of the light is still there 30 frames after the door is shut, and patches of it go at different times: lights \
-             that change are announced (`Lights::epoch`: entries forget faster, means let go sooner), objects that move are not; whether \
-             that is all of the cause has not been tried"
-        }
         ("saturated", "neural") => {
             "the network's rest is a share of the frame's exposure in each channel, whatever colour the light has: docs/gi.md, E/π = \
              C·exp(g) + s·r; `gather` alone is exact"
