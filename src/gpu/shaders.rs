@@ -1,4 +1,4 @@
-//! The one table of shaders: each is a plain WGSL file, and those that it imports ([`join`]).
+//! The one table of shaders: each is a plain WGSL file, and those that it imports ([`Joined`]).
 //!
 //! Numbers come in as `override` constants or as a generated prelude of `const` lines ([`module_with`]), never by
 //! templates inside a body.

@@ -165,7 +165,7 @@ mod unit {
         let slope = |x: f32| 10.0 + x;
         let (a, b) = (wall(0.0, slope), wall(0.6, slope));
         let (moved, shown) = at_same_places(&a, &b);
-        assert!(moved < 1e-5 && shown > 0.9 && shown < 1.0, "{moved} {shown}");
+        assert!(moved < 1e-3 && shown > 0.9 && shown < 1.0, "{moved} {shown}");
         // Pixel by pixel they differ, and a light that goes with the picture does at the same places.
         assert!(change(&a, &b) > 0.03);
         let stuck = wall(0.6, |x| 10.0 + x - 0.6);
@@ -183,7 +183,7 @@ mod unit {
 
     #[test]
     fn changes_are_shares() {
-        let (a, b) = (wall(0.0, |_| 1.0), wall(0.0, |x| if x > 7.2 { 2.0 } else { 1.0 }));
+        let (a, b) = (wall(0.0, |_| 1.0), wall(0.0, |x| if x > 7.6 { 2.0 } else { 1.0 }));
         assert_eq!((change(&a, &a), largest_change(&a, &a)), (0.0, 0.0));
         let one_in_32 = change(&a, &b);
         assert!((one_in_32 - 1.0 / 33.0).abs() < 0.01, "{one_in_32}");
