@@ -73,6 +73,9 @@ impl Look {
     }
 }
 
+/// How far off a pixel's middle rounding may put a place that is there, pixels.
+const ROUNDING: f32 = 1e-3;
+
 /// The light of one look at the places that another one shows.
 pub(super) struct Fetch<'a> {
     from: &'a Look,
@@ -97,6 +100,11 @@ impl<'a> Fetch<'a> {
         let [w, h] = self.from.size.map(|n| n as f32);
         let x = (clip.x / clip.w * 0.5 + 0.5) * w - 0.5;
         let y = (0.5 - clip.y / clip.w * 0.5) * h - 0.5;
+        // Beyond the middles of the outermost pixels there is nothing to be between.
+        let inside = |at: f32, count: f32| at > -ROUNDING && at < count - 1.0 + ROUNDING;
+        if !inside(x, w) || !inside(y, h) {
+            return None;
+        }
         let (x0, y0) = (x.floor(), y.floor());
         let (mut sum, mut all) = ([0.0; 3], 0.0);
         for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
