@@ -22,7 +22,7 @@ mod trees;
 mod wide;
 
 pub use caster::{HitGpu, RayBatch, RayCaster, RayGpu};
-pub use cpu::AccelHit;
+pub use cpu::{AccelHit, SceneBlocks};
 pub use emitters::EmitterGpu;
 pub use gpu::AccelGpu;
 pub use scene::{RayCounts, SceneRays};

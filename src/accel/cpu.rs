@@ -1,9 +1,10 @@
 //! The walk of `traverse.wgsl` on the CPU, for tests and tools.
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
-use super::Accel;
-use super::wide::{Block, NODE};
+use super::wide::{Block, INSTANCE, NODE};
+use super::{Accel, AccelError, scene, trees::SceneTrees};
+use crate::scene::Scene;
 
 /// Where a ray meets a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,15 +43,18 @@ impl Ray {
         Self { origin, inverse: 1.0 / safe, rows: [first, second, direction / direction.length_squared()] }
     }
 
-    /// The nearest hit of a leaf's two triangles before `nearest`.
-    fn leaf(&self, block: &Block, nearest: f32) -> Option<AccelHit> {
+    /// The nearest hit of a leaf's two triangles before `nearest`, of those that `stops` the ray (by place in the leaf, and number).
+    fn leaf(&self, block: &Block, nearest: f32, stops: impl Fn(u32, u32) -> bool) -> Option<AccelHit> {
         let corner = |i: usize| {
             let p = Vec3::from_array(std::array::from_fn(|k| f32::from_bits(block[4 * i + k]))) - self.origin;
             Vec3::from_array(self.rows.map(|row| row.dot(p)))
         };
         let corners: [Vec3; 4] = std::array::from_fn(corner);
-        let first = triangle([corners[0], corners[1], corners[2]], block[7], nearest);
-        let second = triangle([corners[0], corners[2], corners[3]], block[11], first.map_or(nearest, |h| h.t));
+        let of = |corners, place, nearest| {
+            triangle(corners, block[7 + 4 * place as usize], nearest).filter(|hit| stops(place, hit.triangle))
+        };
+        let first = of([corners[0], corners[1], corners[2]], 0, nearest);
+        let second = of([corners[0], corners[2], corners[3]], 1, first.map_or(nearest, |h| h.t));
         second.or(first)
     }
 
@@ -104,22 +108,107 @@ impl Accel {
     }
 
     fn walk(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32) -> (Option<AccelHit>, usize) {
-        let ray = Ray::new(origin.into(), direction.into());
-        let octant = [4, 2, 1].iter().zip(direction).filter(|(_, d)| *d >= 0.0).map(|(bit, _)| bit).sum::<u32>();
-        let (mut best, mut nearest, mut visits) = (None, t_max, 0);
-        let mut open = vec![0u32];
+        let (mut walk, mut visits) = (Walk::new(&self.blocks, t_max, false, 0), 0);
+        walk.tree(0, origin.into(), direction.into(), &mut |_| visits += 1);
+        (walk.best.map(|(hit, _)| hit), visits)
+    }
+}
+
+/// A walk through blocks and what it has found so far.
+struct Walk<'a> {
+    blocks: &'a [Block],
+    /// Ends at the first hit.
+    any: bool,
+    /// Decides which triangles that let a share of rays through stop this one, as in `traverse.wgsl`.
+    seed: u32,
+    nearest: f32,
+    /// With the number of its instance.
+    best: Option<(AccelHit, u32)>,
+}
+
+impl<'a> Walk<'a> {
+    fn new(blocks: &'a [Block], t_max: f32, any: bool, seed: u32) -> Self {
+        Self { blocks, any, seed, nearest: t_max, best: None }
+    }
+
+    /// Goes through the tree at `root`; `seen` hears of each block.
+    fn tree(&mut self, root: u32, origin: Vec3, direction: Vec3, seen: &mut impl FnMut(u32)) {
+        self.below(root, [0, u32::MAX], origin, direction, seen);
+    }
+
+    /// `instance`: number of its mesh's first triangle, and its own.
+    fn below(&mut self, root: u32, instance: [u32; 2], origin: Vec3, direction: Vec3, seen: &mut impl FnMut(u32)) {
+        let ray = Ray::new(origin, direction);
+        let octant =
+            [4, 2, 1].iter().zip(direction.to_array()).filter(|(_, d)| *d >= 0.0).map(|(bit, _)| bit).sum::<u32>();
+        let mut open = vec![root];
         while let Some(index) = open.pop() {
-            visits += 1;
+            seen(index);
             let block = &self.blocks[index as usize];
             if block[3] & NODE != 0 {
-                let met = ray.children(block, nearest);
+                let met = ray.children(block, self.nearest);
                 let places = (0..8).map(|rank| rank ^ octant).filter(|place| met & (1 << place) != 0);
                 open.extend(places.map(|place| (block[3] & !NODE) + place));
-            } else if let Some(hit) = ray.leaf(block, nearest) {
-                nearest = hit.t;
-                best = Some(hit);
+            } else if block[3] & INSTANCE != 0 {
+                let row = |k: usize| Vec3::from_array(std::array::from_fn(|i| f32::from_bits(block[4 * k + i])));
+                let to_mesh = Mat3::from_cols(row(0), row(1), row(2)).transpose();
+                let inside = [block[7], block[11]];
+                self.below(block[3] & !INSTANCE, inside, to_mesh * origin + row(3), to_mesh * direction, seen);
+            } else if let Some(hit) = ray.leaf(block, self.nearest, |place, triangle| {
+                stops(block[15] >> (8 * place) & 255, instance[0] + triangle, self.seed)
+            }) {
+                self.nearest = hit.t;
+                self.best = Some((AccelHit { triangle: instance[0] + hit.triangle, ..hit }, instance[1]));
+            }
+            if self.any && self.best.is_some() {
+                return;
             }
         }
-        (best, visits)
+    }
+}
+
+/// Whether a triangle that lets 1/255 `open` of all rays through stops the one with this seed.
+fn stops(open: u32, triangle: u32, seed: u32) -> bool {
+    let v = (triangle ^ seed).wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let v = ((v >> ((v >> 28) + 4)) ^ v).wrapping_mul(277_803_737);
+    open == 0 || (((v >> 22) ^ v) >> 8) as f32 / 16_777_216.0 * 255.0 >= open as f32
+}
+
+/// The blocks of [`SceneRays`](super::SceneRays) without a device: trees of meshes below a tree over instances.
+pub struct SceneBlocks(Vec<Block>);
+
+impl SceneBlocks {
+    /// Builds the trees of `scene`.
+    ///
+    /// # Errors
+    /// [`AccelError::TooManyTriangles`].
+    pub fn new(scene: &Scene) -> Result<Self, AccelError> {
+        Accel::check_count(scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum())?;
+        let trees = SceneTrees::build(scene, &|_, _| true)?;
+        let mut blocks = trees.blocks;
+        let top = scene::top(&scene::placed(&trees.meshes, &scene.instances), trees.top_room);
+        blocks[..top.len()].copy_from_slice(&top);
+        Ok(Self(blocks))
+    }
+
+    /// Blocks in all.
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    /// The nearest hit (any hit where `any`) with 0 < t < `t_max`, and the number of its instance; `triangle` counts those of all
+    /// meshes, one after the other. Triangles that let rays through do so by `seed`. `seen` hears of each block that is read, in the
+    /// GPU's order.
+    pub fn walk(
+        &self,
+        origin: [f32; 3],
+        direction: [f32; 3],
+        (t_max, any): (f32, bool),
+        seed: u32,
+        seen: &mut impl FnMut(u32),
+    ) -> Option<(AccelHit, u32)> {
+        let mut walk = Walk::new(&self.0, t_max, any, seed);
+        walk.tree(0, origin.into(), direction.into(), seen);
+        walk.best
     }
 }

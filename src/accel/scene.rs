@@ -7,7 +7,7 @@ use super::gpu::{self, ROW};
 use super::trees::{MeshTree, SceneTrees};
 use super::wide::{Block, INSTANCE, WORDS};
 use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, surfaces};
-use crate::scene::Scene;
+use crate::scene::{Instance, Scene};
 use glam::{Mat4, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -107,30 +107,15 @@ impl SceneRays {
             self.placed = scene.instances.iter().map(|i| i.transform).collect();
             self.moves += 1;
         }
-        let mut boxes = Vec::with_capacity(scene.instances.len());
-        let mut leaves = Vec::with_capacity(scene.instances.len());
-        let mut placed = Vec::new();
-        for (number, instance) in (0u32..).zip(&scene.instances) {
-            let world = Mat4::from_cols_array_2d(&instance.transform);
-            let Some(mesh) = self.meshes.get(instance.mesh) else { continue };
-            let Some((bounds, leaf)) = mesh.bounds.and_then(|b| leaf(mesh, b, &world, number)) else { continue };
-            boxes.push(bounds);
-            leaves.push(leaf);
-            if !mesh.glows.is_empty() {
-                placed.push((&mesh.glows[..], world));
-            }
-        }
-        // More instances than there were: those beyond the room are not met.
-        let most = (self.top_room - 16) / 8;
-        boxes.truncate(most);
-        leaves.truncate(most);
-        self.counts.instances = boxes.len();
-        self.counts.left_out = scene.instances.len() - boxes.len();
-        let top = build::over_boxes(&boxes, TOP_LEVELS, |i| leaves[i]);
+        let placed = placed(&self.meshes, &scene.instances);
+        let top = top(&placed, self.top_room);
+        self.counts.instances = placed.len().min(most_placed(self.top_room));
+        self.counts.left_out = scene.instances.len() - self.counts.instances;
         self.accel.write(queue, 0, &top);
 
         let limit = self.device.limits().max_storage_buffer_binding_size as usize / size_of::<EmitterGpu>();
-        let (table, inverse_power) = emitters::table(placed.into_iter(), limit);
+        let glowing = placed.iter().map(|p| (&self.meshes[p.mesh].glows[..], p.world)).filter(|(g, _)| !g.is_empty());
+        let (table, inverse_power) = emitters::table(glowing, limit);
         self.inverse_power = inverse_power;
         self.counts.emitters = table.len();
         let bytes: &[u8] = bytemuck::cast_slice(&table);
@@ -183,6 +168,37 @@ impl SceneRays {
     pub fn counts(&self) -> RayCounts {
         RayCounts { bytes: self.counts.bytes + self.emitters.size(), ..self.counts }
     }
+}
+
+/// An instance that rays can meet.
+pub(super) struct Placed {
+    mesh: usize,
+    world: Mat4,
+    bounds: Aabb,
+    leaf: Block,
+}
+
+/// Those of `instances` that rays can meet.
+pub(super) fn placed(meshes: &[MeshTree], instances: &[Instance]) -> Vec<Placed> {
+    let place = |(number, instance): (u32, &Instance)| {
+        let world = Mat4::from_cols_array_2d(&instance.transform);
+        let mesh = meshes.get(instance.mesh)?;
+        let (bounds, leaf) = leaf(mesh, mesh.bounds?, &world, number)?;
+        Some(Placed { mesh: instance.mesh, world, bounds, leaf })
+    };
+    (0u32..).zip(instances).filter_map(place).collect()
+}
+
+/// Instances whose tree fits into `room` blocks.
+fn most_placed(room: usize) -> usize {
+    (room - 16) / 8
+}
+
+/// The tree over instances, as far as there is room for them: those beyond it are not met.
+pub(super) fn top(placed: &[Placed], room: usize) -> Vec<Block> {
+    let placed = &placed[..placed.len().min(most_placed(room))];
+    let boxes: Vec<Aabb> = placed.iter().map(|p| p.bounds).collect();
+    build::over_boxes(&boxes, TOP_LEVELS, |i| placed[i].leaf)
 }
 
 /// The leaf of an instance and its box in the world; `None` where no ray can meet it.

@@ -27,6 +27,7 @@ pub mod target;
 pub mod trial;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod truth;
+pub mod traffic;
 #[cfg(feature = "io")]
 pub mod varied;
 pub mod views;

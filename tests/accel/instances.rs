@@ -1,7 +1,7 @@
 //! Trees of meshes under a tree of instances: rays must meet what they meet where all triangles stand in one list.
 
 use crate::oracle::*;
-use bouncelight::accel::{Accel, RayCaster, SceneRays};
+use bouncelight::accel::{Accel, RayCaster, SceneBlocks, SceneRays};
 use bouncelight::scene::{Instance, Material, Mesh, Scene};
 use glam::{Mat4, Quat, Vec3};
 
@@ -75,6 +75,44 @@ fn instances_are_met_where_they_stand_and_where_they_go() {
     assert!(different(&gpu, &caster, &rays, &moved) > 0.1);
     rays.place(&gpu.queue, &scene);
     assert!(different(&gpu, &caster, &rays, &moved) < 1e-3);
+}
+
+/// The walk that is counted on the CPU meets what the one list holds, instances and numbers of triangles included; any hit reads no
+/// more than the nearest one does.
+#[test]
+fn the_walk_through_instances_on_the_cpu_is_the_same() {
+    let (scene, world) = placed();
+    let wrong = |blocks: &SceneBlocks| {
+        let accel = Accel::build(&world).unwrap();
+        let sent = random_rays(2000, 1.5, 3);
+        let sizes = scene.meshes.iter().map(|m| m.indices.len() as u32 / 3).collect::<Vec<_>>();
+        let off = |ray: &&bouncelight::accel::RayGpu| {
+            let (mut nearest, mut any) = (0, 0);
+            let walk = |any, n: &mut usize| {
+                blocks.walk(ray.origin, ray.direction, (ray.t_max, any), 0, &mut |_| *n += 1)
+            };
+            let (found, some) = (walk(false, &mut nearest), walk(true, &mut any));
+            assert!(found.is_some() == some.is_some() && any <= nearest);
+            match (accel.closest(ray.origin, ray.direction, ray.t_max), found) {
+                (None, found) => found.is_some(),
+                (Some(_), None) => true,
+                (Some(e), Some((hit, instance))) => {
+                    // In the one list an instance's triangles follow those of the instances before it.
+                    let mesh = scene.instances[instance as usize].mesh;
+                    let before = |n: usize, of: &dyn Fn(usize) -> usize| (0..n).map(|i| sizes[of(i)]).sum::<u32>();
+                    let in_mesh = hit.triangle - before(mesh, &|i| i);
+                    let in_list = before(instance as usize, &|i| scene.instances[i].mesh) + in_mesh;
+                    (e.t - hit.t).abs() > 1e-4 * (1.0 + e.t) || in_list != e.triangle
+                }
+            }
+        };
+        sent.iter().filter(off).count()
+    };
+    assert!(wrong(&SceneBlocks::new(&scene).unwrap()) <= 2);
+    // Negative control: the blocks of a scene that has moved.
+    let mut moved = scene.clone();
+    moved.instances.iter_mut().for_each(|i| i.transform[3][0] += 0.4);
+    assert!(wrong(&SceneBlocks::new(&moved).unwrap()) > 200);
 }
 
 #[test]

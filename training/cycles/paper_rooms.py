@@ -85,7 +85,7 @@ def build(room, sky, light):
     return scene, camera_object, yaw
 
 
-def configure(scene, size, spp, bounces, denoise=False):
+def configure(scene, size, spp, bounces, denoise=False, unlimited=False):
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
@@ -96,6 +96,9 @@ def configure(scene, size, spp, bounces, denoise=False):
         cycles.denoiser = "OPENIMAGEDENOISE"
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = min(bounces, 12), min(bounces, 4), min(bounces, 4)
     cycles.sample_clamp_indirect = 10
+    if unlimited:  # The light itself: what the limits above take away is up to a tenth of it in bright rooms.
+        cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = 128
+        cycles.sample_clamp_indirect = cycles.blur_glossy = 0
     layer = scene.view_layers[0]
     for use in ("z", "normal", "diffuse_color", "diffuse_direct", "diffuse_indirect", "glossy_color", "glossy_direct", "glossy_indirect"):
         setattr(layer, f"use_pass_{use}", True)
@@ -113,6 +116,7 @@ def main():
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--sky", type=float, default=SKY_RADIANCE, help="world radiance")
     parser.add_argument("--bounces", type=int, default=12, help="0 leaves direct light only")
+    parser.add_argument("--unlimited", action="store_true", help="128 bounces, no clamp, no \"Filter Glossy\": the light itself")
     parser.add_argument("--denoise", action="store_true", help="denoise the Combined layer (no other)")
     parser.add_argument("--seed", type=int, default=0, help="added to the seed of Cycles' random numbers: another one gives the same picture with other noise")
     parser.add_argument("--judge", action="store_true", help="allow the rooms kept for judging")
@@ -128,7 +132,7 @@ def main():
         if not todo:
             continue
         scene, camera, yaw = build(room, a.sky, 1.0)
-        configure(scene, a.size, a.spp, a.bounces, a.denoise)
+        configure(scene, a.size, a.spp, a.bounces, a.denoise, a.unlimited)
         scene.cycles.seed = index + a.seed
         for view in todo:
             start = time.time()

@@ -66,7 +66,7 @@ def prepare(scene, a, world, record=None):
     scene.world = bpy.data.worlds.new("world")
     scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs[0].default_value = (*world, 1)
-    paper_rooms.configure(scene, a.size, a.spp, 12, bool(a.denoise))
+    paper_rooms.configure(scene, a.size, a.spp, 12, bool(a.denoise), a.unlimited)
     scene.cycles.seed = a.seed
 
 
@@ -109,6 +109,7 @@ def main():
     parser.add_argument("--light-radius", type=float, default=0.0)
     parser.add_argument("--sun-angle", type=float, default=0.00918)
     parser.add_argument("--denoise", type=int, default=1, help="denoise the Combined layer")
+    parser.add_argument("--unlimited", action="store_true", help="as in paper_rooms.py")
     parser.add_argument("--seed", type=int, default=0, help="of Cycles' random numbers")
     a = parser.parse_args()
     if os.path.isdir(a.scene):

@@ -5,12 +5,13 @@ use super::{Options, PAST, store};
 use crate::gi::interface::rung::Cost;
 use crate::gi::stage::cells::{self, CellsPass};
 
-/// Blocks that rays visit in the mean, for the count: 8 to 20 for the nearest hit and half as many for any, by
-/// `examples/rays` on rooms, a flat, a hotel and a street; short lines meet few. A block is 64 bytes and eight boxes (170
-/// operations) or two triangles.
-const BLOCKS_NEAREST: f64 = 14.0;
-const BLOCKS_ANY: f64 = 7.0;
-const BLOCKS_SHORT: f64 = 6.0;
+/// Blocks that a look reads (nearest hit, line to a light, line to an entry's beginning), and steps of threads that wait for the
+/// slowest of their warp over steps that they take: means of eight scenes by `examples/rays --traffic`, the least 18, the most 97
+/// blocks. A block is eight boxes (170 operations) or two triangles.
+const BLOCKS: f64 = 27.0 + 8.0 + 11.0;
+const WAITING: f64 = 2.0;
+/// Bytes of the trees that come from memory for a look, by the same: they are few megabytes, most of which caches hold.
+const TREES: f64 = 25.0;
 /// Rays of a look: the nearest hit, the light's, the line to the entry's beginning.
 const RAYS: f64 = 3.0;
 /// Entries in use, for the same: rooms and flats have 1,000 to 6,000.
@@ -24,10 +25,9 @@ pub(super) fn costs(size: [u32; 2], options: &Options) -> Vec<Cost> {
     // Entries lie on surfaces: of half the edge there are four times as many, as far as the table holds them.
     let finer = Options::default().entry_scale / options.entry_scale;
     let entries = (ENTRIES_MET * f64::from(finer * finer)).min(f64::from(slots));
-    // A ray, the shadow ray of what it meets, the line to its entry's beginning; 300 operations and 150 bytes of shading.
-    let look = BLOCKS_NEAREST + BLOCKS_ANY + BLOCKS_SHORT;
-    let flops = look * 170.0 + 300.0;
-    let bytes = look * 64.0 + 150.0;
+    // 300 operations and 150 bytes of shading.
+    let flops = BLOCKS * WAITING * 170.0 + 300.0;
+    let bytes = TREES + 150.0;
     vec![
         CellsPass::cost(size),
         Cost::new("gi.evict", f64::from(slots) * 10.0, f64::from(slots) * 16.0),
