@@ -186,7 +186,7 @@ fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 
         diffuse += counts * rgb * (1.0 - metallic);
         f0 += counts * (m.f0 * Vec3::from(m.specular_tint)).lerp(rgb, metallic);
         roughness += counts * (m.roughness * rough[1]).clamp(0.0, 1.0);
-        emission += counts * Vec3::from(m.emissive) * Vec3::new(glow[0], glow[1], glow[2]);
+        emission += counts * Vec3::from(m.emission()) * Vec3::new(glow[0], glow[1], glow[2]);
     }
     let flags = (u32::from(m.double_sided) * DOUBLE_SIDED) | (u32::from(m.unlit) * UNLIT);
     let dark = if m.unlit { 0.0 } else { 1.0 / weight };

@@ -239,7 +239,7 @@ fn lights(scene: &Scene, mut emitters: Vec<Emitter>) -> Vec<Light> {
 
 /// Everything that glows.
 fn emitters(scene: &Scene) -> Vec<Emitter> {
-    let radiance = |m: &Material| if m.unlit { Vec3::ZERO } else { Vec3::from(m.emissive) * mean_emission(scene, m) };
+    let radiance = |m: &Material| if m.unlit { Vec3::ZERO } else { Vec3::from(m.emission()) * mean_emission(scene, m) };
     let radiances: Vec<Vec3> = scene.materials.iter().map(radiance).collect();
     scene.instances.iter().filter_map(|i| emitter(scene, i, &radiances)).collect()
 }

@@ -225,6 +225,13 @@ impl Default for Material {
     }
 }
 
+impl Material {
+    /// `emissive` for whoever draws: 0 in channels that are negative or no number.
+    pub fn emission(&self) -> [f32; 3] {
+        self.emissive.map(|e| if e.is_finite() { e.max(0.0) } else { 0.0 })
+    }
+}
+
 /// A use of an image by a material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TextureRef {

@@ -23,11 +23,11 @@ pub mod rays;
 pub mod stability;
 #[cfg(feature = "reference")]
 pub mod target;
+pub mod traffic;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod trial;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod truth;
-pub mod traffic;
 #[cfg(feature = "io")]
 pub mod varied;
 pub mod views;

@@ -88,9 +88,8 @@ fn the_walk_through_instances_on_the_cpu_is_the_same() {
         let sizes = scene.meshes.iter().map(|m| m.indices.len() as u32 / 3).collect::<Vec<_>>();
         let off = |ray: &&bouncelight::accel::RayGpu| {
             let (mut nearest, mut any) = (0, 0);
-            let walk = |any, n: &mut usize| {
-                blocks.walk(ray.origin, ray.direction, (ray.t_max, any), 0, &mut |_| *n += 1)
-            };
+            let walk =
+                |any, n: &mut usize| blocks.walk(ray.origin, ray.direction, (ray.t_max, any), 0, &mut |_| *n += 1);
             let (found, some) = (walk(false, &mut nearest), walk(true, &mut any));
             assert!(found.is_some() == some.is_some() && any <= nearest);
             match (accel.closest(ray.origin, ray.direction, ray.t_max), found) {

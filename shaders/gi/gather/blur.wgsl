@@ -19,9 +19,9 @@
 const SETTLED = 6.0;
 const NARROW = 2;
 const WIDE = 4;
-// A change of light is one that is beyond so many deviations of noise and this share of the light; younger means than this many
-// frames follow by themselves.
-const SIGMAS = 4.0;
+// A change of light is one that is beyond what chance does once in e^CHANCE and beyond this share of the light; younger means than
+// this many frames follow by themselves.
+const CHANCE = 9.7;
 const LEAST_CHANGE = 0.1;
 // The same for the sum over the cells of a workgroup, which knows more surely that a lamp was switched.
 const LEAST_REGION = 0.05;
@@ -32,21 +32,30 @@ fn past_at(cell: u32) -> Past {
     return past_from(pasts[i], pasts[i + 1u], pasts[i + 2u], pasts[i + 3u], pasts[i + 4u]);
 }
 
-// Of the cells of a workgroup: luminance of all frames, of lately, and its noise.
-var<workgroup> of_cells: array<vec3f, 64>;
-var<workgroup> region: vec3f;
+// Of the cells of a workgroup: luminance of all frames, of lately, its noise, and the most that one ray has in it.
+var<workgroup> of_cells: array<vec4f, 64>;
+var<workgroup> region: vec4f;
 
-fn tells(here: Past) -> vec3f {
-    if here.frames <= LEAST_KNOWN { return vec3f(0.0); }
+fn tells(here: Past) -> vec4f {
+    if here.frames <= LEAST_KNOWN { return vec4f(0.0); }
     let l = luminance(here.light);
-    return vec3f(l, luminance(here.lately), max(here.square - l * l, 0.0) * (LATELY / (2.0 - LATELY)));
+    let variance = max(here.square - l * l, 0.0) * (LATELY / (2.0 - LATELY));
+    return vec4f(l, luminance(here.lately), variance, LATELY * bright_ray(here));
 }
 
-// Whether the mean of lately differs from that of all frames by more than its noise.
-fn differs(all: f32, lately: f32, variance: f32, least: f32) -> bool {
-    let hurried = (gather.flags & GATHER_LIGHTS_CHANGED) != 0u;
-    let sure = select(1.0, 0.2, hurried);
-    return abs(lately - all) > sure * (SIGMAS * sqrt(variance) + least * max(all, lately));
+// Luminance of the rays that bring a cell's light: of rays that find either nothing or one brightness, that brightness.
+fn bright_ray(here: Past) -> f32 {
+    return here.square / max(luminance(here.light), 1e-20);
+}
+
+// Whether the mean of lately differs from that of all frames by more than its noise, by Bernstein's inequality: where light comes
+// from a small bright place few rays meet it, and one of them (`most`) is farther from the mean than any bell curve allows. Where a
+// change is to be expected one such ray may pass for it.
+fn differs(all: f32, lately: f32, variance: f32, most: f32, least: f32) -> bool {
+    let sure = select(1.0, 0.2, (gather.flags & GATHER_LIGHTS_CHANGED) != 0u);
+    let few = select(CHANCE / 3.0 * most, 0.0, (gather.flags & GATHER_CHANGING) != 0u);
+    let noise = few + sqrt(few * few + 2.0 * CHANCE * variance);
+    return abs(lately - all) > sure * (noise + least * max(all, lately));
 }
 
 // One over the difference of roughness from which on two lobes show different things.
@@ -101,17 +110,20 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     var cell = 0u;
     if inside { cell = cell_index(id.xy); }
     let here = past_at(cell);
-    of_cells[index] = vec3f(0.0);
+    of_cells[index] = vec4f(0.0);
     if inside { of_cells[index] = tells(here); }
     workgroupBarrier();
     if index == 0u {
-        var sum = vec3f(0.0);
-        for (var i = 0u; i < 64u; i++) { sum += of_cells[i]; }
+        var sum = vec4f(0.0);
+        for (var i = 0u; i < 64u; i++) {
+            let one = of_cells[i];
+            sum = vec4f(sum.xyz + one.xyz, max(sum.w, one.w));
+        }
         region = sum;
     }
     workgroupBarrier();
     if !inside { return; }
-    let region_differs = differs(region.x, region.y, region.z, LEAST_REGION);
+    let region_differs = differs(region.x, region.y, region.z, region.w, LEAST_REGION);
     changes[cell] = vec4f(0.0);
     if here.frames <= 0.0 {
         light[3u * cell] = vec4f(0.0);
@@ -128,6 +140,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     var total = 0.0;
     var lately = vec3f(0.0);
     var noise = 0.0;
+    var most = 0.0;
     var squares = 0.0;
     var parts = 0.0;
     for (var y = -radius; y <= radius; y++) {
@@ -145,6 +158,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             lately += w * there.lately;
             let l = luminance(there.light);
             noise += w * w * max(there.square - l * l, 0.0);
+            most = max(most, w * bright_ray(there));
             squares += w * there.square;
             parts += w * w / there.frames;
         }
@@ -154,7 +168,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     if here.frames > LEAST_KNOWN && (gather.flags & GATHER_EVEN) == 0u {
         let now = lately / max(total, 1e-30);
         let variance = noise * (LATELY / (2.0 - LATELY)) / max(total * total, 1e-30);
-        if region_differs || differs(luminance(mean), luminance(now), variance, LEAST_CHANGE) {
+        most *= LATELY / max(total, 1e-30);
+        if region_differs || differs(luminance(mean), luminance(now), variance, most, LEAST_CHANGE) {
             changes[cell] = vec4f(now, 1.0);
             mean = now;
         }

@@ -34,13 +34,17 @@ fn motion_of(pixel: vec2i) -> vec2f {
     return finite3(vec3f(textureLoad(motion_map, pixel, 0).xy, 0.0)).xy * vec2f(params.size);
 }
 
+fn rests(motion: vec2f) -> bool {
+    return all(abs(motion) < vec2f(0.02));
+}
+
 // The mean where the surface at x, which faces n, was in the frame before; 0 frames where it was not to be seen.
 fn past_of(cell: vec2u, pixel: vec2i, x: vec3f, n: vec3f, foot: f32) -> Past {
     let none = Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n, vec3f(0.0), NO_LOBE, vec4f(0.0));
     var past = none;
     if (gather.flags & GATHER_CUT) != 0u { return past; }
     let motion = motion_of(pixel);
-    if all(abs(motion) < vec2f(0.02)) {
+    if rests(motion) {
         // At rest a cell stays what it is, whichever of its pixels stands for it.
         let same = past_at(cell_index(cell));
         if same.frames > 0.0 && shows(same, x, n, foot) { return same; }
@@ -78,6 +82,8 @@ fn past_of(cell: vec2u, pixel: vec2i, x: vec3f, n: vec3f, foot: f32) -> Past {
 
 // Frames in which the light between surfaces settles.
 const YOUNG = 16.0;
+// Frames that a mean remembers where its surface moves on the screen, or light may be changing.
+const BRIEF = 128.0;
 // Frames that the mean of lately counts for where light has changed.
 const AFTER_CHANGE = 4.0;
 
@@ -165,7 +171,10 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let x = world_position_at(pixel, z);
     let n = world_normal_at(pixel);
     let past = past_of(id.xy, pixel, x, n, cell_foot(z));
-    let frames = min(past.frames + 1.0, gather.cell_frames);
+    var most = gather.cell_frames;
+    let changing = (gather.flags & GATHER_CHANGING) != 0u || !rests(motion_of(pixel));
+    if changing && (gather.flags & GATHER_EVEN) == 0u { most = min(most, BRIEF); }
+    let frames = min(past.frames + 1.0, most);
     // The first frames count for less, each for its number, since they know least of the light between surfaces; from YOUNG on all
     // count the same.
     var share = select(1.0 / (frames - 0.5 * (YOUNG - 1.0)), 2.0 / (frames + 1.0), frames <= YOUNG);
@@ -173,10 +182,13 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let l = luminance(light);
     let surface = textureLoad(specular_map, pixel, 0);
     let roughness = select(NO_LOBE, surface.a, any(surface.rgb > vec3f(0.0)));
-    let mean = mix(past.light, light, share);
+    let lately = mix(past.lately, light, max(LATELY, 1.0 / frames));
+    // At rest a bright ray comes into the mean over some frames, all of it in the end, and not as a spark.
+    let whole = changing || frames <= YOUNG || (gather.flags & GATHER_EVEN) != 0u;
+    let mean = mix(past.light, select(lately, light, whole), share);
     let now = Past(
         mean, frames, mix(past.vector, vector, share), mix(past.square, l * l, share), x, n,
-        mix(past.lately, light, max(LATELY, 1.0 / frames)), roughness,
+        lately, roughness,
         gloss_of(id.xy, past.gloss, roughness, motion_of(pixel), mean)
     );
     let i = 5u * cell;

@@ -45,6 +45,8 @@ const GATHER_LIGHTS_CHANGED = 16u;
 const GATHER_NO_CAUSTICS = 32u;
 // Surfaces of the picture show none that rays would have to find.
 const GATHER_NO_GLOSS = 64u;
+// Lights, or objects, are not what and where they were a short while ago.
+const GATHER_CHANGING = 128u;
 
 @group(1) @binding(0) var<uniform> gather: Gather;
 @group(1) @binding(1) var accel_blocks: texture_2d<u32>;

@@ -106,6 +106,8 @@ pub struct GatherGi {
     /// Where objects were in the last frame, and frames for which entries forget quickly because lights or objects changed before.
     moves: u64,
     stir: u32,
+    /// Frames for which light may be expected to change for the same reasons.
+    changing: u32,
     scene_id: u64,
 }
 
@@ -199,6 +201,7 @@ impl GatherGi {
             hurry: 0,
             moves: 0,
             stir: 0,
+            changing: 0,
             scene_id: 0,
         }
     }
@@ -228,6 +231,7 @@ impl GatherGi {
             (self.hurry > 0, params::LIGHTS_CHANGED),
             (!self.options.caustics, params::NO_CAUSTICS),
             (inputs.specular.is_none(), params::NO_GLOSS),
+            (self.changing > 0, params::CHANGING),
         ];
         Ok(Params {
             eye: crate::gi::stage::inputs::Params::new(inputs.size, &inputs.camera, inputs.environment)?.eye_position(),
@@ -301,8 +305,11 @@ impl Rung for GatherGi {
             if epoch != self.lights_epoch {
                 self.hurry = HURRY;
             }
-            // After the first frame, too: entries have to come to know each other.
-            if self.frame == 1 || epoch != self.lights_epoch || moves != self.moves {
+            if epoch != self.lights_epoch || moves != self.moves {
+                (self.stir, self.changing) = (STIR, STIR);
+            }
+            // Entries have to come to know each other.
+            if self.frame == 1 {
                 self.stir = STIR;
             }
         }
@@ -344,6 +351,7 @@ impl Rung for GatherGi {
         self.frame += 1;
         self.hurry = self.hurry.saturating_sub(1);
         self.stir = self.stir.saturating_sub(1);
+        self.changing = self.changing.saturating_sub(1);
         let brought = Brought { light: &store.cell_light, glosses: &store.glosses, output, gloss: &store.gloss };
         self.bring.record(recorder, &bound, &self.cells, brought);
         Ok(())

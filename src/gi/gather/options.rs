@@ -6,7 +6,7 @@ use thiserror::Error;
 /// How light is gathered. The numbers that are choices stand in the table of `docs/gi.md`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Frames that a cell's mean remembers.
+    /// Frames that a cell's mean remembers at rest; where it moves, or light or objects do, 128 at most (`BRIEF` in `settle.wgsl`).
     pub cell_frames: f32,
     /// Rays that an entry's mean remembers.
     pub entry_frames: f32,
@@ -29,7 +29,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            cell_frames: 128.0,
+            cell_frames: 1024.0,
             entry_frames: 8.0,
             slots: 1 << 15,
             entry_scale: 1.0 / 16.0,

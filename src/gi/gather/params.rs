@@ -18,6 +18,9 @@ pub(super) const NO_CAUSTICS: u32 = 32;
 /// The host does not say what surfaces mirror.
 pub(super) const NO_GLOSS: u32 = 64;
 
+/// Light or objects are not what they were a short while ago.
+pub(super) const CHANGING: u32 = 128;
+
 /// `Gather` of `shaders/gi/gather/types.wgsl`, which documents the fields.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]

@@ -37,8 +37,20 @@ pub const CANDIDATES: usize = 8;
 const EVEN: f64 = 0.3;
 
 impl LightGpu {
-    /// The shader's form of `light`.
+    /// The shader's form of `light`; one with anything that is no number gives none.
     pub fn new(light: &Light) -> Self {
+        let made = Self::of(light);
+        let [places, rest] =
+            [[made.position, made.direction], [made.color, [made.range, made.radius, made.cone_scale]]];
+        let sound = places.iter().chain(&rest).flatten().all(|v| v.is_finite()) && made.cone_offset.is_finite();
+        if sound {
+            made
+        } else {
+            Self { kind: made.kind, direction: [0.0, -1.0, 0.0], stands_in: made.stands_in, ..Self::zeroed() }
+        }
+    }
+
+    fn of(light: &Light) -> Self {
         let tint = |strength: f32| light.color.map(|c| c * strength);
         let unit = |v: [f32; 3]| glam::Vec3::from(v).try_normalize().unwrap_or(glam::Vec3::NEG_Y).to_array();
         let zero = Self { stands_in: light.stands_in.into(), ..Self::zeroed() };

@@ -117,7 +117,7 @@ fn uniform(m: &Material) -> MaterialGpu {
     });
     MaterialGpu {
         base_color: m.base_color,
-        emissive: m.emissive,
+        emissive: m.emission(),
         unlit: u32::from(m.unlit),
         metallic: m.metallic,
         roughness: m.roughness,
