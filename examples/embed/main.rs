@@ -8,8 +8,8 @@ pub(crate) mod scene;
 
 use bouncelight::gi::{self, Conventions, Inputs, Instance, MeshSource, Surface, Vertices, View, World, WorldOptions};
 use bouncelight::wgpu::{self, VertexFormat};
-use renderer::{Drawn, Renderer};
-use scene::{BLOCKS, place};
+use renderer::Renderer;
+use scene::{BLOCKS, Drawn, place};
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -70,7 +70,7 @@ impl Host {
             conventions: self.conventions,
             ..Inputs::new(host.size, &host.depth, &host.normal, host.matrices)
         };
-        self.view.record(&mut encoder, &self.world, &inputs, &host.light_view)?;
+        self.view.record(&mut encoder, &self.world, &inputs, &host.light)?;
         host.forward(&mut encoder);
         host.queue.submit([encoder.finish()]);
         Ok(())

@@ -1,23 +1,13 @@
 //! A forward renderer that knows nothing of global illumination but one texture that its last pass reads. Depth is 0 near
 //! and 1 far, normals are in view space in 10 bits, motion is in pixels.
 
+use super::scene::Drawn;
 use bouncelight::gi::CameraMatrices;
 use bouncelight::wgpu::{
     self, BufferUsages as B, CommandEncoder as Encoder, Device, Queue, TextureFormat as F, TextureUsages as U,
     TextureView,
 };
 use glam::Vec3;
-
-/// One box as the vertex shader reads it.
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Drawn {
-    /// World from box, now and in the frame before.
-    pub world: [[f32; 4]; 4],
-    pub before: [[f32; 4]; 4],
-    /// Albedo, glow.
-    pub color: [f32; 4],
-}
 
 pub struct Renderer {
     pub device: Device,
@@ -28,8 +18,7 @@ pub struct Renderer {
     pub normal: TextureView,
     pub motion: TextureView,
     /// Light that the forward pass multiplies with albedo, E/π.
-    pub light: wgpu::Texture,
-    pub light_view: TextureView,
+    pub light: TextureView,
     /// sRGB.
     pub picture: wgpu::Texture,
     picture_view: TextureView,
@@ -43,23 +32,20 @@ pub struct Renderer {
 impl Renderer {
     pub fn new(device: &Device, queue: &Queue, size: [u32; 2], corners: &[[f32; 6]], count: usize) -> Self {
         let texture = |format, usage| {
-            let (mip_level_count, sample_count, dimension) = (1, 1, wgpu::TextureDimension::D2);
-            let size = wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 };
-            let (label, view_formats) = (Some("host"), &[][..]);
             device.create_texture(&wgpu::TextureDescriptor {
-                label,
-                size,
-                mip_level_count,
-                sample_count,
-                dimension,
+                label: Some("host"),
+                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
                 format,
                 usage,
-                view_formats,
+                view_formats: &[],
             })
         };
         let [depth, normal, motion] = [F::Depth32Float, F::Rgb10a2Unorm, F::Rg16Float]
             .map(|format| view(&texture(format, U::RENDER_ATTACHMENT | U::TEXTURE_BINDING)));
-        let light = texture(F::Rgba16Float, U::STORAGE_BINDING | U::TEXTURE_BINDING | U::COPY_SRC);
+        let light = view(&texture(F::Rgba16Float, U::STORAGE_BINDING | U::TEXTURE_BINDING | U::COPY_SRC));
         let picture = texture(F::Rgba8UnormSrgb, U::RENDER_ATTACHMENT | U::COPY_SRC);
         let buffer = |usage, size: usize| {
             let (label, size, usage) = (Some("host"), size as u64, usage | B::COPY_DST);
@@ -90,8 +76,7 @@ impl Renderer {
         ];
         let (label, entries) = (Some("host"), &[entry(0, types[0]), entry(1, types[1])]);
         let layout = &device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries });
-        let light_view = view(&light);
-        let resources = [camera.as_entire_binding(), wgpu::BindingResource::TextureView(&light_view)];
+        let resources = [camera.as_entire_binding(), wgpu::BindingResource::TextureView(&light)];
         let bound = |i: usize| wgpu::BindGroupEntry { binding: i as u32, resource: resources[i].clone() };
         let entries = &[bound(0), bound(1)];
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("host"), layout, entries });
@@ -111,7 +96,6 @@ impl Renderer {
             normal,
             motion,
             light,
-            light_view,
             picture_view: view(&picture),
             picture,
             corners: corner_buffer,

@@ -41,3 +41,14 @@ pub fn place(number: usize, time: f32) -> [[f32; 4]; 4] {
     let [a, b, c] = middle;
     [[x, 0.0, 0.0, 0.0], [0.0, y, 0.0, 0.0], [0.0, 0.0, z, 0.0], [a, b, c, 1.0]]
 }
+
+/// One box as the vertex shader reads it.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Drawn {
+    /// World from box, now and in the frame before.
+    pub world: [[f32; 4]; 4],
+    pub before: [[f32; 4]; 4],
+    /// Albedo, glow.
+    pub color: [f32; 4],
+}

@@ -49,15 +49,16 @@ fn depth_and_normals_in_every_convention() {
     let wrong = difference(&still(&gpu, &how, &forward), &plain);
     assert!(wrong > 0.1, "{wrong}");
 
+    // Rays that start a little aside meet other entries of the cache: by noise, not by the format, 1 to 2 % differ.
     use {NormalEncoding as E, NormalRange as R, NormalSpace as S};
     for (encoding, range, format, most) in [
-        (E::Octahedral, R::Signed, F::Rg16Float, 0.01),
-        (E::Octahedral, R::Unsigned, F::Rgb10a2Unorm, 0.02),
-        (E::Xyz, R::Signed, F::Rgba16Float, 0.01),
-        (E::Xyz, R::Unsigned, F::Rgba16Float, 0.01),
-        (E::Xyz, R::Unsigned, F::Rgb10a2Unorm, 0.02),
+        (E::Octahedral, R::Signed, F::Rg16Float, 0.03),
+        (E::Octahedral, R::Unsigned, F::Rgb10a2Unorm, 0.03),
+        (E::Xyz, R::Signed, F::Rgba16Float, 0.03),
+        (E::Xyz, R::Unsigned, F::Rgba16Float, 0.03),
+        (E::Xyz, R::Unsigned, F::Rgb10a2Unorm, 0.03),
         (E::Xyz, R::Unsigned, F::Rgba8Unorm, 0.04),
-        (E::Xy, R::Signed, F::Rg16Float, 0.01),
+        (E::Xy, R::Signed, F::Rg16Float, 0.03),
         (E::Xy, R::Unsigned, F::Rgba8Unorm, 0.04),
     ] {
         for space in [S::World, S::View] {

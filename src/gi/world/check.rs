@@ -135,7 +135,7 @@ impl Evidence<'_> {
         };
         let c = &self.inputs.conventions;
         let stated = score(c.normal_encoding, c.normal_range, c.normal_space, Vec3::ONE);
-        if flat.len() < 16 || stated > RIGHT {
+        if flat.len() < 16 {
             return None;
         }
         let mut best = (0.0, String::new());
@@ -153,11 +153,14 @@ impl Evidence<'_> {
                 }
             }
         }
+        // A camera that is hardly tilted confuses spaces only a little, but then the right one is far nearer.
+        let (score, name) = best;
+        let better = score > 0.85 && 1.0 - stated > 2.0 * (1.0 - score) + 0.02;
         let found = format!("its mean cosine with the surface that depth shows is {stated:.2}");
-        Some(match best {
-            (score, name) if score > 0.85 => format!("{found}; as {name} it would be {score:.2}"),
-            _ => found,
-        })
+        if better {
+            return Some(format!("{found}; as {name} it would be {score:.2}"));
+        }
+        (stated < RIGHT).then_some(found)
     }
 
     fn motion(&self) -> Option<String> {

@@ -55,6 +55,34 @@ struct Placed {
 }
 
 /// The host's scene as rays meet it. Keys are the host's own numbers. Nothing is uploaded before [`World::prepare`].
+///
+/// ```no_run
+/// use bouncelight::gi::{GiError, Indices, Inputs, Instance, MeshSource, Method, Vertices, View, World, WorldOptions};
+/// use bouncelight::scene::{Environment, LightKind};
+/// use bouncelight::wgpu;
+///
+/// fn made(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<(World, View), GiError> {
+///     let mut world = World::new(device, WorldOptions::default());
+///     let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+///     world.mesh(1, &MeshSource::new(Vertices::vec3(&corners), Indices::None))?;
+///     let lamp = LightKind::Point { position: [0.0, 2.0, 1.0], intensity: 5.0, radius: 0.05, range: None };
+///     world.lights(&[lamp.into()])?;
+///     world.sky(&Environment::constant([0.1, 0.12, 0.15]))?;
+///     Ok((world, View::new(device, queue, [1280, 720], &Method::Gather(Default::default()))?))
+/// }
+///
+/// fn frame(
+///     (world, view): (&mut World, &mut View),
+///     (encoder, queue): (&mut wgpu::CommandEncoder, &wgpu::Queue),
+///     transform: [[f32; 4]; 4],
+///     inputs: &Inputs<'_>,
+///     output: &wgpu::TextureView,
+/// ) -> Result<(), GiError> {
+///     world.instance(1, Instance { mesh: 1, transform, surface: None })?;
+///     world.prepare(queue)?;
+///     view.record(encoder, &*world, inputs, output)
+/// }
+/// ```
 pub struct World {
     device: wgpu::Device,
     options: WorldOptions,
