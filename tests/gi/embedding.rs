@@ -11,7 +11,6 @@ use bouncelight::gi::{
 use bouncelight::gpu::Gpu;
 use bouncelight::scene::{Environment, LightKind};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use wgpu::{TextureFormat as F, VertexFormat};
 
 const IDENTITY: [[f32; 4]; 4] =
@@ -141,17 +140,13 @@ fn a_lost_device_is_no_panic() {
     let Some(gpu) = common::gpu() else { return };
     let (device, queue) =
         pollster::block_on(gpu.adapter.request_device(&Default::default())).expect("a device to be lost");
-    let heard = Arc::new(AtomicUsize::new(0));
-    let count = heard.clone();
-    device.on_uncaptured_error(Arc::new(move |_| {
-        count.fetch_add(1, Ordering::Relaxed);
-    }));
+    device.on_uncaptured_error(Arc::new(|_| {}));
     let lost = Gpu { adapter: gpu.adapter.clone(), device, queue, info: gpu.info.clone() };
     let shot = shot(0, [0.0; 2]);
     let targets = written(&lost, &shot, &Written::default(), &shot.camera);
     let (mut world, mut lit) = (world(&lost), gather(&lost));
     let target = output(&lost.device, SIZE);
-    let mut frame = |world: &mut World, lose: bool| {
+    let frame = |lit: &mut View, world: &mut World, lose: bool| {
         let mut encoder = lost.device.create_command_encoder(&Default::default());
         if lose {
             lost.device.destroy();
@@ -162,12 +157,14 @@ fn a_lost_device_is_no_panic() {
         lost.queue.submit([encoder.finish()]);
         (prepared.is_ok(), drawn.is_ok())
     };
-    assert_eq!((frame(&mut world, false), heard.load(Ordering::Relaxed)), ((true, true), 0));
+    let sound = |lit: &View, world: &World| lit.check(&lost.device, world, &targets.inputs(Conventions::default()));
+    assert_eq!(frame(&mut lit, &mut world, false), (true, true));
+    assert!(sound(&lit, &world).is_ok());
     // In the middle of a frame, and in those after it: an error, or a frame that nobody sees.
-    frame(&mut world, true);
-    frame(&mut world, false);
-    assert!(heard.load(Ordering::Relaxed) > 0, "the device is lost");
-    assert!(lit.check(&lost.device, &world, &targets.inputs(Conventions::default())).is_err());
+    frame(&mut lit, &mut world, true);
+    frame(&mut lit, &mut world, false);
+    // Reading back is what notices.
+    assert!(sound(&lit, &world).is_err());
 }
 
 #[test]
@@ -203,23 +200,24 @@ fn what_changes_in_flight_changes_the_light() {
     };
     println!("red over blue {:.3}, then {:.3}", redness(&plain), redness(&redder));
     assert!(redness(&redder) > 1.1 * redness(&plain));
+    // Lamps alone, from none to many: a buffer that has to grow.
+    let mut lamps = |world: &mut World, count: usize| {
+        world.lights(&vec![lamp(40.0 / count.max(1) as f32).into(); count]).expect("lamps");
+        world.prepare(&gpu.queue).expect("it fits");
+        frames(world, 48)
+    };
+    let (none, many) = (lamps(&mut world, 0), lamps(&mut world, 40));
+    println!("no lamp {:.3}, forty {:.3}", mean(&none), mean(&many));
+    assert!(mean(&many) > 1.05 * mean(&none));
     let (positions, indices) = cube();
     let mesh = MeshSource::new(Vertices::vec3(&positions), Indices::U32(&indices[..3]));
     world.mesh(7, &mesh).expect("a triangle in the cube's place");
     world.prepare(&gpu.queue).expect("it fits");
     assert_eq!(world.counts().map(|c| c.triangles), Some(ROOM.len()));
     let open = frames(&world, 24);
-    assert!(difference(&open, &redder) > 0.1);
+    println!("then {:.3}, {:.1} % off", redness(&open), 100.0 * difference(&open, &many));
+    assert!(redness(&open) < 0.9 * redness(&many));
 
-    // Lamps alone, from none to many: a buffer that has to grow.
-    let mut lamps = |count: usize| {
-        world.lights(&vec![lamp(40.0 / count.max(1) as f32).into(); count]).expect("lamps");
-        world.prepare(&gpu.queue).expect("it fits");
-        frames(&world, 48)
-    };
-    let (none, many) = (lamps(0), lamps(40));
-    println!("no lamp {:.3}, forty {:.3}", mean(&none), mean(&many));
-    assert!(mean(&many) > 1.05 * mean(&none));
     assert!(world.remove_mesh(7) && !world.remove_mesh(7));
     world.prepare(&gpu.queue).expect("it fits");
     assert_eq!(world.counts().map(|c| (c.triangles, c.instances)), Some((0, 0)));
