@@ -112,7 +112,7 @@ fn each_mistake_is_named() {
     said(complaints(&gpu, &how, &xyz, |_| {}, |_| {}), "normal", &["`View`"]);
     let unsigned = Conventions { normal_range: NormalRange::Unsigned, ..xyz };
     let how = Written { conventions: unsigned, normal: F::Rgba16Float, ..Default::default() };
-    said(complaints(&gpu, &how, &xyz, |_| {}, |_| {}), "normal", &["`Unsigned`"]);
+    said(complaints(&gpu, &how, &xyz, |_| {}, |_| {}), "normal", &["`Xyz`, `Unsigned`"]);
     let turned = |t: &mut Targets| {
         let normals = shot(1, [0.0; 2]).buffers.normal;
         let texels = normals.iter().flat_map(|n| {

@@ -26,7 +26,7 @@ pub const ROOM: [Block; 5] = [
 /// Eye and target of the camera, `step` steps on its way.
 pub fn eye(step: u32) -> (Vec3, Vec3) {
     let x = 0.12 * step as f32;
-    (Vec3::new(1.5 + x, 2.0, 5.0), Vec3::new(0.2 + x, 0.6, -1.0))
+    (Vec3::new(3.2 + x, 3.0, 4.4), Vec3::new(-0.2 + x, 0.5, -1.0))
 }
 
 /// Corners of a box of 2 m, each face's own.

@@ -138,23 +138,35 @@ impl Evidence<'_> {
         if flat.len() < 16 {
             return None;
         }
-        let mut best = (0.0, String::new());
-        let signs = [("", Vec3::ONE), (", with y negated", Vec3::new(1.0, -1.0, 1.0)), (", negated", Vec3::NEG_ONE)];
-        let signs = signs.into_iter().chain([(", with z negated", Vec3::new(1.0, 1.0, -1.0))]);
+        // Of readings that fit alike, that which differs least from what was said.
+        let mut best = (f32::MIN, 0.0, String::new());
+        let signs = [
+            ("", Vec3::ONE),
+            (", with y negated", Vec3::new(1.0, -1.0, 1.0)),
+            (", with z negated", Vec3::new(1.0, 1.0, -1.0)),
+            (", negated", Vec3::NEG_ONE),
+        ];
         for (flipped, sign) in signs {
             for range in [NormalRange::Signed, NormalRange::Unsigned] {
                 for space in [NormalSpace::World, NormalSpace::View] {
                     for encoding in [NormalEncoding::Octahedral, NormalEncoding::Xyz, NormalEncoding::Xy] {
                         let score = score(encoding, range, space, sign);
-                        if score > best.0 + 0.02 {
-                            best = (score, format!("`{encoding:?}`, `{range:?}`, `{space:?}`{flipped}"));
+                        let differs = [
+                            !flipped.is_empty(),
+                            range != c.normal_range,
+                            space != c.normal_space,
+                            encoding != c.normal_encoding,
+                        ];
+                        let rank = score - 0.02 * differs.iter().filter(|d| **d).count() as f32;
+                        if rank > best.0 {
+                            best = (rank, score, format!("`{encoding:?}`, `{range:?}`, `{space:?}`{flipped}"));
                         }
                     }
                 }
             }
         }
         // A camera that is hardly tilted confuses spaces only a little, but then the right one is far nearer.
-        let (score, name) = best;
+        let (_, score, name) = best;
         let better = score > 0.85 && 1.0 - stated > 2.0 * (1.0 - score) + 0.02;
         let found = format!("its mean cosine with the surface that depth shows is {stated:.2}");
         if better {
