@@ -100,7 +100,7 @@ fn each_mistake_is_named() {
     said(complaints(&gpu, &plain, &own, |_| {}, flipped), "depth", &["upside down"]);
     let holes = |t: &mut Targets| {
         let texels =
-            shot(1, [0.0; 2]).buffers.depth.iter().map(|d| if *d > 0.03 { f32::NAN } else { *d }).collect::<Vec<_>>();
+            shot(1, [0.0; 2]).buffers.depth.iter().map(|d| if *d > 0.018 { f32::NAN } else { *d }).collect::<Vec<_>>();
         t.depth = texture(F::R32Float, bytemuck::cast_slice(&texels));
     };
     said(complaints(&gpu, &plain, &own, |_| {}, holes), "depth", &["NaN"]);

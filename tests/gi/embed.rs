@@ -75,7 +75,8 @@ fn the_host_draws_what_we_draw() {
     assert!(off < 0.04 && seen < 0.05, "{off} {seen}");
 
     // Negative controls: the same targets, read by other conventions.
-    let wrong: [(&str, fn(&mut Conventions)); 3] = [
+    type Change = fn(&mut Conventions);
+    let wrong: [(&str, Change); 3] = [
         ("space", |c| c.normal_space = NormalSpace::World),
         ("range", |c| {
             (c.normal_range, c.normal_encoding) = (NormalRange::Unsigned, bouncelight::gi::NormalEncoding::Xy)

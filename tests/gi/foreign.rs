@@ -149,7 +149,7 @@ pub fn written(gpu: &Gpu, shot: &Shot, how: &Written, before: &CameraMatrices) -
             v = turn * v;
         }
         let v = match c.normal_encoding {
-            NormalEncoding::Octahedral => gi::twin::oct_encode(v.to_array()).into(),
+            NormalEncoding::Octahedral => gi::twin::oct_encode(v.to_array()),
             _ => [v.x, v.y],
         };
         let z = match c.normal_encoding {
