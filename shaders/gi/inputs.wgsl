@@ -28,6 +28,8 @@ const STORED_UNSIGNED = 4u;
 const STORED_IN_VIEW = 8u;
 // Albedo is read sRGB-encoded.
 const STORED_SRGB = 16u;
+// Light is multiplied by an exposure.
+const STORED_EXPOSED = 32u;
 
 // `gi::exposure::Exposure` is the Rust side and documents the fields.
 struct Exposure {
@@ -81,12 +83,18 @@ fn half_pixel(texel: vec2i) -> vec2i {
     return min(2 * texel + 1, vec2i(params.size) - 1);
 }
 
+// Radiance, of light as it is stored.
+fn unexposed(light: vec3f) -> vec3f {
+    if (params.flags & STORED_EXPOSED) == 0u { return light; }
+    return light * params.light_scale;
+}
+
 fn light_at(pixel: vec2i) -> vec3f {
-    return max(finite3(textureLoad(direct_map, pixel, 0).rgb), vec3f(0.0)) * params.light_scale;
+    return unexposed(max(finite3(textureLoad(direct_map, pixel, 0).rgb), vec3f(0.0)));
 }
 
 fn emissive_at(pixel: vec2i) -> vec3f {
-    return max(finite3(textureLoad(emissive_map, pixel, 0).rgb), vec3f(0.0)) * params.light_scale;
+    return unexposed(max(finite3(textureLoad(emissive_map, pixel, 0).rgb), vec3f(0.0)));
 }
 
 // Diffuse reflectance.

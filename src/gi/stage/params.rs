@@ -16,6 +16,8 @@ const UNSIGNED: u32 = 4;
 const IN_VIEW: u32 = 8;
 /// Albedo is read sRGB-encoded.
 const SRGB: u32 = 16;
+/// Light is multiplied by an exposure. A bit, since a factor of 1 would change how compilers round sums with light.
+const EXPOSED: u32 = 32;
 
 /// `Params` of `shaders/gi/inputs.wgsl`.
 #[repr(C)]
@@ -180,7 +182,8 @@ fn flags(c: &Conventions) -> Result<u32, GiError> {
     Ok(encoding
         | bit(c.normal_range == NormalRange::Unsigned, UNSIGNED)
         | bit(c.normal_space == NormalSpace::View, IN_VIEW)
-        | bit(c.albedo == AlbedoEncoding::Srgb, SRGB))
+        | bit(c.albedo == AlbedoEncoding::Srgb, SRGB)
+        | bit(c.light != LightScale::Radiance, EXPOSED))
 }
 
 fn light_scale(c: &Conventions) -> Result<f32, GiError> {
