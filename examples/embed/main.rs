@@ -1,5 +1,6 @@
-//! Somebody else's renderer (`renderer.rs`: a depth prepass and a forward pass), with our light in it: a box that moves in
-//! a room, and a glowing panel that lights it. What embedding takes is in [`Host`].
+//! Somebody else's renderer (`renderer.rs`: a depth prepass and a forward pass), with our light in
+//! it: a box that moves in a room, and a glowing panel that lights it. What embedding takes is in
+//! [`Host`].
 //!
 //!     cargo run --no-default-features --features io --example embed -- FOLDER
 
@@ -25,7 +26,8 @@ pub(crate) struct Host {
 
 impl Host {
     pub(crate) fn new(device: &wgpu::Device, queue: &wgpu::Queue, size: [u32; 2]) -> Result<Self, Failure> {
-        // Its vertex buffer is taken as it is; each box is an instance of the one mesh, with a surface of its own.
+        // Its vertex buffer is taken as it is; each box is an instance of the one mesh, with a
+        // surface of its own.
         let corners = scene::cube();
         let attribute = |offset| {
             let (bytes, format) = (bytemuck::cast_slice(&corners), VertexFormat::Float32x3);

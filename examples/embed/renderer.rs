@@ -1,5 +1,5 @@
-//! A forward renderer that knows nothing of global illumination but one texture that its last pass reads. Depth is 0 near
-//! and 1 far, normals are in view space in 10 bits, motion is in pixels.
+//! A forward renderer that knows nothing of global illumination but one texture that its last pass
+//! reads. Depth is 0 near and 1 far, normals are in view space in 10 bits, motion is in pixels.
 
 use super::scene::Drawn;
 use bouncelight::gi::CameraMatrices;

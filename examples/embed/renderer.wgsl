@@ -1,4 +1,5 @@
-// The host's drawing: a prepass in conventions of its own, and a forward pass that multiplies the light that was found.
+// The host's drawing: a prepass in conventions of its own, and a forward pass that multiplies the
+// light that was found.
 
 struct Camera {
     view_from_world: mat4x4f,

@@ -2,12 +2,14 @@
 //#import gi/inputs.wgsl
 //#import gi/cells.wgsl
 
-// What a few pixels of a host's textures hold, as they are and as they are read, for `gi::View::check` to judge. The picture
-// is divided into SIDE x SIDE fields, of which each gives its middle pixel. The prelude holds SIDE and CELL_SIDE.
+// What a few pixels of a host's textures hold, as they are and as they are read, for
+// `gi::View::check` to judge. The picture is divided into SIDE x SIDE fields, of which each gives
+// its middle pixel. The prelude holds SIDE and CELL_SIDE.
 
 // `gi::world::sample::Sample` is the Rust side.
 struct Sample {
-    // Texel of depth; distance, metres (0: background); 1 where depth is NaN or infinite; 1 where neighbours lie on a plane.
+    // Texel of depth; distance, metres (0: background); 1 where depth is NaN or infinite; 1 where
+    // neighbours lie on a plane.
     depth: vec4f,
     // Texel of the normal; 1 where it is NaN or infinite.
     normal: vec4f,
@@ -15,7 +17,8 @@ struct Sample {
     plane: vec4f,
     // Metres from the eye, along the world's axes; column of the pixel.
     offset: vec4f,
-    // The same of the pixel in the row mirrored at the picture's middle, if its depth were this pixel's; row of the pixel.
+    // The same of the pixel in the row mirrored at the picture's middle, if its depth were this
+    // pixel's; row of the pixel.
     mirrored: vec4f,
     // Texel of motion; 1 where it is NaN or infinite.
     motion: vec4f,

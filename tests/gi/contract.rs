@@ -1,4 +1,5 @@
-//! What a host gets wrong is named: `View::check` on sound targets, and on targets spoilt in every way it knows.
+//! What a host gets wrong is named: `View::check` on sound targets, and on targets spoilt in every
+//! way it knows.
 
 use crate::common;
 use crate::foreign::{ROOM, SIZE, Targets, Written, draw, gather, placed, shot, world, written};

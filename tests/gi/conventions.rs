@@ -49,7 +49,8 @@ fn depth_and_normals_in_every_convention() {
     let wrong = difference(&still(&gpu, &how, &forward), &plain);
     assert!(wrong > 0.1, "{wrong}");
 
-    // Rays that start a little aside meet other entries of the cache: by noise, not by the format, 1 to 2 % differ.
+    // Rays that start a little aside meet other entries of the cache: by noise, not by the format,
+    // 1 to 2 % differ.
     use {NormalEncoding as E, NormalRange as R, NormalSpace as S};
     for (encoding, range, format, most) in [
         (E::Octahedral, R::Signed, F::Rg16Float, 0.03),

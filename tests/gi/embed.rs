@@ -15,8 +15,8 @@ mod host;
 
 const SIZE: [u32; 2] = [96, 72];
 
-/// Frames at rest. Normals in 10 bits send rays a little aside, so noise is another one: after 32 frames 5 % of the light, which is
-/// what our own light after 32 frames is off from that after 128.
+/// Frames at rest. Normals in 10 bits send rays a little aside, so noise is another one: after 32
+/// frames 5 % of the light, which is what our own light after 32 frames is off from that after 128.
 const STILL: u32 = 128;
 
 fn scene() -> Scene {

@@ -1,4 +1,5 @@
-//! What embedding promises: nothing grows, nothing is in the way of anything, and nonsense is an error in words.
+//! What embedding promises: nothing grows, nothing is in the way of anything, and nonsense is an
+//! error in words.
 
 use crate::common;
 use crate::foreign::{ROOM, SIZE, Written, cube, draw, gather, placed, shot, world, written};

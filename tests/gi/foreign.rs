@@ -1,4 +1,5 @@
-//! A room of boxes as somebody else's renderer would hand it over: its world, and its G-buffer in any convention.
+//! A room of boxes as somebody else's renderer would hand it over: its world, and its G-buffer in
+//! any convention.
 
 use crate::shot::{Hit, NEAR, Shot, camera, output, texture_with, view};
 use crate::world::Block;

@@ -1,6 +1,8 @@
-//! How a host's G-buffer says what it says. The defaults are this crate's own renderer's (`render::gbuffer`).
+//! How a host's G-buffer says what it says. The defaults are this crate's own renderer's
+//! (`render::gbuffer`).
 
-/// The conventions of [`Inputs`](super::Inputs), resolved into a uniform and read in `shaders/gi/inputs.wgsl`.
+/// The conventions of [`Inputs`](super::Inputs), resolved into a uniform and read in
+/// `shaders/gi/inputs.wgsl`.
 ///
 /// ```
 /// use bouncelight::gi::{Conventions, Depth, MotionUnits, NormalEncoding, NormalRange, NormalSpace};
@@ -79,7 +81,8 @@ pub enum NormalSpace {
     /// The world's.
     #[default]
     World,
-    /// The camera's: x right, y up, z to the eye ([`CameraMatrices::view_from_world`](super::CameraMatrices)).
+    /// The camera's: x right, y up, z to the eye
+    /// ([`CameraMatrices::view_from_world`](super::CameraMatrices)).
     View,
 }
 

@@ -19,23 +19,27 @@ pub struct CameraMatrices {
     pub clip_from_view: [[f32; 4]; 4],
 }
 
-/// What a method reads. All textures have the same size and usage TEXTURE_BINDING; how their texels are to be read,
-/// [`Conventions`] say. [`Inputs::new`] has what every method needs; what is left out has the fallback that its field names.
+/// What a method reads. All textures have the same size and usage TEXTURE_BINDING; how their texels
+/// are to be read, [`Conventions`] say. [`Inputs::new`] has what every method needs; what is left
+/// out has the fallback that its field names.
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
     /// Width and height of all textures, pixels.
     pub size: [u32; 2],
     /// Depth: a depth format or `R32Float`. Of a format with a stencil, a view of the depth alone.
     pub depth: &'a wgpu::TextureView,
-    /// Normals: `Rg16Float` by default, else any format that has the numbers of [`Conventions::normal_encoding`].
+    /// Normals: `Rg16Float` by default, else any format that has the numbers of
+    /// [`Conventions::normal_encoding`].
     pub normal: &'a wgpu::TextureView,
-    /// Diffuse reflectance in [0, 1] (rgb), 8 or 10 bits or float. Alpha is not read: whoever multiplies the light with albedo
-    /// applies the textures' ambient occlusion, too. `gather` does not read it; the others end with [`GiError::Missing`] without.
+    /// Diffuse reflectance in [0, 1] (rgb), 8 or 10 bits or float. Alpha is not read: whoever
+    /// multiplies the light with albedo applies the textures' ambient occlusion, too. `gather` does
+    /// not read it; the others end with [`GiError::Missing`] without.
     pub albedo: Option<&'a wgpu::TextureView>,
-    /// Emitted radiance, `Rgba16Float`. `gather` does not read it; for the others `None` counts as no surface that glows.
+    /// Emitted radiance, `Rgba16Float`. `gather` does not read it; for the others `None` counts as
+    /// no surface that glows.
     pub emissive: Option<&'a wgpu::TextureView>,
-    /// Direct diffuse light of the analytic lights as E/π, albedo not multiplied in, `Rgba16Float`. As of `albedo`: not read by
-    /// `gather`, needed by the others.
+    /// Direct diffuse light of the analytic lights as E/π, albedo not multiplied in, `Rgba16Float`.
+    /// As of `albedo`: not read by `gather`, needed by the others.
     pub direct: Option<&'a wgpu::TextureView>,
     /// The camera that drew them.
     pub camera: CameraMatrices,
@@ -43,23 +47,28 @@ pub struct Inputs<'a> {
     pub conventions: Conventions,
     /// Radiance of the constant environment, W/(m²·sr).
     pub environment: [f32; 3],
-    /// The analytic lights, for methods that light more than the picture; `None` counts as no lights there.
+    /// The analytic lights, for methods that light more than the picture; `None` counts as no
+    /// lights there.
     pub lights: Option<Lights<'a>>,
-    /// The scene as rays meet it, for methods that ask it ([`Method::needs_rays`](super::Method::needs_rays)).
+    /// The scene as rays meet it, for methods that ask it
+    /// ([`Method::needs_rays`](super::Method::needs_rays)).
     pub rays: Option<Rays<'a>>,
-    /// Where each pixel's surface was in the frame before: texture coordinates then minus now, y down, free of jitter, unless
-    /// [`Conventions`] say otherwise; `Rg16Float`, `Rg32Float` or `Rgba16Float`. For methods that remember frames. `None` counts
-    /// as everything at rest: what moves on the screen starts anew where plane or normal differ, and drags its light where not.
+    /// Where each pixel's surface was in the frame before: texture coordinates then minus now, y
+    /// down, free of jitter, unless [`Conventions`] say otherwise; `Rg16Float`, `Rg32Float` or
+    /// `Rgba16Float`. For methods that remember frames. `None` counts as everything at rest: what
+    /// moves on the screen starts anew where plane or normal differ, and drags its light where not.
     pub motion: Option<&'a wgpu::TextureView>,
-    /// `Rgba8Unorm(Srgb)`: F0 and perceptual roughness, for methods that find what lobes show ([`Rung::gloss`](rung::Rung::gloss)).
-    /// `None`: no lobes.
+    /// `Rgba8Unorm(Srgb)`: F0 and perceptual roughness, for methods that find what lobes show
+    /// ([`Rung::gloss`](rung::Rung::gloss)). `None`: no lobes.
     pub specular: Option<&'a wgpu::TextureView>,
-    /// The picture has nothing to do with the one before (a cut): what is remembered of pixels is forgotten first.
+    /// The picture has nothing to do with the one before (a cut): what is remembered of pixels is
+    /// forgotten first.
     pub reset: bool,
 }
 
 impl<'a> Inputs<'a> {
-    /// What `gather` cannot do without, in this crate's own conventions; everything else is left out.
+    /// What `gather` cannot do without, in this crate's own conventions; everything else is left
+    /// out.
     pub fn new(
         size: [u32; 2],
         depth: &'a wgpu::TextureView,
@@ -109,6 +118,7 @@ pub struct Lights<'a> {
     pub count: u32,
     /// Some of them stand for surfaces that glow, and their light is in [`Inputs::direct`].
     pub stand_in: bool,
-    /// Another number whenever a light is another than before, so that what is remembered of their light is forgotten sooner.
+    /// Another number whenever a light is another than before, so that what is remembered of their
+    /// light is forgotten sooner.
     pub epoch: u64,
 }

@@ -9,7 +9,8 @@ const ALBEDO: &[F] = &[F::Rgba8UnormSrgb, F::Bgra8UnormSrgb, F::Rgb10a2Unorm, F:
 const LIGHT: &[F] = &[F::Rgba16Float, F::Rgba32Float, F::Rg11b10Ufloat];
 const MOTION: &[F] = &[F::Rg16Float, F::Rg32Float, F::Rgba16Float, F::Rgba32Float];
 
-/// Formats of normals. A texture of four floats is not taken for two numbers: it holds something else.
+/// Formats of normals. A texture of four floats is not taken for two numbers: it holds something
+/// else.
 fn normal_formats(encoding: NormalEncoding, range: NormalRange) -> &'static [F] {
     match (encoding, range) {
         (NormalEncoding::Xyz, NormalRange::Signed) => &[F::Rgba16Float, F::Rgba32Float, F::Rgba8Snorm],

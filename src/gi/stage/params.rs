@@ -1,4 +1,5 @@
-//! The uniform that every stage of `gi/` reads: camera, size, and the host's conventions resolved into numbers.
+//! The uniform that every stage of `gi/` reads: camera, size, and the host's conventions resolved
+//! into numbers.
 
 use super::inputs::cells_of;
 use crate::gi::interface::{
@@ -7,7 +8,8 @@ use crate::gi::interface::{
 };
 use glam::{Mat3, Mat4, Vec3};
 
-/// Normals are vectors, or x and y of such, not octahedral. These bits and the next ones: `STORED_*` of `inputs.wgsl`.
+/// Normals are vectors, or x and y of such, not octahedral. These bits and the next ones:
+/// `STORED_*` of `inputs.wgsl`.
 const XYZ: u32 = 1;
 const XY: u32 = 2;
 /// They are v · ½ + ½.
@@ -16,7 +18,8 @@ const UNSIGNED: u32 = 4;
 const IN_VIEW: u32 = 8;
 /// Albedo is read sRGB-encoded.
 const SRGB: u32 = 16;
-/// Light is multiplied by an exposure. A bit, since a factor of 1 would change how compilers round sums with light.
+/// Light is multiplied by an exposure. A bit, since a factor of 1 would change how compilers round
+/// sums with light.
 const EXPOSED: u32 = 32;
 
 /// `Params` of `shaders/gi/inputs.wgsl`.
@@ -29,8 +32,9 @@ pub struct Params {
     pub cells: [u32; 2],
     /// 1/p00, 1/p11, p02, p12 of the projection (row, column).
     pub unproject: [f32; 4],
-    /// View distance = `depth[0] / (texel + depth[1])`; the background's texel; by how much of itself a metre of distance is wrong
-    /// for each metre, because texels are rounded (0 where that is a constant share: reversed floats).
+    /// View distance = `depth[0] / (texel + depth[1])`; the background's texel; by how much of
+    /// itself a metre of distance is wrong for each metre, because texels are rounded (0 where that
+    /// is a constant share: reversed floats).
     pub depth: [f32; 4],
     /// Environment radiance (rgb), finite and not negative; one spare.
     pub environment: [f32; 4],
@@ -56,12 +60,14 @@ impl Params {
     /// Parameters of one recording in this crate's own conventions.
     ///
     /// # Errors
-    /// [`GiError::Size`] for an empty picture, [`GiError::Camera`] for anything but a finite reversed-Z perspective.
+    /// [`GiError::Size`] for an empty picture, [`GiError::Camera`] for anything but a finite
+    /// reversed-Z perspective.
     pub fn new(size: [u32; 2], camera: &CameraMatrices, environment: [f32; 3]) -> Result<Self, GiError> {
         Self::with(size, camera, environment, &Conventions::default())
     }
 
-    /// Parameters of one recording of `inputs`. `last` is [`Params::shift`] of the frame before, if there was one.
+    /// Parameters of one recording of `inputs`. `last` is [`Params::shift`] of the frame before, if
+    /// there was one.
     ///
     /// # Errors
     /// As [`Params::new`], and [`GiError::Conventions`].
@@ -147,7 +153,8 @@ fn distance_by_depth(a: f32, b: f32, depth: Depth) -> Result<[f32; 2], GiError> 
     }
 }
 
-/// Texels are no nearer to each other than this, where they are not floats that grow finer with the distance.
+/// Texels are no nearer to each other than this, where they are not floats that grow finer with the
+/// distance.
 fn depth_step(format: wgpu::TextureFormat, depth: Depth) -> f32 {
     use wgpu::TextureFormat as F;
     match format {
@@ -200,10 +207,10 @@ fn columns(m: Mat3) -> [[f32; 4]; 3] {
     [m.x_axis, m.y_axis, m.z_axis].map(|c| c.extend(0.0).to_array())
 }
 
-/// The camera's frame with the tilt taken out: x = horizontal right, y = world up, z = horizontal backward.
-/// The network should not have to learn that down is down at every tilt. A camera that looks straight down or up has no
-/// horizontal backward; the top of its picture says which way is forward (down) or backward (up), which is the limit
-/// of tilting it there.
+/// The camera's frame with the tilt taken out: x = horizontal right, y = world up, z = horizontal
+/// backward. The network should not have to learn that down is down at every tilt. A camera that
+/// looks straight down or up has no horizontal backward; the top of its picture says which way is
+/// forward (down) or backward (up), which is the limit of tilting it there.
 fn gravity_from_world(view_from_world: &Mat4) -> Result<Mat3, GiError> {
     let up = view_from_world.row(1).truncate().try_normalize();
     let back = view_from_world.row(2).truncate().try_normalize();

@@ -1,5 +1,6 @@
-//! What a host may have got wrong, found in a few texels: each field against itself, depth against the world's triangles,
-//! normals against depth, motion against the cameras. Other readings are tried, and one that fits is named.
+//! What a host may have got wrong, found in a few texels: each field against itself, depth against
+//! the world's triangles, normals against depth, motion against the cameras. Other readings are
+//! tried, and one that fits is named.
 
 use super::sample::{SIDE, Sample};
 use crate::gi::interface::{
@@ -34,7 +35,8 @@ pub(super) struct Evidence<'a> {
     pub now: Params,
     /// Of the frame before, if this one follows it.
     pub before: Option<Params>,
-    /// How many times the way to each sample a ray goes; the same in the mirrored picture. Nothing without a world.
+    /// How many times the way to each sample a ray goes; the same in the mirrored picture. Nothing
+    /// without a world.
     pub rays: Option<[Vec<f32>; 2]>,
 }
 
@@ -116,9 +118,8 @@ impl Evidence<'_> {
         if share(&|i, _| Some(near(rays[i] / k))) >= RIGHT {
             return Some(format!("{found}, but is the same {k:.3} times too small everywhere: other units or planes"));
         }
-        Some(format!(
-            "{found}: wrong matrices (column-major? `view_from_world`, not its inverse?), instances, or planes of the projection"
-        ))
+        let matrices = "wrong matrices (column-major? `view_from_world`, not its inverse?)";
+        Some(format!("{found}: {matrices}, instances, or planes of the projection"))
     }
 
     fn normal(&self) -> Option<String> {
@@ -165,7 +166,8 @@ impl Evidence<'_> {
                 }
             }
         }
-        // A camera that is hardly tilted confuses spaces only a little, but then the right one is far nearer.
+        // A camera that is hardly tilted confuses spaces only a little, but then the right one is
+        // far nearer.
         let (_, score, name) = best;
         let better = score > 0.85 && 1.0 - stated > 2.0 * (1.0 - score) + 0.02;
         let found = format!("its mean cosine with the surface that depth shows is {stated:.2}");

@@ -69,7 +69,8 @@ pub struct Vertices<'a> {
     pub offset: usize,
     /// Bytes from one vertex to the next.
     pub stride: usize,
-    /// Two to four numbers: floats of 32 or 16 bits, or 8 or 16 bits normalised. What is missing of four is 0, 0, 0, 1.
+    /// Two to four numbers: floats of 32 or 16 bits, or 8 or 16 bits normalised. What is missing of
+    /// four is 0, 0, 0, 1.
     pub format: wgpu::VertexFormat,
 }
 

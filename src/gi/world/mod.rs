@@ -1,4 +1,5 @@
-//! What rays of a host's picture meet: its triangles, where they are, its lights and its sky. [`View`] draws with it.
+//! What rays of a host's picture meet: its triangles, where they are, its lights and its sky.
+//! [`View`] draws with it.
 //!
 //! ```text
 //!  once            when it changes              once a frame       once a view and frame
@@ -24,7 +25,8 @@ use std::collections::BTreeMap;
 /// How a [`World`] is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WorldOptions {
-    /// Instances that there is room for at first, 512 bytes each; with more, everything is uploaded anew into twice the room.
+    /// Instances that there is room for at first, 512 bytes each; with more, everything is uploaded
+    /// anew into twice the room.
     pub instances: usize,
 }
 
@@ -54,7 +56,8 @@ struct Placed {
     part: Option<usize>,
 }
 
-/// The host's scene as rays meet it. Keys are the host's own numbers. Nothing is uploaded before [`World::prepare`].
+/// The host's scene as rays meet it. Keys are the host's own numbers. Nothing is uploaded before
+/// [`World::prepare`].
 ///
 /// ```no_run
 /// use bouncelight::gi::{GiError, Indices, Inputs, Instance, MeshSource, Method, Vertices, View, World, WorldOptions};
@@ -121,7 +124,8 @@ impl Changed {
 }
 
 impl World {
-    /// An empty world: no triangles, no lights, a black sky. Keeps a clone of the device (a handle).
+    /// An empty world: no triangles, no lights, a black sky. Keeps a clone of the device (a
+    /// handle).
     pub fn new(device: &wgpu::Device, options: WorldOptions) -> Self {
         Self {
             device: device.clone(),
@@ -138,8 +142,9 @@ impl World {
         }
     }
 
-    /// Takes a mesh, or another one in the place of that with this key, whose instances stay. Builds its tree on this thread;
-    /// [`World::prepared`] takes one whose tree was built on another.
+    /// Takes a mesh, or another one in the place of that with this key, whose instances stay.
+    /// Builds its tree on this thread; [`World::prepared`] takes one whose tree was built on
+    /// another.
     ///
     /// # Errors
     /// [`GiError::World`] for a mesh that disagrees in itself; the world is as it was.
@@ -166,11 +171,13 @@ impl World {
         was
     }
 
-    /// Places a mesh, or moves the instance with this key. The same again costs nothing; another place costs
-    /// [`World::prepare`] a tree over the instances; a surface that no instance of the mesh had costs it an upload of everything.
+    /// Places a mesh, or moves the instance with this key. The same again costs nothing; another
+    /// place costs [`World::prepare`] a tree over the instances; a surface that no instance of the
+    /// mesh had costs it an upload of everything.
     ///
     /// # Errors
-    /// [`GiError::World`] for a mesh that is not there, a matrix that is not finite or not affine, a surface that is not finite.
+    /// [`GiError::World`] for a mesh that is not there, a matrix that is not finite or not affine,
+    /// a surface that is not finite.
     pub fn instance(&mut self, key: u64, instance: Instance) -> Result<(), GiError> {
         let wrong = |reason: &str| Err(GiError::World { what: "instance", key, reason: reason.into() });
         if !self.meshes.contains_key(&instance.mesh) {
@@ -203,8 +210,9 @@ impl World {
         was
     }
 
-    /// The analytic lights, all of them, in place of those before. Rays light with them what the picture does not show; what they
-    /// give to surfaces in the picture is the host's own direct light.
+    /// The analytic lights, all of them, in place of those before. Rays light with them what the
+    /// picture does not show; what they give to surfaces in the picture is the host's own direct
+    /// light.
     ///
     /// # Errors
     /// [`GiError::Light`] for one that is not finite; then those before stay.
@@ -220,11 +228,12 @@ impl World {
         Ok(())
     }
 
-    /// What rays see that meet nothing. A sun in a picture of it is found by rays, as all of it: take it out if you draw it as
-    /// direct light.
+    /// What rays see that meet nothing. A sun in a picture of it is found by rays, as all of it:
+    /// take it out if you draw it as direct light.
     ///
     /// # Errors
-    /// [`GiError::Sky`] for a radiance that is negative or not finite, or a picture that does not fit in itself.
+    /// [`GiError::Sky`] for a radiance that is negative or not finite, or a picture that does not
+    /// fit in itself.
     pub fn sky(&mut self, sky: &Environment) -> Result<(), GiError> {
         if self.environment == *sky {
             return Ok(());
@@ -243,12 +252,14 @@ impl World {
         Ok(())
     }
 
-    /// Brings the GPU up to date, once a frame, before views are recorded: what is written is there for all that is submitted from
-    /// now on. Where nothing has changed it does nothing; where instances have moved it builds and writes the tree over them;
-    /// where meshes have changed it uploads all of them again.
+    /// Brings the GPU up to date, once a frame, before views are recorded: what is written is there
+    /// for all that is submitted from now on. Where nothing has changed it does nothing; where
+    /// instances have moved it builds and writes the tree over them; where meshes have changed it
+    /// uploads all of them again.
     ///
     /// # Errors
-    /// [`GiError::Accel`] for more triangles than rays or the device can have. Views then end with [`GiError::Unprepared`].
+    /// [`GiError::Accel`] for more triangles than rays or the device can have. Views then end with
+    /// [`GiError::Unprepared`].
     pub fn prepare(&mut self, queue: &wgpu::Queue) -> Result<(), GiError> {
         let room = self.gpu.as_ref().map_or(0, |gpu| gpu.room);
         let unknown = self.instances.len() > room || self.instances.values().any(|p| p.part.is_none());

@@ -63,7 +63,8 @@ pub(super) fn read(device: &wgpu::Device, queue: &wgpu::Queue, inputs: &Inputs<'
     Ok(bytemuck::pod_collect_to_vec(&readback::buffer(device, queue, &target, 0, bytes)?))
 }
 
-/// How many times each offset a ray from the eye goes along it before it meets a triangle; infinite where it meets none.
+/// How many times each offset a ray from the eye goes along it before it meets a triangle; infinite
+/// where it meets none.
 pub(super) fn cast(
     device: &wgpu::Device,
     queue: &wgpu::Queue,

@@ -9,8 +9,8 @@ use crate::gi::pass::NeuralGi;
 use crate::gi::stage::inputs::Params;
 use crate::gpu::timing::Recorder;
 
-/// What a method remembers of one camera's picture, and its passes. Make one for each camera; any number may share a
-/// [`World`], a device and a submission.
+/// What a method remembers of one camera's picture, and its passes. Make one for each camera; any
+/// number may share a [`World`], a device and a submission.
 pub struct View {
     queue: wgpu::Queue,
     rung: Box<dyn Rung>,
@@ -30,26 +30,28 @@ impl View {
         NeuralGi::required_limits()
     }
 
-    /// Compiles `method`'s pipelines and makes its buffers for pictures of `size` pixels. Keeps clones of device and queue
-    /// (handles).
+    /// Compiles `method`'s pipelines and makes its buffers for pictures of `size` pixels. Keeps
+    /// clones of device and queue (handles).
     ///
     /// # Errors
-    /// [`GiError::NoMethod`] for [`Method::Direct`], which adds no light; [`GiError`] where a network does not fit.
+    /// [`GiError::NoMethod`] for [`Method::Direct`], which adds no light; [`GiError`] where a
+    /// network does not fit.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, size: [u32; 2], method: &Method) -> Result<Self, GiError> {
         let rung = method::build(device, queue, size, method)?.ok_or(GiError::NoMethod(method.name()))?;
         Ok(Self { queue: queue.clone(), rung, size, seen: [None; 2] })
     }
 
-    /// Records all of the method's passes: `output` (`Rgba16Float`, usage STORAGE_BINDING, the inputs' size) becomes the light
-    /// that direct lighting misses, as E/π; 0 on the background. Lights, sky and rays are those of `world`, whatever `inputs`
-    /// say. Allocates only when the size or the texture views are new. Never submits and never waits.
+    /// Records all of the method's passes: `output` (`Rgba16Float`, usage STORAGE_BINDING, the
+    /// inputs' size) becomes the light that direct lighting misses, as E/π; 0 on the background.
+    /// Lights, sky and rays are those of `world`, whatever `inputs` say. Allocates only when the
+    /// size or the texture views are new. Never submits and never waits.
     ///
-    /// With `None` for the world `gather` and `neural` have nothing to ask: `ssgi` draws, [`View::instead`] says so, and albedo
-    /// and direct light must be there.
+    /// With `None` for the world `gather` and `neural` have nothing to ask: `ssgi` draws,
+    /// [`View::instead`] says so, and albedo and direct light must be there.
     ///
     /// # Errors
-    /// [`GiError`] when inputs or output do not fit, or the world has changed since [`World::prepare`]; then nothing was
-    /// recorded.
+    /// [`GiError`] when inputs or output do not fit, or the world has changed since
+    /// [`World::prepare`]; then nothing was recorded.
     pub fn record<'a>(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
@@ -71,11 +73,12 @@ impl View {
         Ok(())
     }
 
-    /// Reads a few texels of what was handed over to the last [`View::record`] and says what does not fit: NaN, ranges, depth
-    /// against the world's triangles (units, convention, a flipped y, matrices), normals against depth (space, encoding, signs),
-    /// motion against the cameras of the last two frames (units, sense, jitter). What it takes for granted: most of the picture
-    /// is in the world and at rest. Makes buffers, submits and waits: call it when you ask, after the frame was submitted, in
-    /// debug builds say.
+    /// Reads a few texels of what was handed over to the last [`View::record`] and says what does
+    /// not fit: NaN, ranges, depth against the world's triangles (units, convention, a flipped y,
+    /// matrices), normals against depth (space, encoding, signs), motion against the cameras of the
+    /// last two frames (units, sense, jitter). What it takes for granted: most of the picture is in
+    /// the world and at rest. Makes buffers, submits and waits: call it when you ask, after the
+    /// frame was submitted, in debug builds say.
     ///
     /// # Errors
     /// [`GiError`] when the inputs do not fit or reading back fails.
@@ -106,17 +109,20 @@ impl View {
         self.rung.instead()
     }
 
-    /// What the specular lobe of each pixel's surface shows, see [`Rung::gloss`]; with [`Inputs::specular`] only.
+    /// What the specular lobe of each pixel's surface shows, see [`Rung::gloss`]; with
+    /// [`Inputs::specular`] only.
     pub fn gloss(&self) -> Option<&wgpu::TextureView> {
         self.rung.gloss()
     }
 
-    /// Frames that the answer has settled over since the last reset; `None` where it does not settle.
+    /// Frames that the answer has settled over since the last reset; `None` where it does not
+    /// settle.
     pub fn settled(&self) -> Option<u32> {
         self.rung.settled()
     }
 
-    /// Lets go of the texture views that it remembers, and so of the host's textures. A change of size does so by itself.
+    /// Lets go of the texture views that it remembers, and so of the host's textures. A change of
+    /// size does so by itself.
     pub fn forget(&mut self) {
         self.rung.forget();
     }
