@@ -289,6 +289,44 @@ fn vertices_are_read_as_hosts_have_them() {
     assert_eq!(world.counts().map(|c| (c.triangles, c.instances, c.left_out)), Some((1, 1, 0)));
 }
 
+/// The same colour as a constant, of an instance, of vertices and as a picture is the same to rays.
+#[test]
+fn a_colour_is_a_colour_wherever_it_stands() {
+    let Some(gpu) = common::gpu() else { return };
+    let shot = shot(0, [0.0; 2]);
+    let targets = written(&gpu, &shot, &Written::default(), &shot.camera);
+    let (positions, indices) = cube();
+    let plain = MeshSource::new(Vertices::vec3(&positions), Indices::U32(&indices));
+    let light = |source: MeshSource<'_>, surface: Option<Surface>| {
+        let (mut world, mut lit) = (world(&gpu), gather(&gpu));
+        world.mesh(7, &source).expect("a cube");
+        for (key, block) in (0..).zip(&ROOM) {
+            world.instance(key, Instance { surface, ..placed(block) }).expect("it is placed");
+        }
+        world.prepare(&gpu.queue).expect("it fits");
+        let draw = || draw(&gpu, &mut lit, Some(&world), &targets.inputs(Conventions::default()));
+        std::iter::repeat_with(draw).take(6).last().expect("a frame").expect("it draws")
+    };
+    let coloured = |albedo| Surface { albedo, f0: 0.0, ..Default::default() };
+    let (dull, bright) = (coloured([0.8, 0.2, 0.4]), coloured([1.0; 3]));
+    let constant = light(MeshSource { surface: dull, ..plain }, None);
+    let bytes = [204, 51, 102, 255].repeat(16);
+    let image = ImageSource { size: [4, 4], rgba: &bytes, srgb: false };
+    let uv = vec![[0.3, 0.7]; positions.len()];
+    let colors = [204u8, 51, 102, 255].repeat(positions.len());
+    let colors = Vertices { bytes: &colors, offset: 0, stride: 4, format: VertexFormat::Unorm8x4 };
+    let white = MeshSource { surface: bright, ..plain };
+    assert_eq!(constant, light(white, Some(dull)));
+    assert_eq!(constant, light(MeshSource { colors: Some(colors), ..white }, None));
+    let pictured = MeshSource { albedo: Some(image), uv: Some(Vertices::vec2(&uv)), ..white };
+    assert_eq!(constant, light(pictured, None));
+    // Negative controls: white; the same bytes as sRGB.
+    let encoded = MeshSource { albedo: Some(ImageSource { srgb: true, ..image }), ..pictured };
+    for other in [light(white, None), light(encoded, None)] {
+        assert!(difference(&other, &constant) > 0.02, "{}", difference(&other, &constant));
+    }
+}
+
 /// A prepared mesh may be made on any thread.
 #[test]
 fn trees_may_grow_elsewhere() {
