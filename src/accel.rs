@@ -25,7 +25,9 @@ pub use caster::{HitGpu, RayBatch, RayCaster, RayGpu};
 pub use cpu::{AccelHit, SceneBlocks};
 pub use emitters::EmitterGpu;
 pub use gpu::AccelGpu;
+pub(crate) use image::Reductions;
 pub use scene::{RayCounts, SceneRays};
+pub(crate) use trees::{MeshPart, corners};
 
 use thiserror::Error;
 

@@ -47,11 +47,6 @@ fn world_position_at(pixel: vec2i, distance: f32) -> vec3f {
     return offset_at(pixel, distance) + params.eye.xyz;
 }
 
-// Unit normal, world space.
-fn world_normal_at(pixel: vec2i) -> vec3f {
-    return oct_decode(finite3(vec3f(textureLoad(normal_map, pixel, 0).rg, 0.0)).xy);
-}
-
 // E/π on a surface with unit normal `n` (world space).
 fn light_towards(light: CellLight, n: vec3f) -> vec3f {
     let direction = vec4f(n, 1.0);

@@ -58,7 +58,7 @@ fn read_cell(index: u32) -> Partial {
     }
     let light = light_at(pixel);
     let emission = emissive_at(pixel);
-    let outgoing = textureLoad(albedo_map, pixel, 0).rgb * light + emission;
+    let outgoing = albedo_at(pixel) * light + emission;
     return Partial(luminance(light) + luminance(emission), log(z), 1u, bad, outgoing);
 }
 

@@ -1,20 +1,35 @@
 //#import lib/octahedral.wgsl
 
 // What every stage of gi/ reads: the G-buffer, the direct light and the camera (group 0), and how texels become
-// numbers. Everything that leaves this file is finite, whatever the textures hold.
+// numbers, in whichever of a host's conventions (`gi::Conventions`). Everything that leaves this file is finite, whatever
+// the textures hold.
 
 // `gi::inputs::Params` is the Rust side.
 struct Params {
     size: vec2u,                  // pixels
     cells: vec2u,                 // ceil(size / 4)
     unproject: vec4f,             // 1/p00, 1/p11, p02, p12 of the projection
-    depth: vec4f,                 // distance = depth.x / (texel + depth.y)
+    depth: vec4f,                 // distance = depth.x / (texel + depth.y); background's texel; error a metre, squared
     environment: vec4f,           // radiance, finite and not negative
     gravity_from_view: mat3x3f,
     gravity_from_world: mat3x3f,
     world_from_view: mat3x3f,
     eye: vec4f,                   // world space, metres
+    motion: vec4f,                // texture coordinates, then minus now = texel * xy + zw
+    flags: u32,                   // STORED_*
+    light_scale: f32,             // one over the exposure of light_at and emissive_at
+    pad: vec2u,
 }
+
+// Normals are vectors, or x and y of such, not octahedral; they are v / 2 + 1/2; they are in view space.
+const STORED_XYZ = 1u;
+const STORED_XY = 2u;
+const STORED_UNSIGNED = 4u;
+const STORED_IN_VIEW = 8u;
+// Albedo is read sRGB-encoded.
+const STORED_SRGB = 16u;
+// Light is multiplied by an exposure.
+const STORED_EXPOSED = 32u;
 
 // `gi::exposure::Exposure` is the Rust side and documents the fields.
 struct Exposure {
@@ -68,18 +83,33 @@ fn half_pixel(texel: vec2i) -> vec2i {
     return min(2 * texel + 1, vec2i(params.size) - 1);
 }
 
+// Radiance, of light as it is stored.
+fn unexposed(light: vec3f) -> vec3f {
+    if (params.flags & STORED_EXPOSED) == 0u { return light; }
+    return light * params.light_scale;
+}
+
 fn light_at(pixel: vec2i) -> vec3f {
-    return max(finite3(textureLoad(direct_map, pixel, 0).rgb), vec3f(0.0));
+    return unexposed(max(finite3(textureLoad(direct_map, pixel, 0).rgb), vec3f(0.0)));
 }
 
 fn emissive_at(pixel: vec2i) -> vec3f {
-    return max(finite3(textureLoad(emissive_map, pixel, 0).rgb), vec3f(0.0));
+    return unexposed(max(finite3(textureLoad(emissive_map, pixel, 0).rgb), vec3f(0.0)));
+}
+
+// Diffuse reflectance.
+fn albedo_at(pixel: vec2i) -> vec3f {
+    let texel = finite3(textureLoad(albedo_map, pixel, 0).rgb);
+    if (params.flags & STORED_SRGB) == 0u { return texel; }
+    return select(pow((texel + 0.055) / 1.055, vec3f(2.4)), texel / 12.92, texel <= vec3f(0.04045));
 }
 
 // Metres along the view axis; 0 on the background.
 fn distance_at(pixel: vec2i) -> f32 {
-    let texel = finite(textureLoad(depth_map, pixel, 0).r);
-    return select(0.0, clamp(params.depth.x / (texel + params.depth.y), 1e-9, 1e9), texel > 0.0);
+    let read = textureLoad(depth_map, pixel, 0).r;
+    let background = params.depth.z;
+    let texel = select(background, read, (bitcast<u32>(read) & EXPONENT) != EXPONENT);
+    return select(0.0, clamp(params.depth.x / (texel + params.depth.y), 1e-9, 1e9), texel != background);
 }
 
 // Metres from the eye in the gravity frame.
@@ -90,8 +120,26 @@ fn position_at(pixel: vec2i, distance: f32) -> vec3f {
     return params.gravity_from_view * (ray * distance);
 }
 
+// Unit normal as it is stored, in view space or in the world's.
+fn stored_normal(pixel: vec2i) -> vec3f {
+    var texel = finite3(textureLoad(normal_map, pixel, 0).rgb);
+    if (params.flags & STORED_UNSIGNED) != 0u { texel = 2.0 * texel - 1.0; }
+    if (params.flags & (STORED_XYZ | STORED_XY)) == 0u { return oct_decode(texel.xy); }
+    if (params.flags & STORED_XY) != 0u { texel.z = sqrt(max(1.0 - dot(texel.xy, texel.xy), 0.0)); }
+    let length = length(texel);
+    return select(vec3f(0.0, 0.0, 1.0), texel / length, length > 1e-6);
+}
+
 // Unit normal in the gravity frame.
 fn normal_at(pixel: vec2i) -> vec3f {
-    let texel = finite3(vec3f(textureLoad(normal_map, pixel, 0).rg, 0.0));
-    return params.gravity_from_world * oct_decode(texel.xy);
+    let n = stored_normal(pixel);
+    if (params.flags & STORED_IN_VIEW) != 0u { return params.gravity_from_view * n; }
+    return params.gravity_from_world * n;
+}
+
+// Unit normal in the world.
+fn world_normal_at(pixel: vec2i) -> vec3f {
+    let n = stored_normal(pixel);
+    if (params.flags & STORED_IN_VIEW) != 0u { return params.world_from_view * n; }
+    return n;
 }

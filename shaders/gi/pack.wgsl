@@ -52,7 +52,7 @@ fn pack(@builtin(global_invocation_id) id: vec3u) {
     put3(&row, SKY, compress(params.environment.rgb));
     if z > 0.0 {
         let light = light_at(pixel);
-        let albedo = finite3(textureLoad(albedo_map, pixel, 0).rgb);
+        let albedo = albedo_at(pixel);
         let m = exp(exposure.ln_m);
         let v = position_at(pixel, z) / m;
         put3(&row, DIRECT, compress(light));

@@ -20,7 +20,7 @@ fn sum_of(texel: vec2i) -> vec4f {
         let pixel = 2 * texel + vec2i(i & 1, i >> 1u);
         if all(pixel < vec2i(params.size)) && distance_at(pixel) > 0.0 {
             let light = light_at(pixel) + unseen;
-            sum += vec4f(textureLoad(albedo_map, pixel, 0).rgb * light + emissive_at(pixel), 1.0);
+            sum += vec4f(albedo_at(pixel) * light + emissive_at(pixel), 1.0);
         }
     }
     return sum;

@@ -4,10 +4,10 @@
 
 use super::emitters::{self, EmitterGpu};
 use super::gpu::{self, ROW};
-use super::trees::{MeshTree, SceneTrees};
+use super::trees::{MeshPart, MeshTree, SceneTrees};
 use super::wide::{Block, INSTANCE, WORDS};
 use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, surfaces};
-use crate::scene::{Instance, Scene};
+use crate::scene::Scene;
 use glam::{Mat4, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -69,21 +69,34 @@ impl SceneRays {
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
     ) -> Result<Self, AccelError> {
         // What cannot fit is not built first.
-        let triangles: u64 = scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum();
-        Accel::check_count(triangles)?;
-        let limits = device.limits();
-        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let bytes = triangles * size_of::<surfaces::Packed>() as u64;
-        if bytes > limit {
-            return Err(AccelError::Binding { triangles, bytes, limit });
-        }
-        let trees = SceneTrees::build(scene, progress)?;
+        check(device, scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum())?;
+        let mut rays = Self::of_trees(device, queue, SceneTrees::build(scene, progress)?)?;
+        rays.place(queue, scene);
+        Ok(rays)
+    }
+
+    /// Joins parts, with room for so many instances, none of which is placed yet.
+    ///
+    /// # Errors
+    /// As [`SceneRays::new`].
+    pub(crate) fn of_parts(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        parts: Vec<MeshPart>,
+        instances: usize,
+    ) -> Result<Self, AccelError> {
+        check(device, parts.iter().map(|p| p.triangles() as u64).sum())?;
+        Self::of_trees(device, queue, SceneTrees::join(parts, instances))
+    }
+
+    fn of_trees(device: &wgpu::Device, queue: &wgpu::Queue, trees: SceneTrees) -> Result<Self, AccelError> {
+        let triangles = trees.surfaces.len();
         let accel = AccelGpu::of_blocks(device, queue, &trees.blocks)?;
         let surfaces = filled(device, queue, "accel.surfaces", bytemuck::cast_slice(&trees.surfaces));
         let normals = gpu::texels(device, queue, "accel.normals", &trees.normals)?;
         let of_normals = 16 * (trees.normals.len() as u64).next_multiple_of(u64::from(gpu::WIDTH));
         let bytes = 64 * (trees.blocks.len() as u64).next_multiple_of(u64::from(ROW)) + surfaces.size() + of_normals;
-        let mut rays = Self {
+        Ok(Self {
             id: NEXT.fetch_add(1, Ordering::Relaxed),
             accel,
             surfaces,
@@ -92,25 +105,38 @@ impl SceneRays {
             inverse_power: 0.0,
             meshes: trees.meshes,
             top_room: trees.top_room,
-            counts: RayCounts { triangles: triangles as usize, bytes, ..RayCounts::default() },
+            counts: RayCounts { triangles, bytes, ..RayCounts::default() },
             placed: Vec::new(),
             moves: 0,
             device: device.clone(),
-        };
-        rays.place(queue, scene);
-        Ok(rays)
+        })
+    }
+
+    /// Counts as the same scene as `before`, of which something has changed.
+    pub(crate) fn succeed(&mut self, before: &Self) {
+        (self.id, self.moves) = (before.id, self.moves.max(before.moves) + 1);
     }
 
     /// Takes over where the instances of `scene` are; its meshes are those that this was made of. True when buffers were made anew and have to be bound again.
     pub fn place(&mut self, queue: &wgpu::Queue, scene: &Scene) -> bool {
-        if !self.placed.iter().eq(scene.instances.iter().map(|i| &i.transform)) {
-            self.placed = scene.instances.iter().map(|i| i.transform).collect();
+        self.put(queue, scene.instances.iter().map(|i| (i.mesh, i.transform)))
+    }
+
+    /// The same of a list of instances: the mesh or part of each, and where it is.
+    pub(crate) fn put(
+        &mut self,
+        queue: &wgpu::Queue,
+        instances: impl ExactSizeIterator<Item = (usize, [[f32; 4]; 4])> + Clone,
+    ) -> bool {
+        let count = instances.len();
+        if !self.placed.iter().copied().eq(instances.clone().map(|i| i.1)) {
+            self.placed = instances.clone().map(|i| i.1).collect();
             self.moves += 1;
         }
-        let placed = placed(&self.meshes, &scene.instances);
+        let placed = placed(&self.meshes, instances);
         let top = top(&placed, self.top_room);
         self.counts.instances = placed.len().min(most_placed(self.top_room));
-        self.counts.left_out = scene.instances.len() - self.counts.instances;
+        self.counts.left_out = count - self.counts.instances;
         self.accel.write(queue, 0, &top);
 
         let limit = self.device.limits().max_storage_buffer_binding_size as usize / size_of::<EmitterGpu>();
@@ -178,13 +204,16 @@ pub(super) struct Placed {
     leaf: Block,
 }
 
-/// Those of `instances` that rays can meet.
-pub(super) fn placed(meshes: &[MeshTree], instances: &[Instance]) -> Vec<Placed> {
-    let place = |(number, instance): (u32, &Instance)| {
-        let world = Mat4::from_cols_array_2d(&instance.transform);
-        let mesh = meshes.get(instance.mesh)?;
-        let (bounds, leaf) = leaf(mesh, mesh.bounds?, &world, number)?;
-        Some(Placed { mesh: instance.mesh, world, bounds, leaf })
+/// Those of `instances` (the mesh of each, and where it is) that rays can meet.
+pub(super) fn placed(
+    meshes: &[MeshTree],
+    instances: impl Iterator<Item = (usize, [[f32; 4]; 4])>,
+) -> Vec<Placed> {
+    let place = |(number, (mesh, transform))| {
+        let world = Mat4::from_cols_array_2d(&transform);
+        let of = meshes.get(mesh)?;
+        let (bounds, leaf) = leaf(of, of.bounds?, &world, number)?;
+        Some(Placed { mesh, world, bounds, leaf })
     };
     (0u32..).zip(instances).filter_map(place).collect()
 }
@@ -199,6 +228,18 @@ pub(super) fn top(placed: &[Placed], room: usize) -> Vec<Block> {
     let placed = &placed[..placed.len().min(most_placed(room))];
     let boxes: Vec<Aabb> = placed.iter().map(|p| p.bounds).collect();
     build::over_boxes(&boxes, TOP_LEVELS, |i| placed[i].leaf)
+}
+
+/// What cannot fit is not built first.
+fn check(device: &wgpu::Device, triangles: u64) -> Result<(), AccelError> {
+    Accel::check_count(triangles)?;
+    let limits = device.limits();
+    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let bytes = triangles * size_of::<surfaces::Packed>() as u64;
+    if bytes > limit {
+        return Err(AccelError::Binding { triangles, bytes, limit });
+    }
+    Ok(())
 }
 
 /// The leaf of an instance and its box in the world; `None` where no ray can meet it.

@@ -107,6 +107,12 @@ pub fn of_mesh(scene: &Scene, mesh: &Mesh, reductions: &Reductions) -> Vec<Surfa
     mesh.indices.chunks_exact(3).map(one).collect()
 }
 
+/// A material without pictures and vertex colours.
+pub fn plain(material: &Material) -> Surface {
+    let none = Textures { base: None, rough: None, glow: None };
+    surface(material, &none, &Mesh::default(), [0; 3])
+}
+
 /// The pictures of a material, made small.
 struct Textures<'a> {
     base: Option<&'a Reduced>,

@@ -5,8 +5,9 @@ use super::gpu::ROW;
 use super::image::Reductions;
 use super::wide::{Block, NODE, WORDS};
 use super::{Accel, AccelError, build, surfaces, threads};
-use crate::scene::{Mesh, Scene, octahedral::octahedral_word};
+use crate::scene::{Material, Mesh, Scene, octahedral::octahedral_word};
 use glam::Vec3;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// A mesh's tree, where it lies in the texture, and what of it glows.
@@ -35,29 +36,50 @@ fn top_blocks(count: usize) -> usize {
     (8 * count + 16).next_multiple_of(ROW as usize)
 }
 
-/// What one mesh becomes on a thread.
-#[derive(Default)]
-struct Part {
-    accel: Accel,
+/// What one mesh becomes, on any thread: all that rays know of it, but where it lies among the others.
+#[derive(Default, Clone)]
+pub(crate) struct MeshPart {
+    accel: Arc<Accel>,
+    normals: Arc<Vec<[u32; 4]>>,
     surfaces: Vec<surfaces::Surface>,
-    normals: Vec<[u32; 4]>,
     glows: Vec<Glow>,
 }
 
-impl Part {
-    fn new(scene: &Scene, mesh: &Mesh, reductions: &Reductions) -> Self {
-        // What disagrees in itself is refused by the upload of the picture's part; here it is not met.
+impl MeshPart {
+    /// Of a mesh of `scene`. One that disagrees in itself is not met: the upload of the picture's part refuses it.
+    pub fn new(scene: &Scene, mesh: &Mesh, reductions: &Reductions) -> Self {
         if mesh.check(scene.materials.len()).is_err() {
             return Self::default();
         }
         let surfaces = surfaces::of_mesh(scene, mesh, reductions);
-        let corners: Vec<_> =
-            mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize])).collect();
+        let corners = corners(mesh);
         let glows = emitters::glowing(&surfaces, &corners);
         let normal = |i: u32| octahedral_word(mesh.normals[i as usize]);
         let normals = mesh.indices.chunks_exact(3).map(|t| [normal(t[0]), normal(t[1]), normal(t[2]), 0]).collect();
-        Self { accel: build::build(&corners), surfaces, normals, glows }
+        Self { accel: build::build(&corners).into(), normals: Arc::new(normals), surfaces, glows }
     }
+
+    /// The same triangles, with the corners that it was made of, of another material without pictures.
+    pub fn of_material(&self, material: &Material, corners: &[[[f32; 3]; 3]]) -> Self {
+        let surfaces = vec![surfaces::plain(material); self.surfaces.len()];
+        let glows = emitters::glowing(&surfaces, corners);
+        Self { accel: self.accel.clone(), normals: self.normals.clone(), surfaces, glows }
+    }
+
+    /// Triangles, those that no ray can hit among them.
+    pub fn triangles(&self) -> usize {
+        self.surfaces.len()
+    }
+
+    /// Triangles that no ray can hit: not finite, too far out or without area.
+    pub fn dropped(&self) -> usize {
+        self.accel.dropped_not_finite + self.accel.dropped_degenerate
+    }
+}
+
+/// Corners of a mesh's triangles, whose indices were checked.
+pub(crate) fn corners(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
+    mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize])).collect()
 }
 
 impl SceneTrees {
@@ -67,9 +89,9 @@ impl SceneTrees {
         let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(!progress(0, scene.meshes.len())));
         let part = |mesh: &Mesh| {
             if stopped.load(Ordering::Relaxed) {
-                return Part::default();
+                return MeshPart::default();
             }
-            let part = Part::new(scene, mesh, &reductions);
+            let part = MeshPart::new(scene, mesh, &reductions);
             if !progress(done.fetch_add(1, Ordering::Relaxed) + 1, scene.meshes.len()) {
                 stopped.store(true, Ordering::Relaxed);
             }
@@ -80,8 +102,12 @@ impl SceneTrees {
             return Err(AccelError::Stopped);
         }
         drop(reductions);
+        Ok(Self::join(parts, scene.instances.len()))
+    }
 
-        let top_room = top_blocks(scene.instances.len());
+    /// Lays parts one after the other, behind room for a tree over so many instances.
+    pub fn join(parts: Vec<MeshPart>, instances: usize) -> Self {
+        let top_room = top_blocks(instances);
         let mut blocks = Vec::with_capacity(top_room + parts.iter().map(|p| p.accel.block_count() + 8).sum::<usize>());
         blocks.resize(top_room, [0; WORDS]);
         let mut surfaces = Vec::with_capacity(parts.iter().map(|p| p.surfaces.len()).sum());
@@ -98,9 +124,9 @@ impl SceneTrees {
             });
             blocks.extend(part.accel.blocks.iter().map(|b| moved(b, root as u32, &part.surfaces)));
             surfaces.extend(part.surfaces.iter().map(surfaces::Surface::packed));
-            normals.extend(part.normals);
+            normals.extend(part.normals.iter());
         }
-        Ok(Self { blocks, surfaces, normals, meshes, top_room })
+        Self { blocks, surfaces, normals, meshes, top_room }
     }
 }
 

@@ -22,10 +22,10 @@
 //!
 //! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
 //! `docs/gi.md` tells the same with a picture of the data flow and the table of constants; `docs/embedding.md` how another renderer
-//! records [`pass::NeuralGi`].
+//! records them: a [`World`] holds its triangles, a [`View`] lights its picture.
 //!
 //! # Floors
-//! `interface` ← `stage` ← `screen`, `gather` ← `neural` ← `method`: each imports only what stands before it, and nothing here
+//! `interface` ← `stage` ← `screen`, `gather` ← `neural` ← `method` ← `world`: each imports only what stands before it, and nothing here
 //! imports `render`.
 
 pub mod gather;
@@ -35,10 +35,17 @@ pub mod neural;
 mod preludes;
 pub mod screen;
 pub mod stage;
+mod world;
 
-pub use interface::{CameraMatrices, GiError, Inputs, Lights, Rays, rung};
+pub use interface::{
+    AlbedoEncoding, CameraMatrices, Conventions, Depth, GiError, Inputs, Jitter, LightScale, Lights, MotionJitter,
+    MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Rays, rung,
+};
 pub use method::{Method, fitted, name};
 pub use neural::{features, pack, pass, reconstruct, twin};
 pub use preludes::example_preludes;
 pub use screen::{ambient, bitmask, occlusion, ssgi};
 pub use stage::{cells, exposure, exposure::ExposurePass, inputs};
+pub use world::{
+    Complaint, ImageSource, Indices, Instance, MeshSource, PreparedMesh, Surface, Vertices, View, World, WorldOptions,
+};

@@ -20,6 +20,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.settle", super::gather::prelude()),
         ("gi.blur", super::gather::prelude()),
         ("gi.smooth", super::gather::prelude()),
+        ("gi.check", super::world::prelude()),
         ("gi.bring", super::gather::bring::prelude()),
     ]
 }

@@ -37,6 +37,7 @@ const FILES: &[(&str, &str)] = &[
     ("gi.blur", "gi/gather/blur.wgsl"),
     ("gi.smooth", "gi/gather/smooth.wgsl"),
     ("gi.bring", "gi/gather/bring.wgsl"),
+    ("gi.check", "gi/check.wgsl"),
     ("gi.pack", "gi/pack.wgsl"),
     ("gi.reconstruct", "gi/reconstruct.wgsl"),
     ("reference.path", "reference/path.wgsl"),

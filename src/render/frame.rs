@@ -344,10 +344,11 @@ fn gi_inputs<'a>(
         size: targets.size,
         depth: &targets.depth.view,
         normal: &targets.normal.view,
-        albedo: &targets.albedo.view,
-        emissive: &targets.emissive.view,
-        direct: &targets.direct_diffuse.view,
+        albedo: Some(&targets.albedo.view),
+        emissive: Some(&targets.emissive.view),
+        direct: Some(&targets.direct_diffuse.view),
         camera: view.matrices(),
+        conventions: gi::Conventions::default(),
         environment,
         lights: scene.map(|s| gi::Lights {
             buffer: &s.light_buffer,
@@ -358,6 +359,7 @@ fn gi_inputs<'a>(
         rays: scene.and_then(|s| Some(gi::Rays { scene: s.rays.as_ref()?, environment: &s.environment_view })),
         motion: Some(&targets.motion.view),
         specular: Some(&targets.specular.view),
+        reset: false,
     }
 }
 

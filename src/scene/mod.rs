@@ -321,6 +321,13 @@ pub struct Light {
     pub stands_in: bool,
 }
 
+impl From<LightKind> for Light {
+    /// A white light of its own.
+    fn from(kind: LightKind) -> Self {
+        Self { name: String::new(), color: [1.0; 3], kind, stands_in: false }
+    }
+}
+
 /// Kinds of analytic light, in world space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LightKind {

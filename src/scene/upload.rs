@@ -260,6 +260,15 @@ impl SceneGpu {
     }
 }
 
+/// The surroundings as a lat-long picture ([`SceneGpu::environment_view`]), a sun in it left where it is.
+pub(crate) fn whole_sky(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    environment: &Environment,
+) -> Result<wgpu::TextureView, UploadError> {
+    Ok(environment::upload_with(device, queue, environment, false, &mut Vec::new())?.view)
+}
+
 /// Number of the next upload.
 static NEXT: AtomicU64 = AtomicU64::new(1);
 

@@ -6,10 +6,16 @@ mod bring;
 mod build;
 #[path = "../common/mod.rs"]
 mod common;
+mod contract;
+mod conventions;
 mod corrected;
 #[cfg(feature = "io")]
 mod dataset;
 mod edges;
+#[cfg(feature = "io")]
+mod embed;
+mod embedding;
+mod foreign;
 mod gather;
 mod glossy;
 mod glow;

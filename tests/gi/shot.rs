@@ -194,18 +194,11 @@ pub struct Textures {
 impl Textures {
     pub fn inputs(&self, shot: &Shot) -> Inputs<'_> {
         Inputs {
-            size: shot.size,
-            depth: &self.depth,
-            normal: &self.normal,
-            albedo: &self.albedo,
-            emissive: &self.emissive,
-            direct: &self.direct,
-            camera: shot.camera,
+            albedo: Some(&self.albedo),
+            emissive: Some(&self.emissive),
+            direct: Some(&self.direct),
             environment: shot.environment,
-            lights: None,
-            rays: None,
-            motion: None,
-            specular: None,
+            ..Inputs::new(shot.size, &self.depth, &self.normal, shot.camera)
         }
     }
 }

@@ -244,11 +244,12 @@ fn what_does_not_fit_is_an_error_in_words() {
         |inputs, output: &wgpu::TextureView| gi.record(&mut encoder, &inputs, output).map_err(|e| e.to_string());
     let good = textures.inputs(&shot);
     record(good, &target).expect("fits");
-    let error = record(bouncelight::gi::Inputs { normal: good.direct, ..good }, &target).unwrap_err();
+    let direct = good.direct.expect("a shot has direct light");
+    let error = record(bouncelight::gi::Inputs { normal: direct, ..good }, &target).unwrap_err();
     assert!(error.contains("`normal`") && error.contains("Rg16Float"), "{error}");
     let error = record(bouncelight::gi::Inputs { size: [9, 8], ..good }, &target).unwrap_err();
     assert!(error.contains("8x8") && error.contains("9x8"), "{error}");
-    let error = record(good, good.direct).unwrap_err();
+    let error = record(good, direct).unwrap_err();
     assert!(error.contains("`output`") && error.contains("STORAGE_BINDING"), "{error}");
     let mut camera = shot.camera;
     camera.clip_from_view[3][2] = -0.1;

@@ -48,7 +48,9 @@ fn start_at(pixel: vec2i) -> Start {
     let n = world_normal_at(pixel);
     let from_eye = offset_at(pixel, z);
     // Above the surface, and towards the eye, where nothing is in between whatever the normal says.
-    return Start(params.eye.xyz + from_eye * (1.0 - LIFT) + n * (LIFT * z), n, -normalize(from_eye));
+    // A depth whose steps are coarse at this distance asks for more.
+    let lift = max(LIFT, LIFT_STEPS * params.depth.w * z);
+    return Start(params.eye.xyz + from_eye * (1.0 - lift) + n * (lift * z), n, -normalize(from_eye));
 }
 
 fn record(ray: u32, found: Found, weight: vec3f, d: vec3f, glow: vec4f) {

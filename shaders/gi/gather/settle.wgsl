@@ -31,7 +31,8 @@ fn from_shared_exponent(code: u32) -> vec3f {
 
 // Where the surface at this pixel was in the frame before, from here, in pixels.
 fn motion_of(pixel: vec2i) -> vec2f {
-    return finite3(vec3f(textureLoad(motion_map, pixel, 0).xy, 0.0)).xy * vec2f(params.size);
+    let motion = finite3(vec3f(textureLoad(motion_map, pixel, 0).xy, 0.0)).xy;
+    return (motion * params.motion.xy + params.motion.zw) * vec2f(params.size);
 }
 
 fn rests(motion: vec2f) -> bool {

@@ -27,6 +27,7 @@ pub use params::Params;
 
 use crate::gi::interface::rung::{Cost, Rung};
 use crate::gi::interface::{GiError, Inputs, Rays};
+use crate::gi::stage;
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::InputGroup;
 use crate::gpu::bind::{Binder, Bound};
@@ -40,6 +41,9 @@ use store::Store;
 /// A ray begins this share of the view distance off its surface: half along the way to the eye, half along the normal. At
 /// 1024 × 512 and 60° a three-hundredth of a cell's width, and 500 times the rounding of the depth.
 const LIFT: f32 = 3e-5;
+
+/// It begins no nearer than so many steps of the depth's texels.
+const LIFT_STEPS: f32 = 4.0;
 
 /// Frames after a change of the lights for which cells let go of what they remember at less evidence.
 const HURRY: u32 = 8;
@@ -56,7 +60,7 @@ const ROUNDS_YOUNG: u32 = 4;
 
 /// Constants of the shaders as WGSL.
 pub fn prelude() -> String {
-    format!("{}const LIFT = f32({LIFT:?});\n", cells::prelude())
+    format!("{}const LIFT = f32({LIFT:?});\nconst LIFT_STEPS = f32({LIFT_STEPS:?});\n", cells::prelude())
 }
 
 /// Most bits of a lot that may name a query (`lot_bits` of `entries.wgsl`): ten are left to draw by.
@@ -144,7 +148,7 @@ impl GatherGi {
 
     /// Makes pipelines, and buffers for pictures of `size` pixels.
     pub fn new(device: &wgpu::Device, size: [u32; 2], options: Options) -> Self {
-        let inputs = InputGroup::new(device);
+        let inputs = InputGroup::geometry(device);
         let params = ParamsRing::new(device);
         let texels = wgpu::BindingType::Texture {
             sample_type: wgpu::TextureSampleType::Uint,
@@ -157,19 +161,6 @@ impl GatherGi {
         let new = |groups, names, types: &[wgpu::BindingType]| Pass::new(device, groups, names, types);
         let rw = READ_WRITE;
         let table = [rw, rw, rw, rw, rw];
-        let nothing = |label, format| {
-            let texture = device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            });
-            texture.create_view(&Default::default())
-        };
         Self {
             cells: CellsPass::new(device, &inputs, size),
             evict: new(shared, ("gi.evict", "gi.renew", "evict"), &table),
@@ -187,8 +178,8 @@ impl GatherGi {
                 usage: wgpu::BufferUsages::STORAGE,
                 mapped_at_creation: false,
             }),
-            no_motion: nothing("gi.no_motion", wgpu::TextureFormat::Rg16Float),
-            no_specular: nothing("gi.no_specular", wgpu::TextureFormat::Rgba8Unorm),
+            no_motion: stage::absent(device, "gi.no_motion", wgpu::TextureFormat::Rg16Float),
+            no_specular: stage::absent(device, "gi.no_specular", wgpu::TextureFormat::Rgba8Unorm),
             device: device.clone(),
             options,
             inputs,
@@ -234,7 +225,7 @@ impl GatherGi {
             (self.changing > 0, params::CHANGING),
         ];
         Ok(Params {
-            eye: crate::gi::stage::inputs::Params::new(inputs.size, &inputs.camera, inputs.environment)?.eye_position(),
+            eye: stage::inputs::Params::of(inputs, None)?.eye_position(),
             frame: self.frame,
             light_count: inputs.lights.map_or(0, |l| l.count),
             emitter_count: counts.emitters as u32,
@@ -264,13 +255,16 @@ impl Rung for GatherGi {
         inputs: &Inputs<'_>,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
-        crate::gi::stage::inputs::check_output(output, inputs.size)?;
+        stage::inputs::check_output(output, inputs.size)?;
         let rays = inputs.rays.as_ref().ok_or(GiError::Rays)?;
         if inputs.size != self.checked {
             Self::check(&self.device.limits(), inputs.size, &self.options)?;
             self.checked = inputs.size;
         }
         let bound = self.inputs.bind(queue, inputs)?;
+        if inputs.reset {
+            self.frame = 0;
+        }
         // Another scene's light is nobody's past.
         let another = rays.scene.id() != self.scene_id;
         self.scene_id = rays.scene.id();
@@ -378,6 +372,10 @@ impl Rung for GatherGi {
         self.scene.forget();
         self.settle.forget();
         self.bring.forget();
+    }
+
+    fn allocations(&self) -> u64 {
+        self.allocations()
     }
 
     fn bytes(&self) -> u64 {

@@ -14,12 +14,51 @@ pub enum GiError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The camera is not a finite reversed-Z perspective camera.
+    /// The camera is not a finite perspective camera of the depth that the conventions name.
     #[error("the camera cannot be used: {0}")]
     Camera(&'static str),
     /// The method reads [`Inputs::rays`](super::Inputs::rays), which is not there.
     #[error("this method sends rays into the scene's triangles (`Inputs::rays`), which the host did not supply")]
     Rays,
+    /// The method reads a field of [`Inputs`](super::Inputs) that is `None`.
+    #[error("the method that draws here reads `{0}`, which the host did not supply")]
+    Missing(&'static str),
+    /// Conventions that contradict each other or a texture's format.
+    #[error("the conventions of `{name}` cannot hold: {reason}")]
+    Conventions {
+        /// Field of [`Inputs`](super::Inputs).
+        name: &'static str,
+        /// What contradicts what.
+        reason: &'static str,
+    },
+    /// A mesh or an instance that the world cannot take; the world is as it was.
+    #[error("{what} {key} of the world: {reason}")]
+    World {
+        /// `mesh` or `instance`.
+        what: &'static str,
+        /// The host's key.
+        key: u64,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A mesh that disagrees in itself.
+    #[error("the mesh cannot be met by rays: {0}")]
+    Mesh(String),
+    /// Number of a light that holds NaN or infinity.
+    #[error("light {0} holds NaN or infinity")]
+    Light(usize),
+    /// What is wrong with the sky.
+    #[error("the sky cannot be used: {0}")]
+    Sky(String),
+    /// A method that adds no light.
+    #[error("the method `{0}` adds no light, so there is nothing to record")]
+    NoMethod(&'static str),
+    /// The world has changed since it was last prepared.
+    #[error("the world has changed since `World::prepare`; call it once a frame, before views are recorded")]
+    Unprepared,
+    /// The world does not fit the device.
+    #[error(transparent)]
+    Accel(#[from] crate::accel::AccelError),
     /// The device is too small for the method.
     #[error("this device {0}")]
     Device(String),

@@ -1,8 +1,13 @@
 //! What hosts hand over, what a method is, and what can go wrong: nothing here knows any method.
 
+mod conventions;
 mod error;
 pub mod rung;
 
+pub use conventions::{
+    AlbedoEncoding, Conventions, Depth, Jitter, LightScale, MotionJitter, MotionSense, MotionUnits, NormalEncoding,
+    NormalRange, NormalSpace,
+};
 pub use error::GiError;
 
 /// The camera's part of a method's inputs, column-major as in WGSL.
@@ -10,39 +15,83 @@ pub use error::GiError;
 pub struct CameraMatrices {
     /// View space (right-handed, looking down −Z) from world space.
     pub view_from_world: [[f32; 4]; 4],
-    /// Clip space from view space: reversed Z (1 at the near plane, 0 at the background), jitter included.
+    /// Clip space from view space: a perspective whose depth and jitter are as [`Conventions`] say.
     pub clip_from_view: [[f32; 4]; 4],
 }
 
-/// What a method reads. All textures have the same size; `render::gbuffer` says what their texels mean.
+/// What a method reads. All textures have the same size and usage TEXTURE_BINDING; how their texels
+/// are to be read, [`Conventions`] say. [`Inputs::new`] has what every method needs; what is left
+/// out has the fallback that its field names.
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
     /// Width and height of all textures, pixels.
     pub size: [u32; 2],
-    /// Reversed-Z depth, `Depth32Float`; 0 where nothing was hit.
+    /// Depth: a depth format or `R32Float`. Of a format with a stencil, a view of the depth alone.
     pub depth: &'a wgpu::TextureView,
-    /// World normal, octahedral, `Rg16Float`.
+    /// Normals: `Rg16Float` by default, else any format that has the numbers of
+    /// [`Conventions::normal_encoding`].
     pub normal: &'a wgpu::TextureView,
-    /// Diffuse reflectance in [0, 1] (rgb), `Rgba8UnormSrgb`. Alpha is not read: whoever multiplies the light with albedo
-    /// applies the textures' ambient occlusion, too.
-    pub albedo: &'a wgpu::TextureView,
-    /// Emitted radiance, `Rgba16Float`.
-    pub emissive: &'a wgpu::TextureView,
+    /// Diffuse reflectance in [0, 1] (rgb), 8 or 10 bits or float. Alpha is not read: whoever
+    /// multiplies the light with albedo applies the textures' ambient occlusion, too. `gather` does
+    /// not read it; the others end with [`GiError::Missing`] without.
+    pub albedo: Option<&'a wgpu::TextureView>,
+    /// Emitted radiance, `Rgba16Float`. `gather` does not read it; for the others `None` counts as
+    /// no surface that glows.
+    pub emissive: Option<&'a wgpu::TextureView>,
     /// Direct diffuse light of the analytic lights as E/π, albedo not multiplied in, `Rgba16Float`.
-    pub direct: &'a wgpu::TextureView,
+    /// As of `albedo`: not read by `gather`, needed by the others.
+    pub direct: Option<&'a wgpu::TextureView>,
     /// The camera that drew them.
     pub camera: CameraMatrices,
+    /// How texels and matrices are to be read.
+    pub conventions: Conventions,
     /// Radiance of the constant environment, W/(m²·sr).
     pub environment: [f32; 3],
-    /// The analytic lights, for methods that light more than the picture; `None` counts as no lights there.
+    /// The analytic lights, for methods that light more than the picture; `None` counts as no
+    /// lights there.
     pub lights: Option<Lights<'a>>,
-    /// The scene as rays meet it, for methods that ask it ([`Method::needs_rays`](super::Method::needs_rays)).
+    /// The scene as rays meet it, for methods that ask it
+    /// ([`Method::needs_rays`](super::Method::needs_rays)).
     pub rays: Option<Rays<'a>>,
-    /// Where each pixel's surface was in the frame before: texture coordinates then minus now, y down, free of jitter, `Rg16Float`;
-    /// for methods that remember frames. `None` counts as everything at rest.
+    /// Where each pixel's surface was in the frame before: texture coordinates then minus now, y
+    /// down, free of jitter, unless [`Conventions`] say otherwise; `Rg16Float`, `Rg32Float` or
+    /// `Rgba16Float`. For methods that remember frames. `None` counts as everything at rest: what
+    /// moves on the screen starts anew where plane or normal differ, and drags its light where not.
     pub motion: Option<&'a wgpu::TextureView>,
-    /// `Rgba8Unorm(Srgb)`: F0 and perceptual roughness, for methods that find what lobes show ([`Rung::gloss`](rung::Rung::gloss)).
+    /// `Rgba8Unorm(Srgb)`: F0 and perceptual roughness, for methods that find what lobes show
+    /// ([`Rung::gloss`](rung::Rung::gloss)). `None`: no lobes.
     pub specular: Option<&'a wgpu::TextureView>,
+    /// The picture has nothing to do with the one before (a cut): what is remembered of pixels is
+    /// forgotten first.
+    pub reset: bool,
+}
+
+impl<'a> Inputs<'a> {
+    /// What `gather` cannot do without, in this crate's own conventions; everything else is left
+    /// out.
+    pub fn new(
+        size: [u32; 2],
+        depth: &'a wgpu::TextureView,
+        normal: &'a wgpu::TextureView,
+        camera: CameraMatrices,
+    ) -> Self {
+        Self {
+            size,
+            depth,
+            normal,
+            albedo: None,
+            emissive: None,
+            direct: None,
+            camera,
+            conventions: Conventions::default(),
+            environment: [0.0; 3],
+            lights: None,
+            rays: None,
+            motion: None,
+            specular: None,
+            reset: false,
+        }
+    }
 }
 
 /// The scene as rays meet it.
@@ -69,6 +118,7 @@ pub struct Lights<'a> {
     pub count: u32,
     /// Some of them stand for surfaces that glow, and their light is in [`Inputs::direct`].
     pub stand_in: bool,
-    /// Another number whenever a light is another than before, so that what is remembered of their light is forgotten sooner.
+    /// Another number whenever a light is another than before, so that what is remembered of their
+    /// light is forgotten sooner.
     pub epoch: u64,
 }

@@ -108,6 +108,9 @@ pub trait Rung: Send {
     /// GPU memory of buffers, textures and weights, bytes.
     fn bytes(&self) -> u64;
 
+    /// Bind groups and rebuilds since the start; stands still in steady frames.
+    fn allocations(&self) -> u64;
+
     /// What each pass costs for a picture of `size` pixels, in frame order.
     fn costs(&self, size: [u32; 2]) -> Vec<Cost>;
 }

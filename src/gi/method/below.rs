@@ -113,6 +113,10 @@ impl Rung for OrBelow {
         }
     }
 
+    fn allocations(&self) -> u64 {
+        self.above.as_ref().map_or(0, |a| a.allocations()) + self.below.as_ref().map_or(0, |b| b.allocations())
+    }
+
     fn bytes(&self) -> u64 {
         self.above.as_ref().map_or(0, |a| a.bytes()) + self.below.as_ref().map_or(0, |b| b.bytes())
     }

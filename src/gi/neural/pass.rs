@@ -338,6 +338,10 @@ impl Rung for NeuralGi {
         self.forget();
     }
 
+    fn allocations(&self) -> u64 {
+        self.allocations()
+    }
+
     fn bytes(&self) -> u64 {
         self.bytes()
     }

@@ -187,6 +187,10 @@ impl Rung for AmbientGi {
         self.outputs.clear();
     }
 
+    fn allocations(&self) -> u64 {
+        self.allocations()
+    }
+
     fn bytes(&self) -> u64 {
         self.inputs.bytes() + self.exposure.bytes() + self.occlusion.bytes()
     }

@@ -138,6 +138,10 @@ impl Rung for SsgiGi {
         self.outputs.clear();
     }
 
+    fn allocations(&self) -> u64 {
+        self.allocations()
+    }
+
     fn bytes(&self) -> u64 {
         self.inputs.bytes() + self.exposure.bytes() + self.fine.bytes() + self.coarse.bytes() + self.half.bytes() + 16
     }

@@ -3,8 +3,25 @@
 
 pub mod cells;
 pub mod exposure;
+mod formats;
 pub mod inputs;
+mod params;
 mod view_cache;
 pub mod weights;
 
 pub(crate) use view_cache::ViewCache;
+
+/// One texel that reads as 0, bound where a host has nothing.
+pub(crate) fn absent(device: &wgpu::Device, label: &str, format: wgpu::TextureFormat) -> wgpu::TextureView {
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    texture.create_view(&Default::default())
+}

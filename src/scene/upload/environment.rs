@@ -35,6 +35,17 @@ pub(super) fn upload(
     environment: &Environment,
     warnings: &mut Vec<String>,
 ) -> Result<Sky, UploadError> {
+    upload_with(device, queue, environment, true, warnings)
+}
+
+/// The same; a sun is only looked for if `take_sun`, else it stays in the picture.
+pub(super) fn upload_with(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    environment: &Environment,
+    take_sun: bool,
+    warnings: &mut Vec<String>,
+) -> Result<Sky, UploadError> {
     let [r, g, b] = environment.radiance;
     let (mut own, mut light) = (environment.clone(), None);
     let (mut width, mut height, mut texels) = (1, 1, vec![[r, g, b, 0.0]]);
@@ -44,7 +55,7 @@ pub(super) fn upload(
             let reason = format!("{} values for {width}×{height} pixels", image.rgb.len());
             return Err(UploadError::Image { image: image.name.clone(), reason });
         }
-        let sun = image.sun();
+        let sun = if take_sun { image.sun() } else { None };
         texels = self::texels(image, sun.as_ref().map(|s| &s.rest));
         if let Some(sun) = sun {
             if let LightKind::Directional { irradiance, angle, .. } = sun.light.kind {

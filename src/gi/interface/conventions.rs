@@ -1,0 +1,149 @@
+//! How a host's G-buffer says what it says. The defaults are this crate's own renderer's
+//! (`render::gbuffer`).
+
+/// The conventions of [`Inputs`](super::Inputs), resolved into a uniform and read in
+/// `shaders/gi/inputs.wgsl`.
+///
+/// ```
+/// use bouncelight::gi::{Conventions, Depth, MotionUnits, NormalEncoding, NormalRange, NormalSpace};
+/// // Depth 0 near and 1 far, view-space normals in `Rgb10a2Unorm`, motion in pixels.
+/// let conventions = Conventions {
+///     depth: Depth::Forward,
+///     normal_encoding: NormalEncoding::Xyz,
+///     normal_range: NormalRange::Unsigned,
+///     normal_space: NormalSpace::View,
+///     motion_units: MotionUnits::Pixels,
+///     ..Default::default()
+/// };
+/// assert_ne!(conventions, Conventions::default());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Conventions {
+    /// What depth is near and far. Whether the far plane is finite, the projection says.
+    pub depth: Depth,
+    /// Which numbers are a normal.
+    pub normal_encoding: NormalEncoding,
+    /// How they lie in the texture's range.
+    pub normal_range: NormalRange,
+    /// Along whose axes they are.
+    pub normal_space: NormalSpace,
+    /// What a shader reads of albedo.
+    pub albedo: AlbedoEncoding,
+    /// What direct and emitted light are multiplied by.
+    pub light: LightScale,
+    /// What motion is measured in.
+    pub motion_units: MotionUnits,
+    /// Which way motion points.
+    pub motion_sense: MotionSense,
+    /// Whether motion holds the difference of the two frames' jitter.
+    pub motion_jitter: MotionJitter,
+    /// Where the jitter stands.
+    pub jitter: Jitter,
+}
+
+/// What depth is near and far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Depth {
+    /// 1 at the near plane, 0 at the far plane or at infinity; 0 where nothing was hit.
+    #[default]
+    Reversed,
+    /// 0 at the near plane, 1 at the far plane or at infinity; 1 where nothing was hit.
+    Forward,
+    /// The same, by a projection whose clip space is −w to w (OpenGL's); the texture holds 0 to 1.
+    ForwardGl,
+}
+
+/// Which numbers are a normal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum NormalEncoding {
+    /// Two numbers, octahedral (Cigolle et al. 2014; `shaders/lib/octahedral.wgsl`).
+    #[default]
+    Octahedral,
+    /// The vector, of any length.
+    Xyz,
+    /// x and y of a unit vector in view space that points to the eye: z = √(1 − x² − y²).
+    Xy,
+}
+
+/// How a normal's numbers lie in the texture's range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum NormalRange {
+    /// −1 to 1 as they are, in floats or a signed format.
+    #[default]
+    Signed,
+    /// 0 to 1, v · ½ + ½.
+    Unsigned,
+}
+
+/// Along whose axes normals are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum NormalSpace {
+    /// The world's.
+    #[default]
+    World,
+    /// The camera's: x right, y up, z to the eye
+    /// ([`CameraMatrices::view_from_world`](super::CameraMatrices)).
+    View,
+}
+
+/// What a shader reads of albedo.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum AlbedoEncoding {
+    /// Linear values: of an sRGB view, which the texture unit decodes, or stored so.
+    #[default]
+    Linear,
+    /// sRGB values: stored by a shader that encoded them, in a texture that is not sRGB.
+    Srgb,
+}
+
+/// What direct and emitted light are multiplied by.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum LightScale {
+    /// Nothing: E/π and radiance in W/(m²·sr), as of the world's lights.
+    #[default]
+    Radiance,
+    /// An exposure, above 0. The answer is not: multiply it by the same number.
+    PreExposed(f32),
+}
+
+/// What motion is measured in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MotionUnits {
+    /// Texture coordinates: the picture is 1 wide and 1 high, y down.
+    #[default]
+    Uv,
+    /// Pixels, y down.
+    Pixels,
+    /// Clip space over w: the picture is 2 wide and 2 high, y up.
+    Ndc,
+}
+
+/// Which way motion points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MotionSense {
+    /// Where the surface was in the frame before, minus where it is.
+    #[default]
+    ToPast,
+    /// Where it is, minus where it was.
+    FromPast,
+}
+
+/// Whether motion holds the difference of the two frames' jitter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MotionJitter {
+    /// No: a surface at rest has no motion.
+    #[default]
+    Free,
+    /// Yes: both places are those of jittered pictures.
+    Included,
+}
+
+/// Where the jitter stands.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Jitter {
+    /// In the projection, if there is any.
+    #[default]
+    InProjection,
+    /// Not in the projection: the picture was drawn this far to the right and down of it, pixels.
+    Pixels([f32; 2]),
+}

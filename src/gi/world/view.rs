@@ -1,0 +1,139 @@
+//! One camera's picture, lit by a method.
+
+use super::check::{Complaint, Evidence};
+use super::{World, sample};
+use crate::gi::interface::rung::{Instead, Rung};
+use crate::gi::interface::{GiError, Inputs};
+use crate::gi::method::{self, Method};
+use crate::gi::pass::NeuralGi;
+use crate::gi::stage::inputs::Params;
+use crate::gpu::timing::Recorder;
+
+/// What a method remembers of one camera's picture, and its passes. Make one for each camera; any
+/// number may share a [`World`], a device and a submission.
+pub struct View {
+    queue: wgpu::Queue,
+    rung: Box<dyn Rung>,
+    size: [u32; 2],
+    /// The last frame's camera, and that of the frame before if the last one followed it.
+    seen: [Option<Params>; 2],
+}
+
+impl View {
+    /// Features that would be used where the adapter has them. None is needed.
+    pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
+        NeuralGi::optional_features(adapter)
+    }
+
+    /// Limits that the device must have: WebGPU's defaults.
+    pub fn required_limits() -> wgpu::Limits {
+        NeuralGi::required_limits()
+    }
+
+    /// Compiles `method`'s pipelines and makes its buffers for pictures of `size` pixels. Keeps
+    /// clones of device and queue (handles).
+    ///
+    /// # Errors
+    /// [`GiError::NoMethod`] for [`Method::Direct`], which adds no light; [`GiError`] where a
+    /// network does not fit.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, size: [u32; 2], method: &Method) -> Result<Self, GiError> {
+        let rung = method::build(device, queue, size, method)?.ok_or(GiError::NoMethod(method.name()))?;
+        Ok(Self { queue: queue.clone(), rung, size, seen: [None; 2] })
+    }
+
+    /// Records all of the method's passes: `output` (`Rgba16Float`, usage STORAGE_BINDING, the
+    /// inputs' size) becomes the light that direct lighting misses, as E/π; 0 on the background.
+    /// Lights, sky and rays are those of `world`, whatever `inputs` say. Allocates only when the
+    /// size or the texture views are new. Never submits and never waits.
+    ///
+    /// With `None` for the world `gather` and `neural` have nothing to ask: `ssgi` draws,
+    /// [`View::instead`] says so, and albedo and direct light must be there.
+    ///
+    /// # Errors
+    /// [`GiError`] when inputs or output do not fit, or the world has changed since
+    /// [`World::prepare`]; then nothing was recorded.
+    pub fn record<'a>(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        world: impl Into<Option<&'a World>>,
+        inputs: &Inputs<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError> {
+        let inputs = match world.into() {
+            Some(world) => world.complete(inputs)?,
+            None => *inputs,
+        };
+        if inputs.size != self.size {
+            self.rung.forget();
+            self.size = inputs.size;
+        }
+        self.rung.record(&mut Recorder::new(encoder), &self.queue, &inputs, output)?;
+        let before = self.seen[0].filter(|p| !inputs.reset && p.size == inputs.size);
+        self.seen = [Some(Params::of(&inputs, None)?), before];
+        Ok(())
+    }
+
+    /// Reads a few texels of what was handed over to the last [`View::record`] and says what does
+    /// not fit: NaN, ranges, depth against the world's triangles (units, convention, a flipped y,
+    /// matrices), normals against depth (space, encoding, signs), motion against the cameras of the
+    /// last two frames (units, sense, jitter). What it takes for granted: most of the picture is in
+    /// the world and at rest. Makes buffers, submits and waits: call it when you ask, after the
+    /// frame was submitted, in debug builds say.
+    ///
+    /// # Errors
+    /// [`GiError`] when the inputs do not fit or reading back fails.
+    pub fn check<'a>(
+        &self,
+        device: &wgpu::Device,
+        world: impl Into<Option<&'a World>>,
+        inputs: &Inputs<'_>,
+    ) -> Result<Vec<Complaint>, GiError> {
+        let samples = sample::read(device, &self.queue, inputs)?;
+        let now = Params::of(inputs, None)?;
+        let rays = match world.into().and_then(World::rays) {
+            Some(scene) => {
+                let eye = now.eye_position();
+                let cast = |offset: fn(&sample::Sample) -> [f32; 4]| {
+                    let offsets: Vec<_> = samples.iter().map(offset).collect();
+                    sample::cast(device, &self.queue, scene, eye, &offsets)
+                };
+                Some([cast(|s| s.offset)?, cast(|s| s.mirrored)?])
+            }
+            None => None,
+        };
+        Ok(Evidence { inputs, samples: &samples, now, before: self.seen[1], rays }.complaints())
+    }
+
+    /// What drew the last frame in the method's place, and why; `None` where it drew itself.
+    pub fn instead(&self) -> Option<Instead<'_>> {
+        self.rung.instead()
+    }
+
+    /// What the specular lobe of each pixel's surface shows, see [`Rung::gloss`]; with
+    /// [`Inputs::specular`] only.
+    pub fn gloss(&self) -> Option<&wgpu::TextureView> {
+        self.rung.gloss()
+    }
+
+    /// Frames that the answer has settled over since the last reset; `None` where it does not
+    /// settle.
+    pub fn settled(&self) -> Option<u32> {
+        self.rung.settled()
+    }
+
+    /// Lets go of the texture views that it remembers, and so of the host's textures. A change of
+    /// size does so by itself.
+    pub fn forget(&mut self) {
+        self.rung.forget();
+    }
+
+    /// Bind groups and rebuilds since the start; stands still in steady frames.
+    pub fn allocations(&self) -> u64 {
+        self.rung.allocations()
+    }
+
+    /// GPU memory of buffers, textures and weights, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.rung.bytes()
+    }
+}
