@@ -12,7 +12,7 @@ use std::path::Path;
 /// Largest error of a tensor's gradients, relative to the largest of them: rounding of the differences.
 const ALLOWED: f32 = 1e-3;
 /// Step of a weight. The networks are piecewise linear in each, so that nothing but a bend within the step makes a difference wrong.
-const STEP: f32 = 1e-2;
+const STEP: f32 = 3e-3;
 /// Weights of a tensor that are looked at, spread evenly.
 const LOOKED_AT: usize = 16;
 

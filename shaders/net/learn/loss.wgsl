@@ -49,6 +49,7 @@ fn measure(@builtin(local_invocation_index) local: u32) {
         let loud = max(mean / LOUD, 1.0);
         numbers[RESULT * job.total] += job.share * mean / loud;
         numbers[RESULT * job.total + 1u] = job.share / (loud * count);
+        numbers[RESULT * job.total + 4u] += job.share * mean;
     }
 }
 

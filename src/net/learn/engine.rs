@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, HashMap};
 const SECTIONS: usize = 5;
 const AVERAGE: usize = 3;
 const GRADIENT: usize = 4;
-const RESULTS: usize = 4;
+const RESULTS: usize = 5;
 /// Bytes from one job to the next: the largest alignment that a device may ask for.
 const SLOT: u64 = 256;
 /// Workgroups of one dimension.
@@ -44,6 +44,9 @@ pub struct Loaded {
 pub struct Stride {
     /// Mean loss of the step's pictures, before the step.
     pub loss: f32,
+    /// Relative error of the light in the step's pictures, root of the mean square: what the loss is of, loud pictures and the noise of
+    /// targets included.
+    pub error: f32,
     /// Norm of the gradients of all numbers together, before it is clipped.
     pub norm: f32,
 }
@@ -184,7 +187,7 @@ impl Learner {
         }
         self.queue.submit([encoder.finish()]);
         let results = self.read(self.section(SECTIONS), RESULTS)?;
-        let stride = Stride { loss: results[0], norm: results[2] };
+        let stride = Stride { loss: results[0], error: results[4].sqrt(), norm: results[2] };
         if stride.loss.is_finite() && stride.norm.is_finite() {
             return Ok(stride);
         }

@@ -53,8 +53,9 @@ pub struct Learned {
     pub steps: u32,
     /// Multiplications and additions of a step, by count.
     pub step_flops: u64,
-    /// Mean loss of the first and of the last twentieth of the steps.
-    pub loss: [f32; 2],
+    /// Relative error of the light that is learnt (root of the mean square, the noise of targets included): median of the first
+    /// twentieth of the steps, and of the last.
+    pub error: [f32; 2],
     /// Errors in the worst of the views that judge.
     pub worst: [f64; 3],
     /// Mean errors of the views that judge.
@@ -92,9 +93,9 @@ pub fn learn(
     let drawing_seconds = gone();
     let gpu = trial.gpu();
     let mut learner = Learner::new(&gpu.device, &gpu.queue, &start.weights, lessons.cells)?;
-    let losses = steps(&mut learner, &lessons, &mut |step, loss| {
+    let errors = steps(&mut learner, &lessons, &mut |step, error| {
         let share = (gone() - drawing_seconds) / (seconds - drawing_seconds).max(1e-9);
-        told(&format!("step {step}, loss {loss:.4}"), gone());
+        told(&format!("step {step}, error of light {:.0} %", 100.0 * error), gone());
         trial.go_on(share.min(1.0))?;
         Ok(share as f32)
     })?;
@@ -115,7 +116,7 @@ pub fn learn(
     let better = |a: f64, b: f64| options.yardstick.order(a, b).is_lt();
     let beats_both = [worst, mean].iter().all(|e| better(e[2], e[0]) && better(e[2], e[1]));
     let kept = beats_both && better(worst[2], found.choice().worst);
-    let twentieth = losses.len().div_ceil(20);
+    let twentieth = errors.len().div_ceil(20);
     let learned = Learned {
         started_from,
         views: lessons.views,
@@ -124,7 +125,7 @@ pub fn learn(
         step_seconds,
         steps: learner.steps(),
         step_flops: BATCH as u64 * learner.flops()?,
-        loss: [average(&losses[..twentieth]), average(&losses[losses.len() - twentieth..])],
+        error: [median(&errors[..twentieth]), median(&errors[errors.len() - twentieth..])],
         worst,
         mean,
         kept,
@@ -141,14 +142,14 @@ pub fn learn(
     Ok(Some(file))
 }
 
-/// Steps until `told`, which hears how many there were and the mean of the last losses, says that all the time (1) is gone.
+/// Steps until `told`, which hears how many there were and the median of the last errors, says that all the time (1) is gone.
 fn steps(
     learner: &mut Learner,
     lessons: &Lessons,
     told: &mut dyn FnMut(u32, f32) -> Result<f32, FitError>,
 ) -> Result<Vec<f32>, FitError> {
     let mut order = lessons::Order::new(lessons.examples.len());
-    let (mut losses, mut share) = (Vec::new(), 0f32);
+    let (mut errors, mut share) = (Vec::new(), 0f32);
     while share < 1.0 {
         let loaded = (0..BATCH).map(|_| {
             let (picture, mirrored) = order.next();
@@ -159,14 +160,16 @@ fn steps(
         let falling = RATE[1] + 0.5 * (RATE[0] - RATE[1]) * (1.0 + (std::f32::consts::PI * share).cos());
         let rising = ((learner.steps() + 1) as f32 / RISING as f32).min(1.0);
         let stride = learner.step(&loaded.iter().collect::<Vec<_>>(), rising * falling)?;
-        losses.push(stride.loss);
-        share = told(learner.steps(), average(&losses[losses.len().saturating_sub(20)..]))?;
+        errors.push(stride.error);
+        share = told(learner.steps(), median(&errors[errors.len().saturating_sub(20)..]))?;
     }
-    Ok(losses)
+    Ok(errors)
 }
 
-fn average(values: &[f32]) -> f32 {
-    values.iter().sum::<f32>() / values.len().max(1) as f32
+fn median(values: &[f32]) -> f32 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f32::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(f32::NAN)
 }
 
 /// What the weights file says of how it was made.

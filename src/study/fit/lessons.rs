@@ -4,6 +4,7 @@ use super::FitError;
 use crate::{
     gi::{GiError, features::FeatureSet, inputs::cells_of},
     net::{format::Weights, learn::Example},
+    reference::Layer,
     render::RenderError,
     scene::{Camera, bounds::world_bounds},
     study::{
@@ -20,19 +21,20 @@ use glam::Vec3;
 const SEED: u64 = 2;
 /// Most views: more than these take longer to draw than a few minutes of steps can use.
 const MOST_VIEWS: usize = 48;
-/// Cameras that are looked at for each that is wanted.
-const TRIED: usize = 20;
+/// Cameras that are looked at before the first that is a view has been found; and for each, if all the views are wanted.
+const TRIED: usize = 32;
 /// A view shows surfaces in at least this share of its cells, and at most a tenth of them nearer than this, in sizes of the scene.
 const LEAST_SHOWN: f32 = 0.5;
 const NEAREST: f32 = 0.03;
-/// Samples for each cell. Their noise has no bias, and many cells are learnt from.
-const SPP: u32 = 64;
-/// Frames after a cut at which a view is learnt from, beside the last, which is what judges.
+/// Light is traced until the root mean square error of a cell is this share of the mean light, or by so many samples: noise has no bias,
+/// and many cells are learnt from, but pictures that are noise alone teach nothing (in `interior` 64 samples leave more than the light).
+const NOISE: f64 = 0.5;
+const MOST_SAMPLES: u32 = 1024;
+/// Frames after a cut at which a view is learnt from, the first of all and a later one, beside the last, which is what judges.
 const FRAMES: [u32; 2] = [1, 6];
 
 /// What a weights file says of these numbers.
-pub(super) const SENTENCE: &str =
-    "views of the scene, gather's answer after 1, 6 and all frames and bouncelight's path tracer, 64 samples a cell";
+pub(super) const SENTENCE: &str = "views of the scene, gather's answer after 1, 6 and all frames, light by bouncelight's path tracer, up to 1,024 samples a cell";
 
 /// Pictures to learn from.
 pub(super) struct Lessons {
@@ -69,16 +71,21 @@ impl Lessons {
         let frames: Vec<u32> = FRAMES.into_iter().filter(|f| *f < settled).chain([settled]).collect();
         let cameras: Vec<Camera> = around(trial.scene(), SEED).take(TRIED * MOST_VIEWS).collect();
         let mut gatherer = trial.gatherer()?;
-        for camera in cameras {
-            if lessons.views > 0 && (lessons.views == MOST_VIEWS || !more(lessons.views)) {
+        for (tried, camera) in cameras.into_iter().enumerate() {
+            let enough = lessons.views == MOST_VIEWS || !more(lessons.views);
+            let hopeless = lessons.views == 0 && tried == TRIED;
+            if hopeless || (lessons.views > 0 && enough) {
                 break;
             }
-            let cold = trial.samples(&mut gatherer, &camera, &[1])?;
-            if !cold.iter().all(|s| is_a_view(s, size)) {
+            gatherer.cut();
+            let mut samples = vec![trial.sample(&mut gatherer, &camera, 1)?];
+            if !is_a_view(&samples[0], size) {
                 continue;
             }
-            let samples = trial.samples(&mut gatherer, &camera, &frames)?;
-            let options = truth::samples(SPP, lessons.views as u32);
+            for pair in frames.windows(2) {
+                samples.push(trial.sample(&mut gatherer, &camera, pair[1] - pair[0])?);
+            }
+            let options = truth::until(Layer::Gi, NOISE, MOST_SAMPLES, lessons.views as u32);
             let target = trial.light_at_cells(&camera, options)?;
             lessons.examples.extend(samples.iter().map(|s| example(s, &target, &features)));
             lessons.views += 1;

@@ -109,7 +109,9 @@ pub enum FitError {
     )]
     NoViews,
     /// Nothing to learn from.
-    #[error("there is nothing to learn from: no place in the scene shows enough of it to be a view")]
+    #[error(
+        "there is nothing to learn from: no camera among many scattered through the scene sees enough of it, in any light"
+    )]
     NoFreeViews,
     /// The network cannot be learnt.
     #[error(transparent)]

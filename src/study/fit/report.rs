@@ -176,18 +176,18 @@ impl Fit {
 impl Learned {
     /// What was learnt from what, and whether it is kept, in sentences.
     fn sentences(&self, yardstick: &Yardstick) -> String {
-        let Self { started_from, views, pictures, drawing_seconds, step_seconds, steps, loss, worst, mean, .. } = self;
+        let Self { started_from, views, pictures, drawing_seconds, step_seconds, steps, error, worst, mean, .. } = self;
         let shown = |errors: &[f64; 3]| errors.map(|e| yardstick.show(e));
         let [gather, before, after] = shown(worst);
         let [gather_mean, before_mean, after_mean] = shown(mean);
         let end = if self.kept { "It is kept." } else { "It does not win, so it is not kept." };
         format!(
             "`{started_from}` has learned the scene from {pictures} pictures of {views} other views ({drawing_seconds:.0} s) in {steps} steps \
-             ({step_seconds:.0} s, {:.1} a second); loss {:.4} before, {:.4} after. Where it is judged, worst view (mean): `gather` \
+             ({step_seconds:.0} s, {:.1} a second); its error there {:.1} % at first, {:.1} % at last. Where it is judged, worst view (mean): `gather` \
              {gather} ({gather_mean}), `{started_from}` {before} ({before_mean}), learned {after} ({after_mean}). {end}",
             f64::from(*steps) / step_seconds.max(1e-9),
-            loss[0],
-            loss[1],
+            100.0 * error[0],
+            100.0 * error[1],
         )
     }
 }

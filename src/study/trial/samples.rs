@@ -21,21 +21,13 @@ impl Trial<'_> {
         self.renderer(&Method::Gather(gather::Options::default()))
     }
 
-    /// What a network is given for `camera`, so many `frames` after a cut (ascending).
+    /// What a network is given for `camera` after `frames` more frames.
     ///
     /// # Errors
     /// [`TrialError`].
-    pub fn samples(&self, gatherer: &mut Renderer, camera: &Camera, frames: &[u32]) -> Result<Vec<Sample>, TrialError> {
-        gatherer.cut();
-        let mut drawn = 0;
-        let mut samples = Vec::new();
-        for &wanted in frames {
-            let sample = dataset::frame(self.gpu, gatherer, &self.uploaded, camera, wanted - drawn)?;
-            drawn = wanted;
-            samples.push(sample);
-            self.go_on(f64::from(drawn) / f64::from(*frames.last().unwrap_or(&drawn)))?;
-        }
-        Ok(samples)
+    pub fn sample(&self, gatherer: &mut Renderer, camera: &Camera, frames: u32) -> Result<Sample, TrialError> {
+        self.go_on(0.0)?;
+        Ok(dataset::frame(self.gpu, gatherer, &self.uploaded, camera, frames)?)
     }
 
     /// The light that a network's answer should give at each cell: what references hold of it, traced at the cells' own points.
