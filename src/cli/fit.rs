@@ -181,7 +181,7 @@ fn check_learning(args: &Args, output: &Path) -> Result<()> {
     let start = args.weights.first();
     let weights = Weights::find(start.map(PathBuf::as_path))?;
     let named = || start.map_or("the shipped weights".into(), |path| path.display().to_string());
-    Ok(learn::check(&weights, cells_of(args.scene.size)).with_context(named)?)
+    learn::check(&weights, cells_of(args.scene.size)).with_context(named)
 }
 
 fn learn(
