@@ -5,7 +5,8 @@ use bouncelight::gpu::shaders;
 /// Every permutation of every shader: (shader, its prelude of `const` lines). Shaders without numbers from outside have one.
 fn permutations() -> Vec<(String, String)> {
     let gi = bouncelight::gi::example_preludes().into_iter().map(|(name, prelude)| (name.to_owned(), prelude));
-    let mut all: Vec<_> = gi.chain(bouncelight::net::gpu::example_preludes()).collect();
+    let learnt = ["learn.loss", "learn.adam"].map(|name| (name.to_owned(), bouncelight::net::learn::prelude(name)));
+    let mut all: Vec<_> = gi.chain(bouncelight::net::gpu::example_preludes()).chain(learnt).collect();
     let plain = shaders::names().filter(|name| !all.iter().any(|(n, _)| n == name)).collect::<Vec<_>>();
     all.extend(plain.into_iter().map(|name| (name, String::new())));
     all
@@ -57,7 +58,7 @@ fn every_shader_validates_in_every_permutation() {
     let seen: std::collections::BTreeSet<_> = permutations.iter().map(|p| p.0.clone()).collect();
     assert_eq!(seen, shaders::names().collect(), "every shader was seen");
     assert_eq!(shaders::net_names().count(), 94);
-    assert_eq!(permutations.len(), 1041);
+    assert_eq!(permutations.len(), 1046);
 }
 
 #[test]
@@ -138,6 +139,11 @@ fn structs_lie_in_memory_as_their_rust_twins() {
         f0, uses as "base_use", specular_tint,
     ]);
     assert_eq!(size_of::<MaterialGpu>(), 256);
+    use bouncelight::net::learn::tape::Job as LearnJob;
+    same_layout!("learn.conv", "Job", LearnJob, size size_of::<LearnJob>(), [
+        in_size, out_size, kernel, corner, in_channels, out_channels, stride, input, other, output, weight, bias,
+        total, slope, share, rate, unbias, keep,
+    ]);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::{
     accel::AccelError,
     gi::{GiError, fitted::FittedError},
     gpu::GpuError,
-    net::{convert::ConvertError, format::WeightsError, pictures::PicturesError},
+    net::{convert::ConvertError, format::WeightsError, learn::LearnError, pictures::PicturesError},
     reference::PackError,
     render::RenderError,
     scene::{SceneError, environment::EnvironmentError, upload::UploadError},
@@ -95,6 +95,11 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
             _ => None,
         };
         if let Some(GiError::Feature { .. } | GiError::Output(_)) = cause.downcast_ref::<GiError>().or(wrapped) {
+            return INVALID_INPUT;
+        }
+        if let Some(LearnError::Operator { .. } | LearnError::Meaning { .. } | LearnError::Graph(_)) =
+            cause.downcast_ref()
+        {
             return INVALID_INPUT;
         }
         if let Some(ConvertError::NoSuchVariant) = cause.downcast_ref::<ConvertError>() {

@@ -11,7 +11,7 @@ pub use join::{Joined, folder, read_from};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Name (`room.stage`, also the wgpu label) and file of each shader but the network's.
+/// Name (`room.stage`, also the wgpu label) and file of each shader but those that run the network.
 const FILES: &[(&str, &str)] = &[
     ("render.shadow", "render/shadow.wgsl"),
     ("render.gbuffer", "render/gbuffer.wgsl"),
@@ -40,6 +40,11 @@ const FILES: &[(&str, &str)] = &[
     ("gi.check", "gi/check.wgsl"),
     ("gi.pack", "gi/pack.wgsl"),
     ("gi.reconstruct", "gi/reconstruct.wgsl"),
+    ("learn.conv", "net/learn/conv.wgsl"),
+    ("learn.resize", "net/learn/resize.wgsl"),
+    ("learn.add", "net/learn/add.wgsl"),
+    ("learn.loss", "net/learn/loss.wgsl"),
+    ("learn.adam", "net/learn/adam.wgsl"),
     ("reference.path", "reference/path.wgsl"),
     ("reference.first_hit", "reference/first_hit.wgsl"),
     ("viewer.sum", "viewer/sum.wgsl"),

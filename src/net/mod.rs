@@ -6,7 +6,10 @@
 //! - [`pictures`]: four pictures as a network's input, and its output as a picture.
 //! - [`plan`]: which dispatches run and where each tensor lives in one arena.
 //! - [`cpu`]: the slow, obvious twin; every kernel is tested against it and against PyTorch.
-//! - [`gpu`]: the WGSL kernels' host side. The only file here that knows wgpu.
+//! - [`gpu`]: the WGSL kernels' host side.
+//! - [`learn`]: the way back through the shipped network's operators, for fitting it to a scene.
+//!
+//! Only [`gpu`] and [`learn`] know wgpu.
 
 pub mod activation;
 mod check;
@@ -19,6 +22,7 @@ pub mod gpu;
 pub mod graph;
 mod graph_error;
 mod header;
+pub mod learn;
 pub mod op;
 pub mod op_facts;
 pub mod peak;

@@ -1,10 +1,12 @@
 //! One scene, any method: pictures with their layers in linear light, sequences that keep their history, what it costs, and the
 //! path-traced picture beside it. The one place where studies draw.
 
+mod samples;
 mod shot;
 
 use super::{
     bench::{self, BenchError, BenchOptions, Measurement},
+    dataset::DatasetError,
     hash, truth,
     truth::Reference,
 };
@@ -68,6 +70,9 @@ pub enum TrialError {
     /// A measurement failed.
     #[error(transparent)]
     Bench(#[from] BenchError),
+    /// What a network learns from could not be made.
+    #[error(transparent)]
+    Sample(#[from] DatasetError),
     /// A file could not be written.
     #[error(transparent)]
     Image(#[from] ImageError),
@@ -281,13 +286,18 @@ impl<'a> Trial<'a> {
     /// # Errors
     /// [`TrialError`].
     pub fn trace(&mut self, camera: &Camera, options: &TracerOptions) -> Result<Reference, TrialError> {
+        self.prepare_tracer()?;
+        let (kernel, packed) = (self.kernel.as_ref().expect("prepared"), self.packed.as_ref().expect("prepared"));
+        truth::trace(self.gpu, kernel, packed, (camera, self.size), options, &self.watch)
+    }
+
+    fn prepare_tracer(&mut self) -> Result<(), TrialError> {
         let gpu = self.gpu;
-        let kernel = self.kernel.get_or_insert_with(|| Kernel::new(&gpu.device));
+        self.kernel.get_or_insert_with(|| Kernel::new(&gpu.device));
         if self.packed.is_none() {
             self.packed = Some(ReferenceScene::new(&gpu.device, &gpu.queue, &self.scene)?);
         }
-        let packed = self.packed.as_ref().expect("it was made above");
-        truth::trace(gpu, kernel, packed, (camera, self.size), options, &self.watch)
+        Ok(())
     }
 
     /// What the method costs here, frame after frame of a still camera.

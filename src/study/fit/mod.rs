@@ -7,24 +7,27 @@
 //! are rungs of their own. At last, for methods that settle, the fewest frames that still meet the target are sought by bisection, too.
 //! Both bisections take it that error falls as cost rises; what they return has been measured to meet the target in any case.
 
+mod learn;
+mod lessons;
 mod report;
 mod rows;
 mod unseen;
 mod views;
 mod yardstick;
 
+pub use learn::{Learned, Learning, learn};
 pub use report::{Record, RecordRow};
 pub use rows::{Row, Rung, Verdict};
 pub use views::covering;
 pub use yardstick::{Metric, Yardstick};
 
 use super::{
-    judge,
     trial::{Settling, Shot, Trial, TrialError},
     truth::Reference,
 };
 use crate::{
     gi::{gather, pass::Neural},
+    net::{format::WeightsError, learn::LearnError},
     render::capture::Layer,
     scene::Camera,
 };
@@ -78,6 +81,8 @@ pub struct Fit {
     pub reached: bool,
     /// The views.
     pub views: Vec<Seen>,
+    /// What came of learning, where a network was fine-tuned to the scene.
+    pub learned: Option<Learned>,
 }
 
 impl Fit {
@@ -103,6 +108,17 @@ pub enum FitError {
         "there is no view to judge: the scene has no camera that sees a surface; name one with --eye and --look-at"
     )]
     NoViews,
+    /// Nothing to learn from.
+    #[error(
+        "there is nothing to learn from: no camera among many scattered through the scene sees enough of it, in any light"
+    )]
+    NoFreeViews,
+    /// The network cannot be learnt.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// What was learnt is no network.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
     /// The metric says nothing of a view.
     #[error("view {view}: {reason}; choose another view or metric")]
     Blind {
@@ -133,7 +149,7 @@ pub fn fit(
         None => (search.nearest().expect("`direct` draws every scene and costs nothing"), false),
     };
     search.settle(chosen, reached)?;
-    Ok(Fit { rows: search.rows, chosen, reached, views: search.views })
+    Ok(Fit { rows: search.rows, chosen, reached, views: search.views, learned: None })
 }
 
 /// The metric in each view, and the pictures.
@@ -370,23 +386,5 @@ impl Search<'_, '_> {
         }
         let shot = self.trial.picture(&method, &camera, Settling::COLD)?;
         Ok(shot.instead.is_none().then(|| shot.projected_ms()))
-    }
-}
-
-impl Yardstick {
-    /// What the metric says of one picture.
-    fn of(&self, shot: &Shot, reference: &Reference) -> Result<f64, String> {
-        match &self.metric {
-            Metric::Light => {
-                let light = &shot.layer(Layer::DiffInd).data;
-                let found = judge::light_error(light, reference);
-                found.map(|l| l.error).ok_or_else(|| "its reference has no light that a method could add".into())
-            }
-            Metric::Shown(name) => {
-                let flip = name == "flip";
-                let compared = judge::compare(&shot.rgb(), reference, flip).map_err(|e| e.to_string())?;
-                compared.value(name).ok_or_else(|| format!("`{name}` cannot be told here"))
-            }
-        }
     }
 }

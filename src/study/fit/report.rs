@@ -1,6 +1,6 @@
 //! What a fit explains itself by: a record, and a table in Markdown.
 
-use super::{Fit, FitOptions, Verdict};
+use super::{Fit, FitOptions, Learned, Verdict, Yardstick};
 use crate::gi::fitted::{Fitted, FittedWeights, Measured, SCHEMA, Target};
 use serde::Serialize;
 use std::fmt::Write;
@@ -16,6 +16,9 @@ pub struct Record {
     pub references: Vec<([u32; 2], f64)>,
     /// What was tried, and what was not.
     pub rows: Vec<RecordRow>,
+    /// What came of learning, where a network was fine-tuned to the scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub learned: Option<Learned>,
 }
 
 /// One rung.
@@ -88,7 +91,8 @@ impl Fit {
             settling: r.settling.clone(),
         };
         let references = self.views.iter().map(|v| (v.reference.samples, v.reference.seconds)).collect();
-        Record { schema: 1, fitted, references, rows: self.rows.iter().map(row).collect() }
+        let rows = self.rows.iter().map(row).collect();
+        Record { schema: 1, fitted, references, rows, learned: self.learned.clone() }
     }
 
     /// The table: a row for each rung, a column for each view.
@@ -154,6 +158,9 @@ impl Fit {
         if !row.settling.is_empty() {
             let _ = write!(text, " It does so from frame {} after a cut on.", row.frames);
         }
+        if let Some(learned) = &self.learned {
+            let _ = write!(text, " {}", learned.sentences(y));
+        }
         if self.floor() > 0.0 {
             let _ = write!(text, " The reference's own noise makes up to {} of each number.", y.show(self.floor()));
         }
@@ -163,5 +170,24 @@ impl Fit {
                      trust this.";
         }
         text
+    }
+}
+
+impl Learned {
+    /// What was learnt from what, and whether it is kept, in sentences.
+    fn sentences(&self, yardstick: &Yardstick) -> String {
+        let Self { started_from, views, pictures, drawing_seconds, step_seconds, steps, error, worst, mean, .. } = self;
+        let shown = |errors: &[f64; 3]| errors.map(|e| yardstick.show(e));
+        let [gather, before, after] = shown(worst);
+        let [gather_mean, before_mean, after_mean] = shown(mean);
+        let end = if self.kept { "It is kept." } else { "It does not win, so it is not kept." };
+        format!(
+            "`{started_from}` has learned the scene from {pictures} pictures of {views} other views ({drawing_seconds:.0} s) in {steps} steps \
+             ({step_seconds:.0} s, {:.1} a second); its error there {:.1} % at first, {:.1} % at last. Where it is judged, worst view (mean): `gather` \
+             {gather} ({gather_mean}), `{started_from}` {before} ({before_mean}), learned {after} ({after_mean}). {end}",
+            f64::from(*steps) / step_seconds.max(1e-9),
+            100.0 * error[0],
+            100.0 * error[1],
+        )
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::metrics;
 use crate::reference::{Layer, TracerOptions};
-use crate::study::{judge, truth};
+use crate::render::capture;
+use crate::study::{judge, trial::Shot, truth};
 use std::cmp::Ordering;
 use std::str::FromStr;
 
@@ -120,6 +121,22 @@ impl Yardstick {
                 .map(|l| l.floor)
                 .ok_or_else(|| "its reference has no light that a method could add".into()),
             Metric::Shown(_) => Ok(0.0),
+        }
+    }
+
+    /// What the metric says of one picture.
+    pub(super) fn of(&self, shot: &Shot, reference: &truth::Reference) -> Result<f64, String> {
+        match &self.metric {
+            Metric::Light => {
+                let light = &shot.layer(capture::Layer::DiffInd).data;
+                let found = judge::light_error(light, reference);
+                found.map(|l| l.error).ok_or_else(|| "its reference has no light that a method could add".into())
+            }
+            Metric::Shown(name) => {
+                let flip = name == "flip";
+                let compared = judge::compare(&shot.rgb(), reference, flip).map_err(|e| e.to_string())?;
+                compared.value(name).ok_or_else(|| format!("`{name}` cannot be told here"))
+            }
         }
     }
 
