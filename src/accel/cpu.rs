@@ -186,7 +186,10 @@ impl SceneBlocks {
         Accel::check_count(scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum())?;
         let trees = SceneTrees::build(scene, &|_, _| true)?;
         let mut blocks = trees.blocks;
-        let top = scene::top(&scene::placed(&trees.meshes, scene.instances.iter().map(|i| (i.mesh, i.transform))), trees.top_room);
+        let top = scene::top(
+            &scene::placed(&trees.meshes, scene.instances.iter().map(|i| (i.mesh, i.transform))),
+            trees.top_room,
+        );
         blocks[..top.len()].copy_from_slice(&top);
         Ok(Self(blocks))
     }

@@ -205,10 +205,7 @@ pub(super) struct Placed {
 }
 
 /// Those of `instances` (the mesh of each, and where it is) that rays can meet.
-pub(super) fn placed(
-    meshes: &[MeshTree],
-    instances: impl Iterator<Item = (usize, [[f32; 4]; 4])>,
-) -> Vec<Placed> {
+pub(super) fn placed(meshes: &[MeshTree], instances: impl Iterator<Item = (usize, [[f32; 4]; 4])>) -> Vec<Placed> {
     let place = |(number, (mesh, transform))| {
         let world = Mat4::from_cols_array_2d(&transform);
         let of = meshes.get(mesh)?;
