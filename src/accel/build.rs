@@ -7,7 +7,7 @@ use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
-use super::pairs::{self, Pair};
+use super::pairs::{self, Pair, Triangle};
 use super::{Accel, MAX_COORDINATE, STACK_SIZE, wide};
 
 /// Share of the nodes that are put at a better place after clustering.
@@ -15,9 +15,6 @@ const REINSERTION: f32 = 0.05;
 
 /// Boxes alike beyond which the tree is made by halving.
 const MOST_ALIKE: usize = 16;
-
-/// Three corners.
-pub(super) type Triangle = [[f32; 3]; 3];
 
 /// What is wrong with a triangle, if anything.
 enum Kind {

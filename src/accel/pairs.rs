@@ -3,8 +3,10 @@
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
 
-use super::build::Triangle;
 use super::hash::{self, Map};
+
+/// Three corners.
+pub(super) type Triangle = [[f32; 3]; 3];
 
 /// One triangle, or two that share the edge from the first corner to the third.
 #[derive(Debug, Clone, Copy)]

@@ -5,7 +5,7 @@
 //! lobes the nearest hit, a line to a light of the scene, and the short line to where an entry's rays began.
 
 use crate::accel::{AccelError, SceneBlocks};
-use crate::gi::stage::cells;
+use crate::gi::inputs::cells_of;
 use crate::scene::{Camera, LightKind, Scene};
 use glam::{Mat4, Vec3};
 use std::f32::consts::TAU;
@@ -139,7 +139,7 @@ pub fn count(scene: &Scene, camera: &Camera, size: [u32; 2]) -> Result<Traffic, 
     let eye = Vec3::from(camera.eye());
     let mut rays = Rays { scene, first, eye, random: Random(1), read: [0; 3], blocks };
     let world = Mat4::from_cols_array_2d(&camera.transform);
-    let [columns, rows] = cells::grid(size);
+    let [columns, rows] = cells_of(size);
     let half = (0.5 * camera.yfov).tan();
     let mut looks = Vec::new();
     let mut hits = Vec::new();

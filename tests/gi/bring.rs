@@ -6,6 +6,7 @@ use crate::shot::{Hit, Shot, output, view};
 use bouncelight::gi::cells::{self, CellsPass, NO_PIXEL};
 use bouncelight::gi::gather::bring::{BringPass, Brought};
 use bouncelight::gi::inputs::InputGroup;
+use bouncelight::gi::inputs::{CELL, cells_of};
 use bouncelight::gi::twin::oct_decode;
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu::readback;
@@ -102,7 +103,7 @@ fn light_stays_on_its_surface() {
     let light = bring(&gpu, &shot, |pixel| even(LIGHT[surfaces[pixel]]));
     let light: Vec<f32> = light.iter().map(|c| c[0]).collect();
     // Negative control: the nearest cell's middle, whatever it shows.
-    let n = cells::SIDE;
+    let n = CELL;
     let naive: Vec<f32> = (0..SIZE[0] * SIZE[1])
         .map(|i| [i % SIZE[0], i / SIZE[0]].map(|k| k / n * n + n / 2))
         .map(|[x, y]| LIGHT.get(surfaces[(y * SIZE[0] + x) as usize]).copied().unwrap_or(0.0))
@@ -122,8 +123,8 @@ fn light_stays_on_its_surface() {
 fn a_cell_that_shows_a_surface_has_a_pixel_on_the_one_in_front() {
     let Some(gpu) = common::gpu() else { return };
     let (shot, surfaces) = the_room();
-    let n = cells::SIDE as usize;
-    let (width, [columns, _]) = (SIZE[0] as usize, cells::grid(SIZE));
+    let n = CELL as usize;
+    let (width, [columns, _]) = (SIZE[0] as usize, cells_of(SIZE));
     let mut fronts = 0;
     for (i, pixel) in choose(&gpu, &shot).into_iter().enumerate() {
         let (cx, cy) = (i % columns as usize, i / columns as usize);

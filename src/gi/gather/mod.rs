@@ -29,7 +29,7 @@ use crate::gi::interface::rung::{Cost, Rung};
 use crate::gi::interface::{GiError, Inputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells::{self, CellsPass};
-use crate::gi::stage::inputs::InputGroup;
+use crate::gi::stage::inputs::{InputGroup, cells_of};
 use crate::gpu::bind::{Binder, Bound};
 use crate::gpu::binding::{LOAD, READ, READ_WRITE};
 use crate::gpu::timing::Recorder;
@@ -309,7 +309,7 @@ impl Rung for GatherGi {
         }
         (self.lights_epoch, self.moves) = (epoch, moves);
         let mut params = self.params(inputs, rays)?;
-        let [w, h] = cells::grid(inputs.size).map(|n| n.div_ceil(8));
+        let [w, h] = cells_of(inputs.size).map(|n| n.div_ceil(8));
         let mut offset = self.params.write(queue, &params);
         let frame_params = self.frame_params.group([self.params.bound()]);
         let groups = |offset| Groups { inputs: &bound, scene: &scene, offset };

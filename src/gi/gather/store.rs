@@ -1,11 +1,11 @@
 //! What `gather` keeps from frame to frame, and between the passes of one.
 
 use super::{PAST, RECORD};
-use crate::gi::stage::cells;
+use crate::gi::stage::{cells, inputs::cells_of};
 
 /// Squares of 2×2 cells, each of which sends one ray a frame into a lobe.
 pub(super) fn squares(size: [u32; 2]) -> u64 {
-    cells::grid(size).map(|n| u64::from(n.div_ceil(2))).iter().product()
+    cells_of(size).map(|n| u64::from(n.div_ceil(2))).iter().product()
 }
 
 pub(super) struct Store {

@@ -13,7 +13,7 @@
 //! b = Σ L·ω (per π); a spherical harmonic gives a and b. What stands in the rows of cells without a surface is not read.
 
 use super::exposure::{pipeline, storage_entry};
-use super::inputs::{BoundInputs, InputGroup};
+use super::inputs::{BoundInputs, CELL, InputGroup, cells_of};
 use crate::gi::interface::rung::Cost;
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
@@ -21,17 +21,9 @@ use crate::gpu::timing::Recorder;
 /// What `cell_pixels` holds for a cell that shows the background only; `NO_PIXEL` in `shaders/gi/cells.wgsl`.
 pub const NO_PIXEL: u32 = u32::MAX;
 
-/// Pixels on a side of a cell.
-pub const SIDE: u32 = 4;
-
-/// Columns and rows of cells of a picture of `size` pixels.
-pub fn grid(size: [u32; 2]) -> [u32; 2] {
-    size.map(|n| n.div_ceil(SIDE))
-}
-
 /// Cells of a picture of `size` pixels.
 pub fn count(size: [u32; 2]) -> u64 {
-    let [w, h] = grid(size).map(u64::from);
+    let [w, h] = cells_of(size).map(u64::from);
     w * h
 }
 
@@ -42,7 +34,7 @@ pub fn light_bytes(size: [u32; 2]) -> u64 {
 
 /// `CELL_SIDE` as WGSL, for every shader that joins `gi/cells.wgsl`.
 pub fn prelude() -> String {
-    format!("const CELL_SIDE = {SIDE}i;\n")
+    format!("const CELL_SIDE = {CELL}i;\n")
 }
 
 /// The pass that chooses, and the buffer it fills.
@@ -80,7 +72,7 @@ impl CellsPass {
 
     /// Records pass `gi.cells` for inputs of the size that was last given to [`new`](Self::new) or [`fit`](Self::fit).
     pub fn record(&self, recorder: &mut Recorder<'_>, inputs: &BoundInputs) {
-        let [w, h] = grid(inputs.size);
+        let [w, h] = cells_of(inputs.size);
         recorder.compute("gi.cells", |pass| {
             inputs.set(pass);
             pass.set_bind_group(1, &self.group, &[]);

@@ -5,28 +5,15 @@
 
 use super::formats;
 pub(crate) use super::formats::{check, check_output};
-pub use super::params::Params;
+pub use super::params::{CELL, Params, cells_of, sample_pixel};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::ViewCache;
-
-/// Pixels on a side of a cell; `CELL` in `shaders/gi/inputs.wgsl`.
-pub const CELL: u32 = 4;
 
 /// Recordings between two submissions that keep their own parameters.
 pub const SLOTS: u32 = 64;
 
 /// Uniform offsets are multiples of this under WebGPU's default limits.
 const STRIDE: u64 = 256;
-
-/// Width and height of the low resolution: `ceil(size / 4)`.
-pub fn cells_of(size: [u32; 2]) -> [u32; 2] {
-    size.map(|n| n.div_ceil(CELL))
-}
-
-/// The pixel that stands for a cell of a picture of `size` pixels: `sample_pixel` of `shaders/gi/inputs.wgsl`.
-pub fn sample_pixel(cell: [u32; 2], size: [u32; 2]) -> [u32; 2] {
-    std::array::from_fn(|i| (CELL * cell[i] + CELL / 2).min(size[i] - 1))
-}
 
 /// The shared layout, the parameter ring and the remembered groups.
 pub struct InputGroup {

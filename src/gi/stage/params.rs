@@ -1,7 +1,6 @@
 //! The uniform that every stage of `gi/` reads: camera, size, and the host's conventions resolved
 //! into numbers.
 
-use super::inputs::cells_of;
 use crate::gi::interface::{
     AlbedoEncoding, CameraMatrices, Conventions, Depth, GiError, Inputs, Jitter, LightScale, MotionJitter, MotionSense,
     MotionUnits, NormalEncoding, NormalRange, NormalSpace,
@@ -21,6 +20,19 @@ const SRGB: u32 = 16;
 /// Light is multiplied by an exposure. A bit, since a factor of 1 would change how compilers round
 /// sums with light.
 const EXPOSED: u32 = 32;
+
+/// Pixels on a side of a cell; `CELL` in `shaders/gi/inputs.wgsl`.
+pub const CELL: u32 = 4;
+
+/// Width and height of the low resolution: `ceil(size / 4)`.
+pub fn cells_of(size: [u32; 2]) -> [u32; 2] {
+    size.map(|n| n.div_ceil(CELL))
+}
+
+/// The pixel that stands for a cell of a picture of `size` pixels: `sample_pixel` of `shaders/gi/inputs.wgsl`.
+pub fn sample_pixel(cell: [u32; 2], size: [u32; 2]) -> [u32; 2] {
+    std::array::from_fn(|i| (CELL * cell[i] + CELL / 2).min(size[i] - 1))
+}
 
 /// `Params` of `shaders/gi/inputs.wgsl`.
 #[repr(C)]
