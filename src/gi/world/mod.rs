@@ -217,8 +217,7 @@ impl World {
     /// # Errors
     /// [`GiError::Light`] for one that is not finite; then those before stay.
     pub fn lights(&mut self, lights: &[Light]) -> Result<(), GiError> {
-        let finite = |l: &Light| bytemuck::cast::<_, [f32; 16]>(LightGpu::new(l)).iter().all(|v| v.is_finite());
-        if let Some(number) = lights.iter().position(|l| !finite(l)) {
+        if let Some(number) = lights.iter().position(|l| LightGpu::finite(l).is_none()) {
             return Err(GiError::Light(number));
         }
         if self.lights != lights {

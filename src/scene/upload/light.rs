@@ -39,15 +39,17 @@ const EVEN: f64 = 0.3;
 impl LightGpu {
     /// The shader's form of `light`; one with anything that is no number gives none.
     pub fn new(light: &Light) -> Self {
+        let dark = Self { direction: [0.0, -1.0, 0.0], stands_in: light.stands_in.into(), ..Self::zeroed() };
+        Self::finite(light).unwrap_or(dark)
+    }
+
+    /// The shader's form of `light`, if all of it is numbers.
+    pub fn finite(light: &Light) -> Option<Self> {
         let made = Self::of(light);
         let [places, rest] =
             [[made.position, made.direction], [made.color, [made.range, made.radius, made.cone_scale]]];
-        let sound = places.iter().chain(&rest).flatten().all(|v| v.is_finite()) && made.cone_offset.is_finite();
-        if sound {
-            made
-        } else {
-            Self { kind: made.kind, direction: [0.0, -1.0, 0.0], stands_in: made.stands_in, ..Self::zeroed() }
-        }
+        let finite = places.iter().chain(&rest).flatten().all(|v| v.is_finite()) && made.cone_offset.is_finite();
+        finite.then_some(made)
     }
 
     fn of(light: &Light) -> Self {
