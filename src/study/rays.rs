@@ -17,12 +17,18 @@ const SIDE: usize = 384;
 pub const KINDS: [&str; 3] = ["primary", "shadow", "diffuse"];
 
 /// Numbers without any claim to quality: only places to aim at hang on them.
-struct Random(u64);
+pub(super) struct Random(pub(super) u64);
 
 impl Random {
-    fn unit(&mut self) -> f32 {
+    pub(super) fn unit(&mut self) -> f32 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f32 / 16_777_216.0
+    }
+
+    /// A direction.
+    pub(super) fn sphere(&mut self) -> Vec3 {
+        let (z, phi) = (2.0 * self.unit() - 1.0, self.unit() * TAU);
+        ((1.0 - z * z).sqrt() * Vec3::new(phi.cos(), phi.sin(), 0.0)).with_z(z)
     }
 }
 
@@ -118,9 +124,7 @@ impl RayScene {
             let n = (b - a).cross(c - a).normalize();
             let n = if n.dot(d) > 0.0 { -n } else { n };
             let p = view.eye + d * hit.t + n * (1e-4 * hit.t);
-            let (z, phi) = (random.unit() * 2.0 - 1.0, random.unit() * TAU);
-            let ball = ((1.0 - z * z).sqrt() * Vec3::new(phi.cos(), phi.sin(), 0.0)).with_z(z);
-            diffuse.push(ray(p, (n + 0.999 * ball).normalize(), f32::INFINITY, 0));
+            diffuse.push(ray(p, (n + 0.999 * random.sphere()).normalize(), f32::INFINITY, 0));
             let blur = 0.01 * Vec3::new(random.unit(), random.unit(), random.unit());
             shadow.push(match view.light {
                 Light::Towards(d) => ray(p, (d + blur).normalize(), f32::INFINITY, 1),

@@ -4,11 +4,11 @@
 //! The rays are those of `gi.rays` and `gi.renew` in kind and number, not one by one: from every cell and from a quarter as many
 //! lobes the nearest hit, a line to a light of the scene, and the short line to where an entry's rays began.
 
+use super::rays::Random;
 use crate::accel::{AccelError, SceneBlocks};
 use crate::gi::inputs::cells_of;
 use crate::scene::{Camera, LightKind, Scene};
 use glam::{Mat4, Vec3};
-use std::f32::consts::TAU;
 
 /// Multiprocessors of a GTX 1050, and threads that each holds at once.
 const PROCESSORS: usize = 5;
@@ -41,21 +41,6 @@ pub struct Traffic {
     pub missed: f64,
     /// Steps of all threads, those that wait for others of their warp included, over the blocks that are read.
     pub waiting: f64,
-}
-
-/// Numbers without any claim to quality.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / 16_777_216.0
-    }
-
-    fn sphere(&mut self) -> Vec3 {
-        let (z, phi) = (2.0 * self.unit() - 1.0, self.unit() * TAU);
-        ((1.0 - z * z).sqrt() * Vec3::new(phi.cos(), phi.sin(), 0.0)).with_z(z)
-    }
 }
 
 /// A place on a surface, facing whoever saw it.

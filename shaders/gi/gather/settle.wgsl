@@ -40,11 +40,10 @@ fn rests(motion: vec2f) -> bool {
 }
 
 // The mean where the surface at x, which faces n, was in the frame before; 0 frames where it was not to be seen.
-fn past_of(cell: vec2u, pixel: vec2i, x: vec3f, n: vec3f, foot: f32) -> Past {
+fn past_of(cell: vec2u, pixel: vec2i, motion: vec2f, x: vec3f, n: vec3f, foot: f32) -> Past {
     let none = Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n, vec3f(0.0), NO_LOBE, vec4f(0.0));
     var past = none;
     if (gather.flags & GATHER_CUT) != 0u { return past; }
-    let motion = motion_of(pixel);
     if rests(motion) {
         // At rest a cell stays what it is, whichever of its pixels stands for it.
         let same = past_at(cell_index(cell));
@@ -171,9 +170,10 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let z = distance_at(pixel);
     let x = world_position_at(pixel, z);
     let n = world_normal_at(pixel);
-    let past = past_of(id.xy, pixel, x, n, cell_foot(z));
+    let motion = motion_of(pixel);
+    let past = past_of(id.xy, pixel, motion, x, n, cell_foot(z));
     var most = gather.cell_frames;
-    let changing = (gather.flags & GATHER_CHANGING) != 0u || !rests(motion_of(pixel));
+    let changing = (gather.flags & GATHER_CHANGING) != 0u || !rests(motion);
     if changing && (gather.flags & GATHER_EVEN) == 0u { most = min(most, BRIEF); }
     let frames = min(past.frames + 1.0, most);
     // The first frames count for less, each for its number, since they know least of the light between surfaces; from YOUNG on all
@@ -190,7 +190,7 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let now = Past(
         mean, frames, mix(past.vector, vector, share), mix(past.square, l * l, share), x, n,
         lately, roughness,
-        gloss_of(id.xy, past.gloss, roughness, motion_of(pixel), mean)
+        gloss_of(id.xy, past.gloss, roughness, motion, mean)
     );
     let i = 5u * cell;
     after[i] = vec4f(now.light, now.frames);
