@@ -23,7 +23,7 @@ pub(crate) fn uploaded(gpu: &Gpu, scene: &Scene) -> SceneGpu {
 }
 
 /// Indirect light and positions after so many frames.
-fn lit(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, frames: u32) -> (Picture, Picture) {
+pub(crate) fn lit(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, frames: u32) -> (Picture, Picture) {
     let layers = &[Layer::DiffInd, Layer::Position];
     let options = CaptureOptions { layers, warmup: frames - 1, ..Default::default() };
     let frame = capture(gpu, renderer, &uploaded(gpu, scene), &scene.cameras[0], options).expect("the frame is drawn");
@@ -107,6 +107,39 @@ fn share_of_wall(p: [f32; 3], eye: [f32; 3], roughness: f32) -> f64 {
         }
     }
     on / all
+}
+
+/// What was not seen before has four rays a cell, what was has one: its light is half as far from the settled one, or less.
+#[test]
+fn what_is_new_in_the_picture_has_more_rays() {
+    let Some(gpu) = common::gpu() else { return };
+    // A floor under half a sky.
+    let blocks =
+        [([-60.0, -0.2, -60.0], [60.0, 0.0, 60.0], GREY), ([-60.0, 0.0, -61.0], [60.0, 90.0, -60.0], [0.0; 3])];
+    let look =
+        |angle: f32| Camera::look_at([0.0, 9.0, -55.0], [6.0 * angle.sin(), 0.0, -55.0 + 6.0 * angle.cos()], 0.8);
+    let floor = scene(&blocks, &[], 1.0, look(0.0));
+    let uploaded = uploaded(&gpu, &floor);
+    // Each frame shows its own rays.
+    let alone = Method::Gather(Options { cell_frames: 1.0, blur: false, ..Default::default() });
+    let mut renderer = world::renderer(&gpu, [96, 64], alone);
+    let mut settled = world::renderer(&gpu, [96, 64], method());
+    let mut off = |camera: &Camera, frames: u32, columns: std::ops::Range<usize>| {
+        let truth = go_on(&gpu, &mut settled, &uploaded, camera, 64);
+        let found = go_on(&gpu, &mut renderer, &uploaded, camera, frames);
+        let kept = |light: &[f32]| -> Vec<f32> {
+            let pixels = light.chunks_exact(3).enumerate();
+            pixels.filter(|(i, _)| columns.contains(&(i % 96))).map(|(_, p)| p[1]).collect()
+        };
+        difference(&kept(&found), &kept(&truth))
+    };
+    let (first, later) = (off(&look(0.0), 1, 0..96), off(&look(0.0), 3, 0..96));
+    println!("a frame's light is {:.1} % off where it is the first, {:.1} % later", 100.0 * first, 100.0 * later);
+    assert!(first < 0.5 * later && later > 0.2);
+    // After a turn by 20 degrees the same holds of what has come in from the side, and no more in the frame after.
+    let (new, old) = (off(&look(0.35), 1, 0..16), off(&look(0.35), 1, 0..16));
+    println!("after a turn {:.1} % in what is new, {:.1} % a frame later", 100.0 * new, 100.0 * old);
+    assert!(new < 0.5 * old);
 }
 
 /// What a lobe shows of a wall that is not in the picture.

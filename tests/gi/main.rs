@@ -20,6 +20,8 @@ mod gather;
 mod glossy;
 mod glow;
 mod lamps;
+#[cfg(feature = "io")]
+mod real;
 mod screen;
 mod shot;
 mod sky_sun;

@@ -88,10 +88,11 @@ fn entry_of(x: vec3f, n: vec3f) -> u32 {
     return NONE;
 }
 
-// A ray with number `query` has met x, which faces n: the slot of its entry, which round `round` will update.
+// A ray with number `query` has met x, which faces n: the slot of its entry, which round `round` will update. Rays without a number
+// (NONE) read entries and say nothing of where they begin.
 fn ask_entry(x: vec3f, n: vec3f, query: u32, name: u32, round: u32) -> u32 {
     let slot = entry_of(x, n);
-    if slot != NONE {
+    if slot != NONE && query != NONE {
         entry_queries[query] = vec4u(bitcast<vec3u>(x), pack_normal(n));
         let lot = (pcg3(vec3u(name, round, 0x2545f491u)).x << lot_bits()) | query;
         atomicMin(&entry_lots[(round & 1u) * (gather.mask + 1u) + slot], lot);

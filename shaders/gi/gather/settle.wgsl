@@ -7,7 +7,8 @@
 // What a cell's ray found, with the light of its entry, mixed into the mean over the frames before, which is looked up where the
 // surface was then.
 
-@group(2) @binding(0) var<storage, read> cell_pixels: array<u32>;
+// The pixel of a cell, FRESH where `before` has nothing of its surface.
+@group(2) @binding(0) var<storage, read_write> cell_pixels: array<u32>;
 @group(2) @binding(1) var<storage, read> records: array<vec4f>;
 @group(2) @binding(2) var<storage, read> entry_light: array<vec4f>;
 // `Past` of the frame before and of this one, five vectors a cell.
@@ -150,6 +151,38 @@ fn gloss_of(cell: vec2u, past: vec4f, roughness: f32, motion: vec2f, light: vec3
     return gloss;
 }
 
+// Before the rays: marks cells that are fresh.
+@compute @workgroup_size(8, 8)
+fn recall(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= cell_grid()) { return; }
+    let cell = cell_index(id.xy);
+    let packed = cell_pixels[cell];
+    if packed == NO_PIXEL { return; }
+    let pixel = unpack_pixel(packed);
+    let z = distance_at(pixel);
+    let x = world_position_at(pixel, z);
+    if past_of(id.xy, pixel, motion_of(pixel), x, world_normal_at(pixel), cell_foot(z)).frames <= 0.0 {
+        cell_pixels[cell] = packed | FRESH;
+    }
+}
+
+// What one or several rays of a cell have found.
+struct Arrived {
+    light: vec3f,
+    // Luminance times direction; luminance squared.
+    vector: vec3f,
+    square: f32,
+}
+
+fn arrived_by(ray: u32) -> Arrived {
+    let glow = records[3u * ray + 2u];
+    let found = found_by(ray);
+    let vector = luminance(found) * unpack_normal(bitcast<u32>(records[3u * ray + 1u].y))
+        + luminance(glow.rgb) * unpack_normal(bitcast<u32>(glow.w));
+    let l = luminance(found + glow.rgb);
+    return Arrived(found + glow.rgb, vector, l * l);
+}
+
 @compute @workgroup_size(8, 8)
 fn settle(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= cell_grid()) { return; }
@@ -159,12 +192,16 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
         after[5u * cell] = vec4f(0.0);
         return;
     }
-    let arrived = records[3u * cell + 1u];
-    let glow = records[3u * cell + 2u];
-    var light = found_by(cell);
-    let vector = luminance(light) * unpack_normal(bitcast<u32>(arrived.y))
-        + luminance(glow.rgb) * unpack_normal(bitcast<u32>(glow.w));
-    light += glow.rgb;
+    var arrived = arrived_by(cell);
+    let fresh = (packed & FRESH) != 0u;
+    if fresh {
+        for (var look = 1u; look < LOOKS; look++) {
+            let more = arrived_by(cell_record(cell, look));
+            arrived = Arrived(arrived.light + more.light, arrived.vector + more.vector, arrived.square + more.square);
+        }
+        let share = 1.0 / f32(LOOKS);
+        arrived = Arrived(share * arrived.light, share * arrived.vector, share * arrived.square);
+    }
 
     let pixel = unpack_pixel(packed);
     let z = distance_at(pixel);
@@ -175,20 +212,20 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     var most = gather.cell_frames;
     let changing = (gather.flags & GATHER_CHANGING) != 0u || !rests(motion);
     if changing && (gather.flags & GATHER_EVEN) == 0u { most = min(most, BRIEF); }
-    let frames = min(past.frames + 1.0, most);
+    let frames = min(past.frames + f32(select(1u, LOOKS, fresh)), most);
     // The first frames count for less, each for its number, since they know least of the light between surfaces; from YOUNG on all
     // count the same.
     var share = select(1.0 / (frames - 0.5 * (YOUNG - 1.0)), 2.0 / (frames + 1.0), frames <= YOUNG);
     if (gather.flags & GATHER_EVEN) != 0u { share = 1.0 / frames; }
-    let l = luminance(light);
+    if fresh { share = 1.0; }
     let surface = textureLoad(specular_map, pixel, 0);
     let roughness = select(NO_LOBE, surface.a, any(surface.rgb > vec3f(0.0)));
-    let lately = mix(past.lately, light, max(LATELY, 1.0 / frames));
+    let lately = mix(past.lately, arrived.light, select(max(LATELY, 1.0 / frames), 1.0, fresh));
     // At rest a bright ray comes into the mean over some frames, all of it in the end, and not as a spark.
     let whole = changing || frames <= YOUNG || (gather.flags & GATHER_EVEN) != 0u;
-    let mean = mix(past.light, select(lately, light, whole), share);
+    let mean = mix(past.light, select(lately, arrived.light, whole), share);
     let now = Past(
-        mean, frames, mix(past.vector, vector, share), mix(past.square, l * l, share), x, n,
+        mean, frames, mix(past.vector, arrived.vector, share), mix(past.square, arrived.square, share), x, n,
         lately, roughness,
         gloss_of(id.xy, past.gloss, roughness, motion, mean)
     );

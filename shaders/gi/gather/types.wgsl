@@ -56,6 +56,14 @@ const GATHER_CHANGING = 128u;
 @group(1) @binding(5) var environment_picture: texture_2d<f32>;
 @group(1) @binding(6) var corner_normals: texture_2d<u32>;
 
+// Rays of a cell of which nothing is remembered. The others have one.
+const LOOKS = 4u;
+
+// Where ray `look` of a cell stands among the records: the first rays of all cells and those into lobes come first.
+fn cell_record(cell: u32, look: u32) -> u32 {
+    return select(gather.rays + (look - 1u) * gather.cells + cell, cell, look == 0u);
+}
+
 const NONE = 0xffffffffu;
 const FAR = 1e30;
 

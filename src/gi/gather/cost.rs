@@ -30,6 +30,8 @@ pub(super) fn costs(size: [u32; 2], options: &Options) -> Vec<Cost> {
     let bytes = TREES + 150.0;
     vec![
         CellsPass::cost(size),
+        // At rest; where the picture moves it reads up to four cells.
+        Cost::new("gi.recall", cells * 60.0, cells * 64.0),
         Cost::new("gi.evict", f64::from(slots) * 10.0, f64::from(slots) * 16.0),
         // With the rays into lobes.
         Cost::new("gi.rays", (cells + squares) * flops, (cells + squares) * bytes).with_rays((cells + squares) * RAYS),

@@ -69,6 +69,9 @@ const LOT_BITS: u32 = 22;
 /// Storage buffers that `gi.rays` and `gi.renew` bind: as many as every WebGPU device has.
 const STORAGE_BUFFERS: u32 = 8;
 
+/// Rays of a cell of which nothing is remembered; `LOOKS` of `types.wgsl`.
+const LOOKS: u64 = 4;
+
 /// Bytes of what a cell's ray found.
 const RECORD: u64 = 48;
 
@@ -85,6 +88,8 @@ pub struct GatherGi {
     /// Group 1 of passes that send no rays: the parameters alone.
     frame_params: Binder,
     cells: CellsPass,
+    /// Finds cells of which nothing is remembered; binds what `settle` binds.
+    recall: Pass,
     rays: Pass,
     /// Frees entries that no ray has met for long; binds what `renew` binds.
     evict: Pass,
@@ -161,12 +166,14 @@ impl GatherGi {
         let new = |groups, names, types: &[wgpu::BindingType]| Pass::new(device, groups, names, types);
         let rw = READ_WRITE;
         let table = [rw, rw, rw, rw, rw];
+        let history = [rw, READ, READ, READ, rw, READ, LOAD, LOAD];
         Self {
             cells: CellsPass::new(device, &inputs, size),
             evict: new(shared, ("gi.evict", "gi.renew", "evict"), &table),
             rays: new(shared, ("gi.rays", "gi.rays", "rays"), &[rw, rw, rw, READ, rw, LOAD]),
             renew: new(shared, ("gi.renew", "gi.renew", "renew"), &table),
-            settle: new(alone, ("gi.settle", "gi.settle", "settle"), &[READ, READ, READ, READ, rw, READ, LOAD, LOAD]),
+            recall: new(alone, ("gi.recall", "gi.settle", "recall"), &history),
+            settle: new(alone, ("gi.settle", "gi.settle", "settle"), &history),
             blur: new(alone, ("gi.blur", "gi.blur", "blur"), &[READ, rw, rw, rw]),
             smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), &[READ, READ, rw]),
             bring: BringPass::new(device, &inputs),
@@ -204,12 +211,9 @@ impl GatherGi {
 
     /// Bind groups made since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
-        let passes = [&self.evict, &self.rays, &self.renew, &self.settle, &self.blur, &self.smooth].map(Pass::made);
-        self.inputs.made()
-            + self.scene.made()
-            + self.frame_params.made()
-            + self.bring.made()
-            + passes.iter().sum::<u64>()
+        let passes = [&self.recall, &self.evict, &self.rays, &self.renew, &self.settle, &self.blur, &self.smooth];
+        let made = passes.map(Pass::made);
+        self.inputs.made() + self.scene.made() + self.frame_params.made() + self.bring.made() + made.iter().sum::<u64>()
     }
 
     fn params(&self, inputs: &Inputs<'_>, rays: &Rays<'_>) -> Result<Params, GiError> {
@@ -316,10 +320,14 @@ impl Rung for GatherGi {
         let alone = |offset| Groups { scene: &frame_params, ..groups(offset) };
 
         self.cells.record(recorder, &bound);
+        let motion = Bound::from(inputs.motion.unwrap_or(&self.no_motion));
+        let own = [&pixels, &records, &entry_light, &before, &after, &changes, &motion, &specular];
+        let history = || own.map(Clone::clone);
+        self.recall.record(recorder, alone(offset), history(), [w, h, 1]);
         let slots = [self.options.slots.div_ceil(64), 1, 1];
         self.evict.record(recorder, groups(offset), table(), slots);
-        // The second layer of workgroups sends rays into lobes.
-        let layers = 1 + u32::from(inputs.specular.is_some());
+        // The second layer of workgroups sends rays into lobes, those above further ones of fresh cells.
+        let layers = 1 + LOOKS as u32;
         let own = [&keys, &lots, &queries, &pixels, &records, &specular].map(Clone::clone);
         self.rays.record(recorder, groups(offset), own, [w, h, layers]);
         let rounds = match (self.frame, self.stir) {
@@ -335,9 +343,7 @@ impl Rung for GatherGi {
             }
             self.renew.record(recorder, groups(offset), table(), slots);
         }
-        let motion = Bound::from(inputs.motion.unwrap_or(&self.no_motion));
-        let own = [&pixels, &records, &entry_light, &before, &after, &changes, &motion, &specular].map(Clone::clone);
-        self.settle.record(recorder, alone(offset), own, [w, h, 1]);
+        self.settle.record(recorder, alone(offset), history(), [w, h, 1]);
         let own = [&after, &blurred, &changes, &Bound::from(&store.glosses)].map(Clone::clone);
         self.blur.record(recorder, alone(offset), own, [w, h, 1]);
         self.smooth.record(recorder, alone(offset), [after, blurred, light], [w, h, 1]);
@@ -370,6 +376,7 @@ impl Rung for GatherGi {
     fn forget(&mut self) {
         self.inputs.forget();
         self.scene.forget();
+        self.recall.forget();
         self.settle.forget();
         self.bring.forget();
     }

@@ -1,6 +1,6 @@
 //! What `gather` keeps from frame to frame, and between the passes of one.
 
-use super::{PAST, RECORD};
+use super::{LOOKS, PAST, RECORD};
 use crate::gi::stage::{cells, inputs::cells_of};
 
 /// Squares of 2×2 cells, each of which sends one ray a frame into a lobe.
@@ -33,6 +33,7 @@ impl Store {
     pub fn new(device: &wgpu::Device, size: [u32; 2], slots: u32) -> Self {
         let cells = cells::count(size).max(1);
         let rays = cells + squares(size);
+        let records = rays + (LOOKS - 1) * cells;
         let slots = u64::from(slots);
         let buffer = |label, size| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -60,7 +61,7 @@ impl Store {
             queries: buffer("gi.entry_queries", 16 * (rays + 4 * slots)),
             asked: buffer("gi.entry_asked", 4 * slots),
             light: buffer("gi.entry_light", 32 * slots),
-            records: buffer("gi.records", RECORD * rays),
+            records: buffer("gi.records", RECORD * records),
             pasts: [past(), past()],
             cell_light: buffer("gi.light", cells::light_bytes(size)),
             blurred: buffer("gi.blurred", cells::light_bytes(size)),
@@ -74,7 +75,8 @@ impl Store {
     pub fn largest(size: [u32; 2], slots: u32) -> u64 {
         let (cells, slots) = (cells::count(size).max(1), u64::from(slots));
         let rays = cells + squares(size);
-        [16 * (rays + 4 * slots), 32 * slots, PAST * cells, RECORD * rays, cells::light_bytes(size)]
+        let records = rays + (LOOKS - 1) * cells;
+        [16 * (rays + 4 * slots), 32 * slots, PAST * cells, RECORD * records, cells::light_bytes(size)]
             .into_iter()
             .max()
             .unwrap_or(0)

@@ -32,15 +32,6 @@ pub fn why(test: &str, subject: &str) -> Option<&'static str> {
         ("metal" | "mirror", "ambient" | "ssgi") => {
             "its reflections are what the screen shows along the mirrored ray; the red wall behind the camera is not there"
         }
-        ("disocclusion", "gather" | "neural") => {
-            "what comes into view has one ray a cell and is blurred over 9×9 of them, so that the gradient on the box comes with the \
-             frames after; that its light was learnt before the plate moved is not to blame: eight rounds of entries in that frame \
-             change nothing (0.059)"
-        }
-        ("sweep", "gather" | "neural") => {
-            "while lights change a fifth of the evidence is enough for cells to let go of what they remember, and which of them do in a \
-             frame is chance: states of the program that do the same in this test gave 0.8 to 2.3 %"
-        }
         ("mirror", "gather" | "neural") => {
             "rays into lobes are one a cell of 4×4 pixels and blurred over cells; only what is on the screen is sharp, and the mirrored \
              wall is not (docs/gi.md: \"mirrors\" stands among what it cannot do)"
