@@ -64,8 +64,7 @@ fn the_generators_agree_with_pytorch() {
 #[ignore = "218 MB of weights and 26 GFLOP"]
 fn the_papers_generator_at_full_width() {
     let Some(path) = std::env::var_os("BOUNCELIGHT_FULL") else {
-        println!("SKIP: BOUNCELIGHT_FULL is not set");
-        return;
+        return common::skip(common::Need::Generator, "BOUNCELIGHT_FULL is not set");
     };
     let Some(gpu) = common::gpu() else { return };
     let (cases, _) = hashed::cases_at(path.as_ref());

@@ -4,8 +4,9 @@
 use bouncelight::scene::{self, Scene, SceneError};
 use serde_json::{Value, json};
 
+use crate::common::shared_path;
 use crate::glb::load_bytes;
-use crate::shared::{assert_sound, shared};
+use crate::shared::assert_sound;
 
 /// A case of `tests/fixtures/meshopt/cases.json`.
 fn case(name: &str) -> Value {
@@ -140,7 +141,7 @@ fn files_made_by_gltfpack_load() {
     for (name, meshes, triangles, (low, high)) in
         [("dream-apartment", 67, 177_934, apartment), ("hotel", 11, 99_029, hotel)]
     {
-        let Some(path) = shared(&format!("real/meshopt/{name}.glb")) else { continue };
+        let Some(path) = shared_path(&format!("real/meshopt/{name}.glb")) else { continue };
         let scene = scene::load(path.to_str().expect("a path")).unwrap_or_else(|e| panic!("{e}"));
         assert_sound(&scene);
         let count: usize = scene.meshes.iter().map(|m| m.indices.len() / 3).sum();

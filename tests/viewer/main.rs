@@ -2,6 +2,8 @@
 
 #![recursion_limit = "512"]
 
+#[path = "../common/mod.rs"]
+mod common;
 mod display;
 mod rays;
 mod session;
@@ -16,7 +18,7 @@ use std::process::Command;
 /// a dropped scene, sizes, loss of surface and device, and that nothing is drawn when nothing happens.
 #[test]
 fn a_session_with_mouse_and_keys() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("bad.glb"), b"glTF\x02\0\0\0\xff\0\0\0").unwrap();
     let script = json!([
@@ -82,7 +84,7 @@ fn a_session_with_mouse_and_keys() {
 /// F12, Shift+F12, and the command line that draws the very same picture, edits of lights and objects included.
 #[test]
 fn the_copied_command_draws_the_same_picture() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
         { "wait": "loaded" }, { "key": "P" }, { "wait": "idle" },
@@ -132,7 +134,7 @@ fn the_copied_command_draws_the_same_picture() {
 /// The split, the live reference, the error map with its numbers.
 #[test]
 fn methods_and_the_live_reference_side_by_side() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
         { "wait": "loaded" }, { "key": "P" }, { "wait": "idle" },

@@ -1,6 +1,7 @@
 //! What can be switched, dropped and changed under the window's feet while it runs.
 
-use super::display::{self, Display};
+use super::common;
+use super::display::Display;
 use super::session::{mean, printed, session, session_with, succeeds};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -25,7 +26,7 @@ fn sky(rgbe: [u8; 4]) -> Vec<u8> {
 /// frontier's dots; the flicker meter; light theme.
 #[test]
 fn methods_weights_and_views_switch_at_run_time() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("bad.safetensors"), b"not at all").unwrap();
     let script = json!([
@@ -68,7 +69,7 @@ fn methods_weights_and_views_switch_at_run_time() {
 /// Left and right of the line are two methods' pictures: each half is that of the method alone.
 #[test]
 fn a_split_shows_two_raster_methods() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("sky.hdr"), sky([0, 128, 255, 129])).unwrap();
     let script = json!([
@@ -109,7 +110,7 @@ fn a_split_shows_two_raster_methods() {
 /// `--watch`: the scene, the weights and a shader change; what is broken is told and the old state stays.
 #[test]
 fn watched_files_are_loaded_again_and_broken_ones_told() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     let quad = |z: f32| format!("v -1 -1 {z}\nv 1 -1 {z}\nv 0 1 {z}\nf 1 2 3\n");
@@ -154,7 +155,7 @@ fn watched_files_are_loaded_again_and_broken_ones_told() {
 /// the camera all the same.
 #[test]
 fn sizes_densities_and_the_overlays_own_cost() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
         { "wait": "loaded" }, { "wait": "idle" }, { "expect": { "/density_drawn": 1.0, "/window": [480, 300] } },
@@ -187,7 +188,7 @@ fn sizes_densities_and_the_overlays_own_cost() {
 /// A path is recorded while hands move the camera, written, dropped again and played.
 #[test]
 fn a_camera_path_is_recorded_and_played() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
         { "wait": "loaded" }, { "key": "P" }, { "wait": "idle" }, { "key": "Y" }, { "expect": { "/path/playing": false } },
@@ -235,7 +236,7 @@ fn a_camera_path_is_recorded_and_played() {
 /// A file with an animation and two variants: both change the picture, and the copied command draws what is seen.
 #[test]
 fn animations_play_and_variants_change_materials() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let numbers: Vec<f32> = [
         // A triangle, two times, two places.
