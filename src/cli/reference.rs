@@ -2,10 +2,10 @@
 
 use super::{
     args::{Global, usage},
+    drawn::{Drawn, parse_layers},
     error::CliError,
     interrupt,
     progress::Progress,
-    render::{Drawn, parse_layers},
 };
 use crate::{
     gpu::Gpu,

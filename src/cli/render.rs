@@ -2,7 +2,8 @@
 
 use super::{
     args::{Global, MethodName, MethodParser, SceneArgs, usage},
-    compare::{Heat, Shown, shown_bytes},
+    compare::{Heat, Shown},
+    drawn::{Drawn, Format, parse_layers},
     error::CliError,
     interrupt,
     progress::Progress,
@@ -11,11 +12,10 @@ use super::{
 use crate::{
     gi::Method,
     gpu::Gpu,
-    image_io::{self, Metadata},
-    metrics,
+    image_io, metrics,
     render::{
         Renderer, RendererOptions,
-        capture::{CaptureOptions, CapturedFrame, Layer, Picture, capture_with},
+        capture::{CaptureOptions, Layer, Picture, capture_with},
         tonemap_curve::Tonemap,
     },
     scene::{
@@ -24,7 +24,7 @@ use crate::{
     },
 };
 use anyhow::Result;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -86,42 +86,6 @@ pub struct Args {
     // Last, since its heading would go on to what follows.
     #[command(flatten)]
     tracing: reference::Flags,
-}
-
-/// Layers by name: `all`, or a list, whose words `find` knows.
-pub(super) fn parse_layers<L: Copy>(text: &str, all: &[L], name: impl Fn(L) -> &'static str) -> Result<Vec<L>> {
-    if text == "all" {
-        return Ok(all.to_vec());
-    }
-    let mut layers = Vec::new();
-    for word in text.split(',') {
-        let Some(i) = all.iter().position(|&l| name(l) == word) else {
-            let known = all.iter().map(|&l| name(l)).collect::<Vec<_>>().join(", ");
-            return Err(usage(format!("--aov: `{word}` is no layer of this method; there are: {known}")));
-        };
-        if layers.contains(&i) {
-            return Err(usage(format!("--aov: `{word}` is asked for twice")));
-        }
-        layers.push(i);
-    }
-    Ok(layers.into_iter().map(|i| all[i]).collect())
-}
-
-/// What the output's name asks for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Format {
-    Png,
-    Exr,
-}
-
-/// A picture ready to be written and judged.
-pub(super) struct Drawn {
-    /// The picture; its layers are in `layers`.
-    pub frame: CapturedFrame,
-    /// Layers of an EXR beside the picture.
-    pub layers: Vec<image_io::Layer>,
-    /// What is worth knowing of how it was made.
-    pub facts: Metadata,
 }
 
 impl Args {
@@ -202,9 +166,9 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
             raster.draw(progress, &args, &camera)?
         }
     };
-    write(&args, &args.output, format, &drawn, &metadata(&gpu, &drawn))?;
+    drawn.write(&gpu, &args.output, format)?;
     match reference {
-        Some(reference) => judge(&args, &drawn.frame, &reference),
+        Some(reference) => judge(&args, &drawn, &reference),
         None => Ok(()),
     }
 }
@@ -309,8 +273,7 @@ fn film(
     progress.expect(sequence.count());
     for (number, camera) in sequence.frames() {
         let drawn = raster.picture(args, &camera, &mut || ())?;
-        let metadata = metadata(raster.gpu, &drawn);
-        write(args, &sequence::name(&args.output, number), format, &drawn, &metadata)?;
+        drawn.write(raster.gpu, &sequence::name(&args.output, number), format)?;
         raster.running = true;
         progress.step();
     }
@@ -321,14 +284,8 @@ fn film(
 /// Faults that can be told before anything is drawn.
 fn check(args: &Args) -> Result<Format> {
     let path = &args.output;
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    let format = match extension.as_str() {
-        "png" => Format::Png,
-        "exr" => Format::Exr,
-        _ if path.as_os_str() == "-" => Format::Png,
-        _ => return Err(usage(format!("{}: the picture's name must end in .png or .exr", path.display()))),
-    };
-    if args.aov.is_some() && format == Format::Png {
+    let format = Format::of(path, args.exposure, args.tonemap)?;
+    if args.aov.is_some() && format != Format::Exr {
         return Err(usage("--aov needs an .exr: a PNG holds one picture".into()));
     }
     if !args.exposure.is_finite() {
@@ -372,47 +329,10 @@ fn check(args: &Args) -> Result<Format> {
     Ok(format)
 }
 
-fn metadata(gpu: &Gpu, drawn: &Drawn) -> Metadata {
-    let command: Vec<String> = std::env::args().skip(1).collect();
-    let driver = format!("{} {}", gpu.info.driver, gpu.info.driver_info);
-    let software = format!("bouncelight {}", env!("CARGO_PKG_VERSION"));
-    [
-        ("Software", software),
-        ("Command", format!("bouncelight {}", command.join(" "))),
-        ("Adapter", gpu.info.name.clone()),
-        ("Backend", format!("{:?}", gpu.info.backend).to_lowercase()),
-        ("Driver", driver.trim().into()),
-    ]
-    .map(|(k, v)| (k.to_string(), v))
-    .into_iter()
-    .chain(drawn.facts.clone())
-    .collect()
-}
-
-fn write(args: &Args, output: &Path, format: Format, drawn: &Drawn, metadata: &Metadata) -> Result<()> {
-    let [width, height] = args.scene.size;
-    match format {
-        Format::Png => {
-            let rgb = shown_bytes(&rgb(&drawn.frame), args.exposure, args.tonemap);
-            image_io::write_png(output, width, height, &rgb, metadata)?;
-        }
-        Format::Exr => {
-            let mut layers = vec![image_io::Layer::new("", "RGBA", &drawn.frame.beauty.data)];
-            layers.extend(drawn.layers.iter().cloned());
-            image_io::write_exr(output, width, height, &layers, metadata)?;
-        }
-    }
-    Ok(())
-}
-
-fn rgb(frame: &CapturedFrame) -> Vec<f32> {
-    frame.beauty.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
-}
-
 /// Prints the metric and fails when it is on the wrong side of the threshold.
-fn judge(args: &Args, frame: &CapturedFrame, reference: &Shown) -> Result<()> {
+fn judge(args: &Args, drawn: &Drawn, reference: &Shown) -> Result<()> {
     let name = args.output.display().to_string();
-    let ours = Shown::linear(name, args.scene.size.map(|n| n as usize), rgb(frame), args.exposure, args.tonemap);
+    let ours = Shown::linear(name, args.scene.size.map(|n| n as usize), drawn.rgb(), args.exposure, args.tonemap);
     let heat = Heat::of_metric(&args.metric);
     let options =
         metrics::Options { flip: heat == Heat::Flip, hdr_flip: heat == Heat::Hdrflip, ..metrics::Options::default() };

@@ -31,6 +31,7 @@ pub mod plan;
 mod problem;
 mod shape;
 mod shipped;
+mod spec;
 mod stored;
 pub mod tune;
 mod write;

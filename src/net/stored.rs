@@ -6,12 +6,8 @@ use super::graph::Graph;
 use super::header::{Header, TensorInfo};
 use super::op::Op;
 use super::problem::Problem;
+use super::spec::{MAX_SCALE, SCALE_SUFFIX};
 use std::collections::{BTreeMap, BTreeSet};
-
-/// What the scales of a tensor of bytes are called: `NAME.weight` and `NAME.weight_scale`.
-pub const SCALE_SUFFIX: &str = "_scale";
-/// Largest scale: the largest byte times it is still a finite f32.
-pub const MAX_SCALE: f32 = f32::MAX / 128.0;
 
 /// How a tensor's numbers are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -4,7 +4,8 @@
 //! permutations give the same result up to rounding, so a wrong cache costs time, never correctness.
 
 use super::format::Weights;
-use super::gpu::permutation::{Layer, MAX_PARTS};
+use super::gpu::layer::Layer;
+use super::gpu::permutation::MAX_PARTS;
 use super::gpu::{Facts, NetError, Network, Options, Permutation, Pipelines, Tuned};
 use crate::gpu::timing::Recorder;
 use serde::{Deserialize, Serialize};

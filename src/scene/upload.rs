@@ -11,6 +11,7 @@ mod material;
 mod mesh;
 mod texture;
 
+pub(crate) use light::fits_one_map;
 pub use light::{CANDIDATES, LightGpu};
 pub use material::{MaterialGpu, TextureUse, material_layout};
 pub use mesh::{AttributeVertex, Draw, Rows, attribute_layouts, motion_layouts, position_layouts};
@@ -194,7 +195,7 @@ impl SceneGpu {
         let lights: Vec<Light> = scene.lights.iter().chain(&self.sky_sun).cloned().collect();
         let list = LightGpu::list(&lights);
         // A spot's maps depend on how wide it is.
-        let kind = |l: &Light| (std::mem::discriminant(&l.kind), crate::render::shadow::is_flat(&l.kind));
+        let kind = |l: &Light| (std::mem::discriminant(&l.kind), fits_one_map(&l.kind));
         let same = self.lights.iter().map(kind).eq(lights.iter().map(kind));
         self.lights_epoch += u64::from(self.lights != lights);
         self.lights = lights;

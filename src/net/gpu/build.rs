@@ -1,6 +1,6 @@
 //! Buffers, pipelines and bind groups of a network.
 
-use super::kernels::{Bound, Kernel, Numbers, Part};
+use super::kernel::{Bound, Kernel, Numbers, Part};
 use super::permutation::ROW;
 use super::pipelines::Pipelines;
 use super::{NetError, Options};

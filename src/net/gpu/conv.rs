@@ -5,68 +5,15 @@
 
 use super::super::graph::Padding;
 use super::super::plan::{Kind, Plan, Precision, Step};
-use super::kernels::{Bound, Choice, GROUP, Kernel, Part, Prelude, Sum, THREADS, in_rows};
-use super::permutation::{Layer, Permutation, Source, Variant};
+use super::kernel::{Bound, Choice, GROUP, Kernel, Part, Prelude, Sum, in_rows};
+use super::layer::{Filter, Layer, Stage, THREADS};
+use super::permutation::{Permutation, Source, Variant};
 use crate::net::graph::Shape;
 
 /// Vectors side by side in a workgroup that adds up and measures, as in `sum_measured.wgsl`.
 const SUM_COLUMNS: u32 = 8;
 /// WebGPU's default limit of workgroups in one dimension.
 const MAX_DEPTH: u32 = 65535;
-
-/// The convolution kernel's view of a layer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Filter {
-    /// Taps, height and width; of one phase, where there are several.
-    pub taps: [u32; 2],
-    /// Distance of input pixels.
-    pub stride: u32,
-    /// Distance of output pixels: there are as many phases in both directions.
-    pub spread: u32,
-    /// Factor by which the input is enlarged.
-    pub nearest: u32,
-    /// Four-channel vectors read for each output.
-    pub in_vectors: u32,
-    /// Four-channel vectors written that read the same: those of a group of channels, or all.
-    pub group_vectors: u32,
-}
-
-impl Filter {
-    /// Matrices of one block of `vectors` vectors of output channels.
-    pub fn matrices(self, vectors: u32) -> u64 {
-        1 + u64::from(self.taps[0]) * u64::from(self.taps[1]) * u64::from(self.in_vectors) * u64::from(vectors)
-    }
-
-    /// Pixels of one phase of an output of `size`, the largest one's.
-    pub fn pixels(self, size: [u32; 2]) -> u32 {
-        // At most 2^26 pixels, so the product fits.
-        size.map(|edge| edge.div_ceil(self.spread)).iter().product()
-    }
-}
-
-/// How a workgroup of `conv_staged.wgsl` is divided.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Stage {
-    /// Threads side by side in output channels; the others of the 64 in pixels.
-    pub columns: u32,
-    /// Pixels of a thread.
-    pub pixels: u32,
-}
-
-impl Stage {
-    /// For `vectors` vectors a thread: as few columns as cover the output channels, and no more pixels than there are.
-    pub fn of(layer: &Layer, vectors: u32) -> Self {
-        let columns = layer.out_vectors.div_ceil(vectors).next_power_of_two().min(8);
-        let rows = THREADS / columns;
-        let pixels = layer.filter.pixels(layer.size).div_ceil(rows).next_power_of_two().min(8);
-        Self { columns, pixels }
-    }
-
-    /// Workgroups for the pixels of one phase.
-    pub fn groups(self, layer: &Layer) -> u32 {
-        layer.filter.pixels(layer.size).div_ceil(THREADS / self.columns * self.pixels)
-    }
-}
 
 /// Taps of one phase, and its padding: `pad` − ⌊(phase + `base`) / spread⌋.
 struct Phases {

@@ -6,8 +6,8 @@
 //! of stride s is s² ordinary ones, each of which makes every s-th pixel (its phase) in both directions. Where the kernel works by
 //! Winograd's F(n, 3), three neighbouring taps become n + 2.
 
-use super::conv::Filter;
-use super::kernels::{Bound, Kernel, Part};
+use super::kernel::{Bound, Kernel, Part};
+use super::layer::Filter;
 use super::permutation::Source;
 use crate::net::format::Weights;
 use crate::net::graph::Op;

@@ -1,7 +1,7 @@
 //! The ways in which a convolution can run, which of them a device can do, and which is taken when nobody has measured. Pure.
 
 use super::super::plan::{Plan, Precision};
-use super::conv::{Filter, Stage};
+use super::layer::{Layer, Stage};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -121,30 +121,6 @@ impl Facts {
             half: device.features().contains(wgpu::Features::SHADER_F16),
             words: software && device.features().contains(wgpu::Features::SHADER_INT64),
         }
-    }
-}
-
-/// Everything that the speed of one convolution depends on, and the key under which a tuner remembers it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Layer {
-    /// The kernel's view of it.
-    pub filter: Filter,
-    /// Four-channel vectors written.
-    pub out_vectors: u32,
-    /// Width and height of the output.
-    pub size: [u32; 2],
-    /// Storage.
-    pub precision: Precision,
-}
-
-impl std::fmt::Display for Layer {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Filter { taps: [h, w], stride, spread, nearest, in_vectors, group_vectors } = self.filter;
-        let [width, height] = self.size;
-        let bits = if self.precision == Precision::F16 { 16 } else { 32 };
-        write!(f, "{h}x{w} stride {stride} spread {spread} nearest {nearest} {in_vectors}>{} ", self.out_vectors)?;
-        write!(f, "{width}x{height} f{bits}")?;
-        if group_vectors < self.out_vectors { write!(f, " groups of {group_vectors}") } else { Ok(()) }
     }
 }
 

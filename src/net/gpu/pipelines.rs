@@ -1,6 +1,6 @@
 //! Compiled kernels.
 
-use super::kernels::Kernel;
+use super::kernel::Kernel;
 use crate::gpu::shaders;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

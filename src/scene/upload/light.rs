@@ -36,6 +36,14 @@ pub const CANDIDATES: usize = 8;
 /// What all lights of a kind share evenly. Power says nothing of how near a light is: a weak lamp may be all the light of a room.
 const EVEN: f64 = 0.3;
 
+/// A spot whose half angle is above this gets a cube of shadow maps: one map would waste its texels on the rim.
+const WIDEST_SPOT: f32 = 60.0 * std::f32::consts::PI / 180.0;
+
+/// True for lights whose cone fits into one shadow map.
+pub(crate) fn fits_one_map(kind: &LightKind) -> bool {
+    matches!(kind, LightKind::Spot { outer_angle, .. } if *outer_angle <= WIDEST_SPOT)
+}
+
 impl LightGpu {
     /// The shader's form of `light`; one with anything that is no number gives none.
     pub fn new(light: &Light) -> Self {
