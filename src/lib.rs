@@ -15,7 +15,7 @@
 //! - [`accel`]: triangles in trees, on the CPU and the GPU, and what rays hit of them.
 //! - [`gpu`]: device choice, shader sources, readback, pass timing.
 //! - [`render`]: the rasteriser, one file a pass.
-//! - [`net`]: weights file, graph, plan, the slow CPU twin and the WGSL kernels' host side.
+//! - [`net`]: weights file, graph, plan, the slow CPU reference and the WGSL kernels' host side.
 //! - [`gi`]: global-illumination methods, cheapest first; [`gi::World`] and [`gi::View`] are what other renderers embed.
 //! - `reference` (feature `reference`): the path tracer that everything else is measured against.
 //! - [`metrics`]: image metrics, no wgpu.

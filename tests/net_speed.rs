@@ -38,7 +38,7 @@ fn compact_network_at_256x128() {
     let input = cpu::Tensor::zeros(plan.tensors[0].shape);
     let start = Instant::now();
     cpu::run(&weights, &input).unwrap();
-    println!("CPU twin: {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
+    println!("CPU reference: {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
     println!(
         "{:.1} MFLOP, arena {} bytes, traffic {} bytes",
         plan.flops() as f64 / 1e6,

@@ -1,4 +1,4 @@
-//! Every shader of the table parses and validates, and its uniform structs lie as their Rust twins do.
+//! Every shader of the table parses and validates, and its uniform structs lie as their Rust structs do.
 
 use bouncelight::gpu::shaders;
 

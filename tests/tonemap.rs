@@ -110,7 +110,7 @@ fn scene_rows_are_pixels_of_the_references() {
     assert_eq!(rows[SCENE_ROWS..].iter().filter(|r| of_scene(r)).count(), 0);
 }
 
-const TWIN: &str = "
+const WRAPPER: &str = "
 @group(0) @binding(0) var<storage, read> light: array<vec4f>;
 @group(0) @binding(1) var<storage, read_write> shown: array<vec4f>;
 @compute @workgroup_size(64)
@@ -128,7 +128,7 @@ fn shader_and_cpu_form_agree() {
     for view in Tonemap::ALL {
         light.extend(samples().iter().map(|r| [r[0], r[1], r[2], view.kind() as f32]));
     }
-    let source = [include_str!("../shaders/lib/tonemap.wgsl"), TWIN].concat();
+    let source = [include_str!("../shaders/lib/tonemap.wgsl"), WRAPPER].concat();
     let shown = run(&gpu, &source, &light);
     let mut worst = [0.0f32; 4];
     for (input, out) in light.iter().zip(&shown) {
@@ -165,11 +165,11 @@ fn run(gpu: &bouncelight::gpu::Gpu, source: &str, light: &[[f32; 4]]) -> Vec<[f3
         mapped_at_creation: false,
     });
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("tonemap twin"),
+        label: Some("tonemap alone"),
         source: wgpu::ShaderSource::Wgsl(source.into()),
     });
     let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some("tonemap twin"),
+        label: Some("tonemap alone"),
         layout: None,
         module: &module,
         entry_point: Some("main"),

@@ -11,7 +11,7 @@
 @group(1) @binding(1) var blurred: sampler;
 @group(1) @binding(2) var indirect_specular: texture_storage_2d<rgba16float, write>;
 @group(2) @binding(0) var environment_picture: texture_2d<f32>;
-// What rays into lobes have found (`Rung::gloss`); one texel where the method sends none.
+// What rays into lobes have found (`Technique::gloss`); one texel where the method sends none.
 @group(2) @binding(1) var found_gloss: texture_2d<f32>;
 
 // The largest finite half: brighter light is held there instead of becoming infinite.

@@ -1,4 +1,4 @@
-// What every pass knows about the frame; the Rust twin is `render::view::FrameUniform`.
+// What every pass knows about the frame; in Rust `render::view::FrameUniform`.
 
 struct Frame {
     view_from_world: mat4x4f,

@@ -1,6 +1,6 @@
 // What the path tracer reads. Group 0 is the scene (`reference::scene`), group 1 the film (`reference::job`).
 
-// Rust twin: `reference::scene::SceneInfo`.
+// In Rust: `reference::scene::SceneInfo`.
 struct SceneInfo {
     // Constant radiance of the surroundings, W/(m² sr); the mean where there is a picture.
     environment: vec3f,
@@ -29,7 +29,7 @@ const SCENE_COVERED: u32 = 1u;
 // The light that a GI method is given differs from the analytic lights that truly are there.
 const SCENE_ANALYTIC_APART: u32 = 2u;
 
-// Rust twin: `reference::job::Job`.
+// In Rust: `reference::job::Job`.
 struct Job {
     world_from_view: mat4x4f,
     tan_half: vec2f,
@@ -61,7 +61,7 @@ const JOB_COUNT_TWICE: u32 = 32u;
 const JOB_PLAIN_RANDOM: u32 = 64u;
 const JOB_NO_CAUSTICS: u32 = 128u;
 
-// Rust twin: `reference::scene::ImageUse`. Rows of uv' = M (u, v, 1).
+// In Rust: `reference::scene::ImageUse`. Rows of uv' = M (u, v, 1).
 struct ImageUse {
     row0: vec3f,
     // Index of the first texel in `texels`; 0xffffffff for no image.
@@ -73,7 +73,7 @@ struct ImageUse {
     pad: vec2u,
 }
 
-// Rust twin: `reference::scene::RefMaterial`.
+// In Rust: `reference::scene::RefMaterial`.
 struct RefMaterial {
     base_color: vec4f,
     emissive: vec3f,

@@ -6,7 +6,7 @@ use super::surfaces::Surface;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
 
-/// The twin of `Emitter` in `shaders/accel/surface.wgsl`.
+/// Laid out as `Emitter` in `shaders/accel/surface.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct EmitterGpu {

@@ -6,7 +6,7 @@ use super::{
     error::CliError,
 };
 use crate::{
-    gi::{Method, rung::Cost},
+    gi::{Method, technique::Cost},
     gpu::Gpu,
     render::{Renderer, RendererOptions},
     scene::upload::SceneGpu,

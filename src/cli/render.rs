@@ -206,7 +206,7 @@ impl<'a> Raster<'a> {
         let upload = || {
             let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
             if needs_rays {
-                // Where they cannot be had, the rung below draws, and `picture` says so.
+                // Where they cannot be had, the method below draws, and `picture` says so.
                 let _ = uploaded.trace(&gpu.device, &gpu.queue, scene);
             }
             Ok::<_, UploadError>(uploaded)

@@ -39,10 +39,10 @@ mod world;
 
 pub use interface::{
     AlbedoEncoding, CameraMatrices, Conventions, Depth, GiError, Inputs, Jitter, LightScale, Lights, MotionJitter,
-    MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Rays, rung,
+    MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Rays, technique,
 };
 pub use method::{Method, fitted, name};
-pub use neural::{features, pack, pass, reconstruct, twin};
+pub use neural::{cpu, features, pack, pass, reconstruct};
 pub use preludes::example_preludes;
 pub use screen::{ambient, bitmask, occlusion, ssgi};
 pub use stage::{cells, exposure, exposure::ExposurePass, inputs};

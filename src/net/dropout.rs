@@ -1,4 +1,4 @@
-//! Dropout's random numbers: a hash of (seed, operator, value), so that a run is reproducible and the CPU twin and the
+//! Dropout's random numbers: a hash of (seed, operator, value), so that a run is reproducible and the CPU reference and the
 //! kernels (`shaders/net/dropout.wgsl`) drop exactly the same values. Not PyTorch's generator: masks differ from its, their
 //! distribution does not.
 

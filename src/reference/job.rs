@@ -8,7 +8,7 @@ use bytemuck::{Pod, Zeroable};
 /// No limit of bounces: paths end by Russian roulette alone, which is unbiased.
 pub const UNLIMITED: u32 = u32::MAX;
 
-/// The twin of `Job` in `shaders/reference/types.wgsl`, field by field.
+/// Laid out as `Job` in `shaders/reference/types.wgsl`, field by field.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Job {

@@ -74,7 +74,7 @@ pub enum PackError {
     Accel(#[from] accel::AccelError),
 }
 
-/// The twin of `SceneInfo` in `shaders/reference/types.wgsl`, field by field.
+/// Laid out as `SceneInfo` in `shaders/reference/types.wgsl`, field by field.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs, reason = "documented in the shader")]

@@ -15,7 +15,7 @@ use crate::gi::{
     self,
     features::FeatureSet,
     method, pack,
-    rung::{self, Cost, Rung},
+    technique::{self, Cost, Technique},
 };
 use crate::gpu::timing::Recorder;
 use crate::net::gpu::Tap;
@@ -57,7 +57,7 @@ pub struct Renderer {
     lighting: Option<Lighting>,
     method: &'static str,
     /// What fills `indirect`; nothing for direct light alone.
-    indirect: Option<Box<dyn Rung>>,
+    indirect: Option<Box<dyn Technique>>,
     passes: Passes,
     taa: Option<TaaPass>,
     /// Where objects were in the frame before.
@@ -161,7 +161,7 @@ impl Renderer {
     }
 
     /// What drew the last frame in the method's place, and why; `None` where it drew itself.
-    pub fn instead(&self) -> Option<rung::Instead<'_>> {
+    pub fn instead(&self) -> Option<technique::Instead<'_>> {
         self.indirect.as_ref()?.instead()
     }
 

@@ -1,7 +1,7 @@
 //! Specular light of sky and bounces: the split sum's share of what one ray along the mirrored direction finds on the
 //! screen, blurred by the lobe's width.
 //!
-//! Where the method has sent rays into lobes ([`Rung::gloss`](crate::gi::rung::Rung::gloss)), what they found is shown, and the screen is
+//! Where the method has sent rays into lobes ([`Technique::gloss`](crate::gi::technique::Technique::gloss)), what they found is shown, and the screen is
 //! asked by smooth surfaces only, for sharpness.
 //!
 //! `gi.lit` makes a half-size picture of the light that all surfaces send out, and blurs it in steps of two; `gi.glossy`
@@ -14,7 +14,7 @@
 //! mean.
 
 use super::{Targets, tool};
-use crate::gi::rung::Cost;
+use crate::gi::technique::Cost;
 use crate::gpu::bind::Binder;
 use crate::gpu::timing::Recorder;
 
@@ -52,7 +52,7 @@ pub struct GlossyInputs<'a> {
     pub picture: &'a GlossyPicture,
     /// Radiance of the surroundings, for rays that leave the picture.
     pub sky: &'a wgpu::TextureView,
-    /// [`Rung::gloss`](crate::gi::rung::Rung::gloss).
+    /// [`Technique::gloss`](crate::gi::technique::Technique::gloss).
     pub found: Option<&'a wgpu::TextureView>,
 }
 

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// One map's camera; the twin of `ShadowView` in `shaders/lib/shadow_maps.wgsl`.
+/// One map's camera; laid out as `ShadowView` in `shaders/lib/shadow_maps.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct ShadowViewGpu {

@@ -14,7 +14,7 @@ use super::sampling;
 use super::targets::{Target, Targets};
 use super::tool;
 use super::view::View;
-use crate::gi::rung::Cost;
+use crate::gi::technique::Cost;
 use crate::gpu::timing::Recorder;
 use crate::scene::upload::SceneGpu;
 

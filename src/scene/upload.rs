@@ -162,7 +162,7 @@ impl SceneGpu {
     }
 
     /// Makes [`SceneGpu::rays`] for methods that need them ([`crate::gi::Method::needs_rays`]). `scene` is what this was made of.
-    /// Without them the rung below draws in those methods' place.
+    /// Without them the method below draws in those methods' place.
     ///
     /// # Errors
     /// [`AccelError`] when the scene has more triangles than rays can have; [`SceneGpu::no_rays`] says the same.

@@ -7,7 +7,7 @@ use bouncelight::gi::cells::{self, CellsPass, NO_PIXEL};
 use bouncelight::gi::gather::bring::{BringPass, Brought};
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gi::inputs::{CELL, cells_of};
-use bouncelight::gi::twin::oct_decode;
+use bouncelight::gi::cpu::oct_decode;
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu::readback;
 use bouncelight::gpu::timing::Recorder;

@@ -1,4 +1,4 @@
-//! Every operator's way back against central differences of the CPU twin's way there.
+//! Every operator's way back against central differences of the CPU reference's way there.
 
 use super::{common, error, hashed, learner};
 use bouncelight::net::cpu::{self, Tensor};
@@ -50,7 +50,7 @@ fn odd() -> Case {
     Case { name: "odd".into(), bytes: hashed::file(&graph, 5), sizes: vec![[11, 8], [6, 5]] }
 }
 
-/// Σ slopes · output of the twin with one number of the file moved by `by`.
+/// Σ slopes · output of the CPU reference with one number of the file moved by `by`.
 fn moved(bytes: &[u8], at: usize, by: f32, input: &Tensor, slopes: &[f32]) -> (f64, f32) {
     let mut bytes = bytes.to_vec();
     let number: [u8; 4] = bytes[at..at + 4].try_into().unwrap();

@@ -103,9 +103,9 @@ fn several_networks_live_at_once() {
         let out = network.output();
         let bytes =
             bouncelight::gpu::readback::buffer(&gpu.device, &gpu.queue, out.buffer, out.offset, out.size).unwrap();
-        let twin = cpu::run(&weights, input).unwrap();
-        let found = Tensor::from_padded(twin.shape, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes));
-        assert!(error(&found.data, &twin.data) <= TOLERANCE);
+        let by_cpu = cpu::run(&weights, input).unwrap();
+        let found = Tensor::from_padded(by_cpu.shape, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes));
+        assert!(error(&found.data, &by_cpu.data) <= TOLERANCE);
     }
 }
 
@@ -170,12 +170,12 @@ fn dropout_drops_the_same_values_everywhere() {
     for (graph, p) in [(alone, 0.3), (fused, 0.25)] {
         let weights = hashed::network(&graph);
         let input = hashed::input("x", 6, [61, 47]);
-        let twin = cpu::run_with(&weights, &input, Some(7)).unwrap();
-        let dropped = twin.data.iter().filter(|v| **v == 0.0).count() as f32 / twin.data.len() as f32;
+        let by_cpu = cpu::run_with(&weights, &input, Some(7)).unwrap();
+        let dropped = by_cpu.data.iter().filter(|v| **v == 0.0).count() as f32 / by_cpu.data.len() as f32;
         assert!((dropped - p).abs() < 0.02, "{dropped} of the values are dropped, {p} was asked for");
         let other = cpu::run_with(&weights, &input, Some(8)).unwrap();
-        let same = twin.data.iter().zip(&other.data).filter(|(a, b)| (**a == 0.0) == (**b == 0.0)).count();
-        let expected = (p * p + (1.0 - p) * (1.0 - p)) * twin.data.len() as f32;
+        let same = by_cpu.data.iter().zip(&other.data).filter(|(a, b)| (**a == 0.0) == (**b == 0.0)).count();
+        let expected = (p * p + (1.0 - p) * (1.0 - p)) * by_cpu.data.len() as f32;
         assert!((same as f32 / expected - 1.0).abs() < 0.05, "another seed, an independent mask");
         assert!(cpu::run(&weights, &input).unwrap().data.iter().all(|v| *v != 0.0), "off by default");
         let Some(gpu) = &gpu else { continue };
@@ -185,12 +185,12 @@ fn dropout_drops_the_same_values_everywhere() {
         network.set_seed(&gpu.queue, 7);
         let found = run_network(gpu, &network, &input);
         assert!(
-            found.data.iter().zip(&twin.data).all(|(a, b)| (*a == 0.0) == (*b == 0.0)),
+            found.data.iter().zip(&by_cpu.data).all(|(a, b)| (*a == 0.0) == (*b == 0.0)),
             "the masks agree to the bit"
         );
-        assert!(error(&found.data, &twin.data) <= TOLERANCE);
+        assert!(error(&found.data, &by_cpu.data) <= TOLERANCE);
         let unfused = run_gpu(gpu, &weights, &input, Options { fuse: false, dropout: Some(7), ..Options::default() });
-        assert!(error(&unfused.data, &twin.data) <= TOLERANCE);
+        assert!(error(&unfused.data, &by_cpu.data) <= TOLERANCE);
     }
 }
 
@@ -214,7 +214,7 @@ fn wide_layers_agree_with_the_cpu_twin() {
     for (name, channels, ops, size) in cases {
         let weights = hashed::network(&graph(channels, ops));
         let input = hashed::input("x", channels, size);
-        let twin = cpu::run(&weights, &input).unwrap();
+        let by_cpu = cpu::run(&weights, &input).unwrap();
         let staged = |vectors, parts, half| {
             Variant::Fixed(Permutation { parts, half, ..Permutation::new(Source::Staged, false, vectors) })
         };
@@ -231,7 +231,7 @@ fn wide_layers_agree_with_the_cpu_twin() {
         ] {
             let network =
                 Network::sharing(handles, &weights, size, options, Arc::default(), pipelines.clone()).unwrap();
-            let e = error(&run_network(&gpu, &network, &input).data, &twin.data);
+            let e = error(&run_network(&gpu, &network, &input).data, &by_cpu.data);
             let ways: Vec<_> = network.kernels().filter_map(|k| k.permutation).map(|p| p.to_string()).collect();
             println!("{name}, {}: {e:.1e}", ways.join(", "));
             let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };

@@ -1,4 +1,4 @@
-//! Conformance of networks: PyTorch's fixtures ↔ the CPU twin ↔ the WGSL kernels, per operator and whole, at odd sizes
+//! Conformance of networks: PyTorch's fixtures ↔ the CPU reference ↔ the WGSL kernels, per operator and whole, at odd sizes
 //! and with padded channels. Relative error is max |Δ| / max |reference|.
 
 #[path = "../common/mod.rs"]
@@ -124,8 +124,8 @@ fn every_kernel_agrees_with_pytorch_and_with_the_cpu_twin() {
             let few = name == "unet" && variant != Variant::Auto;
             for (input, reference) in cases(name).into_iter().take(if few { 1 } else { usize::MAX }) {
                 let found = run_gpu(&gpu, &weights, &input, Options { variant, ..Options::default() });
-                let twin = cpu::run(&weights, &input).unwrap();
-                let e = error(&found, &reference).max(error(&found, &twin));
+                let by_cpu = cpu::run(&weights, &input).unwrap();
+                let e = error(&found, &reference).max(error(&found, &by_cpu));
                 assert!(e <= TOLERANCE, "{variant:?} {name} {}: relative error {e}", input.shape);
                 worst = worst.max(e);
                 seen += 1;

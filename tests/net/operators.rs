@@ -1,4 +1,4 @@
-//! Every operator: PyTorch ↔ CPU twin ↔ kernels, fused and unfused, in 32 and 16 bits.
+//! Every operator: PyTorch ↔ CPU reference ↔ kernels, fused and unfused, in 32 and 16 bits.
 
 use crate::hashed::{self, cases, graphs};
 use crate::{common, fixed, run_network};
@@ -56,9 +56,9 @@ fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usiz
                 Some(last) => last.rebuilt(&gpu.device, &gpu.queue, &weights, case.size),
             };
             let found = run_network(gpu, network.insert(next.unwrap()), &input);
-            let twin = cpu::run(&weights, &input).unwrap();
-            let e = case.error(&found).max(hashed::error(&found.data, &twin.data));
-            if e > tolerance || found.shape != twin.shape {
+            let by_cpu = cpu::run(&weights, &input).unwrap();
+            let e = case.error(&found).max(hashed::error(&found.data, &by_cpu.data));
+            if e > tolerance || found.shape != by_cpu.shape {
                 faults.push(format!("{name} {:?}: relative error {e}", case.size));
             }
             worst = if e > worst.0 { (e, name.clone()) } else { worst };
@@ -175,7 +175,7 @@ fn groups_read_their_own() {
             hashed::graphs(&serde_json::json!({name: {"input_channels": inputs, "ops": ops}})).remove(name).unwrap();
         let weights = hashed::network(&graph);
         let input = hashed::input(name, inputs, [7, 9]);
-        let twin = cpu::run(&weights, &input).unwrap();
+        let by_cpu = cpu::run(&weights, &input).unwrap();
         for variant in [
             fixed(Source::Lanes, true, 4),
             fixed(Source::Uniform, false, 3),
@@ -194,13 +194,13 @@ fn groups_read_their_own() {
             assert_eq!(filter.in_vectors, if dense { inputs.div_ceil(4) } else { read }, "{variant:?}");
             assert!(whole || dense || kernel.vectors == 1 || read == inputs.div_ceil(4), "{variant:?}");
             let found = run_network(&gpu, &network, &input);
-            let e = hashed::error(&found.data, &twin.data);
-            assert!(e <= TOLERANCE && found.shape == twin.shape, "{groups} groups, {variant:?}: relative error {e}");
+            let e = hashed::error(&found.data, &by_cpu.data);
+            assert!(e <= TOLERANCE && found.shape == by_cpu.shape, "{groups} groups, {variant:?}: relative error {e}");
         }
         // Negative control: neighbours' channels moved by one group are not what is read.
         let mut moved = input.clone();
         moved.data.rotate_right((inputs / groups) as usize * 63);
-        assert!(hashed::error(&cpu::run(&weights, &moved).unwrap().data, &twin.data) > 100.0 * TOLERANCE);
+        assert!(hashed::error(&cpu::run(&weights, &moved).unwrap().data, &by_cpu.data) > 100.0 * TOLERANCE);
     }
 }
 

@@ -1,4 +1,4 @@
-//! The published generators, narrow, whole: PyTorch ↔ CPU twin ↔ kernels.
+//! The published generators, narrow, whole: PyTorch ↔ CPU reference ↔ kernels.
 
 use crate::hashed::{self, cases};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
@@ -29,8 +29,8 @@ fn check_generators(ways: &[Options]) {
         let weights = hashed::network(&generator(&name, 4));
         for case in cases {
             let input = hashed::input(&name, 12, case.size);
-            let twin = cpu::run(&weights, &input).unwrap();
-            let e = case.error(&twin);
+            let by_cpu = cpu::run(&weights, &input).unwrap();
+            let e = case.error(&by_cpu);
             println!("{name} {:?}: CPU {e:.1e}", case.size);
             assert!(e <= TOLERANCE, "{name} {:?} on the CPU: relative error {e}", case.size);
             let Some(gpu) = &gpu else { continue };
@@ -40,7 +40,7 @@ fn check_generators(ways: &[Options]) {
                 let network =
                     Network::sharing(handles, &weights, case.size, options, Arc::default(), pipelines.clone()).unwrap();
                 let found = run_network(gpu, &network, &input);
-                let e = case.error(&found).max(hashed::error(&found.data, &twin.data));
+                let e = case.error(&found).max(hashed::error(&found.data, &by_cpu.data));
                 println!("{name} {:?}: {options:?} {e:.2e}", case.size);
                 if e > tolerance {
                     faults.push(format!("{name} {:?} {options:?}: relative error {e}", case.size));

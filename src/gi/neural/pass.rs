@@ -19,7 +19,7 @@ use super::features::FeatureSet;
 use super::pack::{self, NetworkInputs, PackPass};
 use super::reconstruct::{Answer, ReconstructPass};
 use crate::gi::gather::{self, GatherGi};
-use crate::gi::interface::rung::{Cost, Rung};
+use crate::gi::interface::technique::{Cost, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::exposure::ExposurePass;
 use crate::gi::stage::inputs::{CELL, InputGroup, cells_of};
@@ -295,7 +295,7 @@ impl NeuralGi {
 }
 
 // What a frame of our own sees; hosts that embed the pass use its own methods and need not know the trait.
-impl Rung for NeuralGi {
+impl Technique for NeuralGi {
     fn record(
         &mut self,
         recorder: &mut Recorder<'_>,

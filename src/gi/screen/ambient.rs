@@ -5,7 +5,7 @@
 
 use super::bitmask::{March, bind};
 use super::occlusion::OcclusionPass;
-use crate::gi::interface::rung::{Cost, Rung};
+use crate::gi::interface::technique::{Cost, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::ViewCache;
 use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry};
@@ -133,7 +133,7 @@ impl AmbientGi {
     }
 }
 
-impl Rung for AmbientGi {
+impl Technique for AmbientGi {
     fn record(
         &mut self,
         recorder: &mut Recorder<'_>,

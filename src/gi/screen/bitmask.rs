@@ -5,7 +5,7 @@
 //! and rounding follow a fixed pattern of 4×4 texels, which the mean of 4×4 texels on the way back cancels; without
 //! history the pattern never moves, so a still picture stays still to the bit.
 
-use crate::gi::interface::rung::Cost;
+use crate::gi::interface::technique::Cost;
 use crate::gi::stage::exposure;
 use crate::gi::stage::exposure::storage_entry;
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};

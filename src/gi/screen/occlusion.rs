@@ -5,7 +5,7 @@
 //! ([`March::thickness`]), so light passes behind thick things and is held back behind thin ones.
 
 use super::bitmask::{self, Kernel, March, Pattern, Stage, bind, half_of, pattern_entry, write_entry};
-use crate::gi::interface::rung::Cost;
+use crate::gi::interface::technique::Cost;
 use crate::gi::stage::inputs::{BoundInputs, InputGroup, texture_entry};
 use crate::gpu::timing::Recorder;
 

@@ -8,7 +8,7 @@
 
 use super::ambient;
 use super::bitmask::{self, Kernel, March, Pattern, Stage, bind, half_of, pattern_entry, write_entry};
-use crate::gi::interface::rung::{Cost, Rung};
+use crate::gi::interface::technique::{Cost, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::ViewCache;
 use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry};
@@ -106,7 +106,7 @@ impl SsgiGi {
     }
 }
 
-impl Rung for SsgiGi {
+impl Technique for SsgiGi {
     fn record(
         &mut self,
         recorder: &mut Recorder<'_>,

@@ -14,7 +14,7 @@
 
 use super::exposure::{pipeline, storage_entry};
 use super::inputs::{BoundInputs, CELL, InputGroup, cells_of};
-use crate::gi::interface::rung::Cost;
+use crate::gi::interface::technique::Cost;
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
 

@@ -68,7 +68,7 @@ fn kept(alpha: f64, mu: f64) -> f64 {
     sum / (N * N) as f64
 }
 
-/// The twin of `sample_visible_normal` in `shaders/reference/bsdf.wgsl` (Dupuy and Benyoub 2023).
+/// The same as `sample_visible_normal` in `shaders/reference/bsdf.wgsl` (Dupuy and Benyoub 2023).
 fn visible_normal(view: [f64; 3], alpha: f64, u: [f64; 2]) -> [f64; 3] {
     let stretch = |v: [f64; 3]| {
         let w = [v[0] * alpha, v[1] * alpha, v[2]];

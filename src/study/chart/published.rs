@@ -2,7 +2,7 @@
 
 use super::ChartError;
 use crate::{
-    gi::rung::Cost,
+    gi::technique::Cost,
     gpu::{Gpu, timing::Recorder},
     net::{
         convert::{self, Arch, Norm},

@@ -1,4 +1,4 @@
-//! The slow, obvious CPU twin of `gi/`'s shaders, function by function under the same names. No wgpu. Tests compare
+//! The slow, obvious CPU reference of `gi/`'s shaders, function by function under the same names. No wgpu. Tests compare
 //! the shaders with it; nothing else uses it. Formulas are documented in the shaders and in `gi::features`.
 
 use super::features::FeatureSet;

@@ -42,7 +42,7 @@ pub struct Instead<'a> {
 
 /// A method at work: G-buffer in, indirect diffuse light (E/π) out. Allocates only when size or views are new.
 /// `Send`, so that a viewer can build one on another thread.
-pub trait Rung: Send {
+pub trait Technique: Send {
     /// Records all of the method's passes: `output` (`Rgba16Float`, usage STORAGE_BINDING, the inputs' size) becomes
     /// the light that direct lighting misses; 0 on the background.
     ///
