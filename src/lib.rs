@@ -29,6 +29,9 @@ pub mod gi;
 pub mod gpu;
 #[cfg(feature = "io")]
 pub mod image_io;
+// With all shaders there are, the viewer's included.
+#[cfg(all(test, feature = "viewer"))]
+mod layouts;
 pub mod metrics;
 pub mod net;
 #[cfg(feature = "reference")]

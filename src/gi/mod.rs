@@ -35,7 +35,7 @@ pub mod neural;
 mod preludes;
 pub mod screen;
 pub mod stage;
-mod world;
+pub(crate) mod world;
 
 pub use interface::{
     AlbedoEncoding, CameraMatrices, Conventions, Depth, GiError, Inputs, Jitter, LightScale, Lights, MotionJitter,

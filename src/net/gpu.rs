@@ -3,7 +3,7 @@
 //! The caller fills [`Network::input`] (all channels, padding included, as zeros), records, and reads
 //! [`Network::output`]. Recording allocates nothing. The input's memory is reused by later layers.
 
-mod build;
+pub(crate) mod build;
 mod conv;
 mod examples;
 mod kernel;
@@ -18,7 +18,6 @@ use super::format::Weights;
 use super::graph::Graph;
 use super::plan::{Plan, PlanError, Precision};
 use crate::gpu::timing::Recorder;
-pub use build::StepUniform;
 use build::{Layer, Memory, Trained};
 pub use examples::example_preludes;
 pub use kernel::{Bound, Choice, Kernel, Numbers, Part, Sum};

@@ -32,10 +32,10 @@ enum Mode {
 /// `Blend` of `shaders/render/taa.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Blend {
-    mode: [i32; 4],
-    wx: [f32; 4],
-    wy: [f32; 4],
+pub(crate) struct Blend {
+    pub mode: [i32; 4],
+    pub wx: [f32; 4],
+    pub wy: [f32; 4],
 }
 
 impl Blend {

@@ -26,7 +26,7 @@ mod report;
 mod saved;
 mod screen;
 mod script;
-mod show;
+pub(crate) mod show;
 mod stage;
 mod state;
 mod stats;
