@@ -24,7 +24,7 @@ fn main() -> Result<(), Failure> {
     let gpu = Gpu::open(&GpuOptions::default())?;
     let precision = if rest.iter().any(|a| a == "f16") { Precision::F16 } else { Precision::F32 };
     let options = Options { precision, ..Options::default() };
-    let network = Network::with_options(&gpu.device, &gpu.queue, &weights, size, options)?;
+    let network = Network::new(&gpu.device, &gpu.queue, &weights, size, options)?;
     let data: Vec<f32> = bytemuck::pod_collect_to_vec(&std::fs::read(from)?);
     let input = Tensor { shape: network.plan().tensors[0].shape, data };
     if input.data.len() as u64 != input.shape.pixels() * u64::from(input.shape.channels) {

@@ -21,7 +21,7 @@ fn compact_network_at_256x128() {
     let variants = [Variant::Plain, Variant::Fixed(Permutation::new(Source::Uniform, false, 2)), Variant::Auto];
     let networks = variants.map(|v| {
         let options = Options { variant: v, ..Options::default() };
-        Network::with_options(&gpu.device, &gpu.queue, &weights, [256, 128], options).unwrap()
+        Network::new(&gpu.device, &gpu.queue, &weights, [256, 128], options).unwrap()
     });
     let mut best = [f64::INFINITY; 3];
     for _ in 0..10 {

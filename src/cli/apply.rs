@@ -7,7 +7,7 @@ use crate::{
     image_io::{self, Image},
     net::cpu::{self, Tensor},
     net::format::Weights,
-    net::gpu::{NetError, Network, Options},
+    net::gpu::{NetError, Network, Options, Setup},
     net::{pictures, plan::PlanError},
 };
 use anyhow::Result;
@@ -109,14 +109,9 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
     };
     let options = Options { dropout, precision: global.precision.precision(), ..Default::default() };
     let size = [input.shape.width, input.shape.height];
-    let network = match Network::tuned(
-        &gpu.device,
-        &gpu.queue,
-        weights,
-        size,
-        options,
-        super::tuned::of(&gpu.device, global.quiet),
-    ) {
+    let tuned = super::tuned::of(&gpu.device, global.quiet);
+    let setup = Setup { options, tuned, ..Setup::default() };
+    let network = match Network::new(&gpu.device, &gpu.queue, weights, size, setup) {
         Ok(network) => network,
         Err(e @ (NetError::Plan(PlanError::TooLarge { .. }) | NetError::Limit { .. })) => return slow(&e),
         Err(e) => return Err(e.into()),

@@ -51,10 +51,10 @@ pub struct Args {
     /// Write the ratios of method to method and pass to pass to this file, a base for --compare on other machines.
     #[arg(long, value_name = "F")]
     ratios: Option<PathBuf>,
-    /// A record written earlier, on this device, to compare with; or ratios, on a device of that kind.
+    /// A record written earlier, on this device, to compare with; or ratios, on a device of that kind. Takes --fail-over, too.
     #[arg(long, value_name = "BASE", requires = "fail_over")]
     compare: Option<PathBuf>,
-    /// How much slower than the base is still allowed, such as 5%. (Ratios state what they vary by, and are allowed that at least.)
+    /// With --compare: how much slower than the base is still allowed, such as 5%; above it the exit code is 6. (Ratios state what they vary by, and are allowed that at least.)
     #[arg(long, value_parser = parse_percent, value_name = "P%")]
     fail_over: Option<f64>,
 }

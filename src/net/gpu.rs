@@ -70,6 +70,23 @@ impl Default for Options {
     }
 }
 
+/// What a network is built with.
+#[derive(Clone, Default)]
+pub struct Setup {
+    /// How it runs.
+    pub options: Options,
+    /// What a tuner has found on this device.
+    pub tuned: Arc<Tuned>,
+    /// Compiled kernels that other networks of this device use too.
+    pub pipelines: Pipelines,
+}
+
+impl From<Options> for Setup {
+    fn from(options: Options) -> Self {
+        Self { options, ..Self::default() }
+    }
+}
+
 /// One tensor on the GPU: NHWC f32, channels padded to a multiple of four.
 #[derive(Debug, Clone, Copy)]
 pub struct Binding<'a> {
@@ -102,6 +119,7 @@ pub struct Network {
 
 impl Network {
     /// Builds pipelines, uploads weights, allocates the arena for an input of `size` (width, height).
+    /// `setup`: [`Options`] alone, or a whole [`Setup`].
     ///
     /// # Errors
     /// [`NetError`] when the graph does not take the size, or the device grants too little.
@@ -110,51 +128,9 @@ impl Network {
         queue: &wgpu::Queue,
         weights: &Weights,
         size: [u32; 2],
+        setup: impl Into<Setup>,
     ) -> Result<Self, NetError> {
-        Self::with_options(device, queue, weights, size, Options::default())
-    }
-
-    /// As [`Network::new`], told how.
-    ///
-    /// # Errors
-    /// As [`Network::new`].
-    pub fn with_options(
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        weights: &Weights,
-        size: [u32; 2],
-        options: Options,
-    ) -> Result<Self, NetError> {
-        Self::tuned(device, queue, weights, size, options, Arc::default())
-    }
-
-    /// As [`Network::with_options`], with what a tuner has found on this device.
-    ///
-    /// # Errors
-    /// As [`Network::new`].
-    pub fn tuned(
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        weights: &Weights,
-        size: [u32; 2],
-        options: Options,
-        tuned: Arc<Tuned>,
-    ) -> Result<Self, NetError> {
-        Self::sharing((device, queue), weights, size, options, tuned, Pipelines::default())
-    }
-
-    /// As [`Network::tuned`], with compiled kernels that other networks of this device use too.
-    ///
-    /// # Errors
-    /// As [`Network::new`].
-    pub fn sharing(
-        (device, queue): (&wgpu::Device, &wgpu::Queue),
-        weights: &Weights,
-        size: [u32; 2],
-        options: Options,
-        tuned: Arc<Tuned>,
-        pipelines: Pipelines,
-    ) -> Result<Self, NetError> {
+        let Setup { options, tuned, pipelines } = setup.into();
         let plan = build::plan(device, &weights.graph, size, options)?;
         let choice = Choice { variant: options.variant, tuned: &tuned, facts: Facts::of(device) };
         let kernels: Vec<Kernel> = plan.steps.iter().map(|s| Kernel::choose(&plan, s, &choice)).collect();
@@ -181,7 +157,7 @@ impl Network {
         size: [u32; 2],
     ) -> Result<Self, NetError> {
         let Self { options, pipelines, tuned, .. } = self;
-        Self::sharing((device, queue), weights, size, options, tuned, pipelines)
+        Self::new(device, queue, weights, size, Setup { options, tuned, pipelines })
     }
 
     /// The same network with what a tuner has found in the meantime. Pipelines that serve again are kept.
@@ -195,7 +171,7 @@ impl Network {
         tuned: Arc<Tuned>,
     ) -> Result<Self, NetError> {
         let Self { options, pipelines, plan, .. } = self;
-        Self::sharing((device, queue), weights, [plan.width, plan.height], options, tuned, pipelines)
+        Self::new(device, queue, weights, [plan.width, plan.height], Setup { options, tuned, pipelines })
     }
 
     /// Replaces the trained numbers from the queue's next submission on. Allocates nothing on the GPU.

@@ -6,7 +6,7 @@
 use super::format::Weights;
 use super::gpu::layer::Layer;
 use super::gpu::permutation::MAX_PARTS;
-use super::gpu::{Facts, NetError, Network, Options, Permutation, Pipelines, Tuned};
+use super::gpu::{Facts, NetError, Network, Options, Permutation, Pipelines, Setup, Tuned};
 use crate::gpu::timing::Recorder;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -152,7 +152,8 @@ pub fn tune(
     // What both rivals share is compiled once.
     let pipelines = Pipelines::default();
     let build = |tuned: &Tuned| {
-        Network::sharing((device, queue), weights, size, options, Arc::new(tuned.clone()), pipelines.clone())
+        let (tuned, pipelines) = (Arc::new(tuned.clone()), pipelines.clone());
+        Network::new(device, queue, weights, size, Setup { options, tuned, pipelines })
     };
     let mut champion = build(&known)?;
     // Steps of one shape share what is found.

@@ -9,11 +9,10 @@ use bouncelight::net::arch;
 use bouncelight::net::convert::{Arch, Norm};
 use bouncelight::net::cpu::{self, Tensor};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{NetError, Network, Options, Permutation, Pipelines, Source, Variant};
+use bouncelight::net::gpu::{NetError, Network, Options, Permutation, Pipelines, Setup, Source, Variant};
 use bouncelight::net::graph::{Graph, Shape};
 use bouncelight::net::plan::Precision;
 use serde_json::{Value, json};
-use std::sync::Arc;
 
 fn graph(input_channels: u32, ops: Value) -> Graph {
     hashed::graphs(&json!({"g": {"input_channels": input_channels, "ops": ops}})).remove("g").unwrap()
@@ -78,7 +77,7 @@ fn any_size_is_padded_inside() {
         }
         let Some(gpu) = &gpu else { continue };
         let next = match network.take() {
-            None => Network::new(&gpu.device, &gpu.queue, &weights, size),
+            None => Network::new(&gpu.device, &gpu.queue, &weights, size, Options::default()),
             Some(last) => last.rebuilt(&gpu.device, &gpu.queue, &weights, size),
         };
         let e = error(&run_network(gpu, network.insert(next.unwrap()), &input).data, &found.data);
@@ -91,7 +90,7 @@ fn several_networks_live_at_once() {
     let Some(gpu) = common::gpu() else { return };
     let weights = hashed::network(&unet());
     let inputs = [[8, 8], [4, 12]].map(|size| hashed::input("x", 5, size));
-    let networks = [[8, 8], [4, 12]].map(|size| Network::new(&gpu.device, &gpu.queue, &weights, size).unwrap());
+    let networks = [[8, 8], [4, 12]].map(|size| Network::new(&gpu.device, &gpu.queue, &weights, size, Options::default()).unwrap());
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     for (network, input) in networks.iter().zip(&inputs) {
         let place = network.input();
@@ -125,7 +124,7 @@ fn a_thousand_changes_leak_nothing() {
     bytes[last] ^= 0x80;
     let other = Weights::from_bytes(&bytes).unwrap();
     let sizes = [[16, 8], [3, 5], [40, 30], [1, 1]];
-    let mut network = Network::new(&gpu.device, &gpu.queue, &weights, sizes[0]).unwrap();
+    let mut network = Network::new(&gpu.device, &gpu.queue, &weights, sizes[0], Options::default()).unwrap();
     let mut after_a_round = None;
     for change in 0..1000usize {
         // Alternately other weights in place, and another size with the first weights.
@@ -180,7 +179,7 @@ fn dropout_drops_the_same_values_everywhere() {
         assert!(cpu::run(&weights, &input).unwrap().data.iter().all(|v| *v != 0.0), "off by default");
         let Some(gpu) = &gpu else { continue };
         let options = Options { dropout: Some(8), ..Options::default() };
-        let mut network = Network::with_options(&gpu.device, &gpu.queue, &weights, [61, 47], options).unwrap();
+        let mut network = Network::new(&gpu.device, &gpu.queue, &weights, [61, 47], options).unwrap();
         assert!(error(&run_network(gpu, &network, &input).data, &other.data) <= TOLERANCE);
         network.set_seed(&gpu.queue, 7);
         let found = run_network(gpu, &network, &input);
@@ -198,7 +197,7 @@ fn dropout_drops_the_same_values_everywhere() {
 #[test]
 fn wide_layers_agree_with_the_cpu_twin() {
     let Some(gpu) = common::gpu() else { return };
-    let (handles, pipelines) = ((&gpu.device, &gpu.queue), Pipelines::default());
+    let pipelines = Pipelines::default();
     let norm = |c: u32| json!([{"op": "group_norm", "name": "y", "input": "input", "output": "y", "channels": c, "groups": 2}]);
     let joined = |c: u32| json!([conv("a", "input", c, c, 1, 1), {"op": "concat", "name": "j", "inputs": ["a", "input"], "output": "j"}, up("u", "j", 2 * c, 8)]);
     let cases = [
@@ -230,7 +229,7 @@ fn wide_layers_agree_with_the_cpu_twin() {
             Options { variant: staged(2, 4, true), ..half },
         ] {
             let network =
-                Network::sharing(handles, &weights, size, options, Arc::default(), pipelines.clone()).unwrap();
+                Network::new(&gpu.device, &gpu.queue, &weights, size, Setup { options, pipelines: pipelines.clone(), ..Setup::default() }).unwrap();
             let e = error(&run_network(&gpu, &network, &input).data, &by_cpu.data);
             let ways: Vec<_> = network.kernels().filter_map(|k| k.permutation).map(|p| p.to_string()).collect();
             println!("{name}, {}: {e:.1e}", ways.join(", "));

@@ -74,7 +74,7 @@ fn error(found: &Tensor, reference: &Tensor) -> f32 {
 
 fn run_gpu(gpu: &Gpu, weights: &Weights, input: &Tensor, options: Options) -> Tensor {
     let size = [input.shape.width, input.shape.height];
-    run_network(gpu, &Network::with_options(&gpu.device, &gpu.queue, weights, size, options).unwrap(), input)
+    run_network(gpu, &Network::new(&gpu.device, &gpu.queue, weights, size, options).unwrap(), input)
 }
 
 fn run_network(gpu: &Gpu, network: &Network, input: &Tensor) -> Tensor {
@@ -163,7 +163,7 @@ fn a_perturbed_weight_is_noticed() {
 fn recording_twice_gives_the_same_and_labels_name_the_layers() {
     let Some(gpu) = common::gpu() else { return };
     let weights = Weights::load(&fixture("unet.safetensors")).unwrap();
-    let network = Network::new(&gpu.device, &gpu.queue, &weights, [37, 21]).unwrap();
+    let network = Network::new(&gpu.device, &gpu.queue, &weights, [37, 21], Options::default()).unwrap();
     let (input, _) = cases("unet").into_iter().find(|c| c.0.shape.width == 37).unwrap();
     let mut results = Vec::new();
     for _ in 0..2 {

@@ -7,11 +7,10 @@ use crate::{common, fixed, run_gpu, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::cpu::{self, Tensor};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Source, Variant};
+use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Setup, Source, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::Precision;
 use serde_json::{Value, json};
-use std::sync::Arc;
 
 fn graph(input_channels: u32, ops: Value) -> Graph {
     hashed::graphs(&json!({"g": {"input_channels": input_channels, "ops": ops}})).remove("g").unwrap()
@@ -33,8 +32,7 @@ fn up(i: u32, o: u32, kernel: u32, stride: u32) -> Value {
 
 fn run(gpu: &Gpu, pipelines: &Pipelines, weights: &Weights, input: &Tensor, options: Options) -> (Tensor, usize) {
     let size = [input.shape.width, input.shape.height];
-    let handles = (&gpu.device, &gpu.queue);
-    let network = Network::sharing(handles, weights, size, options, Arc::default(), pipelines.clone()).unwrap();
+    let network = Network::new(&gpu.device, &gpu.queue, weights, size, Setup { options, pipelines: pipelines.clone(), ..Setup::default() }).unwrap();
     let measured = network.plan().steps.iter().filter(|s| s.moments.is_some()).count();
     (run_network(gpu, &network, input), measured)
 }

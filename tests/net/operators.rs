@@ -4,14 +4,13 @@ use crate::hashed::{self, cases, graphs};
 use crate::{common, fixed, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Source, Variant};
+use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Setup, Source, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::op::Op;
 use bouncelight::net::op_facts::KINDS;
 use bouncelight::net::plan::Precision;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 pub const TOLERANCE: f32 = 1e-4;
 pub const TOLERANCE_HALF: f32 = 5e-3;
@@ -50,8 +49,7 @@ fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usiz
             let input = hashed::input(name, graph.input_channels, case.size);
             let next = match network.take() {
                 None => {
-                    let handles = (&gpu.device, &gpu.queue);
-                    Network::sharing(handles, &weights, case.size, options, Arc::default(), pipelines.clone())
+                    Network::new(&gpu.device, &gpu.queue, &weights, case.size, Setup { options, pipelines: pipelines.clone(), ..Setup::default() })
                 }
                 Some(last) => last.rebuilt(&gpu.device, &gpu.queue, &weights, case.size),
             };
@@ -185,9 +183,8 @@ fn groups_read_their_own() {
             Variant::Plain,
         ] {
             let options = Options { variant, ..FULL };
-            let handles = (&gpu.device, &gpu.queue);
             let network =
-                Network::sharing(handles, &weights, [7, 9], options, Arc::default(), pipelines.clone()).unwrap();
+                Network::new(&gpu.device, &gpu.queue, &weights, [7, 9], Setup { options, pipelines: pipelines.clone(), ..Setup::default() }).unwrap();
             let kernel = network.kernels().find(|k| k.filter.is_some()).unwrap();
             let filter = kernel.filter.unwrap();
             let dense = variant == Variant::Plain;

@@ -14,7 +14,7 @@ fn every_layer_can_be_read_as_the_cpu_twin_computes_it() {
     let input = Tensor { shape, data: (0..shape.channels as usize * 384).map(wave).collect() };
     for (precision, tolerance) in [(Precision::F32, TOLERANCE), (Precision::F16, 2e-2)] {
         let options = Options { precision, ..Options::default() };
-        let network = Network::with_options(&gpu.device, &gpu.queue, &weights, [24, 16], options).unwrap();
+        let network = Network::new(&gpu.device, &gpu.queue, &weights, [24, 16], options).unwrap();
         let (mut seen, mut apart) = (0, 0);
         let mut before: Option<Tensor> = None;
         for (step, name) in network.taps() {

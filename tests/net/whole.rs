@@ -6,10 +6,9 @@ use crate::{common, fixed, run_network};
 use bouncelight::net::arch;
 use bouncelight::net::convert::{Arch, Norm};
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Pipelines, Source, Tuned, Variant};
+use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Pipelines, Setup, Source, Tuned, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::{self, Plan, Precision};
-use std::sync::Arc;
 
 fn generator(name: &str, width: u32) -> Graph {
     match name {
@@ -36,9 +35,8 @@ fn check_generators(ways: &[Options]) {
             let Some(gpu) = &gpu else { continue };
             for &options in ways {
                 let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
-                let handles = (&gpu.device, &gpu.queue);
                 let network =
-                    Network::sharing(handles, &weights, case.size, options, Arc::default(), pipelines.clone()).unwrap();
+                    Network::new(&gpu.device, &gpu.queue, &weights, case.size, Setup { options, pipelines: pipelines.clone(), ..Setup::default() }).unwrap();
                 let found = run_network(gpu, &network, &input);
                 let e = case.error(&found).max(hashed::error(&found.data, &by_cpu.data));
                 println!("{name} {:?}: {options:?} {e:.2e}", case.size);
@@ -72,7 +70,7 @@ fn the_papers_generator_at_full_width() {
     for case in &cases["pix2pix_group"] {
         let input = hashed::input("pix2pix_group", 12, case.size);
         for (options, tolerance) in [(Options::default(), TOLERANCE), (HALF, TOLERANCE_HALF)] {
-            let network = Network::with_options(&gpu.device, &gpu.queue, &weights, case.size, options).unwrap();
+            let network = Network::new(&gpu.device, &gpu.queue, &weights, case.size, options).unwrap();
             let start = std::time::Instant::now();
             let found = run_network(&gpu, &network, &input);
             let (e, seconds) = (case.error(&found), start.elapsed().as_secs_f64());

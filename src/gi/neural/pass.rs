@@ -25,7 +25,7 @@ use crate::gi::stage::exposure::ExposurePass;
 use crate::gi::stage::inputs::{CELL, InputGroup, cells_of};
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
-use crate::net::gpu::{self, Network, Tap, Tuned};
+use crate::net::gpu::{self, Network, Setup, Tap, Tuned};
 use std::sync::Arc;
 
 /// What the host chooses.
@@ -364,7 +364,8 @@ impl Rebuilt {
         pack::feature_bytes(device, features, size)?;
         let cells = cells_of(size);
         let Neural { weights, network, tuned } = neural;
-        let network = Network::tuned(device, queue, weights, cells, *network, tuned.clone())
+        let setup = Setup { options: *network, tuned: tuned.clone(), ..Setup::default() };
+        let network = Network::new(device, queue, weights, cells, setup)
             .map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
         let guess = guess_texture(device, if needs_guess(weights) { size } else { [1, 1] });
         let pack = PackPass::new(device, inputs, exposure, features, network.input().resource(), &guess);
