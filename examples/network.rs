@@ -1,6 +1,8 @@
-//! Runs a network again and again when told so, for `training/compare_runtimes.py` and for profiles:
-//! `network WEIGHTS WIDTHxHEIGHT IN.f32 OUT.f32 [f16]`. IN and OUT are planes of f32. On standard input a line `run` makes one run
-//! and answers with its seconds, by the clock and of processor time (Linux; else 0); `write` writes OUT and answers with its shape; `profile` tells every step's processor time.
+//! Runs a network again and again when told so, for `training/compare_runtimes.py` and for
+//! profiles: `network WEIGHTS WIDTHxHEIGHT IN.f32 OUT.f32 [f16]`. IN and OUT are planes of f32. On
+//! standard input a line `run` makes one run and answers with its seconds, by the clock and of
+//! processor time (Linux; else 0); `write` writes OUT and answers with its shape; `profile` tells
+//! every step's processor time.
 
 use bouncelight::gpu::{Gpu, GpuOptions, readback, timing::Recorder};
 use bouncelight::net::cpu::Tensor;

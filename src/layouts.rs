@@ -13,7 +13,8 @@ struct Layout {
     fields: BTreeMap<String, usize>,
 }
 
-/// A row: name in the shaders, Rust struct, fields; `a as "b"` where the shader calls field `a` `b`; `size` where Rust pads.
+/// A row: name in the shaders, Rust struct, fields; `a as "b"` where the shader calls field `a`
+/// `b`; `size` where Rust pads.
 macro_rules! row {
     ($name:literal, $rust:ty, [$($field:ident $(as $other:literal)?),+ $(,)?]) => {
         row!($name, $rust, size size_of::<$rust>(), [$($field $(as $other)?),+])
@@ -28,8 +29,9 @@ macro_rules! row {
     (@name $field:ident $other:literal) => { $other };
 }
 
-/// Structs that no Rust struct matches: shaders alone write and read the first two, the table of the third is written as a
-/// list of numbers before its materials, and the others are a few words, written where they are bound.
+/// Structs that no Rust struct matches: shaders alone write and read the first two, the table of
+/// the third is written as a list of numbers before its materials, and the others are a few words,
+/// written where they are bound.
 const WITHOUT_ROW: [&str; 6] = ["Matrix", "Partial", "MaterialStore", "ShadowCamera", "Options", "Flicker"];
 
 /// What follows the first element of an array in Rust, which shaders name one by one.
@@ -39,19 +41,36 @@ fn rows() -> Vec<(&'static str, Layout)> {
     use crate::accel::{EmitterGpu, HitGpu, RayGpu};
     use crate::gi::{exposure::Exposure, gather, inputs::Params, world::sample::Sample};
     use crate::net::{gpu::build::StepUniform, learn::tape::Job as LearnJob};
-    use crate::render::{shadow::ShadowViewGpu, taa::Blend, tonemap, view::FrameUniform};
     use crate::reference::Job;
     use crate::reference::scene::{ImageUse, RefMaterial, SceneInfo};
+    use crate::render::{shadow::ShadowViewGpu, taa::Blend, tonemap, view::FrameUniform};
     use crate::scene::upload::{LightGpu, MaterialGpu, TextureUse};
     use crate::viewer::show::ShowUniform;
     vec![
-        row!("Frame", FrameUniform, [
-            view_from_world, world_from_view, clip_from_world, clip_from_world_unjittered, previous_clip_from_world,
-            tan_half, jitter, size, near, seed, environment, light_count, picture_only,
-        ]),
-        row!("Light", LightGpu, [
-            position, kind, direction, range, color, radius, cone_scale, cone_offset, stands_in, chance,
-        ]),
+        row!(
+            "Frame",
+            FrameUniform,
+            [
+                view_from_world,
+                world_from_view,
+                clip_from_world,
+                clip_from_world_unjittered,
+                previous_clip_from_world,
+                tan_half,
+                jitter,
+                size,
+                near,
+                seed,
+                environment,
+                light_count,
+                picture_only,
+            ]
+        ),
+        row!(
+            "Light",
+            LightGpu,
+            [position, kind, direction, range, color, radius, cone_scale, cone_offset, stands_in, chance,]
+        ),
         row!("ShadowView", ShadowViewGpu, [clip_from_world, texel, range, scale, layer, size]),
         row!("TextureUse", TextureUse, [row0, row1]),
         row!("Blend", Blend, [mode, wx, wy]),
@@ -59,46 +78,175 @@ fn rows() -> Vec<(&'static str, Layout)> {
         row!("Ray", RayGpu, [origin, t_max, direction, any]),
         row!("Hit", HitGpu, [t, triangle, uv, instance, leaf]),
         row!("Emitter", EmitterGpu, [origin, threshold, edge1, other, edge2, by_area, radiance, flags]),
-        row!("Params", Params, [
-            size, cells, unproject, depth, environment, gravity_from_view, gravity_from_world, world_from_view, eye,
-            motion, flags, light_scale,
-        ]),
+        row!(
+            "Params",
+            Params,
+            [
+                size,
+                cells,
+                unproject,
+                depth,
+                environment,
+                gravity_from_view,
+                gravity_from_world,
+                world_from_view,
+                eye,
+                motion,
+                flags,
+                light_scale,
+            ]
+        ),
         row!("Exposure", Exposure, [s, inv_s, ln_m, hit_fraction, nonfinite, outgoing as "red"]),
-        row!("Gather", gather::Params, [
-            eye, frame, light_count, emitter_count, inverse_power, mask, entry_scale, round, cell_frames, entry_frames,
-            flags, cells, rays,
-        ]),
+        row!(
+            "Gather",
+            gather::Params,
+            [
+                eye,
+                frame,
+                light_count,
+                emitter_count,
+                inverse_power,
+                mask,
+                entry_scale,
+                round,
+                cell_frames,
+                entry_frames,
+                flags,
+                cells,
+                rays,
+            ]
+        ),
         row!("Sample", Sample, [depth, normal, plane, offset, mirrored, motion, color, broken]),
-        row!("Step", StepUniform, [
-            in_size, out_size, input, output, skip, second, pad, base, first_block, blocks, parts, in_channels,
-            in_vectors, in_pitch, out_channels, out_vectors, out_pitch, skip_pitch, group, stream, threshold, keep,
-            slope, epsilon, channel, tiles, moments, group_inputs,
-        ]),
-        row!("Job", LearnJob, [
-            in_size, out_size, kernel, corner, in_channels, out_channels, stride, input, other, output, weight, bias,
-            total, slope, share, rate, unbias, keep,
-        ]),
+        row!(
+            "Step",
+            StepUniform,
+            [
+                in_size,
+                out_size,
+                input,
+                output,
+                skip,
+                second,
+                pad,
+                base,
+                first_block,
+                blocks,
+                parts,
+                in_channels,
+                in_vectors,
+                in_pitch,
+                out_channels,
+                out_vectors,
+                out_pitch,
+                skip_pitch,
+                group,
+                stream,
+                threshold,
+                keep,
+                slope,
+                epsilon,
+                channel,
+                tiles,
+                moments,
+                group_inputs,
+            ]
+        ),
+        row!(
+            "Job",
+            LearnJob,
+            [
+                in_size,
+                out_size,
+                kernel,
+                corner,
+                in_channels,
+                out_channels,
+                stride,
+                input,
+                other,
+                output,
+                weight,
+                bias,
+                total,
+                slope,
+                share,
+                rate,
+                unbias,
+                keep,
+            ]
+        ),
         // The Rust struct ends with padding to the alignment of uniform offsets.
         row!("Material", MaterialGpu, size std::mem::offset_of!(MaterialGpu, tail), [
             base_color, emissive, unlit, metallic, roughness, normal_scale, occlusion_strength, alpha_cutoff, f0,
             uses as "base_use", specular_tint,
         ]),
-        row!("SceneInfo", SceneInfo, [
-            environment, flags, light_count, truth_table, truth_count, analytic_table, environment_share,
-            environment_share_alone, environment_texels, environment_table, environment_size, environment_cells,
-        ]),
-        row!("Job", Job, [
-            world_from_view, tan_half, size, first_point, point_count, film_first, first_sample, sample_count, seed,
-            half, flags, filter_width, near, clamp, bounces, diffuse_bounces, glossy_bounces, filter_glossy,
-        ]),
+        row!(
+            "SceneInfo",
+            SceneInfo,
+            [
+                environment,
+                flags,
+                light_count,
+                truth_table,
+                truth_count,
+                analytic_table,
+                environment_share,
+                environment_share_alone,
+                environment_texels,
+                environment_table,
+                environment_size,
+                environment_cells,
+            ]
+        ),
+        row!(
+            "Job",
+            Job,
+            [
+                world_from_view,
+                tan_half,
+                size,
+                first_point,
+                point_count,
+                film_first,
+                first_sample,
+                sample_count,
+                seed,
+                half,
+                flags,
+                filter_width,
+                near,
+                clamp,
+                bounces,
+                diffuse_bounces,
+                glossy_bounces,
+                filter_glossy,
+            ]
+        ),
         row!("ImageUse", ImageUse, [row0, texel, row1, bits, size]),
-        row!("RefMaterial", RefMaterial, [
-            base_color, emissive, flags, metallic, roughness, normal_scale, alpha_cutoff, specular_tint, f0, base_use,
-            rough_use, normal_use, emissive_use,
-        ]),
-        row!("Show", ShowUniform, [
-            origin, split, line, view, exposure, kind, linear_target, scale, texel, metres, full_error, low, high,
-        ]),
+        row!(
+            "RefMaterial",
+            RefMaterial,
+            [
+                base_color,
+                emissive,
+                flags,
+                metallic,
+                roughness,
+                normal_scale,
+                alpha_cutoff,
+                specular_tint,
+                f0,
+                base_use,
+                rough_use,
+                normal_use,
+                emissive_use,
+            ]
+        ),
+        row!(
+            "Show",
+            ShowUniform,
+            [origin, split, line, view, exposure, kind, linear_target, scale, texel, metres, full_error, low, high,]
+        ),
     ]
 }
 

@@ -16,7 +16,8 @@
 //! - [`gpu`]: device choice, shader sources, readback, pass timing.
 //! - [`render`]: the rasteriser, one file a pass.
 //! - [`net`]: weights file, graph, plan, the slow CPU reference and the WGSL kernels' host side.
-//! - [`gi`]: global-illumination methods, cheapest first; [`gi::World`] and [`gi::View`] are what other renderers embed.
+//! - [`gi`]: global-illumination methods, cheapest first; [`gi::World`] and [`gi::View`] are what
+//!   other renderers embed.
 //! - `reference` (feature `reference`): the path tracer that everything else is measured against.
 //! - [`metrics`]: image metrics, no wgpu.
 //! - `viewer` (feature `viewer`): the window of `bouncelight view`.

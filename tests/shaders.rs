@@ -2,7 +2,8 @@
 
 use bouncelight::gpu::shaders;
 
-/// Every permutation of every shader: (shader, its prelude of `const` lines). Shaders without numbers from outside have one.
+/// Every permutation of every shader: (shader, its prelude of `const` lines). Shaders without
+/// numbers from outside have one.
 fn permutations() -> Vec<(String, String)> {
     let gi = bouncelight::gi::example_preludes().into_iter().map(|(name, prelude)| (name.to_owned(), prelude));
     let learnt = ["learn.loss", "learn.adam"].map(|name| (name.to_owned(), bouncelight::net::learn::prelude(name)));
@@ -18,8 +19,8 @@ fn parse(name: &str, prelude: &str) -> (naga::Module, String) {
     (module, text)
 }
 
-/// Validates against WebGPU without any optional feature. (Packing halves into words belongs to WebGPU; naga counts it as a
-/// capability because some old OpenGL cannot.)
+/// Validates against WebGPU without any optional feature. (Packing halves into words belongs to
+/// WebGPU; naga counts it as a capability because some old OpenGL cannot.)
 fn validate(module: &naga::Module) -> Result<(), Box<naga::WithSpan<naga::valid::ValidationError>>> {
     validate_with(module, naga::valid::Capabilities::empty())
 }

@@ -94,7 +94,8 @@ fn bytes_round_to_nearest() {
     assert_eq!(Tonemap::None.apply_to_bytes(&[0.0, 1.0, 0.214_041_14]), [0, 255, 128]);
 }
 
-/// The scene rows are what they claim to be, so their bounds speak for the reference pictures (make.py measures all pixels).
+/// The scene rows are what they claim to be, so their bounds speak for the reference pictures
+/// (make.py measures all pixels).
 #[cfg(feature = "io")]
 #[test]
 fn scene_rows_are_pixels_of_the_references() {

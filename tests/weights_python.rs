@@ -28,7 +28,8 @@ fn run(arguments: &[&str]) -> String {
     String::from_utf8(out.stdout).expect("Python prints text")
 }
 
-/// `fixtures/bad/expected.json` lists by hand what is wrong; the package's tests hold the package against the same list.
+/// `fixtures/bad/expected.json` lists by hand what is wrong; the package's tests hold the package
+/// against the same list.
 #[test]
 fn bad_files_have_the_faults_that_are_expected() {
     let text = std::fs::read_to_string(folder("fixtures/bad/expected.json")).unwrap();
@@ -46,8 +47,8 @@ fn bad_files_have_the_faults_that_are_expected() {
     }
 }
 
-/// Both readers on hostile files. Known to differ: a half surrogate in a text of an operator, which spoils the document for
-/// the package and the operator for us; no file of this seed has one.
+/// Both readers on hostile files. Known to differ: a half surrogate in a text of an operator, which
+/// spoils the document for the package and the operator for us; no file of this seed has one.
 #[test]
 fn hostile_files_have_the_same_faults() {
     if !python() {

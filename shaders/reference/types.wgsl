@@ -100,7 +100,8 @@ const TABLE_SIDE: u32 = 32u;
 const FILTER_STEPS: u32 = 1024u;
 
 struct MaterialStore {
-    // Share of light that the single-scattering GGX lobe keeps, by n.v (fast) and roughness; then its mean by roughness.
+    // Share of light that the single-scattering GGX lobe keeps, by n.v (fast) and roughness; then
+    // its mean by roughness.
     energy: array<f32, 1024>,
     energy_mean: array<f32, 32>,
     // Inverse integral of the pixel filter, in units of its width.
@@ -110,7 +111,8 @@ struct MaterialStore {
 
 @group(0) @binding(0) var<uniform> scene: SceneInfo;
 @group(0) @binding(1) var accel_blocks: texture_2d<u32>;
-// Four vectors a triangle, then six for each triangle that has texture coordinates or colours; `surface.wgsl` reads them.
+// Four vectors a triangle, then six for each triangle that has texture coordinates or colours;
+// `surface.wgsl` reads them.
 @group(0) @binding(3) var<storage, read> triangles: array<vec4u>;
 @group(0) @binding(4) var<storage, read> materials: MaterialStore;
 @group(0) @binding(5) var<storage, read> lights: array<vec4u>;

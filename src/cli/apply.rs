@@ -123,7 +123,8 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
         let (gflop, mb) = (plan.flops() as f64 / 1e9, network.bytes() as f64 / 1e6);
         eprintln!("{} steps at {}x{}, {gflop:.1} GFLOP, {mb:.0} MB on the GPU", plan.steps.len(), size[0], size[1]);
     }
-    // Step by step, so that a large network on a slow device shows how far it is. The first use of a kernel may compile it.
+    // Step by step, so that a large network on a slow device shows how far it is. The first use of
+    // a kernel may compile it.
     let mut progress = Progress::new(global, "steps", plan.steps.len() as u64);
     for step in 0..plan.steps.len() {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());

@@ -33,8 +33,8 @@ pub struct Args {
     /// Where the picture goes: .png, .exr, or `-` for a PNG on standard output.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How indirect light is found; `reference` traces paths until the light is right. When absent: what `fit` found for the scene, else
-    /// `gather`, `neural` with --weights.
+    /// How indirect light is found; `reference` traces paths until the light is right. When absent:
+    /// what `fit` found for the scene, else `gather`, `neural` with --weights.
     #[arg(long, value_parser = MethodParser)]
     method: Option<MethodName>,
     /// Weights of `neural`; the shipped ones (`small`) when absent.
@@ -48,13 +48,15 @@ pub struct Args {
     /// Real-time anti-aliasing over this many frames before the one that is written.
     #[arg(long, conflicts_with = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     taa: Option<u32>,
-    /// Frames of a still camera up to the one that is written, for methods that settle (`gather`, `neural`): 1 is the first after a cut. 32 when absent.
+    /// Frames of a still camera up to the one that is written, for methods that settle (`gather`,
+    /// `neural`): 1 is the first after a cut. 32 when absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     gi_frames: Option<u32>,
     /// Numbers of `gather` other than its own, such as `blur=0,cell_frames=256`; `plain` forgets and blurs nothing.
     #[arg(long, value_name = "NAME=VALUE,...")]
     gather: Option<crate::gi::gather::Options>,
-    /// Light of what the picture does not show, for `ambient` and `ssgi`: shares of the sky's and of its surfaces' light.
+    /// Light of what the picture does not show, for `ambient` and `ssgi`: shares of the sky's and
+    /// of its surfaces' light.
     #[arg(long, value_name = "sky=X,bounce=Y")]
     unseen: Option<crate::gi::ambient::Unseen>,
     /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.

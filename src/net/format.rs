@@ -1,7 +1,8 @@
 //! Reader of weights files (`weights-format/README.md` is the specification): a safetensors file whose metadata key
 //! `bouncelight` holds one JSON document with inputs, output, graph and provenance.
 //!
-//! Everything is checked before memory is taken for a tensor, and all faults are reported at once. No input makes it panic.
+//! Everything is checked before memory is taken for a tensor, and all faults are reported at once.
+//! No input makes it panic.
 
 use super::document::{self, Document};
 pub use super::document::{Feature, Output, Provenance, Table};

@@ -145,7 +145,8 @@ impl Network {
         Ok(network)
     }
 
-    /// The same network for another size and other weights, whose graph may be another. Pipelines that serve again are kept.
+    /// The same network for another size and other weights, whose graph may be another. Pipelines
+    /// that serve again are kept.
     ///
     /// # Errors
     /// As [`Network::new`]; then the old network is gone.

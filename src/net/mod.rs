@@ -1,6 +1,7 @@
 //! Networks, from file to GPU.
 //!
-//! - [`mod@format`]: the weights file: a safetensors file whose metadata holds the graph. `weights-format/` specifies it.
+//! - [`mod@format`]: the weights file: a safetensors file whose metadata holds the graph.
+//!   `weights-format/` specifies it.
 //! - [`convert`]: published generators' state dicts to weights files.
 //! - [`graph`] and [`op`]: topology, shape inference, parameter and FLOP counts.
 //! - [`pictures`]: four pictures as a network's input, and its output as a picture.

@@ -89,7 +89,8 @@ fn wanted(graph: &Graph) -> BTreeMap<String, Wanted> {
     graph.ops.iter().flat_map(of).collect()
 }
 
-/// Holds the file's tensors against what the graph needs: names, shapes, types, scales, values. Allocates nothing for the values.
+/// Holds the file's tensors against what the graph needs: names, shapes, types, scales, values.
+/// Allocates nothing for the values.
 pub(super) fn check(header: &Header<'_>, graph: &Graph, problems: &mut Vec<Problem>) {
     let wanted = wanted(graph);
     // A tensor whose place was wrong has been reported already and is not missing as well.

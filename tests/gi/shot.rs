@@ -1,7 +1,7 @@
 //! Hand-made pictures for the tests of `gi/`: G-buffers as CPU arrays, traced or random, and their upload.
 
-use bouncelight::gi::inputs::{Params, cells_of};
 use bouncelight::gi::cpu::{GBuffer, Picture, oct_encode};
+use bouncelight::gi::inputs::{Params, cells_of};
 use bouncelight::gi::{CameraMatrices, Inputs};
 use glam::{Mat4, Vec3};
 use half::f16;

@@ -1,5 +1,5 @@
-//! What `gather` makes of surroundings other than walls under lamps: pictures of the sky, holes cut by alpha, surfaces that
-//! shine.
+//! What `gather` makes of surroundings other than walls under lamps: pictures of the sky, holes cut
+//! by alpha, surfaces that shine.
 
 use crate::common;
 use crate::world::{Block, GREY, difference, gather, hall, light, mean, renderer, scene};
@@ -37,7 +37,8 @@ fn a_picture_of_the_sky_shines_from_where_it_is_bright() {
         [0, 2].map(|c| light.iter().skip(c).step_by(3).copied().collect::<Vec<_>>())
     };
     let [red, blue] = lit(1.0, 1.0);
-    // Negative control: the floor hides what is below, so hardly any of its blue arrives (the picture's rows blend at the horizon).
+    // Negative control: the floor hides what is below, so hardly any of its blue arrives (the
+    // picture's rows blend at the horizon).
     assert!(mean(&red) > 0.1 && mean(&blue) < 0.02 * mean(&red), "{}, {}", mean(&red), mean(&blue));
     assert!(mean(&lit(0.0, 1.0)[0]) == 0.0);
     let even: Vec<f32> = light(&gpu, &mut renderer, &hall(GREY, &[], 1.0, 1.0)).into_iter().step_by(3).collect();

@@ -1,4 +1,5 @@
-//! Networks in use: any size, several at once, other weights and sizes between frames, dropout, and norms of awkward numbers.
+//! Networks in use: any size, several at once, other weights and sizes between frames, dropout, and
+//! norms of awkward numbers.
 
 use crate::hashed::{self, error};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
@@ -90,7 +91,8 @@ fn several_networks_live_at_once() {
     let Some(gpu) = common::gpu() else { return };
     let weights = hashed::network(&unet());
     let inputs = [[8, 8], [4, 12]].map(|size| hashed::input("x", 5, size));
-    let networks = [[8, 8], [4, 12]].map(|size| Network::new(&gpu.device, &gpu.queue, &weights, size, Options::default()).unwrap());
+    let networks = [[8, 8], [4, 12]]
+        .map(|size| Network::new(&gpu.device, &gpu.queue, &weights, size, Options::default()).unwrap());
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     for (network, input) in networks.iter().zip(&inputs) {
         let place = network.input();
@@ -137,7 +139,8 @@ fn a_thousand_changes_leak_nothing() {
         network.record(&mut Recorder::new(&mut encoder));
         gpu.queue.submit([encoder.finish()]);
         if change % 40 == 39 {
-            // The allocator's own books wobble by some tens of bytes; a forgotten buffer of 256 bytes a change would not.
+            // The allocator's own books wobble by some tens of bytes; a forgotten buffer of 256
+            // bytes a change would not.
             let now = held(&gpu).unwrap_or(0);
             let first = *after_a_round.get_or_insert(now);
             assert!(now.abs_diff(first) < 4096, "{now} bytes after {} changes, {first} after 40", change + 1);
@@ -193,13 +196,20 @@ fn dropout_drops_the_same_values_everywhere() {
     }
 }
 
-/// Layers as wide as the paper's, whose weights fit no uniform binding: as chosen here, staged, and with their sums in parts.
+/// Layers as wide as the paper's, whose weights fit no uniform binding: as chosen here, staged, and
+/// with their sums in parts.
 #[test]
 fn wide_layers_agree_with_the_cpu_twin() {
     let Some(gpu) = common::gpu() else { return };
     let pipelines = Pipelines::default();
-    let norm = |c: u32| json!([{"op": "group_norm", "name": "y", "input": "input", "output": "y", "channels": c, "groups": 2}]);
-    let joined = |c: u32| json!([conv("a", "input", c, c, 1, 1), {"op": "concat", "name": "j", "inputs": ["a", "input"], "output": "j"}, up("u", "j", 2 * c, 8)]);
+    let norm = |c: u32| {
+        json!([{"op": "group_norm", "name": "y", "input": "input", "output": "y", "channels": c,
+        "groups": 2}])
+    };
+    let joined = |c: u32| {
+        json!([conv("a", "input", c, c, 1, 1),
+        {"op": "concat", "name": "j", "inputs": ["a", "input"], "output": "j"}, up("u", "j", 2 * c, 8)])
+    };
     let cases = [
         ("conv", 512, json!([conv("c", "input", 512, 64, 4, 2)]), [8, 4]),
         ("conv odd", 516, json!([conv("c", "input", 516, 20, 4, 2)]), [6, 6]),
@@ -228,8 +238,14 @@ fn wide_layers_agree_with_the_cpu_twin() {
             Options { variant: staged(1, 7, false), ..half },
             Options { variant: staged(2, 4, true), ..half },
         ] {
-            let network =
-                Network::new(&gpu.device, &gpu.queue, &weights, size, Setup { options, pipelines: pipelines.clone(), ..Setup::default() }).unwrap();
+            let network = Network::new(
+                &gpu.device,
+                &gpu.queue,
+                &weights,
+                size,
+                Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
+            )
+            .unwrap();
             let e = error(&run_network(&gpu, &network, &input).data, &by_cpu.data);
             let ways: Vec<_> = network.kernels().filter_map(|k| k.permutation).map(|p| p.to_string()).collect();
             println!("{name}, {}: {e:.1e}", ways.join(", "));

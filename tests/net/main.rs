@@ -1,5 +1,5 @@
-//! Conformance of networks: PyTorch's fixtures ↔ the CPU reference ↔ the WGSL kernels, per operator and whole, at odd sizes
-//! and with padded channels. Relative error is max |Δ| / max |reference|.
+//! Conformance of networks: PyTorch's fixtures ↔ the CPU reference ↔ the WGSL kernels, per operator
+//! and whole, at odd sizes and with padded channels. Relative error is max |Δ| / max |reference|.
 
 #[path = "../common/mod.rs"]
 mod common;

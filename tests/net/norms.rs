@@ -1,5 +1,5 @@
-//! Norms that measure the picture: what a convolution measures in passing against a step of its own, against the CPU reference, and with means
-//! far from zero.
+//! Norms that measure the picture: what a convolution measures in passing against a step of its
+//! own, against the CPU reference, and with means far from zero.
 
 use crate::hashed::{self, error};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
@@ -32,13 +32,20 @@ fn up(i: u32, o: u32, kernel: u32, stride: u32) -> Value {
 
 fn run(gpu: &Gpu, pipelines: &Pipelines, weights: &Weights, input: &Tensor, options: Options) -> (Tensor, usize) {
     let size = [input.shape.width, input.shape.height];
-    let network = Network::new(&gpu.device, &gpu.queue, weights, size, Setup { options, pipelines: pipelines.clone(), ..Setup::default() }).unwrap();
+    let network = Network::new(
+        &gpu.device,
+        &gpu.queue,
+        weights,
+        size,
+        Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
+    )
+    .unwrap();
     let measured = network.plan().steps.iter().filter(|s| s.moments.is_some()).count();
     (run_network(gpu, &network, input), measured)
 }
 
-/// In every family of kernels, in parts and whole, with channels that pad, groups that begin within a vector, phases, and pictures
-/// that no workgroup fills.
+/// In every family of kernels, in parts and whole, with channels that pad, groups that begin within
+/// a vector, phases, and pictures that no workgroup fills.
 #[test]
 fn what_a_convolution_measures_is_what_a_step_of_its_own_does() {
     let Some(gpu) = common::gpu() else { return };
@@ -107,7 +114,8 @@ fn far(groups: u32, conv: Value) -> Weights {
     Weights::from_bytes(&bytes).unwrap()
 }
 
-/// Where a sum of squares in f32 has lost the variance: measured by a step of its own, by a convolution, and by the sum of its parts.
+/// Where a sum of squares in f32 has lost the variance: measured by a step of its own, by a
+/// convolution, and by the sum of its parts.
 #[test]
 fn norms_of_large_means_are_sound() {
     let mut input = hashed::input("x", 6, [83, 59]);
@@ -138,7 +146,8 @@ fn norms_of_large_means_are_sound() {
             println!("{groups} groups after a convolution, {variant:?}: {e:.1e}");
             assert!(measured == 1 && e <= 2e-3, "{groups} groups, {variant:?}: {e}");
         }
-        // Negative control: the same values without the 4000 are normed to something else by no more than rounding, other weights are not.
+        // Negative control: the same values without the 4000 are normed to something else by no
+        // more than rounding, other weights are not.
         let plain = hashed::network(&graph(6, json!([conv(6, 6, 1, 1), norm("c", 6, groups)])));
         assert!(error(&cpu::run(&plain, &near).unwrap().data, &by_cpu.data) > 0.1);
     }
@@ -151,7 +160,8 @@ fn what_is_measured_once_serves_two_norms() {
     let ops = json!([
         conv(6, 12, 3, 1),
         {"op": "dropout", "name": "d", "input": "c", "output": "d", "p": 0.3},
-        {"op": "group_norm", "name": "n", "input": "d", "output": "n", "channels": 12, "groups": 3, "activation": "relu"},
+        {"op": "group_norm", "name": "n", "input": "d", "output": "n", "channels": 12, "groups": 3,
+            "activation": "relu"},
         {"op": "instance_norm", "name": "m", "input": "d", "output": "m", "channels": 12},
         {"op": "concat", "name": "y", "inputs": ["n", "d", "m"], "output": "y"},
     ]);

@@ -6,7 +6,9 @@ use crate::{common, fixed, run_network};
 use bouncelight::net::arch;
 use bouncelight::net::convert::{Arch, Norm};
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Pipelines, Setup, Source, Tuned, Variant};
+use bouncelight::net::gpu::{
+    Choice, Facts, Kernel, Network, Options, Permutation, Pipelines, Setup, Source, Tuned, Variant,
+};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::{self, Plan, Precision};
 
@@ -35,8 +37,14 @@ fn check_generators(ways: &[Options]) {
             let Some(gpu) = &gpu else { continue };
             for &options in ways {
                 let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
-                let network =
-                    Network::new(&gpu.device, &gpu.queue, &weights, case.size, Setup { options, pipelines: pipelines.clone(), ..Setup::default() }).unwrap();
+                let network = Network::new(
+                    &gpu.device,
+                    &gpu.queue,
+                    &weights,
+                    case.size,
+                    Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
+                )
+                .unwrap();
                 let found = run_network(gpu, &network, &input);
                 let e = case.error(&found).max(hashed::error(&found.data, &by_cpu.data));
                 println!("{name} {:?}: {options:?} {e:.2e}", case.size);
@@ -57,7 +65,8 @@ fn the_generators_agree_with_pytorch() {
     check_generators(&[full, HALF, Options { fuse: false, ..full }, Options { fuse: false, ..HALF }]);
 }
 
-/// Needs what `make_operators.py --full` has written, named by `BOUNCELIGHT_FULL`. Times and errors are in docs/network.md.
+/// Needs what `make_operators.py --full` has written, named by `BOUNCELIGHT_FULL`. Times and errors
+/// are in docs/network.md.
 #[test]
 #[ignore = "218 MB of weights and 26 GFLOP"]
 fn the_papers_generator_at_full_width() {
@@ -96,8 +105,9 @@ fn another_norm_is_noticed() {
     assert!(case.error(&cpu::run(&other, &input).unwrap()) > 100.0 * TOLERANCE_HALF);
 }
 
-/// On a GPU every convolution of the paper's generator, down to 4×2 pixels, has a permutation of at least 128 workgroups in one
-/// dispatch, and its parts of sums, written and read, move less than it moves anyhow.
+/// On a GPU every convolution of the paper's generator, down to 4×2 pixels, has a permutation of at
+/// least 128 workgroups in one dispatch, and its parts of sums, written and read, move less than it
+/// moves anyhow.
 #[test]
 fn small_pictures_can_fill_a_gpu() {
     let plan = Plan::new(&generator("pix2pix_group", 64), 1024, 512).unwrap();
@@ -133,7 +143,8 @@ fn small_pictures_can_fill_a_gpu() {
 /// Weights of all phases of a transposed convolution that are more than one binding holds go into several dispatches.
 #[test]
 fn weights_are_bound_in_pieces_that_fit() {
-    let up = serde_json::json!({"op": "conv_transpose2d", "name": "u", "input": "input", "output": "y", "in_channels": 2048,
+    let up = serde_json::json!({"op": "conv_transpose2d", "name": "u", "input": "input", "output": "y",
+        "in_channels": 2048,
         "out_channels": 1024, "kernel": [4, 4], "stride": 2, "padding": 1});
     let graph = hashed::graphs(&serde_json::json!({"g": {"input_channels": 2048, "ops": [up]}})).remove("g").unwrap();
     let plan = Plan::new(&graph, 4, 2).unwrap();
@@ -177,7 +188,8 @@ fn the_papers_generator_counted_by_hand() {
     let plan = Plan::new(&graph, 1024, 512).unwrap();
     let of = |word: &str| plan.rows().iter().filter(|r| r.kind.contains(word)).map(|r| r.flops).sum::<u64>();
     assert_eq!(of("conv") + of("transposed"), down + up + last);
-    // No tensor is copied to be joined or enlarged, and none read again to be measured: 16 convolutions and 13 norms of two steps each.
+    // No tensor is copied to be joined or enlarged, and none read again to be measured: 16
+    // convolutions and 13 norms of two steps each.
     assert_eq!(plan.steps.len(), 16 + 13 * 2);
     // Everything lives in one binding of WebGPU's default size, and in half of it in 16 bits.
     let half = plan::Options { precision: Precision::F16, ..plan::Options::default() };

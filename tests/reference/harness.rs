@@ -1,6 +1,6 @@
-//! Runs the path tracer's kernel at given points of a picture and keeps both halves of what comes back. It has a host of
-//! its own, a page long, because it wants what no picture needs: each half by itself, and the pixel filter around
-//! chosen points.
+//! Runs the path tracer's kernel at given points of a picture and keeps both halves of what comes
+//! back. It has a host of its own, a page long, because it wants what no picture needs: each half
+//! by itself, and the pixel filter around chosen points.
 
 use crate::stats::Mean;
 use bouncelight::gpu::{Gpu, readback, shaders};

@@ -25,12 +25,13 @@ fn length(base64: &Value) -> usize {
     text.len() / 4 * 3 - text.bytes().filter(|b| *b == b'=').count()
 }
 
-/// A strip of 70 vertices, positions and triangles compressed. Buffers 0 and 1 have the packed bytes, 2 and 3 stand for the
-/// unpacked ones.
+/// A strip of 70 vertices, positions and triangles compressed. Buffers 0 and 1 have the packed
+/// bytes, 2 and 3 stand for the unpacked ones.
 fn strip(extension: &str, version: &str) -> Value {
     let cases = [case(version), case("strip of 4 bytes")];
     let view = |i: usize| {
-        let packed = json!({"buffer": i, "byteLength": length(&cases[i]["packed"]), "byteStride": cases[i]["byteStride"],
+        let packed = json!({"buffer": i, "byteLength": length(&cases[i]["packed"]),
+            "byteStride": cases[i]["byteStride"],
             "count": cases[i]["count"], "mode": cases[i]["mode"], "filter": cases[i]["filter"]});
         json!({"buffer": i + 2, "byteLength": length(&cases[i]["unpacked"]), "extensions": {extension: packed}})
     };

@@ -1,7 +1,7 @@
 //! `cargo xtask demo | test | gpu-report | ci`: set-up and checks; no product code.
 //!
-//! Every command first makes sure of a wgpu adapter: it asks `bouncelight doctor`, and on Debian or Ubuntu without any adapter
-//! it installs Mesa's CPU driver, saying so before it does.
+//! Every command first makes sure of a wgpu adapter: it asks `bouncelight doctor`, and on Debian or
+//! Ubuntu without any adapter it installs Mesa's CPU driver, saying so before it does.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::{Command, ExitCode};

@@ -1,5 +1,5 @@
-//! A method that needs rays, and the method below it, which draws where there are none: while trees are built, in a scene or on a
-//! device that is too large or too small for them.
+//! A method that needs rays, and the method below it, which draws where there are none: while trees
+//! are built, in a scene or on a device that is too large or too small for them.
 
 use crate::gi::interface::technique::{Cost, Instead, Technique};
 use crate::gi::interface::{GiError, Inputs};

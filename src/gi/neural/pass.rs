@@ -10,8 +10,9 @@
 //!  rays ──► gather ─► guess ──┴───┴──────────────────────────►┘
 //! ```
 //!
-//! Weights whose answer is a gain on the first guess ([`Answer::Gain`]) have method `gather` run before them, need the scene's
-//! triangles as it does, and settle over frames as it does; weights that answer light itself need the G-buffer alone.
+//! Weights whose answer is a gain on the first guess ([`Answer::Gain`]) have method `gather` run
+//! before them, need the scene's triangles as it does, and settle over frames as it does; weights
+//! that answer light itself need the G-buffer alone.
 //!
 //! What the method cannot do: see [`crate::gi`].
 
@@ -84,8 +85,8 @@ struct Rebuilt {
 }
 
 impl NeuralGi {
-    /// Features that would be used where the adapter has them: timestamps, by hosts that time passes, and what some of the network's
-    /// kernels use. None is needed.
+    /// Features that would be used where the adapter has them: timestamps, by hosts that time
+    /// passes, and what some of the network's kernels use. None is needed.
     pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
         adapter.features() & crate::gpu::wanted_features()
     }
@@ -187,9 +188,9 @@ impl NeuralGi {
         Ok(())
     }
 
-    /// What the network is given for `inputs`, read back; they must be those of the last recording where the weights use the
-    /// first guess. Makes its own buffers, submits and waits: for tools, not for frames. [`pack::read_features`] does the
-    /// same without weights.
+    /// What the network is given for `inputs`, read back; they must be those of the last recording
+    /// where the weights use the first guess. Makes its own buffers, submits and waits: for tools,
+    /// not for frames. [`pack::read_features`] does the same without weights.
     ///
     /// # Errors
     /// [`GiError`] when the inputs do not fit or reading back fails.
@@ -202,8 +203,9 @@ impl NeuralGi {
         self.rebuilt.network.taps().into_iter().map(|(_, name)| name).collect()
     }
 
-    /// What a layer of the network makes of `inputs`, which must be those of the last recording; `None` if there is no such
-    /// layer. Runs the network as far as that layer, submits and waits: for tools, not for frames.
+    /// What a layer of the network makes of `inputs`, which must be those of the last recording;
+    /// `None` if there is no such layer. Runs the network as far as that layer, submits and waits:
+    /// for tools, not for frames.
     ///
     /// # Errors
     /// [`GiError`] when the inputs do not fit or reading back fails.

@@ -76,7 +76,8 @@ pub fn unseen_prelude(sky: f32, bounce: f32) -> String {
     format!("const SKY = f32({sky:?});\nconst BOUNCE = f32({bounce:?});\n")
 }
 
-/// The method: exposure, occlusion and one write a pixel (`gi.exposure`, `gi.occlusion`, `gi.occlusion_full`, `gi.ambient`).
+/// The method: exposure, occlusion and one write a pixel (`gi.exposure`, `gi.occlusion`,
+/// `gi.occlusion_full`, `gi.ambient`).
 pub struct AmbientGi {
     device: wgpu::Device,
     inputs: InputGroup,

@@ -44,7 +44,8 @@ impl OcclusionPass {
         }
     }
 
-    /// Makes textures for pictures of `size` pixels; true when they are new and groups that bind them must be made anew.
+    /// Makes textures for pictures of `size` pixels; true when they are new and groups that bind
+    /// them must be made anew.
     pub fn fit(&mut self, size: [u32; 2]) -> bool {
         let fresh = self.visibility.fit(&self.device, size) | self.half.fit(&self.device, half_of(size));
         if fresh {

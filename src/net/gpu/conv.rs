@@ -1,7 +1,8 @@
 //! How a convolution runs: as taps, phases and blocks of output channels, in one of several permutations. Pure.
 //!
-//! A transposed convolution of stride s, and a convolution of a picture enlarged s times, are s² ordinary ones of the picture itself, each
-//! of which makes every s-th output pixel in both directions: its phase. All phases go into one dispatch wherever their weights do.
+//! A transposed convolution of stride s, and a convolution of a picture enlarged s times, are s²
+//! ordinary ones of the picture itself, each of which makes every s-th output pixel in both
+//! directions: its phase. All phases go into one dispatch wherever their weights do.
 
 use super::super::graph::Padding;
 use super::super::plan::{Kind, Plan, Precision, Step};
@@ -57,7 +58,8 @@ impl Kernel {
         let blocks = out.vectors().div_ceil(self.vectors);
         let all = blocks * filter.spread * filter.spread;
         let uniform = self.bound == Bound::Uniform;
-        // As many blocks a dispatch as a binding of weights, and its workgroups in z, allow; staged kernels need all at once.
+        // As many blocks a dispatch as a binding of weights, and its workgroups in z, allow; staged
+        // kernels need all at once.
         let bound = match self.bound {
             Bound::Uniform => layer.uniform_blocks(vectors),
             Bound::Storage | Bound::Half if !staged => layer.storage_blocks(self.vectors),
@@ -126,7 +128,8 @@ impl Kernel {
             return format!("conv_staged{arithmetic}{cut}");
         }
         let [wide, high] = if self.winograd > 0 { [4, 4] } else { [2, 4] };
-        // A processor needs no more threads than its vectors are wide, and smaller groups share small pictures out better.
+        // A processor needs no more threads than its vectors are wide, and smaller groups share
+        // small pictures out better.
         let threads = if choice.facts.software { THREADS / 4 } else { THREADS };
         prelude.add("THREADS", threads);
         self.groups = in_rows((columns.div_ceil(wide) * rows.div_ceil(high)).div_ceil(threads));
@@ -181,8 +184,9 @@ fn channels_of_a_group(kind: Kind, input: Shape, out: Shape) -> [u32; 2] {
     [input, out].map(|s| (s.channels / groups).max(1))
 }
 
-/// Vectors that an output reads, and how many output vectors read the same. Groups of whole vectors read their own. Where groups begin
-/// within vectors each output vector reads those that its groups touch; if these are more than half of all, every one reads all.
+/// Vectors that an output reads, and how many output vectors read the same. Groups of whole vectors
+/// read their own. Where groups begin within vectors each output vector reads those that its groups
+/// touch; if these are more than half of all, every one reads all.
 fn read_of(input: Shape, out: Shape, groups: u32) -> [u32; 2] {
     let all = [input, out].map(Shape::vectors);
     let [inputs, outputs] = [input, out].map(|s| s.channels / groups);
@@ -199,8 +203,9 @@ fn read_of(input: Shape, out: Shape, groups: u32) -> [u32; 2] {
     }
 }
 
-/// Along one edge of a kernel after enlarging `n` times: the taps that meet the same pixel are added up, so 4×4 after ×2 has 25 taps in
-/// four phases instead of 64. How many the largest phase has.
+/// Along one edge of a kernel after enlarging `n` times: the taps that meet the same pixel are
+/// added up, so 4×4 after ×2 has 25 taps in four phases instead of 64. How many the largest phase
+/// has.
 fn merged(edge: u32, pad: i32, n: i32) -> u32 {
     let of = |phase: i32| (phase + edge as i32 - 1 - pad).div_euclid(n) - (phase - pad).div_euclid(n) + 1;
     (0..n).map(of).max().unwrap_or(1) as u32

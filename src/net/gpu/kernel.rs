@@ -84,7 +84,8 @@ pub struct Kernel {
     pub layer: Option<Layer>,
     /// For convolutions of an enlarged input whose taps are merged: the factor and the padding before.
     pub enlarged: Option<(u32, [i32; 2])>,
-    /// Weights of 3×3 taps come transformed for Winograd's F(n, 3) along rows, 3×(n + 2) matrices: n, or 0 where they do not.
+    /// Weights of 3×3 taps come transformed for Winograd's F(n, 3) along rows, 3×(n + 2) matrices:
+    /// n, or 0 where they do not.
     pub winograd: u32,
     /// For blocked convolutions.
     pub permutation: Option<Permutation>,
@@ -109,7 +110,8 @@ impl Kernel {
         [self.groups[0], self.groups[1], part.depth]
     }
 
-    /// Tiles of the moments that it writes or reads: of a convolution that measures what it makes one a workgroup and vector of channels.
+    /// Tiles of the moments that it writes or reads: of a convolution that measures what it makes
+    /// one a workgroup and vector of channels.
     pub fn tiles(&self) -> u32 {
         self.numbers.tiles
     }
