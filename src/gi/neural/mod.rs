@@ -4,4 +4,6 @@ pub mod cpu;
 pub mod features;
 pub mod pack;
 pub mod pass;
+mod rebuilt;
 pub mod reconstruct;
+mod trained;
