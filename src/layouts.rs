@@ -13,13 +13,12 @@ struct Layout {
     fields: BTreeMap<String, usize>,
 }
 
-/// A row: name in the shaders, Rust struct, fields; `a as "b"` where the shader calls field `a`
-/// `b`; `size` where Rust pads.
+/// A row: name in the shaders, Rust struct, fields; `a as "b"` where the shader calls field `a` `b`; `size` where Rust pads.
 macro_rules! row {
-    ($name:literal, $rust:ty, [$($field:ident $(as $other:literal)?),+ $(,)?]) => {
-        row!($name, $rust, size size_of::<$rust>(), [$($field $(as $other)?),+])
+    ($name:literal, $rust:ty => $($field:ident $(as $other:literal)?),+ $(,)?) => {
+        row!($name, $rust, size size_of::<$rust>() => $($field $(as $other)?),+)
     };
-    ($name:literal, $rust:ty, size $size:expr, [$($field:ident $(as $other:literal)?),+ $(,)?]) => {
+    ($name:literal, $rust:ty, size $size:expr => $($field:ident $(as $other:literal)?),+ $(,)?) => {
         ($name, Layout {
             size: $size,
             fields: [$((row!(@name $field $($other)?).to_owned(), std::mem::offset_of!($rust, $field))),+].into(),
@@ -29,9 +28,8 @@ macro_rules! row {
     (@name $field:ident $other:literal) => { $other };
 }
 
-/// Structs that no Rust struct matches: shaders alone write and read the first two, the table of
-/// the third is written as a list of numbers before its materials, and the others are a few words,
-/// written where they are bound.
+/// Structs that no Rust struct matches: shaders alone write and read the first two, the table of the third is written as a
+/// list of numbers before its materials, and the others are a few words, written where they are bound.
 const WITHOUT_ROW: [&str; 6] = ["Matrix", "Partial", "MaterialStore", "ShadowCamera", "Options", "Flicker"];
 
 /// What follows the first element of an array in Rust, which shaders name one by one.
@@ -47,205 +45,59 @@ fn rows() -> Vec<(&'static str, Layout)> {
     use crate::scene::upload::{LightGpu, MaterialGpu, TextureUse};
     use crate::viewer::show::ShowUniform;
     vec![
-        row!(
-            "Frame",
-            FrameUniform,
-            [
-                view_from_world,
-                world_from_view,
-                clip_from_world,
-                clip_from_world_unjittered,
-                previous_clip_from_world,
-                tan_half,
-                jitter,
-                size,
-                near,
-                seed,
-                environment,
-                light_count,
-                picture_only,
-            ]
+        row!("Frame", FrameUniform =>
+            view_from_world, world_from_view, clip_from_world, clip_from_world_unjittered, previous_clip_from_world,
+            tan_half, jitter, size, near, seed, environment, light_count, picture_only,
         ),
-        row!(
-            "Light",
-            LightGpu,
-            [position, kind, direction, range, color, radius, cone_scale, cone_offset, stands_in, chance,]
+        row!("Light", LightGpu =>
+            position, kind, direction, range, color, radius, cone_scale, cone_offset, stands_in, chance,
         ),
-        row!("ShadowView", ShadowViewGpu, [clip_from_world, texel, range, scale, layer, size]),
-        row!("TextureUse", TextureUse, [row0, row1]),
-        row!("Blend", Blend, [mode, wx, wy]),
-        row!("Tonemap", tonemap::Uniform, [exposure, kind, linear_target]),
-        row!("Ray", RayGpu, [origin, t_max, direction, any]),
-        row!("Hit", HitGpu, [t, triangle, uv, instance, leaf]),
-        row!("Emitter", EmitterGpu, [origin, threshold, edge1, other, edge2, by_area, radiance, flags]),
-        row!(
-            "Params",
-            Params,
-            [
-                size,
-                cells,
-                unproject,
-                depth,
-                environment,
-                gravity_from_view,
-                gravity_from_world,
-                world_from_view,
-                eye,
-                motion,
-                flags,
-                light_scale,
-            ]
+        row!("ShadowView", ShadowViewGpu => clip_from_world, texel, range, scale, layer, size),
+        row!("TextureUse", TextureUse => row0, row1),
+        row!("Blend", Blend => mode, wx, wy),
+        row!("Tonemap", tonemap::Uniform => exposure, kind, linear_target),
+        row!("Ray", RayGpu => origin, t_max, direction, any),
+        row!("Hit", HitGpu => t, triangle, uv, instance, leaf),
+        row!("Emitter", EmitterGpu => origin, threshold, edge1, other, edge2, by_area, radiance, flags),
+        row!("Params", Params =>
+            size, cells, unproject, depth, environment, gravity_from_view, gravity_from_world, world_from_view, eye,
+            motion, flags, light_scale,
         ),
-        row!("Exposure", Exposure, [s, inv_s, ln_m, hit_fraction, nonfinite, outgoing as "red"]),
-        row!(
-            "Gather",
-            gather::Params,
-            [
-                eye,
-                frame,
-                light_count,
-                emitter_count,
-                inverse_power,
-                mask,
-                entry_scale,
-                round,
-                cell_frames,
-                entry_frames,
-                flags,
-                cells,
-                rays,
-            ]
+        row!("Exposure", Exposure => s, inv_s, ln_m, hit_fraction, nonfinite, outgoing as "red"),
+        row!("Gather", gather::Params =>
+            eye, frame, light_count, emitter_count, inverse_power, mask, entry_scale, round, cell_frames, entry_frames,
+            flags, cells, rays,
         ),
-        row!("Sample", Sample, [depth, normal, plane, offset, mirrored, motion, color, broken]),
-        row!(
-            "Step",
-            StepUniform,
-            [
-                in_size,
-                out_size,
-                input,
-                output,
-                skip,
-                second,
-                pad,
-                base,
-                first_block,
-                blocks,
-                parts,
-                in_channels,
-                in_vectors,
-                in_pitch,
-                out_channels,
-                out_vectors,
-                out_pitch,
-                skip_pitch,
-                group,
-                stream,
-                threshold,
-                keep,
-                slope,
-                epsilon,
-                channel,
-                tiles,
-                moments,
-                group_inputs,
-            ]
+        row!("Sample", Sample => depth, normal, plane, offset, mirrored, motion, color, broken),
+        row!("Step", StepUniform =>
+            in_size, out_size, input, output, skip, second, pad, base, first_block, blocks, parts, in_channels,
+            in_vectors, in_pitch, out_channels, out_vectors, out_pitch, skip_pitch, group, stream, threshold, keep,
+            slope, epsilon, channel, tiles, moments, group_inputs,
         ),
-        row!(
-            "Job",
-            LearnJob,
-            [
-                in_size,
-                out_size,
-                kernel,
-                corner,
-                in_channels,
-                out_channels,
-                stride,
-                input,
-                other,
-                output,
-                weight,
-                bias,
-                total,
-                slope,
-                share,
-                rate,
-                unbias,
-                keep,
-            ]
+        row!("Job", LearnJob =>
+            in_size, out_size, kernel, corner, in_channels, out_channels, stride, input, other, output, weight, bias,
+            total, slope, share, rate, unbias, keep,
         ),
         // The Rust struct ends with padding to the alignment of uniform offsets.
-        row!("Material", MaterialGpu, size std::mem::offset_of!(MaterialGpu, tail), [
+        row!("Material", MaterialGpu, size std::mem::offset_of!(MaterialGpu, tail) =>
             base_color, emissive, unlit, metallic, roughness, normal_scale, occlusion_strength, alpha_cutoff, f0,
             uses as "base_use", specular_tint,
-        ]),
-        row!(
-            "SceneInfo",
-            SceneInfo,
-            [
-                environment,
-                flags,
-                light_count,
-                truth_table,
-                truth_count,
-                analytic_table,
-                environment_share,
-                environment_share_alone,
-                environment_texels,
-                environment_table,
-                environment_size,
-                environment_cells,
-            ]
         ),
-        row!(
-            "Job",
-            Job,
-            [
-                world_from_view,
-                tan_half,
-                size,
-                first_point,
-                point_count,
-                film_first,
-                first_sample,
-                sample_count,
-                seed,
-                half,
-                flags,
-                filter_width,
-                near,
-                clamp,
-                bounces,
-                diffuse_bounces,
-                glossy_bounces,
-                filter_glossy,
-            ]
+        row!("SceneInfo", SceneInfo =>
+            environment, flags, light_count, truth_table, truth_count, analytic_table, environment_share,
+            environment_share_alone, environment_texels, environment_table, environment_size, environment_cells,
         ),
-        row!("ImageUse", ImageUse, [row0, texel, row1, bits, size]),
-        row!(
-            "RefMaterial",
-            RefMaterial,
-            [
-                base_color,
-                emissive,
-                flags,
-                metallic,
-                roughness,
-                normal_scale,
-                alpha_cutoff,
-                specular_tint,
-                f0,
-                base_use,
-                rough_use,
-                normal_use,
-                emissive_use,
-            ]
+        row!("Job", Job =>
+            world_from_view, tan_half, size, first_point, point_count, film_first, first_sample, sample_count, seed,
+            half, flags, filter_width, near, clamp, bounces, diffuse_bounces, glossy_bounces, filter_glossy,
         ),
-        row!(
-            "Show",
-            ShowUniform,
-            [origin, split, line, view, exposure, kind, linear_target, scale, texel, metres, full_error, low, high,]
+        row!("ImageUse", ImageUse => row0, texel, row1, bits, size),
+        row!("RefMaterial", RefMaterial =>
+            base_color, emissive, flags, metallic, roughness, normal_scale, alpha_cutoff, specular_tint, f0, base_use,
+            rough_use, normal_use, emissive_use,
+        ),
+        row!("Show", ShowUniform =>
+            origin, split, line, view, exposure, kind, linear_target, scale, texel, metres, full_error, low, high,
         ),
     ]
 }
