@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
-const USAGE: &str = "usage: gpu_report [--out FOLDER] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] [--triangles N,...] [--commit HASH] [--no-pytorch]";
+const USAGE: &str = "usage: gpu_report [--out FOLDER] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] \
+    [--triangles N,...] [--commit HASH] [--no-pytorch]";
 
 /// Scenes that need no file: the usual room, a box with one lamp, a closed interior.
 const SCENES: &str = "paper-room:2,interior,cornell";

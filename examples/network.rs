@@ -1,6 +1,8 @@
-//! Runs a network again and again when told so, for `training/compare_runtimes.py` and for profiles:
-//! `network WEIGHTS WIDTHxHEIGHT IN.f32 OUT.f32 [f16]`. IN and OUT are planes of f32. On standard input a line `run` makes one run
-//! and answers with its seconds, by the clock and of processor time (Linux; else 0); `write` writes OUT and answers with its shape; `profile` tells every step's processor time.
+//! Runs a network again and again when told so, for `training/compare_runtimes.py` and for
+//! profiles: `network WEIGHTS WIDTHxHEIGHT IN.f32 OUT.f32 [f16]`. IN and OUT are planes of f32. On
+//! standard input a line `run` makes one run and answers with its seconds, by the clock and of
+//! processor time (Linux; else 0); `write` writes OUT and answers with its shape; `profile` tells
+//! every step's processor time.
 
 use bouncelight::gpu::{Gpu, GpuOptions, readback, timing::Recorder};
 use bouncelight::net::cpu::Tensor;
@@ -24,7 +26,7 @@ fn main() -> Result<(), Failure> {
     let gpu = Gpu::open(&GpuOptions::default())?;
     let precision = if rest.iter().any(|a| a == "f16") { Precision::F16 } else { Precision::F32 };
     let options = Options { precision, ..Options::default() };
-    let network = Network::with_options(&gpu.device, &gpu.queue, &weights, size, options)?;
+    let network = Network::new(&gpu.device, &gpu.queue, &weights, size, options)?;
     let data: Vec<f32> = bytemuck::pod_collect_to_vec(&std::fs::read(from)?);
     let input = Tensor { shape: network.plan().tensors[0].shape, data };
     if input.data.len() as u64 != input.shape.pixels() * u64::from(input.shape.channels) {

@@ -1,10 +1,12 @@
-//! Speed of rays: primary, shadow and diffuse ones through the rooms of the paper, and their cost against the number of triangles.
+//! Speed of rays: primary, shadow and diffuse ones through the rooms of the paper, and their cost
+//! against the number of triangles.
 //!
 //!     cargo run --release --example rays -- [--repeat N] [--csv F.csv] [--svg F.svg]
 //!     cargo run --release --example rays -- --traffic SCENE,SCENE,…      # what a frame's rays read of each scene's trees
 //!
-//! Rays are read from and hits written to buffers, which counts; the row `nothing` says how much that is. On a CPU driver
-//! the time is that of the processor, not the clock on the wall, so that other work on the machine does not count.
+//! Rays are read from and hits written to buffers, which counts; the row `nothing` says how much
+//! that is. On a CPU driver the time is that of the processor, not the clock on the wall, so that
+//! other work on the machine does not count.
 
 use bouncelight::accel::RayCaster;
 use bouncelight::gpu::{Gpu, GpuOptions};
@@ -26,7 +28,8 @@ fn chart(rows: &[Row], adapter: &str) -> String {
     let x = |triangles: f64| left + (triangles.log10() - 2.85) / 3.25 * (width - left - 110.0);
     let y = |ns: f64| bottom - ns / most * (bottom - top);
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"13\">\n\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
+        font-size=\"13\">\n\
          <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
          <text x=\"{left}\" y=\"20\" font-size=\"15\">Cost of a ray against the number of triangles</text>\n\
          <text x=\"{left}\" y=\"37\" fill=\"#666\">27 spheres in a box; dashed: a + b · log(triangles), fitted. {adapter}</text>\n"
@@ -35,7 +38,8 @@ fn chart(rows: &[Row], adapter: &str) -> String {
         let at = x(10f64.powi(decade));
         let _ = writeln!(
             svg,
-            "<path d=\"M{at:.1} {top}V{bottom}\" stroke=\"#ddd\"/><text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">10{}</text>",
+            "<path d=\"M{at:.1} {top}V{bottom}\" stroke=\"#ddd\"/><text x=\"{at:.1}\" y=\"{}\" \
+            text-anchor=\"middle\">10{}</text>",
             bottom + 20.0,
             ['³', '⁴', '⁵', '⁶'][decade as usize - 3]
         );
@@ -46,7 +50,8 @@ fn chart(rows: &[Row], adapter: &str) -> String {
         let at = y(tick);
         let _ = writeln!(
             svg,
-            "<path d=\"M{left} {at:.1}H{}\" stroke=\"#ddd\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{tick:.0}</text>",
+            "<path d=\"M{left} {at:.1}H{}\" stroke=\"#ddd\"/><text x=\"{}\" y=\"{:.1}\" \
+            text-anchor=\"end\">{tick:.0}</text>",
             width - 110.0,
             left - 6.0,
             at + 4.0
@@ -123,12 +128,13 @@ fn traffic(names: &str) -> Result<(), Box<dyn std::error::Error>> {
         let camera = scene.cameras.first().ok_or_else(|| format!("{name} has no camera"))?;
         let t = traffic::count(&scene, camera, [1024, 512])?;
         let [nearest, light, entry] = t.read;
-        // 170 operations a block, as `Rung::costs` counts them.
+        // 170 operations a block, as `Technique::costs` counts them.
         let flops = t.asked / 64.0 * 170.0 * t.waiting / GTX_1050.flops;
         let ms = |bytes: f64| 1e3 * flops.max(bytes / GTX_1050.bandwidth) / EFFICIENCY;
         let [size, asked, fetched, missed] = [64.0 * t.blocks as f64, t.asked, t.fetched, t.missed].map(|b| b / 1e6);
         println!(
-            "| {name} | {size:.1} | {} | {nearest:.1}, {light:.1}, {entry:.1} | {asked:.0} | {fetched:.0} | {missed:.1} \
+            "| {name} | {size:.1} | {} | {nearest:.1}, {light:.1}, {entry:.1} | {asked:.0} | {fetched:.0} | \
+            {missed:.1} \
              | {:.2} | {:.2} | {:.2} |",
             t.looks,
             t.waiting,

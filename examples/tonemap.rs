@@ -1,4 +1,5 @@
-//! An EXR's picture through a view transform, as PNG: `cargo run --example tonemap -- in.exr out.png [filmic|agx|neutral|none]`.
+//! An EXR's picture through a view transform, as PNG: `cargo run --example tonemap -- in.exr
+//! out.png [filmic|agx|neutral|none]`.
 //!
 //! The same curve as `bouncelight render`, for pictures from elsewhere, such as a path tracer's reference.
 

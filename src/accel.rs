@@ -1,10 +1,13 @@
-//! Triangles in trees, for rays: built on the CPU, traversed in `shaders/accel/traverse.wgsl`. [`Accel`] is one tree over triangles
-//! of the world, as the path tracer has it; [`SceneRays`] has a tree for each mesh and one over instances, which may move.
+//! Triangles in trees, for rays: built on the CPU, traversed in `shaders/accel/traverse.wgsl`.
+//! [`Accel`] is one tree over triangles of the world, as the path tracer has it; [`SceneRays`] has
+//! a tree for each mesh and one over instances, which may move.
 //!
-//! An eight-wide tree with quantised child boxes, after Ylitie, Karras and Laine ("Efficient Incoherent Ray Traversal on
-//! GPUs Through Compressed Wide BVHs", HPG 2017), collapsed from a binary one by obvhs (PLOC and reinsertion). Nodes and
-//! leaves are blocks of 64 bytes in one texture; a leaf is a pair of triangles that share an edge. How fast it is stands in
-//! `docs/performance.md`, what was tried in `docs/log/2026-11-rays.md`. [`Accel::closest`] is the same walk on the CPU.
+//! An eight-wide tree with quantised child boxes, after Ylitie, Karras and Laine ("Efficient
+//! Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017), collapsed from a
+//! binary one by obvhs (PLOC and reinsertion). Nodes and leaves are blocks of 64 bytes in one
+//! texture; a leaf is a pair of triangles that share an edge. How fast it is stands in
+//! `docs/performance.md`, what was tried in `docs/log/2026-11-rays.md`. [`Accel::closest`] is the
+//! same walk on the CPU.
 
 pub(crate) mod alias;
 mod build;
@@ -40,8 +43,8 @@ pub const MAX_COORDINATE: f32 = 1e12;
 /// Levels that a tree of triangles has at most.
 pub const STACK_SIZE: usize = 24;
 
-/// Levels that a tree of instances has at most, where it can be helped. With those of a mesh's tree they are `STACK_SIZE` in `traverse.wgsl`, the entries of
-/// the traversal's stack.
+/// Levels that a tree of instances has at most, where it can be helped. With those of a mesh's tree
+/// they are `STACK_SIZE` in `traverse.wgsl`, the entries of the traversal's stack.
 pub const TOP_LEVELS: usize = 8;
 
 /// Why there is no acceleration structure.
@@ -49,7 +52,8 @@ pub const TOP_LEVELS: usize = 8;
 pub enum AccelError {
     /// More triangles than can be built within reasonable memory.
     #[error(
-        "the scene has {triangles} triangles, but rays take {MAX_TRIANGLES} at most; use fewer instances or simpler meshes"
+        "the scene has {triangles} triangles, but rays take {MAX_TRIANGLES} at most; use fewer instances or \
+        simpler meshes"
     )]
     TooManyTriangles {
         /// Triangles of the scene.
@@ -57,7 +61,8 @@ pub enum AccelError {
     },
     /// The device's textures are too small.
     #[error(
-        "the scene's rays need {blocks} blocks of 64 bytes, but this device's textures hold {limit} (its largest side is {side}); use a simpler scene"
+        "the scene's rays need {blocks} blocks of 64 bytes, but this device's textures hold {limit} (its \
+        largest side is {side}); use a simpler scene"
     )]
     TooLarge {
         /// Blocks that are needed.
@@ -69,7 +74,8 @@ pub enum AccelError {
     },
     /// The device's bindings are too small.
     #[error(
-        "what rays know of {triangles} triangles needs {bytes} bytes, but this device binds {limit} at once; use a simpler scene"
+        "what rays know of {triangles} triangles needs {bytes} bytes, but this device binds {limit} at once; \
+        use a simpler scene"
     )]
     Binding {
         /// Triangles of all meshes.
@@ -109,10 +115,11 @@ impl Accel {
         if triangles > MAX_TRIANGLES { Err(AccelError::TooManyTriangles { triangles }) } else { Ok(()) }
     }
 
-    /// Builds the structure over `triangles` (three corners each, world space, metres). Hits name triangles by their index here.
+    /// Builds the structure over `triangles` (three corners each, world space, metres). Hits name
+    /// triangles by their index here.
     ///
-    /// Triangles that no ray can hit are left out and counted: `dropped_not_finite`, `dropped_degenerate`. An empty scene
-    /// is one that nothing hits.
+    /// Triangles that no ray can hit are left out and counted: `dropped_not_finite`,
+    /// `dropped_degenerate`. An empty scene is one that nothing hits.
     pub fn build(triangles: &[[[f32; 3]; 3]]) -> Result<Self, AccelError> {
         Self::check_count(triangles.len() as u64)?;
         Ok(build::build(triangles))

@@ -15,8 +15,9 @@
 //! - [`accel`]: triangles in trees, on the CPU and the GPU, and what rays hit of them.
 //! - [`gpu`]: device choice, shader sources, readback, pass timing.
 //! - [`render`]: the rasteriser, one file a pass.
-//! - [`net`]: weights file, graph, plan, the slow CPU twin and the WGSL kernels' host side.
-//! - [`gi`]: global-illumination methods, cheapest first; [`gi::World`] and [`gi::View`] are what other renderers embed.
+//! - [`net`]: weights file, graph, plan, the slow CPU reference and the WGSL kernels' host side.
+//! - [`gi`]: global-illumination methods, cheapest first; [`gi::World`] and [`gi::View`] are what
+//!   other renderers embed.
 //! - `reference` (feature `reference`): the path tracer that everything else is measured against.
 //! - [`metrics`]: image metrics, no wgpu.
 //! - `viewer` (feature `viewer`): the window of `bouncelight view`.
@@ -29,6 +30,9 @@ pub mod gi;
 pub mod gpu;
 #[cfg(feature = "io")]
 pub mod image_io;
+// With all shaders there are, the viewer's included.
+#[cfg(all(test, feature = "viewer"))]
+mod layouts;
 pub mod metrics;
 pub mod net;
 #[cfg(feature = "reference")]

@@ -1,6 +1,8 @@
 //! `bouncelight chart` from the command line: a small chart, taken up again, with a scene that fails.
 #![cfg(feature = "cli")]
 
+mod common;
+
 use assert_cmd::Command;
 use std::path::Path;
 
@@ -34,6 +36,9 @@ fn json(out: &Path) -> serde_json::Value {
 
 #[test]
 fn a_small_chart_is_made_and_taken_up_again() {
+    if common::gpu().is_none() {
+        return;
+    }
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");
     let page = folder.path().join("results.md");
@@ -88,6 +93,9 @@ fn a_small_chart_is_made_and_taken_up_again() {
 
 #[test]
 fn what_cannot_be_is_refused_before_the_work() {
+    if common::gpu().is_none() {
+        return;
+    }
     let folder = tempfile::tempdir().expect("a folder");
     let empty = folder.path().join("empty");
     std::fs::create_dir(&empty).expect("a folder");

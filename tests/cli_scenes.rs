@@ -1,4 +1,5 @@
-//! Scenes as the command line meets them: what they may name, scenes of nothing, surroundings that replace default light.
+//! Scenes as the command line meets them: what they may name, scenes of nothing, surroundings that
+//! replace default light.
 
 #[path = "common/program.rs"]
 mod program;

@@ -234,8 +234,8 @@ fn many_lights_and_wrong_scenes() {
     assert!(matches!(upload(&s), Some(UploadError::Mesh { .. })));
 }
 
-/// What is closed looks the same with both sides drawn as with one: no inner face wins at a silhouette. From inside it is seen;
-/// what is open shows its inner faces.
+/// What is closed looks the same with both sides drawn as with one: no inner face wins at a
+/// silhouette. From inside it is seen; what is open shows its inner faces.
 #[test]
 fn inner_faces_of_closed_bodies_are_seen_from_inside_only() {
     let Some(gpu) = common::gpu() else { return };

@@ -1,5 +1,6 @@
-//! Frame after frame takes no more memory: neither we nor the driver keep anything of a frame that is over. Drivers may, and
-//! one did: it compiled a shader anew for each draw and kept them all. A process of its own, since all of it is measured.
+//! Frame after frame takes no more memory: neither we nor the driver keep anything of a frame that
+//! is over. Drivers may, and one did: it compiled a shader anew for each draw and kept them all. A
+//! process of its own, since all of it is measured.
 #![cfg(target_os = "linux")]
 
 mod common;

@@ -83,8 +83,8 @@ mod against_scikit_image {
         assert_eq!(checked, 32);
     }
 
-    /// Negative control: one level in one channel of one pixel moves every number away from the expected one, and so does
-    /// forgetting the stretch or the paper's data range.
+    /// Negative control: one level in one channel of one pixel moves every number away from the
+    /// expected one, and so does forgetting the stretch or the paper's data range.
     #[test]
     fn numbers_would_notice() {
         let pair = &expected()[0];

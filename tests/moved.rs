@@ -1,4 +1,5 @@
-//! Motion vectors of objects: what moves points to where it was, what stays points nowhere, whoever looks and however often.
+//! Motion vectors of objects: what moves points to where it was, what stays points nowhere, whoever
+//! looks and however often.
 
 #[path = "common/build.rs"]
 mod build;
@@ -72,8 +73,8 @@ fn draw(gpu: &Gpu, renderer: &mut Renderer, scene: &SceneGpu, view: View) -> Fie
 }
 
 impl Fields {
-    /// Largest error of motion on each instance of `now`, pixels, if the frame before showed `before`. Every instance and
-    /// the sky must be seen.
+    /// Largest error of motion on each instance of `now`, pixels, if the frame before showed
+    /// `before`. Every instance and the sky must be seen.
     fn errors(&self, now: &Scene, before: &Scene) -> Vec<f32> {
         let matrix = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m);
         let (current, previous) =

@@ -249,9 +249,10 @@ fn random_graph(choices: &[(u8, u8, u8)], [width, height]: [u32; 2]) -> Graph {
             (6 | 7, _, Some(other)) => {
                 Op::Concat(Concat { name: name.clone(), inputs: vec![from, other.0], output: name.clone() })
             }
-            (8, ..) => json(
-                serde_json::json!({"op": "group_norm", "channels": channels, "groups": if even { 2 } else { 1 }, "activation": activation}),
-            ),
+            (8, ..) => {
+                json(serde_json::json!({"op": "group_norm", "channels": channels, "groups": if even { 2 } else { 1 },
+                    "activation": activation}))
+            }
             (9, ..) => json(serde_json::json!({"op": "batch_norm", "channels": channels})),
             (10, ..) => json(serde_json::json!({"op": "activation", "activation": activation})),
             (11, ..) => json(serde_json::json!({"op": "dropout", "p": 0.5})),
@@ -259,9 +260,10 @@ fn random_graph(choices: &[(u8, u8, u8)], [width, height]: [u32; 2]) -> Graph {
                 json(serde_json::json!({"op": "upsample_nearest", "scale": 2}))
             }
             (13, ..) => json(serde_json::json!({"op": "pad", "padding": [1, 0, b % 3, 2]})),
-            (14, ..) if shape.width.max(shape.height) < 100 => json(
-                serde_json::json!({"op": "conv_transpose2d", "in_channels": channels, "out_channels": 8, "kernel": [4, 4], "stride": 2, "padding": 1, "bias": false}),
-            ),
+            (14, ..) if shape.width.max(shape.height) < 100 => {
+                json(serde_json::json!({"op": "conv_transpose2d", "in_channels": channels, "out_channels": 8,
+                    "kernel": [4, 4], "stride": 2, "padding": 1, "bias": false}))
+            }
             (15, ..) if channels % 4 == 0 => json(serde_json::json!({"op": "pixel_shuffle", "factor": 2})),
             _ => conv(&name, &from, &name, [channels, 5], 1, 1),
         };
@@ -310,7 +312,8 @@ fn norms_are_measured_where_their_input_is_made() {
 #[test]
 fn moments_of_every_kernel_fit() {
     let conv = |kernel: u32, stride: u32, groups: u32| {
-        serde_json::json!({"op": "conv2d", "name": "c", "input": "n", "output": "c", "in_channels": 8, "out_channels": 20,
+        serde_json::json!({"op": "conv2d", "name": "c", "input": "n", "output": "c", "in_channels": 8,
+            "out_channels": 20,
             "kernel": [kernel, kernel], "stride": stride, "padding": kernel / 2, "groups": groups})
     };
     let up = |kernel: u32, stride: u32| {
@@ -325,7 +328,8 @@ fn moments_of_every_kernel_fit() {
             let kind = fields.as_object_mut().unwrap().remove("op").unwrap();
             Op::parse(kind.as_str().unwrap(), fields).unwrap().unwrap()
         };
-        let enlarge = serde_json::json!({"op": "upsample_nearest", "name": "n", "input": "input", "output": "n", "scale": nearest});
+        let enlarge = serde_json::json!({"op": "upsample_nearest", "name": "n", "input": "input", "output": "n",
+            "scale": nearest});
         let norm = serde_json::json!({"op": "instance_norm", "name": "y", "input": "c", "output": "y", "channels": 20});
         let graph = graph(8, [enlarge, layer, norm].map(parse).to_vec());
         for [width, height] in sizes {
@@ -377,7 +381,8 @@ proptest! {
         prop_assert_eq!(plan.flops(), graph.flops(w, h).unwrap());
         let output = &plan.tensors[plan.output];
         prop_assert!(output.full && output.root == plan.output);
-        let whole = *graph.shapes(w, h).unwrap().iter().zip(&graph.ops).find(|(_, op)| op.output() == graph.output).unwrap().0;
+        let whole = *graph.shapes(w, h).unwrap().iter().zip(&graph.ops).find(|(_,
+            op)| op.output() == graph.output).unwrap().0;
         let kept = [Graph::cropped(whole.width, width, w), Graph::cropped(whole.height, height, h)];
         prop_assert_eq!([output.shape.width, output.shape.height], kept);
         prop_assert_eq!(output.shape.channels, whole.channels);

@@ -21,7 +21,7 @@ fn compact_network_at_256x128() {
     let variants = [Variant::Plain, Variant::Fixed(Permutation::new(Source::Uniform, false, 2)), Variant::Auto];
     let networks = variants.map(|v| {
         let options = Options { variant: v, ..Options::default() };
-        Network::with_options(&gpu.device, &gpu.queue, &weights, [256, 128], options).unwrap()
+        Network::new(&gpu.device, &gpu.queue, &weights, [256, 128], options).unwrap()
     });
     let mut best = [f64::INFINITY; 3];
     for _ in 0..10 {
@@ -38,7 +38,7 @@ fn compact_network_at_256x128() {
     let input = cpu::Tensor::zeros(plan.tensors[0].shape);
     let start = Instant::now();
     cpu::run(&weights, &input).unwrap();
-    println!("CPU twin: {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
+    println!("CPU reference: {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
     println!(
         "{:.1} MFLOP, arena {} bytes, traffic {} bytes",
         plan.flops() as f64 / 1e6,

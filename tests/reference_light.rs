@@ -13,7 +13,8 @@ use bouncelight::scene::{AlphaMode, Environment, Material, Scene};
 use build::*;
 use trace::*;
 
-/// Diffuse and glossy surfaces under all kinds of light with size: a wide sun, a point, a spot, two glowing quads, a sky.
+/// Diffuse and glossy surfaces under all kinds of light with size: a wide sun, a point, a spot, two
+/// glowing quads, a sky.
 fn everything_shines() -> Scene {
     let lights = vec![
         sun([0.3, -1.0, -0.2], 1.0, 0.6),

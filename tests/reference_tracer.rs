@@ -1,5 +1,5 @@
-//! The path tracer's host, told by a kernel whose every sample is known: nothing is lost, doubled or mixed up, however the
-//! work is cut.
+//! The path tracer's host, told by a kernel whose every sample is known: nothing is lost, doubled
+//! or mixed up, however the work is cut.
 
 mod common;
 

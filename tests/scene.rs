@@ -1,6 +1,8 @@
 //! Scenes: the paper's stream, glTF and OBJ with everything that can be wrong in them, bundled scenes, round trips.
 #![cfg(feature = "io")]
 
+mod common;
+
 #[path = "scene/bad_input.rs"]
 mod bad_input;
 #[path = "scene/bundled.rs"]

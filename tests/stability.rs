@@ -1,4 +1,5 @@
-//! `bouncelight stability`: tests that the truth passes and its spoilt twin fails, verdicts, record, page, pictures, exit codes.
+//! `bouncelight stability`: tests that the truth passes and its spoilt twin fails, verdicts,
+//! record, page, pictures, exit codes.
 #![cfg(feature = "cli")]
 
 mod common;

@@ -94,7 +94,8 @@ fn bytes_round_to_nearest() {
     assert_eq!(Tonemap::None.apply_to_bytes(&[0.0, 1.0, 0.214_041_14]), [0, 255, 128]);
 }
 
-/// The scene rows are what they claim to be, so their bounds speak for the reference pictures (make.py measures all pixels).
+/// The scene rows are what they claim to be, so their bounds speak for the reference pictures
+/// (make.py measures all pixels).
 #[cfg(feature = "io")]
 #[test]
 fn scene_rows_are_pixels_of_the_references() {
@@ -110,7 +111,7 @@ fn scene_rows_are_pixels_of_the_references() {
     assert_eq!(rows[SCENE_ROWS..].iter().filter(|r| of_scene(r)).count(), 0);
 }
 
-const TWIN: &str = "
+const WRAPPER: &str = "
 @group(0) @binding(0) var<storage, read> light: array<vec4f>;
 @group(0) @binding(1) var<storage, read_write> shown: array<vec4f>;
 @compute @workgroup_size(64)
@@ -128,7 +129,7 @@ fn shader_and_cpu_form_agree() {
     for view in Tonemap::ALL {
         light.extend(samples().iter().map(|r| [r[0], r[1], r[2], view.kind() as f32]));
     }
-    let source = [include_str!("../shaders/lib/tonemap.wgsl"), TWIN].concat();
+    let source = [include_str!("../shaders/lib/tonemap.wgsl"), WRAPPER].concat();
     let shown = run(&gpu, &source, &light);
     let mut worst = [0.0f32; 4];
     for (input, out) in light.iter().zip(&shown) {
@@ -165,11 +166,11 @@ fn run(gpu: &bouncelight::gpu::Gpu, source: &str, light: &[[f32; 4]]) -> Vec<[f3
         mapped_at_creation: false,
     });
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("tonemap twin"),
+        label: Some("tonemap alone"),
         source: wgpu::ShaderSource::Wgsl(source.into()),
     });
     let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some("tonemap twin"),
+        label: Some("tonemap alone"),
         layout: None,
         module: &module,
         entry_point: Some("main"),

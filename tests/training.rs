@@ -1,5 +1,7 @@
 //! The training package's own tests, where Python with PyTorch and OpenEXR is at hand; a visible skip elsewhere.
 
+mod common;
+
 use std::path::Path;
 use std::process::Command;
 
@@ -20,13 +22,8 @@ fn training_runs_end_to_end_at_toy_scale() {
         let program = env!("CARGO_BIN_EXE_bouncelight");
         Command::new("python3").args(args).current_dir(&folder).env("BOUNCELIGHT", program).output()
     };
-    match python(&["-c", "import torch, OpenEXR, safetensors, PIL, matplotlib"]) {
-        Ok(found) if found.status.success() => {}
-        Ok(found) => {
-            let text = String::from_utf8_lossy(&found.stderr).into_owned();
-            return println!("SKIP: {}", text.lines().last().unwrap_or("python3 lacks a package"));
-        }
-        Err(e) => return println!("SKIP: python3: {e}"),
+    if !common::python(common::Need::Torch, "torch, OpenEXR, safetensors, PIL, matplotlib") {
+        return;
     }
     for (module, tests) in MODULES {
         let run = python(&["-m", "unittest", module]).expect("python3 has just answered");

@@ -1,4 +1,5 @@
-//! Every method against a path-traced picture: 64×32 points of four rooms, each with 4,096 paths (`tests/fixtures/truth`).
+//! Every method against a path-traced picture: 64×32 points of four rooms, each with 4,096 paths
+//! (`tests/fixtures/truth`).
 //!
 //! Takes a minute and a half on two cores: four rooms by four methods, two of which settle over 32 frames.
 //!
@@ -122,7 +123,8 @@ fn answers(gpu: &Gpu, method: &Method, scene: &Scene, frames: &[u32]) -> Vec<Vec
     answers
 }
 
-/// Means over blocks of 4×4 points, in which the truth has 65,536 paths: its own noise is 0.4 % of them in the room, 6 % at night.
+/// Means over blocks of 4×4 points, in which the truth has 65,536 paths: its own noise is 0.4 % of
+/// them in the room, 6 % at night.
 fn blocks(light: &[f32]) -> Vec<f32> {
     let [w, h] = cells_of(SIZE).map(|n| n as usize);
     let mut sums = vec![0.0; 3 * (w / 4) * (h / 4)];
@@ -186,7 +188,8 @@ fn methods_are_as_near_to_the_truth_as_they_were() {
     assert!(missed.is_empty(), "{missed:?}");
 }
 
-/// What `gather` converges to: history without end and no filter, so that each cell has as many rays as there were frames.
+/// What `gather` converges to: history without end and no filter, so that each cell has as many
+/// rays as there were frames.
 #[test]
 #[ignore = "prints a table: a quarter of an hour on two cores"]
 fn what_gather_converges_to() {

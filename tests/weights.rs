@@ -1,4 +1,5 @@
-//! The weights reader against every kind of bad file, and against mutated ones: an error that names the fault, never a panic.
+//! The weights reader against every kind of bad file, and against mutated ones: an error that names
+//! the fault, never a panic.
 
 use bouncelight::net::format::{Dtype, KEY, Problem, Weights, WeightsError};
 use serde_json::{Value, json};
@@ -17,7 +18,8 @@ fn sound_document() -> Value {
         "graph": [
             {"op": "conv2d", "name": "a", "input": "input", "output": "h", "in_channels": 4, "out_channels": 4,
              "kernel": [3, 3], "stride": 1, "padding": 1, "activation": "relu"},
-            {"op": "conv2d", "name": "b", "input": "h", "output": "y", "in_channels": 4, "out_channels": 3, "kernel": [1, 1]}
+            {"op": "conv2d", "name": "b", "input": "h", "output": "y", "in_channels": 4, "out_channels": 3,
+                "kernel": [1, 1]}
         ]
     })
 }

@@ -1,9 +1,12 @@
 //! The Python package and this reader: each reads what the other writes, and both find the same faults.
 
+mod common;
 #[path = "weights_fuzz/corpus.rs"]
 mod corpus;
 #[path = "weights_fuzz/mutate.rs"]
 mod mutate;
+
+use common::Need;
 
 use bouncelight::net::format::{Dtype, Weights};
 use std::collections::BTreeSet;
@@ -14,14 +17,8 @@ fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("weights-format").join(name)
 }
 
-/// Whether Python with numpy is there; a visible skip otherwise.
 fn python() -> bool {
-    match Command::new("python3").args(["-c", "import numpy"]).output() {
-        Ok(out) if out.status.success() => return true,
-        Ok(out) => println!("SKIP: {}", String::from_utf8_lossy(&out.stderr).lines().last().unwrap_or("no numpy")),
-        Err(e) => println!("SKIP: python3: {e}"),
-    }
-    false
+    common::python(Need::Python, "numpy")
 }
 
 fn run(arguments: &[&str]) -> String {
@@ -31,7 +28,8 @@ fn run(arguments: &[&str]) -> String {
     String::from_utf8(out.stdout).expect("Python prints text")
 }
 
-/// `fixtures/bad/expected.json` lists by hand what is wrong; the package's tests hold the package against the same list.
+/// `fixtures/bad/expected.json` lists by hand what is wrong; the package's tests hold the package
+/// against the same list.
 #[test]
 fn bad_files_have_the_faults_that_are_expected() {
     let text = std::fs::read_to_string(folder("fixtures/bad/expected.json")).unwrap();
@@ -49,8 +47,8 @@ fn bad_files_have_the_faults_that_are_expected() {
     }
 }
 
-/// Both readers on hostile files. Known to differ: a half surrogate in a text of an operator, which spoils the document for
-/// the package and the operator for us; no file of this seed has one.
+/// Both readers on hostile files. Known to differ: a half surrogate in a text of an operator, which
+/// spoils the document for the package and the operator for us; no file of this seed has one.
 #[test]
 fn hostile_files_have_the_same_faults() {
     if !python() {
@@ -100,6 +98,8 @@ fn the_package_reads_our_files_and_passes_its_tests() {
     // An empty run must not pass.
     assert!(text.contains("ran 7 tests on 9 files"), "{text}");
     print!("{text}");
+    // What the package's tests left out.
+    text.lines().filter_map(|line| line.strip_prefix("SKIP: ")).for_each(|reason| common::skip(Need::Python, reason));
 }
 
 #[test]

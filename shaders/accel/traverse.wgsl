@@ -1,5 +1,6 @@
-// What a ray hits: walk of the eight-wide trees that src/accel builds; wide.rs there has the table of a block's words. A leaf
-// may be an instance: the walk then goes on in that mesh's own tree, in the mesh's own space, and comes back.
+// What a ray hits: walk of the eight-wide trees that src/accel builds; wide.rs there has the table
+// of a block's words. A leaf may be an instance: the walk then goes on in that mesh's own tree, in
+// the mesh's own space, and comes back.
 
 // Whoever joins this file binds the blocks as `accel_blocks: texture_2d<u32>`.
 
@@ -23,8 +24,8 @@ struct Hit {
     triangle: u32,
     // Barycentric weights of the second and third corner.
     uv: vec2f,
-    // Block of the instance that it belongs to, NO_TRIANGLE outside of instances; and block of the leaf, with the leaf's
-    // second triangle marked by the highest bit.
+    // Block of the instance that it belongs to, NO_TRIANGLE outside of instances; and block of the
+    // leaf, with the leaf's second triangle marked by the highest bit.
     instance: u32,
     leaf: u32,
 }
@@ -55,13 +56,15 @@ fn trace_ray(origin: vec3f, direction: vec3f) -> TraceRay {
     return TraceRay(origin, 1.0 / safe, across, up, direction / dot(direction, direction), octant);
 }
 
-// The four bytes of a word as planes: distances along the ray, as integers, which are in the same order where they are positive.
+// The four bytes of a word as planes: distances along the ray, as integers, which are in the same
+// order where they are positive.
 fn planes(word: u32, scale: f32, offset: f32) -> vec4i {
     let bytes = vec4f(vec4i((vec4u(word) >> vec4u(0u, 8u, 16u, 24u)) & vec4u(255u)));
     return bitcast<vec4i>(fma(bytes, vec4f(scale), vec4f(offset)));
 }
 
-// Which of four children's boxes the ray meets before `nearest`. `near` and `far` hold the planes that it reaches first and last.
+// Which of four children's boxes the ray meets before `nearest`. `near` and `far` hold the planes
+// that it reaches first and last.
 fn boxes_met(near: vec3u, far: vec3u, scale: vec3f, offset: vec3f, nearest: i32) -> vec4<bool> {
     let near_x = planes(near.x, scale.x, offset.x);
     let near_y = planes(near.y, scale.y, offset.y);
@@ -69,7 +72,8 @@ fn boxes_met(near: vec3u, far: vec3u, scale: vec3f, offset: vec3f, nearest: i32)
     let far_x = planes(far.x, scale.x, offset.x);
     let far_y = planes(far.y, scale.y, offset.y);
     let far_z = planes(far.z, scale.z, offset.z);
-    // A negative distance is a negative integer, whatever its size: as the far end it fails, as the near end it loses to 0.
+    // A negative distance is a negative integer, whatever its size: as the far end it fails, as the
+    // near end it loses to 0.
     let enter = max(max(near_x, near_y), max(near_z, vec4i(0)));
     let leave = min(min(far_x, far_y), min(far_z, vec4i(nearest)));
     return enter <= leave + vec4i(SLACK);
@@ -159,8 +163,10 @@ fn trace_seeded(origin: vec3f, direction: vec3f, t_max: f32, any: bool, seed: u3
             let near_z = select(z.zw, z.xy, (ray.octant & 1u) != 0u);
             let far_z = select(z.xy, z.zw, (ray.octant & 1u) != 0u);
             let nearest = bitcast<i32>(t);
-            let low = boxes_met(vec3u(near_x.x, near_y.x, near_z.x), vec3u(far_x.x, far_y.x, far_z.x), scale, offset, nearest);
-            let high = boxes_met(vec3u(near_x.y, near_y.y, near_z.y), vec3u(far_x.y, far_y.y, far_z.y), scale, offset, nearest);
+            let low = boxes_met(vec3u(near_x.x, near_y.x, near_z.x), vec3u(far_x.x, far_y.x, far_z.x), scale, offset,
+                nearest);
+            let high = boxes_met(vec3u(near_x.y, near_y.y, near_z.y), vec3u(far_x.y, far_y.y, far_z.y), scale,
+                offset, nearest);
             let met = (or_all(select(vec4u(0u), rank_bits, low)) << low_half)
                 | (or_all(select(vec4u(0u), rank_bits, high)) << (4u - low_half));
             if met != 0u {
@@ -249,7 +255,8 @@ fn trace_turned(instance: u32, n: vec3f) -> vec3f {
     return r0 * n.x + r1 * n.y + r2 * n.z;
 }
 
-// Unit normal of what was hit, in the space of the ray, on the side that the triangle's winding says; 0 where it has no area.
+// Unit normal of what was hit, in the space of the ray, on the side that the triangle's winding
+// says; 0 where it has no area.
 fn trace_normal(hit: Hit) -> vec3f {
     let leaf = hit.leaf & BLOCK;
     let a = bitcast<vec3f>(trace_word(leaf, 0u).xyz);

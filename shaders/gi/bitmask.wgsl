@@ -9,7 +9,8 @@
 // step that lies near the one before it blocks all angles between the two, and half as much again beyond it: a wall
 // must not fall apart between steps, nor end at the last one that met it.
 //
-// The prelude (gi::bitmask) holds SLICES, STEPS, REACH, RADIUS, THICKNESS, GROWTH, JOIN. Group 1 binding 0 is the pattern.
+// The prelude (gi::bitmask) holds SLICES, STEPS, REACH, RADIUS, THICKNESS, GROWTH, JOIN. Group 1
+// binding 0 is the pattern.
 
 @group(1) @binding(0) var<uniform> pattern: vec4u;   // x: number of the frame, 0 without history
 

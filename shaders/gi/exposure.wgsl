@@ -22,7 +22,8 @@ const MAX_GROUPS = 256u;
 var<workgroup> scratch: array<Partial, 256>;
 
 fn plus(a: Partial, b: Partial) -> Partial {
-    return Partial(a.light + b.light, a.ln_z + b.ln_z, a.hits + b.hits, a.nonfinite + b.nonfinite, a.outgoing + b.outgoing);
+    return Partial(a.light + b.light, a.ln_z + b.ln_z, a.hits + b.hits, a.nonfinite + b.nonfinite,
+        a.outgoing + b.outgoing);
 }
 
 // Sum over the workgroup in a fixed order; valid in thread 0.

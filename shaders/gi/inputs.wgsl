@@ -1,8 +1,8 @@
 //#import lib/octahedral.wgsl
 
-// What every stage of gi/ reads: the G-buffer, the direct light and the camera (group 0), and how texels become
-// numbers, in whichever of a host's conventions (`gi::Conventions`). Everything that leaves this file is finite, whatever
-// the textures hold.
+// What every stage of gi/ reads: the G-buffer, the direct light and the camera (group 0), and how
+// texels become numbers, in whichever of a host's conventions (`gi::Conventions`). Everything that
+// leaves this file is finite, whatever the textures hold.
 
 // `gi::inputs::Params` is the Rust side.
 struct Params {

@@ -1,7 +1,7 @@
 //#import gi/outgoing.wgsl
 
-// The lit picture at half size, then half of that and so on, for blurred look-ups: radiance times coverage (rgb) and the
-// share of the texel that shows a surface (a).
+// The lit picture at half size, then half of that and so on, for blurred look-ups: radiance times
+// coverage (rgb) and the share of the texel that shows a surface (a).
 
 @group(1) @binding(0) var finer: texture_2d<f32>;
 @group(1) @binding(1) var coarser: texture_storage_2d<rgba16float, write>;

@@ -1,10 +1,10 @@
 //#import gi/inputs.wgsl
 //#import gi/unseen.wgsl
 
-// What surfaces send on: albedo times light, and emission. Light is the direct light and, for later bounces, what stands
-// in for unseen light. Once at half resolution (mean over the 2x2 pixels of a texel) and once over 8x8 pixels, for steps
-// that are as long: a small lamp that a long step hits or misses would flicker from texel to texel. Background sends
-// nothing here.
+// What surfaces send on: albedo times light, and emission. Light is the direct light and, for later
+// bounces, what stands in for unseen light. Once at half resolution (mean over the 2x2 pixels of a
+// texel) and once over 8x8 pixels, for steps that are as long: a small lamp that a long step hits
+// or misses would flicker from texel to texel. Background sends nothing here.
 
 @group(1) @binding(0) var<storage, read> exposure: Exposure;
 @group(1) @binding(1) var fine: texture_storage_2d<rgba16float, write>;

@@ -1,10 +1,12 @@
 //#import gi/inputs.wgsl
 
-// The network's answers, one per 4x4 cell, brought to every pixel: bilinear where the surface goes on, and only from cells
-// of the pixel's own surface where it does not. All of it in f32; factors are averaged, not their logarithms.
+// The network's answers, one per 4x4 cell, brought to every pixel: bilinear where the surface goes
+// on, and only from cells of the pixel's own surface where it does not. All of it in f32; factors
+// are averaged, not their logarithms.
 //     light = base * exp(y.rgb) + s * (the three numbers after them)
-// where the base is s itself (GAIN false; then there are only three numbers) or the first guess at the pixel (GAIN true).
-// The prelude holds GAIN, LOWEST, HIGHEST, MOST, FALLBACK and the tolerances (gi::reconstruct documents them).
+// where the base is s itself (GAIN false; then there are only three numbers) or the first guess at
+// the pixel (GAIN true). The prelude holds GAIN, LOWEST, HIGHEST, MOST, FALLBACK and the tolerances
+// (gi::reconstruct documents them).
 
 @group(1) @binding(0) var<storage, read> exposure: Exposure;
 @group(1) @binding(1) var<storage, read> answers: array<vec4f>;

@@ -1,11 +1,12 @@
-// glTF's metallic-roughness BRDF: Lambert + GGX with height-correlated Smith visibility; Fresnel's curve for dielectrics,
-// Schlick's for metals.
+// glTF's metallic-roughness BRDF: Lambert + GGX with height-correlated Smith visibility; Fresnel's
+// curve for dielectrics, Schlick's for metals.
 
 const PI: f32 = 3.14159265358979;
 
-// Light that leaves a dielectric through the specular lobe when it comes evenly from everywhere: F0 * x + y (split sum).
-// Fitted to numerical integrals of GGX with the Fresnel term of a dielectric of index 1.5 and the energy that single
-// scattering loses given back, as Cycles' Principled has it; error below 0.012 for n.v > 0.2, 0.023 at grazing angles.
+// Light that leaves a dielectric through the specular lobe when it comes evenly from everywhere:
+// F0 * x + y (split sum). Fitted to numerical integrals of GGX with the Fresnel term of a
+// dielectric of index 1.5 and the energy that single scattering loses given back, as Cycles'
+// Principled has it; error below 0.012 for n.v > 0.2, 0.023 at grazing angles.
 fn split_sum(roughness: f32, n_dot_v: f32) -> vec2f {
     let r = clamp(roughness, 0.0, 1.0);
     let x = 1.0 - clamp(n_dot_v, 0.0, 1.0);
@@ -28,9 +29,10 @@ fn metal_part(f0: vec3f) -> f32 {
     return saturate((max(f0.x, max(f0.y, f0.z)) - 0.1) / 0.2);
 }
 
-// What single scattering of GGX keeps of even light if nothing is absorbed (x), and the part of it that Schlick's curve
-// weighs (y): F0 * (x - y) + y. Fitted to numerical integrals (height-correlated Smith): what a metal shows with the lost
-// light given back is off by less than 0.01 for n.v > 0.2, 0.03 at grazing angles, 0.002 in the mean.
+// What single scattering of GGX keeps of even light if nothing is absorbed (x), and the part of it
+// that Schlick's curve weighs (y): F0 * (x - y) + y. Fitted to numerical integrals
+// (height-correlated Smith): what a metal shows with the lost light given back is off by less than
+// 0.01 for n.v > 0.2, 0.03 at grazing angles, 0.002 in the mean.
 fn single_scattering(roughness: f32, n_dot_v: f32) -> vec2f {
     let r = clamp(roughness, 0.05, 1.0);
     let x = 1.0 - clamp(n_dot_v, 0.0, 1.0);
@@ -46,8 +48,9 @@ fn single_scattering(roughness: f32, n_dot_v: f32) -> vec2f {
     return vec2f(kept, clamp(bias, 0.0, kept));
 }
 
-// By what factor a metal's lobe is brighter for the light that single scattering, which keeps `kept`, loses (Kulla and Conty
-// 2017, as Cycles' Principled has it and reference/bsdf.wgsl): white metal keeps all light at every roughness.
+// By what factor a metal's lobe is brighter for the light that single scattering, which keeps
+// `kept`, loses (Kulla and Conty 2017, as Cycles' Principled has it and reference/bsdf.wgsl): white
+// metal keeps all light at every roughness.
 fn regained(f0: vec3f, roughness: f32, kept: f32) -> vec3f {
     let r = clamp(roughness, 0.0, 1.0);
     // Mean over the cosine-weighted hemisphere of what is kept, and of Schlick's curve.
@@ -56,15 +59,16 @@ fn regained(f0: vec3f, roughness: f32, kept: f32) -> vec3f {
     return 1.0 + fresnel * even / (1.0 - fresnel * (1.0 - even)) * (1.0 - kept) / kept;
 }
 
-// `env_brdf` of a dielectric. Without branches: a rasteriser on the CPU compiled a geometry pass with more of them anew for
-// each frame.
+// `env_brdf` of a dielectric. Without branches: a rasteriser on the CPU compiled a geometry pass
+// with more of them anew for each frame.
 fn dielectric_lobe(f0: vec3f, roughness: f32, n_dot_v: f32) -> vec3f {
     let ab = split_sum(roughness, n_dot_v);
     return f0 * ab.x + ab.y * saturate(50.0 * max(f0.x, max(f0.y, f0.z)));
 }
 
-// What a dielectric's lobe takes from its diffuse light. Above any dielectric's reflectance the lobe is a metal's, which keeps
-// all of f0 at every roughness; without branches for the same reason.
+// What a dielectric's lobe takes from its diffuse light. Above any dielectric's reflectance the
+// lobe is a metal's, which keeps all of f0 at every roughness; without branches for the same
+// reason.
 fn diffuse_loss(f0: f32, roughness: f32, n_dot_v: f32) -> f32 {
     return max(dielectric_lobe(vec3f(f0), roughness, n_dot_v).x, f0 * metal_part(vec3f(f0)));
 }
@@ -121,7 +125,8 @@ fn ggx(n: vec3f, v: vec3f, l: vec3f, f0: vec3f, roughness: f32) -> vec3f {
     return d * vis * fresnel_of(f0, v_h);
 }
 
-// What a metal's lobe gains over `ggx` by light that is scattered more than once; 1 for dielectrics, whose loss is below 1 %.
+// What a metal's lobe gains over `ggx` by light that is scattered more than once; 1 for
+// dielectrics, whose loss is below 1 %.
 fn lobe_gain(f0: vec3f, roughness: f32, n_dot_v: f32) -> vec3f {
     let part = metal_part(f0);
     if part <= 0.0 { return vec3f(1.0); }

@@ -1,8 +1,9 @@
 //#import lib/brdf.wgsl
 
-// Radiance from beyond the scene by direction: a lat-long picture, one texel for a constant sky. The Rust twin is
-// `scene::environment`. Expects `environment_picture` in the module. A sun in the picture is one of the lights, so it is not
-// among what lights the scene from here; alpha is how many times the rest it adds for the eye.
+// Radiance from beyond the scene by direction: a lat-long picture, one texel for a constant sky. In
+// Rust: `scene::environment`. Expects `environment_picture` in the module. A sun in the picture is
+// one of the lights, so it is not among what lights the scene from here; alpha is how many times
+// the rest it adds for the eye.
 
 // `direction`: unit vector away from the eye, world space.
 fn environment_radiance(direction: vec3f) -> vec3f {

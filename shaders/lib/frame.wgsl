@@ -1,4 +1,4 @@
-// What every pass knows about the frame; the Rust twin is `render::view::FrameUniform`.
+// What every pass knows about the frame; in Rust `render::view::FrameUniform`.
 
 struct Frame {
     view_from_world: mat4x4f,
@@ -17,8 +17,8 @@ struct Frame {
     seed: u32,
     environment: vec3f,
     light_count: u32,
-    // 0 where the method asks the scene what glows and what stands between. Else lights that stand for glowing surfaces are drawn, and
-    // occlusion maps darken the light from all around.
+    // 0 where the method asks the scene what glows and what stands between. Else lights that stand
+    // for glowing surfaces are drawn, and occlusion maps darken the light from all around.
     picture_only: u32,
 }
 

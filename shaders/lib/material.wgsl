@@ -1,4 +1,4 @@
-// A material and its textures; the Rust twin is `scene::upload::MaterialGpu`. Bind group 1 of the geometry passes.
+// A material and its textures; in Rust `scene::upload::MaterialGpu`. Bind group 1 of the geometry passes.
 
 struct TextureUse {
     // Rows of uv' = M (u, v, 1); w of the first row is the coordinate set, w of the second 1 where a texture is bound.

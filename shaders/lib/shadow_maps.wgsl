@@ -1,6 +1,7 @@
-// Soft shadows from depth maps (percentage-closer soft shadows, Fernando 2005): find what stands between the point and
-// the light, take the penumbra that the light's size casts from there, filter over it. The pattern of taps is rotated
-// per pixel and frame, so that averaging frames converges. Expects `shadow_views`, `sun_maps`, `local_maps`, `sun_depths`, `local_depths` and
+// Soft shadows from depth maps (percentage-closer soft shadows, Fernando 2005): find what stands
+// between the point and the light, take the penumbra that the light's size casts from there, filter
+// over it. The pattern of taps is rotated per pixel and frame, so that averaging frames converges.
+// Expects `shadow_views`, `sun_maps`, `local_maps`, `sun_depths`, `local_depths` and
 // `shadow_compare` in the module.
 
 struct ShadowView {
@@ -76,7 +77,8 @@ fn sun_disc(
     view: ShadowView, z: f32, uv: vec2f, n: vec3f, n_l: f32, tan_radius: f32, search: f32, pattern: Pattern,
 ) -> f32 {
     // Height of the receiver's plane towards the light, per metre along the map's axes.
-    let slope = -vec2f(dot(n, normalize(row_of(view.clip_from_world, 0u))), dot(n, normalize(row_of(view.clip_from_world, 1u)))) / n_l;
+    let slope = -vec2f(dot(n, normalize(row_of(view.clip_from_world, 0u))),
+        dot(n, normalize(row_of(view.clip_from_world, 1u)))) / n_l;
     let to_uv = vec2f(view.scale, -view.scale);
     let bias = BIAS * view.texel;
     var blocked = 0u;
@@ -131,7 +133,8 @@ fn local_visibility(first: u32, count: u32, p: vec3f, n: vec3f, center: vec3f, r
 
     // On a plane the inverse distance is an affine function of the map's tangent coordinates.
     let tangent = c.xy / c.w * 0.5 / view.scale;
-    let normal = vec3f(dot(n, normalize(row_of(view.clip_from_world, 0u))), dot(n, normalize(row_of(view.clip_from_world, 1u))),
+    let normal = vec3f(dot(n, normalize(row_of(view.clip_from_world, 0u))),
+        dot(n, normalize(row_of(view.clip_from_world, 1u))),
         dot(n, row_of(view.clip_from_world, 3u)));
     let facing = min(dot(normal, vec3f(tangent, 1.0)), -MIN_COSINE);
     let slope = normal.xy / facing / distance;

@@ -1,7 +1,8 @@
 // From scene light to display values. src/render/tonemap_curve.rs is the CPU form, same names and constants, and says
 // where they come from and how near Blender they stand.
 
-// Display-encoded sRGB in [0, 1] of linear Rec.709 light. kind: 0 filmic, 1 agx, 2 neutral, 3 none (sRGB with clamping).
+// Display-encoded sRGB in [0, 1] of linear Rec.709 light. kind: 0 filmic, 1 agx, 2 neutral, 3 none
+// (sRGB with clamping).
 fn tonemap(kind: u32, rgb: vec3f) -> vec3f {
     let light = clamp(rgb, vec3f(0.0), vec3f(65504.0));
     switch kind {

@@ -1,4 +1,5 @@
-// What no other kernel's epilogue could take (a sum, a function, dropout): the input passes through, the epilogue works.
+// What no other kernel's epilogue could take (a sum, a function, dropout): the input passes
+// through, the epilogue works.
 
 @compute @workgroup_size(16, 4)
 fn main(@builtin(global_invocation_id) id: vec3u) {

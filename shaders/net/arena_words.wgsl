@@ -1,5 +1,5 @@
-// The arena in 32 bits, as vectors of two words of 64 (an optional feature): drivers on processors store word by word, thread by thread,
-// and half as many words take two thirds of the time.
+// The arena in 32 bits, as vectors of two words of 64 (an optional feature): drivers on processors
+// store word by word, thread by thread, and half as many words take two thirds of the time.
 @group(0) @binding(1) var<storage, read_write> arena: array<vec2<u64>>;
 
 // A texture with a vector of this precision in each texel.

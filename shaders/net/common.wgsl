@@ -1,5 +1,6 @@
-// What every kernel of a network is told. Tensors are NHWC, four channels a vector, inside one arena whose first vectors
-// are zero: a tap outside the picture reads there, so inner loops have no branch.
+// What every kernel of a network is told. Tensors are NHWC, four channels a vector, inside one
+// arena whose first vectors are zero: a tap outside the picture reads there, so inner loops have no
+// branch.
 
 struct Step {
     in_size: vec2u,

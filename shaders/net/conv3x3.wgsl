@@ -1,5 +1,5 @@
-// 3×3 convolution, stride 1, padding 1: the 24 pixels that a tile's taps share are read once an input vector. Weights come tap by
-// tap, row by row, an input vector after the other (see pack.rs).
+// 3×3 convolution, stride 1, padding 1: the 24 pixels that a tile's taps share are read once an
+// input vector. Weights come tap by tap, row by row, an input vector after the other (see pack.rs).
 
 fn convolve(first: u32, count: u32) {
     let x = i32(corner.x) - 1;

@@ -1,6 +1,6 @@
-// 3×3 convolution, stride 1, padding 1, by Winograd's F(4, 3) along rows: four neighbours of a row cost six products a tap row instead of
-// twelve. Weights come transformed (see pack.rs). 32 bits only: in 16 the transform would cost accuracy. Before: conv3x3_rows.wgsl.
-// KERNEL_W is 6.
+// 3×3 convolution, stride 1, padding 1, by Winograd's F(4, 3) along rows: four neighbours of a row
+// cost six products a tap row instead of twelve. Weights come transformed (see pack.rs). 32 bits
+// only: in 16 the transform would cost accuracy. Before: conv3x3_rows.wgsl. KERNEL_W is 6.
 
 struct Inputs { a: Rows, b: Rows, c: Rows, d: Rows, e: Rows, f: Rows }
 
@@ -24,7 +24,8 @@ fn products(w0: vec4f, w1: vec4f, w2: vec4f, v: Rows) -> vec4f {
 struct Weights { a: Taps, b: Taps, c: Taps, d: Taps, e: Taps, f: Taps }
 
 fn weights_at(w: u32) -> Weights {
-    return Weights(taps(w), taps(w + VECTORS), taps(w + 2u * VECTORS), taps(w + 3u * VECTORS), taps(w + 4u * VECTORS), taps(w + 5u * VECTORS));
+    return Weights(taps(w), taps(w + VECTORS), taps(w + 2u * VECTORS), taps(w + 3u * VECTORS),
+        taps(w + 4u * VECTORS), taps(w + 5u * VECTORS));
 }
 
 // Adds the six results of the transform to the pixels that they belong to.

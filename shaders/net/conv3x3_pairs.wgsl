@@ -1,6 +1,7 @@
-// 3×3 convolution, stride 1, padding 1, by Winograd's F(2, 3) along rows: two neighbours of a row cost four products a tap row instead of
-// six. Weights come transformed (see pack.rs): tap row by tap row the matrices g0, (g0 + g1 + g2) / 2, (g0 − g1 + g2) / 2 and g2. The tile
-// is two pairs of neighbours in each of four rows. Before: conv3x3_rows.wgsl. KERNEL_W is 4.
+// 3×3 convolution, stride 1, padding 1, by Winograd's F(2, 3) along rows: two neighbours of a row
+// cost four products a tap row instead of six. Weights come transformed (see pack.rs): tap row by
+// tap row the matrices g0, (g0 + g1 + g2) / 2, (g0 − g1 + g2) / 2 and g2. The tile is two pairs of
+// neighbours in each of four rows. Before: conv3x3_rows.wgsl. KERNEL_W is 4.
 
 // The results of both pairs.
 struct Both { left: Rows, right: Rows }
@@ -42,7 +43,9 @@ fn products(w0: vec4f, w1: vec4f, w2: vec4f, v: Both) -> Sums {
 
 struct Weights { a: Taps, b: Taps, c: Taps, d: Taps }
 
-fn weights_at(w: u32) -> Weights { return Weights(taps(w), taps(w + VECTORS), taps(w + 2u * VECTORS), taps(w + 3u * VECTORS)); }
+fn weights_at(w: u32) -> Weights {
+    return Weights(taps(w), taps(w + VECTORS), taps(w + 2u * VECTORS), taps(w + 3u * VECTORS));
+}
 
 // Adds the four results of the transform to the pixels that they belong to.
 fn joined(s: Tile, a: Sums, b: Sums, c: Sums, d: Sums) -> Tile {
@@ -123,12 +126,18 @@ fn convolve(first: u32, count: u32) {
     let t53 = tap(x + 3, y + 5); let t54 = tap(x + 4, y + 5); let t55 = tap(x + 5, y + 5);
     var w = first;
     for (var i = 0u; i < count; i++) {
-        let v00 = load(t00 + i); let v01 = load(t01 + i); let v02 = load(t02 + i); let v03 = load(t03 + i); let v04 = load(t04 + i); let v05 = load(t05 + i);
-        let v10 = load(t10 + i); let v11 = load(t11 + i); let v12 = load(t12 + i); let v13 = load(t13 + i); let v14 = load(t14 + i); let v15 = load(t15 + i);
-        let v20 = load(t20 + i); let v21 = load(t21 + i); let v22 = load(t22 + i); let v23 = load(t23 + i); let v24 = load(t24 + i); let v25 = load(t25 + i);
-        let v30 = load(t30 + i); let v31 = load(t31 + i); let v32 = load(t32 + i); let v33 = load(t33 + i); let v34 = load(t34 + i); let v35 = load(t35 + i);
-        let v40 = load(t40 + i); let v41 = load(t41 + i); let v42 = load(t42 + i); let v43 = load(t43 + i); let v44 = load(t44 + i); let v45 = load(t45 + i);
-        let v50 = load(t50 + i); let v51 = load(t51 + i); let v52 = load(t52 + i); let v53 = load(t53 + i); let v54 = load(t54 + i); let v55 = load(t55 + i);
+        let v00 = load(t00 + i); let v01 = load(t01 + i); let v02 = load(t02 + i);
+        let v03 = load(t03 + i); let v04 = load(t04 + i); let v05 = load(t05 + i);
+        let v10 = load(t10 + i); let v11 = load(t11 + i); let v12 = load(t12 + i);
+        let v13 = load(t13 + i); let v14 = load(t14 + i); let v15 = load(t15 + i);
+        let v20 = load(t20 + i); let v21 = load(t21 + i); let v22 = load(t22 + i);
+        let v23 = load(t23 + i); let v24 = load(t24 + i); let v25 = load(t25 + i);
+        let v30 = load(t30 + i); let v31 = load(t31 + i); let v32 = load(t32 + i);
+        let v33 = load(t33 + i); let v34 = load(t34 + i); let v35 = load(t35 + i);
+        let v40 = load(t40 + i); let v41 = load(t41 + i); let v42 = load(t42 + i);
+        let v43 = load(t43 + i); let v44 = load(t44 + i); let v45 = load(t45 + i);
+        let v50 = load(t50 + i); let v51 = load(t51 + i); let v52 = load(t52 + i);
+        let v53 = load(t53 + i); let v54 = load(t54 + i); let v55 = load(t55 + i);
         let v = Inputs(
             Both(Rows(v00 - v02, v10 - v12, v20 - v22, v30 - v32, v40 - v42, v50 - v52),
                  Rows(v02 - v04, v12 - v14, v22 - v24, v32 - v34, v42 - v44, v52 - v54)),

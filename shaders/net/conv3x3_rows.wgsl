@@ -1,9 +1,11 @@
-// What the 3×3 convolutions by Winograd's algorithm along rows (Lavin and Gray 2016) share: the tile and its sums. A thread makes four by four
-// pixels.
+// What the 3×3 convolutions by Winograd's algorithm along rows (Lavin and Gray 2016) share: the
+// tile and its sums. A thread makes four by four pixels.
 //
-// Written for processors, which have few registers and whose compilers keep the order: all that one weight is multiplied with comes at once,
-// several products into sums of one output channel, and inputs are operands from memory. Before: weights_lanes.wgsl, place.wgsl and
-// whole.wgsl, parts.wgsl or measured.wgsl; after: conv3x3_pairs.wgsl or conv3x3_fours.wgsl, and make.wgsl. From the prelude: VECTORS.
+// Written for processors, which have few registers and whose compilers keep the order: all that one
+// weight is multiplied with comes at once, several products into sums of one output channel, and
+// inputs are operands from memory. Before: weights_lanes.wgsl, place.wgsl and whole.wgsl,
+// parts.wgsl or measured.wgsl; after: conv3x3_pairs.wgsl or conv3x3_fours.wgsl, and make.wgsl. From
+// the prelude: VECTORS.
 
 const TILE = vec2u(4u, 4u);
 
@@ -44,10 +46,12 @@ fn taps(w: u32) -> Taps { return Taps(own(w), own(w + KERNEL_W * VECTORS), own(w
 
 // One number of each of the first four threads, or of the second four.
 fn low(v: f32) -> vec4f {
-    return vec4f(subgroupBroadcast(v, 0u), subgroupBroadcast(v, 1u), subgroupBroadcast(v, 2u), subgroupBroadcast(v, 3u));
+    return vec4f(subgroupBroadcast(v, 0u), subgroupBroadcast(v, 1u), subgroupBroadcast(v, 2u),
+        subgroupBroadcast(v, 3u));
 }
 fn high(v: f32) -> vec4f {
-    return vec4f(subgroupBroadcast(v, 4u), subgroupBroadcast(v, 5u), subgroupBroadcast(v, 6u), subgroupBroadcast(v, 7u));
+    return vec4f(subgroupBroadcast(v, 4u), subgroupBroadcast(v, 5u), subgroupBroadcast(v, 6u),
+        subgroupBroadcast(v, 7u));
 }
 
 // A pixel's four channels.
@@ -64,7 +68,8 @@ fn write_one(s: Four, vector: u32) {
     let m1 = column(s.o0.x1, s.o1.x1, s.o2.x1, s.o3.x1);
     let m2 = column(s.o0.x2, s.o1.x2, s.o2.x2, s.o3.x2);
     let m3 = column(s.o0.x3, s.o1.x3, s.o2.x3, s.o3.x3);
-    var pixels = array(m0.y0, m1.y0, m2.y0, m3.y0, m0.y1, m1.y1, m2.y1, m3.y1, m0.y2, m1.y2, m2.y2, m3.y2, m0.y3, m1.y3, m2.y3, m3.y3);
+    var pixels = array(m0.y0, m1.y0, m2.y0, m3.y0, m0.y1, m1.y1, m2.y1, m3.y1, m0.y2, m1.y2, m2.y2, m3.y2, m0.y3,
+        m1.y3, m2.y3, m3.y3);
     // A loop on purpose: unrolled it is most of a kernel's compilation.
     for (var i = 0u; i < 16u; i++) {
         let at = corner + vec2u(i % 4u, i / 4u);

@@ -1,5 +1,5 @@
-// Any convolution, one pixel and four output channels a thread: the plain form, kept as the yardstick for the blocked ones.
-// From the prelude: as conv_any.wgsl and VECTORS.
+// Any convolution, one pixel and four output channels a thread: the plain form, kept as the
+// yardstick for the blocked ones. From the prelude: as conv_any.wgsl and VECTORS.
 
 fn convolve(place: Place, corner: vec2i, half: u32) -> vec4f {
     var w = place.stored * (1u + KERNEL_W * KERNEL_H * step.in_vectors * VECTORS);
@@ -19,7 +19,8 @@ fn convolve(place: Place, corner: vec2i, half: u32) -> vec4f {
 
 @compute @workgroup_size(16, 4)
 fn main(
-    @builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
+    @builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) me: u32
 ) {
     let place = place_of(id.z / VECTORS);

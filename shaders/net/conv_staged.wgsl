@@ -1,7 +1,9 @@
-// Any convolution as the product of two matrices whose pieces a workgroup stages in its memory: every input vector is read once for all
-// COLUMNS · VECTORS vectors of output channels, every weight once for all pixels of the tile. A thread makes PIXELS (1, 2, 4, 8) pixels
-// by VECTORS (1 or 2) vectors. Weights come output vector by output vector: the bias, then tap by tap a matrix for each input vector.
-// From the prelude besides: COLUMNS (1, 2, 4, 8), KERNEL_W, KERNEL_H, STRIDE.
+// Any convolution as the product of two matrices whose pieces a workgroup stages in its memory:
+// every input vector is read once for all COLUMNS · VECTORS vectors of output channels, every
+// weight once for all pixels of the tile. A thread makes PIXELS (1, 2, 4, 8) pixels by VECTORS (1
+// or 2) vectors. Weights come output vector by output vector: the bias, then tap by tap a matrix
+// for each input vector. From the prelude besides: COLUMNS (1, 2, 4, 8), KERNEL_W, KERNEL_H,
+// STRIDE.
 
 const ROWS = 64u / COLUMNS;
 const TILE = ROWS * PIXELS;
@@ -54,7 +56,8 @@ fn bias(place: Place, vector: u32) -> vec4f {
     return select(vec4f(0.0), column(weights_of(place.phase, vector) * 4u), place.part == 0u);
 }
 
-// Stages up to DEPTH vectors from `c` to `end` of the inputs under tap (x, y), and their weights for output vectors from `first` on.
+// Stages up to DEPTH vectors from `c` to `end` of the inputs under tap (x, y), and their weights
+// for output vectors from `first` on.
 fn stage(me: u32, phase: vec2u, first: u32, x: u32, y: u32, c: u32, end: u32) {
     for (var e = me; e < TILE * DEPTH; e += 64u) {
         let k = e % DEPTH;
@@ -86,7 +89,8 @@ fn write(s: Eight, place: Place, tile: u32, row: u32, vector: u32) {
 }
 
 @compute @workgroup_size(64)
-fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) me: u32) {
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) me: u32) {
     let place = place_of(group.z);
     let size = made(place.phase);
     let tile = (group.y * groups.x + group.x) * TILE;

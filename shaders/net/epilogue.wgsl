@@ -1,6 +1,7 @@
-// What follows a kernel's work: skip, activation, dropout, and the write.
-// From the prelude: ACTIVATION (`Activation::code`, 2 for all that are linear on both sides of zero), ADD (0 no skip, 1 before, 2 after
-// the activation), DROPOUT (0 or 1), OUT_FULL (1 if the output is 32 bits in an arena of 16).
+// What follows a kernel's work: skip, activation, dropout, and the write. From the prelude:
+// ACTIVATION (`Activation::code`, 2 for all that are linear on both sides of zero), ADD (0 no skip,
+// 1 before, 2 after the activation), DROPOUT (0 or 1), OUT_FULL (1 if the output is 32 bits in an
+// arena of 16).
 
 fn activate(x: vec4f) -> vec4f {
     // With a slope of 1 nothing, with 0 a ReLU.

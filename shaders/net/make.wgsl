@@ -1,15 +1,16 @@
-// The work of a thread of a blocked convolution, whose tile comes from tile.wgsl or conv3x3_rows.wgsl: TILE, begin, convolve, write.
-// From the prelude: THREADS, of a workgroup.
+// The work of a thread of a blocked convolution, whose tile comes from tile.wgsl or
+// conv3x3_rows.wgsl: TILE, begin, convolve, write. From the prelude: THREADS, of a workgroup.
 
-// First input vector that a block from output vector `vector` on reads. Where groups begin within a vector it reads neighbours too, with
-// weights of zero.
+// First input vector that a block from output vector `vector` on reads. Where groups begin within a
+// vector it reads neighbours too, with weights of zero.
 fn first_read(vector: u32) -> u32 {
     let first = vector * 4u / step.group * step.group_inputs / 4u;
     return min(first, (step.in_channels + 3u) / 4u - step.in_vectors);
 }
 
-// The whole work of thread `local` of workgroup `group`. `convolve(first, count)` adds what the taps see of `count` input vectors, the
-// weights of this block of output channels beginning at `first`.
+// The whole work of thread `local` of workgroup `group`. `convolve(first, count)` adds what the
+// taps see of `count` input vectors, the weights of this block of output channels beginning at
+// `first`.
 fn make(group: vec3u, groups: vec3u, local: u32) {
     place = place_of(group.z);
     let size = made(place.phase);

@@ -1,13 +1,15 @@
-// A convolution that measures what it makes, for the norm after it: of each workgroup and channel the number of values, their mean and the
-// sum of their squared deviations from it. A thread adds up by how much its values differ from its first one, so that nothing is lost
-// however far from zero they lie; threads are merged one after the other (Chan, Golub and LeVeque 1983).
-// Otherwise as whole.wgsl. From the prelude: THREADS, and MADE, the vectors that a thread makes.
+// A convolution that measures what it makes, for the norm after it: of each workgroup and channel
+// the number of values, their mean and the sum of their squared deviations from it. A thread adds
+// up by how much its values differ from its first one, so that nothing is lost however far from
+// zero they lie; threads are merged one after the other (Chan, Golub and LeVeque 1983). Otherwise
+// as whole.wgsl. From the prelude: THREADS, and MADE, the vectors that a thread makes.
 
 var<workgroup> counts: array<f32, MADE * THREADS>;
 var<workgroup> means: array<vec4f, MADE * THREADS>;
 var<workgroup> squares: array<vec4f, MADE * THREADS>;
 
-// Of this thread's values of one vector how many there are, the first, and sums of the differences from it and of their squares.
+// Of this thread's values of one vector how many there are, the first, and sums of the differences
+// from it and of their squares.
 var<private> seen: f32;
 var<private> origin: vec4f;
 var<private> away: vec4f;
@@ -37,8 +39,8 @@ fn close(i: u32, me: u32) {
     away2 = vec4f(0.0);
 }
 
-// Writes the moments of tile `tile`. The whole workgroup comes here. Threads lie in rows of `columns`, and those in a column make the same
-// MADE vectors, the first column from `first` on.
+// Writes the moments of tile `tile`. The whole workgroup comes here. Threads lie in rows of
+// `columns`, and those in a column make the same MADE vectors, the first column from `first` on.
 fn gather(first: u32, columns: u32, tile: u32, me: u32) {
     workgroupBarrier();
     let column = me % columns;

@@ -1,8 +1,10 @@
-// The first level of a norm whose input no convolution has measured: for each tile of 256 pixels and each channel the number of values,
-// their mean and the sum of squared deviations from it, in two passes, the second of which also mends the rounding of the first.
+// The first level of a norm whose input no convolution has measured: for each tile of 256 pixels
+// and each channel the number of values, their mean and the sum of squared deviations from it, in
+// two passes, the second of which also mends the rounding of the first.
 
 @compute @workgroup_size(64)
-fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32) {
     // Vectors of a tile side by side, so that a workgroup is full whatever their number.
     let index = (group.y * groups.x + group.x) * 64u + local;
     let vector = index % step.in_vectors;

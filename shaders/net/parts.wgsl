@@ -1,5 +1,6 @@
-// A convolution whose sum over input channels is cut into parts, one a workgroup, so that small pictures fill a device too: the parts of
-// the sum go to a buffer of their own, and sum.wgsl adds them up and finishes.
+// A convolution whose sum over input channels is cut into parts, one a workgroup, so that small
+// pictures fill a device too: the parts of the sum go to a buffer of their own, and sum.wgsl adds
+// them up and finishes.
 @group(0) @binding(4) var<storage, read_write> partial: array<vec4f>;
 
 fn first_input(part: u32) -> u32 { return part * step.in_vectors / step.parts; }

@@ -1,6 +1,7 @@
-// Where a workgroup of a convolution works. Its index in z counts parts of the sum over input channels, then blocks of output channels,
-// then phases: the interleaved pictures of a transposed convolution, or of one after enlarging. From the prelude: SPREAD (distance of
-// output pixels: 1, or the stride of a transposed convolution), NEAREST (factor by which the input is enlarged).
+// Where a workgroup of a convolution works. Its index in z counts parts of the sum over input
+// channels, then blocks of output channels, then phases: the interleaved pictures of a transposed
+// convolution, or of one after enlarging. From the prelude: SPREAD (distance of output pixels: 1,
+// or the stride of a transposed convolution), NEAREST (factor by which the input is enlarged).
 
 struct Place {
     // First column and row of the output that the phase makes.

@@ -1,5 +1,5 @@
-// The end of a norm: (x − mean) · scale + shift, eight rows a thread. From the prelude: IN_FULL (1 if the input is 32 bits in an
-// arena of 16).
+// The end of a norm: (x − mean) · scale + shift, eight rows a thread. From the prelude: IN_FULL (1
+// if the input is 32 bits in an arena of 16).
 
 fn source(at: u32) -> vec4f {
     if IN_FULL == 1u { return load_full(step.input + at * FULL); }

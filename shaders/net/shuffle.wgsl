@@ -14,7 +14,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                 place = id.xy * FACTOR + vec2u(c % FACTOR, c / FACTOR % FACTOR);
                 channel = c / (FACTOR * FACTOR);
             }
-            v[lane] = load(step.input + (place.y * step.in_size.x + place.x) * step.in_pitch + channel / 4u)[channel % 4u];
+            let pixel = place.y * step.in_size.x + place.x;
+            v[lane] = load(step.input + pixel * step.in_pitch + channel / 4u)[channel % 4u];
         }
     }
     finish(v, id.y * step.out_size.x + id.x, id.z);

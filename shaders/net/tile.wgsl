@@ -1,6 +1,7 @@
-// What the blocked convolutions share: a thread makes two columns by four rows of pixels and VECTORS (1 to 4) vectors of output
-// channels of them. Tiles are counted row by row through the whole picture, so a workgroup of a small picture is full too.
-// From the prelude: KERNEL_W, KERNEL_H, VECTORS; place.wgsl and whole.wgsl or parts.wgsl come before, make.wgsl after.
+// What the blocked convolutions share: a thread makes two columns by four rows of pixels and
+// VECTORS (1 to 4) vectors of output channels of them. Tiles are counted row by row through the
+// whole picture, so a workgroup of a small picture is full too. From the prelude: KERNEL_W,
+// KERNEL_H, VECTORS; place.wgsl and whole.wgsl or parts.wgsl come before, make.wgsl after.
 
 const TILE = vec2u(2u, 4u);
 
@@ -52,7 +53,8 @@ fn begin(bias: mat4x4f) {
     d = all_of(bias[3]);
 }
 
-// Writes the vectors that exist of the pixels that exist. Loops on purpose: unrolled they are most of a kernel's compilation.
+// Writes the vectors that exist of the pixels that exist. Loops on purpose: unrolled they are most
+// of a kernel's compilation.
 fn write(tile: u32, me: u32) {
     let first = place.block * VECTORS;
     let size = made(place.phase);

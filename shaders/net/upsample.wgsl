@@ -1,6 +1,7 @@
-// Bilinear resampling to the output's size, half-pixel centres, edges clamped (PyTorch's align_corners=False). A thread makes the two by
-// two pixels that begin at odd places: at twice the size they lie between the same four of the input. From the prelude: DOUBLE
-// (1 for exactly twice the size).
+// Bilinear resampling to the output's size, half-pixel centres, edges clamped (PyTorch's
+// align_corners=False). A thread makes the two by two pixels that begin at odd places: at twice the
+// size they lie between the same four of the input. From the prelude: DOUBLE (1 for exactly twice
+// the size).
 
 fn texel(x: u32, y: u32, c: u32) -> vec4f {
     return load(step.input + (y * step.in_size.x + x) * step.in_pitch + c);
@@ -11,7 +12,9 @@ struct Column { top: vec4f, bottom: vec4f }
 
 fn column(x: u32, low: u32, high: u32, c: u32) -> Column { return Column(texel(x, low, c), texel(x, high, c)); }
 
-fn between(a: Column, b: Column, f: vec2f) -> vec4f { return mix(mix(a.top, b.top, f.x), mix(a.bottom, b.bottom, f.x), f.y); }
+fn between(a: Column, b: Column, f: vec2f) -> vec4f {
+    return mix(mix(a.top, b.top, f.x), mix(a.bottom, b.bottom, f.x), f.y);
+}
 
 // Finishes a pixel if it is one.
 fn make(at: vec2u, value: vec4f, c: u32) {

@@ -1,6 +1,7 @@
-// A copy: moved by step.pad, beyond the input's edges zero (CLAMP 0) or the nearest pixel (1); its channels go to
-// step.channel and after. Lanes before that keep what they have, so that tensors whose channels are no multiples of four
-// can be joined one after the other. From the prelude: CLAMP, and whether input and output are 32 bits in either arena: IN_FULL, OUT_FULL.
+// A copy: moved by step.pad, beyond the input's edges zero (CLAMP 0) or the nearest pixel (1); its
+// channels go to step.channel and after. Lanes before that keep what they have, so that tensors
+// whose channels are no multiples of four can be joined one after the other. From the prelude:
+// CLAMP, and whether input and output are 32 bits in either arena: IN_FULL, OUT_FULL.
 
 fn source(pixel: u32, vector: u32) -> vec4f {
     if vector * 4u >= step.in_channels { return vec4f(0.0); }
@@ -30,7 +31,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             if id.z > 0u { before = source(pixel, id.z - 1u); }
             var moved = vec4f(0.0);
             for (var lane = 0u; lane < 4u; lane++) {
-                if lane >= skipped { moved[lane] = v[lane - skipped]; } else { moved[lane] = before[lane + 4u - skipped]; }
+                if lane >= skipped {
+                    moved[lane] = v[lane - skipped];
+                } else {
+                    moved[lane] = before[lane + 4u - skipped];
+                }
             }
             v = moved;
         }

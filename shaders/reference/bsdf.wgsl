@@ -7,7 +7,8 @@
 // Principled): white metal keeps all light at every roughness. Its dielectric part has the true Fresnel curve of the
 // material's index, as the rasteriser's `ggx` and Cycles have it and as `env_brdf` was fitted to. Metal has Schlick's.
 
-// Mean of the Fresnel curve over the cosine-weighted hemisphere: Kulla and Conty's fit, scaled to be exact for index 1.5.
+// Mean of the Fresnel curve over the cosine-weighted hemisphere: Kulla and Conty's fit, scaled to
+// be exact for index 1.5.
 fn mean_fresnel(index: f32) -> f32 {
     return min(1.0258 * (index - 1.0) / (4.08567 + 1.00071 * index), 1.0);
 }
@@ -19,8 +20,9 @@ fn fresnel_metal(s: Surface, f0: vec3f, q5: f32) -> vec3f {
     return (f0 + (1.0 - f0) * q5) * (1.0 + again * s.missing);
 }
 
-// Fresnel term with the factor for the lost light. A coloured dielectric rises to white as its index's curve rises to 1;
-// one that reflects more than any (KHR_materials_specular allows it) has a metal's curve, as in the rasteriser.
+// Fresnel term with the factor for the lost light. A coloured dielectric rises to white as its
+// index's curve rises to 1; one that reflects more than any (KHR_materials_specular allows it) has
+// a metal's curve, as in the rasteriser.
 fn fresnel(s: Surface, v_h: f32) -> vec3f {
     let q = 1.0 - v_h;
     let q2 = q * q;

@@ -3,8 +3,8 @@
 //#import lib/sampling.wgsl
 //#import reference/random.wgsl
 
-// What rays see that hit nothing: one radiance, or a lat-long picture (`scene::environment` says how it lies) with a table
-// of cells, even in solid angle, from which light samples choose.
+// What rays see that hit nothing: one radiance, or a lat-long picture (`scene::environment` says
+// how it lies) with a table of cells, even in solid angle, from which light samples choose.
 
 fn environment_texel(x: i32, y: i32) -> vec3f {
     let size = vec2i(scene.environment_size);

@@ -1,11 +1,12 @@
 // The film of one half-buffer: sums over the samples of each point that stay exact over millions of samples.
 //
-// A point has 16 vec4f: 8 sums and the 8 carries that belong to them. A sum is the pair sum + carry; every addition is
-// Knuth's TwoSum, whose rounding error goes into the carry (Ogita, Rump and Oishi 2005, algorithm Sum2: as if summed in twice
-// the precision). What the slots hold is told in `reference::film`.
+// A point has 16 vec4f: 8 sums and the 8 carries that belong to them. A sum is the pair sum +
+// carry; every addition is Knuth's TwoSum, whose rounding error goes into the carry (Ogita, Rump
+// and Oishi 2005, algorithm Sum2: as if summed in twice the precision). What the slots hold is told
+// in `reference::film`.
 //
-// Call `film_add` once for every finished sample and slot, not once a dispatch: then the result does not depend on how the
-// work was cut into dispatches, bit for bit.
+// Call `film_add` once for every finished sample and slot, not once a dispatch: then the result
+// does not depend on how the work was cut into dispatches, bit for bit.
 
 @group(1) @binding(2) var<storage, read_write> film: array<vec4f>;
 
@@ -22,8 +23,9 @@ const FILM_DIFF_COL: u32 = 5u;
 const FILM_GLOSS_COL: u32 = 6u;
 const FILM_ANALYTIC: u32 = 7u;
 
-// The same bits, but the compiler cannot know that: `zero` comes from memory and is 0. Mesa's compiler (and
-// others) reckons with real numbers: without this it finds that every rounding error is nil, and the carries stay empty.
+// The same bits, but the compiler cannot know that: `zero` comes from memory and is 0. Mesa's
+// compiler (and others) reckons with real numbers: without this it finds that every rounding error
+// is nil, and the carries stay empty.
 fn film_opaque(v: vec4f, zero: u32) -> vec4f {
     return bitcast<vec4f>(bitcast<vec4u>(v) ^ vec4u(zero));
 }
@@ -33,8 +35,9 @@ fn film_broken(v: vec4f) -> vec4<bool> {
     return (bitcast<vec4u>(v) & vec4u(0x7f800000u)) == vec4u(0x7f800000u);
 }
 
-// Adds `value` to slot `slot` of the film's point number `point` (counted from the film's first). One invocation a point.
-// Components that are no numbers are left out and counted in the last component of FILM_ANALYTIC, which callers give as 0.
+// Adds `value` to slot `slot` of the film's point number `point` (counted from the film's first).
+// One invocation a point. Components that are no numbers are left out and counted in the last
+// component of FILM_ANALYTIC, which callers give as 0.
 fn film_add(point: u32, slot: u32, value: vec4f) {
     let at = FILM_STRIDE * point + slot;
     // The carry of that count is never written: it stays 0.

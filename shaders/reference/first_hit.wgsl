@@ -6,7 +6,8 @@
 
 // Position and depth of what is seen through exact points of the picture.
 
-// World position (metres; zero where nothing was hit), distance along the view axis (metres; 1e10 where nothing was hit).
+// World position (metres; zero where nothing was hit), distance along the view axis (metres; 1e10
+// where nothing was hit).
 @group(1) @binding(2) var<storage, read_write> found: array<vec4f>;
 
 @compute @workgroup_size(64)

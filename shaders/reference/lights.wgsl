@@ -76,7 +76,8 @@ fn sample_analytic(light: Light, p: vec3f, u: vec2f) -> TrueLight {
     if distance < 1e-6 { return NO_LIGHT; }
     let axis = to / distance;
     if light.radius < NO_SIZE {
-        return TrueLight(axis, distance, light.color * dimming(light, axis, distance) / (distance * distance), 0.0, NONE, 1.0);
+        let irradiance = light.color * dimming(light, axis, distance) / (distance * distance);
+        return TrueLight(axis, distance, irradiance, 0.0, NONE, 1.0);
     }
     let along = to + frame_around(axis) * vec3f(d, 0.0);
     let reach = length(along);
@@ -120,8 +121,8 @@ fn sample_triangle(triangle: u32, p: vec3f, u: vec2f) -> TrueLight {
     let w = weights(uv);
     let q = corners.a * w.x + corners.b * w.y + corners.c * w.z;
     let normal = front_normal(corners);
-    // The ray aims at a point off the surface, like all rays begin. Aiming at q and stopping short by as much would not do:
-    // the offset is not along the normal, and can lie farther away than q.
+    // The ray aims at a point off the surface, like all rays begin. Aiming at q and stopping short
+    // by as much would not do: the offset is not along the normal, and can lie farther away than q.
     let to = off_surface(q, select(normal, -normal, dot(normal, q - p) > 0.0)) - p;
     let d2 = dot(to, to);
     if d2 <= 0.0 { return NO_LIGHT; }

@@ -10,12 +10,14 @@
 //#import reference/rasterised.wgsl
 //#import reference/sums.wgsl
 
-// The path tracer. One invocation advances one point of the picture by `sample_count` samples. The loop runs over
-// vertices, not over samples: a path that has ended starts the next sample at once, so that invocations side by side stay
-// busy. There is one place where rays are traced, whatever they are for.
+// The path tracer. One invocation advances one point of the picture by `sample_count` samples. The
+// loop runs over vertices, not over samples: a path that has ended starts the next sample at once,
+// so that invocations side by side stay busy. There is one place where rays are traced, whatever
+// they are for.
 //
-// At each vertex: a light sample and a scattered ray, weighted against each other (power heuristic; Veach 1997). Diffuse
-// and specular lobe are sampled and weighted apart, so that the light of each goes to its own layer.
+// At each vertex: a light sample and a scattered ray, weighted against each other (power heuristic;
+// Veach 1997). Diffuse and specular lobe are sampled and weighted apart, so that the light of each
+// goes to its own layer.
 
 // What the ray in flight is for.
 const RAY_NONE: u32 = 3u;
@@ -33,16 +35,17 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
     let film_point = point - job.film_first;
     let analytic_only = (job.flags & JOB_ANALYTIC_ONLY) != 0u;
     let covered = (scene.flags & SCENE_COVERED) != 0u;
-    let apart = analytic_only || (scene.flags & SCENE_ANALYTIC_APART) != 0u || (job.flags & (JOB_LIGHTS_ONLY | JOB_HITS_ONLY)) != 0u;
+    let apart = analytic_only || (scene.flags & SCENE_ANALYTIC_APART) != 0u
+        || (job.flags & (JOB_LIGHTS_ONLY | JOB_HITS_ONLY)) != 0u;
 
     var sample = job.first_sample;
     let end = sample + job.sample_count;
     var in_flight = false;
     var rays = 0u;
 
-    // The path: number of its next vertex, what light from there counts, density of its last scattering, the least density
-    // so far and the cosine at the last, whether its first scattering was glossy, bounces so far, whether it ends at the
-    // next surface.
+    // The path: number of its next vertex, what light from there counts, density of its last
+    // scattering, the least density so far and the cosine at the last, whether its first scattering
+    // was glossy, bounces so far, whether it ends at the next surface.
     var vertex: u32;
     var beta: vec3f;
     var pdf: f32;
@@ -53,8 +56,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
     var last: bool;
     // The last scattering was diffuse.
     var after_diffuse: bool;
-    // What starts at the last vertex: the next ray, and shadow rays with what arrives by them (diffuse or all, glossy, as
-    // the rasteriser has it).
+    // What starts at the last vertex: the next ray, and shadow rays with what arrives by them
+    // (diffuse or all, glossy, as the rasteriser has it).
     var base: vec3f;
     var next_l: vec3f;
     var goes_on = false;

@@ -2,9 +2,10 @@
 //#import reference/types.wgsl
 //#import lib/sampling.wgsl
 
-// Random numbers: Owen-scrambled Sobol points, two dimensions at a time (Burley 2020, "Practical Hash-based Owen
-// Scrambling"). Each pair of dimensions has its own scrambling and its own order of the points, both from a hash of seed,
-// half, point and dimension; so the halves are independent, and so are different points of the picture.
+// Random numbers: Owen-scrambled Sobol points, two dimensions at a time (Burley 2020, "Practical
+// Hash-based Owen Scrambling"). Each pair of dimensions has its own scrambling and its own order of
+// the points, both from a hash of seed, half, point and dimension; so the halves are independent,
+// and so are different points of the picture.
 
 var<private> random_point: u32;
 var<private> random_sample: u32;
@@ -41,8 +42,8 @@ fn random2(pair: u32) -> vec2f {
     }
     let seeds = pcg3(vec3u(random_point, pair, 0x68bc21ebu));
     let i = reverseBits(scramble_reversed(reverseBits(random_sample), seeds.x));
-    // Sobol's first dimension is the index itself with reversed bits; the second multiplies by Pascal's triangle modulo 2:
-    // bit k is the parity of all bits whose number contains k (Lucas).
+    // Sobol's first dimension is the index itself with reversed bits; the second multiplies by
+    // Pascal's triangle modulo 2: bit k is the parity of all bits whose number contains k (Lucas).
     var j = i;
     j ^= (j >> 1u) & 0x55555555u;
     j ^= (j >> 2u) & 0x33333333u;
@@ -69,8 +70,9 @@ fn in_disc(u: vec2f) -> vec2f {
     return r * vec2f(cos(angle), sin(angle));
 }
 
-// A point off the surface at p on the side of n, so that rays from there do not meet the surface again: steps in units of
-// the last place, not metres (Wächter and Binder 2019, Ray Tracing Gems 6).
+// A point off the surface at p on the side of n, so that rays from there do not meet the surface
+// again: steps in units of the last place, not metres (Wächter and Binder 2019, Ray Tracing Gems
+// 6).
 fn off_surface(p: vec3f, n: vec3f) -> vec3f {
     let steps = vec3i(n * 256.0);
     let moved = bitcast<vec3f>(bitcast<vec3i>(p) + select(steps, -steps, p < vec3f(0.0)));

@@ -37,8 +37,9 @@ fn sample_rasterised(s: Surface, origin: vec3f, pair: u32) -> RasterisedRay {
     let light = light_at(choice.id);
     var point = sample_analytic(light, origin, random2(pair + PAIR_ANALYTIC_POINT));
     if light.kind == LIGHT_SPOT && chance_of(choice.id) == 0.0 {
-        // A spot that stands in for a flat glowing surface is a disc in that surface's plane, just in front of it: one that
-        // faced the point would reach into the surface, and be shadowed by it.
+        // A spot that stands in for a flat glowing surface is a disc in that surface's plane, just
+        // in front of it: one that faced the point would reach into the surface, and be shadowed by
+        // it.
         let d = in_disc(random2(pair + PAIR_ANALYTIC_POINT)) * light.radius;
         let along = light.position + frame_around(light.direction) * vec3f(d, 0.0) - origin;
         point.reach = length(along);

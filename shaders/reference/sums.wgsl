@@ -1,8 +1,8 @@
 //#import reference/types.wgsl
 //#import reference/film.wgsl
 
-// What one sample adds to the film, sorted as Blender sorts its passes: the first scattering decides between diffuse and
-// glossy, light that arrives there after one ray is direct.
+// What one sample adds to the film, sorted as Blender sorts its passes: the first scattering
+// decides between diffuse and glossy, light that arrives there after one ray is direct.
 
 struct Sums {
     alpha: f32,

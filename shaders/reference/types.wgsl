@@ -1,6 +1,6 @@
 // What the path tracer reads. Group 0 is the scene (`reference::scene`), group 1 the film (`reference::job`).
 
-// Rust twin: `reference::scene::SceneInfo`.
+// In Rust: `reference::scene::SceneInfo`.
 struct SceneInfo {
     // Constant radiance of the surroundings, W/(m² sr); the mean where there is a picture.
     environment: vec3f,
@@ -29,7 +29,7 @@ const SCENE_COVERED: u32 = 1u;
 // The light that a GI method is given differs from the analytic lights that truly are there.
 const SCENE_ANALYTIC_APART: u32 = 2u;
 
-// Rust twin: `reference::job::Job`.
+// In Rust: `reference::job::Job`.
 struct Job {
     world_from_view: mat4x4f,
     tan_half: vec2f,
@@ -61,7 +61,7 @@ const JOB_COUNT_TWICE: u32 = 32u;
 const JOB_PLAIN_RANDOM: u32 = 64u;
 const JOB_NO_CAUSTICS: u32 = 128u;
 
-// Rust twin: `reference::scene::ImageUse`. Rows of uv' = M (u, v, 1).
+// In Rust: `reference::scene::ImageUse`. Rows of uv' = M (u, v, 1).
 struct ImageUse {
     row0: vec3f,
     // Index of the first texel in `texels`; 0xffffffff for no image.
@@ -73,7 +73,7 @@ struct ImageUse {
     pad: vec2u,
 }
 
-// Rust twin: `reference::scene::RefMaterial`.
+// In Rust: `reference::scene::RefMaterial`.
 struct RefMaterial {
     base_color: vec4f,
     emissive: vec3f,
@@ -100,7 +100,8 @@ const TABLE_SIDE: u32 = 32u;
 const FILTER_STEPS: u32 = 1024u;
 
 struct MaterialStore {
-    // Share of light that the single-scattering GGX lobe keeps, by n.v (fast) and roughness; then its mean by roughness.
+    // Share of light that the single-scattering GGX lobe keeps, by n.v (fast) and roughness; then
+    // its mean by roughness.
     energy: array<f32, 1024>,
     energy_mean: array<f32, 32>,
     // Inverse integral of the pixel filter, in units of its width.
@@ -110,7 +111,8 @@ struct MaterialStore {
 
 @group(0) @binding(0) var<uniform> scene: SceneInfo;
 @group(0) @binding(1) var accel_blocks: texture_2d<u32>;
-// Four vectors a triangle, then six for each triangle that has texture coordinates or colours; `surface.wgsl` reads them.
+// Four vectors a triangle, then six for each triangle that has texture coordinates or colours;
+// `surface.wgsl` reads them.
 @group(0) @binding(3) var<storage, read> triangles: array<vec4u>;
 @group(0) @binding(4) var<storage, read> materials: MaterialStore;
 @group(0) @binding(5) var<storage, read> lights: array<vec4u>;

@@ -26,7 +26,8 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     if depth > 0.0 {
         let albedo = textureLoad(albedo_texture, id.xy, 0);
         // Occlusion maps darken what comes from all around, not the analytic lights (glTF 2.0, 3.9.3).
-        radiance = albedo.rgb * (textureLoad(direct_diffuse, id.xy, 0).rgb + textureLoad(indirect, id.xy, 0).rgb * albedo.a)
+        radiance = albedo.rgb * (textureLoad(direct_diffuse, id.xy, 0).rgb
+            + textureLoad(indirect, id.xy, 0).rgb * albedo.a)
             + textureLoad(direct_specular, id.xy, 0).rgb
             + textureLoad(indirect_specular, id.xy, 0).rgb * albedo.a
             + textureLoad(emissive_texture, id.xy, 0).rgb;

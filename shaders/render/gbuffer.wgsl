@@ -5,7 +5,8 @@
 //#import lib/material.wgsl
 //#import render/mesh.wgsl
 
-// One geometry pass: depth, normal, diffuse albedo, specular, emissive, motion. `render/gbuffer.rs` documents each field.
+// One geometry pass: depth, normal, diffuse albedo, specular, emissive, motion. `render/gbuffer.rs`
+// documents each field.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 

@@ -1,9 +1,10 @@
 //#import lib/frame.wgsl
 
-// Temporal anti-aliasing: each frame samples its pixels somewhere else; the 3x3 samples around a pixel's centre, weighted
-// by the pixel filter, are this frame's value, and the mean over frames is the filtered picture. A still camera before
-// objects that are still averages without end. Where either moves, the mean is fetched from where the surface was, dropped
-// where the surface was hidden, and held within what the pixel's neighbourhood shows now.
+// Temporal anti-aliasing: each frame samples its pixels somewhere else; the 3x3 samples around a
+// pixel's centre, weighted by the pixel filter, are this frame's value, and the mean over frames is
+// the filtered picture. A still camera before objects that are still averages without end. Where
+// either moves, the mean is fetched from where the surface was, dropped where the surface was
+// hidden, and held within what the pixel's neighbourhood shows now.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var depth_texture: texture_2d<f32>;
@@ -49,7 +50,8 @@ fn inside(pixel: vec2i) -> vec2i {
     return clamp(pixel, vec2i(0), vec2i(frame.size) - 1);
 }
 
-// Mean over frames at `place` (pixels, centres at a half), by Catmull-Rom: bilinear fetches would blur a little each frame.
+// Mean over frames at `place` (pixels, centres at a half), by Catmull-Rom: bilinear fetches would
+// blur a little each frame.
 fn fetch(place: vec2f) -> vec3f {
     let base = floor(place - 0.5);
     let t = place - 0.5 - base;

@@ -16,7 +16,8 @@ struct Flicker {
 var<workgroup> parts: array<f32, 64>;
 
 @compute @workgroup_size(8, 8)
-fn flicker(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
+fn flicker(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
     var part = 0.0;
     if all(id.xy < textureDimensions(now)) {
         let a = tonemap(options.kind, textureLoad(now, id.xy, 0).rgb * options.exposure);

@@ -82,7 +82,8 @@ fn display(pixel: vec2u, side: u32) -> vec3f {
             return radiance_shown(textureLoad(indirect_right, pixel / show.texel.y, 0).rgb);
         }
         case 6u: {
-            return radiance_shown(textureLoad(direct_specular, pixel, 0).rgb + textureLoad(indirect_specular, pixel, 0).rgb);
+            return radiance_shown(textureLoad(direct_specular, pixel, 0).rgb
+                + textureLoad(indirect_specular, pixel, 0).rgb);
         }
         case 7u: { return select(vec3f(0.0), vec3f(textureLoad(specular_texture, pixel, 0).a), hit); }
         case 8u: {

@@ -58,7 +58,8 @@ pub(super) fn build(triangles: &[Triangle]) -> Accel {
     let pairs = pairs::join(triangles, &kept);
     drop(kept);
     let boxes: Vec<Aabb> = pairs.iter().map(Pair::aabb).collect();
-    // Clustering makes chains of boxes that are all alike, such as many copies of a mesh in one place, in quadratic time.
+    // Clustering makes chains of boxes that are all alike, such as many copies of a mesh in one
+    // place, in quadratic time.
     let chained = most_alike(&boxes) > MOST_ALIKE;
     let leaf = |i: usize| wide::leaf_block(&pairs[i]);
     accel.blocks = wide::blocks(&if chained { halved(&boxes) } else { clustered(&boxes) }, leaf);
@@ -68,8 +69,8 @@ pub(super) fn build(triangles: &[Triangle]) -> Accel {
     accel
 }
 
-/// Blocks of a tree over `boxes`, whose leaves `leaf` makes: for a few thousand things that move, so it is quick to build and no
-/// deeper than `levels`.
+/// Blocks of a tree over `boxes`, whose leaves `leaf` makes: for a few thousand things that move,
+/// so it is quick to build and no deeper than `levels`.
 pub(super) fn over_boxes(boxes: &[Aabb], levels: usize, leaf: impl Fn(usize) -> wide::Block) -> Vec<wide::Block> {
     if boxes.is_empty() {
         return vec![[0; wide::WORDS]];

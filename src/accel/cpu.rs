@@ -43,7 +43,8 @@ impl Ray {
         Self { origin, inverse: 1.0 / safe, rows: [first, second, direction / direction.length_squared()] }
     }
 
-    /// The nearest hit of a leaf's two triangles before `nearest`, of those that `stops` the ray (by place in the leaf, and number).
+    /// The nearest hit of a leaf's two triangles before `nearest`, of those that `stops` the ray
+    /// (by place in the leaf, and number).
     fn leaf(&self, block: &Block, nearest: f32, stops: impl Fn(u32, u32) -> bool) -> Option<AccelHit> {
         let corner = |i: usize| {
             let p = Vec3::from_array(std::array::from_fn(|k| f32::from_bits(block[4 * i + k]))) - self.origin;
@@ -83,8 +84,9 @@ impl Ray {
     }
 }
 
-/// A triangle in the ray's frame, where the ray is the third axis and t its coordinate. Edges shared by two triangles give
-/// both the same products, so no ray passes between them (after Woop, Benthin and Wald 2013).
+/// A triangle in the ray's frame, where the ray is the third axis and t its coordinate. Edges
+/// shared by two triangles give both the same products, so no ray passes between them (after Woop,
+/// Benthin and Wald 2013).
 fn triangle([a, b, c]: [Vec3; 3], word: u32, nearest: f32) -> Option<AccelHit> {
     let edge = |p: Vec3, q: Vec3| q.x * p.y - q.y * p.x;
     let weights = [edge(b, c), edge(c, a), edge(a, b)];
@@ -97,7 +99,8 @@ fn triangle([a, b, c]: [Vec3; 3], word: u32, nearest: f32) -> Option<AccelHit> {
 }
 
 impl Accel {
-    /// The nearest hit of the ray with 0 < t < `t_max`, t counted in lengths of `direction`. Both sides of triangles are hit.
+    /// The nearest hit of the ray with 0 < t < `t_max`, t counted in lengths of `direction`. Both
+    /// sides of triangles are hit.
     pub fn closest(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32) -> Option<AccelHit> {
         self.walk(origin, direction, t_max).0
     }
@@ -199,9 +202,9 @@ impl SceneBlocks {
         self.0.len()
     }
 
-    /// The nearest hit (any hit where `any`) with 0 < t < `t_max`, and the number of its instance; `triangle` counts those of all
-    /// meshes, one after the other. Triangles that let rays through do so by `seed`. `seen` hears of each block that is read, in the
-    /// GPU's order.
+    /// The nearest hit (any hit where `any`) with 0 < t < `t_max`, and the number of its instance;
+    /// `triangle` counts those of all meshes, one after the other. Triangles that let rays through
+    /// do so by `seed`. `seen` hears of each block that is read, in the GPU's order.
     pub fn walk(
         &self,
         origin: [f32; 3],

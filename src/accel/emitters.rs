@@ -6,7 +6,7 @@ use super::surfaces::Surface;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
 
-/// The twin of `Emitter` in `shaders/accel/surface.wgsl`.
+/// Laid out as `Emitter` in `shaders/accel/surface.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct EmitterGpu {
@@ -55,8 +55,9 @@ pub fn glowing(surfaces: &[Surface], corners: &[[[f32; 3]; 3]]) -> Vec<Glow> {
     surfaces.iter().zip(corners).filter_map(glow).collect()
 }
 
-/// The table, and one over the sum of luminance × area × sides of everything in it (0 for nothing). Empty where there are more than
-/// `most`: then only rays that happen to meet them find them, which is right in the mean.
+/// The table, and one over the sum of luminance × area × sides of everything in it (0 for nothing).
+/// Empty where there are more than `most`: then only rays that happen to meet them find them, which
+/// is right in the mean.
 pub fn table<'a>(placed: impl Iterator<Item = (&'a [Glow], Mat4)>, most: usize) -> (Vec<EmitterGpu>, f32) {
     let mut all = Vec::new();
     for (glows, world) in placed {

@@ -1,7 +1,7 @@
 //! The structure in a texture.
 //!
-//! Why a texture: drivers read it at scattered places at least as fast as a storage buffer, and Mesa's CPU driver does so
-//! about three times as fast (`docs/log/2026-11-rays.md`).
+//! Why a texture: drivers read it at scattered places at least as fast as a storage buffer, and
+//! Mesa's CPU driver does so about three times as fast (`docs/log/2026-11-rays.md`).
 
 use super::wide::{Block, WORDS};
 use super::{Accel, AccelError};
@@ -31,7 +31,8 @@ impl AccelGpu {
     /// Uploads `accel`.
     ///
     /// # Errors
-    /// [`AccelError::TooLarge`] when the device's textures are too small, [`AccelError::OutOfMemory`] when its memory is.
+    /// [`AccelError::TooLarge`] when the device's textures are too small,
+    /// [`AccelError::OutOfMemory`] when its memory is.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, accel: &Accel) -> Result<Self, AccelError> {
         Self::of_blocks(device, queue, &accel.blocks)
     }

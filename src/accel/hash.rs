@@ -1,5 +1,5 @@
-//! A hash map for the many small keys of meshes (corners, edges). With the standard one, joining triangles by their edges took half
-//! of the time in which trees were built.
+//! A hash map for the many small keys of meshes (corners, edges). With the standard one, joining
+//! triangles by their edges took half of the time in which trees were built.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasher, Hasher, RandomState};

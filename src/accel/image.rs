@@ -1,12 +1,13 @@
-//! Pictures made small, for what rays see of them: linear colours, and for cut-out materials the share of each texel that is
-//! above the cutoff.
+//! Pictures made small, for what rays see of them: linear colours, and for cut-out materials the
+//! share of each texel that is above the cutoff.
 
 use crate::scene::{AlphaMode, Image, Material, Sampler, Scene, TextureRef, Wrap};
 use glam::Vec2;
 use std::{collections::HashMap, sync::Arc};
 
-/// Longest side of a reduced picture, texels. Charts of a few texels of a 4k atlas blur into their neighbours at this size;
-/// four times the texels would cost 1 MiB of memory a picture while a scene loads.
+/// Longest side of a reduced picture, texels. Charts of a few texels of a 4k atlas blur into their
+/// neighbours at this size; four times the texels would cost 1 MiB of memory a picture while a
+/// scene loads.
 const SIDE: usize = 256;
 
 /// A small linear picture.

@@ -27,8 +27,9 @@ impl Pair {
         Self { corners: [a, b, c, c], triangles: [(index, 0); 2] }
     }
 
-    /// `first` and `second` share the edge that starts at corner `i` of the first and at corner `j` of the second, seen from
-    /// each in its own sense of rotation, so that each one's end is the other's start.
+    /// `first` and `second` share the edge that starts at corner `i` of the first and at corner `j`
+    /// of the second, seen from each in its own sense of rotation, so that each one's end is the
+    /// other's start.
     fn joined(first: (&Triangle, u32, usize), second: (&Triangle, u32, usize)) -> Self {
         let ((a, a_index, i), (b, b_index, j)) = (first, second);
         // The first triangle turned so that the shared edge is from its third corner to its first.
@@ -40,8 +41,9 @@ impl Pair {
     }
 }
 
-/// Pairs are made whose box has at most this share of the area of both triangles' boxes. Tried from 0.6 to 9 on rooms and
-/// spheres: 0.9 visits least; at 1 the corners of cubes are joined, whose box is mostly empty.
+/// Pairs are made whose box has at most this share of the area of both triangles' boxes. Tried from
+/// 0.6 to 9 on rooms and spheres: 0.9 visits least; at 1 the corners of cubes are joined, whose box
+/// is mostly empty.
 const WORTH: f32 = 0.9;
 
 type Edge = [[u32; 3]; 2];

@@ -1,6 +1,7 @@
-//! The triangles of a scene as rays meet them: a tree for each mesh, made once and on all of the machine's threads, and a tree
-//! over the instances, made anew whenever something moves. One texture holds both; what a ray needs to know of a triangle
-//! (`surfaces`) and the triangles that glow (`emitters`) are storage buffers.
+//! The triangles of a scene as rays meet them: a tree for each mesh, made once and on all of the
+//! machine's threads, and a tree over the instances, made anew whenever something moves. One
+//! texture holds both; what a ray needs to know of a triangle (`surfaces`) and the triangles that
+//! glow (`emitters`) are storage buffers.
 
 use super::emitters::{self, EmitterGpu};
 use super::gpu::{self, ROW};
@@ -57,8 +58,8 @@ impl SceneRays {
         Self::with_progress(device, queue, scene, &|_, _| true)
     }
 
-    /// As [`SceneRays::new`]; `progress` hears from any thread how many meshes of how many have their trees, and ends the work by
-    /// answering false.
+    /// As [`SceneRays::new`]; `progress` hears from any thread how many meshes of how many have
+    /// their trees, and ends the work by answering false.
     ///
     /// # Errors
     /// [`AccelError`] as above, and [`AccelError::Stopped`].
@@ -117,7 +118,8 @@ impl SceneRays {
         (self.id, self.moves) = (before.id, self.moves.max(before.moves) + 1);
     }
 
-    /// Takes over where the instances of `scene` are; its meshes are those that this was made of. True when buffers were made anew and have to be bound again.
+    /// Takes over where the instances of `scene` are; its meshes are those that this was made of.
+    /// True when buffers were made anew and have to be bound again.
     pub fn place(&mut self, queue: &wgpu::Queue, scene: &Scene) -> bool {
         self.put(queue, scene.instances.iter().map(|i| (i.mesh, i.transform)))
     }
@@ -175,7 +177,8 @@ impl SceneRays {
         &self.surfaces
     }
 
-    /// Of each triangle of each mesh the octahedral normals of its corners in object space, a texel each, 8192 to a row.
+    /// Of each triangle of each mesh the octahedral normals of its corners in object space, a texel
+    /// each, 8192 to a row.
     pub fn normals(&self) -> &wgpu::TextureView {
         &self.normals
     }

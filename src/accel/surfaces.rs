@@ -1,12 +1,14 @@
-//! What a ray needs to know of a triangle that it meets: colours averaged over it, 16 bytes. A ray of light carries no detail,
-//! so textures are read once, when the scene is loaded, and a scene's 4k pictures cost the rays nothing.
+//! What a ray needs to know of a triangle that it meets: colours averaged over it, 16 bytes. A ray
+//! of light carries no detail, so textures are read once, when the scene is loaded, and a scene's
+//! 4k pictures cost the rays nothing.
 
 use super::image::{Reduced, Reductions};
 use crate::scene::{AlphaMode, Material, Mesh, Scene};
 use glam::{Vec2, Vec3};
 
-/// `Surface` of `shaders/accel/surface.wgsl`, packed: diffuse base colour and roughness, reflectance at normal incidence and
-/// flags, emitted radiance, what a light sample's choice of it goes by.
+/// `Surface` of `shaders/accel/surface.wgsl`, packed: diffuse base colour and roughness,
+/// reflectance at normal incidence and flags, emitted radiance, what a light sample's choice of it
+/// goes by.
 pub type Packed = [u32; 4];
 
 /// Glows on both of its sides, and is drawn from both.
@@ -54,7 +56,8 @@ impl Surface {
         ]
     }
 
-    /// Radiance that reaches those who look at it, as the shader knows it: what lets a share of all rays through sends the rest.
+    /// Radiance that reaches those who look at it, as the shader knows it: what lets a share of all
+    /// rays through sends the rest.
     pub fn glow(&self) -> Vec3 {
         from_shared_exponent(shared_exponent(self.emission)) * ((255 - self.open()) as f32 / 255.0)
     }

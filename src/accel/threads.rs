@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// `work` of every item, in the items' order. Those with the greatest `size` are begun first, so that none of the threads ends
-/// up with a large one alone.
+/// `work` of every item, in the items' order. Those with the greatest `size` are begun first, so
+/// that none of the threads ends up with a large one alone.
 pub fn map<T: Sync, R: Send>(items: &[T], size: impl Fn(&T) -> usize, work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let mut order: Vec<usize> = (0..items.len()).collect();
     order.sort_by_key(|&i| std::cmp::Reverse(size(&items[i])));

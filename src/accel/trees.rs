@@ -31,7 +31,8 @@ pub(super) struct SceneTrees {
     pub top_room: usize,
 }
 
-/// Blocks that the tree over `count` instances can need: a node has a family of eight, and there are fewer nodes than instances.
+/// Blocks that the tree over `count` instances can need: a node has a family of eight, and there
+/// are fewer nodes than instances.
 fn top_blocks(count: usize) -> usize {
     (8 * count + 16).next_multiple_of(ROW as usize)
 }
@@ -83,7 +84,8 @@ pub(crate) fn corners(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
 }
 
 impl SceneTrees {
-    /// Builds them on all of the machine's threads. `progress` as in [`SceneRays::with_progress`](super::SceneRays::with_progress).
+    /// Builds them on all of the machine's threads. `progress` as in
+    /// [`SceneRays::with_progress`](super::SceneRays::with_progress).
     pub fn build(scene: &Scene, progress: &(dyn Fn(usize, usize) -> bool + Sync)) -> Result<Self, AccelError> {
         let reductions = Reductions::new(scene);
         let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(!progress(0, scene.meshes.len())));

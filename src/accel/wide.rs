@@ -11,9 +11,10 @@
 //! | 8–11 | along y | corner 2; the same of the second triangle |
 //! | 12–15 | along z | corner 3; which share of all rays the triangles let through, in 1/255: the first's in the low byte, the second's above it |
 //!
-//! A third kind of leaf is an instance of a mesh: words 0–2, 4–6 and 8–10 are the rows of what brings directions from the world
-//! into the mesh's space, 12–14 what is then added to places; word 3 is the root of the mesh's tree with bit 30 set, word 7 the
-//! number of the mesh's first triangle among those of all meshes, word 11 the number of the instance.
+//! A third kind of leaf is an instance of a mesh: words 0–2, 4–6 and 8–10 are the rows of what
+//! brings directions from the world into the mesh's space, 12–14 what is then added to places; word
+//! 3 is the root of the mesh's tree with bit 30 set, word 7 the number of the mesh's first triangle
+//! among those of all meshes, word 11 the number of the instance.
 
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
@@ -41,7 +42,8 @@ const PAD: f32 = 0.02;
 struct Cover {
     /// Expected visits, times area, with at most k+1 blocks.
     cost: [f32; 8],
-    /// How many of the k+1 blocks the left half gets; 0 when one less is as good. For k = 0: of the eight children of its one block.
+    /// How many of the k+1 blocks the left half gets; 0 when one less is as good. For k = 0: of the
+    /// eight children of its one block.
     left: [u8; 8],
 }
 
@@ -94,8 +96,8 @@ fn children(tree: &Bvh2, covers: &[Cover], node: u32) -> Vec<u32> {
     found
 }
 
-/// Puts children at the places from which a ray's octant tells a good order: place bits 4, 2, 1 stand for the high side in
-/// x, y, z. Greedy, as Ylitie et al. found good enough.
+/// Puts children at the places from which a ray's octant tells a good order: place bits 4, 2, 1
+/// stand for the high side in x, y, z. Greedy, as Ylitie et al. found good enough.
 fn places(tree: &Bvh2, node: u32, children: &[u32]) -> [Option<u32>; 8] {
     let centre = tree.nodes[node as usize].aabb().center();
     let mut costs = Vec::with_capacity(64);
@@ -122,7 +124,8 @@ fn node_block(tree: &Bvh2, node: u32, placed: &[Option<u32>; 8], first: usize) -
     block[3] = NODE | first as u32;
     for axis in 0..3 {
         let (low, high) = (own.min[axis], own.max[axis]);
-        // One step on either side is kept free for padding and rounding, and a step is no finer than the corner's 23 bits.
+        // One step on either side is kept free for padding and rounding, and a step is no finer
+        // than the corner's 23 bits.
         let finest = low.abs().max(high.abs()) / 4_194_304.0;
         let step = ((high - low) / 252.0).max(finest).max(1e-30).log2().ceil().exp2();
         let corner = (low / step - PAD).floor() - 1.0;

@@ -7,7 +7,7 @@ use crate::{
     image_io::{self, Image},
     net::cpu::{self, Tensor},
     net::format::Weights,
-    net::gpu::{NetError, Network, Options},
+    net::gpu::{NetError, Network, Options, Setup},
     net::{pictures, plan::PlanError},
 };
 use anyhow::Result;
@@ -87,7 +87,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     Ok(())
 }
 
-/// Runs on the GPU, or on the slow CPU twin where there is none or the picture is too large for it, saying so.
+/// Runs on the GPU, or on the slow CPU reference where there is none or the picture is too large for it, saying so.
 fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> Result<Tensor> {
     let dropout = args.dropout;
     let slow = |reason: &dyn std::fmt::Display| {
@@ -109,14 +109,9 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
     };
     let options = Options { dropout, precision: global.precision.precision(), ..Default::default() };
     let size = [input.shape.width, input.shape.height];
-    let network = match Network::tuned(
-        &gpu.device,
-        &gpu.queue,
-        weights,
-        size,
-        options,
-        super::tuned::of(&gpu.device, global.quiet),
-    ) {
+    let tuned = super::tuned::of(&gpu.device, global.quiet);
+    let setup = Setup { options, tuned, ..Setup::default() };
+    let network = match Network::new(&gpu.device, &gpu.queue, weights, size, setup) {
         Ok(network) => network,
         Err(e @ (NetError::Plan(PlanError::TooLarge { .. }) | NetError::Limit { .. })) => return slow(&e),
         Err(e) => return Err(e.into()),
@@ -128,7 +123,8 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
         let (gflop, mb) = (plan.flops() as f64 / 1e9, network.bytes() as f64 / 1e6);
         eprintln!("{} steps at {}x{}, {gflop:.1} GFLOP, {mb:.0} MB on the GPU", plan.steps.len(), size[0], size[1]);
     }
-    // Step by step, so that a large network on a slow device shows how far it is. The first use of a kernel may compile it.
+    // Step by step, so that a large network on a slow device shows how far it is. The first use of
+    // a kernel may compile it.
     let mut progress = Progress::new(global, "steps", plan.steps.len() as u64);
     for step in 0..plan.steps.len() {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());

@@ -213,7 +213,8 @@ pub struct SceneArgs {
     /// Time in the animation, seconds.
     #[arg(long, requires = "animation", default_value_t = 0.0, value_name = "SECONDS")]
     pub pose_time: f32,
-    /// Changes a light: its number and any of color=R,G,B strength=S direction=X,Y,Z position=X,Y,Z size=S; may be repeated.
+    /// Changes a light: its number and any of color=R,G,B strength=S direction=X,Y,Z position=X,Y,Z
+    /// size=S; may be repeated.
     #[arg(long, value_name = "N KEY=VALUE ...")]
     pub light: Vec<LightEdit>,
     /// Moves an object: its number and X,Y,Z in metres; may be repeated.

@@ -6,7 +6,7 @@ use super::{
     error::CliError,
 };
 use crate::{
-    gi::{Method, rung::Cost},
+    gi::{Method, technique::Cost},
     gpu::Gpu,
     render::{Renderer, RendererOptions},
     scene::upload::SceneGpu,
@@ -25,7 +25,8 @@ use std::path::PathBuf;
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Real-time method to measure, or `all` of them; what `fit` found for the scene when absent, else all. (`render --method reference` tells its own samples per second.)
+    /// Real-time method to measure, or `all` of them; what `fit` found for the scene when absent,
+    /// else all. (`render --method reference` tells its own samples per second.)
     #[arg(long, value_parser = parse_methods)]
     method: Option<Methods>,
     #[command(flatten)]
@@ -51,10 +52,12 @@ pub struct Args {
     /// Write the ratios of method to method and pass to pass to this file, a base for --compare on other machines.
     #[arg(long, value_name = "F")]
     ratios: Option<PathBuf>,
-    /// A record written earlier, on this device, to compare with; or ratios, on a device of that kind.
+    /// A record written earlier, on this device, to compare with; or ratios, on a device of that
+    /// kind. Takes --fail-over, too.
     #[arg(long, value_name = "BASE", requires = "fail_over")]
     compare: Option<PathBuf>,
-    /// How much slower than the base is still allowed, such as 5%. (Ratios state what they vary by, and are allowed that at least.)
+    /// With --compare: how much slower than the base is still allowed, such as 5%; above it the
+    /// exit code is 6. (Ratios state what they vary by, and are allowed that at least.)
     #[arg(long, value_parser = parse_percent, value_name = "P%")]
     fail_over: Option<f64>,
 }
@@ -251,7 +254,8 @@ fn print(record: &Record, gpu: &Gpu, layers: bool) {
         }
         let sum = |part: fn(&Cost) -> f64| m.costs.iter().map(part).sum::<f64>();
         say!(
-            "  indirect light by count: {:.3} GFLOP, {:.1} MB; projected, not measured: {:.2} ms on a {} at {:.0}% of its peaks",
+            "  indirect light by count: {:.3} GFLOP, {:.1} MB; projected, not measured: {:.2} ms on a {} at \
+            {:.0}% of its peaks",
             sum(|c| c.flops) / 1e9,
             sum(|c| c.bytes) / 1e6,
             projection::total_ms(&m.costs, &GTX_1050, EFFICIENCY),

@@ -230,7 +230,8 @@ impl Shown {
         })
     }
 
-    /// A picture to judge a rendering of `size` pixels by. What makes that impossible is told here, before the rendering.
+    /// A picture to judge a rendering of `size` pixels by. What makes that impossible is told here,
+    /// before the rendering.
     pub fn reference(path: &Path, tonemap: Tonemap, ev: f32, size: [u32; 2], metric: &str) -> Result<Self> {
         let shown = Self::read(path, tonemap, ev)?;
         let size = size.map(|n| n as usize);

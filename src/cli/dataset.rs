@@ -1,8 +1,9 @@
-//! `bouncelight dataset`: network inputs of views around the paper's rooms, through rooms of their kind or through a scene, one
-//! safetensors file a view (training/README.md has the format).
+//! `bouncelight dataset`: network inputs of views around the paper's rooms, through rooms of their
+//! kind or through a scene, one safetensors file a view (training/README.md has the format).
 //!
-//! The light to be learnt is path-traced here (`--spp`), or rendered by Cycles under the same file stems: `training/cycles/paper_rooms.py`
-//! draws the same rooms from the same stream, `training/cycles/scene_file.py` reads the `views.json` written here.
+//! The light to be learnt is path-traced here (`--spp`), or rendered by Cycles under the same file
+//! stems: `training/cycles/paper_rooms.py` draws the same rooms from the same stream,
+//! `training/cycles/scene_file.py` reads the `views.json` written here.
 
 use super::{
     args::{Global, usage},
@@ -44,7 +45,8 @@ pub struct Args {
     #[arg(long, value_enum, default_value = "paper-room")]
     recipe: Recipe,
     /// Indices of rooms, such as 6-9,13 (recipes paper-room and paper-room-varied).
-    #[arg(long, value_parser = parse_rooms, required_if_eq_any([("recipe", "paper-room"), ("recipe", "paper-room-varied")]))]
+    #[arg(long, value_parser = parse_rooms, required_if_eq_any([("recipe", "paper-room"),
+        ("recipe", "paper-room-varied")]))]
     rooms: Option<Rooms>,
     /// A scene file or bundled scene (recipe scene).
     #[arg(long, required_if_eq("recipe", "scene"))]
@@ -61,10 +63,12 @@ pub struct Args {
     /// Path-trace the light to be learnt with so many samples for each cell; 0 leaves it out, for targets from Cycles.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=65_536), value_name = "N")]
     spp: u32,
-    /// Frames of a still camera that method `gather`, the first guess, settles over before it is read: 1 is the first after a cut.
+    /// Frames of a still camera that method `gather`, the first guess, settles over before it is
+    /// read: 1 is the first after a cut.
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=65_536), value_name = "N")]
     gi_frames: u32,
-    /// Only every n-th room (or view of a scene), beginning with the i-th: 0/4, 1/4 … for four machines that share the work.
+    /// Only every n-th room (or view of a scene), beginning with the i-th: 0/4, 1/4 … for four
+    /// machines that share the work.
     #[arg(long, default_value = "0/1", value_parser = parse_shard, value_name = "I/N")]
     shard: [u32; 2],
     /// Folder for the samples; those that exist are kept, so a stopped run goes on where it was.
@@ -73,8 +77,8 @@ pub struct Args {
     /// Also draw a second frame of each view from a camera that has moved a little, for training's temporal term.
     #[arg(long)]
     motion: bool,
-    /// Also keep the picture at full resolution: guides for the way back from cells to pixels, and what puts the picture together
-    /// again (32 bytes a pixel).
+    /// Also keep the picture at full resolution: guides for the way back from cells to pixels, and
+    /// what puts the picture together again (32 bytes a pixel).
     #[arg(long)]
     guides: bool,
     /// Also write each room as a `.glb` with a `_views.json` beside it, for targets from Cycles (recipes paper-room and

@@ -89,7 +89,8 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
                 _ => RUNTIME,
             };
         }
-        // Sound weights that speak of something else than light. `RenderError` shows what it wraps as if it were its own, so its cause is not in the chain.
+        // Sound weights that speak of something else than light. `RenderError` shows what it wraps
+        // as if it were its own, so its cause is not in the chain.
         let wrapped = match cause.downcast_ref::<RenderError>() {
             Some(RenderError::Gi(e)) => Some(e),
             _ => None,

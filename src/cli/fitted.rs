@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 /// Where to look.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Flag {
-    /// What `fit` wrote, obeyed where no --method is given: a file, or `none`. SCENE.gi.toml where it exists when absent.
+    /// What `fit` wrote, obeyed where no --method is given: a file, or `none`. SCENE.gi.toml where
+    /// it exists when absent.
     #[arg(long, value_name = "FILE")]
     gi: Option<PathBuf>,
 }
@@ -29,8 +30,8 @@ impl Flag {
     }
 }
 
-/// The record, if it was made for this scene under this light and its weights are still those that were measured; else a
-/// warning says that it is time to ask again, and the usual method is taken.
+/// The record, if it was made for this scene under this light and its weights are still those that
+/// were measured; else a warning says that it is time to ask again, and the usual method is taken.
 pub fn fresh(fitted: Fitted, scene: &Scene) -> Result<Option<Fitted>> {
     let stale = fitted.stale(&hash::of_scene(scene))?;
     if let Some(why) = &stale {

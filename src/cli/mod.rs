@@ -10,6 +10,7 @@ mod compare;
 mod dataset;
 mod demo;
 mod doctor;
+mod drawn;
 pub mod error;
 mod fit;
 mod fitted;

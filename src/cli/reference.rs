@@ -1,11 +1,12 @@
-//! `--method reference` of `bouncelight render`: flags, the tracing itself with progress, and what is told of the noise.
+//! `--method reference` of `bouncelight render`: flags, the tracing itself with progress, and what
+//! is told of the noise.
 
 use super::{
     args::{Global, usage},
+    drawn::{Drawn, parse_layers},
     error::CliError,
     interrupt,
     progress::Progress,
-    render::{Drawn, parse_layers},
 };
 use crate::{
     gpu::Gpu,
@@ -27,8 +28,8 @@ pub struct Flags {
     /// Samples a pixel, 64 when absent; with --until-error the most there may be, 65536 when absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Stop once the noise of a pixel (root mean square, divided by the mean) is surely not above E, such as 0.05; of the
-    /// picture, or with --cells of the light that a GI method must add.
+    /// Stop once the noise of a pixel (root mean square, divided by the mean) is surely not above
+    /// E, such as 0.05; of the picture, or with --cells of the light that a GI method must add.
     #[arg(long, value_name = "E", value_parser = parse_error_bound, allow_hyphen_values = true)]
     until_error: Option<f64>,
     /// Limit of indirect contributions, as Cycles' clamp; 0 for none. Takes fireflies away, and energy.
@@ -43,16 +44,17 @@ pub struct Flags {
     /// Most glossy bounces.
     #[arg(long, value_name = "N")]
     glossy_bounces: Option<u32>,
-    /// Cycles' "Filter Glossy": widens lobes behind blurry bounces, by Blender's default 1; none when absent. Takes the noise
-    /// of light that reflections focus away, and changes where it lands.
+    /// Cycles' "Filter Glossy": widens lobes behind blurry bounces, by Blender's default 1; none
+    /// when absent. Takes the noise of light that reflections focus away, and changes where it
+    /// lands.
     #[arg(long, value_name = "F", value_parser = parse_limit, allow_hyphen_values = true)]
     filter_glossy: Option<f32>,
-    /// As Cycles without "Reflective Caustics": surfaces seen by a diffusely scattered ray show no gloss. Takes light away; for
-    /// comparisons with such pictures.
+    /// As Cycles without "Reflective Caustics": surfaces seen by a diffusely scattered ray show no
+    /// gloss. Takes light away; for comparisons with such pictures.
     #[arg(long)]
     no_caustics: bool,
-    /// Trace one point for each cell of NxN pixels, the pixel centre that the network samples (N/2, N/2 in the cell), without
-    /// pixel filter; the picture has a pixel for each cell.
+    /// Trace one point for each cell of NxN pixels, the pixel centre that the network samples (N/2,
+    /// N/2 in the cell), without pixel filter; the picture has a pixel for each cell.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     cells: Option<u32>,
 }

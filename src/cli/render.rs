@@ -2,7 +2,8 @@
 
 use super::{
     args::{Global, MethodName, MethodParser, SceneArgs, usage},
-    compare::{Heat, Shown, shown_bytes},
+    compare::{Heat, Shown},
+    drawn::{Drawn, Format, parse_layers},
     error::CliError,
     interrupt,
     progress::Progress,
@@ -11,11 +12,10 @@ use super::{
 use crate::{
     gi::Method,
     gpu::Gpu,
-    image_io::{self, Metadata},
-    metrics,
+    image_io, metrics,
     render::{
         Renderer, RendererOptions,
-        capture::{CaptureOptions, CapturedFrame, Layer, Picture, capture_with},
+        capture::{CaptureOptions, Layer, Picture, capture_with},
         tonemap_curve::Tonemap,
     },
     scene::{
@@ -24,7 +24,7 @@ use crate::{
     },
 };
 use anyhow::Result;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -33,8 +33,8 @@ pub struct Args {
     /// Where the picture goes: .png, .exr, or `-` for a PNG on standard output.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How indirect light is found; `reference` traces paths until the light is right. When absent: what `fit` found for the scene, else
-    /// `gather`, `neural` with --weights.
+    /// How indirect light is found; `reference` traces paths until the light is right. When absent:
+    /// what `fit` found for the scene, else `gather`, `neural` with --weights.
     #[arg(long, value_parser = MethodParser)]
     method: Option<MethodName>,
     /// Weights of `neural`; the shipped ones (`small`) when absent.
@@ -48,13 +48,15 @@ pub struct Args {
     /// Real-time anti-aliasing over this many frames before the one that is written.
     #[arg(long, conflicts_with = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     taa: Option<u32>,
-    /// Frames of a still camera up to the one that is written, for methods that settle (`gather`, `neural`): 1 is the first after a cut. 32 when absent.
+    /// Frames of a still camera up to the one that is written, for methods that settle (`gather`,
+    /// `neural`): 1 is the first after a cut. 32 when absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     gi_frames: Option<u32>,
     /// Numbers of `gather` other than its own, such as `blur=0,cell_frames=256`; `plain` forgets and blurs nothing.
     #[arg(long, value_name = "NAME=VALUE,...")]
     gather: Option<crate::gi::gather::Options>,
-    /// Light of what the picture does not show, for `ambient` and `ssgi`: shares of the sky's and of its surfaces' light.
+    /// Light of what the picture does not show, for `ambient` and `ssgi`: shares of the sky's and
+    /// of its surfaces' light.
     #[arg(long, value_name = "sky=X,bounce=Y")]
     unseen: Option<crate::gi::ambient::Unseen>,
     /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
@@ -86,42 +88,6 @@ pub struct Args {
     // Last, since its heading would go on to what follows.
     #[command(flatten)]
     tracing: reference::Flags,
-}
-
-/// Layers by name: `all`, or a list, whose words `find` knows.
-pub(super) fn parse_layers<L: Copy>(text: &str, all: &[L], name: impl Fn(L) -> &'static str) -> Result<Vec<L>> {
-    if text == "all" {
-        return Ok(all.to_vec());
-    }
-    let mut layers = Vec::new();
-    for word in text.split(',') {
-        let Some(i) = all.iter().position(|&l| name(l) == word) else {
-            let known = all.iter().map(|&l| name(l)).collect::<Vec<_>>().join(", ");
-            return Err(usage(format!("--aov: `{word}` is no layer of this method; there are: {known}")));
-        };
-        if layers.contains(&i) {
-            return Err(usage(format!("--aov: `{word}` is asked for twice")));
-        }
-        layers.push(i);
-    }
-    Ok(layers.into_iter().map(|i| all[i]).collect())
-}
-
-/// What the output's name asks for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Format {
-    Png,
-    Exr,
-}
-
-/// A picture ready to be written and judged.
-pub(super) struct Drawn {
-    /// The picture; its layers are in `layers`.
-    pub frame: CapturedFrame,
-    /// Layers of an EXR beside the picture.
-    pub layers: Vec<image_io::Layer>,
-    /// What is worth knowing of how it was made.
-    pub facts: Metadata,
 }
 
 impl Args {
@@ -202,9 +168,9 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
             raster.draw(progress, &args, &camera)?
         }
     };
-    write(&args, &args.output, format, &drawn, &metadata(&gpu, &drawn))?;
+    drawn.write(&gpu, &args.output, format)?;
     match reference {
-        Some(reference) => judge(&args, &drawn.frame, &reference),
+        Some(reference) => judge(&args, &drawn, &reference),
         None => Ok(()),
     }
 }
@@ -242,7 +208,7 @@ impl<'a> Raster<'a> {
         let upload = || {
             let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
             if needs_rays {
-                // Where they cannot be had, the rung below draws, and `picture` says so.
+                // Where they cannot be had, the method below draws, and `picture` says so.
                 let _ = uploaded.trace(&gpu.device, &gpu.queue, scene);
             }
             Ok::<_, UploadError>(uploaded)
@@ -309,8 +275,7 @@ fn film(
     progress.expect(sequence.count());
     for (number, camera) in sequence.frames() {
         let drawn = raster.picture(args, &camera, &mut || ())?;
-        let metadata = metadata(raster.gpu, &drawn);
-        write(args, &sequence::name(&args.output, number), format, &drawn, &metadata)?;
+        drawn.write(raster.gpu, &sequence::name(&args.output, number), format)?;
         raster.running = true;
         progress.step();
     }
@@ -321,14 +286,8 @@ fn film(
 /// Faults that can be told before anything is drawn.
 fn check(args: &Args) -> Result<Format> {
     let path = &args.output;
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    let format = match extension.as_str() {
-        "png" => Format::Png,
-        "exr" => Format::Exr,
-        _ if path.as_os_str() == "-" => Format::Png,
-        _ => return Err(usage(format!("{}: the picture's name must end in .png or .exr", path.display()))),
-    };
-    if args.aov.is_some() && format == Format::Png {
+    let format = Format::of(path, args.exposure, args.tonemap)?;
+    if args.aov.is_some() && format != Format::Exr {
         return Err(usage("--aov needs an .exr: a PNG holds one picture".into()));
     }
     if !args.exposure.is_finite() {
@@ -372,47 +331,10 @@ fn check(args: &Args) -> Result<Format> {
     Ok(format)
 }
 
-fn metadata(gpu: &Gpu, drawn: &Drawn) -> Metadata {
-    let command: Vec<String> = std::env::args().skip(1).collect();
-    let driver = format!("{} {}", gpu.info.driver, gpu.info.driver_info);
-    let software = format!("bouncelight {}", env!("CARGO_PKG_VERSION"));
-    [
-        ("Software", software),
-        ("Command", format!("bouncelight {}", command.join(" "))),
-        ("Adapter", gpu.info.name.clone()),
-        ("Backend", format!("{:?}", gpu.info.backend).to_lowercase()),
-        ("Driver", driver.trim().into()),
-    ]
-    .map(|(k, v)| (k.to_string(), v))
-    .into_iter()
-    .chain(drawn.facts.clone())
-    .collect()
-}
-
-fn write(args: &Args, output: &Path, format: Format, drawn: &Drawn, metadata: &Metadata) -> Result<()> {
-    let [width, height] = args.scene.size;
-    match format {
-        Format::Png => {
-            let rgb = shown_bytes(&rgb(&drawn.frame), args.exposure, args.tonemap);
-            image_io::write_png(output, width, height, &rgb, metadata)?;
-        }
-        Format::Exr => {
-            let mut layers = vec![image_io::Layer::new("", "RGBA", &drawn.frame.beauty.data)];
-            layers.extend(drawn.layers.iter().cloned());
-            image_io::write_exr(output, width, height, &layers, metadata)?;
-        }
-    }
-    Ok(())
-}
-
-fn rgb(frame: &CapturedFrame) -> Vec<f32> {
-    frame.beauty.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
-}
-
 /// Prints the metric and fails when it is on the wrong side of the threshold.
-fn judge(args: &Args, frame: &CapturedFrame, reference: &Shown) -> Result<()> {
+fn judge(args: &Args, drawn: &Drawn, reference: &Shown) -> Result<()> {
     let name = args.output.display().to_string();
-    let ours = Shown::linear(name, args.scene.size.map(|n| n as usize), rgb(frame), args.exposure, args.tonemap);
+    let ours = Shown::linear(name, args.scene.size.map(|n| n as usize), drawn.rgb(), args.exposure, args.tonemap);
     let heat = Heat::of_metric(&args.metric);
     let options =
         metrics::Options { flip: heat == Heat::Flip, hdr_flip: heat == Heat::Hdrflip, ..metrics::Options::default() };

@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 /// Flags that draw many pictures.
 #[derive(Debug, clap::Args)]
 pub struct SequenceFlags {
-    /// Camera path (JSON, as the viewer records it): draws a frame after the other; the output's name holds `{frame}` or `{frame:04}`.
+    /// Camera path (JSON, as the viewer records it): draws a frame after the other; the output's
+    /// name holds `{frame}` or `{frame:04}`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "look_at", "camera", "reference", "taa"])]
     path: Option<PathBuf>,
     /// Which frames of the path, from A to before B; all when absent.

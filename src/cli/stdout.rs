@@ -1,4 +1,5 @@
-//! Results on standard output. Whoever reads them may stop reading (`| head -1`), which is no error; a full disk is one.
+//! Results on standard output. Whoever reads them may stop reading (`| head -1`), which is no
+//! error; a full disk is one.
 
 use std::io::{ErrorKind, Write};
 
@@ -8,8 +9,8 @@ macro_rules! say {
 }
 pub(super) use say;
 
-/// Writes a line. Ends the program where that cannot be done: with success where the reader has gone, else with the code for
-/// what goes wrong while running.
+/// Writes a line. Ends the program where that cannot be done: with success where the reader has
+/// gone, else with the code for what goes wrong while running.
 pub(super) fn line(words: std::fmt::Arguments<'_>) {
     let mut out = std::io::stdout().lock();
     let Err(error) = writeln!(out, "{words}").and_then(|()| out.flush()) else { return };

@@ -13,8 +13,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The cache's place: `$BOUNCELIGHT_TUNED`, else `bouncelight/tuned.json` in the user's cache folder; none where there is no such
-/// folder or the variable is empty.
+/// The cache's place: `$BOUNCELIGHT_TUNED`, else `bouncelight/tuned.json` in the user's cache
+/// folder; none where there is no such folder or the variable is empty.
 pub fn path() -> Option<PathBuf> {
     let of = |name| std::env::var_os(name);
     if let Some(named) = of("BOUNCELIGHT_TUNED") {

@@ -1,4 +1,5 @@
-//! `bouncelight weights info | verify | convert | tune`: what a weights file holds, whether it is sound, and one from a published network.
+//! `bouncelight weights info | verify | convert | tune`: what a weights file holds, whether it is
+//! sound, and one from a published network.
 
 use super::args::{Global, parse_size};
 use super::stdout::say;
@@ -26,7 +27,8 @@ enum Command {
         /// A weights file, or `small`, the shipped one.
         file: PathBuf,
         /// Width and height of the picture in pixels.
-        #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH")]
+        #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true,
+            value_name = "WxH")]
         size: [u32; 2],
     },
     /// Check everything a reader can check; says `ok` or lists every fault.
@@ -38,7 +40,8 @@ enum Command {
     Tune {
         file: PathBuf,
         /// Width and height of the picture in pixels.
-        #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH")]
+        #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true,
+            value_name = "WxH")]
         size: [u32; 2],
         /// Where to remember it; by default the user's cache folder, or $BOUNCELIGHT_TUNED.
         #[arg(long, value_name = "F")]
@@ -176,7 +179,8 @@ fn info(weights: &Weights, size: [u32; 2]) -> Result<()> {
     say!("output     {}, {} channels", weights.output.meaning, weights.output.channels);
     say!("parameters {}, stored as {}", weights.graph.parameters(), stored(weights));
     say!(
-        "at {}x{} pixels ({}x{} cells, {width}x{height} inside): {:.3} GFLOP, {:.1} MB moved at least, arena of {:.1} MB\n",
+        "at {}x{} pixels ({}x{} cells, {width}x{height} inside): {:.3} GFLOP, {:.1} MB moved at least, arena of \
+        {:.1} MB\n",
         size[0],
         size[1],
         cells[0],

@@ -11,22 +11,25 @@
 //! [`ssgi`] gathers what the pixels around a pixel send on, by visibility bitmask ([`bitmask`]), and `ambient`'s light
 //! through what nothing blocks. It cannot do anything off the screen or hidden in it.
 //!
-//! [`gather`] sends one ray a cell and frame into the scene's triangles and reads a cache of light in the world where it ends. It
-//! asks what stands between; what is left is noise, which frames and neighbours average away.
+//! [`gather`] sends one ray a cell and frame into the scene's triangles and reads a cache of light
+//! in the world where it ends. It asks what stands between; what is left is noise, which frames and
+//! neighbours average away.
 //!
-//! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]), what `gather` says among them, go through a U-Net,
-//! and its gain and rest are applied to `gather`'s answer at full resolution, guided by depth and normal
-//! ([`reconstruct`]). It learns where that answer errs: noise that is left, light that the cache of light blurs. It knows
-//! no more of the world than `gather` and the picture show, corrects nothing finer than a cell (4 pixels), and adds no
+//! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]), what `gather` says among
+//! them, go through a U-Net, and its gain and rest are applied to `gather`'s answer at full
+//! resolution, guided by depth and normal ([`reconstruct`]). It learns where that answer errs:
+//! noise that is left, light that the cache of light blurs. It knows no more of the world than
+//! `gather` and the picture show, corrects nothing finer than a cell (4 pixels), and adds no
 //! specular light beyond what `composite` derives from E.
 //!
-//! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when all light is off.
-//! `docs/gi.md` tells the same with a picture of the data flow and the table of constants; `docs/embedding.md` how another renderer
-//! records them: a [`World`] holds its triangles, a [`View`] lights its picture.
+//! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when
+//! all light is off. `docs/gi.md` tells the same with a picture of the data flow and the table of
+//! constants; `docs/embedding.md` how another renderer records them: a [`World`] holds its
+//! triangles, a [`View`] lights its picture.
 //!
 //! # Floors
-//! `interface` ← `stage` ← `screen`, `gather` ← `neural` ← `method` ← `world`: each imports only what stands before it, and nothing here
-//! imports `render`.
+//! `interface` ← `stage` ← `screen`, `gather` ← `neural` ← `method` ← `world`: each imports only
+//! what stands before it, and nothing here imports `render`.
 
 pub mod gather;
 pub mod interface;
@@ -35,14 +38,14 @@ pub mod neural;
 mod preludes;
 pub mod screen;
 pub mod stage;
-mod world;
+pub(crate) mod world;
 
 pub use interface::{
     AlbedoEncoding, CameraMatrices, Conventions, Depth, GiError, Inputs, Jitter, LightScale, Lights, MotionJitter,
-    MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Rays, rung,
+    MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Rays, technique,
 };
 pub use method::{Method, fitted, name};
-pub use neural::{features, pack, pass, reconstruct, twin};
+pub use neural::{cpu, features, pack, pass, reconstruct};
 pub use preludes::example_preludes;
 pub use screen::{ambient, bitmask, occlusion, ssgi};
 pub use stage::{cells, exposure, exposure::ExposurePass, inputs};

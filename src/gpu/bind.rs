@@ -1,5 +1,6 @@
-//! Bind groups, kept as long as everything in them stays the same: every bound resource is part of the key, so a host that hands
-//! over another light buffer gets another group, and one that hands over the same things every frame makes each group once.
+//! Bind groups, kept as long as everything in them stays the same: every bound resource is part of
+//! the key, so a host that hands over another light buffer gets another group, and one that hands
+//! over the same things every frame makes each group once.
 
 /// Something that is bound.
 #[derive(Debug, Clone, PartialEq)]

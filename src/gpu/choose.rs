@@ -196,7 +196,8 @@ impl Gpu {
     }
 }
 
-/// Optional features that are used when present: timestamps for the timing tables, the others for some of the network's kernels.
+/// Optional features that are used when present: timestamps for the timing tables, the others for
+/// some of the network's kernels.
 pub fn wanted_features() -> wgpu::Features {
     use wgpu::Features;
     Features::TIMESTAMP_QUERY | Features::SUBGROUP | Features::SHADER_F16 | Features::SHADER_INT64

@@ -21,7 +21,8 @@ pub enum ImageError {
         path: PathBuf,
     },
     /// The folder of an output file does not exist.
-    #[error("{path}: cannot be written because the folder {folder} does not exist; create it first", path = path.display(), folder = folder.display())]
+    #[error("{path}: cannot be written because the folder {folder} does not exist; create it first",
+        path = path.display(), folder = folder.display())]
     NoFolder {
         /// The output file.
         path: PathBuf,
@@ -69,7 +70,8 @@ pub enum ImageError {
         message: String,
     },
     /// The header claims more than is decoded; checked before any pixel memory is taken.
-    #[error("{path}: {width}×{height} pixels in {channels} channels is more than is read here (at most {max_pixels} pixels and {max_samples} samples)",
+    #[error("{path}: {width}×{height} pixels in {channels} channels is more than is read here (at most \
+        {max_pixels} pixels and {max_samples} samples)",
         path = path.display(), max_pixels = super::MAX_PIXELS, max_samples = super::MAX_SAMPLES)]
     TooLarge {
         /// The file.
@@ -92,7 +94,8 @@ pub enum ImageError {
         found: String,
     },
     /// A pixel is NaN or infinite.
-    #[error("{path}: layer `{layer}` channel {channel} holds {count} non-finite values, the first at x {x}, y {y}", path = path.display())]
+    #[error("{path}: layer `{layer}` channel {channel} holds {count} non-finite values, the first at x {x}, y {y}",
+        path = path.display())]
     NonFinite {
         /// The file.
         path: PathBuf,

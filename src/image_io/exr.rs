@@ -73,8 +73,9 @@ pub fn write_exr(
     write_whole(path, bytes.get_ref())
 }
 
-/// Reads every layer of an EXR with any compression that the decoder has (none, RLE, ZIP, PIZ, PXR24, B44, DWAA, DWAB).
-/// Parts are joined as `part.layer`; the picture is the data window. Values are as stored, see [`Layers::check_finite`].
+/// Reads every layer of an EXR with any compression that the decoder has (none, RLE, ZIP, PIZ,
+/// PXR24, B44, DWAA, DWAB). Parts are joined as `part.layer`; the picture is the data window.
+/// Values are as stored, see [`Layers::check_finite`].
 ///
 /// # Errors
 /// Missing, empty, truncated or foreign file; too many pixels; deep data, subsampled channels, parts of different sizes

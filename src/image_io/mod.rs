@@ -1,8 +1,9 @@
 //! PNG and multi-layer EXR, written whole or not at all.
 //!
-//! Pixels are f32, rows from the top. An EXR is a list of [`Layer`]s under Blender's pass names: the root layer (empty
-//! name) with R, G, B, A is the beauty, then `DiffDir.R`, `Normal.X`, `Depth.Z`, ... Whatever is read was checked for size
-//! before memory was taken ([`MAX_PIXELS`], [`MAX_SAMPLES`]).
+//! Pixels are f32, rows from the top. An EXR is a list of [`Layer`]s under Blender's pass names:
+//! the root layer (empty name) with R, G, B, A is the beauty, then `DiffDir.R`, `Normal.X`,
+//! `Depth.Z`, ... Whatever is read was checked for size before memory was taken ([`MAX_PIXELS`],
+//! [`MAX_SAMPLES`]).
 
 mod error;
 mod exr;
@@ -65,8 +66,8 @@ pub struct Layer {
 }
 
 impl Layer {
-    /// Splits interleaved `pixels` into one channel for each character of `channels`, as in `Layer::new("Normal", "XYZ", ..)`.
-    /// Values beyond the last whole pixel are left out.
+    /// Splits interleaved `pixels` into one channel for each character of `channels`, as in
+    /// `Layer::new("Normal", "XYZ", ..)`. Values beyond the last whole pixel are left out.
     pub fn new(name: &str, channels: &str, pixels: &[f32]) -> Self {
         let count = channels.chars().count().max(1);
         let split = |i| pixels.chunks_exact(count).map(|p| p[i]).collect();

@@ -47,8 +47,9 @@ fn encode(path: &Path, w: u32, h: u32, rgb: &[u8], metadata: &[(String, String)]
     Ok(bytes)
 }
 
-/// Writes frames of one size (display-encoded sRGB bytes, rows from the top) as an animated PNG that repeats for ever. Programs that
-/// know no animation show the first. The file appears whole or not at all.
+/// Writes frames of one size (display-encoded sRGB bytes, rows from the top) as an animated PNG
+/// that repeats for ever. Programs that know no animation show the first. The file appears whole or
+/// not at all.
 ///
 /// # Errors
 /// No frame, no pixels, a frame of wrong length, or a failed write.

@@ -18,8 +18,9 @@ pub fn mean_absolute_error(a: Picture<'_>, b: Picture<'_>) -> Result<f64, Metric
     mean(a, b, |a, b| (a - b).abs())
 }
 
-/// Mean of (a − b)² / (b² + 0.01) over pixels and channels, for linear radiance (Rousselle, Knaus, Zwicker 2011): errors
-/// weigh by how bright the reference `b` is, and 0.01 keeps black pixels from deciding alone.
+/// Mean of (a − b)² / (b² + 0.01) over pixels and channels, for linear radiance (Rousselle, Knaus,
+/// Zwicker 2011): errors weigh by how bright the reference `b` is, and 0.01 keeps black pixels from
+/// deciding alone.
 ///
 /// # Errors
 /// Different sizes.
@@ -27,8 +28,8 @@ pub fn rel_mse(a: Picture<'_>, b: Picture<'_>) -> Result<f64, MetricError> {
     mean(a, b, relative_square)
 }
 
-/// Mean |a − b| divided by mean |b|, for linear radiance: 0.02 means that the errors together are 2 % of the light. Zero
-/// for equal pictures, infinite where only the reference is black.
+/// Mean |a − b| divided by mean |b|, for linear radiance: 0.02 means that the errors together are 2
+/// % of the light. Zero for equal pictures, infinite where only the reference is black.
 ///
 /// # Errors
 /// Different sizes.

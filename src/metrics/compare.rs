@@ -178,8 +178,8 @@ pub const NAMES: [(&str, bool); 12] = [
 pub const NEEDS_RADIANCE: [&str; 4] = ["relmse", "mre", "bias", "hdrflip"];
 
 impl Comparison {
-    /// The metric called `name` (one of [`NAMES`]); `None` for other names, for what was not asked for, and for metrics of
-    /// radiance without linear pictures.
+    /// The metric called `name` (one of [`NAMES`]); `None` for other names, for what was not asked
+    /// for, and for metrics of radiance without linear pictures.
     pub fn value(&self, name: &str) -> Option<f64> {
         Some(match name {
             "l1" => self.paper.l1,
@@ -198,8 +198,8 @@ impl Comparison {
         })
     }
 
-    /// Whether the metric called `name` is on the good side of `threshold` (equal counts; of `bias` the size counts and not
-    /// the sign); `None` as in [`Self::value`].
+    /// Whether the metric called `name` is on the good side of `threshold` (equal counts; of `bias`
+    /// the size counts and not the sign); `None` as in [`Self::value`].
     pub fn passes(&self, name: &str, threshold: f64) -> Option<bool> {
         let value = self.value(name)?;
         let (_, more_is_better) = NAMES.iter().find(|(n, _)| *n == name)?;

@@ -2,8 +2,9 @@
 
 use super::{MetricError, Picture};
 
-/// Colour of `t` in [0, 1] as sRGB bytes: black over purple and orange to pale yellow, lightness rising evenly, to be read
-/// without red-green vision. A polynomial of degree 5 fitted to matplotlib's magma (within 6 of 255).
+/// Colour of `t` in [0, 1] as sRGB bytes: black over purple and orange to pale yellow, lightness
+/// rising evenly, to be read without red-green vision. A polynomial of degree 5 fitted to
+/// matplotlib's magma (within 6 of 255).
 pub fn heat_color(t: f32) -> [u8; 3] {
     const POWERS: [[f32; 3]; 6] = [
         [-0.021, 0.011, -0.004],

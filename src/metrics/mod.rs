@@ -1,9 +1,10 @@
 //! Image metrics; no wgpu here.
 //!
-//! [`paper`] holds the seed paper's four numbers exactly as its authors computed them, [`basic`] what the field uses,
-//! [`flip`] what an eye would see. Every metric takes two [`Picture`]s of one size without NaN or infinity, and computes in
-//! f64 unless it says otherwise. The second picture is the reference. [`compare`] gives all of them at once; [`heat_map`]
-//! shows where two pictures differ. `docs/metrics.md` has every formula, its range, its source and what it hides.
+//! [`paper`] holds the seed paper's four numbers exactly as its authors computed them, [`basic`]
+//! what the field uses, [`flip`] what an eye would see. Every metric takes two [`Picture`]s of one
+//! size without NaN or infinity, and computes in f64 unless it says otherwise. The second picture
+//! is the reference. [`compare`] gives all of them at once; [`heat_map`] shows where two pictures
+//! differ. `docs/metrics.md` has every formula, its range, its source and what it hides.
 
 pub mod basic;
 mod compare;

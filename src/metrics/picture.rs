@@ -60,7 +60,8 @@ pub enum MetricError {
         height: usize,
     },
     /// FLIP was asked for a viewing distance that nobody has.
-    #[error("{given} pixels per degree; FLIP takes more than 0 and at most {most}", most = super::flip::MAX_PIXELS_PER_DEGREE)]
+    #[error("{given} pixels per degree; FLIP takes more than 0 and at most {most}",
+        most = super::flip::MAX_PIXELS_PER_DEGREE)]
     PixelsPerDegree {
         /// What was asked for.
         given: f32,

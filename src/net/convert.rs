@@ -66,7 +66,8 @@ pub enum ConvertError {
     #[error("deep-illumination comes with batch norm only (or instance norm, which is how it runs in training mode)")]
     NoSuchVariant,
     /// Keys, shapes, types or values are not the generator's.
-    #[error("{} does not hold the state of this generator (base width {width} by its shapes):{}", path.display(), list(problems))]
+    #[error("{} does not hold the state of this generator (base width {width} by its shapes):{}", path.display(),
+        list(problems))]
     StateDict {
         /// File.
         path: PathBuf,
@@ -180,7 +181,8 @@ fn strip_parallel(header: &mut Header<'_>) {
     }
 }
 
-/// The base width that most down steps' shapes agree on, so that one wrong layer is blamed and not the seven others; 64 for none.
+/// The base width that most down steps' shapes agree on, so that one wrong layer is blamed and not
+/// the seven others; 64 for none.
 fn base_width(arch: Arch, header: &Header<'_>) -> u64 {
     let mut votes: BTreeMap<u64, usize> = BTreeMap::new();
     for step in 1..=8 {

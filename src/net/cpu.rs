@@ -1,5 +1,6 @@
-//! The slow, obvious twin: every operator as plain loops over CHW f32. The test oracle for the kernels; it runs the
-//! graph as it stands in the file, so that it also judges the planner's fusion and sharing of memory.
+//! The slow, obvious CPU reference: every operator as plain loops over CHW f32. The test oracle for
+//! the kernels; it runs the graph as it stands in the file, so that it also judges the planner's
+//! fusion and sharing of memory.
 
 mod conv;
 mod plain;

@@ -1,9 +1,9 @@
 //! The JSON document of a weights file: what its fields may say, checked before the tensors are looked at.
 
-use super::format::{KEY, KNOWN_VERSIONS, MAX_OPS, MEANINGS, TABLES, VERSION};
 use super::graph::{Graph, GraphError};
 use super::op::Op;
 use super::problem::Problem;
+use super::spec::{KEY, KNOWN_VERSIONS, MAX_OPS, MEANINGS, TABLES, VERSION};
 use serde::de::{Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;

@@ -1,6 +1,6 @@
-//! Dropout's random numbers: a hash of (seed, operator, value), so that a run is reproducible and the CPU twin and the
-//! kernels (`shaders/net/dropout.wgsl`) drop exactly the same values. Not PyTorch's generator: masks differ from its, their
-//! distribution does not.
+//! Dropout's random numbers: a hash of (seed, operator, value), so that a run is reproducible and
+//! the CPU reference and the kernels (`shaders/net/dropout.wgsl`) drop exactly the same values. Not
+//! PyTorch's generator: masks differ from its, their distribution does not.
 
 /// PCG hash (Jarzynski and Olano 2020), as in `shaders/lib/hash.wgsl`.
 fn pcg(v: u32) -> u32 {

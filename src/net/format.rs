@@ -1,86 +1,19 @@
 //! Reader of weights files (`weights-format/README.md` is the specification): a safetensors file whose metadata key
 //! `bouncelight` holds one JSON document with inputs, output, graph and provenance.
 //!
-//! Everything is checked before memory is taken for a tensor, and all faults are reported at once. No input makes it panic.
+//! Everything is checked before memory is taken for a tensor, and all faults are reported at once.
+//! No input makes it panic.
 
 use super::document::{self, Document};
 pub use super::document::{Feature, Output, Provenance, Table};
 use super::graph::Graph;
 use super::header;
 pub use super::problem::{Problem, WeightsError};
+pub use super::spec::*;
 use super::stored;
-pub use super::stored::{Dtype, MAX_SCALE, SCALE_SUFFIX, WeightTensor};
+pub use super::stored::{Dtype, WeightTensor};
 use std::collections::BTreeMap;
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-
-/// Version of the JSON document that the program writes.
-pub const VERSION: u32 = 2;
-/// Versions that it reads.
-pub const KNOWN_VERSIONS: RangeInclusive<u64> = 1..=VERSION as u64;
-/// Metadata key of the JSON document.
-pub const KEY: &str = "bouncelight";
-/// Files larger than this are refused; the largest network this is for takes a fifth of it.
-pub const MAX_FILE: u64 = 1 << 30;
-/// Most operators of a graph.
-pub const MAX_OPS: usize = 1024;
-/// Meanings of the output that exist. `plain` is for tests: numbers without a unit.
-pub const MEANINGS: &[&str] = &["log_irradiance_over_exposure", "gain_and_rest_on_guess", "display_signed", "plain"];
-
-/// One row of a feature table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FeatureRow {
-    /// Name.
-    pub name: &'static str,
-    /// Channels.
-    pub channels: u32,
-    /// Encodings that there are; files of version 1 mean the first.
-    pub encodings: &'static [&'static str],
-}
-
-/// A table of features that networks can be given.
-#[derive(Debug, Clone, Copy)]
-pub struct FeatureTable {
-    /// Name in files.
-    pub name: &'static str,
-    /// Rows; empty where anything goes.
-    pub features: &'static [FeatureRow],
-    /// A network uses its features in the table's order.
-    pub ordered: bool,
-}
-
-const fn row(name: &'static str, channels: u32, encodings: &'static [&'static str]) -> FeatureRow {
-    FeatureRow { name, channels, encodings }
-}
-
-/// Table `screen`, version 1: one real pixel for each cell of the picture; `gi::features` says what the encodings are.
-pub const SCREEN_V1: &[FeatureRow] = &[
-    row("direct", 3, &["log1p_over_exposure"]),
-    row("outgoing", 3, &["log1p_over_exposure"]),
-    row("albedo", 3, &["linear"]),
-    row("normal", 3, &["gravity_frame"]),
-    row("position", 3, &["gravity_frame_squashed"]),
-    row("depth", 1, &["log_over_mean"]),
-    row("spread", 1, &["log_ratio"]),
-    row("hit", 1, &["flag"]),
-    row("sky", 3, &["log1p_over_exposure"]),
-    row("guess", 3, &["log1p_over_exposure"]),
-];
-
-/// `v` = value of an 8-bit picture / 255. `signed`: 2v − 1. `signed_stretched`: 2(v − min)/(max − min) − 1 with the
-/// picture's own smallest and largest value of all channels, −1 for a picture of one value. `unit`: v.
-const PICTURE: &[&str] = &["signed", "signed_stretched", "unit"];
-
-/// Table `images`, version 1: pictures as they are shown, pixel by pixel, in any order.
-pub const IMAGES_V1: &[FeatureRow] =
-    &[row("depth", 3, PICTURE), row("direct", 3, PICTURE), row("diffuse", 3, PICTURE), row("normal", 3, PICTURE)];
-
-/// Every feature table.
-pub const TABLES: &[FeatureTable] = &[
-    FeatureTable { name: "screen", features: SCREEN_V1, ordered: true },
-    FeatureTable { name: "images", features: IMAGES_V1, ordered: false },
-    FeatureTable { name: "free", features: &[], ordered: false },
-];
 
 /// A network that has passed every check.
 #[derive(Debug, Clone)]

@@ -3,10 +3,12 @@
 //! The caller fills [`Network::input`] (all channels, padding included, as zeros), records, and reads
 //! [`Network::output`]. Recording allocates nothing. The input's memory is reused by later layers.
 
-mod build;
+pub(crate) mod build;
 mod conv;
 mod examples;
+mod kernel;
 mod kernels;
+pub mod layer;
 mod pack;
 pub mod permutation;
 mod pipelines;
@@ -16,11 +18,10 @@ use super::format::Weights;
 use super::graph::Graph;
 use super::plan::{Plan, PlanError, Precision};
 use crate::gpu::timing::Recorder;
-pub use build::StepUniform;
 use build::{Layer, Memory, Trained};
-pub use conv::Filter;
 pub use examples::example_preludes;
-pub use kernels::{Bound, Choice, Kernel, Numbers, Part, Sum};
+pub use kernel::{Bound, Choice, Kernel, Numbers, Part, Sum};
+pub use layer::Filter;
 pub use permutation::{Facts, Permutation, Source, Tuned, Variant};
 pub use pipelines::Pipelines;
 use std::sync::Arc;
@@ -69,6 +70,23 @@ impl Default for Options {
     }
 }
 
+/// What a network is built with.
+#[derive(Clone, Default)]
+pub struct Setup {
+    /// How it runs.
+    pub options: Options,
+    /// What a tuner has found on this device.
+    pub tuned: Arc<Tuned>,
+    /// Compiled kernels that other networks of this device use too.
+    pub pipelines: Pipelines,
+}
+
+impl From<Options> for Setup {
+    fn from(options: Options) -> Self {
+        Self { options, ..Self::default() }
+    }
+}
+
 /// One tensor on the GPU: NHWC f32, channels padded to a multiple of four.
 #[derive(Debug, Clone, Copy)]
 pub struct Binding<'a> {
@@ -101,6 +119,7 @@ pub struct Network {
 
 impl Network {
     /// Builds pipelines, uploads weights, allocates the arena for an input of `size` (width, height).
+    /// `setup`: [`Options`] alone, or a whole [`Setup`].
     ///
     /// # Errors
     /// [`NetError`] when the graph does not take the size, or the device grants too little.
@@ -109,51 +128,9 @@ impl Network {
         queue: &wgpu::Queue,
         weights: &Weights,
         size: [u32; 2],
+        setup: impl Into<Setup>,
     ) -> Result<Self, NetError> {
-        Self::with_options(device, queue, weights, size, Options::default())
-    }
-
-    /// As [`Network::new`], told how.
-    ///
-    /// # Errors
-    /// As [`Network::new`].
-    pub fn with_options(
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        weights: &Weights,
-        size: [u32; 2],
-        options: Options,
-    ) -> Result<Self, NetError> {
-        Self::tuned(device, queue, weights, size, options, Arc::default())
-    }
-
-    /// As [`Network::with_options`], with what a tuner has found on this device.
-    ///
-    /// # Errors
-    /// As [`Network::new`].
-    pub fn tuned(
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        weights: &Weights,
-        size: [u32; 2],
-        options: Options,
-        tuned: Arc<Tuned>,
-    ) -> Result<Self, NetError> {
-        Self::sharing((device, queue), weights, size, options, tuned, Pipelines::default())
-    }
-
-    /// As [`Network::tuned`], with compiled kernels that other networks of this device use too.
-    ///
-    /// # Errors
-    /// As [`Network::new`].
-    pub fn sharing(
-        (device, queue): (&wgpu::Device, &wgpu::Queue),
-        weights: &Weights,
-        size: [u32; 2],
-        options: Options,
-        tuned: Arc<Tuned>,
-        pipelines: Pipelines,
-    ) -> Result<Self, NetError> {
+        let Setup { options, tuned, pipelines } = setup.into();
         let plan = build::plan(device, &weights.graph, size, options)?;
         let choice = Choice { variant: options.variant, tuned: &tuned, facts: Facts::of(device) };
         let kernels: Vec<Kernel> = plan.steps.iter().map(|s| Kernel::choose(&plan, s, &choice)).collect();
@@ -168,7 +145,8 @@ impl Network {
         Ok(network)
     }
 
-    /// The same network for another size and other weights, whose graph may be another. Pipelines that serve again are kept.
+    /// The same network for another size and other weights, whose graph may be another. Pipelines
+    /// that serve again are kept.
     ///
     /// # Errors
     /// As [`Network::new`]; then the old network is gone.
@@ -180,7 +158,7 @@ impl Network {
         size: [u32; 2],
     ) -> Result<Self, NetError> {
         let Self { options, pipelines, tuned, .. } = self;
-        Self::sharing((device, queue), weights, size, options, tuned, pipelines)
+        Self::new(device, queue, weights, size, Setup { options, tuned, pipelines })
     }
 
     /// The same network with what a tuner has found in the meantime. Pipelines that serve again are kept.
@@ -194,7 +172,7 @@ impl Network {
         tuned: Arc<Tuned>,
     ) -> Result<Self, NetError> {
         let Self { options, pipelines, plan, .. } = self;
-        Self::sharing((device, queue), weights, [plan.width, plan.height], options, tuned, pipelines)
+        Self::new(device, queue, weights, [plan.width, plan.height], Setup { options, tuned, pipelines })
     }
 
     /// Replaces the trained numbers from the queue's next submission on. Allocates nothing on the GPU.

@@ -132,10 +132,11 @@ impl Graph {
         Ok(shapes)
     }
 
-    /// The size, at least `width`×`height`, at which the network runs for a picture of that size: the next multiples of the
-    /// smallest power of two for which all its tensors fit together and the output loses no pixels at its edges (a U-Net
-    /// with eight halvings and concatenated skips wants multiples of 256; one that resamples to its skips' sizes takes any).
-    /// The picture's last row and column are repeated, and the output is cropped to [`Graph::cropped`].
+    /// The size, at least `width`×`height`, at which the network runs for a picture of that size:
+    /// the next multiples of the smallest power of two for which all its tensors fit together and
+    /// the output loses no pixels at its edges (a U-Net with eight halvings and concatenated skips
+    /// wants multiples of 256; one that resamples to its skips' sizes takes any). The picture's
+    /// last row and column are repeated, and the output is cropped to [`Graph::cropped`].
     ///
     /// # Errors
     /// What is wrong with the size itself when no larger one will do.

@@ -84,7 +84,8 @@ pub(super) fn dtype_bytes(dtype: &str) -> Option<u64> {
     })
 }
 
-/// Reads the header of `bytes` and checks every offset. Faults in single tensors go to `problems`, and the tensor is left out.
+/// Reads the header of `bytes` and checks every offset. Faults in single tensors go to `problems`,
+/// and the tensor is left out.
 pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8], problems: &mut Vec<Problem>) -> Result<Header<'a>, WeightsError> {
     let not = |reason: String| WeightsError::NotSafetensors { path: path.into(), reason };
     let found = bytes.len() as u64;

@@ -1,11 +1,12 @@
 //! Networks, from file to GPU.
 //!
-//! - [`mod@format`]: the weights file: a safetensors file whose metadata holds the graph. `weights-format/` specifies it.
+//! - [`mod@format`]: the weights file: a safetensors file whose metadata holds the graph.
+//!   `weights-format/` specifies it.
 //! - [`convert`]: published generators' state dicts to weights files.
 //! - [`graph`] and [`op`]: topology, shape inference, parameter and FLOP counts.
 //! - [`pictures`]: four pictures as a network's input, and its output as a picture.
 //! - [`plan`]: which dispatches run and where each tensor lives in one arena.
-//! - [`cpu`]: the slow, obvious twin; every kernel is tested against it and against PyTorch.
+//! - [`cpu`]: the slow, obvious CPU reference; every kernel is tested against it and against PyTorch.
 //! - [`gpu`]: the WGSL kernels' host side.
 //! - [`learn`]: the way back through the shipped network's operators, for fitting it to a scene.
 //!
@@ -31,6 +32,7 @@ pub mod plan;
 mod problem;
 mod shape;
 mod shipped;
+mod spec;
 mod stored;
 pub mod tune;
 mod write;

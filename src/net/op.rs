@@ -142,9 +142,9 @@ operators! {
         activation: Activation,
     }
 
-    /// Resampling: to another tensor's size (`size_as`), or by a whole factor (`scale`); exactly one of the two.
-    /// `upsample_nearest` takes source pixel ⌊x · in / out⌋, `upsample_bilinear` has half-pixel centres and clamped edges
-    /// (`align_corners=False`).
+    /// Resampling: to another tensor's size (`size_as`), or by a whole factor (`scale`); exactly
+    /// one of the two. `upsample_nearest` takes source pixel ⌊x · in / out⌋, `upsample_bilinear`
+    /// has half-pixel centres and clamped edges (`align_corners=False`).
     Upsample {
         /// Tensor read.
         input: String,
@@ -251,8 +251,9 @@ operators! {
         factor: u32,
     }
 
-    /// Dropout. The identity unless the run is given a seed; then a value becomes 0 with probability `p` and is divided by
-    /// 1 − p otherwise, as in PyTorch's training mode. See [`super::dropout`] for the random numbers.
+    /// Dropout. The identity unless the run is given a seed; then a value becomes 0 with
+    /// probability `p` and is divided by 1 − p otherwise, as in PyTorch's training mode. See
+    /// [`super::dropout`] for the random numbers.
     Dropout {
         /// Tensor read.
         input: String,

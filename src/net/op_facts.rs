@@ -82,8 +82,8 @@ impl Op {
         }
     }
 
-    /// Trained tensors: name and shape of each, as PyTorch has them. [`super::graph::Graph::check`] bounds the numbers, so
-    /// ask it first; the operator's own group counts are not judged here.
+    /// Trained tensors: name and shape of each, as PyTorch has them. [`super::graph::Graph::check`]
+    /// bounds the numbers, so ask it first; the operator's own group counts are not judged here.
     pub fn tensors(&self) -> Vec<(String, Vec<u64>)> {
         let named = |leaf: &str| format!("{}.{leaf}", self.name());
         let pair = |weight: Vec<u64>, bias: Option<u32>| {
@@ -119,9 +119,10 @@ impl Op {
         trained.map(|(_, shape)| shape.iter().product::<u64>()).sum()
     }
 
-    /// Floating-point operations from `input` to `output`: two a multiply-add of a convolution (bias and activation not
-    /// counted; of a transposed one, taps that are cut off count), eight a value of a bilinear resampling, two a value of
-    /// a batch norm, eight of a norm that measures the picture, one a value of a sum or a function.
+    /// Floating-point operations from `input` to `output`: two a multiply-add of a convolution
+    /// (bias and activation not counted; of a transposed one, taps that are cut off count), eight a
+    /// value of a bilinear resampling, two a value of a batch norm, eight of a norm that measures
+    /// the picture, one a value of a sum or a function.
     pub fn flops(&self, input: Shape, output: Shape) -> u64 {
         let values = |s: Shape| s.pixels() * u64::from(s.channels);
         let taps = |kernel: [u32; 2]| u64::from(kernel[0]) * u64::from(kernel[1]);

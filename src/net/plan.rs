@@ -1,9 +1,10 @@
 //! From a graph to what the GPU does: the list of dispatches and each tensor's place in one arena. Pure.
 //!
-//! Bias, activation, dropout, sums, batch norms, zero padding and enlarging by a whole factor run inside the operator
-//! before or after them where its kernel has room (`fuse`). A concatenation is one tensor whose makers each write a slice
-//! of its channels, if these are multiples of four. Tensors whose lives do not meet share memory, and a step may overwrite
-//! what it reads for the last time, if each thread reads just the element that it then writes (`place`).
+//! Bias, activation, dropout, sums, batch norms, zero padding and enlarging by a whole factor run
+//! inside the operator before or after them where its kernel has room (`fuse`). A concatenation is
+//! one tensor whose makers each write a slice of its channels, if these are multiples of four.
+//! Tensors whose lives do not meet share memory, and a step may overwrite what it reads for the
+//! last time, if each thread reads just the element that it then writes (`place`).
 
 mod fuse;
 mod norm;

@@ -1,7 +1,7 @@
 //! What can be wrong with a weights file, in sentences that name file, tensor or operator.
 
-use super::format::{KEY, MAX_FILE, MAX_SCALE};
 use super::graph::GraphError;
+use super::spec::{KEY, MAX_FILE, MAX_SCALE};
 use std::path::PathBuf;
 use thiserror::Error;
 

@@ -6,12 +6,8 @@ use super::graph::Graph;
 use super::header::{Header, TensorInfo};
 use super::op::Op;
 use super::problem::Problem;
+use super::spec::{MAX_SCALE, SCALE_SUFFIX};
 use std::collections::{BTreeMap, BTreeSet};
-
-/// What the scales of a tensor of bytes are called: `NAME.weight` and `NAME.weight_scale`.
-pub const SCALE_SUFFIX: &str = "_scale";
-/// Largest scale: the largest byte times it is still a finite f32.
-pub const MAX_SCALE: f32 = f32::MAX / 128.0;
 
 /// How a tensor's numbers are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -93,7 +89,8 @@ fn wanted(graph: &Graph) -> BTreeMap<String, Wanted> {
     graph.ops.iter().flat_map(of).collect()
 }
 
-/// Holds the file's tensors against what the graph needs: names, shapes, types, scales, values. Allocates nothing for the values.
+/// Holds the file's tensors against what the graph needs: names, shapes, types, scales, values.
+/// Allocates nothing for the values.
 pub(super) fn check(header: &Header<'_>, graph: &Graph, problems: &mut Vec<Problem>) {
     let wanted = wanted(graph);
     // A tensor whose place was wrong has been reported already and is not missing as well.

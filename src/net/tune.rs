@@ -1,11 +1,13 @@
 //! The tuner: times the permutations of each convolution on the device at hand and remembers the fastest.
 //!
-//! What it remembers is a [`Cache`], JSON text by device, driver and layer shape; where that lies is the host's business. All
-//! permutations give the same result up to rounding, so a wrong cache costs time, never correctness.
+//! What it remembers is a [`Cache`], JSON text by device, driver and layer shape; where that lies
+//! is the host's business. All permutations give the same result up to rounding, so a wrong cache
+//! costs time, never correctness.
 
 use super::format::Weights;
-use super::gpu::permutation::{Layer, MAX_PARTS};
-use super::gpu::{Facts, NetError, Network, Options, Permutation, Pipelines, Tuned};
+use super::gpu::layer::Layer;
+use super::gpu::permutation::MAX_PARTS;
+use super::gpu::{Facts, NetError, Network, Options, Permutation, Pipelines, Setup, Tuned};
 use crate::gpu::timing::Recorder;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -130,10 +132,10 @@ pub struct Report {
     pub tried: usize,
 }
 
-/// Times the permutations of every convolution of a network at one input size that `cache` does not know yet (or of all, if
-/// `again`), and puts the fastest into `cache`. Rivals take turns, so that other work on the machine hits both. `go_on` hears how
-/// many rounds of how many are done; where it says no, the fastest so
-/// far is remembered of those that have had a rival.
+/// Times the permutations of every convolution of a network at one input size that `cache` does not
+/// know yet (or of all, if `again`), and puts the fastest into `cache`. Rivals take turns, so that
+/// other work on the machine hits both. `go_on` hears how many rounds of how many are done; where
+/// it says no, the fastest so far is remembered of those that have had a rival.
 ///
 /// # Errors
 /// [`NetError`] when the network does not run on this device.
@@ -151,7 +153,8 @@ pub fn tune(
     // What both rivals share is compiled once.
     let pipelines = Pipelines::default();
     let build = |tuned: &Tuned| {
-        Network::sharing((device, queue), weights, size, options, Arc::new(tuned.clone()), pipelines.clone())
+        let (tuned, pipelines) = (Arc::new(tuned.clone()), pipelines.clone());
+        Network::new(device, queue, weights, size, Setup { options, tuned, pipelines })
     };
     let mut champion = build(&known)?;
     // Steps of one shape share what is found.
@@ -217,8 +220,8 @@ fn race(gpu: (&wgpu::Device, &wgpu::Queue), networks: [&Network; 2], step: usize
     best
 }
 
-/// Seconds that a step takes by the clock, `repetitions` in one submission, waited for. Timestamps would leave out the copies
-/// that some permutations need, and some software drivers' are wrong.
+/// Seconds that a step takes by the clock, `repetitions` in one submission, waited for. Timestamps
+/// would leave out the copies that some permutations need, and some software drivers' are wrong.
 fn seconds((device, queue): (&wgpu::Device, &wgpu::Queue), network: &Network, step: usize, repetitions: u32) -> f64 {
     let start = Instant::now();
     let mut encoder = device.create_command_encoder(&Default::default());
@@ -229,7 +232,8 @@ fn seconds((device, queue): (&wgpu::Device, &wgpu::Queue), network: &Network, st
     (start.elapsed().as_secs_f64() / f64::from(repetitions)).max(1e-9)
 }
 
-/// Milliseconds of each step of a network alone, by the clock, waited for: the fastest of `turns` turns through all steps.
+/// Milliseconds of each step of a network alone, by the clock, waited for: the fastest of `turns`
+/// turns through all steps.
 pub fn layers(gpu: (&wgpu::Device, &wgpu::Queue), network: &Network, turns: usize) -> Vec<f64> {
     let mut repetitions = vec![0; network.plan().steps.len()];
     let mut best = vec![f64::INFINITY; repetitions.len()];

@@ -1,8 +1,9 @@
-//! The film: sums over the samples of each point, in two halves that share no random number, so that their difference tells
-//! the noise that is left.
+//! The film: sums over the samples of each point, in two halves that share no random number, so
+//! that their difference tells the noise that is left.
 //!
-//! A point has 256 bytes in each half: 8 vectors of sums, then 8 of carries (`shaders/reference/film.wgsl`). Radiances have
-//! the surface's colour multiplied in, as Blender sums them; [`Layer`](super::Layer) divides it out.
+//! A point has 256 bytes in each half: 8 vectors of sums, then 8 of carries
+//! (`shaders/reference/film.wgsl`). Radiances have the surface's colour multiplied in, as Blender
+//! sums them; [`Layer`](super::Layer) divides it out.
 //!
 //! | vector | red, green, blue | alpha |
 //! |---|---|---|

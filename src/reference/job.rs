@@ -8,7 +8,7 @@ use bytemuck::{Pod, Zeroable};
 /// No limit of bounces: paths end by Russian roulette alone, which is unbiased.
 pub const UNLIMITED: u32 = u32::MAX;
 
-/// The twin of `Job` in `shaders/reference/types.wgsl`, field by field.
+/// Laid out as `Job` in `shaders/reference/types.wgsl`, field by field.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Job {
@@ -47,8 +47,9 @@ pub struct Job {
     pub diffuse_bounces: u32,
     /// Most glossy bounces.
     pub glossy_bounces: u32,
-    /// Cycles' "Filter Glossy" (1 by default there, 0 for none): after a scattering of low density the specular lobes of
-    /// all further surfaces are widened, which loses some light. Biased; for comparisons with Cycles only.
+    /// Cycles' "Filter Glossy" (1 by default there, 0 for none): after a scattering of low density
+    /// the specular lobes of all further surfaces are widened, which loses some light. Biased; for
+    /// comparisons with Cycles only.
     pub filter_glossy: f32,
     /// Unused.
     pub pad: u32,
@@ -69,12 +70,14 @@ pub const HITS_ONLY: u32 = 16;
 pub const COUNT_TWICE: u32 = 32;
 /// Flag: plain hashed random numbers in place of Owen-scrambled Sobol points. For measuring what the latter gain.
 pub const PLAIN_RANDOM: u32 = 64;
-/// Flag: surfaces that are met by a diffusely scattered ray show no specular lobe, as in Cycles without "Reflective Caustics" (metals
-/// are black there, and nothing is taken from the diffuse part). For comparisons with such pictures.
+/// Flag: surfaces that are met by a diffusely scattered ray show no specular lobe, as in Cycles
+/// without "Reflective Caustics" (metals are black there, and nothing is taken from the diffuse
+/// part). For comparisons with such pictures.
 pub const NO_CAUSTICS: u32 = 128;
 
 impl Job {
-    /// A job for `camera` on a picture of `size` pixels: no points yet, one sample, seed 0, filter of 1.5 pixels, no limits.
+    /// A job for `camera` on a picture of `size` pixels: no points yet, one sample, seed 0, filter
+    /// of 1.5 pixels, no limits.
     pub fn new(camera: &Camera, size: [u32; 2]) -> Self {
         let view = View::new(camera, size, [0.0; 2]);
         Self {

@@ -3,8 +3,8 @@
 use super::{ReferenceScene, TracerError, job};
 use crate::gpu::shaders;
 
-/// The compiled kernels. Make one for a device and share it: compiling takes far longer than a small picture. Clones are
-/// handles to the same kernels.
+/// The compiled kernels. Make one for a device and share it: compiling takes far longer than a
+/// small picture. Clones are handles to the same kernels.
 #[derive(Debug, Clone)]
 pub struct Kernel {
     path: wgpu::ComputePipeline,

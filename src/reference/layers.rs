@@ -24,8 +24,9 @@ pub enum Layer {
     Emit,
     /// Radiance of the surroundings where the camera sees them.
     Env,
-    /// What a GI method must add: all diffuse light but the analytic lights' direct part as the rasteriser has it, E/π. May
-    /// be below 0, where analytic lights stand in for surfaces that give less.
+    /// What a GI method must add: all diffuse light but the analytic lights' direct part as the
+    /// rasteriser has it, E/π. May be below 0, where analytic lights stand in for surfaces that
+    /// give less.
     Gi,
     /// Direct diffuse light of the analytic lights as the rasteriser has it (its DiffDir), E/π.
     Analytic,

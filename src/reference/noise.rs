@@ -1,15 +1,17 @@
 //! How much noise is left, told from the difference of two independent halves, and when that is little enough.
 //!
 //! The halves' means a and b are independent estimates of one number from n_a and n_b samples, so
-//! (a − b)² · n_a·n_b / (n_a + n_b)² is an unbiased estimate of the variance of their common mean, already from one sample
-//! in each. For one pixel it says next to nothing; the root of its average over a picture is a sound number.
+//! (a − b)² · n_a·n_b / (n_a + n_b)² is an unbiased estimate of the variance of their common mean,
+//! already from one sample in each. For one pixel it says next to nothing; the root of its average
+//! over a picture is a sound number.
 
 /// Noise that is left in one layer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// Mean of the layer over points and channels.
     pub mean: f64,
-    /// Root mean square error of a pixel, divided by `mean`. 0 where there is none at all, infinite where it cannot be told.
+    /// Root mean square error of a pixel, divided by `mean`. 0 where there is none at all, infinite
+    /// where it cannot be told.
     pub pixel: f64,
     /// What `pixel` is at most, two standard errors of its own estimate away.
     pub pixel_at_most: f64,
@@ -91,8 +93,8 @@ impl Tally {
     }
 }
 
-/// Fewest samples of a point, and of all points together, before an estimate is believed: what is bright and rare has to
-/// have had a chance of being seen.
+/// Fewest samples of a point, and of all points together, before an estimate is believed: what is
+/// bright and rare has to have had a chance of being seen.
 const LEAST_SAMPLES: u32 = 16;
 const LEAST_IN_ALL: u64 = 1 << 16;
 
@@ -102,8 +104,9 @@ pub(super) fn first_check(points: u32) -> u32 {
     u32::try_from(share).unwrap_or(u32::MAX).max(LEAST_SAMPLES).next_multiple_of(2)
 }
 
-/// Samples after which to look again when `noise` was found after `samples` and `bound` is wanted: where the inverse root
-/// says that it is reached, but no more than twice and no less than a quarter more.
+/// Samples after which to look again when `noise` was found after `samples` and `bound` is wanted:
+/// where the inverse root says that it is reached, but no more than twice and no less than a
+/// quarter more.
 pub(super) fn next_check(samples: u32, noise: &Noise, bound: f64) -> u32 {
     let wanted = 1.05 * (noise.pixel_at_most / bound).powi(2);
     let factor = if wanted.is_finite() { wanted.clamp(1.25, 2.0) } else { 2.0 };

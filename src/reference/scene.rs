@@ -74,7 +74,7 @@ pub enum PackError {
     Accel(#[from] accel::AccelError),
 }
 
-/// The twin of `SceneInfo` in `shaders/reference/types.wgsl`, field by field.
+/// Laid out as `SceneInfo` in `shaders/reference/types.wgsl`, field by field.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs, reason = "documented in the shader")]
@@ -160,7 +160,8 @@ impl ReferenceScene {
         Ok(Self { group, triangles: flat.positions.len(), emitters, bytes, _accel: accel })
     }
 
-    /// Layout of group 0. wgpu holds layouts with equal entries for the same, so pipelines can be made before any scene.
+    /// Layout of group 0. wgpu holds layouts with equal entries for the same, so pipelines can be
+    /// made before any scene.
     pub fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
             binding,

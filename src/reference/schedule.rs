@@ -1,10 +1,11 @@
 //! How the work is cut into dispatches: short ones, since a driver's watchdog kills what takes about two seconds, and a
 //! viewer wants its frame. No wgpu here.
 //!
-//! A pass gives every point the same number of samples of one half; a pass that takes too long for one dispatch is cut by
-//! points. Passes grow: the first gives one sample, later ones several, since an invocation that has more than one path to
-//! trace need not wait for its neighbours' long ones. How long a point takes differs by place (sky against a corner), so
-//! speed is remembered by place. Where the time is not in the work (a loaded machine), smaller dispatches gain nothing;
+//! A pass gives every point the same number of samples of one half; a pass that takes too long for
+//! one dispatch is cut by points. Passes grow: the first gives one sample, later ones several,
+//! since an invocation that has more than one path to trace need not wait for its neighbours' long
+//! ones. How long a point takes differs by place (sky against a corner), so speed is remembered by
+//! place. Where the time is not in the work (a loaded machine), smaller dispatches gain nothing;
 //! then a floor rises.
 
 /// Places that speed is remembered for.
@@ -13,8 +14,9 @@ const PLACES: usize = 16;
 /// Points times samples of the first dispatch: a few milliseconds on the slowest device.
 const FIRST_WORK: u64 = 1024;
 
-/// Most samples that one dispatch gives a point. Mesa's CPU driver silently ends all loops of an invocation after 65,535
-/// turns in all (`LP_MAX_TGSI_LOOP_ITERATIONS`), those of the traversal included: about 1,000 rays.
+/// Most samples that one dispatch gives a point. Mesa's CPU driver silently ends all loops of an
+/// invocation after 65,535 turns in all (`LP_MAX_TGSI_LOOP_ITERATIONS`), those of the traversal
+/// included: about 1,000 rays.
 const MOST_SAMPLES: u32 = 16;
 
 /// Most samples that a dispatch gives a point where that means fewer points at once.
@@ -107,7 +109,8 @@ impl Schedule {
         samples
     }
 
-    /// The next dispatch on the way to `goal` samples a point, split evenly between the halves; `None` when it is reached.
+    /// The next dispatch on the way to `goal` samples a point, split evenly between the halves;
+    /// `None` when it is reached.
     pub fn next(&mut self, goal: u32) -> Option<Chunk> {
         if self.points == 0 {
             return None;

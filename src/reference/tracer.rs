@@ -1,8 +1,9 @@
-//! The path tracer's host: a progressive object that works in short dispatches and can be asked for its layers at any time.
+//! The path tracer's host: a progressive object that works in short dispatches and can be asked for
+//! its layers at any time.
 //!
-//! Unlike the passes of a frame it submits and waits for the device, as capture does. Random numbers are keyed by seed,
-//! half, point and sample, and samples are summed one by one; so neither the cutting into dispatches nor into bands shows
-//! in the result, bit for bit.
+//! Unlike the passes of a frame it submits and waits for the device, as capture does. Random
+//! numbers are keyed by seed, half, point and sample, and samples are summed one by one; so neither
+//! the cutting into dispatches nor into bands shows in the result, bit for bit.
 
 use super::{
     Job, Kernel, Layer, Noise, ReferenceScene, Traced, TracerError,
@@ -32,8 +33,9 @@ pub struct Subject<'a> {
     pub camera: &'a Camera,
     /// Size of the picture, pixels.
     pub size: [u32; 2],
-    /// Picture coordinates of the points, pixels (x right, y down; the centre of the first pixel is 0.5, 0.5); every sample
-    /// goes through its point, no pixel filter. `None` for all pixels, through the filter.
+    /// Picture coordinates of the points, pixels (x right, y down; the centre of the first pixel is
+    /// 0.5, 0.5); every sample goes through its point, no pixel filter. `None` for all pixels,
+    /// through the filter.
     pub points: Option<&'a [[f32; 2]]>,
 }
 
@@ -47,7 +49,8 @@ pub struct TracerOptions {
     pub until_error: Option<(Layer, f64)>,
     /// Seed; the same seed gives the same result on the same device.
     pub seed: u32,
-    /// Most bounces in all, as Blender counts them; [`job::UNLIMITED`] leaves the end to Russian roulette, without bias.
+    /// Most bounces in all, as Blender counts them; [`job::UNLIMITED`] leaves the end to Russian
+    /// roulette, without bias.
     pub bounces: u32,
     /// Most diffuse bounces.
     pub diffuse_bounces: u32,

@@ -31,8 +31,9 @@ pub enum Layer {
     Depth = 9,
     /// World position of the sample at the pixel's centre, metres (Y up).
     Position = 10,
-    /// Texture coordinates in the previous frame minus in this one, of the sample at the pixel's centre. Objects have moved
-    /// since the renderer's last frame; the camera only with temporal anti-aliasing.
+    /// Texture coordinates in the previous frame minus in this one, of the sample at the pixel's
+    /// centre. Objects have moved since the renderer's last frame; the camera only with temporal
+    /// anti-aliasing.
     Motion = 11,
 }
 

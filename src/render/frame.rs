@@ -15,7 +15,7 @@ use crate::gi::{
     self,
     features::FeatureSet,
     method, pack,
-    rung::{self, Cost, Rung},
+    technique::{self, Cost, Technique},
 };
 use crate::gpu::timing::Recorder;
 use crate::net::gpu::Tap;
@@ -57,7 +57,7 @@ pub struct Renderer {
     lighting: Option<Lighting>,
     method: &'static str,
     /// What fills `indirect`; nothing for direct light alone.
-    indirect: Option<Box<dyn Rung>>,
+    indirect: Option<Box<dyn Technique>>,
     passes: Passes,
     taa: Option<TaaPass>,
     /// Where objects were in the frame before.
@@ -142,8 +142,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// The next frame has nothing to do with the last (a cut): no object has moved since, and temporal anti-aliasing starts
-    /// anew.
+    /// The next frame has nothing to do with the last (a cut): no object has moved since, and
+    /// temporal anti-aliasing starts anew.
     pub fn cut(&mut self) {
         self.moved.cut();
         if let Some(taa) = &mut self.taa {
@@ -161,7 +161,7 @@ impl Renderer {
     }
 
     /// What drew the last frame in the method's place, and why; `None` where it drew itself.
-    pub fn instead(&self) -> Option<rung::Instead<'_>> {
+    pub fn instead(&self) -> Option<technique::Instead<'_>> {
         self.indirect.as_ref()?.instead()
     }
 
@@ -195,8 +195,9 @@ impl Renderer {
         gi_inputs(&self.targets, view, environment, None)
     }
 
-    /// All that a network can be given of the last frame, which `view` drew, read back: the G-buffer's features and, where the
-    /// method has computed it, what `gather` answers. Waits for the GPU.
+    /// All that a network can be given of the last frame, which `view` drew, read back: the
+    /// G-buffer's features and, where the method has computed it, what `gather` answers. Waits for
+    /// the GPU.
     ///
     /// # Errors
     /// As [`pack::read_features`].
@@ -218,8 +219,8 @@ impl Renderer {
         self.indirect.as_ref().map(|i| i.layers()).unwrap_or_default()
     }
 
-    /// What a layer of the network made of the last frame, which `view` drew; `None` where there is no such layer. Runs the
-    /// network again and waits for the GPU.
+    /// What a layer of the network made of the last frame, which `view` drew; `None` where there is
+    /// no such layer. Runs the network again and waits for the GPU.
     ///
     /// # Errors
     /// As [`NeuralGi::read_layer`](gi::pass::NeuralGi::read_layer).
@@ -249,8 +250,9 @@ impl Renderer {
         rows
     }
 
-    /// Records one frame of `scene` as `view` sees it into [`Renderer::targets`]. `view.size` is the targets' size. What was
-    /// placed elsewhere in the frame recorded before has motion vectors that point there.
+    /// Records one frame of `scene` as `view` sees it into [`Renderer::targets`]. `view.size` is
+    /// the targets' size. What was placed elsewhere in the frame recorded before has motion vectors
+    /// that point there.
     ///
     /// # Errors
     /// [`RenderError::Gi`] when the GI method cannot work with this camera; the encoder then holds half a frame.
@@ -264,9 +266,9 @@ impl Renderer {
         self.record_frame(recorder, queue, scene, view, true)
     }
 
-    /// As [`Renderer::record`]; without `shadows` the maps stay as the previous frame left them, which is right for
-    /// further samples of one picture; without temporal anti-aliasing, to which each sample is a frame, so do motion vectors
-    /// of objects.
+    /// As [`Renderer::record`]; without `shadows` the maps stay as the previous frame left them,
+    /// which is right for further samples of one picture; without temporal anti-aliasing, to which
+    /// each sample is a frame, so do motion vectors of objects.
     pub(crate) fn record_frame(
         &mut self,
         recorder: &mut Recorder<'_>,

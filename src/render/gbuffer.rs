@@ -19,10 +19,11 @@
 //! | `indirect_specular` | `Rgba16Float` | radiance of the specular lobe under sky and bounces, W/(m²·sr) | 0 |
 //! | `hdr` | `Rgba16Float` | the picture: radiance, W/(m²·sr); a: 1 | the environment |
 //!
-//! The five colour attachments take exactly the 32 bytes a sample that WebGPU grants by default. Unlit materials have
-//! albedo and F0 of 0 and their colour in `emissive`. Motion vectors know where the camera was and where each object was
-//! ([`moved`](super::moved)); they do not know of lights, nor of textures that move. The background's are 0 whatever the
-//! camera does: it follows from the view alone.
+//! The five colour attachments take exactly the 32 bytes a sample that WebGPU grants by default.
+//! Unlit materials have albedo and F0 of 0 and their colour in `emissive`. Motion vectors know
+//! where the camera was and where each object was ([`moved`](super::moved)); they do not know of
+//! lights, nor of textures that move. The background's are 0 whatever the camera does: it follows
+//! from the view alone.
 
 use super::targets::Targets;
 use super::tool;
@@ -36,8 +37,8 @@ use glam::Vec3;
 pub struct GbufferInputs<'a> {
     /// The scene.
     pub scene: &'a SceneGpu,
-    /// Its instances as they were in the frame before ([`Moved::before`](super::moved::Moved::before)); `scene.instances`
-    /// where nothing moves.
+    /// Its instances as they were in the frame before
+    /// ([`Moved::before`](super::moved::Moved::before)); `scene.instances` where nothing moves.
     pub before: &'a wgpu::Buffer,
     /// Who sees it.
     pub view: &'a View,
@@ -111,8 +112,9 @@ impl GbufferPass {
 
 /// Which pipeline a draw needs: culling (back, front for mirrored, none) × coverage.
 ///
-/// What is closed shows its outer faces alone from outside, whatever its material says: where an inner face meets an outer one at
-/// a silhouette, both cover a pixel at depths that only rounding tells apart, and the inner one would now and then win.
+/// What is closed shows its outer faces alone from outside, whatever its material says: where an
+/// inner face meets an outer one at a silhouette, both cover a pixel at depths that only rounding
+/// tells apart, and the inner one would now and then win.
 fn variant(draw: &Draw, view: &View) -> usize {
     let cull =
         if draw.double_sided && !(draw.closed && is_outside(view, draw)) { 2 } else { usize::from(draw.mirrored) };

@@ -1,20 +1,22 @@
 //! Specular light of sky and bounces: the split sum's share of what one ray along the mirrored direction finds on the
 //! screen, blurred by the lobe's width.
 //!
-//! Where the method has sent rays into lobes ([`Rung::gloss`](crate::gi::rung::Rung::gloss)), what they found is shown, and the screen is
-//! asked by smooth surfaces only, for sharpness.
+//! Where the method has sent rays into lobes
+//! ([`Technique::gloss`](crate::gi::technique::Technique::gloss)), what they found is shown, and
+//! the screen is asked by smooth surfaces only, for sharpness.
 //!
-//! `gi.lit` makes a half-size picture of the light that all surfaces send out, and blurs it in steps of two; `gi.glossy`
-//! marches one ray a pixel through the depth texture (16 steps, 48 for smooth surfaces) and looks the picture up where
-//! it hits, sharp for smooth surfaces. A ray that finds nothing takes the diffuse light of the surface's own side, mixed
-//! with what the picture shows where the ray leaves it.
+//! `gi.lit` makes a half-size picture of the light that all surfaces send out, and blurs it in
+//! steps of two; `gi.glossy` marches one ray a pixel through the depth texture (16 steps, 48 for
+//! smooth surfaces) and looks the picture up where it hits, sharp for smooth surfaces. A ray that
+//! finds nothing takes the diffuse light of the surface's own side, mixed with what the picture
+//! shows where the ray leaves it.
 //!
 //! Under even light the result is exactly the split sum. What it cannot do: show what is hidden or outside the picture,
 //! spread a rough lobe over a corner (it looks along one direction), and show reflections in reflections but for their
 //! mean.
 
 use super::{Targets, tool};
-use crate::gi::rung::Cost;
+use crate::gi::technique::Cost;
 use crate::gpu::bind::Binder;
 use crate::gpu::timing::Recorder;
 
@@ -52,7 +54,7 @@ pub struct GlossyInputs<'a> {
     pub picture: &'a GlossyPicture,
     /// Radiance of the surroundings, for rays that leave the picture.
     pub sky: &'a wgpu::TextureView,
-    /// [`Rung::gloss`](crate::gi::rung::Rung::gloss).
+    /// [`Technique::gloss`](crate::gi::technique::Technique::gloss).
     pub found: Option<&'a wgpu::TextureView>,
 }
 
@@ -170,10 +172,12 @@ impl GlossyPass {
         });
     }
 
-    /// What the passes cost for a picture of `size` pixels without smooth surfaces; `rays`: the method has sent rays into lobes.
-    /// `gi.lit`: a quarter of the pixels with 140 operations and 40 bytes, then levels of 8 bytes read and written, and copied.
-    /// `gi.glossy`: split sum 110 and look-ups 60; without rays of lobes each ray marches all of its 21 steps of 16 operations, with a
-    /// track of 110 and 60 around it. Depth, normal, specular, indirect or what lobes show and the result, and the lit picture once.
+    /// What the passes cost for a picture of `size` pixels without smooth surfaces; `rays`: the
+    /// method has sent rays into lobes. `gi.lit`: a quarter of the pixels with 140 operations and
+    /// 40 bytes, then levels of 8 bytes read and written, and copied. `gi.glossy`: split sum 110
+    /// and look-ups 60; without rays of lobes each ray marches all of its 21 steps of 16
+    /// operations, with a track of 110 and 60 around it. Depth, normal, specular, indirect or what
+    /// lobes show and the result, and the lit picture once.
     pub fn costs(size: [u32; 2], rays: bool) -> [Cost; 2] {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let (march, lit) = if rays { (0.0, 0.0) } else { (21.0 * 16.0 + 170.0, 8.0 / 3.0) };

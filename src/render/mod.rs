@@ -11,6 +11,7 @@ pub mod sampling;
 pub mod shadow;
 mod shadow_local;
 mod shadow_sun;
+mod shadow_view;
 pub mod taa;
 pub mod targets;
 pub mod tonemap;

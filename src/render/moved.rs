@@ -1,10 +1,11 @@
 //! Where objects were in the frame before: rows of the world-from-object matrices, slot by slot as those of
 //! [`SceneGpu::instances`], for motion vectors.
 //!
-//! What "before" means depends on who drew: two renderers may show one scene, each at its own pace, and placements may
-//! change more than once between two frames. So each renderer remembers what its own last frame showed, by instance, since
-//! draws are sorted anew when placements change (a mirrored transform, another material) and slots then change hands.
-//! While nothing moves nothing is written: the rows of this frame are those of the one before.
+//! What "before" means depends on who drew: two renderers may show one scene, each at its own pace,
+//! and placements may change more than once between two frames. So each renderer remembers what its
+//! own last frame showed, by instance, since draws are sorted anew when placements change (a
+//! mirrored transform, another material) and slots then change hands. While nothing moves nothing
+//! is written: the rows of this frame are those of the one before.
 
 use crate::scene::upload::{Rows, SceneGpu};
 

@@ -21,8 +21,8 @@ pub fn offset(i: u32, seed: u32) -> [f32; 2] {
     })
 }
 
-/// Blackman-Harris window over [−w, w], about 0 at its ends and not meant beyond them, for the filter's nominal width w: Cycles stretches the window to twice its
-/// width setting.
+/// Blackman-Harris window over [−w, w], about 0 at its ends and not meant beyond them, for the
+/// filter's nominal width w: Cycles stretches the window to twice its width setting.
 pub(crate) fn window(x: f32) -> f32 {
     let v = std::f32::consts::TAU * (x / (2.0 * FILTER_WIDTH) + 0.5);
     0.35875 - 0.48829 * v.cos() + 0.14128 * (2.0 * v).cos() - 0.01168 * (3.0 * v).cos()

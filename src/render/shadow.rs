@@ -5,12 +5,12 @@
 //! several have 1024²), and the local lights share [`MAX_LOCAL_LAYERS`] layers (1024² up to 12 of them, then 512²).
 //! Lights beyond that shine without shadow, and a warning says so once.
 
+pub use super::shadow_view::ShadowViewGpu;
 use super::view::View;
 use super::{shadow_local, shadow_sun, tool};
 use crate::gpu::{shaders, timing::Recorder};
-use crate::scene::upload::{SceneGpu, attribute_layouts, material_layout, position_layouts};
+use crate::scene::upload::{SceneGpu, attribute_layouts, fits_one_map, material_layout, position_layouts};
 use crate::scene::{Light, LightKind};
-use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Suns that cast shadows.
@@ -33,26 +33,6 @@ impl Default for ShadowOptions {
     fn default() -> Self {
         Self { sun_size: 2048, cascades: 4, local_size: 1024 }
     }
-}
-
-/// One map's camera; the twin of `ShadowView` in `shaders/lib/shadow_maps.wgsl`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct ShadowViewGpu {
-    /// Reversed-Z clip space of the light.
-    pub clip_from_world: [[f32; 4]; 4],
-    /// Metres a texel (sun) or tangent units a texel (local).
-    pub texel: f32,
-    /// Metres from near to far plane (sun), or the near plane (local).
-    pub range: f32,
-    /// Texture coordinates a metre (sun) or a tangent unit (local).
-    pub scale: f32,
-    /// Layer of the array.
-    pub layer: u32,
-    /// Texels of the map's side.
-    pub size: f32,
-    /// Unused.
-    pub pad: [f32; 3],
 }
 
 /// What of the shadow maps depends on the lights only.
@@ -81,7 +61,7 @@ impl Plan {
                 }
                 LightKind::Directional { .. } => 0,
                 kind => {
-                    let maps = if is_flat(&kind) { 1 } else { 6 };
+                    let maps = if fits_one_map(&kind) { 1 } else { 6 };
                     if local_layers + maps <= MAX_LOCAL_LAYERS {
                         local_layers += maps;
                         maps
@@ -98,11 +78,6 @@ impl Plan {
         let local_size = options.local_size.clamp(64, 2048) >> u32::from(local_layers > 24);
         Self { of_light, views, sun_size, sun_layers: suns * cascades, local_size, local_layers, unshadowed }
     }
-}
-
-/// True for lights whose cone fits into one map.
-pub(crate) fn is_flat(kind: &LightKind) -> bool {
-    matches!(kind, LightKind::Spot { outer_angle, .. } if *outer_angle <= shadow_local::WIDEST_SPOT)
 }
 
 /// The maps of one scene, with what the direct pass binds.

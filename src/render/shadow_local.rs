@@ -1,14 +1,11 @@
 //! Perspective shadow views of spot lights (one map) and of point lights and wide spots (six faces of a cube).
 
-use super::shadow::ShadowViewGpu;
+use super::shadow_view::ShadowViewGpu;
 use glam::{Mat4, Vec3, Vec4};
 
 /// What faces and cones show beyond their edge, in tangent units, so that filters never reach outside.
 /// `LOCAL_SEARCH` in `shaders/lib/shadow_maps.wgsl` stays below it.
 const MARGIN: f32 = 0.15;
-
-/// A spot whose half angle is above this gets a cube: a flat map would waste its texels on the rim.
-pub(super) const WIDEST_SPOT: f32 = 60.0 * std::f32::consts::PI / 180.0;
 
 /// The view of a spot light along `direction` with half angle `outer` (radians).
 pub(super) fn spot(position: Vec3, direction: Vec3, outer: f32, radius: f32, size: u32, layer: u32) -> ShadowViewGpu {

@@ -1,6 +1,6 @@
 //! Cascades of a sun: squares in the light's plane that cover what the camera sees of the scene.
 
-use super::shadow::ShadowViewGpu;
+use super::shadow_view::ShadowViewGpu;
 use super::view::View;
 use glam::{Mat4, Vec2, Vec3, Vec4};
 

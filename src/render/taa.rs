@@ -1,20 +1,22 @@
 //! Temporal anti-aliasing and the history behind it: the mean over frames, each of which samples its pixels elsewhere.
 //!
-//! A camera that stands still in a scene that does not change averages without end, so the picture converges to the
-//! filtered one and stops moving. Otherwise the mean is fetched along the motion vectors, dropped where the surface was
-//! not seen before, and held within the colours around the pixel (variance clipping, Salvi 2016), which keeps ten frames
-//! at most. A frame's value at a pixel is the mean of the 3×3 samples around its centre under the pixel filter
-//! ([`sampling`]), whatever the jitter, so the mean over frames is the filtered picture.
+//! A camera that stands still in a scene that does not change averages without end, so the picture
+//! converges to the filtered one and stops moving. Otherwise the mean is fetched along the motion
+//! vectors, dropped where the surface was not seen before, and held within the colours around the
+//! pixel (variance clipping, Salvi 2016), which keeps ten frames at most. A frame's value at a
+//! pixel is the mean of the 3×3 samples around its centre under the pixel filter ([`sampling`]),
+//! whatever the jitter, so the mean over frames is the filtered picture.
 //!
-//! What it cannot do: tell a changed light from noise faster than the neighbourhood's colours allow; reflections move
-//! with their surfaces; things thinner than a pixel lose brightness while the camera moves. What an object's distance was
-//! is guessed from where it is now, so one that comes or goes by more than a few percent of it in a frame starts anew.
+//! What it cannot do: tell a changed light from noise faster than the neighbourhood's colours
+//! allow; reflections move with their surfaces; things thinner than a pixel lose brightness while
+//! the camera moves. What an object's distance was is guessed from where it is now, so one that
+//! comes or goes by more than a few percent of it in a frame starts anew.
 
 use super::sampling;
 use super::targets::{Target, Targets};
 use super::tool;
 use super::view::View;
-use crate::gi::rung::Cost;
+use crate::gi::technique::Cost;
 use crate::gpu::timing::Recorder;
 use crate::scene::upload::SceneGpu;
 
@@ -32,10 +34,10 @@ enum Mode {
 /// `Blend` of `shaders/render/taa.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Blend {
-    mode: [i32; 4],
-    wx: [f32; 4],
-    wy: [f32; 4],
+pub(crate) struct Blend {
+    pub mode: [i32; 4],
+    pub wx: [f32; 4],
+    pub wy: [f32; 4],
 }
 
 impl Blend {

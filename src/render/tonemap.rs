@@ -16,11 +16,11 @@ pub struct TonemapOptions {
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-struct Uniform {
-    exposure: f32,
-    kind: u32,
-    linear_target: u32,
-    pad: u32,
+pub(crate) struct Uniform {
+    pub exposure: f32,
+    pub kind: u32,
+    pub linear_target: u32,
+    pub pad: u32,
 }
 
 /// Draws `hdr` through a curve into a colour target of one format.

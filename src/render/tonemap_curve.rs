@@ -11,9 +11,10 @@
 //! | AgX | 0.3, 12 | 0.5, 11 |
 //! | Neutral | 0.2, 3 | 0.8, 7 |
 //!
-//! What is left of AgX is mostly the interpolation in Blender's own table: at its nodes the formula agrees to 0.1 in
-//! the mean; between nodes the darkest channel of saturated colours goes astray there. Blender's Neutral is a table, too.
-//! Negative components count as zero (Blender bends them into the gamut), NaN as zero, light above 65504 as 65504.
+//! What is left of AgX is mostly the interpolation in Blender's own table: at its nodes the formula
+//! agrees to 0.1 in the mean; between nodes the darkest channel of saturated colours goes astray
+//! there. Blender's Neutral is a table, too. Negative components count as zero (Blender bends them
+//! into the gamut), NaN as zero, light above 65504 as 65504.
 
 use crate::srgb;
 use std::fmt;

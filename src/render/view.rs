@@ -132,7 +132,7 @@ fn projection(tan_half: [f32; 2], near: f32, shift: [f32; 2]) -> Mat4 {
     )
 }
 
-/// The twin of `Frame` in `shaders/lib/frame.wgsl`, field by field.
+/// Laid out as `Frame` in `shaders/lib/frame.wgsl`, field by field.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs, reason = "documented in the shader and in View")]

@@ -7,8 +7,9 @@ use super::Camera;
 impl Camera {
     /// A camera at `eye` that looks at `target` with +Y up (−Z up where it looks straight down or up).
     ///
-    /// `yfov` is the vertical field of view in radians. The near plane is 0.1 % of the distance, between 1 mm and 0.1 m;
-    /// the far plane is infinite. When `eye` equals `target` the camera looks along −Z.
+    /// `yfov` is the vertical field of view in radians. The near plane is 0.1 % of the distance,
+    /// between 1 mm and 0.1 m; the far plane is infinite. When `eye` equals `target` the camera
+    /// looks along −Z.
     pub fn look_at(eye: [f32; 3], target: [f32; 3], yfov: f32) -> Camera {
         let (eye, target) = (Vec3::from(eye), Vec3::from(target));
         let distance = eye.distance(target);

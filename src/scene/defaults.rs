@@ -1,15 +1,17 @@
 //! A camera and light for scenes that bring none.
 //!
-//! Camera: looks at the whole scene from the front (+Z) and a little above, unless another side lets one look deeper
-//! into it, as the open side of a box does.
-//! Light: where surfaces emit enough for a picture, up to four spot or point lights stand in for the strongest, because
-//! direct light is computed for analytic lights only. Else a sun behind the camera's shoulder and a dim grey sky, unless
-//! the surroundings are given. Fainter glow shines beside them where a method or the path tracer finds it.
+//! Camera: looks at the whole scene from the front (+Z) and a little above, unless another side
+//! lets one look deeper into it, as the open side of a box does. Light: where surfaces emit enough
+//! for a picture, up to four spot or point lights stand in for the strongest, because direct light
+//! is computed for analytic lights only. Else a sun behind the camera's shoulder and a dim grey
+//! sky, unless the surroundings are given. Fainter glow shines beside them where a method or the
+//! path tracer finds it.
 //!
-//! Enough is [`ENOUGH`]: the flux of all emitters (π · radiance · area) over the area of the box around the scene is the
-//! irradiance that they would give to its walls. A light grey wall under less is darker than a dark grey of 12 in 255 at
-//! exposure 0, where a file's maker cannot have meant it to be the only light. It is a ratio of areas, so that it does
-//! not matter whether the file counts in metres or millimetres.
+//! Enough is [`ENOUGH`]: the flux of all emitters (π · radiance · area) over the area of the box
+//! around the scene is the irradiance that they would give to its walls. A light grey wall under
+//! less is darker than a dark grey of 12 in 255 at exposure 0, where a file's maker cannot have
+//! meant it to be the only light. It is a ratio of areas, so that it does not matter whether the
+//! file counts in metres or millimetres.
 
 use glam::{Mat4, Vec3};
 
@@ -74,8 +76,8 @@ fn sun_added(scene: &Scene, glows: bool) -> String {
 }
 
 impl Scene {
-    /// Takes surroundings that somebody gives. They replace the default sky and with it the default sun, which are there
-    /// only as long as nobody says where light comes from.
+    /// Takes surroundings that somebody gives. They replace the default sky and with it the default
+    /// sun, which are there only as long as nobody says where light comes from.
     pub fn surround(&mut self, environment: Environment) {
         if std::mem::take(&mut self.default_light) {
             let told = [true, false].map(|glows| sun_added(self, glows));

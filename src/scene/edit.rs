@@ -1,8 +1,9 @@
 //! Small changes of a scene as text: what the viewer does to lights and objects, and `bouncelight render` repeats.
 //!
-//! A light: `INDEX key=value …` with the keys `color`, `strength` (W/m² of a sun, W/sr of other lights), `direction`,
-//! `position` and `size` (angle of a sun in radians, radius of other lights in metres). An object: `INDEX x,y,z`, metres by
-//! which it is moved from where the file has it. Numbers are written so that they read back bit for bit.
+//! A light: `INDEX key=value …` with the keys `color`, `strength` (W/m² of a sun, W/sr of other
+//! lights), `direction`, `position` and `size` (angle of a sun in radians, radius of other lights
+//! in metres). An object: `INDEX x,y,z`, metres by which it is moved from where the file has it.
+//! Numbers are written so that they read back bit for bit.
 
 use super::{Light, LightKind, Scene};
 use std::{fmt, str::FromStr};
@@ -50,7 +51,8 @@ pub enum EditError {
 }
 
 impl LightEdit {
-    /// What has to be said of light number `light` to turn `from` into `to`, which is of the same kind; `None` for nothing.
+    /// What has to be said of light number `light` to turn `from` into `to`, which is of the same
+    /// kind; `None` for nothing.
     pub fn between(light: usize, from: &Light, to: &Light) -> Option<Self> {
         let (a, b) = (Self::of(light, from), Self::of(light, to));
         let edit = Self {

@@ -70,8 +70,9 @@ impl Environment {
         Ok(Self { radiance: image.mean(), image: Some(Arc::new(image)) })
     }
 
-    /// Reads a Radiance HDR or an EXR picture. Single texels that no light can have are mended, which is told in a
-    /// sentence: overflown ones get the largest radiance that there is, negative ones and such that are no numbers none.
+    /// Reads a Radiance HDR or an EXR picture. Single texels that no light can have are mended,
+    /// which is told in a sentence: overflown ones get the largest radiance that there is, negative
+    /// ones and such that are no numbers none.
     ///
     /// # Errors
     /// [`EnvironmentError`]: not such a file, or more than a hundredth of its radiances is negative or not finite.

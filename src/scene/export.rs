@@ -1,8 +1,9 @@
 //! Writes a whole [`Scene`] as one GLB: meshes, materials, textures as PNG, lights, cameras.
 //!
-//! Light goes out in glTF's photometric units (times 683). What glTF has no field for, a light's radius, the sun's
-//! angle, the sky and that a light only stands in for a glowing surface, is in `extras.bouncelight`, where [`super::gltf`] finds it again and others ignore it.
-//! A texture transform that is no scale, rotation and offset (sheared) is written as the nearest that is.
+//! Light goes out in glTF's photometric units (times 683). What glTF has no field for, a light's
+//! radius, the sun's angle, the sky and that a light only stands in for a glowing surface, is in
+//! `extras.bouncelight`, where [`super::gltf`] finds it again and others ignore it. A texture
+//! transform that is no scale, rotation and offset (sheared) is written as the nearest that is.
 
 use std::io::Cursor;
 use std::path::Path;

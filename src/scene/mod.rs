@@ -155,7 +155,8 @@ pub enum AlphaMode {
         /// Alpha threshold in [0, 1].
         cutoff: f32,
     },
-    /// Drawn by stochastic coverage: a fragment survives with probability alpha, so `--samples N` converges to blending.
+    /// Drawn by stochastic coverage: a fragment survives with probability alpha, so `--samples N`
+    /// converges to blending.
     Blend,
 }
 
@@ -316,8 +317,8 @@ pub struct Light {
     pub color: [f32; 3],
     /// Where it is and how strong.
     pub kind: LightKind,
-    /// It only stands in for a glowing surface of the scene. The rasteriser, which knows no such light, uses it; the path
-    /// tracer leaves it out and lets the surface shine.
+    /// It only stands in for a glowing surface of the scene. The rasteriser, which knows no such
+    /// light, uses it; the path tracer leaves it out and lets the surface shine.
     pub stands_in: bool,
 }
 

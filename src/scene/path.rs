@@ -1,4 +1,5 @@
-//! Camera paths: where a camera is at which time, as JSON. The viewer records them, `bouncelight render --path` draws them.
+//! Camera paths: where a camera is at which time, as JSON. The viewer records them, `bouncelight
+//! render --path` draws them.
 //!
 //! ```json
 //! { "schema": 1, "keys": [ { "time": 0.0, "eye": [0, 1, 3], "look_at": [0, 1, 0], "fov": 45.0 } ] }
@@ -97,7 +98,8 @@ impl CameraPath {
         self.keys.last().map_or(0.0, |k| k.time)
     }
 
-    /// The camera at `time`, seconds: through every key, smoothly (cubic Hermite), never swinging out beyond them; before the first and after the last it stands still. `None` without keys.
+    /// The camera at `time`, seconds: through every key, smoothly (cubic Hermite), never swinging
+    /// out beyond them; before the first and after the last it stands still. `None` without keys.
     pub fn at(&self, time: f64) -> Option<PathKey> {
         let (first, last) = (self.keys.first()?, self.keys.last()?);
         if time <= first.time {
@@ -113,8 +115,9 @@ impl CameraPath {
         let curve = |of: &dyn Fn(&PathKey) -> [f32; 3]| {
             let value = |i: usize| Vec3::from(of(&self.keys[i]));
             let secant = |i: usize| (value(i + 1) - value(i)) / (self.keys[i + 1].time - self.keys[i].time) as f32;
-            // Change by second at a key: between those before and after it, and none where it turns or rests, so that the
-            // camera never swings out (harmonic mean, Fritsch and Butland 1984).
+            // Change by second at a key: between those before and after it, and none where it turns
+            // or rests, so that the camera never swings out (harmonic mean, Fritsch and Butland
+            // 1984).
             let slope = |i: usize| match (i.checked_sub(1).map(secant), (i + 1 < self.keys.len()).then(|| secant(i))) {
                 (Some(p), Some(n)) => {
                     let mean = |p: f32, n: f32| if p * n > 0.0 { 2.0 * p * n / (p + n) } else { 0.0 };

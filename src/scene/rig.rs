@@ -1,4 +1,5 @@
-//! Animations of nodes: translation, rotation and scale over time, as glTF has them. Skins and morph targets are not here.
+//! Animations of nodes: translation, rotation and scale over time, as glTF has them. Skins and
+//! morph targets are not here.
 
 use super::Scene;
 use glam::{Mat4, Quat, Vec3, Vec4};
@@ -49,7 +50,8 @@ pub struct Channel {
     pub interpolation: Interpolation,
     /// Seconds, rising, at least one.
     pub times: Vec<f32>,
-    /// One for each time, or for [`Interpolation::Cubic`] three: in-tangent, value, out-tangent. Three-vectors end with 0.
+    /// One for each time, or for [`Interpolation::Cubic`] three: in-tangent, value, out-tangent.
+    /// Three-vectors end with 0.
     pub values: Vec<[f32; 4]>,
 }
 
@@ -107,7 +109,8 @@ impl Channel {
 }
 
 impl Rig {
-    /// World transform of each instance in animation `animation` at `time`, seconds; `None` if there is no such animation.
+    /// World transform of each instance in animation `animation` at `time`, seconds; `None` if
+    /// there is no such animation.
     pub fn pose(&self, animation: usize, time: f32) -> Option<Vec<[[f32; 4]; 4]>> {
         let animation = self.animations.get(animation)?;
         let mut nodes = self.nodes.clone();

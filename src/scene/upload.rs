@@ -11,6 +11,7 @@ mod material;
 mod mesh;
 mod texture;
 
+pub(crate) use light::fits_one_map;
 pub use light::{CANDIDATES, LightGpu};
 pub use material::{MaterialGpu, TextureUse, material_layout};
 pub use mesh::{AttributeVertex, Draw, Rows, attribute_layouts, motion_layouts, position_layouts};
@@ -101,7 +102,8 @@ pub struct SceneGpu {
     pub lights_epoch: u64,
     /// What lights the scene from beyond it: `radiance` is the mean without that sun.
     pub environment: Environment,
-    /// The same as a lat-long `Rgba32Float` picture; one texel for a constant. rgb is without the sun, rgb · (1 + a) with it.
+    /// The same as a lat-long `Rgba32Float` picture; one texel for a constant. rgb is without the
+    /// sun, rgb · (1 + a) with it.
     pub environment_view: wgpu::TextureView,
     /// World-space bounds of all instances; `None` for a scene without triangles.
     pub bounds: Option<([f32; 3], [f32; 3])>,
@@ -160,8 +162,9 @@ impl SceneGpu {
         })
     }
 
-    /// Makes [`SceneGpu::rays`] for methods that need them ([`crate::gi::Method::needs_rays`]). `scene` is what this was made of.
-    /// Without them the rung below draws in those methods' place.
+    /// Makes [`SceneGpu::rays`] for methods that need them ([`crate::gi::Method::needs_rays`]).
+    /// `scene` is what this was made of. Without them the method below draws in those methods'
+    /// place.
     ///
     /// # Errors
     /// [`AccelError`] when the scene has more triangles than rays can have; [`SceneGpu::no_rays`] says the same.
@@ -176,7 +179,8 @@ impl SceneGpu {
         Ok(())
     }
 
-    /// Takes over rays that were made apart, or why there can be none. `scene` is as it is drawn now: instances may have moved since.
+    /// Takes over rays that were made apart, or why there can be none. `scene` is as it is drawn
+    /// now: instances may have moved since.
     pub fn set_rays(&mut self, queue: &wgpu::Queue, scene: &Scene, rays: Result<SceneRays, String>) {
         match rays {
             Ok(mut rays) => {
@@ -194,7 +198,7 @@ impl SceneGpu {
         let lights: Vec<Light> = scene.lights.iter().chain(&self.sky_sun).cloned().collect();
         let list = LightGpu::list(&lights);
         // A spot's maps depend on how wide it is.
-        let kind = |l: &Light| (std::mem::discriminant(&l.kind), crate::render::shadow::is_flat(&l.kind));
+        let kind = |l: &Light| (std::mem::discriminant(&l.kind), fits_one_map(&l.kind));
         let same = self.lights.iter().map(kind).eq(lights.iter().map(kind));
         self.lights_epoch += u64::from(self.lights != lights);
         self.lights = lights;
@@ -228,8 +232,9 @@ impl SceneGpu {
         Ok(())
     }
 
-    /// Takes over the placements of `scene`, whose instances, meshes and materials are those that were uploaded. The next
-    /// frame of each renderer has motion vectors for what is elsewhere than in its last one.
+    /// Takes over the placements of `scene`, whose instances, meshes and materials are those that
+    /// were uploaded. The next frame of each renderer has motion vectors for what is elsewhere than
+    /// in its last one.
     pub fn set_placements(&mut self, queue: &wgpu::Queue, scene: &Scene) {
         let (placed, draws) = mesh::placements(scene, &self.closed);
         self.draws = draws;

@@ -1,7 +1,7 @@
 //! Time and memory of one method: GPU milliseconds per pass from timestamps, synchronised wall clock beside them.
 
 use crate::{
-    gi::rung::Cost,
+    gi::technique::Cost,
     gpu::{
         Gpu,
         timing::{self, Recorder},

@@ -2,7 +2,7 @@
 
 use crate::gpu::Gpu;
 use crate::net::format::Weights;
-use crate::net::gpu::{Kernel, NetError, Network, Options, Tuned};
+use crate::net::gpu::{Kernel, NetError, Network, Options, Setup, Tuned};
 use crate::net::peak::Peak;
 use crate::net::tune;
 use serde::{Deserialize, Serialize};
@@ -57,7 +57,8 @@ pub fn measure(
     tuned: Arc<Tuned>,
     peak: Peak,
 ) -> Result<Layers, NetError> {
-    let network = Network::tuned(&gpu.device, &gpu.queue, weights, cells, options, tuned)?;
+    let setup = Setup { options, tuned, ..Setup::default() };
+    let network = Network::new(&gpu.device, &gpu.queue, weights, cells, setup)?;
     let times = tune::layers((&gpu.device, &gpu.queue), &network, TURNS);
     let layer = |((row, kernel), ms): ((crate::net::plan::Row, &Kernel), f64)| {
         let share = (row.flops as f64 / peak.flops).max(row.traffic as f64 / peak.bytes);

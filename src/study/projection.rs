@@ -1,7 +1,7 @@
 //! What counted work would take on a card that nobody here owns: a roofline with one efficiency. Never a measurement;
 //! whoever prints it says so.
 
-use crate::gi::rung::Cost;
+use crate::gi::technique::Cost;
 
 /// A card by its data sheet.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -173,7 +173,7 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    /// One picture of a still camera, from a renderer that knows nothing yet. Where the scene can have no rays, the rung below
+    /// One picture of a still camera, from a renderer that knows nothing yet. Where the scene can have no rays, the method below
     /// draws, and [`Shot::instead`] says so.
     ///
     /// # Errors
@@ -332,7 +332,7 @@ impl<'a> Trial<'a> {
     fn renderer(&mut self, method: &Method) -> Result<Renderer, TrialError> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         if method.needs_rays() && self.uploaded.rays.is_none() && self.uploaded.no_rays.is_none() {
-            // Where they cannot be had, the rung below draws, and each shot says so.
+            // Where they cannot be had, the method below draws, and each shot says so.
             let _ = self.uploaded.trace(device, queue, &self.scene);
         }
         let options = RendererOptions { method: method.clone(), taa: self.options.taa, ..Default::default() };

@@ -13,8 +13,9 @@ impl Source {
         Self::REAL_TIME[(at + by).rem_euclid(n) as usize]
     }
 
-    /// Mean error of indirect light on the five judged rooms, %, as docs/accuracy.md has it (`light`; of `neural` the shipped
-    /// weights): measured once, on other scenes, not here; `None` where nobody has.
+    /// Mean error of indirect light on the five judged rooms, %, as docs/accuracy.md has it
+    /// (`light`; of `neural` the shipped weights): measured once, on other scenes, not here; `None`
+    /// where nobody has.
     pub fn static_error(self) -> Option<f64> {
         [Some(100.0), Some(28.8), Some(23.0), Some(6.0), Some(4.8), None][self as usize]
     }

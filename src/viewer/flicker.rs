@@ -1,6 +1,6 @@
-//! The flicker meter: mean change of display values from one frame to the next of a view that stands still. Frames there differ
-//! by where in the pixel they sample and by their patterns, so this is what eyes would see shimmer. It waits for the GPU, so it
-//! is off unless asked for.
+//! The flicker meter: mean change of display values from one frame to the next of a view that
+//! stands still. Frames there differ by where in the pixel they sample and by their patterns, so
+//! this is what eyes would see shimmer. It waits for the GPU, so it is off unless asked for.
 
 use crate::gpu::readback::{self, ReadbackError};
 use crate::render::{targets::Target, tonemap_curve::Tonemap, tool};
@@ -31,8 +31,8 @@ impl FlickerPass {
         Self { pipeline, layout, uniform, kept: None }
     }
 
-    /// Mean |this frame − the one before|, display values in [0, 1]; `None` for the first frame of a size. `follows` says that
-    /// both show the same view.
+    /// Mean |this frame − the one before|, display values in [0, 1]; `None` for the first frame of
+    /// a size. `follows` says that both show the same view.
     ///
     /// # Errors
     /// Reading back failed.

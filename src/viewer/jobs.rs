@@ -176,7 +176,7 @@ fn fitted(spec: &str, scene: &Scene) -> Option<Result<Box<Fitted>, String>> {
     }
 }
 
-/// Builds the trees that rays need, while the rung below draws.
+/// Builds the trees that rays need, while the method below draws.
 pub fn rays(handles: &Handles, stamp: u64, scene: &Scene, progress: &Progress) -> Result<Product, String> {
     let told = |done: usize, all: usize| {
         progress.stage(&format!("rays: {done} of {all} meshes"));
@@ -295,7 +295,7 @@ pub fn capture(gpu: &crate::gpu::Gpu, shot: &Shot, progress: &Progress) -> Resul
         let mut scene = SceneGpu::new(&gpu.device, &gpu.queue, &shot.scene).map_err(|e| e.to_string())?;
         if method.needs_rays() {
             progress.stage("building trees for rays");
-            // Where they cannot be had, the rung below draws.
+            // Where they cannot be had, the method below draws.
             let _ = scene.trace(&gpu.device, &gpu.queue, &shot.scene);
         }
         progress.stage("capturing");

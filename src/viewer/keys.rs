@@ -82,7 +82,8 @@ pub fn action(key: Key, modifiers: Modifiers, state: &State) -> Option<Action> {
     BINDINGS.iter().find(|b| b.key == key && b.with == with).map(|b| (b.action)(state))
 }
 
-/// What the arrows do: move the selected object over the floor, else orbit. Points of the drag they stand for, or metres.
+/// What the arrows do: move the selected object over the floor, else orbit. Points of the drag they
+/// stand for, or metres.
 pub fn arrow(key: Key) -> Option<[f32; 2]> {
     match key {
         Key::ArrowLeft => Some([-1.0, 0.0]),

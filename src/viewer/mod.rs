@@ -8,8 +8,9 @@
 //!                                                       └────────── live (reference) ◄─┘
 //! ```
 //!
-//! `state` knows neither window nor wgpu; `ui` turns hands into its actions; `stage` holds the GPU's side; `app` brings them
-//! together and draws only when something has changed. `script` drives all of it for tests. `docs/viewer.md` is for users.
+//! `state` knows neither window nor wgpu; `ui` turns hands into its actions; `stage` holds the
+//! GPU's side; `app` brings them together and draws only when something has changed. `script`
+//! drives all of it for tests. `docs/viewer.md` is for users.
 
 mod app;
 mod choice;
@@ -26,7 +27,7 @@ mod report;
 mod saved;
 mod screen;
 mod script;
-mod show;
+pub(crate) mod show;
 mod stage;
 mod state;
 mod stats;
@@ -83,7 +84,8 @@ fn window_reason(error: &impl std::fmt::Display) -> String {
 pub enum ViewError {
     /// No window system answers.
     #[error(
-        "no window can be opened here: {0}. Set DISPLAY or WAYLAND_DISPLAY, or use `bouncelight render`, which needs no window"
+        "no window can be opened here: {0}. Set DISPLAY or WAYLAND_DISPLAY, or use `bouncelight render`, which \
+        needs no window"
     )]
     NoDisplay(String),
     /// No adapter that can present to the window.

@@ -12,9 +12,16 @@ pub fn report(app: &App) -> Value {
     let key = |side: Side| stage.and_then(|st| st.key(side as usize)).map(|k| k.0.name());
     let shown = app.state.shown.as_ref();
     let scene = shown.map(|shown| {
-        let lights: Vec<_> = shown.scene.lights.iter().enumerate().map(|(i, l)| crate::scene::edit::LightEdit::of(i, l).to_string()).collect();
+        let lights: Vec<_> = shown
+            .scene
+            .lights
+            .iter()
+            .enumerate()
+            .map(|(i, l)| crate::scene::edit::LightEdit::of(i, l).to_string())
+            .collect();
         json!({
-            "spec": shown.spec, "objects": shown.scene.instances.len(), "lights": lights, "environment": shown.environment,
+            "spec": shown.spec, "objects": shown.scene.instances.len(), "lights": lights,
+            "environment": shown.environment,
             "sky": shown.scene.environment.radiance, "moved": shown.moved.len(),
             "variant": shown.variant, "variants": shown.scene.variants, "pose": shown.pose,
             "animations": shown.scene.rig.as_ref().map_or(0, |r| r.animations.len()),
@@ -26,7 +33,8 @@ pub fn report(app: &App) -> Value {
     let mut report = json!({
         "loaded": shown.is_some() && stage.is_some_and(|st| st.has_scene() && st.still() > 0),
         "idle": app.is_idle(),
-        "frames": app.frames, "layouts": app.overlay.layouts, "built": app.built, "places": app.overlay.memory.places, "density_drawn": app.overlay.density, "scene_frames": app.scene_frames,
+        "frames": app.frames, "layouts": app.overlay.layouts, "built": app.built, "places": app.overlay.memory.places,
+        "density_drawn": app.overlay.density, "scene_frames": app.scene_frames,
         "view": s.view.name(), "left": s.left.name(), "right": s.right.name(), "split": s.split, "line": s.line,
         "instead": stage.and_then(|st| st.instead()).map(|(method, why)| format!("{method}: {why}")),
         "drawn": { "left": key(Side::Left), "right": key(Side::Right) },
@@ -42,7 +50,8 @@ pub fn report(app: &App) -> Value {
         },
         "path": {
             "keys": app.state.path.as_ref().map_or(0, |p| p.keys.len()),
-            "recording": matches!(app.state.film, Film::Records(_)), "playing": matches!(app.state.film, Film::Plays { .. }),
+            "recording": matches!(app.state.film, Film::Records(_)),
+            "playing": matches!(app.state.film, Film::Plays { .. }),
         },
         "selected": app.state.selected, "scene": scene, "weights": s.weights, "recent": s.recent,
         "size": app.state.size, "window": app.screen.as_ref().map(|sc| sc.size()),
@@ -59,11 +68,14 @@ pub fn report(app: &App) -> Value {
             "samples": found.map_or(0, |f| f.samples), "finished": found.is_some_and(|f| f.finished),
             "noise": found.map(|f| f.noise),
         },
-        "verdict": v.map(|v| json!({ "psnr": v.psnr, "ssim": v.ssim, "mae": v.mae, "relmse": v.rel_mse, "bias": v.bias })),
+        "verdict": v.map(|v| json!({ "psnr": v.psnr, "ssim": v.ssim, "mae": v.mae, "relmse": v.rel_mse,
+            "bias": v.bias })),
         "flicker": app.meter.flicker, "passes": passes, "memory": memory,
-        "gpu_ms": app.meter.times.gpu.spread().map(|t| t.median), "cpu_ms": app.meter.times.cpu.spread().map(|t| t.median),
+        "gpu_ms": app.meter.times.gpu.spread().map(|t| t.median),
+        "cpu_ms": app.meter.times.cpu.spread().map(|t| t.median),
         "overlay_ms": app.meter.times.overlay.spread().map(|t| t.mean),
-        "overlay": app.meter.times.overlay.spread().map(|t| json!({ "median": t.median, "p95": t.p95, "count": t.count })),
+        "overlay": app.meter.times.overlay.spread().map(|t| json!({ "median": t.median, "p95": t.p95,
+            "count": t.count })),
     });
     if let (Some(all), Value::Object(world), Value::Object(measured)) = (report.as_object_mut(), world, measured) {
         all.extend(world);

@@ -133,8 +133,8 @@ impl Settings {
     }
 }
 
-/// Where settings lie: `$BOUNCELIGHT_VIEW`, else `bouncelight/view.json` in the user's configuration folder; none where there
-/// is no such folder or the variable is empty.
+/// Where settings lie: `$BOUNCELIGHT_VIEW`, else `bouncelight/view.json` in the user's
+/// configuration folder; none where there is no such folder or the variable is empty.
 pub fn path() -> Option<PathBuf> {
     let of = |name| std::env::var_os(name).map(PathBuf::from);
     if let Some(named) = of("BOUNCELIGHT_VIEW") {

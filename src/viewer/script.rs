@@ -1,15 +1,20 @@
-//! Scripted sessions: a list of steps that drives the window with mouse and keys, asks how things stand, and takes pictures.
+//! Scripted sessions: a list of steps that drives the window with mouse and keys, asks how things
+//! stand, and takes pictures.
 //!
 //! ```json
 //! [ { "wait": "idle" }, { "key": "2" }, { "expect": { "/view": "albedo" } },
 //!   { "drag": [[200, 150], [260, 150]] }, { "screenshot": "albedo.png" }, { "resize": [500, 300] } ]
 //! ```
 //!
-//! Places are in points from the window's top left; a `click` can also name something of the panel that is to be seen (`/places`). Steps: `wait` (`loaded`, `idle`, `samples:N`, or a number of frames), `key`
-//! (`"F12"`, `"Shift+F12"`), `hold` and `release` of a key, `text`, `move`, `press`, `lift`, `click`, `drag` with optional
-//! `button` and `keys`, `wheel`, `drop` of a file, `copy` of one over another, `resize` (to nothing, too), `zoom` of the text, `scale` (pixels a point), `minimise`, `lose` (`surface`, `device`), `variant` of materials by number,
-//! `expect` (JSON pointer into the state: a value, or `{"min","max","contains","not"}`), `until` (the same, waited for), `save` of such values, `expect_saved` and `expect_not_saved`,
-//! `print` of values on standard output, `screenshot`, `quit`.
+//! Places are in points from the window's top left; a `click` can also name something of the panel
+//! that is to be seen (`/places`). Steps: `wait` (`loaded`, `idle`, `samples:N`, or a number of
+//! frames), `key` (`"F12"`, `"Shift+F12"`), `hold` and `release` of a key, `text`, `move`, `press`,
+//! `lift`, `click`, `drag` with optional `button` and `keys`, `wheel`, `drop` of a file, `copy` of
+//! one over another, `resize` (to nothing, too), `zoom` of the text, `scale` (pixels a point),
+//! `minimise`, `lose` (`surface`, `device`), `variant` of materials by number, `expect` (JSON
+//! pointer into the state: a value, or `{"min","max","contains","not"}`), `until` (the same, waited
+//! for), `save` of such values, `expect_saved` and `expect_not_saved`, `print` of values on
+//! standard output, `screenshot`, `quit`.
 
 use egui::{Event, Key, Modifiers, PointerButton, Pos2};
 use serde::Deserialize;
@@ -370,7 +375,8 @@ mod tests {
     #[test]
     fn expectations_that_fail_end_the_script() {
         let state = json!({ "view": "albedo", "ev": 0.5, "messages": ["no such file: x.glb"] });
-        let good = json!([{ "expect": { "/view": "albedo", "/ev": { "min": 0.4, "max": 0.6 }, "/messages": { "contains": "x.glb" } } }]);
+        let good = json!([{ "expect": { "/view": "albedo", "/ev": { "min": 0.4, "max": 0.6 },
+            "/messages": { "contains": "x.glb" } } }]);
         assert_eq!(run(good, &state, 1)[0].orders, [Order::Quit]);
         for bad in [
             json!({ "/view": "normal" }),

@@ -77,8 +77,8 @@ fn instances_are_met_where_they_stand_and_where_they_go() {
     assert!(different(&gpu, &caster, &rays, &moved) < 1e-3);
 }
 
-/// The walk that is counted on the CPU meets what the one list holds, instances and numbers of triangles included; any hit reads no
-/// more than the nearest one does.
+/// The walk that is counted on the CPU meets what the one list holds, instances and numbers of
+/// triangles included; any hit reads no more than the nearest one does.
 #[test]
 fn the_walk_through_instances_on_the_cpu_is_the_same() {
     let (scene, world) = placed();

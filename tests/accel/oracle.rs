@@ -119,8 +119,9 @@ pub fn ray(origin: Point, direction: Point) -> RayGpu {
     RayGpu { origin, t_max: f32::INFINITY, direction, any: 0 }
 }
 
-/// Rays that disagree with brute force: another triangle (unless two are equally near) or another distance. Distances
-/// agree to 1e-5; where a ray grazes its triangle, rounding of the corners moves the hit along it, by one over the cosine.
+/// Rays that disagree with brute force: another triangle (unless two are equally near) or another
+/// distance. Distances agree to 1e-5; where a ray grazes its triangle, rounding of the corners
+/// moves the hit along it, by one over the cosine.
 pub fn disagreements(triangles: &[Triangle], rays: &[RayGpu], hits: &[HitGpu], unit: f64) -> usize {
     let wrong = |ray: &RayGpu, got: &HitGpu| {
         let best = brute(triangles, ray);

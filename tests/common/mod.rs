@@ -1,36 +1,116 @@
-//! Shared by the tests: an adapter or a visible skip, and the folder of reference renders.
+//! Shared by the tests: what a machine may lack, and the one way to skip a test for it.
 
 #![allow(dead_code, reason = "each test binary uses a part")]
 
 use bouncelight::gpu::{Gpu, GpuOptions};
+use std::fmt::Display;
+use std::io::Write;
 use std::path::PathBuf;
 
-/// A device whose validation errors fail the test, or `None` after a visible `SKIP`.
+/// What a test may need and a machine may lack.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Need {
+    /// A wgpu adapter of any kind.
+    Adapter,
+    /// An X server without a screen (Xvfb).
+    Screen,
+    /// OpenGL beside Vulkan.
+    OpenGl,
+    /// python3 with numpy and jsonschema.
+    Python,
+    /// python3 with PyTorch and what else training imports.
+    Torch,
+    /// The folder of reference renders and other people's scenes.
+    Shared,
+    /// The paper's generator at full width.
+    Generator,
+}
+
+impl Need {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Adapter => "adapter",
+            Self::Screen => "screen",
+            Self::OpenGl => "OpenGL",
+            Self::Python => "Python",
+            Self::Torch => "PyTorch",
+            Self::Shared => "shared folder",
+            Self::Generator => "generator",
+        }
+    }
+
+    /// The variable that makes lacking it a failure, if it is set.
+    fn required_by(self) -> Option<&'static str> {
+        let set = |name| std::env::var(name).is_ok_and(|v| v == "1").then_some(name);
+        match self {
+            Self::Adapter => set("REQUIRE_GPU").or(set("REQUIRE_ALL")),
+            Self::Screen if cfg!(target_os = "linux") => set("REQUIRE_GPU").or(set("REQUIRE_ALL")),
+            Self::OpenGl | Self::Python => set("REQUIRE_ALL"),
+            // Continuous integration has none of these: PyTorch and the generator's weights are
+            // gigabytes and 218 MB, the shared folder is not part of the repository.
+            Self::Screen | Self::Torch | Self::Shared | Self::Generator => None,
+        }
+    }
+}
+
+/// Says that the running test is left out, past libtest's capture, and adds a line to the file that
+/// `SKIP_LOG` names, which `cargo xtask test` counts.
 ///
 /// # Panics
-/// When `REQUIRE_GPU=1` and there is no adapter.
+/// When `REQUIRE_GPU=1` or `REQUIRE_ALL=1` asks for what is lacking.
+pub fn skip(need: Need, reason: impl Display) {
+    if let Some(variable) = need.required_by() {
+        panic!("{variable}=1, but no {}: {reason}", need.name());
+    }
+    let binary = std::env::current_exe().ok().and_then(|p| Some(p.file_stem()?.to_string_lossy().into_owned()));
+    let (binary, thread) = (binary.unwrap_or_default(), std::thread::current());
+    let test = format!("{}::{}", binary.rsplit_once('-').map_or("?", |b| b.0), thread.name().unwrap_or("?"));
+    // In one piece, beside other tests' lines; losing one is no reason to fail.
+    let _ = std::io::stderr().write_all(format!("SKIP: {test}: no {}: {reason}\n", need.name()).as_bytes());
+    if let Some(path) = std::env::var_os("SKIP_LOG") {
+        let file = std::fs::OpenOptions::new().append(true).create(true).open(path);
+        let _ = file.and_then(|mut f| f.write_all(format!("{}\t{test}\n", need.name()).as_bytes()));
+    }
+}
+
+/// A device whose validation errors fail the test, or `None` after a [`skip`].
 pub fn gpu() -> Option<Gpu> {
     match Gpu::open(&GpuOptions::default()) {
         Ok(gpu) => {
             gpu.device.on_uncaptured_error(std::sync::Arc::new(|e| panic!("wgpu: {e}")));
             Some(gpu)
         }
-        Err(e) if std::env::var("REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("REQUIRE_GPU=1, but: {e}"),
         Err(e) => {
-            println!("SKIP: {e}");
+            skip(Need::Adapter, e);
             None
         }
     }
 }
 
-/// The folder of reference renders and third-party scenes (`BOUNCELIGHT_SHARED`, else `../shared`), or `None` after a visible `SKIP`.
-pub fn shared() -> Option<PathBuf> {
-    let path = std::env::var_os("BOUNCELIGHT_SHARED")
-        .map(PathBuf::from)
-        .unwrap_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"));
-    if path.join("reference").is_dir() {
-        return Some(path);
+/// A path below the folder of reference renders and other people's scenes (`BOUNCELIGHT_SHARED`,
+/// else `../shared`), or `None` after a [`skip`].
+pub fn shared_path(relative: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("BOUNCELIGHT_SHARED")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+    let path = root.join(relative);
+    if !path.exists() {
+        skip(Need::Shared, format_args!("{} is not here", path.display()));
+        return None;
     }
-    println!("SKIP: no reference folder at {}", path.display());
-    None
+    Some(path)
+}
+
+/// That folder, if it holds reference renders; else `None` after a [`skip`].
+pub fn shared() -> Option<PathBuf> {
+    Some(shared_path("reference")?.parent().expect("a folder was added").to_owned())
+}
+
+/// Whether python3 imports `packages`; a [`skip`] otherwise.
+pub fn python(need: Need, packages: &str) -> bool {
+    match std::process::Command::new("python3").args(["-c", &format!("import {packages}")]).output() {
+        Ok(out) if out.status.success() => return true,
+        Ok(out) => skip(need, String::from_utf8_lossy(&out.stderr).lines().last().unwrap_or("python3 fails")),
+        Err(e) => skip(need, format_args!("python3: {e}")),
+    }
+    false
 }

@@ -8,8 +8,8 @@ use bouncelight::reference::scene::ReferenceScene;
 use bouncelight::scene::Scene;
 use bouncelight::wgpu;
 
-/// Sums of a point: diffuse direct, indirect, glossy direct, indirect, emitted, diffuse colour, glossy colour, analytic;
-/// the fourth components as `reference::film` tells.
+/// Sums of a point: diffuse direct, indirect, glossy direct, indirect, emitted, diffuse colour,
+/// glossy colour, analytic; the fourth components as `reference::film` tells.
 pub type Point = [[f64; 4]; 8];
 
 /// A scene and the pipeline of `reference.path`.

@@ -4,10 +4,10 @@ use crate::common;
 use crate::edges::{FLOOR, LIGHT, PLATE, POLE, SIZE, WALL, bleeding, room};
 use crate::shot::{Hit, Shot, output, view};
 use bouncelight::gi::cells::{self, CellsPass, NO_PIXEL};
+use bouncelight::gi::cpu::oct_decode;
 use bouncelight::gi::gather::bring::{BringPass, Brought};
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gi::inputs::{CELL, cells_of};
-use bouncelight::gi::twin::oct_decode;
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu::readback;
 use bouncelight::gpu::timing::Recorder;
@@ -91,7 +91,7 @@ fn constants_come_back_at_every_size() {
         let light = bring(&gpu, &shot, |_| even(0.75));
         for (texel, depth) in light.iter().zip(&shot.buffers.depth) {
             let expected = if *depth > 0.0 { 0.75 } else { 0.0 };
-            assert!(texel.iter().all(|x| (x - expected).abs() < 1e-3), "{size:?}: {texel:?}");
+            assert!(texel.iter().all(|x| (x - expected).abs() < 6e-4), "{size:?}: {texel:?}");
         }
     }
 }
@@ -112,7 +112,7 @@ fn light_stays_on_its_surface() {
         let (wrong, worst) = bleeding(&light, &surfaces, 1.0, surface);
         let (naive_wrong, _) = bleeding(&naive, &surfaces, 1.0, surface);
         println!("{name}: {wrong:.4} wrong, worst {worst:.3}; nearest {naive_wrong:.4}");
-        assert!(wrong < 0.002, "{name}: {wrong} of the pixels are wrong");
+        assert!(wrong < 1e-4, "{name}: {wrong} of the pixels are wrong");
         // The pole may happen to lie on the middles of a column of cells.
         assert!(naive_wrong > 0.006 || surface == POLE, "{name}: the nearest cell must fail this test");
     }
@@ -150,7 +150,7 @@ fn a_cell_that_shows_a_surface_has_a_pixel_on_the_one_in_front() {
             assert_eq!(pixel, middle, "one surface: the middle stands for it");
         }
     }
-    assert!(fronts > 8, "{fronts}");
+    assert!(fronts > 15, "{fronts}");
 }
 
 /// A sphere of radius 1 before the eye.
@@ -182,7 +182,7 @@ fn directional_light_is_exact_for_every_normal() {
     // Negative control: light for the cell's own normal alone.
     let flat = |pixel: usize| channels.map(|l| [0.0, 0.0, 0.0, towards(&l, normal(pixel))]);
     let found = worst(&bring(&gpu, &shot, flat));
-    assert!(found > 0.02, "without directions it must be off, but only by {found}");
+    assert!(found > 0.1, "without directions it must be off, but only by {found}");
 }
 
 #[test]
@@ -199,9 +199,9 @@ fn what_lobes_show_stays_on_surfaces_with_lobes() {
         all.iter().filter(|w| **w).count() as f32 / all.len() as f32
     };
     let found = off(&shows);
-    assert!(found < 0.02, "{found} of the floor's and the plate's pixels show another surface's lobe");
+    assert!(found < 1e-3, "{found} of the floor's and the plate's pixels show another surface's lobe");
     // Negative control: one lobe for all.
-    assert!(off(&|_| shows(PLATE)) > 0.05);
+    assert!(off(&|_| shows(PLATE)) > 0.5);
     // Far from any lobe the light of the surface's own side stands in.
     let (_, gloss) = bring_both(&gpu, &shot, |_| even(0.25), |_| [0.0; 4]);
     assert!((0..gloss.len()).filter(|i| surfaces[*i] == WALL).all(|i| (gloss[i][0] - 0.25).abs() < 1e-3));

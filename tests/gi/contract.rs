@@ -117,7 +117,7 @@ fn each_mistake_is_named() {
     let turned = |t: &mut Targets| {
         let normals = shot(1, [0.0; 2]).buffers.normal;
         let texels = normals.iter().flat_map(|n| {
-            let [x, y, z] = bouncelight::gi::twin::oct_decode(*n);
+            let [x, y, z] = bouncelight::gi::cpu::oct_decode(*n);
             [x, -y, z, 0.0].map(f16::from_f32)
         });
         t.normal = texture(F::Rgba16Float, bytemuck::cast_slice(&texels.collect::<Vec<_>>()));

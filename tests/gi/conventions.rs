@@ -190,7 +190,7 @@ fn what_contradicts_itself_is_said() {
     assert!(said.contains("`normal`") && said.contains("Rg16Float") && said.contains("Rgba16Float"), "{said}");
     let said = error(own, &|i| i.motion = Some(i.depth)).to_string();
     assert!(said.contains("`motion`") && said.contains("R32Float"), "{said}");
-    // Without a world the rung below asks for what it reads.
+    // Without a world the method below asks for what it reads.
     let mut alone = View::new(&gpu.device, &gpu.queue, SIZE, &Method::Gather(Default::default())).expect("made");
     let said = draw(&gpu, &mut alone, None, &targets.inputs(own)).expect_err("there is no albedo");
     assert!(matches!(said, GiError::Missing("albedo")), "{said}");

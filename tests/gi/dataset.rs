@@ -1,4 +1,5 @@
-//! Training samples of a real frame: guides put the picture together again, and the next frame's flow finds the same surfaces.
+//! Training samples of a real frame: guides put the picture together again, and the next frame's
+//! flow finds the same surfaces.
 
 use crate::common;
 use bouncelight::{
@@ -57,7 +58,8 @@ fn guides_put_the_picture_together() {
     assert!(guides.depth.iter().all(|z| z.is_finite() && *z >= 0.0) && guides.depth.iter().any(|z| *z > 0.5));
 }
 
-/// Mean |difference| of a colour-blind plane of features between a cell and its place in the next frame, over its mean, by `find`.
+/// Mean |difference| of a colour-blind plane of features between a cell and its place in the next
+/// frame, over its mean, by `find`.
 fn change(first: &Sample, second: &Sample, plane: usize, flow: &[f32]) -> f32 {
     let [w, h] = first.inputs.cells.map(|n| n as usize);
     let at = |s: &Sample, x: usize, y: usize| s.inputs.features[plane * w * h + y * w + x];

@@ -145,17 +145,17 @@ pub fn written(gpu: &Gpu, shot: &Shot, how: &Written, before: &CameraMatrices) -
     let depth: Vec<f32> = shot.buffers.depth.iter().map(depth).collect();
     let turn = glam::Mat3::from_mat4(Mat4::from_cols_array_2d(&shot.camera.view_from_world));
     let normal = |oct: &[f32; 2]| {
-        let mut v = Vec3::from(gi::twin::oct_decode(*oct));
+        let mut v = Vec3::from(gi::cpu::oct_decode(*oct));
         if c.normal_space == NormalSpace::View {
             v = turn * v;
         }
         let v = match c.normal_encoding {
-            NormalEncoding::Octahedral => gi::twin::oct_encode(v.to_array()),
+            NormalEncoding::Octahedral => gi::cpu::oct_encode(v.to_array()),
             _ => [v.x, v.y],
         };
         let z = match c.normal_encoding {
             NormalEncoding::Xyz => {
-                let world = Vec3::from(gi::twin::oct_decode(*oct));
+                let world = Vec3::from(gi::cpu::oct_decode(*oct));
                 if c.normal_space == NormalSpace::View { (turn * world).z } else { world.z }
             }
             _ => 0.0,

@@ -84,8 +84,9 @@ fn a_lit_panel_sends_what_its_form_factor_says() {
     assert_eq!(mean(&lit(&gpu, &mut renderer, &build(0.0), 2).0.data), 0.0);
 }
 
-/// Of even light 1 on a wall at z = -4 that is 2 m high, the share that a white metal's lobe on the floor shows at p to an eye: GGX with
-/// height-correlated Smith, by the midpoints of 300 × 600 directions. Light that is scattered more than once cancels out.
+/// Of even light 1 on a wall at z = -4 that is 2 m high, the share that a white metal's lobe on the
+/// floor shows at p to an eye: GGX with height-correlated Smith, by the midpoints of 300 × 600
+/// directions. Light that is scattered more than once cancels out.
 fn share_of_wall(p: [f32; 3], eye: [f32; 3], roughness: f32) -> f64 {
     let to = glam::DVec3::from_array([0, 1, 2].map(|i| f64::from(eye[i] - p[i])));
     let (v, a2) = (to.normalize(), f64::from(roughness).powi(4));

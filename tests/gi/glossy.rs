@@ -89,8 +89,9 @@ fn even_light_gives_exactly_the_split_sum() {
     }
 }
 
-/// What a GGX metal of reflectance `f0` shows of even light at the cosine `c`, the light that single scattering loses given back
-/// (Kulla and Conty 2017) or not: numerical integrals over visible normals (Dupuy and Benyoub 2023), height-correlated Smith.
+/// What a GGX metal of reflectance `f0` shows of even light at the cosine `c`, the light that
+/// single scattering loses given back (Kulla and Conty 2017) or not: numerical integrals over
+/// visible normals (Dupuy and Benyoub 2023), height-correlated Smith.
 fn metal(f0: f64, roughness: f64, c: f64, again: bool) -> f64 {
     let single = |c: f64| {
         let (alpha, steps) = (roughness * roughness, 48);

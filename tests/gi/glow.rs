@@ -1,4 +1,5 @@
-//! What glows lights each place exactly once in `gather`: seen through holes, mirrored, and with lights that stand in for it.
+//! What glows lights each place exactly once in `gather`: seen through holes, mirrored, and with
+//! lights that stand in for it.
 
 use crate::build::{look_at, material, quad};
 use crate::common;

@@ -5,8 +5,8 @@ use crate::{common, read_light};
 use bouncelight::gi::bitmask::March;
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gi::occlusion::OcclusionPass;
-use bouncelight::gi::rung::Rung;
 use bouncelight::gi::ssgi::{SsgiGi, SsgiOptions};
+use bouncelight::gi::technique::Technique;
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
 use glam::Vec3;
 

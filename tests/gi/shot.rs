@@ -1,7 +1,7 @@
 //! Hand-made pictures for the tests of `gi/`: G-buffers as CPU arrays, traced or random, and their upload.
 
+use bouncelight::gi::cpu::{GBuffer, Picture, oct_encode};
 use bouncelight::gi::inputs::{Params, cells_of};
-use bouncelight::gi::twin::{GBuffer, Picture, oct_encode};
 use bouncelight::gi::{CameraMatrices, Inputs};
 use glam::{Mat4, Vec3};
 use half::f16;
@@ -19,7 +19,7 @@ impl Random {
     }
 }
 
-/// One picture, already rounded to the textures' precision, so that the CPU twin sees what the GPU sees.
+/// One picture, already rounded to the textures' precision, so that the CPU reference sees what the GPU sees.
 #[derive(Clone)]
 pub struct Shot {
     pub size: [u32; 2],

@@ -1,4 +1,5 @@
-//! A picture of the surroundings with a sun in it: rasteriser and rays have it as a light, and all of its light counts once.
+//! A picture of the surroundings with a sun in it: rasteriser and rays have it as a light, and all
+//! of its light counts once.
 
 use crate::build::{look_at, material, quad};
 use crate::common;

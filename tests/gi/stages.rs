@@ -11,7 +11,7 @@ use bouncelight::gi::features::{FEATURES, FeatureSet};
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gi::pack::{NetworkInputs, read_features};
 use bouncelight::gi::reconstruct::{Answer, ReconstructPass};
-use bouncelight::gi::rung::Rung;
+use bouncelight::gi::technique::Technique;
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu::timing::Recorder;
 use glam::Vec3;
@@ -64,12 +64,12 @@ fn close(a: f32, b: f32, tolerance: f32) -> bool {
 }
 
 /// Rounding to half floats, which drivers may do towards zero, costs 2^-10 of the value; what differs beyond that.
-pub fn largest_excess(gpu: &[[f32; 3]], twin: &[[f32; 3]]) -> f32 {
-    assert_eq!(gpu.len(), twin.len());
+pub fn largest_excess(gpu: &[[f32; 3]], by_cpu: &[[f32; 3]]) -> f32 {
+    assert_eq!(gpu.len(), by_cpu.len());
     let excess = |a: f32, b: f32| {
         if a.is_finite() { ((a - b).abs() - b.abs() / 1024.0) / b.abs().max(1.0) } else { f32::INFINITY }
     };
-    gpu.iter().flatten().zip(twin.iter().flatten()).map(|(a, b)| excess(*a, *b)).fold(0.0, f32::max)
+    gpu.iter().flatten().zip(by_cpu.iter().flatten()).map(|(a, b)| excess(*a, *b)).fold(0.0, f32::max)
 }
 
 const SIZES: [[u32; 2]; 5] = [[1, 1], [17, 13], [4, 4], [3, 70], [131, 66]];
@@ -109,9 +109,9 @@ fn exposure_is_exact_over_many_cells() {
     shot.buffers.direct.fill([crate::shot::half(0.001); 3]);
     shot.buffers.direct[2 + 2 * 2048] = [60000.0; 3];
     let (found, _) = ambient(&gpu, &shot);
-    let twin = shot.picture().exposure();
-    assert!((found.s / twin.s - 1.0).abs() < 1e-6, "{} {}", found.s, twin.s);
-    assert!((found.ln_m - twin.ln_m).abs() < 1e-6);
+    let by_cpu = shot.picture().exposure();
+    assert!((found.s / by_cpu.s - 1.0).abs() < 1e-6, "{} {}", found.s, by_cpu.s);
+    assert!((found.ln_m - by_cpu.ln_m).abs() < 1e-6);
     assert_eq!(ambient(&gpu, &shot).0, found, "the same picture gives the same bits");
 }
 
@@ -121,8 +121,8 @@ fn ambient_is_its_twin_and_linear() {
     for (seed, size) in SIZES.into_iter().enumerate() {
         let shot = Shot::random(size, seed as u64);
         let (exposure, light) = ambient(&gpu, &shot);
-        let twin = shot.picture().ambient(&exposure, &visibility(&gpu, &shot, March::NEAR, 0));
-        assert!(largest_excess(&light, &twin) < 1e-4, "{size:?}");
+        let by_cpu = shot.picture().ambient(&exposure, &visibility(&gpu, &shot, March::NEAR, 0));
+        assert!(largest_excess(&light, &by_cpu) < 1e-4, "{size:?}");
         let background = shot.buffers.depth.iter().zip(&light).filter(|(d, _)| **d == 0.0);
         assert!(background.into_iter().all(|(_, l)| *l == [0.0; 3]));
         let (_, double) = ambient(&gpu, &shot.scaled(2.0));
@@ -153,8 +153,8 @@ fn pack_is_its_twin() {
             let [w, h] = shot.cells();
             let n = (w * h) as usize;
             assert_eq!(found.features.len(), n * set.channels() as usize);
-            let twin = shot.picture().exposure();
-            assert!(close(found.exposure.s, twin.s, 1e-5) && close(found.exposure.ln_m, twin.ln_m, 1e-5));
+            let by_cpu = shot.picture().exposure();
+            assert!(close(found.exposure.s, by_cpu.s, 1e-5) && close(found.exposure.ln_m, by_cpu.ln_m, 1e-5));
             let differs = |shift: f32| {
                 let value = |i: usize| rows[(i % n) * set.padded() as usize + i / n];
                 let error = |i: usize| (found.features[i] - value(i) - shift).abs();
@@ -206,8 +206,8 @@ fn features_mean_what_the_table_says() {
     }
 }
 
-/// The twin's light of three numbers a cell, or six.
-fn twin<const N: usize>(shot: &Shot, answers: &[[f32; N]]) -> Vec<[f32; 3]> {
+/// The CPU reference's light of three numbers a cell, or six.
+fn by_cpu<const N: usize>(shot: &Shot, answers: &[[f32; N]]) -> Vec<[f32; 3]> {
     let six: Vec<[f32; 6]> =
         answers.iter().map(|y| std::array::from_fn(|c| y.get(c).copied().unwrap_or(0.0))).collect();
     let picture = shot.picture();
@@ -219,14 +219,14 @@ fn same_as_twin<const N: usize>(gpu: &Gpu, shot: &Shot, mut answers: Vec<[f32; N
         answers[1] = std::array::from_fn(|c| [f32::NAN, 90.0, -90.0][c % 3]);
     }
     let light = reconstruct(gpu, shot, &answers);
-    let excess = largest_excess(&light, &twin(shot, &answers));
+    let excess = largest_excess(&light, &by_cpu(shot, &answers));
     println!("{:?}: {excess}", shot.size);
     assert!(excess < 1e-4, "{:?}: {excess}", shot.size);
     // A single cell may be background, and then its numbers count for nothing.
     for c in (0..N).filter(|_| answers.len() > 1) {
         let mut other = answers.clone();
         other.iter_mut().for_each(|y| y[c] += 0.2);
-        assert!(largest_excess(&light, &twin(shot, &other)) > 1e-3, "sees a fifth in number {c}");
+        assert!(largest_excess(&light, &by_cpu(shot, &other)) > 1e-3, "sees a fifth in number {c}");
     }
 }
 

@@ -1,5 +1,5 @@
-//! Temporal anti-aliasing: off is off, a still picture converges to the filtered one, a slow pan beats single frames, and
-//! what was never there, or is elsewhere now, leaves no ghost.
+//! Temporal anti-aliasing: off is off, a still picture converges to the filtered one, a slow pan
+//! beats single frames, and what was never there, or is elsewhere now, leaves no ghost.
 
 use crate::{build, common, read_light};
 use bouncelight::gi::Method;

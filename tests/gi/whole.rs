@@ -26,8 +26,8 @@ fn light(gpu: &Gpu, shot: &Shot, mut gi: NeuralGi) -> Vec<[f32; 3]> {
     read_light(gpu, &target)
 }
 
-/// The whole method by the CPU twins: pack, network, reconstruct.
-fn twin(shot: &Shot) -> Vec<[f32; 3]> {
+/// The whole method by the CPU references: pack, network, reconstruct.
+fn by_cpu(shot: &Shot) -> Vec<[f32; 3]> {
     let weights = weights::weights();
     let picture = shot.picture();
     let exposure = picture.exposure();
@@ -40,15 +40,15 @@ fn twin(shot: &Shot) -> Vec<[f32; 3]> {
 }
 
 #[test]
-fn the_whole_is_its_twin() {
+fn the_whole_is_the_cpu_references() {
     let Some(gpu) = common::gpu() else { return };
     for (seed, size) in [[1, 1], [17, 13], [64, 40]].into_iter().enumerate() {
         let shot = Shot::random(size, 300 + seed as u64);
         let light = neural(&gpu, &shot);
-        let excess = largest_excess(&light, &twin(&shot));
+        let excess = largest_excess(&light, &by_cpu(&shot));
         assert!(excess < 5e-4, "{size:?}: {excess}");
         let other = Shot::random(size, 400 + seed as u64);
-        assert!(size == [1, 1] || largest_excess(&light, &twin(&other)) > 1e-2, "another picture is told apart");
+        assert!(size == [1, 1] || largest_excess(&light, &by_cpu(&other)) > 1e-2, "another picture is told apart");
     }
 }
 
@@ -121,7 +121,7 @@ fn broken_texels_stay_where_they_are() {
     assert!(broken > 100);
     let light = neural(&gpu, &shot);
     assert!(light.iter().flatten().all(|x| x.is_finite() && *x >= 0.0));
-    assert!(largest_excess(&light, &twin(&shot)) < 5e-4);
+    assert!(largest_excess(&light, &by_cpu(&shot)) < 5e-4);
     let exposure = shot.picture().exposure();
     let (found, _) = crate::stages::ambient(&gpu, &shot);
     assert!(found.nonfinite > 5 && found.nonfinite == exposure.nonfinite, "{found:?} {exposure:?}");
@@ -180,7 +180,7 @@ fn two_views_in_one_submission_keep_their_own_cameras() {
         let bytes = bouncelight::gpu::readback::texture(&device, &queue, &targets[i]).expect("readable");
         let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
         let light: Vec<_> = halves.chunks_exact(4).map(|c| [c[0], c[1], c[2]].map(half::f16::to_f32)).collect();
-        assert!(largest_excess(&light, &twin(&shots[i])) < 5e-4, "view {i}");
+        assert!(largest_excess(&light, &by_cpu(&shots[i])) < 5e-4, "view {i}");
     }
 }
 

@@ -107,9 +107,9 @@ fn what_the_picture_shows_besides_does_not_matter() {
     };
     let (gather, ambient) = (apart(gather()), apart(Method::Ambient));
     println!("wide against narrow: gather {:.2} %, ambient {:.2} %", 100.0 * gather, 100.0 * ambient);
-    assert!(gather < 0.05, "{gather}");
+    assert!(gather < 0.03, "{gather}");
     // Negative control: the mean of the picture changes with the picture.
-    assert!(ambient > 0.1, "{ambient}");
+    assert!(ambient > 0.3, "{ambient}");
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn a_red_wall_behind_the_camera_tints_the_floor() {
     let mut renderer = renderer(&gpu, [48, 32], gather());
     let (red, grey) = (redness([0.9, 0.1, 0.1], &mut renderer), redness(GREY, &mut renderer));
     println!("red over green {red:.3} by a red wall, {grey:.3} by a grey one");
-    assert!(red > 1.15 && (grey - 1.0).abs() < 0.01, "{red}, {grey}");
+    assert!(red > 1.8 && (grey - 1.0).abs() < 1e-4, "{red}, {grey}");
 }
 
 #[test]
@@ -163,14 +163,16 @@ fn a_closed_room_stays_dark_under_a_bright_sky() {
     let mut renderer = renderer(&gpu, [48, 32], gather());
     let [closed, half] = [3.2, 0.0].map(|top| mean(&light(&gpu, &mut renderer, &build(top))));
     println!("E/π under a sky of 1: {closed:.5} closed, {half:.3} with half a roof");
-    assert!(closed < 1e-4, "{closed}");
-    assert!(half > 0.05, "negative control: {half}");
+    assert_eq!(closed, 0.0);
+    assert!(half > 0.2, "negative control: {half}");
 }
 
-#[test]
-fn many_lights_odd_sizes_and_empty_scenes() {
-    let Some(gpu) = common::gpu() else { return };
-    let point = |x: f32| LightKind::Point { position: [x, 2.0, 0.0], intensity: 5.0, radius: 0.05, range: None };
+fn bulb(x: f32) -> LightKind {
+    LightKind::Point { position: [x, 2.0, 0.0], intensity: 5.0, radius: 0.05, range: None }
+}
+
+/// Two suns, two bulbs, a narrow and a wide spot.
+fn six_lights() -> [LightKind; 6] {
     let spot = |outer_angle: f32| LightKind::Spot {
         position: [0.0, 3.0, 2.0],
         direction: [0.0, -0.5, -1.0],
@@ -180,26 +182,59 @@ fn many_lights_odd_sizes_and_empty_scenes() {
         inner_angle: 0.2,
         outer_angle,
     };
-    let all = [sun(BACKWARDS, 1.0), sun([0.5, -1.0, 0.1], 1.0), point(3.0), point(-3.0), spot(0.6), spot(1.3)];
+    [sun(BACKWARDS, 1.0), sun([0.5, -1.0, 0.1], 1.0), bulb(3.0), bulb(-3.0), spot(0.6), spot(1.3)]
+}
+
+#[test]
+fn lights_of_every_kind_add_up() {
+    let Some(gpu) = common::gpu() else { return };
     let mut renderer = renderer(&gpu, [48, 32], gather());
-    let together = light(&gpu, &mut renderer, &hall(GREY, &all, 0.0, 1.0));
-    let mut apart = vec![0.0; together.len()];
-    for kind in all {
-        let one = light(&gpu, &mut renderer, &hall(GREY, &[kind], 0.0, 1.0));
-        assert!(mean(&one) > 1e-3, "{kind:?}");
-        apart.iter_mut().zip(one).for_each(|(sum, x)| *sum += x);
+    let together = light(&gpu, &mut renderer, &hall(GREY, &six_lights(), 0.0, 1.0));
+    let (mut apart, mut last) = (vec![0.0; together.len()], Vec::new());
+    for kind in six_lights() {
+        last = light(&gpu, &mut renderer, &hall(GREY, &[kind], 0.0, 1.0));
+        assert!(mean(&last) > 1e-3, "{kind:?}");
+        apart.iter_mut().zip(&last).for_each(|(sum, x)| *sum += x);
     }
     let off = difference(&together, &apart);
     println!("six lights together {:.2} % from their sum", 100.0 * off);
-    assert!(off < 0.1, "{off}");
-    // Forty lights are more than the maps' budget.
-    let crowd: Vec<LightKind> = (0..40).map(|i| point(0.2 * i as f32 - 4.0)).collect();
-    assert!(mean(&light(&gpu, &mut renderer, &hall(GREY, &crowd, 0.0, 1.0))) > 0.0);
+    assert!(off < 0.055, "{off}");
+    // Negative control: without one of them.
+    apart.iter_mut().zip(&last).for_each(|(sum, x)| *sum -= x);
+    assert!(difference(&together, &apart) > 0.08, "{}", difference(&together, &apart));
+}
+
+#[test]
+fn more_lights_than_shadow_maps_shine() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut renderer = renderer(&gpu, [48, 32], gather());
+    let mut of = |bulbs: usize| {
+        let lights: Vec<LightKind> = (0..bulbs).map(|i| bulb(8.0 / bulbs as f32 * i as f32 - 4.0)).collect();
+        mean(&light(&gpu, &mut renderer, &hall(GREY, &lights, 0.0, 1.0)))
+    };
+    // Forty are more than the maps' budget; four in the same line are not.
+    let (four, forty) = (of(4), of(40));
+    println!("forty lights give {:.2} times the light of four", forty / four);
+    assert!((9.0..11.0).contains(&(forty / four)), "{forty} of {four}");
+}
+
+#[test]
+fn an_empty_scene_has_no_light() {
+    let Some(gpu) = common::gpu() else { return };
     let empty = scene(&[], &[sun(BACKWARDS, 1.0)], 1.0, Camera::look_at([0.0; 3], [0.0, 0.0, -1.0], 1.0));
+    let mut renderer = renderer(&gpu, [48, 32], gather());
     assert!(light(&gpu, &mut renderer, &empty).iter().all(|x| *x == 0.0));
+    assert!(mean(&light(&gpu, &mut renderer, &hall(GREY, &[sun(BACKWARDS, 1.0)], 1.0, 1.0))) > 0.0);
+}
+
+#[test]
+fn odd_sizes_are_lit() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut renderer = renderer(&gpu, [48, 32], gather());
     for odd in [[1, 1], [17, 13]] {
         renderer.resize(odd).expect("the size fits");
-        assert!(light(&gpu, &mut renderer, &hall(GREY, &all, 0.1, 1.0)).iter().all(|x| x.is_finite()));
+        let light = light(&gpu, &mut renderer, &hall(GREY, &six_lights(), 0.1, 1.0));
+        assert!(light.iter().all(|x| x.is_finite()) && mean(&light) > 0.0, "{odd:?}");
     }
 }
 

@@ -1,4 +1,4 @@
-//! Every operator's way back against central differences of the CPU twin's way there.
+//! Every operator's way back against central differences of the CPU reference's way there.
 
 use super::{common, error, hashed, learner};
 use bouncelight::net::cpu::{self, Tensor};
@@ -11,7 +11,8 @@ use std::path::Path;
 
 /// Largest error of a tensor's gradients, relative to the largest of them: rounding of the differences.
 const ALLOWED: f32 = 1e-3;
-/// Step of a weight. The networks are piecewise linear in each, so that nothing but a bend within the step makes a difference wrong.
+/// Step of a weight. The networks are piecewise linear in each, so that nothing but a bend within
+/// the step makes a difference wrong.
 const STEP: f32 = 3e-3;
 /// Weights of a tensor that are looked at, spread evenly.
 const LOOKED_AT: usize = 16;
@@ -28,8 +29,9 @@ fn fixture(name: &str) -> Case {
     Case { name: name.into(), bytes: std::fs::read(path).unwrap(), sizes: vec![[13, 9], [5, 3], [1, 1]] }
 }
 
-/// What fixtures do not hold: a picture that is made smaller, a sum with what is its own summand, a convolution without bias, sides
-/// of other widths, a kernel that is not square, a tensor that three operators read.
+/// What fixtures do not hold: a picture that is made smaller, a sum with what is its own summand, a
+/// convolution without bias, sides of other widths, a kernel that is not square, a tensor that
+/// three operators read.
 fn odd() -> Case {
     let ops = [
         json!({"op": "conv2d", "name": "a", "input": "input", "output": "a", "in_channels": 3, "out_channels": 5,
@@ -37,7 +39,8 @@ fn odd() -> Case {
         json!({"op": "conv2d", "name": "b", "input": "a", "output": "b", "in_channels": 5, "out_channels": 5,
                "kernel": [2, 3], "stride": 2, "padding": 1, "bias": false}),
         json!({"op": "upsample_bilinear", "name": "down", "input": "a", "output": "down", "size_as": "b"}),
-        json!({"op": "add", "name": "sum", "inputs": ["down", "b"], "output": "sum", "activation": {"leaky_relu": 0.1}}),
+        json!({"op": "add", "name": "sum", "inputs": ["down", "b"], "output": "sum",
+            "activation": {"leaky_relu": 0.1}}),
         json!({"op": "add", "name": "twice", "inputs": ["sum", "sum"], "output": "twice"}),
         json!({"op": "upsample_bilinear", "name": "up", "input": "twice", "output": "up", "size_as": "a"}),
         json!({"op": "add", "name": "end", "inputs": ["up", "a"], "output": "y"}),
@@ -50,7 +53,7 @@ fn odd() -> Case {
     Case { name: "odd".into(), bytes: hashed::file(&graph, 5), sizes: vec![[11, 8], [6, 5]] }
 }
 
-/// Σ slopes · output of the twin with one number of the file moved by `by`.
+/// Σ slopes · output of the CPU reference with one number of the file moved by `by`.
 fn moved(bytes: &[u8], at: usize, by: f32, input: &Tensor, slopes: &[f32]) -> (f64, f32) {
     let mut bytes = bytes.to_vec();
     let number: [u8; 4] = bytes[at..at + 4].try_into().unwrap();
@@ -60,8 +63,8 @@ fn moved(bytes: &[u8], at: usize, by: f32, input: &Tensor, slopes: &[f32]) -> (f
     (output.data.iter().zip(slopes).map(|(y, s)| f64::from(*y) * f64::from(*s)).sum(), value)
 }
 
-/// Worst error of all tensors' gradients (what is looked at of `found` is turned by `sign`), and the share of the weights looked at that
-/// have no bend within the step: only these are compared.
+/// Worst error of all tensors' gradients (what is looked at of `found` is turned by `sign`), and
+/// the share of the weights looked at that have no bend within the step: only these are compared.
 fn worst(bytes: &[u8], found: &Gradients, input: &Tensor, slopes: &[f32], sign: f32) -> (f32, f32) {
     let (header, metadata) = SafeTensors::read_metadata(bytes).unwrap();
     let (mut worst, mut straight, mut all) = (0f32, 0, 0);

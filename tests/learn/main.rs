@@ -1,4 +1,4 @@
-//! Learning: gradients against finite differences of the CPU twin and against PyTorch, and what a few steps do.
+//! Learning: gradients against finite differences of the CPU reference and against PyTorch, and what a few steps do.
 
 #[path = "../common/mod.rs"]
 mod common;

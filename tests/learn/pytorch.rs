@@ -1,4 +1,5 @@
-//! The shipped network's loss, gradients and steps as PyTorch has them (`training/gradients.py` made the file, in 64 bits).
+//! The shipped network's loss, gradients and steps as PyTorch has them (`training/gradients.py`
+//! made the file, in 64 bits).
 
 use super::{common, error, learner};
 use bouncelight::net::format::Weights;
@@ -10,8 +11,9 @@ const CELLS: [u32; 2] = [17, 11];
 const PIXELS: usize = 17 * 11;
 const RATE: f32 = 1e-3;
 
-/// Largest errors that rounding to 32 bits makes: of losses; of a tensor's gradients, relative to the largest; of weights after
-/// five steps, which divide gradients by their own size and so make much of the least of them.
+/// Largest errors that rounding to 32 bits makes: of losses; of a tensor's gradients, relative to
+/// the largest; of weights after five steps, which divide gradients by their own size and so make
+/// much of the least of them.
 const OF_LOSS: f32 = 1e-4;
 const OF_GRADIENTS: f32 = 1e-3;
 const OF_STEPS: f32 = 1e-3;

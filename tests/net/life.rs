@@ -1,4 +1,5 @@
-//! Networks in use: any size, several at once, other weights and sizes between frames, dropout, and norms of awkward numbers.
+//! Networks in use: any size, several at once, other weights and sizes between frames, dropout, and
+//! norms of awkward numbers.
 
 use crate::hashed::{self, error};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
@@ -9,11 +10,10 @@ use bouncelight::net::arch;
 use bouncelight::net::convert::{Arch, Norm};
 use bouncelight::net::cpu::{self, Tensor};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{NetError, Network, Options, Permutation, Pipelines, Source, Variant};
+use bouncelight::net::gpu::{NetError, Network, Options, Permutation, Pipelines, Setup, Source, Variant};
 use bouncelight::net::graph::{Graph, Shape};
 use bouncelight::net::plan::Precision;
 use serde_json::{Value, json};
-use std::sync::Arc;
 
 fn graph(input_channels: u32, ops: Value) -> Graph {
     hashed::graphs(&json!({"g": {"input_channels": input_channels, "ops": ops}})).remove("g").unwrap()
@@ -78,7 +78,7 @@ fn any_size_is_padded_inside() {
         }
         let Some(gpu) = &gpu else { continue };
         let next = match network.take() {
-            None => Network::new(&gpu.device, &gpu.queue, &weights, size),
+            None => Network::new(&gpu.device, &gpu.queue, &weights, size, Options::default()),
             Some(last) => last.rebuilt(&gpu.device, &gpu.queue, &weights, size),
         };
         let e = error(&run_network(gpu, network.insert(next.unwrap()), &input).data, &found.data);
@@ -91,7 +91,8 @@ fn several_networks_live_at_once() {
     let Some(gpu) = common::gpu() else { return };
     let weights = hashed::network(&unet());
     let inputs = [[8, 8], [4, 12]].map(|size| hashed::input("x", 5, size));
-    let networks = [[8, 8], [4, 12]].map(|size| Network::new(&gpu.device, &gpu.queue, &weights, size).unwrap());
+    let networks = [[8, 8], [4, 12]]
+        .map(|size| Network::new(&gpu.device, &gpu.queue, &weights, size, Options::default()).unwrap());
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     for (network, input) in networks.iter().zip(&inputs) {
         let place = network.input();
@@ -103,9 +104,9 @@ fn several_networks_live_at_once() {
         let out = network.output();
         let bytes =
             bouncelight::gpu::readback::buffer(&gpu.device, &gpu.queue, out.buffer, out.offset, out.size).unwrap();
-        let twin = cpu::run(&weights, input).unwrap();
-        let found = Tensor::from_padded(twin.shape, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes));
-        assert!(error(&found.data, &twin.data) <= TOLERANCE);
+        let by_cpu = cpu::run(&weights, input).unwrap();
+        let found = Tensor::from_padded(by_cpu.shape, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes));
+        assert!(error(&found.data, &by_cpu.data) <= TOLERANCE);
     }
 }
 
@@ -125,7 +126,7 @@ fn a_thousand_changes_leak_nothing() {
     bytes[last] ^= 0x80;
     let other = Weights::from_bytes(&bytes).unwrap();
     let sizes = [[16, 8], [3, 5], [40, 30], [1, 1]];
-    let mut network = Network::new(&gpu.device, &gpu.queue, &weights, sizes[0]).unwrap();
+    let mut network = Network::new(&gpu.device, &gpu.queue, &weights, sizes[0], Options::default()).unwrap();
     let mut after_a_round = None;
     for change in 0..1000usize {
         // Alternately other weights in place, and another size with the first weights.
@@ -138,7 +139,8 @@ fn a_thousand_changes_leak_nothing() {
         network.record(&mut Recorder::new(&mut encoder));
         gpu.queue.submit([encoder.finish()]);
         if change % 40 == 39 {
-            // The allocator's own books wobble by some tens of bytes; a forgotten buffer of 256 bytes a change would not.
+            // The allocator's own books wobble by some tens of bytes; a forgotten buffer of 256
+            // bytes a change would not.
             let now = held(&gpu).unwrap_or(0);
             let first = *after_a_round.get_or_insert(now);
             assert!(now.abs_diff(first) < 4096, "{now} bytes after {} changes, {first} after 40", change + 1);
@@ -170,37 +172,44 @@ fn dropout_drops_the_same_values_everywhere() {
     for (graph, p) in [(alone, 0.3), (fused, 0.25)] {
         let weights = hashed::network(&graph);
         let input = hashed::input("x", 6, [61, 47]);
-        let twin = cpu::run_with(&weights, &input, Some(7)).unwrap();
-        let dropped = twin.data.iter().filter(|v| **v == 0.0).count() as f32 / twin.data.len() as f32;
+        let by_cpu = cpu::run_with(&weights, &input, Some(7)).unwrap();
+        let dropped = by_cpu.data.iter().filter(|v| **v == 0.0).count() as f32 / by_cpu.data.len() as f32;
         assert!((dropped - p).abs() < 0.02, "{dropped} of the values are dropped, {p} was asked for");
         let other = cpu::run_with(&weights, &input, Some(8)).unwrap();
-        let same = twin.data.iter().zip(&other.data).filter(|(a, b)| (**a == 0.0) == (**b == 0.0)).count();
-        let expected = (p * p + (1.0 - p) * (1.0 - p)) * twin.data.len() as f32;
+        let same = by_cpu.data.iter().zip(&other.data).filter(|(a, b)| (**a == 0.0) == (**b == 0.0)).count();
+        let expected = (p * p + (1.0 - p) * (1.0 - p)) * by_cpu.data.len() as f32;
         assert!((same as f32 / expected - 1.0).abs() < 0.05, "another seed, an independent mask");
         assert!(cpu::run(&weights, &input).unwrap().data.iter().all(|v| *v != 0.0), "off by default");
         let Some(gpu) = &gpu else { continue };
         let options = Options { dropout: Some(8), ..Options::default() };
-        let mut network = Network::with_options(&gpu.device, &gpu.queue, &weights, [61, 47], options).unwrap();
+        let mut network = Network::new(&gpu.device, &gpu.queue, &weights, [61, 47], options).unwrap();
         assert!(error(&run_network(gpu, &network, &input).data, &other.data) <= TOLERANCE);
         network.set_seed(&gpu.queue, 7);
         let found = run_network(gpu, &network, &input);
         assert!(
-            found.data.iter().zip(&twin.data).all(|(a, b)| (*a == 0.0) == (*b == 0.0)),
+            found.data.iter().zip(&by_cpu.data).all(|(a, b)| (*a == 0.0) == (*b == 0.0)),
             "the masks agree to the bit"
         );
-        assert!(error(&found.data, &twin.data) <= TOLERANCE);
+        assert!(error(&found.data, &by_cpu.data) <= TOLERANCE);
         let unfused = run_gpu(gpu, &weights, &input, Options { fuse: false, dropout: Some(7), ..Options::default() });
-        assert!(error(&unfused.data, &twin.data) <= TOLERANCE);
+        assert!(error(&unfused.data, &by_cpu.data) <= TOLERANCE);
     }
 }
 
-/// Layers as wide as the paper's, whose weights fit no uniform binding: as chosen here, staged, and with their sums in parts.
+/// Layers as wide as the paper's, whose weights fit no uniform binding: as chosen here, staged, and
+/// with their sums in parts.
 #[test]
 fn wide_layers_agree_with_the_cpu_twin() {
     let Some(gpu) = common::gpu() else { return };
-    let (handles, pipelines) = ((&gpu.device, &gpu.queue), Pipelines::default());
-    let norm = |c: u32| json!([{"op": "group_norm", "name": "y", "input": "input", "output": "y", "channels": c, "groups": 2}]);
-    let joined = |c: u32| json!([conv("a", "input", c, c, 1, 1), {"op": "concat", "name": "j", "inputs": ["a", "input"], "output": "j"}, up("u", "j", 2 * c, 8)]);
+    let pipelines = Pipelines::default();
+    let norm = |c: u32| {
+        json!([{"op": "group_norm", "name": "y", "input": "input", "output": "y", "channels": c,
+        "groups": 2}])
+    };
+    let joined = |c: u32| {
+        json!([conv("a", "input", c, c, 1, 1),
+        {"op": "concat", "name": "j", "inputs": ["a", "input"], "output": "j"}, up("u", "j", 2 * c, 8)])
+    };
     let cases = [
         ("conv", 512, json!([conv("c", "input", 512, 64, 4, 2)]), [8, 4]),
         ("conv odd", 516, json!([conv("c", "input", 516, 20, 4, 2)]), [6, 6]),
@@ -214,7 +223,7 @@ fn wide_layers_agree_with_the_cpu_twin() {
     for (name, channels, ops, size) in cases {
         let weights = hashed::network(&graph(channels, ops));
         let input = hashed::input("x", channels, size);
-        let twin = cpu::run(&weights, &input).unwrap();
+        let by_cpu = cpu::run(&weights, &input).unwrap();
         let staged = |vectors, parts, half| {
             Variant::Fixed(Permutation { parts, half, ..Permutation::new(Source::Staged, false, vectors) })
         };
@@ -229,9 +238,15 @@ fn wide_layers_agree_with_the_cpu_twin() {
             Options { variant: staged(1, 7, false), ..half },
             Options { variant: staged(2, 4, true), ..half },
         ] {
-            let network =
-                Network::sharing(handles, &weights, size, options, Arc::default(), pipelines.clone()).unwrap();
-            let e = error(&run_network(&gpu, &network, &input).data, &twin.data);
+            let network = Network::new(
+                &gpu.device,
+                &gpu.queue,
+                &weights,
+                size,
+                Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
+            )
+            .unwrap();
+            let e = error(&run_network(&gpu, &network, &input).data, &by_cpu.data);
             let ways: Vec<_> = network.kernels().filter_map(|k| k.permutation).map(|p| p.to_string()).collect();
             println!("{name}, {}: {e:.1e}", ways.join(", "));
             let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };

@@ -1,5 +1,5 @@
-//! Conformance of networks: PyTorch's fixtures ↔ the CPU twin ↔ the WGSL kernels, per operator and whole, at odd sizes
-//! and with padded channels. Relative error is max |Δ| / max |reference|.
+//! Conformance of networks: PyTorch's fixtures ↔ the CPU reference ↔ the WGSL kernels, per operator
+//! and whole, at odd sizes and with padded channels. Relative error is max |Δ| / max |reference|.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -74,7 +74,7 @@ fn error(found: &Tensor, reference: &Tensor) -> f32 {
 
 fn run_gpu(gpu: &Gpu, weights: &Weights, input: &Tensor, options: Options) -> Tensor {
     let size = [input.shape.width, input.shape.height];
-    run_network(gpu, &Network::with_options(&gpu.device, &gpu.queue, weights, size, options).unwrap(), input)
+    run_network(gpu, &Network::new(&gpu.device, &gpu.queue, weights, size, options).unwrap(), input)
 }
 
 fn run_network(gpu: &Gpu, network: &Network, input: &Tensor) -> Tensor {
@@ -124,8 +124,8 @@ fn every_kernel_agrees_with_pytorch_and_with_the_cpu_twin() {
             let few = name == "unet" && variant != Variant::Auto;
             for (input, reference) in cases(name).into_iter().take(if few { 1 } else { usize::MAX }) {
                 let found = run_gpu(&gpu, &weights, &input, Options { variant, ..Options::default() });
-                let twin = cpu::run(&weights, &input).unwrap();
-                let e = error(&found, &reference).max(error(&found, &twin));
+                let by_cpu = cpu::run(&weights, &input).unwrap();
+                let e = error(&found, &reference).max(error(&found, &by_cpu));
                 assert!(e <= TOLERANCE, "{variant:?} {name} {}: relative error {e}", input.shape);
                 worst = worst.max(e);
                 seen += 1;
@@ -163,7 +163,7 @@ fn a_perturbed_weight_is_noticed() {
 fn recording_twice_gives_the_same_and_labels_name_the_layers() {
     let Some(gpu) = common::gpu() else { return };
     let weights = Weights::load(&fixture("unet.safetensors")).unwrap();
-    let network = Network::new(&gpu.device, &gpu.queue, &weights, [37, 21]).unwrap();
+    let network = Network::new(&gpu.device, &gpu.queue, &weights, [37, 21], Options::default()).unwrap();
     let (input, _) = cases("unet").into_iter().find(|c| c.0.shape.width == 37).unwrap();
     let mut results = Vec::new();
     for _ in 0..2 {

@@ -1,5 +1,5 @@
-//! Norms that measure the picture: what a convolution measures in passing against a step of its own, against the CPU twin, and with means
-//! far from zero.
+//! Norms that measure the picture: what a convolution measures in passing against a step of its
+//! own, against the CPU reference, and with means far from zero.
 
 use crate::hashed::{self, error};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
@@ -7,11 +7,10 @@ use crate::{common, fixed, run_gpu, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::cpu::{self, Tensor};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Source, Variant};
+use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Setup, Source, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::Precision;
 use serde_json::{Value, json};
-use std::sync::Arc;
 
 fn graph(input_channels: u32, ops: Value) -> Graph {
     hashed::graphs(&json!({"g": {"input_channels": input_channels, "ops": ops}})).remove("g").unwrap()
@@ -33,14 +32,20 @@ fn up(i: u32, o: u32, kernel: u32, stride: u32) -> Value {
 
 fn run(gpu: &Gpu, pipelines: &Pipelines, weights: &Weights, input: &Tensor, options: Options) -> (Tensor, usize) {
     let size = [input.shape.width, input.shape.height];
-    let handles = (&gpu.device, &gpu.queue);
-    let network = Network::sharing(handles, weights, size, options, Arc::default(), pipelines.clone()).unwrap();
+    let network = Network::new(
+        &gpu.device,
+        &gpu.queue,
+        weights,
+        size,
+        Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
+    )
+    .unwrap();
     let measured = network.plan().steps.iter().filter(|s| s.moments.is_some()).count();
     (run_network(gpu, &network, input), measured)
 }
 
-/// In every family of kernels, in parts and whole, with channels that pad, groups that begin within a vector, phases, and pictures
-/// that no workgroup fills.
+/// In every family of kernels, in parts and whole, with channels that pad, groups that begin within
+/// a vector, phases, and pictures that no workgroup fills.
 #[test]
 fn what_a_convolution_measures_is_what_a_step_of_its_own_does() {
     let Some(gpu) = common::gpu() else { return };
@@ -70,10 +75,10 @@ fn what_a_convolution_measures_is_what_a_step_of_its_own_does() {
         let ways = ways.chain([Options { variant: variants[0], ..half }]);
         for (size, options) in [[37, 29], [1, 3], [70, 2]].into_iter().flat_map(|s| ways.clone().map(move |w| (s, w))) {
             let input = hashed::input("x", channels, size);
-            let twin = cpu::run(&weights, &input).unwrap();
+            let by_cpu = cpu::run(&weights, &input).unwrap();
             let (found, measured) = run(&gpu, &pipelines, &weights, &input, options);
             assert_eq!(measured, 1);
-            let mut e = error(&found.data, &twin.data);
+            let mut e = error(&found.data, &by_cpu.data);
             if options.variant == Variant::Auto {
                 let (apart, measured) = run(&gpu, &pipelines, &weights, &input, Options { fuse: false, ..options });
                 assert_eq!(measured, 0);
@@ -109,7 +114,8 @@ fn far(groups: u32, conv: Value) -> Weights {
     Weights::from_bytes(&bytes).unwrap()
 }
 
-/// Where a sum of squares in f32 has lost the variance: measured by a step of its own, by a convolution, and by the sum of its parts.
+/// Where a sum of squares in f32 has lost the variance: measured by a step of its own, by a
+/// convolution, and by the sum of its parts.
 #[test]
 fn norms_of_large_means_are_sound() {
     let mut input = hashed::input("x", 6, [83, 59]);
@@ -123,26 +129,27 @@ fn norms_of_large_means_are_sound() {
     let Some(gpu) = common::gpu() else { return };
     for groups in [1, 2, 6] {
         let weights = hashed::network(&graph(6, json!([norm("input", 6, groups)])));
-        let twin = cpu::run(&weights, &input).unwrap();
-        let e = error(&run_gpu(&gpu, &weights, &input, Options::default()).data, &twin.data);
+        let by_cpu = cpu::run(&weights, &input).unwrap();
+        let e = error(&run_gpu(&gpu, &weights, &input, Options::default()).data, &by_cpu.data);
         println!("{groups} groups: {e:.1e}");
         // The mean itself, 4000, is known to a few 1e-4 only in f32.
         assert!(e <= 2e-3, "{groups} groups: {e}");
         let far = far(groups, conv(6, 6, 1, 1));
-        let twin = cpu::run(&far, &near).unwrap();
+        let by_cpu = cpu::run(&far, &near).unwrap();
         let parts = |weights| {
             Variant::Fixed(Permutation { parts: 2, ..Permutation::new(weights, weights == Source::Lanes, 2) })
         };
         for variant in [Variant::Auto, fixed(Source::Uniform, false, 2), parts(Source::Staged), parts(Source::Lanes)] {
             let (found, measured) =
                 run(&gpu, &Pipelines::default(), &far, &near, Options { variant, ..Options::default() });
-            let e = error(&found.data, &twin.data);
+            let e = error(&found.data, &by_cpu.data);
             println!("{groups} groups after a convolution, {variant:?}: {e:.1e}");
             assert!(measured == 1 && e <= 2e-3, "{groups} groups, {variant:?}: {e}");
         }
-        // Negative control: the same values without the 4000 are normed to something else by no more than rounding, other weights are not.
+        // Negative control: the same values without the 4000 are normed to something else by no
+        // more than rounding, other weights are not.
         let plain = hashed::network(&graph(6, json!([conv(6, 6, 1, 1), norm("c", 6, groups)])));
-        assert!(error(&cpu::run(&plain, &near).unwrap().data, &twin.data) > 0.1);
+        assert!(error(&cpu::run(&plain, &near).unwrap().data, &by_cpu.data) > 0.1);
     }
 }
 
@@ -153,18 +160,19 @@ fn what_is_measured_once_serves_two_norms() {
     let ops = json!([
         conv(6, 12, 3, 1),
         {"op": "dropout", "name": "d", "input": "c", "output": "d", "p": 0.3},
-        {"op": "group_norm", "name": "n", "input": "d", "output": "n", "channels": 12, "groups": 3, "activation": "relu"},
+        {"op": "group_norm", "name": "n", "input": "d", "output": "n", "channels": 12, "groups": 3,
+            "activation": "relu"},
         {"op": "instance_norm", "name": "m", "input": "d", "output": "m", "channels": 12},
         {"op": "concat", "name": "y", "inputs": ["n", "d", "m"], "output": "y"},
     ]);
     let weights = hashed::network(&graph(6, ops));
     let input = hashed::input("x", 6, [41, 23]);
-    let twin = cpu::run_with(&weights, &input, Some(5)).unwrap();
+    let by_cpu = cpu::run_with(&weights, &input, Some(5)).unwrap();
     let options = Options { dropout: Some(5), ..Options::default() };
     let (found, measured) = run(&gpu, &Pipelines::default(), &weights, &input, options);
     assert_eq!(measured, 1);
-    assert!(error(&found.data, &twin.data) <= TOLERANCE);
+    assert!(error(&found.data, &by_cpu.data) <= TOLERANCE);
     // Negative control: another seed is other moments.
     let other = cpu::run_with(&weights, &input, Some(6)).unwrap();
-    assert!(error(&other.data, &twin.data) > 100.0 * TOLERANCE);
+    assert!(error(&other.data, &by_cpu.data) > 100.0 * TOLERANCE);
 }

@@ -1,17 +1,16 @@
-//! Every operator: PyTorch ↔ CPU twin ↔ kernels, fused and unfused, in 32 and 16 bits.
+//! Every operator: PyTorch ↔ CPU reference ↔ kernels, fused and unfused, in 32 and 16 bits.
 
 use crate::hashed::{self, cases, graphs};
 use crate::{common, fixed, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Source, Variant};
+use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Setup, Source, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::op::Op;
 use bouncelight::net::op_facts::KINDS;
 use bouncelight::net::plan::Precision;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 pub const TOLERANCE: f32 = 1e-4;
 pub const TOLERANCE_HALF: f32 = 5e-3;
@@ -36,7 +35,8 @@ fn the_cpu_twin_agrees_with_pytorch_on_every_operator() {
     println!("{} graphs, {} cases, worst {worst:?}", graphs.len(), cases.values().map(Vec::len).sum::<usize>());
 }
 
-/// Runs the graphs that `wanted` picks at up to `sizes` sizes in the way that `options` say, with compiled kernels shared.
+/// Runs the graphs that `wanted` picks at up to `sizes` sizes in the way that `options` say, with
+/// compiled kernels shared.
 fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usize, wanted: impl Fn(&Graph) -> bool) {
     let (cases, metadata) = cases("operators.safetensors");
     let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
@@ -49,16 +49,19 @@ fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usiz
         for case in cases[name].iter().rev().take(sizes) {
             let input = hashed::input(name, graph.input_channels, case.size);
             let next = match network.take() {
-                None => {
-                    let handles = (&gpu.device, &gpu.queue);
-                    Network::sharing(handles, &weights, case.size, options, Arc::default(), pipelines.clone())
-                }
+                None => Network::new(
+                    &gpu.device,
+                    &gpu.queue,
+                    &weights,
+                    case.size,
+                    Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
+                ),
                 Some(last) => last.rebuilt(&gpu.device, &gpu.queue, &weights, case.size),
             };
             let found = run_network(gpu, network.insert(next.unwrap()), &input);
-            let twin = cpu::run(&weights, &input).unwrap();
-            let e = case.error(&found).max(hashed::error(&found.data, &twin.data));
-            if e > tolerance || found.shape != twin.shape {
+            let by_cpu = cpu::run(&weights, &input).unwrap();
+            let e = case.error(&found).max(hashed::error(&found.data, &by_cpu.data));
+            if e > tolerance || found.shape != by_cpu.shape {
                 faults.push(format!("{name} {:?}: relative error {e}", case.size));
             }
             worst = if e > worst.0 { (e, name.clone()) } else { worst };
@@ -70,8 +73,9 @@ fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usiz
 
 const FULL: Options = Options { variant: Variant::Auto, precision: Precision::F32, dropout: None, fuse: true };
 
-/// Permutations of the convolutions in which each kind of weights, each way to read the input and each width meets the others: all
-/// pairs of them or, if `all`, every combination. Uniform weights do not exist in 16 bits: storage takes their place.
+/// Permutations of the convolutions in which each kind of weights, each way to read the input and
+/// each width meets the others: all pairs of them or, if `all`, every combination. Uniform weights
+/// do not exist in 16 bits: storage takes their place.
 fn permutations(all: bool) -> Vec<Variant> {
     let mut found = Vec::new();
     for vectors in 1..=4 {
@@ -105,8 +109,9 @@ fn shapes(graph: &Graph) -> BTreeSet<String> {
     graph.ops.iter().filter_map(shape).collect()
 }
 
-/// Every graph at every size, fused and not, by the kernels that are chosen here and by the plain ones; then in every permutation as
-/// many graphs as it takes to meet every shape of convolution. Kernels of the same text are compiled once for all of them.
+/// Every graph at every size, fused and not, by the kernels that are chosen here and by the plain
+/// ones; then in every permutation as many graphs as it takes to meet every shape of convolution.
+/// Kernels of the same text are compiled once for all of them.
 fn check_permutations(precision: Precision) {
     let Some(gpu) = common::gpu() else { return };
     let pipelines = Pipelines::default();
@@ -151,12 +156,14 @@ fn the_kernels_agree_in_every_way() {
     }
 }
 
-/// Groups read the vectors that they touch only, in every kind of kernel: whole vectors, parts of them, and single channels.
+/// Groups read the vectors that they touch only, in every kind of kernel: whole vectors, parts of
+/// them, and single channels.
 #[test]
 fn groups_read_their_own() {
     let Some(gpu) = common::gpu() else { return };
     let pipelines = Pipelines::default();
-    // Input and output channels, groups, kernel, stride; vectors that an output reads, and whether groups are whole vectors.
+    // Input and output channels, groups, kernel, stride; vectors that an output reads, and whether
+    // groups are whole vectors.
     for ([inputs, outputs, groups, kernel, stride], read, whole) in [
         ([16, 24, 2, 3, 1], 2, true),
         ([16, 48, 4, 3, 2], 1, true),
@@ -169,13 +176,15 @@ fn groups_read_their_own() {
         ([18, 18, 3, 3, 1], 5, false),
     ] {
         let name = "grouped";
-        let ops = serde_json::json!([{"op": "conv2d", "name": "c", "input": "input", "output": "y", "in_channels": inputs,
-            "out_channels": outputs, "kernel": [kernel, kernel], "stride": stride, "padding": kernel / 2, "groups": groups}]);
+        let ops = serde_json::json!([{"op": "conv2d", "name": "c", "input": "input", "output": "y",
+            "in_channels": inputs,
+            "out_channels": outputs, "kernel": [kernel, kernel], "stride": stride, "padding": kernel / 2,
+            "groups": groups}]);
         let graph =
             hashed::graphs(&serde_json::json!({name: {"input_channels": inputs, "ops": ops}})).remove(name).unwrap();
         let weights = hashed::network(&graph);
         let input = hashed::input(name, inputs, [7, 9]);
-        let twin = cpu::run(&weights, &input).unwrap();
+        let by_cpu = cpu::run(&weights, &input).unwrap();
         for variant in [
             fixed(Source::Lanes, true, 4),
             fixed(Source::Uniform, false, 3),
@@ -185,22 +194,27 @@ fn groups_read_their_own() {
             Variant::Plain,
         ] {
             let options = Options { variant, ..FULL };
-            let handles = (&gpu.device, &gpu.queue);
-            let network =
-                Network::sharing(handles, &weights, [7, 9], options, Arc::default(), pipelines.clone()).unwrap();
+            let network = Network::new(
+                &gpu.device,
+                &gpu.queue,
+                &weights,
+                [7, 9],
+                Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
+            )
+            .unwrap();
             let kernel = network.kernels().find(|k| k.filter.is_some()).unwrap();
             let filter = kernel.filter.unwrap();
             let dense = variant == Variant::Plain;
             assert_eq!(filter.in_vectors, if dense { inputs.div_ceil(4) } else { read }, "{variant:?}");
             assert!(whole || dense || kernel.vectors == 1 || read == inputs.div_ceil(4), "{variant:?}");
             let found = run_network(&gpu, &network, &input);
-            let e = hashed::error(&found.data, &twin.data);
-            assert!(e <= TOLERANCE && found.shape == twin.shape, "{groups} groups, {variant:?}: relative error {e}");
+            let e = hashed::error(&found.data, &by_cpu.data);
+            assert!(e <= TOLERANCE && found.shape == by_cpu.shape, "{groups} groups, {variant:?}: relative error {e}");
         }
         // Negative control: neighbours' channels moved by one group are not what is read.
         let mut moved = input.clone();
         moved.data.rotate_right((inputs / groups) as usize * 63);
-        assert!(hashed::error(&cpu::run(&weights, &moved).unwrap().data, &twin.data) > 100.0 * TOLERANCE);
+        assert!(hashed::error(&cpu::run(&weights, &moved).unwrap().data, &by_cpu.data) > 100.0 * TOLERANCE);
     }
 }
 

@@ -3,8 +3,8 @@
 use super::*;
 use bouncelight::net::plan::Precision;
 
-/// Each layer's result is what the CPU twin computes when its graph ends there; of the shipped network, whose concatenations are
-/// slices of one tensor and whose layers share memory.
+/// Each layer's result is what the CPU reference computes when its graph ends there; of the shipped
+/// network, whose concatenations are slices of one tensor and whose layers share memory.
 #[test]
 fn every_layer_can_be_read_as_the_cpu_twin_computes_it() {
     let Some(gpu) = common::gpu() else { return };
@@ -14,7 +14,7 @@ fn every_layer_can_be_read_as_the_cpu_twin_computes_it() {
     let input = Tensor { shape, data: (0..shape.channels as usize * 384).map(wave).collect() };
     for (precision, tolerance) in [(Precision::F32, TOLERANCE), (Precision::F16, 2e-2)] {
         let options = Options { precision, ..Options::default() };
-        let network = Network::with_options(&gpu.device, &gpu.queue, &weights, [24, 16], options).unwrap();
+        let network = Network::new(&gpu.device, &gpu.queue, &weights, [24, 16], options).unwrap();
         let (mut seen, mut apart) = (0, 0);
         let mut before: Option<Tensor> = None;
         for (step, name) in network.taps() {

@@ -2,7 +2,7 @@
 
 use crate::{TOLERANCE, cases, common, error, fixed, fixture, run_gpu, run_network};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{Network, Options, Permutation, Source, Tuned, Variant};
+use bouncelight::net::gpu::{Network, Options, Permutation, Setup, Source, Tuned, Variant};
 use bouncelight::net::tune::{Cache, CacheError, MAX_TEXT, VERSION, tune};
 use bouncelight::wgpu::{AdapterInfo, Backend, DeviceType};
 use std::sync::Arc;
@@ -74,7 +74,7 @@ fn what_is_tuned_is_remembered_and_right() {
     assert!(again.is_empty());
     let tuned = Arc::new(cache.tuned(&gpu.info));
     assert_eq!(tuned.len(), 1);
-    let network = Network::tuned(&gpu.device, &gpu.queue, &weights, size, Options::default(), tuned).unwrap();
+    let network = Network::new(&gpu.device, &gpu.queue, &weights, size, Setup { tuned, ..Setup::default() }).unwrap();
     let kernel = network.kernels().next().unwrap();
     assert_eq!(kernel.permutation, Some(report.best.0));
     assert!(error(&run_network(&gpu, &network, &input), &reference) <= TOLERANCE);
@@ -87,21 +87,21 @@ fn wishes_that_cannot_be_met_do_no_harm() {
     let weights = Weights::load(&fixture("conv1x1.safetensors")).unwrap();
     let (input, reference) = cases("conv1x1").pop().unwrap();
     let size = [input.shape.width, input.shape.height];
-    let plain = Network::new(&gpu.device, &gpu.queue, &weights, size).unwrap();
+    let plain = Network::new(&gpu.device, &gpu.queue, &weights, size, Options::default()).unwrap();
     let layer = plain.kernels().next().unwrap().layer.unwrap().to_string();
     for wish in [
         Permutation { parts: 4000, half: true, ..Permutation::new(Source::Lanes, false, 4000) },
         Permutation::new(Source::Uniform, true, 0),
     ] {
-        let tuned: Tuned = [(layer.clone(), wish)].into();
+        let tuned: Arc<Tuned> = Arc::new([(layer.clone(), wish)].into());
         let network =
-            Network::tuned(&gpu.device, &gpu.queue, &weights, size, Options::default(), Arc::new(tuned)).unwrap();
+            Network::new(&gpu.device, &gpu.queue, &weights, size, Setup { tuned, ..Setup::default() }).unwrap();
         assert!(error(&run_network(&gpu, &network, &input), &reference) <= TOLERANCE, "{wish:?}");
     }
     // Negative control: the permutation that is asked for is the one that runs.
     let Variant::Fixed(wanted) = fixed(Source::Storage, true, 1) else { unreachable!() };
     let options = Options { variant: Variant::Fixed(wanted), ..Options::default() };
-    let network = Network::with_options(&gpu.device, &gpu.queue, &weights, size, options).unwrap();
+    let network = Network::new(&gpu.device, &gpu.queue, &weights, size, options).unwrap();
     assert_eq!(network.kernels().next().unwrap().permutation, Some(wanted));
     assert!(error(&run_gpu(&gpu, &weights, &input, options), &reference) <= TOLERANCE);
 }

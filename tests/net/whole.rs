@@ -1,4 +1,4 @@
-//! The published generators, narrow, whole: PyTorch ↔ CPU twin ↔ kernels.
+//! The published generators, narrow, whole: PyTorch ↔ CPU reference ↔ kernels.
 
 use crate::hashed::{self, cases};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
@@ -6,10 +6,11 @@ use crate::{common, fixed, run_network};
 use bouncelight::net::arch;
 use bouncelight::net::convert::{Arch, Norm};
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Pipelines, Source, Tuned, Variant};
+use bouncelight::net::gpu::{
+    Choice, Facts, Kernel, Network, Options, Permutation, Pipelines, Setup, Source, Tuned, Variant,
+};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::{self, Plan, Precision};
-use std::sync::Arc;
 
 fn generator(name: &str, width: u32) -> Graph {
     match name {
@@ -29,18 +30,23 @@ fn check_generators(ways: &[Options]) {
         let weights = hashed::network(&generator(&name, 4));
         for case in cases {
             let input = hashed::input(&name, 12, case.size);
-            let twin = cpu::run(&weights, &input).unwrap();
-            let e = case.error(&twin);
+            let by_cpu = cpu::run(&weights, &input).unwrap();
+            let e = case.error(&by_cpu);
             println!("{name} {:?}: CPU {e:.1e}", case.size);
             assert!(e <= TOLERANCE, "{name} {:?} on the CPU: relative error {e}", case.size);
             let Some(gpu) = &gpu else { continue };
             for &options in ways {
                 let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
-                let handles = (&gpu.device, &gpu.queue);
-                let network =
-                    Network::sharing(handles, &weights, case.size, options, Arc::default(), pipelines.clone()).unwrap();
+                let network = Network::new(
+                    &gpu.device,
+                    &gpu.queue,
+                    &weights,
+                    case.size,
+                    Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
+                )
+                .unwrap();
                 let found = run_network(gpu, &network, &input);
-                let e = case.error(&found).max(hashed::error(&found.data, &twin.data));
+                let e = case.error(&found).max(hashed::error(&found.data, &by_cpu.data));
                 println!("{name} {:?}: {options:?} {e:.2e}", case.size);
                 if e > tolerance {
                     faults.push(format!("{name} {:?} {options:?}: relative error {e}", case.size));
@@ -59,13 +65,13 @@ fn the_generators_agree_with_pytorch() {
     check_generators(&[full, HALF, Options { fuse: false, ..full }, Options { fuse: false, ..HALF }]);
 }
 
-/// Needs what `make_operators.py --full` has written, named by `BOUNCELIGHT_FULL`. Times and errors are in docs/network.md.
+/// Needs what `make_operators.py --full` has written, named by `BOUNCELIGHT_FULL`. Times and errors
+/// are in docs/network.md.
 #[test]
 #[ignore = "218 MB of weights and 26 GFLOP"]
 fn the_papers_generator_at_full_width() {
     let Some(path) = std::env::var_os("BOUNCELIGHT_FULL") else {
-        println!("SKIP: BOUNCELIGHT_FULL is not set");
-        return;
+        return common::skip(common::Need::Generator, "BOUNCELIGHT_FULL is not set");
     };
     let Some(gpu) = common::gpu() else { return };
     let (cases, _) = hashed::cases_at(path.as_ref());
@@ -73,7 +79,7 @@ fn the_papers_generator_at_full_width() {
     for case in &cases["pix2pix_group"] {
         let input = hashed::input("pix2pix_group", 12, case.size);
         for (options, tolerance) in [(Options::default(), TOLERANCE), (HALF, TOLERANCE_HALF)] {
-            let network = Network::with_options(&gpu.device, &gpu.queue, &weights, case.size, options).unwrap();
+            let network = Network::new(&gpu.device, &gpu.queue, &weights, case.size, options).unwrap();
             let start = std::time::Instant::now();
             let found = run_network(&gpu, &network, &input);
             let (e, seconds) = (case.error(&found), start.elapsed().as_secs_f64());
@@ -99,8 +105,9 @@ fn another_norm_is_noticed() {
     assert!(case.error(&cpu::run(&other, &input).unwrap()) > 100.0 * TOLERANCE_HALF);
 }
 
-/// On a GPU every convolution of the paper's generator, down to 4×2 pixels, has a permutation of at least 128 workgroups in one
-/// dispatch, and its parts of sums, written and read, move less than it moves anyhow.
+/// On a GPU every convolution of the paper's generator, down to 4×2 pixels, has a permutation of at
+/// least 128 workgroups in one dispatch, and its parts of sums, written and read, move less than it
+/// moves anyhow.
 #[test]
 fn small_pictures_can_fill_a_gpu() {
     let plan = Plan::new(&generator("pix2pix_group", 64), 1024, 512).unwrap();
@@ -136,7 +143,8 @@ fn small_pictures_can_fill_a_gpu() {
 /// Weights of all phases of a transposed convolution that are more than one binding holds go into several dispatches.
 #[test]
 fn weights_are_bound_in_pieces_that_fit() {
-    let up = serde_json::json!({"op": "conv_transpose2d", "name": "u", "input": "input", "output": "y", "in_channels": 2048,
+    let up = serde_json::json!({"op": "conv_transpose2d", "name": "u", "input": "input", "output": "y",
+        "in_channels": 2048,
         "out_channels": 1024, "kernel": [4, 4], "stride": 2, "padding": 1});
     let graph = hashed::graphs(&serde_json::json!({"g": {"input_channels": 2048, "ops": [up]}})).remove("g").unwrap();
     let plan = Plan::new(&graph, 4, 2).unwrap();
@@ -180,7 +188,8 @@ fn the_papers_generator_counted_by_hand() {
     let plan = Plan::new(&graph, 1024, 512).unwrap();
     let of = |word: &str| plan.rows().iter().filter(|r| r.kind.contains(word)).map(|r| r.flops).sum::<u64>();
     assert_eq!(of("conv") + of("transposed"), down + up + last);
-    // No tensor is copied to be joined or enlarged, and none read again to be measured: 16 convolutions and 13 norms of two steps each.
+    // No tensor is copied to be joined or enlarged, and none read again to be measured: 16
+    // convolutions and 13 norms of two steps each.
     assert_eq!(plan.steps.len(), 16 + 13 * 2);
     // Everything lives in one binding of WebGPU's default size, and in half of it in 16 bits.
     let half = plan::Options { precision: Precision::F16, ..plan::Options::default() };

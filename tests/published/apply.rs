@@ -195,9 +195,8 @@ fn what_cannot_be_applied() {
 #[test]
 fn the_authors_pictures() {
     let Some(shared) = common::shared() else { return };
-    let ready = Command::new("python3").args(["-c", "import torch, PIL"]).output();
-    if !ready.is_ok_and(|out| out.status.success()) {
-        return println!("SKIP: python3 with torch and Pillow");
+    if !common::python(common::Need::Torch, "torch, PIL") {
+        return;
     }
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().expect("a temporary path is text").to_string();

@@ -1,4 +1,5 @@
-//! Published generators: from a PyTorch state dict to a weights file to a picture, against PyTorch and through the program.
+//! Published generators: from a PyTorch state dict to a weights file to a picture, against PyTorch
+//! and through the program.
 #![cfg(feature = "cli")]
 
 mod apply;

@@ -1,10 +1,11 @@
 //! How far two noisy pictures of the same thing lie apart, noise taken off.
 //!
-//! Ours come as two independent halves A and B, theirs as two independent renders C and D. With d the true difference,
-//! every product of one of ours-minus-theirs with the other, (A − C)(B − D), has the expectation d² exactly: no noise is
-//! in both factors, so no noise level has to be estimated and subtracted. Its mean over the pixels is the mean square
-//! difference, its spread over them gives the error bar. (A − D)(B − C) is as good; the mean of both is used.
-//! Averages over tiles of neighbours first see smaller differences, where those keep their sign over a tile.
+//! Ours come as two independent halves A and B, theirs as two independent renders C and D. With d
+//! the true difference, every product of one of ours-minus-theirs with the other, (A − C)(B − D),
+//! has the expectation d² exactly: no noise is in both factors, so no noise level has to be
+//! estimated and subtracted. Its mean over the pixels is the mean square difference, its spread
+//! over them gives the error bar. (A − D)(B − C) is as good; the mean of both is used. Averages
+//! over tiles of neighbours first see smaller differences, where those keep their sign over a tile.
 
 use crate::stats::{Mean, Random};
 

@@ -1,4 +1,5 @@
-//! Scenes as they should not be: the picture stays finite, and right where there is a right answer, or an error says why not.
+//! Scenes as they should not be: the picture stays finite, and right where there is a right answer,
+//! or an error says why not.
 
 use crate::harness::{Options, Sums, lab};
 use crate::scenes::*;
@@ -109,7 +110,8 @@ fn a_camera_inside_a_wall_sees_darkness() {
     }
 }
 
-/// Light neither leaks nor gets caught in the rounding of coordinates, whatever the scale or the distance from the origin.
+/// Light neither leaks nor gets caught in the rounding of coordinates, whatever the scale or the
+/// distance from the origin.
 #[test]
 fn furnaces_of_all_sizes_glow_alike() {
     for scale in [1e-4f32, 1.0, 1e4] {
@@ -124,7 +126,8 @@ fn furnaces_of_all_sizes_glow_alike() {
     light.assert_is("furnace six kilometres away", 2.0);
 }
 
-/// Twelve million triangles are more than WebGPU's default limits hold: an error that says so, before any memory is taken.
+/// Twelve million triangles are more than WebGPU's default limits hold: an error that says so,
+/// before any memory is taken.
 #[test]
 fn a_million_instances_are_refused_with_a_reason() {
     let Some(lab) = lab() else { return };

@@ -29,8 +29,9 @@ fn a_closed_sphere_glows_with_one_over_one_minus_albedo() {
     }
 }
 
-/// Thousands of samples of few points, through the host as `render` uses it: no sample may get lost on the way. Mesa's CPU
-/// driver ends the loops of an invocation that works too long without saying so.
+/// Thousands of samples of few points, through the host as `render` uses it: no sample may get lost
+/// on the way. Mesa's CPU driver ends the loops of an invocation that works too long without saying
+/// so.
 #[test]
 fn many_samples_of_few_points_lose_nothing() {
     let Some(lab) = lab() else { return };
@@ -79,9 +80,10 @@ fn white_bodies_vanish_in_white_surroundings() {
     }
 }
 
-/// As above for the specular lobe: a metal that reflects everything at every angle, and a white dielectric, whose diffuse
-/// part has what the specular part leaves. Single scattering between microfacets alone would lose 60 % at roughness 1
-/// seen squarely; what remains is the error of the fit that gives it back, at most 0.023 by its own account.
+/// As above for the specular lobe: a metal that reflects everything at every angle, and a white
+/// dielectric, whose diffuse part has what the specular part leaves. Single scattering between
+/// microfacets alone would lose 60 % at roughness 1 seen squarely; what remains is the error of the
+/// fit that gives it back, at most 0.023 by its own account.
 #[test]
 fn white_metal_and_white_plastic_lose_no_light() {
     let Some(lab) = lab() else { return };

@@ -1,6 +1,6 @@
-//! Runs the path tracer's kernel at given points of a picture and keeps both halves of what comes back. It has a host of
-//! its own, a page long, because it wants what no picture needs: each half by itself, and the pixel filter around
-//! chosen points.
+//! Runs the path tracer's kernel at given points of a picture and keeps both halves of what comes
+//! back. It has a host of its own, a page long, because it wants what no picture needs: each half
+//! by itself, and the pixel filter around chosen points.
 
 use crate::stats::Mean;
 use bouncelight::gpu::{Gpu, readback, shaders};
@@ -17,10 +17,13 @@ pub struct Lab {
     busy: Mutex<()>,
 }
 
-/// The lab, or `None` after a visible `SKIP`.
+/// The lab, or `None` after a skip, which each test says for itself.
 pub fn lab() -> Option<&'static Lab> {
-    static LAB: OnceLock<Option<Lab>> = OnceLock::new();
-    LAB.get_or_init(|| crate::common::gpu().map(Lab::new)).as_ref()
+    static LAB: OnceLock<Lab> = OnceLock::new();
+    match LAB.get() {
+        None => crate::common::gpu().map(|gpu| LAB.get_or_init(|| Lab::new(gpu))),
+        lab => lab,
+    }
 }
 
 impl Lab {

@@ -69,7 +69,8 @@ fn a_panel_lights_the_floor_by_lamberts_formula() {
     }
 }
 
-/// The sun is a disc; its irradiance on a tilted surface is that on one that faces it, times the cosine, whatever its size.
+/// The sun is a disc; its irradiance on a tilted surface is that on one that faces it, times the
+/// cosine, whatever its size.
 #[test]
 fn sunlight_goes_with_the_cosine() {
     let Some(lab) = lab() else { return };

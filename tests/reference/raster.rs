@@ -1,5 +1,5 @@
-//! The rasteriser's direct light, shadow maps and all, against the path tracer at zero bounces: the same analytic lights,
-//! the same pixel filter, the same camera.
+//! The rasteriser's direct light, shadow maps and all, against the path tracer at zero bounces: the
+//! same analytic lights, the same pixel filter, the same camera.
 
 use crate::harness::{Lab, Options, Traced, lab};
 use bouncelight::render::capture::{CapturedFrame, Layer, Picture};
@@ -21,8 +21,9 @@ struct Numbers {
     counted: f64,
 }
 
-/// A pixel is away from penumbrae where nothing happens in the 5×5 around it: normals within 2.5°, albedo within 0.03, and
-/// light within 20 % + 3 % of its mean in both pictures. A shadow that one of them lacks is flat in both, and counts.
+/// A pixel is away from penumbrae where nothing happens in the 5×5 around it: normals within 2.5°,
+/// albedo within 0.03, and light within 20 % + 3 % of its mean in both pictures. A shadow that one
+/// of them lacks is flat in both, and counts.
 fn away(
     picture: &dyn Fn(usize, usize) -> [f32; 2],
     normal: &Picture,

@@ -142,7 +142,8 @@ fn textured(image: &[u8]) -> Glb {
 #[test]
 fn materials() {
     let mut glb = textured(&png([10, 20, 30, 255], 4, 2));
-    let turned = json!({"KHR_texture_transform": {"offset": [0.1, 0.2], "rotation": std::f32::consts::FRAC_PI_2, "scale": [2.0, 3.0]}});
+    let turned = json!({"KHR_texture_transform": {"offset": [0.1, 0.2], "rotation": std::f32::consts::FRAC_PI_2,
+        "scale": [2.0, 3.0]}});
     glb.json["materials"] = json!([{
         "name": "all of it", "alphaMode": "MASK", "alphaCutoff": 0.25, "doubleSided": true,
         "pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 0.4], "metallicFactor": 0.5, "roughnessFactor": 0.6,
@@ -150,7 +151,8 @@ fn materials() {
         "normalTexture": {"index": 0, "scale": 0.7, "extensions": turned},
         "occlusionTexture": {"index": 0, "strength": 0.8},
         "emissiveTexture": {"index": 0}, "emissiveFactor": [1.0, 0.5, 0.0],
-        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8000.0}, "KHR_materials_ior": {"ior": 1.0}},
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8000.0},
+            "KHR_materials_ior": {"ior": 1.0}},
     }]);
     let scene = load(&glb);
     let m = &scene.materials[0];
@@ -320,8 +322,10 @@ fn nodes_move_as_their_animation_says() {
     let channel =
         |node: usize, path: &str, sampler: usize| json!({"sampler": sampler, "target": {"node": node, "path": path}});
     glb.json["animations"] = json!([
-        {"name": "up", "samplers": [{"input": times, "output": places}], "channels": [channel(1, "translation", 0), channel(3, "translation", 0)]},
-        {"name": "broken", "samplers": [{"input": times, "output": 99}], "channels": [channel(1, "translation", 0), channel(1, "weights", 7)]},
+        {"name": "up", "samplers": [{"input": times, "output": places}],
+            "channels": [channel(1, "translation", 0), channel(3, "translation", 0)]},
+        {"name": "broken", "samplers": [{"input": times, "output": 99}],
+            "channels": [channel(1, "translation", 0), channel(1, "weights", 7)]},
     ]);
     let mut scene = load(&glb);
     let rig = scene.rig.clone().expect("it moves");

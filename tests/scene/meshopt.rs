@@ -4,8 +4,9 @@
 use bouncelight::scene::{self, Scene, SceneError};
 use serde_json::{Value, json};
 
+use crate::common::shared_path;
 use crate::glb::load_bytes;
-use crate::shared::{assert_sound, shared};
+use crate::shared::assert_sound;
 
 /// A case of `tests/fixtures/meshopt/cases.json`.
 fn case(name: &str) -> Value {
@@ -24,12 +25,13 @@ fn length(base64: &Value) -> usize {
     text.len() / 4 * 3 - text.bytes().filter(|b| *b == b'=').count()
 }
 
-/// A strip of 70 vertices, positions and triangles compressed. Buffers 0 and 1 have the packed bytes, 2 and 3 stand for the
-/// unpacked ones.
+/// A strip of 70 vertices, positions and triangles compressed. Buffers 0 and 1 have the packed
+/// bytes, 2 and 3 stand for the unpacked ones.
 fn strip(extension: &str, version: &str) -> Value {
     let cases = [case(version), case("strip of 4 bytes")];
     let view = |i: usize| {
-        let packed = json!({"buffer": i, "byteLength": length(&cases[i]["packed"]), "byteStride": cases[i]["byteStride"],
+        let packed = json!({"buffer": i, "byteLength": length(&cases[i]["packed"]),
+            "byteStride": cases[i]["byteStride"],
             "count": cases[i]["count"], "mode": cases[i]["mode"], "filter": cases[i]["filter"]});
         json!({"buffer": i + 2, "byteLength": length(&cases[i]["unpacked"]), "extensions": {extension: packed}})
     };
@@ -140,7 +142,7 @@ fn files_made_by_gltfpack_load() {
     for (name, meshes, triangles, (low, high)) in
         [("dream-apartment", 67, 177_934, apartment), ("hotel", 11, 99_029, hotel)]
     {
-        let Some(path) = shared(&format!("real/meshopt/{name}.glb")) else { continue };
+        let Some(path) = shared_path(&format!("real/meshopt/{name}.glb")) else { continue };
         let scene = scene::load(path.to_str().expect("a path")).unwrap_or_else(|e| panic!("{e}"));
         assert_sound(&scene);
         let count: usize = scene.meshes.iter().map(|m| m.indices.len() / 3).sum();

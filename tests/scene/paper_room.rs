@@ -4,7 +4,8 @@ use bouncelight::scene::{self, LightKind, Scene, paper_room};
 use glam::{DMat3, DMat4, DQuat, DVec3, Mat4, Vec3};
 use serde_json::Value;
 
-use crate::shared::{assert_sound, hausdorff, shared, unique, world_points};
+use crate::common::shared_path;
+use crate::shared::{assert_sound, hausdorff, unique, world_points};
 
 const NUMBERS: &str = include_str!("../fixtures/paper_room/numbers.json");
 const PRIMITIVES: &str = include_str!("../fixtures/paper_room/primitives.json");
@@ -136,7 +137,7 @@ fn light_sky_and_lens_are_the_papers() {
 fn rooms_are_those_that_blender_exported() {
     let mut seen = 0;
     for index in [2u32, 3, 4, 5] {
-        let Some(path) = shared(&format!("reference/cycles/paper_{index:04}/scene.glb")) else { continue };
+        let Some(path) = shared_path(&format!("reference/cycles/paper_{index:04}/scene.glb")) else { continue };
         let theirs = scene::gltf::load(&path).expect("the reference's glb");
         let ours = paper_room::scene(index);
         assert_eq!(ours.instances.len(), theirs.instances.len());
@@ -165,7 +166,7 @@ fn rooms_are_those_that_blender_exported() {
     assert!(seen == 4 || seen == 0, "some of the references are missing");
     if seen > 0 {
         // Negative control: the neighbouring room is another one.
-        let path = shared("reference/cycles/paper_0002/scene.glb").expect("was there");
+        let path = shared_path("reference/cycles/paper_0002/scene.glb").expect("was there");
         let theirs = scene::gltf::load(&path).expect("the reference's glb");
         let other = paper_room::scene(3);
         assert!(other.instances.iter().zip(&theirs.instances).any(|(a, b)| a.name != b.name));

@@ -2,10 +2,11 @@
 
 use bouncelight::scene::{self, Scene};
 
-use crate::shared::{assert_sound, shared};
+use crate::common::shared_path;
+use crate::shared::assert_sound;
 
 fn load(relative: &str) -> Option<Scene> {
-    let path = shared(relative)?;
+    let path = shared_path(relative)?;
     let scene = scene::load(path.to_str().expect("a readable path")).unwrap_or_else(|e| panic!("{e}"));
     assert_sound(&scene);
     println!(

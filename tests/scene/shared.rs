@@ -1,21 +1,7 @@
 //! What several of the scene tests need.
 
-use std::path::PathBuf;
-
 use bouncelight::scene::Scene;
 use glam::{Mat4, Vec3};
-
-/// A path below the folder of material that is not part of the repository, or `None` with a visible skip.
-pub fn shared(relative: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("BOUNCELIGHT_SHARED")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
-    let path = root.join(relative);
-    if !path.exists() {
-        println!("SKIP: {} is not here", path.display());
-        return None;
-    }
-    Some(path)
-}
 
 /// World positions of the vertices that instance `i` uses.
 pub fn world_points(scene: &Scene, i: usize) -> Vec<Vec3> {

@@ -1,5 +1,6 @@
 //! A screen for tests: Xvfb on a free number, or a visible skip.
 
+use crate::common::{Need, skip};
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
@@ -10,10 +11,7 @@ pub struct Display {
 }
 
 impl Display {
-    /// Starts one; `None` after a visible `SKIP` where Xvfb is missing.
-    ///
-    /// # Panics
-    /// When `REQUIRE_GPU=1`, as in continuous integration, on Linux without Xvfb.
+    /// Starts one; `None` after a [`skip`] where Xvfb is missing.
     pub fn open() -> Option<Self> {
         let command = Command::new("Xvfb")
             .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
@@ -23,9 +21,7 @@ impl Display {
         let mut server = match command {
             Ok(server) => server,
             Err(e) => {
-                let needed = cfg!(target_os = "linux") && std::env::var("REQUIRE_GPU").is_ok_and(|v| v == "1");
-                assert!(!needed, "REQUIRE_GPU=1, but Xvfb does not start: {e}");
-                println!("SKIP: Xvfb does not start ({e}); on Debian: apt-get install xvfb");
+                skip(Need::Screen, format_args!("Xvfb does not start ({e}); on Debian: apt-get install xvfb"));
                 return None;
             }
         };
@@ -45,17 +41,5 @@ impl Drop for Display {
     fn drop(&mut self) {
         let _ = self.server.kill();
         let _ = self.server.wait();
-    }
-}
-
-/// As `tests/common`: an adapter, or a visible skip.
-pub fn gpu() -> Option<bouncelight::gpu::Gpu> {
-    match bouncelight::gpu::Gpu::open(&Default::default()) {
-        Ok(gpu) => Some(gpu),
-        Err(e) if std::env::var("REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("REQUIRE_GPU=1, but: {e}"),
-        Err(e) => {
-            println!("SKIP: {e}");
-            None
-        }
     }
 }

@@ -2,6 +2,8 @@
 
 #![recursion_limit = "512"]
 
+#[path = "../common/mod.rs"]
+mod common;
 mod display;
 mod rays;
 mod session;
@@ -12,11 +14,12 @@ use serde_json::json;
 use session::{mean, session, succeeds};
 use std::process::Command;
 
-/// The required half of the viewer in one session: loading, keys, orbiting, flying, light, objects, a file that is no scene,
-/// a dropped scene, sizes, loss of surface and device, and that nothing is drawn when nothing happens.
+/// The required half of the viewer in one session: loading, keys, orbiting, flying, light, objects,
+/// a file that is no scene, a dropped scene, sizes, loss of surface and device, and that nothing is
+/// drawn when nothing happens.
 #[test]
 fn a_session_with_mouse_and_keys() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("bad.glb"), b"glTF\x02\0\0\0\xff\0\0\0").unwrap();
     let script = json!([
@@ -26,36 +29,46 @@ fn a_session_with_mouse_and_keys() {
         { "save": { "frames": "/frames", "scene": "/scene_frames" } }, { "wait": 30 },
         { "expect_saved": { "frames": "/frames", "scene": "/scene_frames" } },
         // Keys choose what is shown; a view of the same frame draws no scene.
-        { "key": "3" }, { "wait": "idle" }, { "expect": { "/view": "normal" } }, { "expect_saved": { "scene": "/scene_frames" } },
+        { "key": "3" }, { "wait": "idle" }, { "expect": { "/view": "normal" } },
+        { "expect_saved": { "scene": "/scene_frames" } },
         { "expect_not_saved": { "frames": "/frames" } }, { "screenshot": "normal.png" },
-        { "key": "1" }, { "key": "." }, { "key": "." }, { "key": "T" }, { "expect": { "/exposure": 0.5, "/tonemap": "agx" } },
-        { "key": "P" }, { "wait": "idle" }, { "expect": { "/panel": false, "/size": [480, 300] } }, { "screenshot": "picture.png" },
+        { "key": "1" }, { "key": "." }, { "key": "." }, { "key": "T" },
+        { "expect": { "/exposure": 0.5, "/tonemap": "agx" } },
+        { "key": "P" }, { "wait": "idle" }, { "expect": { "/panel": false, "/size": [480, 300] } },
+        { "screenshot": "picture.png" },
         // Hands move the camera: drag orbits, the wheel comes nearer, W flies.
         { "save": { "eye": "/camera/eye", "target": "/camera/target" } },
         { "drag": [[240, 150], [250, 150], [280, 160]] }, { "wait": "idle" },
         { "expect_not_saved": { "eye": "/camera/eye" } }, { "expect_saved": { "target": "/camera/target" } },
         { "expect": { "/camera/file": null } },
-        { "save": { "eye": "/camera/eye" } }, { "wheel": 2 }, { "wait": "idle" }, { "expect_not_saved": { "eye": "/camera/eye" } },
-        { "save": { "target": "/camera/target" } }, { "hold": "W" }, { "wait": 3 }, { "release": "W" }, { "wait": "idle" },
+        { "save": { "eye": "/camera/eye" } }, { "wheel": 2 }, { "wait": "idle" },
+        { "expect_not_saved": { "eye": "/camera/eye" } },
+        { "save": { "target": "/camera/target" } }, { "hold": "W" }, { "wait": 3 }, { "release": "W" },
+        { "wait": "idle" },
         { "expect_not_saved": { "target": "/camera/target" } },
         // In flight the wheel changes the speed and leaves the eye where it is.
         { "key": "G" }, { "save": { "speed": "/camera/speed", "eye": "/camera/eye" } }, { "wheel": 1 },
-        { "expect_not_saved": { "speed": "/camera/speed" } }, { "expect_saved": { "eye": "/camera/eye" } }, { "key": "G" },
+        { "expect_not_saved": { "speed": "/camera/speed" } }, { "expect_saved": { "eye": "/camera/eye" } },
+        { "key": "G" },
         { "key": "C" }, { "wait": "idle" }, { "expect": { "/camera/file": 0 } },
         // Select and move an object; undo.
-        { "click": [240, 230] }, { "expect": { "/selected": { "min": 0 } } }, { "key": "Right" }, { "expect": { "/scene/moved": 1 } },
+        { "click": [240, 230] }, { "expect": { "/selected": { "min": 0 } } }, { "key": "Right" },
+        { "expect": { "/scene/moved": 1 } },
         { "key": "U" }, { "expect": { "/scene/moved": 0 } }, { "key": "Escape" }, { "expect": { "/selected": null } },
         // A method switch builds beside the window and then shows.
-        { "key": "M" }, { "wait": "idle" }, { "expect": { "/left": "ssgi", "/drawn/left": "ssgi", "/passes": { "contains": "ssgi" } } },
+        { "key": "M" }, { "wait": "idle" }, { "expect": { "/left": "ssgi", "/drawn/left": "ssgi",
+            "/passes": { "contains": "ssgi" } } },
         // A bad file is told and the old scene stays; a good name replaces it.
         { "drop": "bad.glb" }, { "wait": "idle" },
         { "expect": { "/scene/spec": "cornell", "/messages": { "contains": "bad.glb" }, "/errors": 1 } },
-        { "key": "Escape" }, { "drop": "paper-room:3" }, { "wait": "idle" }, { "expect": { "/scene/spec": "paper-room:3" } },
+        { "key": "Escape" }, { "drop": "paper-room:3" }, { "wait": "idle" },
+        { "expect": { "/scene/spec": "paper-room:3" } },
         // The sun turns under Ctrl and drag.
         { "save": { "lights": "/scene/lights" } }, { "drag": [[240, 150], [200, 140], [180, 140]], "keys": "Ctrl" },
         { "wait": "idle" }, { "expect_not_saved": { "lights": "/scene/lights" } },
         // Sizes, as a window manager throws them at a window; then none at all.
-        { "resize": [300, 200] }, { "resize": [500, 240] }, { "resize": [170, 400] }, { "resize": [321, 243] }, { "wait": 20 },
+        { "resize": [300, 200] }, { "resize": [500, 240] }, { "resize": [170, 400] }, { "resize": [321, 243] },
+        { "wait": 20 },
         { "wait": "idle" }, { "expect": { "/window": [321, 243], "/size": [321, 243] } },
         { "minimise": true }, { "wait": 5 }, { "minimise": false }, { "wait": "idle" },
         { "lose": "surface" }, { "wait": "idle" },
@@ -82,12 +95,14 @@ fn a_session_with_mouse_and_keys() {
 /// F12, Shift+F12, and the command line that draws the very same picture, edits of lights and objects included.
 #[test]
 fn the_copied_command_draws_the_same_picture() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
         { "wait": "loaded" }, { "key": "P" }, { "wait": "idle" },
-        { "drag": [[120, 75], [140, 80]] }, { "drag": [[120, 75], [90, 70]], "keys": "Ctrl" }, { "click": [120, 110] }, { "key": "Right" },
-        { "key": "." }, { "wait": "idle" }, { "screenshot": "window.png" }, { "key": "K" }, { "expect": { "/copied": { "contains": "--eye=" } } },
+        { "drag": [[120, 75], [140, 80]] }, { "drag": [[120, 75], [90, 70]], "keys": "Ctrl" },
+        { "click": [120, 110] }, { "key": "Right" },
+        { "key": "." }, { "wait": "idle" }, { "screenshot": "window.png" }, { "key": "K" },
+        { "expect": { "/copied": { "contains": "--eye=" } } },
         { "key": "F12" }, { "wait": "idle" }, { "expect": { "/captured": { "contains": ".png" } } },
         { "key": "Shift+F12" }, { "wait": "idle" }, { "expect": { "/captured": { "contains": ".exr" } } }
     ]);
@@ -132,7 +147,7 @@ fn the_copied_command_draws_the_same_picture() {
 /// The split, the live reference, the error map with its numbers.
 #[test]
 fn methods_and_the_live_reference_side_by_side() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
         { "wait": "loaded" }, { "key": "P" }, { "wait": "idle" },
@@ -140,11 +155,14 @@ fn methods_and_the_live_reference_side_by_side() {
         { "save": { "line": "/line", "eye": "/camera/eye" } }, { "drag": [[56, 50], [66, 50], [80, 52]] },
         { "expect_not_saved": { "line": "/line" } }, { "expect_saved": { "eye": "/camera/eye" } },
         { "key": "9" }, { "wait": "idle" },
-        { "expect": { "/view": "error", "/reference/samples": 4, "/reference/finished": true, "/verdict/psnr": { "min": 8.0, "max": 30.0 } } },
+        { "expect": { "/view": "error", "/reference/samples": 4, "/reference/finished": true,
+            "/verdict/psnr": { "min": 8.0, "max": 30.0 } } },
         { "screenshot": "error.png" },
         // Another camera begins anew.
-        { "key": "1" }, { "key": "V" }, { "wait": 60 }, { "wait": "idle" }, { "expect": { "/reference/finished": true } },
-        { "key": "0" }, { "key": "0" }, { "wait": "idle" }, { "expect": { "/view": "feature", "/feature": { "contains": "`direct.1`" } } },
+        { "key": "1" }, { "key": "V" }, { "wait": 60 }, { "wait": "idle" },
+        { "expect": { "/reference/finished": true } },
+        { "key": "0" }, { "key": "0" }, { "wait": "idle" },
+        { "expect": { "/view": "feature", "/feature": { "contains": "`direct.1`" } } },
     ]);
     let out = session(&display, dir.path(), script, &["cornell", "--method", "direct", "--size", "112x84"]);
     succeeds(&out);

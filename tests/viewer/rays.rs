@@ -1,12 +1,13 @@
 //! A method that sends rays: the window draws before there are any, and with them once there are.
 
-use super::display::{self, Display};
+use super::common;
+use super::display::Display;
 use super::session::{session, succeeds};
 use serde_json::json;
 
 #[test]
 fn rays_take_over_when_their_trees_are_there() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
         { "wait": "loaded" }, { "wait": "idle" },

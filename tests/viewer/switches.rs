@@ -1,6 +1,7 @@
 //! What can be switched, dropped and changed under the window's feet while it runs.
 
-use super::display::{self, Display};
+use super::common;
+use super::display::Display;
 use super::session::{mean, printed, session, session_with, succeeds};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -25,7 +26,7 @@ fn sky(rgbe: [u8; 4]) -> Vec<u8> {
 /// frontier's dots; the flicker meter; light theme.
 #[test]
 fn methods_weights_and_views_switch_at_run_time() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("bad.safetensors"), b"not at all").unwrap();
     let script = json!([
@@ -46,14 +47,16 @@ fn methods_weights_and_views_switch_at_run_time() {
         { "key": "Shift+N" }, { "key": "Shift+N" }, { "key": "Shift+B" },
         // Weights that are none are told; others are used at once.
         { "drop": "bad.safetensors" }, { "wait": "idle" },
-        { "expect": { "/left": "ambient", "/weights": null, "/errors": 1, "/messages": { "contains": "bad.safetensors" } } },
+        { "expect": { "/left": "ambient", "/weights": null, "/errors": 1,
+            "/messages": { "contains": "bad.safetensors" } } },
         { "key": "Escape" }, { "wait": 2 },
         { "drop": shipped() }, { "wait": "idle" },
         { "expect": { "/left": "neural", "/drawn/left": "neural", "/weights": { "contains": "small" }, "/errors": 0 } },
         { "save": { "passes": "/passes" } },
         // What goes in, what `gather` makes of it, and what layers make of that.
         { "key": "0" }, { "wait": "idle" }, { "expect": { "/feature": { "contains": "of 24" } } },
-        { "key": "L" }, { "wait": "idle" }, { "expect": { "/view": "layer", "/feature": { "contains": "layer 1 of" } } },
+        { "key": "L" }, { "wait": "idle" }, { "expect": { "/view": "layer",
+            "/feature": { "contains": "layer 1 of" } } },
         { "key": "L" }, { "wait": "idle" }, { "expect": { "/feature": { "contains": "layer 2 of" } } },
         { "screenshot": "layer.png" }, { "key": "1" },
         { "drop": other() }, { "wait": "idle" }, { "expect": { "/weights": { "contains": "unet" } } },
@@ -68,7 +71,7 @@ fn methods_weights_and_views_switch_at_run_time() {
 /// Left and right of the line are two methods' pictures: each half is that of the method alone.
 #[test]
 fn a_split_shows_two_raster_methods() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("sky.hdr"), sky([0, 128, 255, 129])).unwrap();
     let script = json!([
@@ -109,7 +112,7 @@ fn a_split_shows_two_raster_methods() {
 /// `--watch`: the scene, the weights and a shader change; what is broken is told and the old state stays.
 #[test]
 fn watched_files_are_loaded_again_and_broken_ones_told() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     let quad = |z: f32| format!("v -1 -1 {z}\nv 1 -1 {z}\nv 0 1 {z}\nf 1 2 3\n");
@@ -128,20 +131,25 @@ fn watched_files_are_loaded_again_and_broken_ones_told() {
     std::fs::write(at("bad.wgsl"), ambient + "\nfn broken( {\n").unwrap();
     let shader = "shaders/gi/ambient.wgsl";
     let script = json!([
-        { "wait": "loaded" }, { "wait": "idle" }, { "expect": { "/scene/objects": 1, "/left": "ambient" } }, { "wait": 80 },
+        { "wait": "loaded" }, { "wait": "idle" }, { "expect": { "/scene/objects": 1, "/left": "ambient" } },
+        { "wait": 80 },
         { "copy": ["two.obj", "scene.obj"] }, { "until": { "/scene/objects": 2 } }, { "wait": "idle" },
         { "copy": ["bad.obj", "scene.obj"] }, { "until": { "/errors": 1 } }, { "wait": "idle" },
         { "expect": { "/scene/objects": 2, "/messages": { "contains": "scene.obj" } } }, { "key": "Escape" },
         { "copy": ["bad.wgsl", shader] }, { "until": { "/errors": 1 } }, { "wait": "idle" },
-        { "expect": { "/drawn/left": "ambient", "/loaded": true, "/left": "ambient", "/messages": { "contains": "gi/ambient.wgsl:" } } },
+        { "expect": { "/drawn/left": "ambient", "/loaded": true, "/left": "ambient",
+            "/messages": { "contains": "gi/ambient.wgsl:" } } },
         { "screenshot": "broken.png" },
-        { "key": "Escape" }, { "save": { "built": "/built" } }, { "copy": ["good.wgsl", shader] }, { "wait": 80 }, { "wait": "idle" },
+        { "key": "Escape" }, { "save": { "built": "/built" } }, { "copy": ["good.wgsl", shader] }, { "wait": 80 },
+        { "wait": "idle" },
         { "expect": { "/errors": 0, "/drawn/left": "ambient" } }, { "expect_not_saved": { "built": "/built" } },
         { "drop": "net.safetensors" }, { "wait": "idle" }, { "expect": { "/drawn/left": "neural" } }, { "wait": 80 },
-        { "save": { "passes": "/passes", "built": "/built" } }, { "copy": ["junk", "net.safetensors"] }, { "until": { "/errors": 1 } },
+        { "save": { "passes": "/passes", "built": "/built" } }, { "copy": ["junk", "net.safetensors"] },
+        { "until": { "/errors": 1 } },
         { "wait": "idle" }, { "expect": { "/drawn/left": "neural", "/messages": { "contains": "net.safetensors" } } },
         { "expect_saved": { "built": "/built" } }, { "key": "Escape" },
-        { "copy": ["other.safetensors", "net.safetensors"] }, { "wait": 80 }, { "wait": "idle" }, { "expect": { "/errors": 0 } },
+        { "copy": ["other.safetensors", "net.safetensors"] }, { "wait": 80 }, { "wait": "idle" },
+        { "expect": { "/errors": 0 } },
         { "expect_not_saved": { "built": "/built", "passes": "/passes" } }
     ]);
     let args = ["scene.obj", "--watch", "--method", "ambient", "--size", "220x160"];
@@ -150,26 +158,29 @@ fn watched_files_are_loaded_again_and_broken_ones_told() {
     succeeds(&out);
 }
 
-/// A window of no size, other densities, and a long measurement: the overlay is not laid out for every frame, and a drag moves
-/// the camera all the same.
+/// A window of no size, other densities, and a long measurement: the overlay is not laid out for
+/// every frame, and a drag moves the camera all the same.
 #[test]
 fn sizes_densities_and_the_overlays_own_cost() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
         { "wait": "loaded" }, { "wait": "idle" }, { "expect": { "/density_drawn": 1.0, "/window": [480, 300] } },
         { "resize": [0, 0] }, { "wait": 10 }, { "save": { "frames": "/frames" } }, { "key": "3" }, { "wait": 10 },
         { "expect_saved": { "frames": "/frames" } },
-        { "resize": [420, 260] }, { "wait": 10 }, { "wait": "idle" }, { "expect": { "/window": [420, 260], "/view": "normal" } },
+        { "resize": [420, 260] }, { "wait": 10 }, { "wait": "idle" },
+        { "expect": { "/window": [420, 260], "/view": "normal" } },
         { "expect_not_saved": { "frames": "/frames" } },
-        { "save": { "size": "/size" } }, { "scale": 2.0 }, { "key": "1" }, { "wait": "idle" }, { "screenshot": "double.png" },
+        { "save": { "size": "/size" } }, { "scale": 2.0 }, { "key": "1" }, { "wait": "idle" },
+        { "screenshot": "double.png" },
         { "expect": { "/density_drawn": 2.0, "/window": [420, 260] } }, { "expect_not_saved": { "size": "/size" } },
         { "scale": 1.0 }, { "key": "1" }, { "wait": "idle" }, { "expect": { "/density_drawn": 1.0 } },
         { "expect_saved": { "size": "/size" } },
         // Frame after frame.
         { "resize": [380, 120] }, { "wait": 10 }, { "wait": "idle" }, { "key": "B" }, { "wait": 20 },
         { "print": ["/layouts", "/frames", "/camera/eye/0"] },
-        { "press": [20, 50] }, { "move": [25, 50] }, { "wait": 60 }, { "move": [30, 50] }, { "move": [35, 50] }, { "wait": 2 },
+        { "press": [20, 50] }, { "move": [25, 50] }, { "wait": 60 }, { "move": [30, 50] }, { "move": [35, 50] },
+        { "wait": 2 },
         { "print": ["/layouts", "/frames", "/camera/eye/0", "/overlay_ms", "/cpu_ms"] },
         { "move": [40, 50] }, { "lift": [40, 50] }, { "key": "B" }, { "wait": "idle" }, { "print": ["/camera/eye/0"] }
     ]);
@@ -187,13 +198,16 @@ fn sizes_densities_and_the_overlays_own_cost() {
 /// A path is recorded while hands move the camera, written, dropped again and played.
 #[test]
 fn a_camera_path_is_recorded_and_played() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
-        { "wait": "loaded" }, { "key": "P" }, { "wait": "idle" }, { "key": "Y" }, { "expect": { "/path/playing": false } },
+        { "wait": "loaded" }, { "key": "P" }, { "wait": "idle" }, { "key": "Y" },
+        { "expect": { "/path/playing": false } },
         { "key": "R" }, { "expect": { "/path/recording": true } }, { "save": { "start": "/camera/eye/0" } },
-        { "drag": [[100, 75], [110, 75], [130, 75], [150, 75]] }, { "wait": "idle" }, { "save": { "end": "/camera/eye" } },
-        { "key": "R" }, { "expect": { "/path/recording": false, "/path/keys": { "min": 2 }, "/messages": { "contains": "camera-0001.json" } } },
+        { "drag": [[100, 75], [110, 75], [130, 75], [150, 75]] }, { "wait": "idle" },
+        { "save": { "end": "/camera/eye" } },
+        { "key": "R" }, { "expect": { "/path/recording": false, "/path/keys": { "min": 2 },
+            "/messages": { "contains": "camera-0001.json" } } },
         { "key": "V" }, { "wait": "idle" }, { "expect_not_saved": { "end": "/camera/eye" } },
         { "drop": "camera-0001.json" }, { "key": "Y" }, { "expect": { "/path/playing": true } },
         { "until": { "/path/playing": false } }, { "wait": "idle" }, { "expect_saved": { "end": "/camera/eye" } },
@@ -235,7 +249,7 @@ fn a_camera_path_is_recorded_and_played() {
 /// A file with an animation and two variants: both change the picture, and the copied command draws what is seen.
 #[test]
 fn animations_play_and_variants_change_materials() {
-    let (Some(_), Some(display)) = (display::gpu(), Display::open()) else { return };
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
     let dir = tempfile::tempdir().unwrap();
     let numbers: Vec<f32> = [
         // A triangle, two times, two places.
@@ -245,15 +259,22 @@ fn animations_play_and_variants_change_materials() {
     ]
     .concat();
     std::fs::write(dir.path().join("scene.bin"), bytes(&numbers)).unwrap();
-    let material = |r: f32, b: f32| json!({ "pbrMetallicRoughness": { "baseColorFactor": [r, 0.05, b, 1.0] }, "doubleSided": true });
+    let material = |r: f32, b: f32| {
+        json!({ "pbrMetallicRoughness": { "baseColorFactor": [r, 0.05, b, 1.0] },
+        "doubleSided": true })
+    };
     let view = |offset: u32, length: u32| json!({ "buffer": 0, "byteOffset": offset, "byteLength": length });
-    let accessor = |view: u32, count: u32, kind: &str| json!({ "bufferView": view, "componentType": 5126, "count": count, "type": kind });
+    let accessor = |view: u32, count: u32, kind: &str| {
+        json!({ "bufferView": view, "componentType": 5126,
+        "count": count, "type": kind })
+    };
     let mappings = json!({ "mappings": [{ "material": 1, "variants": [0] }] });
     let file = json!({
         "asset": { "version": "2.0" }, "extensionsUsed": ["KHR_materials_variants"],
         "extensions": { "KHR_materials_variants": { "variants": [{ "name": "in blue" }] } },
         "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "name": "flag", "mesh": 0 }],
-        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0, "extensions": { "KHR_materials_variants": mappings } }] }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0,
+            "extensions": { "KHR_materials_variants": mappings } }] }],
         "materials": [material(0.8, 0.05), material(0.05, 0.8)],
         "buffers": [{ "uri": "scene.bin", "byteLength": 4 * numbers.len() }],
         "bufferViews": [view(0, 36), view(36, 8), view(44, 24)],
@@ -263,14 +284,17 @@ fn animations_play_and_variants_change_materials() {
     });
     std::fs::write(dir.path().join("flag.gltf"), file.to_string()).unwrap();
     let script = json!([
-        { "wait": "loaded" }, { "wait": "idle" }, { "expect": { "/scene/animations": 1, "/scene/variants": ["in blue"], "/scene/pose": null } },
+        { "wait": "loaded" }, { "wait": "idle" },
+        { "expect": { "/scene/animations": 1, "/scene/variants": ["in blue"], "/scene/pose": null } },
         { "key": "P" }, { "wait": "idle" }, { "screenshot": "rest.png" }, { "save": { "frames": "/scene_frames" } },
         { "key": "I" }, { "until": { "/scene/pose/1": { "min": 0.3 } } }, { "key": "I" }, { "wait": "idle" },
         { "expect_not_saved": { "frames": "/scene_frames" } }, { "save": { "pose": "/scene/pose" } }, { "wait": 10 },
         { "expect_saved": { "pose": "/scene/pose" } }, { "screenshot": "risen.png" },
-        { "variant": 0 }, { "wait": "idle" }, { "expect": { "/scene/variant": 0 } }, { "expect_saved": { "pose": "/scene/pose" } },
+        { "variant": 0 }, { "wait": "idle" }, { "expect": { "/scene/variant": 0 } },
+        { "expect_saved": { "pose": "/scene/pose" } },
         { "screenshot": "blue.png" }, { "key": "K" },
-        { "expect": { "/copied": { "contains": "--animation=0" } } }, { "expect": { "/copied": { "contains": "'--variant=in blue'" } } },
+        { "expect": { "/copied": { "contains": "--animation=0" } } },
+        { "expect": { "/copied": { "contains": "'--variant=in blue'" } } },
         { "key": "F12" }, { "wait": "idle" }, { "key": "U" }, { "wait": "idle" },
         { "expect": { "/scene/variant": null, "/scene/pose": null } }, { "screenshot": "again.png" }
     ]);

@@ -65,8 +65,10 @@ pub fn weights() -> Vec<File> {
         "output": {"tensor": "y", "meaning": "log_irradiance_over_exposure", "channels": 3},
         "graph": [
             {"op": "conv2d", "name": "a", "input": "input", "output": "h", "in_channels": 4, "out_channels": 4,
-             "kernel": [3, 3], "stride": 1, "padding": 1, "activation": "relu", "add": "input", "add_at": "after_activation"},
-            {"op": "conv2d", "name": "b", "input": "h", "output": "y", "in_channels": 4, "out_channels": 3, "kernel": [1, 1]}
+             "kernel": [3, 3], "stride": 1, "padding": 1, "activation": "relu", "add": "input",
+             "add_at": "after_activation"},
+            {"op": "conv2d", "name": "b", "input": "h", "output": "y", "in_channels": 4, "out_channels": 3,
+                "kernel": [1, 1]}
         ],
         "provenance": {"command": "none", "seed": 1}
     });
@@ -82,7 +84,8 @@ pub fn weights() -> Vec<File> {
 fn every_operator() -> File {
     let signed = |name: &str| json!({"name": name, "channels": 3, "encoding": "signed"});
     let document = json!({
-        "version": 2, "name": "every operator", "licence": "CC0-1.0", "table": {"name": "images", "version": 1}, "cell": 1,
+        "version": 2, "name": "every operator", "licence": "CC0-1.0", "table": {"name": "images", "version": 1},
+        "cell": 1,
         "inputs": [signed("depth"), signed("direct")],
         "output": {"tensor": "y", "meaning": "display_signed", "channels": 3},
         "graph": [
@@ -102,7 +105,8 @@ fn every_operator() -> File {
             {"op": "pad", "name": "p", "input": "ps", "output": "p", "padding": [1, 1, 0, 0]},
             {"op": "upsample_nearest", "name": "un", "input": "p", "output": "un", "scale": 2},
             {"op": "upsample_bilinear", "name": "ub", "input": "un", "output": "ub", "size_as": "input"},
-            {"op": "conv2d", "name": "o", "input": "ub", "output": "o", "in_channels": 16, "out_channels": 6, "kernel": [1, 1]},
+            {"op": "conv2d", "name": "o", "input": "ub", "output": "o", "in_channels": 16, "out_channels": 6,
+                "kernel": [1, 1]},
             {"op": "add", "name": "sum", "inputs": ["o", "input"], "output": "s", "activation": "exp"},
             {"op": "dropout", "name": "drop", "input": "s", "output": "dr", "p": 0.5},
             {"op": "activation", "name": "act", "input": "dr", "output": "t", "activation": "tanh"},

@@ -1,7 +1,7 @@
 //! Hostile weights files and state dicts: no panic, no hang, no memory beyond a small multiple of the file.
 //!
-//! `WEIGHTS_FUZZ_CASES` and `WEIGHTS_FUZZ_SEED` make a longer run; `weights-format/README.md` records one. The allocator
-//! counts for the whole program, so this binary has one test.
+//! `WEIGHTS_FUZZ_CASES` and `WEIGHTS_FUZZ_SEED` make a longer run; `weights-format/README.md`
+//! records one. The allocator counts for the whole program, so this binary has one test.
 
 mod corpus;
 mod mutate;
@@ -21,7 +21,8 @@ static MEMORY: PeakAlloc = PeakAlloc;
 /// Cases of an ordinary test run.
 const CASES: u64 = 6_000;
 const SEED: u64 = 20_260_101;
-/// Longest that one file may take. The honest ones take about a millisecond; a loaded machine may stop any of them for a while.
+/// Longest that one file may take. The honest ones take about a millisecond; a loaded machine may
+/// stop any of them for a while.
 const SLOWEST: Duration = Duration::from_secs(3);
 
 /// Most memory that reading a file may take: bytes become f32, which is four times as much, plus one tensor of scales;

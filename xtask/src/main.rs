@@ -1,15 +1,17 @@
 //! `cargo xtask demo | test | gpu-report | ci`: set-up and checks; no product code.
 //!
-//! Every command first sees to a wgpu adapter: it asks `bouncelight doctor`, and on Debian or Ubuntu without any adapter
-//! it installs Mesa's CPU driver, saying so before it does.
+//! Every command first makes sure of a wgpu adapter: it asks `bouncelight doctor`, and on Debian or
+//! Ubuntu without any adapter it installs Mesa's CPU driver, saying so before it does.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::process::{Command, ExitCode};
 
 const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   demo   draw the bundled interior with the shipped weights: out/demo.png and a timing table
-  test   every test (an adapter is seen to first; REQUIRE_GPU=1 makes a missing one an error)
+  test   every test, and which were skipped (an adapter is made sure of first; REQUIRE_GPU=1 makes a missing one an
+         error, REQUIRE_ALL=1 all that .ci/run installs)
   gpu-report [--dev] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] [--triangles N,...] [--out FOLDER] [--no-pytorch]
          measures on this device all that docs/ projects: docs/measured/DEVICE.json and DEVICE.md, in less than eight minutes
          (--dev builds without release's optimisation: for rehearsals)
@@ -42,15 +44,34 @@ fn main() -> ExitCode {
 fn demo() -> Result<(), String> {
     let program = ["--release", "--bin", "bouncelight"];
     cargo(&[["build"].as_slice(), &program].concat())?;
-    see_to_adapter(&["--release"])?;
+    make_sure_of_adapter(&["--release"])?;
     cargo(&[["run", "--quiet"].as_slice(), &program, &["--", "demo"]].concat())
 }
 
 fn test() -> Result<(), String> {
     cargo(&["build", "--bin", "bouncelight"])?;
-    see_to_adapter(&[])?;
-    see_to_display()?;
-    cargo(&["test", "--workspace"])
+    make_sure_of_adapter(&[])?;
+    make_sure_of_display()?;
+    // Tests append what they skip to this file: `tests/common`.
+    let skips = std::env::current_exe().map_err(|e| format!("own path: {e}"))?.with_file_name("skips.txt");
+    if skips.exists() {
+        std::fs::remove_file(&skips).map_err(|e| format!("{}: {e}", skips.display()))?;
+    }
+    let tested = run(command("cargo", &["test", "--workspace"]).env("SKIP_LOG", &skips));
+    print_skips(&std::fs::read_to_string(&skips).unwrap_or_default());
+    tested
+}
+
+/// How many tests were skipped for want of what; a line is that and the test, maybe more than once.
+fn print_skips(lines: &str) {
+    let mut tests: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for (need, test) in lines.lines().filter_map(|line| line.split_once('\t')) {
+        tests.entry(need).or_default().insert(test);
+    }
+    println!("xtask: {} tests were skipped", tests.values().flatten().collect::<BTreeSet<_>>().len());
+    for (need, tests) in tests {
+        println!("  {:3} for want of: {need} ({})", tests.len(), tests.into_iter().collect::<Vec<_>>().join(", "));
+    }
 }
 
 /// Everything that the documentation projects, measured on the device at hand.
@@ -59,7 +80,7 @@ fn gpu_report(mut args: Vec<String>) -> Result<(), String> {
     args.retain(|a| a != "--dev");
     let build = ["build", "--bin", "bouncelight", "--example", "gpu_report"];
     cargo(&[&build, profile].concat())?;
-    see_to_adapter(profile)?;
+    make_sure_of_adapter(profile)?;
     // A source that is not committed has no name that others could find.
     let git = |words: &[&str]| command("git", words).output().ok().filter(|o| o.status.success());
     let clean = git(&["status", "--porcelain", "--untracked-files=no"]).is_some_and(|o| o.stdout.is_empty());
@@ -76,7 +97,7 @@ fn ci() -> Result<(), String> {
 }
 
 /// Makes sure that an adapter answers; installs Mesa's CPU driver where that is a matter of one package.
-fn see_to_adapter(profile: &[&str]) -> Result<(), String> {
+fn make_sure_of_adapter(profile: &[&str]) -> Result<(), String> {
     if doctor(profile)? {
         return Ok(());
     }
@@ -90,7 +111,7 @@ fn see_to_adapter(profile: &[&str]) -> Result<(), String> {
 }
 
 /// The viewer's tests need an X server without a screen, and what a window under X loads at run time.
-fn see_to_display() -> Result<(), String> {
+fn make_sure_of_display() -> Result<(), String> {
     let runs = |program: &str| Command::new(program).arg("-help").output().is_ok();
     if runs("Xvfb") || !std::path::Path::new("/etc/debian_version").exists() {
         return Ok(());

@@ -1,5 +1,6 @@
 // One step of AdamW (Loshchilov and Hutter 2019) on clipped gradients, and the average over steps.
-// From the prelude: BETA_1, BETA_2, TINY, DECAY, CLIP. `job.unbias` is 1 / (1 − βⁿ) in the n-th step, `job.keep` what the average keeps.
+// From the prelude: BETA_1, BETA_2, TINY, DECAY, CLIP. `job.unbias` is 1 / (1 − βⁿ) in the n-th
+// step, `job.keep` what the average keeps.
 //#import net/learn/job.wgsl
 
 const THREADS = 256u;
@@ -27,7 +28,8 @@ fn norm(@builtin(local_invocation_index) local: u32) {
 }
 
 @compute @workgroup_size(64)
-fn step(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+fn step(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32) {
     let i = element(group, groups, local);
     if i >= job.total { return; }
     let gradient = numbers[GRADIENT * job.total + i] * numbers[RESULT * job.total + 3u];

@@ -1,11 +1,12 @@
-// A convolution, its activation, and the way back to what it read and to its weights. One thread makes one number, so that every sum
-// has one order and two runs are the same to the bit.
+// A convolution, its activation, and the way back to what it read and to its weights. One thread
+// makes one number, so that every sum has one order and two runs are the same to the bit.
 //#import net/learn/job.wgsl
 
 fn places() -> u32 { return job.out_size.x * job.out_size.y; }
 
 @compute @workgroup_size(64)
-fn forward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+fn forward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32) {
     let index = element(group, groups, local);
     if index >= places() * job.out_channels { return; }
     let channel = index / places();
@@ -29,16 +30,19 @@ fn forward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups:
     values[job.output + index] = select(job.slope * sum, sum, sum > 0.0);
 }
 
-// Slopes of what the activation made become those of what it was given. Activations here keep the sign, so what they made tells.
+// Slopes of what the activation made become those of what it was given. Activations here keep the
+// sign, so what they made tells.
 @compute @workgroup_size(64)
-fn activation(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+fn activation(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32) {
     let index = element(group, groups, local);
     if index >= places() * job.out_channels { return; }
     if values[job.output + index] <= 0.0 { slopes[job.output + index] *= job.slope; }
 }
 
 @compute @workgroup_size(64)
-fn to_input(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+fn to_input(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32) {
     let index = element(group, groups, local);
     let plane = job.in_size.x * job.in_size.y;
     if index >= plane * job.in_channels { return; }
@@ -65,7 +69,8 @@ fn to_input(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups
 
 // A thread for each weight, then one for each bias.
 @compute @workgroup_size(64)
-fn to_weights(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+fn to_weights(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32) {
     let index = element(group, groups, local);
     let taps = job.kernel.x * job.kernel.y;
     let weights = job.out_channels * job.in_channels * taps;
@@ -87,7 +92,9 @@ fn to_weights(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) grou
         if y >= job.in_size.y { continue; }
         for (var ox = 0u; ox < job.out_size.x; ox++) {
             let x = u32(i32(ox * job.stride) + tap.x);
-            if x < job.in_size.x { sum += slopes[output + oy * job.out_size.x + ox] * values[input + y * job.in_size.x + x]; }
+            if x < job.in_size.x {
+                sum += slopes[output + oy * job.out_size.x + ox] * values[input + y * job.in_size.x + x];
+            }
         }
     }
     numbers[gradients + job.weight + index] += sum;

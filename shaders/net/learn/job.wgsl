@@ -1,4 +1,5 @@
-// What every kernel of learning is told (`net::learn::tape::Job`), and where numbers lie: f32, channel by channel, rows from the top.
+// What every kernel of learning is told (`net::learn::tape::Job`), and where numbers lie: f32,
+// channel by channel, rows from the top.
 
 struct Job {
     in_size: vec2u,
@@ -33,8 +34,9 @@ const NONE = 0xffffffffu;
 // Every tensor of the network, and the slope of the loss in each of its values.
 @group(0) @binding(1) var<storage, read_write> values: array<f32>;
 @group(0) @binding(2) var<storage, read_write> slopes: array<f32>;
-// Sections of `total` numbers: what is learnt, two moments, the average over steps, gradients; then results: the step's loss,
-// what a picture's slopes are multiplied with, the gradients' norm, what they are multiplied with, the loss as if no picture were too loud.
+// Sections of `total` numbers: what is learnt, two moments, the average over steps, gradients; then
+// results: the step's loss, what a picture's slopes are multiplied with, the gradients' norm, what
+// they are multiplied with, the loss as if no picture were too loud.
 @group(0) @binding(3) var<storage, read_write> numbers: array<f32>;
 // Guess and target (three planes each, light in units of the exposure) and which cells count (one plane).
 @group(0) @binding(4) var<storage, read> picture: array<f32>;

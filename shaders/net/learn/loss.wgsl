@@ -1,6 +1,6 @@
-// The loss of an answer that means gain and rest, as training/bouncelight_training/losses.py has it: the square of the error relative to
-// the light itself, which has its least value at the mean of noisy targets (Lehtinen et al. 2018).
-// From the prelude: MOST_GAIN, MOST_REST, EPSILON, LOUD.
+// The loss of an answer that means gain and rest, as training/bouncelight_training/losses.py has
+// it: the square of the error relative to the light itself, which has its least value at the mean
+// of noisy targets (Lehtinen et al. 2018). From the prelude: MOST_GAIN, MOST_REST, EPSILON, LOUD.
 //#import net/learn/job.wgsl
 
 const THREADS = 256u;
@@ -54,7 +54,8 @@ fn measure(@builtin(local_invocation_index) local: u32) {
 }
 
 @compute @workgroup_size(64)
-fn spread(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+fn spread(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32) {
     let index = element(group, groups, local);
     if index >= 3u * cells() { return; }
     let channel = index / cells();

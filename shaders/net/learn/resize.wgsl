@@ -11,7 +11,8 @@ fn place(at: u32, size: u32, other: u32) -> Place {
 }
 
 @compute @workgroup_size(64)
-fn forward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+fn forward(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32) {
     let index = element(group, groups, local);
     let places = job.out_size.x * job.out_size.y;
     if index >= places * job.out_channels { return; }
@@ -38,7 +39,8 @@ fn range(at: u32, size: u32, other: u32) -> vec2u {
 }
 
 @compute @workgroup_size(64)
-fn to_input(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) local: u32) {
+fn to_input(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32) {
     let index = element(group, groups, local);
     let plane = job.in_size.x * job.in_size.y;
     if index >= plane * job.in_channels { return; }

@@ -6,7 +6,7 @@
 //! [`reconstruct`](crate::gi::reconstruct)'s). Where those four mostly disagree the 4×4 cells around are blended in. Background pixels
 //! get 0. A workgroup reads each cell around its 8×8 pixels once, into its shared memory.
 
-use crate::gi::interface::rung::Cost;
+use crate::gi::interface::technique::Cost;
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
 use crate::gi::stage::weights::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};

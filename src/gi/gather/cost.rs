@@ -2,7 +2,7 @@
 
 use super::bring::BringPass;
 use super::{Options, PAST, store};
-use crate::gi::interface::rung::Cost;
+use crate::gi::interface::technique::Cost;
 use crate::gi::stage::cells::{self, CellsPass};
 
 /// Blocks that a look reads (nearest hit, line to a light, line to an entry's beginning), and steps of threads that wait for the

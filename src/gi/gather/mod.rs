@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Of each 2×2 cells one in turn sends a second ray, into its surface's lobe: what lobes show goes the same way beside the light
-//! ([`Rung::gloss`]).
+//! ([`Technique::gloss`]).
 //!
 //! It asks what stands between, so it needs no constant for that. What it knows of a surface that a ray meets is one colour a
 //! triangle; how finely it knows the light between surfaces is the size of an entry's cell; the rest is noise, which frames and
@@ -25,7 +25,7 @@ mod store;
 pub use options::{Options, OptionsError};
 pub use params::Params;
 
-use crate::gi::interface::rung::{Cost, Rung};
+use crate::gi::interface::technique::{Cost, Technique};
 use crate::gi::interface::{GiError, Inputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells::{self, CellsPass};
@@ -251,7 +251,7 @@ impl GatherGi {
     }
 }
 
-impl Rung for GatherGi {
+impl Technique for GatherGi {
     fn record(
         &mut self,
         recorder: &mut Recorder<'_>,

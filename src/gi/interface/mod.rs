@@ -2,7 +2,7 @@
 
 mod conventions;
 mod error;
-pub mod rung;
+pub mod technique;
 
 pub use conventions::{
     AlbedoEncoding, Conventions, Depth, Jitter, LightScale, MotionJitter, MotionSense, MotionUnits, NormalEncoding,
@@ -59,7 +59,7 @@ pub struct Inputs<'a> {
     /// moves on the screen starts anew where plane or normal differ, and drags its light where not.
     pub motion: Option<&'a wgpu::TextureView>,
     /// `Rgba8Unorm(Srgb)`: F0 and perceptual roughness, for methods that find what lobes show
-    /// ([`Rung::gloss`](rung::Rung::gloss)). `None`: no lobes.
+    /// ([`Technique::gloss`](technique::Technique::gloss)). `None`: no lobes.
     pub specular: Option<&'a wgpu::TextureView>,
     /// The picture has nothing to do with the one before (a cut): what is remembered of pixels is
     /// forgotten first.

@@ -1,7 +1,7 @@
-//! A method that needs rays, and the rung below it, which draws where there are none: while trees are built, in a scene or on a
-//! device that is too large or too small for them.
+//! A method that needs rays, and the method below it, which draws where there are none: while trees
+//! are built, in a scene or on a device that is too large or too small for them.
 
-use crate::gi::interface::rung::{Cost, Instead, Rung};
+use crate::gi::interface::technique::{Cost, Instead, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::screen::ssgi::{SsgiGi, SsgiOptions};
 use crate::gpu::timing::Recorder;
@@ -10,10 +10,10 @@ use crate::net::gpu::Tap;
 /// The method, or why the device cannot have it, with what draws instead.
 pub(super) struct OrBelow {
     device: wgpu::Device,
-    above: Result<Box<dyn Rung>, String>,
+    above: Result<Box<dyn Technique>, String>,
     /// Made when it is first needed.
     below: Option<SsgiGi>,
-    /// Why the last frame is of the rung below.
+    /// Why the last frame is of the method below.
     why: Option<String>,
     /// That is for the size of the picture.
     too_small: bool,
@@ -21,21 +21,21 @@ pub(super) struct OrBelow {
 
 impl OrBelow {
     /// `above`: the method, or one sentence that says what the device lacks for it.
-    pub fn new(device: &wgpu::Device, above: Result<Box<dyn Rung>, String>) -> Self {
+    pub fn new(device: &wgpu::Device, above: Result<Box<dyn Technique>, String>) -> Self {
         let why = above.as_ref().err().cloned();
         Self { device: device.clone(), above, below: None, why, too_small: false }
     }
 
     /// What drew the last frame.
-    fn drew(&self) -> Option<&dyn Rung> {
+    fn drew(&self) -> Option<&dyn Technique> {
         match (&self.why, &self.above) {
             (None, Ok(above)) => Some(above.as_ref()),
-            _ => self.below.as_ref().map(|b| b as &dyn Rung),
+            _ => self.below.as_ref().map(|b| b as &dyn Technique),
         }
     }
 }
 
-impl Rung for OrBelow {
+impl Technique for OrBelow {
     fn record(
         &mut self,
         recorder: &mut Recorder<'_>,

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// The record, version 1. With feature `io` it is read from and written to TOML; a host without it can bring it in by `serde`.
+/// The record, version 1. With feature `io` it is read from and written to TOML; a host without it
+/// can bring it in by `serde`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fitted {
@@ -22,7 +23,8 @@ pub struct Fitted {
     /// Numbers of `gather` that differ from its own, as `render --gather` takes them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gather: Option<String>,
-    /// Numbers of unseen light that were fitted to the scene, for `ambient` and `ssgi`, as `render --unseen` takes them.
+    /// Numbers of unseen light that were fitted to the scene, for `ambient` and `ssgi`, as `render
+    /// --unseen` takes them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unseen: Option<String>,
     /// Frames of a still camera after which the target was met, for methods that settle; 1 for others.
@@ -117,8 +119,8 @@ pub const SCHEMA: u32 = 1;
 const MOST_FRAMES: u32 = 65_536;
 
 impl Fitted {
-    /// Where the record of a scene lies: `SCENE.gi.toml` beside a file (`flat.glb.gi.toml`); for a name, in the current folder
-    /// (`interior.gi.toml`, `paper-room-2.gi.toml`).
+    /// Where the record of a scene lies: `SCENE.gi.toml` beside a file (`flat.glb.gi.toml`); for a
+    /// name, in the current folder (`interior.gi.toml`, `paper-room-2.gi.toml`).
     pub fn path(scene: &str) -> PathBuf {
         let name = if scene.starts_with("paper-room:") { scene.replace(':', "-") } else { scene.to_owned() };
         format!("{name}.gi.toml").into()
@@ -147,8 +149,8 @@ impl Fitted {
         Ok(Method::Neural(Box::new(Neural::from(weights))))
     }
 
-    /// Why it is time to ask again instead of obeying: the scene, whose hash is `scene` now, or the weights are not those that were
-    /// measured. `None` where it stands.
+    /// Why it is time to ask again instead of obeying: the scene, whose hash is `scene` now, or the
+    /// weights are not those that were measured. `None` where it stands.
     ///
     /// # Errors
     /// As [`Fitted::method`], but for weights that have changed.
@@ -233,7 +235,8 @@ impl Fitted {
 
     /// As TOML, with a comment that says what it is.
     pub fn text(&self) -> String {
-        let what = "# Written by `bouncelight fit`: the cheapest method that is good enough for this scene. `render`, `view` and `bench`\n\
+        let what = "# Written by `bouncelight fit`: the cheapest method that is good enough for this scene. \
+            `render`, `view` and `bench`\n\
                     # obey it as long as the scene has this hash; `--method` overrides it. When the scene or its light changes, fit again.\n";
         // Texts, numbers and tables of them: nothing here can fail.
         format!("{what}{}", toml::to_string(self).unwrap_or_default())

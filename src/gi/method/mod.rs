@@ -5,7 +5,7 @@ pub mod fitted;
 pub mod name;
 
 use super::gather::{self, GatherGi};
-use super::interface::{GiError, rung::Rung};
+use super::interface::{GiError, technique::Technique};
 use super::neural::pass::{self, NeuralGi, Options};
 use super::screen::{
     ambient::{AmbientGi, Unseen},
@@ -73,7 +73,7 @@ pub fn build(
     queue: &wgpu::Queue,
     size: [u32; 2],
     method: &Method,
-) -> Result<Option<Box<dyn Rung>>, GiError> {
+) -> Result<Option<Box<dyn Technique>>, GiError> {
     Ok(match method {
         Method::Direct => None,
         Method::Ambient => Some(Box::new(AmbientGi::new(device))),
@@ -85,12 +85,12 @@ pub fn build(
         }
         Method::Gather(options) => {
             let above = GatherGi::check(&device.limits(), size, options);
-            let above = above.map(|()| Box::new(GatherGi::new(device, size, *options)) as Box<dyn Rung>);
+            let above = above.map(|()| Box::new(GatherGi::new(device, size, *options)) as Box<dyn Technique>);
             Some(Box::new(OrBelow::new(device, above.map_err(|e| e.to_string()))))
         }
         Method::Neural(neural) if method.needs_rays() => {
             let above = match GatherGi::check(&device.limits(), size, &Default::default()) {
-                Ok(()) => Ok(Box::new(NeuralGi::with(device, queue, neural, Options { size })?) as Box<dyn Rung>),
+                Ok(()) => Ok(Box::new(NeuralGi::with(device, queue, neural, Options { size })?) as Box<dyn Technique>),
                 Err(lacks) => Err(lacks.to_string()),
             };
             Some(Box::new(OrBelow::new(device, above)))

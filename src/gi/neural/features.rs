@@ -14,10 +14,11 @@ pub struct FeatureInfo {
     pub doc: &'static str,
 }
 
-/// Table `screen` v1, in channel order. A cell is 4×4 pixels; cell (i, j) samples pixel (4i+2, 4j+2), or the last row or
-/// column where that lies outside. `s` and `m` (e^ln_m) are [`Exposure`](crate::gi::stage::exposure::Exposure)'s. Texels that are
-/// NaN or infinite read as 0, radiances below 0 too. Where the sample is background all but `hit` and `sky` are 0, and
-/// `hit` says so.
+/// Table `screen` v1, in channel order. A cell is 4×4 pixels; cell (i, j) samples pixel (4i+2,
+/// 4j+2), or the last row or column where that lies outside. `s` and `m` (e^ln_m) are
+/// [`Exposure`](crate::gi::stage::exposure::Exposure)'s. Texels that are NaN or infinite read as 0,
+/// radiances below 0 too. Where the sample is background all but `hit` and `sky` are 0, and `hit`
+/// says so.
 pub const FEATURES: [FeatureInfo; 10] = [
     FeatureInfo { name: "direct", channels: 3, doc: "ln(1 + L/s), L = direct diffuse light E/π without albedo" },
     FeatureInfo { name: "outgoing", channels: 3, doc: "ln(1 + (albedo·L + emission)/s)" },

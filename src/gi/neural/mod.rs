@@ -1,7 +1,9 @@
 //! The network's method: features of cells, a U-Net, its answer applied to what `gather` says.
 
+pub mod cpu;
 pub mod features;
 pub mod pack;
 pub mod pass;
+mod rebuilt;
 pub mod reconstruct;
-pub mod twin;
+mod trained;

@@ -14,8 +14,9 @@ pub struct PackPass {
 }
 
 impl PackPass {
-    /// Compiles the shader for `features` and binds `target` (NHWC f32, `features.padded()` channels a cell) and `guess`,
-    /// what method `gather` answers (`Rgba16Float`, of the picture's size; any texture if `features` has no `guess`).
+    /// Compiles the shader for `features` and binds `target` (NHWC f32, `features.padded()`
+    /// channels a cell) and `guess`, what method `gather` answers (`Rgba16Float`, of the picture's
+    /// size; any texture if `features` has no `guess`).
     pub fn new(
         device: &wgpu::Device,
         inputs: &InputGroup,
@@ -67,9 +68,9 @@ pub struct NetworkInputs {
     pub exposure: crate::gi::stage::exposure::Exposure,
 }
 
-/// Computes and reads back the features of one picture, without any network. `guess` is what method `gather` made of the same
-/// inputs, not read if `features` has no `guess`. Makes its own buffers, submits and waits: for the `dataset` command and
-/// tests, not for frames.
+/// Computes and reads back the features of one picture, without any network. `guess` is what method
+/// `gather` made of the same inputs, not read if `features` has no `guess`. Makes its own buffers,
+/// submits and waits: for the `dataset` command and tests, not for frames.
 ///
 /// # Errors
 /// [`GiError`] for inputs that do not fit and for features larger than the device binds.

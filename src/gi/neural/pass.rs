@@ -10,51 +10,32 @@
 //!  rays ──► gather ─► guess ──┴───┴──────────────────────────►┘
 //! ```
 //!
-//! Weights whose answer is a gain on the first guess ([`Answer::Gain`]) have method `gather` run before them, need the scene's
-//! triangles as it does, and settle over frames as it does; weights that answer light itself need the G-buffer alone.
+//! Weights whose answer is a gain on the first guess ([`Answer::Gain`](super::reconstruct::Answer::Gain)) have method `gather` run
+//! before them, need the scene's triangles as it does, and settle over frames as it does; weights
+//! that answer light itself need the G-buffer alone.
 //!
 //! What the method cannot do: see [`crate::gi`].
 
 use super::features::FeatureSet;
-use super::pack::{self, NetworkInputs, PackPass};
-use super::reconstruct::{Answer, ReconstructPass};
+use super::pack::{self, NetworkInputs};
+use super::rebuilt::{Rebuilt, guess_bytes};
+use super::reconstruct::ReconstructPass;
+use super::trained::check_weights;
+pub use super::trained::{Neural, needs_guess};
 use crate::gi::gather::{self, GatherGi};
-use crate::gi::interface::rung::{Cost, Rung};
+use crate::gi::interface::technique::{Cost, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::exposure::ExposurePass;
-use crate::gi::stage::inputs::{CELL, InputGroup, cells_of};
+use crate::gi::stage::inputs::{InputGroup, cells_of};
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
-use crate::net::gpu::{self, Network, Tap, Tuned};
-use std::sync::Arc;
+use crate::net::gpu::{Network, Tap};
 
 /// What the host chooses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// Width and height of the pictures to come, pixels. A recording of another size rebuilds the buffers.
     pub size: [u32; 2],
-}
-
-/// Whether weights have method `gather` run before them, and so need [`Inputs::rays`].
-pub fn needs_guess(weights: &Weights) -> bool {
-    weights.output.meaning == Answer::Gain.name() || weights.inputs.iter().any(|f| f.name == "guess")
-}
-
-/// A network as a frame's method: what was trained, and how it runs.
-#[derive(Debug, Clone)]
-pub struct Neural {
-    /// The trained numbers.
-    pub weights: Weights,
-    /// Kernels and storage. Dropout does not belong into frames; with a seed every frame has the same.
-    pub network: gpu::Options,
-    /// What a tuner has found on this device; empty without one.
-    pub tuned: Arc<Tuned>,
-}
-
-impl From<Weights> for Neural {
-    fn from(weights: Weights) -> Self {
-        Self { weights, network: gpu::Options::default(), tuned: Arc::default() }
-    }
 }
 
 /// The embeddable pass. Keeps clones of device and queue (both are handles) to rebuild on a change of size and to
@@ -74,18 +55,9 @@ pub struct NeuralGi {
     rebuilds: u64,
 }
 
-/// What depends on the size of the picture.
-struct Rebuilt {
-    size: [u32; 2],
-    network: Network,
-    pack: PackPass,
-    /// What `gather` answers; one texel where nobody asks it.
-    guess: wgpu::TextureView,
-}
-
 impl NeuralGi {
-    /// Features that would be used where the adapter has them: timestamps, by hosts that time passes, and what some of the network's
-    /// kernels use. None is needed.
+    /// Features that would be used where the adapter has them: timestamps, by hosts that time
+    /// passes, and what some of the network's kernels use. None is needed.
     pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
         adapter.features() & crate::gpu::wanted_features()
     }
@@ -187,9 +159,9 @@ impl NeuralGi {
         Ok(())
     }
 
-    /// What the network is given for `inputs`, read back; they must be those of the last recording where the weights use the
-    /// first guess. Makes its own buffers, submits and waits: for tools, not for frames. [`pack::read_features`] does the
-    /// same without weights.
+    /// What the network is given for `inputs`, read back; they must be those of the last recording
+    /// where the weights use the first guess. Makes its own buffers, submits and waits: for tools,
+    /// not for frames. [`pack::read_features`] does the same without weights.
     ///
     /// # Errors
     /// [`GiError`] when the inputs do not fit or reading back fails.
@@ -202,8 +174,9 @@ impl NeuralGi {
         self.rebuilt.network.taps().into_iter().map(|(_, name)| name).collect()
     }
 
-    /// What a layer of the network makes of `inputs`, which must be those of the last recording; `None` if there is no such
-    /// layer. Runs the network as far as that layer, submits and waits: for tools, not for frames.
+    /// What a layer of the network makes of `inputs`, which must be those of the last recording;
+    /// `None` if there is no such layer. Runs the network as far as that layer, submits and waits:
+    /// for tools, not for frames.
     ///
     /// # Errors
     /// [`GiError`] when the inputs do not fit or reading back fails.
@@ -295,7 +268,7 @@ impl NeuralGi {
 }
 
 // What a frame of our own sees; hosts that embed the pass use its own methods and need not know the trait.
-impl Rung for NeuralGi {
+impl Technique for NeuralGi {
     fn record(
         &mut self,
         recorder: &mut Recorder<'_>,
@@ -349,59 +322,4 @@ impl Rung for NeuralGi {
     fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
         self.costs(size)
     }
-}
-
-impl Rebuilt {
-    fn new(
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        neural: &Neural,
-        features: &FeatureSet,
-        inputs: &InputGroup,
-        exposure: &ExposurePass,
-        size: [u32; 2],
-    ) -> Result<Self, GiError> {
-        pack::feature_bytes(device, features, size)?;
-        let cells = cells_of(size);
-        let Neural { weights, network, tuned } = neural;
-        let network = Network::tuned(device, queue, weights, cells, *network, tuned.clone())
-            .map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
-        let guess = guess_texture(device, if needs_guess(weights) { size } else { [1, 1] });
-        let pack = PackPass::new(device, inputs, exposure, features, network.input().resource(), &guess);
-        Ok(Self { size, network, pack, guess })
-    }
-}
-
-fn guess_texture(device: &wgpu::Device, size: [u32; 2]) -> wgpu::TextureView {
-    let texture = device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("gi.guess"),
-        size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba16Float,
-        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    });
-    texture.create_view(&Default::default())
-}
-
-fn guess_bytes(size: [u32; 2]) -> u64 {
-    8 * u64::from(size[0]) * u64::from(size[1])
-}
-
-/// The feature set of weights that this pass can run, and what their numbers mean.
-fn check_weights(weights: &Weights) -> Result<(FeatureSet, Answer), GiError> {
-    let table = &weights.table;
-    if (table.name.as_str(), table.version, weights.cell) != ("screen", 1, CELL) {
-        let found = format!("table {} version {}, {} pixels a cell", table.name, table.version, weights.cell);
-        let reason = format!("list is made for {found}; this program makes screen version 1, {CELL} pixels a cell");
-        return Err(GiError::Feature { name: "(all)".into(), reason });
-    }
-    let output = &weights.output;
-    let fits = |a: &Answer| output.meaning == a.name() && output.channels == a.channels();
-    let Some(answer) = [Answer::Light, Answer::Gain].into_iter().find(fits) else {
-        return Err(GiError::Output(format!("{} channels of `{}`", output.channels, output.meaning)));
-    };
-    Ok((FeatureSet::new(weights.inputs.iter().map(|f| (f.name.as_str(), f.channels)))?, answer))
 }

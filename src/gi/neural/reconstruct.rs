@@ -1,9 +1,11 @@
 //! From one answer per 4×4 cell to light at every pixel: a joint bilateral upsampling in f32.
 //!
-//! The four cells around a pixel are weighted bilinearly times how much their sample lies on the pixel's own surface:
-//! distance from the pixel's plane relative to the pixel's depth, and agreement of normals. Where those four mostly
-//! disagree (an edge, something thin) the 4×4 cells around are asked, then 8×8; where even those show only background
-//! the first guess stays, or the ambient constant answers. Background pixels get 0. Cells whose sample is background never give light.
+//! The four cells around a pixel are weighted bilinearly times how much their sample lies on the
+//! pixel's own surface: distance from the pixel's plane relative to the pixel's depth, and
+//! agreement of normals. Where those four mostly disagree (an edge, something thin) the 4×4 cells
+//! around are asked, then 8×8; where even those show only background the first guess stays, or the
+//! ambient constant answers. Background pixels get 0. Cells whose sample is background never give
+//! light.
 
 use crate::gi::interface::GiError;
 use crate::gi::stage::ViewCache;
@@ -23,13 +25,16 @@ pub const LOST: f32 = 1e-3;
 pub enum Answer {
     /// Three numbers y: E/π = s·exp(y), y clamped to [−10, 6].
     Light,
-    /// Six numbers g, r: E/π = guess·exp(g) + s·r at the pixel, not below 0; g clamped to ±[`MOST_GAIN`], r to ±[`MOST_ADDED`].
-    /// The guess is what method `gather` answers at that pixel, so its detail stays.
+    /// Six numbers g, r: E/π = guess·exp(g) + s·r at the pixel, not below 0; g clamped to
+    /// ±[`MOST_GAIN`], r to ±[`MOST_ADDED`]. The guess is what method `gather` answers at that
+    /// pixel, so its detail stays.
     Gain,
 }
 
-/// Largest |g|: a cell makes the guess at most a third brighter or darker. (On rooms 2 to 5 that changes nothing that can be measured; but where a network
-/// meets what it never learnt it does little harm: `small` lit a sharp shadow of room 0 three times too brightly at ±2, paper's L1 38,976 against 18,664.)
+/// Largest |g|: a cell makes the guess at most a third brighter or darker. (On rooms 2 to 5 that
+/// changes nothing that can be measured; but where a network meets what it never learnt it does
+/// little harm: `small` lit a sharp shadow of room 0 three times too brightly at ±2, paper's L1
+/// 38,976 against 18,664.)
 pub const MOST_GAIN: f32 = 0.3;
 /// Largest |r|, in units of the exposure.
 pub const MOST_ADDED: f32 = 0.1;
@@ -110,9 +115,10 @@ impl ReconstructPass {
         Self { device: device.clone(), pipeline, layout, outputs: ViewCache::new() }
     }
 
-    /// Records pass `gi.reconstruct`. `answers` holds what [`Answer`] says, NHWC with the channels padded to a multiple of 4;
-    /// `guess` is the first guess, E/π (`Rgba16Float`, the picture's size; any texture for [`Answer::Light`]). Both must be the same
-    /// until [`forget`](Self::forget). `output` (`Rgba16Float`, storage, full size) becomes E/π.
+    /// Records pass `gi.reconstruct`. `answers` holds what [`Answer`] says, NHWC with the channels
+    /// padded to a multiple of 4; `guess` is the first guess, E/π (`Rgba16Float`, the picture's
+    /// size; any texture for [`Answer::Light`]). Both must be the same until
+    /// [`forget`](Self::forget). `output` (`Rgba16Float`, storage, full size) becomes E/π.
     ///
     /// # Errors
     /// [`GiError::Texture`] when `output` does not fit.

@@ -5,7 +5,7 @@
 
 use super::bitmask::{March, bind};
 use super::occlusion::OcclusionPass;
-use crate::gi::interface::rung::{Cost, Rung};
+use crate::gi::interface::technique::{Cost, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::ViewCache;
 use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry};
@@ -76,7 +76,8 @@ pub fn unseen_prelude(sky: f32, bounce: f32) -> String {
     format!("const SKY = f32({sky:?});\nconst BOUNCE = f32({bounce:?});\n")
 }
 
-/// The method: exposure, occlusion and one write a pixel (`gi.exposure`, `gi.occlusion`, `gi.occlusion_full`, `gi.ambient`).
+/// The method: exposure, occlusion and one write a pixel (`gi.exposure`, `gi.occlusion`,
+/// `gi.occlusion_full`, `gi.ambient`).
 pub struct AmbientGi {
     device: wgpu::Device,
     inputs: InputGroup,
@@ -133,7 +134,7 @@ impl AmbientGi {
     }
 }
 
-impl Rung for AmbientGi {
+impl Technique for AmbientGi {
     fn record(
         &mut self,
         recorder: &mut Recorder<'_>,

@@ -5,7 +5,7 @@
 //! and rounding follow a fixed pattern of 4×4 texels, which the mean of 4×4 texels on the way back cancels; without
 //! history the pattern never moves, so a still picture stays still to the bit.
 
-use crate::gi::interface::rung::Cost;
+use crate::gi::interface::technique::Cost;
 use crate::gi::stage::exposure;
 use crate::gi::stage::exposure::storage_entry;
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
@@ -22,8 +22,8 @@ pub struct March {
     pub reach: f32,
     /// Nothing further from the receiver than this counts, as a multiple of its view distance; the outer half fades.
     pub radius: f32,
-    /// How far behind its front a surface ends at least, as a share of its distance from the eye. A depth buffer does not
-    /// tell; rooms of 100 m with objects of 2 m gave 2 %.
+    /// How far behind its front a surface ends at least, as a share of its distance from the eye. A
+    /// depth buffer does not tell; rooms of 100 m with objects of 2 m gave 2 %.
     pub thickness: f32,
     /// The same as a share of its distance from the receiver: the depth buffer is known as densely as it is sampled.
     pub growth: f32,

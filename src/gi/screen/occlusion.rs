@@ -5,7 +5,7 @@
 //! ([`March::thickness`]), so light passes behind thick things and is held back behind thin ones.
 
 use super::bitmask::{self, Kernel, March, Pattern, Stage, bind, half_of, pattern_entry, write_entry};
-use crate::gi::interface::rung::Cost;
+use crate::gi::interface::technique::Cost;
 use crate::gi::stage::inputs::{BoundInputs, InputGroup, texture_entry};
 use crate::gpu::timing::Recorder;
 
@@ -44,7 +44,8 @@ impl OcclusionPass {
         }
     }
 
-    /// Makes textures for pictures of `size` pixels; true when they are new and groups that bind them must be made anew.
+    /// Makes textures for pictures of `size` pixels; true when they are new and groups that bind
+    /// them must be made anew.
     pub fn fit(&mut self, size: [u32; 2]) -> bool {
         let fresh = self.visibility.fit(&self.device, size) | self.half.fit(&self.device, half_of(size));
         if fresh {

@@ -2,13 +2,14 @@
 //! ([`bitmask`]), and unseen light (the sky and a stand-in for later bounces,
 //! [`ambient`]) through what nothing blocks.
 //!
-//! What it cannot do: anything off the screen or hidden in it. A red wall lights the floor until it leaves the picture; a
-//! roof that is not in view is sky; the back of a lamp shade is dark. Thickness is assumed, so light passes behind thick
-//! things. Surfaces finer than two pixels send and receive through their neighbours.
+//! What it cannot do: anything off the screen or hidden in it. A red wall lights the floor until it
+//! leaves the picture; a roof that is not in view is sky; the back of a lamp shade is dark.
+//! Thickness is assumed, so light passes behind thick things. Surfaces finer than two pixels send
+//! and receive through their neighbours.
 
 use super::ambient;
 use super::bitmask::{self, Kernel, March, Pattern, Stage, bind, half_of, pattern_entry, write_entry};
-use crate::gi::interface::rung::{Cost, Rung};
+use crate::gi::interface::technique::{Cost, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::ViewCache;
 use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry};
@@ -106,7 +107,7 @@ impl SsgiGi {
     }
 }
 
-impl Rung for SsgiGi {
+impl Technique for SsgiGi {
     fn record(
         &mut self,
         recorder: &mut Recorder<'_>,

@@ -8,13 +8,14 @@
 //! `gi.bring` of the method `gather`.
 //!
 //! # The light buffer
-//! Three `vec4f` a cell, one a colour channel: `(bx, by, bz, a)` means E/π(n) = max(0, a + b·n) for a world-space unit
-//! normal n near the cell's own. A sum over emitters, each cut off at the cell's horizon, is exactly a = 0 and
-//! b = Σ L·ω (per π); a spherical harmonic gives a and b. What stands in the rows of cells without a surface is not read.
+//! Three `vec4f` a cell, one a colour channel: `(bx, by, bz, a)` means E/π(n) = max(0, a + b·n) for
+//! a world-space unit normal n near the cell's own. A sum over emitters, each cut off at the cell's
+//! horizon, is exactly a = 0 and b = Σ L·ω (per π); a spherical harmonic gives a and b. What stands
+//! in the rows of cells without a surface is not read.
 
 use super::exposure::{pipeline, storage_entry};
 use super::inputs::{BoundInputs, CELL, InputGroup, cells_of};
-use crate::gi::interface::rung::Cost;
+use crate::gi::interface::technique::Cost;
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
 

@@ -3,7 +3,7 @@
 
 use super::inputs::{BoundInputs, InputGroup};
 use crate::gi::interface::GiError;
-use crate::gi::interface::rung::Cost;
+use crate::gi::interface::technique::Cost;
 use crate::gpu::readback;
 use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;

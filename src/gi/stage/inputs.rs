@@ -53,7 +53,8 @@ impl InputGroup {
         Self::reading(device, false)
     }
 
-    /// As [`InputGroup::new`], for methods that read neither albedo nor light of the picture, which hosts may then leave out.
+    /// As [`InputGroup::new`], for methods that read neither albedo nor light of the picture, which
+    /// hosts may then leave out.
     pub fn geometry(device: &wgpu::Device) -> Self {
         Self::reading(device, true)
     }
@@ -99,8 +100,8 @@ impl InputGroup {
     /// Checks `inputs`, writes their parameters into the next slot and finds or makes their bind group.
     ///
     /// # Errors
-    /// [`GiError::Size`], [`GiError::Camera`], [`GiError::Conventions`], [`GiError::Texture`] or [`GiError::Missing`] for what does
-    /// not fit or is not there.
+    /// [`GiError::Size`], [`GiError::Camera`], [`GiError::Conventions`], [`GiError::Texture`] or
+    /// [`GiError::Missing`] for what does not fit or is not there.
     pub fn bind(&mut self, queue: &wgpu::Queue, inputs: &Inputs<'_>) -> Result<BoundInputs, GiError> {
         let params = Params::of(inputs, self.shift)?;
         formats::check_inputs(inputs)?;

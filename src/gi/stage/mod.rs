@@ -1,5 +1,5 @@
-//! What passes share: the G-buffer as shaders read it, cells, the mean light of a picture, groups kept by view, weights by which
-//! cells light pixels.
+//! What passes share: the G-buffer as shaders read it, cells, the mean light of a picture, groups
+//! kept by view, weights by which cells light pixels.
 
 pub mod cells;
 pub mod exposure;

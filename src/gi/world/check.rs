@@ -233,7 +233,7 @@ impl Evidence<'_> {
 fn decode(texel: Vec3, encoding: NormalEncoding, range: NormalRange) -> Vec3 {
     let v = if range == NormalRange::Unsigned { 2.0 * texel - 1.0 } else { texel };
     match encoding {
-        NormalEncoding::Octahedral => crate::gi::twin::oct_decode([v.x, v.y]).into(),
+        NormalEncoding::Octahedral => crate::gi::cpu::oct_decode([v.x, v.y]).into(),
         NormalEncoding::Xyz => v.normalize_or(Vec3::Z),
         NormalEncoding::Xy => Vec3::new(v.x, v.y, (1.0 - v.x * v.x - v.y * v.y).max(0.0).sqrt()).normalize_or(Vec3::Z),
     }

@@ -8,7 +8,7 @@
 
 mod check;
 mod mesh;
-mod sample;
+pub(crate) mod sample;
 mod view;
 
 pub use check::Complaint;

@@ -13,7 +13,7 @@ pub(super) const SIDE: u32 = 32;
 /// `Sample` of `shaders/gi/check.wgsl`, which documents the fields.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-pub(super) struct Sample {
+pub(crate) struct Sample {
     pub depth: [f32; 4],
     pub normal: [f32; 4],
     pub plane: [f32; 4],

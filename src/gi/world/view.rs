@@ -2,7 +2,7 @@
 
 use super::check::{Complaint, Evidence};
 use super::{World, sample};
-use crate::gi::interface::rung::{Instead, Rung};
+use crate::gi::interface::technique::{Instead, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::method::{self, Method};
 use crate::gi::pass::NeuralGi;
@@ -13,7 +13,7 @@ use crate::gpu::timing::Recorder;
 /// number may share a [`World`], a device and a submission.
 pub struct View {
     queue: wgpu::Queue,
-    rung: Box<dyn Rung>,
+    technique: Box<dyn Technique>,
     size: [u32; 2],
     /// The last frame's camera, and that of the frame before if the last one followed it.
     seen: [Option<Params>; 2],
@@ -37,8 +37,8 @@ impl View {
     /// [`GiError::NoMethod`] for [`Method::Direct`], which adds no light; [`GiError`] where a
     /// network does not fit.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, size: [u32; 2], method: &Method) -> Result<Self, GiError> {
-        let rung = method::build(device, queue, size, method)?.ok_or(GiError::NoMethod(method.name()))?;
-        Ok(Self { queue: queue.clone(), rung, size, seen: [None; 2] })
+        let technique = method::build(device, queue, size, method)?.ok_or(GiError::NoMethod(method.name()))?;
+        Ok(Self { queue: queue.clone(), technique, size, seen: [None; 2] })
     }
 
     /// Records all of the method's passes: `output` (`Rgba16Float`, usage STORAGE_BINDING, the
@@ -64,10 +64,10 @@ impl View {
             None => *inputs,
         };
         if inputs.size != self.size {
-            self.rung.forget();
+            self.technique.forget();
             self.size = inputs.size;
         }
-        self.rung.record(&mut Recorder::new(encoder), &self.queue, &inputs, output)?;
+        self.technique.record(&mut Recorder::new(encoder), &self.queue, &inputs, output)?;
         let before = self.seen[0].filter(|p| !inputs.reset && p.size == inputs.size);
         self.seen = [Some(Params::of(&inputs, None)?), before];
         Ok(())
@@ -106,34 +106,34 @@ impl View {
 
     /// What drew the last frame in the method's place, and why; `None` where it drew itself.
     pub fn instead(&self) -> Option<Instead<'_>> {
-        self.rung.instead()
+        self.technique.instead()
     }
 
-    /// What the specular lobe of each pixel's surface shows, see [`Rung::gloss`]; with
+    /// What the specular lobe of each pixel's surface shows, see [`Technique::gloss`]; with
     /// [`Inputs::specular`] only.
     pub fn gloss(&self) -> Option<&wgpu::TextureView> {
-        self.rung.gloss()
+        self.technique.gloss()
     }
 
     /// Frames that the answer has settled over since the last reset; `None` where it does not
     /// settle.
     pub fn settled(&self) -> Option<u32> {
-        self.rung.settled()
+        self.technique.settled()
     }
 
     /// Lets go of the texture views that it remembers, and so of the host's textures. A change of
     /// size does so by itself.
     pub fn forget(&mut self) {
-        self.rung.forget();
+        self.technique.forget();
     }
 
     /// Bind groups and rebuilds since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
-        self.rung.allocations()
+        self.technique.allocations()
     }
 
     /// GPU memory of buffers, textures and weights, bytes.
     pub fn bytes(&self) -> u64 {
-        self.rung.bytes()
+        self.technique.bytes()
     }
 }

@@ -1,4 +1,5 @@
-//! One WGSL text out of many files: the line `//#import lib/frame.wgsl` brings that file in, once and before the file that says so.
+//! One WGSL text out of many files: the line `//#import lib/frame.wgsl` brings that file in, once
+//! and before the file that says so.
 
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};
@@ -13,8 +14,8 @@ const IMPORT: &str = "//#import ";
 /// Where files are read from instead, where they are there; nothing by default.
 static FOLDER: RwLock<Option<PathBuf>> = RwLock::new(None);
 
-/// Reads shaders from `folder` from now on, where it has them, so that they can be edited while a program runs. `None` goes back to
-/// what was compiled in.
+/// Reads shaders from `folder` from now on, where it has them, so that they can be edited while a
+/// program runs. `None` goes back to what was compiled in.
 pub fn read_from(folder: Option<PathBuf>) {
     if let Ok(mut place) = FOLDER.write() {
         *place = folder;

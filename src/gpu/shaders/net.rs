@@ -7,7 +7,8 @@ const ONE: &[&str] = &[""];
 const WIDTHS: &[&str] = &["", "_half"];
 /// What reads tensors from a texture (`_mirror`), and writes them in words of 64 bits (`_words`).
 const MIRRORED: &[&str] = &["", "_half", "_mirror", "_mirror_words", "_mirror_half"];
-/// `_wide` has its weights in a storage buffer; `_lanes` reads these, too, from a texture, and the threads of a subgroup share them out.
+/// `_wide` has its weights in a storage buffer; `_lanes` reads these, too, from a texture, and the
+/// threads of a subgroup share them out.
 const BLOCKED: &[&str] = &[
     "",
     "_wide",
@@ -48,7 +49,8 @@ const FAMILIES: &[(&str, &[&str], &[&str])] = &[
     ("shuffle", WIDTHS, ONE),
 ];
 
-/// Names of all of them, `net.FAMILY_VARIANT`. They need a prelude; `net::gpu::example_preludes` gives one of each kind.
+/// Names of all of them, `net.FAMILY_VARIANT`. They need a prelude; `net::gpu::example_preludes`
+/// gives one of each kind.
 pub(super) fn names() -> impl Iterator<Item = String> {
     FAMILIES.iter().flat_map(|(family, variants, ends)| {
         variants.iter().flat_map(move |v| ends.iter().map(move |e| format!("net.{family}{v}{e}")))

@@ -1,9 +1,10 @@
 //! FLIP: how much two pictures differ to an eye that switches between them, pixel by pixel in [0, 1].
 //!
-//! [`flip`] is for display values (Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild, HPG 2020):
-//! pictures are blurred as the eye would at a viewing distance, colours compared in a perceptual space, and the result
-//! raised where edges or points differ. [`hdr_flip`] is for radiance (Andersson, Nilsson, Shirley and Akenine-Möller,
-//! Eurographics short papers 2021): the largest [`flip`] over a range of exposures through an ACES curve. Both agree with
+//! [`flip`] is for display values (Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and
+//! Fairchild, HPG 2020): pictures are blurred as the eye would at a viewing distance, colours
+//! compared in a perceptual space, and the result raised where edges or points differ. [`hdr_flip`]
+//! is for radiance (Andersson, Nilsson, Shirley and Akenine-Möller, Eurographics short papers
+//! 2021): the largest [`flip`] over a range of exposures through an ACES curve. Both agree with
 //! NVIDIA's `flip-evaluator` 1.7 (`tests/fixtures/metrics/flip`), computing in f32 as it does.
 
 mod color;
@@ -90,8 +91,9 @@ fn aces(v: f32) -> f32 {
     (above / below).clamp(0.0, 1.0)
 }
 
-/// The range in which `reference` shows its brightest and its median pixel. A median of zero counts as 1.2e-7 (as in the
-/// reference implementation since 1.7), and so does a picture without any light (which that refuses).
+/// The range in which `reference` shows its brightest and its median pixel. A median of zero counts
+/// as 1.2e-7 (as in the reference implementation since 1.7), and so does a picture without any
+/// light (which that refuses).
 pub fn exposures(reference: Picture<'_>) -> Exposures {
     const TARGET: f32 = 0.85;
     let [a, b, c] = [0, 1, 2].map(|i| ACES[0][i] - TARGET * ACES[1][i]);

@@ -1,9 +1,11 @@
 //! The two published generators as graphs. Operators carry the module names of the published code.
 //!
-//! - `pix2pix`: "Global Illumination using Pix2Pix GAN" (github.com/Jaredrhd/Global-Illumination-using-Pix2Pix-GAN, `Network.py`).
-//! - `deep-illumination`: Thomas and Forbes 2018 (github.com/CreativeCodingLab/DeepIllumination, `model.py`). Differs in four ways:
-//!   convolutions have biases, skips pass a second ReLU after they are joined, dropout is in the first three up steps only,
-//!   and the last layer is transposed. Its layers of equal width share one batch norm; here each has its own copy.
+//! - `pix2pix`: "Global Illumination using Pix2Pix GAN"
+//!   (github.com/Jaredrhd/Global-Illumination-using-Pix2Pix-GAN, `Network.py`).
+//! - `deep-illumination`: Thomas and Forbes 2018 (github.com/CreativeCodingLab/DeepIllumination,
+//!   `model.py`). Differs in four ways: convolutions have biases, skips pass a second ReLU after
+//!   they are joined, dropout is in the first three up steps only, and the last layer is
+//!   transposed. Its layers of equal width share one batch norm; here each has its own copy.
 
 use super::{Arch, Norm};
 use crate::net::graph::{

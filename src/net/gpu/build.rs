@@ -1,6 +1,6 @@
 //! Buffers, pipelines and bind groups of a network.
 
-use super::kernels::{Bound, Kernel, Numbers, Part};
+use super::kernel::{Bound, Kernel, Numbers, Part};
 use super::permutation::ROW;
 use super::pipelines::Pipelines;
 use super::{NetError, Options};
@@ -11,35 +11,35 @@ use crate::net::plan::{self, Kind, Plan, Precision, Step};
 /// The uniform that a kernel reads; `Step` in `shaders/net/common.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct StepUniform {
-    in_size: [u32; 2],
-    out_size: [u32; 2],
-    input: u32,
-    output: u32,
-    skip: u32,
-    second: u32,
-    pad: [i32; 2],
-    base: [i32; 2],
-    first_block: u32,
-    blocks: u32,
-    parts: u32,
-    in_channels: u32,
-    in_vectors: u32,
-    in_pitch: u32,
-    out_channels: u32,
-    out_vectors: u32,
-    out_pitch: u32,
-    skip_pitch: u32,
-    group: u32,
-    stream: u32,
-    threshold: u32,
-    keep: f32,
-    slope: f32,
-    epsilon: f32,
-    channel: u32,
-    tiles: u32,
-    moments: u32,
-    group_inputs: u32,
+pub(crate) struct StepUniform {
+    pub in_size: [u32; 2],
+    pub out_size: [u32; 2],
+    pub input: u32,
+    pub output: u32,
+    pub skip: u32,
+    pub second: u32,
+    pub pad: [i32; 2],
+    pub base: [i32; 2],
+    pub first_block: u32,
+    pub blocks: u32,
+    pub parts: u32,
+    pub in_channels: u32,
+    pub in_vectors: u32,
+    pub in_pitch: u32,
+    pub out_channels: u32,
+    pub out_vectors: u32,
+    pub out_pitch: u32,
+    pub skip_pitch: u32,
+    pub group: u32,
+    pub stream: u32,
+    pub threshold: u32,
+    pub keep: f32,
+    pub slope: f32,
+    pub epsilon: f32,
+    pub channel: u32,
+    pub tiles: u32,
+    pub moments: u32,
+    pub group_inputs: u32,
 }
 
 /// Distance of uniforms in their buffer, and alignment of weights: WebGPU's default alignment of bindings.

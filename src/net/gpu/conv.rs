@@ -1,72 +1,20 @@
 //! How a convolution runs: as taps, phases and blocks of output channels, in one of several permutations. Pure.
 //!
-//! A transposed convolution of stride s, and a convolution of a picture enlarged s times, are s² ordinary ones of the picture itself, each
-//! of which makes every s-th output pixel in both directions: its phase. All phases go into one dispatch wherever their weights do.
+//! A transposed convolution of stride s, and a convolution of a picture enlarged s times, are s²
+//! ordinary ones of the picture itself, each of which makes every s-th output pixel in both
+//! directions: its phase. All phases go into one dispatch wherever their weights do.
 
 use super::super::graph::Padding;
 use super::super::plan::{Kind, Plan, Precision, Step};
-use super::kernels::{Bound, Choice, GROUP, Kernel, Part, Prelude, Sum, THREADS, in_rows};
-use super::permutation::{Layer, Permutation, Source, Variant};
+use super::kernel::{Bound, Choice, GROUP, Kernel, Part, Prelude, Sum, in_rows};
+use super::layer::{Filter, Layer, Stage, THREADS};
+use super::permutation::{Permutation, Source, Variant};
 use crate::net::graph::Shape;
 
 /// Vectors side by side in a workgroup that adds up and measures, as in `sum_measured.wgsl`.
 const SUM_COLUMNS: u32 = 8;
 /// WebGPU's default limit of workgroups in one dimension.
 const MAX_DEPTH: u32 = 65535;
-
-/// The convolution kernel's view of a layer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Filter {
-    /// Taps, height and width; of one phase, where there are several.
-    pub taps: [u32; 2],
-    /// Distance of input pixels.
-    pub stride: u32,
-    /// Distance of output pixels: there are as many phases in both directions.
-    pub spread: u32,
-    /// Factor by which the input is enlarged.
-    pub nearest: u32,
-    /// Four-channel vectors read for each output.
-    pub in_vectors: u32,
-    /// Four-channel vectors written that read the same: those of a group of channels, or all.
-    pub group_vectors: u32,
-}
-
-impl Filter {
-    /// Matrices of one block of `vectors` vectors of output channels.
-    pub fn matrices(self, vectors: u32) -> u64 {
-        1 + u64::from(self.taps[0]) * u64::from(self.taps[1]) * u64::from(self.in_vectors) * u64::from(vectors)
-    }
-
-    /// Pixels of one phase of an output of `size`, the largest one's.
-    pub fn pixels(self, size: [u32; 2]) -> u32 {
-        // At most 2^26 pixels, so the product fits.
-        size.map(|edge| edge.div_ceil(self.spread)).iter().product()
-    }
-}
-
-/// How a workgroup of `conv_staged.wgsl` is divided.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Stage {
-    /// Threads side by side in output channels; the others of the 64 in pixels.
-    pub columns: u32,
-    /// Pixels of a thread.
-    pub pixels: u32,
-}
-
-impl Stage {
-    /// For `vectors` vectors a thread: as few columns as cover the output channels, and no more pixels than there are.
-    pub fn of(layer: &Layer, vectors: u32) -> Self {
-        let columns = layer.out_vectors.div_ceil(vectors).next_power_of_two().min(8);
-        let rows = THREADS / columns;
-        let pixels = layer.filter.pixels(layer.size).div_ceil(rows).next_power_of_two().min(8);
-        Self { columns, pixels }
-    }
-
-    /// Workgroups for the pixels of one phase.
-    pub fn groups(self, layer: &Layer) -> u32 {
-        layer.filter.pixels(layer.size).div_ceil(THREADS / self.columns * self.pixels)
-    }
-}
 
 /// Taps of one phase, and its padding: `pad` − ⌊(phase + `base`) / spread⌋.
 struct Phases {
@@ -110,7 +58,8 @@ impl Kernel {
         let blocks = out.vectors().div_ceil(self.vectors);
         let all = blocks * filter.spread * filter.spread;
         let uniform = self.bound == Bound::Uniform;
-        // As many blocks a dispatch as a binding of weights, and its workgroups in z, allow; staged kernels need all at once.
+        // As many blocks a dispatch as a binding of weights, and its workgroups in z, allow; staged
+        // kernels need all at once.
         let bound = match self.bound {
             Bound::Uniform => layer.uniform_blocks(vectors),
             Bound::Storage | Bound::Half if !staged => layer.storage_blocks(self.vectors),
@@ -179,7 +128,8 @@ impl Kernel {
             return format!("conv_staged{arithmetic}{cut}");
         }
         let [wide, high] = if self.winograd > 0 { [4, 4] } else { [2, 4] };
-        // A processor needs no more threads than its vectors are wide, and smaller groups share small pictures out better.
+        // A processor needs no more threads than its vectors are wide, and smaller groups share
+        // small pictures out better.
         let threads = if choice.facts.software { THREADS / 4 } else { THREADS };
         prelude.add("THREADS", threads);
         self.groups = in_rows((columns.div_ceil(wide) * rows.div_ceil(high)).div_ceil(threads));
@@ -234,8 +184,9 @@ fn channels_of_a_group(kind: Kind, input: Shape, out: Shape) -> [u32; 2] {
     [input, out].map(|s| (s.channels / groups).max(1))
 }
 
-/// Vectors that an output reads, and how many output vectors read the same. Groups of whole vectors read their own. Where groups begin
-/// within vectors each output vector reads those that its groups touch; if these are more than half of all, every one reads all.
+/// Vectors that an output reads, and how many output vectors read the same. Groups of whole vectors
+/// read their own. Where groups begin within vectors each output vector reads those that its groups
+/// touch; if these are more than half of all, every one reads all.
 fn read_of(input: Shape, out: Shape, groups: u32) -> [u32; 2] {
     let all = [input, out].map(Shape::vectors);
     let [inputs, outputs] = [input, out].map(|s| s.channels / groups);
@@ -252,8 +203,9 @@ fn read_of(input: Shape, out: Shape, groups: u32) -> [u32; 2] {
     }
 }
 
-/// Along one edge of a kernel after enlarging `n` times: the taps that meet the same pixel are added up, so 4×4 after ×2 has 25 taps in
-/// four phases instead of 64. How many the largest phase has.
+/// Along one edge of a kernel after enlarging `n` times: the taps that meet the same pixel are
+/// added up, so 4×4 after ×2 has 25 taps in four phases instead of 64. How many the largest phase
+/// has.
 fn merged(edge: u32, pad: i32, n: i32) -> u32 {
     let of = |phase: i32| (phase + edge as i32 - 1 - pad).div_euclid(n) - (phase - pad).div_euclid(n) + 1;
     (0..n).map(of).max().unwrap_or(1) as u32

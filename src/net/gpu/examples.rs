@@ -62,6 +62,7 @@ pub fn example_preludes() -> Vec<(String, String)> {
 
 fn kernel([edge, stride, spread, nearest]: [u32; 4], vectors: u32) -> String {
     format!(
-        "const KERNEL_H = {edge}u;\nconst KERNEL_W = {edge}u;\nconst STRIDE = {stride}u;\nconst SPREAD = {spread}u;\nconst NEAREST = {nearest}u;\nconst VECTORS = {vectors}u;\nconst MADE = {vectors}u;\n"
+        "const KERNEL_H = {edge}u;\nconst KERNEL_W = {edge}u;\nconst STRIDE = {stride}u;\nconst SPREAD = {spread}u;\n\
+        const NEAREST = {nearest}u;\nconst VECTORS = {vectors}u;\nconst MADE = {vectors}u;\n"
     )
 }

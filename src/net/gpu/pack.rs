@@ -1,13 +1,15 @@
 //! Trained numbers as the kernels read them. Pure.
 //!
-//! Convolutions: output channels in blocks of one to four vectors. A block is one matrix with the bias, a column a vector, then for
-//! each input vector, tap row, tap column and output vector of the block one 4×4 matrix, which takes four input channels to four
-//! output channels. (For staged kernels input vectors come within taps.) All blocks of one phase come before those of the next. Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
-//! of stride s is s² ordinary ones, each of which makes every s-th pixel (its phase) in both directions. Where the kernel works by
-//! Winograd's F(n, 3), three neighbouring taps become n + 2.
+//! Convolutions: output channels in blocks of one to four vectors. A block is one matrix with the
+//! bias, a column a vector, then for each input vector, tap row, tap column and output vector of
+//! the block one 4×4 matrix, which takes four input channels to four output channels. (For staged
+//! kernels input vectors come within taps.) All blocks of one phase come before those of the next.
+//! Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
+//! of stride s is s² ordinary ones, each of which makes every s-th pixel (its phase) in both
+//! directions. Where the kernel works by Winograd's F(n, 3), three neighbouring taps become n + 2.
 
-use super::conv::Filter;
-use super::kernels::{Bound, Kernel, Part};
+use super::kernel::{Bound, Kernel, Part};
+use super::layer::Filter;
 use super::permutation::Source;
 use crate::net::format::Weights;
 use crate::net::graph::Op;

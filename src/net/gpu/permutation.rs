@@ -1,7 +1,8 @@
-//! The ways in which a convolution can run, which of them a device can do, and which is taken when nobody has measured. Pure.
+//! The ways in which a convolution can run, which of them a device can do, and which is taken when
+//! nobody has measured. Pure.
 
 use super::super::plan::{Plan, Precision};
-use super::conv::{Filter, Stage};
+use super::layer::{Layer, Stage};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -19,7 +20,8 @@ pub const MAX_PARTS: u32 = 64;
 const MAX_PARTIAL: u64 = 16 << 20;
 /// WebGPU's default limit of one storage binding.
 const MAX_STORAGE: u64 = 128 << 20;
-/// Most blocks of a staged kernel: with all its parts they stay below WebGPU's default limit of workgroups in one dimension.
+/// Most blocks of a staged kernel: with all its parts they stay below WebGPU's default limit of
+/// workgroups in one dimension.
 const MAX_STAGED: u32 = 65535 / MAX_PARTS * 2;
 /// Bytes of one matrix of weights in 32 bits.
 pub const MATRIX: u64 = 64;
@@ -32,7 +34,8 @@ pub enum Source {
     Uniform,
     /// In a storage buffer.
     Storage,
-    /// In a texture, shared out among the threads of a subgroup: an optional feature. Reads the input from the mirror too.
+    /// In a texture, shared out among the threads of a subgroup: an optional feature. Reads the
+    /// input from the mirror too.
     Lanes,
     /// In a storage buffer, and with the input staged in the memory of a workgroup.
     Staged,
@@ -48,11 +51,13 @@ pub struct Permutation {
     pub mirror: bool,
     /// Vectors of output channels a thread, 1 to 4, staged at most 2.
     pub vectors: u32,
-    /// Parts into which the sum over input channels is cut, so that small pictures have work for more workgroups; staged and lanes only.
+    /// Parts into which the sum over input channels is cut, so that small pictures have work for
+    /// more workgroups; staged and lanes only.
     #[serde(default = "one")]
     pub parts: u32,
-    /// Products are taken in 16 bits, of four input channels each, and added up in 32: an optional feature, staged and with 16-bit
-    /// storage only. Sums of four products beyond 65504 become infinite.
+    /// Products are taken in 16 bits, of four input channels each, and added up in 32: an optional
+    /// feature, staged and with 16-bit storage only. Sums of four products beyond 65504 become
+    /// infinite.
     #[serde(default)]
     pub half: bool,
 }
@@ -124,36 +129,13 @@ impl Facts {
     }
 }
 
-/// Everything that the speed of one convolution depends on, and the key under which a tuner remembers it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Layer {
-    /// The kernel's view of it.
-    pub filter: Filter,
-    /// Four-channel vectors written.
-    pub out_vectors: u32,
-    /// Width and height of the output.
-    pub size: [u32; 2],
-    /// Storage.
-    pub precision: Precision,
-}
-
-impl std::fmt::Display for Layer {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Filter { taps: [h, w], stride, spread, nearest, in_vectors, group_vectors } = self.filter;
-        let [width, height] = self.size;
-        let bits = if self.precision == Precision::F16 { 16 } else { 32 };
-        write!(f, "{h}x{w} stride {stride} spread {spread} nearest {nearest} {in_vectors}>{} ", self.out_vectors)?;
-        write!(f, "{width}x{height} f{bits}")?;
-        if group_vectors < self.out_vectors { write!(f, " groups of {group_vectors}") } else { Ok(()) }
-    }
-}
-
 /// The permutations that a tuner has found to be the fastest, by [`Layer`] as text.
 pub type Tuned = HashMap<String, Permutation>;
 
 impl Layer {
-    /// Every permutation worth timing here, the guess first. On processors buffers are several times slower than textures, a workgroup's
-    /// memory is no faster than any other, 16-bit arithmetic is converted, and a few workgroups are enough: all that is left out there.
+    /// Every permutation worth timing here, the guess first. On processors buffers are several
+    /// times slower than textures, a workgroup's memory is no faster than any other, 16-bit
+    /// arithmetic is converted, and a few workgroups are enough: all that is left out there.
     pub fn candidates(&self, plan: &Plan, facts: Facts) -> Vec<Permutation> {
         let mut vectors: Vec<u32> = (1..=self.out_vectors.min(4)).collect();
         vectors.sort_by_key(|v| self.rounds(*v));
@@ -183,8 +165,8 @@ impl Layer {
         found
     }
 
-    /// Into how many parts to cut the sum besides one: those that bring at least a quarter of [`CROWD`] workgroups, up to the first that
-    /// brings all.
+    /// Into how many parts to cut the sum besides one: those that bring at least a quarter of
+    /// [`CROWD`] workgroups, up to the first that brings all.
     fn parts(&self, permutation: Permutation) -> impl Iterator<Item = u32> + use<> {
         let groups = self.groups(permutation).max(1);
         let all = (CROWD / groups).next_power_of_two();
@@ -207,8 +189,8 @@ impl Layer {
         width * height * u64::from(self.out_vectors) * u64::from(parts) * 16
     }
 
-    /// What is known without timing. On processors loads are dear, and textures and shared weights the cheapest of them. Of
-    /// GPUs nothing is known yet: 8×8 a thread, uniform weights.
+    /// What is known without timing. On processors loads are dear, and textures and shared weights
+    /// the cheapest of them. Of GPUs nothing is known yet: 8×8 a thread, uniform weights.
     pub fn guess(&self, plan: &Plan, facts: Facts) -> Permutation {
         let wanted = if facts.software {
             let best = (1..=self.out_vectors.min(4)).rev().min_by_key(|v| self.rounds(*v)).unwrap_or(1);
@@ -219,7 +201,8 @@ impl Layer {
         self.fitted(wanted, plan, facts)
     }
 
-    /// Cost of all blocks of `vectors` output vectors: of each the loads, which weigh about as much as one vector, and the rest.
+    /// Cost of all blocks of `vectors` output vectors: of each the loads, which weigh about as much
+    /// as one vector, and the rest.
     fn rounds(&self, vectors: u32) -> u32 {
         self.out_vectors.div_ceil(vectors) * (1 + vectors)
     }

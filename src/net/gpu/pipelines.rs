@@ -1,6 +1,6 @@
 //! Compiled kernels.
 
-use super::kernels::Kernel;
+use super::kernel::Kernel;
 use crate::gpu::shaders;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,9 +9,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub(super) type Compiled = (wgpu::ComputePipeline, wgpu::BindGroupLayout);
 type Map = HashMap<(String, String), Compiled>;
 
-/// Compiled kernels of one device, by shader and `const` lines: steps that agree in both share a pipeline. A clone is the same
-/// collection; networks that were given the same one compile nothing twice. What is in it stays as long as the host or more than one
-/// network holds it; a network that holds it alone lets go of what it does not use when it is rebuilt.
+/// Compiled kernels of one device, by shader and `const` lines: steps that agree in both share a
+/// pipeline. A clone is the same collection; networks that were given the same one compile nothing
+/// twice. What is in it stays as long as the host or more than one network holds it; a network that
+/// holds it alone lets go of what it does not use when it is rebuilt.
 #[derive(Debug, Clone, Default)]
 pub struct Pipelines(Arc<Mutex<Map>>);
 

@@ -18,7 +18,8 @@ pub struct Tap {
 }
 
 impl Network {
-    /// Position in the plan and name of each step whose result is a picture, in order; the statistics of norms are none.
+    /// Position in the plan and name of each step whose result is a picture, in order; the
+    /// statistics of norms are none.
     pub fn taps(&self) -> Vec<(usize, &str)> {
         let steps = self.plan.steps.iter().enumerate();
         steps

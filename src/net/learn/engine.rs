@@ -17,7 +17,8 @@ const SLOT: u64 = 256;
 /// Workgroups of one dimension.
 const MOST_GROUPS: u64 = 65_535;
 
-/// A network that is being learnt from pictures of one size. Owns its buffers; submits and waits: for tools, not for frames.
+/// A network that is being learnt from pictures of one size. Owns its buffers; submits and waits:
+/// for tools, not for frames.
 pub struct Learner {
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -44,8 +45,8 @@ pub struct Loaded {
 pub struct Stride {
     /// Mean loss of the step's pictures, before the step.
     pub loss: f32,
-    /// Relative error of the light in the step's pictures, root of the mean square: what the loss is of, loud pictures and the noise of
-    /// targets included.
+    /// Relative error of the light in the step's pictures, root of the mean square: what the loss
+    /// is of, loud pictures and the noise of targets included.
     pub error: f32,
     /// Norm of the gradients of all numbers together, before it is clipped.
     pub norm: f32,
@@ -58,8 +59,8 @@ impl Learner {
     /// Takes the numbers of `weights` up, to be learnt from pictures of `cells` (width, height). Compiles the kernels.
     ///
     /// # Errors
-    /// An operator without a way back, and what does not fit the device. A network whose answer has no loss here has a way back
-    /// ([`Self::gradients`]), but [`Self::step`] refuses it.
+    /// An operator without a way back, and what does not fit the device. A network whose answer has
+    /// no loss here has a way back ([`Self::gradients`]), but [`Self::step`] refuses it.
     pub fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
@@ -194,7 +195,8 @@ impl Learner {
         Err(LearnError::Diverged { step: self.steps, loss: stride.loss, norm: stride.norm })
     }
 
-    /// The slope of Σ `output_slopes` · output in each learnt number, for one input; both channel by channel. Learns nothing.
+    /// The slope of Σ `output_slopes` · output in each learnt number, for one input; both channel
+    /// by channel. Learns nothing.
     ///
     /// # Errors
     /// Lists of other lengths; the device was lost.

@@ -1,8 +1,10 @@
-//! Learning on the device that draws: a way back through the operators of the shipped network's family (convolutions with
-//! piecewise linear activations, bilinear resampling, sums), the loss of training, and AdamW.
+//! Learning on the device that draws: a way back through the operators of the shipped network's
+//! family (convolutions with piecewise linear activations, bilinear resampling, sums), the loss of
+//! training, and AdamW.
 //!
-//! Plain kernels in 32 bits: one thread makes one number, nothing is added up by atomics, so that the same pictures in the same
-//! order give the same weights to the bit. [`mod@tape`] says what is dispatched, `engine` does it.
+//! Plain kernels in 32 bits: one thread makes one number, nothing is added up by atomics, so that
+//! the same pictures in the same order give the same weights to the bit. [`mod@tape`] says what is
+//! dispatched, `engine` does it.
 
 mod engine;
 pub mod tape;
@@ -20,17 +22,18 @@ pub const MEANING: &str = "gain_and_rest_on_guess";
 /// (`gi::reconstruct`), but a number at its limit has no slope. As in `training/bouncelight_training/features.py`.
 const MOST_GAIN: f32 = 2.0;
 const MOST_REST: f32 = 1.0;
-/// Light below this share of the exposure is no divisor of an error; and the loss of a picture that is as loud as any may be.
-/// As in `training/bouncelight_training`.
+/// Light below this share of the exposure is no divisor of an error; and the loss of a picture that
+/// is as loud as any may be. As in `training/bouncelight_training`.
 const EPSILON: f32 = 0.05;
 const LOUD: f32 = 0.04;
-/// AdamW's numbers, PyTorch's and training's: what moments keep, what roots are kept above 0 by, what is forgotten, the largest norm of
-/// all gradients together.
+/// AdamW's numbers, PyTorch's and training's: what moments keep, what roots are kept above 0 by,
+/// what is forgotten, the largest norm of all gradients together.
 const BETA: [f32; 2] = [0.9, 0.999];
 const TINY: f32 = 1e-8;
 const DECAY: f32 = 1e-4;
 const CLIP: f32 = 1.0;
-/// What the average over steps keeps of itself in a step; less in the first ones. As `training/bouncelight_training/finetune.py`.
+/// What the average over steps keeps of itself in a step; less in the first ones. As
+/// `training/bouncelight_training/finetune.py`.
 const KEEP: f32 = 0.99;
 
 /// The lines of `const` in front of shader `shader`.

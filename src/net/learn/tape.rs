@@ -9,7 +9,7 @@ use std::ops::Range;
 /// `Job` of `shaders/net/learn/job.wgsl`, where its fields are told.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[allow(missing_docs, reason = "the shader's twin tells them")]
+#[allow(missing_docs, reason = "documented in shaders/net/learn/job.wgsl")]
 pub struct Job {
     pub in_size: [u32; 2],
     pub out_size: [u32; 2],

@@ -1,5 +1,6 @@
-//! Which operators share a dispatch. Every operator becomes a [`Node`]; then nodes are merged where one kernel can do the
-//! work of two. A merged node stands where the later of the two stood, so that all it reads exists.
+//! Which operators share a dispatch. Every operator becomes a [`Node`]; then nodes are merged where
+//! one kernel can do the work of two. A merged node stands where the later of the two stood, so
+//! that all it reads exists.
 
 use super::super::graph::{Activation, AddAt, Graph, Op, Padding, Shape};
 use super::Options;

@@ -17,8 +17,8 @@ impl Builder<'_> {
         scale
     }
 
-    /// The tensor with the moments of tiles of `input`. A convolution measures what it makes in passing; of anything else a step of its
-    /// own reads it again.
+    /// The tensor with the moments of tiles of `input`. A convolution measures what it makes in
+    /// passing; of anything else a step of its own reads it again.
     fn moments(&mut self, name: &str, node: &Node, input: usize) -> usize {
         let shape = self.plan.tensors[input].shape;
         // Number, mean and sum of squared deviations of each tile and channel.
@@ -42,8 +42,9 @@ impl Builder<'_> {
     }
 }
 
-/// Most workgroups that make a vector of channels of a convolution's picture, whichever kernel runs: each measures its own. In
-/// each phase a workgroup of the plain kernel makes 16×4 pixels, of the others at least 32 unless there are fewer.
+/// Most workgroups that make a vector of channels of a convolution's picture, whichever kernel
+/// runs: each measures its own. In each phase a workgroup of the plain kernel makes 16×4 pixels, of
+/// the others at least 32 unless there are fewer.
 fn most_tiles(kind: Kind, out: Shape) -> u32 {
     let spread = match kind {
         Kind::Transposed { stride, .. } => stride,

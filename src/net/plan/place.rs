@@ -46,8 +46,8 @@ pub(super) fn overwrite(plan: &Plan, inside: &mut [Option<Inside>]) {
     }
 }
 
-/// Gives every tensor its root, pitch and offset. Greedy by size: the largest root first, each at the lowest offset that is
-/// free during its life.
+/// Gives every tensor its root, pitch and offset. Greedy by size: the largest root first, each at
+/// the lowest offset that is free during its life.
 pub(super) fn place(plan: &mut Plan, inside: &[Option<Inside>]) {
     for t in 0..plan.tensors.len() {
         let (mut root, mut slice) = (t, 0);

@@ -95,8 +95,9 @@ pub enum Kind {
     Upsample,
     /// Nearest resampling.
     Nearest,
-    /// A copy with offsets; no epilogue. Output pixel (x, y) is input pixel (x − left, y − top); beyond the edges zero, or
-    /// the nearest pixel if `clamp`. Channels go to `channel` and after, what lies before stays.
+    /// A copy with offsets; no epilogue. Output pixel (x, y) is input pixel (x − left, y − top);
+    /// beyond the edges zero, or the nearest pixel if `clamp`. Channels go to `channel` and after,
+    /// what lies before stays.
     Window {
         /// Columns to the right.
         left: u32,
@@ -157,8 +158,8 @@ pub struct Step {
     pub fold: Option<usize>,
     /// Index of the tensor written.
     pub output: usize,
-    /// Index of the tensor into which a convolution writes the moments of its output: for as many tiles as it takes workgroups, which
-    /// depends on the kernel; the tensor has room for the most.
+    /// Index of the tensor into which a convolution writes the moments of its output: for as many
+    /// tiles as it takes workgroups, which depends on the kernel; the tensor has room for the most.
     pub moments: Option<usize>,
     /// Floating-point operations, those of fused operators included.
     pub flops: u64,

@@ -6,7 +6,7 @@ use crate::scene::{AlphaMode, ColorSpace, Image, Material, Scene, TextureRef, Wr
 use bytemuck::{Pod, Zeroable};
 use std::borrow::Cow;
 
-/// A use of an image; the twin of `ImageUse` in `shaders/reference/types.wgsl`.
+/// A use of an image; laid out as `ImageUse` in `shaders/reference/types.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct ImageUse {
@@ -24,7 +24,7 @@ pub struct ImageUse {
     pub pad: [u32; 2],
 }
 
-/// A material; the twin of `RefMaterial` in `shaders/reference/types.wgsl`.
+/// A material; laid out as `RefMaterial` in `shaders/reference/types.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct RefMaterial {

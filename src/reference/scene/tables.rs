@@ -68,7 +68,7 @@ fn kept(alpha: f64, mu: f64) -> f64 {
     sum / (N * N) as f64
 }
 
-/// The twin of `sample_visible_normal` in `shaders/reference/bsdf.wgsl` (Dupuy and Benyoub 2023).
+/// The same as `sample_visible_normal` in `shaders/reference/bsdf.wgsl` (Dupuy and Benyoub 2023).
 fn visible_normal(view: [f64; 3], alpha: f64, u: [f64; 2]) -> [f64; 3] {
     let stretch = |v: [f64; 3]| {
         let w = [v[0] * alpha, v[1] * alpha, v[2]];
@@ -91,8 +91,9 @@ mod tests {
         let t = header();
         assert_eq!(t.len(), HEADER);
         assert!(t[..SIDE * SIDE].iter().all(|&e| e > 0.3 && e <= 1.0 + 1e-6));
-        // A mirror loses nothing. Roughness 1 seen along the normal: visible normals are cosine-distributed, half of them
-        // reflect below the horizon, and the masking of the rest, 2z/(1 + z), integrates to 1 − ln 2.
+        // A mirror loses nothing. Roughness 1 seen along the normal: visible normals are
+        // cosine-distributed, half of them reflect below the horizon, and the masking of the rest,
+        // 2z/(1 + z), integrates to 1 − ln 2.
         assert!(t[SIDE - 1] > 0.999);
         let rough = t[SIDE * SIDE - 1];
         assert!((rough - (1.0 - 2f32.ln())).abs() < 1e-3, "{rough}");

@@ -103,8 +103,9 @@ fn add(flat: &mut Flat, mesh: &Mesh, world: Mat4) {
     }
 }
 
-/// Six vectors: uv0 of corners 0 and 1; uv0 of 2 and uv1 of 0; uv1 of 1 and 2; tangents (octahedral) with their signs in
-/// bits 0 to 2 and "has tangents" in bit 3 of the last; colours of 0 and 1 as halves; colour of 2.
+/// Six vectors: uv0 of corners 0 and 1; uv0 of 2 and uv1 of 0; uv1 of 1 and 2; tangents
+/// (octahedral) with their signs in bits 0 to 2 and "has tangents" in bit 3 of the last; colours of
+/// 0 and 1 as halves; colour of 2.
 fn extra(data: &mut Vec<[u32; 4]>, mesh: &Mesh, corners: [usize; 3], world: Mat4, sign: f32) {
     let uv = |set: &[[f32; 2]], i: usize| set.get(i).copied().unwrap_or_default().map(f32::to_bits);
     let [a, b, c] = corners.map(|i| uv(&mesh.uv0, i));

@@ -341,8 +341,8 @@ fn decoration(b: &mut Builder, palette: &Palette) {
 
 fn lamp(b: &mut Builder, palette: &Palette) {
     let warm = [1.0, 0.62, 0.30];
-    // Bright enough to look like a lamp, and little light (a tenth) next to the point light, which is the room's true lamp:
-    // the path tracer counts both.
+    // Bright enough to look like a lamp, and little light (a tenth) next to the point light, which
+    // is the room's true lamp: the path tracer counts both.
     let glow = b.material(Material { emissive: warm.map(|c| c * 20.0), ..dielectric("bulb", [0.8; 3], 0.5) });
     let shade = b.material(Material { double_sided: true, ..dielectric("enamel", [0.82, 0.80, 0.74], 0.3) });
     b.part("bulb", glow, 1.0, |p| p.ball(BULB, 0.045, 24));

@@ -1,18 +1,21 @@
-//! A sun in a picture of the surroundings, taken out as a light: a few texels that hold a large share of all light are hardly ever
-//! met by a ray, which then shows as a spark, and a rasteriser has shadow maps for lights only.
+//! A sun in a picture of the surroundings, taken out as a light: a few texels that hold a large
+//! share of all light are hardly ever met by a ray, which then shows as a spark, and a rasteriser
+//! has shadow maps for lights only.
 
 use super::EnvironmentImage;
 use crate::scene::{Light, LightKind};
 use glam::{DVec3, Vec3};
 use std::f64::consts::{PI, TAU};
 
-/// Half the angle around the brightest texel in which a sun is looked for, radians: four degrees, sixteen times the sun's own
-/// radius, which holds the bright part of its aureole. What is as bright over more than half of that is a window or a lamp, whose shape
-/// counts. A picture's texels may be larger than the sun; their side is added to both.
+/// Half the angle around the brightest texel in which a sun is looked for, radians: four degrees,
+/// sixteen times the sun's own radius, which holds the bright part of its aureole. What is as
+/// bright over more than half of that is a window or a lamp, whose shape counts. A picture's texels
+/// may be larger than the sun; their side is added to both.
 const CONE: f64 = 0.07;
 
-/// Times the mean of the rest up to which a texel of the cone stays in the picture. The whole cone at that brightness adds less to
-/// one ray's standard deviation (`sqrt(cone / π)` · 10, 0.7) than the mean that it is about.
+/// Times the mean of the rest up to which a texel of the cone stays in the picture. The whole cone
+/// at that brightness adds less to one ray's standard deviation (`sqrt(cone / π)` · 10, 0.7) than
+/// the mean that it is about.
 const STAYS: f64 = 10.0;
 
 /// A sun, and the picture without it. Together they send what the picture sent.
@@ -24,8 +27,8 @@ pub struct SkySun {
     pub rest: EnvironmentImage,
 }
 
-/// A texel's share of the sphere where the picture is read bilinearly: its solid angle, and the mean direction times that, along +Y
-/// and away from that axis.
+/// A texel's share of the sphere where the picture is read bilinearly: its solid angle, and the
+/// mean direction times that, along +Y and away from that axis.
 #[derive(Default)]
 struct Row {
     solid_angle: f64,
@@ -70,8 +73,8 @@ impl EnvironmentImage {
         row
     }
 
-    /// The sun, if the picture has one: a small place far brighter than the rest, which makes the light that single rays find vary by
-    /// more than the mean of all other light.
+    /// The sun, if the picture has one: a small place far brighter than the rest, which makes the
+    /// light that single rays find vary by more than the mean of all other light.
     pub fn sun(&self) -> Option<SkySun> {
         let (width, height) = (self.width as usize, self.height as usize);
         let texels = |y: usize| &self.rgb[3 * y * width..3 * (y + 1) * width];
@@ -103,7 +106,8 @@ impl EnvironmentImage {
             return None;
         }
 
-        // Irradiance of each colour as a vector, so that every surface that sees all of it gets the same from the light.
+        // Irradiance of each colour as a vector, so that every surface that sees all of it gets the
+        // same from the light.
         let (mut vectors, mut turned, mut covered) = ([DVec3::ZERO; 3], 0.0, 0.0);
         let mut rest = self.rgb.clone();
         for y in rows {
@@ -128,7 +132,8 @@ impl EnvironmentImage {
         }
         let total = vectors[0] * 0.2126 + vectors[1] * 0.7152 + vectors[2] * 0.0722;
         let (towards, irradiance) = (total.normalize_or(middle), total.length());
-        // Second moment about the middle of the light; bilinear reading spreads each texel by a third of its side's square more.
+        // Second moment about the middle of the light; bilinear reading spreads each texel by a
+        // third of its side's square more.
         let off = towards.angle_between(middle);
         let spread = (turned / irradiance - off * off).max(0.0) + texel * texel / 3.0;
         // A disc of radius r has the moment r²/2.
@@ -162,7 +167,8 @@ impl EnvironmentImage {
 mod tests {
     use super::*;
 
-    /// A sky that darkens towards the ground, with a disc of `radius` radians and `brightness` in it, by 8×8 points a texel.
+    /// A sky that darkens towards the ground, with a disc of `radius` radians and `brightness` in
+    /// it, by 8×8 points a texel.
     fn sky(width: u32, radius: f64, brightness: f32, towards: DVec3) -> EnvironmentImage {
         let mut image = EnvironmentImage { name: "sky".into(), width, height: width / 2, rgb: Vec::new() };
         let towards = towards.normalize();

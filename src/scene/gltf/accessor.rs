@@ -80,7 +80,8 @@ impl Reader<'_> {
         let end = (count - 1).checked_mul(stride).and_then(|n| n.checked_add(size)?.checked_add(offset));
         if end.is_none_or(|end| end > data.len()) {
             let problem = format!(
-                "{count} elements of {size} bytes from byte {offset} (stride {stride}) reach beyond its buffer view of {} bytes",
+                "{count} elements of {size} bytes from byte {offset} (stride {stride}) reach beyond its buffer \
+                view of {} bytes",
                 data.len()
             );
             return Err(self.broken(index, problem));

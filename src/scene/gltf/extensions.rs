@@ -50,7 +50,8 @@ fn advice(path: &Path, missing: &[&str]) -> String {
     match (steps.first(), others) {
         (Some(step), false) => format!("`npx @gltf-transform/cli {step} {name} converted.glb` writes a file without"),
         (Some(step), true) => format!(
-            "`npx @gltf-transform/cli {step} {name} converted.glb` unpacks what is compressed; export the file without the others"
+            "`npx @gltf-transform/cli {step} {name} converted.glb` unpacks what is compressed; export the file \
+            without the others"
         ),
         (None, _) => "export the file without".to_owned(),
     }

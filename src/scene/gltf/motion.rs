@@ -1,4 +1,5 @@
-//! Animations of nodes and variants of materials. Neither is worth refusing a file: what is broken is left out with a warning.
+//! Animations of nodes and variants of materials. Neither is worth refusing a file: what is broken
+//! is left out with a warning.
 
 use super::Loader;
 use super::accessor::{Integers, Reader};

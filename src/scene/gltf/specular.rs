@@ -11,8 +11,9 @@ use crate::scene::texture::{self, Use};
 use crate::scene::{ColorSpace, DIELECTRIC_F0, Image, Material, TextureRef};
 
 impl<'a> Loader<'a> {
-    /// `f0` and its tint: `min(((ior − 1) / (ior + 1))² · specularColor, 1) · specular`, as KHR_materials_specular says.
-    /// An index of 0 is infinite (KHR_materials_ior), which the formula gives by itself.
+    /// `f0` and its tint: `min(((ior − 1) / (ior + 1))² · specularColor, 1) · specular`, as
+    /// KHR_materials_specular says. An index of 0 is infinite (KHR_materials_ior), which the
+    /// formula gives by itself.
     pub(super) fn specular(&mut self, place: &str, material: &gltf::Material<'a>, out: &mut Material) {
         let plain_f0 = material.ior().map_or(DIELECTRIC_F0, |ior| ((ior - 1.0) / (ior + 1.0)).powi(2));
         let Some(specular) = material.specular() else {
@@ -134,9 +135,10 @@ fn converted(
 
 /// The metallic-roughness surface that looks most like one of this diffuse and specular colour.
 ///
-/// With the diffuse light D that the specular lobe leaves, the reflectance S, and a dielectric's f = 0.04, base colour b
-/// and metallic m would have to fulfil b (1 − m) (1 − f) = D and f (1 − m) + b m = S. For the mean of the colours that
-/// is a quadratic equation of 1 − m; b is then the one of least squared error over both equations, colour by colour.
+/// With the diffuse light D that the specular lobe leaves, the reflectance S, and a dielectric's f
+/// = 0.04, base colour b and metallic m would have to fulfil b (1 − m) (1 − f) = D and f (1 − m) +
+/// b m = S. For the mean of the colours that is a quadratic equation of 1 − m; b is then the one of
+/// least squared error over both equations, colour by colour.
 fn metallic_of(diffuse: [f32; 3], specular: [f32; 3]) -> ([f32; 3], f32) {
     const F: f32 = DIELECTRIC_F0;
     let specular = specular.map(|s| s.clamp(0.0, 1.0));

@@ -7,8 +7,8 @@ use glam::Vec3;
 /// Larger meshes are not asked: the answer saves them nothing that anybody would see.
 const MOST: usize = 200_000;
 
-/// True where every edge of `mesh` borders exactly two triangles that wind the same way, and these face outwards. Vertices of one
-/// place (to a hundred-thousandth of the mesh's reach) are one.
+/// True where every edge of `mesh` borders exactly two triangles that wind the same way, and these
+/// face outwards. Vertices of one place (to a hundred-thousandth of the mesh's reach) are one.
 pub(super) fn is_closed(mesh: &Mesh) -> bool {
     if mesh.indices.is_empty() || mesh.indices.len() > 3 * MOST {
         return false;

@@ -6,7 +6,8 @@ use crate::scene::{Light, LightKind};
 
 /// The surroundings on the GPU.
 pub(super) struct Sky {
-    /// A picture's rest, once its sun is taken out; alpha is what the eye sees beside that, as a multiple: 0 but for the sun's texels.
+    /// A picture's rest, once its sun is taken out; alpha is what the eye sees beside that, as a
+    /// multiple: 0 but for the sun's texels.
     pub view: wgpu::TextureView,
     pub bytes: u64,
     /// With the rest's mean.

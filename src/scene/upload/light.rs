@@ -25,16 +25,27 @@ pub struct LightGpu {
     pub cone_offset: f32,
     /// 1 for a light that stands for a surface that glows: rays meet the surface itself.
     pub stands_in: u32,
-    /// For whoever draws lights by lot: this light is drawn by numbers of [0, 1) below this and not below the `chance` of the light
-    /// before it in the list ([`LightGpu::list`]). (The path tracer keeps its own chance here.)
+    /// For whoever draws lights by lot: this light is drawn by numbers of [0, 1) below this and not
+    /// below the `chance` of the light before it in the list ([`LightGpu::list`]). (The path tracer
+    /// keeps its own chance here.)
     pub chance: f32,
 }
 
-/// Lights that a draw by lot looks at; `CANDIDATES` in `shaders/gi/gather/look.wgsl`. Lists that are no longer are looked at whole.
+/// Lights that a draw by lot looks at; `CANDIDATES` in `shaders/gi/gather/look.wgsl`. Lists that
+/// are no longer are looked at whole.
 pub const CANDIDATES: usize = 8;
 
-/// What all lights of a kind share evenly. Power says nothing of how near a light is: a weak lamp may be all the light of a room.
+/// What all lights of a kind share evenly. Power says nothing of how near a light is: a weak lamp
+/// may be all the light of a room.
 const EVEN: f64 = 0.3;
+
+/// A spot whose half angle is above this gets a cube of shadow maps: one map would waste its texels on the rim.
+const WIDEST_SPOT: f32 = 60.0 * std::f32::consts::PI / 180.0;
+
+/// True for lights whose cone fits into one shadow map.
+pub(crate) fn fits_one_map(kind: &LightKind) -> bool {
+    matches!(kind, LightKind::Spot { outer_angle, .. } if *outer_angle <= WIDEST_SPOT)
+}
 
 impl LightGpu {
     /// The shader's form of `light`; one with anything that is no number gives none.
@@ -84,9 +95,11 @@ impl LightGpu {
         }
     }
 
-    /// The shader's form of a list of lights, with the chances by which one is drawn: lamps in proportion to their power, with a
-    /// share for everybody. Lamps and suns have nothing to compare by, so each sun has one of the [`CANDIDATES`] for itself, and where
-    /// there are many they share half of them. Lights that stand for surfaces that glow are never drawn: rays meet the surfaces.
+    /// The shader's form of a list of lights, with the chances by which one is drawn: lamps in
+    /// proportion to their power, with a share for everybody. Lamps and suns have nothing to
+    /// compare by, so each sun has one of the [`CANDIDATES`] for itself, and where there are many
+    /// they share half of them. Lights that stand for surfaces that glow are never drawn: rays meet
+    /// the surfaces.
     pub fn list(lights: &[Light]) -> Vec<Self> {
         let mut list: Vec<Self> = lights.iter().map(Self::new).collect();
         let power: Vec<f64> = lights.iter().map(power).collect();

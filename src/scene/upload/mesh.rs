@@ -75,7 +75,8 @@ pub fn attribute_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 3] {
     [positions, instances, layout(36, wgpu::VertexStepMode::Vertex, &ATTRIBUTES)]
 }
 
-/// As [`attribute_layouts`], for passes that write motion vectors: slot 3 has the instances as they were in the frame before.
+/// As [`attribute_layouts`], for passes that write motion vectors: slot 3 has the instances as they
+/// were in the frame before.
 pub fn motion_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 4] {
     let [positions, instances, attributes] = attribute_layouts();
     [positions, instances, attributes, layout(48, wgpu::VertexStepMode::Instance, &BEFORE)]

@@ -19,7 +19,7 @@ use super::{
     trial::TrialError,
 };
 use crate::{
-    gi::rung::Cost,
+    gi::technique::Cost,
     gpu::Gpu,
     image_io::ImageError,
     metrics::MetricError,

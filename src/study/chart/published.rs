@@ -2,7 +2,7 @@
 
 use super::ChartError;
 use crate::{
-    gi::rung::Cost,
+    gi::technique::Cost,
     gpu::{Gpu, timing::Recorder},
     net::{
         convert::{self, Arch, Norm},
@@ -76,7 +76,7 @@ pub(super) fn generator(gpu: &Gpu, size: [u32; 2], options: BenchOptions, key: S
 
 /// A network on a picture of `size`.
 pub(super) fn network(gpu: &Gpu, weights: &Weights, size: [u32; 2]) -> Result<Network, ChartError> {
-    Ok(Network::with_options(&gpu.device, &gpu.queue, weights, size, Options::default())?)
+    Ok(Network::new(&gpu.device, &gpu.queue, weights, size, Options::default())?)
 }
 
 /// Counted cost of a network's steps.

@@ -8,7 +8,7 @@ use super::{
     run::Plan,
 };
 use crate::{
-    gi::{Method, rung::Cost},
+    gi::{Method, technique::Cost},
     gpu::Gpu,
     metrics::{Comparison, MetricError},
     reference,

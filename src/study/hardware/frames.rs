@@ -163,7 +163,7 @@ fn label(precision: Precision) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gi::rung::Cost;
+    use crate::gi::technique::Cost;
     use crate::study::bench::{PassTime, Spread};
 
     #[test]

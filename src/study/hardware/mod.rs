@@ -212,7 +212,7 @@ pub struct Projected {
 
 impl Projected {
     /// Of `costs` that took `measured` milliseconds on a device with the peaks of `card`; none where nothing was counted or timed.
-    fn of(costs: &[crate::gi::rung::Cost], measured: f64, card: &Card) -> Option<Self> {
+    fn of(costs: &[crate::gi::technique::Cost], measured: f64, card: &Card) -> Option<Self> {
         let here_ms = projection::total_ms(costs, card, EFFICIENCY);
         let gtx_1050_ms = projection::total_ms(costs, &GTX_1050, EFFICIENCY);
         let ratio = measured / here_ms;
@@ -228,7 +228,7 @@ impl Projected {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gi::rung::Cost;
+    use crate::gi::technique::Cost;
 
     #[test]
     fn a_projection_is_set_against_what_was_measured() {

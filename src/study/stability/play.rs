@@ -268,7 +268,7 @@ impl<'a> Play<'a> {
         let gpu = self.stage.gpu;
         let mut trial = self.trial(scene, size, &layers)?;
         let options = Options { dropout: Some(0), ..Options::default() };
-        let mut network = Network::with_options(&gpu.device, &gpu.queue, weights, size, options)?;
+        let mut network = Network::new(&gpu.device, &gpu.queue, weights, size, options)?;
         let mut looks = Vec::new();
         for frame in script.wanted_only().0 {
             trial.edit(&frame.edits)?;

@@ -1,7 +1,7 @@
 //! What is asked of a trial, and what comes back.
 
 use crate::{
-    gi::{Method, rung::Cost},
+    gi::{Method, technique::Cost},
     render::capture::{CapturedFrame, Layer, Picture},
     scene::{Camera, Environment, Light},
     study::projection,

@@ -1,5 +1,5 @@
-//! The program around the window: winit's events in, jobs and the live reference beside it, and the rule that nothing is drawn
-//! unless something has changed.
+//! The program around the window: winit's events in, jobs and the live reference beside it, and the
+//! rule that nothing is drawn unless something has changed.
 
 mod device;
 mod frame;

@@ -1,5 +1,6 @@
-//! The overlay beside the picture's frames. It is laid out when hands, news or the clock ask for it, and drawn again as it was in
-//! between: a picture that moves needs no new panels, and nobody reads numbers that change more than four times a second.
+//! The overlay beside the picture's frames. It is laid out when hands, news or the clock ask for
+//! it, and drawn again as it was in between: a picture that moves needs no new panels, and nobody
+//! reads numbers that change more than four times a second.
 
 use super::App;
 use crate::viewer::state::State;
@@ -139,8 +140,8 @@ impl Overlay {
 }
 
 impl App {
-    /// Lets hands act and brings the overlay up to date, if that is due. `anew`: something has changed that it shows. Returns the
-    /// time it took.
+    /// Lets hands act and brings the overlay up to date, if that is due. `anew`: something has
+    /// changed that it shows. Returns the time it took.
     pub(super) fn overlay(&mut self, anew: bool) -> Duration {
         let started = Instant::now();
         let Some(screen) = &self.screen else { return Duration::ZERO };

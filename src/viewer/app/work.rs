@@ -184,7 +184,8 @@ impl App {
         }
     }
 
-    /// Takes the method that was fitted to the scene on show; where there is none, methods have their own numbers again.
+    /// Takes the method that was fitted to the scene on show; where there is none, methods have
+    /// their own numbers again.
     fn obey(&mut self, fitted: Option<Result<Box<Fitted>, String>>) {
         let fitted = match fitted {
             Some(Err(why)) => {

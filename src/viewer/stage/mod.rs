@@ -1,5 +1,5 @@
-//! The GPU's side of the viewer: the uploaded scene, a renderer for each side of the line, the live reference's picture, and
-//! what a frame of the window records. Nothing here knows winit or egui.
+//! The GPU's side of the viewer: the uploaded scene, a renderer for each side of the line, the live
+//! reference's picture, and what a frame of the window records. Nothing here knows winit or egui.
 
 mod feature;
 mod sides;
@@ -163,8 +163,8 @@ impl Stage {
         self.still
     }
 
-    /// Records the next frame of the scene where one is due: the view has changed, is being averaged, or `again` is set.
-    /// True if something was recorded.
+    /// Records the next frame of the scene where one is due: the view has changed, is being
+    /// averaged, or `again` is set. True if something was recorded.
     ///
     /// # Errors
     /// A picture the device cannot hold, or a camera that the method cannot use.

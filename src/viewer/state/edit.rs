@@ -69,8 +69,8 @@ impl State {
         self.place();
     }
 
-    /// Places all objects: at rest or as the animation has them, then moved by hand. Always from the file's places, so that the
-    /// command line can repeat it bit for bit.
+    /// Places all objects: at rest or as the animation has them, then moved by hand. Always from
+    /// the file's places, so that the command line can repeat it bit for bit.
     fn place(&mut self) {
         let Some(shown) = &mut self.shown else { return };
         let scene = Arc::make_mut(&mut shown.scene);

@@ -1,6 +1,6 @@
-//! The viewer's mind: what is chosen, from where one looks, what was changed in the scene. No window, no wgpu, so that
-//! tests and scripts can ask it everything. Hands act through [`State::apply`]; what has to be done outside is queued in
-//! [`State::requests`].
+//! The viewer's mind: what is chosen, from where one looks, what was changed in the scene. No
+//! window, no wgpu, so that tests and scripts can ask it everything. Hands act through
+//! [`State::apply`]; what has to be done outside is queued in [`State::requests`].
 
 mod action;
 mod edit;

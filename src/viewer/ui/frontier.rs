@@ -109,7 +109,13 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
             state.apply(Action::Source(Side::Left, clicked));
         }
     }
-    ui.label(RichText::new("across: GPU ms measured in this window; up: mean error of indirect light on five judged rooms (docs/accuracy.md), not measured here").small());
+    ui.label(
+        RichText::new(
+            "across: GPU ms measured in this window; up: mean error of indirect light on five \
+        judged rooms (docs/accuracy.md), not measured here",
+        )
+        .small(),
+    );
     let is_missing = |s: &Source| s.static_error().is_some() && !facts.measured.contains_key(&(*s as usize));
     let missing: Vec<Source> = Source::ALL.into_iter().filter(is_missing).collect();
     if !missing.is_empty() {

@@ -122,7 +122,8 @@ fn three(ui: &mut Ui, v: &mut [f32; 3]) -> bool {
     .inner
 }
 
-/// The sky from above: the middle is straight up, the rim the horizon. Dragging moves the sun; the new direction of its light.
+/// The sky from above: the middle is straight up, the rim the horizon. Dragging moves the sun; the
+/// new direction of its light.
 fn sky_disc(ui: &mut Ui, direction: [f32; 3]) -> Option<[f32; 3]> {
     let (rect, response) = ui.allocate_exact_size(Vec2::splat(120.0), Sense::click_and_drag());
     let (middle, radius) = (rect.center(), 0.5 * rect.width() - 8.0);

@@ -1,5 +1,5 @@
-//! The overlay: panels around the picture, marks on it, and what hands do over it. It draws with egui and changes nothing but
-//! the [`State`], so tests run it without a window.
+//! The overlay: panels around the picture, marks on it, and what hands do over it. It draws with
+//! egui and changes nothing but the [`State`], so tests run it without a window.
 
 mod frontier;
 pub mod hands;

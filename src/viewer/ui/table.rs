@@ -1,4 +1,5 @@
-//! Tables of numbers, painted straight: no widget a cell, and only the rows that are seen. A network has dozens of layers.
+//! Tables of numbers, painted straight: no widget a cell, and only the rows that are seen. A
+//! network has dozens of layers.
 
 use egui::{Align2, FontId, Pos2, Rect, Sense, TextStyle, Ui, Vec2};
 

@@ -1,5 +1,6 @@
-//! The slow, obvious CPU twin of `gi/`'s shaders, function by function under the same names. No wgpu. Tests compare
-//! the shaders with it; nothing else uses it. Formulas are documented in the shaders and in `gi::features`.
+//! The slow, obvious CPU reference of `gi/`'s shaders, function by function under the same names.
+//! No wgpu. Tests compare the shaders with it; nothing else uses it. Formulas are documented in the
+//! shaders and in `gi::features`.
 
 use super::features::FeatureSet;
 use super::reconstruct::{Answer, LOST, MOST_ADDED, TRUST};

@@ -42,7 +42,7 @@ pub struct Instead<'a> {
 
 /// A method at work: G-buffer in, indirect diffuse light (E/π) out. Allocates only when size or views are new.
 /// `Send`, so that a viewer can build one on another thread.
-pub trait Rung: Send {
+pub trait Technique: Send {
     /// Records all of the method's passes: `output` (`Rgba16Float`, usage STORAGE_BINDING, the inputs' size) becomes
     /// the light that direct lighting misses; 0 on the background.
     ///
@@ -67,8 +67,9 @@ pub trait Rung: Send {
         None
     }
 
-    /// Whether it asks the scene what glows and what stands between, so that lights that stand for glowing surfaces
-    /// ([`Light::stands_in`](crate::scene::Light::stands_in)) and occlusion maps would count twice. `rays`: whether there are any.
+    /// Whether it asks the scene what glows and what stands between, so that lights that stand for
+    /// glowing surfaces ([`Light::stands_in`](crate::scene::Light::stands_in)) and occlusion maps
+    /// would count twice. `rays`: whether there are any.
     fn knows_scene(&self, _rays: bool) -> bool {
         false
     }
@@ -78,8 +79,9 @@ pub trait Rung: Send {
         None
     }
 
-    /// What the specular lobe of each pixel's surface shows, divided by its directional albedo (`env_brdf`): radiance, W/(m²·sr), where
-    /// the method knows it. `Rgba16Float` of the picture's size; another view after a change of size.
+    /// What the specular lobe of each pixel's surface shows, divided by its directional albedo
+    /// (`env_brdf`): radiance, W/(m²·sr), where the method knows it. `Rgba16Float` of the picture's
+    /// size; another view after a change of size.
     fn gloss(&self) -> Option<&wgpu::TextureView> {
         None
     }
@@ -94,7 +96,8 @@ pub trait Rung: Send {
         Vec::new()
     }
 
-    /// What a layer of the network makes of `inputs`, which must be those of the last recording; `None` where there is no such layer.
+    /// What a layer of the network makes of `inputs`, which must be those of the last recording;
+    /// `None` where there is no such layer.
     ///
     /// # Errors
     /// [`GiError`] when the inputs do not fit or reading back fails.

@@ -1,0 +1,47 @@
+//! Weights as a frame's method: which of them it can run, and how they run.
+
+use super::features::FeatureSet;
+use super::reconstruct::Answer;
+use crate::gi::interface::GiError;
+use crate::gi::stage::inputs::CELL;
+use crate::net::format::Weights;
+use crate::net::gpu::{self, Tuned};
+use std::sync::Arc;
+
+/// Whether weights have method `gather` run before them, and so need [`Inputs::rays`](crate::gi::Inputs::rays).
+pub fn needs_guess(weights: &Weights) -> bool {
+    weights.output.meaning == Answer::Gain.name() || weights.inputs.iter().any(|f| f.name == "guess")
+}
+
+/// A network as a frame's method: what was trained, and how it runs.
+#[derive(Debug, Clone)]
+pub struct Neural {
+    /// The trained numbers.
+    pub weights: Weights,
+    /// Kernels and storage. Dropout does not belong into frames; with a seed every frame has the same.
+    pub network: gpu::Options,
+    /// What a tuner has found on this device; empty without one.
+    pub tuned: Arc<Tuned>,
+}
+
+impl From<Weights> for Neural {
+    fn from(weights: Weights) -> Self {
+        Self { weights, network: gpu::Options::default(), tuned: Arc::default() }
+    }
+}
+
+/// The feature set of weights that this pass can run, and what their numbers mean.
+pub(super) fn check_weights(weights: &Weights) -> Result<(FeatureSet, Answer), GiError> {
+    let table = &weights.table;
+    if (table.name.as_str(), table.version, weights.cell) != ("screen", 1, CELL) {
+        let found = format!("table {} version {}, {} pixels a cell", table.name, table.version, weights.cell);
+        let reason = format!("list is made for {found}; this program makes screen version 1, {CELL} pixels a cell");
+        return Err(GiError::Feature { name: "(all)".into(), reason });
+    }
+    let output = &weights.output;
+    let fits = |a: &Answer| output.meaning == a.name() && output.channels == a.channels();
+    let Some(answer) = [Answer::Light, Answer::Gain].into_iter().find(fits) else {
+        return Err(GiError::Output(format!("{} channels of `{}`", output.channels, output.meaning)));
+    };
+    Ok((FeatureSet::new(weights.inputs.iter().map(|f| (f.name.as_str(), f.channels)))?, answer))
+}
