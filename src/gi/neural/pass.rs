@@ -49,11 +49,13 @@ pub struct Neural {
     pub network: gpu::Options,
     /// What a tuner has found on this device; empty without one.
     pub tuned: Arc<Tuned>,
+    /// Numbers of the `gather` whose answer the network corrects.
+    pub gather: gather::Options,
 }
 
 impl From<Weights> for Neural {
     fn from(weights: Weights) -> Self {
-        Self { weights, network: gpu::Options::default(), tuned: Arc::default() }
+        Self { weights, network: gpu::Options::default(), tuned: Arc::default(), gather: gather::Options::default() }
     }
 }
 
@@ -133,7 +135,7 @@ impl NeuralGi {
             exposure,
             reconstruct,
             gather: needs_guess(&neural.weights)
-                .then(|| GatherGi::new(device, options.size, gather::Options::default())),
+                .then(|| GatherGi::new(device, options.size, neural.gather)),
             rebuilt,
             rebuilds: 0,
         })
@@ -363,7 +365,7 @@ impl Rebuilt {
     ) -> Result<Self, GiError> {
         pack::feature_bytes(device, features, size)?;
         let cells = cells_of(size);
-        let Neural { weights, network, tuned } = neural;
+        let Neural { weights, network, tuned, .. } = neural;
         let network = Network::tuned(device, queue, weights, cells, *network, tuned.clone())
             .map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
         let guess = guess_texture(device, if needs_guess(weights) { size } else { [1, 1] });

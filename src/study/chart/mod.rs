@@ -5,6 +5,7 @@
 
 pub mod entries;
 mod on_pictures;
+pub mod plan;
 pub mod plot;
 pub mod published;
 pub mod report;
@@ -165,7 +166,7 @@ pub struct SceneFacts {
     pub size: [u32; 2],
     /// Where its reference comes from.
     pub reference: String,
-    /// Fewest and most samples of its pixels, where we traced it.
+    /// Fewest and most samples of its reference's pixels, where they are known.
     pub samples: Option<[u32; 2]>,
     /// Root mean square error of the reference's light at a pixel, as a share of its mean, and of a block of 4×4.
     pub noise: Option<[f64; 2]>,
@@ -233,6 +234,9 @@ pub struct Record {
     pub frames: [u32; 2],
     /// Bound of the references' error at a pixel, and most samples.
     pub reference: (f64, u32),
+    /// Light that gloss throws on after a diffuse bounce is left out, in references, paths and methods.
+    #[serde(default)]
+    pub no_caustics: bool,
     /// Entries, in the order of the table.
     pub entries: Vec<EntryFacts>,
     /// Scenes.

@@ -193,7 +193,7 @@ fn how(record: &Record, metric: Metric) -> String {
         "{what} Means over {} scenes, in brackets best and worst. Settled pictures are of the 32nd frame of a still camera on, {} samples \
          a pixel; the first frame has one. Time: a whole frame, rasteriser included, median of {frames} frames after {warmup}; {}. \
          Counted (GFLOP, MB, rays) and projected: only the passes that find and add indirect light. \
-         \"Against paths\": how many times as long our path tracer takes to come as near on this device.\n",
+         \"Against paths\": how many times as long our path tracer takes to come as near on this device.{}\n",
         record.sound_scenes(),
         record.samples,
         match Clock::of(record) {
@@ -202,6 +202,12 @@ fn how(record: &Record, metric: Metric) -> String {
                 "by the synchronised clock, since timestamps are more than {:.0} % away from it on this device or are not there",
                 AGREEMENT * 100.0
             ),
+        },
+        if record.no_caustics {
+            " What gloss throws on after a diffuse bounce is left out of references, paths and methods alike (`--no-caustics`), as \
+             Cycles' references leave it out."
+        } else {
+            ""
         }
     )
 }
@@ -334,7 +340,8 @@ pub fn slope(sweep: &Sweep) -> String {
 
 fn sweeps(record: &Record) -> String {
     let mut text = String::from(
-        "Milliseconds of a whole frame by the synchronised clock. Resolution: paper room 2; triangles: an uneven floor under sun and sky; lights: point \
+        "Milliseconds of a whole frame by the synchronised clock; in brackets the frames of the median where time allowed fewer than above. \
+         Resolution: paper room 2; triangles: an uneven floor under sun and sky; lights: point \
          lamps in a closed room (shadow maps are shared by the first 8; the others shine without).\n\n",
     );
     for axis in super::sweep::Axis::ALL {
@@ -348,7 +355,9 @@ fn sweeps(record: &Record) -> String {
         let _ =
             writeln!(text, "| {} | {} | slope |\n|{}", axis.name(), heads.join(" | "), "---|".repeat(heads.len() + 2));
         for sweep in &of {
-            let cell = |i: usize| sweep.points.get(i).map_or("—".into(), |p| format!("{:.1}", p.wall_ms.median));
+            let frames = |n: u32| if n < record.frames[0] { format!(" ({n})") } else { String::new() };
+            let cell = |p: &super::sweep::Point| format!("{:.1}{}", p.wall_ms.median, frames(p.frames));
+            let cell = |i: usize| sweep.points.get(i).map_or("—".into(), cell);
             let cells: Vec<String> = (0..heads.len()).map(cell).collect();
             let ended = sweep.ended.as_ref().map_or(String::new(), |why| format!(" (ends here: {why})"));
             let _ = writeln!(text, "| {} | {} | {}{ended} |", sweep.entry, cells.join(" | "), slope(sweep));

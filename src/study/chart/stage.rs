@@ -5,7 +5,7 @@ use super::{
     entries::Entry,
     on_pictures,
     published::{self, PIXELS},
-    run::Plan,
+    plan::Plan,
 };
 use crate::{
     gi::{Method, rung::Cost},
@@ -83,7 +83,7 @@ impl Stage<'_> {
                 })
             }
             Entry::Paths(count) => {
-                let traced = self.trial.trace(&self.camera, &truth::samples(*count, 1))?;
+                let traced = self.trial.trace(&self.camera, &plan.paths(truth::samples(*count, 1)))?;
                 let light = judge::light_error(traced.layer(reference::Layer::Gi), &self.reference);
                 let seen = judge::compare(&traced.rgb(), &self.reference, true)?;
                 let ms = 1e3 * traced.seconds;

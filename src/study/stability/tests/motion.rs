@@ -88,7 +88,7 @@ pub static DOORWAY: Test = Test {
         at_most: 0.15,
         source: "a fifth of a stop",
     }],
-    control: Fault::Screen(1.0),
+    control: Fault::Late(0.9),
     size: SMALL,
     paths: 64,
     pictures: false,
