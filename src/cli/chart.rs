@@ -33,8 +33,9 @@ use std::{
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Scenes by name, files, or folders of references (scene.glb, frame0000.exr, meta.json; or roomIIII_view0.exr). Two bundled scenes
-    /// and three of the paper's rooms when absent, against our own path tracer.
+    /// Scenes by name, files, or folders of references (scene.glb, frame0000.exr, meta.json; or
+    /// roomIIII_view0.exr). Two bundled scenes and three of the paper's rooms when absent, against
+    /// our own path tracer.
     #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
     scenes: Vec<String>,
     /// Real-time methods, or `all` of them.
@@ -46,10 +47,12 @@ pub struct Args {
     /// Also the network of this file: one over the scene, or one on pictures; may be repeated.
     #[arg(long, value_name = "W")]
     weights: Vec<PathBuf>,
-    /// What is up: light (error of the light that is added), flip, l1 (the paper's). All are in the records.
+    /// What is up: light (error of the light that is added), flip, l1 (the paper's). All are in the
+    /// records.
     #[arg(long, value_enum, default_value = "light")]
     metric: MetricName,
-    /// Folder for chart.svg, chart.png, chart.csv, chart.json. What is in chart.json already is not done again.
+    /// Folder for chart.svg, chart.png, chart.csv, chart.json. What is in chart.json already is not
+    /// done again.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Where the page goes, such as docs/results.md; DIR/results.md when absent.
@@ -79,11 +82,13 @@ pub struct Args {
     /// Costs as these grow: resolution, triangles, lights; all or none.
     #[arg(long, value_delimiter = ',', default_value = "none", value_name = "AXIS,...", value_parser = parse_axis)]
     sweeps: Vec<Axes>,
-    /// Seconds for the frames of a step of a sweep: fewer are timed where all would take longer, and the sweep ends where two would.
+    /// Seconds for the frames of a step of a sweep: fewer are timed where all would take longer,
+    /// and the sweep ends where two would.
     #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
     sweep_seconds: f64,
-    /// Leave out what gloss throws on after a diffuse bounce, in our references, paths, `gather` and `neural` alike: for folders of
-    /// references that were rendered so (Cycles without "Reflective Caustics").
+    /// Leave out what gloss throws on after a diffuse bounce, in our references, paths, `gather`
+    /// and `neural` alike: for folders of references that were rendered so (Cycles without
+    /// "Reflective Caustics").
     #[arg(long)]
     no_caustics: bool,
     /// Leave the paper's generator out.

@@ -134,8 +134,7 @@ impl NeuralGi {
             inputs,
             exposure,
             reconstruct,
-            gather: needs_guess(&neural.weights)
-                .then(|| GatherGi::new(device, options.size, neural.gather)),
+            gather: needs_guess(&neural.weights).then(|| GatherGi::new(device, options.size, neural.gather)),
             rebuilt,
             rebuilds: 0,
         })

@@ -33,8 +33,8 @@ pub struct Plan {
     pub sweeps: Vec<Axis>,
     /// Seconds a step of a sweep.
     pub sweep_seconds: f64,
-    /// Light that gloss throws on after a diffuse bounce is left out of paths, ours and the references'. Methods have numbers of
-    /// their own for that.
+    /// Light that gloss throws on after a diffuse bounce is left out of paths, ours and the
+    /// references'. Methods have numbers of their own for that.
     pub no_caustics: bool,
 }
 

@@ -37,7 +37,8 @@ pub struct Hooks<'a> {
     pub save: &'a dyn Fn(&Record) -> Result<(), ChartError>,
 }
 
-/// Does what `plan` says. Pieces that `before` holds under the same key (same program, device, scene, numbers) are not done again.
+/// Does what `plan` says. Pieces that `before` holds under the same key (same program, device,
+/// scene, numbers) are not done again.
 ///
 /// # Errors
 /// [`ChartError::Stopped`] (what was done has been saved by then); folders of references that cannot be read; saving.
@@ -125,7 +126,8 @@ impl<'a> Work<'a> {
 
     fn end(&mut self, parts: f64) -> Result<(), ChartError> {
         self.done += parts;
-        // What is not done yet stays from the run before, so that one that is cut off again loses nothing.
+        // What is not done yet stays from the run before, so that one that is cut off again loses
+        // nothing.
         let mut kept = self.record.clone();
         let missing = |u: &&Unit| !self.record.units.iter().any(|n| n.key == u.key);
         kept.units.extend(self.before.units.iter().filter(missing).cloned());

@@ -15,7 +15,8 @@ use crate::{
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// Scenes that are charted unless others are named: two that ship, and three rooms that nothing is judged by elsewhere.
+/// Scenes that are charted unless others are named: two that ship, and three rooms that nothing is
+/// judged by elsewhere.
 pub const DEFAULT: [&str; 5] = ["interior", "cornell", "paper-room:2", "paper-room:3", "paper-room:5"];
 
 /// A scene, and what it is judged by.
@@ -158,10 +159,11 @@ impl Source {
     }
 }
 
-/// The picture in `path` as a reference. What a method has to add is its diffuse light without what our rasteriser finds
-/// directly, since Blender counts the sky as direct light. Which surfaces there are, and what they reflect, is told by our own
-/// layers, not by the file's: half floats, filtered over pixels, show black walls as dark grey ones, where light is nowhere to be
-/// seen. Its noise is not known.
+/// The picture in `path` as a reference. What a method has to add is its diffuse light without what
+/// our rasteriser finds directly, since Blender counts the sky as direct light. Which surfaces
+/// there are, and what they reflect, is told by our own layers, not by the file's: half floats,
+/// filtered over pixels, show black walls as dark grey ones, where light is nowhere to be seen. Its
+/// noise is not known.
 ///
 /// # Errors
 /// A file that cannot be read or lacks a layer; drawing direct light.
@@ -215,8 +217,8 @@ mod tests {
         std::fs::write(at("flat/scene.glb"), "").unwrap();
         let refused = sources(&word()).unwrap_err().to_string();
         assert!(refused.contains("meta.json"), "{refused}");
-        std::fs::write(at("flat/meta.json"), r#"{"world": 0.5, "light": "point", "point": [[1, 2, 3, 60, 0.05]], "spp": 9}"#)
-            .unwrap();
+        let meta = r#"{"world": 0.5, "light": "point", "point": [[1, 2, 3, 60, 0.05]], "spp": 9}"#;
+        std::fs::write(at("flat/meta.json"), meta).unwrap();
         let found = sources(&word()).unwrap();
         let names: Vec<_> = found.iter().map(|s| s.name.as_str()).collect();
         assert_eq!(names, ["flat", "room0002_view0"]);

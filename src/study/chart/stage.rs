@@ -4,8 +4,8 @@ use super::{
     Scores, Time,
     entries::Entry,
     on_pictures,
-    published::{self, PIXELS},
     plan::Plan,
+    published::{self, PIXELS},
 };
 use crate::{
     gi::{Method, rung::Cost},

@@ -102,8 +102,9 @@ pub struct Point {
 }
 
 impl Sweep {
-    /// Slope of the synchronised clock: milliseconds for the axis' unit, by least squares; and the exponent of growth between the
-    /// first and the last step (1: as much as what grows). `None` with fewer than two steps.
+    /// Slope of the synchronised clock: milliseconds for the axis' unit, by least squares; and the
+    /// exponent of growth between the first and the last step (1: as much as what grows). `None`
+    /// with fewer than two steps.
     pub fn slope(&self) -> Option<(f64, f64)> {
         let points: Vec<(f64, f64)> = self.points.iter().map(|p| (p.x, p.wall_ms.median)).collect();
         let (first, last) = (points.first()?, points.last()?);
@@ -124,20 +125,22 @@ impl Sweep {
 pub struct Limits {
     /// Most frames timed.
     pub bench: BenchOptions,
-    /// Seconds that a step's frames may take. Fewer are drawn where all would take longer; a step is left out, and those after
-    /// it, where two would.
+    /// Seconds that a step's frames may take. Fewer are drawn where all would take longer; a step
+    /// is left out, and those after it, where two would.
     pub seconds: f64,
 }
 
 impl Limits {
-    /// Frames of a step that grows `factor` times over one whose frame took `before` milliseconds; or why there are none. Nothing
-    /// here grows slower than by the root of what grows.
+    /// Frames of a step that grows `factor` times over one whose frame took `before` milliseconds;
+    /// or why there are none. Nothing here grows slower than by the root of what grows.
     fn frames(self, before: f64, factor: f64) -> Result<BenchOptions, String> {
         let least = before * 1e-3 * factor.sqrt();
         let fit = (self.seconds / least) as u32;
         if fit < 2 {
             let (limit, last) = (self.seconds, before * 1e-3);
-            return Err(format!("two frames of the next step would take more than {limit} s: one of this took {last:.1} s"));
+            return Err(format!(
+                "two frames of the next step would take more than {limit} s: one of this took {last:.1} s"
+            ));
         }
         let warmup = self.bench.warmup.min(fit / 2);
         Ok(BenchOptions { frames: self.bench.frames.min(fit - warmup), warmup })

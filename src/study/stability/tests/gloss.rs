@@ -41,7 +41,8 @@ pub static MIRROR: Test = Test {
     ..METAL
 };
 
-/// Four metal balls in a sunlit hall, one material each; the red wall that they mirror is behind the camera.
+/// Four metal balls in a sunlit hall, one material each; the red wall that they mirror is behind
+/// the camera.
 fn balls(roughness: [f32; 4]) -> (Scene, Camera) {
     let mut hall = rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 3.0)], 0.3);
     for (i, roughness) in roughness.into_iter().enumerate() {
