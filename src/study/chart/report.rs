@@ -366,7 +366,7 @@ fn sweeps(record: &Record) -> String {
         let _ =
             writeln!(text, "| {} | {} | slope |\n|{}", axis.name(), heads.join(" | "), "---|".repeat(heads.len() + 2));
         for sweep in &of {
-            let frames = |n: u32| if n < record.frames[0] { format!(" ({n})") } else { String::new() };
+            let frames = |n: u32| if (1..record.frames[0]).contains(&n) { format!(" ({n})") } else { String::new() };
             let cell = |p: &super::sweep::Point| format!("{:.1}{}", p.wall_ms.median, frames(p.frames));
             let cell = |i: usize| sweep.points.get(i).map_or("—".into(), cell);
             let cells: Vec<String> = (0..heads.len()).map(cell).collect();

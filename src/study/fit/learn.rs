@@ -149,7 +149,7 @@ pub fn learn(
     let twentieth = errors.len().div_ceil(20);
     let learned = Learned {
         started_from,
-        views: lessons.views,
+        views: lessons.learnt_views(),
         pictures: lessons.examples.len(),
         drawing_seconds,
         step_seconds,

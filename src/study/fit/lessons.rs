@@ -99,12 +99,17 @@ impl Lessons {
             }
             let options = truth::until(Layer::Gi, NOISE, MOST_SAMPLES, lessons.views as u32);
             let target = trial.light_at_cells(&camera, options)?;
-            let held_out = lessons.views % HELD_OUT == 1;
+            let held_out = is_held_out(lessons.views);
             let examples = if held_out { &mut lessons.held_out } else { &mut lessons.examples };
             examples.extend(samples.iter().map(|s| example(s, &target, &features)));
             lessons.views += 1;
         }
         if lessons.views == 0 { Err(FitError::NoFreeViews) } else { Ok(lessons) }
+    }
+
+    /// Views that are learnt from.
+    pub fn learnt_views(&self) -> usize {
+        (0..self.views).filter(|view| !is_held_out(*view)).count()
     }
 
     /// A picture, or with left and right exchanged. (A cell's sample point is half a pixel right of
@@ -124,6 +129,10 @@ impl Lessons {
         }
         example
     }
+}
+
+fn is_held_out(view: usize) -> bool {
+    view % HELD_OUT == 1
 }
 
 /// The features that the weights use.
