@@ -91,6 +91,37 @@ fn a_small_chart_is_made_and_taken_up_again() {
     assert_eq!(json(&out)["scenes"].as_array().map(Vec::len), Some(3));
 }
 
+/// A folder as other programs' references stand in: its own size, its samples, its sky.
+#[test]
+fn a_folder_with_a_reference_is_judged_by_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (room, out) = (folder.path().join("refs/room"), folder.path().join("out"));
+    std::fs::create_dir_all(&room).expect("a folder");
+    let scene = bouncelight::scene::load("cornell").expect("it ships");
+    bouncelight::scene::export::write_glb(&scene, &room.join("scene.glb")).expect("written");
+    std::fs::write(room.join("meta.json"), r#"{"world": 0.1, "light": "sun", "spp": 64}"#).expect("written");
+    let mut traced = Command::cargo_bin("bouncelight").expect("it was built");
+    traced.current_dir(&room).args(["render", "scene.glb", "--environment", "0.1", "--size", "48x24", "-q"]);
+    let layers = ["--method", "reference", "--spp", "64", "--no-caustics", "--aov", "all", "-o", "frame0000.exr"];
+    traced.args(layers).assert().success();
+    let refs = folder.path().join("refs");
+    chart(&out, &["--scenes", refs.to_str().expect("plain"), "--no-caustics"]).success();
+    let record = json(&out);
+    let scene = &record["scenes"][0];
+    assert_eq!((&scene["name"], &scene["reference"]), (&"room".into(), &"room/frame0000.exr".into()));
+    assert_eq!((&scene["size"], &scene["samples"]), (&[48, 24].into(), &[64, 64].into()), "not --size's");
+    assert_eq!(record["no_caustics"], true);
+    let light = |entry: &str| {
+        let units = record["units"].as_array().expect("a list");
+        let unit = units.iter().find(|u| u["entry"] == entry).expect("it is there");
+        unit["scores"]["light"].as_f64().expect("a number")
+    };
+    println!("ambient {}, 1 path {}, 4 paths {}", light("ambient"), light("1 path"), light("4 paths"));
+    assert!((light("direct") - 1.0).abs() < 1e-6, "no light is all of it missing");
+    assert!(light("4 paths") < light("1 path") && light("4 paths") < 0.4);
+    assert!(std::fs::read_to_string(out.join("results.md")).expect("written").contains("`--no-caustics`"));
+}
+
 #[test]
 fn what_cannot_be_is_refused_before_the_work() {
     if common::gpu().is_none() {

@@ -72,6 +72,19 @@ fn gather_passes_what_ambient_fails_and_every_control_fails() {
     assert!(sheet.height > 4 * 128 && sheet.pixels.iter().any(|v| *v > 0.5));
 }
 
+/// The truth itself passes in units a thousand times as large, and what a slow history shows in a doorway is noticed.
+#[test]
+fn units_and_doorway_say_something() {
+    let Some(gpu) = common::gpu() else { return };
+    let tests = stability::named("units,doorway").expect("they are there");
+    let subjects = vec![method("direct", Method::Direct)];
+    let suite = Suite::new(&gpu, SuiteOptions { tests, subjects, kept: None, resume: None });
+    let record: Record = suite.run(&|| true, &mut |_| Ok::<(), StabilityError>(())).expect("it runs");
+    for finding in &record.tests {
+        assert!(finding.sound, "{}: {:?}", finding.name, finding.criteria);
+    }
+}
+
 /// Objects that move change the light between surfaces that stand still (half a minute: 150 frames of white rooms).
 #[test]
 fn a_door_that_is_shut_leaves_a_dark_room() {

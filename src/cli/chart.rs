@@ -16,8 +16,9 @@ use crate::{
         chart::{
             ChartError, Metric, Provenance, Record,
             entries::{Entry, path_counts},
+            plan::Plan,
             plot, report,
-            run::{self, Hooks, Plan},
+            run::{self, Hooks},
             scenes::{self, sources},
             sweep::Axis,
         },
@@ -32,8 +33,9 @@ use std::{
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Scenes by name, files, or folders of references (scene.glb, frame0000.exr, meta.json; or roomIIII_view0.exr). Two bundled scenes
-    /// and three of the paper's rooms when absent, against our own path tracer.
+    /// Scenes by name, files, or folders of references (scene.glb, frame0000.exr, meta.json; or
+    /// roomIIII_view0.exr). Two bundled scenes and three of the paper's rooms when absent, against
+    /// our own path tracer.
     #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
     scenes: Vec<String>,
     /// Real-time methods, or `all` of them.
@@ -45,10 +47,12 @@ pub struct Args {
     /// Also the network of this file: one over the scene, or one on pictures; may be repeated.
     #[arg(long, value_name = "W")]
     weights: Vec<PathBuf>,
-    /// What is up: light (error of the light that is added), flip, l1 (the paper's). All are in the records.
+    /// What is up: light (error of the light that is added), flip, l1 (the paper's). All are in the
+    /// records.
     #[arg(long, value_enum, default_value = "light")]
     metric: MetricName,
-    /// Folder for chart.svg, chart.png, chart.csv, chart.json. What is in chart.json already is not done again.
+    /// Folder for chart.svg, chart.png, chart.csv, chart.json. What is in chart.json already is not
+    /// done again.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Where the page goes, such as docs/results.md; DIR/results.md when absent.
@@ -78,9 +82,15 @@ pub struct Args {
     /// Costs as these grow: resolution, triangles, lights; all or none.
     #[arg(long, value_delimiter = ',', default_value = "none", value_name = "AXIS,...", value_parser = parse_axis)]
     sweeps: Vec<Axes>,
-    /// A step of a sweep that would take longer ends it, seconds.
+    /// Seconds for the frames of a step of a sweep: fewer are timed where all would take longer,
+    /// and the sweep ends where two would.
     #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
     sweep_seconds: f64,
+    /// Leave out what gloss throws on after a diffuse bounce, in our references, paths, `gather`
+    /// and `neural` alike: for folders of references that were rendered so (Cycles without
+    /// "Reflective Caustics").
+    #[arg(long)]
+    no_caustics: bool,
     /// Leave the paper's generator out.
     #[arg(long)]
     no_generator: bool,
@@ -169,6 +179,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         generator: !args.no_generator,
         sweeps: args.sweeps.iter().flat_map(|a| a.0.clone()).collect(),
         sweep_seconds: args.sweep_seconds,
+        no_caustics: args.no_caustics,
     };
     let provenance = provenance(args.keep.then_some(&before).and_then(|b| b.as_ref()));
     let progress = RefCell::new(Progress::new(global, "parts of the work", 1));
@@ -216,7 +227,7 @@ fn entries(global: &Global, args: &Args) -> Result<Vec<Entry>> {
         entries.push(Entry::Method { name: method.name().into(), method });
     }
     for options in &args.gather {
-        let name = format!("gather {}", differences(options));
+        let name = format!("gather {}", options.words().unwrap_or_else(|| "again".into()));
         entries.push(Entry::Method { name, method: Method::Gather(*options) });
     }
     for path in &args.weights {
@@ -230,6 +241,15 @@ fn entries(global: &Global, args: &Args) -> Result<Vec<Entry>> {
             entries.push(Entry::Method { name: format!("neural {stem}"), method });
         }
     }
+    if args.no_caustics {
+        for entry in &mut entries {
+            match entry {
+                Entry::Method { method: Method::Gather(options), .. } => options.caustics = false,
+                Entry::Method { method: Method::Neural(neural), .. } => neural.gather.caustics = false,
+                _ => {}
+            }
+        }
+    }
     entries.extend(path_counts(args.paths).into_iter().map(Entry::Paths));
     let mut seen = Vec::new();
     for entry in &entries {
@@ -239,18 +259,6 @@ fn entries(global: &Global, args: &Args) -> Result<Vec<Entry>> {
         seen.push(entry.name());
     }
     Ok(entries)
-}
-
-/// What is not `gather`'s own, in words.
-fn differences(options: &gather::Options) -> String {
-    let own = format!("{:?}", gather::Options::default());
-    let inner = |text: &str| -> Vec<String> {
-        let text = text.trim_start_matches("Options { ").trim_end_matches(" }");
-        text.split(", ").map(|w| w.replace(": ", "=")).collect()
-    };
-    let (own, theirs) = (inner(&own), inner(&format!("{options:?}")));
-    let other: Vec<String> = theirs.into_iter().zip(own).filter(|(a, b)| a != b).map(|(a, _)| a).collect();
-    if other.is_empty() { "again".into() } else { other.join(",") }
 }
 
 fn json(record: &Record) -> Result<String, ChartError> {
@@ -347,13 +355,6 @@ fn print(args: &Args, record: &Record, metric: Metric) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_say_what_is_other() {
-        let options: gather::Options = "blur=0,cell_frames=32".parse().unwrap();
-        assert_eq!(differences(&options), "cell_frames=32.0,blur=false");
-        assert_eq!(differences(&gather::Options::default()), "again");
-    }
 
     #[test]
     fn words_are_understood() {

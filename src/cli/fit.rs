@@ -1,4 +1,5 @@
-//! `bouncelight fit`: the cheapest method that is good enough for a scene, kept beside it, and a network that has learned the scene.
+//! `bouncelight fit`: the cheapest method that is good enough for a scene, kept beside it, and a
+//! network that has learned the scene.
 
 use super::{
     args::{Global, SceneArgs, usage},
@@ -26,16 +27,19 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// What is good enough, in every view: `light=8%` (mean error of the light that a method has to add), or a metric of `compare`.
+    /// What is good enough, in every view: `light=8%` (mean error of the light that a method has to
+    /// add), or a metric of `compare`.
     #[arg(long, default_value = "light=10%", value_name = "METRIC=T")]
     target: Yardstick,
     /// Most milliseconds a frame that the method's own passes may take, at --size.
     #[arg(long, value_name = "B", value_parser = parse_budget)]
     budget_ms: Option<f64>,
-    /// Whose milliseconds: this device's, measured, or a GTX 1050's, projected from counted work. `auto` projects on software adapters.
+    /// Whose milliseconds: this device's, measured, or a GTX 1050's, projected from counted work.
+    /// `auto` projects on software adapters.
     #[arg(long, value_enum, default_value = "auto")]
     cost: Cost,
-    /// Views to judge by: the scene's cameras, then ones chosen to cover it. --eye and --look-at replace them all.
+    /// Views to judge by: the scene's cameras, then ones chosen to cover it. --eye and --look-at
+    /// replace them all.
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     views: u32,
     /// Frames of a still camera up to the one that is judged, for methods that settle.
@@ -44,8 +48,9 @@ pub struct Args {
     /// A network to try beside the shipped one; may be repeated.
     #[arg(long, value_name = "W")]
     weights: Vec<PathBuf>,
-    /// Where nothing meets the target: fine-tune the network (the first of --weights, else the shipped one) to the scene for so many minutes,
-    /// on this device and on views of its own, and keep it beside the record if it wins where it is judged.
+    /// Where nothing meets the target: fine-tune the network (the first of --weights, else the
+    /// shipped one) to the scene for so many minutes, on this device and on views of its own, and
+    /// keep it beside the record if it wins where it is judged.
     #[arg(long, value_name = "MINUTES", value_parser = parse_minutes)]
     learn: Option<f64>,
     /// Most samples a pixel of a reference.
@@ -54,7 +59,8 @@ pub struct Args {
     /// Folder where references are kept for the next time.
     #[arg(long, value_name = "DIR")]
     references: Option<PathBuf>,
-    /// Where the result goes; SCENE.gi.toml beside the scene when absent, `-` for standard output alone.
+    /// Where the result goes; SCENE.gi.toml beside the scene when absent, `-` for standard output
+    /// alone.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Folder for a page that explains the choice with pictures, and a JSON record.
@@ -119,7 +125,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     if let Some(weights) = weights {
         let path = weights_path(&output);
         image_io::write_whole(&path, &weights)?;
-        // As other weights: the record must still name them when somebody reads it in another folder.
+        // As other weights: the record must still name them when somebody reads it in another
+        // folder.
         let whole = std::fs::canonicalize(&path).with_context(|| format!("cannot read {}", path.display()))?;
         options.networks.last_mut().expect("it was learnt").file = whole;
     }

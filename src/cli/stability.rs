@@ -1,4 +1,5 @@
-//! `bouncelight stability`: named tests of where methods fail, over all methods, with contact sheets, a record and a page.
+//! `bouncelight stability`: named tests of where methods fail, over all methods, with contact
+//! sheets, a record and a page.
 
 use super::{
     args::{Global, MethodName, usage},
@@ -29,25 +30,30 @@ pub struct Args {
     /// Tell the tests with their thresholds, and draw nothing.
     #[arg(long)]
     list: bool,
-    /// Methods by name between commas, or `all`; `paper` is the paper's recipe where --paper names its weights.
+    /// Methods by name between commas, or `all`; `paper` is the paper's recipe where --paper names
+    /// its weights.
     #[arg(long, default_value = "all", value_name = "NAMES")]
     methods: String,
     /// Weights of `neural`; the shipped ones (`small`) when absent.
     #[arg(long, value_name = "W")]
     weights: Option<PathBuf>,
-    /// Weights of a network on pictures (the paper's recipe, as `weights convert` and training make them), tested as `paper`.
+    /// Weights of a network on pictures (the paper's recipe, as `weights convert` and training make
+    /// them), tested as `paper`.
     #[arg(long, value_name = "W")]
     paper: Option<PathBuf>,
-    /// Which method's failures make the exit code 5: the program's default where it is among those tested, else all of them.
+    /// Which method's failures make the exit code 5: the program's default where it is among those
+    /// tested, else all of them.
     #[arg(long, value_name = "NAME")]
     judge: Option<String>,
     /// Failures that docs/limits.md explains do not count.
     #[arg(long)]
     allow_known: bool,
-    /// Folder for contact sheets (NAME.png), short sequences (NAME.apng.png), the record and references that were traced.
+    /// Folder for contact sheets (NAME.png), short sequences (NAME.apng.png), the record and
+    /// references that were traced.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Tests whose findings are in --out already, of the same program, device and weights, are not run again.
+    /// Tests whose findings are in --out already, of the same program, device and weights, are not
+    /// run again.
     #[arg(long, requires = "out")]
     resume: bool,
     /// Write the record to this file, too; `-` is standard output, which then holds nothing else.

@@ -1,4 +1,5 @@
-//! Time and memory of one method: GPU milliseconds per pass from timestamps, synchronised wall clock beside them.
+//! Time and memory of one method: GPU milliseconds per pass from timestamps, synchronised wall
+//! clock beside them.
 
 use crate::{
     gi::technique::Cost,
@@ -54,21 +55,23 @@ pub struct Measurement {
     pub wall_ms: Spread,
     /// Resident GPU bytes by owner.
     pub bytes: Vec<(String, u64)>,
-    /// Counted cost of the passes that find and add indirect light; empty in records from before it was counted.
+    /// Counted cost of the passes that find and add indirect light; empty in records from before it
+    /// was counted.
     #[serde(default)]
     pub costs: Vec<Cost>,
 }
 
 impl Measurement {
-    /// How far GPU time and wall clock are apart, as a share of the wall clock, when it is more than [`AGREEMENT`].
-    /// A driver that lets passes run on past their timestamps shows itself here.
+    /// How far GPU time and wall clock are apart, as a share of the wall clock, when it is more
+    /// than [`AGREEMENT`]. A driver that lets passes run on past their timestamps shows itself
+    /// here.
     pub fn disagreement(&self) -> Option<f64> {
         let apart = (self.wall_ms.median - self.gpu_ms?.median).abs() / self.wall_ms.median;
         (apart > AGREEMENT).then_some(apart)
     }
 
-    /// GPU milliseconds of the passes that find and add indirect light (medians, added up); none where there are no timestamps or
-    /// they do not agree with the clock.
+    /// GPU milliseconds of the passes that find and add indirect light (medians, added up); none
+    /// where there are no timestamps or they do not agree with the clock.
     pub fn own_ms(&self) -> Option<f64> {
         self.gpu_ms.filter(|_| self.disagreement().is_none())?;
         let counted = |pass: &str| self.costs.iter().any(|c| c.pass == pass);
@@ -82,7 +85,8 @@ impl Measurement {
     }
 }
 
-/// Timestamps and synchronised wall clock should agree within this share, or one of them is not to be trusted.
+/// Timestamps and synchronised wall clock should agree within this share, or one of them is not to
+/// be trusted.
 pub const AGREEMENT: f64 = 0.1;
 
 /// Why a measurement failed.
@@ -102,7 +106,8 @@ pub enum BenchError {
     NoFrames,
 }
 
-/// Draws `options.warmup + options.frames` frames of the same view, waiting for each, and measures the latter.
+/// Draws `options.warmup + options.frames` frames of the same view, waiting for each, and measures
+/// the latter.
 ///
 /// # Errors
 /// [`BenchError`].
@@ -116,7 +121,8 @@ pub fn measure(
     measure_frames(gpu, renderer, scene, camera, options, false)
 }
 
-/// As [`measure`], but each frame is the first after a cut, on which methods with a history may spend more.
+/// As [`measure`], but each frame is the first after a cut, on which methods with a history may
+/// spend more.
 ///
 /// # Errors
 /// [`BenchError`].
@@ -182,7 +188,8 @@ fn measure_frames(
     })
 }
 
-/// Collects each pass over the frames. Passes that share a label within a frame (shadow faces, say) are added up.
+/// Collects each pass over the frames. Passes that share a label within a frame (shadow faces, say)
+/// are added up.
 fn per_pass(frames: &[Vec<(String, f64)>]) -> Vec<PassTime> {
     let mut order: Vec<&str> = Vec::new();
     for (label, _) in frames.iter().flatten() {

@@ -1,4 +1,5 @@
-//! One training sample: what the network is fed for a view, with the raw G-buffer values at the same sample points.
+//! One training sample: what the network is fed for a view, with the raw G-buffer values at the
+//! same sample points.
 
 use super::guides::Guides;
 use crate::{
@@ -67,8 +68,9 @@ pub struct Next {
     pub flow: Vec<f32>,
 }
 
-/// Draws `camera`'s view for `frames` frames after a cut, unjittered, and reads what training needs of the last. `renderer`'s method is
-/// `gather`, whose answer is one of the network's inputs. Blocks.
+/// Draws `camera`'s view for `frames` frames after a cut, unjittered, and reads what training needs
+/// of the last. `renderer`'s method is `gather`, whose answer is one of the network's inputs.
+/// Blocks.
 pub fn sample(
     gpu: &Gpu,
     renderer: &mut Renderer,
@@ -123,9 +125,11 @@ impl Sample {
         near as f32 / self.depth.len().max(1) as f32
     }
 
-    /// The sample as a safetensors file: `features` [channels, h, w], `scale` (the exposure s, one value), `direct`, `albedo` and
-    /// `normal` [3, h, w], `depth` [h, w]; where it was drawn, `next_features`, `next_scale` and `flow` [2, h, w] of the next frame; where
-    /// it was traced, `light` [3, h, w] and its `noise` (one value); all f32; and, where they were read, the [`Guides`].
+    /// The sample as a safetensors file: `features` [channels, h, w], `scale` (the exposure s, one
+    /// value), `direct`, `albedo` and `normal` [3, h, w], `depth` [h, w]; where it was drawn,
+    /// `next_features`, `next_scale` and `flow` [2, h, w] of the next frame; where it was traced,
+    /// `light` [3, h, w] and its `noise` (one value); all f32; and, where they were read, the
+    /// [`Guides`].
     pub fn to_bytes(&self) -> Result<Vec<u8>, DatasetError> {
         let [w, h] = self.inputs.cells.map(|n| n as usize);
         let channels = self.inputs.features.len() / (w * h);
@@ -176,7 +180,8 @@ struct Cells {
 }
 
 impl Cells {
-    /// Decodes the sample point of every cell from tightly packed texels of `T` bytes into `N` planes.
+    /// Decodes the sample point of every cell from tightly packed texels of `T` bytes into `N`
+    /// planes.
     fn pick<const T: usize, const N: usize>(&self, texels: &[u8], decode: impl Fn([u8; T]) -> [f32; N]) -> Vec<f32> {
         let mut planes: [Vec<f32>; N] = std::array::from_fn(|_| Vec::new());
         for j in 0..self.low[1] {

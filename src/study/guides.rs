@@ -1,5 +1,5 @@
-//! What a training sample holds at full resolution, on request: guides for the way back from cells to pixels, and all that puts
-//! the picture together again once the light is known.
+//! What a training sample holds at full resolution, on request: guides for the way back from cells
+//! to pixels, and all that puts the picture together again once the light is known.
 
 use super::dataset::{DatasetError, octahedral};
 use crate::{
@@ -11,7 +11,8 @@ use safetensors::{Dtype, tensor::TensorView};
 
 /// Planes `[channel][row][column]` of a picture of `size` pixels.
 ///
-/// picture = albedo · (direct + occlusion · E) + rest, E the light that a method adds; exact for E = `guess` and `rest` as it is.
+/// picture = albedo · (direct + occlusion · E) + rest, E the light that a method adds; exact for E
+/// = `guess` and `rest` as it is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guides {
     /// Width and height, pixels.
@@ -26,12 +27,14 @@ pub struct Guides {
     pub direct: Vec<f16>,
     /// What method `gather` adds, E/π, three planes.
     pub guess: Vec<f16>,
-    /// Specular light of all kinds and emission; on background the surroundings. Radiance, three planes.
+    /// Specular light of all kinds and emission; on background the surroundings. Radiance, three
+    /// planes.
     pub rest: Vec<f16>,
 }
 
 impl Guides {
-    /// Reads what the last frame left in `targets`, drawn by a camera whose near plane is `near` metres away. Blocks.
+    /// Reads what the last frame left in `targets`, drawn by a camera whose near plane is `near`
+    /// metres away. Blocks.
     ///
     /// # Errors
     /// [`DatasetError::Readback`].

@@ -4,8 +4,9 @@ use crate::scene::{Camera, Image, Mesh, Scene};
 use sha2::{Digest, Sha256};
 use std::fmt::{self, Write};
 
-/// Everything that decides what a scene looks like, as 16 hexadecimal digits: meshes, placements, materials, images, lights and
-/// surroundings. Names, cameras and how things could move do not count.
+/// Everything that decides what a scene looks like, as 16 hexadecimal digits: meshes, placements,
+/// materials, images, lights and surroundings. Names, cameras and how things could move do not
+/// count.
 pub fn of_scene(scene: &Scene) -> String {
     // Taken apart, so that whoever adds a field decides here whether it counts.
     let Scene {

@@ -9,7 +9,8 @@ use crate::render::tonemap_curve::Tonemap;
 pub const BLOCK: usize = 4;
 /// Least diffuse reflectance at which diffuse light is looked at.
 const LEAST_ALBEDO: f32 = 0.01;
-/// Where the reference has less than this share of its median light, nothing is compared: coincident faces, which show black.
+/// Where the reference has less than this share of its median light, nothing is compared:
+/// coincident faces, which show black.
 const LEAST_LIGHT: f32 = 0.02;
 
 /// What is found of the light that a GI method has to add.
@@ -19,20 +20,27 @@ pub struct LightError {
     pub error: f64,
     /// Σ(ours − reference) / Σ|reference|: above 0 where ours is too bright.
     pub bias: f64,
-    /// What `error` would be of the reference's own noise, were ours perfect; an estimate from its two halves.
+    /// What `error` would be of the reference's own noise, were ours perfect; an estimate from its
+    /// two halves.
     pub floor: f64,
+    /// Standard deviation that the reference's noise gives the difference of two pictures' errors, at
+    /// most. A block's noise moves its |ours − reference| by no more than itself, so it moves the
+    /// difference by no more than twice that; over N independent blocks: 2 σ / √N, whatever share of
+    /// the noise each of them has.
+    pub doubt: f64,
 }
 
-/// Compares `light` (rgb a pixel, E/π: [`Shot::added`](super::trial::Shot::added), or another tracing's [`Layer::Gi`]) with the reference's [`Layer::Gi`] as
-/// docs/accuracy.md says: on pixels with a surface, diffuse reflectance above 0.01 and at least 2 % of the reference's median
-/// light, pooled over blocks of 4×4. `None` where no block is left or the reference has no light there.
+/// Compares `light` (rgb a pixel, E/π: [`Shot::added`](super::trial::Shot::added), or another
+/// tracing's [`Layer::Gi`]) with the reference's [`Layer::Gi`] as docs/accuracy.md says: on pixels
+/// with a surface, diffuse reflectance above 0.01 and at least 2 % of the reference's median light,
+/// pooled over blocks of 4×4. `None` where no block is left or the reference has no light there.
 pub fn light_error(light: &[f32], reference: &Reference) -> Option<LightError> {
     let [width, height] = reference.size.map(|n| n as usize);
     let wanted = reference.layer(Layer::Gi);
     assert_eq!(light.len(), wanted.len(), "the picture has the reference's size");
     let weight = weights(reference)?;
     let (blocks_x, blocks_y) = (width / BLOCK, height / BLOCK);
-    let (mut apart, mut signed, mut all) = (0.0, 0.0, 0.0);
+    let (mut apart, mut signed, mut all, mut blocks) = (0.0, 0.0, 0.0, 0u32);
     for block in 0..blocks_x * blocks_y {
         let (x0, y0) = (block % blocks_x * BLOCK, block / blocks_x * BLOCK);
         let pixels = (0..BLOCK * BLOCK).map(|i| (y0 + i / BLOCK) * width + x0 + i % BLOCK);
@@ -46,6 +54,7 @@ pub fn light_error(light: &[f32], reference: &Reference) -> Option<LightError> {
         }
         // Half a block at least: the rim of an object is no place to judge light at.
         if count > (BLOCK * BLOCK / 2) as f64 {
+            blocks += 1;
             for (ours, theirs) in sums[0].iter().zip(sums[1]).map(|(ours, theirs)| (ours / count, theirs / count)) {
                 apart += (ours - theirs).abs();
                 signed += ours - theirs;
@@ -54,8 +63,9 @@ pub fn light_error(light: &[f32], reference: &Reference) -> Option<LightError> {
         }
     }
     // Of a Gaussian the mean |Δ| is √(2/π) of the root mean square.
-    let floor = reference.light_noise() / BLOCK as f64 * std::f64::consts::FRAC_2_PI.sqrt();
-    (all > 0.0).then(|| LightError { error: apart / all, bias: signed / all, floor })
+    let noise = reference.light_noise() / BLOCK as f64;
+    let (floor, doubt) = (noise * std::f64::consts::FRAC_2_PI.sqrt(), 2.0 * noise / f64::from(blocks).sqrt());
+    (all > 0.0).then(|| LightError { error: apart / all, bias: signed / all, floor, doubt })
 }
 
 /// Which pixels count.
@@ -74,8 +84,9 @@ fn weights(reference: &Reference) -> Option<Vec<bool>> {
     Some((0..depth.len()).map(|p| surface(p) && light(p) >= least).collect())
 }
 
-/// Every metric of what is shown through Filmic in 8-bit steps, as a saved picture would be, and of radiance. `rgb`: linear, of the
-/// reference's size. FLIP takes as long as all others together and is left out unless asked for.
+/// Every metric of what is shown through Filmic in 8-bit steps, as a saved picture would be, and of
+/// radiance. `rgb`: linear, of the reference's size. FLIP takes as long as all others together and
+/// is left out unless asked for.
 ///
 /// # Errors
 /// Values that are no numbers; fewer than 7 pixels in width or height.
@@ -83,7 +94,8 @@ pub fn compare(rgb: &[f32], reference: &Reference, flip: bool) -> Result<Compari
     with_views(&shown(rgb), Some(rgb), reference, flip)
 }
 
-/// The same for a picture that is known as it is shown only, display values in [0, 1]: without the metrics of radiance.
+/// The same for a picture that is known as it is shown only, display values in [0, 1]: without the
+/// metrics of radiance.
 ///
 /// # Errors
 /// As [`compare`].
@@ -138,6 +150,8 @@ mod tests {
         let same = light_error(&[2.0; 192], &truth).unwrap();
         assert_eq!((same.error, same.bias), (0.0, 0.0));
         assert!((same.floor - 0.01 * 0.797_88).abs() < 1e-6);
+        // Four blocks of 1 % each.
+        assert!((same.doubt - 0.01).abs() < 1e-9, "{}", same.doubt);
         let dark = light_error(&[1.0; 192], &truth).unwrap();
         assert!((dark.error - 0.5).abs() < 1e-9 && (dark.bias + 0.5).abs() < 1e-9);
         // Noise that differs from pixel to pixel is gone in blocks, a wrong block is not.

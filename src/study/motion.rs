@@ -1,5 +1,5 @@
-//! Two frames of a camera that moves a little, and which cell of the second shows what a cell of the first shows: what training's
-//! temporal term compares.
+//! Two frames of a camera that moves a little, and which cell of the second shows what a cell of
+//! the first shows: what training's temporal term compares.
 
 use super::{dataset::Sample, views::SplitMix};
 use crate::{
@@ -9,18 +9,20 @@ use crate::{
 };
 use glam::{Mat3, Mat4, Quat, Vec2, Vec3};
 
-/// Most cells that the picture moves by turning the camera, and as many again, at most, by moving it.
+/// Most cells that the picture moves by turning the camera, and as many again, at most, by moving
+/// it.
 const MOST_CELLS: f32 = 2.0;
-/// Distance from a surface's plane, in its view distances, up to which a cell of the other frame shows the same surface, and the
-/// least cosine between their normals.
+/// Distance from a surface's plane, in its view distances, up to which a cell of the other frame
+/// shows the same surface, and the least cosine between their normals.
 const SAME_PLANE: f32 = 0.005;
 const SAME_NORMAL: f32 = 0.97;
 
 /// What [`flow`] holds where the second frame does not show the surface.
 pub const UNSEEN: f32 = -1e4;
 
-/// `camera` after a small step: turned about two axes and moved any way, each by up to two cells of a picture of `size` pixels whose
-/// surfaces lie `distance` metres away. The same seed gives the same step.
+/// `camera` after a small step: turned about two axes and moved any way, each by up to two cells of
+/// a picture of `size` pixels whose surfaces lie `distance` metres away. The same seed gives the
+/// same step.
 pub fn stepped(camera: &Camera, size: [u32; 2], distance: f32, seed: u64) -> Camera {
     let mut numbers = SplitMix::new(seed);
     let mut between = |most: f32| most * (2.0 * numbers.next() - 1.0);
@@ -71,7 +73,8 @@ impl<'a> Frame<'a> {
         Vec3::new(self.sample.normal[at], self.sample.normal[plane + at], self.sample.normal[2 * plane + at])
     }
 
-    /// Where the frame shows a point, in cells (whole numbers are sample points), and how far it is along the view axis.
+    /// Where the frame shows a point, in cells (whole numbers are sample points), and how far it is
+    /// along the view axis.
     fn place(&self, point: Vec3) -> Option<(Vec2, f32)> {
         let v = self.turn.transpose() * (point - self.eye);
         let z = -v.z;
@@ -83,7 +86,8 @@ impl<'a> Frame<'a> {
         (z > 0.0).then(|| (Vec2::from(cells), z))
     }
 
-    /// True where all four cells around a place show the plane through `point`, so that a value between them is one of its surface.
+    /// True where all four cells around a place show the plane through `point`, so that a value
+    /// between them is one of its surface.
     fn shows(&self, place: Vec2, z: f32, point: Vec3, normal: Vec3) -> bool {
         let last = self.low.map(|n| n as f32 - 1.0);
         let inside = place.x >= 0.0 && place.y >= 0.0 && place.x <= last[0] && place.y <= last[1];
@@ -98,9 +102,9 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// For each cell of the first sample where the second one shows its surface point: x plane, then y plane, in cells of the second (whole
-/// numbers are its cells' own sample points); [`UNSEEN`] where it is hidden, outside or between surfaces. Both samples are of
-/// pictures of `size` pixels.
+/// For each cell of the first sample where the second one shows its surface point: x plane, then y
+/// plane, in cells of the second (whole numbers are its cells' own sample points); [`UNSEEN`] where
+/// it is hidden, outside or between surfaces. Both samples are of pictures of `size` pixels.
 pub fn flow(first: (&Sample, &Camera), second: (&Sample, &Camera), size: [u32; 2]) -> Vec<f32> {
     let (a, b) = (Frame::new(first.0, first.1, size), Frame::new(second.0, second.1, size));
     let mut planes = [Vec::new(), Vec::new()];
@@ -154,7 +158,8 @@ mod tests {
 
     #[test]
     fn a_wall_moves_against_the_camera_and_what_is_not_the_wall_is_unseen() {
-        // At 90 degrees and 32 pixels a metre, 16 metres away, is a pixel: four metres to the right are one cell to the left.
+        // At 90 degrees and 32 pixels a metre, 16 metres away, is a pixel: four metres to the right
+        // are one cell to the left.
         let (a, b) = (wall(16.0, Vec3::Z), wall(16.0, Vec3::Z));
         let (still, moved) = (camera(0.0), camera(4.0));
         let same = flow((&a, &still), (&b, &still), SIZE);

@@ -1,5 +1,5 @@
-//! What counted work would take on a card that nobody here owns: a roofline with one efficiency. Never a measurement;
-//! whoever prints it says so.
+//! What counted work would take on a card that nobody here owns: a roofline with one efficiency.
+//! Never a measurement; whoever prints it says so.
 
 use crate::gi::technique::Cost;
 
@@ -17,8 +17,9 @@ pub struct Card {
 /// The card that bouncelight is made for: 4 GB, no ray-tracing cores.
 pub const GTX_1050: Card = Card { name: "GTX 1050", flops: 1.86e12, bandwidth: 112e9 };
 
-/// Share of both peaks that a pass is taken to reach: the middle of the 24–45 % that portable compute kernels were seen
-/// to reach on the card's sister, the GTX 1060 (ggml's Vulkan convolutions).
+/// Share of both peaks that a pass is taken to reach: the middle of the 24–45 % that portable
+/// compute kernels were seen to reach on the card's sister, the GTX 1060 (ggml's Vulkan
+/// convolutions).
 pub const EFFICIENCY: f64 = 0.35;
 
 /// Milliseconds of one pass: arithmetic or traffic, whichever takes longer.

@@ -1,5 +1,6 @@
-//! Times as ratios: method to method and pass to pass, so that a baseline can be committed where seconds could not. Methods take turns,
-//! and the fastest turn of each counts, which other programs have disturbed least.
+//! Times as ratios: method to method and pass to pass, so that a baseline can be committed where
+//! seconds could not. Methods take turns, and the fastest turn of each counts, which other programs
+//! have disturbed least.
 
 use super::bench::Measurement;
 use serde::{Deserialize, Serialize};
@@ -8,7 +9,8 @@ use serde::{Deserialize, Serialize};
 const LEAST_SHARE: f64 = 0.03;
 /// Least tolerance that a baseline states, as a share.
 pub const LEAST_ALLOWED: f64 = 0.25;
-/// The method and the pass that others are divided by: every method has the pass, and both are as heavy as what they are compared with.
+/// The method and the pass that others are divided by: every method has the pass, and both are as
+/// heavy as what they are compared with.
 const METHOD: &str = "direct";
 const PASS: &str = "direct";
 
@@ -19,8 +21,8 @@ pub struct Ratio {
     pub of: String,
     /// Of the fastest turns.
     pub value: f64,
-    /// How much larger it may be before that is a fault, as a share: twice what one half of the rounds was off when the baseline
-    /// was made, and at least [`LEAST_ALLOWED`].
+    /// How much larger it may be before that is a fault, as a share: twice what one half of the
+    /// rounds was off when the baseline was made, and at least [`LEAST_ALLOWED`].
     pub allowed: f64,
 }
 
@@ -65,7 +67,8 @@ pub fn of(rounds: &[Vec<Measurement>]) -> Vec<Ratio> {
             ratios.extend(ratio(format!("{name} / {METHOD}"), rounds, &|r| method(r, name), &|r| method(r, METHOD)));
         }
         let frame: f64 = measured.passes.iter().map(|p| p.ms.median).sum();
-        // A network's layers run on past their timestamps on some drivers: the method's own ratio holds them.
+        // A network's layers run on past their timestamps on some drivers: the method's own ratio
+        // holds them.
         let heavy =
             measured.passes.iter().filter(|p| p.ms.median >= LEAST_SHARE * frame && !p.pass.starts_with("net."));
         for p in heavy.filter(|p| p.pass != PASS) {
@@ -91,8 +94,8 @@ fn ratio(of: String, rounds: &[Vec<Measurement>], above: Time<'_>, below: Time<'
     Some(Ratio { of, value, allowed: (2.0 * off).max(LEAST_ALLOWED) })
 }
 
-/// What became slower than `base` says by more than it or `allowed` permits, and what became as much faster, which asks for a new
-/// baseline; one sentence each.
+/// What became slower than `base` says by more than it or `allowed` permits, and what became as
+/// much faster, which asks for a new baseline; one sentence each.
 pub fn compare(base: &[Ratio], now: &[Ratio], allowed: f64) -> (Vec<String>, Vec<String>) {
     let (mut slower, mut faster) = (Vec::new(), Vec::new());
     for base in base {

@@ -1,7 +1,8 @@
 //! Speed of rays by kind: primary, shadow and diffuse ones through a scene's triangles.
 //!
-//! Rays are read from and hits written to buffers, which counts; [`RayScene::nothing`] says how much that is. On a CPU driver the
-//! time is that of the processor, not the clock on the wall, so that other work on the machine does not count.
+//! Rays are read from and hits written to buffers, which counts; [`RayScene::nothing`] says how
+//! much that is. On a CPU driver the time is that of the processor, not the clock on the wall, so
+//! that other work on the machine does not count.
 
 use crate::accel::{Accel, AccelError, AccelGpu, RayBatch, RayCaster, RayGpu};
 use crate::gpu::Gpu;
@@ -13,7 +14,8 @@ use std::time::Instant;
 /// Rays of each kind along a side of the picture.
 const SIDE: usize = 384;
 
-/// The kinds of rays: from the eye; from what the eye sees towards a light, any hit; from there all around, nearest hit.
+/// The kinds of rays: from the eye; from what the eye sees towards a light, any hit; from there all
+/// around, nearest hit.
 pub const KINDS: [&str; 3] = ["primary", "shadow", "diffuse"];
 
 /// Numbers without any claim to quality: only places to aim at hang on them.
@@ -53,7 +55,8 @@ pub struct RayScene {
 }
 
 impl RayScene {
-    /// A scene's triangles, seen by its first camera (from the origin without one) and lit by its first sun (from above without one).
+    /// A scene's triangles, seen by its first camera (from the origin without one) and lit by its
+    /// first sun (from above without one).
     pub fn of(scene: &Scene) -> Self {
         let mut triangles = Vec::new();
         for instance in &scene.instances {

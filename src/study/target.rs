@@ -1,4 +1,5 @@
-//! What a network learns: the light that a GI method must add, path-traced at the very points that its cells look at.
+//! What a network learns: the light that a GI method must add, path-traced at the very points that
+//! its cells look at.
 
 use super::dataset::DatasetError;
 use crate::{
@@ -19,7 +20,8 @@ pub struct Target {
     pub samples: u32,
 }
 
-/// Cycles' settings, which the pictures that the tables are made against follow: bounces, clamp and "Filter Glossy".
+/// Cycles' settings, which the pictures that the tables are made against follow: bounces, clamp and
+/// "Filter Glossy".
 pub fn options(samples: u32, seed: u32) -> TracerOptions {
     TracerOptions {
         samples,
@@ -34,7 +36,8 @@ pub fn options(samples: u32, seed: u32) -> TracerOptions {
     }
 }
 
-/// Traces the light at each cell's sample point in a picture of `size` pixels. Blocks; `go_on` is asked between dispatches.
+/// Traces the light at each cell's sample point in a picture of `size` pixels. Blocks; `go_on` is
+/// asked between dispatches.
 ///
 /// # Errors
 /// What the tracer reports; `None` where `go_on` said no.

@@ -1,8 +1,10 @@
-//! What the rays of a frame of `gather` read of a scene's trees, counted ray by ray on the CPU: blocks that they ask for, those
-//! that a GPU's caches do not hold, and steps that threads wait for the slowest of their warp.
+//! What the rays of a frame of `gather` read of a scene's trees, counted ray by ray on the CPU:
+//! blocks that they ask for, those that a GPU's caches do not hold, and steps that threads wait for
+//! the slowest of their warp.
 //!
-//! The rays are those of `gi.rays` and `gi.renew` in kind and number, not one by one: from every cell and from a quarter as many
-//! lobes the nearest hit, a line to a light of the scene, and the short line to where an entry's rays began.
+//! The rays are those of `gi.rays` and `gi.renew` in kind and number, not one by one: from every
+//! cell and from a quarter as many lobes the nearest hit, a line to a light of the scene, and the
+//! short line to where an entry's rays began.
 
 use super::rays::Random;
 use crate::accel::{AccelError, SceneBlocks};
@@ -24,14 +26,16 @@ const WAYS: usize = 16;
 /// Entries that are in use, as in `Technique::costs`.
 const ENTRIES: usize = 4000;
 
-/// What was read. A look is a ray for the nearest hit, a line to a light, a line to an entry's beginning.
+/// What was read. A look is a ray for the nearest hit, a line to a light, a line to an entry's
+/// beginning.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Traffic {
     /// Looks of the frame.
     pub looks: usize,
     /// Blocks in all trees of the scene.
     pub blocks: usize,
-    /// Blocks that a look reads in the mean: for the nearest hit, on the line to the light, on the short line.
+    /// Blocks that a look reads in the mean: for the nearest hit, on the line to the light, on the
+    /// short line.
     pub read: [f64; 3],
     /// Bytes that all looks read, each for itself.
     pub asked: f64,
@@ -39,7 +43,8 @@ pub struct Traffic {
     pub fetched: f64,
     /// Bytes that the second-level cache has to get from memory.
     pub missed: f64,
-    /// Steps of all threads, those that wait for others of their warp included, over the blocks that are read.
+    /// Steps of all threads, those that wait for others of their warp included, over the blocks
+    /// that are read.
     pub waiting: f64,
 }
 

@@ -1,5 +1,5 @@
-//! One scene, any method: pictures with their layers in linear light, sequences that keep their history, what it costs, and the
-//! path-traced picture beside it. The one place where studies draw.
+//! One scene, any method: pictures with their layers in linear light, sequences that keep their
+//! history, what it costs, and the path-traced picture beside it. The one place where studies draw.
 
 mod samples;
 mod shot;
@@ -41,7 +41,8 @@ pub struct TrialOptions {
     pub taa: bool,
     /// Seed of offsets and stochastic patterns.
     pub seed: u32,
-    /// Folder of references that were traced before; made when it is needed. Without one nothing is kept.
+    /// Folder of references that were traced before; made when it is needed. Without one nothing is
+    /// kept.
     pub kept: Option<PathBuf>,
 }
 
@@ -120,7 +121,8 @@ impl<'a> Trial<'a> {
         self
     }
 
-    /// References are traced with a kernel that is compiled already: compiling takes longer than a small picture.
+    /// References are traced with a kernel that is compiled already: compiling takes longer than a
+    /// small picture.
     pub fn share_kernel(&mut self, kernel: Kernel) {
         self.kernel = Some(kernel);
     }
@@ -173,8 +175,8 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    /// One picture of a still camera, from a renderer that knows nothing yet. Where the scene can have no rays, the method below
-    /// draws, and [`Shot::instead`] says so.
+    /// One picture of a still camera, from a renderer that knows nothing yet. Where the scene can
+    /// have no rays, the method below draws, and [`Shot::instead`] says so.
     ///
     /// # Errors
     /// [`TrialError`].
@@ -198,8 +200,9 @@ impl<'a> Trial<'a> {
         Ok(Some(shot.layer(Layer::DiffDir).data.clone()))
     }
 
-    /// `frames` pictures one after the other by one renderer, which keeps its history; `change` says what each frame shows. Each
-    /// is sampled through the pixels' centres. The scene is afterwards as it was before. Only wanted frames are returned.
+    /// `frames` pictures one after the other by one renderer, which keeps its history; `change`
+    /// says what each frame shows. Each is sampled through the pixels' centres. The scene is
+    /// afterwards as it was before. Only wanted frames are returned.
     ///
     /// # Errors
     /// [`TrialError`].
@@ -214,7 +217,8 @@ impl<'a> Trial<'a> {
         Ok(shots)
     }
 
-    /// As [`Self::sequence`], handing each wanted picture over as soon as it is there: nothing but one is in memory.
+    /// As [`Self::sequence`], handing each wanted picture over as soon as it is there: nothing but
+    /// one is in memory.
     ///
     /// # Errors
     /// [`TrialError`].
@@ -262,8 +266,9 @@ impl<'a> Trial<'a> {
         drawn
     }
 
-    /// The path-traced picture of `camera`, from the folder of references if it was traced before; `options` from
-    /// [`truth::samples`] or [`truth::until`], with limits of bounces where a comparison needs them.
+    /// The path-traced picture of `camera`, from the folder of references if it was traced before;
+    /// `options` from [`truth::samples`] or [`truth::until`], with limits of bounces where a
+    /// comparison needs them.
     ///
     /// # Errors
     /// [`TrialError`].
@@ -369,7 +374,8 @@ impl<'a> Trial<'a> {
         })
     }
 
-    /// A frame whose layers nobody reads, but waited for: drivers let thousands of them pile up otherwise.
+    /// A frame whose layers nobody reads, but waited for: drivers let thousands of them pile up
+    /// otherwise.
     fn draw(&self, renderer: &mut Renderer, camera: &Camera) -> Result<(), TrialError> {
         let options = CaptureOptions { samples: 1, seed: self.options.seed, layers: &[], warmup: 0 };
         capture_with(self.gpu, renderer, &self.uploaded, camera, options, &mut || true)?;

@@ -1,4 +1,5 @@
-//! What methods are judged by: a path-traced picture with its layers and its stated noise, kept in a folder once it is traced.
+//! What methods are judged by: a path-traced picture with its layers and its stated noise, kept in
+//! a folder once it is traced.
 
 use super::{hash, trial::TrialError};
 use crate::{
@@ -22,7 +23,8 @@ pub struct Reference {
     pub size: [u32; 2],
     /// Those of [`LAYERS`]: rows from the top, channels interleaved.
     pub layers: Vec<(Layer, Vec<f32>)>,
-    /// Noise of [`JUDGED`](crate::reference::JUDGED): Combined, DiffInd, Gi; from two halves of the samples.
+    /// Noise of [`JUDGED`](crate::reference::JUDGED): Combined, DiffInd, Gi; from two halves of the
+    /// samples.
     pub noise: [Noise; 3],
     /// Samples of the pixel that has fewest and of the one that has most.
     pub samples: [u32; 2],
@@ -47,7 +49,8 @@ impl Reference {
         self.layer(Layer::Combined).chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
     }
 
-    /// Root mean square error of a pixel of the light that a method has to add ([`Layer::Gi`]), divided by its mean.
+    /// Root mean square error of a pixel of the light that a method has to add ([`Layer::Gi`]),
+    /// divided by its mean.
     pub fn light_noise(&self) -> f64 {
         self.noise[2].pixel
     }
@@ -58,8 +61,9 @@ pub fn samples(count: u32, seed: u32) -> TracerOptions {
     TracerOptions { samples: count, seed, ..TracerOptions::default() }
 }
 
-/// Samples until the root mean square error of a pixel of `layer` (one of [`JUDGED`](crate::reference::JUDGED)), divided by its mean, is surely not above
-/// `error`, and at most `most` of them.
+/// Samples until the root mean square error of a pixel of `layer` (one of
+/// [`JUDGED`](crate::reference::JUDGED)), divided by its mean, is surely not above `error`, and at
+/// most `most` of them.
 pub fn until(layer: Layer, error: f64, most: u32, seed: u32) -> TracerOptions {
     TracerOptions { until_error: Some((layer, error)), ..samples(most, seed) }
 }
@@ -93,7 +97,8 @@ pub(super) fn trace(
     Ok(Reference { size, layers: traced.layers, noise, samples, seconds, kept: false })
 }
 
-/// Name of the file that holds the picture: everything that decides what is in it, the tracer's own shaders included.
+/// Name of the file that holds the picture: everything that decides what is in it, the tracer's own
+/// shaders included.
 pub(super) fn file_name(scene: &str, camera: &Camera, size: [u32; 2], options: &TracerOptions) -> String {
     let TracerOptions {
         samples,
@@ -151,7 +156,8 @@ pub(super) fn keep(path: &Path, reference: &Reference, device: &str) -> Result<(
     Ok(image_io::write_whole(path, &bytes)?)
 }
 
-/// The picture that [`keep`] kept; `None` where there is none, or none that can be read: it is then traced again.
+/// The picture that [`keep`] kept; `None` where there is none, or none that can be read: it is then
+/// traced again.
 pub(super) fn kept(path: &Path) -> Option<Reference> {
     let bytes = std::fs::read(path).ok()?;
     let (_, words) = SafeTensors::read_metadata(&bytes).ok()?;

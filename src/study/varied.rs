@@ -1,5 +1,6 @@
-//! Rooms of the paper's kind that are none of the paper's: other lights, skies, roofs with a window, metals, sizes, colours
-//! and camera heights. What a network learns from in order not to take one sun and one grey sky for the world.
+//! Rooms of the paper's kind that are none of the paper's: other lights, skies, roofs with a
+//! window, metals, sizes, colours and camera heights. What a network learns from in order not to
+//! take one sun and one grey sky for the world.
 
 use super::views::SplitMix;
 use crate::scene::{
@@ -14,9 +15,10 @@ const HALF: f32 = 50.0;
 /// Half the thickness of walls, floor and roof, metres.
 const THICK: f32 = 1.0;
 
-/// Room `index` of this stream; the same index gives the same room. 20 to 250 primitives of 1 to 6 metres between walls of
-/// 10 to 50 metres; 40 % have a roof with a window; the light is a sun (half of them), a point light or a spot light,
-/// tinted, 15 % of the objects are metals; the sky may be tinted, dim or black.
+/// Room `index` of this stream; the same index gives the same room. 20 to 250 primitives of 1 to 6
+/// metres between walls of 10 to 50 metres; 40 % have a roof with a window; the light is a sun
+/// (half of them), a point light or a spot light, tinted, 15 % of the objects are metals; the sky
+/// may be tinted, dim or black.
 pub fn scene(index: u32) -> Scene {
     let mut room = Room::new(index);
     let height = room.between(10.0, 50.0);

@@ -3,15 +3,17 @@
 use crate::scene::{Camera, Scene, bounds::world_bounds};
 use glam::{Mat4, Vec3};
 
-/// `camera` turned about the vertical through the origin by a fraction of a full turn, counter-clockwise from above.
+/// `camera` turned about the vertical through the origin by a fraction of a full turn,
+/// counter-clockwise from above.
 pub fn turned(camera: &Camera, fraction: f32) -> Camera {
     let turn = Mat4::from_rotation_y(fraction * std::f32::consts::TAU);
     let transform = turn * Mat4::from_cols_array_2d(&camera.transform);
     Camera { transform: transform.to_cols_array_2d(), ..camera.clone() }
 }
 
-/// An endless row of cameras inside the scene's bounds, looking at points inside them, with the field of view of the
-/// scene's first camera. The same seed gives the same row. Empty for a scene without triangles or cameras.
+/// An endless row of cameras inside the scene's bounds, looking at points inside them, with the
+/// field of view of the scene's first camera. The same seed gives the same row. Empty for a scene
+/// without triangles or cameras.
 pub fn around(scene: &Scene, seed: u64) -> impl Iterator<Item = Camera> {
     let place = world_bounds(scene).zip(scene.cameras.first().cloned());
     let mut numbers = SplitMix(seed);
@@ -25,7 +27,8 @@ pub fn around(scene: &Scene, seed: u64) -> impl Iterator<Item = Camera> {
                 low + size * at
             };
             let (eye, target) = (within(0.15), within(0.02));
-            // A nearly vertical look has no horizon; the person who looks around a room rarely does that.
+            // A nearly vertical look has no horizon; the person who looks around a room rarely does
+            // that.
             let target = Vec3::new(target.x, eye.y + 0.5 * (target.y - eye.y), target.z);
             let aim = if eye.distance(target) > 1e-3 * size.length() { target } else { eye + Vec3::NEG_Z };
             Camera { name: "around".into(), ..Camera::look_at(eye.into(), aim.into(), own.yfov) }
@@ -33,7 +36,8 @@ pub fn around(scene: &Scene, seed: u64) -> impl Iterator<Item = Camera> {
     })
 }
 
-/// Steele, Lea and Flood's SplitMix64: a few lines for reproducible scattering, no statistics hang on it.
+/// Steele, Lea and Flood's SplitMix64: a few lines for reproducible scattering, no statistics hang
+/// on it.
 pub(super) struct SplitMix(u64);
 
 impl SplitMix {

@@ -44,6 +44,20 @@ fn what_can_be_met_is_met_and_two_runs_are_the_same() {
     // The answer is a gain of ln 1.2 everywhere, which the last layer's biases can give by themselves: no loss at all.
     assert!(first > 0.01 && last < 0.02 * first, "{first} to {last}");
     assert_eq!(weights.to_bytes(), learnt(&gpu, &examples, 60).0.to_bytes(), "two runs are the same to the bit");
+    // Asking what the error is on other pictures teaches nothing.
+    let mut asked = learner(&gpu, &Weights::shipped().unwrap(), CELLS);
+    let loaded: Vec<_> = examples.iter().map(|e| asked.load(e).unwrap()).collect();
+    let before = asked.error(&loaded).unwrap();
+    let steps = (0..60).map(|_| {
+        asked.error(&loaded[..1]).unwrap();
+        asked.step(&loaded.iter().collect::<Vec<_>>(), 2e-3).unwrap().error
+    });
+    let steps: Vec<f32> = steps.collect();
+    assert_eq!(asked.weights().unwrap().to_bytes(), weights.to_bytes());
+    // It is that of the next step, but of the average over steps, which comes a few steps behind.
+    let after = asked.error(&loaded).unwrap();
+    assert!((before / steps[0] - 1.0).abs() < 1e-5, "{before}, {}", steps[0]);
+    assert!(after < 0.5 * before && after > 0.0, "{before} to {after}");
     // Cells that do not count teach nothing.
     let blind = examples.map(|e| Example { counts: vec![0.0; PIXELS], ..e });
     assert_eq!(learnt(&gpu, &blind, 3).1, [0.0; 3]);

@@ -22,7 +22,7 @@ use super::rebuilt::{Rebuilt, guess_bytes};
 use super::reconstruct::ReconstructPass;
 use super::trained::check_weights;
 pub use super::trained::{Neural, needs_guess};
-use crate::gi::gather::{self, GatherGi};
+use crate::gi::gather::GatherGi;
 use crate::gi::interface::technique::{Cost, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::exposure::ExposurePass;
@@ -104,8 +104,7 @@ impl NeuralGi {
             inputs,
             exposure,
             reconstruct,
-            gather: needs_guess(&neural.weights)
-                .then(|| GatherGi::new(device, options.size, gather::Options::default())),
+            gather: needs_guess(&neural.weights).then(|| GatherGi::new(device, options.size, neural.gather)),
             rebuilt,
             rebuilds: 0,
         })

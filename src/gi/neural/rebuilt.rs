@@ -29,7 +29,7 @@ impl Rebuilt {
     ) -> Result<Self, GiError> {
         pack::feature_bytes(device, features, size)?;
         let cells = cells_of(size);
-        let Neural { weights, network, tuned } = neural;
+        let Neural { weights, network, tuned, .. } = neural;
         let setup = Setup { options: *network, tuned: tuned.clone(), ..Setup::default() };
         let network = Network::new(device, queue, weights, cells, setup)
             .map_err(|e| GiError::Network { cells, source: Box::new(e) })?;

@@ -2,6 +2,7 @@
 
 use super::features::FeatureSet;
 use super::reconstruct::Answer;
+use crate::gi::gather;
 use crate::gi::interface::GiError;
 use crate::gi::stage::inputs::CELL;
 use crate::net::format::Weights;
@@ -22,11 +23,13 @@ pub struct Neural {
     pub network: gpu::Options,
     /// What a tuner has found on this device; empty without one.
     pub tuned: Arc<Tuned>,
+    /// Numbers of the `gather` whose answer the network corrects.
+    pub gather: gather::Options,
 }
 
 impl From<Weights> for Neural {
     fn from(weights: Weights) -> Self {
-        Self { weights, network: gpu::Options::default(), tuned: Arc::default() }
+        Self { weights, network: gpu::Options::default(), tuned: Arc::default(), gather: gather::Options::default() }
     }
 }
 

@@ -31,6 +31,8 @@ pub struct Learner {
     values: wgpu::Buffer,
     slopes: wgpu::Buffer,
     numbers: wgpu::Buffer,
+    /// Where what is learnt waits while the average is asked, and the average on its way there.
+    aside: [wgpu::Buffer; 2],
     steps: u32,
 }
 
@@ -95,6 +97,8 @@ impl Learner {
             values: buffer("learn.values", tape.values * 4, wgpu::BufferUsages::STORAGE),
             slopes: buffer("learn.slopes", tape.values * 4, wgpu::BufferUsages::STORAGE),
             numbers: buffer("learn.numbers", numbers as u64 * 4, wgpu::BufferUsages::STORAGE),
+            aside: ["learn.learnt", "learn.average"]
+                .map(|label| buffer(label, tape.total() as u64 * 4, wgpu::BufferUsages::empty())),
             device: device.clone(),
             queue: queue.clone(),
             weights: weights.clone(),
@@ -163,6 +167,8 @@ impl Learner {
             return Err(LearnError::Meaning { found: self.weights.output.meaning.clone() });
         }
         self.steps += 1;
+        let own = self.tape.forward.len() + self.tape.backward.len();
+        let loss = self.write_loss(pictures.len());
         let unbias = BETA.map(|beta| (1.0 / (1.0 - f64::from(beta).powi(self.steps as i32))) as f32);
         // The first averages would be of the beginning alone.
         let keep = KEEP.min(self.steps as f32 / (9 + self.steps) as f32);
@@ -170,9 +176,7 @@ impl Learner {
         let adam = Job { total: total as u32, rate, unbias, keep, ..Job::default() };
         let call = |kernel, elements| Call { kernel, job: adam, elements };
         let adam = [call(Kernel::AdamNorm, 1), call(Kernel::AdamStep, total as u64)];
-        let loss = loss_calls(self.tape.output, total, pictures.len().max(1));
-        let own = self.tape.forward.len() + self.tape.backward.len();
-        loss.iter().chain(&adam).enumerate().for_each(|(i, call)| self.write_job(own + i, call));
+        adam.iter().enumerate().for_each(|(i, call)| self.write_job(own + loss.len() + i, call));
 
         let mut encoder = self.device.create_command_encoder(&Default::default());
         encoder.clear_buffer(&self.numbers, self.section(GRADIENT), None);
@@ -195,8 +199,35 @@ impl Learner {
         Err(LearnError::Diverged { step: self.steps, loss: stride.loss, norm: stride.norm })
     }
 
-    /// The slope of Σ `output_slopes` · output in each learnt number, for one input; both channel
-    /// by channel. Learns nothing.
+    /// Relative error of the light in these pictures, as [`Stride::error`], by the network that [`Self::weights`] returns. Learns
+    /// nothing: the same for pictures that are never learnt from tells when to stop.
+    ///
+    /// # Errors
+    /// A meaning without a loss; the device was lost.
+    pub fn error(&self, pictures: &[Loaded]) -> Result<f32, LearnError> {
+        if self.weights.output.meaning != MEANING {
+            return Err(LearnError::Meaning { found: self.weights.output.meaning.clone() });
+        }
+        let own = self.tape.forward.len() + self.tape.backward.len();
+        let loss = self.write_loss(pictures.len());
+        let (learnt, average) = (&self.aside[0], &self.aside[1]);
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&self.numbers, 0, learnt, 0, learnt.size());
+        encoder.copy_buffer_to_buffer(&self.numbers, self.section(AVERAGE), average, 0, average.size());
+        encoder.copy_buffer_to_buffer(average, 0, &self.numbers, 0, average.size());
+        encoder.clear_buffer(&self.numbers, self.section(GRADIENT), None);
+        for picture in pictures {
+            self.prepare(&mut encoder, picture);
+            let mut pass = self.pass(&mut encoder, picture);
+            self.dispatch(&mut pass, 0, &self.tape.forward);
+            self.dispatch(&mut pass, own, &loss);
+        }
+        encoder.copy_buffer_to_buffer(learnt, 0, &self.numbers, 0, learnt.size());
+        self.queue.submit([encoder.finish()]);
+        Ok(self.read(self.section(SECTIONS), RESULTS)?[4].sqrt())
+    }
+
+    /// The slope of Σ `output_slopes` · output in each learnt number, for one input; both channel by channel. Learns nothing.
     ///
     /// # Errors
     /// Lists of other lengths; the device was lost.
@@ -269,6 +300,14 @@ impl Learner {
     fn section_by_tensor(&self, section: usize) -> Result<Gradients, LearnError> {
         let all = self.read(self.section(section), self.tape.total())?;
         Ok(self.tape.learnt.iter().map(|(name, range)| (name.clone(), all[range.clone()].to_vec())).collect())
+    }
+
+    /// Writes the jobs of the mean loss of so many pictures, behind the network's own.
+    fn write_loss(&self, pictures: usize) -> [Call; 2] {
+        let loss = loss_calls(self.tape.output, self.tape.total(), pictures.max(1));
+        let own = self.tape.forward.len() + self.tape.backward.len();
+        loss.iter().enumerate().for_each(|(i, call)| self.write_job(own + i, call));
+        loss
     }
 
     fn write_job(&self, slot: usize, call: &Call) {

@@ -48,7 +48,7 @@ impl Entry {
         match self {
             Entry::Method { method: Method::Gather(options), .. } => format!("gather {options:?}"),
             Entry::Method { method: Method::Neural(neural), .. } => {
-                format!("neural {} {:?}", neural.weights.hash_text(), neural.network.precision)
+                format!("neural {} {:?} {:?}", neural.weights.hash_text(), neural.network.precision, neural.gather)
             }
             Entry::Method { method, .. } => method.name().into(),
             Entry::Pictures { weights, .. } => format!("pictures {}", weights.hash_text()),

@@ -1,10 +1,12 @@
-//! Speed charted against accuracy: every method over a set of scenes, measured and judged, with the paths that would do the same.
+//! Speed charted against accuracy: every method over a set of scenes, measured and judged, with the
+//! paths that would do the same.
 //!
-//! [`run`] fills a [`Record`], piece by piece, so that what was done is kept; [`summary`] makes means, spreads and the Pareto
-//! frontier of it; [`plot`] draws, [`report`] writes.
+//! [`run`] fills a [`Record`], piece by piece, so that what was done is kept; [`summary`] makes
+//! means, spreads and the Pareto frontier of it; [`plot`] draws, [`report`] writes.
 
 pub mod entries;
 mod on_pictures;
+pub mod plan;
 pub mod plot;
 pub mod published;
 pub mod report;
@@ -34,7 +36,8 @@ use thiserror::Error;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Metric {
-    /// Error of the light that a method has to add ([`judge::light_error`](super::judge::light_error)).
+    /// Error of the light that a method has to add
+    /// ([`judge::light_error`](super::judge::light_error)).
     Light,
     /// FLIP of the finished picture.
     Flip,
@@ -78,7 +81,8 @@ impl Metric {
 /// How near one picture is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
-    /// Error of the light; absent where an entry has no light of its own to compare, or the scene none.
+    /// Error of the light; absent where an entry has no light of its own to compare, or the scene
+    /// none.
     pub light: Option<f64>,
     /// How much too bright that light is, as a share of it.
     pub light_bias: Option<f64>,
@@ -165,9 +169,10 @@ pub struct SceneFacts {
     pub size: [u32; 2],
     /// Where its reference comes from.
     pub reference: String,
-    /// Fewest and most samples of its pixels, where we traced it.
+    /// Fewest and most samples of its reference's pixels, where they are known.
     pub samples: Option<[u32; 2]>,
-    /// Root mean square error of the reference's light at a pixel, as a share of its mean, and of a block of 4×4.
+    /// Root mean square error of the reference's light at a pixel, as a share of its mean, and of a
+    /// block of 4×4.
     pub noise: Option<[f64; 2]>,
     /// Where it failed, and nothing was done in it.
     pub failed: Option<String>,
@@ -233,6 +238,10 @@ pub struct Record {
     pub frames: [u32; 2],
     /// Bound of the references' error at a pixel, and most samples.
     pub reference: (f64, u32),
+    /// Light that gloss throws on after a diffuse bounce is left out, in references, paths and
+    /// methods.
+    #[serde(default)]
+    pub no_caustics: bool,
     /// Entries, in the order of the table.
     pub entries: Vec<EntryFacts>,
     /// Scenes.
@@ -251,7 +260,8 @@ pub struct Record {
 pub enum ChartError {
     /// A folder that holds nothing to judge by.
     #[error(
-        "{}: no references here: a folder with scene.glb, frame0000.exr and meta.json, folders of that kind, or roomIIII_view0.exr are needed", path.display()
+        "{}: no references here: a folder with scene.glb, frame0000.exr and meta.json, folders of that kind, or \
+         roomIIII_view0.exr are needed", path.display()
     )]
     NoReferences { path: PathBuf },
     /// A file of a reference.

@@ -1,5 +1,6 @@
-//! Networks on four pictures, fed with our rasteriser's as the paper fed its own with Eevee's: 8 bits, through Filmic.
-//! `training/bouncelight_training/pix2pix/pairs.py` makes the pictures that such networks learn from in the same way.
+//! Networks on four pictures, fed with our rasteriser's as the paper fed its own with Eevee's: 8
+//! bits, through Filmic. `training/bouncelight_training/pix2pix/pairs.py` makes the pictures that
+//! such networks learn from in the same way.
 
 use super::{ChartError, published};
 use crate::{
@@ -19,7 +20,8 @@ struct Four {
 }
 
 impl Four {
-    /// Of direct light. `sky`: radiance that comes from everywhere, which Eevee counts as direct, without occlusion.
+    /// Of direct light. `sky`: radiance that comes from everywhere, which Eevee counts as direct,
+    /// without occlusion.
     fn new(shot: &Shot, sky: [f32; 3]) -> Self {
         let shown = |linear: Vec<f32>| -> Vec<f32> {
             Tonemap::Filmic.apply_to_bytes(&linear).into_iter().map(|b| f32::from(b) / 255.0).collect()

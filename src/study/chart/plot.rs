@@ -1,7 +1,9 @@
-//! The chart as SVG and PNG: error up, time across, once as measured here and once as projected for a GTX 1050.
+//! The chart as SVG and PNG: error up, time across, once as measured here and once as projected for
+//! a GTX 1050.
 //!
-//! Marks differ in shape as well as in colour (Okabe and Ito's palette), names stand beside them in black, and nothing is told by
-//! colour alone, so that the chart can be read in print and by the colour-blind.
+//! Marks differ in shape as well as in colour (Okabe and Ito's palette), names stand beside them in
+//! black, and nothing is told by colour alone, so that the chart can be read in print and by the
+//! colour-blind.
 
 mod canvas;
 

@@ -19,15 +19,16 @@ use std::time::Instant;
 
 /// L1 of the network in the authors' table: the mean over their own 375 pictures of 1024×512.
 pub const PRINTED_L1: f64 = 45_178.0;
-/// Milliseconds that their table leaves for the network on a GTX 1050: 0.275 s with it, 0.27 s without. It was read from a wall
-/// clock that did not wait for the GPU.
+/// Milliseconds that their table leaves for the network on a GTX 1050: 0.275 s with it, 0.27 s
+/// without. It was read from a wall clock that did not wait for the GPU.
 pub const PRINTED_MS: f64 = 5.0;
 /// Base width of their generator.
 const WIDTH: u32 = 64;
 /// Pixels of their pictures, which sums over pixels are scaled to.
 pub const PIXELS: f64 = 1024.0 * 512.0;
 
-/// Their generator, with numbers that nobody trained, run here: time does not depend on the numbers.
+/// Their generator, with numbers that nobody trained, run here: time does not depend on the
+/// numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Generator {
     /// Everything that decides the result, as [`Unit::key`](super::Unit::key).
@@ -90,7 +91,8 @@ pub(super) fn time(gpu: &Gpu, network: &Network, options: BenchOptions) -> Resul
     let mut times = Vec::new();
     for run in 0..options.warmup.min(2) + options.frames.max(1) {
         let start = Instant::now();
-        // Step by step: a large network at once may keep a slow device longer than its watchdog likes.
+        // Step by step: a large network at once may keep a slow device longer than its watchdog
+        // likes.
         for step in 0..network.plan().steps.len() {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             network.record_step(step, &mut Recorder::new(&mut encoder));

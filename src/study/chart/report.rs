@@ -183,32 +183,44 @@ fn how(record: &Record, metric: Metric) -> String {
     let [frames, warmup] = record.frames;
     let what = match metric {
         Metric::Light => {
-            "Error: Σ|ours − reference| / Σ reference of the diffuse light that a method has to add (E/π), after pooling over 4×4 \
+            "Error: Σ|ours − reference| / Σ reference of the diffuse light that a method has to add (E/π), after \
+             pooling over 4×4 \
              pixels, on surfaces with albedo above 0.01 and light above 2 % of the median (docs/accuracy.md)."
         }
         Metric::Flip => "Error: FLIP of the finished picture through Filmic, in 8 bits.",
         Metric::L1 => "Error: the paper's L1 (each channel stretched on its own), scaled to the pixels of 1024×512.",
     };
     format!(
-        "{what} Means over {} scenes, in brackets best and worst. Settled pictures are of the 32nd frame of a still camera on, {} samples \
-         a pixel; the first frame has one. Time: a whole frame, rasteriser included, median of {frames} frames after {warmup}; {}. \
+        "{what} Means over {} scenes, in brackets best and worst. Settled pictures are of the 32nd frame of a still \
+         camera on, {} samples \
+         a pixel; the first frame has one. Time: a whole frame, rasteriser included, median of {frames} frames after \
+         {warmup}; {}. \
          Counted (GFLOP, MB, rays) and projected: only the passes that find and add indirect light. \
-         \"Against paths\": how many times as long our path tracer takes to come as near on this device.\n",
+         \"Against paths\": how many times as long our path tracer takes to come as near on this device.{}\n",
         record.sound_scenes(),
         record.samples,
         match Clock::of(record) {
             Clock::Gpu => "by timestamps, with the synchronised clock beside them".to_owned(),
             Clock::Wall => format!(
-                "by the synchronised clock, since timestamps are more than {:.0} % away from it on this device or are not there",
+                "by the synchronised clock, since timestamps are more than {:.0} % away from it on this device or are \
+                 not there",
                 AGREEMENT * 100.0
             ),
+        },
+        if record.no_caustics {
+            " What gloss throws on after a diffuse bounce is left out of references, paths and methods alike \
+             (`--no-caustics`), as \
+             Cycles' references leave it out."
+        } else {
+            ""
         }
     )
 }
 
 fn main_table(record: &Record, metric: Metric) -> String {
     let mut text = format!(
-        "| | error, settled | first frame | frame, ms | clock, ms | GFLOP | MB | Mray | GPU memory, MiB | {} ms, **projected** | against paths |\n|{}\n",
+        "| | error, settled | first frame | frame, ms | clock, ms | GFLOP | MB | Mray | GPU memory, MiB | {} ms, \
+         **projected** | against paths |\n|{}\n",
         GTX_1050.name,
         "---|".repeat(11)
     );
@@ -276,8 +288,10 @@ fn generator(record: &Record) -> String {
         _ => "was not run".into(),
     };
     format!(
-        "**The paper's generator** ({} parameters, group norm, numbers nobody trained) at {w}×{h} {ran}, the raster before it not counted; \
-         {:.1} GFLOP by count; projected for a {}: {:.1} ms. Printed by its authors: {PRINTED_MS:.0} ms on that card at 1024×512, by a clock that \
+        "**The paper's generator** ({} parameters, group norm, numbers nobody trained) at {w}×{h} {ran}, the raster \
+         before it not counted; \
+         {:.1} GFLOP by count; projected for a {}: {:.1} ms. Printed by its authors: {PRINTED_MS:.0} ms on that card \
+         at 1024×512, by a clock that \
          did not wait for the GPU, and L1 {PRINTED_L1:.0} on their own 375 pictures.\n",
         g.parameters,
         g.gflop(),
@@ -304,7 +318,8 @@ fn by_scene(record: &Record, metric: Metric) -> String {
 
 fn references(record: &Record) -> String {
     let mut text = String::from(
-        "| scene | reference | samples a pixel | noise of its light: a pixel, a block of 4×4 | content |\n|---|---|---|---|---|\n",
+        "| scene | reference | samples a pixel | noise of its light: a pixel, a block of 4×4 | content \
+         |\n|---|---|---|---|---|\n",
     );
     for scene in &record.scenes {
         let samples =
@@ -316,7 +331,8 @@ fn references(record: &Record) -> String {
     let (error, most) = record.reference;
     let _ = writeln!(
         text,
-        "\nOurs are traced until a pixel's noise is surely not above {:.1} % of the mean, with at most {most} samples; noise is told by two halves of the samples. \
+        "\nOurs are traced until a pixel's noise is surely not above {:.1} % of the mean, with at most {most} \
+         samples; noise is told by two halves of the samples. \
          Below their own noise no error can be told.",
         100.0 * error
     );
@@ -334,7 +350,9 @@ pub fn slope(sweep: &Sweep) -> String {
 
 fn sweeps(record: &Record) -> String {
     let mut text = String::from(
-        "Milliseconds of a whole frame by the synchronised clock. Resolution: paper room 2; triangles: an uneven floor under sun and sky; lights: point \
+        "Milliseconds of a whole frame by the synchronised clock; in brackets the frames of the median where time \
+         allowed fewer than above. \
+         Resolution: paper room 2; triangles: an uneven floor under sun and sky; lights: point \
          lamps in a closed room (shadow maps are shared by the first 8; the others shine without).\n\n",
     );
     for axis in super::sweep::Axis::ALL {
@@ -348,7 +366,9 @@ fn sweeps(record: &Record) -> String {
         let _ =
             writeln!(text, "| {} | {} | slope |\n|{}", axis.name(), heads.join(" | "), "---|".repeat(heads.len() + 2));
         for sweep in &of {
-            let cell = |i: usize| sweep.points.get(i).map_or("—".into(), |p| format!("{:.1}", p.wall_ms.median));
+            let frames = |n: u32| if (1..record.frames[0]).contains(&n) { format!(" ({n})") } else { String::new() };
+            let cell = |p: &super::sweep::Point| format!("{:.1}{}", p.wall_ms.median, frames(p.frames));
+            let cell = |i: usize| sweep.points.get(i).map_or("—".into(), cell);
             let cells: Vec<String> = (0..heads.len()).map(cell).collect();
             let ended = sweep.ended.as_ref().map_or(String::new(), |why| format!(" (ends here: {why})"));
             let _ = writeln!(text, "| {} | {} | {}{ended} |", sweep.entry, cells.join(" | "), slope(sweep));

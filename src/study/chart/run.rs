@@ -3,56 +3,27 @@
 use super::{
     ChartError, Device, Kind, Metric, Provenance, Record, SceneFacts, Unit,
     entries::Entry,
+    plan::Plan,
     published,
     scenes::{self, Source},
     stage::Stage,
-    sweep::{self, Axis, Limits},
+    sweep::{self, Limits},
 };
 use crate::{
     gpu::Gpu,
     reference,
     render::capture::Layer,
-    scene::LoadOptions,
     study::{
-        bench::BenchOptions,
         hash, judge,
         trial::{Trial, TrialError, TrialOptions},
         truth,
     },
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 /// Seed of references; what is judged has another.
 const REFERENCE_SEED: u32 = 20_001;
-
-/// What is to be charted.
-#[derive(Debug, Clone)]
-pub struct Plan {
-    /// What is compared.
-    pub entries: Vec<Entry>,
-    /// In which scenes.
-    pub sources: Vec<Source>,
-    /// What their files may do.
-    pub load: LoadOptions,
-    /// Pixels of the pictures, but for scenes that bring a reference.
-    pub size: [u32; 2],
-    /// Jittered frames averaged in settled pictures.
-    pub samples: u32,
-    /// How long to time.
-    pub bench: BenchOptions,
-    /// Bound of our references' error at a pixel of the light, and most samples.
-    pub reference: (f64, u32),
-    /// Folder of references that were traced before.
-    pub kept: PathBuf,
-    /// Run the paper's generator, too.
-    pub generator: bool,
-    /// Costs against sizes, of every method.
-    pub sweeps: Vec<Axis>,
-    /// Seconds a step of a sweep.
-    pub sweep_seconds: f64,
-}
 
 /// Who looks on.
 pub struct Hooks<'a> {
@@ -66,7 +37,8 @@ pub struct Hooks<'a> {
     pub save: &'a dyn Fn(&Record) -> Result<(), ChartError>,
 }
 
-/// Does what `plan` says. Pieces that `before` holds under the same key (same program, device, scene, numbers) are not done again.
+/// Does what `plan` says. Pieces that `before` holds under the same key (same program, device,
+/// scene, numbers) are not done again.
 ///
 /// # Errors
 /// [`ChartError::Stopped`] (what was done has been saved by then); folders of references that cannot be read; saving.
@@ -87,6 +59,7 @@ pub fn run(
         samples: plan.samples,
         frames: [plan.bench.frames, plan.bench.warmup],
         reference: plan.reference,
+        no_caustics: plan.no_caustics,
         entries: plan.entries.iter().map(Entry::facts).collect(),
         ..Record::default()
     };
@@ -100,35 +73,6 @@ pub fn run(
     }
     work.sweeps()?;
     Ok(work.record)
-}
-
-impl Plan {
-    /// Parts of the work of a picture by an entry, roughly: a guess for who waits.
-    fn parts(&self, entry: &Entry) -> f64 {
-        let frames = f64::from(self.bench.frames + self.bench.warmup);
-        match entry {
-            Entry::Method { method, .. } if method.has_history() => 36.0 + 2.0 * frames + f64::from(self.samples),
-            Entry::Method { .. } | Entry::Pictures { .. } => 4.0 + frames + f64::from(self.samples),
-            Entry::Paths(n) => 1.0 + f64::from(*n) / 8.0,
-        }
-    }
-
-    fn reference_parts(&self, source: &Source) -> f64 {
-        if source.reference.is_some() { 2.0 } else { 4.0 + f64::from(self.reference.1) / 16.0 }
-    }
-
-    fn work(&self) -> f64 {
-        let entries: f64 = self.entries.iter().map(|e| self.parts(e)).sum();
-        let scenes: f64 = self.sources.iter().map(|s| self.reference_parts(s) + entries).sum();
-        let frames = f64::from(self.bench.frames + self.bench.warmup);
-        scenes
-            + self.sweep_methods().count() as f64 * self.sweeps.len() as f64 * 6.0 * frames
-            + if self.generator { 4.0 * frames } else { 0.0 }
-    }
-
-    fn sweep_methods(&self) -> impl Iterator<Item = &Entry> {
-        self.entries.iter().filter(|e| matches!(e, Entry::Method { .. }))
-    }
 }
 
 /// What the driver refused since it was last asked.
@@ -167,9 +111,9 @@ struct Work<'a> {
 impl<'a> Work<'a> {
     /// Everything that decides a result but the piece itself.
     fn key(&self, of: &impl std::fmt::Debug) -> String {
-        let Plan { samples, bench, reference, .. } = self.plan;
+        let Plan { samples, bench, reference, no_caustics, .. } = self.plan;
         let here = (&self.record.device, &self.record.provenance.program);
-        hash::of_text(&(here, samples, bench, reference, of))
+        hash::of_text(&(here, samples, bench, reference, no_caustics, of))
     }
 
     fn begin(&self, what: &str) -> Result<(), ChartError> {
@@ -182,7 +126,8 @@ impl<'a> Work<'a> {
 
     fn end(&mut self, parts: f64) -> Result<(), ChartError> {
         self.done += parts;
-        // What is not done yet stays from the run before, so that one that is cut off again loses nothing.
+        // What is not done yet stays from the run before, so that one that is cut off again loses
+        // nothing.
         let mut kept = self.record.clone();
         let missing = |u: &&Unit| !self.record.units.iter().any(|n| n.key == u.key);
         kept.units.extend(self.before.units.iter().filter(missing).cloned());
@@ -252,7 +197,10 @@ impl<'a> Work<'a> {
         let (error, most) = self.plan.reference;
         let reference = match &source.reference {
             Some(path) => scenes::reference(path, &mut trial, self.plan.samples)?,
-            None => trial.reference(&camera, &truth::until(reference::Layer::Gi, error, most, REFERENCE_SEED))?,
+            None => {
+                let options = truth::until(reference::Layer::Gi, error, most, REFERENCE_SEED);
+                trial.reference(&camera, &self.plan.paths(options))?
+            }
         };
         tracing.set(false);
         let traced = source.reference.is_none();
@@ -261,11 +209,8 @@ impl<'a> Work<'a> {
             name: source.name.clone(),
             hash: trial.hash().to_owned(),
             size,
-            reference: match &source.reference {
-                Some(path) => path.display().to_string(),
-                None => "our path tracer, no limit of bounces".into(),
-            },
-            samples: traced.then_some(reference.samples),
+            reference: source.origin(),
+            samples: if traced { Some(reference.samples) } else { source.samples.map(|n| [n; 2]) },
             noise: (traced && noise.is_finite()).then_some([noise, noise / judge::BLOCK as f64]),
             failed: None,
         };

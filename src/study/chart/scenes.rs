@@ -15,7 +15,8 @@ use crate::{
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// Scenes that are charted unless others are named: two that ship, and three rooms that nothing is judged by elsewhere.
+/// Scenes that are charted unless others are named: two that ship, and three rooms that nothing is
+/// judged by elsewhere.
 pub const DEFAULT: [&str; 5] = ["interior", "cornell", "paper-room:2", "paper-room:3", "paper-room:5"];
 
 /// A scene, and what it is judged by.
@@ -31,6 +32,8 @@ pub struct Source {
     light_radius: Option<f32>,
     /// An EXR with Blender's passes; without one our own path tracer is asked.
     pub reference: Option<PathBuf>,
+    /// Its samples a pixel, where the folder says them.
+    pub samples: Option<u32>,
 }
 
 /// What a folder says of a scene beside its files.
@@ -42,6 +45,8 @@ struct Meta {
     /// x, y, z, watts, radius.
     #[serde(default)]
     point: Vec<Vec<f32>>,
+    /// Samples a pixel of the reference.
+    spp: Option<u32>,
 }
 
 /// The scenes that `words` name; a folder may hold many.
@@ -55,7 +60,7 @@ pub fn sources(words: &[String]) -> Result<Vec<Source>, ChartError> {
         if !path.is_dir() {
             let name = if path.is_file() { stem(path) } else { word.clone() };
             let spec = word.clone();
-            found.push(Source { name, spec, environment: None, light_radius: None, reference: None });
+            found.push(Source::plain(name, spec, None));
             continue;
         }
         let before = found.len();
@@ -69,8 +74,7 @@ pub fn sources(words: &[String]) -> Result<Vec<Source>, ChartError> {
                 if path.join("scene.glb").is_file() {
                     found.push(of_folder(&path)?);
                 } else if let Some(room) = room_of(&path) {
-                    let (name, spec) = (stem(&path), format!("paper-room:{room}"));
-                    found.push(Source { name, spec, environment: None, light_radius: None, reference: Some(path) });
+                    found.push(Source::plain(stem(&path), format!("paper-room:{room}"), Some(path)));
                 }
             }
         }
@@ -93,6 +97,7 @@ fn of_folder(path: &Path) -> Result<Source, ChartError> {
         environment: Some(facts.world),
         light_radius: (facts.light == "point").then_some(radius),
         reference: Some(path.join("frame0000.exr")),
+        samples: facts.spp,
     })
 }
 
@@ -110,6 +115,18 @@ fn file(path: &Path, error: &dyn std::fmt::Display) -> ChartError {
 }
 
 impl Source {
+    /// A scene that says all of itself.
+    fn plain(name: String, spec: String, reference: Option<PathBuf>) -> Self {
+        Self { name, spec, environment: None, light_radius: None, reference, samples: None }
+    }
+
+    /// Where its reference comes from, in words.
+    pub fn origin(&self) -> String {
+        let Some(path) = &self.reference else { return "our path tracer, no limit of bounces".into() };
+        let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
+        parts[parts.len().saturating_sub(2)..].join("/")
+    }
+
     /// Reads the scene.
     ///
     /// # Errors
@@ -142,8 +159,11 @@ impl Source {
     }
 }
 
-/// The picture in `path` as a reference. What a method has to add is its diffuse light without what our rasteriser finds
-/// directly, since Blender counts the sky as direct light. Its noise is not known.
+/// The picture in `path` as a reference. What a method has to add is its diffuse light without what
+/// our rasteriser finds directly, since Blender counts the sky as direct light. Which surfaces
+/// there are, and what they reflect, is told by our own layers, not by the file's: half floats,
+/// filtered over pixels, show black walls as dark grey ones, where light is nowhere to be seen. Its
+/// noise is not known.
 ///
 /// # Errors
 /// A file that cannot be read or lacks a layer; drawing direct light.
@@ -158,11 +178,10 @@ pub fn reference(path: &Path, trial: &mut Trial<'_>, samples: u32) -> Result<Ref
     let (diff_dir, diff_ind) = (read("DiffDir")?, read("DiffInd")?);
     let camera = trial.scene().cameras[0].clone();
     let direct = trial.picture(&Method::Direct, &camera, Settling { frames: 1, samples })?;
-    let ours = &direct.layer(capture::Layer::DiffDir).data;
-    let gi = diff_dir.iter().zip(&diff_ind).zip(ours).map(|((d, i), o)| d + i - o).collect();
+    let drawn = |layer| direct.layer(layer).data.clone();
+    let ours = drawn(capture::Layer::DiffDir);
+    let gi = diff_dir.iter().zip(&diff_ind).zip(&ours).map(|((d, i), o)| d + i - o).collect();
     let combined = read("Combined")?.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 1.0]).collect();
-    let depth = layers.image("Depth")?;
-    let depth = depth.pixels.iter().step_by(depth.channels.max(1) as usize).copied().collect();
     let unknown = Noise { mean: f64::NAN, pixel: f64::NAN, pixel_at_most: f64::NAN, picture: f64::NAN };
     Ok(Reference {
         size: [layers.width, layers.height],
@@ -170,10 +189,10 @@ pub fn reference(path: &Path, trial: &mut Trial<'_>, samples: u32) -> Result<Ref
             (Layer::Combined, combined),
             (Layer::DiffDir, diff_dir),
             (Layer::DiffInd, diff_ind),
-            (Layer::DiffCol, read("DiffCol")?),
+            (Layer::DiffCol, drawn(capture::Layer::DiffCol)),
             (Layer::Gi, gi),
-            (Layer::Normal, read("Normal")?),
-            (Layer::Depth, depth),
+            (Layer::Normal, drawn(capture::Layer::Normal)),
+            (Layer::Depth, drawn(capture::Layer::Depth)),
         ],
         noise: [unknown; 3],
         samples: [0; 2],
@@ -198,12 +217,13 @@ mod tests {
         std::fs::write(at("flat/scene.glb"), "").unwrap();
         let refused = sources(&word()).unwrap_err().to_string();
         assert!(refused.contains("meta.json"), "{refused}");
-        std::fs::write(at("flat/meta.json"), r#"{"world": 0.5, "light": "point", "point": [[1, 2, 3, 60, 0.05]]}"#)
-            .unwrap();
+        let meta = r#"{"world": 0.5, "light": "point", "point": [[1, 2, 3, 60, 0.05]], "spp": 9}"#;
+        std::fs::write(at("flat/meta.json"), meta).unwrap();
         let found = sources(&word()).unwrap();
         let names: Vec<_> = found.iter().map(|s| s.name.as_str()).collect();
         assert_eq!(names, ["flat", "room0002_view0"]);
-        assert_eq!((found[0].environment, found[0].light_radius), (Some(0.5), Some(0.05)));
+        assert_eq!((found[0].environment, found[0].light_radius, found[0].samples), (Some(0.5), Some(0.05), Some(9)));
+        assert_eq!((found[0].origin().as_str(), found[1].samples), ("flat/frame0000.exr", None));
         assert_eq!(found[1].spec, "paper-room:2");
         let named = sources(&["cornell".into()]).unwrap();
         assert_eq!((named[0].name.as_str(), named[0].reference.is_none()), ("cornell", true));

@@ -4,8 +4,8 @@ use super::{
     Scores, Time,
     entries::Entry,
     on_pictures,
+    plan::Plan,
     published::{self, PIXELS},
-    run::Plan,
 };
 use crate::{
     gi::{Method, technique::Cost},
@@ -83,7 +83,7 @@ impl Stage<'_> {
                 })
             }
             Entry::Paths(count) => {
-                let traced = self.trial.trace(&self.camera, &truth::samples(*count, 1))?;
+                let traced = self.trial.trace(&self.camera, &plan.paths(truth::samples(*count, 1)))?;
                 let light = judge::light_error(traced.layer(reference::Layer::Gi), &self.reference);
                 let seen = judge::compare(&traced.rgb(), &self.reference, true)?;
                 let ms = 1e3 * traced.seconds;

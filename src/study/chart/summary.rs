@@ -36,7 +36,8 @@ pub enum Clock {
 }
 
 impl Clock {
-    /// Timestamps, where all methods have them and none is more than [`bench::AGREEMENT`] away from the synchronised clock.
+    /// Timestamps, where all methods have them and none is more than [`bench::AGREEMENT`] away from
+    /// the synchronised clock.
     pub fn of(record: &Record) -> Self {
         let agrees = |unit: &Unit| match &unit.time {
             Some(time) => time
@@ -94,7 +95,8 @@ pub struct Row {
     pub best: bool,
     /// The same by projected time.
     pub best_projected: bool,
-    /// How many times as long paths take to come as near, and whether that lies beyond the paths that were traced.
+    /// How many times as long paths take to come as near, and whether that lies beyond the paths
+    /// that were traced.
     pub against_paths: Option<(f64, bool)>,
 }
 
@@ -197,8 +199,8 @@ pub fn frontier(points: &[(usize, f64, f64)]) -> Vec<usize> {
     sorted.into_iter().map(|p| p.0).collect()
 }
 
-/// Milliseconds at which a curve of (milliseconds, error) reaches `error`: between its points by powers, before and after them by
-/// the square root that paths obey; true for the latter.
+/// Milliseconds at which a curve of (milliseconds, error) reaches `error`: between its points by
+/// powers, before and after them by the square root that paths obey; true for the latter.
 pub fn time_to(curve: &[(f64, f64)], error: f64) -> Option<(f64, bool)> {
     let mut curve = curve.to_vec();
     curve.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -97,11 +97,15 @@ pub struct Point {
     pub wall_ms: Spread,
     /// GPU memory, bytes.
     pub bytes: u64,
+    /// Frames timed: as many as were asked for, or as the limit of time allows; 0 in records of older programs.
+    #[serde(default)]
+    pub frames: u32,
 }
 
 impl Sweep {
-    /// Slope of the synchronised clock: milliseconds for the axis' unit, by least squares; and the exponent of growth between the
-    /// first and the last step (1: as much as what grows). `None` with fewer than two steps.
+    /// Slope of the synchronised clock: milliseconds for the axis' unit, by least squares; and the
+    /// exponent of growth between the first and the last step (1: as much as what grows). `None`
+    /// with fewer than two steps.
     pub fn slope(&self) -> Option<(f64, f64)> {
         let points: Vec<(f64, f64)> = self.points.iter().map(|p| (p.x, p.wall_ms.median)).collect();
         let (first, last) = (points.first()?, points.last()?);
@@ -120,10 +124,28 @@ impl Sweep {
 /// How far a sweep goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Frames timed.
+    /// Most frames timed.
     pub bench: BenchOptions,
-    /// A step is left out, and those after it, that would surely take more seconds than this by the one before.
+    /// Seconds that a step's frames may take. Fewer are drawn where all would take longer; a step
+    /// is left out, and those after it, where two would.
     pub seconds: f64,
+}
+
+impl Limits {
+    /// Frames of a step that grows `factor` times over one whose frame took `before` milliseconds;
+    /// or why there are none. Nothing here grows slower than by the root of what grows.
+    fn frames(self, before: f64, factor: f64) -> Result<BenchOptions, String> {
+        let least = before * 1e-3 * factor.sqrt();
+        let fit = (self.seconds / least) as u32;
+        if fit < 2 {
+            let (limit, last) = (self.seconds, before * 1e-3);
+            return Err(format!(
+                "two frames of the next step would take more than {limit} s: one of this took {last:.1} s"
+            ));
+        }
+        let warmup = self.bench.warmup.min(fit / 2);
+        Ok(BenchOptions { frames: self.bench.frames.min(fit - warmup), warmup })
+    }
 }
 
 /// Times `method` along `axis`. `go_on` is asked between steps.
@@ -137,25 +159,26 @@ pub(super) fn sweep(
     go_on: &dyn Fn() -> bool,
 ) -> Result<Sweep, ChartError> {
     let mut found = Sweep { key, axis, entry: entry.into(), points: Vec::new(), ended: None };
-    let frames = f64::from(limits.bench.frames + limits.bench.warmup);
     for step in axis.steps(size) {
         if !go_on() {
             return Err(ChartError::Stopped);
         }
-        // Nothing here grows slower than by the root of what grows.
-        if let Some(before) = found.points.last()
-            && before.wall_ms.median * 1e-3 * frames * (f64::from(step.count) / before.x).sqrt() > limits.seconds
-        {
-            found.ended = Some(format!("longer than {} s a step on this device", limits.seconds));
-            break;
-        }
+        let before = found.points.last();
+        let bench = before.map_or(Ok(limits.bench), |b| limits.frames(b.wall_ms.median, f64::from(step.count) / b.x));
+        let bench = match bench {
+            Ok(bench) => bench,
+            Err(why) => {
+                found.ended = Some(why);
+                break;
+            }
+        };
         let once = || -> Result<Point, ChartError> {
             let scene = axis.scene(&step)?;
             let camera = scene.cameras[0].clone();
             let mut trial = Trial::new(gpu, scene, step.size, TrialOptions::default())?;
-            let measured = trial.measure(method, &camera, limits.bench)?;
+            let measured = trial.measure(method, &camera, bench)?;
             let (gpu_ms, wall_ms, bytes) = (measured.gpu_ms, measured.wall_ms, measured.total_bytes());
-            Ok(Point { x: f64::from(step.count), size: step.size, gpu_ms, wall_ms, bytes })
+            Ok(Point { x: f64::from(step.count), size: step.size, gpu_ms, wall_ms, bytes, frames: bench.frames })
         };
         match once() {
             Ok(point) => found.points.push(point),
@@ -257,12 +280,24 @@ mod tests {
     #[test]
     fn slopes_are_found() {
         let spread = |ms: f64| Spread { median: ms, p95: ms };
-        let point = |x: f64, ms: f64| Point { x, size: [1; 2], gpu_ms: None, wall_ms: spread(ms), bytes: 0 };
+        let point = |x: f64, ms: f64| Point { x, size: [1; 2], gpu_ms: None, wall_ms: spread(ms), bytes: 0, frames: 1 };
         let points = vec![point(1e6, 5.0), point(2e6, 7.0), point(4e6, 11.0)];
         let sweep = Sweep { key: String::new(), axis: Axis::Resolution, entry: "x".into(), points, ended: None };
         let (slope, exponent) = sweep.slope().unwrap();
         assert!((slope - 2.0).abs() < 1e-9 && (exponent - (2.2f64).ln() / 4f64.ln()).abs() < 1e-9);
         assert_eq!(Sweep { points: vec![point(1.0, 1.0)], ..sweep }.slope(), None);
+    }
+
+    #[test]
+    fn a_step_takes_the_frames_that_fit() {
+        let bench = BenchOptions { frames: 8, warmup: 2 };
+        let limits = Limits { bench, seconds: 10.0 };
+        assert_eq!(limits.frames(10.0, 4.0), Ok(bench));
+        // Twice as long as 1.25 s: four fit.
+        assert_eq!(limits.frames(1250.0, 4.0), Ok(BenchOptions { frames: 2, warmup: 2 }));
+        assert_eq!(limits.frames(2500.0, 4.0), Ok(BenchOptions { frames: 1, warmup: 1 }));
+        let why = limits.frames(3000.0, 4.0).unwrap_err();
+        assert!(why.contains("10 s") && why.contains("3.0 s"), "{why}");
     }
 
     #[test]

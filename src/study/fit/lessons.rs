@@ -1,4 +1,5 @@
-//! What is learnt from a scene: cameras scattered through it, drawn by `gather` from a cut to settled, with the light traced at each cell.
+//! What is learnt from a scene: cameras scattered through it, drawn by `gather` from a cut to
+//! settled, with the light traced at each cell.
 
 use super::FitError;
 use crate::{
@@ -21,17 +22,23 @@ use glam::Vec3;
 const SEED: u64 = 2;
 /// Most views: more than these take longer to draw than a few minutes of steps can use.
 const MOST_VIEWS: usize = 48;
-/// Cameras that are looked at before the first that is a view has been found; and for each, if all the views are wanted.
+/// Cameras that are looked at before the first that is a view has been found; and for each, if all
+/// the views are wanted.
 const TRIED: usize = 32;
-/// A view shows surfaces in at least this share of its cells, and at most a tenth of them nearer than this, in sizes of the scene.
+/// A view shows surfaces in at least this share of its cells, and at most a tenth of them nearer
+/// than this, in sizes of the scene.
 const LEAST_SHOWN: f32 = 0.5;
 const NEAREST: f32 = 0.03;
-/// Light is traced until the root mean square error of a cell is this share of the mean light, or by so many samples: noise has no bias,
-/// and the same samples teach more in many views than in few. (With 1,024 one view of `interior` took three minutes on two busy cores.)
+/// Light is traced until the root mean square error of a cell is this share of the mean light, or
+/// by so many samples: noise has no bias, and the same samples teach more in many views than in
+/// few. (With 1,024 one view of `interior` took three minutes on two busy cores.)
 const NOISE: f64 = 0.5;
 const MOST_SAMPLES: u32 = 128;
-/// Frames after a cut at which a view is learnt from, the first of all and a later one, beside the last, which is what judges.
+/// Frames after a cut at which a view is learnt from, the first of all and a later one, beside the
+/// last, which is what judges.
 const FRAMES: [u32; 2] = [1, 6];
+/// One view of so many is held out, the second first.
+const HELD_OUT: usize = 4;
 
 /// What a weights file says of these numbers.
 pub(super) const SENTENCE: &str = "views of the scene, gather's answer after 1, 6 and all frames, light by bouncelight's path tracer, up to 128 samples a cell";
@@ -42,14 +49,18 @@ pub(super) struct Lessons {
     pub cells: [u32; 2],
     /// Cameras.
     pub views: usize,
-    /// Each camera's pictures, one after the other.
+    /// Pictures to learn from, each camera's one after the other.
     pub examples: Vec<Example>,
+    /// Pictures of views that are not learnt from, which tell when what is learnt helps elsewhere
+    /// in the scene; none of a single view.
+    pub held_out: Vec<Example>,
     /// Input planes that turn their sign when left and right are exchanged.
     turning: Vec<usize>,
 }
 
 impl Lessons {
-    /// Draws and traces until `more`, which hears the number of the next view, says no; at least one view.
+    /// Draws and traces until `more`, which hears the number of the next view, says no; at least
+    /// one view.
     ///
     /// # Errors
     /// [`FitError::NoFreeViews`] where none of many cameras sees enough; [`FitError::Trial`].
@@ -64,6 +75,7 @@ impl Lessons {
             cells: cells_of(trial.size()),
             views: 0,
             examples: Vec::new(),
+            held_out: Vec::new(),
             // The first of the three planes of each is the way to the right.
             turning: ["normal", "position"].iter().filter_map(|n| features.offset(n)).map(|o| o as usize).collect(),
         };
@@ -87,14 +99,21 @@ impl Lessons {
             }
             let options = truth::until(Layer::Gi, NOISE, MOST_SAMPLES, lessons.views as u32);
             let target = trial.light_at_cells(&camera, options)?;
-            lessons.examples.extend(samples.iter().map(|s| example(s, &target, &features)));
+            let held_out = is_held_out(lessons.views);
+            let examples = if held_out { &mut lessons.held_out } else { &mut lessons.examples };
+            examples.extend(samples.iter().map(|s| example(s, &target, &features)));
             lessons.views += 1;
         }
         if lessons.views == 0 { Err(FitError::NoFreeViews) } else { Ok(lessons) }
     }
 
-    /// A picture, or with left and right exchanged. (A cell's sample point is half a pixel right of its middle, mirrored half a
-    /// pixel left; that is ignored, as in training.)
+    /// Views that are learnt from.
+    pub fn learnt_views(&self) -> usize {
+        (0..self.views).filter(|view| !is_held_out(*view)).count()
+    }
+
+    /// A picture, or with left and right exchanged. (A cell's sample point is half a pixel right of
+    /// its middle, mirrored half a pixel left; that is ignored, as in training.)
     pub fn example(&self, picture: usize, mirrored: bool) -> Example {
         let mut example = self.examples[picture].clone();
         if mirrored {
@@ -110,6 +129,10 @@ impl Lessons {
         }
         example
     }
+}
+
+fn is_held_out(view: usize) -> bool {
+    view % HELD_OUT == 1
 }
 
 /// The features that the weights use.
@@ -142,7 +165,8 @@ fn example(sample: &Sample, target: &Target, features: &FeatureSet) -> Example {
     }
 }
 
-/// Pictures in the order of learning: all once, shuffled, then all again; half of them mirrored. The same every time.
+/// Pictures in the order of learning: all once, shuffled, then all again; half of them mirrored.
+/// The same every time.
 pub(super) struct Order {
     numbers: SplitMix,
     round: Vec<usize>,
@@ -195,7 +219,8 @@ mod tests {
             target: vec![6.0, 5.0, 4.0, 3.0, 2.0, 1.0],
             counts: vec![1.0, 0.0],
         };
-        let lessons = Lessons { cells: [2, 1], views: 1, examples: vec![example.clone()], turning: vec![1] };
+        let (examples, held_out) = (vec![example.clone()], Vec::new());
+        let lessons = Lessons { cells: [2, 1], views: 1, examples, held_out, turning: vec![1] };
         assert_eq!(lessons.example(0, false), example);
         let mirrored = lessons.example(0, true);
         assert_eq!(mirrored.input, [2.0, 1.0, -4.0, -3.0]);

@@ -1,12 +1,16 @@
 //! The cheapest method that is good enough for a scene: no more model than it needs.
 //!
-//! A few views are traced to the error that the target asks for and no further. Then rungs are tried from the cheapest up, and the
-//! first that meets the target in every view ends the search; what is dearer is not tried. Free numbers: the light of `ambient` and
-//! `ssgi` is linear in two of them, so where the usual ones miss the target, the scene's own follow from three pictures a view. Of
-//! `gather` the usual ones are tried first: where they are good enough, cheaper ones are sought by bisection, where not, finer ones
-//! are rungs of their own. At last, for methods that settle, the fewest frames that still meet the target are sought by bisection, too.
-//! Both bisections take it that error falls as cost rises; what they return has been measured to meet the target in any case.
+//! A few views are traced to the error that the target asks for and no further. Then rungs are
+//! tried from the cheapest up, and the first that meets the target in every view ends the search;
+//! what is dearer is not tried. Free numbers: the light of `ambient` and `ssgi` is linear in two of
+//! them, so where the usual ones miss the target, the scene's own follow from three pictures a
+//! view. Of `gather` the usual ones are tried first: where they are good enough, cheaper ones are
+//! sought by bisection, where not, finer ones are rungs of their own. At last, for methods that
+//! settle, the fewest frames that still meet the target are sought by bisection, too. Both
+//! bisections take it that error falls as cost rises; what they return has been measured to meet
+//! the target in any case.
 
+mod error;
 mod learn;
 mod lessons;
 mod report;
@@ -15,6 +19,7 @@ mod unseen;
 mod views;
 mod yardstick;
 
+pub use error::FitError;
 pub use learn::{Learned, Learning, learn};
 pub use report::{Record, RecordRow};
 pub use rows::{Row, Rung, Verdict};
@@ -22,18 +27,18 @@ pub use views::covering;
 pub use yardstick::{Metric, Yardstick};
 
 use super::{
-    trial::{Settling, Shot, Trial, TrialError},
+    trial::{Settling, Shot, Trial},
     truth::Reference,
 };
 use crate::{
     gi::{gather, pass::Neural},
-    net::{format::WeightsError, learn::LearnError},
     render::capture::Layer,
     scene::Camera,
 };
 use std::path::PathBuf;
 
-/// Sizes of `gather`'s entries over their distance, coarser and finer than its own, of which half the size is four times as many.
+/// Sizes of `gather`'s entries over their distance, coarser and finer than its own, of which half
+/// the size is four times as many.
 const COARSER: [f32; 3] = [1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
 const FINER: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
 
@@ -69,6 +74,9 @@ pub struct Seen {
     pub reference: Reference,
     /// What the metric would say of the reference's own noise; 0 for metrics that cannot tell.
     pub floor: f64,
+    /// Standard deviation that this noise may give the difference of two pictures' metric; 0 for
+    /// metrics that cannot tell.
+    pub doubt: f64,
 }
 
 /// What was found.
@@ -97,39 +105,8 @@ impl Fit {
     }
 }
 
-/// Why nothing could be fitted.
-#[derive(Debug, thiserror::Error)]
-pub enum FitError {
-    /// A picture could not be drawn or traced.
-    #[error(transparent)]
-    Trial(#[from] TrialError),
-    /// Nothing to look at.
-    #[error(
-        "there is no view to judge: the scene has no camera that sees a surface; name one with --eye and --look-at"
-    )]
-    NoViews,
-    /// Nothing to learn from.
-    #[error(
-        "there is nothing to learn from: no camera among many scattered through the scene sees enough of it, in any light"
-    )]
-    NoFreeViews,
-    /// The network cannot be learnt.
-    #[error(transparent)]
-    Learn(#[from] LearnError),
-    /// What was learnt is no network.
-    #[error(transparent)]
-    Weights(#[from] WeightsError),
-    /// The metric says nothing of a view.
-    #[error("view {view}: {reason}; choose another view or metric")]
-    Blind {
-        /// Its number, from 0.
-        view: usize,
-        /// What is missing.
-        reason: String,
-    },
-}
-
-/// Looks for it. Blocks, for minutes on a slow device; `told` hears what is being done and how many steps of how many are done.
+/// Looks for it. Blocks, for minutes on a slow device; `told` hears what is being done and how many
+/// steps of how many are done.
 ///
 /// # Errors
 /// [`FitError`]. That the target is out of reach is no error: [`Fit::reached`].
@@ -168,7 +145,8 @@ struct Search<'a, 'b> {
 }
 
 impl Search<'_, '_> {
-    /// Steps that there will be if nothing ends the search early: a reference or a rung in one view each.
+    /// Steps that there will be if nothing ends the search early: a reference or a rung in one view
+    /// each.
     fn guess(&self, views: usize) -> u32 {
         (views * (1 + 4 + FINER.len() + self.options.networks.len())) as u32
     }
@@ -184,9 +162,9 @@ impl Search<'_, '_> {
         for (view, camera) in cameras.iter().enumerate() {
             self.tell(&format!("reference of view {view}"));
             let reference = self.trial.reference(camera, &options)?;
-            let floor = self.options.yardstick.floor(&reference);
-            let floor = floor.map_err(|reason| FitError::Blind { view, reason })?;
-            self.views.push(Seen { camera: camera.clone(), reference, floor });
+            let noise = self.options.yardstick.noise(&reference);
+            let [floor, doubt] = noise.map_err(|reason| FitError::Blind { view, reason })?;
+            self.views.push(Seen { camera: camera.clone(), reference, floor, doubt });
         }
         if self.views.is_empty() { Err(FitError::NoViews) } else { Ok(()) }
     }
@@ -230,7 +208,8 @@ impl Search<'_, '_> {
         Ok(None)
     }
 
-    /// A rung whose light is linear in two numbers, with those that suit these views best; `None` for the others.
+    /// A rung whose light is linear in two numbers, with those that suit these views best; `None`
+    /// for the others.
     fn own_numbers(&mut self, row: Option<usize>) -> Result<Option<Rung>, FitError> {
         let Some(rung) = row.map(|row| self.rows[row].rung.clone()) else { return Ok(None) };
         let mut problem = unseen::Problem::default();
@@ -279,7 +258,8 @@ impl Search<'_, '_> {
         Ok(best)
     }
 
-    /// The fewest frames after which the choice meets the target; where it never does, those that were asked for.
+    /// The fewest frames after which the choice meets the target; where it never does, those that
+    /// were asked for.
     fn settle(&mut self, chosen: usize, reached: bool) -> Result<(), FitError> {
         let rung = self.rows[chosen].rung.clone();
         let most = self.rows[chosen].frames;
@@ -307,7 +287,8 @@ impl Search<'_, '_> {
         tried.min_by(|a, b| self.options.yardstick.order(a.1.worst, b.1.worst)).map(|(i, _)| i)
     }
 
-    /// Tries a rung in every view and adds its row; `None` where it is too dear or cannot draw the scene.
+    /// Tries a rung in every view and adds its row; `None` where it is too dear or cannot draw the
+    /// scene.
     fn attempt(&mut self, rung: Rung, frames: u32) -> Result<Option<usize>, FitError> {
         let cost_ms = match self.cost(&rung)? {
             Some(cost) => cost,
@@ -380,7 +361,8 @@ impl Search<'_, '_> {
             if let Some(ms) = measured.own_ms() {
                 return Ok(Some(ms));
             }
-            // Without timestamps that can be believed: the clock, less that of the rasteriser alone.
+            // Without timestamps that can be believed: the clock, less that of the rasteriser
+            // alone.
             let bare = self.trial.measure(&crate::gi::Method::Direct, &camera, options)?;
             return Ok(Some((measured.wall_ms.median - bare.wall_ms.median).max(0.0)));
         }

@@ -164,7 +164,8 @@ impl Fit {
         if self.floor() > 0.0 {
             let _ = write!(text, " The reference's own noise makes up to {} of each number.", y.show(self.floor()));
         }
-        // The bound is for noise that is surely below it, so a reference that reached it is a little better than that.
+        // The bound is for noise that is surely below it, so a reference that reached it is a
+        // little better than that.
         if self.floor() > 1.05 * y.noise_allowed() {
             text += " That is more than a quarter of the target, as --spp allowed no more samples: raise it before you \
                      trust this.";
@@ -177,14 +178,28 @@ impl Learned {
     /// What was learnt from what, and whether it is kept, in sentences.
     fn sentences(&self, yardstick: &Yardstick) -> String {
         let Self { started_from, views, pictures, drawing_seconds, step_seconds, steps, error, worst, mean, .. } = self;
+        let held_out = self.best.map_or(String::new(), |b| {
+            format!(
+                " Of {} pictures that it did not learn from, the state after {} steps is nearest: {:.1} %, before \
+                 {:.1} %.",
+                self.held_out,
+                b.step,
+                100.0 * b.error,
+                100.0 * b.before
+            )
+        });
+        let [by_worst, by_mean] = self.margin.map(|m| yardstick.difference(m));
         let shown = |errors: &[f64; 3]| errors.map(|e| yardstick.show(e));
         let [gather, before, after] = shown(worst);
         let [gather_mean, before_mean, after_mean] = shown(mean);
         let end = if self.kept { "It is kept." } else { "It does not win, so it is not kept." };
         format!(
-            "`{started_from}` has learned the scene from {pictures} pictures of {views} other views ({drawing_seconds:.0} s) in {steps} steps \
-             ({step_seconds:.0} s, {:.1} a second); its error there {:.1} % at first, {:.1} % at last. Where it is judged, worst view (mean): `gather` \
-             {gather} ({gather_mean}), `{started_from}` {before} ({before_mean}), learned {after} ({after_mean}). {end}",
+            "`{started_from}` has learned the scene from {pictures} pictures of {views} other views \
+             ({drawing_seconds:.0} s) in {steps} steps \
+             ({step_seconds:.0} s, {:.1} a second); its error there {:.1} % at first, {:.1} % at last.{held_out} \
+             Where it is judged, worst view (mean): `gather` \
+             {gather} ({gather_mean}), `{started_from}` {before} ({before_mean}), learned {after} ({after_mean}); the \
+             references' noise explains differences of {by_worst} ({by_mean}). {end}",
             f64::from(*steps) / step_seconds.max(1e-9),
             100.0 * error[0],
             100.0 * error[1],

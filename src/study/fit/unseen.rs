@@ -1,8 +1,9 @@
 //! The two numbers of unseen light that suit a scene best.
 //!
-//! Light is affine in them: E = E₀ + sky · A + bounce · B at every pixel, and three pictures tell E₀, A and B. What is sought is the
-//! least Σ|E − reference|, as the error of light is measured; it is found by least squares whose weights are one over the
-//! residuals of the round before (Schlossmacher 1973).
+//! Light is affine in them: E = E₀ + sky · A + bounce · B at every pixel, and three pictures tell
+//! E₀, A and B. What is sought is the least Σ|E − reference|, as the error of light is measured; it
+//! is found by least squares whose weights are one over the residuals of the round before
+//! (Schlossmacher 1973).
 
 use crate::gi::ambient::Unseen;
 use crate::reference::Layer;
@@ -16,7 +17,8 @@ pub const ASKED: [Unseen; 3] =
 const ROUNDS: usize = 30;
 /// Residuals below this share of the mean light weigh no more than at it.
 const LEAST: f64 = 1e-3;
-/// Where one number's light is the other's times something, up to this share of the squares, they cannot be told apart.
+/// Where one number's light is the other's times something, up to this share of the squares, they
+/// cannot be told apart.
 const ALIKE: f64 = 1e-6;
 /// Largest number.
 const MOST: f64 = 16.0;

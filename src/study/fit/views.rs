@@ -16,13 +16,14 @@ use std::collections::HashSet;
 const TRIED: usize = 8;
 /// Cells along each side of the scene's box.
 const CELLS: f32 = 16.0;
-/// Least share of the picture that shows a surface, and how near the nearest tenth of it may be, in sizes of the scene: a wall
-/// before the nose is no view.
+/// Least share of the picture that shows a surface, and how near the nearest tenth of it may be, in
+/// sizes of the scene: a wall before the nose is no view.
 const LEAST_SHOWN: f32 = 0.5;
 const NEAREST: f32 = 0.02;
 
-/// `count` cameras, the scene's own first and then scattered ones that together see most of it: each the one that shows most
-/// cells of the scene's box that none before it shows. Fewer where fewer can see anything.
+/// `count` cameras, the scene's own first and then scattered ones that together see most of it:
+/// each the one that shows most cells of the scene's box that none before it shows. Fewer where
+/// fewer can see anything.
 ///
 /// # Errors
 /// A picture that cannot be drawn.
@@ -100,7 +101,8 @@ mod tests {
         let camera = Camera::look_at([0.0; 3], [0.0, 0.0, -1.0], std::f32::consts::FRAC_PI_2);
         let bounds = (Vec3::splat(-8.0), Vec3::splat(8.0));
         let far = cells(&camera, [8, 8], &[7.5; 64], bounds);
-        // A wall 7.5 away fills 15 metres: eight points on it are nearly two cells of a metre apart.
+        // A wall 7.5 away fills 15 metres: eight points on it are nearly two cells of a metre
+        // apart.
         assert_eq!(far.len(), 64);
         assert!(far.iter().all(|c| c[2] == 0), "{far:?}");
         let near = cells(&camera, [8, 8], &[1.0; 64], bounds);

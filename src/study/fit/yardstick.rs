@@ -1,4 +1,5 @@
-//! What "good enough" means: a metric and its bound, and how well the truth has to be known for that.
+//! What "good enough" means: a metric and its bound, and how well the truth has to be known for
+//! that.
 
 use crate::metrics;
 use crate::reference::{Layer, TracerOptions};
@@ -27,7 +28,8 @@ pub struct Yardstick {
 
 /// Share of the target that the reference's own noise may make.
 const NOISE: f64 = 0.25;
-/// Noise of a pixel that references have for metrics of what is shown, whose own floor nobody can tell.
+/// Noise of a pixel that references have for metrics of what is shown, whose own floor nobody can
+/// tell.
 const SHOWN_NOISE: f64 = 0.03;
 /// Frames that are averaged for metrics of what is shown, which see aliasing.
 const SHOWN_SAMPLES: u32 = 4;
@@ -95,7 +97,8 @@ impl Yardstick {
     /// How references are traced: to the error that the target needs, and no more.
     pub fn reference(&self, most_samples: u32) -> TracerOptions {
         match self.metric {
-            // Blocks of 4×4 pixels average a pixel's noise; of a Gaussian the mean |Δ| is √(2/π) of the root mean square.
+            // Blocks of 4×4 pixels average a pixel's noise; of a Gaussian the mean |Δ| is √(2/π) of
+            // the root mean square.
             Metric::Light => {
                 let pixel = NOISE * self.target * judge::BLOCK as f64 / std::f64::consts::FRAC_2_PI.sqrt();
                 truth::until(Layer::Gi, pixel, most_samples, 0)
@@ -114,14 +117,20 @@ impl Yardstick {
         if self.metric == Metric::Light { 1 } else { SHOWN_SAMPLES }
     }
 
-    /// What the metric would say of the reference's own noise; 0 where that cannot be told.
-    pub(super) fn floor(&self, reference: &truth::Reference) -> Result<f64, String> {
+    /// What the metric would say of the reference's own noise, and how much that may move the
+    /// difference of two pictures (one standard deviation); 0 where that cannot be told.
+    pub(super) fn noise(&self, reference: &truth::Reference) -> Result<[f64; 2], String> {
         match self.metric {
             Metric::Light => judge::light_error(reference.layer(Layer::Gi), reference)
-                .map(|l| l.floor)
+                .map(|l| [l.floor, l.doubt])
                 .ok_or_else(|| "its reference has no light that a method could add".into()),
-            Metric::Shown(_) => Ok(0.0),
+            Metric::Shown(_) => Ok([0.0; 2]),
         }
+    }
+
+    /// Whether `value` is better than `other` by more than `margin`.
+    pub(super) fn beats(&self, value: f64, other: f64, margin: f64) -> bool {
+        self.order(value, other).is_lt() && (value - other).abs() > margin
     }
 
     /// What the metric says of one picture.
@@ -137,6 +146,14 @@ impl Yardstick {
                 let compared = judge::compare(&shot.rgb(), reference, flip).map_err(|e| e.to_string())?;
                 compared.value(name).ok_or_else(|| format!("`{name}` cannot be told here"))
             }
+        }
+    }
+
+    /// A difference of values for people.
+    pub(super) fn difference(&self, value: f64) -> String {
+        match self.metric {
+            Metric::Light => format!("{:.2} %", value * 100.0),
+            Metric::Shown(_) => self.show(value),
         }
     }
 

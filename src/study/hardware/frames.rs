@@ -14,7 +14,8 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 
-/// Frames that count and those before them, where time allows: methods with a history settle within them.
+/// Frames that count and those before them, where time allows: methods with a history settle within
+/// them.
 const MOST: BenchOptions = BenchOptions { frames: 60, warmup: 32 };
 const LEAST: BenchOptions = BenchOptions { frames: 5, warmup: 3 };
 /// How much of the time that is left one row may take.
@@ -49,7 +50,8 @@ pub struct FrameRow {
 pub enum Timing {
     /// The passes' timestamps, whose sum agrees with the synchronised clock.
     Timestamps,
-    /// The synchronised clock, less that of `direct`: there are no timestamps, or they do not agree with it.
+    /// The synchronised clock, less that of `direct`: there are no timestamps, or they do not agree
+    /// with it.
     Clock,
 }
 
@@ -86,7 +88,8 @@ fn rows(
     let mut rows: Vec<FrameRow> = Vec::new();
     for &method in methods.iter().filter(|m| rays || !(m.needs_rays() || **m == MethodName::Neural)) {
         let what = format!("{what}, {}, {}", method.name(), label(precision));
-        // Whatever came before is a fair guess for what comes next; the methods are listed cheapest first.
+        // Whatever came before is a fair guess for what comes next; the methods are listed cheapest
+        // first.
         let before = rows.last().map_or(0.0, |r| r.measured.wall_ms.median * 1e-3);
         if !run.affords(&what, before * f64::from(LEAST.frames + LEAST.warmup)) {
             continue;

@@ -1,9 +1,11 @@
-//! Everything that the documentation projects for cards that nobody here owns, measured on the device at hand within a given time:
-//! frames of every method by size, the network's layers as tuned and not, rays by kind, the path tracer, in both precisions.
+//! Everything that the documentation projects for cards that nobody here owns, measured on the
+//! device at hand within a given time: frames of every method by size, the network's layers as
+//! tuned and not, rays by kind, the path tracer, in both precisions.
 //!
-//! Beside each measured time stands the projection of the same counted work: once for this device, by the peaks that it was
-//! measured to have and the efficiency that [`projection`] assumes, so that the ratio of the two tells how good that
-//! assumption is; and once for the target card, as assumed and as this device reached. What did not fit into the time, or failed, is listed.
+//! Beside each measured time stands the projection of the same counted work: once for this device,
+//! by the peaks that it was measured to have and the efficiency that [`projection`] assumes, so
+//! that the ratio of the two tells how good that assumption is; and once for the target card, as
+//! assumed and as this device reached. What did not fit into the time, or failed, is listed.
 
 mod frames;
 mod network;
@@ -27,7 +29,8 @@ use thiserror::Error;
 
 /// What to measure.
 pub struct HardwareOptions {
-    /// Scenes by name, the most usual first: all sizes are measured in that one, the others at the second size.
+    /// Scenes by name, the most usual first: all sizes are measured in that one, the others at the
+    /// second size.
     pub scenes: Vec<(String, Scene)>,
     /// Sizes of pictures, pixels, the smallest first.
     pub sizes: Vec<[u32; 2]>,
@@ -59,16 +62,19 @@ pub struct HardwareReport {
     pub software: bool,
     /// It tells when passes begin and end.
     pub timestamps: bool,
-    /// The program was built without optimisation for release: what runs on the processor is slower than it need be.
+    /// The program was built without optimisation for release: what runs on the processor is slower
+    /// than it need be.
     pub debug_build: bool,
-    /// Other work before the beginning, in busy threads, where Linux tells: where it is near the number of cores, clocks count it, too.
+    /// Other work before the beginning, in busy threads, where Linux tells: where it is near the
+    /// number of cores, clocks count it, too.
     #[serde(default)]
     pub load: Option<f64>,
     /// How long the measurement took, seconds.
     pub seconds: f64,
     /// Operations a second, multiplications and additions without a load between them, measured.
     pub peak_flops: f64,
-    /// Bytes read and written a second by copies of 32 MiB, measured. On devices with large caches that is no memory's rate.
+    /// Bytes read and written a second by copies of 32 MiB, measured. On devices with large caches
+    /// that is no memory's rate.
     pub peak_bytes: f64,
     /// Methods by scene and size.
     pub frames: Vec<FrameRow>,
@@ -78,7 +84,8 @@ pub struct HardwareReport {
     pub rays: Vec<RayRow>,
     /// The path tracer.
     pub tracer: Vec<TracerRow>,
-    /// What another runtime needs for the network, as its measuring script says; text says why there is none.
+    /// What another runtime needs for the network, as its measuring script says; text says why
+    /// there is none.
     #[serde(default)]
     pub pytorch: serde_json::Value,
     /// What was left out or failed, and why.
@@ -111,7 +118,8 @@ impl Run<'_> {
         self.until.saturating_duration_since(Instant::now()).as_secs_f64()
     }
 
-    /// Whether there is time for something that takes about `seconds`; where not, `what` is listed as left out.
+    /// Whether there is time for something that takes about `seconds`; where not, `what` is listed
+    /// as left out.
     fn affords(&mut self, what: &str, seconds: f64) -> bool {
         // Nothing is begun once the time is up, however short it is.
         let enough = seconds < self.left();
@@ -129,7 +137,8 @@ impl Run<'_> {
     }
 }
 
-/// Measures. Blocks for up to `options.time`, or as long as the last thing begun takes; `told` hears what is being measured.
+/// Measures. Blocks for up to `options.time`, or as long as the last thing begun takes; `told`
+/// hears what is being measured.
 ///
 /// # Errors
 /// [`HardwareError`]; anything that fails alone is listed in the record instead.
@@ -211,7 +220,8 @@ pub struct Projected {
 }
 
 impl Projected {
-    /// Of `costs` that took `measured` milliseconds on a device with the peaks of `card`; none where nothing was counted or timed.
+    /// Of `costs` that took `measured` milliseconds on a device with the peaks of `card`; none
+    /// where nothing was counted or timed.
     fn of(costs: &[crate::gi::technique::Cost], measured: f64, card: &Card) -> Option<Self> {
         let here_ms = projection::total_ms(costs, card, EFFICIENCY);
         let gtx_1050_ms = projection::total_ms(costs, &GTX_1050, EFFICIENCY);

@@ -1,4 +1,5 @@
-//! The shipped network: its layers by themselves and all together, by the guess and as tuned, in both precisions.
+//! The shipped network: its layers by themselves and all together, by the guess and as tuned, in
+//! both precisions.
 
 use super::Run;
 use crate::{
@@ -39,7 +40,8 @@ pub(super) fn untuned(run: &mut Run<'_>, size: [u32; 2], peak: Peak) -> Vec<Netw
     PRECISIONS.iter().filter_map(|&precision| row(run, size, peak, precision, Arc::default())).collect()
 }
 
-/// With those that the tuner finds fastest here, as far as time allows. The user's own cache is neither read nor written.
+/// With those that the tuner finds fastest here, as far as time allows. The user's own cache is
+/// neither read nor written.
 pub(super) fn tuned(run: &mut Run<'_>, size: [u32; 2], peak: Peak) -> Vec<NetworkRow> {
     let mut rows = Vec::new();
     for (precision, name) in PRECISIONS {

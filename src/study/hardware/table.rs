@@ -44,7 +44,8 @@ impl HardwareReport {
         }
         writeln!(
             out,
-            "\nPeaks, measured: {:.1} GFLOP/s of multiplications and additions, {:.1} GB/s copied (32 MiB: on a device with a larger cache that is the cache's rate).\n",
+            "\nPeaks, measured: {:.1} GFLOP/s of multiplications and additions, {:.1} GB/s copied (32 MiB: on a \
+             device with a larger cache that is the cache's rate).\n",
             self.peak_flops / 1e9,
             self.peak_bytes / 1e9
         )?;
@@ -64,10 +65,14 @@ impl HardwareReport {
         writeln!(out, "## Methods\n")?;
         writeln!(
             out,
-            "Milliseconds; medians. *Own*: the passes that find and add indirect light{}. *Projected here*: the counted work at {share:.0} % of this device's measured peaks, and *measured / projected* what that assumption is worth. \
-             The last two columns are projections for a {}: as the documentation assumes, and with the efficiency that this device reached.\n",
+            "Milliseconds; medians. *Own*: the passes that find and add indirect light{}. *Projected here*: the \
+             counted work at {share:.0} % of this device's measured peaks, and *measured / projected* what that \
+             assumption is worth. \
+             The last two columns are projections for a {}: as the documentation assumes, and with the efficiency \
+             that this device reached.\n",
             if self.frames.iter().any(|r| r.timing == Timing::Clock) {
-                ", by their timestamps; with `~` by the synchronised clock less that of `direct`, where timestamps are missing or do not agree with it"
+                ", by their timestamps; with `~` by the synchronised clock less that of `direct`, where timestamps \
+                 are missing or do not agree with it"
             } else {
                 ", by their timestamps, which agree with the synchronised clock within 10 %"
             },
@@ -75,7 +80,8 @@ impl HardwareReport {
         )?;
         writeln!(
             out,
-            "| scene | size | method | own, median | all passes | p95 | clock | MiB | projected here | **measured / projected** | {0}, projected | {0} as here, projected |",
+            "| scene | size | method | own, median | all passes | p95 | clock | MiB | projected here | **measured / \
+             projected** | {0}, projected | {0} as here, projected |",
             GTX_1050.name
         )?;
         writeln!(out, "|---|---|---|---|---|---|---|---|---|---|---|---|")?;

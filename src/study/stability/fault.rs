@@ -1,4 +1,5 @@
-//! Ways to spoil pictures on purpose: the negative controls. Each stands for something that real methods do wrong.
+//! Ways to spoil pictures on purpose: the negative controls. Each stands for something that real
+//! methods do wrong.
 
 use super::look::Look;
 
@@ -9,7 +10,8 @@ pub enum Fault {
     Noise(f32),
     /// This share of what was shown stays for another frame: a history that does not let go.
     Late(f32),
-    /// Light grows by this share from the picture's top left to its bottom right: an answer that depends on where in the picture a place is.
+    /// Light grows by this share from the picture's top left to its bottom right: an answer that
+    /// depends on where in the picture a place is.
     Screen(f32),
     /// Light times this: wrong energy.
     Gain(f32),

@@ -12,7 +12,8 @@ pub(super) const NOTHING: f32 = 1e9;
 pub struct Look {
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// What the method added, E/π, rgb interleaved. Of the paper's network, which knows no light: its picture as it is shown.
+    /// What the method added, E/π, rgb interleaved. Of the paper's network, which knows no light:
+    /// its picture as it is shown.
     pub light: Vec<f32>,
     /// The picture, linear radiance, rgb interleaved.
     pub rgb: Vec<f32>,
@@ -26,7 +27,8 @@ pub struct Look {
     pub camera: Camera,
 }
 
-/// How far from the plane of a place another may be and still be of the same surface, as a share of its distance.
+/// How far from the plane of a place another may be and still be of the same surface, as a share of
+/// its distance.
 const PLANE: f32 = 0.01;
 
 impl Look {
@@ -90,8 +92,8 @@ impl<'a> Fetch<'a> {
         Self { from, positions: from.positions(), clip_from_world }
     }
 
-    /// Light at a place of a surface with the given normal, between the four pixels around it that show the same surface;
-    /// `None` where it is outside or hidden.
+    /// Light at a place of a surface with the given normal, between the four pixels around it that
+    /// show the same surface; `None` where it is outside or hidden.
     pub fn at(&self, place: Vec3, normal: Vec3) -> Option<[f32; 3]> {
         let clip = self.clip_from_world * Vec4::from((place, 1.0));
         if clip.w <= 0.0 {

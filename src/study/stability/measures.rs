@@ -38,11 +38,13 @@ pub fn largest_change(a: &Look, b: &Look) -> f64 {
     share(f64::from(changes[(changes.len() * 999 / 1000).min(changes.len() - 1)]), b.mean())
 }
 
-/// Edge of the blocks that light at places is compared over, pixels: a cell of the methods. The truth's noise is a quarter in them.
+/// Edge of the blocks that light at places is compared over, pixels: a cell of the methods. The
+/// truth's noise is a quarter in them.
 const BLOCK: usize = 4;
 
-/// Σ|Δ| / Σ of the light at places that both looks show, each fetched from `a` where `b` shows it, over blocks of `b`'s pixels half
-/// of which are found at least; and the share of `b`'s surfaces that both show.
+/// Σ|Δ| / Σ of the light at places that both looks show, each fetched from `a` where `b` shows it,
+/// over blocks of `b`'s pixels half of which are found at least; and the share of `b`'s surfaces
+/// that both show.
 pub fn at_same_places(a: &Look, b: &Look) -> (f64, f64) {
     let fetch = Fetch::new(a);
     let width = b.size[0] as usize;
@@ -105,7 +107,8 @@ pub fn masked_mean(values: &[f32], mask: &[bool]) -> f64 {
     sum / count.max(1.0)
 }
 
-/// Frames until nine tenths of the way from `from` to `to` are done for good; `values` holds one value a frame after the change.
+/// Frames until nine tenths of the way from `from` to `to` are done for good; `values` holds one
+/// value a frame after the change.
 pub fn frames_to_ninety(values: &[f64], from: f64, to: f64) -> f64 {
     let done = |v: f64| (v - from) / (to - from) >= 0.9;
     match values.iter().rposition(|v| !done(*v)) {
@@ -115,7 +118,8 @@ pub fn frames_to_ninety(values: &[f64], from: f64, to: f64) -> f64 {
     }
 }
 
-/// Standard deviation over mean of the light where `mask` is set, after blocks of `block`² pixels were averaged (1 for none).
+/// Standard deviation over mean of the light where `mask` is set, after blocks of `block`² pixels
+/// were averaged (1 for none).
 pub fn unevenness(look: &Look, mask: impl Fn(usize, usize) -> bool, block: usize) -> f64 {
     let [w, h] = look.size.map(|n| n as usize);
     let mut means = Vec::new();
@@ -166,7 +170,8 @@ mod unit {
         let (a, b) = (wall(0.0, slope), wall(0.6, slope));
         let (moved, shown) = at_same_places(&a, &b);
         assert!(moved < 1e-5 && shown > 0.9 && shown < 1.0, "{moved} {shown}");
-        // Pixel by pixel they differ, and a light that goes with the picture does at the same places.
+        // Pixel by pixel they differ, and a light that goes with the picture does at the same
+        // places.
         assert!(change(&a, &b) > 0.03);
         let stuck = wall(0.6, |x| 10.0 + x - 0.6);
         assert!((at_same_places(&a, &stuck).0 - 0.06).abs() < 0.01);

@@ -1,4 +1,5 @@
-//! Where methods fail, as named tests: small scenes, short sequences, numbers with thresholds, the path tracer's own number beside each.
+//! Where methods fail, as named tests: small scenes, short sequences, numbers with thresholds, the
+//! path tracer's own number beside each.
 //!
 //! ```text
 //!  tests/*  one function a test, written against [`Play`]: "these frames, please" ─► looks ─► numbers
@@ -7,8 +8,9 @@
 //!  record   what JSON and tables are made of;  sheet: contact sheets and short sequences
 //! ```
 //!
-//! A test does not know who draws. So the truth takes every test, too: what it does not pass is no test of methods; and a test
-//! that the truth still passes when it is spoilt on purpose measures nothing.
+//! A test does not know who draws. So the truth takes every test, too: what it does not pass is no
+//! test of methods; and a test that the truth still passes when it is spoilt on purpose measures
+//! nothing.
 
 mod explain;
 mod fault;

@@ -1,4 +1,5 @@
-//! The page docs/limits.md: a table of method × test, a sentence on every failure, every number with its threshold.
+//! The page docs/limits.md: a table of method × test, a sentence on every failure, every number
+//! with its threshold.
 
 use super::{Finding, Found, Record};
 use std::fmt::Write;
@@ -17,9 +18,11 @@ fn head(w: &mut String, record: &Record, command: &str) -> std::fmt::Result {
     writeln!(w, "# Where methods fail\n")?;
     writeln!(
         w,
-        "Small scenes and short sequences, each with numbers that have a threshold. The path tracer takes every test, too, and passes it; the same pictures spoilt on\n\
+        "Small scenes and short sequences, each with numbers that have a threshold. The path tracer takes every test, \
+         too, and passes it; the same pictures spoilt on\n\
          purpose must fail it. Made by\n\n    {command}\n\n\
-         which also leaves a contact sheet of each test and, where something moves, a short sequence. Do not edit: the program writes this page (version {}, on {}, {} {}{}).\n",
+         which also leaves a contact sheet of each test and, where something moves, a short sequence. Do not edit: \
+         the program writes this page (version {}, on {}, {} {}{}).\n",
         record.version,
         record.adapter,
         record.backend,
@@ -37,7 +40,8 @@ fn head(w: &mut String, record: &Record, command: &str) -> std::fmt::Result {
 fn table(w: &mut String, record: &Record) -> std::fmt::Result {
     writeln!(
         w,
-        "Each cell has the value that is worst against its threshold, **bold where the test fails**; – where it has no meaning.\n"
+        "Each cell has the value that is worst against its threshold, **bold where the test fails**; – where it has \
+         no meaning.\n"
     )?;
     let names: Vec<String> = record.subjects.iter().map(|s| format!("`{}`", s.name)).collect();
     writeln!(w, "| test | {} | what can go wrong |", names.join(" | "))?;
@@ -117,9 +121,12 @@ fn tail(w: &mut String, record: &Record) -> std::fmt::Result {
     writeln!(
         w,
         "## What is not tested here\n\n\
-         - 8K as a whole picture: `sizes` draws pictures as wide and as high as 8K, not both. `bench --size 7680x4320` does where memory allows.\n\
-         - 8-bit networks: there are none. Another driver: one adapter draws all; `--adapter` and `--backend` choose it, and `tests/net` compares networks with the CPU twin.\n\
-         - InstanceNorm: the published generator's weights are not here. `paper` is our small run of its recipe, with group norms and dropout as published.\n\
+         - 8K as a whole picture: `sizes` draws pictures as wide and as high as 8K, not both. `bench --size \
+         7680x4320` does where memory allows.\n\
+         - 8-bit networks: there are none. Another driver: one adapter draws all; `--adapter` and `--backend` choose \
+         it, and `tests/net` compares networks with the CPU twin.\n\
+         - InstanceNorm: the published generator's weights are not here. `paper` is our small run of its recipe, with \
+         group norms and dropout as published.\n\
          - Temporal anti-aliasing: `tests/gi/taa.rs`."
     )?;
     let names = |of: Vec<&str>| of.join(", ");

@@ -1,4 +1,5 @@
-//! Who draws what a test asks for: a method frame by frame with its history, the path tracer, or the paper's network.
+//! Who draws what a test asks for: a method frame by frame with its history, the path tracer, or
+//! the paper's network.
 
 use super::{
     Fault, Script, StabilityError,
@@ -125,7 +126,8 @@ impl<'a> Play<'a> {
         Self { stage, subject, fault, size, paths, moments, rolls, frames: Cell::new(0), instead }
     }
 
-    /// Whether the path tracer draws. It has no history and takes seconds a frame, so tests ask it for fewer frames.
+    /// Whether the path tracer draws. It has no history and takes seconds a frame, so tests ask it
+    /// for fewer frames.
     pub fn is_truth(&self) -> bool {
         matches!(self.subject, Subject::Truth)
     }
@@ -256,7 +258,8 @@ impl<'a> Play<'a> {
         Ok(looks)
     }
 
-    /// The paper's network: pictures as `training/bouncelight_training/pix2pix/pairs.py` makes them, dropout as published.
+    /// The paper's network: pictures as `training/bouncelight_training/pix2pix/pairs.py` makes
+    /// them, dropout as published.
     fn painted(
         &self,
         weights: &Weights,
@@ -303,7 +306,8 @@ fn look_of(shot: &Shot, camera: Camera) -> Look {
     Look { size, light, rgb, depth: data(Layer::Depth), normal: data(Layer::Normal), broken: 0, camera }
 }
 
-/// Depth, direct light, albedo and normals as the paper's network takes them: through Filmic, in 8-bit steps.
+/// Depth, direct light, albedo and normals as the paper's network takes them: through Filmic, in
+/// 8-bit steps.
 fn four_pictures(shot: &Shot, sky: [f32; 3]) -> [Vec<f32>; 4] {
     let shown = |linear: &[f32]| -> Vec<f32> {
         Tonemap::Filmic.apply_to_bytes(linear).into_iter().map(|b| f32::from(b) / 255.0).collect()

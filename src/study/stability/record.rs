@@ -83,7 +83,8 @@ pub struct Criterion {
 pub struct Found {
     /// Its name.
     pub subject: String,
-    /// Values in the order of the criteria; not finite ones are null, and fail. Empty where the test has no meaning for it.
+    /// Values in the order of the criteria; not finite ones are null, and fail. Empty where the
+    /// test has no meaning for it.
     #[serde(deserialize_with = "values")]
     pub values: Vec<f64>,
     /// Every value is within its limit; absent where the test has no meaning for it.
@@ -138,7 +139,8 @@ impl Finding {
         (0..found.values.len()).max_by(|a, b| over(*a).total_cmp(&over(*b)))
     }
 
-    /// Value and verdict of the worst criterion in a few words: `0.3 %`, `**12 %**` where it fails, `–` where there is none.
+    /// Value and verdict of the worst criterion in a few words: `0.3 %`, `**12 %**` where it fails,
+    /// `–` where there is none.
     pub fn cell(&self, found: &Found) -> String {
         let Some(worst) = self.worst(found) else {
             return if found.pass == Some(false) { "**no answer**".into() } else { "–".into() };
@@ -183,7 +185,8 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    /// Whether `other`, whose finding is that of a test that has not been run yet, would find the same again.
+    /// Whether `other`, whose finding is that of a test that has not been run yet, would find the
+    /// same again.
     pub fn is_of(&self, other: &Self) -> bool {
         let plain = |f: &Finding| {
             let limits = f.criteria.iter().map(|c| Criterion { truth: None, control: None, ..c.clone() });

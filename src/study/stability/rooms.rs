@@ -59,7 +59,8 @@ pub fn lamp(position: [f32; 3], intensity: f32) -> LightKind {
 /// Shines onto the wall behind the camera of [`hall`].
 pub const BACKWARDS: [f32; 3] = [0.2, -0.7, 0.7];
 
-/// A floor of 12 m, an open top, four walls of 4 m, a block. The wall at +Z, behind [`hall_camera`], has a colour of its own.
+/// A floor of 12 m, an open top, four walls of 4 m, a block. The wall at +Z, behind
+/// [`hall_camera`], has a colour of its own.
 pub fn hall(behind: [f32; 3], lights: &[LightKind], sky: f32) -> Scene {
     hall_of(GREY, behind, lights, sky)
 }
@@ -99,8 +100,8 @@ pub fn shell(low: [f32; 3], high: [f32; 3], colour: [f32; 3]) -> Vec<Block> {
     blocks
 }
 
-/// Two rooms of 4×4×3 m side by side, closed but for an opening of 1×2 m in the wall between them, which is `thick` metres thick.
-/// The first room is at x < 0.
+/// Two rooms of 4×4×3 m side by side, closed but for an opening of 1×2 m in the wall between them,
+/// which is `thick` metres thick. The first room is at x < 0.
 pub fn two_rooms(thick: f32, opening: bool, colour: [f32; 3]) -> Vec<Block> {
     let mut blocks = shell([-4.0, 0.0, -2.0], [4.0, 3.0, 2.0], colour);
     // No plane of any grid.

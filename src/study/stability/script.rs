@@ -55,7 +55,8 @@ impl Script {
         self.0.push(FrameChange { camera: camera.clone(), edits, cut, wanted });
     }
 
-    /// For who has no history: the wanted frames alone, each with all that has changed since the last.
+    /// For who has no history: the wanted frames alone, each with all that has changed since the
+    /// last.
     pub(super) fn wanted_only(&self) -> Self {
         let mut pending = Edits::default();
         let mut frames = Vec::new();

@@ -50,7 +50,8 @@ pub(super) struct Row {
 pub struct Sheet {
     title: String,
     rows: Vec<Row>,
-    /// What radiance is multiplied by: the first picture that holds light decides, which is the truth's.
+    /// What radiance is multiplied by: the first picture that holds light decides, which is the
+    /// truth's.
     gain: Option<f32>,
 }
 
@@ -88,7 +89,8 @@ impl Sheet {
         Ok(true)
     }
 
-    /// Writes the short sequence as an animated PNG, all subjects side by side; nothing where a test has none.
+    /// Writes the short sequence as an animated PNG, all subjects side by side; nothing where a
+    /// test has none.
     ///
     /// # Errors
     /// The file cannot be written.

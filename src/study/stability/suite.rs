@@ -19,8 +19,8 @@ pub struct SuiteOptions {
     pub subjects: Vec<Subject>,
     /// Folder of references that were traced before.
     pub kept: Option<PathBuf>,
-    /// Folder of findings, one file a test; a test whose finding is there and of the same program, device and subjects is not run
-    /// again. Without one nothing is kept.
+    /// Folder of findings, one file a test; a test whose finding is there and of the same program,
+    /// device and subjects is not run again. Without one nothing is kept.
     pub resume: Option<PathBuf>,
 }
 
@@ -64,7 +64,8 @@ impl<'a> Suite<'a> {
         self.options.tests.len() as u64 * (self.options.subjects.len() as u64 + 2)
     }
 
-    /// Runs all tests. What cannot be drawn is told in the record and loses nobody else's answer. `go_on` is asked all the time.
+    /// Runs all tests. What cannot be drawn is told in the record and loses nobody else's answer.
+    /// `go_on` is asked all the time.
     ///
     /// # Errors
     /// [`TrialError::Stopped`] where `go_on` said no; what `told` returns.

@@ -30,7 +30,8 @@ impl Trial<'_> {
         Ok(dataset::frame(self.gpu, gatherer, &self.uploaded, camera, frames)?)
     }
 
-    /// The light that a network's answer should give at each cell: what references hold of it, traced at the cells' own points.
+    /// The light that a network's answer should give at each cell: what references hold of it,
+    /// traced at the cells' own points.
     ///
     /// # Errors
     /// [`TrialError`].

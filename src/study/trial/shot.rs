@@ -10,7 +10,8 @@ use crate::{
 /// How long a still camera looks, and how finely.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settling {
-    /// Frames up to and including the one that is taken, for methods with a history: 1 is the first after a cut.
+    /// Frames up to and including the one that is taken, for methods with a history: 1 is the first
+    /// after a cut.
     pub frames: u32,
     /// Jittered frames that are averaged, at least 1.
     pub samples: u32,
@@ -41,9 +42,11 @@ pub struct FrameChange {
     pub camera: Camera,
     /// What changes in the scene before it is drawn.
     pub edits: Edits,
-    /// It has nothing to do with the frame before, and the program says so ([`Renderer::cut`](crate::render::Renderer::cut)).
+    /// It has nothing to do with the frame before, and the program says so
+    /// ([`Renderer::cut`](crate::render::Renderer::cut)).
     pub cut: bool,
-    /// Whether its picture is wanted; one that is not is drawn all the same, but its layers are not read back.
+    /// Whether its picture is wanted; one that is not is drawn all the same, but its layers are not
+    /// read back.
     pub wanted: bool,
 }
 
@@ -57,8 +60,8 @@ impl FrameChange {
 /// A picture and what is known of it.
 #[derive(Debug, Clone)]
 pub struct Shot {
-    /// The picture (linear radiance) and the layers that were asked for. `DiffInd` is what the method added, E/π, without
-    /// albedo, as in `render --aov`; [`Shot::added`] is what to compare.
+    /// The picture (linear radiance) and the layers that were asked for. `DiffInd` is what the
+    /// method added, E/π, without albedo, as in `render --aov`; [`Shot::added`] is what to compare.
     pub frame: CapturedFrame,
     /// Number of the frame in its sequence, from 0.
     pub number: u32,
@@ -72,8 +75,8 @@ pub struct Shot {
     pub costs: Vec<Cost>,
     /// GPU memory of everything, bytes.
     pub bytes: u64,
-    /// DiffDir of `direct` where this picture's is another: methods that know the scene leave lights out that stand in for glowing
-    /// surfaces, and find these themselves.
+    /// DiffDir of `direct` where this picture's is another: methods that know the scene leave
+    /// lights out that stand in for glowing surfaces, and find these themselves.
     pub(super) without: Option<Vec<f32>>,
 }
 
@@ -91,9 +94,9 @@ impl Shot {
         self.frame.layer(layer).unwrap_or_else(|| panic!("layer {} was not asked for", layer.name()))
     }
 
-    /// The light that was added to what `direct` draws, rgb a pixel, E/π: what a reference's `Gi` is compared with. `DiffInd`, but
-    /// in scenes with lights that stand in for glowing surfaces, whose direct light is not in every method's DiffDir. There it may
-    /// be below 0.
+    /// The light that was added to what `direct` draws, rgb a pixel, E/π: what a reference's `Gi`
+    /// is compared with. `DiffInd`, but in scenes with lights that stand in for glowing surfaces,
+    /// whose direct light is not in every method's DiffDir. There it may be below 0.
     ///
     /// # Panics
     /// If the trial's options do not name DiffInd and DiffDir.
@@ -104,7 +107,8 @@ impl Shot {
         found.iter().zip(own).zip(without).map(|((found, own), without)| found + own - without).collect()
     }
 
-    /// What a GTX 1050 would take for the method by count, milliseconds: a projection, never a measurement.
+    /// What a GTX 1050 would take for the method by count, milliseconds: a projection, never a
+    /// measurement.
     pub fn projected_ms(&self) -> f64 {
         projection::total_ms(&self.costs, &projection::GTX_1050, projection::EFFICIENCY)
     }

@@ -78,15 +78,17 @@ fn furnace(albedo: f32) -> Scene {
     room
 }
 
+const SEALED_LIMIT: Limit = Limit {
+    name: "light inside over light outside",
+    unit: Unit::Share,
+    at_most: 0.001,
+    source: "physics: none; 0.1 % is ten stops below",
+};
+
 pub static SEALED: Test = Test {
     name: "sealed",
     question: "Does a closed room stay dark under a bright sky and sun?",
-    limits: &[Limit {
-        name: "light inside over light outside",
-        unit: Unit::Share,
-        at_most: 0.001,
-        source: "physics: none; 0.1 % is ten stops below",
-    }],
+    limits: &[SEALED_LIMIT],
     control: Fault::Leak(0.01),
     size: SMALL,
     paths: 16,
@@ -104,16 +106,7 @@ pub static SEALED: Test = Test {
 pub static THIN_WALL: Test = Test {
     name: "thin-wall",
     question: "Does a wall of 2 cm keep the light of the next room out?",
-    limits: &[Limit {
-        name: "light behind the wall over light before it",
-        unit: Unit::Share,
-        at_most: 0.001,
-        source: "physics: none; 0.1 % is ten stops below",
-    }],
-    control: Fault::Leak(0.01),
-    size: SMALL,
-    paths: 16,
-    pictures: false,
+    limits: &[Limit { name: "light behind the wall over light before it", ..SEALED_LIMIT }],
     run: |play| {
         let rooms =
             rooms::scene(&rooms::two_rooms(0.02, false, rooms::GREY), &[rooms::lamp([-2.0, 2.2, 0.3], 10.0)], 0.0);
@@ -123,6 +116,7 @@ pub static THIN_WALL: Test = Test {
         play.keep("behind the wall", &dark);
         Ok(vec![measures::share(dark.mean(), bright.mean().max(1e-9))])
     },
+    ..SEALED
 };
 
 pub static CORNER: Test = Test {
@@ -151,7 +145,8 @@ pub static CORNER: Test = Test {
     },
 };
 
-/// An L of two corridors, 2 m wide; the lamp is at the end of the one along Z, the camera looks along the wall of the one along X.
+/// An L of two corridors, 2 m wide; the lamp is at the end of the one along Z, the camera looks
+/// along the wall of the one along X.
 fn corridor() -> (Scene, Camera) {
     let mut blocks = rooms::shell([-6.0, 0.0, -1.0], [1.0, 2.5, 7.0], rooms::WHITE);
     // What is not corridor is filled.

@@ -33,17 +33,8 @@ pub static JITTER: Test = Test {
 pub static SLOW_PAN: Test = Test {
     name: "slow-pan",
     question: "Does light keep still on its surfaces in a pan of 0.1 degrees a frame?",
-    limits: &[Limit {
-        name: WARPED,
-        unit: Unit::Share,
-        at_most: 0.02,
-        source: "twice the least contrast that an eye sees",
-    }],
-    control: Fault::Noise(0.8),
-    size: SMALL,
-    paths: 128,
-    pictures: false,
     run: |play| flicker(play, &std::array::from_fn::<f32, 16, _>(|i| 0.1 * (i + 1) as f32), 2),
+    ..JITTER
 };
 
 pub static FAST_PAN: Test = Test {
@@ -55,11 +46,8 @@ pub static FAST_PAN: Test = Test {
         at_most: 0.05,
         source: "five times the least contrast: at 300 degrees a second an eye resolves little",
     }],
-    control: Fault::Noise(0.8),
-    size: SMALL,
-    paths: 128,
-    pictures: false,
     run: |play| flicker(play, &std::array::from_fn::<f32, 8, _>(|i| 5.0 * (i + 1) as f32), 2),
+    ..JITTER
 };
 
 /// Change at the same places between the last `pairs` + 1 of these angles, after a long rest at 0.
@@ -88,7 +76,7 @@ pub static DOORWAY: Test = Test {
         at_most: 0.15,
         source: "a fifth of a stop",
     }],
-    control: Fault::Screen(1.0),
+    control: Fault::Late(0.9),
     size: SMALL,
     paths: 64,
     pictures: false,

@@ -6,17 +6,20 @@ use crate::scene::{Camera, Scene};
 
 const STILL: &str = "half of the least contrast that an eye sees, 1 % (Weber)";
 
+const CHANGE: Limit = Limit { name: "change from frame to frame", unit: Unit::Share, at_most: 0.005, source: STILL };
+const SPARK: Limit = Limit {
+    name: "largest change of a pixel (99.9th percentile, of the mean light)",
+    unit: Unit::Share,
+    at_most: 0.05,
+    source: "a spark of 5 % in one frame of a thousandth of the picture",
+};
+
 pub static FROZEN: Test = Test {
     name: "frozen",
     question: "Does a still picture come to rest within 100 frames?",
     limits: &[
-        Limit { name: "change from frame to frame", unit: Unit::Share, at_most: 0.005, source: STILL },
-        Limit {
-            name: "largest change of a pixel (99.9th percentile, of the mean light)",
-            unit: Unit::Share,
-            at_most: 0.05,
-            source: "a spark of 5 % in one frame of a thousandth of the picture",
-        },
+        CHANGE,
+        SPARK,
         Limit { name: "change of all light since frame 50", unit: Unit::Share, at_most: 0.01, source: "1 % (Weber)" },
     ],
     control: Fault::Noise(0.1),
@@ -32,13 +35,8 @@ pub static DARK_ROOM: Test = Test {
     name: "dark-room",
     question: "Is a dark room, lit by a patch of sun behind the camera, quiet for 200 frames?",
     limits: &[
-        Limit { name: "change from frame to frame", unit: Unit::Share, at_most: 0.005, source: STILL },
-        Limit {
-            name: "largest change of a pixel (99.9th percentile, of the mean light)",
-            unit: Unit::Share,
-            at_most: 0.05,
-            source: "a spark of 5 % in one frame of a thousandth of the picture",
-        },
+        CHANGE,
+        SPARK,
         Limit {
             name: "change of all light since frame 100",
             unit: Unit::Share,
@@ -46,14 +44,11 @@ pub static DARK_ROOM: Test = Test {
             source: "twice the least contrast that an eye sees, over three seconds",
         },
     ],
-    control: Fault::Noise(0.1),
-    size: SMALL,
-    paths: 16,
-    pictures: false,
     run: |play| {
         let (room, camera) = dark_room();
         at_rest(play, &room, &camera, 200)
     },
+    ..FROZEN
 };
 
 pub static REPEAT: Test = Test {
