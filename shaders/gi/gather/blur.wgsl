@@ -26,6 +26,8 @@ const LEAST_CHANGE = 0.1;
 // The same for the sum over the cells of a workgroup, which knows more surely that a lamp was switched.
 const LEAST_REGION = 0.05;
 const LEAST_KNOWN = 5.0;
+// Frames after a change from which on two deviations are enough. While something moves there are none.
+const KNOWN = 2u;
 
 fn past_at(cell: u32) -> Past {
     let i = 5u * cell;
@@ -39,8 +41,8 @@ var<workgroup> region: vec4f;
 fn tells(here: Past) -> vec4f {
     if here.frames <= LEAST_KNOWN { return vec4f(0.0); }
     let l = luminance(here.light);
-    let variance = max(here.square - l * l, 0.0) * (LATELY / (2.0 - LATELY));
-    return vec4f(l, luminance(here.lately), variance, LATELY * bright_ray(here));
+    let variance = max(here.square - l * l, 0.0) * lately_noise();
+    return vec4f(l, luminance(here.lately), variance, lately_share() * bright_ray(here));
 }
 
 // Luminance of the rays that bring a cell's light: of rays that find either nothing or one brightness, that brightness.
@@ -52,8 +54,10 @@ fn bright_ray(here: Past) -> f32 {
 // from a small bright place few rays meet it, and one of them (`most`) is farther from the mean than any bell curve allows. Where a
 // change is to be expected one such ray may pass for it.
 fn differs(all: f32, lately: f32, variance: f32, most: f32, least: f32) -> bool {
-    let sure = select(1.0, 0.2, (gather.flags & GATHER_LIGHTS_CHANGED) != 0u);
-    let few = select(CHANCE / 3.0 * most, 0.0, (gather.flags & GATHER_CHANGING) != 0u);
+    let changing = (gather.flags & GATHER_CHANGING) != 0u;
+    var sure = select(1.0, 0.45, changing && gather.since >= KNOWN);
+    if (gather.flags & GATHER_LIGHTS_CHANGED) != 0u { sure = 0.2; }
+    let few = select(CHANCE / 3.0 * most, 0.0, changing);
     let noise = few + sqrt(few * few + 2.0 * CHANCE * variance);
     return abs(lately - all) > sure * (noise + least * max(all, lately));
 }
@@ -167,8 +171,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     // The mean of lately against that of all frames: its own noise, from that of single frames, allows for so much.
     if here.frames > LEAST_KNOWN && (gather.flags & GATHER_EVEN) == 0u {
         let now = lately / max(total, 1e-30);
-        let variance = noise * (LATELY / (2.0 - LATELY)) / max(total * total, 1e-30);
-        most *= LATELY / max(total, 1e-30);
+        let variance = noise * lately_noise() / max(total * total, 1e-30);
+        most *= lately_share() / max(total, 1e-30);
         if region_differs || differs(luminance(mean), luminance(now), variance, most, LEAST_CHANGE) {
             changes[cell] = vec4f(now, 1.0);
             mean = now;

@@ -29,6 +29,17 @@ fn past_from(a: vec4f, b: vec4f, c: vec4f, d: vec4f, e: vec4f) -> Past {
 // Weight of a new frame in `lately`: 95 % of a change are there after six frames.
 const LATELY = 0.4;
 
+// The same now: from the sixth frame after a change on each frame since counts for its number, so that `lately` comes to know.
+fn lately_share() -> f32 {
+    let since = max(f32(gather.since), 6.0);
+    return select(LATELY, min(LATELY, 2.0 / (since - 1.0)), (gather.flags & GATHER_CHANGING) != 0u);
+}
+
+// Variance of `lately` over that of a frame, at most.
+fn lately_noise() -> f32 {
+    return min(LATELY / (2.0 - LATELY), lately_share());
+}
+
 // Width of a cell at view distance z.
 fn cell_foot(z: f32) -> f32 {
     return 2.0 * params.unproject.y * z * f32(CELL_SIDE) / f32(params.size.y);

@@ -97,7 +97,7 @@ fn past_at(cell: u32) -> Past {
         past.light = change.rgb;
         past.vector *= gain;
         past.square = luminance(change.rgb) * luminance(change.rgb) * 2.0;
-        past.frames = min(past.frames, AFTER_CHANGE);
+        past.frames = min(past.frames, max(AFTER_CHANGE, 1.0 / lately_share()));
     }
     return past;
 }
@@ -220,7 +220,7 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     if fresh { share = 1.0; }
     let surface = textureLoad(specular_map, pixel, 0);
     let roughness = select(NO_LOBE, surface.a, any(surface.rgb > vec3f(0.0)));
-    let lately = mix(past.lately, arrived.light, select(max(LATELY, 1.0 / frames), 1.0, fresh));
+    let lately = mix(past.lately, arrived.light, select(max(lately_share(), 1.0 / frames), 1.0, fresh));
     // At rest a bright ray comes into the mean over some frames, all of it in the end, and not as a spark.
     let whole = changing || frames <= YOUNG || (gather.flags & GATHER_EVEN) != 0u;
     let mean = mix(past.light, select(lately, arrived.light, whole), share);

@@ -31,7 +31,8 @@ struct Gather {
     cells: u32,
     // Rays of cells and into lobes.
     rays: u32,
-    pad: u32,
+    // Frames since lights or objects changed, while GATHER_CHANGING.
+    since: u32,
 }
 
 const GATHER_STANDS_IN = 1u;

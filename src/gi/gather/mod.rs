@@ -246,7 +246,7 @@ impl GatherGi {
             flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
             cells: cells::count(inputs.size) as u32,
             rays: (cells::count(inputs.size) + store::squares(inputs.size)) as u32,
-            pad: 0,
+            since: STIR - self.changing,
         })
     }
 }

@@ -39,7 +39,7 @@ pub struct Params {
     pub flags: u32,
     pub cells: u32,
     pub rays: u32,
-    pub pad: u32,
+    pub since: u32,
 }
 
 /// Uniform offsets are multiples of this under WebGPU's default limits.
