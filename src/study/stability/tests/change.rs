@@ -76,7 +76,7 @@ pub static SWEEP: Test = Test {
         },
     ],
     control: Fault::Late(0.93),
-    // All light is as noisy as its rays are few: of 384 cells it trembles by 2.3 % while a lamp moves.
+    // All light is the mean of as many rays as there are cells: at 96×64 `gather` has 2.3 % of noise (docs/log).
     size: [192, 128],
     paths: 16,
     pictures: false,
