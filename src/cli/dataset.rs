@@ -21,6 +21,7 @@ use crate::{
     study::{
         dataset::{Next, Sample, frame, sample},
         guides::Guides,
+        moments::{self, When},
         motion, target, varied,
         views::{around, turned},
     },
@@ -74,6 +75,10 @@ pub struct Args {
     /// Folder for the samples; those that exist are kept, so a stopped run goes on where it was.
     #[arg(long)]
     out: PathBuf,
+    /// What a network that filters learns from, instead: moments at which what cells remember is kept, frames after a cut or `pan`
+    /// (at the end of twelve frames of a moving camera), such as 1,2,4,8,32,pan. --spp tells the samples of the light.
+    #[arg(long, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST", conflicts_with_all = ["motion", "guides"])]
+    moments: Vec<When>,
     /// Also draw a second frame of each view from a camera that has moved a little, for training's temporal term.
     #[arg(long)]
     motion: bool,
@@ -117,6 +122,14 @@ fn parse_rooms(text: &str) -> Result<Rooms, String> {
     Ok(Rooms(rooms))
 }
 
+fn parse_moment(text: &str) -> Result<When, String> {
+    match text.parse() {
+        Ok(frames) if frames > 0 => Ok(When::Frames(frames)),
+        _ if text == "pan" => Ok(When::Pan),
+        _ => Err(format!("{text} is neither a number of frames nor `pan`")),
+    }
+}
+
 fn parse_shard(text: &str) -> Result<[u32; 2], String> {
     let number = |t: &str| t.trim().parse::<u32>().map_err(|e| format!("{t}: {e}"));
     let (i, n) = text.split_once('/').ok_or("a shard is I/N, such as 0/4")?;
@@ -139,9 +152,16 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let options = RendererOptions { method: Method::Gather(gather::Options::default()), ..Default::default() };
     let renderer = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
     let kernel = (args.spp > 0).then(|| Kernel::new(&gpu.device));
-    let Args { spp, motion, guides, gi_frames, ref out, .. } = args;
+    let Args { spp, motion, guides, gi_frames, ref out, ref moments, .. } = args;
+    if !moments.is_empty() && spp == 0 {
+        return Err(usage("--moments need the light to be learnt: --spp N".into()));
+    }
+    // Those of a still camera in the order in which they come, the pan last.
+    let mut moments = moments.clone();
+    moments.sort();
+    moments.dedup();
     let (out, listed) = (out.clone(), HashSet::new());
-    let mut writer = Writer { gpu, renderer, kernel, spp, motion, guides, gi_frames, out, listed };
+    let mut writer = Writer { gpu, renderer, kernel, spp, motion, guides, gi_frames, moments, out, listed };
     writer.open_list()?;
     match (args.recipe, &args.rooms, &args.scene) {
         (Recipe::PaperRoom | Recipe::PaperRoomVaried, Some(rooms), _) => many_rooms(global, &mut writer, rooms, &args)?,
@@ -177,6 +197,8 @@ struct Writer {
     motion: bool,
     guides: bool,
     gi_frames: u32,
+    /// What cells remember is written instead, at these moments.
+    moments: Vec<When>,
     out: PathBuf,
     /// Names in the list of checksums.
     listed: HashSet<String>,
@@ -202,6 +224,9 @@ impl Writer {
 
     /// Draws, traces and writes the sample `stem`; `seed` is the path tracer's.
     fn write(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32) -> Result<()> {
+        if !self.moments.is_empty() {
+            return self.write_lesson(stem, scene, camera, seed);
+        }
         let sample = self.sample(&scene.raster, camera)?;
         self.complete(stem, scene, camera, seed, sample)
     }
@@ -226,11 +251,20 @@ impl Writer {
             sample.target = target::target(&self.gpu, kernel, traced, camera, self.renderer.size(), options, go_on)?;
             interrupt::check()?;
         }
-        self.save(stem, &sample)
+        self.save(stem, sample.to_bytes()?)
     }
 
-    fn save(&mut self, stem: &str, sample: &Sample) -> Result<()> {
-        let bytes = sample.to_bytes()?;
+    fn write_lesson(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32) -> Result<()> {
+        let (Some(kernel), Some(traced)) = (&self.kernel, &scene.traced) else { return Ok(()) };
+        let go_on = || !interrupt::requested();
+        let scene = (&scene.raster, traced, kernel);
+        let asked = (self.moments.as_slice(), self.spp, seed);
+        let lesson = moments::lesson(&self.gpu, &mut self.renderer, scene, camera, asked, go_on)?;
+        interrupt::check()?;
+        lesson.map_or(Ok(()), |lesson| self.save(stem, lesson.to_bytes()?))
+    }
+
+    fn save(&mut self, stem: &str, bytes: Vec<u8>) -> Result<()> {
         write_whole(&self.path(stem), &bytes)?;
         self.list(stem, &bytes)
     }
@@ -339,7 +373,11 @@ fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> R
         }
         let name = format!("{stem}_view{view}");
         if view % of == shard && !writer.has(&name)? {
-            writer.complete(&name, &uploaded, &camera, view, sample)?;
+            if writer.moments.is_empty() {
+                writer.complete(&name, &uploaded, &camera, view, sample)?;
+            } else {
+                writer.write_lesson(&name, &uploaded, &camera, view)?;
+            }
         }
         cameras.push(camera);
         progress.step();

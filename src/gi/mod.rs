@@ -45,7 +45,7 @@ pub use interface::{
     MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Rays, technique,
 };
 pub use method::{Method, fitted, name};
-pub use neural::{cpu, features, pack, pass, reconstruct};
+pub use neural::{cpu, features, memory, pack, pass, reconstruct};
 pub use preludes::example_preludes;
 pub use screen::{ambient, bitmask, occlusion, ssgi};
 pub use stage::{cells, exposure, exposure::ExposurePass, inputs};

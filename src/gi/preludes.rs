@@ -18,6 +18,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.rays", super::gather::prelude()),
         ("gi.renew", super::gather::prelude()),
         ("gi.settle", super::gather::prelude()),
+        ("gi.features", super::gather::prelude()),
         ("gi.blur", super::gather::prelude()),
         ("gi.smooth", super::gather::prelude()),
         ("gi.check", super::world::prelude()),

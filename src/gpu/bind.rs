@@ -9,6 +9,8 @@ pub enum Bound {
     Buffer(wgpu::Buffer),
     /// The first so many bytes of a buffer, from a dynamic offset on.
     Slot(wgpu::Buffer, u64),
+    /// From an offset on so many bytes of a buffer.
+    Part(wgpu::Buffer, u64, u64),
     /// A texture.
     View(wgpu::TextureView),
 }
@@ -32,6 +34,11 @@ impl Bound {
             Bound::Slot(buffer, size) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
                 buffer,
                 offset: 0,
+                size: wgpu::BufferSize::new(*size),
+            }),
+            Bound::Part(buffer, offset, size) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                buffer,
+                offset: *offset,
                 size: wgpu::BufferSize::new(*size),
             }),
             Bound::View(view) => wgpu::BindingResource::TextureView(view),

@@ -39,6 +39,7 @@ const FILES: &[(&str, &str)] = &[
     ("gi.bring", "gi/gather/bring.wgsl"),
     ("gi.check", "gi/check.wgsl"),
     ("gi.pack", "gi/pack.wgsl"),
+    ("gi.features", "gi/features.wgsl"),
     ("gi.reconstruct", "gi/reconstruct.wgsl"),
     ("learn.conv", "net/learn/conv.wgsl"),
     ("learn.resize", "net/learn/resize.wgsl"),

@@ -17,7 +17,8 @@ pub const SCALE_SUFFIX: &str = "_scale";
 /// Largest scale: the largest byte times it is still a finite f32.
 pub const MAX_SCALE: f32 = f32::MAX / 128.0;
 /// Meanings of the output that exist. `plain` is for tests: numbers without a unit.
-pub const MEANINGS: &[&str] = &["log_irradiance_over_exposure", "gain_and_rest_on_guess", "display_signed", "plain"];
+pub const MEANINGS: &[&str] =
+    &["log_irradiance_over_exposure", "gain_and_rest_on_guess", "filter", "display_signed", "plain"];
 
 /// One row of a feature table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +60,20 @@ pub const SCREEN_V1: &[FeatureRow] = &[
     row("guess", 3, &["log1p_over_exposure"]),
 ];
 
+/// Table `cells`, version 1: what `gather` remembers of each cell; `gi::neural::memory` says what the encodings are.
+pub const CELLS_V1: &[FeatureRow] = &[
+    row("light", 1, &["log1p_over_exposure"]),
+    row("chroma", 2, &["differences_over_sum"]),
+    row("deviation", 1, &["log1p_over_light"]),
+    row("frames", 1, &["inverse_root"]),
+    row("lately", 1, &["difference_over_sum"]),
+    row("nearness", 1, &["width_over_length"]),
+    row("depth", 1, &["log_over_mean"]),
+    row("normal", 3, &["gravity_frame"]),
+    row("hit", 1, &["flag"]),
+    row("towards", 3, &["gravity_frame"]),
+];
+
 /// `v` = value of an 8-bit picture / 255. `signed`: 2v − 1. `signed_stretched`: 2(v − min)/(max − min) − 1 with the
 /// picture's own smallest and largest value of all channels, −1 for a picture of one value. `unit`: v.
 const PICTURE: &[&str] = &["signed", "signed_stretched", "unit"];
@@ -70,6 +85,7 @@ pub const IMAGES_V1: &[FeatureRow] =
 /// Every feature table.
 pub const TABLES: &[FeatureTable] = &[
     FeatureTable { name: "screen", features: SCREEN_V1, ordered: true },
+    FeatureTable { name: "cells", features: CELLS_V1, ordered: true },
     FeatureTable { name: "images", features: IMAGES_V1, ordered: false },
     FeatureTable { name: "free", features: &[], ordered: false },
 ];

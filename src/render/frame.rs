@@ -214,6 +214,11 @@ impl Renderer {
         pack::read_features(&self.device, queue, &set, &inputs, guess.unwrap_or(&self.targets.indirect.view))
     }
 
+    /// What cells remember after the last frame, where the method gathers.
+    pub fn memory(&self) -> Option<technique::Memory<'_>> {
+        self.indirect.as_ref()?.memory()
+    }
+
     /// Names of the network's layers; none without a network.
     pub fn layers(&self) -> Vec<&str> {
         self.indirect.as_ref().map(|i| i.layers()).unwrap_or_default()

@@ -14,6 +14,8 @@ pub mod hash;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod judge;
 pub mod layers;
+#[cfg(all(feature = "io", feature = "reference"))]
+pub mod moments;
 #[cfg(feature = "io")]
 pub mod motion;
 pub mod projection;

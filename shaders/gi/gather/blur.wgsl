@@ -3,6 +3,7 @@
 //#import gi/gather/types.wgsl
 //#import gi/gather/gloss.wgsl
 //#import gi/gather/past.wgsl
+//#import gi/gather/guided.wgsl
 
 // Means of cells blurred over neighbours on the same surface, as directional light (`CellLight`).
 
@@ -14,6 +15,8 @@
 
 // What lobes show over `env_brdf` (a: 1), 0 on surfaces without.
 @group(2) @binding(3) var<storage, read_write> glosses: array<vec4f>;
+// Of each cell, with GATHER_GUIDED.
+@group(2) @binding(4) var<storage, read> guidance: array<vec4f>;
 
 // Frames from which on the narrow blur is enough, and the radii of both in cells.
 const SETTLED = 6.0;
@@ -32,6 +35,12 @@ const KNOWN = 2u;
 fn past_at(cell: u32) -> Past {
     let i = 5u * cell;
     return past_from(pasts[i], pasts[i + 1u], pasts[i + 2u], pasts[i + 3u], pasts[i + 4u]);
+}
+
+fn guidance_at(cell: u32) -> Guidance {
+    if (gather.flags & GATHER_GUIDED) == 0u { return Guidance(); }
+    let i = 3u * cell;
+    return guidance_from(guidance[i], guidance[i + 1u], guidance[i + 2u]);
 }
 
 // Of the cells of a workgroup: luminance of all frames, of lately, its noise, and the most that one ray has in it.
@@ -137,6 +146,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
         return;
     }
     let plane = strictness_at(here.x);
+    let own = guidance_at(cell);
     var radius = select(WIDE, NARROW, here.frames >= SETTLED);
     if (gather.flags & GATHER_NO_BLUR) != 0u { radius = 0; }
     var sum = vec3f(0.0);
@@ -151,11 +161,16 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
         for (var x = -radius; x <= radius; x++) {
             let at = vec2i(id.xy) + vec2i(x, y);
             if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
-            let there = past_at(cell_index(vec2u(at)));
+            let neighbour = cell_index(vec2u(at));
+            let there = past_at(neighbour);
             if there.frames <= 0.0 { continue; }
             // Half at the rim: then each of the sixteen places of the rays' lattice counts the same.
             let rim = select(1.0, 0.5, abs(x) == radius && radius > 0) * select(1.0, 0.5, abs(y) == radius && radius > 0);
-            let w = rim * alike(here, there, plane) * min(there.frames, 16.0);
+            var w = rim * alike(here, there, plane) * min(there.frames, 16.0);
+            if (gather.flags & GATHER_GUIDED) != 0u {
+                let other = guidance_at(neighbour);
+                w *= kinship(own.near, other.near) * exp(other.trust);
+            }
             sum += w * there.light;
             vector += w * there.vector;
             total += w;

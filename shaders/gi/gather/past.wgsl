@@ -16,6 +16,8 @@ struct Past {
     lately: vec3f,
     // Of the cell's surface now; NO_LOBE where it mirrors nothing.
     roughness: f32,
+    // How near what the cell's rays meet is: mean of w / (w + distance), w the cell's width.
+    nearness: f32,
     // What the lobe shows over `env_brdf`, and rays in it.
     gloss: vec4f,
 }
@@ -23,7 +25,8 @@ struct Past {
 const NO_LOBE = 2.0;
 
 fn past_from(a: vec4f, b: vec4f, c: vec4f, d: vec4f, e: vec4f) -> Past {
-    return Past(a.rgb, a.a, b.xyz, b.w, c.xyz, unpack_normal(bitcast<u32>(c.w)), d.rgb, d.w, e);
+    let halves = unpack2x16float(bitcast<u32>(d.w));
+    return Past(a.rgb, a.a, b.xyz, b.w, c.xyz, unpack_normal(bitcast<u32>(c.w)), d.rgb, halves.x, halves.y, e);
 }
 
 // Weight of a new frame in `lately`: 95 % of a change are there after six frames.

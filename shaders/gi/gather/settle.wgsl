@@ -42,7 +42,7 @@ fn rests(motion: vec2f) -> bool {
 
 // The mean where the surface at x, which faces n, was in the frame before; 0 frames where it was not to be seen.
 fn past_of(cell: vec2u, pixel: vec2i, motion: vec2f, x: vec3f, n: vec3f, foot: f32) -> Past {
-    let none = Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n, vec3f(0.0), NO_LOBE, vec4f(0.0));
+    let none = Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n, vec3f(0.0), NO_LOBE, 0.0, vec4f(0.0));
     var past = none;
     if (gather.flags & GATHER_CUT) != 0u { return past; }
     if rests(motion) {
@@ -68,6 +68,7 @@ fn past_of(cell: vec2u, pixel: vec2i, motion: vec2f, x: vec3f, n: vec3f, foot: f
         past.vector += w * one.vector;
         past.square += w * one.square;
         past.lately += w * one.lately;
+        past.nearness += w * one.nearness;
         past.gloss += w * one.gloss;
         total += w;
     }
@@ -77,6 +78,7 @@ fn past_of(cell: vec2u, pixel: vec2i, motion: vec2f, x: vec3f, n: vec3f, foot: f
     past.vector /= total;
     past.square /= total;
     past.lately /= total;
+    past.nearness /= total;
     past.gloss /= total;
     return past;
 }
@@ -172,15 +174,18 @@ struct Arrived {
     // Luminance times direction; luminance squared.
     vector: vec3f,
     square: f32,
+    nearness: f32,
 }
 
-fn arrived_by(ray: u32) -> Arrived {
+// `width` of the cell.
+fn arrived_by(ray: u32, width: f32) -> Arrived {
     let glow = records[3u * ray + 2u];
+    let nearness = width / (width + records[3u * ray + 1u].z);
     let found = found_by(ray);
     let vector = luminance(found) * unpack_normal(bitcast<u32>(records[3u * ray + 1u].y))
         + luminance(glow.rgb) * unpack_normal(bitcast<u32>(glow.w));
     let l = luminance(found + glow.rgb);
-    return Arrived(found + glow.rgb, vector, l * l);
+    return Arrived(found + glow.rgb, vector, l * l, nearness);
 }
 
 @compute @workgroup_size(8, 8)
@@ -192,23 +197,29 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
         after[5u * cell] = vec4f(0.0);
         return;
     }
-    var arrived = arrived_by(cell);
+    let pixel = unpack_pixel(packed);
+    let z = distance_at(pixel);
+    let width = cell_foot(z);
+    var arrived = arrived_by(cell, width);
     let fresh = (packed & FRESH) != 0u;
     if fresh {
         for (var look = 1u; look < LOOKS; look++) {
-            let more = arrived_by(cell_record(cell, look));
-            arrived = Arrived(arrived.light + more.light, arrived.vector + more.vector, arrived.square + more.square);
+            let more = arrived_by(cell_record(cell, look), width);
+            arrived.light += more.light;
+            arrived.vector += more.vector;
+            arrived.square += more.square;
+            arrived.nearness += more.nearness;
         }
         let share = 1.0 / f32(LOOKS);
-        arrived = Arrived(share * arrived.light, share * arrived.vector, share * arrived.square);
+        arrived = Arrived(
+            share * arrived.light, share * arrived.vector, share * arrived.square, share * arrived.nearness
+        );
     }
 
-    let pixel = unpack_pixel(packed);
-    let z = distance_at(pixel);
     let x = world_position_at(pixel, z);
     let n = world_normal_at(pixel);
     let motion = motion_of(pixel);
-    let past = past_of(id.xy, pixel, motion, x, n, cell_foot(z));
+    let past = past_of(id.xy, pixel, motion, x, n, width);
     var most = gather.cell_frames;
     let changing = (gather.flags & GATHER_CHANGING) != 0u || !rests(motion);
     if changing && (gather.flags & GATHER_EVEN) == 0u { most = min(most, BRIEF); }
@@ -226,13 +237,13 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let mean = mix(past.light, select(lately, arrived.light, whole), share);
     let now = Past(
         mean, frames, mix(past.vector, arrived.vector, share), mix(past.square, arrived.square, share), x, n,
-        lately, roughness,
+        lately, roughness, mix(past.nearness, arrived.nearness, share),
         gloss_of(id.xy, past.gloss, roughness, motion, mean)
     );
     let i = 5u * cell;
     after[i] = vec4f(now.light, now.frames);
     after[i + 1u] = vec4f(now.vector, now.square);
     after[i + 2u] = vec4f(now.x, bitcast<f32>(pack_normal(now.n)));
-    after[i + 3u] = vec4f(now.lately, now.roughness);
+    after[i + 3u] = vec4f(now.lately, bitcast<f32>(pack2x16float(vec2f(now.roughness, now.nearness))));
     after[i + 4u] = now.gloss;
 }

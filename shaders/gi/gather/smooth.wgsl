@@ -2,6 +2,7 @@
 //#import gi/cells.wgsl
 //#import gi/gather/types.wgsl
 //#import gi/gather/past.wgsl
+//#import gi/gather/guided.wgsl
 
 // Light of cells averaged with that of cells further away that differ by no more than noise: one à-trous step (Dammertz et al. 2010) whose
 // tolerance is the noise itself. Where means are known well it does nothing.
@@ -10,6 +11,8 @@
 // What blur.wgsl wrote: directional light, with the variance of its luminance.
 @group(2) @binding(1) var<storage, read> blurred: array<vec4f>;
 @group(2) @binding(2) var<storage, read_write> light: array<vec4f>;
+// Of each cell, with GATHER_GUIDED.
+@group(2) @binding(3) var<storage, read> guidance: array<vec4f>;
 
 // Cells between taps: those of the blur before are used up.
 const SMOOTH_STRIDE = 4;
@@ -43,6 +46,10 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= cell_grid()) { return; }
     let cell = cell_index(id.xy);
     let here = blurred_at(cell);
+    var own = Guidance();
+    if (gather.flags & GATHER_GUIDED) != 0u {
+        own = guidance_from(guidance[3u * cell], guidance[3u * cell + 1u], guidance[3u * cell + 2u]);
+    }
     var red = here.red;
     var green = here.green;
     var blue = here.blue;
@@ -54,13 +61,17 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
             let step = vec2i(i % 5 - 2, i / 5 - 2);
             let at = vec2i(id.xy) + SMOOTH_STRIDE * step;
             if all(step == vec2i(0)) || any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
-            let there = blurred_at(cell_index(vec2u(at)));
+            let other = cell_index(vec2u(at));
+            let there = blurred_at(other);
             if there.frames <= 0.0 { continue; }
             let apart = there.luminance - here.luminance;
             // Two means of the same light differ by their two variances.
-            let noise = 2.0 * (here.variance + there.variance);
+            let noise = 2.0 * exp(own.tolerance) * (here.variance + there.variance);
             var w = taps[abs(step.x)] * taps[abs(step.y)] * exp(-min(apart * apart / max(noise, 1e-30), 60.0));
             w *= same_surface(there.x - here.x, here.n, there.n, strictness);
+            if (gather.flags & GATHER_GUIDED) != 0u {
+                w *= kinship(own.far, finite4(guidance[3u * other + 1u]));
+            }
             red += w * there.red;
             green += w * there.green;
             blue += w * there.blue;
@@ -70,7 +81,8 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
         green /= total;
         blue /= total;
     }
-    light[3u * cell] = vec4f(red, 0.0);
-    light[3u * cell + 1u] = vec4f(green, 0.0);
-    light[3u * cell + 2u] = vec4f(blue, 0.0);
+    let gain = exp(own.gain);
+    light[3u * cell] = vec4f(gain * red, 0.0);
+    light[3u * cell + 1u] = vec4f(gain * green, 0.0);
+    light[3u * cell + 2u] = vec4f(gain * blue, 0.0);
 }

@@ -48,6 +48,8 @@ const GATHER_NO_CAUSTICS = 32u;
 const GATHER_NO_GLOSS = 64u;
 // Lights, or objects, are not what and where they were a short while ago.
 const GATHER_CHANGING = 128u;
+// A network says which cells are averaged.
+const GATHER_GUIDED = 256u;
 
 @group(1) @binding(0) var<uniform> gather: Gather;
 @group(1) @binding(1) var accel_blocks: texture_2d<u32>;

@@ -17,25 +17,27 @@
 
 pub mod bring;
 mod cost;
+mod frame;
 mod options;
 mod params;
 mod pass;
 mod store;
 
+pub use frame::Settled;
 pub use options::{Options, OptionsError};
 pub use params::Params;
 
-use crate::gi::interface::technique::{Cost, Technique};
-use crate::gi::interface::{GiError, Inputs, Rays};
+use crate::gi::interface::technique::{Cost, Memory, Technique};
+use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage;
 use crate::gi::stage::cells::{self, CellsPass};
-use crate::gi::stage::inputs::{InputGroup, cells_of};
-use crate::gpu::bind::{Binder, Bound};
+use crate::gi::stage::inputs::InputGroup;
+use crate::gpu::bind::Binder;
 use crate::gpu::binding::{LOAD, READ, READ_WRITE};
 use crate::gpu::timing::Recorder;
-use bring::{BringPass, Brought};
+use bring::BringPass;
 use params::ParamsRing;
-use pass::{Groups, Pass};
+use pass::Pass;
 use store::Store;
 
 /// A ray begins this share of the view distance off its surface: half along the way to the eye, half along the normal. At
@@ -76,7 +78,10 @@ const LOOKS: u64 = 4;
 const RECORD: u64 = 48;
 
 /// Bytes of what a cell remembers.
-const PAST: u64 = 80;
+pub const PAST: u64 = 80;
+
+/// Bytes of what a network says of a cell; `Guidance` of `guided.wgsl`.
+pub const GUIDANCE: u64 = 48;
 
 /// The method at work.
 pub struct GatherGi {
@@ -94,7 +99,7 @@ pub struct GatherGi {
     /// Frees entries that no ray has met for long; binds what `renew` binds.
     evict: Pass,
     renew: Pass,
-    settle: Pass,
+    mean: Pass,
     blur: Pass,
     smooth: Pass,
     bring: BringPass,
@@ -103,6 +108,8 @@ pub struct GatherGi {
     checked: [u32; 2],
     /// Bound where the host names no lights or no motion.
     no_lights: wgpu::Buffer,
+    /// Bound where no network guides the filter.
+    no_guidance: wgpu::Buffer,
     no_motion: wgpu::TextureView,
     /// Bound where the host names no specular reflectance: there is none.
     no_specular: wgpu::TextureView,
@@ -164,6 +171,10 @@ impl GatherGi {
         let frame_params = Binder::new(device, "gi.gather", &[ParamsRing::TYPE]);
         let (shared, alone) = ((&inputs, &scene), (&inputs, &frame_params));
         let new = |groups, names, types: &[wgpu::BindingType]| Pass::new(device, groups, names, types);
+        let unused = |label, size| {
+            let usage = wgpu::BufferUsages::STORAGE;
+            device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+        };
         let rw = READ_WRITE;
         let table = [rw, rw, rw, rw, rw];
         let history = [rw, READ, READ, READ, rw, READ, LOAD, LOAD];
@@ -173,18 +184,14 @@ impl GatherGi {
             rays: new(shared, ("gi.rays", "gi.rays", "rays"), &[rw, rw, rw, READ, rw, LOAD]),
             renew: new(shared, ("gi.renew", "gi.renew", "renew"), &table),
             recall: new(alone, ("gi.recall", "gi.settle", "recall"), &history),
-            settle: new(alone, ("gi.settle", "gi.settle", "settle"), &history),
-            blur: new(alone, ("gi.blur", "gi.blur", "blur"), &[READ, rw, rw, rw]),
-            smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), &[READ, READ, rw]),
+            mean: new(alone, ("gi.settle", "gi.settle", "settle"), &history),
+            blur: new(alone, ("gi.blur", "gi.blur", "blur"), &[READ, rw, rw, rw, READ]),
+            smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), &[READ, READ, rw, READ]),
             bring: BringPass::new(device, &inputs),
             store: Store::new(device, size, options.slots),
             checked: size,
-            no_lights: device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("gi.no_lights"),
-                size: size_of::<crate::scene::upload::LightGpu>() as u64,
-                usage: wgpu::BufferUsages::STORAGE,
-                mapped_at_creation: false,
-            }),
+            no_lights: unused("gi.no_lights", size_of::<crate::scene::upload::LightGpu>() as u64),
+            no_guidance: unused("gi.no_guidance", GUIDANCE),
             no_motion: stage::absent(device, "gi.no_motion", wgpu::TextureFormat::Rg16Float),
             no_specular: stage::absent(device, "gi.no_specular", wgpu::TextureFormat::Rgba8Unorm),
             device: device.clone(),
@@ -211,43 +218,9 @@ impl GatherGi {
 
     /// Bind groups made since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
-        let passes = [&self.recall, &self.evict, &self.rays, &self.renew, &self.settle, &self.blur, &self.smooth];
+        let passes = [&self.recall, &self.evict, &self.rays, &self.renew, &self.mean, &self.blur, &self.smooth];
         let made = passes.map(Pass::made);
         self.inputs.made() + self.scene.made() + self.frame_params.made() + self.bring.made() + made.iter().sum::<u64>()
-    }
-
-    fn params(&self, inputs: &Inputs<'_>, rays: &Rays<'_>) -> Result<Params, GiError> {
-        let counts = rays.scene.counts();
-        let flags = [
-            (inputs.lights.is_some_and(|l| l.stand_in), params::STANDS_IN),
-            (self.frame == 0, params::CUT),
-            (!self.options.blur, params::NO_BLUR),
-            (self.options.even, params::EVEN),
-            (self.hurry > 0, params::LIGHTS_CHANGED),
-            (!self.options.caustics, params::NO_CAUSTICS),
-            (inputs.specular.is_none(), params::NO_GLOSS),
-            (self.changing > 0, params::CHANGING),
-        ];
-        Ok(Params {
-            eye: stage::inputs::Params::of(inputs, None)?.eye_position(),
-            frame: self.frame,
-            light_count: inputs.lights.map_or(0, |l| l.count),
-            emitter_count: counts.emitters as u32,
-            inverse_power: rays.scene.inverse_power(),
-            mask: self.options.slots - 1,
-            entry_scale: self.options.entry_scale,
-            round: self.round,
-            cell_frames: self.options.cell_frames,
-            entry_frames: if self.stir > 0 {
-                self.options.entry_frames.min(HURRIED)
-            } else {
-                self.options.entry_frames
-            },
-            flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
-            cells: cells::count(inputs.size) as u32,
-            rays: (cells::count(inputs.size) + store::squares(inputs.size)) as u32,
-            since: STIR - self.changing,
-        })
     }
 }
 
@@ -260,105 +233,18 @@ impl Technique for GatherGi {
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
         stage::inputs::check_output(output, inputs.size)?;
-        let rays = inputs.rays.as_ref().ok_or(GiError::Rays)?;
-        if inputs.size != self.checked {
-            Self::check(&self.device.limits(), inputs.size, &self.options)?;
-            self.checked = inputs.size;
-        }
-        let bound = self.inputs.bind(queue, inputs)?;
-        if inputs.reset {
-            self.frame = 0;
-        }
-        // Another scene's light is nobody's past.
-        let another = rays.scene.id() != self.scene_id;
-        self.scene_id = rays.scene.id();
-        if self.cells.fit(inputs.size) || another {
-            self.store = Store::new(&self.device, inputs.size, self.options.slots);
-            // The same scene gets the same rays, whatever was drawn before.
-            self.round = 0;
-            self.bring.forget();
-            self.frame = 0;
-        }
-        let lights = inputs.lights.map_or(&self.no_lights, |l| l.buffer);
-        let scene = self.scene.group([
-            self.params.bound(),
-            rays.scene.accel().view().into(),
-            rays.scene.surfaces().into(),
-            rays.scene.emitters().into(),
-            lights.into(),
-            rays.environment.into(),
-            rays.scene.normals().into(),
-        ]);
-        let store = &self.store;
-        let [keys, lots, queries, asked, entry_light] =
-            [&store.keys, &store.lots, &store.queries, &store.asked, &store.light].map(Bound::from);
-        let specular = Bound::from(inputs.specular.unwrap_or(&self.no_specular));
-        let [pixels, records] = [self.cells.pixels(), &store.records].map(Bound::from);
-        let [before, after] = [self.frame & 1, 1 - (self.frame & 1)].map(|i| Bound::from(&store.pasts[i as usize]));
-        let [changes, blurred, light] = [&store.changes, &store.blurred, &store.cell_light].map(Bound::from);
-        let table = || [&keys, &lots, &queries, &asked, &entry_light].map(Clone::clone);
-
-        let (epoch, moves) = (inputs.lights.map_or(0, |l| l.epoch), rays.scene.moves());
-        if self.frame > 0 && !self.options.even {
-            if epoch != self.lights_epoch {
-                self.hurry = HURRY;
-            }
-            if epoch != self.lights_epoch || moves != self.moves {
-                (self.stir, self.changing) = (STIR, STIR);
-            }
-            // Entries have to come to know each other.
-            if self.frame == 1 {
-                self.stir = STIR;
-            }
-        }
-        (self.lights_epoch, self.moves) = (epoch, moves);
-        let mut params = self.params(inputs, rays)?;
-        let [w, h] = cells_of(inputs.size).map(|n| n.div_ceil(8));
-        let mut offset = self.params.write(queue, &params);
-        let frame_params = self.frame_params.group([self.params.bound()]);
-        let groups = |offset| Groups { inputs: &bound, scene: &scene, offset };
-        let alone = |offset| Groups { scene: &frame_params, ..groups(offset) };
-
-        self.cells.record(recorder, &bound);
-        let motion = Bound::from(inputs.motion.unwrap_or(&self.no_motion));
-        let own = [&pixels, &records, &entry_light, &before, &after, &changes, &motion, &specular];
-        let history = || own.map(Clone::clone);
-        self.recall.record(recorder, alone(offset), history(), [w, h, 1]);
-        let slots = [self.options.slots.div_ceil(64), 1, 1];
-        self.evict.record(recorder, groups(offset), table(), slots);
-        // The second layer of workgroups sends rays into lobes, those above further ones of fresh cells.
-        let layers = 1 + LOOKS as u32;
-        let own = [&keys, &lots, &queries, &pixels, &records, &specular].map(Clone::clone);
-        self.rays.record(recorder, groups(offset), own, [w, h, layers]);
-        let rounds = match (self.frame, self.stir) {
-            (0, _) => self.options.first_rounds.max(1),
-            (1..=YOUNG, _) => ROUNDS_YOUNG,
-            (_, 0) => 1,
-            _ => 2,
-        };
-        for round in 0..rounds {
-            if round > 0 {
-                params.round += 1;
-                offset = self.params.write(queue, &params);
-            }
-            self.renew.record(recorder, groups(offset), table(), slots);
-        }
-        self.settle.record(recorder, alone(offset), history(), [w, h, 1]);
-        let own = [&after, &blurred, &changes, &Bound::from(&store.glosses)].map(Clone::clone);
-        self.blur.record(recorder, alone(offset), own, [w, h, 1]);
-        self.smooth.record(recorder, alone(offset), [after, blurred, light], [w, h, 1]);
-        self.round = params.round + 1;
-        self.frame += 1;
-        self.hurry = self.hurry.saturating_sub(1);
-        self.stir = self.stir.saturating_sub(1);
-        self.changing = self.changing.saturating_sub(1);
-        let brought = Brought { light: &store.cell_light, glosses: &store.glosses, output, gloss: &store.gloss };
-        self.bring.record(recorder, &bound, &self.cells, brought);
+        let settled = self.settle(recorder, queue, inputs, false)?;
+        self.filter(recorder, &settled, None, output);
         Ok(())
     }
 
     fn gloss(&self) -> Option<&wgpu::TextureView> {
         Some(&self.store.gloss)
+    }
+
+    fn memory(&self) -> Option<Memory<'_>> {
+        let pasts = &self.store.pasts[(self.frame & 1) as usize];
+        Some(Memory { pasts, pixels: self.cells.pixels(), light: &self.store.cell_light })
     }
 
     fn knows_scene(&self, rays: bool) -> bool {
@@ -377,7 +263,7 @@ impl Technique for GatherGi {
         self.inputs.forget();
         self.scene.forget();
         self.recall.forget();
-        self.settle.forget();
+        self.mean.forget();
         self.bring.forget();
     }
 

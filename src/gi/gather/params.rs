@@ -21,6 +21,9 @@ pub(super) const NO_GLOSS: u32 = 64;
 /// Light or objects are not what they were a short while ago.
 pub(super) const CHANGING: u32 = 128;
 
+/// A network says which cells are averaged.
+pub(super) const GUIDED: u32 = 256;
+
 /// `Gather` of `shaders/gi/gather/types.wgsl`, which documents the fields.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]

@@ -40,6 +40,17 @@ pub struct Instead<'a> {
     pub why: &'a str,
 }
 
+/// What `gather` holds of the cells after a frame, for tools that read it back.
+#[derive(Debug, Clone, Copy)]
+pub struct Memory<'a> {
+    /// What cells remember: `Past` of `past.wgsl`, [`PAST`](crate::gi::gather::PAST) bytes each.
+    pub pasts: &'a wgpu::Buffer,
+    /// The pixel that stands for each: [`cells`](crate::gi::stage::cells).
+    pub pixels: &'a wgpu::Buffer,
+    /// The light that the frame shows, 48 bytes each.
+    pub light: &'a wgpu::Buffer,
+}
+
 /// A method at work: G-buffer in, indirect diffuse light (E/π) out. Allocates only when size or views are new.
 /// `Send`, so that a viewer can build one on another thread.
 pub trait Technique: Send {
@@ -83,6 +94,11 @@ pub trait Technique: Send {
     /// (`env_brdf`): radiance, W/(m²·sr), where the method knows it. `Rgba16Float` of the picture's
     /// size; another view after a change of size.
     fn gloss(&self) -> Option<&wgpu::TextureView> {
+        None
+    }
+
+    /// What cells remember after the last recording, where the method gathers.
+    fn memory(&self) -> Option<Memory<'_>> {
         None
     }
 

@@ -1,7 +1,7 @@
 //! A method that needs rays, and the method below it, which draws where there are none: while trees
 //! are built, in a scene or on a device that is too large or too small for them.
 
-use crate::gi::interface::technique::{Cost, Instead, Technique};
+use crate::gi::interface::technique::{Cost, Instead, Memory, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::screen::ssgi::{SsgiGi, SsgiOptions};
 use crate::gpu::timing::Recorder;
@@ -67,6 +67,10 @@ impl Technique for OrBelow {
 
     fn gloss(&self) -> Option<&wgpu::TextureView> {
         self.drew()?.gloss()
+    }
+
+    fn memory(&self) -> Option<Memory<'_>> {
+        self.drew()?.memory()
     }
 
     fn guess(&self) -> Option<&wgpu::TextureView> {

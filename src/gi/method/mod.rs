@@ -6,6 +6,7 @@ pub mod name;
 
 use super::gather::{self, GatherGi};
 use super::interface::{GiError, technique::Technique};
+use super::neural::filter::{FilterGi, is_filter};
 use super::neural::pass::{self, NeuralGi, Options};
 use super::screen::{
     ambient::{AmbientGi, Unseen},
@@ -90,6 +91,9 @@ pub fn build(
         }
         Method::Neural(neural) if method.needs_rays() => {
             let above = match GatherGi::check(&device.limits(), size, &Default::default()) {
+                Ok(()) if is_filter(&neural.weights) => {
+                    Ok(Box::new(FilterGi::new(device, queue, neural, size)?) as Box<dyn Technique>)
+                }
                 Ok(()) => Ok(Box::new(NeuralGi::with(device, queue, neural, Options { size })?) as Box<dyn Technique>),
                 Err(lacks) => Err(lacks.to_string()),
             };

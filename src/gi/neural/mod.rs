@@ -2,6 +2,8 @@
 
 pub mod cpu;
 pub mod features;
+pub mod filter;
+pub mod memory;
 pub mod pack;
 pub mod pass;
 mod rebuilt;

@@ -9,9 +9,11 @@ use crate::net::format::Weights;
 use crate::net::gpu::{self, Tuned};
 use std::sync::Arc;
 
-/// Whether weights have method `gather` run before them, and so need [`Inputs::rays`](crate::gi::Inputs::rays).
+/// Whether weights have method `gather` run before or around them, and so need [`Inputs::rays`](crate::gi::Inputs::rays).
 pub fn needs_guess(weights: &Weights) -> bool {
-    weights.output.meaning == Answer::Gain.name() || weights.inputs.iter().any(|f| f.name == "guess")
+    super::filter::is_filter(weights)
+        || weights.output.meaning == Answer::Gain.name()
+        || weights.inputs.iter().any(|f| f.name == "guess")
 }
 
 /// A network as a frame's method: what was trained, and how it runs.

@@ -10,7 +10,7 @@ VERSION = 2
 KNOWN_VERSIONS = (1, 2)
 KEY = "bouncelight"
 MAX_OPS = 1024
-MEANINGS = ("log_irradiance_over_exposure", "gain_and_rest_on_guess", "display_signed", "plain")
+MEANINGS = ("log_irradiance_over_exposure", "gain_and_rest_on_guess", "filter", "display_signed", "plain")
 # What is said of networks that correct a method which is gone.
 REPLACED = "it builds on method `cache`, which `gather` has replaced; a network has to be trained anew"
 _PICTURE = ("signed", "signed_stretched", "unit")
@@ -21,9 +21,14 @@ SCREEN_V1 = {
     "spread": (1, ("log_ratio",)), "hit": (1, ("flag",)), "sky": (3, ("log1p_over_exposure",)),
     "guess": (3, ("log1p_over_exposure",)),
 }
+CELLS_V1 = {
+    "light": (1, ("log1p_over_exposure",)), "chroma": (2, ("differences_over_sum",)), "deviation": (1, ("log1p_over_light",)),
+    "frames": (1, ("inverse_root",)), "lately": (1, ("difference_over_sum",)), "nearness": (1, ("width_over_length",)),
+    "depth": (1, ("log_over_mean",)), "normal": (3, ("gravity_frame",)), "hit": (1, ("flag",)), "towards": (3, ("gravity_frame",)),
+}
 IMAGES_V1 = {name: (3, _PICTURE) for name in ("depth", "direct", "diffuse", "normal")}
 # Table: (features, whether a network uses them in the table's order).
-TABLES = {"screen": (SCREEN_V1, True), "images": (IMAGES_V1, False), "free": ({}, False)}
+TABLES = {"screen": (SCREEN_V1, True), "cells": (CELLS_V1, True), "images": (IMAGES_V1, False), "free": ({}, False)}
 SCALE_SUFFIX = "_scale"
 MAX_SCALE = float(np.finfo(np.float32).max) / 128
 

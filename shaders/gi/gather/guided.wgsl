@@ -1,0 +1,35 @@
+// What a network says of a cell, three vectors; all zeros is the filter without one. `gi::neural::filter` documents their limits.
+struct Guidance {
+    // Places of the cell in two spaces: cells count for each other by exp(-distance²) there, among its neighbours and among
+    // those further away.
+    near: vec4f,
+    far: vec4f,
+    // Logarithms: how much it counts for its neighbours, how much noise it allows for, what its light is multiplied by.
+    trust: f32,
+    tolerance: f32,
+    gain: f32,
+}
+
+const MOST_TRUST = 4.0;
+const MOST_TOLERANCE = 4.0;
+// A cell's light becomes at most a third brighter or darker.
+const MOST_GAIN = 0.3;
+
+fn limited(x: f32, most: f32) -> f32 {
+    return clamp(finite(x), -most, most);
+}
+
+fn finite4(v: vec4f) -> vec4f {
+    return select(vec4f(0.0), v, (bitcast<vec4u>(v) & vec4u(EXPONENT)) != vec4u(EXPONENT));
+}
+
+fn guidance_from(a: vec4f, b: vec4f, c: vec4f) -> Guidance {
+    return Guidance(
+        finite4(a), finite4(b), limited(c.x, MOST_TRUST), limited(c.y, MOST_TOLERANCE), limited(c.z, MOST_GAIN)
+    );
+}
+
+fn kinship(a: vec4f, b: vec4f) -> f32 {
+    let apart = a - b;
+    return exp(-min(dot(apart, apart), 60.0));
+}

@@ -1,0 +1,188 @@
+//! One frame of the method: rays and means, then the filter over neighbours.
+
+use super::bring::Brought;
+use super::params::{self, Params};
+use super::pass::Groups;
+use super::store::{self, Store};
+use super::{GatherGi, HURRIED, HURRY, LOOKS, ROUNDS_YOUNG, STIR, YOUNG};
+use crate::gi::interface::{GiError, Inputs, Rays};
+use crate::gi::stage;
+use crate::gi::stage::cells;
+use crate::gi::stage::inputs::{BoundInputs, cells_of};
+use crate::gpu::bind::Bound;
+use crate::gpu::timing::Recorder;
+
+/// A frame whose means are recorded, before its filter.
+pub struct Settled {
+    inputs: BoundInputs,
+    /// What cells remember now, [`PAST`](super::PAST) bytes each: `Past` of `past.wgsl`.
+    pub pasts: wgpu::Buffer,
+    /// Group 1, and where the frame's parameters lie in it.
+    params: wgpu::BindGroup,
+    offset: u32,
+}
+
+impl GatherGi {
+    fn params(&self, inputs: &Inputs<'_>, rays: &Rays<'_>, guided: bool) -> Result<Params, GiError> {
+        let counts = rays.scene.counts();
+        let flags = [
+            (inputs.lights.is_some_and(|l| l.stand_in), params::STANDS_IN),
+            (self.frame == 0, params::CUT),
+            (!self.options.blur, params::NO_BLUR),
+            (self.options.even, params::EVEN),
+            (self.hurry > 0, params::LIGHTS_CHANGED),
+            (!self.options.caustics, params::NO_CAUSTICS),
+            (inputs.specular.is_none(), params::NO_GLOSS),
+            (self.changing > 0, params::CHANGING),
+            (guided, params::GUIDED),
+        ];
+        Ok(Params {
+            eye: stage::inputs::Params::of(inputs, None)?.eye_position(),
+            frame: self.frame,
+            light_count: inputs.lights.map_or(0, |l| l.count),
+            emitter_count: counts.emitters as u32,
+            inverse_power: rays.scene.inverse_power(),
+            mask: self.options.slots - 1,
+            entry_scale: self.options.entry_scale,
+            round: self.round,
+            cell_frames: self.options.cell_frames,
+            entry_frames: if self.stir > 0 {
+                self.options.entry_frames.min(HURRIED)
+            } else {
+                self.options.entry_frames
+            },
+            flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
+            cells: cells::count(inputs.size) as u32,
+            rays: (cells::count(inputs.size) + store::squares(inputs.size)) as u32,
+            since: STIR - self.changing,
+        })
+    }
+
+    /// Records the frame up to the cells' means; then [`filter`](Self::filter) is due. `guided`: whether it gets a network's
+    /// guidance.
+    ///
+    /// # Errors
+    /// [`GiError`] when the inputs do not fit; then nothing was recorded.
+    pub fn settle(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+        guided: bool,
+    ) -> Result<Settled, GiError> {
+        let rays = inputs.rays.as_ref().ok_or(GiError::Rays)?;
+        if inputs.size != self.checked {
+            Self::check(&self.device.limits(), inputs.size, &self.options)?;
+            self.checked = inputs.size;
+        }
+        let bound = self.inputs.bind(queue, inputs)?;
+        if inputs.reset {
+            self.frame = 0;
+        }
+        // Another scene's light is nobody's past.
+        let another = rays.scene.id() != self.scene_id;
+        self.scene_id = rays.scene.id();
+        if self.cells.fit(inputs.size) || another {
+            self.store = Store::new(&self.device, inputs.size, self.options.slots);
+            // The same scene gets the same rays, whatever was drawn before.
+            self.round = 0;
+            self.bring.forget();
+            self.frame = 0;
+        }
+        let lights = inputs.lights.map_or(&self.no_lights, |l| l.buffer);
+        let scene = self.scene.group([
+            self.params.bound(),
+            rays.scene.accel().view().into(),
+            rays.scene.surfaces().into(),
+            rays.scene.emitters().into(),
+            lights.into(),
+            rays.environment.into(),
+            rays.scene.normals().into(),
+        ]);
+        let store = &self.store;
+        let [keys, lots, queries, asked, entry_light] =
+            [&store.keys, &store.lots, &store.queries, &store.asked, &store.light].map(Bound::from);
+        let specular = Bound::from(inputs.specular.unwrap_or(&self.no_specular));
+        let [pixels, records] = [self.cells.pixels(), &store.records].map(Bound::from);
+        let [before, after] = [self.frame & 1, 1 - (self.frame & 1)].map(|i| Bound::from(&store.pasts[i as usize]));
+        let changes = Bound::from(&store.changes);
+        let table = || [&keys, &lots, &queries, &asked, &entry_light].map(Clone::clone);
+
+        let (epoch, moves) = (inputs.lights.map_or(0, |l| l.epoch), rays.scene.moves());
+        if self.frame > 0 && !self.options.even {
+            if epoch != self.lights_epoch {
+                self.hurry = HURRY;
+            }
+            if epoch != self.lights_epoch || moves != self.moves {
+                (self.stir, self.changing) = (STIR, STIR);
+            }
+            // Entries have to come to know each other.
+            if self.frame == 1 {
+                self.stir = STIR;
+            }
+        }
+        (self.lights_epoch, self.moves) = (epoch, moves);
+        let mut params = self.params(inputs, rays, guided)?;
+        let [w, h] = cells_of(inputs.size).map(|n| n.div_ceil(8));
+        let mut offset = self.params.write(queue, &params);
+        let frame_params = self.frame_params.group([self.params.bound()]);
+        let groups = |offset| Groups { inputs: &bound, scene: &scene, offset };
+        let alone = |offset| Groups { scene: &frame_params, ..groups(offset) };
+
+        self.cells.record(recorder, &bound);
+        let motion = Bound::from(inputs.motion.unwrap_or(&self.no_motion));
+        let own = [&pixels, &records, &entry_light, &before, &after, &changes, &motion, &specular];
+        let history = || own.map(Clone::clone);
+        self.recall.record(recorder, alone(offset), history(), [w, h, 1]);
+        let slots = [self.options.slots.div_ceil(64), 1, 1];
+        self.evict.record(recorder, groups(offset), table(), slots);
+        // The second layer of workgroups sends rays into lobes, those above further ones of fresh cells.
+        let layers = 1 + LOOKS as u32;
+        let own = [&keys, &lots, &queries, &pixels, &records, &specular].map(Clone::clone);
+        self.rays.record(recorder, groups(offset), own, [w, h, layers]);
+        let rounds = match (self.frame, self.stir) {
+            (0, _) => self.options.first_rounds.max(1),
+            (1..=YOUNG, _) => ROUNDS_YOUNG,
+            (_, 0) => 1,
+            _ => 2,
+        };
+        for round in 0..rounds {
+            if round > 0 {
+                params.round += 1;
+                offset = self.params.write(queue, &params);
+            }
+            self.renew.record(recorder, groups(offset), table(), slots);
+        }
+        self.mean.record(recorder, alone(offset), history(), [w, h, 1]);
+        self.round = params.round + 1;
+        self.frame += 1;
+        self.hurry = self.hurry.saturating_sub(1);
+        self.stir = self.stir.saturating_sub(1);
+        self.changing = self.changing.saturating_sub(1);
+        let pasts = self.store.pasts[(self.frame & 1) as usize].clone();
+        Ok(Settled { inputs: bound, pasts, params: frame_params, offset })
+    }
+
+    /// Records the rest of the frame: means averaged over neighbours, brought to full size. `guidance`:
+    /// [`GUIDANCE`](super::GUIDANCE) bytes a cell.
+    pub fn filter(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        settled: &Settled,
+        guidance: Option<Bound>,
+        output: &wgpu::TextureView,
+    ) {
+        let store = &self.store;
+        let guidance = guidance.unwrap_or_else(|| Bound::from(&self.no_guidance));
+        let pasts = Bound::from(&settled.pasts);
+        let [changes, glosses, blurred, light] =
+            [&store.changes, &store.glosses, &store.blurred, &store.cell_light].map(Bound::from);
+        let [w, h] = settled.inputs.cells.map(|n| n.div_ceil(8));
+        let groups = Groups { inputs: &settled.inputs, scene: &settled.params, offset: settled.offset };
+        let own = [&pasts, &blurred, &changes, &glosses, &guidance].map(Clone::clone);
+        self.blur.record(recorder, groups, own, [w, h, 1]);
+        self.smooth.record(recorder, groups, [pasts, blurred, light, guidance], [w, h, 1]);
+        let brought = Brought { light: &store.cell_light, glosses: &store.glosses, output, gloss: &store.gloss };
+        self.bring.record(recorder, &settled.inputs, &self.cells, brought);
+    }
+}

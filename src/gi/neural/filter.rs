@@ -1,0 +1,207 @@
+//! [`FilterGi`]: method `gather`, whose filter over neighbouring cells a network guides.
+//!
+//! ```text
+//!  G-buffer ─► gather: rays, means ──┬──────────────────────────────► gi.blur ─► gi.smooth ─► gi.bring ─► E/π, gloss
+//!                                    └► gi.features ─► U-Net (net.*) ──► ▲ guidance
+//! ```
+//!
+//! The network never says light. It says which cells' light is averaged, and multiplies it by at most a third
+//! (`MOST_GAIN` of `guided.wgsl`); so darkness stays dark, twice the light is twice the answer, and an answer of zeros is
+//! `gather` itself.
+
+use super::memory::{self, FeaturesPass};
+use super::trained::Neural;
+use crate::gi::gather::{GUIDANCE, GatherGi};
+use crate::gi::interface::technique::{Cost, Technique};
+use crate::gi::interface::{GiError, Inputs};
+use crate::gi::stage;
+use crate::gi::stage::exposure::ExposurePass;
+use crate::gi::stage::inputs::{InputGroup, cells_of};
+use crate::gpu::bind::Bound;
+use crate::gpu::timing::Recorder;
+use crate::net::format::Weights;
+use crate::net::gpu::{Binding, Network, Setup, Tap};
+
+/// The output's meaning in weights files.
+pub const MEANING: &str = "filter";
+/// Numbers of a cell: two places in spaces of four dimensions; trust, tolerance, gain, and one that is not read.
+pub const CHANNELS: u32 = GUIDANCE as u32 / 4;
+
+/// Whether the weights are those of a network that filters.
+pub fn is_filter(weights: &Weights) -> bool {
+    weights.output.meaning == MEANING
+}
+
+/// The method at work.
+pub struct FilterGi {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    neural: Neural,
+    gather: GatherGi,
+    inputs: InputGroup,
+    exposure: ExposurePass,
+    features: FeaturesPass,
+    network: Network,
+    size: [u32; 2],
+    rebuilds: u64,
+}
+
+impl FilterGi {
+    /// Compiles all pipelines, uploads the weights and makes the buffers for pictures of `size` pixels.
+    ///
+    /// # Errors
+    /// [`GiError::Feature`] or [`GiError::Output`] when the weights speak of something else, [`GiError::Network`] when the
+    /// size does not fit the device.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, neural: &Neural, size: [u32; 2]) -> Result<Self, GiError> {
+        check(&neural.weights)?;
+        let inputs = InputGroup::new(device);
+        let gather = GatherGi::new(device, size, neural.gather);
+        Ok(Self {
+            exposure: ExposurePass::new(device, &inputs),
+            features: FeaturesPass::new(device, &inputs),
+            network: network(device, queue, neural, size)?,
+            device: device.clone(),
+            queue: queue.clone(),
+            neural: neural.clone(),
+            gather,
+            inputs,
+            size,
+            rebuilds: 0,
+        })
+    }
+}
+
+/// The tensors for pictures of `size` pixels.
+fn network(device: &wgpu::Device, queue: &wgpu::Queue, neural: &Neural, size: [u32; 2]) -> Result<Network, GiError> {
+    let cells = cells_of(size);
+    let setup = Setup { options: neural.network, tuned: neural.tuned.clone(), ..Setup::default() };
+    Network::new(device, queue, &neural.weights, cells, setup)
+        .map_err(|e| GiError::Network { cells, source: Box::new(e) })
+}
+
+/// Whether the weights are given what there is, and answer what is asked.
+fn check(weights: &Weights) -> Result<(), GiError> {
+    let wrong = |name: &str, reason: String| Err(GiError::Feature { name: name.into(), reason });
+    let table = &weights.table;
+    if (table.name.as_str(), table.version, weights.cell) != ("cells", 1, stage::inputs::CELL) {
+        let found = format!("table {} version {}, {} pixels a cell", table.name, table.version, weights.cell);
+        let own = stage::inputs::CELL;
+        return wrong(
+            "(all)",
+            format!("list is made for {found}; a filter is given cells version 1, {own} pixels a cell"),
+        );
+    }
+    let named = || weights.inputs.iter().map(|f| (f.name.as_str(), f.channels));
+    if !named().eq(memory::FEATURES) {
+        let found: Vec<_> = named().map(|(name, _)| name).collect();
+        return wrong("(all)", format!("list is {}; a filter is given the whole table", found.join(", ")));
+    }
+    if weights.output.channels != CHANNELS {
+        return Err(GiError::Output(format!("{} channels of `{MEANING}`", weights.output.channels)));
+    }
+    Ok(())
+}
+
+fn bound(binding: Binding<'_>) -> Bound {
+    Bound::Part(binding.buffer.clone(), binding.offset, binding.size)
+}
+
+impl Technique for FilterGi {
+    fn record(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), GiError> {
+        stage::inputs::check_output(output, inputs.size)?;
+        if inputs.size != self.size {
+            self.network = network(&self.device, &self.queue, &self.neural, inputs.size)?;
+            self.size = inputs.size;
+            self.rebuilds += 1;
+            self.forget();
+        }
+        let lit = self.inputs.bind(queue, inputs)?;
+        let settled = self.gather.settle(recorder, queue, inputs, true)?;
+        self.exposure.record(recorder, &lit);
+        let known = (&settled.pasts, &self.exposure);
+        self.features.record(recorder, &lit, known, bound(self.network.input()));
+        self.network.record(recorder);
+        self.gather.filter(recorder, &settled, Some(bound(self.network.output())), output);
+        Ok(())
+    }
+
+    fn cut(&mut self) {
+        self.gather.cut();
+    }
+
+    fn settled(&self) -> Option<u32> {
+        self.gather.settled()
+    }
+
+    fn knows_scene(&self, rays: bool) -> bool {
+        self.gather.knows_scene(rays)
+    }
+
+    fn gloss(&self) -> Option<&wgpu::TextureView> {
+        self.gather.gloss()
+    }
+
+    fn layers(&self) -> Vec<&str> {
+        self.network.taps().into_iter().map(|(_, name)| name).collect()
+    }
+
+    fn read_layer(&mut self, inputs: &Inputs<'_>, layer: usize) -> Result<Option<Tap>, GiError> {
+        let taps = self.network.taps();
+        let Some(&(step, _)) = taps.get(layer).filter(|_| inputs.size == self.size) else { return Ok(None) };
+        // The features of the last recording lie where the network reads them.
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        self.network.record_until(step, &mut Recorder::new(&mut encoder));
+        self.queue.submit([encoder.finish()]);
+        Ok(Some(self.network.read_tap(&self.device, &self.queue, step)?))
+    }
+
+    fn forget(&mut self) {
+        self.inputs.forget();
+        self.features.forget();
+        self.gather.forget();
+    }
+
+    fn allocations(&self) -> u64 {
+        self.inputs.made() + self.features.made() + self.rebuilds + self.gather.allocations()
+    }
+
+    fn bytes(&self) -> u64 {
+        self.inputs.bytes() + self.exposure.bytes() + self.network.bytes() + self.gather.bytes()
+    }
+
+    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
+        let count = |size| cells_of(size).map(f64::from).iter().product::<f64>();
+        let (cells, scale) = (count(size), count(size) / count(self.size));
+        let mut costs = self.gather.costs(size);
+        // The filter reads three vectors more of each tap's cell, once from memory, and weighs by two exponentials.
+        for cost in &mut costs {
+            if ["gi.blur", "gi.smooth"].contains(&cost.pass.as_str()) {
+                cost.flops += cells * 25.0 * 25.0;
+                cost.bytes += cells * GUIDANCE as f64;
+            }
+        }
+        costs.push(stage::exposure::cost(size));
+        costs.push(Cost::new("gi.features", cells * 90.0, cells * (80.0 + 4.0 * f64::from(memory::PITCH))));
+        costs.extend(self.network.plan().steps.iter().map(|step| {
+            Cost::new(&format!("net.{}", step.name), scale * step.flops as f64, scale * step.traffic as f64)
+        }));
+        costs
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_table_has_the_channels_that_it_says() {
+        let sum: u32 = super::memory::FEATURES.iter().map(|(_, channels)| channels).sum();
+        assert_eq!(sum, super::memory::CHANNELS);
+        // What `guided.wgsl` reads of a cell.
+        assert_eq!(super::CHANNELS, 12);
+    }
+}

@@ -1,0 +1,89 @@
+"""`gi.blur` and `gi.smooth` (shaders/gi/gather) as torch computes them, with what a network says of each cell."""
+import torch
+import torch.nn.functional as F
+
+LUMINANCE = torch.tensor([0.2126, 0.7152, 0.0722])
+# Of shaders/gi/gather/blur.wgsl and smooth.wgsl.
+SETTLED, NARROW, WIDE, STRIDE = 6, 2, 4, 4
+# Of shaders/gi/gather/guided.wgsl: numbers of a cell, and their limits.
+GUIDANCE, MOST_TRUST, MOST_TOLERANCE, MOST_GAIN = 12, 4.0, 4.0, 0.3
+
+
+def luminance(rgb):
+    """[n,3,h,w] to [n,h,w]."""
+    return (rgb * LUMINANCE.view(1, 3, 1, 1)).sum(1)
+
+
+def around(x, radius, stride=1):
+    """[n,c,h,w] to [n,c,k,h,w]: the k cells of the square around each, 0 outside."""
+    n, c, h, w = x.shape
+    k = 2 * radius + 1
+    return F.unfold(x, k, dilation=stride, padding=radius * stride).view(n, c, k * k, h, w)
+
+
+def same_surface(batch, radius, stride):
+    """[n,k,h,w]: how much the cells around lie in the cell's plane and face its way; 0 where they show nothing."""
+    x, normal = batch["x"], batch["n"]
+    to = around(x, radius, stride) - x.unsqueeze(2)
+    off_plane = (to * normal.unsqueeze(2)).sum(1) * batch["strictness"].unsqueeze(1)
+    facing = (around(normal, radius, stride) * normal.unsqueeze(2)).sum(1).clamp(0, 1)
+    there = around(batch["frames"].unsqueeze(1), radius, stride)[:, 0] > 0
+    return torch.exp(-(off_plane * off_plane).clamp(max=80)) * facing ** 16 * there
+
+
+def kinship(place, radius, stride):
+    """[n,k,h,w] of places [n,4,h,w]."""
+    apart = around(place, radius, stride) - place.unsqueeze(2)
+    return torch.exp(-(apart * apart).sum(1).clamp(max=60))
+
+
+def limited(x, most):
+    """Within ±most, but with a slope beyond, so that what has gone there comes back."""
+    return x + (x.clamp(-most, most) - x).detach()
+
+
+def blur(batch, near, trust):
+    """Mean light [n,3,h,w] over neighbours, and the variance [n,h,w] of its luminance."""
+    radius = WIDE
+    with torch.no_grad():
+        steps = torch.arange(-radius, radius + 1)
+        reach = torch.maximum(steps.abs().view(-1, 1), steps.abs().view(1, -1)).reshape(1, -1, 1, 1)
+        own = torch.where(batch["frames"] >= SETTLED, NARROW, WIDE).unsqueeze(1)
+        rows, columns = steps.abs().view(-1, 1).expand(-1, 2 * radius + 1).reshape(1, -1, 1, 1), steps.abs().repeat(2 * radius + 1).view(1, -1, 1, 1)
+        rim = torch.where(rows == own, 0.5, 1.0) * torch.where(columns == own, 0.5, 1.0) * (reach <= own)
+        frames = around(batch["frames"].unsqueeze(1), radius)[:, 0]
+        fixed = rim * same_surface(batch, radius, 1) * frames.clamp(max=16)
+        light, square = around(batch["light"], radius), around(batch["square"].unsqueeze(1), radius)[:, 0]
+    w = fixed * kinship(near, radius, 1) * torch.exp(around(trust.unsqueeze(1), radius)[:, 0])
+    total = w.sum(1).clamp(min=1e-30)
+    mean = (w.unsqueeze(1) * light).sum(2) / total.unsqueeze(1)
+    squares = (w * square).sum(1) / total
+    parts = (w * w / frames.clamp(min=1)).sum(1) / (total * total).clamp(min=1e-30)
+    return mean, (squares - luminance(mean) ** 2).clamp(min=0) * parts
+
+
+def smooth(batch, mean, variance, far, tolerance):
+    """One à-trous step over cells that differ by no more than noise."""
+    taps = torch.tensor([1 / 6, 2 / 3, 1, 2 / 3, 1 / 6])
+    weights = (taps.view(-1, 1) * taps.view(1, -1)).reshape(1, -1, 1, 1)
+    bright = luminance(mean)
+    apart = around(bright.unsqueeze(1), 2, STRIDE)[:, 0] - bright.unsqueeze(1)
+    noise = 2 * torch.exp(tolerance).unsqueeze(1) * (variance.unsqueeze(1) + around(variance.unsqueeze(1), 2, STRIDE)[:, 0])
+    with torch.no_grad():
+        same = weights * same_surface(batch, 2, STRIDE)
+        same[:, 12] = 0
+    w = same * torch.exp(-(apart * apart / noise.clamp(min=1e-30)).clamp(max=60)) * kinship(far, 2, STRIDE)
+    return (mean + (w.unsqueeze(1) * around(mean, 2, STRIDE)).sum(2)) / (1 + w.sum(1)).unsqueeze(1)
+
+
+def filtered(batch, answer=None):
+    """Light [n,3,h,w] that the filter shows, and the mean of its first step. `answer` [n,12,h,w]; None: zeros."""
+    if answer is None:
+        answer = torch.zeros(len(batch["frames"]), GUIDANCE, *batch["frames"].shape[1:])
+    near, far = answer[:, :4], answer[:, 4:8]
+    trust, tolerance, gain = (limited(answer[:, 8 + i], most) for i, most in enumerate((MOST_TRUST, MOST_TOLERANCE, MOST_GAIN)))
+    mean, variance = blur(batch, near, trust)
+    # A difference of means squared over a variance of nothing has no slope worth having.
+    least = 1e-8 * (luminance(mean) ** 2).detach()
+    shown = smooth(batch, mean, torch.maximum(variance, least), far, tolerance)
+    return shown * torch.exp(gain).unsqueeze(1), mean

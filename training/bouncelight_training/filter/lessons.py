@@ -1,0 +1,74 @@
+"""What `bouncelight dataset --moments` writes: one safetensors file a view (src/study/moments.rs)."""
+import glob
+import os
+
+import numpy as np
+import torch
+from safetensors import SafetensorError
+from safetensors.numpy import load_file
+
+from ..errors import TrainingError
+
+# Table `cells`, version 1 (src/gi/neural/memory.rs).
+TABLE = [("light", 1), ("chroma", 2), ("deviation", 1), ("frames", 1), ("lately", 1), ("nearness", 1), ("depth", 1), ("normal", 3), ("hit", 1), ("towards", 3)]
+CHANNELS = sum(n for _, n in TABLE)
+
+
+def unpack_normals(bits):
+    """[h,w] words of two signed 16-bit numbers to [3,h,w] unit normals (`oct_decode` of shaders/lib/octahedral.wgsl)."""
+    words = np.ascontiguousarray(bits).view(np.uint32)
+    low, high = (words & 0xFFFF).astype(np.uint16).view(np.int16), (words >> 16).astype(np.uint16).view(np.int16)
+    x, y = (np.clip(v.astype(np.float32) / 32767, -1, 1) for v in (low, high))
+    z = 1 - np.abs(x) - np.abs(y)
+    t = np.maximum(-z, 0)
+    n = np.stack([x - np.where(x >= 0, t, -t), y - np.where(y >= 0, t, -t), z])
+    return n / np.maximum(np.linalg.norm(n, axis=0), 1e-20)
+
+
+class Lesson:
+    """One moment of one view, as tensors of one picture: `features` [15,h,w], `light`, `x`, `n` [3,h,w], `frames`, `square`, `strictness`
+    [h,w]; what is to be learnt, `target` [3,h,w], and where (`mask` [h,w]); `shown` [3,h,w]: what `gather` itself shows."""
+
+    def __init__(self, file, when, name):
+        self.name, self.when = name, when
+        past = file[f"past.{when}"].astype(np.float32)
+        n = unpack_normals(file[f"past.{when}"][11])
+        frames = past[3]
+        foot, eye, ahead = file["view"][0], file["view"][1:4], file["view"][4:7]
+        z = np.einsum("c,chw->hw", ahead, past[8:11] - eye[:, None, None])
+        shown = file[f"shown.{when}"]
+        self.shown = np.maximum(np.stack([shown[4 * c + 3] + (shown[4 * c:4 * c + 3] * n).sum(0) for c in range(3)]), 0)
+        self.strictness = 1 / (0.5 * foot * np.maximum(z, 1e-9))
+        self.features, self.light, self.square, self.x, self.n, self.frames = file[f"features.{when}"], past[0:3], past[7], past[8:11], n, frames
+        self.target = file["light"]
+        self.mask = (frames > 0) & np.isfinite(self.target).all(0)
+        for field in ("features", "light", "square", "x", "n", "frames", "strictness", "shown", "target"):
+            setattr(self, field, torch.from_numpy(np.ascontiguousarray(np.nan_to_num(getattr(self, field), posinf=0, neginf=0), np.float32)))
+        self.x = self.x * (self.frames > 0)
+        self.mask = torch.from_numpy(self.mask)
+        self.mean = float((self.target * self.mask).sum() / (3 * self.mask.sum()).clamp(min=1))
+
+
+def read(folder):
+    """All moments of all views of a folder; pictures without light are left out."""
+    paths = sorted(glob.glob(os.path.join(folder, "*.safetensors")))
+    if not paths:
+        raise TrainingError(f"{folder}: no samples; make them with bouncelight dataset --moments")
+    lessons = []
+    for path in paths:
+        try:
+            file = load_file(path)
+            moments = [name.split(".")[1] for name in file if name.startswith("past.")]
+            made = [Lesson(file, when, os.path.basename(path).removesuffix(".safetensors")) for when in moments]
+        except (OSError, SafetensorError, KeyError) as error:
+            raise TrainingError(f"{path}: not a lesson of a filter: {error}; make it with bouncelight dataset --moments") from error
+        lessons += [lesson for lesson in made if lesson.mean > 1e-6 and lesson.mask.float().mean() > 0.2]
+    return lessons
+
+
+def stacked(lessons):
+    """A batch: one tensor of every field."""
+    fields = ("features", "light", "square", "x", "n", "frames", "strictness", "target", "mask")
+    batch = {field: torch.stack([getattr(lesson, field) for lesson in lessons]) for field in fields}
+    batch["mean"] = torch.tensor([lesson.mean for lesson in lessons])
+    return batch

@@ -1,0 +1,248 @@
+"""Trains the network that guides `gather`'s filter, on the CPU.
+
+    python -m bouncelight_training.filter.train --train FOLDER[,FOLDER] --validation FOLDER --run runs/NAME [--minutes 20]
+
+The same command goes on where a killed run stopped. The run's folder holds config.json, checkpoint.pt and log.csv; what is kept is the
+average of the weights over steps (EMA) that did best on the validation's views, the untrained network (`gather` itself) included.
+"""
+import argparse
+import csv
+import dataclasses
+import json
+import os
+import sys
+import time
+
+import numpy as np
+import torch
+from torch import nn
+
+from ..errors import TrainingError, reported
+from ..losses import pooled_error
+from ..model import LEAK, flops, parameter_count
+from ..provenance import commit, machine_of
+from ..weights import GraphNet, unet
+from . import blur, lessons
+
+FIELDS = ["step", "samples", "seconds", "learning_rate", "loss", "validation_error"]
+
+
+@dataclasses.dataclass
+class Config:
+    """What a run is made of."""
+
+    train: str = ""
+    validation: str = ""
+    widths: tuple = (16, 24, 32, 48)
+    pointwise: int = 1  # levels with 1x1 kernels
+    without: tuple = ()  # features of the table that are zeroed, for ablations
+    minutes: float = 20.0
+    batch: int = 4
+    learning_rate: float = 2e-3
+    weight_decay: float = 1e-4
+    ema: float = 0.998
+    gain: float = 1.0  # weight of staying with the light as it is: mean square of the gain's logarithm
+    raw: float = 0.3  # share of the loss that looks at the first step alone
+    seed: int = 1
+    threads: int = 2
+
+
+def network(config):
+    """The untrained network, whose answer is zeros."""
+    torch.manual_seed(config.seed)
+    model = GraphNet(*unet(lessons.CHANNELS, tuple(config.widths), blur.GUIDANCE, config.pointwise, {"leaky_relu": LEAK}))
+    for op in model.graph:
+        if op["op"] == "conv2d":
+            layer = model.get_submodule(op["name"])
+            nn.init.kaiming_normal_(layer.weight, nonlinearity="linear" if op["activation"] == "none" else "leaky_relu", a=LEAK)
+            nn.init.zeros_(layer.bias)
+    # All places alike have no slope: exp(-distance²) is flat there. A hundredth is far enough to begin.
+    nn.init.normal_(layer.weight, std=0.01)
+    nn.init.zeros_(layer.weight[8:])
+    return model
+
+
+def kept_channels(config):
+    """1 for channels that the network is given, else 0: [1,15,1,1]."""
+    unknown = set(config.without) - {name for name, _ in lessons.TABLE}
+    if unknown:
+        raise TrainingError(f"no such feature: {sorted(unknown)[0]}")
+    return torch.tensor([float(name not in config.without) for name, n in lessons.TABLE for _ in range(n)]).view(1, -1, 1, 1)
+
+
+def loss_of(shown, target, mask, mean):
+    """Square of the difference over light here and in the picture: without bias on targets that hold noise, and even to bright and dark. A cell
+    whose difference is beyond five times both counts by the root: a firefly of the path tracer."""
+    mean = mean.view(-1, 1, 1, 1)
+    scale = (shown.detach().clamp(min=0) + 0.05 * mean) * mean
+    error = (shown - target) ** 2 / scale
+    most = (25 * (shown.detach() + mean) ** 2) / scale
+    error = torch.where(error > most, torch.sqrt(error * most + 1e-12), error)
+    weight = mask.unsqueeze(1)
+    return ((error * weight).sum((1, 2, 3)) / (3 * weight.sum((1, 2, 3))).clamp(min=1)).clamp(max=1).mean()
+
+
+def mirrored(batch, rng):
+    """The batch, or its mirror image (left for right; the gravity frame's x with it)."""
+    if rng.random() < 0.5:
+        return batch
+    flipped = {k: v.flip(-1) if v.dim() > 1 else v for k, v in batch.items()}
+    features = flipped["features"].clone()
+    names = [name for name, n in lessons.TABLE for _ in range(n)]
+    for name in ("normal", "towards"):
+        features[:, names.index(name)] *= -1
+    return flipped | {"features": features}
+
+
+def validate(model, views, channels):
+    """Pooled error of `gather`'s light and of the network's, by moment, and over all."""
+    sums = {}
+    with torch.no_grad():
+        for lesson in views:
+            batch = lessons.stacked([lesson])
+            for which, answer in (("gather", None), ("network", model(batch["features"] * channels))):
+                shown, _ = blur.filtered(batch, answer)
+                below_above = pooled_error(shown.clamp(min=0) / lesson.mean, batch["target"] / lesson.mean, batch["mask"])
+                for key in (lesson.when, "all"):
+                    a, b = sums.get((key, which), (0, 0))
+                    sums[key, which] = (a + below_above[0], b + below_above[1])
+    return {f"{key} {which}": above / max(below, 1e-20) for (key, which), (above, below) in sums.items()}
+
+
+class Run:
+    """A network on its way."""
+
+    def __init__(self, config, folder):
+        self.config, self.folder = config, folder
+        self.model, self.channels = network(config), kept_channels(config)
+        self.average = {k: v.detach().clone() for k, v in self.model.state_dict().items()}
+        self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
+        self.step, self.seconds, self.rows, self.best = 0, 0.0, [], (float("inf"), None)
+
+    @property
+    def path(self):
+        return os.path.join(self.folder, "checkpoint.pt")
+
+    def save(self):
+        state = {k: getattr(self, k) for k in ("average", "step", "seconds", "rows", "best")}
+        state |= {"config": dataclasses.asdict(self.config), "model": self.model.state_dict(), "optimiser": self.optimiser.state_dict(),
+                  "commit": commit(), "machine": machine_of(torch.device("cpu"))}
+        torch.save(state, self.path + ".part")
+        os.replace(self.path + ".part", self.path)
+
+    def load(self):
+        if not os.path.exists(self.path):
+            return
+        state = read_checkpoint(self.path)
+        differ = [k for k, v in dataclasses.asdict(self.config).items() if k not in ("minutes", "threads") and state["config"].get(k) != v]
+        if differ:
+            raise TrainingError(f"{self.path} was made with another {differ[0]}; use another --run")
+        self.model.load_state_dict(state["model"])
+        self.optimiser.load_state_dict(state["optimiser"])
+        for k in ("average", "step", "seconds", "rows", "best"):
+            setattr(self, k, state[k])
+
+    def averaged(self):
+        model = network(self.config)
+        model.load_state_dict(self.average)
+        return model.eval()
+
+    def train_step(self, views, began):
+        c = self.config
+        rng = np.random.default_rng([c.seed, self.step])
+        done = min((self.seconds + time.monotonic() - began) / (60 * c.minutes), 1)
+        rate = c.learning_rate * min(1, (self.step + 1) / 50) * (0.01 + 0.99 * 0.5 * (1 + np.cos(np.pi * done)))
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate
+        chosen = [views[i] for i in rng.integers(0, len(views), c.batch)]
+        shapes = {lesson.mask.shape for lesson in chosen}
+        loss_sum = 0.0
+        self.optimiser.zero_grad()
+        for shape in shapes:
+            own = [lesson for lesson in chosen if lesson.mask.shape == shape]
+            batch = mirrored(lessons.stacked(own), rng)
+            answer = self.model(batch["features"] * self.channels)
+            shown, first = blur.filtered(batch, answer)
+            loss = (1 - c.raw) * loss_of(shown, batch["target"], batch["mask"], batch["mean"]) + c.raw * loss_of(first, batch["target"], batch["mask"], batch["mean"])
+            loss = loss + c.gain * (answer[:, 10].clamp(-1, 1) ** 2).mean() * 0.01 + 1e-4 * (answer[:, :8] ** 2).mean()
+            (loss * len(own) / c.batch).backward()
+            loss_sum += loss.item() * len(own) / c.batch
+        nn.utils.clip_grad_norm_(self.model.parameters(), 0.5)
+        self.optimiser.step()
+        self.step += 1
+        keep = min(c.ema, (self.step + 1) / (self.step + 10))
+        for k, v in self.model.state_dict().items():
+            self.average[k].lerp_(v, 1 - keep)
+        return loss_sum, rate, done
+
+
+def read_checkpoint(path):
+    try:
+        return torch.load(path, weights_only=True)
+    except (OSError, RuntimeError, ValueError, EOFError, KeyError) as error:
+        raise TrainingError(f"{path}: not a readable checkpoint: {error}") from error
+
+
+def train(config, folder):
+    """Runs to the end; returns the Run."""
+    torch.set_num_threads(config.threads)
+    views = [lesson for name in config.train.split(",") for lesson in lessons.read(name)]
+    held_out = lessons.read(config.validation)
+    shared = {v.name for v in views} & {v.name for v in held_out}
+    if shared:
+        raise TrainingError(f"{sorted(shared)[0]} stands in training and validation")
+    os.makedirs(folder, exist_ok=True)
+    run = Run(config, folder)
+    run.load()
+    with open(os.path.join(folder, "config.json"), "w") as file:
+        json.dump(dataclasses.asdict(config), file, indent=1)
+    print(f"{parameter_count(run.model)} parameters, {flops(run.model, 128, 256) / 1e9:.3f} GFLOP at 256x128 cells; {len(views)} training and {len(held_out)} validation "
+          f"moments", file=sys.stderr, flush=True)
+    began, sums, looked = time.monotonic(), [], time.monotonic()
+    done = run.seconds / (60 * config.minutes)
+    if run.step == 0:
+        note(run, held_out, 0.0, 0.0)
+    while done < 1:
+        loss, rate, done = run.train_step(views, began)
+        sums.append(loss)
+        if time.monotonic() - looked > 90 or done >= 1:
+            run.seconds, began = run.seconds + time.monotonic() - began, time.monotonic()
+            note(run, held_out, float(np.mean(sums)), rate)
+            sums, looked, began = [], time.monotonic(), time.monotonic()
+            run.save()
+    return run
+
+
+def note(run, held_out, loss, rate):
+    """Validates the averaged network, keeps it if it is the best, adds a row to the log."""
+    errors = validate(run.averaged(), held_out, run.channels)
+    if errors["all network"] < run.best[0]:
+        run.best = (errors["all network"], {k: v.clone() for k, v in run.average.items()})
+    run.rows.append({"step": run.step, "samples": run.step * run.config.batch, "seconds": round(run.seconds, 1), "learning_rate": rate,
+                     "loss": loss, "validation_error": errors["all network"]})
+    with open(os.path.join(run.folder, "log.csv.part"), "w", newline="") as file:
+        writer = csv.DictWriter(file, FIELDS)
+        writer.writeheader()
+        writer.writerows(run.rows)
+    os.replace(os.path.join(run.folder, "log.csv.part"), os.path.join(run.folder, "log.csv"))
+    print(f"step {run.step} {run.seconds:.0f} s loss {loss:.4f} " + " ".join(f"{k} {v:.2%}" for k, v in errors.items()), file=sys.stderr, flush=True)
+
+
+@reported
+def main(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--run", required=True, help="folder of the run; continued if it has a checkpoint")
+    for field in dataclasses.fields(Config):
+        kind = {"widths": lambda t: tuple(int(n) for n in t.split(",")), "without": lambda t: tuple(t.split(","))}.get(field.name, type(field.default))
+        parser.add_argument("--" + field.name, type=kind, default=field.default, help=f"default {field.default}")
+    a = vars(parser.parse_args(arguments))
+    folder = a.pop("run")
+    config = Config(**a)
+    for name in ("train", "validation"):
+        if not getattr(config, name):
+            raise TrainingError(f"--{name} is missing: a folder that bouncelight dataset --moments has written")
+    train(config, folder)
+
+
+if __name__ == "__main__":
+    main()
