@@ -35,6 +35,7 @@ pub mod image_io;
 mod layouts;
 pub mod metrics;
 pub mod net;
+mod numbers;
 #[cfg(feature = "reference")]
 pub mod reference;
 pub mod render;

@@ -1,4 +1,4 @@
-//! Scenes: the paper's stream, glTF and OBJ with everything that can be wrong in them, bundled scenes, round trips.
+//! Scenes: the paper's stream, homes, glTF and OBJ with everything that can be wrong in them, bundled scenes, round trips.
 #![cfg(feature = "io")]
 
 mod common;
@@ -15,6 +15,8 @@ mod extensions;
 mod glb;
 #[path = "scene/gltf_features.rs"]
 mod gltf_features;
+#[path = "scene/home.rs"]
+mod home;
 #[path = "scene/limits.rs"]
 mod limits;
 #[path = "scene/meshopt.rs"]

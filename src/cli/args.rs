@@ -178,7 +178,7 @@ pub fn load_weights(path: Option<&PathBuf>) -> Result<Weights> {
 /// Which scene, how it is lit, and from where it is seen.
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, or a bundled scene (interior, cornell).
+    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, `home:INDEX`, or a bundled scene (interior, cornell).
     pub scene: String,
     /// Width and height in pixels.
     #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH")]

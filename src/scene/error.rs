@@ -69,18 +69,20 @@ pub enum SceneError {
         reason: String,
     },
     /// Neither a file nor a bundled scene.
-    #[error("{name}: neither a file (.gltf, .glb, .obj) nor a bundled scene ({known}) nor paper-room:INDEX")]
+    #[error("{name}: neither a file (.gltf, .glb, .obj) nor a bundled scene ({known}) nor paper-room:INDEX nor home:INDEX")]
     UnknownName {
         /// What was asked for.
         name: String,
         /// The names that exist, comma separated.
         known: String,
     },
-    /// `paper-room:` is not followed by a usable number.
-    #[error("{spec}: the part after `paper-room:` must be a whole number from 0 to {max}")]
+    /// The name of a stream of scenes is not followed by a colon and a usable number.
+    #[error("{spec}: INDEX of {stream}:INDEX must be a whole number from 0 to {max}")]
     BadIndex {
         /// The whole specification.
         spec: String,
+        /// Name of the stream.
+        stream: &'static str,
         /// The largest index accepted.
         max: u32,
     },

@@ -1,11 +1,15 @@
-//! One door for every kind of scene: a path, a bundled name, or `paper-room:INDEX`.
+//! One door for every kind of scene: a path, a bundled name, `paper-room:INDEX` or `home:INDEX`.
 
 use std::path::Path;
 
-use super::{LoadOptions, Scene, SceneError, bundled, gltf, obj, paper_room};
+use super::{LoadOptions, Scene, SceneError, bundled, gltf, home, obj, paper_room};
 
-/// Loads what `spec` names: a `.gltf`, `.glb` or `.obj` path, `paper-room:INDEX` (see [`paper_room`]), or one of
-/// [`bundled::NAMES`]. The result has at least one camera and one source of light; see [`super::defaults`].
+/// Streams of scenes: name, largest index, what makes one.
+const STREAMS: [(&str, u32, fn(u32) -> Scene); 2] =
+    [("paper-room", paper_room::MAX_INDEX, paper_room::scene), ("home", home::MAX_INDEX, home::scene)];
+
+/// Loads what `spec` names: a `.gltf`, `.glb` or `.obj` path, `paper-room:INDEX` (see [`paper_room`]), `home:INDEX`
+/// (see [`home`]), or one of [`bundled::NAMES`]. The result has at least one camera and one source of light; see [`super::defaults`].
 ///
 /// # Errors
 /// [`SceneError`], which names the file and the place in it.
@@ -18,14 +22,12 @@ pub fn load(spec: &str) -> Result<Scene, SceneError> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(spec: &str, options: LoadOptions) -> Result<Scene, SceneError> {
-    if let Some(index) = spec.strip_prefix("paper-room:") {
-        return match index.parse::<u32>() {
-            Ok(index) if index <= paper_room::MAX_INDEX => Ok(paper_room::scene(index)),
-            _ => Err(SceneError::BadIndex { spec: spec.to_owned(), max: paper_room::MAX_INDEX }),
+    let (name, index) = spec.split_once(':').unwrap_or((spec, ""));
+    if let Some((stream, max, make)) = STREAMS.into_iter().find(|(stream, ..)| *stream == name) {
+        return match index.parse() {
+            Ok(index) if index <= max => Ok(make(index)),
+            _ => Err(SceneError::BadIndex { spec: spec.to_owned(), stream, max }),
         };
-    }
-    if spec == "paper-room" {
-        return Err(SceneError::BadIndex { spec: spec.to_owned(), max: paper_room::MAX_INDEX });
     }
     if let Some(scene) = bundled::scene(spec) {
         return Ok(scene);

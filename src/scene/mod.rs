@@ -24,6 +24,8 @@ mod geometry;
 #[cfg(feature = "io")]
 pub mod gltf;
 #[cfg(feature = "io")]
+pub mod home;
+#[cfg(feature = "io")]
 mod load;
 pub(crate) mod mips;
 #[cfg(feature = "io")]

@@ -1,9 +1,10 @@
 //! Two frames of a camera that moves a little, and which cell of the second shows what a cell of
 //! the first shows: what training's temporal term compares.
 
-use super::{dataset::Sample, views::SplitMix};
+use super::dataset::Sample;
 use crate::{
     gi::inputs::{CELL, sample_pixel},
+    numbers::SplitMix,
     render::View,
     scene::Camera,
 };

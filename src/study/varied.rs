@@ -2,7 +2,7 @@
 //! window, metals, sizes, colours and camera heights. What a network learns from in order not to
 //! take one sun and one grey sky for the world.
 
-use super::views::SplitMix;
+use crate::numbers::SplitMix;
 use crate::scene::{
     Camera, Environment, Instance, Light, LightKind, Material, SUN_ANGLE, Scene,
     shapes::{self, Shape},

@@ -1,5 +1,6 @@
 //! Cameras to look at a scene from: turned around its own place, or scattered through the scene.
 
+use crate::numbers::SplitMix;
 use crate::scene::{Camera, Scene, bounds::world_bounds};
 use glam::{Mat4, Vec3};
 
@@ -16,10 +17,10 @@ pub fn turned(camera: &Camera, fraction: f32) -> Camera {
 /// without triangles or cameras.
 pub fn around(scene: &Scene, seed: u64) -> impl Iterator<Item = Camera> {
     let place = world_bounds(scene).zip(scene.cameras.first().cloned());
-    let mut numbers = SplitMix(seed);
+    let mut numbers = SplitMix::new(seed);
     place.into_iter().flat_map(move |((low, high), own)| {
         let (low, size) = (Vec3::from(low), Vec3::from(high) - Vec3::from(low));
-        let mut numbers = std::mem::replace(&mut numbers, SplitMix(0));
+        let mut numbers = std::mem::replace(&mut numbers, SplitMix::new(0));
         std::iter::repeat_with(move || {
             // Eyes keep away from the outer walls and the floor; targets may be anywhere.
             let mut within = |margin: f32| {
@@ -34,25 +35,4 @@ pub fn around(scene: &Scene, seed: u64) -> impl Iterator<Item = Camera> {
             Camera { name: "around".into(), ..Camera::look_at(eye.into(), aim.into(), own.yfov) }
         })
     })
-}
-
-/// Steele, Lea and Flood's SplitMix64: a few lines for reproducible scattering, no statistics hang
-/// on it.
-pub(super) struct SplitMix(u64);
-
-impl SplitMix {
-    /// Another seed, another row.
-    #[cfg(feature = "io")]
-    pub(super) fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    /// Uniform in [0, 1).
-    pub(super) fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
-    }
 }

@@ -44,7 +44,7 @@ use thiserror::Error;
 /// What `bouncelight view` was told.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// A file, a bundled scene or `paper-room:INDEX`; the bundled interior when absent.
+    /// A file, a bundled scene, `paper-room:INDEX` or `home:INDEX`; the bundled interior when absent.
     pub scene: Option<String>,
     /// What scene files may name.
     pub load: crate::scene::LoadOptions,

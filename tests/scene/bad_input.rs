@@ -23,11 +23,14 @@ fn specifications() {
     refused(scene::load("nowhere/at/all.glb"), &["nowhere/at/all.glb", "no such file"]);
     refused(scene::load("nowhere.obj"), &["nowhere.obj", "no such file"]);
     refused(scene::load(env!("CARGO_MANIFEST_DIR")), &[env!("CARGO_MANIFEST_DIR"), "is a folder", ".glb"]);
-    refused(scene::load("cornel"), &["cornel", "cornell", "interior", "paper-room:INDEX"]);
+    refused(scene::load("cornel"), &["cornel", "cornell", "interior", "paper-room:INDEX", "home:INDEX"]);
     refused(scene::load("Cargo.toml"), &["Cargo.toml", "`.toml`", ".gltf"]);
     for bad in ["paper-room:", "paper-room", "paper-room:-1", "paper-room:x", "paper-room:1.5", "paper-room:4000000000"]
     {
-        refused(scene::load(bad), &[bad, "whole number", "65535"]);
+        refused(scene::load(bad), &[bad, "paper-room:INDEX", "whole number", "65535"]);
+    }
+    for bad in ["home:", "home", "home:-1", "home:x", "home:1.5", "home:4000000000"] {
+        refused(scene::load(bad), &[bad, "home:INDEX", "whole number", "65535"]);
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let odd = folder.path().join("folder.glb");

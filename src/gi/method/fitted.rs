@@ -122,7 +122,8 @@ impl Fitted {
     /// Where the record of a scene lies: `SCENE.gi.toml` beside a file (`flat.glb.gi.toml`); for a
     /// name, in the current folder (`interior.gi.toml`, `paper-room-2.gi.toml`).
     pub fn path(scene: &str) -> PathBuf {
-        let name = if scene.starts_with("paper-room:") { scene.replace(':', "-") } else { scene.to_owned() };
+        let made = scene.starts_with("paper-room:") || scene.starts_with("home:");
+        let name = if made { scene.replace(':', "-") } else { scene.to_owned() };
         format!("{name}.gi.toml").into()
     }
 
@@ -284,6 +285,7 @@ mod tests {
         assert!(matches!(own.method().unwrap(), Method::AmbientWith(u) if (u.sky, u.bounce) == (1.0, 0.5)));
         assert_eq!(Fitted::path("a/flat.glb"), Path::new("a/flat.glb.gi.toml"));
         assert_eq!(Fitted::path("paper-room:2"), Path::new("paper-room-2.gi.toml"));
+        assert_eq!(Fitted::path("home:7"), Path::new("home-7.gi.toml"));
     }
 
     #[test]

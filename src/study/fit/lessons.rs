@@ -5,6 +5,7 @@ use super::FitError;
 use crate::{
     gi::{GiError, features::FeatureSet, inputs::cells_of},
     net::{format::Weights, learn::Example},
+    numbers::SplitMix,
     reference::Layer,
     render::RenderError,
     scene::{Camera, bounds::world_bounds},
@@ -13,7 +14,7 @@ use crate::{
         target::Target,
         trial::{Trial, TrialError},
         truth,
-        views::{SplitMix, around},
+        views::around,
     },
 };
 use glam::Vec3;

@@ -51,7 +51,7 @@ fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
         }
     }
     ui.horizontal(|ui| {
-        let hint = "file, interior, paper-room:7";
+        let hint = "file, interior, home:7";
         let field = ui.add(egui::TextEdit::singleline(&mut memory.path).hint_text(hint).desired_width(200.0));
         let enter = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
         if (ui.button("Open").clicked() || enter) && !memory.path.trim().is_empty() {
