@@ -17,7 +17,7 @@ use crate::{
     image_io::write_whole,
     reference::{Kernel, ReferenceScene},
     render::{Renderer, RendererOptions},
-    scene::{self, Camera, LightKind, Scene, paper_room, upload::SceneGpu},
+    scene::{self, Camera, LightKind, Scene, home, paper_room, upload::SceneGpu},
     study::{
         dataset::{Next, Sample, frame, sample},
         guides::Guides,
@@ -45,14 +45,14 @@ pub struct Args {
     /// What is drawn.
     #[arg(long, value_enum, default_value = "paper-room")]
     recipe: Recipe,
-    /// Indices of rooms, such as 6-9,13 (recipes paper-room and paper-room-varied).
+    /// Indices of rooms, such as 6-9,13 (recipes paper-room, paper-room-varied and home).
     #[arg(long, value_parser = parse_rooms, required_if_eq_any([("recipe", "paper-room"),
-        ("recipe", "paper-room-varied")]))]
+        ("recipe", "paper-room-varied"), ("recipe", "home")]))]
     rooms: Option<Rooms>,
     /// A scene file or bundled scene (recipe scene).
     #[arg(long, required_if_eq("recipe", "scene"))]
     scene: Option<String>,
-    /// Views of each room (directions into which the full turn is cut) or of the scene (drawn around its own camera).
+    /// Views of each room (directions into which the full turn is cut; of a home, its cameras) or of the scene (drawn around its own camera).
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
     /// Seed of the views of recipe scene.
@@ -101,6 +101,8 @@ enum Recipe {
     PaperRoom,
     /// Rooms of that kind with other lights, skies, roofs, metals, sizes and cameras.
     PaperRoomVaried,
+    /// Flats and streets made by code; views are their cameras, three at most.
+    Home,
     /// Views through one scene.
     Scene,
 }
@@ -164,7 +166,9 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let mut writer = Writer { gpu, renderer, kernel, spp, motion, guides, gi_frames, moments, out, listed };
     writer.open_list()?;
     match (args.recipe, &args.rooms, &args.scene) {
-        (Recipe::PaperRoom | Recipe::PaperRoomVaried, Some(rooms), _) => many_rooms(global, &mut writer, rooms, &args)?,
+        (Recipe::PaperRoom | Recipe::PaperRoomVaried | Recipe::Home, Some(rooms), _) => {
+            many_rooms(global, &mut writer, rooms, &args)?
+        }
         (Recipe::Scene, _, Some(spec)) => one_scene(global, &mut writer, spec, &args)?,
         _ => return Err(usage("--rooms goes with the rooms' recipes, --scene with recipe scene".into())),
     }
@@ -176,7 +180,10 @@ fn announce(global: &Global, args: &Args, samples: usize) {
     let [w, h] = cells_of(args.size).map(u64::from);
     // Features, direct light, albedo, normal, depth, and the light to be learnt; about 1 KB of header.
     let features = u64::from(FeatureSet::all().channels());
-    let planes = features + 10 + if args.spp > 0 { 3 } else { 0 } + if args.motion { features + 2 } else { 0 };
+    let mut planes = features + 10 + if args.spp > 0 { 3 } else { 0 } + if args.motion { features + 2 } else { 0 };
+    if !args.moments.is_empty() {
+        planes = 3 + args.moments.len() as u64 * moments::PLANES;
+    }
     let guides = if args.guides { Guides::bytes(args.size) } else { 0 };
     let bytes = samples as u64 * (w * h * planes * 4 + guides + 1024);
     if !global.quiet {
@@ -310,24 +317,32 @@ impl Writer {
 fn many_rooms(global: &Global, writer: &mut Writer, Rooms(rooms): &Rooms, args: &Args) -> Result<()> {
     let [shard, of] = args.shard;
     let mine: Vec<u32> = rooms.iter().copied().skip(shard as usize).step_by(of as usize).collect();
-    announce(global, args, mine.len() * args.views as usize);
-    let mut progress = Progress::new(global, "views", mine.len() as u64 * u64::from(args.views));
-    let varied = args.recipe == Recipe::PaperRoomVaried;
+    let home = args.recipe == Recipe::Home;
+    let count = if home { args.views.min(home::CAMERAS as u32) } else { args.views };
+    announce(global, args, mine.len() * count as usize);
+    let mut progress = Progress::new(global, "views", mine.len() as u64 * u64::from(count));
+    let (kind, build): (&str, fn(u32) -> Scene) = match args.recipe {
+        Recipe::PaperRoomVaried => ("varied", varied::scene),
+        Recipe::Home => ("home", home::scene),
+        _ => ("room", paper_room::scene),
+    };
     for room in mine {
-        let name = format!("{}{room:04}", if varied { "varied" } else { "room" });
+        let name = format!("{kind}{room:04}");
         let stem = |view: u32| format!("{name}_view{view}");
         let views_of = |scene: &Scene| -> Vec<Camera> {
-            (0..args.views).map(|view| turned(&scene.cameras[0], view as f32 / args.views as f32)).collect()
+            if home {
+                return scene.cameras.iter().take(count as usize).cloned().collect();
+            }
+            (0..count).map(|view| turned(&scene.cameras[0], view as f32 / count as f32)).collect()
         };
-        let build = || if varied { varied::scene(room) } else { paper_room::scene(room) };
         if args.export {
             // Written again by every run: the next one may ask for more views.
-            let scene = build();
+            let scene = build(room);
             scene::export::write_glb(&scene, &writer.out.join(format!("{name}.glb")))?;
             record_views(writer, &name, &scene.name, u64::from(room), &views_of(&scene), &scene)?;
         }
         let mut missing = Vec::new();
-        for view in 0..args.views {
+        for view in 0..count {
             if writer.has(&stem(view))? {
                 progress.step();
             } else {
@@ -337,7 +352,7 @@ fn many_rooms(global: &Global, writer: &mut Writer, Rooms(rooms): &Rooms, args: 
         if missing.is_empty() {
             continue;
         }
-        let scene = build();
+        let scene = build(room);
         let uploaded = writer.upload(&scene)?;
         let cameras = views_of(&scene);
         for view in missing {

@@ -1,7 +1,7 @@
 //! What a network that filters learns from: what `gather` remembers of a view's cells at several moments of its settling, and the
 //! light that they are to show.
 
-use super::{dataset::DatasetError, views::SplitMix};
+use super::dataset::DatasetError;
 use crate::{
     gi::{
         ExposurePass,
@@ -11,6 +11,7 @@ use crate::{
         memory::{CHANNELS, FeaturesPass, PITCH},
     },
     gpu::{Gpu, bind::Bound, readback, timing::Recorder},
+    numbers::SplitMix,
     reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions},
     render::{Renderer, View},
     scene::{Camera, upload::SceneGpu},
@@ -29,6 +30,9 @@ pub enum When {
 
 /// Frames of a pan.
 pub const PAN: u32 = 12;
+
+/// Planes that a moment takes: features, memory, light.
+pub const PLANES: u64 = CHANNELS as u64 + PAST / 4 + 12;
 
 /// The memory of all cells at one moment; planes of rows.
 #[derive(Debug, Clone)]

@@ -33,7 +33,7 @@ const STREETS: u32 = 6;
 const NIGHTS: f32 = 0.45;
 const CLOSED: f32 = 0.3;
 /// Cameras of a scene.
-const CAMERAS: usize = 3;
+pub const CAMERAS: usize = 3;
 
 /// Scene `index` of this stream; the same index gives the same scene. It has three cameras at places where a person
 /// would stand, and 500 to 60,000 triangles.
