@@ -69,7 +69,9 @@ pub enum SceneError {
         reason: String,
     },
     /// Neither a file nor a bundled scene.
-    #[error("{name}: neither a file (.gltf, .glb, .obj) nor a bundled scene ({known}) nor paper-room:INDEX nor home:INDEX")]
+    #[error(
+        "{name}: neither a file (.gltf, .glb, .obj) nor a bundled scene ({known}) nor paper-room:INDEX nor home:INDEX"
+    )]
     UnknownName {
         /// What was asked for.
         name: String,
