@@ -158,7 +158,7 @@ impl Builder {
         let (saturation, value) = if self.chance(0.78) {
             (self.between(0.0, 0.16), self.between(0.62, 0.85))
         } else {
-            (self.between(0.4, 0.9), self.between(0.3, 0.75))
+            (self.between(0.25, 0.7), self.between(0.3, 0.75))
         };
         self.hue(saturation, value)
     }

@@ -111,8 +111,8 @@ impl Furnisher<'_> {
             Kind::Office => self.office(),
             Kind::Hall => self.hall(),
         }
-        let more = (self.room.floor() / 9.0) as usize;
-        for _ in 0..self.b.below(more + 2) {
+        let more = (self.room.floor() / 6.0) as usize;
+        for _ in 0..self.b.count(more / 2, more + 1) {
             match self.b.below(5) {
                 0 | 1 => self.plant(),
                 2 => self.shelf(),

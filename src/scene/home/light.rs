@@ -32,7 +32,7 @@ pub(super) fn sun(b: &mut Builder, from: f32, irradiance: f32) {
 /// From candles to overcast noon; a tenth are coloured.
 pub(super) fn lamp_tint(b: &mut Builder) -> [f32; 3] {
     if b.chance(0.1) {
-        return b.hue(0.8, 1.0);
+        return b.hue(0.6, 1.0);
     }
     let cold = b.between(0.0, 1.0);
     [1.0 - 0.15 * cold * cold, 0.6 + 0.35 * cold, 0.3 + 0.7 * cold]
@@ -44,8 +44,8 @@ pub(super) fn day(b: &mut Builder, plan: &Plan) {
     let (surface, glass) = lit.fold((0.0, 0.0), |(s, g), r| (s + r.surface(), g + r.glass()));
     let clear = b.chance(0.65);
     // Half of what a window shows is ground.
-    let wanted = b.between(0.12, 0.4) * if clear { 0.4 } else { 1.0 };
-    let sky = (wanted * surface * SWALLOWED / (0.6 * glass.max(0.1))).clamp(0.15, 6.0);
+    let wanted = b.between(0.2, 0.5) * if clear { 0.5 } else { 1.0 };
+    let sky = (wanted * surface * SWALLOWED / (0.6 * glass.max(0.1))).clamp(0.15, 7.0);
     let tint = sky_tint(b);
     b.scene.environment = Environment::constant(tint.map(|c| c * sky));
     if !clear {
@@ -81,7 +81,7 @@ pub(super) fn night(b: &mut Builder, plan: &mut Plan, look: &Look) -> Vec<usize>
     for &i in &lit {
         let lamps = b.count(1, most);
         for _ in 0..lamps {
-            let wanted = b.between(0.12, 0.45) / (lamps as f32).sqrt();
+            let wanted = b.between(0.2, 0.6) / (lamps as f32).sqrt();
             lamp(&mut Furnisher { b, room: &mut plan.rooms[i], look }, wanted);
         }
     }

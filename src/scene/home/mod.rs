@@ -62,12 +62,19 @@ fn flat(b: &mut Builder, night: bool) {
         light::day(b, &plan);
         (0..plan.rooms.len()).filter(|&i| plan.rooms[i].glass() > 0.0).collect()
     };
-    // Rooms with light of their own, twice, so that they are chosen more often, and those behind their doors.
-    let behind = lit.iter().flat_map(|&i| plan.rooms[i].neighbours.iter());
-    let rooms: Vec<usize> = lit.iter().chain(&lit).chain(behind).copied().collect();
+    // From rooms with light of their own, and from those behind their doors through the door.
+    let doors = |i: usize| plan.rooms[i].neighbours.iter().zip(&plan.rooms[i].ways).map(move |(n, way)| (i, *n, way));
+    let dark = (0..plan.rooms.len()).filter(|i| !lit.contains(i));
+    let through: Vec<_> = dark.flat_map(doors).filter(|(_, behind, _)| lit.contains(behind)).collect();
     for i in 0..CAMERAS {
+        let from_dark = !through.is_empty() && b.chance(0.25);
         camera::choose(b, &format!("room {i}"), |b| {
-            let room = b.one_of(&rooms);
+            if from_dark {
+                let (room, _, way) = b.one_of(&through);
+                let view = inside(b, &plan.rooms[room]);
+                return Proposal { target: way.center(), ..view };
+            }
+            let room = b.one_of(&lit);
             inside(b, &plan.rooms[room])
         });
     }

@@ -118,7 +118,7 @@ impl Plan {
         let count = b.one_of(&[1, 1, 2, 2, 3, 3, 4, 4, 5]);
         let least = 3.0 + count as f32;
         let size = vec3(b.between(least.max(4.0), 14.0), height, b.between(least.max(3.0), 11.0));
-        let size = if count == 1 { size.min(vec3(9.0, height, 8.0)) } else { size };
+        let size = if count == 1 { size.min(vec3(7.5, height, 6.5)) } else { size };
         let (inner, outer) = (b.between(0.08, 0.15), b.between(0.2, 0.38));
         let inside = Solid { low: Vec3::ZERO, high: size };
         let mut parts = Vec::new();

@@ -174,7 +174,7 @@ fn cameras(b: &mut Builder, p: &Profile, stands: &[Vec3]) {
         // Over the rail, to one side or the other.
         let across = Vec3::NEG_Z * eye.z.signum();
         let turn = Quat::from_rotation_y(b.between(-1.1, 1.1));
-        let ahead = turn * across + Vec3::Y * b.between(-0.5, 0.1);
+        let ahead = turn * across + Vec3::Y * b.between(-0.6, -0.1);
         Proposal { eye, target: eye + ahead, depth: 4.0 }
     });
 }
