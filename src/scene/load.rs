@@ -4,8 +4,10 @@ use std::path::Path;
 
 use super::{LoadOptions, Scene, SceneError, bundled, gltf, home, obj, paper_room};
 
-/// Streams of scenes: name, largest index, what makes one.
-const STREAMS: [(&str, u32, fn(u32) -> Scene); 2] =
+/// A stream of scenes: name, largest index, what makes one.
+type Stream = (&'static str, u32, fn(u32) -> Scene);
+
+const STREAMS: [Stream; 2] =
     [("paper-room", paper_room::MAX_INDEX, paper_room::scene), ("home", home::MAX_INDEX, home::scene)];
 
 /// Loads what `spec` names: a `.gltf`, `.glb` or `.obj` path, `paper-room:INDEX` (see [`paper_room`]), `home:INDEX`

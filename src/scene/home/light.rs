@@ -17,7 +17,7 @@ const SWALLOWED: f32 = 0.45;
 /// White, or a sky's tint of blue, grey or evening.
 pub(super) fn sky_tint(b: &mut Builder) -> [f32; 3] {
     let depth = b.between(0.0, 0.5);
-    if b.chance(0.75) { [1.0 - depth, 1.0 - 0.6 * depth, 1.0] } else { [1.0, 1.0 - 0.5 * depth, 1.0 - depth] }
+    if b.chance(0.85) { [1.0 - depth, 1.0 - 0.6 * depth, 1.0] } else { [1.0, 1.0 - 0.5 * depth, 1.0 - depth] }
 }
 
 /// A sun over the horizon, whiter the higher it stands; it shines from the turn `from`.
