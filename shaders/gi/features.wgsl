@@ -36,7 +36,7 @@ fn features(@builtin(global_invocation_id) id: vec3u) {
     let n = params.gravity_from_world * past.n;
     let towards = params.gravity_from_world * (past.vector * inverse);
     table[row] = vec4f(
-        log(1.0 + l * exposure.inv_s), (past.light.r - past.light.g) / total, (past.light.b - past.light.g) / total,
+        l / max(l + exposure.s, 1e-20), (past.light.r - past.light.g) / total, (past.light.b - past.light.g) / total,
         log(1.0 + min(deviation, 1e4))
     );
     table[row + 1u] = vec4f(

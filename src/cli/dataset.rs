@@ -76,9 +76,13 @@ pub struct Args {
     #[arg(long)]
     out: PathBuf,
     /// What a network that filters learns from, instead: moments at which what cells remember is kept, frames after a cut or `pan`
-    /// (at the end of twelve frames of a moving camera), such as 1,2,4,8,32,pan. --spp tells the samples of the light.
+    /// (at the end of six frames of a moving camera), such as 1,2,8,pan. --spp tells the samples of the light.
     #[arg(long, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST", conflicts_with_all = ["motion", "guides"])]
     moments: Vec<When>,
+    /// Weights of a network that filters, whose light is kept beside what cells remember (with --moments): what it makes of them in
+    /// the program.
+    #[arg(long, requires = "moments", value_name = "FILE")]
+    weights: Option<PathBuf>,
     /// Also draw a second frame of each view from a camera that has moved a little, for training's temporal term.
     #[arg(long)]
     motion: bool,
@@ -151,7 +155,11 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make the folder {}", args.out.display()))?;
     interrupt::install()?;
     let gpu = global.open_gpu()?;
-    let options = RendererOptions { method: Method::Gather(gather::Options::default()), ..Default::default() };
+    let method = match &args.weights {
+        Some(path) => Method::Neural(Box::new(super::args::load_weights(Some(path))?.into())),
+        None => Method::Gather(gather::Options::default()),
+    };
+    let options = RendererOptions { method, ..Default::default() };
     let renderer = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
     let kernel = (args.spp > 0).then(|| Kernel::new(&gpu.device));
     let Args { spp, motion, guides, gi_frames, ref out, ref moments, .. } = args;
@@ -163,7 +171,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     moments.sort();
     moments.dedup();
     let (out, listed) = (out.clone(), HashSet::new());
-    let mut writer = Writer { gpu, renderer, kernel, spp, motion, guides, gi_frames, moments, out, listed };
+    let mut writer =
+        Writer { gpu, renderer, kernel, spp, motion, guides, gi_frames, moments, reader: None, out, listed };
     writer.open_list()?;
     match (args.recipe, &args.rooms, &args.scene) {
         (Recipe::PaperRoom | Recipe::PaperRoomVaried | Recipe::Home, Some(rooms), _) => {
@@ -206,6 +215,7 @@ struct Writer {
     gi_frames: u32,
     /// What cells remember is written instead, at these moments.
     moments: Vec<When>,
+    reader: Option<moments::Reader>,
     out: PathBuf,
     /// Names in the list of checksums.
     listed: HashSet<String>,
@@ -266,7 +276,8 @@ impl Writer {
         let go_on = || !interrupt::requested();
         let scene = (&scene.raster, traced, kernel);
         let asked = (self.moments.as_slice(), self.spp, seed);
-        let lesson = moments::lesson(&self.gpu, &mut self.renderer, scene, camera, asked, go_on)?;
+        let reader = self.reader.get_or_insert_with(|| moments::Reader::new(&self.gpu.device));
+        let lesson = moments::lesson(&self.gpu, (&mut self.renderer, reader), scene, camera, asked, go_on)?;
         interrupt::check()?;
         lesson.map_or(Ok(()), |lesson| self.save(stem, lesson.to_bytes()?))
     }

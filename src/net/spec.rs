@@ -62,7 +62,7 @@ pub const SCREEN_V1: &[FeatureRow] = &[
 
 /// Table `cells`, version 1: what `gather` remembers of each cell; `gi::neural::memory` says what the encodings are.
 pub const CELLS_V1: &[FeatureRow] = &[
-    row("light", 1, &["log1p_over_exposure"]),
+    row("light", 1, &["over_sum_with_exposure"]),
     row("chroma", 2, &["differences_over_sum"]),
     row("deviation", 1, &["log1p_over_light"]),
     row("frames", 1, &["inverse_root"]),

@@ -29,7 +29,7 @@ pub enum When {
 }
 
 /// Frames of a pan.
-pub const PAN: u32 = 12;
+pub const PAN: u32 = 6;
 
 /// Planes that a moment takes: features, memory, light.
 pub const PLANES: u64 = CHANNELS as u64 + PAST / 4 + 12;
@@ -68,7 +68,7 @@ pub struct Lesson {
 /// What drawing, tracing and reading back report; `None` where `go_on` said no.
 pub fn lesson(
     gpu: &Gpu,
-    renderer: &mut Renderer,
+    (renderer, reader): (&mut Renderer, &mut Reader),
     (raster, traced, kernel): (&SceneGpu, &ReferenceScene, &Kernel),
     camera: &Camera,
     (moments, samples, seed): (&[When], u32, u32),
@@ -101,7 +101,7 @@ pub fn lesson(
             fresh = false;
         }
         let view = View::new(camera, size, [0.0; 2]);
-        let (moment, own) = read_moment(gpu, renderer, &view, raster.environment.radiance, when)?;
+        let (moment, own) = reader.read(gpu, renderer, &view, raster.environment.radiance, when)?;
         pixels = own;
         read.push(moment);
     }
@@ -172,47 +172,60 @@ fn draw(
     Ok(())
 }
 
-/// The memory of the last frame, and the pixel of each cell.
-fn read_moment(
-    gpu: &Gpu,
-    renderer: &Renderer,
-    view: &View,
-    environment: [f32; 3],
-    when: When,
-) -> Result<(Moment, Vec<u32>), DatasetError> {
-    let (device, queue) = (&gpu.device, &gpu.queue);
-    let Some(memory) = renderer.memory() else { return Err(crate::gi::GiError::Rays.into()) };
-    let inputs = renderer.gi_inputs(view, environment);
-    let mut group = InputGroup::new(device);
-    let bound = group.bind(queue, &inputs)?;
-    let exposure = ExposurePass::new(device, &group);
-    let mut pass = FeaturesPass::new(device, &group);
-    let count = u64::from(bound.cells[0]) * u64::from(bound.cells[1]);
-    let target = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("gi.features"),
-        size: count * 4 * u64::from(PITCH),
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.create_command_encoder(&Default::default());
-    let mut recorder = Recorder::new(&mut encoder);
-    exposure.record(&mut recorder, &bound);
-    pass.record(&mut recorder, &bound, (memory.pasts, &exposure), Bound::from(&target));
-    queue.submit([encoder.finish()]);
-    let planes = |buffer: &wgpu::Buffer, pitch: usize, channels: usize| -> Result<Vec<f32>, DatasetError> {
-        let raw = readback::buffer(device, queue, buffer, 0, count * 4 * pitch as u64)?;
-        let rows: Vec<f32> = bytemuck::pod_collect_to_vec(&raw);
-        Ok((0..channels).flat_map(|c| rows.iter().skip(c).step_by(pitch).copied()).collect())
-    };
-    let past = PAST as usize / 4;
-    let moment = Moment {
-        when,
-        features: planes(&target, PITCH as usize, CHANNELS as usize)?,
-        past: planes(memory.pasts, past, past)?,
-        shown: planes(memory.light, 12, 12)?,
-    };
-    let pixels = bytemuck::pod_collect_to_vec(&readback::buffer(device, queue, memory.pixels, 0, 4 * count)?);
-    Ok((moment, pixels))
+/// Reads what cells remember.
+pub struct Reader {
+    inputs: InputGroup,
+    exposure: ExposurePass,
+    features: FeaturesPass,
+}
+
+impl Reader {
+    /// Compiles the shaders.
+    pub fn new(device: &wgpu::Device) -> Self {
+        let inputs = InputGroup::new(device);
+        let (exposure, features) = (ExposurePass::new(device, &inputs), FeaturesPass::new(device, &inputs));
+        Self { inputs, exposure, features }
+    }
+
+    /// The memory of the last frame, and the pixel of each cell.
+    fn read(
+        &mut self,
+        gpu: &Gpu,
+        renderer: &Renderer,
+        view: &View,
+        environment: [f32; 3],
+        when: When,
+    ) -> Result<(Moment, Vec<u32>), DatasetError> {
+        let (device, queue) = (&gpu.device, &gpu.queue);
+        let Some(memory) = renderer.memory() else { return Err(crate::gi::GiError::Rays.into()) };
+        let bound = self.inputs.bind(queue, &renderer.gi_inputs(view, environment))?;
+        let count = u64::from(bound.cells[0]) * u64::from(bound.cells[1]);
+        let target = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("gi.features"),
+            size: count * 4 * u64::from(PITCH),
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let mut recorder = Recorder::new(&mut encoder);
+        self.exposure.record(&mut recorder, &bound);
+        self.features.record(&mut recorder, &bound, (memory.pasts, &self.exposure), Bound::from(&target));
+        queue.submit([encoder.finish()]);
+        let planes = |buffer: &wgpu::Buffer, pitch: usize, channels: usize| -> Result<Vec<f32>, DatasetError> {
+            let raw = readback::buffer(device, queue, buffer, 0, count * 4 * pitch as u64)?;
+            let rows: Vec<f32> = bytemuck::pod_collect_to_vec(&raw);
+            Ok((0..channels).flat_map(|c| rows.iter().skip(c).step_by(pitch).copied()).collect())
+        };
+        let past = PAST as usize / 4;
+        let moment = Moment {
+            when,
+            features: planes(&target, PITCH as usize, CHANNELS as usize)?,
+            past: planes(memory.pasts, past, past)?,
+            shown: planes(memory.light, 12, 12)?,
+        };
+        let pixels = bytemuck::pod_collect_to_vec(&readback::buffer(device, queue, memory.pixels, 0, 4 * count)?);
+        Ok((moment, pixels))
+    }
 }
 
 impl When {

@@ -15,6 +15,7 @@ mod edges;
 #[cfg(feature = "io")]
 mod embed;
 mod embedding;
+mod filter;
 mod foreign;
 mod gather;
 mod glossy;

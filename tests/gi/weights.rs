@@ -1,6 +1,7 @@
 //! A tiny weights file in memory: a 1×1 and a 3×3 convolution on all features of the G-buffer.
 
 use bouncelight::gi::features::{FEATURES, FeatureSet};
+use bouncelight::net::format::{CELLS_V1, FeatureRow, SCREEN_V1, Weights};
 use safetensors::tensor::{Dtype, TensorView};
 
 use crate::shot::Random;
@@ -43,32 +44,53 @@ pub fn bytes(replace: Option<(&str, &str)>) -> Vec<u8> {
 }
 
 /// The loaded file.
-pub fn weights() -> bouncelight::net::format::Weights {
-    bouncelight::net::format::Weights::from_bytes(&bytes(None)).expect("a sound file")
+pub fn weights() -> Weights {
+    Weights::from_bytes(&bytes(None)).expect("a sound file")
 }
 
 /// Weights that answer the same six numbers everywhere: a gain and a rest on what method `gather` says.
-pub fn constant_gain(answer: [f32; 6]) -> bouncelight::net::format::Weights {
-    let inputs: Vec<String> = FEATURES
-        .iter()
-        .zip(bouncelight::net::format::SCREEN_V1)
-        .map(|(f, row)| {
-            format!(r#"{{"name": "{}", "channels": {}, "encoding": "{}"}}"#, f.name, f.channels, row.encodings[0])
-        })
-        .collect();
+pub fn constant_gain(answer: [f32; 6]) -> Weights {
+    linear("screen", SCREEN_V1, "gain_and_rest_on_guess", &[0.0; 6 * 24], &answer)
+}
+
+/// Weights of a filter that answer the same twelve numbers everywhere.
+pub fn constant_filter(answer: [f32; 12]) -> Weights {
+    linear("cells", CELLS_V1, "filter", &[0.0; 12 * 15], &answer)
+}
+
+/// Weights of a filter that answer what chance makes of a cell, up to `most`.
+pub fn random_filter(most: f32) -> Weights {
+    let mut random = Random(7);
+    let numbers: Vec<f32> = (0..12 * 15).map(|_| most * (2.0 * random.unit() - 1.0)).collect();
+    linear("cells", CELLS_V1, "filter", &numbers, &[0.0; 12])
+}
+
+/// One 1×1 convolution on a whole table.
+fn linear(table: &str, rows: &[FeatureRow], meaning: &str, weight: &[f32], bias: &[f32]) -> Weights {
+    Weights::from_bytes(&linear_bytes(table, rows, meaning, weight, bias)).expect("a sound file")
+}
+
+/// The bytes of such a file.
+pub fn linear_bytes(table: &str, rows: &[FeatureRow], meaning: &str, weight: &[f32], bias: &[f32]) -> Vec<u8> {
+    let row = |r: &FeatureRow| {
+        format!(r#"{{"name": "{}", "channels": {}, "encoding": "{}"}}"#, r.name, r.channels, r.encodings[0])
+    };
+    let inputs: Vec<String> = rows.iter().map(row).collect();
+    let channels: u32 = rows.iter().map(|r| r.channels).sum();
+    let outputs = bias.len();
     let document = format!(
-        r#"{{"version": 2, "licence": "CC0-1.0", "table": {{"name": "screen", "version": 1}}, "inputs": [{}],
-            "cell": 4, "output": {{"tensor": "y", "meaning": "gain_and_rest_on_guess", "channels": 6}},
-            "graph": [{{"op": "conv2d", "name": "a", "input": "input", "output": "y", "in_channels": 24,
-                "out_channels": 6, "kernel": [1, 1]}}]}}"#,
+        r#"{{"version": 2, "licence": "CC0-1.0", "table": {{"name": "{table}", "version": 1}}, "inputs": [{}],
+            "cell": 4, "output": {{"tensor": "y", "meaning": "{meaning}", "channels": {outputs}}},
+            "graph": [{{"op": "conv2d", "name": "a", "input": "input", "output": "y", "in_channels": {channels},
+                "out_channels": {outputs}, "kernel": [1, 1]}}]}}"#,
         inputs.join(", ")
     );
     let bytes = |v: &[f32]| -> Vec<u8> { v.iter().flat_map(|x| x.to_le_bytes()).collect() };
-    let tensors = [("a.weight", vec![6, 24, 1, 1], bytes(&[0.0; 144])), ("a.bias", vec![6], bytes(&answer))];
+    let shape = vec![outputs, channels as usize, 1, 1];
+    let tensors = [("a.weight", shape, bytes(weight)), ("a.bias", vec![outputs], bytes(bias))];
     let views = tensors
         .iter()
         .map(|(name, shape, data)| (*name, TensorView::new(Dtype::F32, shape.clone(), data).expect("sizes agree")));
     let metadata = std::collections::HashMap::from([("bouncelight".to_string(), document)]);
-    let file = safetensors::serialize(views, Some(metadata)).expect("serialises");
-    bouncelight::net::format::Weights::from_bytes(&file).expect("a sound file")
+    safetensors::serialize(views, Some(metadata)).expect("serialises")
 }

@@ -147,6 +147,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     }
     let plane = strictness_at(here.x);
     let own = guidance_at(cell);
+    let share = guided_share(here.frames);
     var radius = select(WIDE, NARROW, here.frames >= SETTLED);
     if (gather.flags & GATHER_NO_BLUR) != 0u { radius = 0; }
     var sum = vec3f(0.0);
@@ -169,7 +170,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             var w = rim * alike(here, there, plane) * min(there.frames, 16.0);
             if (gather.flags & GATHER_GUIDED) != 0u {
                 let other = guidance_at(neighbour);
-                w *= kinship(own.near, other.near) * exp(other.trust);
+                w *= kinship(own.near, other.near, share) * exp(share * other.trust);
             }
             sum += w * there.light;
             vector += w * there.vector;

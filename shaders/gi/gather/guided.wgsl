@@ -1,7 +1,7 @@
 // What a network says of a cell, three vectors; all zeros is the filter without one. `gi::neural::filter` documents their limits.
 struct Guidance {
-    // Places of the cell in two spaces: cells count for each other by exp(-distance²) there, among its neighbours and among
-    // those further away.
+    // Places of the cell in two spaces: cells count for each other by 1/(1 + distance²)² there, among its neighbours and
+    // among those further away.
     near: vec4f,
     far: vec4f,
     // Logarithms: how much it counts for its neighbours, how much noise it allows for, what its light is multiplied by.
@@ -10,6 +10,8 @@ struct Guidance {
     gain: f32,
 }
 
+// Frames up to which what a network says counts in full; it has learnt of no older means than these. Later by so much less.
+const GUIDED_FRAMES = 12.0;
 const MOST_TRUST = 4.0;
 const MOST_TOLERANCE = 4.0;
 // A cell's light becomes at most a third brighter or darker.
@@ -29,7 +31,12 @@ fn guidance_from(a: vec4f, b: vec4f, c: vec4f) -> Guidance {
     );
 }
 
-fn kinship(a: vec4f, b: vec4f) -> f32 {
-    let apart = a - b;
-    return exp(-min(dot(apart, apart), 60.0));
+fn guided_share(frames: f32) -> f32 {
+    return min(1.0, GUIDED_FRAMES / max(frames, 1.0));
+}
+
+fn kinship(a: vec4f, b: vec4f, share: f32) -> f32 {
+    let apart = share * (a - b);
+    let once = 1.0 + min(dot(apart, apart), 1e12);
+    return 1.0 / (once * once);
 }

@@ -47,6 +47,7 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     let cell = cell_index(id.xy);
     let here = blurred_at(cell);
     var own = Guidance();
+    let share = guided_share(here.frames);
     if (gather.flags & GATHER_GUIDED) != 0u {
         own = guidance_from(guidance[3u * cell], guidance[3u * cell + 1u], guidance[3u * cell + 2u]);
     }
@@ -66,11 +67,11 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
             if there.frames <= 0.0 { continue; }
             let apart = there.luminance - here.luminance;
             // Two means of the same light differ by their two variances.
-            let noise = 2.0 * exp(own.tolerance) * (here.variance + there.variance);
+            let noise = 2.0 * exp(share * own.tolerance) * (here.variance + there.variance);
             var w = taps[abs(step.x)] * taps[abs(step.y)] * exp(-min(apart * apart / max(noise, 1e-30), 60.0));
             w *= same_surface(there.x - here.x, here.n, there.n, strictness);
             if (gather.flags & GATHER_GUIDED) != 0u {
-                w *= kinship(own.far, finite4(guidance[3u * other + 1u]));
+                w *= kinship(own.far, finite4(guidance[3u * other + 1u]), share);
             }
             red += w * there.red;
             green += w * there.green;
@@ -81,7 +82,7 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
         green /= total;
         blue /= total;
     }
-    let gain = exp(own.gain);
+    let gain = exp(share * own.gain);
     light[3u * cell] = vec4f(gain * red, 0.0);
     light[3u * cell + 1u] = vec4f(gain * green, 0.0);
     light[3u * cell + 2u] = vec4f(gain * blue, 0.0);

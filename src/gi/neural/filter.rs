@@ -12,7 +12,7 @@
 use super::memory::{self, FeaturesPass};
 use super::trained::Neural;
 use crate::gi::gather::{GUIDANCE, GatherGi};
-use crate::gi::interface::technique::{Cost, Technique};
+use crate::gi::interface::technique::{Cost, Memory, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage;
 use crate::gi::stage::exposure::ExposurePass;
@@ -145,6 +145,10 @@ impl Technique for FilterGi {
 
     fn gloss(&self) -> Option<&wgpu::TextureView> {
         self.gather.gloss()
+    }
+
+    fn memory(&self) -> Option<Memory<'_>> {
+        self.gather.memory()
     }
 
     fn layers(&self) -> Vec<&str> {

@@ -12,7 +12,7 @@ use crate::gpu::{shaders, timing::Recorder};
 ///
 /// | name | what it holds |
 /// |---|---|
-/// | `light` | ln(1 + L/s) |
+/// | `light` | L / (L + s) |
 /// | `chroma` | (red − green) and (blue − green) over the sum of the three |
 /// | `deviation` | ln(1 + standard deviation of single frames / L) |
 /// | `frames` | 1/√(frames in the mean) |

@@ -5,8 +5,8 @@ import torch.nn.functional as F
 LUMINANCE = torch.tensor([0.2126, 0.7152, 0.0722])
 # Of shaders/gi/gather/blur.wgsl and smooth.wgsl.
 SETTLED, NARROW, WIDE, STRIDE = 6, 2, 4, 4
-# Of shaders/gi/gather/guided.wgsl: numbers of a cell, and their limits.
-GUIDANCE, MOST_TRUST, MOST_TOLERANCE, MOST_GAIN = 12, 4.0, 4.0, 0.3
+# Of shaders/gi/gather/guided.wgsl: numbers of a cell, frames up to which they count in full, and their limits.
+GUIDANCE, GUIDED_FRAMES, MOST_TRUST, MOST_TOLERANCE, MOST_GAIN = 12, 12.0, 4.0, 4.0, 0.3
 
 
 def luminance(rgb):
@@ -31,10 +31,15 @@ def same_surface(batch, radius, stride):
     return torch.exp(-(off_plane * off_plane).clamp(max=80)) * facing ** 16 * there
 
 
-def kinship(place, radius, stride):
+def guided_share(batch):
+    """[n,h,w]: how much guidance counts."""
+    return (GUIDED_FRAMES / batch["frames"].clamp(min=1)).clamp(max=1)
+
+
+def kinship(place, share, radius, stride):
     """[n,k,h,w] of places [n,4,h,w]."""
-    apart = around(place, radius, stride) - place.unsqueeze(2)
-    return torch.exp(-(apart * apart).sum(1).clamp(max=60))
+    apart = share.view(len(share), 1, 1, *share.shape[1:]) * (around(place, radius, stride) - place.unsqueeze(2))
+    return 1 / (1 + (apart * apart).sum(1)) ** 2
 
 
 def limited(x, most):
@@ -54,7 +59,8 @@ def blur(batch, near, trust):
         frames = around(batch["frames"].unsqueeze(1), radius)[:, 0]
         fixed = rim * same_surface(batch, radius, 1) * frames.clamp(max=16)
         light, square = around(batch["light"], radius), around(batch["square"].unsqueeze(1), radius)[:, 0]
-    w = fixed * kinship(near, radius, 1) * torch.exp(around(trust.unsqueeze(1), radius)[:, 0])
+    share = guided_share(batch)
+    w = fixed * kinship(near, share, radius, 1) * torch.exp(share.unsqueeze(1) * around(trust.unsqueeze(1), radius)[:, 0])
     total = w.sum(1).clamp(min=1e-30)
     mean = (w.unsqueeze(1) * light).sum(2) / total.unsqueeze(1)
     squares = (w * square).sum(1) / total
@@ -68,11 +74,12 @@ def smooth(batch, mean, variance, far, tolerance):
     weights = (taps.view(-1, 1) * taps.view(1, -1)).reshape(1, -1, 1, 1)
     bright = luminance(mean)
     apart = around(bright.unsqueeze(1), 2, STRIDE)[:, 0] - bright.unsqueeze(1)
-    noise = 2 * torch.exp(tolerance).unsqueeze(1) * (variance.unsqueeze(1) + around(variance.unsqueeze(1), 2, STRIDE)[:, 0])
+    share = guided_share(batch)
+    noise = 2 * torch.exp(share * tolerance).unsqueeze(1) * (variance.unsqueeze(1) + around(variance.unsqueeze(1), 2, STRIDE)[:, 0])
     with torch.no_grad():
         same = weights * same_surface(batch, 2, STRIDE)
         same[:, 12] = 0
-    w = same * torch.exp(-(apart * apart / noise.clamp(min=1e-30)).clamp(max=60)) * kinship(far, 2, STRIDE)
+    w = same * torch.exp(-(apart * apart / noise.clamp(min=1e-30)).clamp(max=60)) * kinship(far, share, 2, STRIDE)
     return (mean + (w.unsqueeze(1) * around(mean, 2, STRIDE)).sum(2)) / (1 + w.sum(1)).unsqueeze(1)
 
 
@@ -86,4 +93,4 @@ def filtered(batch, answer=None):
     # A difference of means squared over a variance of nothing has no slope worth having.
     least = 1e-8 * (luminance(mean) ** 2).detach()
     shown = smooth(batch, mean, torch.maximum(variance, least), far, tolerance)
-    return shown * torch.exp(gain).unsqueeze(1), mean
+    return shown * torch.exp(guided_share(batch) * gain).unsqueeze(1), mean

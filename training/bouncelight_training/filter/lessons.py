@@ -12,6 +12,8 @@ from ..errors import TrainingError
 # Table `cells`, version 1 (src/gi/neural/memory.rs).
 TABLE = [("light", 1), ("chroma", 2), ("deviation", 1), ("frames", 1), ("lately", 1), ("nearness", 1), ("depth", 1), ("normal", 3), ("hit", 1), ("towards", 3)]
 CHANNELS = sum(n for _, n in TABLE)
+# Root mean square error of a cell's target over the picture's mean above which the picture teaches nothing.
+MOST_NOISE = 2.0
 
 
 def unpack_normals(bits):
@@ -40,7 +42,7 @@ class Lesson:
         self.shown = np.maximum(np.stack([shown[4 * c + 3] + (shown[4 * c:4 * c + 3] * n).sum(0) for c in range(3)]), 0)
         self.strictness = 1 / (0.5 * foot * np.maximum(z, 1e-9))
         self.features, self.light, self.square, self.x, self.n, self.frames = file[f"features.{when}"], past[0:3], past[7], past[8:11], n, frames
-        self.target = file["light"]
+        self.target, self.noise, self.base = file["light"], float(file["noise"][0]), 0.0
         self.mask = (frames > 0) & np.isfinite(self.target).all(0)
         for field in ("features", "light", "square", "x", "n", "frames", "strictness", "shown", "target"):
             setattr(self, field, torch.from_numpy(np.ascontiguousarray(np.nan_to_num(getattr(self, field), posinf=0, neginf=0), np.float32)))
@@ -50,7 +52,7 @@ class Lesson:
 
 
 def read(folder):
-    """All moments of all views of a folder; pictures without light are left out."""
+    """All moments of all views of a folder; pictures without light, or with more noise than light, are left out."""
     paths = sorted(glob.glob(os.path.join(folder, "*.safetensors")))
     if not paths:
         raise TrainingError(f"{folder}: no samples; make them with bouncelight dataset --moments")
@@ -62,7 +64,7 @@ def read(folder):
             made = [Lesson(file, when, os.path.basename(path).removesuffix(".safetensors")) for when in moments]
         except (OSError, SafetensorError, KeyError) as error:
             raise TrainingError(f"{path}: not a lesson of a filter: {error}; make it with bouncelight dataset --moments") from error
-        lessons += [lesson for lesson in made if lesson.mean > 1e-6 and lesson.mask.float().mean() > 0.2]
+        lessons += [lesson for lesson in made if lesson.mean > 1e-6 and lesson.mask.float().mean() > 0.2 and lesson.noise < MOST_NOISE]
     return lessons
 
 
@@ -71,4 +73,6 @@ def stacked(lessons):
     fields = ("features", "light", "square", "x", "n", "frames", "strictness", "target", "mask")
     batch = {field: torch.stack([getattr(lesson, field) for lesson in lessons]) for field in fields}
     batch["mean"] = torch.tensor([lesson.mean for lesson in lessons])
+    batch["noise"] = torch.tensor([lesson.noise for lesson in lessons])
+    batch["base"] = torch.tensor([lesson.base for lesson in lessons])
     return batch

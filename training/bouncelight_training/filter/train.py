@@ -15,6 +15,7 @@ import time
 
 import numpy as np
 import torch
+import torch.nn.functional as F
 from torch import nn
 
 from ..errors import TrainingError, reported
@@ -24,6 +25,10 @@ from ..provenance import commit, machine_of
 from ..weights import GraphNet, unet
 from . import blur, lessons
 
+# Of the loss of `gather`: a picture that is right already teaches nothing.
+LEAST_BASE = 0.01
+# A picture that has become so much worse counts no more than this.
+LOUD = 2.0
 FIELDS = ["step", "samples", "seconds", "learning_rate", "loss", "validation_error"]
 
 
@@ -38,7 +43,7 @@ class Config:
     without: tuple = ()  # features of the table that are zeroed, for ablations
     minutes: float = 20.0
     batch: int = 4
-    learning_rate: float = 2e-3
+    learning_rate: float = 1e-3
     weight_decay: float = 1e-4
     ema: float = 0.998
     gain: float = 1.0  # weight of staying with the light as it is: mean square of the gain's logarithm
@@ -70,16 +75,29 @@ def kept_channels(config):
     return torch.tensor([float(name not in config.without) for name, n in lessons.TABLE for _ in range(n)]).view(1, -1, 1, 1)
 
 
-def loss_of(shown, target, mask, mean):
-    """Square of the difference over light here and in the picture: without bias on targets that hold noise, and even to bright and dark. A cell
-    whose difference is beyond five times both counts by the root: a firefly of the path tracer."""
-    mean = mean.view(-1, 1, 1, 1)
-    scale = (shown.detach().clamp(min=0) + 0.05 * mean) * mean
-    error = (shown - target) ** 2 / scale
-    most = (25 * (shown.detach() + mean) ** 2) / scale
-    error = torch.where(error > most, torch.sqrt(error * most + 1e-12), error)
-    weight = mask.unsqueeze(1)
-    return ((error * weight).sum((1, 2, 3)) / (3 * weight.sum((1, 2, 3))).clamp(min=1)).clamp(max=1).mean()
+def loss_of(shown, target, mask, mean, noise):
+    """Square of the difference over light here and in the picture, of cells and of means over 2x2 and 4x4 of them: without bias on targets that
+    hold noise, and even to bright and dark: [n]. Each is weighed by how much of it the target's noise is; a place whose difference is beyond five
+    times both lights counts by the root: a firefly of the path tracer. shown, target [n,3,h,w], mask [n,h,w], mean and noise [n]."""
+    mean, weight = mean.view(-1, 1, 1, 1), mask.unsqueeze(1).to(shown.dtype)
+    loss = 0.0
+    for size in (1, 2, 4):
+        share = F.avg_pool2d(weight, size)
+        pooled = [F.avg_pool2d(x * weight, size) / share.clamp(min=1e-6) for x in (shown, target)]
+        here = pooled[0].detach().clamp(min=0)
+        scale = (here + 0.05 * mean) * mean
+        error, most = (pooled[0] - pooled[1]) ** 2 / scale, 25 * (here + mean) ** 2 / scale
+        error = torch.where(error > most, torch.sqrt(error * most + 1e-12), error)
+        means = (error * share).sum((1, 2, 3)) / (3 * share.sum((1, 2, 3))).clamp(min=1)
+        loss = loss + means * 0.02 / (0.02 + (noise / size) ** 2)
+    return loss
+
+
+def held(answer, gain):
+    """What keeps an answer [n,12,h,w] small where nothing speaks for it, and within its limits."""
+    limits = torch.tensor([blur.MOST_TRUST, blur.MOST_TOLERANCE, blur.MOST_GAIN]).view(1, 3, 1, 1)
+    beyond = (answer[:, 8:11].abs() - limits).clamp(min=0)
+    return 0.01 * gain * (answer[:, 10] ** 2).mean() + 1e-3 * (answer[:, :8] ** 2).mean() + 0.01 * (beyond ** 2).mean()
 
 
 def mirrored(batch, rng):
@@ -163,8 +181,11 @@ class Run:
             batch = mirrored(lessons.stacked(own), rng)
             answer = self.model(batch["features"] * self.channels)
             shown, first = blur.filtered(batch, answer)
-            loss = (1 - c.raw) * loss_of(shown, batch["target"], batch["mask"], batch["mean"]) + c.raw * loss_of(first, batch["target"], batch["mask"], batch["mean"])
-            loss = loss + c.gain * (answer[:, 10].clamp(-1, 1) ** 2).mean() * 0.01 + 1e-4 * (answer[:, :8] ** 2).mean()
+            learnt = [batch[k] for k in ("target", "mask", "mean", "noise")]
+            loss = (1 - c.raw) * loss_of(shown, *learnt) + c.raw * loss_of(first, *learnt)
+            # Over that of `gather` alone: a late moment counts as much as an early one, a quiet picture as much as one of fireflies.
+            loss = loss / (batch["base"] + LEAST_BASE)
+            loss = (loss / (loss.detach() / LOUD).clamp(min=1)).mean() + held(answer, c.gain)
             (loss * len(own) / c.batch).backward()
             loss_sum += loss.item() * len(own) / c.batch
         nn.utils.clip_grad_norm_(self.model.parameters(), 0.5)
@@ -196,6 +217,10 @@ def train(config, folder):
     run.load()
     with open(os.path.join(folder, "config.json"), "w") as file:
         json.dump(dataclasses.asdict(config), file, indent=1)
+    with torch.no_grad():
+        for lesson in views:
+            batch = lessons.stacked([lesson])
+            lesson.base = loss_of(blur.filtered(batch)[0], *(batch[k] for k in ("target", "mask", "mean", "noise"))).item()
     print(f"{parameter_count(run.model)} parameters, {flops(run.model, 128, 256) / 1e9:.3f} GFLOP at 256x128 cells; {len(views)} training and {len(held_out)} validation "
           f"moments", file=sys.stderr, flush=True)
     began, sums, looked = time.monotonic(), [], time.monotonic()
