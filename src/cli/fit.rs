@@ -186,8 +186,8 @@ fn check_learning(args: &Args, output: &Path) -> Result<()> {
     }
     image_io::check_writable(&path)?;
     let start = args.weights.first();
-    let weights = start.map_or_else(Weights::small, |path| Weights::find(Some(path)))?;
-    let named = || start.map_or("the shipped `small`".into(), |path| path.display().to_string());
+    let weights = Weights::find(start.map(PathBuf::as_path))?;
+    let named = || start.map_or("the shipped weights".into(), |path| path.display().to_string());
     learn::check(&weights, cells_of(args.scene.size)).with_context(named)
 }
 
@@ -202,8 +202,8 @@ fn learn(
     let scene =
         Path::new(&args.scene.scene).file_stem().map_or(args.scene.scene.clone().into(), |s| s.to_string_lossy());
     let command: Vec<String> = std::env::args().skip(1).collect();
-    // The shipped networks come first of `options`: `filter`, then `small`, which can learn.
-    let start = 1 + usize::from(!args.weights.is_empty());
+    // The shipped network comes first of `options`.
+    let start = usize::from(!args.weights.is_empty());
     let learning =
         Learning { minutes, start, scene: scene.into_owned(), command: format!("bouncelight {}", command.join(" ")) };
     let mut progress = Progress::new(global, "seconds", 1);
@@ -237,8 +237,7 @@ fn typed(e: TrialError) -> anyhow::Error {
 }
 
 fn options(global: &Global, gpu: &Gpu, args: &Args) -> Result<FitOptions> {
-    let mut networks =
-        vec![(PathBuf::from("filter"), Weights::shipped()?), (PathBuf::from("small"), Weights::small()?)];
+    let mut networks = vec![(PathBuf::from("small"), Weights::shipped()?)];
     for path in &args.weights {
         // The record must still name them when somebody reads it in another folder.
         let whole = std::fs::canonicalize(path).with_context(|| format!("cannot read {}", path.display()))?;

@@ -10,7 +10,7 @@ use super::{
     reference, sequence,
 };
 use crate::{
-    gi::Method,
+    gi::{Method, gather, pass::Neural},
     gpu::Gpu,
     image_io, metrics,
     render::{
@@ -37,7 +37,7 @@ pub struct Args {
     /// what `fit` found for the scene, else `gather`, `neural` with --weights.
     #[arg(long, value_parser = MethodParser)]
     method: Option<MethodName>,
-    /// Weights of `neural`; the shipped ones (`filter`) when absent.
+    /// Weights of `neural`; the shipped ones (`small`) when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
     #[command(flatten)]
@@ -54,7 +54,7 @@ pub struct Args {
     gi_frames: Option<u32>,
     /// Numbers of `gather` other than its own, such as `blur=0,cell_frames=256`; `plain` forgets and blurs nothing.
     #[arg(long, value_name = "NAME=VALUE,...")]
-    gather: Option<crate::gi::gather::Options>,
+    gather: Option<gather::Options>,
     /// Light of what the picture does not show, for `ambient` and `ssgi`: shares of the sky's and
     /// of its surfaces' light.
     #[arg(long, value_name = "sky=X,bounce=Y")]
@@ -125,6 +125,14 @@ impl Args {
     }
 }
 
+/// The method, a network's with other numbers of the `gather` that it builds on.
+fn gathering(method: Method, options: Option<gather::Options>) -> Method {
+    match (method, options) {
+        (Method::Neural(neural), Some(gather)) => Method::Neural(Box::new(Neural { gather, ..*neural })),
+        (method, _) => method,
+    }
+}
+
 pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let loaded = args.obey(global)?;
     let format = check(&args)?;
@@ -136,7 +144,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
                 MethodName::Gather => Method::Gather(args.gather.unwrap_or_default()),
                 MethodName::Ambient => args.unseen.map_or(Method::Ambient, Method::AmbientWith),
                 MethodName::Ssgi => args.unseen.map_or(Method::Ssgi, Method::SsgiWith),
-                _ => name.method(global, args.weights.as_ref())?,
+                _ => gathering(name.method(global, args.weights.as_ref())?, args.gather),
             };
             Task::Rasterise(method, layers.unwrap_or_default())
         }
@@ -318,8 +326,8 @@ fn check(args: &Args) -> Result<Format> {
             "--gi-frames belongs to methods gather and neural; `{name}` does not settle over frames"
         )));
     }
-    if args.gather.is_some() && args.method() != MethodName::Gather {
-        return Err(usage(format!("--gather belongs to --method gather, not to `{name}`")));
+    if args.gather.is_some() && !settles {
+        return Err(usage(format!("--gather belongs to methods gather and neural, not to `{name}`")));
     }
     if args.unseen.is_some() && ![MethodName::Ambient, MethodName::Ssgi].contains(&args.method()) {
         return Err(usage(format!("--unseen belongs to methods ambient and ssgi, not to `{name}`")));

@@ -27,28 +27,12 @@ fn an_answer_of_zeros_is_gather_to_the_bit() {
     assert_eq!(filtered(&gpu, constant_filter([0.0; 12]), &room(1.0)), alone);
     // Places and trust that are the same everywhere say nothing.
     let mut same = [2.0; 12];
-    (same[9], same[10], same[11]) = (0.0, 0.0, 5.0);
+    (same[9], same[10], same[11]) = (0.0, 5.0, 5.0);
     let apart = difference(&filtered(&gpu, constant_filter(same), &room(1.0)), &alone);
     // What differs from cell to cell says something, and so does a tolerance.
     let other = difference(&filtered(&gpu, random_filter(3.0), &room(1.0)), &alone);
     println!("the same everywhere {apart:e}, by chance {other:.5}");
     assert!(apart < 1e-3 && other > 2e-3, "{apart} {other}");
-}
-
-#[test]
-fn light_is_multiplied_within_limits_and_by_less_where_it_is_known() {
-    let Some(gpu) = common::gpu() else { return };
-    let alone = light(&gpu, &mut renderer(&gpu, SIZE, gather()), &room(1.0));
-    // A frame of 32 and three more of the first: twelve count in full (guided.wgsl).
-    let share = 12.0 / 35.0;
-    for (gain, factor) in [(0.2f32, (0.2f32 * share).exp()), (9.0, (0.3 * share).exp()), (-9.0, (-0.3 * share).exp())] {
-        let mut answer = [0.0; 12];
-        answer[10] = gain;
-        let found = filtered(&gpu, constant_filter(answer), &room(1.0));
-        let expected: Vec<f32> = alone.iter().map(|c| factor * c).collect();
-        let (near, control) = (difference(&found, &expected), difference(&found, &alone));
-        assert!(near < 0.01 && control > 0.05, "{gain}: {near} from what is expected, {control} from no gain");
-    }
 }
 
 #[test]

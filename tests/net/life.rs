@@ -60,7 +60,7 @@ fn any_size_is_padded_inside() {
     {
         assert_eq!(pix2pix.inner_size(size[0], size[1]).unwrap(), inner);
     }
-    let compact = Weights::small().unwrap().graph;
+    let compact = Weights::shipped().unwrap().graph;
     assert_eq!(compact.inner_size(37, 21).unwrap(), [37, 21], "a network that takes any size is not padded");
     let gpu = common::gpu();
     let weights = hashed::network(&unet());

@@ -8,7 +8,7 @@ use bouncelight::net::plan::Precision;
 #[test]
 fn every_layer_can_be_read_as_the_cpu_twin_computes_it() {
     let Some(gpu) = common::gpu() else { return };
-    let weights = Weights::small().unwrap();
+    let weights = Weights::shipped().unwrap();
     let shape = Shape { channels: weights.graph.input_channels, width: 24, height: 16 };
     let wave = |i: usize| (i as f32 * 0.37).sin();
     let input = Tensor { shape, data: (0..shape.channels as usize * 384).map(wave).collect() };

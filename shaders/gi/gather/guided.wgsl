@@ -4,21 +4,18 @@ struct Guidance {
     // among those further away.
     near: vec4f,
     far: vec4f,
-    // Logarithms: how much it counts for its neighbours, how much noise it allows for, what its light is multiplied by.
+    // Logarithms: how much it counts for its neighbours, how much noise it allows for.
     trust: f32,
     tolerance: f32,
-    gain: f32,
 }
 
-// Frames up to which what a network says counts in full; it has learnt of no older means than these. Later by so much less.
-const GUIDED_FRAMES = 12.0;
-const MOST_TRUST = 4.0;
-const MOST_TOLERANCE = 4.0;
-// A cell's light becomes at most a third brighter or darker.
-const MOST_GAIN = 0.3;
+// Frames up to which what a network says counts in full; from there on the blur is narrow, and noise less. Later by
+// so much less.
+const GUIDED_FRAMES = 6.0;
+const MOST_LOG = 4.0;
 
-fn limited(x: f32, most: f32) -> f32 {
-    return clamp(finite(x), -most, most);
+fn limited(x: f32) -> f32 {
+    return clamp(finite(x), -MOST_LOG, MOST_LOG);
 }
 
 fn finite4(v: vec4f) -> vec4f {
@@ -26,9 +23,7 @@ fn finite4(v: vec4f) -> vec4f {
 }
 
 fn guidance_from(a: vec4f, b: vec4f, c: vec4f) -> Guidance {
-    return Guidance(
-        finite4(a), finite4(b), limited(c.x, MOST_TRUST), limited(c.y, MOST_TOLERANCE), limited(c.z, MOST_GAIN)
-    );
+    return Guidance(finite4(a), finite4(b), limited(c.x), limited(c.y));
 }
 
 fn guided_share(frames: f32) -> f32 {

@@ -82,8 +82,7 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
         green /= total;
         blue /= total;
     }
-    let gain = exp(share * own.gain);
-    light[3u * cell] = vec4f(gain * red, 0.0);
-    light[3u * cell + 1u] = vec4f(gain * green, 0.0);
-    light[3u * cell + 2u] = vec4f(gain * blue, 0.0);
+    light[3u * cell] = vec4f(red, 0.0);
+    light[3u * cell + 1u] = vec4f(green, 0.0);
+    light[3u * cell + 2u] = vec4f(blue, 0.0);
 }

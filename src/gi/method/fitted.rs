@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn other_weights_are_not_taken_for_those_that_were_measured() {
-        let shipped = Weights::small().unwrap().hash_text();
+        let shipped = Weights::shipped().unwrap().hash_text();
         let with = |hash: &str| Fitted {
             method: MethodName::Neural,
             gather: None,

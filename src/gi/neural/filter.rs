@@ -5,9 +5,8 @@
 //!                                    └► gi.features ─► U-Net (net.*) ──► ▲ guidance
 //! ```
 //!
-//! The network never says light. It says which cells' light is averaged, and multiplies it by at most a third
-//! (`MOST_GAIN` of `guided.wgsl`); so darkness stays dark, twice the light is twice the answer, and an answer of zeros is
-//! `gather` itself.
+//! The network never says light, it says which cells' light is averaged: darkness stays dark, twice the light is twice the
+//! answer, and an answer of zeros is `gather` itself.
 
 use super::memory::{self, FeaturesPass};
 use super::trained::Neural;
@@ -24,7 +23,7 @@ use crate::net::gpu::{Binding, Network, Setup, Tap};
 
 /// The output's meaning in weights files.
 pub const MEANING: &str = "filter";
-/// Numbers of a cell: two places in spaces of four dimensions; trust, tolerance, gain, and one that is not read.
+/// Numbers of a cell: two places in spaces of four dimensions; trust, tolerance, and two that are not read.
 pub const CHANNELS: u32 = GUIDANCE as u32 / 4;
 
 /// Whether the weights are those of a network that filters.

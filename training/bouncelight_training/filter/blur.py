@@ -5,8 +5,8 @@ import torch.nn.functional as F
 LUMINANCE = torch.tensor([0.2126, 0.7152, 0.0722])
 # Of shaders/gi/gather/blur.wgsl and smooth.wgsl.
 SETTLED, NARROW, WIDE, STRIDE = 6, 2, 4, 4
-# Of shaders/gi/gather/guided.wgsl: numbers of a cell, frames up to which they count in full, and their limits.
-GUIDANCE, GUIDED_FRAMES, MOST_TRUST, MOST_TOLERANCE, MOST_GAIN = 12, 12.0, 4.0, 4.0, 0.3
+# Of shaders/gi/gather/guided.wgsl: numbers of a cell (two are not read), frames up to which they count in full, and their limit.
+GUIDANCE, GUIDED_FRAMES, MOST_LOG = 12, 6.0, 4.0
 
 
 def luminance(rgb):
@@ -40,11 +40,6 @@ def kinship(place, share, radius, stride):
     """[n,k,h,w] of places [n,4,h,w]."""
     apart = share.view(len(share), 1, 1, *share.shape[1:]) * (around(place, radius, stride) - place.unsqueeze(2))
     return 1 / (1 + (apart * apart).sum(1)) ** 2
-
-
-def limited(x, most):
-    """Within ±most, but with a slope beyond, so that what has gone there comes back."""
-    return x + (x.clamp(-most, most) - x).detach()
 
 
 def blur(batch, near, trust):
@@ -88,9 +83,8 @@ def filtered(batch, answer=None):
     if answer is None:
         answer = torch.zeros(len(batch["frames"]), GUIDANCE, *batch["frames"].shape[1:])
     near, far = answer[:, :4], answer[:, 4:8]
-    trust, tolerance, gain = (limited(answer[:, 8 + i], most) for i, most in enumerate((MOST_TRUST, MOST_TOLERANCE, MOST_GAIN)))
+    trust, tolerance = (answer[:, c].clamp(-MOST_LOG, MOST_LOG) for c in (8, 9))
     mean, variance = blur(batch, near, trust)
     # A difference of means squared over a variance of nothing has no slope worth having.
     least = 1e-8 * (luminance(mean) ** 2).detach()
-    shown = smooth(batch, mean, torch.maximum(variance, least), far, tolerance)
-    return shown * torch.exp(guided_share(batch) * gain).unsqueeze(1), mean
+    return smooth(batch, mean, torch.maximum(variance, least), far, tolerance), mean

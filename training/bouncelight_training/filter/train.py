@@ -9,6 +9,7 @@ import argparse
 import csv
 import dataclasses
 import json
+import math
 import os
 import sys
 import time
@@ -38,15 +39,14 @@ class Config:
 
     train: str = ""
     validation: str = ""
-    widths: tuple = (16, 24, 32, 48)
+    widths: tuple = (12, 16, 24, 32)
     pointwise: int = 1  # levels with 1x1 kernels
     without: tuple = ()  # features of the table that are zeroed, for ablations
     minutes: float = 20.0
     batch: int = 4
     learning_rate: float = 1e-3
-    weight_decay: float = 1e-4
+    weight_decay: float = 1e-2
     ema: float = 0.998
-    gain: float = 1.0  # weight of staying with the light as it is: mean square of the gain's logarithm
     raw: float = 0.3  # share of the loss that looks at the first step alone
     seed: int = 1
     threads: int = 2
@@ -93,23 +93,29 @@ def loss_of(shown, target, mask, mean, noise):
     return loss
 
 
-def held(answer, gain):
+def held(answer):
     """What keeps an answer [n,12,h,w] small where nothing speaks for it, and within its limits."""
-    limits = torch.tensor([blur.MOST_TRUST, blur.MOST_TOLERANCE, blur.MOST_GAIN]).view(1, 3, 1, 1)
-    beyond = (answer[:, 8:11].abs() - limits).clamp(min=0)
-    return 0.01 * gain * (answer[:, 10] ** 2).mean() + 1e-3 * (answer[:, :8] ** 2).mean() + 0.01 * (beyond ** 2).mean()
+    beyond = (answer[:, 8:10].abs() - blur.MOST_LOG).clamp(min=0)
+    return 1e-3 * (answer[:, :8] ** 2).mean() + 0.01 * (beyond ** 2).mean()
 
 
-def mirrored(batch, rng):
-    """The batch, or its mirror image (left for right; the gravity frame's x with it)."""
-    if rng.random() < 0.5:
-        return batch
-    flipped = {k: v.flip(-1) if v.dim() > 1 else v for k, v in batch.items()}
-    features = flipped["features"].clone()
+def augmented(batch, rng):
+    """The batch, or its mirror image (left for right; the gravity frame's x with it), with its colours in another order."""
     names = [name for name, n in lessons.TABLE for _ in range(n)]
-    for name in ("normal", "towards"):
-        features[:, names.index(name)] *= -1
-    return flipped | {"features": features}
+    order = torch.from_numpy(rng.permutation(3))
+    batch = batch | {k: batch[k][:, order] for k in ("light", "target")}
+    if rng.random() < 0.5:
+        batch = {k: v.flip(-1) if v.dim() > 1 else v for k, v in batch.items()}
+        features = batch["features"].clone()
+        for name in ("normal", "towards"):
+            features[:, names.index(name)] *= -1
+        batch["features"] = features
+    features, first = batch["features"].clone(), names.index("chroma")
+    # The weights of the three colours in a luminance stay those of the order before: of a network that is to look at differences, no matter.
+    light = batch["light"]
+    total = light.sum(1).clamp(min=1e-20)
+    features[:, first], features[:, first + 1] = (light[:, 0] - light[:, 1]) / total, (light[:, 2] - light[:, 1]) / total
+    return batch | {"features": features}
 
 
 def validate(model, views, channels):
@@ -169,7 +175,7 @@ class Run:
         c = self.config
         rng = np.random.default_rng([c.seed, self.step])
         done = min((self.seconds + time.monotonic() - began) / (60 * c.minutes), 1)
-        rate = c.learning_rate * min(1, (self.step + 1) / 50) * (0.01 + 0.99 * 0.5 * (1 + np.cos(np.pi * done)))
+        rate = c.learning_rate * min(1, (self.step + 1) / 50) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * done)))
         for group in self.optimiser.param_groups:
             group["lr"] = rate
         chosen = [views[i] for i in rng.integers(0, len(views), c.batch)]
@@ -178,14 +184,14 @@ class Run:
         self.optimiser.zero_grad()
         for shape in shapes:
             own = [lesson for lesson in chosen if lesson.mask.shape == shape]
-            batch = mirrored(lessons.stacked(own), rng)
+            batch = augmented(lessons.stacked(own), rng)
             answer = self.model(batch["features"] * self.channels)
             shown, first = blur.filtered(batch, answer)
             learnt = [batch[k] for k in ("target", "mask", "mean", "noise")]
             loss = (1 - c.raw) * loss_of(shown, *learnt) + c.raw * loss_of(first, *learnt)
             # Over that of `gather` alone: a late moment counts as much as an early one, a quiet picture as much as one of fireflies.
             loss = loss / (batch["base"] + LEAST_BASE)
-            loss = (loss / (loss.detach() / LOUD).clamp(min=1)).mean() + held(answer, c.gain)
+            loss = (loss / (loss.detach() / LOUD).clamp(min=1)).mean() + held(answer)
             (loss * len(own) / c.batch).backward()
             loss_sum += loss.item() * len(own) / c.batch
         nn.utils.clip_grad_norm_(self.model.parameters(), 0.5)

@@ -1,0 +1,105 @@
+"""The filter that a network guides: torch against the shaders, in lessons that the program draws (BOUNCELIGHT=FILE); a few steps of
+training; what is refused."""
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import torch
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+from bouncelight_training.errors import TrainingError  # noqa: E402
+from bouncelight_training.filter import blur, export, lessons, train  # noqa: E402
+
+PROGRAM = os.environ.get("BOUNCELIGHT")
+SIZE = ["--size", "96x64", "--spp", "4", "--moments", "1,8,pan", "-q"]
+
+
+def draw(folder, rooms, *more):
+    """Lessons of homes. 96x64 pixels: 24x16 cells."""
+    run = subprocess.run([PROGRAM, "dataset", "--recipe", "home", "--rooms", rooms, "--views", "1", "--out", folder, *SIZE, *more], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    return lessons.read(folder)
+
+
+def off(lesson, answer):
+    """How far torch's light is from the program's, over the mean light."""
+    shown, _ = blur.filtered(lessons.stacked([lesson]), answer)
+    return (((shown[0] - lesson.shown).abs() * lesson.mask).sum() / (lesson.shown * lesson.mask).sum()).item()
+
+
+@unittest.skipUnless(PROGRAM, "SKIP: BOUNCELIGHT does not name the program")
+class WithTheProgram(unittest.TestCase):
+    def test_torch_filters_as_the_shaders_do(self):
+        with tempfile.TemporaryDirectory() as folder:
+            views = draw(os.path.join(folder, "a"), "1")
+            self.assertEqual(sorted(v.when for v in views), ["1", "8", "pan"])
+            for view in views:
+                self.assertLess(off(view, None), 1e-5, view.when)
+            # A network of random numbers: the program runs it, torch runs it, and they show the same light.
+            config = train.Config(train="a", validation="b", widths=(4, 8))
+            run = train.Run(config, folder)
+            torch.nn.init.normal_(run.model.get_submodule("head").weight, std=0.5)
+            run.average = {k: v.detach().half().float() for k, v in run.model.state_dict().items()}
+            run.best, run.rows = (1.0, run.average), [{"validation_error": 1.0}]
+            run.save()
+            file = os.path.join(folder, "random.safetensors")
+            export.export(folder, file)
+            model = run.averaged()
+            for view in draw(os.path.join(folder, "b"), "1", "--weights", file):
+                with torch.no_grad():
+                    answer = model(view.features[None])
+                near, control = off(view, answer), off(view, None)
+                self.assertLess(near, 2e-3, view.when)
+                self.assertGreater(control, 5 * near, view.when)
+
+    def test_a_few_steps_of_training_and_an_export(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for name, rooms in (("a", "1-2"), ("b", "3")):
+                draw(os.path.join(folder, name), rooms)
+            paths = ["--train", os.path.join(folder, "a"), "--validation", os.path.join(folder, "b"), "--run", os.path.join(folder, "run")]
+            train.main([*paths, "--minutes", "0.05", "--widths", "4,8"])
+            summary = export.export(os.path.join(folder, "run"), os.path.join(folder, "toy.safetensors"))
+            self.assertLessEqual(summary["value"], summary["untrained"])
+            info = subprocess.run([PROGRAM, "weights", "verify", summary["file"]], capture_output=True, text=True)
+            self.assertEqual(info.returncode, 0, info.stderr)
+            with open(os.path.join(folder, "toy.json")) as file:
+                self.assertIn("filter.train", json.load(file)["command"])
+            with self.assertRaisesRegex(TrainingError, "training and validation"):
+                train.train(train.Config(train=os.path.join(folder, "a"), validation=os.path.join(folder, "a")), os.path.join(folder, "other"))
+
+
+class Alone(unittest.TestCase):
+    def test_what_is_no_lesson_is_named(self):
+        with tempfile.TemporaryDirectory() as folder:
+            with self.assertRaisesRegex(TrainingError, "no samples"):
+                lessons.read(folder)
+            with open(os.path.join(folder, "a.safetensors"), "wb") as file:
+                file.write(b"nothing")
+            with self.assertRaisesRegex(TrainingError, "a.safetensors: not a lesson"):
+                lessons.read(folder)
+
+    def test_places_apart_keep_light_apart_and_trust_counts(self):
+        # A plane, its left half bright and its right half dark.
+        h, w = 8, 16
+        x = torch.stack([torch.arange(w).float().expand(h, w), torch.arange(h).float().view(-1, 1).expand(h, w), torch.zeros(h, w)])
+        light = torch.where(torch.arange(w) < w // 2, 1.0, 0.1).expand(3, h, w)
+        batch = {"x": x[None], "n": torch.tensor([0.0, 0, 1]).view(1, 3, 1, 1).expand(1, 3, h, w), "light": light[None], "square": (light[0] ** 2)[None],
+                 "frames": torch.full((1, h, w), 4.0), "strictness": torch.full((1, h, w), 2.0)}
+        plain, _ = blur.filtered(batch)
+        apart = torch.zeros(1, blur.GUIDANCE, h, w)
+        apart[:, 0] = apart[:, 4] = torch.where(torch.arange(w) < w // 2, 0.0, 100.0)
+        kept, _ = blur.filtered(batch, apart)
+        self.assertGreater((plain - light).abs().max().item(), 0.3)
+        self.assertLess((kept - light).abs().max().item(), 1e-5)
+        # What is trusted more pulls its neighbours' light towards its own.
+        trusted = torch.zeros(1, blur.GUIDANCE, h, w)
+        trusted[:, 8, :, :w // 2] = 2.0
+        pulled, _ = blur.filtered(batch, trusted)
+        self.assertGreater(pulled[0, 0, 4, w // 2].item(), plain[0, 0, 4, w // 2].item() + 0.05)
+
+
+if __name__ == "__main__":
+    unittest.main()
