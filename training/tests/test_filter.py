@@ -37,7 +37,10 @@ class WithTheProgram(unittest.TestCase):
             views = draw(os.path.join(folder, "a"), "1")
             self.assertEqual(sorted(v.when for v in views), ["1", "8", "pan"])
             for view in views:
-                self.assertLess(off(view, None), 1e-5, view.when)
+                # Where surfaces are curved the shaders average light with its direction, torch without: a thousandth.
+                near, control = off(view, None), off(view, torch.randn(1, blur.GUIDANCE, *view.mask.shape, generator=torch.Generator().manual_seed(1)))
+                self.assertLess(near, 2e-3, view.when)
+                self.assertGreater(control, 10 * near, view.when)
             # A network of random numbers: the program runs it, torch runs it, and they show the same light.
             config = train.Config(train="a", validation="b", widths=(4, 8))
             run = train.Run(config, folder)
