@@ -240,7 +240,7 @@ impl When {
 
 impl Lesson {
     /// The lesson as a safetensors file, all f32: `features.WHEN` [15, h, w], `past.WHEN` [20, h, w], `shown.WHEN` [12, h, w] of each
-    /// moment (WHEN: frames, or `pan`); `light` [3, h, w], `noise` [1], `view` [7].
+    /// moment (WHEN: frames, or `pan`); `light` [3, h, w], `noise` (one number), `view` (seven).
     ///
     /// # Errors
     /// [`DatasetError::Serialize`].

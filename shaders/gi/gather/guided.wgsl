@@ -1,4 +1,4 @@
-// What a network says of a cell, three vectors; all zeros is the filter without one. `gi::neural::filter` documents their limits.
+// What a network says of a cell, three vectors, the last two numbers of which are not read; all zeros is the filter without one.
 struct Guidance {
     // Places of the cell in two spaces: cells count for each other by 1/(1 + distance²)² there, among its neighbours and
     // among those further away.
