@@ -52,7 +52,8 @@ pub struct Args {
     /// A scene file or bundled scene (recipe scene).
     #[arg(long, required_if_eq("recipe", "scene"))]
     scene: Option<String>,
-    /// Views of each room (directions into which the full turn is cut; of a home, its cameras) or of the scene (drawn around its own camera).
+    /// Views of each room (directions into which the full turn is cut; of a home, its cameras) or of the
+    /// scene (drawn around its own camera).
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
     /// Seed of the views of recipe scene.
@@ -75,12 +76,14 @@ pub struct Args {
     /// Folder for the samples; those that exist are kept, so a stopped run goes on where it was.
     #[arg(long)]
     out: PathBuf,
-    /// What a network that filters learns from, instead: moments at which what cells remember is kept, frames after a cut or `pan`
-    /// (at the end of six frames of a moving camera), such as 1,2,8,pan. --spp tells the samples of the light.
-    #[arg(long, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST", conflicts_with_all = ["motion", "guides"])]
+    /// What a network that filters learns from, instead: moments at which what cells remember is kept, frames
+    /// after a cut or `pan` (at the end of six frames of a moving camera), such as 1,2,8,pan. --spp tells the
+    /// samples of the light.
+    #[arg(long, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST",
+        conflicts_with_all = ["motion", "guides"])]
     moments: Vec<When>,
-    /// Weights of a network that filters, whose light is kept beside what cells remember (with --moments): what it makes of them in
-    /// the program.
+    /// Weights of a network that filters, whose light is kept beside what cells remember (with --moments):
+    /// what it makes of them in the program.
     #[arg(long, requires = "moments", value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Also draw a second frame of each view from a camera that has moved a little, for training's temporal term.

@@ -1,5 +1,5 @@
-//! What a network that filters learns from: what `gather` remembers of a view's cells at several moments of its settling, and the
-//! light that they are to show.
+//! What a network that filters learns from: what `gather` remembers of a view's cells at several moments of
+//! its settling, and the light that they are to show.
 
 use super::dataset::DatasetError;
 use crate::{
@@ -41,7 +41,8 @@ pub struct Moment {
     pub when: When,
     /// What the network is given: [`CHANNELS`] planes.
     pub features: Vec<f32>,
-    /// What cells remember: 20 planes, as `Past` lies in memory, the normal and the halves of its fourth vector as bits.
+    /// What cells remember: 20 planes, as `Past` lies in memory, the normal and the halves of its fourth
+    /// vector as bits.
     pub past: Vec<f32>,
     /// The light that `gather` shows of each cell: three vectors, 12 planes.
     pub shown: Vec<f32>,
@@ -56,7 +57,8 @@ pub struct Lesson {
     pub moments: Vec<Moment>,
     /// Width of a cell at view distance 1 (`cell_foot`), and the eye and the direction of view in the world.
     pub view: [f32; 7],
-    /// E/π that a method must add at each cell's pixel, three planes; its noise: root mean square error of a cell over the mean.
+    /// E/π that a method must add at each cell's pixel, three planes; its noise: root mean square error of a
+    /// cell over the mean.
     pub light: Vec<f32>,
     /// See `light`.
     pub noise: f32,
@@ -137,8 +139,8 @@ pub fn lesson(
     }))
 }
 
-/// The cameras of a pan that ends at `camera`: 0.2 to 2 degrees a frame about the vertical, and up to half a hundredth of a metre
-/// and as many degrees of anything else.
+/// The cameras of a pan that ends at `camera`: 0.2 to 2 degrees a frame about its vertical, up to 0.3 about its horizontal, and
+/// up to 0.04 metres of way, a frame.
 fn pan(camera: &Camera, seed: u32) -> Vec<Camera> {
     let mut numbers = SplitMix::new(0x9a70_0000_0000 | u64::from(seed));
     let mut between = |low: f32, high: f32| low + (high - low) * numbers.next();
@@ -239,8 +241,9 @@ impl When {
 }
 
 impl Lesson {
-    /// The lesson as a safetensors file, all f32: `features.WHEN` [15, h, w], `past.WHEN` [20, h, w], `shown.WHEN` [12, h, w] of each
-    /// moment (WHEN: frames, or `pan`); `light` [3, h, w], `noise` (one number), `view` (seven).
+    /// The lesson as a safetensors file, all f32: `features.WHEN` [15, h, w], `past.WHEN` [20, h, w],
+    /// `shown.WHEN` [12, h, w] of each moment (WHEN: frames, or `pan`); `light` [3, h, w], `noise` (one
+    /// number), `view` (seven).
     ///
     /// # Errors
     /// [`DatasetError::Serialize`].

@@ -1,7 +1,8 @@
-// What a network says of a cell, three vectors, the last two numbers of which are not read; all zeros is the filter without one.
+// What a network says of a cell, three vectors, the last two numbers of which are not read; all zeros is the
+// filter without one.
 struct Guidance {
-    // Places of the cell in two spaces: cells count for each other by 1/(1 + distance²)² there, among its neighbours and
-    // among those further away.
+    // Places of the cell in two spaces: cells count for each other by 1/(1 + distance²)² there, among its
+    // neighbours and among those further away.
     near: vec4f,
     far: vec4f,
     // Logarithms: how much it counts for its neighbours, how much noise it allows for.

@@ -58,8 +58,8 @@ impl GatherGi {
         })
     }
 
-    /// Records the frame up to the cells' means; then [`filter`](Self::filter) is due. `guided`: whether it gets a network's
-    /// guidance.
+    /// Records the frame up to the cells' means; then [`filter`](Self::filter) is due. `guided`: whether it
+    /// gets a network's guidance.
     ///
     /// # Errors
     /// [`GiError`] when the inputs do not fit; then nothing was recorded.

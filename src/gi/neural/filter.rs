@@ -5,8 +5,8 @@
 //!                                    └► gi.features ─► U-Net (net.*) ──► ▲ guidance
 //! ```
 //!
-//! The network never says light, it says which cells' light is averaged: darkness stays dark, twice the light is twice the
-//! answer, and an answer of zeros is `gather` itself.
+//! The network never says light, it says which cells' light is averaged: darkness stays dark, twice the light
+//! is twice the answer, and an answer of zeros is `gather` itself.
 
 use super::memory::{self, FeaturesPass};
 use super::trained::Neural;
@@ -49,8 +49,8 @@ impl FilterGi {
     /// Compiles all pipelines, uploads the weights and makes the buffers for pictures of `size` pixels.
     ///
     /// # Errors
-    /// [`GiError::Feature`] or [`GiError::Output`] when the weights speak of something else, [`GiError::Network`] when the
-    /// size does not fit the device.
+    /// [`GiError::Feature`] or [`GiError::Output`] when the weights speak of something else,
+    /// [`GiError::Network`] when the size does not fit the device.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, neural: &Neural, size: [u32; 2]) -> Result<Self, GiError> {
         check(&neural.weights)?;
         let inputs = InputGroup::new(device);

@@ -9,7 +9,8 @@ use crate::net::format::Weights;
 use crate::net::gpu::{self, Tuned};
 use std::sync::Arc;
 
-/// Whether weights have method `gather` run before or around them, and so need [`Inputs::rays`](crate::gi::Inputs::rays).
+/// Whether weights have method `gather` run before or around them, and so need
+/// [`Inputs::rays`](crate::gi::Inputs::rays).
 pub fn needs_guess(weights: &Weights) -> bool {
     super::filter::is_filter(weights)
         || weights.output.meaning == Answer::Gain.name()
