@@ -117,3 +117,117 @@ fn the_display_pass_is_the_curve_on_the_cpu() {
         }
     }
 }
+
+/// Blackman-Harris over ±1.5 pixels, as Cycles filters.
+fn filter(x: f32) -> f32 {
+    let v = std::f32::consts::PI * (x / 1.5 + 1.0);
+    0.35875 - 0.48829 * v.cos() + 0.14128 * (2.0 * v).cos() - 0.01168 * (3.0 * v).cos()
+}
+
+/// Many samples of a pixel show what the pixel's filter shows of a texture, and not a texture that mip levels had
+/// filtered before.
+#[test]
+fn textures_are_filtered_once() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut s = board();
+    // Columns of one texel on a board that fills the picture.
+    let row: Vec<[u8; 4]> = (0..64).map(|i| if i % 2 == 0 { [0, 0, 0, 255] } else { [255; 4] }).collect();
+    s.images = vec![image(&row, 64, ColorSpace::Linear)];
+    s.materials[0].base_color_texture = Some(reference(0));
+    // A third of a texel a pixel, and more than one: what mip levels blur.
+    let mut white = 0.0_f32;
+    for width in [192usize, 48] {
+        let camera = look_at([0.0, 0.0, 2.0], [0.0; 3], 2.0 * 0.5_f32.atan());
+        // Nearest texels where they are large: how drivers interpolate between them is theirs.
+        let sampler = Sampler { mag_linear: false, ..Default::default() };
+        s.materials[0].base_color_texture = Some(TextureRef { sampler, ..reference(0) });
+        let f = render(&gpu, &s, &camera, [width as u32, width as u32], 64);
+        let color = f.layer(Layer::DiffCol).unwrap();
+        // The middle of a column has all of its colour where columns are as wide as the filter.
+        white = color.data.iter().fold(white, |a, &b| a.max(b));
+        let texels = 64.0 / width as f32;
+        // The texture, and the mean of it under a filter of some width.
+        let shown = |at: f32| f32::from(row[at.clamp(0.0, 63.0) as usize][0]) / 255.0;
+        let expected = |pixel: usize, wide: f32| {
+            let steps = (-300..=300).map(|i| i as f32 / 200.0);
+            let (sum, mass) = steps.fold((0.0, 0.0), |(sum, mass), x| {
+                let w = filter(x);
+                (sum + w * shown((pixel as f32 + 0.5 + wide * x) * texels), mass + w)
+            });
+            sum / mass
+        };
+        let error = |wide: f32| {
+            let of = |x: usize| (color.at(x, width / 2)[0] / white - expected(x, wide)).abs();
+            (width / 4..3 * width / 4).map(of).sum::<f32>() / (width / 2) as f32
+        };
+        let (right, wide) = (error(1.0), error(1.4));
+        println!("{width} pixels: {right:.4}, against a filter 1.4 times as wide {wide:.4}");
+        assert!(right < 0.02 && wide > 2.0 * right, "{width}: {right} {wide}");
+    }
+}
+
+/// Stripes that run away from the eye stay apart where a pixel's footprint is long and narrow.
+#[test]
+fn textures_stay_sharp_at_grazing_angles() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut s = scene(vec![quad([-4.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, -64.0])], vec![]);
+    let row: Vec<[u8; 4]> = (0..64).map(|i| if i % 2 == 0 { [0, 0, 0, 255] } else { [255; 4] }).collect();
+    s.images = vec![image(&row.repeat(64), 64, ColorSpace::Linear)];
+    let camera = look_at([0.0, 0.25, 1.0], [0.0, 0.0, -4.0], 0.6);
+    let mut contrast = |mag_linear: bool| {
+        let sampler = Sampler { mag_linear, ..Default::default() };
+        // Two thousand texels along the stripes.
+        let transform = [[1.0, 0.0, 0.0], [0.0, 32.0, 0.0]];
+        s.materials[0].base_color_texture = Some(TextureRef { sampler, transform, ..reference(0) });
+        let f = render(&gpu, &s, &camera, [256, 256], 1);
+        let color = f.layer(Layer::DiffCol).unwrap();
+        // Five metres away stripes are ten pixels wide, and a pixel eight texels high.
+        let row: Vec<f32> = (64..192).map(|x| color.at(x, 128)[0]).collect();
+        let mean = row.iter().sum::<f32>() / row.len() as f32;
+        row.iter().map(|v| (v - mean).abs()).sum::<f32>() / row.len() as f32 / mean
+    };
+    // Negative control: a sampler that WebGPU lets no device filter so.
+    let (sharp, blurred) = (contrast(true), contrast(false));
+    println!("contrast {sharp:.3}, with round footprints {blurred:.3}");
+    assert!(sharp > 0.4 && blurred < 0.5 * sharp, "{sharp} {blurred}");
+}
+
+/// Bumps too small for a pixel shine as much and as widely as those that one sees.
+#[test]
+fn small_bumps_are_rough() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut s = board();
+    // Slopes of both axes at four quantiles of the normal distribution, in fields of 4×4 texels.
+    let slope = |i: usize| 0.12_f32 * [-1.15, -0.32, 0.32, 1.15][i];
+    let texel = |i: usize| {
+        let n = glam::Vec3::new(slope(i % 4), slope(i / 64 % 4), 1.0).normalize();
+        let [x, y, z] = (n * 0.5 + 0.5).to_array().map(|v| (v * 255.0).round() as u8);
+        [x, y, z, 255]
+    };
+    let bumps: Vec<_> = (0..64 * 64).map(texel).collect();
+    s.images = vec![image(&bumps, 64, ColorSpace::Linear)];
+    s.meshes[0].tangents = vec![[1.0, 0.0, 0.0, 1.0]; 4];
+    s.materials[0].metallic = 1.0;
+    s.materials[0].roughness = 0.4;
+    let shine = |s: &Scene, pixels: u32, samples: u32| {
+        let f = render(&gpu, s, &camera(), [pixels, pixels], samples);
+        let (p, n) = (f.beauty, 16);
+        // Means over 16×16 fields, whatever the size.
+        let side = pixels as usize / n;
+        let mean = |i: usize| {
+            let (x, y) = (i % n * side, i / n * side);
+            let of = |k: usize| p.at(x + k % side, y + k / side)[0];
+            (0..side * side).map(of).sum::<f32>() / (side * side) as f32
+        };
+        (0..n * n).map(mean).collect::<Vec<_>>()
+    };
+    let error = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / b.iter().sum::<f32>();
+    let smooth = shine(&s, 16, 1);
+    // Interpolated near, texels would be less bumpy.
+    let sampler = Sampler { mag_linear: false, ..Default::default() };
+    s.materials[0].normal_texture = Some(TextureRef { sampler, ..reference(0) });
+    let (near, far) = (shine(&s, 512, 1), shine(&s, 16, 1));
+    let (bumpy, flat) = (error(&far, &near), error(&smooth, &near));
+    println!("small bumps: {:.1} % off large ones, none at all {:.1} %", 100.0 * bumpy, 100.0 * flat);
+    assert!(bumpy < 0.2 && flat > 0.3, "{bumpy} {flat}");
+}

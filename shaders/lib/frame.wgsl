@@ -20,6 +20,8 @@ struct Frame {
     // 0 where the method asks the scene what glows and what stands between. Else lights that stand
     // for glowing surfaces are drawn, and occlusion maps darken the light from all around.
     picture_only: u32,
+    // Added to mip levels: a sample of several in a pixel sees finer ones.
+    texture_bias: f32,
 }
 
 // Direction in view space of the ray through the sample point of `pixel`, scaled to z = -1.

@@ -36,12 +36,15 @@ struct Fields {
 
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
+    let bias = frame.texture_bias;
     let base = material.base_color * in.color
-        * textureSample(base_texture, base_sampler, coordinates(material.base_use, in.uv));
-    let rough_metal = textureSample(rough_texture, rough_sampler, coordinates(material.rough_use, in.uv));
-    let bump = textureSample(normal_texture, normal_sampler, coordinates(material.normal_use, in.uv)).xyz;
-    let occlusion = textureSample(occlusion_texture, occlusion_sampler, coordinates(material.occlusion_use, in.uv)).r;
-    let glow = textureSample(emissive_texture, emissive_sampler, coordinates(material.emissive_use, in.uv)).rgb;
+        * textureSampleBias(base_texture, base_sampler, coordinates(material.base_use, in.uv), bias);
+    let rough_metal = textureSampleBias(rough_texture, rough_sampler, coordinates(material.rough_use, in.uv), bias);
+    let bump = textureSampleBias(normal_texture, normal_sampler, coordinates(material.normal_use, in.uv), bias);
+    let shade =
+        textureSampleBias(occlusion_texture, occlusion_sampler, coordinates(material.occlusion_use, in.uv), bias).r;
+    let glow =
+        textureSampleBias(emissive_texture, emissive_sampler, coordinates(material.emissive_use, in.uv), bias).rgb;
     if ALPHA {
         let q = vec2u(in.position.xy);
         // The depth in the seed makes layers of one pixel independent, so that coverages multiply.
@@ -52,16 +55,18 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
 
     let front = facing == (in.mirror > 0.0);
     var n = normalize(in.normal);
+    var spread = 0.0;
     if in.tangent.w != 0.0 && material.normal_use.row1.w > 0.5 {
         let t = in.tangent.xyz;
         let b = cross(n, t) * in.tangent.w;
-        let m = (bump * 2.0 - 1.0) * vec3f(material.normal_scale, material.normal_scale, 1.0);
+        let m = (bump.xyz * 2.0 - 1.0) * vec3f(material.normal_scale, material.normal_scale, 1.0);
         n = normalize(normalize(t) * m.x + normalize(b) * m.y + n * m.z);
+        spread = slope_variance(bump.a) * material.normal_scale * material.normal_scale;
     }
     n = select(-n, n, front);
 
     let metallic = saturate(material.metallic * rough_metal.b);
-    let roughness = saturate(material.roughness * rough_metal.g);
+    let roughness = rougher(saturate(material.roughness * rough_metal.g), spread);
     let color = saturate(base.rgb);
     let v = -(frame.world_from_view * vec4f(view_ray_at(in.position.xy), 0.0)).xyz;
     let n_v = dot(n, normalize(v));
@@ -72,7 +77,7 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     var out: Fields;
     out.normal = oct_encode(n);
     let darkened = select(0.0, material.occlusion_strength, frame.picture_only != 0u);
-    out.albedo = vec4f(color * (1.0 - metallic) * (1.0 - share), mix(1.0, occlusion, darkened));
+    out.albedo = vec4f(color * (1.0 - metallic) * (1.0 - share), mix(1.0, shade, darkened));
     out.specular = vec4f(mix(material.f0 * material.specular_tint.rgb, color, metallic), roughness);
     out.emissive = vec4f(material.emissive * glow, 1.0);
     if material.unlit != 0u {
@@ -82,6 +87,19 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     }
     out.motion = (previous.xy / previous.w - current.xy / current.w) * vec2f(0.5, -0.5);
     return out;
+}
+
+// Variance of slopes along one axis of normals that differ, from √(1 − r) of a normal map's alpha: that of von Mises'
+// and Fisher's distribution whose mean has length r (Banerjee et al. 2005), at most 1 (normals all over the place).
+fn slope_variance(short: f32) -> f32 {
+    let r = 1.0 - short * short;
+    return min((1.0 - r * r) / max(r * (3.0 - r * r), 1e-3), 1.0);
+}
+
+// Roughness of microfacets on a surface whose normals differ: α² is twice the variance of slopes, and variances add.
+fn rougher(roughness: f32, spread: f32) -> f32 {
+    let alpha = roughness * roughness;
+    return sqrt(sqrt(min(alpha * alpha + 2.0 * spread, 1.0)));
 }
 
 // As `view_ray`, from the fragment's position: pixel centres in pixels.

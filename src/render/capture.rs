@@ -209,7 +209,8 @@ pub fn capture_with(
     let decoder = Decoder::new(&gpu.device, renderer);
     let mut draw = |i: u32, shadows: bool| -> Result<(), RenderError> {
         let seed = options.seed.wrapping_mul(0x9e37_79b9).wrapping_add(i);
-        let view = View::new(camera, size, sampling::offset(i, options.seed)).with_seed(seed);
+        let view =
+            View::new(camera, size, sampling::offset(i, options.seed)).with_seed(seed).with_samples(options.samples);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, shadows)?;
         gpu.queue.submit([encoder.finish()]);

@@ -35,6 +35,8 @@ pub struct View {
     pub far: f32,
     /// Number of the frame; rotates the stochastic patterns (soft shadows, coverage).
     pub seed: u32,
+    /// Samples of a pixel that are averaged, this one among them: each stands for as much less of what textures show.
+    pub samples: u32,
 }
 
 impl View {
@@ -65,6 +67,7 @@ impl View {
             near,
             far: camera.far,
             seed: 0,
+            samples: 1,
         }
     }
 
@@ -77,6 +80,12 @@ impl View {
     /// The same view with frame number `seed`.
     pub fn with_seed(mut self, seed: u32) -> Self {
         self.seed = seed;
+        self
+    }
+
+    /// The same view as one of `samples` that are averaged.
+    pub fn with_samples(mut self, samples: u32) -> Self {
+        self.samples = samples.max(1);
         self
     }
 
@@ -117,7 +126,9 @@ impl View {
             environment: environment.radiance,
             light_count,
             picture_only: picture_only.into(),
-            pad: [0; 3],
+            // A sample has an n-th of the pixel's area, 1/√n of its width.
+            texture_bias: -0.5 * (self.samples.max(1) as f32).log2(),
+            pad: [0; 2],
         }
     }
 }
@@ -150,5 +161,6 @@ pub struct FrameUniform {
     pub environment: [f32; 3],
     pub light_count: u32,
     pub picture_only: u32,
-    pub pad: [u32; 3],
+    pub texture_bias: f32,
+    pub pad: [u32; 2],
 }

@@ -127,7 +127,7 @@ impl SceneGpu {
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Self, UploadError> {
         let mut warnings = Vec::new();
         let geometry = mesh::upload(device, queue, scene)?;
-        let textures = texture::upload(device, queue, &scene.images, &mut warnings)?;
+        let textures = texture::upload(device, queue, scene, &mut warnings)?;
         let materials = material::upload(device, queue, scene, &textures)?;
         let sky = environment::upload(device, queue, &scene.environment, &mut warnings)?;
         let lights: Vec<Light> = scene.lights.iter().chain(&sky.sun).cloned().collect();

@@ -48,6 +48,9 @@ pub struct MaterialGpu {
     pub tail: [f32; 4],
 }
 
+/// Most texels along a footprint's length: what every device of the last twenty years has.
+const ANISOTROPY: u16 = 16;
+
 pub(super) struct Materials {
     pub groups: Vec<wgpu::BindGroup>,
     pub bytes: u64,
@@ -172,7 +175,10 @@ fn sampler(device: &wgpu::Device, s: Sampler) -> wgpu::Sampler {
         Wrap::ClampToEdge => wgpu::AddressMode::ClampToEdge,
     };
     let filter = |linear| if linear { wgpu::FilterMode::Linear } else { wgpu::FilterMode::Nearest };
+    // WebGPU asks for linear filters throughout; devices clamp to what they have.
+    let anisotropy_clamp = if s.mag_linear && s.min_linear { ANISOTROPY } else { 1 };
     device.create_sampler(&wgpu::SamplerDescriptor {
+        anisotropy_clamp,
         label: Some("scene.sampler"),
         address_mode_u: wrap(s.wrap[0]),
         address_mode_v: wrap(s.wrap[1]),
