@@ -4,8 +4,7 @@
 use super::inputs::{BoundInputs, InputGroup};
 use crate::gi::interface::GiError;
 use crate::gi::interface::technique::Cost;
-use crate::gpu::readback;
-use crate::gpu::shaders;
+use crate::gpu::{bind, readback, shaders, tape};
 use crate::gpu::timing::Recorder;
 
 /// Most workgroups of the first level; `MAX_GROUPS` in the shader.
@@ -57,7 +56,7 @@ impl ExposurePass {
             label: Some("gi.exposure"),
             entries: &[storage_entry(0, false), storage_entry(1, false)],
         });
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        let group = tape::bind_group(device, &wgpu::BindGroupDescriptor {
             label: Some("gi.exposure"),
             layout: &layout,
             entries: &[
@@ -147,17 +146,5 @@ pub(crate) fn pipeline(
     inputs: &InputGroup,
     own: &wgpu::BindGroupLayout,
 ) -> wgpu::ComputePipeline {
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(label),
-        bind_group_layouts: &[Some(inputs.layout()), Some(own)],
-        immediate_size: 0,
-    });
-    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(label),
-        layout: Some(&layout),
-        module,
-        entry_point: Some(entry),
-        compilation_options: Default::default(),
-        cache: None,
-    })
+    bind::pipeline(device, label, module, entry, &[inputs.layout(), own])
 }
