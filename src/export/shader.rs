@@ -148,7 +148,7 @@ impl Parsed {
                 let mut writer = glsl::Writer::new(&mut out, &module, &info, &options, &pipeline, policies)
                     .map_err(|e| wrong(e.to_string()))?;
                 writer.write().map_err(|e| wrong(e.to_string()))?;
-                Ok(Translated { bytes: out.into_bytes(), entry: "main".to_owned() })
+                Ok(Translated { bytes: with_integer_mix(&out).into_bytes(), entry: "main".to_owned() })
             }
             Target::Spirv => {
                 let mut options = spv::Options {
@@ -169,6 +169,34 @@ impl Parsed {
             }
         }
     }
+}
+
+/// GLSL's `mix` chooses among vectors of integers from 4.50 on only, and naga takes it for granted.
+fn with_integer_mix(text: &str) -> String {
+    if !text.contains("mix(") {
+        return text.to_owned();
+    }
+    let mut own = String::new();
+    for (n, parts) in [(1, ""), (2, "xy"), (3, "xyz"), (4, "xyzw")] {
+        let name = |prefix: &str, scalar: &str| if n == 1 { scalar.to_owned() } else { format!("{prefix}vec{n}") };
+        let (float, bools) = (name("", "float"), name("b", "bool"));
+        let mut weights = vec![float.clone(), bools.clone(), "float".to_owned()];
+        weights.dedup();
+        weights.truncate(if n == 1 { 2 } else { 3 });
+        for weight in weights {
+            own += &format!("{float} own_mix({float} a, {float} b, {weight} t) {{ return mix(a, b, t); }}\n");
+        }
+        for kind in [name("u", "uint"), name("i", "int"), bools.clone()] {
+            let choice = |p: char| if n == 1 { "t ? b : a".to_owned() } else { format!("t.{p} ? b.{p} : a.{p}") };
+            let all: Vec<_> = if n == 1 { vec![choice(' ')] } else { parts.chars().map(choice).collect() };
+            let all = all.join(", ");
+            own += &format!("{kind} own_mix({kind} a, {kind} b, {bools} t) {{ return {kind}({all}); }}\n");
+        }
+    }
+    own += "#define mix own_mix\n";
+    // Behind the lines that come first.
+    let head: usize = text.split_inclusive('\n').take_while(|l| l.starts_with('#')).map(str::len).sum();
+    format!("{}{own}{}", &text[..head], &text[head..])
 }
 
 /// Least bytes of a buffer of this type: one element of an array without a length.

@@ -50,7 +50,7 @@ impl ExposurePass {
                 mapped_at_creation: false,
             })
         };
-        let partials = buffer("gi.exposure.partials", u64::from(MAX_GROUPS) * 32, wgpu::BufferUsages::empty());
+        let partials = buffer("gi.exposure.partials", u64::from(MAX_GROUPS) * 32, wgpu::BufferUsages::COPY_SRC);
         let result = buffer("gi.exposure", size_of::<Exposure>() as u64, wgpu::BufferUsages::COPY_SRC);
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("gi.exposure"),
