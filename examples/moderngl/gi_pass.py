@@ -76,6 +76,11 @@ class Pass:
         """Light that direct lighting misses, E/π; rows from the top."""
         return self.textures["output"]
 
+    @property
+    def gloss(self):
+        """Radiance that specular lobes show, over their directional albedo; rows from the top."""
+        return self.textures["gloss_output"]
+
     def frame(self, camera, inputs, reset=False):
         """Records and runs a frame: `camera` of `camera_values`, `inputs` textures by the manifest's names, rows from
         the top. `reset`: the picture has nothing to do with the one before."""

@@ -27,9 +27,9 @@ def main():
         view, projection = renderer.camera()
         inputs = renderer.draw(view, projection)
         gi.frame(camera_values(view, projection), inputs)
-    picture = renderer.show(gi.output)
+    picture = renderer.show(gi)
     if args.beside:
-        picture = np.hstack([renderer.show(gi.output, light=False), picture])
+        picture = np.hstack([renderer.show(gi, light=False), picture])
     Image.fromarray(picture).save(args.out)
     print(f"{args.out}: {args.frames} frames of {gi.manifest['method']} by {ctx.info['GL_RENDERER']}")
 

@@ -39,8 +39,9 @@ void main() {
     unit = dot(unit, eye - p) < 0.0 ? -unit : unit;
     vec3 base = color * texture(picture, t).rgb;
     out_normal = octahedral(unit);
-    // What the specular part reflects, about 4 % of what is no metal, the diffuse part lacks.
-    out_albedo = vec4(base * (1.0 - metallic) * 0.96, 1.0);
+    // What the specular part reflects, the diffuse part lacks.
+    float share = lobe(vec3(0.04), roughness, dot(unit, normalize(eye - p))).x;
+    out_albedo = vec4(base * (1.0 - metallic) * (1.0 - share), 1.0);
     out_specular = vec4(mix(vec3(0.04), base, metallic), roughness);
     out_emissive = vec4(emission, 1.0);
     // Texture coordinates then minus now: rows run from the top and so does clip space here.
@@ -63,6 +64,22 @@ void main() {}
 
 SCREEN = "#version 430\nvoid main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }"
 
+# Shared by fragments: octahedral normals, and the share of even light that a lobe shows (Karis, "Physically Based
+# Shading on Mobile", 2014).
+SHARED = """
+vec3 decoded(vec2 e) {
+    vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
+    float t = max(-n.z, 0.0);
+    n.xy -= mix(vec2(-t), vec2(t), greaterThanEqual(n.xy, vec2(0.0)));
+    return normalize(n);
+}
+vec3 lobe(vec3 f0, float roughness, float n_v) {
+    vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
+    float a = min(r.x * r.x, exp2(-9.28 * n_v)) * r.x + r.y;
+    return f0 * (-1.04 * a + r.z) + 1.04 * a + r.w;
+}
+"""
+
 # Direct diffuse light as E/π, one view of a shadow map at a time, added up.
 LIGHT = """
 #version 430
@@ -72,12 +89,6 @@ uniform mat4 clip_from_world;
 uniform vec3 strength, place, back;
 uniform bool sun;
 out vec4 light;
-vec3 decoded(vec2 e) {
-    vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
-    float t = max(-n.z, 0.0);
-    n.xy -= mix(vec2(-t), vec2(t), greaterThanEqual(n.xy, vec2(0.0)));
-    return normalize(n);
-}
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec4 p = texelFetch(places, pixel, 0);
@@ -99,7 +110,8 @@ void main() {
 
 COMPOSITE = """
 #version 430
-uniform sampler2D albedo, emissive, direct, indirect;
+uniform sampler2D albedo, emissive, direct, indirect, gloss, normals, places, speculars;
+uniform vec3 eye;
 uniform bool with_direct, with_indirect;
 out vec4 color;
 void main() {
@@ -107,6 +119,10 @@ void main() {
     vec3 light = (with_direct ? texelFetch(direct, pixel, 0).rgb : vec3(0.0))
         + (with_indirect ? texelFetch(indirect, pixel, 0).rgb : vec3(0.0));
     vec3 hdr = texelFetch(albedo, pixel, 0).rgb * light + texelFetch(emissive, pixel, 0).rgb;
+    vec3 n = decoded(texelFetch(normals, pixel, 0).xy);
+    vec4 surface = texelFetch(speculars, pixel, 0);
+    float n_v = dot(n, normalize(eye - texelFetch(places, pixel, 0).xyz));
+    if (with_indirect) { hdr += texelFetch(gloss, pixel, 0).rgb * lobe(surface.rgb, surface.a, max(n_v, 0.0)); }
     vec3 v = clamp(hdr, 0.0, 1.0);
     color = vec4(mix(12.92 * v, 1.055 * pow(v, vec3(1.0 / 2.4)) - 0.055, greaterThan(v, vec3(0.0031308))), 1.0);
 }
@@ -140,11 +156,14 @@ class Renderer:
         self.ctx, self.scene, self.size = ctx, scene, size
 
         def program(text):
-            both = (text.replace("#version 430", f"#version 430\n#define {stage}") for stage in ("VERTEX", "FRAGMENT"))
-            return ctx.program(*both)
+            stages = (f"#version 430\n#define {stage}\n{SHARED}" for stage in ("VERTEX", "FRAGMENT"))
+            return ctx.program(*(text.replace("#version 430", stage) for stage in stages))
+
+        def screen(text):
+            return ctx.program(SCREEN, text.replace("#version 430", "#version 430\n" + SHARED))
 
         self.geometry, self.shadow = program(GEOMETRY), program(SHADOW)
-        self.light, self.composite = ctx.program(SCREEN, LIGHT), ctx.program(SCREEN, COMPOSITE)
+        self.light, self.composite = screen(LIGHT), screen(COMPOSITE)
         self.light_screen, self.composite_screen = (ctx.vertex_array(p, []) for p in (self.light, self.composite))
         white = ctx.texture((1, 1), 4, b"\xff" * 4)
         pictures = [self._picture(image) for image in scene.images]
@@ -237,7 +256,7 @@ class Renderer:
             self._set(self.geometry, clip_from_world=clip, clip_before=before, eye=eye, **{
                 k: draw[k] for k in ("world", "color", "emission", "metallic", "roughness")})
             lit.render()
-        self.before = clip
+        self.before, self.eye = clip, eye
         self._light()
         inputs = {k: self.targets[k] for k in ("normal", "albedo", "specular", "emissive", "motion")}
         return {"depth": self.depth, "direct": self.direct, **inputs}
@@ -257,11 +276,13 @@ class Renderer:
             self.light_screen.render(vertices=3)
         self.ctx.enable_only(moderngl.NOTHING)
 
-    def show(self, indirect, direct=True, light=True):
-        """The picture, rows from the top; `light`: with the pass's light."""
+    def show(self, gi, direct=True, light=True):
+        """The picture, rows from the top; `light`: with what the pass found for diffuse surfaces and for lobes."""
         self.shown.use()
-        pictures = {"albedo": self.targets["albedo"], "emissive": self.targets["emissive"], "direct": self.direct,
-                    "indirect": indirect}
+        t = self.targets
+        pictures = {"albedo": t["albedo"], "emissive": t["emissive"], "direct": self.direct, "indirect": gi.output,
+                    "gloss": gi.gloss, "normals": t["normal"], "places": t["place"], "speculars": t["specular"]}
+        self._set(self.composite, eye=self.eye)
         for slot, (name, texture) in enumerate(pictures.items()):
             texture.use(slot)
             self.composite[name] = slot
