@@ -81,6 +81,11 @@ class Pass:
         """Radiance that specular lobes show, over their directional albedo; rows from the top."""
         return self.textures["gloss_output"]
 
+    @property
+    def sky(self):
+        """Radiance of the surroundings, the mean if they are a picture."""
+        return next(w["values"]["environment"] for w in self.manifest["frames"][0]["writes"] if w["type"] == "Params")[:3]
+
     def frame(self, camera, inputs, reset=False):
         """Records and runs a frame: `camera` of `camera_values`, `inputs` textures by the manifest's names, rows from
         the top. `reset`: the picture has nothing to do with the one before."""

@@ -88,6 +88,8 @@ uniform sampler2DShadow shadow;
 uniform mat4 clip_from_world;
 uniform vec3 strength, place, back;
 uniform bool sun;
+// Width of a texel of the map: of a sun, metres; of a lamp, over the distance.
+uniform float texel;
 out vec4 light;
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -96,7 +98,7 @@ void main() {
     vec3 to = sun ? back : place - p.xyz;
     float square = sun ? 1.0 : dot(to, to);
     vec3 l = normalize(to);
-    vec4 q = clip_from_world * vec4(p.xyz + n * 0.01, 1.0);
+    vec4 q = clip_from_world * vec4(p.xyz + n * (0.002 + 3.0 * texel * (sun ? 1.0 : sqrt(square))), 1.0);
     vec3 c = q.xyz / q.w;
     bool within = p.w > 0.0 && q.w > 0.0 && all(lessThan(abs(c), vec3(1.0)));
     float seen = 0.0;
@@ -111,7 +113,7 @@ void main() {
 COMPOSITE = """
 #version 430
 uniform sampler2D albedo, emissive, direct, indirect, gloss, normals, places, speculars;
-uniform vec3 eye;
+uniform vec3 eye, sky;
 uniform bool with_direct, with_indirect;
 out vec4 color;
 void main() {
@@ -123,6 +125,7 @@ void main() {
     vec4 surface = texelFetch(speculars, pixel, 0);
     float n_v = dot(n, normalize(eye - texelFetch(places, pixel, 0).xyz));
     if (with_indirect) { hdr += texelFetch(gloss, pixel, 0).rgb * lobe(surface.rgb, surface.a, max(n_v, 0.0)); }
+    hdr = texelFetch(places, pixel, 0).w > 0.0 ? hdr : sky;
     vec3 v = clamp(hdr, 0.0, 1.0);
     color = vec4(mix(12.92 * v, 1.055 * pow(v, vec3(1.0 / 2.4)) - 0.055, greaterThan(v, vec3(0.0031308))), 1.0);
 }
@@ -199,7 +202,7 @@ class Renderer:
         return texture
 
     def _shadows(self):
-        """One map for a sun, six for a lamp: light, matrix, map. The scene stands still, so they are drawn once."""
+        """One map for a sun, six for a lamp: light, matrix, map, width of a texel. The scene stands still, so they are drawn once."""
         low, high = self.scene.bounds()
         centre, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
         views = []
@@ -208,15 +211,15 @@ class Renderer:
                 back = light["back"] / np.linalg.norm(light["back"])
                 up = np.array([0, 1, 0]) if abs(back[1]) < 0.9 else np.array([1, 0, 0])
                 box = np.diag([1 / radius, 1 / radius, -1 / radius, 1.0])
-                views.append((light, box @ looking(centre, back, up), 2048))
+                views.append((light, box @ looking(centre, back, up), 2048, 2 * radius / 2048))
             else:
                 for axis in range(3):
                     for sign in (1, -1):
                         back, up = np.zeros(3), np.roll([0.0, 1.0, 0.0], axis)
                         back[axis] = sign
                         matrix = perspective(np.pi / 2, 1, 0.02, 2 * radius) @ looking(light["place"], back, up)
-                        views.append((light, matrix, 512))
-        return [(light, matrix, self._map(matrix, side)) for light, matrix, side in views]
+                        views.append((light, matrix, 1024, 2 / 1024))
+        return [(light, matrix, self._map(matrix, side), texel) for light, matrix, side, texel in views]
 
     def _map(self, matrix, side):
         texture = self.ctx.depth_texture((side, side))
@@ -269,10 +272,10 @@ class Renderer:
         self.targets["normal"].use(0)
         self.targets["place"].use(1)
         self.light["normals"], self.light["places"], self.light["shadow"] = 0, 1, 2
-        for light, matrix, shadow in self.views:
+        for light, matrix, shadow, texel in self.views:
             shadow.use(2)
             self.light["sun"] = light["kind"] == "directional"
-            self._set(self.light, clip_from_world=matrix, **{k: light[k] for k in ("strength", "place", "back")})
+            self._set(self.light, clip_from_world=matrix, texel=texel, **{k: light[k] for k in ("strength", "place", "back")})
             self.light_screen.render(vertices=3)
         self.ctx.enable_only(moderngl.NOTHING)
 
@@ -282,7 +285,7 @@ class Renderer:
         t = self.targets
         pictures = {"albedo": t["albedo"], "emissive": t["emissive"], "direct": self.direct, "indirect": gi.output,
                     "gloss": gi.gloss, "normals": t["normal"], "places": t["place"], "speculars": t["specular"]}
-        self._set(self.composite, eye=self.eye)
+        self._set(self.composite, eye=self.eye, sky=gi.sky)
         for slot, (name, texture) in enumerate(pictures.items()):
             texture.use(slot)
             self.composite[name] = slot
