@@ -34,19 +34,18 @@ fn file<'a>(package: &'a Package, name: &str) -> &'a [u8] {
 }
 
 fn validated(module: &Module, name: &str) -> naga::valid::ModuleInfo {
-    // As in `tests/shaders.rs`; SPIR-V asks for some of what WGSL always has.
+    // As in `tests/shaders.rs`.
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32);
     validator.validate(module).unwrap_or_else(|e| panic!("{name}: {e:?}"))
 }
 
-/// Group, binding and kind of what an entry point uses.
-fn used(module: &Module, info: &naga::valid::ModuleInfo, entry: &str) -> BTreeSet<(u32, u32, String)> {
+/// Group, binding and kind of what an entry point uses, or of all there is without `info`.
+fn used(module: &Module, info: Option<&naga::valid::ModuleInfo>, entry: &str) -> BTreeSet<(u32, u32, String)> {
     let index = module.entry_points.iter().position(|e| e.name == entry).expect("the entry point is there");
     let mut found = BTreeSet::new();
     for (handle, variable) in module.global_variables.iter() {
-        let Some(place) = variable.binding.filter(|_| !info.get_entry_point(index)[handle].is_empty()) else {
-            continue;
-        };
+        let within = info.is_none_or(|info| !info.get_entry_point(index)[handle].is_empty());
+        let Some(place) = variable.binding.filter(|_| within) else { continue };
         let kind = match (variable.space, &module.types[variable.ty].inner) {
             (AddressSpace::Uniform, _) => "uniform",
             (AddressSpace::Storage { access }, _) if access.contains(naga::StorageAccess::STORE) => "storage",
@@ -118,10 +117,19 @@ fn shaders_of_every_target_validate_and_bind_what_the_manifest_says() {
             assert!(m.shaders.len() >= 9, "{} shaders", m.shaders.len());
             for shader in &m.shaders {
                 let bytes = file(&package, &shader.file);
-                let module = match target {
-                    Target::Wgsl => naga::front::wgsl::parse_str(std::str::from_utf8(bytes).unwrap()).unwrap(),
-                    Target::Spirv => naga::front::spv::parse_u8_slice(bytes, &Default::default())
-                        .unwrap_or_else(|e| panic!("{}: {e}", shader.name)),
+                let (module, info) = match target {
+                    Target::Wgsl => {
+                        let text = std::str::from_utf8(bytes).unwrap();
+                        let module = naga::front::wgsl::parse_str(text).unwrap();
+                        let info = validated(&module, &shader.name);
+                        (module, Some(info))
+                    }
+                    // naga reads its own SPIR-V with other signs of integers, which its validator refuses; whether it is
+                    // valid, `spirv-val` says below. There is nothing in it that the entry point does not use.
+                    Target::Spirv => {
+                        let module = naga::front::spv::parse_u8_slice(bytes, &Default::default());
+                        (module.unwrap_or_else(|e| panic!("{}: {e}", shader.name)), None)
+                    }
                     Target::Glsl430 => {
                         // OpenGL's own compiler reads it in `examples/moderngl`.
                         let text = std::str::from_utf8(bytes).unwrap();
@@ -133,14 +141,39 @@ fn shaders_of_every_target_validate_and_bind_what_the_manifest_says() {
                         continue;
                     }
                 };
-                let info = validated(&module, &shader.name);
-                let used = used(&module, &info, &shader.entry);
+                let used = used(&module, info.as_ref(), &shader.entry);
                 assert_eq!(used, told(&shader.bindings), "{} {}", m.target, shader.name);
                 // Negative control: without one of them they differ.
                 assert_ne!(used, told(&shader.bindings[1..]), "{}", shader.name);
                 let entry = module.entry_points.iter().find(|e| e.name == shader.entry).expect("it is there");
                 assert_eq!(entry.workgroup_size, shader.workgroup_size, "{}", shader.name);
             }
+        }
+    }
+}
+
+/// What `spirv-val` says of `bytes`.
+fn spirv_val(bytes: &[u8]) -> std::process::Output {
+    let mut file = tempfile::NamedTempFile::new().expect("a file");
+    std::io::Write::write_all(&mut file, bytes).expect("it can be written");
+    let mut command = std::process::Command::new("spirv-val");
+    command.args(["--target-env", "vulkan1.1"]).arg(file.path()).output().expect("it starts")
+}
+
+#[test]
+fn spirv_is_valid_for_vulkan() {
+    let Some(gpu) = common::gpu() else { return };
+    if let Err(e) = std::process::Command::new("spirv-val").arg("--version").output() {
+        return common::skip(common::Need::SpirvVal, e);
+    }
+    for method in methods() {
+        let package = exported(&gpu, &method, Target::Spirv);
+        for shader in &package.manifest.shaders {
+            let bytes = file(&package, &shader.file);
+            let said = spirv_val(bytes);
+            assert!(said.status.success(), "{}: {}", shader.name, String::from_utf8_lossy(&said.stderr));
+            // Negative control: without its last words it is none.
+            assert!(!spirv_val(&bytes[..bytes.len() - 8]).status.success(), "{}", shader.name);
         }
     }
 }

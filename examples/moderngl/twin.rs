@@ -40,7 +40,9 @@ struct Camera {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [scene, method, folder] = &args[..] else { return Err("usage: moderngl_twin SCENE gather|neural FOLDER".into()) };
+    let [scene, method, folder] = &args[..] else {
+        return Err("usage: moderngl_twin SCENE gather|neural FOLDER".into());
+    };
     let (scene, folder) = (scene::load(scene)?, Path::new(folder));
     let method = match method.as_str() {
         "neural" => Method::Neural(Box::new(Neural::from(Weights::shipped()?))),

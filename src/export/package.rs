@@ -191,7 +191,8 @@ impl Packing<'_> {
 
     fn resource(&mut self, bound: &crate::gpu::bind::Bound, shift: u64, binding: &manifest::Binding) -> Bound {
         let taken = |name: &str, this: &Self| {
-            let host = this.recording.host.iter().any(|h| h.1 == name) || HOST.iter().any(|h| h.0.to_lowercase() == name);
+            let host =
+                this.recording.host.iter().any(|h| h.1 == name) || HOST.iter().any(|h| h.0.to_lowercase() == name);
             host || this.buffers.iter().any(|b| b.name == name) || this.textures.iter().any(|t| t.name == name)
         };
         if let Some((buffer, offset, bytes)) = part(bound) {
@@ -219,11 +220,7 @@ impl Packing<'_> {
     }
 
     /// What the host writes in frame `k`, and how many rounds it counts.
-    fn writes(
-        &self,
-        k: u32,
-        written: &BTreeMap<&'static str, Vec<Vec<u8>>>,
-    ) -> Result<(Vec<Write>, u32), ExportError> {
+    fn writes(&self, k: u32, written: &BTreeMap<&'static str, Vec<Vec<u8>>>) -> Result<(Vec<Write>, u32), ExportError> {
         let mut writes = Vec::new();
         let number = |bytes: &[u8], layout: &Struct, name: &str| {
             let at = layout.members.iter().find(|m| m.name == name).map_or(0, |m| m.offset as usize);
@@ -233,7 +230,8 @@ impl Packing<'_> {
         for (name, changing) in HOST {
             let (Some(slots), Some(layout)) = (written.get(name), self.uniforms.get(name)) else { continue };
             let round = |bytes: &Vec<u8>| number(bytes, layout, "round");
-            let (first, last) = (slots.iter().map(round).min().unwrap_or(0), slots.iter().map(round).max().unwrap_or(0));
+            let (first, last) =
+                (slots.iter().map(round).min().unwrap_or(0), slots.iter().map(round).max().unwrap_or(0));
             if name == "Gather" {
                 rounds = last - first + 1;
             }
@@ -282,7 +280,8 @@ impl Packing<'_> {
         for named in &self.textures {
             let (texture, name) = (&named.resource, &named.name);
             let host = self.recording.host.iter().find(|h| h.0 == *texture).map(|h| h.2);
-            let (stored, loaded) = (named.kinds.iter().any(|k| k == "storage-texture"), named.kinds.iter().any(|k| k == "texture"));
+            let (stored, loaded) =
+                (named.kinds.iter().any(|k| k == "storage-texture"), named.kinds.iter().any(|k| k == "texture"));
             let role = host.unwrap_or(if stored && !loaded { "output" } else { "internal" });
             let content = if stored || host.is_some() {
                 Content::Fill(0)
@@ -324,7 +323,13 @@ fn content(files: &mut Vec<(String, Vec<u8>)>, name: &str, bytes: Vec<u8>) -> Co
 /// The member of type `kind` that begins `bytes`.
 fn value(bytes: &[u8], kind: &str) -> Value {
     let word = |i: usize| [bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]];
-    let number = |i| if kind.contains("u32") { f64::from(u32::from_le_bytes(word(i))) } else { f64::from(f32::from_le_bytes(word(i))) };
+    let number = |i| {
+        if kind.contains("u32") {
+            f64::from(u32::from_le_bytes(word(i)))
+        } else {
+            f64::from(f32::from_le_bytes(word(i)))
+        }
+    };
     let places: Vec<usize> = match kind {
         "u32" | "f32" => return Value::Number(number(0)),
         "mat3x3<f32>" => (0..3).flat_map(|c| (0..3).map(move |r| 4 * c + r)).collect(),
@@ -337,7 +342,8 @@ fn value(bytes: &[u8], kind: &str) -> Value {
 /// From which frame on they repeat, every one or every two; known when they have done so eight times.
 fn steady(frames: &[Frame]) -> Option<Steady> {
     let repeats = |period: usize| {
-        let from = (0..frames.len().checked_sub(period)?).rev().take_while(|&k| frames[k] == frames[k + period]).last()?;
+        let from =
+            (0..frames.len().checked_sub(period)?).rev().take_while(|&k| frames[k] == frames[k + period]).last()?;
         (frames.len() - from >= 8 * period).then_some(Steady { from, period })
     };
     [1, 2].into_iter().filter_map(repeats).min_by_key(|s| s.from + s.period)

@@ -127,11 +127,7 @@ fn host_texture(device: &wgpu::Device, size: [u32; 2], format: wgpu::TextureForm
 }
 
 /// Reads the uniforms of each dispatch before the next frame writes them.
-fn taken(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    dispatches: Vec<Dispatch>,
-) -> Result<Vec<Taken>, ExportError> {
+fn taken(device: &wgpu::Device, queue: &wgpu::Queue, dispatches: Vec<Dispatch>) -> Result<Vec<Taken>, ExportError> {
     let mut read: Vec<(wgpu::Buffer, Vec<u8>)> = Vec::new();
     let mut all = Vec::with_capacity(dispatches.len());
     for dispatch in dispatches {

@@ -137,8 +137,11 @@ impl Parsed {
                     binding_map: slots.collect::<BTreeMap<_, _>>().into_iter().collect(),
                     zero_initialize_workgroup_memory: true,
                 };
-                let pipeline =
-                    glsl::PipelineOptions { shader_stage: ShaderStage::Compute, entry_point: entry.to_owned(), multiview: None };
+                let pipeline = glsl::PipelineOptions {
+                    shader_stage: ShaderStage::Compute,
+                    entry_point: entry.to_owned(),
+                    multiview: None,
+                };
                 // As wgpu has them on OpenGL: what lies beyond a buffer GLSL itself leaves undefined.
                 let policies = BoundsCheckPolicies {
                     image_load: BoundsCheckPolicy::ReadZeroSkipWrite,
@@ -162,8 +165,10 @@ impl Parsed {
                     ..spv::Options::default()
                 };
                 options.flags.remove(spv::WriterFlags::ADJUST_COORDINATE_SPACE | spv::WriterFlags::DEBUG);
-                let pipeline = spv::PipelineOptions { shader_stage: ShaderStage::Compute, entry_point: entry.to_owned() };
-                let words = spv::write_vec(&module, &info, &options, Some(&pipeline)).map_err(|e| wrong(e.to_string()))?;
+                let pipeline =
+                    spv::PipelineOptions { shader_stage: ShaderStage::Compute, entry_point: entry.to_owned() };
+                let words =
+                    spv::write_vec(&module, &info, &options, Some(&pipeline)).map_err(|e| wrong(e.to_string()))?;
                 let bytes = words.iter().flat_map(|w| w.to_le_bytes()).collect();
                 Ok(Translated { bytes, entry: entry.to_owned() })
             }

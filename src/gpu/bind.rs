@@ -104,11 +104,10 @@ impl Binder {
             .zip(&resources)
             .map(|(binding, bound)| wgpu::BindGroupEntry { binding, resource: bound.resource() })
             .collect();
-        let group = tape::bind_group(&self.device, &wgpu::BindGroupDescriptor {
-            label: Some(self.label),
-            layout: &self.layout,
-            entries: &entries,
-        });
+        let group = tape::bind_group(
+            &self.device,
+            &wgpu::BindGroupDescriptor { label: Some(self.label), layout: &self.layout, entries: &entries },
+        );
         self.made += 1;
         let entry = (resources.to_vec(), group.clone());
         if self.groups.len() < CAPACITY {

@@ -99,6 +99,13 @@ fn gpu_report(mut args: Vec<String>) -> Result<(), String> {
 fn hosts() -> Result<(), String> {
     cargo(&["build", "--bin", "bouncelight", "--example", "moderngl_twin", "--example", "export_scene"])?;
     make_sure_of_adapter(&[])?;
+    if Command::new("spirv-val").arg("--version").output().is_err()
+        && std::path::Path::new("/etc/debian_version").exists()
+    {
+        eprintln!("xtask: no spirv-val; installing spirv-tools with apt-get");
+        apt(&["install", "-y", "-q", "--no-install-recommends", "spirv-tools"])?;
+    }
+    cargo(&["test", "--test", "export"])?;
     let own = std::env::current_exe().map_err(|e| format!("own path: {e}"))?;
     // The folder of `cargo build`: xtask lies in it.
     let built = own.parent().ok_or("own path has no folder")?;
@@ -127,7 +134,8 @@ fn hosts() -> Result<(), String> {
     let target = ["-q", "export", "cornell", "--target", "glsl430", "-o", &folder];
     run(&mut command(&program, &[target.as_slice(), &size].concat()))?;
     run(&mut command(&python, &["examples/moderngl/main.py", &folder, &glb, &own]))?;
-    let render = ["-q", "render", "cornell", "--method", "gather", "--gi-frames", "64", "--tonemap", "none", "-o", &ours];
+    let render =
+        ["-q", "render", "cornell", "--method", "gather", "--gi-frames", "64", "--tonemap", "none", "-o", &ours];
     run(&mut command(&program, &[render.as_slice(), &size].concat()))?;
     run(&mut command(&program, &["compare", &own, &ours, "--metric", "flip", "--threshold", "0.05"]))
 }

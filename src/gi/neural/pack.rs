@@ -30,15 +30,18 @@ impl PackPass {
             entries: &[storage_entry(0, true), storage_entry(1, false), texture_entry(2)],
         });
         let module = shaders::module_with(device, "gi.pack", &features.prelude());
-        let group = tape::bind_group(device, &wgpu::BindGroupDescriptor {
-            label: Some("gi.pack"),
-            layout: &layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: target },
-                wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(guess) },
-            ],
-        });
+        let group = tape::bind_group(
+            device,
+            &wgpu::BindGroupDescriptor {
+                label: Some("gi.pack"),
+                layout: &layout,
+                entries: &[
+                    wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
+                    wgpu::BindGroupEntry { binding: 1, resource: target },
+                    wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(guess) },
+                ],
+            },
+        );
         Self { pipeline: pipeline(device, "gi.pack", &module, "pack", inputs, &layout), group }
     }
 

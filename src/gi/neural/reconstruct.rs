@@ -133,16 +133,19 @@ impl ReconstructPass {
     ) -> Result<(), GiError> {
         crate::gi::stage::inputs::check_output(output, inputs.size)?;
         let group = self.outputs.get([output], || {
-            Ok::<_, GiError>(tape::bind_group(&self.device, &wgpu::BindGroupDescriptor {
-                label: Some("gi.reconstruct"),
-                layout: &self.layout,
-                entries: &[
-                    wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
-                    wgpu::BindGroupEntry { binding: 1, resource: answers },
-                    wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(output) },
-                    wgpu::BindGroupEntry { binding: 3, resource: wgpu::BindingResource::TextureView(guess) },
-                ],
-            }))
+            Ok::<_, GiError>(tape::bind_group(
+                &self.device,
+                &wgpu::BindGroupDescriptor {
+                    label: Some("gi.reconstruct"),
+                    layout: &self.layout,
+                    entries: &[
+                        wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
+                        wgpu::BindGroupEntry { binding: 1, resource: answers },
+                        wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(output) },
+                        wgpu::BindGroupEntry { binding: 3, resource: wgpu::BindingResource::TextureView(guess) },
+                    ],
+                },
+            ))
         })?;
         recorder.compute("gi.reconstruct", |pass| {
             inputs.set(pass);

@@ -106,10 +106,13 @@ fn buffer(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, size: [u32; 2])
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     });
-    let group = tape::bind_group(device, &wgpu::BindGroupDescriptor {
-        label: Some("gi.cells"),
-        layout,
-        entries: &[wgpu::BindGroupEntry { binding: 0, resource: pixels.as_entire_binding() }],
-    });
+    let group = tape::bind_group(
+        device,
+        &wgpu::BindGroupDescriptor {
+            label: Some("gi.cells"),
+            layout,
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: pixels.as_entire_binding() }],
+        },
+    );
     (pixels, group)
 }

@@ -4,8 +4,8 @@
 use super::inputs::{BoundInputs, InputGroup};
 use crate::gi::interface::GiError;
 use crate::gi::interface::technique::Cost;
-use crate::gpu::{bind, readback, shaders, tape};
 use crate::gpu::timing::Recorder;
+use crate::gpu::{bind, readback, shaders, tape};
 
 /// Most workgroups of the first level; `MAX_GROUPS` in the shader.
 const MAX_GROUPS: u32 = 256;
@@ -56,14 +56,17 @@ impl ExposurePass {
             label: Some("gi.exposure"),
             entries: &[storage_entry(0, false), storage_entry(1, false)],
         });
-        let group = tape::bind_group(device, &wgpu::BindGroupDescriptor {
-            label: Some("gi.exposure"),
-            layout: &layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: partials.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: result.as_entire_binding() },
-            ],
-        });
+        let group = tape::bind_group(
+            device,
+            &wgpu::BindGroupDescriptor {
+                label: Some("gi.exposure"),
+                layout: &layout,
+                entries: &[
+                    wgpu::BindGroupEntry { binding: 0, resource: partials.as_entire_binding() },
+                    wgpu::BindGroupEntry { binding: 1, resource: result.as_entire_binding() },
+                ],
+            },
+        );
         let module = shaders::module(device, "gi.exposure");
         let pipeline = |entry| pipeline(device, "gi.exposure", &module, entry, inputs, &layout);
         Self { sum: pipeline("sum_cells"), finish: pipeline("finish"), group, partials, result }

@@ -124,11 +124,14 @@ impl InputGroup {
                 size: wgpu::BufferSize::new(size_of::<Params>() as u64),
             };
             let params = wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(ring) };
-            Ok::<_, GiError>(tape::bind_group(&self.device, &wgpu::BindGroupDescriptor {
-                label: Some("gi.inputs"),
-                layout: &self.layout,
-                entries: &[params, view(0), view(1), view(2), view(3), view(4)],
-            }))
+            Ok::<_, GiError>(tape::bind_group(
+                &self.device,
+                &wgpu::BindGroupDescriptor {
+                    label: Some("gi.inputs"),
+                    layout: &self.layout,
+                    entries: &[params, view(0), view(1), view(2), view(3), view(4)],
+                },
+            ))
         })?;
         self.shift = Some(params.shift());
         let slot = self.next;

@@ -85,7 +85,12 @@ impl Trained {
                 let uniform = bound == Bound::Uniform;
                 let kind = if uniform { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
                 let size = each.next_multiple_of(SLOT) * parts;
-                Trained::Buffer(buffer(device, label, size, kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC))
+                Trained::Buffer(buffer(
+                    device,
+                    label,
+                    size,
+                    kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+                ))
             }
         }
     }
@@ -278,7 +283,9 @@ impl Memory {
             arena: buffer(device, "net.arena", bytes, usage),
             steps: steps_buffer(device, kernels),
             mirror: mirrored.then(|| texture(device, "net.mirror", (bytes / row) as u32, element(plan))),
-            partial: partial.map(|bytes| buffer(device, "net.partial", bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)),
+            partial: partial.map(|bytes| {
+                buffer(device, "net.partial", bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)
+            }),
         }
     }
 
