@@ -64,8 +64,8 @@ void main() {}
 
 SCREEN = "#version 430\nvoid main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }"
 
-# Shared by fragments: octahedral normals, and the share of even light that a lobe shows (Karis, "Physically Based
-# Shading on Mobile", 2014).
+# Shared by fragments: octahedral normals, and the share of even light that a lobe shows, of which the split sum is that
+# of bouncelight's `shaders/lib/brdf.wgsl`, so that pictures can be compared.
 SHARED = """
 vec3 decoded(vec2 e) {
     vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
@@ -74,9 +74,17 @@ vec3 decoded(vec2 e) {
     return normalize(n);
 }
 vec3 lobe(vec3 f0, float roughness, float n_v) {
-    vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
-    float a = min(r.x * r.x, exp2(-9.28 * n_v)) * r.x + r.y;
-    return f0 * (-1.04 * a + r.z) + 1.04 * a + r.w;
+    float x = 1.0 - clamp(n_v, 0.0, 1.0), r = clamp(roughness, 0.0, 1.0), s = max(r, 0.1);
+    float exponent = (6.0393 + 26.2500 * r * r) * exp(-3.1851 * r);
+    float rim = 1.2024 + r * (-3.4406 + r * (3.4447 - r * 1.1744));
+    float bias = clamp(pow(max(x, 1e-6), exponent) * rim + 0.01503 * r * (1.0 - r), 0.0, 1.0);
+    vec4 q = vec4(1.0, s, s * s, s * s * s);
+    float scale = dot(vec4(0.9051, 0.9982, -2.4025, 0.7910), q)
+        + x * (dot(vec4(0.3306, -3.0833, 5.2607, -2.3697), q)
+        + x * (dot(vec4(-2.2334, 20.9684, -41.1089, 23.1553), q)
+        + x * (dot(vec4(6.3627, -54.4488, 103.1189, -56.3863), q)
+        + x * dot(vec4(-5.7047, 38.8754, -67.3500, 35.1796), q))));
+    return f0 * clamp(scale, 0.0, 1.0 - bias) + bias;
 }
 """
 
