@@ -21,6 +21,7 @@ pub(crate) type Group = Vec<(u32, Bound)>;
 
 /// One dispatch as it was recorded.
 #[derive(Debug, Clone)]
+#[cfg_attr(not(feature = "export"), allow(dead_code, reason = "only `export` starts a tape and reads it"))]
 pub(crate) struct Dispatch {
     /// Of the compute pass.
     pub label: String,
