@@ -16,18 +16,18 @@ async function start() {
   const errors = [];
   device.onuncapturederror = (e) => { errors.push(e.error.message); say(e.error.message); };
   const method = query.get("test");
-  const names = method ? [method] : ["gather", "neural"];
   const scene = await loadScene(`${data}/scene.glb`);
-  const { size } = await (await fetch(`${data}/${names[0]}/bouncelight.json`)).json();
+  const { size } = await (await fetch(`${data}/${method ?? "gather"}/bouncelight.json`)).json();
   const renderer = new Renderer(device, scene, size, "rgba8unorm");
   const passes = {};
-  for (const name of names) passes[name] = await Pass.load(device, `${data}/${name}`, renderer.inputs);
+  // A network's shaders take long to compile, so a pass is loaded when it is asked for.
+  const loaded = async (name) => passes[name] ??= await Pass.load(device, `${data}/${name}`, renderer.inputs);
   const frame = (encoder, pass, shift) => {
     const view = renderer.view(shift);
     renderer.draw(encoder, view);
     pass.record(encoder, cameraValues(view, renderer.projection()));
   };
-  if (method) return await test(device, renderer, passes[method], frame, errors);
+  if (method) return await test(device, renderer, await loaded(method), frame, errors);
 
   const canvas = document.querySelector("canvas");
   [canvas.width, canvas.height] = size;
@@ -36,18 +36,20 @@ async function start() {
   const [select, split] = ["select", "input"].map((tag) => document.querySelector(tag));
   const times = {};
   const loop = async () => {
+    const pass = await loaded(select.value);
     const began = performance.now();
     const encoder = device.createCommandEncoder();
-    frame(encoder, passes[select.value]);
-    renderer.show(encoder, context.getCurrentTexture().createView(), passes[select.value], split.value * size[0]);
+    frame(encoder, pass);
+    renderer.show(encoder, context.getCurrentTexture().createView(), pass, split.value * size[0]);
     device.queue.submit([encoder.finish()]);
     await device.queue.onSubmittedWorkDone();
     const took = performance.now() - began;
     times[select.value] = 0.9 * (times[select.value] ?? took) + 0.1 * took;
     say(Object.entries(times).map(([name, ms]) => `${name} ${ms.toFixed(1)} ms a frame`).join(", "));
-    requestAnimationFrame(loop);
+    requestAnimationFrame(guarded);
   };
-  loop();
+  const guarded = () => loop().catch((error) => say(String(error)));
+  guarded();
 }
 
 async function test(device, renderer, pass, frame, errors) {
@@ -57,6 +59,7 @@ async function test(device, renderer, pass, frame, errors) {
     frame(encoder, pass);
     device.queue.submit([encoder.finish()]);
     await device.queue.onSubmittedWorkDone();
+    if (errors.length) throw new Error(errors[0]);
   }
   const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
   const texture = device.createTexture({ size: [width, height], format: "rgba8unorm", usage });

@@ -48,12 +48,17 @@ export class Pass {
       if (row.file || row.fill) device.queue.writeBuffer(buffer, 0, await content(row, row.bytes));
       pass.buffers[row.name] = buffer;
     }
+    const stored = new Set();
+    for (const { shader, resources } of manifest.dispatches) {
+      const written = resources.filter((_, i) => manifest.shaders[shader].bindings[i].kind === "storage-texture");
+      written.forEach(({ resource }) => stored.add(resource));
+    }
     for (const row of manifest.textures) {
       if (inputs[row.name]) {
         pass.views[row.name] = inputs[row.name];
         continue;
       }
-      const written = row.role === "output" ? GPUTextureUsage.STORAGE_BINDING : 0;
+      const written = stored.has(row.name) ? GPUTextureUsage.STORAGE_BINDING : 0;
       const usage = GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST | written;
       const texture = device.createTexture({ size: row.size, format: row.format, usage });
       if (row.file) {
