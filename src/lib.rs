@@ -20,12 +20,15 @@
 //!   other renderers embed.
 //! - `reference` (feature `reference`): the path tracer that everything else is measured against.
 //! - [`metrics`]: image metrics, no wgpu.
+//! - `export` (feature `export`): the pass for hosts without wgpu.
 //! - `viewer` (feature `viewer`): the window of `bouncelight view`.
 //! - [`study`]: what is measured over methods and scenes.
 //!
 //! Conventions (units, spaces, encodings) stand in `docs/architecture.md`.
 
 pub mod accel;
+#[cfg(feature = "export")]
+pub mod export;
 pub mod gi;
 pub mod gpu;
 #[cfg(feature = "io")]

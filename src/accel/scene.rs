@@ -274,7 +274,7 @@ fn filled(device: &wgpu::Device, queue: &wgpu::Queue, label: &str, data: &[u8]) 
     let buffer = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size: (data.len() as u64).max(64),
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     });
     if !data.is_empty() {

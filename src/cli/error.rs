@@ -2,6 +2,7 @@
 
 use crate::{
     accel::AccelError,
+    export::ExportError,
     gi::{GiError, fitted::FittedError},
     gpu::GpuError,
     net::{convert::ConvertError, format::WeightsError, learn::LearnError, pictures::PicturesError},
@@ -86,6 +87,14 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
             return match e {
                 ViewError::Gpu(_) => NO_ADAPTER,
                 ViewError::Script(_) | ViewError::Settings(_) => USAGE,
+                _ => RUNTIME,
+            };
+        }
+        // As `RenderError`, it shows what it wraps as if it were its own.
+        if let Some(e) = cause.downcast_ref::<ExportError>() {
+            return match e {
+                ExportError::Upload(_) | ExportError::Accel(_) => INVALID_INPUT,
+                ExportError::Gi(GiError::Feature { .. } | GiError::Output(_)) => INVALID_INPUT,
                 _ => RUNTIME,
             };
         }

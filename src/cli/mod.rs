@@ -12,6 +12,7 @@ mod demo;
 mod doctor;
 mod drawn;
 pub mod error;
+mod export;
 mod fit;
 mod fitted;
 mod interrupt;
@@ -63,6 +64,8 @@ enum Command {
     Fit(fit::Args),
     /// Run a network on G-buffer pictures from elsewhere.
     Apply(apply::Args),
+    /// Write what a host without wgpu needs to run the pass: shaders, buffers and how to dispatch them.
+    Export(export::Args),
     /// Look into a weights file, check it, or make one from a published generator's state.
     Weights(weights::Args),
     /// Draw the bundled interior by three methods beside Cycles' picture, and say where the time goes.
@@ -83,7 +86,7 @@ impl Command {
             Command::Stability(a) => a.runs_network(),
             Command::Chart(a) => a.runs_network(),
             Command::Weights(a) => a.runs_network(),
-            Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) => false,
+            Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) | Command::Export(_) => false,
         }
     }
 }
@@ -113,6 +116,7 @@ pub fn main() -> ExitCode {
         Command::Chart(a) => chart::run(&cli.global, a),
         Command::Compare(a) => compare::run(a),
         Command::Dataset(a) => dataset::run(&cli.global, a),
+        Command::Export(a) => export::run(&cli.global, a),
         Command::Fit(a) => fit::run(&cli.global, a),
         Command::Stability(a) => stability::run(&cli.global, a),
         Command::Apply(a) => apply::run(&cli.global, a),

@@ -2,6 +2,8 @@
 //! the key, so a host that hands over another light buffer gets another group, and one that hands
 //! over the same things every frame makes each group once.
 
+use super::tape;
+
 /// Something that is bound.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Bound {
@@ -28,6 +30,18 @@ impl From<&wgpu::TextureView> for Bound {
 }
 
 impl Bound {
+    /// What a group's entry holds; `None` for samplers and lists, which compute passes here do without.
+    pub(super) fn of(resource: &wgpu::BindingResource<'_>) -> Option<Self> {
+        match resource {
+            wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size }) => {
+                let size = size.map_or(buffer.size() - offset, |s| s.get());
+                Some(Self::Part((*buffer).clone(), *offset, size))
+            }
+            wgpu::BindingResource::TextureView(view) => Some(Self::View((*view).clone())),
+            _ => None,
+        }
+    }
+
     fn resource(&self) -> wgpu::BindingResource<'_> {
         match self {
             Bound::Buffer(buffer) => buffer.as_entire_binding(),
@@ -90,11 +104,10 @@ impl Binder {
             .zip(&resources)
             .map(|(binding, bound)| wgpu::BindGroupEntry { binding, resource: bound.resource() })
             .collect();
-        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(self.label),
-            layout: &self.layout,
-            entries: &entries,
-        });
+        let group = tape::bind_group(
+            &self.device,
+            &wgpu::BindGroupDescriptor { label: Some(self.label), layout: &self.layout, entries: &entries },
+        );
         self.made += 1;
         let entry = (resources.to_vec(), group.clone());
         if self.groups.len() < CAPACITY {
@@ -132,12 +145,13 @@ pub fn pipeline(
         bind_group_layouts: &layouts,
         immediate_size: 0,
     });
-    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+    let descriptor = wgpu::ComputePipelineDescriptor {
         label: Some(label),
         layout: Some(&layout),
         module,
         entry_point: Some(entry),
         compilation_options: Default::default(),
         cache: None,
-    })
+    };
+    tape::compute_pipeline(device, &descriptor)
 }

@@ -5,6 +5,7 @@ pub(crate) mod binding;
 mod choose;
 pub mod readback;
 pub mod shaders;
+pub(crate) mod tape;
 pub mod timing;
 
 pub use choose::{Backend, Gpu, GpuError, GpuOptions, candidates, wanted_features};

@@ -113,11 +113,11 @@ pub fn located(message: &str) -> String {
 pub fn module_with(device: &wgpu::Device, name: &str, prelude: &str) -> wgpu::ShaderModule {
     COMPILED.fetch_add(1, Ordering::Relaxed);
     let joined = joined(name, prelude);
-    let source = wgpu::ShaderSource::Wgsl(joined.text.clone().into());
+    let text = joined.text.clone();
     if folder().is_some() {
         let mut edited = EDITED.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         edited.retain(|(other, _)| other != name);
         edited.push((name.to_owned(), Joined { text: String::new(), ..joined }));
     }
-    device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source })
+    super::tape::shader_module(device, name, text)
 }

@@ -1,6 +1,7 @@
 //! GPU time per pass: a [`Recorder`] pairs a command encoder with an optional profiler, so that every pass is
 //! written once and timed when somebody asks.
 
+pub use super::tape::Pass;
 use wgpu_profiler::{GpuProfiler, GpuTimerQueryResult};
 
 /// Records passes into an encoder and, when it has a profiler, their timestamps under the pass's label.
@@ -26,12 +27,11 @@ impl<'a> Recorder<'a> {
     }
 
     /// Runs `body` in a compute pass named `label`.
-    pub fn compute(&mut self, label: &str, body: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
+    pub fn compute(&mut self, label: &str, body: impl FnOnce(&mut Pass<'_>)) {
         let query = self.profiler.map(|p| p.begin_pass_query(label, self.encoder));
         let timestamp_writes = query.as_ref().and_then(|q| q.compute_pass_timestamp_writes());
-        body(
-            &mut self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes }),
-        );
+        let descriptor = wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes };
+        body(&mut Pass::new(self.encoder.begin_compute_pass(&descriptor), label));
         self.end(query);
     }
 

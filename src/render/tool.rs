@@ -59,7 +59,7 @@ pub(crate) fn compute(
 }
 
 /// Dispatches enough 8×8 workgroups for `size`.
-pub(crate) fn dispatch(pass: &mut wgpu::ComputePass<'_>, size: [u32; 2]) {
+pub(crate) fn dispatch(pass: &mut crate::gpu::timing::Pass<'_>, size: [u32; 2]) {
     pass.dispatch_workgroups(size[0].div_ceil(8), size[1].div_ceil(8), 1);
 }
 

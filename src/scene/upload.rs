@@ -291,7 +291,7 @@ fn filled<T: Pod>(
     data: &[T],
 ) -> wgpu::Buffer {
     let size = (std::mem::size_of_val(data).max(64) as u64).next_multiple_of(4);
-    let usage = usage | wgpu::BufferUsages::COPY_DST;
+    let usage = usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
     let buffer =
         device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
     if !data.is_empty() {

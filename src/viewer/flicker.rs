@@ -3,6 +3,7 @@
 //! this is what eyes would see shimmer. It waits for the GPU, so it is off unless asked for.
 
 use crate::gpu::readback::{self, ReadbackError};
+use crate::gpu::timing::Recorder;
 use crate::render::{targets::Target, tonemap_curve::Tonemap, tool};
 
 /// Compares frames.
@@ -67,10 +68,11 @@ impl FlickerPass {
         let mut encoder = device.create_command_encoder(&Default::default());
         let compare = follows && !fresh;
         if compare {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&self.pipeline);
-            pass.set_bind_group(0, &kept.group, &[]);
-            tool::dispatch(&mut pass, size);
+            Recorder::new(&mut encoder).compute("viewer.flicker", |pass| {
+                pass.set_pipeline(&self.pipeline);
+                pass.set_bind_group(0, &kept.group, &[]);
+                tool::dispatch(pass, size);
+            });
         }
         let (from, to) = (hdr.texture.as_image_copy(), kept.before.texture.as_image_copy());
         encoder.copy_texture_to_texture(from, to, hdr.texture.size());

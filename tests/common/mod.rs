@@ -16,6 +16,8 @@ pub enum Need {
     Screen,
     /// OpenGL beside Vulkan.
     OpenGl,
+    /// spirv-val, of Khronos' SPIRV-Tools.
+    SpirvVal,
     /// python3 with numpy and jsonschema.
     Python,
     /// python3 with PyTorch and what else training imports.
@@ -32,6 +34,7 @@ impl Need {
             Self::Adapter => "adapter",
             Self::Screen => "screen",
             Self::OpenGl => "OpenGL",
+            Self::SpirvVal => "spirv-val",
             Self::Python => "Python",
             Self::Torch => "PyTorch",
             Self::Shared => "shared folder",
@@ -48,7 +51,8 @@ impl Need {
             Self::OpenGl | Self::Python => set("REQUIRE_ALL"),
             // Continuous integration has none of these: PyTorch and the generator's weights are
             // gigabytes and 218 MB, the shared folder is not part of the repository.
-            Self::Screen | Self::Torch | Self::Shared | Self::Generator => None,
+            // `cargo xtask hosts` needs the network anyway, and installs spirv-val.
+            Self::Screen | Self::SpirvVal | Self::Torch | Self::Shared | Self::Generator => None,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! `cargo xtask demo | test | gpu-report | ci`: set-up and checks; no product code.
+//! `cargo xtask demo | test | hosts | gpu-report | ci`: set-up and checks; no product code.
 //!
 //! Every command first makes sure of a wgpu adapter: it asks `bouncelight doctor`, and on Debian or
 //! Ubuntu without any adapter it installs Mesa's CPU driver, saying so before it does.
@@ -12,6 +12,8 @@ usage: cargo xtask COMMAND
   demo   draw the bundled interior with the shipped weights: out/demo.png and a timing table
   test   every test, and which were skipped (an adapter is made sure of first; REQUIRE_GPU=1 makes a missing one an
          error, REQUIRE_ALL=1 all that .ci/run installs)
+  hosts  the pass in hosts without wgpu, against the Rust pass: exports, sets up Python with moderngl in target/hosts, and
+         runs examples/moderngl/test.py and a picture (needs python3 with venv, the network for pip, and EGL)
   gpu-report [--dev] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] [--triangles N,...] [--out FOLDER] [--no-pytorch]
          measures on this device all that docs/ projects: docs/measured/DEVICE.json and DEVICE.md, in less than eight minutes
          (--dev builds without release's optimisation: for rehearsals)
@@ -19,12 +21,15 @@ usage: cargo xtask COMMAND
 
 /// Exit code with which `bouncelight doctor` says that there is no usable adapter.
 const NO_ADAPTER: i32 = 3;
+/// Exit code with which `bouncelight render` says that a picture differs from its reference.
+const ABOVE_THRESHOLD: i32 = 5;
 
 fn main() -> ExitCode {
     let command = std::env::args().nth(1).unwrap_or_default();
     let done = match command.as_str() {
         "demo" => demo(),
         "test" => test(),
+        "hosts" => hosts(),
         "gpu-report" => gpu_report(std::env::args().skip(2).collect()),
         "ci" => ci(),
         _ => {
@@ -90,6 +95,56 @@ fn gpu_report(mut args: Vec<String>) -> Result<(), String> {
     }
     let words: Vec<&str> = args.iter().map(String::as_str).collect();
     cargo(&[&["run", "--quiet", "--example", "gpu_report"], profile, &["--"], &words].concat())
+}
+
+/// Hosts in other languages; their tests are their own programs.
+fn hosts() -> Result<(), String> {
+    cargo(&["build", "--bin", "bouncelight", "--example", "moderngl_twin", "--example", "export_scene"])?;
+    make_sure_of_adapter(&[])?;
+    if Command::new("spirv-val").arg("--version").output().is_err()
+        && std::path::Path::new("/etc/debian_version").exists()
+    {
+        eprintln!("xtask: no spirv-val; installing spirv-tools with apt-get");
+        apt(&["install", "-y", "-q", "--no-install-recommends", "spirv-tools"])?;
+    }
+    cargo(&["test", "--test", "export"])?;
+    let own = std::env::current_exe().map_err(|e| format!("own path: {e}"))?;
+    // The folder of `cargo build`: xtask lies in it.
+    let built = own.parent().ok_or("own path has no folder")?;
+    let work = built.with_file_name("hosts");
+    std::fs::create_dir_all(&work).map_err(|e| format!("{}: {e}", work.display()))?;
+    let text = |path: &std::path::Path| path.to_string_lossy().into_owned();
+    let [program, twin, scene_writer] =
+        ["bouncelight", "examples/moderngl_twin", "examples/export_scene"].map(|p| text(&built.join(p)));
+    let (venv, glb) = (text(&work.join("venv")), text(&work.join("cornell.glb")));
+    let python = format!("{venv}/bin/python");
+    if !std::path::Path::new(&python).exists() {
+        run(&mut command("python3", &["-m", "venv", &venv]))?;
+    }
+    run(&mut command(&python, &["-m", "pip", "install", "-q", "-r", "examples/moderngl/requirements.txt"]))?;
+    run(&mut command(&scene_writer, &["cornell", &glb]))?;
+    for method in ["gather", "neural"] {
+        let folder = text(&work.join(format!("moderngl-{method}")));
+        let target = ["--method", method, "--target", "glsl430", "--size", "160x96", "-o", &folder];
+        run(&mut command(&program, &[["-q", "export", "cornell"].as_slice(), &target].concat()))?;
+        run(&mut command(&python, &["examples/moderngl/test.py", &folder, "cornell", &glb, &twin]))?;
+    }
+    // The whole picture: our renderer's against this host's, and as a control without the light that the pass finds.
+    let [folder, picture, ours] =
+        ["moderngl-picture", "moderngl.png", "bouncelight.png"].map(|name| text(&work.join(name)));
+    let size = ["--size", "384x384"];
+    let target = ["-q", "export", "cornell", "--target", "glsl430", "-o", &folder];
+    run(&mut command(&program, &[target.as_slice(), &size].concat()))?;
+    run(&mut command(&python, &["examples/moderngl/main.py", &folder, &glb, &picture]))?;
+    let render = ["-q", "render", "cornell", "--tonemap", "none", "-o", &ours, "--reference", &picture];
+    let render = [render.as_slice(), &size, &["--metric", "flip", "--threshold", "0.05"]].concat();
+    match command(&program, &[render.as_slice(), &["--method", "direct"]].concat()).status() {
+        Ok(status) if status.code() == Some(ABOVE_THRESHOLD) => {
+            eprintln!("xtask: without the pass it is, as it should")
+        }
+        other => return Err(format!("without the pass's light the pictures should differ: {other:?}")),
+    }
+    run(&mut command(&program, &[render.as_slice(), &["--method", "gather", "--gi-frames", "64"]].concat()))
 }
 
 fn ci() -> Result<(), String> {

@@ -172,7 +172,7 @@ impl GatherGi {
         let (shared, alone) = ((&inputs, &scene), (&inputs, &frame_params));
         let new = |groups, names, types: &[wgpu::BindingType]| Pass::new(device, groups, names, types);
         let unused = |label, size| {
-            let usage = wgpu::BufferUsages::STORAGE;
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
             device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
         };
         let rw = READ_WRITE;

@@ -66,7 +66,7 @@ impl ParamsRing {
         let buffer = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("gi.gather"),
             size: STRIDE * u64::from(SLOTS),
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
         Self { buffer, next: 0 }

@@ -47,7 +47,7 @@ impl Store {
         let lots = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("gi.entry_lots"),
             size: 8 * slots,
-            usage: wgpu::BufferUsages::STORAGE,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: true,
         });
         if let Ok(mut range) = lots.get_mapped_range_mut(..) {
@@ -113,7 +113,9 @@ fn gloss(device: &wgpu::Device, size: [u32; 2]) -> wgpu::TextureView {
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: wgpu::TextureFormat::Rgba16Float,
-            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING,
+            usage: wgpu::TextureUsages::STORAGE_BINDING
+                | wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         })
         .create_view(&Default::default())

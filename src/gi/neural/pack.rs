@@ -5,7 +5,7 @@ use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::exposure::{ExposurePass, pipeline, storage_entry};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup, cells_of, check, texture_entry};
 use crate::gpu::timing::Recorder;
-use crate::gpu::{readback, shaders};
+use crate::gpu::{readback, shaders, tape};
 
 /// The pack stage, bound to one input buffer.
 pub struct PackPass {
@@ -30,15 +30,18 @@ impl PackPass {
             entries: &[storage_entry(0, true), storage_entry(1, false), texture_entry(2)],
         });
         let module = shaders::module_with(device, "gi.pack", &features.prelude());
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("gi.pack"),
-            layout: &layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: target },
-                wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(guess) },
-            ],
-        });
+        let group = tape::bind_group(
+            device,
+            &wgpu::BindGroupDescriptor {
+                label: Some("gi.pack"),
+                layout: &layout,
+                entries: &[
+                    wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
+                    wgpu::BindGroupEntry { binding: 1, resource: target },
+                    wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(guess) },
+                ],
+            },
+        );
         Self { pipeline: pipeline(device, "gi.pack", &module, "pack", inputs, &layout), group }
     }
 

@@ -12,8 +12,8 @@ use crate::gi::stage::ViewCache;
 use crate::gi::stage::exposure::{ExposurePass, output_entry, pipeline, storage_entry};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup, texture_entry};
 use crate::gi::stage::weights::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
-use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
+use crate::gpu::{shaders, tape};
 
 /// Sum of the four weights below which more cells are asked.
 pub const TRUST: f32 = 0.1;
@@ -133,16 +133,19 @@ impl ReconstructPass {
     ) -> Result<(), GiError> {
         crate::gi::stage::inputs::check_output(output, inputs.size)?;
         let group = self.outputs.get([output], || {
-            Ok::<_, GiError>(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("gi.reconstruct"),
-                layout: &self.layout,
-                entries: &[
-                    wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
-                    wgpu::BindGroupEntry { binding: 1, resource: answers },
-                    wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(output) },
-                    wgpu::BindGroupEntry { binding: 3, resource: wgpu::BindingResource::TextureView(guess) },
-                ],
-            }))
+            Ok::<_, GiError>(tape::bind_group(
+                &self.device,
+                &wgpu::BindGroupDescriptor {
+                    label: Some("gi.reconstruct"),
+                    layout: &self.layout,
+                    entries: &[
+                        wgpu::BindGroupEntry { binding: 0, resource: exposure.buffer().as_entire_binding() },
+                        wgpu::BindGroupEntry { binding: 1, resource: answers },
+                        wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(output) },
+                        wgpu::BindGroupEntry { binding: 3, resource: wgpu::BindingResource::TextureView(guess) },
+                    ],
+                },
+            ))
         })?;
         recorder.compute("gi.reconstruct", |pass| {
             inputs.set(pass);

@@ -16,8 +16,8 @@
 use super::exposure::{pipeline, storage_entry};
 use super::inputs::{BoundInputs, CELL, InputGroup, cells_of};
 use crate::gi::interface::technique::Cost;
-use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
+use crate::gpu::{shaders, tape};
 
 /// What `cell_pixels` holds for a cell that shows the background only; `NO_PIXEL` in `shaders/gi/cells.wgsl`.
 pub const NO_PIXEL: u32 = u32::MAX;
@@ -106,10 +106,13 @@ fn buffer(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, size: [u32; 2])
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     });
-    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("gi.cells"),
-        layout,
-        entries: &[wgpu::BindGroupEntry { binding: 0, resource: pixels.as_entire_binding() }],
-    });
+    let group = tape::bind_group(
+        device,
+        &wgpu::BindGroupDescriptor {
+            label: Some("gi.cells"),
+            layout,
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: pixels.as_entire_binding() }],
+        },
+    );
     (pixels, group)
 }

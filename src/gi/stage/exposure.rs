@@ -4,9 +4,8 @@
 use super::inputs::{BoundInputs, InputGroup};
 use crate::gi::interface::GiError;
 use crate::gi::interface::technique::Cost;
-use crate::gpu::readback;
-use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
+use crate::gpu::{bind, readback, shaders, tape};
 
 /// Most workgroups of the first level; `MAX_GROUPS` in the shader.
 const MAX_GROUPS: u32 = 256;
@@ -51,20 +50,23 @@ impl ExposurePass {
                 mapped_at_creation: false,
             })
         };
-        let partials = buffer("gi.exposure.partials", u64::from(MAX_GROUPS) * 32, wgpu::BufferUsages::empty());
+        let partials = buffer("gi.exposure.partials", u64::from(MAX_GROUPS) * 32, wgpu::BufferUsages::COPY_SRC);
         let result = buffer("gi.exposure", size_of::<Exposure>() as u64, wgpu::BufferUsages::COPY_SRC);
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("gi.exposure"),
             entries: &[storage_entry(0, false), storage_entry(1, false)],
         });
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("gi.exposure"),
-            layout: &layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: partials.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: result.as_entire_binding() },
-            ],
-        });
+        let group = tape::bind_group(
+            device,
+            &wgpu::BindGroupDescriptor {
+                label: Some("gi.exposure"),
+                layout: &layout,
+                entries: &[
+                    wgpu::BindGroupEntry { binding: 0, resource: partials.as_entire_binding() },
+                    wgpu::BindGroupEntry { binding: 1, resource: result.as_entire_binding() },
+                ],
+            },
+        );
         let module = shaders::module(device, "gi.exposure");
         let pipeline = |entry| pipeline(device, "gi.exposure", &module, entry, inputs, &layout);
         Self { sum: pipeline("sum_cells"), finish: pipeline("finish"), group, partials, result }
@@ -147,17 +149,5 @@ pub(crate) fn pipeline(
     inputs: &InputGroup,
     own: &wgpu::BindGroupLayout,
 ) -> wgpu::ComputePipeline {
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(label),
-        bind_group_layouts: &[Some(inputs.layout()), Some(own)],
-        immediate_size: 0,
-    });
-    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(label),
-        layout: Some(&layout),
-        module,
-        entry_point: Some(entry),
-        compilation_options: Default::default(),
-        cache: None,
-    })
+    bind::pipeline(device, label, module, entry, &[inputs.layout(), own])
 }

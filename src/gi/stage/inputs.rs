@@ -8,6 +8,8 @@ pub(crate) use super::formats::{check, check_output};
 pub use super::params::{CELL, Params, cells_of, sample_pixel};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::ViewCache;
+use crate::gpu::tape;
+use crate::gpu::timing::Pass;
 
 /// Recordings between two submissions that keep their own parameters.
 pub const SLOTS: u32 = 64;
@@ -42,7 +44,7 @@ pub struct BoundInputs {
 
 impl BoundInputs {
     /// Sets group 0 of `pass`.
-    pub fn set(&self, pass: &mut wgpu::ComputePass<'_>) {
+    pub fn set(&self, pass: &mut Pass<'_>) {
         pass.set_bind_group(0, &self.group, &[self.offset]);
     }
 }
@@ -84,7 +86,7 @@ impl InputGroup {
         let ring = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("gi.params"),
             size: STRIDE * u64::from(SLOTS),
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
         let absent = super::absent(device, "gi.absent", wgpu::TextureFormat::Rgba16Float);
@@ -122,11 +124,14 @@ impl InputGroup {
                 size: wgpu::BufferSize::new(size_of::<Params>() as u64),
             };
             let params = wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(ring) };
-            Ok::<_, GiError>(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("gi.inputs"),
-                layout: &self.layout,
-                entries: &[params, view(0), view(1), view(2), view(3), view(4)],
-            }))
+            Ok::<_, GiError>(tape::bind_group(
+                &self.device,
+                &wgpu::BindGroupDescriptor {
+                    label: Some("gi.inputs"),
+                    layout: &self.layout,
+                    entries: &[params, view(0), view(1), view(2), view(3), view(4)],
+                },
+            ))
         })?;
         self.shift = Some(params.shift());
         let slot = self.next;

@@ -20,7 +20,7 @@ pub(crate) fn absent(device: &wgpu::Device, label: &str, format: wgpu::TextureFo
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
         view_formats: &[],
     });
     texture.create_view(&Default::default())

@@ -4,6 +4,7 @@ use super::kernel::{Bound, Kernel, Numbers, Part};
 use super::permutation::ROW;
 use super::pipelines::Pipelines;
 use super::{NetError, Options};
+use crate::gpu::tape;
 use crate::net::dropout;
 use crate::net::graph::Graph;
 use crate::net::plan::{self, Kind, Plan, Precision, Step};
@@ -84,7 +85,12 @@ impl Trained {
                 let uniform = bound == Bound::Uniform;
                 let kind = if uniform { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
                 let size = each.next_multiple_of(SLOT) * parts;
-                Trained::Buffer(buffer(device, label, size, kind | wgpu::BufferUsages::COPY_DST))
+                Trained::Buffer(buffer(
+                    device,
+                    label,
+                    size,
+                    kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+                ))
             }
         }
     }
@@ -115,7 +121,7 @@ fn texture(device: &wgpu::Device, label: &str, rows: u32, texel: u64) -> wgpu::T
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format: if texel == 8 { wgpu::TextureFormat::Rgba16Float } else { wgpu::TextureFormat::Rgba32Float },
-        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
+        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
         view_formats: &[],
     })
 }
@@ -183,7 +189,7 @@ pub(super) fn check_limits(device: &wgpu::Device, plan: &Plan, kernels: &[Kernel
 /// Room for the uniforms of all dispatches.
 fn steps_buffer(device: &wgpu::Device, kernels: &[Kernel]) -> wgpu::Buffer {
     let parts: usize = kernels.iter().map(|k| k.parts.len()).sum();
-    let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+    let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
     buffer(device, "net.steps", (parts.max(1) as u64) * SLOT, usage)
 }
 
@@ -277,7 +283,9 @@ impl Memory {
             arena: buffer(device, "net.arena", bytes, usage),
             steps: steps_buffer(device, kernels),
             mirror: mirrored.then(|| texture(device, "net.mirror", (bytes / row) as u32, element(plan))),
-            partial: partial.map(|bytes| buffer(device, "net.partial", bytes, wgpu::BufferUsages::STORAGE)),
+            partial: partial.map(|bytes| {
+                buffer(device, "net.partial", bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)
+            }),
         }
     }
 
@@ -312,7 +320,7 @@ pub(super) fn layers(
             let entries: Vec<_> =
                 resources.into_iter().map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
             let label = Some(step.name.as_str());
-            device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout, entries: &entries })
+            tape::bind_group(device, &wgpu::BindGroupDescriptor { label, layout, entries: &entries })
         };
         let shared = |slot: u64| {
             vec![

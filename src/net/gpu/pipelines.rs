@@ -1,7 +1,7 @@
 //! Compiled kernels.
 
 use super::kernel::Kernel;
-use crate::gpu::shaders;
+use crate::gpu::{shaders, tape};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -57,7 +57,7 @@ impl Pipelines {
                 compilation_options: Default::default(),
                 cache: None,
             };
-            let pipeline = device.create_compute_pipeline(&descriptor);
+            let pipeline = tape::compute_pipeline(device, &descriptor);
             let layout = pipeline.get_bind_group_layout(0);
             (pipeline, layout)
         };

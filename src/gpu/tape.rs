@@ -1,0 +1,161 @@
+//! A tape of what compute passes are: while one runs on this thread, shaders, pipelines, bind groups and dispatches are
+//! written down as they are made, for `export`. Without one, each function here is wgpu's own and a look at a flag.
+
+use super::bind::Bound;
+use std::cell::{Cell, RefCell};
+
+thread_local! {
+    static RUNS: Cell<bool> = const { Cell::new(false) };
+    static TAPE: RefCell<Tape> = RefCell::default();
+}
+
+/// A compiled shader's name and text.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Source {
+    pub name: String,
+    pub text: String,
+}
+
+/// Resources of one group by number of the binding.
+pub(crate) type Group = Vec<(u32, Bound)>;
+
+/// One dispatch as it was recorded.
+#[derive(Debug, Clone)]
+#[cfg_attr(not(feature = "export"), allow(dead_code, reason = "only `export` starts a tape and reads it"))]
+pub(crate) struct Dispatch {
+    /// Of the compute pass.
+    pub label: String,
+    pub source: Source,
+    pub entry: String,
+    pub workgroups: [u32; 3],
+    /// What was bound, by number of the group, each with the offset of its first binding.
+    pub groups: Vec<(u32, Group, u32)>,
+}
+
+#[derive(Default)]
+struct Tape {
+    sources: Vec<(wgpu::ShaderModule, Source)>,
+    pipelines: Vec<(wgpu::ComputePipeline, Source, String)>,
+    groups: Vec<(wgpu::BindGroup, Group)>,
+    dispatches: Vec<Dispatch>,
+}
+
+/// A tape that runs on this thread until it is dropped. There is one at a time.
+#[cfg(feature = "export")]
+pub(crate) struct Running(());
+
+#[cfg(feature = "export")]
+impl Running {
+    /// Starts.
+    pub fn start() -> Self {
+        TAPE.take();
+        RUNS.set(true);
+        Self(())
+    }
+
+    /// Dispatches since the start or the last call, in order.
+    pub fn take(&mut self) -> Vec<Dispatch> {
+        TAPE.with_borrow_mut(|tape| std::mem::take(&mut tape.dispatches))
+    }
+}
+
+#[cfg(feature = "export")]
+impl Drop for Running {
+    fn drop(&mut self) {
+        RUNS.set(false);
+        TAPE.take();
+    }
+}
+
+fn write(note: impl FnOnce(&mut Tape)) {
+    if RUNS.get() {
+        TAPE.with_borrow_mut(note);
+    }
+}
+
+/// Compiles WGSL.
+pub(crate) fn shader_module(device: &wgpu::Device, name: &str, text: String) -> wgpu::ShaderModule {
+    let kept = RUNS.get().then(|| text.clone());
+    let source = wgpu::ShaderSource::Wgsl(text.into());
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source });
+    if let Some(text) = kept {
+        write(|tape| tape.sources.push((module.clone(), Source { name: name.to_owned(), text })));
+    }
+    module
+}
+
+/// Makes a pipeline.
+pub(crate) fn compute_pipeline(
+    device: &wgpu::Device,
+    descriptor: &wgpu::ComputePipelineDescriptor<'_>,
+) -> wgpu::ComputePipeline {
+    let pipeline = device.create_compute_pipeline(descriptor);
+    write(|tape| {
+        let source = tape.sources.iter().find(|(module, _)| module == descriptor.module).map(|s| s.1.clone());
+        if let Some(source) = source {
+            let entry = descriptor.entry_point.unwrap_or_default().to_owned();
+            tape.pipelines.push((pipeline.clone(), source, entry));
+        }
+    });
+    pipeline
+}
+
+/// Makes a bind group.
+pub(crate) fn bind_group(device: &wgpu::Device, descriptor: &wgpu::BindGroupDescriptor<'_>) -> wgpu::BindGroup {
+    let group = device.create_bind_group(descriptor);
+    write(|tape| {
+        let bound = |e: &wgpu::BindGroupEntry<'_>| Some((e.binding, Bound::of(&e.resource)?));
+        tape.groups.push((group.clone(), descriptor.entries.iter().filter_map(bound).collect()));
+    });
+    group
+}
+
+/// A compute pass.
+pub struct Pass<'a> {
+    pass: wgpu::ComputePass<'a>,
+    label: &'a str,
+    pipeline: Option<wgpu::ComputePipeline>,
+    groups: Vec<(u32, wgpu::BindGroup, u32)>,
+}
+
+impl<'a> Pass<'a> {
+    pub(crate) fn new(pass: wgpu::ComputePass<'a>, label: &'a str) -> Self {
+        Self { pass, label, pipeline: None, groups: Vec::new() }
+    }
+
+    /// As [`wgpu::ComputePass::set_pipeline`].
+    pub fn set_pipeline(&mut self, pipeline: &wgpu::ComputePipeline) {
+        self.pass.set_pipeline(pipeline);
+        if RUNS.get() {
+            self.pipeline = Some(pipeline.clone());
+        }
+    }
+
+    /// As [`wgpu::ComputePass::set_bind_group`]; a dynamic offset is that of the group's first binding.
+    pub fn set_bind_group(&mut self, index: u32, group: &wgpu::BindGroup, offsets: &[u32]) {
+        self.pass.set_bind_group(index, group, offsets);
+        if RUNS.get() {
+            self.groups.retain(|g| g.0 != index);
+            self.groups.push((index, group.clone(), offsets.first().copied().unwrap_or(0)));
+        }
+    }
+
+    /// As [`wgpu::ComputePass::dispatch_workgroups`].
+    pub fn dispatch_workgroups(&mut self, x: u32, y: u32, z: u32) {
+        self.pass.dispatch_workgroups(x, y, z);
+        write(|tape| {
+            // What was made before the tape began leaves an empty place, which `export` refuses.
+            let pipeline = tape.pipelines.iter().find(|(p, ..)| Some(p) == self.pipeline.as_ref());
+            let known = pipeline.map(|(_, source, entry)| (source.clone(), entry.clone()));
+            let (source, entry) = known.unwrap_or((Source { name: String::new(), text: String::new() }, String::new()));
+            let group = |(index, group, offset): &(u32, wgpu::BindGroup, u32)| {
+                let bound = tape.groups.iter().find(|(g, _)| g == group);
+                (*index, bound.map(|b| b.1.clone()).unwrap_or_default(), *offset)
+            };
+            let mut groups: Vec<_> = self.groups.iter().map(group).collect();
+            groups.sort_by_key(|g| g.0);
+            let label = self.label.to_owned();
+            tape.dispatches.push(Dispatch { label, source, entry, workgroups: [x, y, z], groups });
+        });
+    }
+}
