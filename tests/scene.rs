@@ -17,6 +17,8 @@ mod glb;
 mod gltf_features;
 #[path = "scene/home.rs"]
 mod home;
+#[path = "scene/layers.rs"]
+mod layers;
 #[path = "scene/limits.rs"]
 mod limits;
 #[path = "scene/meshopt.rs"]

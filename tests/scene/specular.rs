@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use crate::glb::{Glb, png};
 use crate::shared::assert_sound;
 
-fn loaded(material: Value, images: &[Vec<u8>]) -> Scene {
+pub(crate) fn loaded(material: Value, images: &[Vec<u8>]) -> Scene {
     let mut glb = Glb::triangle();
     let uv = glb.floats("VEC2", &[0.0, 1.0, 1.0, 1.0, 0.0, 0.0]);
     glb.attribute("TEXCOORD_0", uv);

@@ -54,11 +54,15 @@ impl<'a> Loader<'a> {
             }
         }
         self.clean(&place, &mut out);
+        let json = &self.document.as_json().materials[index];
+        if let Some(extensions) = json.extensions.as_ref().map(|e| &e.others) {
+            self.clearcoat(&place, extensions, &mut out);
+            self.transmission(&place, extensions, &mut out);
+        }
         out.emissive_texture =
             material.emissive_texture().and_then(|t| self.texture(&place, "emissiveTexture", plain(&t), Use::Color));
 
         // For these two the crate types no KHR_texture_transform, so it is read from what it keeps as JSON.
-        let json = &self.document.as_json().materials[index];
         if let Some(normal) = material.normal_texture() {
             let others = json.normal_texture.as_ref().and_then(|t| t.extensions.as_ref()).map(|e| &e.others);
             let reference = special(normal.texture().index(), normal.tex_coord(), others);

@@ -7,6 +7,7 @@
 mod accessor;
 mod extensions;
 mod instancing;
+mod layers;
 mod light;
 mod material;
 mod mend;

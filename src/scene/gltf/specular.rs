@@ -91,7 +91,7 @@ impl<'a> Loader<'a> {
 }
 
 /// Splits a coloured reflectance at normal incidence into its largest component and its colour.
-fn set_reflectance(out: &mut Material, f0: [f32; 3]) {
+pub(super) fn set_reflectance(out: &mut Material, f0: [f32; 3]) {
     let most = f0.iter().fold(0.0f32, |a, b| a.max(*b));
     out.f0 = most;
     out.specular_tint = if most > 0.0 && most.is_finite() { f0.map(|c| c / most) } else { [1.0; 3] };
