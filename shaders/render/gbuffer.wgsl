@@ -89,8 +89,8 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     return out;
 }
 
-// Variance of slopes along one axis of normals that differ, from √(1 − r) of a normal map's alpha: that of von Mises'
-// and Fisher's distribution whose mean has length r (Banerjee et al. 2005), at most 1 (normals all over the place).
+// Variance of slopes along one axis of normals that differ, from √(1 − r) of a normal map's alpha: that of the
+// von Mises-Fisher distribution whose mean has length r (Banerjee et al. 2005), at most 1 (normals all over the place).
 fn slope_variance(short: f32) -> f32 {
     let r = 1.0 - short * short;
     return min((1.0 - r * r) / max(r * (3.0 - r * r), 1e-3), 1.0);
