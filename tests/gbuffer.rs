@@ -289,3 +289,41 @@ fn inner_faces_of_closed_bodies_are_seen_from_inside_only() {
     let [both, one] = [&open(&away), &one_sided(&open(&away))].map(|s| normals(s, [1.0, 1.0, 9.0], [0.0; 3]));
     assert!(differ(&both, &one) > 100, "a single triangle has two sides");
 }
+
+/// Coverage of layers over a black board, pixel by pixel: its mean with its standard deviation over pixels.
+#[test]
+fn layers_cover_their_share_and_many_frames_know_it_well() {
+    let Some(gpu) = common::gpu() else { return };
+    let camera = look_at([0.3, 0.4, 2.0], [0.0; 3], 0.6);
+    let covered = |layers: &[f32], samples: u32| {
+        let board = |z: f32| quad([-2.0, -2.0, z], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]);
+        let mut s = scene((0..=layers.len()).map(|i| board(0.02 * i as f32)).collect(), vec![]);
+        s.materials = vec![s.materials[0].clone(); layers.len() + 1];
+        for (i, mesh) in s.meshes.iter_mut().enumerate() {
+            mesh.material = i;
+        }
+        s.materials[0].base_color = [0.0, 0.0, 0.0, 1.0];
+        for (material, &alpha) in s.materials[1..].iter_mut().zip(layers) {
+            (material.base_color, material.f0) = ([1.0, 1.0, 1.0, alpha], 0.0);
+            material.alpha_mode = AlphaMode::Blend;
+        }
+        let f = render(&gpu, &s, &camera, [48, 48], samples);
+        let color = f.layer(Layer::DiffCol).unwrap();
+        let values: Vec<f32> = color.data.chunks_exact(3).map(|p| p[0]).collect();
+        let n = values.len() as f32;
+        let mean = values.iter().sum::<f32>() / n;
+        (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / n).sqrt())
+    };
+    for samples in [4, 16, 64] {
+        let (mean, spread) = covered(&[0.3], samples);
+        // What independent draws would leave.
+        let drawn = (0.3 * 0.7 / samples as f32).sqrt();
+        println!("{samples} samples: {mean:.3} ± {spread:.4}, of independent draws {drawn:.4}");
+        assert!((mean - 0.3).abs() < 0.01 && spread < 0.8 * drawn, "{samples}: {mean} ± {spread} {drawn}");
+        assert!(samples < 16 || spread < 0.5 * drawn, "{samples}: {mean} ± {spread} {drawn}");
+    }
+    // Layers are independent in every pixel, or coverages would not multiply: the same threshold gives 0.3 again.
+    let (mean, spread) = covered(&[0.3, 0.3], 1024);
+    println!("two layers: {mean:.4} ± {spread:.4}");
+    assert!((mean - 0.51).abs() < 0.01 && spread < 0.02, "{mean} ± {spread}");
+}

@@ -18,8 +18,9 @@ struct Before {
 }
 
 @vertex
-fn vertex(v: Vertex, before: Before) -> Varying {
+fn vertex(v: Vertex, before: Before, @builtin(instance_index) instance: u32) -> Varying {
     var out = placed(v, frame.clip_from_world);
+    out.instance = instance;
     // Differences of rows first: exactly 0 for what has not moved, whatever the compiler fuses.
     let p = vec4f(v.position, 1.0);
     out.back = vec3f(dot(before.row0 - v.row0, p), dot(before.row1 - v.row1, p), dot(before.row2 - v.row2, p));
@@ -45,10 +46,10 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
         textureSampleBias(occlusion_texture, occlusion_sampler, coordinates(material.occlusion_use, in.uv), bias).r;
     let glow =
         textureSampleBias(emissive_texture, emissive_sampler, coordinates(material.emissive_use, in.uv), bias).rgb;
+    // Depth of the surface at the pixel's centre, wherever in the pixel this frame looks: linear on a plane.
+    let centre = in.position.z - dot(frame.jitter, vec2f(dpdx(in.position.z), dpdy(in.position.z)));
     if ALPHA {
-        let q = vec2u(in.position.xy);
-        // The depth in the seed makes layers of one pixel independent, so that coverages multiply.
-        if base.a < cutoff(hash01(q.x, q.y, frame.seed, bitcast<u32>(in.position.z))) {
+        if base.a < cutoff(coverage_threshold(in, facing, centre)) {
             discard;
         }
     }
@@ -87,6 +88,20 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     }
     out.motion = (previous.xy / previous.w - current.xy / current.w) * vec2f(0.5, -0.5);
     return out;
+}
+
+// What the coverage of a layer is asked against, in (0, 1]. Over the frames of a pixel it is an additive recurrence near
+// the golden ratio's, so that their mean converges with their number and not its root. Each layer of a pixel begins
+// elsewhere and goes on by another step, so that coverages multiply; layers are told apart by instance, side and depth.
+fn coverage_threshold(in: Varying, facing: bool, depth: f32) -> f32 {
+    let q = vec2u(in.position.xy);
+    // In steps of 0.3 %, more than what rounding leaves of a surface's depth from frame to frame.
+    let distance = bitcast<u32>(depth) >> 15u;
+    let layer = (in.instance << 1u) + u32(facing);
+    let start = hash01(q.x, q.y, layer, distance);
+    let step = 0.618034 + 0.06 * (hash01(q.y, layer, distance, q.x) - 0.5);
+    // In whole numbers, which frames without end do not wear out.
+    return 1.0 - f32(u32(start * 16777215.0) + frame.seed * u32(step * 16777216.0) & 0xffffffu) / 16777216.0;
 }
 
 // Variance of slopes along one axis of normals that differ, from √(1 − r) of a normal map's alpha: that of the

@@ -26,6 +26,8 @@ struct Varying {
     @location(5) @interpolate(flat) mirror: f32,
     // Where the surface was in the frame before, minus where it is, metres; 0 in passes that do not ask.
     @location(6) back: vec3f,
+    // Which instance of all that are drawn; 0 in passes that do not ask.
+    @location(7) @interpolate(flat) instance: u32,
 }
 
 // The vertex in the world, and where `clip_from_world` shows it.
@@ -48,5 +50,6 @@ fn placed(v: Vertex, clip_from_world: mat4x4f) -> Varying {
     out.world = world;
     out.mirror = mirror;
     out.back = vec3f(0.0);
+    out.instance = 0u;
     return out;
 }
