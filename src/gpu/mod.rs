@@ -2,6 +2,7 @@
 
 pub mod bind;
 pub(crate) mod binding;
+mod bound;
 mod choose;
 pub mod readback;
 pub mod shaders;
