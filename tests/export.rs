@@ -299,6 +299,10 @@ fn a_folder_is_written_whole_or_not_at_all() {
     let with = |rest: &[&'static str]| [&base[..4], rest].concat();
     fails(&[&base[..], &[&mine]].concat(), 2, &["mine", "something else"]);
     assert_eq!(std::fs::read(dir.path().join("mine/letter")).unwrap(), b"dear");
+    // Nor does it go where it lies beside an earlier export.
+    std::fs::write(dir.path().join("out/letter"), "dear").unwrap();
+    fails(&[&base[..], &[&out]].concat(), 2, &["out", "something else"]);
+    assert_eq!(std::fs::read(dir.path().join("out/letter")).unwrap(), b"dear");
     fails(&with(&["-o", "/nowhere/at/all"]), 2, &["does not exist"]);
     let fresh = path(&dir, "fresh");
     fails(&["export", "cornell", "--target", "wgsl", "--method", "ssgi", "-o", &fresh], 2, &["gather"]);

@@ -396,9 +396,12 @@ pub fn check_folder(folder: &Path) -> Result<(), ExportError> {
     if !folder.exists() {
         return if folder.file_name().is_some() { Ok(()) } else { wrong("it has no name") };
     }
-    match std::fs::read_dir(folder).map(|mut entries| entries.next().is_none()) {
-        Err(_) => wrong("it is no folder that can be read"),
-        Ok(empty) if empty || folder.join(MANIFEST).is_file() => Ok(()),
-        Ok(_) => wrong("the folder holds something else than an export; name a new one"),
+    let Ok(entries) = std::fs::read_dir(folder) else { return wrong("it is no folder that can be read") };
+    // Whatever else is in it would go with the export that is replaced.
+    let ours = |name: &std::ffi::OsStr| [MANIFEST, "shaders", "data"].iter().any(|own| name == *own);
+    let names: Vec<_> = entries.flatten().map(|e| e.file_name()).collect();
+    if names.is_empty() || (folder.join(MANIFEST).is_file() && names.iter().all(|n| ours(n))) {
+        return Ok(());
     }
+    wrong("the folder holds something else than an export; name a new one")
 }

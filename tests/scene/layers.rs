@@ -47,6 +47,12 @@ fn what_is_transmitted_is_neither_scattered_nor_added() {
     let extensions = json!({"KHR_materials_transmission": {"transmissionFactor": 1.0}});
     let metal = loaded(json!({"extensions": extensions, "pbrMetallicRoughness": pbr}), &[]);
     assert_eq!(metal.materials[0].alpha_mode, AlphaMode::Opaque);
+    // A texture may say that nothing is metal where the factor leaves it open.
+    let extensions = json!({"KHR_materials_transmission": {"transmissionFactor": 1.0}});
+    let pbr = json!({"metallicRoughnessTexture": {"index": 0}});
+    let images = [png([0, 255, 0, 255], 1, 1)];
+    let pane = loaded(json!({"extensions": extensions, "pbrMetallicRoughness": pbr}), &images);
+    close(shares(&pane.materials[0])[2], 0.96);
 }
 
 #[test]

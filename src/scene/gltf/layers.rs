@@ -25,13 +25,13 @@ impl Loader<'_> {
         }
         let coat_roughness = self.factor(place, coat, "clearcoatRoughness", 1);
         let coat = weight * DIELECTRIC_F0;
-        let metal = mean(out.base_color) * out.metallic;
-        let below = (1.0 - coat) * (metal + out.f0 * (1.0 - out.metallic));
+        let metallic = self.metalness(out);
+        let below = (1.0 - coat) * (mean(out.base_color) * metallic + out.f0 * (1.0 - metallic));
         let tint = |c: usize| coat + (1.0 - coat) * out.f0 * out.specular_tint[c];
         let f0 = [tint(0), tint(1), tint(2)];
         super::specular::set_reflectance(out, f0);
         // Of a metal the base colour is the reflectance.
-        (0..3).for_each(|c| out.base_color[c] = (1.0 - coat) * out.base_color[c] + coat * out.metallic);
+        (0..3).for_each(|c| out.base_color[c] = (1.0 - coat) * out.base_color[c] + coat * metallic);
         out.roughness = (coat * coat_roughness + below * out.roughness) / (coat + below);
     }
 
@@ -42,7 +42,7 @@ impl Loader<'_> {
     /// light of the whole, so both are divided by the coverage.
     pub(super) fn transmission(&mut self, place: &str, extensions: &Extensions, out: &mut Material) {
         let Some(through) = extensions.get("KHR_materials_transmission") else { return };
-        let share = self.factor(place, through, "transmission", 0) * (1.0 - out.metallic);
+        let share = self.factor(place, through, "transmission", 0) * (1.0 - self.metalness(out));
         if share == 0.0 {
             return;
         }
@@ -68,6 +68,12 @@ impl Loader<'_> {
         out.base_color[3] *= covered;
         (0..3).for_each(|c| out.base_color[c] *= (1.0 - share) / covered);
         out.f0 = (out.f0 / covered).min(1.0);
+    }
+
+    /// Mean of what is metal of a surface: many files leave the factor at 1 and say in the texture that nothing is.
+    fn metalness(&self, material: &Material) -> f32 {
+        let image = material.metallic_roughness_texture.map(|t| &self.scene.images[t.image]);
+        material.metallic * image.map_or(1.0, |image| texture::mean(image)[2])
     }
 
     /// `NAMEFactor` in [0, 1], times the mean of channel `channel` of `NAMETexture`.
