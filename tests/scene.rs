@@ -7,6 +7,8 @@ mod common;
 mod bad_input;
 #[path = "scene/bundled.rs"]
 mod bundled;
+#[path = "scene/compressed.rs"]
+mod compressed;
 #[path = "scene/defaults.rs"]
 mod defaults;
 #[path = "scene/extensions.rs"]
@@ -27,6 +29,8 @@ mod meshopt;
 mod nothing;
 #[path = "scene/obj.rs"]
 mod obj;
+#[path = "scene/packed.rs"]
+mod packed;
 #[path = "scene/paper_room.rs"]
 mod paper_room;
 #[path = "scene/real_files.rs"]

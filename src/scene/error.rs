@@ -51,14 +51,12 @@ pub enum SceneError {
         problem: String,
     },
     /// A glTF file cannot be shown without an extension that is not implemented.
-    #[error("{}: extensionsRequired: not supported: {extension}; {advice}", path.display())]
+    #[error("{}: extensionsRequired: not supported: {extension}; export the file without", path.display())]
     RequiresExtension {
         /// The file.
         path: PathBuf,
         /// The names of all such extensions, comma separated.
         extension: String,
-        /// What can be done about it.
-        advice: String,
     },
     /// No triangle of it can be seen from anywhere.
     #[error("{}: there is nothing to draw: {reason}", path.display())]

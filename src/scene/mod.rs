@@ -26,6 +26,8 @@ pub mod gltf;
 #[cfg(feature = "io")]
 pub mod home;
 #[cfg(feature = "io")]
+mod ktx2;
+#[cfg(feature = "io")]
 mod load;
 pub(crate) mod mips;
 #[cfg(feature = "io")]

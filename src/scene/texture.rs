@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use super::{ColorSpace, Image};
+use super::{ColorSpace, Image, ktx2};
 
 /// What a texture is used for; decides how its bytes are read and what stands in for it when it is broken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -38,13 +38,22 @@ pub(crate) fn room(images: &[Image], most: u64) -> Result<(), String> {
     if taken < most { Ok(()) } else { Err(format!("is left out: the scene's images already take {taken} bytes")) }
 }
 
-/// Decodes PNG, JPEG, WebP, BMP, TGA or HDR bytes (told apart by content, then by the name's ending).
+/// No texture may need more to be decoded, as the `image` crate has it.
+const MAX_DECODED: u64 = 512 << 20;
+
+/// Decodes PNG, JPEG, WebP, BMP, TGA, HDR or KTX2 bytes (told apart by content, then by the name's ending).
 ///
 /// # Errors
 /// A sentence without subject, such as "the file is empty (0 bytes)".
 pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<Image, String> {
     if bytes.is_empty() {
         return Err("the file is empty (0 bytes)".to_owned());
+    }
+    let image =
+        |width, height, rgba| Image { name: name.to_owned(), width, height, rgba, color_space: usage.color_space() };
+    if ktx2::is_ktx2(bytes) {
+        let (width, height, rgba) = ktx2::decode(bytes, MAX_SIDE, MAX_DECODED)?;
+        return Ok(image(width, height, rgba));
     }
     let mut reader = image::ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
@@ -56,6 +65,7 @@ pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<Image, Stri
     }
     let mut limits = image::Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
+    limits.max_alloc = Some(MAX_DECODED);
     reader.limits(limits);
     let decoded = reader.decode().map_err(|e| format!("cannot be decoded: {e}"))?;
     let rgba = decoded.into_rgba8();
@@ -63,7 +73,7 @@ pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<Image, Stri
     if width == 0 || height == 0 {
         return Err(format!("has no pixels ({width}x{height})"));
     }
-    Ok(Image { name: name.to_owned(), width, height, rgba: rgba.into_raw(), color_space: usage.color_space() })
+    Ok(image(width, height, rgba.into_raw()))
 }
 
 /// An 8×8 checker that nobody overlooks: magenta and black for colours, smooth and rough for data, tilted to the left

@@ -66,7 +66,7 @@ fn with_company(scene: &Path) -> Vec<PathBuf> {
     let folder = scene.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let is_company = |p: &PathBuf| {
         let extension = p.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-        ["bin", "mtl", "png", "jpg", "jpeg", "webp"].contains(&extension.as_str())
+        ["bin", "mtl", "png", "jpg", "jpeg", "webp", "ktx2"].contains(&extension.as_str())
     };
     if scene.extension().is_some_and(|e| !e.eq_ignore_ascii_case("glb")) {
         let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();

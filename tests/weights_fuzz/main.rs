@@ -5,11 +5,13 @@
 
 mod corpus;
 mod mutate;
+#[path = "../common/spoil.rs"]
+mod spoil;
 
 use bouncelight::net::convert::{Arch, ConvertError, Norm, Recipe, convert};
 use bouncelight::net::format::{Dtype, Provenance, Weights};
-use mutate::Random;
 use peak_alloc::PeakAlloc;
+use spoil::Random;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

@@ -4,10 +4,11 @@ use crate::scene::SceneError;
 use std::path::Path;
 
 /// Extensions that this loader has.
-const SUPPORTED: [&str; 16] = [
+const SUPPORTED: [&str; 18] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
@@ -20,6 +21,7 @@ const SUPPORTED: [&str; 16] = [
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
 
@@ -33,29 +35,5 @@ pub(super) fn check_required(path: &Path, root: &gltf::json::Root) -> Result<(),
     if missing.is_empty() {
         return Ok(());
     }
-    let advice = advice(path, &missing);
-    Err(SceneError::RequiresExtension { path: path.to_owned(), extension: missing.join(", "), advice })
-}
-
-/// What makes a file of it that can be read: commands of gltf-transform (npm), which knows these formats.
-fn advice(path: &Path, missing: &[&str]) -> String {
-    let has = |name: &str| missing.contains(&name);
-    let mut steps = Vec::new();
-    if has("KHR_texture_basisu") {
-        steps.push("ktxdecompress");
-    } else if has("KHR_draco_mesh_compression") {
-        // Any command of it writes geometry without Draco; this one does nothing else.
-        steps.push("copy");
-    }
-    let convertible = ["KHR_texture_basisu", "KHR_draco_mesh_compression"];
-    let others = missing.iter().any(|e| !convertible.contains(e));
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    match (steps.first(), others) {
-        (Some(step), false) => format!("`npx @gltf-transform/cli {step} {name} converted.glb` writes a file without"),
-        (Some(step), true) => format!(
-            "`npx @gltf-transform/cli {step} {name} converted.glb` unpacks what is compressed; export the file \
-            without the others"
-        ),
-        (None, _) => "export the file without".to_owned(),
-    }
+    Err(SceneError::RequiresExtension { path: path.to_owned(), extension: missing.join(", ") })
 }

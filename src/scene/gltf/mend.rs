@@ -10,7 +10,7 @@ type Warning = (String, String);
 /// Mends what a strict reader would refuse and reads extensions that only redirect; tells what was left out.
 pub(super) fn mend(root: &mut Root) -> Vec<Warning> {
     let mut warnings = unknown_lights(root);
-    warnings.extend(webp(root));
+    warnings.extend(other_images(root));
     warnings
 }
 
@@ -38,19 +38,23 @@ fn unknown_lights(root: &mut Root) -> Vec<Warning> {
     unknown.into_iter().map(tell).collect()
 }
 
-/// EXT_texture_webp: the WebP image is taken instead of the one beside it.
-fn webp(root: &mut Root) -> Vec<Warning> {
+/// Extensions whose image is taken instead of the one beside it, the last that a texture has.
+const IMAGES: [&str; 2] = ["EXT_texture_webp", "KHR_texture_basisu"];
+
+fn other_images(root: &mut Root) -> Vec<Warning> {
     let count = root.images.len();
     let mut warnings = Vec::new();
     for (i, texture) in root.textures.iter_mut().enumerate() {
-        let extension = texture.extensions.as_ref().and_then(|e| e.others.get("EXT_texture_webp"));
-        let Some(source) = extension.map(|e| e.get("source").and_then(serde_json::Value::as_u64)) else { continue };
-        match source {
-            Some(source) if source < count as u64 => texture.source = Index::new(source as u32),
-            _ => warnings.push((
-                format!("textures[{i}].extensions.EXT_texture_webp"),
-                "names no image of the file; the texture's other image is used".to_owned(),
-            )),
+        for name in IMAGES {
+            let extension = texture.extensions.as_ref().and_then(|e| e.others.get(name));
+            let Some(source) = extension.map(|e| e.get("source").and_then(serde_json::Value::as_u64)) else { continue };
+            match source {
+                Some(source) if source < count as u64 => texture.source = Index::new(source as u32),
+                _ => warnings.push((
+                    format!("textures[{i}].extensions.{name}"),
+                    "names no image of the file; the texture's other image is used".to_owned(),
+                )),
+            }
         }
     }
     warnings

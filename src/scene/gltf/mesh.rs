@@ -3,10 +3,46 @@
 use gltf::Semantic;
 use gltf::mesh::Mode;
 
-use super::Loader;
 use super::accessor::{Integers, Reader};
+use super::{Loader, draco};
 use crate::scene::geometry::{self, Topology};
 use crate::scene::{Mesh, SceneError};
+
+/// Where a primitive's numbers are: in accessors, or in a compressed stream.
+struct Vertices<'a> {
+    reader: Reader<'a>,
+    primitive: &'a gltf::Primitive<'a>,
+    packed: Option<draco::Unpacked>,
+    place: &'a str,
+}
+
+impl Vertices<'_> {
+    /// An attribute of all vertices; empty where the primitive has none.
+    fn floats<const N: usize>(
+        &self,
+        semantic: Semantic,
+        integers: Integers,
+        fill: Option<f32>,
+    ) -> Result<Vec<[f32; N]>, SceneError> {
+        let Some(accessor) = self.primitive.get(&semantic) else { return Ok(Vec::new()) };
+        let unpacked = match &self.packed {
+            Some(packed) => packed.floats(&semantic, accessor.normalized(), integers, fill),
+            None => Ok(None),
+        };
+        match unpacked.map_err(|problem| SceneError::broken(self.reader.path, self.place, problem))? {
+            Some(values) => Ok(values),
+            None => self.reader.floats(&accessor, integers, fill),
+        }
+    }
+
+    fn indices(&self, vertices: usize) -> Result<Vec<u32>, SceneError> {
+        match (&self.packed, self.primitive.indices()) {
+            (Some(packed), _) => Ok(packed.indices()),
+            (None, Some(accessor)) => self.reader.indices(&accessor),
+            (None, None) => Ok((0..vertices as u32).collect()),
+        }
+    }
+}
 
 impl<'a> Loader<'a> {
     /// Scene meshes of a glTF mesh's primitives; read once, shared by all nodes that place it.
@@ -42,30 +78,25 @@ impl<'a> Loader<'a> {
                 return Ok(None);
             }
         };
-        let Some(positions) = primitive.get(&Semantic::Positions) else {
+        if primitive.get(&Semantic::Positions).is_none() {
             self.warn(&place, "has no POSITION and is left out");
             return Ok(None);
-        };
-        let read = Reader { path: self.path, source: self.source };
-        let mut out = Mesh { name, ..Mesh::default() };
-        out.positions = read.floats(&positions, Integers::AsFlagged, None)?;
-        let count = out.positions.len();
+        }
+        let packed = self.packed(&place, mesh.index(), primitive.index())?;
+        let read =
+            Vertices { reader: Reader { path: self.path, source: self.source }, primitive, packed, place: &place };
         let flagged = Integers::AsFlagged;
-        if let Some(accessor) = primitive.get(&Semantic::Normals) {
-            out.normals = read.floats(&accessor, flagged, None)?;
-        }
-        if let Some(accessor) = primitive.get(&Semantic::Tangents) {
-            out.tangents = read.floats(&accessor, flagged, None)?;
-        }
-        if let Some(accessor) = primitive.get(&Semantic::TexCoords(0)) {
-            out.uv0 = read.floats(&accessor, flagged, None)?;
-        }
-        if let Some(accessor) = primitive.get(&Semantic::TexCoords(1)) {
-            out.uv1 = read.floats(&accessor, flagged, None)?;
-        }
-        if let Some(accessor) = primitive.get(&Semantic::Colors(0)) {
-            out.colors = read.floats(&accessor, Integers::Normalized, Some(1.0))?;
-        }
+        let mut out = Mesh {
+            name,
+            positions: read.floats(Semantic::Positions, flagged, None)?,
+            normals: read.floats(Semantic::Normals, flagged, None)?,
+            tangents: read.floats(Semantic::Tangents, flagged, None)?,
+            uv0: read.floats(Semantic::TexCoords(0), flagged, None)?,
+            uv1: read.floats(Semantic::TexCoords(1), flagged, None)?,
+            colors: read.floats(Semantic::Colors(0), Integers::Normalized, Some(1.0))?,
+            ..Mesh::default()
+        };
+        let count = out.positions.len();
         for (attribute, length) in [
             ("NORMAL", out.normals.len()),
             ("TANGENT", out.tangents.len()),
@@ -77,10 +108,9 @@ impl<'a> Loader<'a> {
                 return Err(self.broken(place, format!("{attribute} has {length} elements, POSITION {count}")));
             }
         }
-        let indices = match primitive.indices() {
-            Some(accessor) => read.indices(&accessor)?,
-            None => (0..count as u32).collect(),
-        };
+        let indices = read.indices(count)?;
+        // What Draco has packed are triangles, however they were given to it.
+        let topology = if read.packed.is_some() { Topology::List } else { topology };
         if let Some(bad) = indices.iter().find(|&&i| i as usize >= count) {
             return Err(self.broken(place, format!("index {bad} is not below the {count} vertices")));
         }
@@ -96,6 +126,16 @@ impl<'a> Loader<'a> {
         out.material = self.material(&primitive.material());
         self.finish(&place, &mut out);
         Ok(Some(out))
+    }
+
+    /// What is compressed of a primitive, if it is.
+    fn packed(&self, place: &str, mesh: usize, primitive: usize) -> Result<Option<draco::Unpacked>, SceneError> {
+        let broken = |problem| self.broken(place, problem);
+        let json = &self.document.as_json().meshes[mesh].primitives[primitive];
+        let Some(packed) = draco::Packed::of(json).map_err(broken)? else { return Ok(None) };
+        let view = self.document.views().nth(packed.buffer_view);
+        let view = view.ok_or_else(|| broken(format!("its Draco buffer view {} is missing", packed.buffer_view)))?;
+        packed.unpack(self.source.view(&view)?).map(Some).map_err(broken)
     }
 
     fn check_finite(&self, place: &str, mesh: &Mesh) -> Result<(), SceneError> {

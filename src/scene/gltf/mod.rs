@@ -5,6 +5,7 @@
 //! leaves a picture (a missing texture, a line primitive, a skin) becomes a warning; the rest is a [`SceneError`].
 
 mod accessor;
+mod draco;
 mod extensions;
 mod instancing;
 mod layers;
@@ -86,6 +87,8 @@ fn validate(path: &Path, root: &gltf::json::Root) -> Result<(), SceneError> {
             Invalid::Missing | Invalid::Invalid if position => true,
             // The crate knows fewer extensions than this loader; its list was checked before.
             Invalid::Unsupported => place.starts_with("extensionsRequired"),
+            // Zeros, says the specification, and what Draco packs has none.
+            Invalid::Missing if place.starts_with("accessors[") && place.ends_with("].bufferView") => true,
             // A texture without image is legal (an extension may have one) and gets a stand-in.
             Invalid::Missing => place.starts_with("textures[") && place.ends_with("source"),
             // A dangling image index as well; textures are not worth refusing a file.

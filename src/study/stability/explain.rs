@@ -2,7 +2,7 @@
 //! how the method works. A failure without one is shown as not explained.
 
 /// Tests of light that has to be there: who adds none fails them.
-const NEEDS_LIGHT: [&str; 8] = ["switch", "door", "albedo", "furnace", "corner", "metal", "mirror", "unseen"];
+const NEEDS_LIGHT: [&str; 9] = ["switch", "sweep", "door", "albedo", "furnace", "corner", "metal", "mirror", "unseen"];
 
 /// Tests in which the picture changes and the light must not.
 const NEEDS_MORE_THAN_THE_PICTURE: [&str; 9] =

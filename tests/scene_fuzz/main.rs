@@ -1,0 +1,214 @@
+//! Hostile glTF files, plain and compressed (meshopt, Draco, Basis Universal): no panic, no hang, bounded memory.
+//!
+//! `SCENE_FUZZ_CASES` and `SCENE_FUZZ_SEED` make a longer run; `docs/log/2026-11-24-compressed.md` records one. The
+//! allocator counts for the whole program, so this binary has one test.
+#![cfg(feature = "io")]
+
+#[path = "../scene/glb.rs"]
+#[allow(dead_code, reason = "the scene tests use more of it")]
+mod glb;
+#[path = "../scene/packed.rs"]
+mod packed;
+#[path = "../scene/shared.rs"]
+#[allow(dead_code, reason = "the scene tests use more of it")]
+mod shared;
+#[path = "../common/spoil.rs"]
+mod spoil;
+
+use bouncelight::scene::{self, export};
+use glb::Glb;
+use peak_alloc::PeakAlloc;
+use serde_json::{Value, json};
+use spoil::{Random, TOKENS, spoil_text, spoil_value};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+#[global_allocator]
+static MEMORY: PeakAlloc = PeakAlloc;
+
+/// Cases of an ordinary test run.
+const CASES: u64 = 100_000;
+const SEED: u64 = 20_261_124;
+/// Longest that one file may take. The honest ones take less than a millisecond; a loaded machine may stop any of them
+/// for a while, and a picture of the largest size that is allowed takes its time to be cleared.
+const SLOWEST: Duration = Duration::from_secs(5);
+/// What a picture may need to be decoded (docs/scenes.md), and room for the rest.
+const MOST_MEMORY: usize = (512 + 64) << 20;
+
+/// JSON and binary chunk of a GLB.
+fn taken_apart(glb: &[u8]) -> Glb {
+    let length = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().expect("four bytes")) as usize;
+    let json = 20..20 + length(12);
+    let bin = json.end + 8;
+    let parsed = serde_json::from_slice(&glb[json]).expect("JSON");
+    Glb { json: parsed, bin: glb[bin..bin + length(bin - 8)].to_vec() }
+}
+
+/// A triangle with a picture in one of Basis Universal's encodings.
+fn textured(picture: &[u8]) -> Glb {
+    let mut glb = Glb::triangle();
+    let view = glb.view(picture);
+    glb.json["images"] = json!([{"bufferView": view, "mimeType": "image/ktx2"}]);
+    glb.json["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
+    glb.json["materials"] = json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
+    glb.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    glb
+}
+
+/// The sound files that mutations start from.
+fn corpus() -> Vec<Glb> {
+    let cornell = export::to_glb(&scene::load("cornell").expect("a bundled scene")).expect("it can be written");
+    let mut plain = Glb::triangle();
+    let view = plain.view(&glb::png([200, 100, 50, 255], 4, 4));
+    plain.json["images"] = json!([{"bufferView": view, "mimeType": "image/png"}]);
+    plain.json["textures"] = json!([{"source": 0, "sampler": 0}]);
+    plain.json["samplers"] = json!([{"wrapS": 33071, "minFilter": 9984}]);
+    plain.json["materials"] = json!([{"alphaMode": "MASK", "normalTexture": {"index": 0},
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}},
+        "extensions": {"KHR_materials_transmission": {"transmissionTexture": {"index": 0}},
+            "KHR_materials_specular": {"specularColorFactor": [1.0, 0.5, 0.2]}}}]);
+    plain.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    let times = plain.floats("SCALAR", &[0.0, 1.0]);
+    let places = plain.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 2.0, 3.0]);
+    plain.json["animations"] = json!([{"samplers": [{"input": times, "output": places}],
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}]);
+    plain.json["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}});
+    let packed = Glb { json: packed::strip("EXT_meshopt_compression", "floats, version 0, level 2"), bin: Vec::new() };
+    vec![
+        taken_apart(&cornell),
+        plain,
+        packed,
+        taken_apart(include_bytes!("../fixtures/compressed/edgebreaker.glb")),
+        taken_apart(include_bytes!("../fixtures/compressed/sequential.glb")),
+        textured(include_bytes!("../fixtures/compressed/etc1s.ktx2")),
+        textured(include_bytes!("../fixtures/compressed/uastc.ktx2")),
+        textured(include_bytes!("../fixtures/compressed/uastc-zstd.ktx2")),
+    ]
+}
+
+/// A few bytes flipped, replaced, cut or moved; mostly near the front of something, where the numbers are that matter.
+fn spoil_bytes(bytes: &mut Vec<u8>, starts: &[usize], random: &mut Random) {
+    for _ in 0..1 + random.below(6) {
+        if bytes.is_empty() {
+            return;
+        }
+        let near = *random.pick(starts) + random.below(120);
+        let at = if random.below(3) == 0 { random.below(bytes.len()) } else { near.min(bytes.len() - 1) };
+        match random.below(10) {
+            0..=2 => bytes[at] ^= 1 << random.below(8),
+            3..=5 => bytes[at] = random.below(256) as u8,
+            6 => bytes[at] = 255,
+            7 => bytes.truncate(at),
+            8 => drop(bytes.drain(at..(at + 1 + random.below(32)).min(bytes.len()))),
+            _ => {
+                let other = random.below(bytes.len());
+                bytes.swap(at, other);
+            }
+        }
+    }
+}
+
+/// One hostile file.
+fn case(files: &[Glb], random: &mut Random) -> Vec<u8> {
+    let file = random.pick(files);
+    let mut json = file.json.clone();
+    let mut bin = file.bin.clone();
+    let views = json["bufferViews"].as_array().into_iter().flatten();
+    let mut starts: Vec<usize> =
+        views.map(|v| v["byteOffset"].as_u64().unwrap_or(0) as usize).filter(|at| *at < bin.len()).collect();
+    starts.push(0);
+    if random.below(2) == 0 {
+        spoil_bytes(&mut bin, &starts, random);
+    } else {
+        (0..1 + random.below(3)).for_each(|_| spoil_value(&mut json, random, 0));
+    }
+    if let Some(uri) = json.pointer_mut("/buffers/0/uri").filter(|_| random.below(3) == 0)
+        && let Value::String(text) = uri
+        && text.is_ascii()
+        && !text.is_empty()
+    {
+        // Compressed bytes that are in the JSON as base64.
+        let at = (text.len() / 4 + random.below(text.len() * 3 / 4)).min(text.len() - 1);
+        text.replace_range(at..at + 1, ["A", "/", "z", "7"][random.below(4)]);
+    }
+    let glb = Glb { json, bin };
+    let mut bytes = glb.bytes();
+    match random.below(12) {
+        0 => {
+            let text = spoil_text(&glb.json.to_string(), random);
+            bytes = text.into_bytes();
+        }
+        1 => {
+            let at = random.below(bytes.len());
+            bytes.splice(at..at, random.pick(&TOKENS).bytes());
+        }
+        2 => spoil_bytes(&mut bytes, &[0], random),
+        _ => {}
+    }
+    bytes
+}
+
+fn setting(name: &str, otherwise: u64) -> u64 {
+    std::env::var(name).map_or(otherwise, |text| text.parse().expect("a whole number"))
+}
+
+/// What came of a file.
+#[derive(Default)]
+struct Tally {
+    accepted: u64,
+    refused: u64,
+    slowest: Duration,
+    most: usize,
+}
+
+impl Tally {
+    fn read(&mut self, path: &Path, bytes: &[u8]) {
+        std::fs::write(path, bytes).expect("a temporary file");
+        let (before, started) = (MEMORY.current_usage(), Instant::now());
+        MEMORY.reset_peak_usage();
+        let read = scene::load(path.to_str().expect("a readable path"));
+        let (taken, time) = (MEMORY.peak_usage().saturating_sub(before), started.elapsed());
+        assert!(time < SLOWEST, "took {time:?}");
+        assert!(taken <= MOST_MEMORY, "took {taken} bytes of memory for a file of {}", bytes.len());
+        (self.slowest, self.most) = (self.slowest.max(time), self.most.max(taken));
+        match read {
+            Ok(scene) => {
+                self.accepted += 1;
+                shared::assert_sound(&scene);
+            }
+            Err(error) => {
+                self.refused += 1;
+                let told = error.to_string();
+                assert!(told.contains("case."), "names no file: {told}");
+            }
+        }
+    }
+}
+
+#[test]
+fn hostile_files() {
+    let (cases, seed) = (setting("SCENE_FUZZ_CASES", CASES), setting("SCENE_FUZZ_SEED", SEED));
+    let files = corpus();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("case.glb");
+    let mut tally = Tally::default();
+    files.iter().for_each(|file| tally.read(&path, &file.bytes()));
+    assert_eq!(tally.accepted as usize, files.len(), "the originals are sound");
+    let started = Instant::now();
+    for case_number in 0..cases {
+        let bytes = case(&files, &mut Random::new(seed, case_number));
+        let path = folder.path().join(if bytes.first() == Some(&b'{') { "case.gltf" } else { "case.glb" });
+        let run = catch_unwind(AssertUnwindSafe(|| tally.read(&path, &bytes)));
+        if run.is_err() {
+            let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("case-{seed}-{case_number}.glb"));
+            std::fs::write(&kept, &bytes).expect("the file can be kept");
+            panic!("case {case_number} of seed {seed} failed; the message is above, the file in {}", kept.display());
+        }
+    }
+    println!("seed {seed}: {cases} cases in {:.1} s", started.elapsed().as_secs_f64());
+    println!("{} accepted, {} refused, slowest {:?}", tally.accepted, tally.refused, tally.slowest);
+    println!("{} MiB of memory at most", tally.most >> 20);
+    // Some mutations are harmless and many are not; without both the test would ask nothing.
+    assert!(tally.accepted > cases / 10 && tally.refused > cases / 10);
+}
