@@ -100,6 +100,13 @@ pub(super) fn parse<'a>(
         problems.push(Problem::Document("the key is missing, so this file holds no bouncelight network".into()));
         return None;
     };
+    // What is skipped or kept as text below is not looked at in full, and a half of a surrogate pair is no JSON.
+    if text.contains("\\u")
+        && let Err(e) = serde_json::from_str::<serde_json::Value>(text)
+    {
+        problems.push(Problem::Document(e.to_string()));
+        return None;
+    }
     // The version is judged first and alone: a document of another version may look like anything.
     if let Ok(Versioned { version: Some(version) }) = serde_json::from_str(text)
         && let Some(found) = version.as_u64()

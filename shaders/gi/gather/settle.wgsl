@@ -85,6 +85,13 @@ fn past_of(cell: vec2u, pixel: vec2i, motion: vec2f, x: vec3f, n: vec3f, foot: f
 
 // Frames in which the light between surfaces settles.
 const YOUNG = 16.0;
+// Share of a frame in a mean, by its number. The first frames count for less, each for its number, since they know least of the light
+// between surfaces; from YOUNG on all count the same. `more` is what the first one counts for beyond that.
+fn share_of_frame(number: f32, more: f32) -> f32 {
+    let weight = min(number, YOUNG);
+    return weight / (0.5 * weight * (weight + 1.0) + more + YOUNG * (number - weight));
+}
+
 // Frames that a mean remembers where its surface moves on the screen, or light may be changing.
 const BRIEF = 128.0;
 // Frames that the mean of lately counts for where light has changed.
@@ -224,9 +231,9 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let changing = (gather.flags & GATHER_CHANGING) != 0u || !rests(motion);
     if changing && (gather.flags & GATHER_EVEN) == 0u { most = min(most, BRIEF); }
     let frames = min(past.frames + f32(select(1u, LOOKS, fresh)), most);
-    // The first frames count for less, each for its number, since they know least of the light between surfaces; from YOUNG on all
-    // count the same.
-    var share = select(1.0 / (frames - 0.5 * (YOUNG - 1.0)), 2.0 / (frames + 1.0), frames <= YOUNG);
+    // The first has several rays and counts for as many, but is no older for it.
+    let more = f32(LOOKS - 1u);
+    var share = max(share_of_frame(max(frames - more, 1.0), more), share_of_frame(most, 0.0));
     if (gather.flags & GATHER_EVEN) != 0u { share = 1.0 / frames; }
     if fresh { share = 1.0; }
     let surface = textureLoad(specular_map, pixel, 0);

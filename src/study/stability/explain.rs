@@ -49,6 +49,10 @@ pub fn why(test: &str, subject: &str) -> Option<&'static str> {
              same 4 and 7 %): it has \
              learnt from rooms with lamps and sun, where no wall glows"
         }
+        ("corner", "neural") => {
+            "the network takes away what `gather` has found in the dark end: it has learnt from rooms that a lamp or \
+             the sun reaches"
+        }
         ("saturated", "neural") => {
             "the network's rest is a share of the frame's exposure in each channel, whatever colour the light has: \
              docs/gi.md, E/π = \
