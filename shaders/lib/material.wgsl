@@ -14,7 +14,7 @@ struct Material {
     roughness: f32,
     normal_scale: f32,
     occlusion_strength: f32,
-    // Alpha below it is discarded; 0 for opaque; above 1 marks stochastic coverage.
+    // Alpha below it is discarded; 0 for opaque; 2 marks stochastic coverage, 3 a veil, which may be blended instead.
     alpha_cutoff: f32,
     // Reflectance of a dielectric at normal incidence.
     f0: f32,
@@ -47,6 +47,10 @@ override ALPHA: bool = false;
 fn coordinates(use_: TextureUse, uv: vec4f) -> vec2f {
     let p = vec3f(select(uv.xy, uv.zw, use_.row0.w > 0.5), 1.0);
     return vec2f(dot(use_.row0.xyz, p), dot(use_.row1.xyz, p));
+}
+
+fn is_veil() -> bool {
+    return material.alpha_cutoff > 2.5;
 }
 
 // Alpha below which a fragment is dropped: the mask's cutoff, or `random` in (0, 1] for stochastic coverage.

@@ -16,7 +16,7 @@ use crate::{
     gpu::Gpu,
     image_io::write_whole,
     reference::{Kernel, ReferenceScene},
-    render::{Renderer, RendererOptions},
+    render::{Blending, Renderer, RendererOptions},
     scene::{self, Camera, LightKind, Scene, home, paper_room, upload::SceneGpu},
     study::{
         dataset::{Next, Sample, frame, sample},
@@ -162,7 +162,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         Some(path) => Method::Neural(Box::new(super::args::load_weights(Some(path))?.into())),
         None => Method::Gather(gather::Options::default()),
     };
-    let options = RendererOptions { method, ..Default::default() };
+    let options = RendererOptions { method, blending: Blending::Stochastic, ..Default::default() };
     let renderer = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
     let kernel = (args.spp > 0).then(|| Kernel::new(&gpu.device));
     let Args { spp, motion, guides, gi_frames, ref out, ref moments, .. } = args;

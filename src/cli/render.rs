@@ -14,7 +14,7 @@ use crate::{
     gpu::Gpu,
     image_io, metrics,
     render::{
-        Renderer, RendererOptions,
+        Blending, Renderer, RendererOptions,
         capture::{CaptureOptions, Layer, Picture, capture_with},
         tonemap_curve::Tonemap,
     },
@@ -66,6 +66,10 @@ pub struct Args {
     /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
     #[arg(long, value_name = "LAYERS")]
     aov: Option<String>,
+    /// Surfaces that blend with what is behind: `sorted` are drawn over the picture without grain, `stochastic` by lot,
+    /// as paths meet them, for pictures of many samples and layers. When absent: `sorted` for a PNG, else `stochastic`.
+    #[arg(long, value_name = "HOW")]
+    blending: Option<Blending>,
     /// Stops by which a PNG is brighter.
     #[arg(long, default_value_t = 0.0, allow_hyphen_values = true, value_name = "EV")]
     exposure: f32,
@@ -104,6 +108,11 @@ impl Args {
     fn samples(&self, format: Format) -> u32 {
         let raw = format == Format::Exr || self.taa.is_some() || self.gi_frames == Some(1) || self.sequence.is_given();
         self.samples.unwrap_or(if raw { 1 } else { PICTURE_SAMPLES })
+    }
+
+    /// How what blends is drawn.
+    fn blending(&self, format: Format) -> Blending {
+        self.blending.unwrap_or(if format == Format::Exr { Blending::Stochastic } else { Blending::Sorted })
     }
 
     /// It may run a network on a device: what was fitted is not known yet.
@@ -179,7 +188,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
             let method = super::tuned::tuned(method, &gpu, global.quiet);
             // Says from here on what the program does: without a shader cache nothing is drawn for half a minute.
             let progress = Progress::compiling(global, if sequence.is_some() { "frames" } else { "samples" }, 1);
-            let mut raster = Raster::new(&args, &gpu, &scene, method, (layers, args.samples(format)))?;
+            let mut raster = Raster::new(&args, &gpu, &scene, method, (layers, format))?;
             if let Some(sequence) = sequence {
                 return film(progress, &args, format, raster, &sequence);
             }
@@ -222,14 +231,15 @@ impl<'a> Raster<'a> {
         gpu: &'a Gpu,
         scene: &Scene,
         method: Method,
-        (layers, samples): (Vec<Layer>, u32),
+        (layers, format): (Vec<Layer>, Format),
     ) -> Result<Self> {
         let weights = match &method {
             Method::Neural(neural) => neural.weights.hash_text(),
             _ => "none".into(),
         };
         let (asked, settles, needs_rays) = (method.name(), method.has_history(), method.needs_rays());
-        let options = RendererOptions { method, taa: args.taa.is_some(), ..Default::default() };
+        let options =
+            RendererOptions { method, taa: args.taa.is_some(), blending: args.blending(format), ..Default::default() };
         // Trees are built while the driver compiles shaders.
         let upload = || {
             let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
@@ -245,6 +255,7 @@ impl<'a> Raster<'a> {
             (uploading.join().unwrap_or_else(|e| std::panic::resume_unwind(e)), renderer)
         });
         let (scene, renderer) = (scene?, renderer?);
+        let samples = args.samples(format);
         Ok(Self { gpu, scene, renderer, layers, samples, weights, asked, settles, running: false })
     }
 

@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 const FILES: &[(&str, &str)] = &[
     ("render.shadow", "render/shadow.wgsl"),
     ("render.gbuffer", "render/gbuffer.wgsl"),
+    ("render.blended", "render/blended.wgsl"),
     ("render.direct", "render/direct.wgsl"),
     ("render.composite", "render/composite.wgsl"),
     ("render.taa", "render/taa.wgsl"),

@@ -34,11 +34,12 @@ impl DirectPass {
             layout(device, "render.direct", stage, &[UNIFORM, LOAD, LOAD, LOAD, STORE_HALF, STORE_HALF]);
         let light_layout = layout(
             device,
-            "render.direct",
-            stage,
+            "render.lights",
+            stage | wgpu::ShaderStages::FRAGMENT,
             &[READ, READ, READ, COMPARE_ARRAY, COMPARE_ARRAY, comparison, LOAD_ARRAY, LOAD_ARRAY],
         );
-        let pipeline = compute(device, "render.direct", "direct", &[&picture_layout, &light_layout]);
+        let pipeline =
+            compute_with(device, "render.direct", "direct", &[Some(&picture_layout), None, Some(&light_layout)]);
         let compare = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("render.direct"),
             mag_filter: wgpu::FilterMode::Linear,
@@ -67,6 +68,11 @@ impl DirectPass {
         )
     }
 
+    /// What lights and shadow maps are bound by: group 2 of `shaders/lib/direct_light.wgsl`.
+    pub fn light_layout(&self) -> &wgpu::BindGroupLayout {
+        &self.light_layout
+    }
+
     /// Binds lights and shadow maps.
     pub fn lights(&self, device: &wgpu::Device, scene: &SceneGpu, maps: &ShadowMaps) -> wgpu::BindGroup {
         tool::group(
@@ -91,7 +97,7 @@ impl DirectPass {
         recorder.compute("direct", |pass| {
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, inputs.picture, &[]);
-            pass.set_bind_group(1, inputs.lights, &[]);
+            pass.set_bind_group(2, inputs.lights, &[]);
             tool::dispatch(pass, inputs.size);
         });
     }

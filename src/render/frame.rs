@@ -1,7 +1,8 @@
-//! The frame, told in order: shadow → gbuffer → direct → indirect → glossy → composite (→ taa). A display adds
+//! The frame, told in order: shadow → gbuffer → direct → indirect → glossy → composite → blended (→ taa). A display adds
 //! `tonemap` after it.
 
 use super::RenderError;
+use super::blended::{BlendedInputs, BlendedPass, Blending};
 use super::composite::CompositePass;
 use super::direct::{DirectInputs, DirectPass};
 use super::gbuffer::{GbufferInputs, GbufferPass};
@@ -31,6 +32,8 @@ pub struct RendererOptions {
     /// Temporal anti-aliasing ([`TaaPass`]): `hdr` is the mean over frames. Views should then be jittered by
     /// [`sampling::offset`](super::sampling::offset) of the frame's number. Off, nothing of it exists.
     pub taa: bool,
+    /// How surfaces are drawn that blend with what is behind.
+    pub blending: Blending,
 }
 
 /// What is bound as long as the targets stay.
@@ -38,6 +41,7 @@ struct Picture {
     direct: wgpu::BindGroup,
     glossy: GlossyPicture,
     composite: wgpu::BindGroup,
+    blended: Option<wgpu::BindGroup>,
 }
 
 /// What is bound as long as the scene stays.
@@ -73,16 +77,21 @@ struct Passes {
     direct: DirectPass,
     glossy: GlossyPass,
     composite: CompositePass,
+    /// `None` where what blends is drawn by lot.
+    blended: Option<BlendedPass>,
 }
 
 impl Passes {
-    fn new(device: &wgpu::Device, frame: &wgpu::Buffer, shadow: ShadowOptions) -> Self {
+    fn new(device: &wgpu::Device, frame: &wgpu::Buffer, options: &RendererOptions) -> Self {
+        let direct = DirectPass::new(device);
+        let blended = (options.blending == Blending::Sorted).then(|| BlendedPass::new(device, direct.light_layout()));
         Self {
-            shadow: ShadowPass::new(device, shadow),
-            gbuffer: GbufferPass::new(device, frame),
-            direct: DirectPass::new(device),
+            shadow: ShadowPass::new(device, options.shadow),
+            gbuffer: GbufferPass::new(device, frame, options.blending),
+            direct,
             glossy: GlossyPass::new(device),
             composite: CompositePass::new(device),
+            blended,
         }
     }
 
@@ -101,6 +110,7 @@ impl Passes {
             direct: self.direct.picture(device, frame, targets),
             glossy: self.glossy.picture(device, frame, targets),
             composite: self.composite.picture(device, frame, targets, picture),
+            blended: self.blended.as_ref().map(|b| b.picture(device, frame, targets)),
         }
     }
 }
@@ -120,7 +130,7 @@ impl Renderer {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let passes = Passes::new(device, &frame, options.shadow);
+        let passes = Passes::new(device, &frame, &options);
         let mut taa = options.taa.then(|| TaaPass::new(device));
         let picture = passes.bind(device, &frame, &targets, &mut taa);
         let indirect = method::build(device, queue, size, &options.method)?;
@@ -326,6 +336,11 @@ impl Renderer {
             None => clear(recorder, &self.targets),
         }
         self.passes.composite.record(recorder, &self.picture.composite, &lighting.sky, size);
+        if let (Some(blended), Some(picture)) = (&self.passes.blended, &self.picture.blended) {
+            let hdr = &self.taa.as_ref().map_or(&self.targets.hdr, TaaPass::current).view;
+            let (lights, depth) = (&lighting.group, &self.targets.depth.view);
+            blended.record(recorder, BlendedInputs { scene, view, picture, lights, hdr, depth });
+        }
         if let Some(taa) = &mut self.taa {
             taa.record(recorder, queue, scene, view);
         }

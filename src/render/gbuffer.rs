@@ -25,6 +25,7 @@
 //! lights, nor of textures that move. The background's are 0 whatever the camera does: it follows
 //! from the view alone.
 
+use super::blended::Blending;
 use super::targets::Targets;
 use super::tool;
 use super::view::View;
@@ -52,7 +53,7 @@ pub struct GbufferPass {
 
 impl GbufferPass {
     /// Builds the pipelines; `frame` is the frame's uniform buffer.
-    pub fn new(device: &wgpu::Device, frame: &wgpu::Buffer) -> Self {
+    pub fn new(device: &wgpu::Device, frame: &wgpu::Buffer, blending: Blending) -> Self {
         let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
         let layout = tool::layout(device, "render.gbuffer", stages, &[tool::UNIFORM]);
         let frame = tool::group(device, "render.gbuffer", &layout, &[frame.as_entire_binding()]);
@@ -62,7 +63,7 @@ impl GbufferPass {
             immediate_size: 0,
         });
         let module = shaders::module(device, "render.gbuffer");
-        let pipelines = (0..6).map(|i| pipeline(device, &pipeline_layout, &module, i)).collect();
+        let pipelines = (0..6).map(|i| pipeline(device, (&pipeline_layout, &module), i, blending)).collect();
         Self { pipelines, frame }
     }
 
@@ -131,57 +132,23 @@ fn is_outside(view: &View, draw: &Draw) -> bool {
 
 fn pipeline(
     device: &wgpu::Device,
-    layout: &wgpu::PipelineLayout,
-    module: &wgpu::ShaderModule,
+    (layout, module): (&wgpu::PipelineLayout, &wgpu::ShaderModule),
     variant: usize,
+    blending: Blending,
 ) -> wgpu::RenderPipeline {
     use wgpu::TextureFormat as F;
     let formats = [F::Rg16Float, F::Rgba8UnormSrgb, F::Rgba8UnormSrgb, F::Rgba16Float, F::Rg16Float];
-    let cull = [Some(wgpu::Face::Back), Some(wgpu::Face::Front), None][variant % 3];
-    let drawn = (&motion_layouts()[..], &formats[..]);
-    mesh_pipeline(device, "render.gbuffer", (layout, module), drawn, cull, variant >= 3)
-}
-
-/// A pipeline that draws a scene's meshes, from vertex `buffers`, with reversed depth into targets of these `formats`;
-/// `covered`: alpha decides which fragments there are.
-pub(super) fn mesh_pipeline(
-    device: &wgpu::Device,
-    label: &str,
-    (layout, module): (&wgpu::PipelineLayout, &wgpu::ShaderModule),
-    (buffers, formats): (&[Option<wgpu::VertexBufferLayout<'_>>], &[wgpu::TextureFormat]),
-    cull_mode: Option<wgpu::Face>,
-    covered: bool,
-) -> wgpu::RenderPipeline {
-    let target = |&format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL });
-    let targets: Vec<_> = formats.iter().map(target).collect();
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(label),
-        layout: Some(layout),
-        vertex: wgpu::VertexState {
-            module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers,
+    let constant = |is: bool| f64::from(u8::from(is));
+    tool::mesh(
+        device,
+        "render.gbuffer",
+        (layout, module),
+        tool::Drawn {
+            buffers: &motion_layouts(),
+            targets: &formats.map(|format| Some(format.into())),
+            cull: [Some(wgpu::Face::Back), Some(wgpu::Face::Front), None][variant % 3],
+            writes_depth: true,
+            constants: &[("ALPHA", constant(variant >= 3)), ("SORTED", constant(blending == Blending::Sorted))],
         },
-        primitive: wgpu::PrimitiveState { cull_mode, ..Default::default() },
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: wgpu::TextureFormat::Depth32Float,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(wgpu::CompareFunction::Greater),
-            stencil: Default::default(),
-            bias: Default::default(),
-        }),
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module,
-            entry_point: Some("fragment"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[("ALPHA", if covered { 1.0 } else { 0.0 })],
-                ..Default::default()
-            },
-            targets: &targets,
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+    )
 }

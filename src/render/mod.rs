@@ -1,5 +1,6 @@
 //! The rasteriser: one pass, one file; [`frame`] tells the order.
 
+pub mod blended;
 pub mod capture;
 pub mod composite;
 pub mod direct;
@@ -19,6 +20,7 @@ pub mod tonemap_curve;
 pub(crate) mod tool;
 pub mod view;
 
+pub use blended::Blending;
 pub use frame::{Renderer, RendererOptions};
 pub use targets::Targets;
 pub use view::View;

@@ -108,8 +108,10 @@ impl TaaPass {
     /// Makes the history's textures for `targets` and forgets what it held.
     pub fn fit(&mut self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets) {
         use wgpu::TextureFormat::{R32Float, Rgba16Float};
-        let make = |name, format| Target::new(device, name, targets.size, format, wgpu::TextureUsages::STORAGE_BINDING);
-        let current = make("taa.current", Rgba16Float);
+        let stored = wgpu::TextureUsages::STORAGE_BINDING;
+        let make = |name, format| Target::new(device, name, targets.size, format, stored);
+        let drawn = stored | wgpu::TextureUsages::RENDER_ATTACHMENT;
+        let current = Target::new(device, "taa.current", targets.size, Rgba16Float, drawn);
         let history = ["taa.history_a", "taa.history_b"].map(|name| make(name, Rgba16Float));
         let distance = ["taa.distance_a", "taa.distance_b"].map(|name| make(name, R32Float));
         let groups = [0, 1].map(|i| {

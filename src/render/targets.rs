@@ -102,7 +102,7 @@ impl Targets {
             direct_specular: stored("direct_specular"),
             indirect: both("indirect"),
             indirect_specular: both("indirect_specular"),
-            hdr: stored("hdr"),
+            hdr: both("hdr"),
         })
     }
 

@@ -43,9 +43,19 @@ pub(crate) fn compute(
     layouts: &[&wgpu::BindGroupLayout],
 ) -> wgpu::ComputePipeline {
     let layouts: Vec<_> = layouts.iter().map(|&l| Some(l)).collect();
+    compute_with(device, name, entry, &layouts)
+}
+
+/// As [`compute`], where some groups are left out.
+pub(crate) fn compute_with(
+    device: &wgpu::Device,
+    name: &str,
+    entry: &str,
+    layouts: &[Option<&wgpu::BindGroupLayout>],
+) -> wgpu::ComputePipeline {
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(name),
-        bind_group_layouts: &layouts,
+        bind_group_layouts: layouts,
         immediate_size: 0,
     });
     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -93,6 +103,54 @@ pub(crate) fn screen(
             entry_point: Some("fragment"),
             compilation_options: Default::default(),
             targets: &[Some(format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+/// How [`mesh`] draws.
+pub(crate) struct Drawn<'a> {
+    /// Where vertices come from.
+    pub buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    pub targets: &'a [Option<wgpu::ColorTargetState>],
+    pub cull: Option<wgpu::Face>,
+    /// Else only what is nearer than the depth that is there is drawn, and leaves it.
+    pub writes_depth: bool,
+    /// Of the fragment stage.
+    pub constants: &'a [(&'a str, f64)],
+}
+
+/// A pipeline that draws a scene's meshes with reversed depth.
+pub(crate) fn mesh(
+    device: &wgpu::Device,
+    label: &str,
+    (layout, module): (&wgpu::PipelineLayout, &wgpu::ShaderModule),
+    drawn: Drawn<'_>,
+) -> wgpu::RenderPipeline {
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(label),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: drawn.buffers,
+        },
+        primitive: wgpu::PrimitiveState { cull_mode: drawn.cull, ..Default::default() },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: wgpu::TextureFormat::Depth32Float,
+            depth_write_enabled: Some(drawn.writes_depth),
+            depth_compare: Some(wgpu::CompareFunction::Greater),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some("fragment"),
+            compilation_options: wgpu::PipelineCompilationOptions { constants: drawn.constants, ..Default::default() },
+            targets: drawn.targets,
         }),
         multiview_mask: None,
         cache: None,

@@ -10,6 +10,7 @@ mod light;
 mod material;
 mod mesh;
 mod texture;
+mod veil;
 
 pub(crate) use light::fits_one_map;
 pub use light::{CANDIDATES, LightGpu};
@@ -117,6 +118,8 @@ pub struct SceneGpu {
     sky_sun: Option<Light>,
     /// Which meshes are closed.
     closed: Vec<bool>,
+    /// Which materials are veils.
+    veils: Vec<bool>,
     /// What `instances` holds, with the index of each one's instance in the scene.
     placed: Vec<(u32, Rows)>,
     bytes: u64,
@@ -126,9 +129,10 @@ impl SceneGpu {
     /// Uploads `scene`. Images larger than the device allows are halved until they fit, with a warning.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Self, UploadError> {
         let mut warnings = Vec::new();
-        let geometry = mesh::upload(device, queue, scene)?;
+        let veils = veil::veils(scene);
+        let geometry = mesh::upload(device, queue, scene, &veils)?;
         let textures = texture::upload(device, queue, scene, &mut warnings)?;
-        let materials = material::upload(device, queue, scene, &textures)?;
+        let materials = material::upload(device, queue, (scene, &veils), &textures)?;
         let sky = environment::upload(device, queue, &scene.environment, &mut warnings)?;
         let lights: Vec<Light> = scene.lights.iter().chain(&sky.sun).cloned().collect();
         let list = LightGpu::list(&lights);
@@ -154,6 +158,7 @@ impl SceneGpu {
             sky_sun: sky.sun,
             bounds: geometry.bounds,
             closed: geometry.closed,
+            veils,
             rays: None,
             no_rays: None,
             placed: geometry.placed,
@@ -236,7 +241,7 @@ impl SceneGpu {
     /// were uploaded. The next frame of each renderer has motion vectors for what is elsewhere than
     /// in its last one.
     pub fn set_placements(&mut self, queue: &wgpu::Queue, scene: &Scene) {
-        let (placed, draws) = mesh::placements(scene, &self.closed);
+        let (placed, draws) = mesh::placements(scene, &self.closed, &self.veils);
         self.draws = draws;
         if placed != self.placed {
             self.placement += 1;

@@ -16,7 +16,7 @@ use crate::{
     image_io::ImageError,
     reference::{Kernel, PackError, ReferenceScene, TracerError, TracerOptions},
     render::{
-        RenderError, Renderer, RendererOptions,
+        Blending, RenderError, Renderer, RendererOptions,
         capture::{CaptureOptions, Layer, capture_with},
     },
     scene::{
@@ -340,7 +340,9 @@ impl<'a> Trial<'a> {
             // Where they cannot be had, the method below draws, and each shot says so.
             let _ = self.uploaded.trace(device, queue, &self.scene);
         }
-        let options = RendererOptions { method: method.clone(), taa: self.options.taa, ..Default::default() };
+        // What is judged is compared with paths, which meet such surfaces by lot.
+        let blending = Blending::Stochastic;
+        let options = RendererOptions { method: method.clone(), taa: self.options.taa, blending, ..Default::default() };
         Ok(Renderer::new(device, queue, self.size, options)?)
     }
 

@@ -4,7 +4,7 @@
 
 use bouncelight::gpu::Gpu;
 use bouncelight::render::capture::{CaptureOptions, CapturedFrame, Layer, Picture, capture};
-use bouncelight::render::{Renderer, RendererOptions};
+use bouncelight::render::{Blending, Renderer, RendererOptions};
 use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{Camera, Environment, Instance, Light, LightKind, Material, Mesh, Scene};
 
@@ -84,9 +84,10 @@ pub fn corner(lights: Vec<Light>) -> Scene {
     s
 }
 
-/// Analytic lights alone.
+/// Analytic lights alone; what blends is in the layers, by lot.
 pub fn direct_only() -> RendererOptions {
-    RendererOptions { method: bouncelight::gi::Method::Direct, ..Default::default() }
+    let blending = Blending::Stochastic;
+    RendererOptions { method: bouncelight::gi::Method::Direct, blending, ..Default::default() }
 }
 
 /// Captures all layers of `scene`.

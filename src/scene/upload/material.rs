@@ -34,7 +34,7 @@ pub struct MaterialGpu {
     pub normal_scale: f32,
     /// Strength of the occlusion map.
     pub occlusion_strength: f32,
-    /// 0 opaque, the mask's cutoff, or 2 for stochastic coverage.
+    /// 0 opaque, the mask's cutoff, 2 for stochastic coverage, 3 for a veil, which may be blended instead.
     pub alpha_cutoff: f32,
     /// Reflectance of a dielectric at normal incidence.
     pub f0: f32,
@@ -59,11 +59,11 @@ pub(super) struct Materials {
 pub(super) fn upload(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
-    scene: &Scene,
+    (scene, veils): (&Scene, &[bool]),
     textures: &Textures,
 ) -> Result<Materials, UploadError> {
     let layout = material_layout(device);
-    let uniforms: Vec<MaterialGpu> = scene.materials.iter().map(uniform).collect();
+    let uniforms: Vec<MaterialGpu> = scene.materials.iter().zip(veils).map(|(m, veil)| uniform(m, *veil)).collect();
     let buffer = filled(device, queue, "scene.materials", wgpu::BufferUsages::UNIFORM, &uniforms);
     let mut samplers = HashMap::new();
     for material in &scene.materials {
@@ -110,7 +110,7 @@ fn references(m: &Material) -> [Option<TextureRef>; 5] {
     [m.base_color_texture, m.metallic_roughness_texture, m.normal_texture, m.occlusion_texture, m.emissive_texture]
 }
 
-fn uniform(m: &Material) -> MaterialGpu {
+fn uniform(m: &Material, veil: bool) -> MaterialGpu {
     let uses = references(m).map(|r| match r {
         None => TextureUse { row0: [1.0, 0.0, 0.0, 0.0], row1: [0.0, 1.0, 0.0, 0.0] },
         Some(r) => {
@@ -129,7 +129,7 @@ fn uniform(m: &Material) -> MaterialGpu {
         alpha_cutoff: match m.alpha_mode {
             AlphaMode::Opaque => 0.0,
             AlphaMode::Mask { cutoff } => cutoff.min(1.0),
-            AlphaMode::Blend => 2.0,
+            AlphaMode::Blend => 2.0 + f32::from(u8::from(veil)),
         },
         f0: m.f0,
         pad: [0.0; 2],

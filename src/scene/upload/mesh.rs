@@ -46,6 +46,8 @@ pub struct Draw {
     pub closed: bool,
     /// Masked or blended: needs the permutation that discards.
     pub covered: bool,
+    /// A veil, to be blended with what is behind: one instance, so that draws can be put in order.
+    pub veil: bool,
     /// World-space bounds of all its instances.
     pub bounds: ([f32; 3], [f32; 3]),
 }
@@ -94,7 +96,12 @@ pub(super) struct Geometry {
     pub bytes: u64,
 }
 
-pub(super) fn upload(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Geometry, UploadError> {
+pub(super) fn upload(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    scene: &Scene,
+    veils: &[bool],
+) -> Result<Geometry, UploadError> {
     let limit = device.limits().max_buffer_size;
     let (mut positions, mut attributes, mut indices) = (Vec::new(), Vec::new(), Vec::<u32>::new());
     for mesh in &scene.meshes {
@@ -123,7 +130,7 @@ pub(super) fn upload(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) 
         }
     }
     let closed: Vec<bool> = scene.meshes.iter().map(is_closed).collect();
-    let (placed, draws) = placements(scene, &closed);
+    let (placed, draws) = placements(scene, &closed, veils);
     let bounds = draws.iter().map(|d| d.bounds).reduce(union);
     let vertex = wgpu::BufferUsages::VERTEX;
     let positions = filled(device, queue, "scene.positions", vertex, &positions);
@@ -140,8 +147,9 @@ pub(super) fn rows(placed: &[(u32, Rows)]) -> Vec<Rows> {
 }
 
 /// Rows of the world-from-object matrices in the order of the instance buffer, each with its instance's index, and the
-/// draws that refer to them, for a scene whose instances name meshes that exist; which of these are `closed` is known.
-pub(super) fn placements(scene: &Scene, closed: &[bool]) -> (Vec<(u32, Rows)>, Vec<Draw>) {
+/// draws that refer to them, for a scene whose instances name meshes that exist; which of these are `closed` is known, and
+/// which materials are `veils`.
+pub(super) fn placements(scene: &Scene, closed: &[bool], veils: &[bool]) -> (Vec<(u32, Rows)>, Vec<Draw>) {
     // Where each mesh begins in the shared buffers.
     let (mut vertex, mut index) = (0, 0);
     let mut ranges = Vec::with_capacity(scene.meshes.len());
@@ -173,9 +181,10 @@ pub(super) fn placements(scene: &Scene, closed: &[bool]) -> (Vec<(u32, Rows)>, V
             draw.bounds = union(draw.bounds, bounds);
             continue;
         }
-        last = Some((mesh, mirrored));
         let (base_vertex, range) = ranges[mesh].clone();
         let m = &scene.materials[material];
+        let veil = veils.get(material) == Some(&true);
+        last = (!veil).then_some((mesh, mirrored));
         draws.push(Draw {
             material,
             indices: range,
@@ -185,6 +194,7 @@ pub(super) fn placements(scene: &Scene, closed: &[bool]) -> (Vec<(u32, Rows)>, V
             double_sided: m.double_sided,
             closed: closed.get(mesh) == Some(&true) && !is_covered(m.alpha_mode),
             covered: is_covered(m.alpha_mode),
+            veil,
             bounds,
         });
     }

@@ -1,0 +1,57 @@
+//#import lib/frame.wgsl
+//#import lib/hash.wgsl
+//#import lib/brdf.wgsl
+//#import lib/lights.wgsl
+//#import lib/shadow_maps.wgsl
+
+// Light of the analytic lights on a surface, with their shadows. Expects `frame` in the module.
+
+@group(2) @binding(0) var<storage, read> lights: array<Light>;
+// First shadow view and how many, for each light; none means unshadowed.
+@group(2) @binding(1) var<storage, read> light_shadows: array<vec2u>;
+@group(2) @binding(2) var<storage, read> shadow_views: array<ShadowView>;
+@group(2) @binding(3) var sun_maps: texture_depth_2d_array;
+@group(2) @binding(4) var local_maps: texture_depth_2d_array;
+@group(2) @binding(5) var shadow_compare: sampler_comparison;
+// The same maps once more, for plain loads.
+@group(2) @binding(6) var sun_depths: texture_2d_array<f32>;
+@group(2) @binding(7) var local_depths: texture_2d_array<f32>;
+
+struct DirectLight {
+    // E/π.
+    diffuse: vec3f,
+    // Radiance of the specular lobe.
+    specular: vec3f,
+}
+
+// Of a pixel, another one in each frame.
+fn pattern_of(pixel: vec2u) -> Pattern {
+    return Pattern(6.2831853 * hash01(pixel.x, pixel.y, frame.seed, 1u), hash01(pixel.x, pixel.y, frame.seed, 2u));
+}
+
+// At p, which faces n, to an eye at v; `surface`: F0 and roughness.
+fn direct_light(p: vec3f, n: vec3f, v: vec3f, surface: vec4f, pattern: Pattern) -> DirectLight {
+    var sum = DirectLight();
+    for (var i = 0u; i < frame.light_count; i++) {
+        let light = lights[i];
+        if light.stands_in != 0u && frame.picture_only == 0u { continue; }
+        let s = sample_light(light, p);
+        let n_l = dot(n, s.l);
+        if n_l <= 0.0 || all(s.irradiance <= vec3f(0.0)) { continue; }
+        let shadow = light_shadows[i];
+        var seen = 1.0;
+        if shadow.y > 0u {
+            if light.kind == LIGHT_SUN {
+                seen = sun_visibility(shadow.x, shadow.y, p, n, s.l, light.radius, pattern);
+            } else {
+                seen = local_visibility(shadow.x, shadow.y, p, n, light.position, light.radius, pattern);
+            }
+        }
+        if seen <= 0.0 { continue; }
+        let e = s.irradiance * (n_l * seen);
+        sum.diffuse += e / PI;
+        sum.specular += e * ggx(n, v, s.l, surface.rgb, surface.a);
+    }
+    if any(sum.specular > vec3f(0.0)) { sum.specular *= lobe_gain(surface.rgb, surface.a, dot(n, v)); }
+    return sum;
+}
