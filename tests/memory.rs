@@ -27,7 +27,7 @@ fn frames_take_no_memory() {
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("the scene fits");
     for method in [Method::Direct, Method::Ssgi] {
         let shadow = ShadowOptions { sun_size: 512, ..Default::default() };
-        let options = RendererOptions { method: method.clone(), taa: true, shadow };
+        let options = RendererOptions { method: method.clone(), taa: true, shadow, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, [64, 32], options).expect("the size fits");
         let mut before = 0;
         for i in 0..35 {

@@ -25,7 +25,7 @@ impl<'a> Stage<'a> {
         let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the scene fits");
         // Small shadow maps: most of the time would go there.
         let shadow = ShadowOptions { sun_size: 512, ..Default::default() };
-        let options = RendererOptions { method, taa, shadow };
+        let options = RendererOptions { method, taa, shadow, ..Default::default() };
         let renderer = Renderer::new(&gpu.device, &gpu.queue, SIZE, options).expect("the size fits");
         Self { gpu, uploaded, renderer }
     }
