@@ -26,7 +26,7 @@ use crate::{
 use anyhow::Result;
 use std::path::PathBuf;
 
-/// Samples of a PNG where none are asked for: edges without steps, and what is half covered without grain.
+/// Samples of a picture where none are asked for: edges without steps, and what is half covered without grain.
 const PICTURE_SAMPLES: u32 = 8;
 
 #[derive(Debug, clap::Args)]
@@ -45,8 +45,8 @@ pub struct Args {
     weights: Option<PathBuf>,
     #[command(flatten)]
     fitted: super::fitted::Flag,
-    /// Jittered frames that are averaged through Cycles' pixel filter; 1 is the raw frame. When absent: 8 for a PNG; 1 for
-    /// an EXR, with --taa, for frames of a sequence, and for the first frame after a cut (--gi-frames 1).
+    /// Jittered frames that are averaged through Cycles' pixel filter; 1 is the raw frame. When absent: 8; 1 with --aov,
+    /// with --taa, for frames of a sequence, and for the first frame after a cut (--gi-frames 1).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     samples: Option<u32>,
     /// Real-time anti-aliasing over this many frames before the one that is written.
@@ -67,7 +67,7 @@ pub struct Args {
     #[arg(long, value_name = "LAYERS")]
     aov: Option<String>,
     /// Surfaces that blend with what is behind: `sorted` are drawn over the picture without grain, `stochastic` by lot,
-    /// as paths meet them, for pictures of many samples and layers. When absent: `sorted` for a PNG, else `stochastic`.
+    /// as paths meet them, for layers and many samples. When absent: `stochastic` with --aov, else `sorted`.
     #[arg(long, value_name = "HOW")]
     blending: Option<Blending>,
     /// Stops by which a PNG is brighter.
@@ -105,14 +105,14 @@ impl Args {
     }
 
     /// Frames that are averaged.
-    fn samples(&self, format: Format) -> u32 {
-        let raw = format == Format::Exr || self.taa.is_some() || self.gi_frames == Some(1) || self.sequence.is_given();
+    fn samples(&self) -> u32 {
+        let raw = self.aov.is_some() || self.taa.is_some() || self.gi_frames == Some(1) || self.sequence.is_given();
         self.samples.unwrap_or(if raw { 1 } else { PICTURE_SAMPLES })
     }
 
     /// How what blends is drawn.
-    fn blending(&self, format: Format) -> Blending {
-        self.blending.unwrap_or(if format == Format::Exr { Blending::Stochastic } else { Blending::Sorted })
+    fn blending(&self) -> Blending {
+        self.blending.unwrap_or(if self.aov.is_some() { Blending::Stochastic } else { Blending::Sorted })
     }
 
     /// It may run a network on a device: what was fitted is not known yet.
@@ -188,7 +188,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
             let method = super::tuned::tuned(method, &gpu, global.quiet);
             // Says from here on what the program does: without a shader cache nothing is drawn for half a minute.
             let progress = Progress::compiling(global, if sequence.is_some() { "frames" } else { "samples" }, 1);
-            let mut raster = Raster::new(&args, &gpu, &scene, method, (layers, format))?;
+            let mut raster = Raster::new(&args, &gpu, &scene, method, layers)?;
             if let Some(sequence) = sequence {
                 return film(progress, &args, format, raster, &sequence);
             }
@@ -226,20 +226,14 @@ struct Raster<'a> {
 }
 
 impl<'a> Raster<'a> {
-    fn new(
-        args: &Args,
-        gpu: &'a Gpu,
-        scene: &Scene,
-        method: Method,
-        (layers, format): (Vec<Layer>, Format),
-    ) -> Result<Self> {
+    fn new(args: &Args, gpu: &'a Gpu, scene: &Scene, method: Method, layers: Vec<Layer>) -> Result<Self> {
         let weights = match &method {
             Method::Neural(neural) => neural.weights.hash_text(),
             _ => "none".into(),
         };
         let (asked, settles, needs_rays) = (method.name(), method.has_history(), method.needs_rays());
         let options =
-            RendererOptions { method, taa: args.taa.is_some(), blending: args.blending(format), ..Default::default() };
+            RendererOptions { method, taa: args.taa.is_some(), blending: args.blending(), ..Default::default() };
         // Trees are built while the driver compiles shaders.
         let upload = || {
             let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
@@ -255,7 +249,7 @@ impl<'a> Raster<'a> {
             (uploading.join().unwrap_or_else(|e| std::panic::resume_unwind(e)), renderer)
         });
         let (scene, renderer) = (scene?, renderer?);
-        let samples = args.samples(format);
+        let samples = args.samples();
         Ok(Self { gpu, scene, renderer, layers, samples, weights, asked, settles, running: false })
     }
 

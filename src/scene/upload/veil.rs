@@ -64,7 +64,7 @@ mod tests {
         assert!(!veil(&[0, 0, 0, 0, 0, 60, 200, 255, 255, 255], 1.0));
         // The same at half its coverage; a beam that fades out.
         assert!(veil(&[0, 0, 0, 0, 0, 60, 200, 255, 255, 255], 0.5));
-        assert!(veil(&[0, 10, 40, 80, 120, 255], 1.0));
+        assert!(veil(&[0, 10, 40, 80, 120, 160], 1.0));
         assert!(!veil(&[0, 0], 1.0), "what covers nothing needs no order");
         // Masks are cut-outs whatever they hold.
         assert!(!veils(&scene(&[100, 120], 0.5, AlphaMode::Mask { cutoff: 0.2 }))[0]);
