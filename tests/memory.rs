@@ -1,5 +1,6 @@
 //! Frame after frame takes no more memory: neither we nor the driver keep anything of a frame that
-//! is over. Drivers may, and one did: it compiled a shader anew for each draw and kept them all. A
+//! is over. Drivers may: Mesa's for CPUs compiles a shader anew for each draw where uniforms alone decide
+//! which way it goes, and keeps them all (`gather`: 31 MB a frame, before its shaders asked otherwise). A
 //! process of its own, since all of it is measured.
 #![cfg(target_os = "linux")]
 
@@ -7,6 +8,7 @@ mod common;
 
 use bouncelight::gi::Method;
 use bouncelight::gpu::timing::Recorder;
+use bouncelight::net::format::Weights;
 use bouncelight::render::shadow::ShadowOptions;
 use bouncelight::render::{Renderer, RendererOptions, View, sampling};
 use bouncelight::scene::{self, upload::SceneGpu};
@@ -25,7 +27,10 @@ fn frames_take_no_memory() {
     let Some(gpu) = common::gpu() else { return };
     let scene = scene::load("paper-room:60").expect("the room is made by code");
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("the scene fits");
-    for method in [Method::Direct, Method::Ssgi] {
+    let network = Weights::shipped().expect("the shipped file is sound");
+    for method in
+        [Method::Direct, Method::Ssgi, Method::Gather(Default::default()), Method::Neural(Box::new(network.into()))]
+    {
         let shadow = ShadowOptions { sun_size: 512, ..Default::default() };
         let options = RendererOptions { method: method.clone(), taa: true, shadow, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, [64, 32], options).expect("the size fits");
@@ -43,11 +48,11 @@ fn frames_take_no_memory() {
             gpu.device.poll(wgpu::PollType::wait_indefinitely()).expect("the frame ends");
         }
         let grown = resident().saturating_sub(before);
-        println!("{method:?}: {:.1} MiB in 30 frames", grown as f64 / MIB as f64);
-        assert!(grown < 48 * MIB, "{method:?}: {grown} bytes in 30 frames");
+        println!("{}: {:.1} MiB in 30 frames", method.name(), grown as f64 / MIB as f64);
+        assert!(grown < 20 * MIB, "{}: {grown} bytes in 30 frames", method.name());
     }
     // Negative control: what is kept is seen.
     let before = resident();
     let kept: Vec<Vec<u8>> = (0..30).map(|i| vec![i as u8 + 1; 3 * MIB as usize]).collect();
-    assert!(resident() - before > 48 * MIB && kept.len() == 30);
+    assert!(resident() - before > 20 * MIB && kept.len() == 30);
 }

@@ -85,8 +85,7 @@ fn half_pixel(texel: vec2i) -> vec2i {
 
 // Radiance, of light as it is stored.
 fn unexposed(light: vec3f) -> vec3f {
-    if (params.flags & STORED_EXPOSED) == 0u { return light; }
-    return light * params.light_scale;
+    return light * select(1.0, params.light_scale, (params.flags & STORED_EXPOSED) != 0u);
 }
 
 fn light_at(pixel: vec2i) -> vec3f {
@@ -100,7 +99,8 @@ fn emissive_at(pixel: vec2i) -> vec3f {
 // Diffuse reflectance.
 fn albedo_at(pixel: vec2i) -> vec3f {
     let texel = finite3(textureLoad(albedo_map, pixel, 0).rgb);
-    if (params.flags & STORED_SRGB) == 0u { return texel; }
+    // The texel is asked, too: Mesa's CPU driver compiles what uniforms alone branch on anew for each dispatch.
+    if all(texel <= vec3f(0.0)) | ((params.flags & STORED_SRGB) == 0u) { return texel; }
     return select(pow((texel + 0.055) / 1.055, vec3f(2.4)), texel / 12.92, texel <= vec3f(0.04045));
 }
 

@@ -45,8 +45,8 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     // Depth of the surface at the pixel's centre, wherever in the pixel this frame looks: linear on a plane.
     let centre = in.position.z - dot(frame.jitter, vec2f(dpdx(in.position.z), dpdy(in.position.z)));
     if ALPHA {
-        var threshold = SOLID;
-        if !SORTED || !is_veil() { threshold = coverage_threshold(in, facing, centre); }
+        // Chosen, not branched, as in `surface_at`.
+        let threshold = select(coverage_threshold(in, facing, centre), SOLID, SORTED && is_veil());
         if s.alpha < cutoff(threshold) {
             discard;
         }

@@ -52,12 +52,13 @@ fn surface_at(in: Varying, facing: bool) -> Surface {
     let n_v = dot(n, normalize(v));
     let share = diffuse_loss(material.f0, roughness, max(n_v, 0.0));
     let darkened = select(0.0, material.occlusion_strength, frame.picture_only != 0u);
-    if material.unlit != 0u {
-        return Surface(n, base.a, vec3f(0.0), 1.0, vec4f(0.0, 0.0, 0.0, 1.0), max(base.rgb, vec3f(0.0)));
-    }
+    // Chosen, not branched: Mesa's CPU driver compiles what uniforms alone branch on anew for each draw.
+    let unlit = material.unlit != 0u;
+    let specular = vec4f(mix(material.f0 * material.specular_tint.rgb, color, metallic), roughness);
     return Surface(
-        n, base.a, color * (1.0 - metallic) * (1.0 - share), mix(1.0, shade, darkened),
-        vec4f(mix(material.f0 * material.specular_tint.rgb, color, metallic), roughness), material.emissive * glow
+        n, base.a, select(color * (1.0 - metallic) * (1.0 - share), vec3f(0.0), unlit),
+        select(mix(1.0, shade, darkened), 1.0, unlit), select(specular, vec4f(0.0, 0.0, 0.0, 1.0), unlit),
+        select(material.emissive * glow, max(base.rgb, vec3f(0.0)), unlit)
     );
 }
 

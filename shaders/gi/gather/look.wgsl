@@ -85,10 +85,12 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
     var total = 0.0;
     var best = 0.0;
     var lot = u.x;
+    // The lengths of the lists are asked, too: Mesa's CPU driver compiles what uniforms alone branch on anew for each dispatch.
+    let all = min(gather.light_count, arrayLength(&lights));
+    let glowing = min(gather.emitter_count, arrayLength(&emitters));
     if lamps {
         // A long list is looked at in places only, evenly spread over the lights' chances, and what is found there stands for
         // the rest: resampled importance sampling (Talbot et al. 2005), right in the mean whatever the chances are.
-        let all = gather.light_count;
         let few = all <= CANDIDATES || lights[all - 1u].chance <= 0.0;
         let shift = unit_floats(pcg3(seed ^ vec3u(0x2c1b3c6du))).x;
         let looks = select(CANDIDATES, all, few);
@@ -118,10 +120,10 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
         }
     }
     var towards_light = best > 0.0;
-    if gather.emitter_count > 0u {
+    if glowing > 0u {
         let more = unit_floats(pcg3(seed ^ vec3u(0x68bc21ebu)));
-        let scaled = u.y * f32(gather.emitter_count);
-        let first = min(u32(scaled), gather.emitter_count - 1u);
+        let scaled = u.y * f32(glowing);
+        let first = min(u32(scaled), glowing - 1u);
         let at = select(emitters[first].other, first, more.z < emitters[first].threshold);
         let e = emitters[at];
         let r = sqrt(more.x);
