@@ -8,7 +8,10 @@ use super::{
 use crate::{
     gi::{Method, technique::Cost},
     gpu::Gpu,
-    render::{Renderer, RendererOptions},
+    render::{
+        DrawnCount, Renderer, RendererOptions,
+        cull::Count,
+    },
     scene::upload::SceneGpu,
     study::{
         bench::{BenchOptions, Measurement, measure},
@@ -262,10 +265,21 @@ fn print(record: &Record, gpu: &Gpu, layers: bool) {
             GTX_1050.name,
             EFFICIENCY * 100.0
         );
+        print_drawn(&m.drawn);
         let mib = |b: u64| b as f64 / (1 << 20) as f64;
         let parts = m.bytes.iter().filter(|(_, b)| *b > 0).map(|(n, b)| format!("{n} {:.1}", mib(*b)));
         say!("  {:.1} MiB of GPU memory: {}", mib(m.total_bytes()), parts.collect::<Vec<_>>().join(", "));
     }
+}
+
+/// What the last frame drew and left out.
+fn print_drawn(drawn: &DrawnCount) {
+    let words = |c: &Count| {
+        let thousand = |n: u64| n as f64 / 1e3;
+        format!("{} draws, {:.1} k triangles, {:.1} k culled", c.draws, thousand(c.triangles), thousand(c.culled))
+    };
+    say!("  camera: {}", words(&drawn.camera));
+    say!("  shadows: {} maps drawn: {}; {} kept: {}", drawn.maps, words(&drawn.shadows), drawn.maps_kept, words(&drawn.kept));
 }
 
 /// Rows of the table; without `layers` the network's layers are one row (whose p95 is a sum of p95s, an upper bound).

@@ -1,5 +1,6 @@
 //! Surfaces that cover a share of what is behind them, drawn over the picture from far to near.
 
+use super::cull::{Count, Volume};
 use super::targets::Targets;
 use super::tool;
 use super::view::View;
@@ -90,12 +91,14 @@ impl BlendedPass {
         tool::group(device, "render.blended", &self.layout, &resources)
     }
 
-    /// Draws over `hdr`; nothing is recorded where the scene has nothing that blends.
-    pub fn record(&self, recorder: &mut Recorder<'_>, inputs: BlendedInputs<'_>) {
+    /// Draws over `hdr`, and adds to `count`; nothing is recorded where nothing that blends is to be seen.
+    pub fn record(&self, recorder: &mut Recorder<'_>, inputs: BlendedInputs<'_>, count: &mut Count) {
         let BlendedInputs { scene, view, .. } = inputs;
         let eye = Vec3::from(view.eye());
         let away = |draw: &Draw| (0.5 * (Vec3::from(draw.bounds.0) + Vec3::from(draw.bounds.1)) - eye).length_squared();
-        let mut draws: Vec<(f32, &Draw)> = scene.draws.iter().filter(|d| d.veil).map(|d| (away(d), d)).collect();
+        let volume = Volume::new(&view.clip_from_world);
+        let seen = scene.draws.iter().filter(|d| d.veil && volume.meets(&d.bounds));
+        let mut draws: Vec<(f32, &Draw)> = seen.map(|d| (away(d), d)).collect();
         if draws.is_empty() {
             return;
         }
@@ -118,7 +121,9 @@ impl BlendedPass {
                 let cull = if draw.double_sided { 2 } else { usize::from(draw.mirrored) };
                 pass.set_pipeline(&self.pipelines[cull]);
                 pass.set_bind_group(1, &scene.material_groups[draw.material], &[]);
-                pass.draw_indexed(draw.indices.clone(), draw.base_vertex, draw.instances.clone());
+                count.runs(scene, draw, &volume, |instances| {
+                    pass.draw_indexed(draw.indices.clone(), draw.base_vertex, instances);
+                });
             }
         });
     }

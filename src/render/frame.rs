@@ -4,6 +4,7 @@
 use super::RenderError;
 use super::blended::{BlendedInputs, BlendedPass, Blending};
 use super::composite::CompositePass;
+use super::cull::DrawnCount;
 use super::direct::{DirectInputs, DirectPass};
 use super::gbuffer::{GbufferInputs, GbufferPass};
 use super::glossy::{GlossyInputs, GlossyPass, GlossyPicture};
@@ -68,6 +69,8 @@ pub struct Renderer {
     moved: Moved,
     /// What the frame before was seen with, for motion vectors.
     last: Option<View>,
+    /// What the last frame drew.
+    drawn: DrawnCount,
 }
 
 /// The passes that every method shares.
@@ -136,8 +139,8 @@ impl Renderer {
         let indirect = method::build(device, queue, size, &options.method)?;
         let method = options.method.name();
         let device = device.clone();
-        let (lighting, moved) = (None, Moved::default());
-        Ok(Self { device, frame, targets, picture, lighting, method, indirect, passes, taa, moved, last: None })
+        let (lighting, moved, drawn) = (None, Moved::default(), DrawnCount::default());
+        Ok(Self { device, frame, targets, picture, lighting, method, indirect, passes, taa, moved, last: None, drawn })
     }
 
     /// New targets of `size` pixels; the views of the old ones are of no use any more.
@@ -244,6 +247,11 @@ impl Renderer {
         indirect.read_layer(&gi_inputs(&self.targets, view, environment, None), layer)
     }
 
+    /// Draw calls, triangles and shadow maps of the last frame.
+    pub fn drawn(&self) -> DrawnCount {
+        self.drawn
+    }
+
     /// The textures that [`Renderer::record`] fills.
     pub fn targets(&self) -> &Targets {
         &self.targets
@@ -306,14 +314,15 @@ impl Renderer {
         let uniform = view.uniform(&scene.environment, scene.lights.len() as u32, picture_only);
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 
+        let mut drawn = DrawnCount::default();
         if shadows || fresh {
-            self.passes.shadow.record(recorder, queue, scene, view, &mut lighting.maps);
+            self.passes.shadow.record(recorder, queue, scene, view, &mut lighting.maps, &mut drawn);
         }
         if shadows || self.taa.is_some() || !self.moved.knows(scene) {
             self.moved.follow(&self.device, queue, scene);
         }
         let inputs = GbufferInputs { scene, before: self.moved.before(scene), view };
-        self.passes.gbuffer.record(recorder, inputs, &self.targets);
+        self.passes.gbuffer.record(recorder, inputs, &self.targets, &mut drawn.camera);
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
         self.passes.direct.record(recorder, inputs);
         let mut inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene));
@@ -339,12 +348,13 @@ impl Renderer {
         if let (Some(blended), Some(picture)) = (&self.passes.blended, &self.picture.blended) {
             let hdr = &self.taa.as_ref().map_or(&self.targets.hdr, TaaPass::current).view;
             let (lights, depth) = (&lighting.group, &self.targets.depth.view);
-            blended.record(recorder, BlendedInputs { scene, view, picture, lights, hdr, depth });
+            blended.record(recorder, BlendedInputs { scene, view, picture, lights, hdr, depth }, &mut drawn.camera);
         }
         if let Some(taa) = &mut self.taa {
             taa.record(recorder, queue, scene, view);
         }
         self.lighting = Some(lighting);
+        self.drawn = drawn;
         Ok(())
     }
 

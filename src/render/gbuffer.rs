@@ -26,6 +26,7 @@
 //! from the view alone.
 
 use super::blended::Blending;
+use super::cull::{Count, Volume};
 use super::targets::Targets;
 use super::tool;
 use super::view::View;
@@ -67,8 +68,14 @@ impl GbufferPass {
         Self { pipelines, frame }
     }
 
-    /// Clears the G-buffer and draws a scene into it.
-    pub fn record(&self, recorder: &mut Recorder<'_>, inputs: GbufferInputs<'_>, targets: &Targets) {
+    /// Clears the G-buffer and draws into it what the view sees of a scene, which is added to `count`.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder<'_>,
+        inputs: GbufferInputs<'_>,
+        targets: &Targets,
+        count: &mut Count,
+    ) {
         let GbufferInputs { scene, before, view } = inputs;
         let colors =
             [&targets.normal, &targets.albedo, &targets.specular, &targets.emissive, &targets.motion].map(|t| {
@@ -94,18 +101,21 @@ impl GbufferPass {
             pass.set_vertex_buffer(2, scene.attributes.slice(..));
             pass.set_vertex_buffer(3, before.slice(..));
             pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
+            let volume = Volume::new(&view.clip_from_world);
             let (mut pipeline, mut material) = (usize::MAX, usize::MAX);
             for draw in &scene.draws {
-                let wanted = variant(draw, view);
-                if pipeline != wanted {
-                    pipeline = wanted;
-                    pass.set_pipeline(&self.pipelines[pipeline]);
-                }
-                if material != draw.material {
-                    material = draw.material;
-                    pass.set_bind_group(1, &scene.material_groups[material], &[]);
-                }
-                pass.draw_indexed(draw.indices.clone(), draw.base_vertex, draw.instances.clone());
+                count.runs(scene, draw, &volume, |instances| {
+                    let wanted = variant(draw, view);
+                    if pipeline != wanted {
+                        pipeline = wanted;
+                        pass.set_pipeline(&self.pipelines[pipeline]);
+                    }
+                    if material != draw.material {
+                        material = draw.material;
+                        pass.set_bind_group(1, &scene.material_groups[material], &[]);
+                    }
+                    pass.draw_indexed(draw.indices.clone(), draw.base_vertex, instances);
+                });
             }
         });
     }

@@ -3,6 +3,7 @@
 pub mod blended;
 pub mod capture;
 pub mod composite;
+pub mod cull;
 pub mod direct;
 pub mod frame;
 pub mod gbuffer;
@@ -10,6 +11,7 @@ pub mod glossy;
 pub mod moved;
 pub mod sampling;
 pub mod shadow;
+mod shadow_kept;
 mod shadow_local;
 mod shadow_sun;
 mod shadow_view;
@@ -21,6 +23,7 @@ pub(crate) mod tool;
 pub mod view;
 
 pub use blended::Blending;
+pub use cull::DrawnCount;
 pub use frame::{Renderer, RendererOptions};
 pub use targets::Targets;
 pub use view::View;

@@ -1,10 +1,13 @@
 //! Shadow maps of all lights: who gets how many, and the passes that draw them.
 //!
 //! A sun gets cascades (layers of one array), a spot one map, a point light or a spot wider than 60° six faces (layers
-//! of another array). Memory is bounded: at most [`MAX_SUNS`] suns share 64 MiB (one alone has four maps of 2048²,
+//! of another array). A map is drawn again when its camera has moved, or when something that it sees has moved or shows
+//! another lot ([`shadow_kept`](super::shadow_kept)). Memory is bounded: at most [`MAX_SUNS`] suns share 64 MiB (one alone has four maps of 2048²,
 //! several have 1024²), and the local lights share [`MAX_LOCAL_LAYERS`] layers (1024² up to 12 of them, then 512²).
 //! Lights beyond that shine without shadow, and a warning says so once.
 
+use super::cull::{Count, DrawnCount, Volume};
+use super::shadow_kept::Kept;
 pub use super::shadow_view::ShadowViewGpu;
 use super::view::View;
 use super::{shadow_local, shadow_sun, tool};
@@ -89,6 +92,10 @@ pub struct ShadowMaps {
     cameras: wgpu::Buffer,
     group: wgpu::BindGroup,
     views: Vec<ShadowViewGpu>,
+    /// What each view sees.
+    volumes: Vec<Volume>,
+    /// What each layer was drawn of.
+    kept: Vec<Option<Kept>>,
     camera_bytes: Vec<u8>,
     /// All cascades.
     pub sun_view: wgpu::TextureView,
@@ -237,6 +244,8 @@ impl ShadowPass {
             local_view: whole(&local),
             view_buffer: buffer("shadow.views", views * size_of::<ShadowViewGpu>() as u64, storage),
             views: Vec::with_capacity(plan.views as usize),
+            volumes: Vec::with_capacity(plan.views as usize),
+            kept: vec![None; plan.views as usize],
             camera_bytes: vec![0; (u64::from(plan.views) * CAMERA_STRIDE) as usize],
             plan,
             sun,
@@ -248,7 +257,7 @@ impl ShadowPass {
         }
     }
 
-    /// Fits the maps to `view` and draws them.
+    /// Fits the maps to `view` and draws those that do not hold already what they would.
     pub fn record(
         &self,
         recorder: &mut Recorder<'_>,
@@ -256,6 +265,7 @@ impl ShadowPass {
         scene: &SceneGpu,
         view: &View,
         maps: &mut ShadowMaps,
+        count: &mut DrawnCount,
     ) {
         if maps.plan.views == 0 {
             return;
@@ -268,18 +278,36 @@ impl ShadowPass {
         queue.write_buffer(&maps.cameras, 0, &maps.camera_bytes);
         queue.write_buffer(&maps.view_buffer, 0, bytemuck::cast_slice(&maps.views));
         for (i, layer) in maps.layers.iter().enumerate() {
+            let (camera, volume) = (maps.views[i].clip_from_world, maps.volumes[i]);
+            let kept = maps.kept[i].as_mut().filter(|k| k.holds(scene, &camera, &volume, view.seed));
+            if let Some(kept) = kept {
+                count.maps_kept += 1;
+                count.kept += kept.count;
+                continue;
+            }
+            let kept = maps.kept[i].insert(Kept::new(scene, camera, volume, view.seed));
             let depth = wgpu::RenderPassDepthStencilAttachment {
                 view: layer,
                 depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
                 stencil_ops: None,
             };
             recorder.render("shadow", &[], Some(depth), |pass| {
-                self.draw(pass, scene, &maps.group, (i as u64 * CAMERA_STRIDE) as u32);
+                let camera = (&maps.group, (i as u64 * CAMERA_STRIDE) as u32);
+                self.draw(pass, scene, camera, &volume, &mut kept.count);
             });
+            count.maps += 1;
+            count.shadows += kept.count;
         }
     }
 
-    fn draw(&self, pass: &mut wgpu::RenderPass<'_>, scene: &SceneGpu, group: &wgpu::BindGroup, camera: u32) {
+    fn draw(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        scene: &SceneGpu,
+        (group, camera): (&wgpu::BindGroup, u32),
+        volume: &Volume,
+        count: &mut Count,
+    ) {
         pass.set_vertex_buffer(0, scene.positions.slice(..));
         pass.set_vertex_buffer(1, scene.instances.slice(..));
         pass.set_vertex_buffer(2, scene.attributes.slice(..));
@@ -291,20 +319,25 @@ impl ShadowPass {
             }
             pass.set_pipeline(if covered { &self.covered } else { &self.opaque });
             pass.set_bind_group(0, group, &[camera]);
+            let mut material = usize::MAX;
             for draw in draws {
-                if covered {
-                    pass.set_bind_group(1, &scene.material_groups[draw.material], &[]);
-                }
-                pass.draw_indexed(draw.indices.clone(), draw.base_vertex, draw.instances.clone());
+                count.runs(scene, draw, volume, |instances| {
+                    if covered && material != draw.material {
+                        material = draw.material;
+                        pass.set_bind_group(1, &scene.material_groups[material], &[]);
+                    }
+                    pass.draw_indexed(draw.indices.clone(), draw.base_vertex, instances);
+                });
             }
         }
     }
 }
 
-/// Fills `maps.views` for what `view` sees.
+/// Fills `maps.views` and `maps.volumes` for what `view` sees.
 fn fit(scene: &SceneGpu, view: &View, maps: &mut ShadowMaps, cascades: u32) {
     let bounds = scene.bounds.map_or((Vec3::ZERO, Vec3::ZERO), |(low, high)| (low.into(), high.into()));
     maps.views.clear();
+    maps.volumes.clear();
     let (mut sun_layer, mut local_layer) = (0, 0);
     let size = maps.plan.local_size;
     for (light, &[_, count]) in scene.lights.iter().zip(&maps.plan.of_light) {
@@ -330,6 +363,16 @@ fn fit(scene: &SceneGpu, view: &View, maps: &mut ShadowMaps, cascades: u32) {
                 maps.views.extend(shadow_local::cube(position.into(), radius, size, local_layer));
                 local_layer += 6;
             }
+        }
+        let reach = match light.kind {
+            LightKind::Point { position, range, .. } | LightKind::Spot { position, range, .. } => {
+                range.map(|r| (Vec3::from(position), r))
+            }
+            LightKind::Directional { .. } => None,
+        };
+        for v in &maps.views[maps.volumes.len()..] {
+            let volume = Volume::new(&v.clip_from_world);
+            maps.volumes.push(reach.map_or(volume, |(p, r)| volume.within(p, r)));
         }
     }
 }

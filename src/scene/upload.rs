@@ -15,7 +15,7 @@ mod veil;
 pub(crate) use light::fits_one_map;
 pub use light::{CANDIDATES, LightGpu};
 pub use material::{MaterialGpu, TextureUse, material_layout};
-pub use mesh::{AttributeVertex, Draw, Rows, attribute_layouts, motion_layouts, position_layouts};
+pub use mesh::{AttributeVertex, Bounds, Draw, Rows, Slot, attribute_layouts, motion_layouts, position_layouts};
 
 use super::{AlphaMode, Environment, Light, Scene};
 use crate::accel::{AccelError, SceneRays};
@@ -91,6 +91,8 @@ pub struct SceneGpu {
     pub instances: wgpu::Buffer,
     /// Number of the placements: another one whenever an instance has moved or taken another's slot in `instances`.
     pub placement: u64,
+    /// Bounds and version of each entry of `instances`.
+    pub slots: Vec<Slot>,
     /// What to draw, sorted by material.
     pub draws: Vec<Draw>,
     /// One bind group a material, of [`material_layout`].
@@ -148,6 +150,7 @@ impl SceneGpu {
             indices: geometry.indices,
             instances: geometry.instances,
             placement: 0,
+            slots: geometry.slots,
             draws: geometry.draws,
             material_groups: materials.groups,
             light_buffer,
@@ -241,8 +244,9 @@ impl SceneGpu {
     /// were uploaded. The next frame of each renderer has motion vectors for what is elsewhere than
     /// in its last one.
     pub fn set_placements(&mut self, queue: &wgpu::Queue, scene: &Scene) {
-        let (placed, draws) = mesh::placements(scene, &self.closed, &self.veils);
-        self.draws = draws;
+        let before = (self.placed.as_slice(), self.slots.as_slice());
+        let mesh::Placements { placed, slots, draws } = mesh::placements(scene, &self.closed, &self.veils, before);
+        (self.draws, self.slots) = (draws, slots);
         if placed != self.placed {
             self.placement += 1;
             queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&mesh::rows(&placed)));

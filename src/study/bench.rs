@@ -7,7 +7,7 @@ use crate::{
         Gpu,
         timing::{self, Recorder},
     },
-    render::{RenderError, Renderer, View},
+    render::{DrawnCount, RenderError, Renderer, View},
     scene::{Camera, upload::SceneGpu},
 };
 use serde::{Deserialize, Serialize};
@@ -59,6 +59,9 @@ pub struct Measurement {
     /// was counted.
     #[serde(default)]
     pub costs: Vec<Cost>,
+    /// Draw calls, triangles and shadow maps of the last frame.
+    #[serde(default)]
+    pub drawn: DrawnCount,
 }
 
 impl Measurement {
@@ -179,6 +182,7 @@ fn measure_frames(
         gpu_ms: (!sums.is_empty()).then(|| spread(sums)),
         wall_ms: spread(wall),
         costs: renderer.costs(),
+        drawn: renderer.drawn(),
         bytes: renderer
             .bytes()
             .into_iter()

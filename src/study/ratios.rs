@@ -126,6 +126,7 @@ mod tests {
             wall_ms: spread(ms),
             bytes: Vec::new(),
             costs: Vec::new(),
+            drawn: Default::default(),
         }
     }
 

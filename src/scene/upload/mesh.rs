@@ -2,11 +2,13 @@
 
 use super::closed::is_closed;
 use super::{UploadError, filled, is_covered};
-use crate::scene::{Mesh, Scene, octahedral::octahedral};
+use crate::scene::{AlphaMode, Mesh, Scene, octahedral::octahedral};
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
 use half::f16;
+use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Everything of a vertex but its position; 36 bytes.
 #[repr(C)]
@@ -27,6 +29,18 @@ pub struct AttributeVertex {
 /// Rows of a world-from-object matrix, metres; the fourth is 0, 0, 0, 1.
 pub type Rows = [[f32; 4]; 3];
 
+/// Lowest and highest corner of a box along the world's axes.
+pub type Bounds = ([f32; 3], [f32; 3]);
+
+/// What is known of an instance in the instance buffer beside its rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slot {
+    /// World-space bounds, which hold whatever of it is drawn.
+    pub bounds: Bounds,
+    /// Number of what is there: another one whenever it is another instance, elsewhere or of another shape.
+    pub version: u64,
+}
+
 /// All instances of one mesh that share a winding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draw {
@@ -46,10 +60,12 @@ pub struct Draw {
     pub closed: bool,
     /// Masked or blended: needs the permutation that discards.
     pub covered: bool,
+    /// Covers a share of each place by lot (`BLEND`), so that another frame's shadow of it is another.
+    pub by_lot: bool,
     /// A veil, to be blended with what is behind: one instance, so that draws can be put in order.
     pub veil: bool,
     /// World-space bounds of all its instances.
-    pub bounds: ([f32; 3], [f32; 3]),
+    pub bounds: Bounds,
 }
 
 const POSITION: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32x3];
@@ -90,8 +106,9 @@ pub(super) struct Geometry {
     pub indices: wgpu::Buffer,
     pub instances: wgpu::Buffer,
     pub placed: Vec<(u32, Rows)>,
+    pub slots: Vec<Slot>,
     pub draws: Vec<Draw>,
-    pub bounds: Option<([f32; 3], [f32; 3])>,
+    pub bounds: Option<Bounds>,
     pub closed: Vec<bool>,
     pub bytes: u64,
 }
@@ -130,7 +147,7 @@ pub(super) fn upload(
         }
     }
     let closed: Vec<bool> = scene.meshes.iter().map(is_closed).collect();
-    let (placed, draws) = placements(scene, &closed, veils);
+    let Placements { placed, slots, draws } = placements(scene, &closed, veils, (&[], &[]));
     let bounds = draws.iter().map(|d| d.bounds).reduce(union);
     let vertex = wgpu::BufferUsages::VERTEX;
     let positions = filled(device, queue, "scene.positions", vertex, &positions);
@@ -138,7 +155,7 @@ pub(super) fn upload(
     let indices = filled(device, queue, "scene.indices", wgpu::BufferUsages::INDEX, &indices);
     let instances = filled(device, queue, "scene.instances", vertex, &rows(&placed));
     let bytes = positions.size() + attributes.size() + indices.size() + instances.size();
-    Ok(Geometry { positions, attributes, indices, instances, placed, draws, bounds, closed, bytes })
+    Ok(Geometry { positions, attributes, indices, instances, placed, slots, draws, bounds, closed, bytes })
 }
 
 /// What the instance buffer holds.
@@ -146,10 +163,29 @@ pub(super) fn rows(placed: &[(u32, Rows)]) -> Vec<Rows> {
     placed.iter().map(|p| p.1).collect()
 }
 
-/// Rows of the world-from-object matrices in the order of the instance buffer, each with its instance's index, and the
-/// draws that refer to them, for a scene whose instances name meshes that exist; which of these are `closed` is known, and
-/// which materials are `veils`.
-pub(super) fn placements(scene: &Scene, closed: &[bool], veils: &[bool]) -> (Vec<(u32, Rows)>, Vec<Draw>) {
+/// Numbers of what has ever been in a slot.
+static VERSION: AtomicU64 = AtomicU64::new(1);
+
+/// Where everything is.
+pub(super) struct Placements {
+    /// What the instance buffer holds, each with its instance's index in the scene.
+    pub placed: Vec<(u32, Rows)>,
+    /// The same slots.
+    pub slots: Vec<Slot>,
+    /// Draws that refer to them.
+    pub draws: Vec<Draw>,
+}
+
+/// Places a scene whose instances name meshes that exist; which of these are `closed` is known, which materials are
+/// `veils`, and how instances were placed `before`: what has not moved since need not be measured again.
+pub(super) fn placements(
+    scene: &Scene,
+    closed: &[bool],
+    veils: &[bool],
+    before: (&[(u32, Rows)], &[Slot]),
+) -> Placements {
+    let known: HashMap<u32, (&Rows, Bounds)> =
+        before.0.iter().zip(before.1).map(|((instance, rows), slot)| (*instance, (rows, slot.bounds))).collect();
     // Where each mesh begins in the shared buffers.
     let (mut vertex, mut index) = (0, 0);
     let mut ranges = Vec::with_capacity(scene.meshes.len());
@@ -169,12 +205,19 @@ pub(super) fn placements(scene: &Scene, closed: &[bool], veils: &[bool]) -> (Vec
     }
     order.sort_by_key(|o| (o.0, o.1, o.2));
     let mut placed = Vec::with_capacity(order.len());
+    let mut slots: Vec<Slot> = Vec::with_capacity(order.len());
     let mut draws: Vec<Draw> = Vec::new();
     let mut last = None;
     for (material, mesh, mirrored, instance, transform) in order {
         let at = placed.len() as u32;
-        placed.push((instance, [0, 1, 2].map(|row| transform.row(row).to_array())));
-        let bounds = world_bounds(&scene.meshes[mesh], &transform);
+        let rows = [0, 1, 2].map(|row| transform.row(row).to_array());
+        let measured = known.get(&instance).filter(|(old, _)| **old == rows).map(|(_, bounds)| *bounds);
+        let bounds = measured.unwrap_or_else(|| world_bounds(&scene.meshes[mesh], &transform));
+        let same = before.0.get(placed.len()).filter(|old| **old == (instance, rows));
+        let version = same.and_then(|_| before.1.get(placed.len())).map(|slot| slot.version);
+        let version = version.unwrap_or_else(|| VERSION.fetch_add(1, Ordering::Relaxed));
+        slots.push(Slot { bounds, version });
+        placed.push((instance, rows));
         if last == Some((mesh, mirrored)) {
             let draw = draws.last_mut().expect("the previous instance made a draw");
             draw.instances.end = at + 1;
@@ -194,11 +237,12 @@ pub(super) fn placements(scene: &Scene, closed: &[bool], veils: &[bool]) -> (Vec
             double_sided: m.double_sided,
             closed: closed.get(mesh) == Some(&true) && !is_covered(m.alpha_mode),
             covered: is_covered(m.alpha_mode),
+            by_lot: m.alpha_mode == AlphaMode::Blend,
             veil,
             bounds,
         });
     }
-    (placed, draws)
+    Placements { placed, slots, draws }
 }
 
 fn attribute(mesh: &Mesh, i: usize) -> AttributeVertex {
@@ -215,7 +259,7 @@ fn attribute(mesh: &Mesh, i: usize) -> AttributeVertex {
     }
 }
 
-fn world_bounds(mesh: &Mesh, transform: &Mat4) -> ([f32; 3], [f32; 3]) {
+fn world_bounds(mesh: &Mesh, transform: &Mat4) -> Bounds {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for &p in &mesh.positions {
         let p = transform.transform_point3(p.into());
@@ -229,6 +273,6 @@ fn world_bounds(mesh: &Mesh, transform: &Mat4) -> ([f32; 3], [f32; 3]) {
     (low.to_array(), high.to_array())
 }
 
-pub(super) fn union(a: ([f32; 3], [f32; 3]), b: ([f32; 3], [f32; 3])) -> ([f32; 3], [f32; 3]) {
+pub(super) fn union(a: Bounds, b: Bounds) -> Bounds {
     (Vec3::from(a.0).min(b.0.into()).to_array(), Vec3::from(a.1).max(b.1.into()).to_array())
 }

@@ -180,6 +180,7 @@ mod tests {
             wall_ms: at(4.6),
             bytes: Vec::new(),
             costs: vec![Cost::new("gi.ambient", 1.0, 1.0), Cost::new("gi.glossy", 1.0, 1.0)],
+            drawn: Default::default(),
         };
         assert_eq!(own(&m, 3.0), (1.5, Timing::Timestamps));
         // Timestamps that do not add up to the clock are not believed.

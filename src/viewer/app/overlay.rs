@@ -234,6 +234,7 @@ impl App {
             layers: &stage.layers(),
             flicker: self.meter.flicker,
             instead: instead.as_ref(),
+            drawn: stage.drawn(),
         };
         ui::show(ui, &mut self.state, &mut self.overlay.memory, &facts)
     }

@@ -12,7 +12,7 @@ use super::show::{ShowInputs, ShowPass, SumPass, Sums};
 use super::state::{Stale, State};
 use crate::accel::SceneRays;
 use crate::gpu::{Gpu, readback, timing::Recorder};
-use crate::render::{RenderError, Renderer, View as Eye, sampling};
+use crate::render::{DrawnCount, RenderError, Renderer, View as Eye, sampling};
 use crate::scene::{Camera, Scene, upload::SceneGpu};
 use feature::Feature;
 use sides::Reference;
@@ -107,6 +107,11 @@ impl Stage {
             None => instead.why.into(),
         };
         Some((instead.method, why))
+    }
+
+    /// What the left side's last frame drew.
+    pub fn drawn(&self) -> DrawnCount {
+        self.slots[0].as_ref().map(|s| s.renderer.drawn()).unwrap_or_default()
     }
 
     /// True once there is a scene to draw.

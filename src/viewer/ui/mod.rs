@@ -15,6 +15,7 @@ use super::jobs::Job;
 use super::judge::Verdict;
 use super::state::{Action, State};
 use super::stats::{Times, Track};
+use crate::render::DrawnCount;
 use egui::{Color32, Pos2, Rect, Sense, Ui};
 use std::collections::BTreeMap;
 
@@ -45,6 +46,8 @@ pub struct Facts<'a> {
     pub flicker: Option<f64>,
     /// What draws in the place of the left side's method, and why.
     pub instead: Option<&'a (&'static str, String)>,
+    /// Draw calls, triangles and shadow maps of the left side's last frame.
+    pub drawn: DrawnCount,
 }
 
 #[cfg(test)]
@@ -66,6 +69,7 @@ impl<'a> Facts<'a> {
             layers: &[],
             flicker: None,
             instead: None,
+            drawn: DrawnCount::default(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::table::{Line, table};
 use super::{BLUE, Facts, Memory, ORANGE, SKY};
+use crate::render::DrawnCount;
 use crate::viewer::state::State;
 use crate::viewer::stats::{CURVE, Row, Spread, Track};
 use egui::{Align2, FontId, Pos2, RichText, Sense, Shape, Stroke, Ui, Vec2};
@@ -19,6 +20,8 @@ pub fn times(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<
     ui.label(RichText::new(format!("ms; frames drawn in the last two seconds: {count}")).weak());
     let lines = lines(facts);
     table(ui, ["median", "p95"], lines.len(), |i| lines[i].clone());
+    let drawn = drawn(&facts.drawn);
+    table(ui, ["drawn", "left out"], drawn.len(), |i| drawn[i].clone());
     ui.horizontal(|ui| {
         let doc =
             "mean change of display values from one frame to the next of a view that stands still; waits for the GPU";
@@ -56,6 +59,26 @@ fn lines<'a>(facts: &Facts<'a>) -> Vec<Line<'a>> {
         lines.extend(layers.iter().map(|r| line(&r.name, r.track.spread(), false)));
     }
     lines
+}
+
+/// Triangles, draw calls and shadow maps of the last frame.
+fn drawn(drawn: &DrawnCount) -> [Line<'static>; 5] {
+    let count = |n: u64| match n {
+        0..10_000 => n.to_string(),
+        10_000..10_000_000 => format!("{:.1} k", n as f64 / 1e3),
+        _ => format!("{:.1} M", n as f64 / 1e6),
+    };
+    let [camera, shadows] = [&drawn.camera, &drawn.shadows];
+    let line = |name, drawn: u64, other: Option<u64>| {
+        Line::new(name, [count(drawn), other.map(count).unwrap_or_default()], false)
+    };
+    [
+        line("triangles, camera", camera.triangles, Some(camera.culled)),
+        line("draw calls, camera", camera.draws.into(), None),
+        line("shadow maps; kept", drawn.maps.into(), Some(drawn.maps_kept.into())),
+        line("triangles, shadows", shadows.triangles, Some(shadows.culled)),
+        line("draw calls, shadows", shadows.draws.into(), None),
+    ]
 }
 
 /// Scrolling curves of GPU and CPU time.
