@@ -41,17 +41,18 @@ fn rows() -> Vec<(&'static str, Layout)> {
     use crate::net::{gpu::build::StepUniform, learn::tape::Job as LearnJob};
     use crate::reference::Job;
     use crate::reference::scene::{ImageUse, RefMaterial, SceneInfo};
-    use crate::render::{shadow::ShadowViewGpu, taa::Blend, tonemap, view::FrameUniform};
+    use crate::render::{light_choice::LightShadowGpu, shadow::ShadowViewGpu, taa::Blend, tonemap, view::FrameUniform};
     use crate::scene::upload::{LightGpu, MaterialGpu, TextureUse};
     use crate::viewer::show::ShowUniform;
     vec![
         row!("Frame", FrameUniform =>
             view_from_world, world_from_view, clip_from_world, clip_from_world_unjittered, previous_clip_from_world,
-            tan_half, jitter, size, near, seed, environment, light_count, picture_only, texture_bias,
+            tan_half, jitter, size, near, seed, environment, light_count, picture_only, texture_bias, tile_words,
         ),
         row!("Light", LightGpu =>
             position, kind, direction, range, color, radius, cone_scale, cone_offset, stands_in, chance,
         ),
+        row!("LightShadow", LightShadowGpu => first, count, reach),
         row!("ShadowView", ShadowViewGpu => clip_from_world, texel, range, scale, layer, size),
         row!("TextureUse", TextureUse => row0, row1),
         row!("Blend", Blend => mode, wx, wy),

@@ -246,3 +246,61 @@ fn all_lights_in_one_picture() {
     assert!(largest(&frame.beauty) > 0.3);
     show("shadows", &frame.beauty, 1.5);
 }
+
+/// The same scene in units `k` times as small.
+fn in_units(s: &bouncelight::scene::Scene, k: f32) -> bouncelight::scene::Scene {
+    let mut s = s.clone();
+    let moved = |p: &mut [f32; 3]| p.iter_mut().for_each(|v| *v *= k);
+    s.meshes.iter_mut().for_each(|m| m.positions.iter_mut().for_each(moved));
+    for light in &mut s.lights {
+        if let LightKind::Point { position, intensity, radius, .. }
+        | LightKind::Spot { position, intensity, radius, .. } = &mut light.kind
+        {
+            moved(position);
+            (*intensity, *radius) = (*intensity * k * k, *radius * k);
+        }
+    }
+    s
+}
+
+/// Shadows, near plane, first camera, temporal anti-aliasing: nothing knows how long a metre is.
+#[test]
+fn a_scene_looks_the_same_whatever_its_unit() {
+    use bouncelight::render::{Renderer, RendererOptions, capture};
+    use bouncelight::scene::{Camera, defaults, upload::SceneGpu};
+    let Some(gpu) = common::gpu() else { return };
+    let lamp = spot([-3.0, 5.0, 4.0], [0.4, -1.0, -0.5], 0.3, 0.6, 0.1);
+    let s = corner(vec![sun([0.3, -1.0, -0.4], 1.0, 0.02), point([3.0, 3.0, 2.0], 20.0, 0.0), lamp]);
+    let size = [128, 80];
+    let picture = |k: f32, framing: bool, taa: bool, lights: f32| {
+        let mut scaled = in_units(&s, k * lights);
+        let camera = if framing {
+            defaults::complete(&mut scaled);
+            scaled.cameras[0].clone()
+        } else {
+            Camera::look_at([0.5 * k, 4.0 * k, 10.0 * k], [0.0, 1.0 * k, 0.0], 0.8)
+        };
+        let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scaled).unwrap();
+        let options = RendererOptions { taa, ..direct_only() };
+        let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, options).unwrap();
+        let options = capture::CaptureOptions { warmup: if taa { 6 } else { 0 }, ..Default::default() };
+        capture::capture(&gpu, &mut renderer, &uploaded, &camera, options).unwrap().beauty
+    };
+    let differ = |a: &Picture, b: &Picture| {
+        let off = a.data.chunks(4).zip(b.data.chunks(4)).filter(|(a, b)| (a[0] - b[0]).abs() > 1.0 / 255.0).count();
+        off as f32 / (a.data.len() / 4) as f32
+    };
+    for (framing, taa) in [(false, false), (true, true)] {
+        let metres = picture(1.0, framing, taa, 1.0);
+        show(if framing { "units_framing" } else { "units" }, &metres, 1.0);
+        for k in [1e-3, 1e3] {
+            let other = picture(k, framing, taa, 1.0);
+            let off = differ(&metres, &other);
+            println!("x{k}, framing {framing}, taa {taa}: {:.3} % of the pixels differ", 100.0 * off);
+            assert!(off < 0.003, "x{k}, framing {framing}, taa {taa}: {off}");
+        }
+    }
+    // Negative control: a scene that is a tenth larger before the same camera.
+    let off = differ(&picture(1.0, false, false, 1.0), &picture(1.0, false, false, 1.1));
+    assert!(off > 0.03, "{off}");
+}

@@ -3,6 +3,8 @@
 
 mod common;
 
+#[path = "scene/area.rs"]
+mod area;
 #[path = "scene/bad_input.rs"]
 mod bad_input;
 #[path = "scene/bundled.rs"]

@@ -22,6 +22,8 @@ struct Frame {
     picture_only: u32,
     // Added to mip levels: a sample of several in a pixel sees finer ones.
     texture_bias: f32,
+    // Words of a tile's list of lights (light_list.wgsl); 0 where there are no lists.
+    tile_words: u32,
 }
 
 // Direction in view space of the ray through the sample point of `pixel`, scaled to z = -1.

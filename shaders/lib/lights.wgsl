@@ -39,9 +39,9 @@ fn sample_light(light: Light, p: vec3f) -> LightSample {
     }
     let to = light.position - p;
     // Inside the source the inverse square would run away.
-    let d2 = max(dot(to, to), max(light.radius * light.radius, 1e-8));
+    let d2 = max(dot(to, to), max(light.radius * light.radius, 1e-30));
     let d = sqrt(d2);
-    let l = to / max(length(to), 1e-8);
+    let l = to / max(length(to), 1e-15);
     var fall = 1.0 / d2;
     if light.range > 0.0 {
         let q = d / light.range;

@@ -50,7 +50,7 @@ fn sample_rasterised(s: Surface, origin: vec3f, pair: u32) -> RasterisedRay {
     out.light.diffuse /= choice.chance;
     out.light.glossy /= choice.chance;
     // Shadow maps leave out what is inside the lamp itself, see `shadow_local.rs`.
-    let near = select(max(0.5 * light.radius, 0.01), 0.0, light.kind == LIGHT_SUN);
+    let near = select(0.5 * light.radius, 0.0, light.kind == LIGHT_SUN);
     out.reach = max(point.reach - near, 1e-6);
     return out;
 }

@@ -24,8 +24,7 @@ fn direct(@builtin(global_invocation_id) id: vec3u) {
         let surface = textureLoad(specular_texture, id.xy, 0);
         let p = world_position(frame, id.xy, depth);
         let v = to_eye(frame, id.xy);
-        let pattern = pattern_of(id.xy);
-        light = direct_light(p, n, v, surface, pattern);
+        light = direct_light(p, n, v, surface, id.xy, false);
     }
     textureStore(direct_diffuse, id.xy, vec4f(min(light.diffuse, vec3f(HALF_MAX)), 1.0));
     textureStore(direct_specular, id.xy, vec4f(min(light.specular, vec3f(HALF_MAX)), 1.0));

@@ -16,6 +16,7 @@ const FILES: &[(&str, &str)] = &[
     ("render.shadow", "render/shadow.wgsl"),
     ("render.gbuffer", "render/gbuffer.wgsl"),
     ("render.blended", "render/blended.wgsl"),
+    ("render.lights", "render/lights.wgsl"),
     ("render.direct", "render/direct.wgsl"),
     ("render.composite", "render/composite.wgsl"),
     ("render.taa", "render/taa.wgsl"),

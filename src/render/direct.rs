@@ -1,5 +1,6 @@
 //! Direct light of the analytic lights (compute): diffuse as E/π, specular as radiance.
 
+use super::lights::LightLists;
 use super::shadow::ShadowMaps;
 use super::targets::Targets;
 use super::tool;
@@ -36,7 +37,7 @@ impl DirectPass {
             device,
             "render.lights",
             stage | wgpu::ShaderStages::FRAGMENT,
-            &[READ, READ, READ, COMPARE_ARRAY, COMPARE_ARRAY, comparison, LOAD_ARRAY, LOAD_ARRAY],
+            &[READ, READ, READ, COMPARE_ARRAY, COMPARE_ARRAY, comparison, LOAD_ARRAY, LOAD_ARRAY, READ],
         );
         let pipeline =
             compute_with(device, "render.direct", "direct", &[Some(&picture_layout), None, Some(&light_layout)]);
@@ -73,8 +74,14 @@ impl DirectPass {
         &self.light_layout
     }
 
-    /// Binds lights and shadow maps.
-    pub fn lights(&self, device: &wgpu::Device, scene: &SceneGpu, maps: &ShadowMaps) -> wgpu::BindGroup {
+    /// Binds lights, shadow maps and lists of lights.
+    pub fn lights(
+        &self,
+        device: &wgpu::Device,
+        scene: &SceneGpu,
+        maps: &ShadowMaps,
+        lists: &LightLists,
+    ) -> wgpu::BindGroup {
         tool::group(
             device,
             "render.direct",
@@ -88,6 +95,7 @@ impl DirectPass {
                 wgpu::BindingResource::Sampler(&self.compare),
                 wgpu::BindingResource::TextureView(&maps.sun_view),
                 wgpu::BindingResource::TextureView(&maps.local_view),
+                lists.buffer.as_entire_binding(),
             ],
         )
     }

@@ -1,4 +1,4 @@
-//! The frame, told in order: shadow → gbuffer → direct → indirect → glossy → composite → blended (→ taa). A display adds
+//! The frame, told in order: shadow → gbuffer (→ lights) → direct → indirect → glossy → composite → blended (→ taa). A display adds
 //! `tonemap` after it.
 
 use super::RenderError;
@@ -7,9 +7,13 @@ use super::composite::CompositePass;
 use super::cull::DrawnCount;
 use super::direct::{DirectInputs, DirectPass};
 use super::gbuffer::{GbufferInputs, GbufferPass};
+use super::handed::{clear, gi_inputs};
 use super::glossy::{GlossyInputs, GlossyPass, GlossyPicture};
+use super::light_choice::LightOptions;
+use super::lights::{LightLists, LightsPass};
 use super::moved::Moved;
 use super::shadow::{ShadowMaps, ShadowOptions, ShadowPass};
+use super::shadow_maps::Audience;
 use super::taa::TaaPass;
 use super::targets::Targets;
 use super::view::{FrameUniform, View};
@@ -30,6 +34,8 @@ pub struct RendererOptions {
     pub method: gi::Method,
     /// Sizes of shadow maps.
     pub shadow: ShadowOptions,
+    /// What is done where there are many lights.
+    pub lights: LightOptions,
     /// Temporal anti-aliasing ([`TaaPass`]): `hdr` is the mean over frames. Views should then be jittered by
     /// [`sampling::offset`](super::sampling::offset) of the frame's number. Off, nothing of it exists.
     pub taa: bool,
@@ -39,6 +45,7 @@ pub struct RendererOptions {
 
 /// What is bound as long as the targets stay.
 struct Picture {
+    lights: wgpu::BindGroup,
     direct: wgpu::BindGroup,
     glossy: GlossyPicture,
     composite: wgpu::BindGroup,
@@ -49,6 +56,7 @@ struct Picture {
 struct Lighting {
     scene: u64,
     maps: ShadowMaps,
+    lists: LightLists,
     group: wgpu::BindGroup,
     sky: wgpu::BindGroup,
 }
@@ -64,6 +72,7 @@ pub struct Renderer {
     /// What fills `indirect`; nothing for direct light alone.
     indirect: Option<Box<dyn Technique>>,
     passes: Passes,
+    lights: LightOptions,
     taa: Option<TaaPass>,
     /// Where objects were in the frame before.
     moved: Moved,
@@ -77,6 +86,7 @@ pub struct Renderer {
 struct Passes {
     shadow: ShadowPass,
     gbuffer: GbufferPass,
+    lights: LightsPass,
     direct: DirectPass,
     glossy: GlossyPass,
     composite: CompositePass,
@@ -91,6 +101,7 @@ impl Passes {
         Self {
             shadow: ShadowPass::new(device, options.shadow),
             gbuffer: GbufferPass::new(device, frame, options.blending),
+            lights: LightsPass::new(device),
             direct,
             glossy: GlossyPass::new(device),
             composite: CompositePass::new(device),
@@ -110,6 +121,7 @@ impl Passes {
         }
         let picture = taa.as_ref().map_or(&targets.hdr, TaaPass::current);
         Picture {
+            lights: self.lights.picture(device, frame, targets),
             direct: self.direct.picture(device, frame, targets),
             glossy: self.glossy.picture(device, frame, targets),
             composite: self.composite.picture(device, frame, targets, picture),
@@ -140,7 +152,8 @@ impl Renderer {
         let method = options.method.name();
         let device = device.clone();
         let (lighting, moved, drawn) = (None, Moved::default(), DrawnCount::default());
-        Ok(Self { device, frame, targets, picture, lighting, method, indirect, passes, taa, moved, last: None, drawn })
+        let (lights, last) = (options.lights, None);
+        Ok(Self { device, frame, targets, picture, lighting, method, indirect, passes, lights, taa, moved, last, drawn })
     }
 
     /// New targets of `size` pixels; the views of the old ones are of no use any more.
@@ -266,6 +279,7 @@ impl Renderer {
     pub fn bytes(&self) -> Vec<(&'static str, u64)> {
         let mut rows = self.targets.bytes();
         rows.extend(self.lighting.iter().flat_map(|l| l.maps.bytes()));
+        rows.extend(self.lighting.iter().map(|l| ("lights", l.lists.buffer.size())));
         rows.push(("gi.lit", self.picture.glossy.bytes()));
         rows.push(("moved", self.moved.bytes()));
         rows.extend(self.taa.iter().flat_map(TaaPass::bytes));
@@ -303,7 +317,10 @@ impl Renderer {
         let size = self.targets.size;
         let known = self.lighting.take().filter(|l| l.scene == scene.id);
         let fresh = known.is_none();
-        let mut lighting = known.unwrap_or_else(|| self.lighting(queue, scene));
+        let mut lighting = known.unwrap_or_else(|| self.lighting(scene));
+        if !lighting.lists.fit(size) {
+            (lighting.lists, lighting.group) = self.lists(scene, &lighting.maps);
+        }
         let last = self.last.filter(|last| last.size == view.size);
         let view = &match &self.taa {
             Some(taa) => taa.follow(view),
@@ -311,18 +328,21 @@ impl Renderer {
         };
         self.last = Some(*view);
         let picture_only = !self.indirect.as_ref().is_some_and(|i| i.knows_scene(scene.rays.is_some()));
-        let uniform = view.uniform(&scene.environment, scene.lights.len() as u32, picture_only);
+        let counts = [scene.lights.len() as u32, lighting.lists.words];
+        let uniform = view.uniform(&scene.environment, counts, picture_only);
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 
         let mut drawn = DrawnCount::default();
         if shadows || fresh {
-            self.passes.shadow.record(recorder, queue, scene, view, &mut lighting.maps, &mut drawn);
+            let audience = Audience { scene, view, options: &self.lights, stand_ins: picture_only };
+            self.passes.shadow.record(recorder, queue, &audience, &mut lighting.maps, &mut drawn);
         }
         if shadows || self.taa.is_some() || !self.moved.knows(scene) {
             self.moved.follow(&self.device, queue, scene);
         }
         let inputs = GbufferInputs { scene, before: self.moved.before(scene), view };
         self.passes.gbuffer.record(recorder, inputs, &self.targets, &mut drawn.camera);
+        self.passes.lights.record(recorder, &self.picture.lights, &lighting.lists);
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
         self.passes.direct.record(recorder, inputs);
         let mut inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene));
@@ -358,52 +378,18 @@ impl Renderer {
         Ok(())
     }
 
-    fn lighting(&self, queue: &wgpu::Queue, scene: &SceneGpu) -> Lighting {
-        let maps = self.passes.shadow.maps(&self.device, queue, scene);
-        let group = self.passes.direct.lights(&self.device, scene, &maps);
+    fn lighting(&self, scene: &SceneGpu) -> Lighting {
+        let maps = self.passes.shadow.maps(&self.device, scene);
+        let (lists, group) = self.lists(scene, &maps);
         let sky = self.passes.composite.sky(&self.device, &scene.environment_view);
-        Lighting { scene: scene.id, maps, group, sky }
+        Lighting { scene: scene.id, maps, lists, group, sky }
     }
-}
 
-fn gi_inputs<'a>(
-    targets: &'a Targets,
-    view: &View,
-    environment: [f32; 3],
-    scene: Option<&'a SceneGpu>,
-) -> gi::Inputs<'a> {
-    gi::Inputs {
-        size: targets.size,
-        depth: &targets.depth.view,
-        normal: &targets.normal.view,
-        albedo: Some(&targets.albedo.view),
-        emissive: Some(&targets.emissive.view),
-        direct: Some(&targets.direct_diffuse.view),
-        camera: view.matrices(),
-        conventions: gi::Conventions::default(),
-        environment,
-        lights: scene.map(|s| gi::Lights {
-            buffer: &s.light_buffer,
-            count: s.lights.len() as u32,
-            stand_in: s.lights.iter().any(|l| l.stands_in),
-            epoch: s.lights_epoch,
-        }),
-        rays: scene.and_then(|s| Some(gi::Rays { scene: s.rays.as_ref()?, environment: &s.environment_view })),
-        motion: Some(&targets.motion.view),
-        specular: Some(&targets.specular.view),
-        reset: false,
+    /// Lists of lights for pictures of the targets' size.
+    fn lists(&self, scene: &SceneGpu, maps: &ShadowMaps) -> (LightLists, wgpu::BindGroup) {
+        let (device, passes) = (&self.device, &self.passes);
+        let lists = passes.lights.lists(device, scene, maps, self.targets.size, self.lights.tiled_from);
+        let group = passes.direct.lights(device, scene, maps, &lists);
+        (lists, group)
     }
-}
-
-/// No indirect light, neither diffuse nor specular.
-fn clear(recorder: &mut Recorder<'_>, targets: &Targets) {
-    let attachments = [&targets.indirect, &targets.indirect_specular].map(|target| {
-        Some(wgpu::RenderPassColorAttachment {
-            view: &target.view,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store },
-        })
-    });
-    recorder.render("indirect", &attachments, None, |_| {});
 }

@@ -31,8 +31,6 @@ pub struct View {
     pub tan_half: [f32; 2],
     /// Near plane, metres.
     pub near: f32,
-    /// Far distance for shadow fitting, metres; may be infinite.
-    pub far: f32,
     /// Number of the frame; rotates the stochastic patterns (soft shadows, coverage).
     pub seed: u32,
     /// Samples of a pixel that are averaged, this one among them: each stands for as much less of what textures show.
@@ -65,7 +63,6 @@ impl View {
             previous_clip_from_world: clip_from_world_unjittered,
             tan_half,
             near,
-            far: camera.far,
             seed: 0,
             samples: 1,
         }
@@ -106,12 +103,13 @@ impl View {
         Mat4::from_cols_array_2d(&self.world_from_view).transform_point3(p)
     }
 
-    /// Distance of a world point along the view axis, metres; negative behind the eye.
-    pub(crate) fn depth_of(&self, p: Vec3) -> f32 {
-        -Mat4::from_cols_array_2d(&self.view_from_world).transform_point3(p).z
-    }
-
-    pub(crate) fn uniform(&self, environment: &Environment, light_count: u32, picture_only: bool) -> FrameUniform {
+    /// `tile_words`: of [`LightLists`](super::lights::LightLists).
+    pub(crate) fn uniform(
+        &self,
+        environment: &Environment,
+        [light_count, tile_words]: [u32; 2],
+        picture_only: bool,
+    ) -> FrameUniform {
         FrameUniform {
             view_from_world: self.view_from_world,
             world_from_view: self.world_from_view,
@@ -128,7 +126,8 @@ impl View {
             picture_only: picture_only.into(),
             // A sample has an n-th of the pixel's area, 1/√n of its width.
             texture_bias: -0.5 * (self.samples.max(1) as f32).log2(),
-            pad: [0; 2],
+            tile_words,
+            pad: 0,
         }
     }
 }
@@ -162,5 +161,6 @@ pub struct FrameUniform {
     pub light_count: u32,
     pub picture_only: u32,
     pub texture_bias: f32,
-    pub pad: [u32; 2],
+    pub tile_words: u32,
+    pub pad: u32,
 }

@@ -105,7 +105,7 @@ pub fn framing_camera(scene: &Scene) -> Camera {
     };
     let (low, high) = (Vec3::from(low), Vec3::from(high));
     let center = (low + high) * 0.5;
-    let half = ((high - low) * 0.5).max(Vec3::splat(1e-6));
+    let half = ((high - low) * 0.5).max(Vec3::splat((1e-6 * low.distance(high)).max(f32::MIN_POSITIVE)));
 
     // The front and a view from above are preferred; another side has to be clearly deeper.
     let mut best = (f32::NEG_INFINITY, Vec3::Z);
@@ -126,8 +126,7 @@ pub fn framing_camera(scene: &Scene) -> Camera {
     let distance =
         corners.map(|c| c.dot(back) + c.dot(up).abs().max(c.dot(right).abs()) / slope).fold(0.0f32, f32::max);
     let eye = center + back * (distance * 1.03);
-    let near = (distance * 1e-3).clamp(1e-4, 0.1);
-    Camera { name: "framing".to_owned(), near, ..Camera::look_at(eye.into(), center.into(), FRAMING_YFOV) }
+    Camera { name: "framing".to_owned(), ..Camera::look_at(eye.into(), center.into(), FRAMING_YFOV) }
 }
 
 fn sign(bit: u32) -> f32 {

@@ -386,7 +386,7 @@ pub struct Camera {
     pub yfov: f32,
     /// Near plane, metres, above 0.
     pub near: f32,
-    /// Far plane, metres; `f32::INFINITY` where the file gives none. Used to fit shadows, never to clip.
+    /// Far plane, metres; `f32::INFINITY` where the file gives none. Never used to clip.
     pub far: f32,
 }
 

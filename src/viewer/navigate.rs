@@ -49,13 +49,15 @@ pub struct Navigator {
     pub fly: bool,
     /// Metres a second.
     pub speed: f32,
+    /// Radius of the scene, metres: what lengths are small or large against.
+    pub scale: f32,
     /// The file's camera that is used untouched.
     pub file_camera: Option<usize>,
 }
 
 impl Default for Navigator {
     fn default() -> Self {
-        Self { eye: Vec3::new(0.0, 0.0, 3.0), target: Vec3::ZERO, fov: 45.0, fly: false, speed: 1.0, file_camera: None }
+        Self { eye: Vec3::new(0.0, 0.0, 3.0), target: Vec3::ZERO, fov: 45.0, fly: false, speed: 1.0, scale: 1.0, file_camera: None }
     }
 }
 
@@ -74,10 +76,10 @@ impl Navigator {
         let (eye, forward) = (Vec3::from(camera.eye()), Vec3::from(camera.forward()));
         let (middle, radius) = sphere(scene);
         // The point of the view axis nearest to the scene's middle, but in front.
-        let distance = (middle - eye).dot(forward).clamp(0.1 * radius, 10.0 * radius).max(1e-3);
+        let distance = (middle - eye).dot(forward).clamp(0.1 * radius, 10.0 * radius);
         (self.eye, self.target) = (eye, eye + forward * distance);
         self.fov = camera.yfov.to_degrees();
-        self.speed = 0.4 * radius;
+        (self.speed, self.scale) = (0.4 * radius, radius);
         self.file_camera = Some(n);
     }
 
@@ -92,7 +94,7 @@ impl Navigator {
 
     /// Turns `back` by a drag of (dx, dy) points, level, not over the poles.
     fn turned(back: Vec3, dx: f32, dy: f32) -> Vec3 {
-        let length = back.length().max(1e-6);
+        let length = back.length().max(f32::MIN_POSITIVE);
         let yaw = back.x.atan2(back.z) - TURN * dx;
         let pitch = ((back.y / length).clamp(-1.0, 1.0).asin() + TURN * dy).clamp(-STEEPEST, STEEPEST);
         length * (Quat::from_rotation_y(yaw) * Vec3::new(0.0, pitch.sin(), pitch.cos()))
@@ -122,13 +124,13 @@ impl Navigator {
     /// Nearer (positive) or farther by notches of a wheel.
     pub fn dolly(&mut self, notches: f32) {
         let back = self.back() * 0.88f32.powf(notches);
-        self.eye = self.target + back.clamp_length(1e-3, 1e6);
+        self.eye = self.target + back.clamp_length(1e-3 * self.scale, 1e6 * self.scale);
         self.moved();
     }
 
     /// The wheel while flying.
     pub fn faster(&mut self, notches: f32) {
-        self.speed = (self.speed * 1.25f32.powf(notches)).clamp(1e-3, 1e5);
+        self.speed = (self.speed * 1.25f32.powf(notches)).clamp(1e-3 * self.scale, 1e5 * self.scale);
     }
 
     /// Flies along right, up and forward for `seconds`.
@@ -159,7 +161,7 @@ impl Navigator {
         let distance = radius / tangent.atan().sin().max(1e-3);
         self.target = middle;
         self.eye = middle + direction * distance;
-        self.speed = 0.4 * radius;
+        (self.speed, self.scale) = (0.4 * radius, radius);
         self.moved();
     }
 
@@ -176,7 +178,8 @@ pub fn sphere(scene: &Scene) -> (Vec3, f32) {
     match world_bounds(scene) {
         Some((low, high)) => {
             let (low, high) = (Vec3::from(low), Vec3::from(high));
-            (0.5 * (low + high), (0.5 * low.distance(high)).max(1e-3))
+            let radius = 0.5 * low.distance(high);
+            (0.5 * (low + high), if radius > 0.0 { radius } else { 1.0 })
         }
         None => (Vec3::ZERO, 1.0),
     }

@@ -35,7 +35,8 @@ pub fn pick(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<(usize, f32)
 }
 
 fn hits_box(origin: Vec3, direction: Vec3, low: Vec3, high: Vec3) -> bool {
-    let pad = Vec3::splat(1e-4);
+    // A flat box is met, too.
+    let pad = Vec3::splat(1e-5 * low.distance(high));
     let (a, b) = ((low - pad - origin) / direction, (high + pad - origin) / direction);
     let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
     far >= near.max(0.0)
@@ -46,7 +47,7 @@ fn triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f32> 
     let (ab, ac) = (b - a, c - a);
     let p = direction.cross(ac);
     let determinant = ab.dot(p);
-    if determinant.abs() < 1e-12 {
+    if determinant == 0.0 {
         return None;
     }
     let s = (origin - a) / determinant;
@@ -54,7 +55,7 @@ fn triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f32> 
     let q = s.cross(ab);
     let v = direction.dot(q);
     let t = ac.dot(q);
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 1e-5).then_some(t)
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
 }
 
 #[cfg(test)]

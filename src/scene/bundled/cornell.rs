@@ -67,6 +67,6 @@ pub(super) fn scene() -> Scene {
         stands_in: true,
     });
     let camera = Camera::look_at([0.0, h, h + 2.9], [0.0, h, 0.0], 2.0 * (h * 1.04 / 2.9f32).atan());
-    scene.cameras.push(Camera { name: "front".to_owned(), ..camera });
+    scene.cameras.push(Camera { name: "front".to_owned(), near: 2.9e-3, ..camera });
     scene
 }

@@ -4,7 +4,8 @@ use crate::scene::SceneError;
 use std::path::Path;
 
 /// Extensions that this loader has.
-const SUPPORTED: [&str; 18] = [
+const SUPPORTED: [&str; 19] = [
+    super::area::NAME,
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",

@@ -5,6 +5,7 @@
 //! leaves a picture (a missing texture, a line primitive, a skin) becomes a warning; the rest is a [`SceneError`].
 
 mod accessor;
+mod area;
 mod draco;
 mod extensions;
 mod instancing;
@@ -222,6 +223,7 @@ impl<'a> Loader<'a> {
         if let Some(light) = node.light() {
             self.light(&light, &name, world);
         }
+        self.area_light(node, &name, &place, world);
         Ok(())
     }
 

@@ -176,7 +176,7 @@ fn drag_object(state: &mut State, d: Vec2, rect: Rect) {
     };
     let middle = 0.5 * (Vec3::from(low) + Vec3::from(high));
     let [right, up, forward] = state.navigator.axes();
-    let distance = (middle - state.navigator.eye).dot(forward).max(1e-3);
+    let distance = (middle - state.navigator.eye).dot(forward).max(1e-3 * state.navigator.scale);
     let metres = 2.0 * (0.5 * state.navigator.fov.to_radians()).tan() * distance / rect.height().max(1.0);
     state.apply(Action::Move((right * d.x - up * d.y) * metres));
 }

@@ -282,7 +282,10 @@ fn camera(ui: &mut Ui, state: &mut State) {
         ui.selectable_value(&mut fly, false, "orbit");
         ui.selectable_value(&mut fly, true, "fly");
         state.navigator.fly = fly;
-        ui.add(egui::DragValue::new(&mut state.navigator.speed).range(0.001..=1e5).speed(0.05).suffix(" m/s"));
+        let (least, most) = (1e-3 * state.navigator.scale, 1e5 * state.navigator.scale);
+        let drag = f64::from(0.02 * state.navigator.scale);
+        let speed = &mut state.navigator.speed;
+        ui.add(egui::DragValue::new(speed).range(least..=most).speed(drag).max_decimals(6).suffix(" m/s"));
     });
     let mut fov = state.navigator.fov;
     if ui.add(egui::Slider::new(&mut fov, 5.0..=150.0).text("field of view").suffix("°")).changed() {
