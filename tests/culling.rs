@@ -114,9 +114,8 @@ fn maps_are_drawn_again_when_what_they_see_changes_and_only_then() {
 
     let shift = |s: &mut Scene, name: &str, by: [f32; 3]| {
         let instance = s.instances.iter_mut().find(|i| i.name == name).unwrap();
-        instance.transform = (Mat4::from_translation(by.into())
-            * Mat4::from_cols_array_2d(&instance.transform))
-        .to_cols_array_2d();
+        instance.transform =
+            (Mat4::from_translation(by.into()) * Mat4::from_cols_array_2d(&instance.transform)).to_cols_array_2d();
     };
     // In the sight of all of them, and then far from lamp and spot.
     shift(&mut s, "slab 191", [1.0, 0.5, 1.5]);

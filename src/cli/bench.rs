@@ -8,10 +8,7 @@ use super::{
 use crate::{
     gi::{Method, technique::Cost},
     gpu::Gpu,
-    render::{
-        DrawnCount, Renderer, RendererOptions,
-        cull::Count,
-    },
+    render::{DrawnCount, Renderer, RendererOptions, cull::Count},
     scene::upload::SceneGpu,
     study::{
         bench::{BenchOptions, Measurement, measure},
@@ -279,7 +276,13 @@ fn print_drawn(drawn: &DrawnCount) {
         format!("{} draws, {:.1} k triangles, {:.1} k culled", c.draws, thousand(c.triangles), thousand(c.culled))
     };
     say!("  camera: {}", words(&drawn.camera));
-    say!("  shadows: {} maps drawn: {}; {} kept: {}", drawn.maps, words(&drawn.shadows), drawn.maps_kept, words(&drawn.kept));
+    say!(
+        "  shadows: {} maps drawn: {}; {} kept: {}",
+        drawn.maps,
+        words(&drawn.shadows),
+        drawn.maps_kept,
+        words(&drawn.kept)
+    );
 }
 
 /// Rows of the table; without `layers` the network's layers are one row (whose p95 is a sum of p95s, an upper bound).

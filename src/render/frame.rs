@@ -7,8 +7,8 @@ use super::composite::CompositePass;
 use super::cull::DrawnCount;
 use super::direct::{DirectInputs, DirectPass};
 use super::gbuffer::{GbufferInputs, GbufferPass};
-use super::handed::{clear, gi_inputs};
 use super::glossy::{GlossyInputs, GlossyPass, GlossyPicture};
+use super::handed::{clear, gi_inputs};
 use super::light_choice::LightOptions;
 use super::lights::{LightLists, LightsPass};
 use super::moved::Moved;
@@ -153,7 +153,21 @@ impl Renderer {
         let device = device.clone();
         let (lighting, moved, drawn) = (None, Moved::default(), DrawnCount::default());
         let (lights, last) = (options.lights, None);
-        Ok(Self { device, frame, targets, picture, lighting, method, indirect, passes, lights, taa, moved, last, drawn })
+        Ok(Self {
+            device,
+            frame,
+            targets,
+            picture,
+            lighting,
+            method,
+            indirect,
+            passes,
+            lights,
+            taa,
+            moved,
+            last,
+            drawn,
+        })
     }
 
     /// New targets of `size` pixels; the views of the old ones are of no use any more.

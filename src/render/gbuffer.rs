@@ -69,13 +69,7 @@ impl GbufferPass {
     }
 
     /// Clears the G-buffer and draws into it what the view sees of a scene, which is added to `count`.
-    pub fn record(
-        &self,
-        recorder: &mut Recorder<'_>,
-        inputs: GbufferInputs<'_>,
-        targets: &Targets,
-        count: &mut Count,
-    ) {
+    pub fn record(&self, recorder: &mut Recorder<'_>, inputs: GbufferInputs<'_>, targets: &Targets, count: &mut Count) {
         let GbufferInputs { scene, before, view } = inputs;
         let colors =
             [&targets.normal, &targets.albedo, &targets.specular, &targets.emissive, &targets.motion].map(|t| {

@@ -174,11 +174,8 @@ mod tests {
             ]
         };
         let estimate = |k: f32| {
-            let view = View::new(
-                &Camera::look_at([0.0, 1.6 * k, 6.0 * k], [0.0, 1.0 * k, 0.0], 0.9),
-                [160, 90],
-                [0.0; 2],
-            );
+            let view =
+                View::new(&Camera::look_at([0.0, 1.6 * k, 6.0 * k], [0.0, 1.0 * k, 0.0], 0.9), [160, 90], [0.0; 2]);
             let bounds = ([-50.0 * k, 0.0, -50.0 * k], [50.0 * k, 5.0 * k, 50.0 * k]);
             let lights = lights(k).map(|mut l| {
                 l.radius *= k;

@@ -3,9 +3,9 @@
 use super::light_choice::{Estimate, LightOptions, LightShadowGpu, NO_END, choose};
 use super::shadow::{MAX_LOCAL_LAYERS, MAX_SUNS, ShadowOptions};
 use super::shadow_kept::Kept;
+use super::shadow_sun::{self, Stage};
 use super::shadow_view::ShadowViewGpu;
 use super::view::View;
-use super::shadow_sun::{self, Stage};
 use super::{cull::Volume, shadow_local};
 use crate::scene::upload::{LightGpu, SceneGpu, fits_one_map};
 use crate::scene::{Light, LightKind};
@@ -32,7 +32,13 @@ impl Plan {
         let is_sun: Vec<bool> = lights.iter().map(|l| matches!(l.kind, LightKind::Directional { .. })).collect();
         let need = |l: &Light| match l.kind {
             LightKind::Directional { .. } => cascades,
-            kind => if fits_one_map(&kind) { 1 } else { 6 },
+            kind => {
+                if fits_one_map(&kind) {
+                    1
+                } else {
+                    6
+                }
+            }
         };
         let maps: Vec<u32> = lights.iter().map(need).collect();
         let suns = is_sun.iter().filter(|s| **s).count() as u32;
@@ -145,11 +151,7 @@ impl ShadowMaps {
             sun_view: whole(&sun),
             local_view: whole(&local),
             view_buffer: buffer("shadow.views", views * size_of::<ShadowViewGpu>() as u64, storage),
-            light_buffer: buffer(
-                "shadow.lights",
-                (size_of::<LightShadowGpu>() * lights.max(1)) as u64,
-                storage,
-            ),
+            light_buffer: buffer("shadow.lights", (size_of::<LightShadowGpu>() * lights.max(1)) as u64, storage),
             maps: Vec::with_capacity(layers.len()),
             kept: vec![None; layers.len()],
             held: vec![Vec::new(); lights],

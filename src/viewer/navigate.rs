@@ -57,7 +57,15 @@ pub struct Navigator {
 
 impl Default for Navigator {
     fn default() -> Self {
-        Self { eye: Vec3::new(0.0, 0.0, 3.0), target: Vec3::ZERO, fov: 45.0, fly: false, speed: 1.0, scale: 1.0, file_camera: None }
+        Self {
+            eye: Vec3::new(0.0, 0.0, 3.0),
+            target: Vec3::ZERO,
+            fov: 45.0,
+            fly: false,
+            speed: 1.0,
+            scale: 1.0,
+            file_camera: None,
+        }
     }
 }
 

@@ -38,7 +38,8 @@ fn area_lights_are_surfaces_of_their_size_and_luminance_that_glow_on_one_side() 
     // Turned to shine along -Y, with scales of which the largest counts.
     let node = json!({"name": "panel", "translation": [1.0, 2.5, -1.0], "rotation": [-0.5f32.sqrt(), 0.0, 0.0, 0.5f32.sqrt()],
         "scale": [1.0, 2.0, 0.5]});
-    let rect = json!({"type": "rect", "intensity": 2000.0, "color": [1.0, 0.5, 0.25], "size": 0.3, "rect": {"aspect": 2.0}});
+    let rect =
+        json!({"type": "rect", "intensity": 2000.0, "color": [1.0, 0.5, 0.25], "size": 0.3, "rect": {"aspect": 2.0}});
     let disk = json!({"type": "disk", "size": 0.5});
     for (light, area, nits) in [(rect, 0.6 * 1.2, [2000.0, 1000.0, 500.0]), (disk, PI * 0.25, [1000.0; 3])] {
         let scene = loaded(light, node.clone());
