@@ -60,7 +60,7 @@ fn reaches(light: Light, reach: f32, box: Box) -> bool {
     if light.kind == LIGHT_SPOT && light.cone_scale > 0.0 {
         let cosine = clamp(-light.cone_offset / light.cone_scale, 0.0, 1.0);
         let along = dot(middle, light.direction);
-        let aside = sqrt(max(dot(middle, middle) - along * along, 0.0));
+        let aside = length(middle - along * light.direction);
         // From the cone's side to the middle of the sphere around the box.
         if aside * cosine - along * sqrt(1.0 - cosine * cosine) > radius + 1e-4 * size { return false; }
     }
