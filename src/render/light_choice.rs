@@ -15,7 +15,7 @@ use glam::Vec3;
 pub struct LightOptions {
     /// From so many lights on, tiles of 16×16 pixels have lists of those that can reach them.
     pub tiled_from: u32,
-    /// From so many lights on, lamps are left out where they are too far away to count: at any place, all that are left
+    /// Of nine lights and more, lamps are left out where they are too far away to count: at any place, all that are left
     /// out there would add up to no more than this share of the view's irradiance (geometric mean over where surfaces
     /// may be, shadows not counted). 0 leaves none out.
     ///
@@ -26,7 +26,7 @@ pub struct LightOptions {
 
 impl Default for LightOptions {
     fn default() -> Self {
-        Self { tiled_from: 9, cut: 1.0 / 1024.0 }
+        Self { tiled_from: FEW as u32 + 1, cut: 1.0 / 1024.0 }
     }
 }
 
@@ -44,6 +44,8 @@ pub struct LightShadowGpu {
     pub pad: u32,
 }
 
+/// So few lights are drawn wherever they reach.
+pub(super) const FEW: usize = 8;
 /// Farther than anything, and its square is still a number.
 pub(super) const NO_END: f32 = 1e18;
 /// Rays across and down, and points on each.

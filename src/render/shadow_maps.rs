@@ -1,6 +1,6 @@
 //! The shadow maps of a scene: who has which, and what each sees.
 
-use super::light_choice::{Estimate, LightOptions, LightShadowGpu, NO_END, choose};
+use super::light_choice::{Estimate, FEW, LightOptions, LightShadowGpu, NO_END, choose};
 use super::shadow::{MAX_LOCAL_LAYERS, MAX_SUNS, ShadowOptions};
 use super::shadow_kept::Kept;
 use super::shadow_sun::{self, Stage};
@@ -184,7 +184,7 @@ impl ShadowMaps {
             of.filter(|((_, is_sun), counts)| **is_sun == sun && **counts).map(|((m, _), _)| m).sum::<u32>()
         };
         let scarce = wanted(true) > plan.sun_layers || wanted(false) > plan.local_layers;
-        let cuts = lights.len() as u32 >= options.tiled_from && options.cut > 0.0;
+        let cuts = lights.len() > FEW && options.cut > 0.0;
         let estimate = (scarce || cuts).then(|| Estimate::new(view, scene.bounds, &lights, &counts));
 
         let given = estimate.as_ref().map_or_else(|| vec![0.0; lights.len()], |e| e.given.clone());
