@@ -18,6 +18,7 @@ mod gpu;
 pub(crate) mod hash;
 mod image;
 mod pairs;
+mod refit;
 mod scene;
 mod surfaces;
 mod threads;

@@ -42,7 +42,7 @@ fn rows() -> Vec<(&'static str, Layout)> {
     use crate::reference::Job;
     use crate::reference::scene::{ImageUse, RefMaterial, SceneInfo};
     use crate::render::{light_choice::LightShadowGpu, shadow::ShadowViewGpu, taa::Blend, tonemap, view::FrameUniform};
-    use crate::scene::upload::{LightGpu, MaterialGpu, TextureUse};
+    use crate::scene::upload::{DeformGpu, LightGpu, MaterialGpu, TextureUse};
     use crate::viewer::show::ShowUniform;
     vec![
         row!("Frame", FrameUniform =>
@@ -53,6 +53,9 @@ fn rows() -> Vec<(&'static str, Layout)> {
             position, kind, direction, range, color, radius, cone_scale, cone_offset, stands_in, chance,
         ),
         row!("LightShadow", LightShadowGpu => first, count, reach),
+        row!("Deforming", DeformGpu =>
+            vertex, count, rest, first, deltas, skin, sets, joints, weights, targets, tangents,
+        ),
         row!("ShadowView", ShadowViewGpu => clip_from_world, texel, range, scale, layer, size),
         row!("TextureUse", TextureUse => row0, row1),
         row!("Blend", Blend => mode, wx, wy),

@@ -40,12 +40,22 @@ pub(super) fn is_good(triangle: &Triangle) -> bool {
 
 /// See [`Accel::build`].
 pub(super) fn build(triangles: &[Triangle]) -> Accel {
+    build_with(triangles, None)
+}
+
+/// The same of triangles that will move: those without area may get one, and corners meet where `places` says so.
+pub(super) fn build_deforming(triangles: &[Triangle], places: &pairs::Places) -> Accel {
+    build_with(triangles, Some(places))
+}
+
+fn build_with(triangles: &[Triangle], places: Option<&pairs::Places>) -> Accel {
     let mut accel = Accel::default();
     let mut kept = Vec::with_capacity(triangles.len());
     for (i, triangle) in triangles.iter().enumerate() {
         match kind(triangle) {
             Kind::Good => kept.push(i as u32),
             Kind::NotFinite => accel.dropped_not_finite += 1,
+            Kind::Degenerate if places.is_some() => kept.push(i as u32),
             Kind::Degenerate => accel.dropped_degenerate += 1,
         }
     }
@@ -55,7 +65,7 @@ pub(super) fn build(triangles: &[Triangle]) -> Accel {
     if kept.is_empty() {
         return accel;
     }
-    let pairs = pairs::join(triangles, &kept);
+    let pairs = pairs::join(triangles, &kept, places);
     drop(kept);
     let boxes: Vec<Aabb> = pairs.iter().map(Pair::aabb).collect();
     // Clustering makes chains of boxes that are all alike, such as many copies of a mesh in one

@@ -178,7 +178,7 @@ fn stops(open: u32, triangle: u32, seed: u32) -> bool {
 }
 
 /// The blocks of [`SceneRays`](super::SceneRays) without a device: trees of meshes below a tree over instances.
-pub struct SceneBlocks(Vec<Block>);
+pub struct SceneBlocks(SceneTrees);
 
 impl SceneBlocks {
     /// Builds the trees of `scene`.
@@ -187,19 +187,32 @@ impl SceneBlocks {
     /// [`AccelError::TooManyTriangles`].
     pub fn new(scene: &Scene) -> Result<Self, AccelError> {
         Accel::check_count(scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum())?;
-        let trees = SceneTrees::build(scene, &|_, _| true)?;
-        let mut blocks = trees.blocks;
-        let top = scene::top(
-            &scene::placed(&trees.meshes, scene.instances.iter().map(|i| (i.mesh, i.transform))),
-            trees.top_room,
-        );
+        let mut blocks = Self(SceneTrees::build(scene, &|_, _| true)?);
+        blocks.place(scene);
+        Ok(blocks)
+    }
+
+    /// Takes over where the instances of `scene` are and how its meshes are deformed, as
+    /// [`SceneRays::place`](super::SceneRays::place) does.
+    pub fn place(&mut self, scene: &Scene) {
+        let SceneTrees { blocks, meshes, top_room, .. } = &mut self.0;
+        for deform in &scene.deforms {
+            let Some(mesh) = meshes.get_mut(deform.mesh) else { continue };
+            if mesh.follow(deform)
+                && let Some(own) = &mesh.refit
+            {
+                let root = own.tree.root as usize;
+                blocks[root..root + own.tree.blocks.len()].copy_from_slice(&own.tree.blocks);
+            }
+        }
+        let placed = scene::placed(meshes, scene.instances.iter().map(|i| (i.mesh, i.transform)));
+        let top = scene::top(&placed, *top_room);
         blocks[..top.len()].copy_from_slice(&top);
-        Ok(Self(blocks))
     }
 
     /// Blocks in all.
     pub fn count(&self) -> usize {
-        self.0.len()
+        self.0.blocks.len()
     }
 
     /// The nearest hit (any hit where `any`) with 0 < t < `t_max`, and the number of its instance;
@@ -213,7 +226,7 @@ impl SceneBlocks {
         seed: u32,
         seen: &mut impl FnMut(u32),
     ) -> Option<(AccelHit, u32)> {
-        let mut walk = Walk::new(&self.0, t_max, any, seed);
+        let mut walk = Walk::new(&self.0.blocks, t_max, any, seed);
         walk.tree(0, origin.into(), direction.into(), seen);
         walk.best
     }

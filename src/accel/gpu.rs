@@ -48,9 +48,9 @@ impl AccelGpu {
         Ok(Self { blocks: texels(device, queue, "accel.blocks", bytemuck::cast_slice(all))? })
     }
 
-    /// Overwrites blocks from the start of row `row` on.
-    pub(super) fn write(&self, queue: &wgpu::Queue, row: u32, blocks: &[Block]) {
-        write(queue, self.blocks.texture(), row, bytemuck::cast_slice(blocks));
+    /// Overwrites blocks from block `first` on.
+    pub(super) fn write(&self, queue: &wgpu::Queue, first: u32, blocks: &[Block]) {
+        write(queue, self.blocks.texture(), TEXELS * first, bytemuck::cast_slice(blocks));
     }
 
     /// The texture.
@@ -111,24 +111,25 @@ pub(super) fn texels(
     }
 }
 
-/// Whole rows at once, then the last one: no padded copy of everything is made.
-fn write(queue: &wgpu::Queue, texture: &wgpu::Texture, row: u32, texels: &[[u32; 4]]) {
-    let whole = texels.len() as u32 / WIDTH;
-    let (body, tail) = texels.split_at((whole * WIDTH) as usize);
-    for (data, y, width, height) in [(body, 0, WIDTH, whole), (tail, whole, tail.len() as u32, 1)] {
-        if data.is_empty() {
-            continue;
-        }
+/// Overwrites texels from texel `at` on, whole rows at once: no padded copy of everything is made.
+pub(super) fn write(queue: &wgpu::Queue, texture: &wgpu::Texture, mut at: u32, mut texels: &[[u32; 4]]) {
+    while !texels.is_empty() {
+        let (x, y) = (at % WIDTH, at / WIDTH);
+        let rows = if x == 0 { texels.len() as u32 / WIDTH } else { 0 };
+        let width = if rows > 0 { WIDTH } else { (WIDTH - x).min(texels.len() as u32) };
+        let height = rows.max(1);
+        let (data, rest) = texels.split_at((width * height) as usize);
         queue.write_texture(
             wgpu::TexelCopyTextureInfo {
                 texture,
                 mip_level: 0,
-                origin: wgpu::Origin3d { x: 0, y: row + y, z: 0 },
+                origin: wgpu::Origin3d { x, y, z: 0 },
                 aspect: wgpu::TextureAspect::All,
             },
             bytemuck::cast_slice(data),
             wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(WIDTH * 16), rows_per_image: None },
             wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
         );
+        (at, texels) = (at + width * height, rest);
     }
 }

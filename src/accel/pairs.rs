@@ -52,17 +52,25 @@ fn edge(triangle: &Triangle, start: usize) -> Edge {
     [triangle[start], triangle[(start + 1) % 3]].map(|p| p.map(f32::to_bits))
 }
 
+/// What tells corners apart that are in one place now and may not be later: a number for each.
+pub(super) type Places = [[u32; 3]];
+
 fn half_area(triangles: &[&Triangle]) -> f32 {
     triangles.iter().flat_map(|t| t.iter()).fold(Aabb::empty(), |mut sum, p| *sum.extend(Vec3A::from(*p))).half_area()
 }
 
 /// Joins the triangles `kept`. Each takes the free neighbour with which it fills the smallest box, if visiting that box
-/// costs less than visiting both triangles' own.
-pub(super) fn join(triangles: &[Triangle], kept: &[u32]) -> Vec<Pair> {
+/// costs less than visiting both triangles' own. Corners are the same where they are in one place, or where `places`
+/// says so.
+pub(super) fn join(triangles: &[Triangle], kept: &[u32], places: Option<&Places>) -> Vec<Pair> {
+    let edge_of = |index: u32, start: usize| match places {
+        Some(places) => [start, (start + 1) % 3].map(|k| [places[index as usize][k], 0, 0]),
+        None => edge(&triangles[index as usize], start),
+    };
     let mut owners: Map<Edge, (u32, usize)> = hash::map(kept.len() * 3);
     for &index in kept {
         for start in 0..3 {
-            owners.insert(edge(&triangles[index as usize], start), (index, start));
+            owners.insert(edge_of(index, start), (index, start));
         }
     }
     let mut taken = vec![false; triangles.len()];
@@ -73,7 +81,7 @@ pub(super) fn join(triangles: &[Triangle], kept: &[u32]) -> Vec<Pair> {
         }
         let own = &triangles[index as usize];
         let candidates = (0..3).filter_map(|start| {
-            let [from, to] = edge(own, start);
+            let [from, to] = edge_of(index, start);
             let &(other, other_start) = owners.get(&[to, from])?;
             let theirs = &triangles[other as usize];
             let area = half_area(&[own, theirs]);

@@ -118,9 +118,20 @@ impl SceneRays {
         (self.id, self.moves) = (before.id, self.moves.max(before.moves) + 1);
     }
 
-    /// Takes over where the instances of `scene` are; its meshes are those that this was made of.
-    /// True when buffers were made anew and have to be bound again.
+    /// Takes over where the instances of `scene` are and how its meshes are deformed; they are those that this was made
+    /// of. True when buffers were made anew and have to be bound again.
     pub fn place(&mut self, queue: &wgpu::Queue, scene: &Scene) -> bool {
+        for deform in &scene.deforms {
+            let Some(mesh) = self.meshes.get_mut(deform.mesh) else { continue };
+            if !mesh.follow(deform) {
+                continue;
+            }
+            self.moves += 1;
+            if let Some(own) = &mesh.refit {
+                self.accel.write(queue, own.tree.root, &own.tree.blocks);
+                gpu::write(queue, self.normals.texture(), mesh.first_triangle, &own.normals);
+            }
+        }
         self.put(queue, scene.instances.iter().map(|i| (i.mesh, i.transform)))
     }
 

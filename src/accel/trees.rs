@@ -3,8 +3,10 @@
 use super::emitters::{self, Glow};
 use super::gpu::ROW;
 use super::image::Reductions;
+use super::refit::Refit;
 use super::wide::{Block, NODE, WORDS};
 use super::{Accel, AccelError, build, surfaces, threads};
+use crate::scene::deform::{Deform, Joint, Vertices};
 use crate::scene::{Material, Mesh, Scene, octahedral::octahedral_word};
 use glam::Vec3;
 use std::sync::Arc;
@@ -17,6 +19,41 @@ pub(super) struct MeshTree {
     /// Object space; `None` for a mesh that nothing can hit.
     pub bounds: Option<(Vec3, Vec3)>,
     pub glows: Vec<Glow>,
+    /// Of a mesh that deforms.
+    pub refit: Option<Box<Deforming>>,
+}
+
+/// A tree that follows a pose.
+pub(super) struct Deforming {
+    pub tree: Refit,
+    /// The pose that it is in.
+    last: Option<(Vec<Joint>, Vec<f32>)>,
+    vertices: Vertices,
+    pub normals: Vec<[u32; 4]>,
+}
+
+impl MeshTree {
+    /// Brings the tree into the pose of `deform`, its mesh's; false where it is in that pose or does not deform.
+    pub fn follow(&mut self, deform: &Deform) -> bool {
+        let Some(own) = self.refit.as_deref_mut() else { return false };
+        if own.last.as_ref().is_some_and(|(joints, weights)| *joints == deform.joints && *weights == deform.weights) {
+            return false;
+        }
+        deform.vertices(&mut own.vertices);
+        self.bounds = own.tree.follow(&own.vertices.positions);
+        own.normals = normals(own.tree.triangles.iter().copied(), &own.vertices.normals);
+        if own.tree.surfaces.iter().any(|s| s.glow_by_area() > 0.0) {
+            self.glows = emitters::glowing(&own.tree.surfaces, &own.tree.corners(&own.vertices.positions));
+        }
+        own.last = Some((deform.joints.clone(), deform.weights.clone()));
+        true
+    }
+}
+
+/// Octahedral normals of the corners of triangles.
+fn normals(triangles: impl Iterator<Item = [u32; 3]>, of: &[[f32; 3]]) -> Vec<[u32; 4]> {
+    let normal = |i: u32| octahedral_word(of[i as usize]);
+    triangles.map(|t| [normal(t[0]), normal(t[1]), normal(t[2]), 0]).collect()
 }
 
 /// All that is uploaded once.
@@ -44,27 +81,38 @@ pub(crate) struct MeshPart {
     normals: Arc<Vec<[u32; 4]>>,
     surfaces: Vec<surfaces::Surface>,
     glows: Vec<Glow>,
+    /// Vertices of each triangle of a mesh that deforms.
+    deforming: Option<Vec<[u32; 3]>>,
 }
 
 impl MeshPart {
-    /// Of a mesh of `scene`. One that disagrees in itself is not met: the upload of the picture's part refuses it.
-    pub fn new(scene: &Scene, mesh: &Mesh, reductions: &Reductions) -> Self {
+    /// Of a mesh of `scene`, and of how it deforms, if it does. One that disagrees in itself is not met: the upload of the
+    /// picture's part refuses it.
+    pub fn new(scene: &Scene, mesh: &Mesh, reductions: &Reductions, deform: Option<&Deform>) -> Self {
         if mesh.check(scene.materials.len()).is_err() {
             return Self::default();
         }
         let surfaces = surfaces::of_mesh(scene, mesh, reductions);
         let corners = corners(mesh);
         let glows = emitters::glowing(&surfaces, &corners);
-        let normal = |i: u32| octahedral_word(mesh.normals[i as usize]);
-        let normals = mesh.indices.chunks_exact(3).map(|t| [normal(t[0]), normal(t[1]), normal(t[2]), 0]).collect();
-        Self { accel: build::build(&corners).into(), normals: Arc::new(normals), surfaces, glows }
+        let triangles = || mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);
+        let normals = Arc::new(normals(triangles(), &mesh.normals));
+        let deform = deform.filter(|d| d.check(mesh).is_ok());
+        let accel = match deform.map(|d| d.shape.places()) {
+            Some(places) => {
+                let places: Vec<_> = triangles().map(|t| t.map(|i| places[i as usize])).collect();
+                build::build_deforming(&corners, &places)
+            }
+            None => build::build(&corners),
+        };
+        Self { accel: accel.into(), normals, surfaces, glows, deforming: deform.map(|_| triangles().collect()) }
     }
 
     /// The same triangles, with the corners that it was made of, of another material without pictures.
     pub fn of_material(&self, material: &Material, corners: &[[[f32; 3]; 3]]) -> Self {
         let surfaces = vec![surfaces::plain(material); self.surfaces.len()];
         let glows = emitters::glowing(&surfaces, corners);
-        Self { accel: self.accel.clone(), normals: self.normals.clone(), surfaces, glows }
+        Self { accel: self.accel.clone(), normals: self.normals.clone(), surfaces, glows, deforming: None }
     }
 
     /// Triangles, those that no ray can hit among them.
@@ -89,17 +137,18 @@ impl SceneTrees {
     pub fn build(scene: &Scene, progress: &(dyn Fn(usize, usize) -> bool + Sync)) -> Result<Self, AccelError> {
         let reductions = Reductions::new(scene);
         let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(!progress(0, scene.meshes.len())));
-        let part = |mesh: &Mesh| {
+        let part = |&(index, mesh): &(usize, &Mesh)| {
             if stopped.load(Ordering::Relaxed) {
                 return MeshPart::default();
             }
-            let part = MeshPart::new(scene, mesh, &reductions);
+            let part = MeshPart::new(scene, mesh, &reductions, scene.deform_of(index));
             if !progress(done.fetch_add(1, Ordering::Relaxed) + 1, scene.meshes.len()) {
                 stopped.store(true, Ordering::Relaxed);
             }
             part
         };
-        let parts = threads::map(&scene.meshes, |m| m.indices.len(), part);
+        let all: Vec<(usize, &Mesh)> = scene.meshes.iter().enumerate().collect();
+        let parts = threads::map(&all, |m| m.1.indices.len(), part);
         if stopped.into_inner() {
             return Err(AccelError::Stopped);
         }
@@ -118,13 +167,18 @@ impl SceneTrees {
         for part in parts {
             let root = blocks.len().next_multiple_of(8);
             blocks.resize(root, [0; WORDS]);
+            blocks.extend(part.accel.blocks.iter().map(|b| moved(b, root as u32, &part.surfaces)));
+            let refit = part.deforming.map(|triangles| {
+                let tree = Refit::new(&blocks[root..], root as u32, triangles, part.surfaces.clone());
+                Box::new(Deforming { tree, last: None, vertices: Vertices::default(), normals: Vec::new() })
+            });
             meshes.push(MeshTree {
                 root: root as u32,
                 first_triangle: surfaces.len() as u32,
                 bounds: bounds(&part.accel),
                 glows: part.glows,
+                refit,
             });
-            blocks.extend(part.accel.blocks.iter().map(|b| moved(b, root as u32, &part.surfaces)));
             surfaces.extend(part.surfaces.iter().map(surfaces::Surface::packed));
             normals.extend(part.normals.iter());
         }

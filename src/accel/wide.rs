@@ -119,9 +119,15 @@ fn places(tree: &Bvh2, node: u32, children: &[u32]) -> [Option<u32>; 8] {
 }
 
 fn node_block(tree: &Bvh2, node: u32, placed: &[Option<u32>; 8], first: usize) -> Block {
-    let own = tree.nodes[node as usize].aabb();
     let mut block = [0; WORDS];
     block[3] = NODE | first as u32;
+    let of = |node: u32| *tree.nodes[node as usize].aabb();
+    put_boxes(&mut block, &of(node), &placed.map(|child| child.map(of)));
+    block
+}
+
+/// Writes a node's own box and those of its children, place by place, into its block.
+pub(super) fn put_boxes(block: &mut Block, own: &Aabb, children: &[Option<Aabb>; 8]) {
     for axis in 0..3 {
         let (low, high) = (own.min[axis], own.max[axis]);
         // One step on either side is kept free for padding and rounding, and a step is no finer
@@ -130,20 +136,20 @@ fn node_block(tree: &Bvh2, node: u32, placed: &[Option<u32>; 8], first: usize) -
         let step = ((high - low) / 252.0).max(finest).max(1e-30).log2().ceil().exp2();
         let corner = (low / step - PAD).floor() - 1.0;
         block[axis] = ((corner as i32) << 8) as u32 | (step.to_bits() >> 23);
-        for (place, child) in placed.iter().enumerate() {
+        let planes = 4 + 4 * axis;
+        block[planes..planes + 4].fill(0);
+        for (place, child) in children.iter().enumerate() {
             // Places without a child get a box that is inside out.
             let (mut from, mut to) = (255, 0);
             if let Some(child) = child {
-                let child: &Aabb = tree.nodes[*child as usize].aabb();
                 from = (child.min[axis] / step - corner - PAD).floor().clamp(0.0, 255.0) as u32;
                 to = (child.max[axis] / step - corner + PAD).ceil().clamp(0.0, 255.0) as u32;
             }
-            let (word, shift) = (4 + 4 * axis + place / 4, 8 * (place % 4));
+            let (word, shift) = (planes + place / 4, 8 * (place % 4));
             block[word] |= from << shift;
             block[word + 2] |= to << shift;
         }
     }
-    block
 }
 
 pub(super) fn leaf_block(pair: &Pair) -> Block {

@@ -207,11 +207,11 @@ pub struct SceneArgs {
     /// Variant of materials, by name or number from 0.
     #[arg(long, value_name = "NAME|N")]
     pub variant: Option<String>,
-    /// Animation that places the objects, from 0; at --pose-time.
-    #[arg(long, value_name = "N")]
-    pub animation: Option<usize>,
-    /// Time in the animation, seconds.
-    #[arg(long, requires = "animation", default_value_t = 0.0, value_name = "SECONDS")]
+    /// Animation of the file, by name or number from 0, that moves objects, skins, lights and cameras.
+    #[arg(long, value_name = "NAME|N")]
+    pub animation: Option<String>,
+    /// Time in the animation, seconds; of a sequence the time of frame 0.
+    #[arg(long, visible_alias = "time", requires = "animation", default_value_t = 0.0, value_name = "SECONDS")]
     pub pose_time: f32,
     /// Changes a light: its number and any of color=R,G,B strength=S direction=X,Y,Z position=X,Y,Z
     /// size=S; may be repeated.
@@ -255,13 +255,38 @@ impl SceneArgs {
                 return Err(usage(format!("--variant {name}: the scene has {} variants: {all}", scene.variants.len())));
             }
         }
-        if let Some(n) = self.animation.filter(|&n| !scene.pose(n, self.pose_time)) {
-            let count = scene.rig.as_ref().map_or(0, |r| r.animations.len());
-            return Err(usage(format!("--animation {n}: the scene has {count} animations")));
+        if let Some(animation) = self.animation(&scene)? {
+            scene.pose(animation, self.pose_time);
         }
-        self.light.iter().try_for_each(|edit| edit.apply(&mut scene)).map_err(|e| usage(format!("--light: {e}")))?;
-        self.object.iter().try_for_each(|edit| edit.apply(&mut scene)).map_err(|e| usage(format!("--object: {e}")))?;
+        self.edit(&mut scene)?;
         Ok(scene)
+    }
+
+    /// Number of the animation that is asked for.
+    pub fn animation(&self, scene: &Scene) -> Result<Option<usize>> {
+        let Some(name) = &self.animation else { return Ok(None) };
+        let rig = scene.rig.as_ref();
+        let names = || rig.iter().flat_map(|r| &r.animations).map(|a| a.name.as_str()).collect::<Vec<_>>();
+        match rig.and_then(|r| r.find(name)) {
+            Some(found) => Ok(Some(found)),
+            None => {
+                let names = names();
+                let text = format!("the scene has {} animations: {}", names.len(), names.join(", "));
+                Err(usage(format!("--animation {name}: {}", text.trim_end_matches(": "))))
+            }
+        }
+    }
+
+    /// Moves everything to `time` of animation `animation`, seconds, but the vertices that only the CPU needs; changes by
+    /// hand stay.
+    pub fn move_to(&self, scene: &mut Scene, animation: usize, time: f32) -> Result<()> {
+        scene.pose_parts(animation, time);
+        self.edit(scene)
+    }
+
+    fn edit(&self, scene: &mut Scene) -> Result<()> {
+        self.light.iter().try_for_each(|edit| edit.apply(scene)).map_err(|e| usage(format!("--light: {e}")))?;
+        self.object.iter().try_for_each(|edit| edit.apply(scene)).map_err(|e| usage(format!("--object: {e}")))
     }
 
     /// The camera that the flags ask for.

@@ -174,11 +174,11 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
     }
     let judged = |path| Shown::reference(path, args.tonemap, args.exposure, args.scene.size, &args.metric);
     let reference = args.reference.as_deref().map(judged).transpose()?;
-    let sequence = args.sequence.sequence(&args.output)?;
+    let sequence = args.sequence.sequence(&args.output, args.scene.animation.is_some())?;
     let scene = loaded.map_or_else(|| args.scene.load(global), Ok)?;
     let camera = match sequence.as_ref().and_then(|s| s.frames().next()) {
-        Some((_, camera)) => camera,
-        None => args.scene.camera(&scene)?,
+        Some((_, _, Some(camera))) => camera,
+        _ => args.scene.camera(&scene)?,
     };
     interrupt::install()?;
     let gpu = global.open_gpu()?;
@@ -190,7 +190,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
             let progress = Progress::compiling(global, if sequence.is_some() { "frames" } else { "samples" }, 1);
             let mut raster = Raster::new(&args, &gpu, &scene, method, layers)?;
             if let Some(sequence) = sequence {
-                return film(progress, &args, format, raster, &sequence);
+                return film(progress, &args, format, raster, (&sequence, scene));
             }
             raster.draw(progress, &args, &camera)?
         }
@@ -294,16 +294,24 @@ impl<'a> Raster<'a> {
     }
 }
 
-/// A picture for each frame of a camera path.
+/// A picture for each frame of a camera path or an animation.
 fn film(
     mut progress: Progress,
     args: &Args,
     format: Format,
     mut raster: Raster,
-    sequence: &sequence::Sequence,
+    (sequence, mut scene): (&sequence::Sequence, Scene),
 ) -> Result<()> {
     progress.expect(sequence.count());
-    for (number, camera) in sequence.frames() {
+    let animation = args.scene.animation(&scene)?;
+    for (number, time, camera) in sequence.frames() {
+        if let Some(animation) = animation {
+            args.scene.move_to(&mut scene, animation, args.scene.pose_time + time as f32)?;
+            let (device, queue) = (&raster.gpu.device, &raster.gpu.queue);
+            raster.scene.set_placements(queue, &scene);
+            raster.scene.set_lights(device, queue, &scene);
+        }
+        let camera = camera.map_or_else(|| args.scene.camera(&scene), Ok)?;
         let drawn = raster.picture(args, &camera, &mut || ())?;
         drawn.write(raster.gpu, &sequence::name(&args.output, number), format)?;
         raster.running = true;
@@ -333,7 +341,7 @@ fn check(args: &Args) -> Result<Format> {
         }
         if args.sequence.is_given() {
             return Err(usage(
-                "--path draws frames of the rasteriser; trace single ones with --eye and --look-at".into(),
+                "--path and --frames draw with the rasteriser; trace single pictures with --eye or --time".into(),
             ));
         }
         if args.weights.is_some() {

@@ -1,4 +1,4 @@
-//! Frames of a camera path: which ones, when, and what their files are called.
+//! Frames of a camera path or an animation: which ones, when, and what their files are called.
 
 use super::args::usage;
 use crate::scene::path::CameraPath;
@@ -13,53 +13,76 @@ pub struct SequenceFlags {
     /// name holds `{frame}` or `{frame:04}`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "look_at", "camera", "reference", "taa"])]
     path: Option<PathBuf>,
-    /// Which frames of the path, from A to before B; all when absent.
-    #[arg(long, value_name = "A..B", requires = "path", value_parser = parse_frames)]
+    /// Which frames of the path or of --animation, from A to before B; all of a path when absent. The animation goes on
+    /// from frame to frame.
+    #[arg(long, value_name = "A..B", conflicts_with_all = ["reference", "taa"], value_parser = parse_frames)]
     frames: Option<Range<u32>>,
-    /// Seconds from one frame to the next, such as 1/24.
-    #[arg(long, value_name = "SECONDS", requires = "path", default_value = "1/60", value_parser = parse_step)]
-    fixed_dt: f64,
+    /// Seconds from one frame to the next, such as 1/24; 1/60 when absent.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_step)]
+    fixed_dt: Option<f64>,
 }
+
+/// Seconds from one frame to the next where nobody says.
+const STEP: f64 = 1.0 / 60.0;
 
 /// Most frames of one run.
 const MOST: f64 = 1e6;
 
-/// A path and its frames.
+/// Frames, seen along a path or by the scene's own camera.
 #[derive(Debug)]
 pub struct Sequence {
-    path: CameraPath,
+    path: Option<CameraPath>,
     frames: Range<u32>,
     step: f64,
 }
 
 impl SequenceFlags {
-    /// True where a path is asked for.
+    /// True where more than one picture is asked for.
     pub fn is_given(&self) -> bool {
-        self.path.is_some()
+        self.path.is_some() || self.frames.is_some()
     }
 
-    /// The sequence that is asked for, if one is. `output` is the pattern of the files' names.
-    pub fn sequence(&self, output: &Path) -> Result<Option<Sequence>> {
-        let Some(file) = &self.path else { return Ok(None) };
+    /// The sequence that is asked for, if one is. `output` is the pattern of the files' names; the scene is `animated`
+    /// or stands still.
+    pub fn sequence(&self, output: &Path, animated: bool) -> Result<Option<Sequence>> {
+        if !self.is_given() {
+            let text = "--fixed-dt belongs to the frames of --path or --frames".to_owned();
+            return if self.fixed_dt.is_some() { Err(usage(text)) } else { Ok(None) };
+        }
         if name(output, 0) == name(output, 1) {
-            let text = format!("{}: with --path the name needs a `{{frame}}` or `{{frame:04}}`", output.display());
+            let flag = if self.path.is_some() { "--path" } else { "--frames" };
+            let text = format!("{}: with {flag} the name needs a `{{frame}}` or `{{frame:04}}`", output.display());
             return Err(usage(text));
         }
+        let step = self.fixed_dt.unwrap_or(STEP);
+        let Some(file) = &self.path else {
+            let Some(frames) = self.frames.clone().filter(|_| animated) else {
+                return Err(usage("--frames are those of a --path or an --animation".into()));
+            };
+            return Ok(Some(Sequence { path: None, frames, step }));
+        };
         let path = CameraPath::load(file)?;
-        let all = path.end() / self.fixed_dt;
+        let all = path.end() / step;
         if all > MOST {
-            return Err(usage(format!("--fixed-dt {} makes {all:.0} frames of {}", self.fixed_dt, file.display())));
+            return Err(usage(format!("--fixed-dt {step} makes {all:.0} frames of {}", file.display())));
         }
         // Half a millionth of a frame forgives what rounding does to 1/60.
         let frames = self.frames.clone().unwrap_or(0..(all + 5e-7) as u32 + 1);
-        Ok(Some(Sequence { path, frames, step: self.fixed_dt }))
+        Ok(Some(Sequence { path: Some(path), frames, step }))
     }
 }
 
 impl Sequence {
-    /// Number and camera of each frame.
-    pub fn frames(&self) -> impl Iterator<Item = (u32, crate::scene::Camera)> + '_ {
-        self.frames.clone().filter_map(|n| Some((n, self.path.at(f64::from(n) * self.step)?.camera())))
+    /// Number, seconds since frame 0, and the path's camera of each frame.
+    pub fn frames(&self) -> impl Iterator<Item = (u32, f64, Option<crate::scene::Camera>)> + '_ {
+        self.frames.clone().filter_map(|n| {
+            let time = f64::from(n) * self.step;
+            let camera = match &self.path {
+                Some(path) => Some(path.at(time)?.camera()),
+                None => None,
+            };
+            Some((n, time, camera))
+        })
     }
 
     /// How many there are.

@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Name (`room.stage`, also the wgpu label) and file of each shader but those that run the network.
 const FILES: &[(&str, &str)] = &[
+    ("render.deform", "render/deform.wgsl"),
     ("render.shadow", "render/shadow.wgsl"),
     ("render.gbuffer", "render/gbuffer.wgsl"),
     ("render.blended", "render/blended.wgsl"),

@@ -1,10 +1,12 @@
-//! The frame, told in order: shadow → gbuffer (→ lights) → direct → indirect → glossy → composite → blended (→ taa). A display adds
+//! The frame, told in order: deform → shadow → gbuffer (→ lights) → direct → indirect → glossy → composite → blended
+//! (→ taa). A display adds
 //! `tonemap` after it.
 
 use super::RenderError;
 use super::blended::{BlendedInputs, BlendedPass, Blending};
 use super::composite::CompositePass;
 use super::cull::DrawnCount;
+use super::deform::DeformPass;
 use super::direct::{DirectInputs, DirectPass};
 use super::gbuffer::{GbufferInputs, GbufferPass};
 use super::glossy::{GlossyInputs, GlossyPass, GlossyPicture};
@@ -84,6 +86,7 @@ pub struct Renderer {
 
 /// The passes that every method shares.
 struct Passes {
+    deform: DeformPass,
     shadow: ShadowPass,
     gbuffer: GbufferPass,
     lights: LightsPass,
@@ -99,6 +102,7 @@ impl Passes {
         let direct = DirectPass::new(device);
         let blended = (options.blending == Blending::Sorted).then(|| BlendedPass::new(device, direct.light_layout()));
         Self {
+            deform: DeformPass::new(device),
             shadow: ShadowPass::new(device, options.shadow),
             gbuffer: GbufferPass::new(device, frame, options.blending),
             lights: LightsPass::new(device),
@@ -186,6 +190,7 @@ impl Renderer {
     /// temporal anti-aliasing starts anew.
     pub fn cut(&mut self) {
         self.moved.cut();
+        self.passes.deform.cut();
         if let Some(taa) = &mut self.taa {
             taa.cut();
         }
@@ -296,6 +301,7 @@ impl Renderer {
         rows.extend(self.lighting.iter().map(|l| ("lights", l.lists.buffer.size())));
         rows.push(("gi.lit", self.picture.glossy.bytes()));
         rows.push(("moved", self.moved.bytes()));
+        rows.push(("deform", self.passes.deform.bytes()));
         rows.extend(self.taa.iter().flat_map(TaaPass::bytes));
         rows.push((self.method, self.indirect.as_ref().map_or(0, |i| i.bytes())));
         rows
@@ -347,14 +353,16 @@ impl Renderer {
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 
         let mut drawn = DrawnCount::default();
+        if shadows || self.taa.is_some() || !self.moved.knows(scene) {
+            self.moved.follow(&self.device, queue, scene);
+            self.passes.deform.record(recorder, queue, scene);
+        }
         if shadows || fresh {
             let audience = Audience { scene, view, options: &self.lights, stand_ins: picture_only };
             self.passes.shadow.record(recorder, queue, &audience, &mut lighting.maps, &mut drawn);
         }
-        if shadows || self.taa.is_some() || !self.moved.knows(scene) {
-            self.moved.follow(&self.device, queue, scene);
-        }
-        let inputs = GbufferInputs { scene, before: self.moved.before(scene), view };
+        let (before, deformed) = (self.moved.before(scene), self.passes.deform.before());
+        let inputs = GbufferInputs { scene, before, deformed, view };
         self.passes.gbuffer.record(recorder, inputs, &self.targets, &mut drawn.camera);
         self.passes.lights.record(recorder, &self.picture.lights, &lighting.lists);
         let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };

@@ -21,8 +21,8 @@
 //!
 //! The five colour attachments take exactly the 32 bytes a sample that WebGPU grants by default.
 //! Unlit materials have albedo and F0 of 0 and their colour in `emissive`. Motion vectors know
-//! where the camera was and where each object was ([`moved`](super::moved)); they do not know of
-//! lights, nor of textures that move. The background's are 0 whatever the camera does: it follows
+//! where the camera was and where each object and each deforming vertex was ([`moved`](super::moved),
+//! [`deform`](super::deform)); they do not know of lights, nor of textures that move. The background's are 0 whatever the camera does: it follows
 //! from the view alone.
 
 use super::blended::Blending;
@@ -42,6 +42,9 @@ pub struct GbufferInputs<'a> {
     /// Its instances as they were in the frame before
     /// ([`Moved::before`](super::moved::Moved::before)); `scene.instances` where nothing moves.
     pub before: &'a wgpu::Buffer,
+    /// Its deforming vertices as they were then ([`DeformPass::before`](super::deform::DeformPass::before)), if they
+    /// were elsewhere.
+    pub deformed: Option<&'a wgpu::Buffer>,
     /// Who sees it.
     pub view: &'a View,
 }
@@ -70,7 +73,7 @@ impl GbufferPass {
 
     /// Clears the G-buffer and draws into it what the view sees of a scene, which is added to `count`.
     pub fn record(&self, recorder: &mut Recorder<'_>, inputs: GbufferInputs<'_>, targets: &Targets, count: &mut Count) {
-        let GbufferInputs { scene, before, view } = inputs;
+        let GbufferInputs { scene, before, deformed, view } = inputs;
         let colors =
             [&targets.normal, &targets.albedo, &targets.specular, &targets.emissive, &targets.motion].map(|t| {
                 Some(wgpu::RenderPassColorAttachment {
@@ -94,6 +97,8 @@ impl GbufferPass {
             pass.set_vertex_buffer(1, scene.instances.slice(..));
             pass.set_vertex_buffer(2, scene.attributes.slice(..));
             pass.set_vertex_buffer(3, before.slice(..));
+            pass.set_vertex_buffer(4, scene.positions.slice(..));
+            let mut past = false;
             pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
             let volume = Volume::new(&view.clip_from_world);
             let (mut pipeline, mut material) = (usize::MAX, usize::MAX);
@@ -103,6 +108,10 @@ impl GbufferPass {
                     if pipeline != wanted {
                         pipeline = wanted;
                         pass.set_pipeline(&self.pipelines[pipeline]);
+                    }
+                    if let Some(deformed) = deformed.filter(|_| past != draw.deforms) {
+                        past = draw.deforms;
+                        pass.set_vertex_buffer(4, if past { deformed } else { &scene.positions }.slice(..));
                     }
                     if material != draw.material {
                         material = draw.material;

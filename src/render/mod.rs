@@ -4,6 +4,7 @@ pub mod blended;
 pub mod capture;
 pub mod composite;
 pub mod cull;
+pub mod deform;
 pub mod direct;
 pub mod frame;
 pub mod gbuffer;

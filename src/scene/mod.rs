@@ -11,6 +11,7 @@ pub mod bounds;
 pub mod bundled;
 mod camera;
 pub mod defaults;
+pub mod deform;
 pub mod edit;
 pub mod environment;
 #[cfg(feature = "io")]
@@ -73,6 +74,8 @@ pub struct Scene {
     pub environment: Environment,
     /// Names of the variants of materials that the file has; see [`Scene::choose_variant`].
     pub variants: Vec<String>,
+    /// Meshes whose vertices move, as they stand now; each is placed by the instances of one node.
+    pub deforms: Vec<deform::Deform>,
     /// How the objects move, if they do; see [`Scene::pose`].
     pub rig: Option<rig::Rig>,
     /// The sun and the sky are those that the loader adds where a file has no light; see [`Scene::surround`].

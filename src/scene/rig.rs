@@ -1,8 +1,13 @@
-//! Animations of nodes: translation, rotation and scale over time, as glTF has them. Skins and
-//! morph targets are not here.
+//! Animations of nodes over time, as glTF has them: where they are, and with them objects, cameras, lights, joints of
+//! skins and weights of morph targets.
 
-use super::Scene;
-use glam::{Mat4, Quat, Vec3, Vec4};
+mod channel;
+
+use super::deform::Joint;
+use super::{Camera, LightKind, Scene};
+use glam::{DMat4, Mat4, Quat, Vec3};
+
+pub use channel::{Channel, Interpolation, Property};
 
 /// The tree of nodes behind a scene's instances, and how they move.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -11,6 +16,14 @@ pub struct Rig {
     pub nodes: Vec<RigNode>,
     /// Node of each of [`Scene::instances`].
     pub instances: Vec<usize>,
+    /// Node of each of the first of [`Scene::cameras`]; those that follow were added by a loader.
+    pub cameras: Vec<usize>,
+    /// Node of each of the first of [`Scene::lights`].
+    pub lights: Vec<usize>,
+    /// What moves each of [`Scene::deforms`].
+    pub deforms: Vec<RigDeform>,
+    /// Joints that deforming meshes may name.
+    pub skins: Vec<Skin>,
     /// Never empty.
     pub animations: Vec<Animation>,
 }
@@ -28,6 +41,26 @@ pub struct RigNode {
     pub scale: [f32; 3],
 }
 
+/// What moves a deforming mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RigDeform {
+    /// Node that places the mesh, and has the weights.
+    pub node: usize,
+    /// Index into [`Rig::skins`], if it has one.
+    pub skin: Option<usize>,
+    /// Weights of its morph targets at rest.
+    pub weights: Vec<f32>,
+}
+
+/// Joints of a skin.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Skin {
+    /// Node of each joint.
+    pub joints: Vec<usize>,
+    /// From the space of the skin's meshes to that of each joint, as they were bound; column-major.
+    pub inverse_bind: Vec<[[f32; 4]; 4]>,
+}
+
 /// Channels that play together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Animation {
@@ -39,88 +72,50 @@ pub struct Animation {
     pub channels: Vec<Channel>,
 }
 
-/// A property of a node over time.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Channel {
-    /// Index into [`Rig::nodes`].
-    pub node: usize,
-    /// Which property.
-    pub property: Property,
-    /// What lies between keys.
-    pub interpolation: Interpolation,
-    /// Seconds, rising, at least one.
-    pub times: Vec<f32>,
-    /// One for each time, or for [`Interpolation::Cubic`] three: in-tangent, value, out-tangent.
-    /// Three-vectors end with 0.
-    pub values: Vec<[f32; 4]>,
+/// Where everything is at a time. World transforms, column-major.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Pose {
+    /// Of each of [`Rig::instances`].
+    pub instances: Vec<[[f32; 4]; 4]>,
+    /// Of each of [`Rig::cameras`].
+    pub cameras: Vec<[[f32; 4]; 4]>,
+    /// Of each of [`Rig::lights`].
+    pub lights: Vec<[[f32; 4]; 4]>,
+    /// Of each of [`Rig::deforms`]: joints, weights, and whether its instances stand at the origin, see [`joints`].
+    pub deforms: Vec<(Vec<Joint>, Vec<f32>, bool)>,
 }
 
-/// What a channel moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(missing_docs, reason = "as in glTF")]
-pub enum Property {
-    Translation,
-    Rotation,
-    Scale,
-}
-
-/// What lies between two keys.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(missing_docs, reason = "as in glTF")]
-pub enum Interpolation {
-    Step,
-    Linear,
-    Cubic,
-}
-
-impl Channel {
-    /// The value at `time`; before the first key and after the last these stand.
-    fn at(&self, time: f32) -> Vec4 {
-        let cubic = self.interpolation == Interpolation::Cubic;
-        let value = |key: usize, part: usize| Vec4::from(self.values[if cubic { 3 * key + part } else { key }]);
-        let last = self.times.len() - 1;
-        let next = self.times.partition_point(|&t| t <= time);
-        let rotates = self.property == Property::Rotation;
-        let found = if next == 0 {
-            value(0, 1)
-        } else if next > last {
-            value(last, 1)
-        } else {
-            let (a, b) = (next - 1, next);
-            let span = self.times[b] - self.times[a];
-            let t = (time - self.times[a]) / span;
-            match self.interpolation {
-                Interpolation::Step => value(a, 1),
-                Interpolation::Linear if rotates => {
-                    Quat::from_vec4(value(a, 1)).normalize().slerp(Quat::from_vec4(value(b, 1)).normalize(), t).into()
-                }
-                Interpolation::Linear => value(a, 1).lerp(value(b, 1), t),
-                Interpolation::Cubic => {
-                    let (t2, t3) = (t * t, t * t * t);
-                    value(a, 1) * (2.0 * t3 - 3.0 * t2 + 1.0)
-                        + value(a, 2) * span * (t3 - 2.0 * t2 + t)
-                        + value(b, 1) * (3.0 * t2 - 2.0 * t3)
-                        + value(b, 0) * span * (t3 - t2)
-                }
-            }
-        };
-        if rotates { found.try_normalize().unwrap_or(Vec4::W) } else { found }
-    }
+/// Matrices of a skin's joints in the space of its mesh's node, as glTF defines them: the node's own place cancels out.
+/// `joints`: world transform and inverse bind matrix of each. True beside them where the node has no inverse; then the
+/// vertices are in the world, and the mesh has to stand at its origin.
+pub fn joints<'a>(node: Mat4, joints: impl Iterator<Item = (Mat4, &'a [[f32; 4]; 4])>) -> (Vec<Joint>, bool) {
+    let inverse = Some(node.as_dmat4().inverse()).filter(|m| m.is_finite() && node.determinant() != 0.0);
+    let from_world = inverse.unwrap_or(DMat4::IDENTITY);
+    let rows = |(joint, bind): (Mat4, &[[f32; 4]; 4])| {
+        let matrix = (from_world * joint.as_dmat4() * Mat4::from_cols_array_2d(bind).as_dmat4()).as_mat4();
+        [0, 1, 2].map(|k| matrix.row(k).to_array())
+    };
+    (joints.map(rows).collect(), inverse.is_none())
 }
 
 impl Rig {
-    /// World transform of each instance in animation `animation` at `time`, seconds; `None` if
-    /// there is no such animation.
-    pub fn pose(&self, animation: usize, time: f32) -> Option<Vec<[[f32; 4]; 4]>> {
+    /// Where everything is in animation `animation` at `time`, seconds; `None` if there is no such animation.
+    pub fn pose(&self, animation: usize, time: f32) -> Option<Pose> {
         let animation = self.animations.get(animation)?;
         let mut nodes = self.nodes.clone();
+        let mut weights: Vec<Vec<f32>> = self.deforms.iter().map(|d| d.weights.clone()).collect();
         for channel in &animation.channels {
             let value = channel.at(time);
             let node = &mut nodes[channel.node];
-            match channel.property {
-                Property::Translation => node.translation = value.truncate().to_array(),
-                Property::Rotation => node.rotation = value.to_array(),
-                Property::Scale => node.scale = value.truncate().to_array(),
+            match (channel.property, value.as_slice()) {
+                (Property::Translation, &[x, y, z]) => node.translation = [x, y, z],
+                (Property::Rotation, &[x, y, z, w]) => node.rotation = [x, y, z, w],
+                (Property::Scale, &[x, y, z]) => node.scale = [x, y, z],
+                (Property::Weights, value) => {
+                    let of_node = self.deforms.iter().zip(&mut weights).filter(|(d, _)| d.node == channel.node);
+                    of_node.filter(|(_, w)| w.len() == value.len()).for_each(|(_, w)| w.copy_from_slice(value));
+                }
+                _ => {}
             }
         }
         let mut world: Vec<Mat4> = Vec::with_capacity(nodes.len());
@@ -129,15 +124,84 @@ impl Rig {
             let own = Mat4::from_scale_rotation_translation(scale, Quat::from_array(node.rotation), translation);
             world.push(node.parent.map_or(own, |p| world[p] * own));
         }
-        Some(self.instances.iter().map(|&n| world[n].to_cols_array_2d()).collect())
+        let placed = |nodes: &[usize]| nodes.iter().map(|&n| world[n].to_cols_array_2d()).collect();
+        let deform = |(d, weights): (&RigDeform, Vec<f32>)| {
+            let skin = d.skin.and_then(|s| self.skins.get(s));
+            let (matrices, free) = skin.map_or((Vec::new(), false), |skin| {
+                joints(world[d.node], skin.joints.iter().map(|&j| world[j]).zip(&skin.inverse_bind))
+            });
+            (matrices, weights, free)
+        };
+        Some(Pose {
+            instances: placed(&self.instances),
+            cameras: placed(&self.cameras),
+            lights: placed(&self.lights),
+            deforms: self.deforms.iter().zip(weights).map(deform).collect(),
+        })
+    }
+
+    /// The animation that `name` names: by its name, else by its number from 0.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        let number = || name.parse().ok().filter(|n| *n < self.animations.len());
+        self.animations.iter().position(|a| a.name == name).or_else(number)
+    }
+}
+
+impl Camera {
+    /// Puts the camera where a node is, whose scale and shear are not a camera's. False, and nothing is done, where the
+    /// node has no rotation.
+    pub(super) fn place(&mut self, world: Mat4) -> bool {
+        let (_, rotation, position) = world.to_scale_rotation_translation();
+        let sound = rotation.is_finite() && rotation.length_squared() >= 0.5 && position.is_finite();
+        if sound {
+            self.transform = Mat4::from_rotation_translation(rotation.normalize(), position).to_cols_array_2d();
+        }
+        sound
+    }
+}
+
+impl LightKind {
+    /// Puts the light where a node is, shining along its −Z. False, and nothing is done, where that is nowhere.
+    pub(super) fn place(&mut self, world: Mat4) -> bool {
+        let to = world.w_axis.truncate();
+        let Some(along) = world.transform_vector3(Vec3::NEG_Z).try_normalize().filter(|_| to.is_finite()) else {
+            return false;
+        };
+        match self {
+            LightKind::Directional { direction, .. } => *direction = along.into(),
+            LightKind::Point { position, .. } => *position = to.into(),
+            LightKind::Spot { position, direction, .. } => (*position, *direction) = (to.into(), along.into()),
+        }
+        true
     }
 }
 
 impl Scene {
-    /// Places all instances as animation `animation` has them at `time`, seconds. False if there is no such animation.
+    /// Puts objects, cameras, lights and vertices where animation `animation` has them at `time`, seconds. False if
+    /// there is no such animation.
     pub fn pose(&mut self, animation: usize, time: f32) -> bool {
+        let known = self.pose_parts(animation, time);
+        if known {
+            self.move_vertices();
+        }
+        known
+    }
+
+    /// As [`Scene::pose`], but leaves the vertices of [`Scene::meshes`] where they are: what the GPU and rays need is in
+    /// [`Scene::deforms`]. For whoever draws one frame after the other.
+    pub fn pose_parts(&mut self, animation: usize, time: f32) -> bool {
         let Some(pose) = self.rig.as_ref().and_then(|rig| rig.pose(animation, time)) else { return false };
-        self.instances.iter_mut().zip(pose).for_each(|(instance, transform)| instance.transform = transform);
+        self.instances.iter_mut().zip(pose.instances).for_each(|(instance, transform)| instance.transform = transform);
+        let world = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m);
+        self.cameras.iter_mut().zip(&pose.cameras).for_each(|(camera, m)| _ = camera.place(world(m)));
+        self.lights.iter_mut().zip(&pose.lights).for_each(|(light, m)| _ = light.kind.place(world(m)));
+        for (deform, (joints, weights, free)) in self.deforms.iter_mut().zip(pose.deforms) {
+            (deform.joints, deform.weights) = (joints, weights);
+            if free {
+                let of_mesh = self.instances.iter_mut().filter(|i| i.mesh == deform.mesh);
+                of_mesh.for_each(|i| i.transform = Mat4::IDENTITY.to_cols_array_2d());
+            }
+        }
         true
     }
 
@@ -155,18 +219,21 @@ mod tests {
     use super::*;
 
     fn channel(property: Property, interpolation: Interpolation, values: &[[f32; 4]]) -> Channel {
-        Channel { node: 1, property, interpolation, times: vec![1.0, 3.0], values: values.to_vec() }
+        let width = if property == Property::Rotation { 4 } else { 3 };
+        let values = values.iter().flat_map(|v| v[..width].to_vec()).collect();
+        Channel { node: 1, property, interpolation, times: vec![1.0, 3.0], values }
     }
 
     fn rig(channel: Channel) -> Rig {
         let node =
             |parent, x| RigNode { parent, translation: [x, 0.0, 0.0], rotation: [0.0, 0.0, 0.0, 1.0], scale: [1.0; 3] };
         let animations = vec![Animation { name: String::new(), end: 3.0, channels: vec![channel] }];
-        Rig { nodes: vec![node(None, 10.0), node(Some(0), 1.0), node(Some(1), 2.0)], instances: vec![2, 0], animations }
+        let nodes = vec![node(None, 10.0), node(Some(0), 1.0), node(Some(1), 2.0)];
+        Rig { nodes, instances: vec![2, 0], animations, ..Rig::default() }
     }
 
     fn places(rig: &Rig, time: f32) -> [Vec3; 2] {
-        let pose = rig.pose(0, time).unwrap();
+        let pose = rig.pose(0, time).unwrap().instances;
         [0, 1].map(|i: usize| Mat4::from_cols_array_2d(&pose[i]).transform_point3(Vec3::ZERO))
     }
 

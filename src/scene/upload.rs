@@ -5,6 +5,7 @@
 //! rows of the world-from-object matrix), a light 64, a material 256.
 
 mod closed;
+mod deform;
 mod environment;
 mod light;
 mod material;
@@ -12,11 +13,14 @@ mod mesh;
 mod texture;
 mod veil;
 
+pub use deform::DeformGpu;
+pub(crate) use deform::{STRIDE as DEFORM_STRIDE, Shapes};
 pub(crate) use light::fits_one_map;
 pub use light::{CANDIDATES, LightGpu};
 pub use material::{MaterialGpu, TextureUse, material_layout};
 pub use mesh::{AttributeVertex, Bounds, Draw, Rows, Slot, attribute_layouts, motion_layouts, position_layouts};
 
+use super::deform::pose_of;
 use super::{AlphaMode, Environment, Light, Scene};
 use crate::accel::{AccelError, SceneRays};
 use bytemuck::Pod;
@@ -89,7 +93,8 @@ pub struct SceneGpu {
     pub indices: wgpu::Buffer,
     /// Rows of the world-from-object matrices, grouped by draw.
     pub instances: wgpu::Buffer,
-    /// Number of the placements: another one whenever an instance has moved or taken another's slot in `instances`.
+    /// Number of the placements: another one whenever an instance has moved or deformed, or taken another's slot in
+    /// `instances`.
     pub placement: u64,
     /// Bounds and version of each entry of `instances`.
     pub slots: Vec<Slot>,
@@ -122,6 +127,10 @@ pub struct SceneGpu {
     closed: Vec<bool>,
     /// Which materials are veils.
     veils: Vec<bool>,
+    /// What deforms.
+    shapes: Option<Shapes>,
+    /// How it stands: joints and weights, one deforming mesh after the other.
+    pose: Vec<f32>,
     /// What `instances` holds, with the index of each one's instance in the scene.
     placed: Vec<(u32, Rows)>,
     bytes: u64,
@@ -133,6 +142,7 @@ impl SceneGpu {
         let mut warnings = Vec::new();
         let veils = veil::veils(scene);
         let geometry = mesh::upload(device, queue, scene, &veils)?;
+        let shapes = Shapes::new(device, queue, scene)?;
         let textures = texture::upload(device, queue, scene, &mut warnings)?;
         let materials = material::upload(device, queue, (scene, &veils), &textures)?;
         let sky = environment::upload(device, queue, &scene.environment, &mut warnings)?;
@@ -140,6 +150,7 @@ impl SceneGpu {
         let list = LightGpu::list(&lights);
         let light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &list);
         let bytes = sky.bytes + geometry.bytes + textures.bytes + materials.bytes + light_buffer.size();
+        let bytes = bytes + shapes.as_ref().map_or(0, Shapes::bytes);
         for warning in &warnings {
             tracing::warn!("{warning}");
         }
@@ -162,6 +173,8 @@ impl SceneGpu {
             bounds: geometry.bounds,
             closed: geometry.closed,
             veils,
+            shapes,
+            pose: pose_of(&scene.deforms),
             rays: None,
             no_rays: None,
             placed: geometry.placed,
@@ -240,15 +253,21 @@ impl SceneGpu {
         Ok(())
     }
 
-    /// Takes over the placements of `scene`, whose instances, meshes and materials are those that
+    /// Takes over the placements of `scene` and how its meshes are deformed; instances, meshes and materials are those that
     /// were uploaded. The next frame of each renderer has motion vectors for what is elsewhere than
     /// in its last one.
     pub fn set_placements(&mut self, queue: &wgpu::Queue, scene: &Scene) {
+        let pose = pose_of(&scene.deforms);
+        let deformed = pose.len() == self.pose.len() && pose != self.pose;
+        if deformed {
+            self.pose = pose;
+        }
         let before = (self.placed.as_slice(), self.slots.as_slice());
-        let mesh::Placements { placed, slots, draws } = mesh::placements(scene, &self.closed, &self.veils, before);
+        let placements = mesh::placements(scene, &self.closed, &self.veils, before, deformed);
+        let mesh::Placements { placed, slots, draws } = placements;
         (self.draws, self.slots) = (draws, slots);
+        self.placement += u64::from(deformed || placed != self.placed);
         if placed != self.placed {
-            self.placement += 1;
             queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&mesh::rows(&placed)));
             self.placed = placed;
         }
@@ -261,6 +280,16 @@ impl SceneGpu {
     /// Rows of the world-from-object matrices in the order of `instances`, each with its instance's index in the scene.
     pub fn placed(&self) -> &[(u32, Rows)] {
         &self.placed
+    }
+
+    /// What deforms, if anything.
+    pub(crate) fn shapes(&self) -> Option<&Shapes> {
+        self.shapes.as_ref()
+    }
+
+    /// How it stands.
+    pub(crate) fn pose(&self) -> &[f32] {
+        &self.pose
     }
 
     /// What was bound of this scene is bound anew.

@@ -19,6 +19,8 @@ pub fn of_scene(scene: &Scene) -> String {
         cameras: _,
         environment,
         variants: _,
+        // How they stand now is in the meshes.
+        deforms: _,
         rig: _,
         default_light: _,
         warnings: _,

@@ -91,6 +91,13 @@ impl Navigator {
         self.file_camera = Some(n);
     }
 
+    /// The file's camera, which is the one on show, has moved.
+    pub fn follow(&mut self, camera: &Camera) {
+        let distance = self.eye.distance(self.target);
+        self.eye = camera.eye().into();
+        self.target = self.eye + distance * Vec3::from(camera.forward());
+    }
+
     fn moved(&mut self) {
         self.file_camera = None;
     }

@@ -24,6 +24,7 @@ pub fn report(app: &App) -> Value {
             "environment": shown.environment,
             "sky": shown.scene.environment.radiance, "moved": shown.moved.len(),
             "variant": shown.variant, "variants": shown.scene.variants, "pose": shown.pose,
+            "playing": app.state.animated.is_some(),
             "animations": shown.scene.rig.as_ref().map_or(0, |r| r.animations.len()),
         })
     });

@@ -4,6 +4,9 @@
 //! allocator counts for the whole program, so this binary has one test.
 #![cfg(feature = "io")]
 
+#[path = "../deform/figures.rs"]
+#[allow(dead_code, reason = "the tests of deformation use more of it")]
+mod figures;
 #[path = "../scene/glb.rs"]
 #[allow(dead_code, reason = "the scene tests use more of it")]
 mod glb;
@@ -74,10 +77,20 @@ fn corpus() -> Vec<Glb> {
     plain.json["animations"] = json!([{"samplers": [{"input": times, "output": places}],
         "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}]);
     plain.json["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}});
+    // Two bones, and a morph target over them, both moving.
+    let mut skinned = figures::strip(4, figures::Coded::TwoSets);
+    figures::bends(&mut skinned, 2, 1.0);
+    let up = skinned.floats("VEC3", &[0.0, 0.1, 0.2].repeat(10));
+    skinned.json["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": up, "NORMAL": up}]);
+    let target = json!({"node": 0, "path": "weights"});
+    figures::also(&mut skinned, target, "SCALAR", &[0.0, 1.0], &[0.0, 0.0, 1.0, 0.0, 1.0, 0.0], "CUBICSPLINE");
+    let pointer = json!({"extensions": {"KHR_animation_pointer": {"pointer": "/nodes/2/translation"}}});
+    figures::also(&mut skinned, pointer, "VEC3", &[0.0, 1.0], &[0.0, 1.0, 0.0, 0.0, 1.5, 0.0], "STEP");
     let packed = Glb { json: packed::strip("EXT_meshopt_compression", "floats, version 0, level 2"), bin: Vec::new() };
     vec![
         taken_apart(&cornell),
         plain,
+        skinned,
         packed,
         taken_apart(include_bytes!("../fixtures/compressed/edgebreaker.glb")),
         taken_apart(include_bytes!("../fixtures/compressed/sequential.glb")),
@@ -173,9 +186,13 @@ impl Tally {
         assert!(taken <= MOST_MEMORY, "took {taken} bytes of memory for a file of {}", bytes.len());
         (self.slowest, self.most) = (self.slowest.max(time), self.most.max(taken));
         match read {
-            Ok(scene) => {
+            Ok(mut scene) => {
                 self.accepted += 1;
                 shared::assert_sound(&scene);
+                // Any numbers may come of it, but no panic.
+                if scene.pose(0, 0.7) {
+                    assert!(scene.deforms.iter().all(|d| d.bounds().is_none_or(|b| b.0[0] <= b.1[0])));
+                }
             }
             Err(error) => {
                 self.refused += 1;

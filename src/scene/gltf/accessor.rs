@@ -143,6 +143,17 @@ impl Reader<'_> {
             .collect())
     }
 
+    /// Column-major matrices of four rows.
+    pub(super) fn matrices(&self, accessor: &gltf::Accessor) -> Result<Vec<[[f32; 4]; 4]>, SceneError> {
+        if accessor.dimensions() != Dimensions::Mat4 || accessor.data_type() != DataType::F32 {
+            let problem = format!("is {:?} of {:?}", accessor.dimensions(), accessor.data_type());
+            return Err(self.broken(accessor.index(), problem + " where matrices of floats are needed"));
+        }
+        let float = |at: &[u8]| f32::from_bits(unsigned(at));
+        let matrix = |m: &[u8]| std::array::from_fn(|c| std::array::from_fn(|r| float(&m[16 * c + 4 * r..][..4])));
+        Ok(self.bytes(accessor)?.chunks_exact(64).map(matrix).collect())
+    }
+
     /// Vertex indices.
     pub(super) fn indices(&self, accessor: &gltf::Accessor) -> Result<Vec<u32>, SceneError> {
         let kind = accessor.data_type();

@@ -4,11 +4,12 @@ use crate::scene::SceneError;
 use std::path::Path;
 
 /// Extensions that this loader has.
-const SUPPORTED: [&str; 19] = [
+const SUPPORTED: [&str; 21] = [
     super::area::NAME,
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_animation_pointer",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
@@ -22,6 +23,7 @@ const SUPPORTED: [&str; 19] = [
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
+    "KHR_node_visibility",
     "KHR_texture_basisu",
     "KHR_texture_transform",
 ];

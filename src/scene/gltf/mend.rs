@@ -5,7 +5,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
 /// Place and problem of a warning.
-type Warning = (String, String);
+pub(super) type Warning = (String, String);
 
 /// Mends what a strict reader would refuse and reads extensions that only redirect; tells what was left out.
 pub(super) fn mend(root: &mut Root) -> Vec<Warning> {

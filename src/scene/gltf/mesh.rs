@@ -9,16 +9,16 @@ use crate::scene::geometry::{self, Topology};
 use crate::scene::{Mesh, SceneError};
 
 /// Where a primitive's numbers are: in accessors, or in a compressed stream.
-struct Vertices<'a> {
-    reader: Reader<'a>,
-    primitive: &'a gltf::Primitive<'a>,
+pub(super) struct Vertices<'a> {
+    pub(super) reader: Reader<'a>,
+    pub(super) primitive: &'a gltf::Primitive<'a>,
     packed: Option<draco::Unpacked>,
     place: &'a str,
 }
 
 impl Vertices<'_> {
     /// An attribute of all vertices; empty where the primitive has none.
-    fn floats<const N: usize>(
+    pub(super) fn floats<const N: usize>(
         &self,
         semantic: Semantic,
         integers: Integers,
@@ -52,21 +52,17 @@ impl<'a> Loader<'a> {
         }
         let mut made = Vec::new();
         for primitive in mesh.primitives() {
-            if let Some(built) = self.primitive(mesh, &primitive)? {
-                made.push(self.scene.meshes.len());
-                self.scene.meshes.push(built);
+            let at = self.scene.meshes.len();
+            if self.primitive(mesh, &primitive)? {
+                made.push(at);
             }
         }
         self.meshes.insert(mesh.index(), made.clone());
         Ok(made)
     }
 
-    /// One primitive; `None` with a warning where there is nothing to draw.
-    fn primitive(
-        &mut self,
-        mesh: &gltf::Mesh<'a>,
-        primitive: &gltf::Primitive<'a>,
-    ) -> Result<Option<Mesh>, SceneError> {
+    /// Adds one primitive; false with a warning where there is nothing to draw.
+    fn primitive(&mut self, mesh: &gltf::Mesh<'a>, primitive: &gltf::Primitive<'a>) -> Result<bool, SceneError> {
         let name = mesh.name().map_or_else(|| format!("meshes[{}]", mesh.index()), str::to_owned);
         let place = format!("meshes[{}].primitives[{}] '{name}'", mesh.index(), primitive.index());
         let topology = match primitive.mode() {
@@ -75,12 +71,12 @@ impl<'a> Loader<'a> {
             Mode::TriangleFan => Topology::Fan,
             other => {
                 self.warn(&place, &format!("{other:?} are left out; only triangles are drawn"));
-                return Ok(None);
+                return Ok(false);
             }
         };
         if primitive.get(&Semantic::Positions).is_none() {
             self.warn(&place, "has no POSITION and is left out");
-            return Ok(None);
+            return Ok(false);
         }
         let packed = self.packed(&place, mesh.index(), primitive.index())?;
         let read =
@@ -118,14 +114,17 @@ impl<'a> Loader<'a> {
         out.indices = geometry::triangle_list(&indices, topology);
         if out.indices.is_empty() {
             self.warn(&place, "has no triangle and is left out");
-            return Ok(None);
+            return Ok(false);
         }
-        if primitive.morph_targets().next().is_some() {
-            self.warn(&place, "its morph targets are ignored");
-        }
+        let draft = self.draft(&place, &read, count, out.normals.is_empty());
         out.material = self.material(&primitive.material());
+        let before = out.indices.clone();
         self.finish(&place, &mut out);
-        Ok(Some(out))
+        self.scene.meshes.push(out);
+        if let Some(draft) = draft {
+            self.keep(self.scene.meshes.len() - 1, draft, (&before, count));
+        }
+        Ok(true)
     }
 
     /// What is compressed of a primitive, if it is.

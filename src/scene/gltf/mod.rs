@@ -2,10 +2,11 @@
 //!
 //! The `gltf` crate parses the JSON and types it; container, buffers and accessors are read here, because the crate's
 //! readers panic or give up wholesale on the broken files that people have. What cannot be used for a reason that
-//! leaves a picture (a missing texture, a line primitive, a skin) becomes a warning; the rest is a [`SceneError`].
+//! leaves a picture (a missing texture, a line primitive, a broken skin) becomes a warning; the rest is a [`SceneError`].
 
 mod accessor;
 mod area;
+mod deform;
 mod draco;
 mod extensions;
 mod instancing;
@@ -16,6 +17,7 @@ mod mend;
 mod mesh;
 mod meshopt;
 mod motion;
+mod pointer;
 mod source;
 mod specular;
 mod texture;
@@ -46,7 +48,8 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError> {
     let bytes = error::read_file(path)?;
     let (json, blob) = source::split(path, &bytes)?;
-    let json = files::without_mark(json);
+    let pointed = pointer::rewrite(files::without_mark(json));
+    let json = pointed.as_ref().map_or(files::without_mark(json), |p| &p.0);
     let mut root: gltf::json::Root =
         gltf::json::deserialize::from_slice(json).map_err(|e| SceneError::broken(path, "JSON", e.to_string()))?;
     extensions::check_required(path, &root)?;
@@ -55,12 +58,13 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError>
     let document = gltf::Document::from_json_without_validation(root);
     let source = Source::open(path, &document, blob, options)?;
     let mut loader = Loader::new(path, &source, &document);
-    mended.iter().for_each(|(place, what)| loader.warn(place, what));
+    mended.iter().chain(pointed.iter().flat_map(|p| &p.1)).for_each(|(place, what)| loader.warn(place, what));
     for extension in document.extensions_used().filter(|e| !extensions::is_known(e)) {
         loader.warn("extensionsUsed", &format!("{extension} is not supported; the file is shown without it"));
     }
     loader.walk()?;
     loader.variants(json);
+    loader.settle_deforms();
     let mut scene = loader.scene;
     sound::settle(&mut scene, path)?;
     defaults::complete(&mut scene);
@@ -130,6 +134,8 @@ pub(super) struct Loader<'a> {
     converted: HashMap<String, (usize, usize, [f32; 4])>,
     /// How each instance stands to its node.
     placed: Vec<instancing::Copy>,
+    /// Skins and morph targets.
+    deforming: deform::Deforming,
 }
 
 impl<'a> Loader<'a> {
@@ -146,6 +152,7 @@ impl<'a> Loader<'a> {
             images: HashMap::new(),
             converted: HashMap::new(),
             placed: Vec::new(),
+            deforming: deform::Deforming::default(),
         }
     }
 
@@ -178,11 +185,11 @@ impl<'a> Loader<'a> {
             }
         };
         let mut seen = vec![false; document.nodes().len()];
-        let mut stack: Vec<(gltf::Node, Mat4, Option<usize>)> =
-            roots.into_iter().rev().map(|n| (n, Mat4::IDENTITY, None)).collect();
-        // For animations: nodes in the order of this walk, and which of them each instance belongs to.
-        let (mut walked, mut placed) = (Vec::new(), Vec::new());
-        while let Some((node, parent, above)) = stack.pop() {
+        let mut stack: Vec<(gltf::Node, Mat4, Option<usize>, bool)> =
+            roots.into_iter().rev().map(|n| (n, Mat4::IDENTITY, None, true)).collect();
+        // For animations: nodes in the order of this walk, and which of them each instance, camera and light belongs to.
+        let (mut walked, mut carried, mut places) = (Vec::new(), motion::Carried::default(), HashMap::new());
+        while let Some((node, parent, above, visible)) = stack.pop() {
             if std::mem::replace(&mut seen[node.index()], true) {
                 let place = format!("nodes[{}]", node.index());
                 return Err(self.broken(place, "is reached twice; nodes must form trees, not cycles"));
@@ -191,25 +198,34 @@ impl<'a> Loader<'a> {
             if !world.is_finite() {
                 return Err(self.broken(format!("nodes[{}]", node.index()), "has a transform that is not finite"));
             }
-            self.node(&node, world)?;
-            placed.resize(self.scene.instances.len(), walked.len());
-            let children: Vec<_> = node.children().map(|child| (child, world, Some(walked.len()))).collect();
+            let visible = visible && self.is_visible(&node);
+            self.node(&node, world, visible)?;
+            carried.follow(&self.scene, walked.len());
+            places.insert(node.index(), (walked.len(), world));
+            let children: Vec<_> = node.children().map(|child| (child, world, Some(walked.len()), visible)).collect();
             walked.push((node, above));
             stack.extend(children.into_iter().rev());
         }
-        self.animations(&walked, placed);
+        let deforms = self.resolve(&places);
+        self.animations(&walked, &places, carried, deforms);
         Ok(())
     }
 
-    fn node(&mut self, node: &gltf::Node<'a>, world: Mat4) -> Result<(), SceneError> {
+    /// What KHR_node_visibility says of a node itself.
+    fn is_visible(&self, node: &gltf::Node) -> bool {
+        let extensions = self.document.as_json().nodes[node.index()].extensions.as_ref();
+        let visibility = extensions.and_then(|e| e.others.get("KHR_node_visibility"));
+        visibility.and_then(|v| v.get("visible")?.as_bool()).unwrap_or(true)
+    }
+
+    /// Meshes and lights are those that are `visible`; a camera sees from wherever it is.
+    fn node(&mut self, node: &gltf::Node<'a>, world: Mat4, visible: bool) -> Result<(), SceneError> {
         let place = format!("nodes[{}]", node.index());
         let name = node.name().map_or_else(|| place.clone(), str::to_owned);
-        if let Some(mesh) = node.mesh() {
-            if node.skin().is_some() {
-                self.warn(&format!("{place} '{name}'"), "its skin is ignored; the mesh stands in its bind pose");
-            }
+        if let Some(mesh) = node.mesh().filter(|_| visible) {
             let copies = self.copies(node, &place)?;
             for mesh in self.mesh(&mesh)? {
+                let mesh = self.own(node, &format!("{place} '{name}'"), mesh);
                 for copy in &copies {
                     let transform = (world * copy.matrix()).to_cols_array_2d();
                     self.scene.instances.push(Instance { name: name.clone(), mesh, transform });
@@ -220,10 +236,12 @@ impl<'a> Loader<'a> {
         if let Some(camera) = node.camera() {
             self.camera(&camera, &name, world);
         }
-        if let Some(light) = node.light() {
+        if let Some(light) = node.light().filter(|_| visible) {
             self.light(&light, &name, world);
         }
-        self.area_light(node, &name, &place, world);
+        if visible {
+            self.area_light(node, &name, &place, world);
+        }
         Ok(())
     }
 
@@ -234,14 +252,13 @@ impl<'a> Loader<'a> {
         };
         let (yfov, near) = (lens.yfov(), lens.znear());
         let usable = yfov > 0.0 && yfov < std::f32::consts::PI && near > 0.0 && near.is_finite();
-        // Scale and shear of the node do not belong to a camera.
-        let (_, rotation, position) = world.to_scale_rotation_translation();
-        if !usable || !rotation.is_finite() || rotation.length_squared() < 0.5 {
+        let far = lens.zfar().filter(|&far| far > near).unwrap_or(f32::INFINITY);
+        let transform = Mat4::IDENTITY.to_cols_array_2d();
+        let mut camera = Camera { name: node.to_owned(), transform, yfov, near, far };
+        if !usable || !camera.place(world) {
             return self.warn(&place, "has an impossible lens or transform and is left out");
         }
-        let transform = Mat4::from_rotation_translation(rotation.normalize(), position).to_cols_array_2d();
-        let far = lens.zfar().filter(|&far| far > near).unwrap_or(f32::INFINITY);
-        self.scene.cameras.push(Camera { name: node.to_owned(), transform, yfov, near, far });
+        self.scene.cameras.push(camera);
     }
 
     /// Reads the sky that [`super::export`] writes into the scene's extras; other files have none.

@@ -1,24 +1,48 @@
-//! Animations of nodes and variants of materials. Neither is worth refusing a file: what is broken
+//! Animations, and variants of materials. Neither is worth refusing a file: what is broken
 //! is left out with a warning.
 
 use super::Loader;
 use super::accessor::{Integers, Reader};
-use crate::scene::geometry;
-use crate::scene::rig::{Animation, Channel, Interpolation, Property, Rig, RigNode};
+use crate::scene::rig::{Animation, Channel, Interpolation, Property, Rig, RigDeform, RigNode, Skin};
+use crate::scene::{Scene, geometry};
+use glam::Mat4;
 use gltf::json::animation as json;
 use gltf::json::validation::Checked;
 use std::collections::HashMap;
 
+/// Node of each instance, camera and light of the scene.
+#[derive(Default)]
+pub(super) struct Carried {
+    instances: Vec<usize>,
+    cameras: Vec<usize>,
+    lights: Vec<usize>,
+}
+
+impl Carried {
+    /// What has come to `scene` since is node `node`'s.
+    pub(super) fn follow(&mut self, scene: &Scene, node: usize) {
+        self.instances.resize(scene.instances.len(), node);
+        self.cameras.resize(scene.cameras.len(), node);
+        self.lights.resize(scene.lights.len(), node);
+    }
+}
+
 impl<'a> Loader<'a> {
     /// Reads all animations of nodes; `nodes` are those of the scene, parents first: glTF node, position of its parent.
-    pub(super) fn animations(&mut self, nodes: &[(gltf::Node<'a>, Option<usize>)], instances: Vec<usize>) {
+    /// `places`: where in that list each glTF node is.
+    pub(super) fn animations(
+        &mut self,
+        nodes: &[(gltf::Node<'a>, Option<usize>)],
+        places: &HashMap<usize, (usize, Mat4)>,
+        Carried { instances, cameras, lights }: Carried,
+        (skins, deforms): (Vec<Skin>, Vec<RigDeform>),
+    ) {
         let document = self.document;
-        let place: HashMap<usize, usize> = nodes.iter().enumerate().map(|(i, (node, _))| (node.index(), i)).collect();
         let mut animations = Vec::new();
         for (i, animation) in document.as_json().animations.iter().enumerate() {
             let mut channels = Vec::new();
             for (c, channel) in animation.channels.iter().enumerate() {
-                match self.channel(animation, channel, &place) {
+                match self.channel(animation, channel, places) {
                     Ok(read) => channels.extend(read),
                     Err(problem) => {
                         self.warn(&format!("animations[{i}].channels[{c}]"), &format!("{problem} and is left out"))
@@ -34,17 +58,13 @@ impl<'a> Loader<'a> {
         if animations.is_empty() {
             return;
         }
-        let carries = |node: &gltf::Node| node.camera().is_some() || node.light().is_some();
-        if nodes.iter().any(|(node, _)| carries(node)) {
-            self.warn("animations", "move objects only; lights and cameras stand in their rest pose");
-        }
         let rest = |(node, parent): &(gltf::Node, Option<usize>)| {
             let (translation, rotation, scale) = node.transform().decomposed();
             RigNode { parent: *parent, translation, rotation, scale }
         };
         let mut nodes = nodes.iter().map(rest).collect();
         let instances = self.with_copies(&mut nodes, instances);
-        self.scene.rig = Some(Rig { nodes, instances, animations });
+        self.scene.rig = Some(Rig { nodes, instances, cameras, lights, deforms, skins, animations });
     }
 
     /// A channel; nothing for a node of another scene.
@@ -52,16 +72,17 @@ impl<'a> Loader<'a> {
         &self,
         animation: &json::Animation,
         channel: &json::Channel,
-        place: &HashMap<usize, usize>,
+        places: &HashMap<usize, (usize, Mat4)>,
     ) -> Result<Option<Channel>, String> {
         let property = match channel.target.path {
             Checked::Valid(json::Property::Translation) => Property::Translation,
             Checked::Valid(json::Property::Rotation) => Property::Rotation,
             Checked::Valid(json::Property::Scale) => Property::Scale,
-            Checked::Valid(json::Property::MorphTargetWeights) => return Err("moves morph targets".into()),
+            Checked::Valid(json::Property::MorphTargetWeights) => Property::Weights,
             Checked::Invalid => return Err("moves nothing that is known".into()),
         };
-        let Some(&node) = place.get(&channel.target.node.value()) else { return Ok(None) };
+        let target = channel.target.node.value();
+        let Some(&(node, _)) = places.get(&target) else { return Ok(None) };
         let sampler = animation.samplers.get(channel.sampler.value()).ok_or("has no sampler")?;
         let interpolation = match sampler.interpolation {
             Checked::Valid(json::Interpolation::Step) => Interpolation::Step,
@@ -75,15 +96,29 @@ impl<'a> Loader<'a> {
         let told = |e: crate::scene::SceneError| e.to_string();
         let times: Vec<f32> =
             read.floats::<1>(&input, Integers::AsFlagged, None).map_err(told)?.into_iter().map(|[t]| t).collect();
-        let fill = (property != Property::Rotation).then_some(0.0);
-        let values = read.floats::<4>(&output, Integers::AsFlagged, fill).map_err(told)?;
-        let each = if interpolation == Interpolation::Cubic { 3 } else { 1 };
+        let flag = Integers::AsFlagged;
+        let (width, values) = match property {
+            Property::Rotation => (4, read.floats::<4>(&output, flag, None).map(|v| v.as_flattened().to_vec())),
+            Property::Weights => (self.targets_of(target), read.floats::<1>(&output, flag, None).map(|v| v.concat())),
+            _ => (3, read.floats::<3>(&output, flag, None).map(|v| v.as_flattened().to_vec())),
+        };
+        let values = values.map_err(told)?;
+        if width == 0 {
+            return Err("moves the weights of a node without morph targets".into());
+        }
         let rising = times.windows(2).all(|w| w[0] < w[1]);
-        let finite = times.iter().chain(values.iter().flatten()).all(|v| v.is_finite());
-        if times.is_empty() || values.len() != each * times.len() || !rising || !finite {
+        let finite = times.iter().chain(&values).all(|v| v.is_finite());
+        if times.is_empty() || values.len() != width * interpolation.parts() * times.len() || !rising || !finite {
             return Err("has keys that do not rise, are no numbers or do not match their values".into());
         }
         Ok(Some(Channel { node, property, interpolation, times, values }))
+    }
+
+    /// Morph targets of the mesh of a glTF node.
+    fn targets_of(&self, node: usize) -> usize {
+        let json = self.document.as_json();
+        let mesh = json.nodes.get(node).and_then(|n| json.meshes.get(n.mesh?.value()));
+        mesh.and_then(|m| m.primitives.first()?.targets.as_ref()).map_or(0, Vec::len)
     }
 
     /// Names of the variants, and the materials that the primitives have in them (KHR_materials_variants).
@@ -117,11 +152,18 @@ impl<'a> Loader<'a> {
                 }
                 let maps = materials.iter().filter_map(|&m| self.scene.materials[m].normal_texture);
                 let map = maps.into_iter().next();
-                let mesh = &mut self.scene.meshes[out];
-                if let Some(map) = map.filter(|_| mesh.tangents.is_empty()) {
-                    geometry::make_tangents(mesh, map.uv_set, map.transform);
+                let before = self.scene.meshes[out].indices.clone();
+                let map = map.filter(|_| self.scene.meshes[out].tangents.is_empty());
+                for at in [vec![out], self.copies_of(out)].concat() {
+                    let mesh = &mut self.scene.meshes[at];
+                    if let Some(map) = map {
+                        geometry::make_tangents(mesh, map.uv_set, map.transform);
+                    }
+                    mesh.variants.clone_from(&materials);
                 }
-                mesh.variants = materials;
+                if !self.scene.meshes[out].tangents.is_empty() && map.is_some() {
+                    self.repeated(out, &before);
+                }
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use super::closed::is_closed;
 use super::{UploadError, filled, is_covered};
+use crate::scene::bounds::posed_bounds;
 use crate::scene::{AlphaMode, Mesh, Scene, octahedral::octahedral};
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
@@ -64,6 +65,8 @@ pub struct Draw {
     pub by_lot: bool,
     /// A veil, to be blended with what is behind: one instance, so that draws can be put in order.
     pub veil: bool,
+    /// Its vertices move: they are among the first of the scene's.
+    pub deforms: bool,
     /// World-space bounds of all its instances.
     pub bounds: Bounds,
 }
@@ -73,6 +76,7 @@ const ATTRIBUTES: [wgpu::VertexAttribute; 5] =
     wgpu::vertex_attr_array![1 => Snorm16x2, 2 => Snorm16x4, 3 => Float32x2, 4 => Float32x2, 5 => Float16x4];
 const ROWS: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![6 => Float32x4, 7 => Float32x4, 8 => Float32x4];
 const BEFORE: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![9 => Float32x4, 10 => Float32x4, 11 => Float32x4];
+const POSITION_BEFORE: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![12 => Float32x3];
 
 fn layout(
     array_stride: u64,
@@ -93,11 +97,12 @@ pub fn attribute_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 3] {
     [positions, instances, layout(36, wgpu::VertexStepMode::Vertex, &ATTRIBUTES)]
 }
 
-/// As [`attribute_layouts`], for passes that write motion vectors: slot 3 has the instances as they
+/// As [`attribute_layouts`], for passes that write motion vectors: slots 3 and 4 have instances and positions as they
 /// were in the frame before.
-pub fn motion_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 4] {
+pub fn motion_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 5] {
     let [positions, instances, attributes] = attribute_layouts();
-    [positions, instances, attributes, layout(48, wgpu::VertexStepMode::Instance, &BEFORE)]
+    let before = layout(48, wgpu::VertexStepMode::Instance, &BEFORE);
+    [positions, instances, attributes, before, layout(12, wgpu::VertexStepMode::Vertex, &POSITION_BEFORE)]
 }
 
 pub(super) struct Geometry {
@@ -121,7 +126,13 @@ pub(super) fn upload(
 ) -> Result<Geometry, UploadError> {
     let limit = device.limits().max_buffer_size;
     let (mut positions, mut attributes, mut indices) = (Vec::new(), Vec::new(), Vec::<u32>::new());
-    for mesh in &scene.meshes {
+    for deform in &scene.deforms {
+        let mesh = scene.meshes.get(deform.mesh);
+        let checked = mesh.map_or(Err("is missing".to_owned()), |mesh| deform.check(mesh));
+        let name = mesh.map_or_else(|| deform.mesh.to_string(), |m| m.name.clone());
+        checked.map_err(|reason| UploadError::Mesh { mesh: name, reason })?;
+    }
+    for mesh in order(scene).into_iter().map(|m| &scene.meshes[m]) {
         mesh.check(scene.materials.len()).map_err(|reason| UploadError::Mesh { mesh: mesh.name.clone(), reason })?;
         let too_large = |what, bytes| UploadError::TooLarge { mesh: mesh.name.clone(), what, bytes, limit };
         let vertex_bytes = 36 * (positions.len() + mesh.positions.len()) as u64;
@@ -146,16 +157,37 @@ pub(super) fn upload(
             });
         }
     }
-    let closed: Vec<bool> = scene.meshes.iter().map(is_closed).collect();
-    let Placements { placed, slots, draws } = placements(scene, &closed, veils, (&[], &[]));
+    // What deforms may turn inside out.
+    let deforms = deforming(scene);
+    let closed: Vec<bool> =
+        scene.meshes.iter().zip(&deforms).map(|(mesh, deforms)| !deforms && is_closed(mesh)).collect();
+    let Placements { placed, slots, draws } = placements(scene, &closed, veils, (&[], &[]), false);
     let bounds = draws.iter().map(|d| d.bounds).reduce(union);
     let vertex = wgpu::BufferUsages::VERTEX;
-    let positions = filled(device, queue, "scene.positions", vertex, &positions);
-    let attributes = filled(device, queue, "scene.attributes", vertex, &attributes);
+    let moved = if scene.deforms.is_empty() { vertex } else { vertex | wgpu::BufferUsages::STORAGE };
+    let positions = filled(device, queue, "scene.positions", moved, &positions);
+    let attributes = filled(device, queue, "scene.attributes", moved, &attributes);
     let indices = filled(device, queue, "scene.indices", wgpu::BufferUsages::INDEX, &indices);
     let instances = filled(device, queue, "scene.instances", vertex, &rows(&placed));
     let bytes = positions.size() + attributes.size() + indices.size() + instances.size();
     Ok(Geometry { positions, attributes, indices, instances, placed, slots, draws, bounds, closed, bytes })
+}
+
+/// Which meshes deform.
+fn deforming(scene: &Scene) -> Vec<bool> {
+    let mut deforms = vec![false; scene.meshes.len()];
+    for deform in &scene.deforms {
+        if let Some(own) = deforms.get_mut(deform.mesh) {
+            *own = true;
+        }
+    }
+    deforms
+}
+
+/// Meshes in the order of the shared buffers: first those that deform, in the order of [`Scene::deforms`].
+fn order(scene: &Scene) -> Vec<usize> {
+    let deforms = deforming(scene);
+    scene.deforms.iter().map(|d| d.mesh).chain((0..scene.meshes.len()).filter(|m| !deforms[*m])).collect()
 }
 
 /// What the instance buffer holds.
@@ -178,42 +210,50 @@ pub(super) struct Placements {
 
 /// Places a scene whose instances name meshes that exist; which of these are `closed` is known, which materials are
 /// `veils`, and how instances were placed `before`: what has not moved since need not be measured again.
+/// `deformed`: what deforms does so otherwise than before.
 pub(super) fn placements(
     scene: &Scene,
     closed: &[bool],
     veils: &[bool],
     before: (&[(u32, Rows)], &[Slot]),
+    deformed: bool,
 ) -> Placements {
     let known: HashMap<u32, (&Rows, Bounds)> =
         before.0.iter().zip(before.1).map(|((instance, rows), slot)| (*instance, (rows, slot.bounds))).collect();
     // Where each mesh begins in the shared buffers.
     let (mut vertex, mut index) = (0, 0);
-    let mut ranges = Vec::with_capacity(scene.meshes.len());
-    for mesh in &scene.meshes {
+    let mut ranges = vec![(0, 0..0); scene.meshes.len()];
+    for m in order(scene) {
+        let mesh = &scene.meshes[m];
         let indices = mesh.indices.len() as u32;
-        ranges.push((vertex, index..index + indices));
+        ranges[m] = (vertex, index..index + indices);
         vertex += mesh.positions.len() as i32;
         index += indices;
     }
 
     // Grouped by material, then by mesh and winding, so that instances of one mesh become one draw.
-    let mut order = Vec::with_capacity(scene.instances.len());
+    let mut sorted = Vec::with_capacity(scene.instances.len());
     for (i, instance) in scene.instances.iter().enumerate() {
         let Some(mesh) = scene.meshes.get(instance.mesh).filter(|m| !m.indices.is_empty()) else { continue };
         let transform = Mat4::from_cols_array_2d(&instance.transform);
-        order.push((mesh.material, instance.mesh, transform.determinant() < 0.0, i as u32, transform));
+        sorted.push((mesh.material, instance.mesh, transform.determinant() < 0.0, i as u32, transform));
     }
-    order.sort_by_key(|o| (o.0, o.1, o.2));
-    let mut placed = Vec::with_capacity(order.len());
-    let mut slots: Vec<Slot> = Vec::with_capacity(order.len());
+    sorted.sort_by_key(|o| (o.0, o.1, o.2));
+    let mut placed = Vec::with_capacity(sorted.len());
+    let mut slots: Vec<Slot> = Vec::with_capacity(sorted.len());
     let mut draws: Vec<Draw> = Vec::new();
     let mut last = None;
-    for (material, mesh, mirrored, instance, transform) in order {
+    let deforms = deforming(scene);
+    for (material, mesh, mirrored, instance, transform) in sorted {
         let at = placed.len() as u32;
         let rows = [0, 1, 2].map(|row| transform.row(row).to_array());
-        let measured = known.get(&instance).filter(|(old, _)| **old == rows).map(|(_, bounds)| *bounds);
-        let bounds = measured.unwrap_or_else(|| world_bounds(&scene.meshes[mesh], &transform));
-        let same = before.0.get(placed.len()).filter(|old| **old == (instance, rows));
+        let changed = deformed && deforms[mesh];
+        let measured = known.get(&instance).filter(|(old, _)| !changed && **old == rows).map(|(_, bounds)| *bounds);
+        let bounds = measured.unwrap_or_else(|| match deforms[mesh] {
+            true => posed_bounds(&scene.instances[instance as usize], scene).unwrap_or_default(),
+            false => world_bounds(&scene.meshes[mesh], &transform),
+        });
+        let same = before.0.get(placed.len()).filter(|old| !changed && **old == (instance, rows));
         let version = same.and_then(|_| before.1.get(placed.len())).map(|slot| slot.version);
         let version = version.unwrap_or_else(|| VERSION.fetch_add(1, Ordering::Relaxed));
         slots.push(Slot { bounds, version });
@@ -239,6 +279,7 @@ pub(super) fn placements(
             covered: is_covered(m.alpha_mode),
             by_lot: m.alpha_mode == AlphaMode::Blend,
             veil,
+            deforms: deforms[mesh],
             bounds,
         });
     }

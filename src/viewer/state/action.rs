@@ -4,6 +4,7 @@ use crate::render::tonemap_curve::Tonemap;
 use crate::scene::edit::LightEdit;
 use crate::viewer::choice::{Side, Source, View};
 use crate::viewer::navigate::Preset;
+use crate::viewer::state::Playback;
 use glam::Vec3;
 use std::path::PathBuf;
 
@@ -55,6 +56,8 @@ pub enum Action {
     Pose(Option<(usize, f32)>),
     /// Plays the animation, or stops it.
     Animate,
+    /// How it plays.
+    Playback(Playback),
     /// Changes between dark and light.
     Theme,
     Flicker,

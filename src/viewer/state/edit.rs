@@ -7,7 +7,7 @@ use crate::scene::{
 };
 use glam::Vec3;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 impl State {
     /// Takes a picture of the surroundings from `path`.
@@ -72,20 +72,49 @@ impl State {
     /// Places all objects: at rest or as the animation has them, then moved by hand. Always from
     /// the file's places, so that the command line can repeat it bit for bit.
     fn place(&mut self) {
+        let edits = self.light_edits();
         let Some(shown) = &mut self.shown else { return };
-        let scene = Arc::make_mut(&mut shown.scene);
-        for (instance, original) in scene.instances.iter_mut().zip(&shown.original.instances) {
+        let (scene, original) = (Arc::make_mut(&mut shown.scene), &shown.original);
+        for (instance, original) in scene.instances.iter_mut().zip(&original.instances) {
             instance.transform = original.transform;
         }
+        let lit = original.rig.as_ref().map_or(0, |rig| rig.lights.len());
+        for ((now, base), original) in scene.lights.iter_mut().zip(&mut shown.lights).zip(&original.lights).take(lit) {
+            base.clone_from(original);
+            now.clone_from(original);
+        }
+        scene.cameras.clone_from(&original.cameras);
+        scene.deforms.clone_from(&original.deforms);
         if let Some((animation, time)) = shown.pose {
-            scene.pose(animation, time);
+            scene.pose_parts(animation, time);
+        }
+        for (now, base) in scene.lights.iter().zip(&mut shown.lights).take(lit) {
+            base.clone_from(now);
+        }
+        for edit in edits.into_iter().filter(|edit| edit.light < lit) {
+            // What could be changed can be changed again.
+            let _ = edit.apply(scene);
         }
         for (&object, &by) in &shown.moved {
             // Only objects that are there are ever moved.
             let _ = ObjectEdit { object, by }.apply(scene);
         }
+        shown.unsettled = !scene.deforms.is_empty();
+        if let Some(camera) = self.navigator.file_camera.and_then(|n| scene.cameras.get(n)) {
+            self.navigator.follow(camera);
+        }
         self.stale.placements = true;
+        self.stale.lights |= lit > 0;
         self.version += 1;
+    }
+
+    /// Writes the vertices of what deforms, for whoever looks at meshes: clicks, the path tracer, files. Not done in each
+    /// frame of an animation, which the GPU moves by itself.
+    pub fn settle(&mut self) {
+        if let Some(shown) = self.shown.as_mut().filter(|shown| shown.unsettled) {
+            Arc::make_mut(&mut shown.scene).move_vertices();
+            shown.unsettled = false;
+        }
     }
 
     pub(super) fn pose(&mut self, pose: Option<(usize, f32)>) {
@@ -93,30 +122,46 @@ impl State {
         let count = shown.original.rig.as_ref().map_or(0, |r| r.animations.len());
         shown.pose = pose.filter(|(animation, _)| *animation < count);
         self.place();
-    }
-
-    /// Plays the animation that was chosen last from where it stands, or stops it.
-    pub(super) fn animate(&mut self, now: Instant) {
-        let Some(rig) = self.shown.as_ref().and_then(|s| s.original.rig.as_ref()) else {
-            return self.tell("this scene has no animation", false);
-        };
-        if self.animated.take().is_none() {
-            let (_, time) = self.shown.as_ref().and_then(|s| s.pose).unwrap_or_default();
-            let end = rig.animations.iter().map(|a| a.end).fold(0.0, f32::max);
-            self.animated = now.checked_sub(Duration::from_secs_f32(time.clamp(0.0, end)));
+        if self.animated.is_none() {
+            self.settle();
         }
     }
 
-    /// The animation goes on, over and over; true while it plays.
+    /// Seconds until the end of the animation that was chosen last; `None` where there is none.
+    fn animation_end(&self) -> Option<f32> {
+        let shown = self.shown.as_ref()?;
+        let animations = &shown.original.rig.as_ref()?.animations;
+        animations.get(shown.pose.map_or(0, |p| p.0)).map(|a| a.end)
+    }
+
+    /// Plays the animation that was chosen last from where it stands, from its beginning if it is at its end; or stops it.
+    pub(super) fn animate(&mut self, now: Instant) {
+        let Some(end) = self.animation_end() else { return self.tell("this scene has no animation", false) };
+        if self.animated.take().is_some() {
+            self.settle();
+            return;
+        }
+        let (animation, time) = self.shown.as_ref().and_then(|s| s.pose).unwrap_or_default();
+        self.animated = Some(now);
+        self.pose(Some((animation, if time >= end { 0.0 } else { time })));
+    }
+
+    /// The animation goes on; true while it plays.
     pub(super) fn animation(&mut self, now: Instant) -> bool {
-        let (Some(since), Some(shown)) = (self.animated, &self.shown) else { return false };
-        let animation = shown.pose.map_or(0, |p| p.0);
-        let Some(end) = shown.original.rig.as_ref().and_then(|r| r.animations.get(animation)).map(|a| a.end) else {
-            return false;
+        let (Some(last), Some(end)) = (self.animated, self.animation_end()) else { return false };
+        let (animation, before) = self.shown.as_ref().and_then(|s| s.pose).unwrap_or_default();
+        let time = before + self.playback.speed * now.saturating_duration_since(last).as_secs_f32();
+        let over = time >= end;
+        let stops = over && !self.playback.again;
+        self.animated = (!stops).then_some(now);
+        let time = match over {
+            true if stops => end,
+            true if end > 0.0 => time % end,
+            true => 0.0,
+            false => time,
         };
-        let time = now.duration_since(since).as_secs_f32();
-        self.pose(Some((animation, if end > 0.0 { time % end } else { 0.0 })));
-        true
+        self.pose(Some((animation, time)));
+        !stops
     }
 
     /// Materials of a variant; those of the file without one.
@@ -140,6 +185,8 @@ impl State {
         shown.pose = None;
         self.animated = None;
         shown.scene = shown.original.clone();
+        shown.lights.clone_from(&shown.original.lights);
+        shown.unsettled = false;
         shown.moved.clear();
         shown.environment = None;
         self.stale = Stale { lights: true, placements: true, environment: true };
@@ -149,7 +196,7 @@ impl State {
     /// What was changed in the lights.
     pub fn light_edits(&self) -> Vec<LightEdit> {
         let Some(shown) = &self.shown else { return Vec::new() };
-        let pairs = shown.original.lights.iter().zip(&shown.scene.lights).enumerate();
+        let pairs = shown.lights.iter().zip(&shown.scene.lights).enumerate();
         // Surroundings replace a default sun, and what stands there then is another light.
         let pairs = pairs.filter(|(_, (from, to))| from.name == to.name);
         pairs.filter_map(|(i, (from, to))| LightEdit::between(i, from, to)).collect()
@@ -191,6 +238,85 @@ mod tests {
         state.apply(Action::Undo);
         let shown = state.shown.as_ref().unwrap();
         assert_eq!(shown.scene.instances[3].transform, shown.original.instances[3].transform);
+    }
+
+    /// The room with an animation of 2 s that lifts its object 0 by 1 m and carries its light 0 along.
+    fn lively() -> crate::viewer::state::State {
+        use crate::scene::rig::{Animation, Channel, Interpolation, Property, Rig, RigNode};
+        let mut scene = crate::scene::paper_room::scene(3);
+        let node = RigNode { parent: None, translation: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0], scale: [1.0; 3] };
+        let channel = Channel {
+            node: 0,
+            property: Property::Translation,
+            interpolation: Interpolation::Linear,
+            times: vec![0.0, 2.0],
+            values: vec![0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+        };
+        scene.lights = vec![crate::scene::Light::from(crate::scene::LightKind::Point {
+            position: [0.0; 3],
+            intensity: 1.0,
+            radius: 0.0,
+            range: None,
+        })];
+        scene.rig = Some(Rig {
+            nodes: vec![node; 2],
+            instances: (0..scene.instances.len()).map(|i| usize::from(i > 0)).collect(),
+            lights: vec![0],
+            animations: vec![Animation { name: "lift".into(), end: 2.0, channels: vec![channel] }],
+            ..Rig::default()
+        });
+        let mut state = crate::viewer::state::State::new(Default::default());
+        state.show("lively".into(), Arc::new(scene));
+        state
+    }
+
+    #[test]
+    fn animations_play_pause_scrub_loop_and_stop() {
+        use crate::viewer::state::Playback;
+        let mut state = lively();
+        let height =
+            |state: &crate::viewer::state::State| state.shown.as_ref().unwrap().scene.instances[0].transform[3][1];
+        let time = |state: &crate::viewer::state::State| state.shown.as_ref().unwrap().pose.map(|p| p.1);
+        let start = Instant::now();
+        let at = |ms: u64| start + std::time::Duration::from_millis(ms);
+        assert!(!state.animation(at(0)), "nothing plays by itself");
+        state.animate(at(0));
+        assert!(state.animation(at(500)) && (height(&state) - 0.25).abs() < 1e-4, "{}", height(&state));
+        state.apply(Action::Playback(Playback { speed: 2.0, again: true }));
+        assert!(state.animation(at(1000)) && (height(&state) - 0.75).abs() < 1e-4, "twice as fast");
+        assert!(state.animation(at(1500)) && (time(&state).unwrap() - 0.5).abs() < 1e-3, "over the end and on");
+        state.animate(at(1600));
+        assert!(!state.animation(at(9000)) && (time(&state).unwrap() - 0.5).abs() < 1e-3, "paused");
+        state.apply(Action::Playback(Playback { speed: 1.0, again: false }));
+        state.animate(at(9000));
+        assert!(state.animation(at(10_000)) && !state.animation(at(11_000)) && !state.animation(at(12_000)));
+        assert_eq!((time(&state), height(&state)), (Some(2.0), 1.0), "it stops at its end");
+        state.animate(at(13_000));
+        assert_eq!(time(&state), Some(0.0), "and begins anew");
+        state.apply(Action::Pose(Some((0, 1.0))));
+        assert!(!state.animation(at(14_000)) && (height(&state) - 0.5).abs() < 1e-6, "a hand on the slider pauses it");
+        state.apply(Action::Pose(Some((7, 1.0))));
+        let rest = state.shown.as_ref().unwrap().original.instances[0].transform[3][1];
+        assert_eq!((time(&state), height(&state)), (None, rest), "there is no such animation");
+        // Speeds that are none.
+        state.apply(Action::Playback(Playback { speed: f32::NAN, again: true }));
+        assert_eq!(state.playback.speed, 1.0);
+    }
+
+    #[test]
+    fn lights_move_with_their_nodes_and_keep_what_hands_did() {
+        let mut state = lively();
+        let edit = LightEdit { light: 0, strength: Some(3.0), ..LightEdit::default() };
+        state.apply(Action::Light(edit.clone()));
+        state.apply(Action::Pose(Some((0, 2.0))));
+        let light = state.shown.as_ref().unwrap().scene.lights[0].kind;
+        let crate::scene::LightKind::Point { position, intensity, .. } = light else { panic!("{light:?}") };
+        assert_eq!((position, intensity), ([0.0, 1.0, 0.0], 3.0));
+        // What the animation does is no change by hand.
+        assert_eq!(state.light_edits(), [edit]);
+        assert!(state.stale.lights && state.stale.placements);
+        state.apply(Action::Undo);
+        assert_eq!(state.light_edits(), []);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::film::{self, Film, Recording};
 use super::navigate::{Navigator, Preset};
 use super::saved::Settings;
 use crate::render::tonemap_curve::Tonemap;
-use crate::scene::{Scene, path::CameraPath};
+use crate::scene::{Light, Scene, path::CameraPath};
 pub use action::{Action, Request};
 pub use edit::{angles, from_angles};
 use std::collections::BTreeMap;
@@ -42,6 +42,10 @@ pub struct Shown {
     pub original: Arc<Scene>,
     /// With lights, objects and surroundings as they are now.
     pub scene: Arc<Scene>,
+    /// Lights as the file has them in this pose.
+    pub lights: Vec<Light>,
+    /// Its deforming meshes' vertices are those of another pose.
+    pub unsettled: bool,
     /// How objects were moved, metres.
     pub moved: BTreeMap<usize, [f32; 3]>,
     /// Which variant of materials, if not the file's own.
@@ -80,8 +84,24 @@ pub struct State {
     pub path: Option<CameraPath>,
     /// What is done with it.
     pub film: Film,
-    /// Since when the animation plays that began at time 0.
+    /// When the animation went on last, if it plays.
     pub animated: Option<Instant>,
+    pub playback: Playback,
+}
+
+/// How an animation plays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Playback {
+    /// Seconds of it a second.
+    pub speed: f32,
+    /// Begins anew at its end, where it else stops.
+    pub again: bool,
+}
+
+impl Default for Playback {
+    fn default() -> Self {
+        Self { speed: 1.0, again: true }
+    }
 }
 
 impl State {
@@ -117,6 +137,8 @@ impl State {
         self.shown = Some(Shown {
             spec,
             original: scene.clone(),
+            lights: scene.lights.clone(),
+            unsettled: false,
             scene,
             moved: BTreeMap::new(),
             variant: None,
@@ -204,7 +226,10 @@ impl State {
                 self.apply(A::Camera(next));
             }
             A::Fly => self.navigator.fly = !self.navigator.fly,
-            A::Capture { exr } => self.requests.push(Request::Capture { exr }),
+            A::Capture { exr } => {
+                self.settle();
+                self.requests.push(Request::Capture { exr });
+            }
             A::CopyCommand => {
                 let text = super::command::line(self, None);
                 self.requests.push(Request::Copy(text));
@@ -234,6 +259,10 @@ impl State {
                 self.pose(pose);
             }
             A::Animate => self.animate(Instant::now()),
+            A::Playback(playback) => {
+                let speed = if playback.speed.is_finite() { playback.speed.clamp(0.05, 8.0) } else { 1.0 };
+                self.playback = Playback { speed, ..playback };
+            }
             A::Theme => self.settings.dark = !self.settings.dark,
             A::Flicker => self.settings.flicker = !self.settings.flicker,
             A::Reload => {

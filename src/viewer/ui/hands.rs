@@ -2,7 +2,7 @@
 
 use super::Memory;
 use crate::render::View as Eye;
-use crate::scene::bounds::instance_bounds;
+use crate::scene::bounds::posed_bounds;
 use crate::viewer::navigate::Navigator;
 use crate::viewer::state::{Action, State};
 use crate::viewer::{keys, pick};
@@ -114,6 +114,7 @@ pub(super) fn hands(ui: &Ui, state: &mut State, memory: &mut Memory, response: &
             () if modifiers.ctrl || modifiers.command => Grip::Sun,
             () if modifiers.shift => {
                 if state.selected.is_none() {
+                    state.settle();
                     state.selected = object_at(ui, state, origin, rect);
                 }
                 Grip::Object
@@ -132,6 +133,7 @@ pub(super) fn hands(ui: &Ui, state: &mut State, memory: &mut Memory, response: &
     if response.clicked() {
         ui.ctx().memory_mut(|m| m.stop_text_input());
         if let Some(p) = response.interact_pointer_pos() {
+            state.settle();
             state.apply(Action::Select(object_at(ui, state, p, rect)));
         }
     }
@@ -171,9 +173,7 @@ fn object_at(ui: &Ui, state: &State, p: Pos2, rect: Rect) -> Option<usize> {
 fn drag_object(state: &mut State, d: Vec2, rect: Rect) {
     let Some((object, shown)) = state.selected.zip(state.shown.as_ref()) else { return };
     let Some(instance) = shown.scene.instances.get(object) else { return };
-    let Some((low, high)) = shown.scene.meshes.get(instance.mesh).and_then(|m| instance_bounds(instance, m)) else {
-        return;
-    };
+    let Some((low, high)) = posed_bounds(instance, &shown.scene) else { return };
     let middle = 0.5 * (Vec3::from(low) + Vec3::from(high));
     let [right, up, forward] = state.navigator.axes();
     let distance = (middle - state.navigator.eye).dot(forward).max(1e-3 * state.navigator.scale);

@@ -2,7 +2,7 @@
 
 use super::{Facts, ORANGE};
 use crate::render::View as Eye;
-use crate::scene::bounds::instance_bounds;
+use crate::scene::bounds::posed_bounds;
 use crate::viewer::choice::{Source, View};
 use crate::viewer::state::{Request, State};
 use egui::{Align2, Color32, FontId, Pos2, Rect, Shape, Stroke, Ui, Vec2};
@@ -50,7 +50,7 @@ fn label(painter: &egui::Painter, at: Pos2, align: Align2, text: &str, error: bo
 /// The edges of the selected object's box, in a picture at `rect` of `density` pixels a point.
 pub fn outline(state: &State, rect: Rect, density: f32) -> Vec<Shape> {
     let Some((object, shown)) = state.selected.zip(state.shown.as_ref()) else { return Vec::new() };
-    let found = shown.scene.instances.get(object).and_then(|i| instance_bounds(i, shown.scene.meshes.get(i.mesh)?));
+    let found = shown.scene.instances.get(object).and_then(|i| posed_bounds(i, &shown.scene));
     let Some((low, high)) = found else { return Vec::new() };
     let eye = Eye::new(&state.navigator.camera(&shown.scene), state.size, [0.0; 2]);
     let clip = glam::Mat4::from_cols_array_2d(&eye.clip_from_world);

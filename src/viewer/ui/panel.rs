@@ -87,7 +87,7 @@ fn variants(ui: &mut Ui, state: &mut State, names: &[String], now: Option<usize>
 fn animation(ui: &mut Ui, state: &mut State, all: Vec<(String, f32)>, pose: Option<(usize, f32)>) {
     let (now, mut time) = pose.unwrap_or_default();
     ui.horizontal(|ui| {
-        let text = if state.animated.is_some() { "Stop (I)" } else { "Play (I)" };
+        let text = if state.animated.is_some() { "Pause (I)" } else { "Play (I)" };
         if ui.button(text).clicked() {
             state.apply(Action::Animate);
         }
@@ -104,6 +104,18 @@ fn animation(ui: &mut Ui, state: &mut State, all: Vec<(String, f32)>, pose: Opti
     if ui.add(egui::Slider::new(&mut time, 0.0..=end).suffix(" s").max_decimals(2)).changed() {
         state.apply(Action::Pose(Some((now, time))));
     }
+    ui.horizontal(|ui| {
+        let mut playback = state.playback;
+        let speed = egui::DragValue::new(&mut playback.speed).range(0.05..=8.0).speed(0.01).prefix("speed × ");
+        ui.add(speed).on_hover_text("seconds of the animation a second");
+        ui.checkbox(&mut playback.again, "loop");
+        if playback != state.playback {
+            state.apply(Action::Playback(playback));
+        }
+        if ui.add_enabled(state.shown.as_ref().is_some_and(|s| s.pose.is_some()), egui::Button::new("Rest")).clicked() {
+            state.apply(Action::Pose(None));
+        }
+    });
 }
 
 fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
