@@ -1,6 +1,8 @@
 //! Writes any scene that bouncelight can load as one GLB, for Blender and other viewers.
 //!
 //!     cargo run --example export_scene -- interior interior.glb
+//!
+//! With `--bare` without its cameras and lights, to see what is made of such a file.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -8,12 +10,16 @@ use std::process::ExitCode;
 use bouncelight::scene;
 
 fn main() -> ExitCode {
-    let args: Vec<String> = std::env::args().skip(1).collect();
+    let mut args: Vec<String> = std::env::args().skip(1).collect();
+    let bare = args.iter().position(|a| a == "--bare").map(|i| args.remove(i)).is_some();
     let [spec, out] = &args[..] else {
-        eprintln!("usage: export_scene SCENE OUT.glb");
+        eprintln!("usage: export_scene [--bare] SCENE OUT.glb");
         return ExitCode::from(2);
     };
-    let written = scene::load(spec).and_then(|scene| {
+    let written = scene::load(spec).and_then(|mut scene| {
+        if bare {
+            scene::export::strip(&mut scene);
+        }
         scene.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
         scene::export::write_glb(&scene, Path::new(out))
     });

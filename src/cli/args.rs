@@ -9,6 +9,8 @@ use crate::{
     scene::{
         self, Camera, Environment, LightKind, LoadOptions, Scene,
         edit::{LightEdit, ObjectEdit},
+        look::{FRAMING, Look},
+        upload::TextureMemory,
     },
 };
 use anyhow::{Context, Result};
@@ -36,6 +38,10 @@ pub struct Global {
     /// Buffers, textures and material libraries may lie outside the folder of the scene file that names them.
     #[arg(long, global = true)]
     pub allow_outside: bool,
+    /// How textures lie in the device's memory: `compressed` in blocks of a byte a texel (BC7) where the device has
+    /// them, `full` with four bytes a texel, `auto` in blocks where a scene's would take more than 512 MiB.
+    #[arg(long, global = true, value_enum, default_value = "auto")]
+    pub textures: TexturesName,
     /// More log lines; twice for yet more.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
@@ -79,6 +85,16 @@ impl PrecisionName {
     }
 }
 
+/// How textures lie in the device's memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+#[allow(missing_docs, reason = "the variants are their own words on the command line")]
+pub enum TexturesName {
+    #[default]
+    Auto,
+    Full,
+    Compressed,
+}
+
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 pub enum ProgressKind {
@@ -96,6 +112,15 @@ impl Global {
     /// What a scene file may do.
     pub fn load_options(&self) -> LoadOptions {
         LoadOptions { allow_outside: self.allow_outside }
+    }
+
+    /// How textures are uploaded.
+    pub fn textures(&self) -> TextureMemory {
+        match self.textures {
+            TexturesName::Auto => TextureMemory::Auto,
+            TexturesName::Full => TextureMemory::Full,
+            TexturesName::Compressed => TextureMemory::Compressed,
+        }
     }
 
     /// What is asked of the device.
@@ -198,6 +223,9 @@ pub struct SceneArgs {
     /// The surroundings: radiance as `R,G,B` or one number for grey, or a lat-long picture (.hdr, .exr).
     #[arg(long, value_parser = parse_surroundings, value_name = "R,G,B|FILE")]
     pub environment: Option<Surroundings>,
+    /// Turns the picture of the surroundings about the vertical, the way from +X to +Z.
+    #[arg(long, value_name = "DEGREES", requires = "environment", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub environment_turn: f32,
     /// Radius of point and spot lights, metres.
     #[arg(long, value_name = "M")]
     pub light_radius: Option<f32>,
@@ -214,7 +242,7 @@ pub struct SceneArgs {
     #[arg(long, visible_alias = "time", requires = "animation", default_value_t = 0.0, value_name = "SECONDS")]
     pub pose_time: f32,
     /// Changes a light: its number and any of color=R,G,B strength=S direction=X,Y,Z position=X,Y,Z
-    /// size=S; may be repeated.
+    /// size=S; with kind=sun, point or spot and the next free number it adds one; may be repeated.
     #[arg(long, value_name = "N KEY=VALUE ...")]
     pub light: Vec<LightEdit>,
     /// Moves an object: its number and X,Y,Z in metres; may be repeated.
@@ -230,7 +258,10 @@ impl SceneArgs {
             Some(Surroundings::Constant(radiance)) => scene.surround(Environment::constant(*radiance)),
             Some(Surroundings::Picture(path)) => {
                 let (environment, mended) = Environment::load(path)?;
-                scene.surround(environment);
+                if !self.environment_turn.is_finite() {
+                    return Err(usage(format!("--environment-turn {} is no angle", self.environment_turn)));
+                }
+                scene.surround(environment.turned(self.environment_turn));
                 scene.warnings.extend(mended);
             }
             None => {}
@@ -307,6 +338,12 @@ impl SceneArgs {
             .cloned()
             .with_context(|| format!("--camera {}: the scene has {} cameras", self.camera, scene.cameras.len()))
             .map_err(|e| usage(format!("{e:#}")))?;
+        if camera.name == FRAMING
+            && let Some(look) = Look::new(scene).filter(|_| scene.cameras.len() == 1)
+        {
+            // Made for any shape of picture; this one's is known.
+            camera = look.camera_for(self.size[0] as f32 / self.size[1] as f32);
+        }
         camera.yfov = fov.unwrap_or(camera.yfov);
         Ok(camera)
     }

@@ -3,6 +3,7 @@
 use super::args::Global;
 use super::stdout::say;
 use crate::gpu::{self, Gpu};
+use crate::scene::upload::TextureMemory;
 use anyhow::Result;
 use serde_json::json;
 
@@ -54,7 +55,14 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     for (name, value) in have {
         say!("limit     {name} = {value}{}", if short.contains(&name) { "  (below WebGPU's default)" } else { "" });
     }
-    if !missing.is_empty() {
+    let blocks = used.contains(wgpu::Features::TEXTURE_COMPRESSION_BC);
+    let most = TextureMemory::MOST >> 20;
+    if blocks {
+        say!("textures  in blocks of a byte a texel (BC7) where a scene's take more than {most} MiB whole; --textures");
+    } else {
+        say!("textures  whole, four bytes a texel: this device has no blocks (BC7)");
+    }
+    if missing.contains(wgpu::Features::TIMESTAMP_QUERY) {
         say!("note      without timestamp_query, bench shows synchronised wall-clock time only");
     }
     Ok(())

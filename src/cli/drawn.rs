@@ -4,7 +4,7 @@ use super::{args::usage, compare::shown_bytes};
 use crate::{
     gpu::Gpu,
     image_io::{self, Metadata},
-    render::{capture::CapturedFrame, tonemap_curve::Tonemap},
+    render::{Exposure, capture::CapturedFrame, exposure, tonemap_curve::Tonemap},
 };
 use anyhow::Result;
 use std::path::Path;
@@ -12,20 +12,20 @@ use std::path::Path;
 /// What the output's name asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Format {
-    /// Through a view transform, brighter by so many stops.
-    Png { exposure: f32, tonemap: Tonemap },
+    /// Through a view transform, after the exposure.
+    Png(Tonemap),
     /// Radiance and layers.
     Exr,
 }
 
 impl Format {
     /// Of a file's name, or of `-`, which is a PNG.
-    pub fn of(path: &Path, exposure: f32, tonemap: Tonemap) -> Result<Self> {
+    pub fn of(path: &Path, tonemap: Tonemap) -> Result<Self> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         match extension.as_str() {
             "exr" => Ok(Self::Exr),
-            "png" => Ok(Self::Png { exposure, tonemap }),
-            _ if path.as_os_str() == "-" => Ok(Self::Png { exposure, tonemap }),
+            "png" => Ok(Self::Png(tonemap)),
+            _ if path.as_os_str() == "-" => Ok(Self::Png(tonemap)),
             _ => Err(usage(format!("{}: the picture's name must end in .png or .exr", path.display()))),
         }
     }
@@ -47,14 +47,24 @@ impl Drawn {
         self.frame.beauty.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
     }
 
-    /// Writes it whole or not at all, with the device, the command line and its facts as metadata.
-    pub fn write(&self, gpu: &Gpu, output: &Path, format: Format) -> Result<()> {
+    /// Stops by which it is to be shown brighter; `background` is the colour where nothing is, if it is one.
+    pub fn stops(&self, exposure: Exposure, background: Option<[f32; 3]>) -> f32 {
+        match exposure {
+            Exposure::Stops(stops) => stops,
+            Exposure::Auto => exposure::measure(&self.frame.beauty.data, 4, background),
+        }
+    }
+
+    /// Writes it whole or not at all, with the device, the command line and its facts as metadata; a PNG `stops`
+    /// brighter.
+    pub fn write(&self, gpu: &Gpu, output: &Path, format: Format, stops: f32) -> Result<()> {
         let beauty = &self.frame.beauty;
         let [width, height] = [beauty.width as u32, beauty.height as u32];
-        let metadata = self.metadata(gpu);
+        let mut metadata = self.metadata(gpu);
         match format {
-            Format::Png { exposure, tonemap } => {
-                let rgb = shown_bytes(&self.rgb(), exposure, tonemap);
+            Format::Png(tonemap) => {
+                metadata.push(("Exposure".into(), format!("{stops} EV")));
+                let rgb = shown_bytes(&self.rgb(), stops, tonemap);
                 image_io::write_png(output, width, height, &rgb, &metadata)?;
             }
             Format::Exr => {

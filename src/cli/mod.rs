@@ -22,6 +22,7 @@ mod progress;
 mod reference;
 mod render;
 mod sequence;
+mod showing;
 mod stability;
 mod stdout;
 mod tuned;

@@ -8,19 +8,20 @@ use super::{
     interrupt,
     progress::Progress,
     reference, sequence,
+    showing::Showing,
 };
 use crate::{
     gi::{Method, gather, pass::Neural},
     gpu::Gpu,
     image_io, metrics,
     render::{
-        Blending, Renderer, RendererOptions,
+        Blending, Exposure, Renderer, RendererOptions,
         capture::{CaptureOptions, Layer, Picture, capture_with},
         tonemap_curve::Tonemap,
     },
     scene::{
         Camera, Scene,
-        upload::{SceneGpu, UploadError},
+        upload::{SceneGpu, TextureMemory, UploadError},
     },
 };
 use anyhow::Result;
@@ -70,9 +71,10 @@ pub struct Args {
     /// as paths meet them, for layers and many samples. When absent: `stochastic` with --aov, else `sorted`.
     #[arg(long, value_name = "HOW")]
     blending: Option<Blending>,
-    /// Stops by which a PNG is brighter.
-    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true, value_name = "EV")]
-    exposure: f32,
+    /// Stops by which a PNG is brighter, or `auto`: as many as make the mean of what is seen middle grey. When absent:
+    /// `auto` for a file without any light, 0 for others and with --reference.
+    #[arg(long, allow_hyphen_values = true, value_name = "EV|auto")]
+    exposure: Option<Exposure>,
     /// View transform of a PNG.
     #[arg(long, default_value = "filmic")]
     tonemap: Tonemap,
@@ -108,6 +110,11 @@ impl Args {
     fn samples(&self) -> u32 {
         let raw = self.aov.is_some() || self.taa.is_some() || self.gi_frames == Some(1) || self.sequence.is_given();
         self.samples.unwrap_or(if raw { 1 } else { PICTURE_SAMPLES })
+    }
+
+    /// Stops of a picture that is compared.
+    fn stops(&self) -> f32 {
+        if let Some(Exposure::Stops(stops)) = self.exposure { stops } else { 0.0 }
     }
 
     /// How what blends is drawn.
@@ -172,10 +179,12 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
         // From here on the size is that of the picture that is written.
         args.scene.size = task.size();
     }
-    let judged = |path| Shown::reference(path, args.tonemap, args.exposure, args.scene.size, &args.metric);
+    let ev = args.stops();
+    let judged = |path| Shown::reference(path, args.tonemap, ev, args.scene.size, &args.metric);
     let reference = args.reference.as_deref().map(judged).transpose()?;
     let sequence = args.sequence.sequence(&args.output, args.scene.animation.is_some())?;
     let scene = loaded.map_or_else(|| args.scene.load(global), Ok)?;
+    let showing = Showing::new(args.exposure, args.reference.is_some(), format, &scene, global.quiet);
     let camera = match sequence.as_ref().and_then(|s| s.frames().next()) {
         Some((_, _, Some(camera))) => camera,
         _ => args.scene.camera(&scene)?,
@@ -188,16 +197,16 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
             let method = super::tuned::tuned(method, &gpu, global.quiet);
             // Says from here on what the program does: without a shader cache nothing is drawn for half a minute.
             let progress = Progress::compiling(global, if sequence.is_some() { "frames" } else { "samples" }, 1);
-            let mut raster = Raster::new(&args, &gpu, &scene, method, layers)?;
+            let mut raster = Raster::new(&args, (&gpu, global.textures()), &scene, method, layers)?;
             if let Some(sequence) = sequence {
-                return film(progress, &args, format, raster, (&sequence, scene));
+                return film(progress, &args, showing, raster, (&sequence, scene));
             }
             raster.draw(progress, &args, &camera)?
         }
     };
-    drawn.write(&gpu, &args.output, format)?;
+    showing.write(&gpu, &args.output, &drawn, None)?;
     match reference {
-        Some(reference) => judge(&args, &drawn, &reference),
+        Some(reference) => judge(&args, &drawn, &reference, ev),
         None => Ok(()),
     }
 }
@@ -226,7 +235,13 @@ struct Raster<'a> {
 }
 
 impl<'a> Raster<'a> {
-    fn new(args: &Args, gpu: &'a Gpu, scene: &Scene, method: Method, layers: Vec<Layer>) -> Result<Self> {
+    fn new(
+        args: &Args,
+        (gpu, textures): (&'a Gpu, TextureMemory),
+        scene: &Scene,
+        method: Method,
+        layers: Vec<Layer>,
+    ) -> Result<Self> {
         let weights = match &method {
             Method::Neural(neural) => neural.weights.hash_text(),
             _ => "none".into(),
@@ -236,7 +251,7 @@ impl<'a> Raster<'a> {
             RendererOptions { method, taa: args.taa.is_some(), blending: args.blending(), ..Default::default() };
         // Trees are built while the driver compiles shaders.
         let upload = || {
-            let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
+            let mut uploaded = SceneGpu::with_textures(&gpu.device, &gpu.queue, scene, textures)?;
             if needs_rays {
                 // Where they cannot be had, the method below draws, and `picture` says so.
                 let _ = uploaded.trace(&gpu.device, &gpu.queue, scene);
@@ -298,11 +313,12 @@ impl<'a> Raster<'a> {
 fn film(
     mut progress: Progress,
     args: &Args,
-    format: Format,
+    showing: Showing,
     mut raster: Raster,
     (sequence, mut scene): (&sequence::Sequence, Scene),
 ) -> Result<()> {
     progress.expect(sequence.count());
+    let mut stops = None;
     let animation = args.scene.animation(&scene)?;
     for (number, time, camera) in sequence.frames() {
         if let Some(animation) = animation {
@@ -313,7 +329,8 @@ fn film(
         }
         let camera = camera.map_or_else(|| args.scene.camera(&scene), Ok)?;
         let drawn = raster.picture(args, &camera, &mut || ())?;
-        drawn.write(raster.gpu, &sequence::name(&args.output, number), format)?;
+        // The first frame's measure holds for all, so that a path does not flicker.
+        stops = Some(showing.write(raster.gpu, &sequence::name(&args.output, number), &drawn, stops)?);
         raster.running = true;
         progress.step();
     }
@@ -324,12 +341,14 @@ fn film(
 /// Faults that can be told before anything is drawn.
 fn check(args: &Args) -> Result<Format> {
     let path = &args.output;
-    let format = Format::of(path, args.exposure, args.tonemap)?;
+    let format = Format::of(path, args.tonemap)?;
     if args.aov.is_some() && format != Format::Exr {
         return Err(usage("--aov needs an .exr: a PNG holds one picture".into()));
     }
-    if !args.exposure.is_finite() {
-        return Err(usage(format!("--exposure {} is not a finite number of stops", args.exposure)));
+    if args.exposure == Some(Exposure::Auto) && args.reference.is_some() {
+        return Err(usage(
+            "--exposure auto measures this picture; with --reference both need a number of stops".into(),
+        ));
     }
     let name = args.method().name();
     if args.method() == MethodName::Reference {
@@ -370,9 +389,9 @@ fn check(args: &Args) -> Result<Format> {
 }
 
 /// Prints the metric and fails when it is on the wrong side of the threshold.
-fn judge(args: &Args, drawn: &Drawn, reference: &Shown) -> Result<()> {
+fn judge(args: &Args, drawn: &Drawn, reference: &Shown, ev: f32) -> Result<()> {
     let name = args.output.display().to_string();
-    let ours = Shown::linear(name, args.scene.size.map(|n| n as usize), drawn.rgb(), args.exposure, args.tonemap);
+    let ours = Shown::linear(name, args.scene.size.map(|n| n as usize), drawn.rgb(), ev, args.tonemap);
     let heat = Heat::of_metric(&args.metric);
     let options =
         metrics::Options { flip: heat == Heat::Flip, hdr_flip: heat == Heat::Hdrflip, ..metrics::Options::default() };

@@ -196,11 +196,15 @@ impl Gpu {
     }
 }
 
-/// Optional features that are used when present: timestamps for the timing tables, the others for
-/// some of the network's kernels.
+/// Optional features that are used when present: timestamps for the timing tables, compressed textures for scenes with
+/// many of them, the others for some of the network's kernels.
 pub fn wanted_features() -> wgpu::Features {
     use wgpu::Features;
-    Features::TIMESTAMP_QUERY | Features::SUBGROUP | Features::SHADER_F16 | Features::SHADER_INT64
+    Features::TIMESTAMP_QUERY
+        | Features::SUBGROUP
+        | Features::SHADER_F16
+        | Features::SHADER_INT64
+        | Features::TEXTURE_COMPRESSION_BC
 }
 
 /// All adapters that fit the backend choice, best first, with the words for what was searched. GL is only asked when
@@ -271,7 +275,7 @@ fn is_usable(adapter: &wgpu::Adapter) -> bool {
     adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
 }
 
-fn is_software(info: &wgpu::AdapterInfo) -> bool {
+pub(crate) fn is_software(info: &wgpu::AdapterInfo) -> bool {
     // Mesa's GL drivers do not report their kind, so the name has to tell.
     let name = info.name.to_lowercase();
     info.device_type == wgpu::DeviceType::Cpu

@@ -6,6 +6,7 @@ pub mod composite;
 pub mod cull;
 pub mod deform;
 pub mod direct;
+pub mod exposure;
 pub mod frame;
 pub mod gbuffer;
 pub mod glossy;
@@ -29,6 +30,7 @@ pub mod view;
 
 pub use blended::Blending;
 pub use cull::DrawnCount;
+pub use exposure::Exposure;
 pub use frame::{Renderer, RendererOptions};
 pub use light_choice::LightOptions;
 pub use targets::Targets;

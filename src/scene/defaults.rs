@@ -1,11 +1,11 @@
-//! A camera and light for scenes that bring none.
+//! Light for scenes that bring none; the camera that they get is [`look`]'s.
 //!
-//! Camera: looks at the whole scene from the front (+Z) and a little above, unless another side
-//! lets one look deeper into it, as the open side of a box does. Light: where surfaces emit enough
-//! for a picture, up to four spot or point lights stand in for the strongest, because direct light
-//! is computed for analytic lights only. Else a sun behind the camera's shoulder and a dim grey
-//! sky, unless the surroundings are given. Fainter glow shines beside them where a method or the
-//! path tracer finds it.
+//! Where surfaces emit enough for a picture, up to four spot or point lights stand in for the
+//! strongest, because direct light is computed for analytic lights only. Else, unless the
+//! surroundings are given: before a camera that stands in a room a brighter sky and a sun where
+//! most of it comes in, or a lamp where nothing comes in; anywhere else a sun behind the camera's
+//! shoulder and a dim grey sky. Fainter glow shines beside them where a method or the path tracer
+//! finds it.
 //!
 //! Enough is [`ENOUGH`]: the flux of all emitters (π · radiance · area) over the area of the box
 //! around the scene is the irradiance that they would give to its walls. A light grey wall under
@@ -16,17 +16,22 @@
 use glam::{Mat4, Vec3};
 
 use super::{
-    AlphaMode, Camera, Environment, Instance, Light, LightKind, Material, SUN_ANGLE, Scene, bounds::world_bounds,
+    AlphaMode, Camera, Environment, Instance, Light, LightKind, Material, SUN_ANGLE, Scene,
+    bounds::world_bounds,
+    look::{self, Daylight, Look},
 };
-
-/// Vertical field of view of the framing camera, radians (45°).
-pub const FRAMING_YFOV: f32 = std::f32::consts::FRAC_PI_4;
 
 /// Irradiance of the default sun, W/m².
 pub const DEFAULT_SUN: f32 = 1.0;
 
 /// Radiance of the sky that comes with the default sun, W/(m²·sr).
 pub const DEFAULT_SKY: f32 = 0.05;
+
+/// Irradiance of the sun that comes into a room, W/m².
+pub const INDOOR_SUN: f32 = 10.0;
+
+/// Radiance of the sky outside a room, W/(m²·sr).
+pub const INDOOR_SKY: f32 = 0.6;
 
 /// Irradiance by emitters, averaged over the box around the scene, from which on they are its light, W/m². A diffuse
 /// surface of albedo 0.8 then has the radiance 0.005, a 200th of what the view transform shows as white.
@@ -37,21 +42,67 @@ const MAX_PROXIES: usize = 4;
 
 /// Adds a camera if there is none, then light if there is none; says so in the warnings where it matters.
 pub fn complete(scene: &mut Scene) {
+    let look = if scene.cameras.is_empty() || scene.lights.is_empty() { Look::new(scene) } else { None };
+    let first = scene.cameras.first().cloned().unwrap_or_else(|| look::first_camera(look.as_ref()));
+    let daylight = look.as_ref().map(|l| l.daylight(&first));
+    drop(look);
     if scene.cameras.is_empty() {
-        scene.cameras.push(framing_camera(scene));
+        scene.cameras.push(first);
     }
     if !scene.lights.is_empty() {
         return;
     }
     let own_sky = scene.environment != Environment::default();
     let emitters = emitters(scene);
-    if own_sky || irradiance(scene, &emitters) >= ENOUGH {
+    let glow = irradiance(scene, &emitters);
+    if glow > 0.0 {
+        tracing::info!("{}: its glow would give its walls {glow:.4} W/m²", scene.name);
+    }
+    if own_sky || glow >= ENOUGH {
+        scene.lightless = !own_sky;
         stand_in(scene, emitters);
     } else {
-        scene.lights.push(default_sun(&scene.cameras[0]));
-        scene.environment = Environment::constant([DEFAULT_SKY; 3]);
-        scene.default_light = true;
-        scene.warnings.push(sun_added(scene, !emitters.is_empty()));
+        let added = illuminate(scene, daylight.unwrap_or(Daylight::Outdoors));
+        let lacks = if emitters.is_empty() { "" } else { " but a faint glow" };
+        scene.warnings.push(format!("{}{lacks}; {added}", lightless(scene)));
+        (scene.default_light, scene.lightless) = (true, true);
+    }
+}
+
+/// How the sentence begins that tells of light that was added.
+fn lightless(scene: &Scene) -> String {
+    format!("'{}' has no light", scene.name)
+}
+
+/// Adds light for a place and says what.
+fn illuminate(scene: &mut Scene, daylight: Daylight) -> String {
+    let sun = |direction: Vec3, irradiance| Light {
+        name: "default sun".to_owned(),
+        color: [1.0; 3],
+        kind: LightKind::Directional { direction: direction.into(), irradiance, angle: SUN_ANGLE },
+        stands_in: false,
+    };
+    match daylight {
+        Daylight::Outdoors => {
+            scene.lights.push(sun(over_the_shoulder(&scene.cameras[0]), DEFAULT_SUN));
+            scene.environment = Environment::constant([DEFAULT_SKY; 3]);
+            format!("a sun of {DEFAULT_SUN} W/m² and a grey sky of {DEFAULT_SKY} W/(m²·sr) were added")
+        }
+        Daylight::Openings(towards) => {
+            scene.environment = Environment::constant([INDOOR_SKY; 3]);
+            scene.lights.extend(towards.map(|t| sun(-t, INDOOR_SUN)));
+            let with = if towards.is_some() { format!("a sun of {INDOOR_SUN} W/m² and ") } else { String::new() };
+            format!("it is a room, so {with}a grey sky of {INDOOR_SKY} W/(m²·sr) were added outside")
+        }
+        Daylight::Lamp { position, height } => {
+            // One W/m² on the floor below.
+            let intensity = height * height;
+            let radius = 0.04 * height;
+            let kind = LightKind::Point { position: position.into(), intensity, radius, range: None };
+            scene.lights.push(Light { name: "default lamp".to_owned(), ..Light::from(kind) });
+            scene.environment = Environment::constant([DEFAULT_SKY; 3]);
+            format!("it is a closed room, so a lamp of {intensity:.3} W/sr under the ceiling was added")
+        }
     }
 }
 
@@ -67,21 +118,13 @@ fn stand_in(scene: &mut Scene, emitters: Vec<Emitter>) {
     }
 }
 
-fn sun_added(scene: &Scene, glows: bool) -> String {
-    let lacks = if glows { "no light but a faint glow" } else { "no light" };
-    format!(
-        "'{}' has {lacks}; a sun of {DEFAULT_SUN} W/m² and a grey sky of {DEFAULT_SKY} W/(m²·sr) were added",
-        scene.name
-    )
-}
-
 impl Scene {
     /// Takes surroundings that somebody gives. They replace the default sky and with it the default
     /// sun, which are there only as long as nobody says where light comes from.
     pub fn surround(&mut self, environment: Environment) {
         if std::mem::take(&mut self.default_light) {
-            let told = [true, false].map(|glows| sun_added(self, glows));
-            self.warnings.retain(|w| !told.contains(w));
+            let told = lightless(self);
+            self.warnings.retain(|w| !w.starts_with(&told));
             stand_in(self, emitters(self));
         }
         self.environment = environment;
@@ -98,111 +141,15 @@ fn irradiance(scene: &Scene, emitters: &[Emitter]) -> f32 {
     if walls > 0.0 { flux / walls } else { 0.0 }
 }
 
-/// A camera that sees all of the scene in any picture at least as wide as high.
-pub fn framing_camera(scene: &Scene) -> Camera {
-    let Some((low, high)) = world_bounds(scene) else {
-        return Camera { name: "framing".to_owned(), ..Camera::look_at([0.0, 0.0, 3.0], [0.0; 3], FRAMING_YFOV) };
-    };
-    let (low, high) = (Vec3::from(low), Vec3::from(high));
-    let center = (low + high) * 0.5;
-    let half = ((high - low) * 0.5).max(Vec3::splat((1e-6 * low.distance(high)).max(f32::MIN_POSITIVE)));
-
-    // The front and a view from above are preferred; another side has to be clearly deeper.
-    let mut best = (f32::NEG_INFINITY, Vec3::Z);
-    for (side, liking) in [(Vec3::Z, 1.3), (Vec3::NEG_Z, 1.0), (Vec3::X, 1.0), (Vec3::NEG_X, 1.0)] {
-        for (rise, liking) in [(0.36, 1.2 * liking), (0.0, liking)] {
-            let towards_eye = (side + Vec3::Y * rise).normalize();
-            let score = (depth_seen(scene, towards_eye, center, half) + 0.02) * liking;
-            if score > best.0 {
-                best = (score, towards_eye);
-            }
-        }
-    }
-    let back = best.1;
-    let right = Vec3::Y.cross(back).normalize();
-    let up = back.cross(right);
-    let slope = (FRAMING_YFOV * 0.5).tan();
-    let corners = (0..8).map(|i| half * Vec3::new(sign(i & 1), sign(i & 2), sign(i & 4)));
-    let distance =
-        corners.map(|c| c.dot(back) + c.dot(up).abs().max(c.dot(right).abs()) / slope).fold(0.0f32, f32::max);
-    let eye = center + back * (distance * 1.03);
-    Camera { name: "framing".to_owned(), ..Camera::look_at(eye.into(), center.into(), FRAMING_YFOV) }
-}
-
-fn sign(bit: u32) -> f32 {
-    if bit == 0 { -1.0 } else { 1.0 }
-}
-
-/// Mean depth of what a parallel view from `towards_eye` sees, behind the near side of the bounding box, as a share of
-/// the box's extent along the view; 0 where nothing is seen. A small depth buffer without perspective.
-fn depth_seen(scene: &Scene, towards_eye: Vec3, center: Vec3, half: Vec3) -> f32 {
-    const SIZE: usize = 40;
-    let right = Vec3::Y.cross(towards_eye).normalize();
-    let up = towards_eye.cross(right);
-    let extent = |axis: Vec3| half.dot(axis.abs());
-    let (ex, ey, ez) = (extent(right), extent(up), extent(towards_eye));
-    let scale = Vec3::new(0.5 * SIZE as f32 / ex, 0.5 * SIZE as f32 / ey, 0.5 / ez);
-    let mut nearest = vec![f32::INFINITY; SIZE * SIZE];
-    for instance in &scene.instances {
-        let world = Mat4::from_cols_array_2d(&instance.transform);
-        let Some(mesh) = scene.meshes.get(instance.mesh) else { continue };
-        let Some(material) = scene.materials.get(mesh.material) else { continue };
-        if matches!(material.alpha_mode, AlphaMode::Blend) {
-            continue;
-        }
-        let flipped = world.determinant() < 0.0;
-        let project = |p: [f32; 3]| {
-            let p = world.transform_point3(p.into()) - center;
-            let view = Vec3::new(p.dot(right) + ex, p.dot(up) + ey, ez - p.dot(towards_eye));
-            view * scale
-        };
-        for triangle in mesh.indices.chunks_exact(3) {
-            let [a, b, c] = [0, 1, 2].map(|k| project(mesh.positions[triangle[k] as usize]));
-            let area = (b - a).truncate().perp_dot((c - a).truncate());
-            if area == 0.0 || (!material.double_sided && (area < 0.0) != flipped) {
-                continue;
-            }
-            splat(&mut nearest, SIZE, [a, b, c], area);
-        }
-    }
-    let seen: Vec<f32> = nearest.into_iter().filter(|d| d.is_finite()).collect();
-    if seen.is_empty() { 0.0 } else { seen.iter().sum::<f32>() / seen.len() as f32 }
-}
-
-/// Rasterises one triangle (x, y in pixels, z depth) at pixel centres.
-fn splat(nearest: &mut [f32], size: usize, [a, b, c]: [Vec3; 3], area: f32) {
-    let low = a.min(b).min(c).max(Vec3::ZERO);
-    let high = a.max(b).max(c).min(Vec3::splat(size as f32));
-    for y in low.y as usize..(high.y.ceil().max(0.0) as usize).min(size) {
-        for x in low.x as usize..(high.x.ceil().max(0.0) as usize).min(size) {
-            let p = Vec3::new(x as f32 + 0.5, y as f32 + 0.5, 0.0);
-            let edge = |u: Vec3, v: Vec3| (v - u).truncate().perp_dot((p - u).truncate()) / area;
-            let (wa, wb, wc) = (edge(b, c), edge(c, a), edge(a, b));
-            if wa >= 0.0 && wb >= 0.0 && wc >= 0.0 {
-                let depth = wa * a.z + wb * b.z + wc * c.z;
-                let cell = &mut nearest[y * size + x];
-                *cell = cell.min(depth);
-            }
-        }
-    }
-}
-
-/// A sun behind the left shoulder of whoever looks through `camera`.
-fn default_sun(camera: &Camera) -> Light {
+/// Where the light of a sun goes that stands behind the left shoulder of whoever looks through `camera`.
+fn over_the_shoulder(camera: &Camera) -> Vec3 {
     let flat = |column: usize| {
         let [x, _, z, _] = camera.transform[column];
         Vec3::new(x, 0.0, z).try_normalize()
     };
     let right = flat(0).unwrap_or(Vec3::X);
     let back = flat(2).unwrap_or(Vec3::Z);
-    let towards_sun = (right * -0.45 + Vec3::Y * 0.9 + back * 0.8).normalize();
-    let direction = (-towards_sun).into();
-    Light {
-        name: "default sun".to_owned(),
-        color: [1.0; 3],
-        kind: LightKind::Directional { direction, irradiance: DEFAULT_SUN, angle: SUN_ANGLE },
-        stands_in: false,
-    }
+    -(right * -0.45 + Vec3::Y * 0.9 + back * 0.8).normalize()
 }
 
 /// What a glowing instance amounts to.
@@ -240,9 +187,26 @@ fn lights(scene: &Scene, mut emitters: Vec<Emitter>) -> Vec<Light> {
 
 /// Everything that glows.
 fn emitters(scene: &Scene) -> Vec<Emitter> {
-    let radiance = |m: &Material| if m.unlit { Vec3::ZERO } else { Vec3::from(m.emission()) * mean_emission(scene, m) };
+    let radiance = |m: &Material| {
+        let glows = !m.unlit && m.emission() != [0.0; 3];
+        if glows { Vec3::from(m.emission()) * mean_emission(scene, m) * coverage(scene, m) } else { Vec3::ZERO }
+    };
     let radiances: Vec<Vec3> = scene.materials.iter().map(radiance).collect();
     scene.instances.iter().filter_map(|i| emitter(scene, i, &radiances)).collect()
+}
+
+/// Share of a surface that is there, on average: a beam of light that covers 3 % of what is behind it sends 3 % of its
+/// glow.
+fn coverage(scene: &Scene, material: &Material) -> f32 {
+    if material.alpha_mode == AlphaMode::Opaque {
+        return 1.0;
+    }
+    let mean = |image: &super::Image| {
+        let sum: u64 = image.rgba.iter().skip(3).step_by(4).map(|a| u64::from(*a)).sum();
+        sum as f32 / (255.0 * (image.rgba.len() / 4).max(1) as f32)
+    };
+    let texture = material.base_color_texture.and_then(|t| scene.images.get(t.image)).map_or(1.0, mean);
+    (material.base_color[3] * texture).clamp(0.0, 1.0)
 }
 
 /// `radiances`: mean of each material's emission.

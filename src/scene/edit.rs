@@ -2,18 +2,56 @@
 //!
 //! A light: `INDEX key=value …` with the keys `color`, `strength` (W/m² of a sun, W/sr of other
 //! lights), `direction`, `position` and `size` (angle of a sun in radians, radius of other lights
-//! in metres). An object: `INDEX x,y,z`, metres by which it is moved from where the file has it.
+//! in metres). With `kind=sun`, `point` or `spot` and the number after the last one, a light is
+//! added. An object: `INDEX x,y,z`, metres by which it is moved from where the file has it.
 //! Numbers are written so that they read back bit for bit.
 
-use super::{Light, LightKind, Scene};
+use super::{Light, LightKind, SUN_ANGLE, Scene};
 use std::{fmt, str::FromStr};
 use thiserror::Error;
+
+/// What a light that is added is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NewLight {
+    /// A sun from above, 1 W/m².
+    Sun,
+    /// A ball of 2 cm at the origin, 1 W/sr.
+    Point,
+    /// The same, into a cone of 30° straight down that fades from 20° on.
+    Spot,
+}
+
+impl NewLight {
+    /// All of them.
+    pub const ALL: [NewLight; 3] = [NewLight::Sun, NewLight::Point, NewLight::Spot];
+
+    /// The word for it.
+    pub fn name(self) -> &'static str {
+        ["sun", "point", "spot"][self as usize]
+    }
+
+    /// The light, to be changed by the rest of an edit.
+    fn light(self) -> Light {
+        let (position, direction, intensity, radius, range) = ([0.0; 3], [0.0, -1.0, 0.0], 1.0, 0.02, None);
+        let kind = match self {
+            NewLight::Sun => LightKind::Directional { direction, irradiance: 1.0, angle: SUN_ANGLE },
+            NewLight::Point => LightKind::Point { position, intensity, radius, range },
+            NewLight::Spot => {
+                let (inner_angle, outer_angle) = (20f32.to_radians(), 30f32.to_radians());
+                LightKind::Spot { position, direction, intensity, radius, range, inner_angle, outer_angle }
+            }
+        };
+        Light { name: "added".into(), ..kind.into() }
+    }
+}
 
 /// A light as it is after the change.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LightEdit {
     /// Index into [`Scene::lights`].
     pub light: usize,
+    /// It is added, as the last one.
+    pub kind: Option<NewLight>,
     /// Linear tint.
     pub color: Option<[f32; 3]>,
     /// W/m² (sun) or W/sr.
@@ -51,12 +89,23 @@ pub enum EditError {
 }
 
 impl LightEdit {
+    /// What has to be said to add `light` as number `index`, which is as [`NewLight`] has it but for what can be changed.
+    pub fn added(index: usize, light: &Light) -> Self {
+        let kind = match light.kind {
+            LightKind::Directional { .. } => NewLight::Sun,
+            LightKind::Point { .. } => NewLight::Point,
+            LightKind::Spot { .. } => NewLight::Spot,
+        };
+        Self { kind: Some(kind), ..Self::of(index, light) }
+    }
+
     /// What has to be said of light number `light` to turn `from` into `to`, which is of the same
     /// kind; `None` for nothing.
     pub fn between(light: usize, from: &Light, to: &Light) -> Option<Self> {
         let (a, b) = (Self::of(light, from), Self::of(light, to));
         let edit = Self {
             light,
+            kind: None,
             color: b.color.filter(|_| a.color != b.color),
             strength: b.strength.filter(|_| a.strength != b.strength),
             direction: b.direction.filter(|_| a.direction != b.direction),
@@ -91,6 +140,14 @@ impl LightEdit {
     /// # Errors
     /// No such light, or it has no such property; then nothing has changed.
     pub fn apply(&self, scene: &mut Scene) -> Result<(), EditError> {
+        if let Some(kind) = self.kind.filter(|_| self.light == scene.lights.len()) {
+            scene.lights.push(kind.light());
+            let done = Self { kind: None, ..self.clone() }.apply(scene);
+            if done.is_err() {
+                scene.lights.pop();
+            }
+            return done;
+        }
         let count = scene.lights.len();
         let light =
             scene.lights.get_mut(self.light).ok_or(EditError::Missing { what: "light", index: self.light, count })?;
@@ -149,6 +206,7 @@ impl fmt::Display for LightEdit {
         write!(f, "{}", self.light)?;
         let three = |v: [f32; 3]| format!("{},{},{}", v[0], v[1], v[2]);
         let words = [
+            ("kind", self.kind.map(|k| k.name().to_owned())),
             ("color", self.color.map(three)),
             ("strength", self.strength.map(|v| v.to_string())),
             ("direction", self.direction.map(three)),
@@ -195,6 +253,10 @@ impl FromStr for LightEdit {
             let (key, value) = word.split_once('=').ok_or_else(|| wrong("must be written as key=value"))?;
             let not_negative = |v: f32| if v < 0.0 { Err(wrong("must not be negative")) } else { Ok(v) };
             match key {
+                "kind" => {
+                    let kind = NewLight::ALL.into_iter().find(|k| k.name() == value);
+                    edit.kind = Some(kind.ok_or_else(|| wrong("is no kind; there are sun, point and spot"))?);
+                }
                 "color" => {
                     let color = three(text, value)?;
                     color.into_iter().try_for_each(|v| not_negative(v).map(|_| ()))?;
@@ -210,7 +272,7 @@ impl FromStr for LightEdit {
                     edit.direction = Some(direction);
                 }
                 "position" => edit.position = Some(three(text, value)?),
-                _ => return Err(wrong("is unknown; there are color, strength, direction, position and size")),
+                _ => return Err(wrong("is unknown; there are kind, color, strength, direction, position and size")),
             }
         }
         Ok(edit)
@@ -258,12 +320,30 @@ mod tests {
     }
 
     #[test]
+    fn lights_are_added_at_the_end() {
+        let mut scene = Scene { lights: vec![sun()], ..Scene::default() };
+        let edit: LightEdit = "1 kind=point position=1,2,3 strength=4".parse().unwrap();
+        edit.apply(&mut scene).unwrap();
+        let LightKind::Point { position, intensity, .. } = scene.lights[1].kind else { panic!("{:?}", scene.lights) };
+        assert_eq!((position, intensity), ([1.0, 2.0, 3.0], 4.0));
+        let again: LightEdit = LightEdit::added(1, &scene.lights[1]).to_string().parse().unwrap();
+        let mut other = Scene { lights: vec![sun()], ..Scene::default() };
+        again.apply(&mut other).unwrap();
+        assert_eq!(other.lights, scene.lights);
+        // Not with a gap, nor with what such a light does not have; then nothing has changed.
+        assert!("7 kind=sun".parse::<LightEdit>().unwrap().apply(&mut scene).is_err());
+        assert!("2 kind=sun position=1,2,3".parse::<LightEdit>().unwrap().apply(&mut scene).is_err());
+        assert_eq!(scene.lights.len(), 2);
+    }
+
+    #[test]
     fn bad_words_are_named() {
         for (text, word) in [
             ("x strength=1", "x"),
             ("0 strength", "strength"),
             ("0 strength=-1", "strength=-1"),
             ("0 glow=1", "glow=1"),
+            ("1 kind=disc", "kind=disc"),
             ("0 position=1,2", "1,2"),
             ("0 direction=0,0,0", "direction=0,0,0"),
             ("0 size=nan", "nan"),

@@ -70,6 +70,12 @@ impl Environment {
         Ok(Self { radiance: image.mean(), image: Some(Arc::new(image)) })
     }
 
+    /// The same turned about the vertical by `degrees`, the way from +X to +Z.
+    pub fn turned(&self, degrees: f32) -> Self {
+        let image = self.image.as_ref().map(|i| Arc::new(i.turned(degrees / 360.0)));
+        Self { image: if degrees == 0.0 { self.image.clone() } else { image }, ..*self }
+    }
+
     /// Reads a Radiance HDR or an EXR picture. Single texels that no light can have are mended,
     /// which is told in a sentence: overflown ones get the largest radiance that there is, negative
     /// ones and such that are no numbers none.
@@ -147,6 +153,23 @@ impl EnvironmentImage {
         sum.map(|s| s as f32)
     }
 
+    /// The same turned about the vertical by `turns` whole turns, the way from +X to +Z; columns in between are
+    /// interpolated.
+    pub fn turned(&self, turns: f32) -> Self {
+        let width = self.width as usize;
+        let shift = turns.rem_euclid(1.0) * self.width as f32;
+        let (whole, part) = (shift as usize, shift.fract());
+        let mut rgb = Vec::with_capacity(self.rgb.len());
+        for row in self.rgb.chunks_exact(3 * width) {
+            for x in 0..width {
+                let from = 3 * ((x + width - whole % width) % width);
+                let before = 3 * ((x + 2 * width - whole % width - 1) % width);
+                rgb.extend((0..3).map(|c| row[from + c] * (1.0 - part) + row[before + c] * part));
+            }
+        }
+        Self { name: self.name.clone(), rgb, ..*self }
+    }
+
     /// Radiance from `direction` (unit vector, away from the eye), bilinear, wrapping around and held at the poles;
     /// `shaders/lib/environment.wgsl` says the same.
     pub fn radiance(&self, direction: [f32; 3]) -> [f32; 3] {
@@ -219,6 +242,20 @@ mod tests {
         // Between the last column and the first.
         let [r, ..] = i.radiance(direction(0.0, 0.25));
         assert!((r - 1.5).abs() < 1e-4, "{r}");
+    }
+
+    #[test]
+    fn a_quarter_turn_brings_what_was_at_x_to_z() {
+        let sun = image(8, 4, |x, _| [if x == 4 { 1.0 } else { 0.0 }; 3]);
+        let quarter = sun.turned(0.25);
+        assert_eq!(quarter.rgb[3 * 6], 1.0);
+        assert_eq!(sun.turned(1.0).rgb, sun.rgb);
+        assert_eq!(sun.turned(-0.75).rgb, quarter.rgb);
+        // Half a column: half to each.
+        let between = sun.turned(1.0 / 16.0);
+        assert_eq!((between.rgb[3 * 4], between.rgb[3 * 5]), (0.5, 0.5));
+        let near = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
+        assert!(near(between.mean(), sun.mean()), "no light is lost");
     }
 
     #[test]

@@ -16,6 +16,13 @@ use super::{
     SceneError, TextureRef, Wrap,
 };
 
+/// Takes cameras, lights and surroundings away, to see what a file without them looks like.
+pub fn strip(scene: &mut Scene) {
+    scene.cameras.clear();
+    scene.lights.clear();
+    scene.environment = super::Environment::default();
+}
+
 /// Writes `scene` to `path`, whole or not at all: a temporary file beside it is renamed at the end.
 ///
 /// # Errors

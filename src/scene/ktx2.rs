@@ -14,15 +14,18 @@ pub(super) fn is_ktx2(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 
-/// Width, height and RGBA of the largest level; mip levels are made anew at upload.
+/// A decoded level: the picture's size, the level's width and height, its RGBA.
+pub(super) type Decoded = ([u32; 2], u32, u32, Vec<u8>);
+
+/// The largest level with no side above `kept_side`, or the smallest that there is; mip levels are made anew at upload.
 ///
 /// # Errors
 /// A sentence without subject. No side may exceed `most_side`, nor the decoded picture `most_bytes`.
-pub(super) fn decode(bytes: &[u8], most_side: u32, most_bytes: u64) -> Result<(u32, u32, Vec<u8>), String> {
+pub(super) fn decode(bytes: &[u8], most_side: u32, kept_side: u32, most_bytes: u64) -> Result<Decoded, String> {
     let cut_off = || format!("is a KTX2 file cut off after {} bytes", bytes.len());
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    let (Some(format), Some(width), Some(height), Some(low), Some(high)) =
-        (word(12), word(20), word(24), word(96), word(100))
+    let (Some(format), Some(width), Some(height), Some(levels), Some(low), Some(high)) =
+        (word(12), word(20), word(24), word(40), word(96), word(100))
     else {
         return Err(cut_off());
     };
@@ -32,8 +35,12 @@ pub(super) fn decode(bytes: &[u8], most_side: u32, most_bytes: u64) -> Result<(u
     if width == 0 || height == 0 {
         return Err(format!("has no pixels ({width}x{height})"));
     }
+    let size = |level: u32| [width, height].map(|n| (n >> level).max(1));
+    let levels = levels.clamp(1, 16);
+    let level = (0..levels).find(|l| size(*l)[0].max(size(*l)[1]) <= kept_side).unwrap_or(levels - 1);
+    let [w, h] = size(level);
     // In this order: the second product overflows where a side is too long.
-    if width.max(height) > most_side || u64::from(width) * u64::from(height) * 4 > most_bytes {
+    if width.max(height) > most_side || u64::from(w) * u64::from(h) * 4 > most_bytes {
         return Err(format!("is {width}x{height}; no side may exceed {most_side} and no picture {most_bytes} bytes"));
     }
     // What a level says that it unpacks to is taken at its word by the decoder.
@@ -48,8 +55,8 @@ pub(super) fn decode(bytes: &[u8], most_side: u32, most_bytes: u64) -> Result<(u
     if texture.layer_count() > 1 || texture.face_count() > 1 {
         return Err("is an array or a cube; a material's texture has one picture".to_owned());
     }
-    let rgba = texture.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).map_err(problem)?;
-    Ok((width, height, rgba))
+    let rgba = texture.transcode(level, TargetFormat::Rgba32, DecodeFlags::NONE).map_err(problem)?;
+    Ok(([width, height], w, h, rgba))
 }
 
 /// What the decoder says, which has no sentences of its own.

@@ -30,6 +30,7 @@ pub mod home;
 mod ktx2;
 #[cfg(feature = "io")]
 mod load;
+pub mod look;
 pub(crate) mod mips;
 #[cfg(feature = "io")]
 pub mod obj;
@@ -44,6 +45,7 @@ pub mod shapes;
 pub mod sound;
 #[cfg(feature = "io")]
 mod texture;
+pub mod triangles;
 
 pub use environment::Environment;
 #[cfg(feature = "io")]
@@ -80,6 +82,9 @@ pub struct Scene {
     pub rig: Option<rig::Rig>,
     /// The sun and the sky are those that the loader adds where a file has no light; see [`Scene::surround`].
     pub default_light: bool,
+    /// The file has no lights, only glow if anything, so nobody knows how bright pictures of it are meant to be: they
+    /// are exposed by measure unless somebody says otherwise.
+    pub lightless: bool,
     /// What was mended or left out while loading, one plain sentence each, naming the file and place.
     pub warnings: Vec<String>,
 }

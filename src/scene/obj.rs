@@ -228,11 +228,19 @@ impl Textures<'_> {
                 texture::room(&scene.images, texture::MAX_TOTAL)?;
                 texture::decode(&name, &bytes, usage)
             });
-            let image = decoded.unwrap_or_else(|problem| {
-                let what = format!("texture '{name}': {problem}; a checker stands in for it");
-                scene.warnings.push(format!("{}: {what}", self.path.display()));
-                texture::stand_in(&name, usage)
-            });
+            let mut warn = |what: String| {
+                scene.warnings.push(format!("{}: texture '{name}': {what}", self.path.display()));
+            };
+            let image = match decoded {
+                Ok((image, told)) => {
+                    told.into_iter().for_each(warn);
+                    image
+                }
+                Err(problem) => {
+                    warn(format!("{problem}; a checker stands in for it"));
+                    texture::stand_in(&name, usage)
+                }
+            };
             scene.images.push(image);
             scene.images.len() - 1
         });

@@ -2,7 +2,9 @@
 
 use std::io::Cursor;
 
-use super::{ColorSpace, Image, ktx2};
+use super::{ColorSpace, Image, ktx2, mips::Level};
+use image::DynamicImage;
+use std::borrow::Cow;
 
 /// What a texture is used for; decides how its bytes are read and what stands in for it when it is broken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -23,8 +25,12 @@ impl Use {
     }
 }
 
-/// No side of a texture may be longer; WebGPU grants 8192 by default and larger ones are scaled at upload or refused.
+/// No side of a texture may be longer.
 const MAX_SIDE: u32 = 16_384;
+
+/// Larger ones are halved as they are read: WebGPU grants no more by default, and a picture of 16,384² would keep a
+/// gigabyte.
+const KEPT_SIDE: u32 = 8192;
 
 /// Bytes of all decoded images of a scene together: thousands of small files can hold large pictures.
 pub(crate) const MAX_TOTAL: u64 = 4 << 30;
@@ -38,22 +44,38 @@ pub(crate) fn room(images: &[Image], most: u64) -> Result<(), String> {
     if taken < most { Ok(()) } else { Err(format!("is left out: the scene's images already take {taken} bytes")) }
 }
 
-/// No texture may need more to be decoded, as the `image` crate has it.
-const MAX_DECODED: u64 = 512 << 20;
+/// No texture may need more to be decoded, as the `image` crate has it: 16,384² pixels of four bytes, and what a
+/// decoder keeps beside them.
+const MAX_DECODED: u64 = (1 << 30) + (64 << 20);
 
-/// Decodes PNG, JPEG, WebP, BMP, TGA, HDR or KTX2 bytes (told apart by content, then by the name's ending).
+/// Nor may the level of a KTX2 file that is kept: a few bytes can claim to be any of them.
+const MAX_TRANSCODED: u64 = 512 << 20;
+
+/// Decodes PNG, JPEG, WebP, BMP, TGA, HDR or KTX2 bytes (told apart by content, then by the name's ending). What is
+/// larger than [`KEPT_SIDE`] is halved until it is not, and a sentence without subject tells it.
 ///
 /// # Errors
 /// A sentence without subject, such as "the file is empty (0 bytes)".
-pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<Image, String> {
+pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<(Image, Option<String>), String> {
     if bytes.is_empty() {
         return Err("the file is empty (0 bytes)".to_owned());
     }
-    let image =
-        |width, height, rgba| Image { name: name.to_owned(), width, height, rgba, color_space: usage.color_space() };
+    let color_space = usage.color_space();
+    let kept = |[from_width, from_height]: [u32; 2], mut level: Level<'_>| {
+        while level.width.max(level.height) > KEPT_SIDE {
+            level = level.halved(color_space);
+        }
+        let Level { width, height, rgba } = level;
+        let told = (width != from_width || height != from_height).then(|| {
+            format!(
+                "is {from_width}x{from_height}; shown at {width}x{height}, as no side of more than {KEPT_SIDE} is kept"
+            )
+        });
+        (Image { name: name.to_owned(), width, height, rgba: rgba.into_owned(), color_space }, told)
+    };
     if ktx2::is_ktx2(bytes) {
-        let (width, height, rgba) = ktx2::decode(bytes, MAX_SIDE, MAX_DECODED)?;
-        return Ok(image(width, height, rgba));
+        let (size, width, height, rgba) = ktx2::decode(bytes, MAX_SIDE, KEPT_SIDE, MAX_TRANSCODED)?;
+        return Ok(kept(size, Level { width, height, rgba: Cow::Owned(rgba) }));
     }
     let mut reader = image::ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
@@ -68,12 +90,29 @@ pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<Image, Stri
     limits.max_alloc = Some(MAX_DECODED);
     reader.limits(limits);
     let decoded = reader.decode().map_err(|e| format!("cannot be decoded: {e}"))?;
-    let rgba = decoded.into_rgba8();
-    let (width, height) = rgba.dimensions();
+    let (width, height) = (decoded.width(), decoded.height());
     if width == 0 || height == 0 {
         return Err(format!("has no pixels ({width}x{height})"));
     }
-    Ok(image(width, height, rgba.into_raw()))
+    let level = if width.max(height) > KEPT_SIDE {
+        halved(&decoded, color_space)
+    } else {
+        Level { width, height, rgba: Cow::Owned(decoded.into_rgba8().into_raw()) }
+    };
+    Ok(kept([width, height], level))
+}
+
+/// Half of a large picture, two rows at a time, so that it never lies in memory twice.
+fn halved(image: &DynamicImage, space: ColorSpace) -> Level<'static> {
+    let (width, height) = ((image.width() / 2).max(1), (image.height() / 2).max(1));
+    let mut rgba = Vec::with_capacity(width as usize * height as usize * 4);
+    for y in 0..height {
+        let rows = image.crop_imm(0, 2 * y, image.width(), 2.min(image.height()));
+        let (w, h) = (rows.width(), rows.height());
+        let two = Level { width: w, height: h, rgba: Cow::Owned(rows.into_rgba8().into_raw()) };
+        rgba.extend_from_slice(&two.halved(space).rgba);
+    }
+    Level { width, height, rgba: Cow::Owned(rgba) }
 }
 
 /// An 8×8 checker that nobody overlooks: magenta and black for colours, smooth and rough for data, tilted to the left
@@ -121,6 +160,24 @@ mod tests {
         assert!(room(&images, 513).is_ok());
         let told = room(&images, 512).unwrap_err();
         assert!(told.contains("512 bytes"), "{told}");
+    }
+
+    #[test]
+    fn what_is_too_large_is_halved_and_told() {
+        // 16,384 columns of black and white: half of the light.
+        let mut picture = image::RgbImage::new(16_384, 3);
+        picture.enumerate_pixels_mut().for_each(|(x, _, p)| p.0 = [255 * (x % 2) as u8; 3]);
+        let mut bytes = Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        let (halved, told) = decode("wide.png", bytes.get_ref(), Use::Color).unwrap();
+        assert_eq!((halved.width, halved.height), (8192, 1));
+        assert!(told.unwrap().contains("is 16384x3; shown at 8192x1"));
+        assert!(halved.rgba.chunks_exact(4).all(|p| p == [188, 188, 188, 255]));
+        // Negative control: at the limit it stays as it is.
+        let mut bytes = Cursor::new(Vec::new());
+        image::RgbImage::new(8192, 1).write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        let (kept, told) = decode("fits.png", bytes.get_ref(), Use::Color).unwrap();
+        assert_eq!((kept.width, told), (8192, None));
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! rows of the world-from-object matrix), a light 64, a material 256.
 
 mod closed;
+mod compress;
 mod deform;
 mod environment;
 mod light;
@@ -19,6 +20,7 @@ pub(crate) use light::fits_one_map;
 pub use light::{CANDIDATES, LightGpu};
 pub use material::{MaterialGpu, TextureUse, material_layout};
 pub use mesh::{AttributeVertex, Bounds, Draw, Rows, Slot, attribute_layouts, motion_layouts, position_layouts};
+pub use texture::{TextureBytes, TextureMemory};
 
 use super::deform::pose_of;
 use super::{AlphaMode, Environment, Light, Scene};
@@ -133,23 +135,37 @@ pub struct SceneGpu {
     pose: Vec<f32>,
     /// What `instances` holds, with the index of each one's instance in the scene.
     placed: Vec<(u32, Rows)>,
+    textures: TextureBytes,
     bytes: u64,
 }
 
 impl SceneGpu {
     /// Uploads `scene`. Images larger than the device allows are halved until they fit, with a warning.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Self, UploadError> {
+        Self::with_textures(device, queue, scene, TextureMemory::Auto)
+    }
+
+    /// As [`SceneGpu::new`], with textures whole or in blocks.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn with_textures(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        scene: &Scene,
+        memory: TextureMemory,
+    ) -> Result<Self, UploadError> {
         let mut warnings = Vec::new();
         let veils = veil::veils(scene);
         let geometry = mesh::upload(device, queue, scene, &veils)?;
         let shapes = Shapes::new(device, queue, scene)?;
-        let textures = texture::upload(device, queue, scene, &mut warnings)?;
+        let textures = texture::upload(device, queue, scene, memory, &mut warnings)?;
         let materials = material::upload(device, queue, (scene, &veils), &textures)?;
         let sky = environment::upload(device, queue, &scene.environment, &mut warnings)?;
         let lights: Vec<Light> = scene.lights.iter().chain(&sky.sun).cloned().collect();
         let list = LightGpu::list(&lights);
         let light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &list);
-        let bytes = sky.bytes + geometry.bytes + textures.bytes + materials.bytes + light_buffer.size();
+        let bytes = sky.bytes + geometry.bytes + textures.bytes.kept + materials.bytes + light_buffer.size();
         let bytes = bytes + shapes.as_ref().map_or(0, Shapes::bytes);
         for warning in &warnings {
             tracing::warn!("{warning}");
@@ -179,6 +195,7 @@ impl SceneGpu {
             no_rays: None,
             placed: geometry.placed,
             warnings,
+            textures: textures.bytes,
             bytes,
         })
     }
@@ -295,6 +312,11 @@ impl SceneGpu {
     /// What was bound of this scene is bound anew.
     fn renew(&mut self) {
         self.id = NEXT.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Bytes of the materials' textures, before and after they were compressed; they are part of [`SceneGpu::bytes`].
+    pub fn texture_bytes(&self) -> TextureBytes {
+        self.textures
     }
 
     /// Bytes of all buffers and textures.

@@ -23,6 +23,7 @@ pub fn of_scene(scene: &Scene) -> String {
         deforms: _,
         rig: _,
         default_light: _,
+        lightless: _,
         warnings: _,
     } = scene;
     let mut hash = Hash::default();

@@ -2,6 +2,7 @@
 
 use super::choice::Source;
 use super::state::State;
+use crate::scene::upload::TextureMemory;
 
 /// The line for the left side of the view. `output` is the file it writes, `view.png` if nobody says.
 pub fn line(state: &State, output: Option<&str>) -> String {
@@ -46,8 +47,16 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     if s.left == Source::Neural && state.half {
         flag("precision", "f16".into());
     }
+    match state.textures {
+        TextureMemory::Auto => {}
+        TextureMemory::Full => flag("textures", "full".into()),
+        TextureMemory::Compressed => flag("textures", "compressed".into()),
+    }
     if let Some(environment) = &shown.environment {
         flag("environment", environment.clone());
+        if let Some((_, turn)) = shown.sky.as_ref().filter(|(_, turn)| *turn != 0.0) {
+            flag("environment-turn", turn.to_string());
+        }
     }
     if let Some(name) = shown.variant.and_then(|n| shown.scene.variants.get(n)) {
         flag("variant", name.clone());
@@ -62,8 +71,9 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     for (object, [x, y, z]) in &shown.moved {
         flag("object", format!("{object} {x},{y},{z}"));
     }
-    if s.exposure != 0.0 {
-        flag("exposure", s.exposure.to_string());
+    // A file without light is measured unless somebody says a number.
+    if state.stops() != 0.0 || shown.scene.lightless {
+        flag("exposure", state.stops().to_string());
     }
     flag("tonemap", s.tonemap.name().into());
     words

@@ -11,7 +11,10 @@ use crate::net::{format::Weights, gpu::Tuned, plan::Precision};
 use crate::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
 use crate::render::capture::{CaptureOptions, Layer, capture_with};
 use crate::render::{Renderer, RendererOptions};
-use crate::scene::{self, Camera, Environment, Scene, upload::SceneGpu};
+use crate::scene::{
+    self, Camera, Environment, Scene,
+    upload::{SceneGpu, TextureMemory},
+};
 use crate::study::hash;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -121,6 +124,14 @@ pub struct Done {
 pub struct Handles {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
+    pub textures: TextureMemory,
+}
+
+impl Handles {
+    /// Uploads a scene.
+    pub fn upload(&self, scene: &Scene) -> Result<SceneGpu, String> {
+        SceneGpu::with_textures(&self.device, &self.queue, scene, self.textures).map_err(|e| e.to_string())
+    }
 }
 
 /// Starts `work` on a thread; `send` brings its end to the window.
@@ -158,7 +169,7 @@ pub fn scene(
         return Err("cancelled".into());
     }
     progress.stage(&format!("uploading {spec}"));
-    let gpu = SceneGpu::new(&handles.device, &handles.queue, &scene).map_err(|e| e.to_string())?;
+    let gpu = handles.upload(&scene)?;
     let fitted = if obey { fitted(&spec, &scene) } else { None };
     Ok(Product::Scene { spec, scene: Box::new(scene), gpu: Box::new(gpu), fitted })
 }
@@ -248,6 +259,7 @@ pub struct Shot {
     pub network: Network,
     pub scene: Arc<Scene>,
     pub camera: Camera,
+    pub textures: TextureMemory,
     pub size: [u32; 2],
     pub samples: u32,
     pub ev: f32,
@@ -271,9 +283,10 @@ impl Shot {
             network,
             scene: shown.scene.clone(),
             camera: state.navigator.camera(&shown.scene),
+            textures: state.textures,
             size: state.size,
             samples: if s.left == Source::Reference { s.spp } else { s.samples },
-            ev: s.exposure,
+            ev: state.stops(),
             tonemap: s.tonemap,
             metadata,
         })
@@ -292,7 +305,8 @@ pub fn capture(gpu: &crate::gpu::Gpu, shot: &Shot, progress: &Progress) -> Resul
         traced
     } else {
         let method = method(shot.source, shot.weights.as_deref(), &shot.network)?;
-        let mut scene = SceneGpu::new(&gpu.device, &gpu.queue, &shot.scene).map_err(|e| e.to_string())?;
+        let mut scene =
+            SceneGpu::with_textures(&gpu.device, &gpu.queue, &shot.scene, shot.textures).map_err(|e| e.to_string())?;
         if method.needs_rays() {
             progress.stage("building trees for rays");
             // Where they cannot be had, the method below draws.

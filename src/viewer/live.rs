@@ -128,7 +128,7 @@ struct Work {
 impl Work {
     fn run(&self, scene: Arc<Scene>, send: &dyn Fn(Report)) -> Result<(), String> {
         let stopped = || self.stop.load(Ordering::Relaxed);
-        let Handles { device, queue } = &self.handles;
+        let Handles { device, queue, .. } = &self.handles;
         let known = self.kept.0.lock().map_err(|e| e.to_string())?.clone();
         send(Report::At { stage: "compiling the path tracer", samples: 0, share: 0.0 });
         let (kernel, packed) = match known {

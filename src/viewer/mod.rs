@@ -64,6 +64,8 @@ pub struct Options {
     pub captures: Option<PathBuf>,
     /// Which adapter.
     pub gpu: GpuOptions,
+    /// How textures lie in the device's memory.
+    pub textures: crate::scene::upload::TextureMemory,
     /// How networks store their numbers.
     pub precision: Precision,
     /// What a tuner has found on a device, if somebody knows.

@@ -1,12 +1,15 @@
 //! Where the viewer's camera stands, and how hands move it. No window, no wgpu.
 
-use crate::scene::{Camera, Scene, bounds::world_bounds};
+use crate::scene::{Camera, Scene, bounds::world_bounds, look::Look};
 use glam::{Quat, Vec3};
 
 /// Steepest angle between view and horizon, radians: straight up has no left and right.
 const STEEPEST: f32 = 1.553;
 /// Radians that a drag over one point of the window turns.
 const TURN: f32 = 0.006;
+
+/// Vertical field of view of the long lens, degrees.
+const LONG: f32 = 2.0;
 
 /// Sides from which a scene can be looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -143,6 +146,21 @@ impl Navigator {
         self.moved();
     }
 
+    /// Changes between a lens of 2°, for which parallels are nearly parallel, and the usual one; what is at the target
+    /// keeps its size.
+    pub fn long_lens(&mut self) {
+        let half = |degrees: f32| (0.5 * degrees.to_radians()).tan();
+        let to = if self.is_long() { 45.0 } else { LONG };
+        let back = self.back() * (half(self.fov) / half(to));
+        (self.eye, self.fov) = (self.target + back, to);
+        self.moved();
+    }
+
+    /// Whether parallels are nearly parallel.
+    pub fn is_long(&self) -> bool {
+        self.fov <= 1.5 * LONG
+    }
+
     /// The wheel while flying.
     pub fn faster(&mut self, notches: f32) {
         self.speed = (self.speed * 1.25f32.powf(notches)).clamp(1e-3 * self.scale, 1e5 * self.scale);
@@ -160,23 +178,37 @@ impl Navigator {
         self.moved();
     }
 
-    /// All of the scene in view, from where one looks now.
+    /// All of the scene in view, from where one looks now; in a room, as much of it as one sees from inside.
     pub fn fit(&mut self, scene: &Scene, aspect: f32) {
-        self.fit_from(scene, aspect, self.back().normalize_or(Vec3::Z));
+        let back = self.back();
+        self.frame(scene, aspect, |room| if room { level(back) } else { back.normalize_or(Vec3::Z) });
     }
 
     /// All of the scene in view, from a side.
     pub fn preset(&mut self, scene: &Scene, aspect: f32, preset: Preset) {
-        self.fit_from(scene, aspect, preset.direction());
+        self.frame(scene, aspect, |_| preset.direction());
     }
 
-    fn fit_from(&mut self, scene: &Scene, aspect: f32, direction: Vec3) {
-        let (middle, radius) = sphere(scene);
-        let tangent = (0.5 * self.fov.to_radians()).tan() * aspect.clamp(0.05, 1.0);
-        let distance = radius / tangent.atan().sin().max(1e-3);
-        self.target = middle;
-        self.eye = middle + direction * distance;
-        (self.speed, self.scale) = (0.4 * radius, radius);
+    /// Frames the scene from a direction, which may depend on whether it is a room.
+    fn frame(&mut self, scene: &Scene, aspect: f32, back: impl FnOnce(bool) -> Vec3) {
+        if let Some(look) = Look::new(scene) {
+            let camera = look.from(back(look.is_interior()), self.fov.to_radians(), aspect);
+            self.stand(&look, &camera);
+        }
+    }
+
+    /// Where a scene without cameras is first seen from, in a picture of a shape.
+    pub fn first(&mut self, scene: &Scene, aspect: f32) {
+        if let Some(look) = Look::new(scene) {
+            self.stand(&look, &look.camera_for(aspect));
+        }
+    }
+
+    fn stand(&mut self, look: &Look<'_>, camera: &Camera) {
+        let (eye, forward) = (Vec3::from(camera.eye()), Vec3::from(camera.forward()));
+        (self.eye, self.target) = (eye, eye + forward * look.distance(camera));
+        self.fov = camera.yfov.to_degrees();
+        (self.speed, self.scale) = (0.2 * look.size(), 0.5 * look.size());
         self.moved();
     }
 
@@ -186,6 +218,11 @@ impl Navigator {
         let right = forward.cross(Vec3::Y).normalize_or(Vec3::X);
         [right, right.cross(forward), forward]
     }
+}
+
+/// The same direction without its rise.
+fn level(v: Vec3) -> Vec3 {
+    v.with_y(0.0).normalize_or(Vec3::Z)
 }
 
 /// Middle and radius of a sphere around the scene.
@@ -242,6 +279,26 @@ mod tests {
         n.pan(0.0, 100.0, 200.0);
         // Half the window's height is tan(22.5°)·3 metres; dragging down brings down what was above.
         assert!((n.target.y - 3.0 * 22.5f32.to_radians().tan()).abs() < 1e-4, "{}", n.target.y);
+    }
+
+    #[test]
+    fn a_long_lens_keeps_the_size_of_what_is_looked_at() {
+        let scene = scene();
+        let mut n = Navigator { target: Vec3::new(0.0, 1.0, 0.0), ..Navigator::default() };
+        let seen = |n: &Navigator, p: Vec3| {
+            let view = crate::render::View::new(&n.camera(&scene), [100, 100], [0.0; 2]);
+            let p = glam::Mat4::from_cols_array_2d(&view.clip_from_world) * p.extend(1.0);
+            p.truncate() / p.w
+        };
+        let (at, behind) = (n.target + Vec3::X, n.target + Vec3::new(1.0, 0.0, -1.0));
+        let before = [seen(&n, at), seen(&n, behind)];
+        n.long_lens();
+        let after = [seen(&n, at), seen(&n, behind)];
+        assert!((before[0].x - after[0].x).abs() < 0.01, "{before:?} {after:?}");
+        // A metre behind it, size is lost only through the usual lens.
+        assert!((after[1].x / after[0].x - 1.0).abs() < 0.02 && before[1].x / before[0].x < 0.85);
+        n.long_lens();
+        assert!((n.eye - Vec3::new(0.0, 0.0, 3.0)).length() < 1e-3 && !n.is_long());
     }
 
     #[test]

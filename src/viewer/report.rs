@@ -21,7 +21,7 @@ pub fn report(app: &App) -> Value {
             .collect();
         json!({
             "spec": shown.spec, "objects": shown.scene.instances.len(), "lights": lights,
-            "environment": shown.environment,
+            "environment": shown.environment, "added": shown.added,
             "sky": shown.scene.environment.radiance, "moved": shown.moved.len(),
             "variant": shown.variant, "variants": shown.scene.variants, "pose": shown.pose,
             "playing": app.state.animated.is_some(),
@@ -39,9 +39,9 @@ pub fn report(app: &App) -> Value {
         "view": s.view.name(), "left": s.left.name(), "right": s.right.name(), "split": s.split, "line": s.line,
         "instead": stage.and_then(|st| st.instead()).map(|(method, why)| format!("{method}: {why}")),
         "drawn": { "left": key(Side::Left), "right": key(Side::Right) },
-        "exposure": s.exposure, "tonemap": s.tonemap.name(), "samples": s.samples,
+        "exposure": app.state.stops(), "auto_exposure": app.state.auto_exposure, "tonemap": s.tonemap.name(), "samples": s.samples,
         "still": stage.map_or(0, |st| st.still()),
-        "panel": s.panel, "help": app.state.help, "dark": s.dark, "zoom": s.zoom, "measure": app.state.measure,
+        "full_screen": app.state.full_screen, "panel": s.panel, "help": app.state.help, "dark": s.dark, "zoom": s.zoom, "measure": app.state.measure,
         "feature": stage.and_then(|st| st.feature()).map(|f| f.0.to_string()),
     });
     let world = json!({

@@ -166,6 +166,7 @@ fn broken_basis_textures_get_a_checker_and_a_sentence() {
     // 16,384² texels are a gigabyte.
     let mut large = set(20, 16_384, 4);
     large[24..28].copy_from_slice(&16_384u32.to_le_bytes());
+    large[40..44].copy_from_slice(&1u32.to_le_bytes());
     told(&large, &["16384x16384"]);
     // A level that claims to unpack to an exabyte.
     told(&set(96, 1 << 60, 8), &["1152921504606846976 bytes"]);

@@ -2,6 +2,7 @@
 
 use bouncelight::scene::{
     Camera, Instance, Light, LightKind, Material, Mesh, Scene, defaults,
+    look::{self, Daylight, Look},
     shapes::{self, Shape},
 };
 use glam::{Mat4, Quat, Vec3};
@@ -25,18 +26,35 @@ fn open_box() -> Mesh {
     mesh
 }
 
+fn first(scene: &Scene) -> Camera {
+    look::first_camera(Look::new(scene).as_ref())
+}
+
 #[test]
 fn the_camera_looks_into_the_open_side() {
     for quarter in 0..4 {
         let turn = Quat::from_rotation_y(quarter as f32 * std::f32::consts::FRAC_PI_2);
         let inside = Material { double_sided: true, ..Material::default() };
         let scene = one(open_box(), inside, Mat4::from_rotation_translation(turn, Vec3::new(7.0, -3.0, 1.0)));
-        let forward = Vec3::from(defaults::framing_camera(&scene).forward());
-        assert!(forward.dot(turn * Vec3::NEG_Z) > 0.9, "turned {quarter} times: {forward}");
+        let forward = Vec3::from(first(&scene).forward());
+        assert!(forward.dot(turn * Vec3::NEG_Z) > 0.7, "turned {quarter} times: {forward}");
     }
-    // Negative control: a closed cube is seen from the front, whichever way it is turned.
-    let closed = one(shapes::flat(Shape::Cube), Material::default(), Mat4::from_rotation_y(1.0));
-    assert!(defaults::framing_camera(&closed).forward()[2] < -0.8);
+    // Negative control: a closed cube is seen from the front, at an angle and from above, whichever way it is turned.
+    let closed = one(shapes::flat(Shape::Cube), Material::default(), Mat4::IDENTITY);
+    let [x, y, z] = first(&closed).forward();
+    assert!(z < -0.6 && x.abs() > 0.4 && y < -0.2, "{x} {y} {z}");
+    assert!(!Look::new(&closed).unwrap().is_interior(), "a solid body is no room");
+}
+
+/// How far out of the middle of a square picture the farthest of `points` is; 1 is its edge.
+fn reach(camera: &Camera, points: impl Iterator<Item = Vec3>) -> f32 {
+    let to_view = Mat4::from_cols_array_2d(&camera.transform).inverse();
+    let slope = (camera.yfov / 2.0).tan();
+    points.fold(0.0f32, |reach, p| {
+        let v = to_view.transform_point3(p);
+        assert!(v.z < -camera.near, "in front of the near plane");
+        reach.max(v.x.abs().max(v.y.abs()) / (-v.z * slope))
+    })
 }
 
 #[test]
@@ -47,18 +65,82 @@ fn everything_is_in_the_picture() {
         Vec3::new(100.0, 50.0, -20.0),
     );
     for shape in Shape::ALL {
-        let scene = one(shapes::flat(shape), Material::default(), stretched);
-        let camera = defaults::framing_camera(&scene);
-        let to_view = Mat4::from_cols_array_2d(&camera.transform).inverse();
-        let slope = (camera.yfov / 2.0).tan();
-        let mut widest = 0.0f32;
-        for p in &scene.meshes[0].positions {
-            let v = to_view.transform_point3(stretched.transform_point3((*p).into()));
-            assert!(v.z < -camera.near, "{}: in front of the near plane", shape.name());
-            widest = widest.max(v.x.abs().max(v.y.abs()) / (-v.z * slope));
+        for unit in [1e-3, 1.0, 1e3] {
+            let place = Mat4::from_scale(Vec3::splat(unit)) * stretched;
+            let scene = one(shapes::flat(shape), Material::default(), place);
+            let camera = first(&scene);
+            let points = scene.meshes[0].positions.iter().map(|p| place.transform_point3((*p).into()));
+            let widest = reach(&camera, points);
+            assert!(widest < 1.0 && widest > 0.9, "{} by {unit}: {widest}", shape.name());
         }
-        assert!(widest < 1.0 && widest > 0.5, "{}: {widest}", shape.name());
     }
+}
+
+#[test]
+fn what_lies_far_away_does_not_count() {
+    let ball = || one(shapes::flat(Shape::UvSphere), Material::default(), Mat4::IDENTITY);
+    let alone = first(&ball());
+    let with = |at: Vec3, size: f32| {
+        let mut scene = ball();
+        scene.meshes.push(shapes::flat(Shape::Cube));
+        let transform = Mat4::from_scale_rotation_translation(Vec3::splat(size), Quat::IDENTITY, at).to_cols_array_2d();
+        scene.instances.push(Instance { name: "far".to_owned(), mesh: 1, transform });
+        first(&scene)
+    };
+    let apart = |a: &Camera| Vec3::from(a.eye()).distance(alone.eye().into());
+    assert!(apart(&with(Vec3::new(400.0, 3.0, 0.0), 1.0)) < 1e-3, "one thing far away");
+    assert!(apart(&with(Vec3::ZERO, 500.0)) < 1e-3, "a dome");
+    // Negative control: what is near is part of it.
+    assert!(apart(&with(Vec3::new(4.0, 0.0, 0.0), 1.0)) > 1.0);
+}
+
+/// A room of 6 m by 2.7 m by 4 m between slabs; `window` leaves the upper half of the +X wall open.
+fn room(window: bool) -> Scene {
+    let mut scene = one(shapes::flat(Shape::Cube), Material::default(), Mat4::IDENTITY);
+    scene.instances.clear();
+    let mut slab = |low: [f32; 3], high: [f32; 3]| {
+        let (low, high) = (Vec3::from(low), Vec3::from(high));
+        let place = Mat4::from_translation(0.5 * (low + high)) * Mat4::from_scale(0.5 * (high - low));
+        scene.instances.push(Instance { name: "slab".to_owned(), mesh: 0, transform: place.to_cols_array_2d() });
+    };
+    slab([-0.3, -0.3, -0.3], [6.3, 0.0, 4.3]);
+    slab([-0.3, 2.7, -0.3], [6.3, 3.0, 4.3]);
+    slab([-0.3, 0.0, -0.3], [6.3, 2.7, 0.0]);
+    slab([-0.3, 0.0, 4.0], [6.3, 2.7, 4.3]);
+    slab([-0.3, 0.0, 0.0], [0.0, 2.7, 4.0]);
+    slab([6.0, 0.0, 0.0], [6.3, if window { 1.2 } else { 2.7 }, 4.0]);
+    slab([2.0, 0.0, 1.5], [3.0, 0.7, 2.5]);
+    scene
+}
+
+#[test]
+fn in_a_room_one_stands_in_it() {
+    let within = |p: [f32; 3]| (0.2..5.8).contains(&p[0]) && (0.2..2.5).contains(&p[1]) && (0.2..3.8).contains(&p[2]);
+    for window in [true, false] {
+        let scene = room(window);
+        let look = Look::new(&scene).unwrap();
+        assert!(look.is_interior());
+        let camera = look.camera();
+        assert!(within(camera.eye()) && (1.0..2.0).contains(&camera.eye()[1]), "{:?}", camera.eye());
+        // Whichever side one wishes to see, one stays inside.
+        for back in [Vec3::X, Vec3::Z, Vec3::NEG_X] {
+            let camera = look.from(back, 0.8, 1.5);
+            assert!(within(camera.eye()) && Vec3::from(camera.forward()).dot(-back) > 0.9, "{back}");
+        }
+        match look.daylight(&camera) {
+            Daylight::Openings(Some(sun)) => assert!(window && sun.x > 0.5 && sun.y > 0.2, "{sun}"),
+            Daylight::Lamp { position, height } => {
+                assert!(!window && within(position.into()) && (1.5..2.7).contains(&height), "{position} {height}");
+            }
+            other => panic!("{window}: {other:?}"),
+        }
+        let lit = completed(room(window)).1;
+        assert!(lit.lightless && lit.default_light && lit.warnings[0].contains("room"), "{:?}", lit.warnings);
+    }
+    // Negative control: through a camera outside it is lit as any other thing.
+    let scene = room(true);
+    let outside = Camera::look_at([12.0, 4.0, 9.0], [3.0, 1.0, 2.0], 0.8);
+    assert_eq!(Look::new(&scene).unwrap().daylight(&outside), Daylight::Outdoors);
 }
 
 #[test]

@@ -33,7 +33,7 @@ fn methods_weights_and_views_switch_at_run_time() {
         { "wait": "loaded" }, { "wait": "idle" },
         // The frontier: a dot for each method that was drawn, and a click on it chooses the method.
         { "key": "M" }, { "wait": "idle" }, { "expect": { "/left": "ssgi" } },
-        { "click": "Times" }, { "wait": "idle" }, { "click": "Speed and accuracy" }, { "wait": 30 }, { "wait": "idle" },
+        { "click": "Speed and accuracy" }, { "wait": 30 }, { "wait": "idle" },
         { "expect": { "/places/dot ssgi/0": { "min": 300.0 }, "/places/dot ambient/0": { "min": 300.0 } } },
         { "screenshot": "frontier.png" },
         { "click": "dot ambient" }, { "wait": "idle" }, { "expect": { "/left": "ambient", "/drawn/left": "ambient" } },

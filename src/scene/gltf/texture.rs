@@ -88,10 +88,17 @@ impl Loader<'_> {
                 (label, decoded)
             }
         };
-        decoded.unwrap_or_else(|problem| {
-            self.warn(&format!("texture '{label}'"), &format!("{problem}; a checker stands in for it"));
-            texture::stand_in(&label, usage)
-        })
+        let place = format!("texture '{label}'");
+        match decoded {
+            Ok((image, told)) => {
+                told.into_iter().for_each(|told| self.warn(&place, &told));
+                image
+            }
+            Err(problem) => {
+                self.warn(&place, &format!("{problem}; a checker stands in for it"));
+                texture::stand_in(&label, usage)
+            }
+        }
     }
 }
 

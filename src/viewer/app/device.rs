@@ -55,7 +55,7 @@ impl App {
         let precision = self.options.precision;
         self.network = jobs::Network { precision, tuned, ..self.network.clone() };
         self.state.half = self.options.precision == crate::net::plan::Precision::F16;
-        self.stage = Some(Stage::new(gpu, screen.format()));
+        self.stage = Some(Stage::new(gpu, screen.format(), self.options.textures));
         self.screen = Some(screen);
         self.redraw = true;
         Ok(())

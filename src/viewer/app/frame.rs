@@ -197,7 +197,34 @@ impl App {
         if let Err(e) = stage.update_feature(&self.state, &camera) {
             self.state.tell(e, true);
         }
+        self.expose();
         drawn
+    }
+
+    /// Measures the exposure, if that is wished: in the first frame of a scene, and again at rest whenever something else
+    /// than the camera has changed meanwhile.
+    fn expose(&mut self) {
+        let (Some(stage), Some(shown)) = (&self.stage, &self.state.shown) else { return };
+        let first = self.state.measured.is_none() && stage.still() > 0;
+        let now = (self.state.version, stage.key(0), stage.wants_rays());
+        let rests = !stage.is_converging(&self.state) && self.meter.exposed != Some(now);
+        if !self.state.auto_exposure || !(first || rests) || stage.key(0).is_none() {
+            return;
+        }
+        let sky = &shown.scene.environment;
+        let background = sky.image.is_none().then_some(sky.radiance);
+        match stage.read_left() {
+            Ok(Some(rgb)) => {
+                if rests {
+                    self.meter.exposed = Some(now);
+                }
+                let stops = crate::render::exposure::measure(&rgb, 3, background);
+                self.redraw |= self.state.measured != Some(stops);
+                self.state.measured = Some(stops);
+            }
+            Ok(None) => {}
+            Err(e) => self.state.tell(e.to_string(), true),
+        }
     }
 
     /// When the next picture is due.
@@ -224,6 +251,12 @@ impl App {
                         screen.input.set_clipboard_text(text.clone());
                     }
                     self.copied = Some(text);
+                }
+                Request::FullScreen(full) => {
+                    if let Some(screen) = &self.screen {
+                        let whole = full.then_some(winit::window::Fullscreen::Borderless(None));
+                        screen.window.set_fullscreen(whole);
+                    }
                 }
                 request => self.start(request),
             }

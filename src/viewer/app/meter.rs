@@ -2,6 +2,7 @@
 
 use super::App;
 use crate::gpu::timing;
+use crate::viewer::jobs::Key;
 use crate::viewer::stats::Times;
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -20,6 +21,8 @@ pub struct Meter {
     pub memory: Vec<(String, u64)>,
     /// Median GPU time of sources drawn in this session, ms.
     pub measured: BTreeMap<usize, f64>,
+    /// For which state of the scene the exposure was measured at rest.
+    pub exposed: Option<(u64, Option<Key>, bool)>,
     /// Mean change of display values between frames.
     pub flicker: Option<f64>,
 }

@@ -39,6 +39,8 @@ pub enum Event {
     Judged(u64, Result<Verdict, String>),
     DeviceLost(u32, String),
     GpuError(String),
+    /// The file that somebody chose in the dialog, if any.
+    Chosen(Option<PathBuf>),
 }
 
 /// Time between two looks for GPU times that have not arrived.
@@ -124,6 +126,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
     let event_loop =
         EventLoop::<Event>::with_user_event().build().map_err(|e| ViewError::NoDisplay(window_reason(&e)))?;
     let mut state = State::new(settings);
+    state.textures = options.textures;
     if let Some(text) = trouble {
         state.tell(text, true);
     }
@@ -253,6 +256,7 @@ impl ApplicationHandler<Event> for App {
                 }
             }
             Event::DeviceLost(generation, message) => self.hear_loss(generation, message, event_loop),
+            Event::Chosen(path) => self.hear_choice(path),
             Event::GpuError(text) => {
                 self.state.tell(format!("the GPU driver refused a command: {text}"), true);
                 self.redraw = true;
@@ -270,7 +274,8 @@ impl ApplicationHandler<Event> for App {
         let window = screen.window.clone();
         let response = screen.input.on_window_event(&window, &event);
         match event {
-            WindowEvent::CloseRequested => self.quit(event_loop),
+            // Destroyed: somebody else has closed it, and there is nothing left to draw into.
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => self.quit(event_loop),
             WindowEvent::DroppedFile(path) => {
                 self.state.apply(Action::Open(path.display().to_string()));
                 self.redraw = true;

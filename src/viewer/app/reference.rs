@@ -138,7 +138,7 @@ impl App {
         let read = |side| stage.read_side(&self.state, side).unwrap_or_default();
         let (Some(left), Some(right)) = (read(Side::Left), read(Side::Right)) else { return };
         let s = &self.state.settings;
-        let pair = Pair { size: self.state.size, left, right, ev: s.exposure, tonemap: s.tonemap };
+        let pair = Pair { size: self.state.size, left, right, ev: self.state.stops(), tonemap: s.tonemap };
         self.tracing.judged += 1;
         let (number, proxy) = (self.tracing.judged, self.proxy.clone());
         self.tracing.judging = Some(number);

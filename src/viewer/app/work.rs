@@ -6,7 +6,7 @@ use crate::image_io;
 use crate::scene::path::CameraPath;
 use crate::viewer::choice::Source;
 use crate::viewer::jobs::{self, Done, Kind, Product, Shot};
-use crate::viewer::state::{Request, Stale};
+use crate::viewer::state::{Action, Request, Stale};
 use crate::viewer::stats::Track;
 use crate::viewer::watch::Changed;
 use std::path::PathBuf;
@@ -70,8 +70,7 @@ impl App {
             Request::Upload => {
                 let Some(scene) = self.state.shown.as_ref().map(|s| s.scene.clone()) else { return };
                 self.spawn("upload the scene again".into(), Kind::Scene, move |_| {
-                    let gpu = crate::scene::upload::SceneGpu::new(&handles.device, &handles.queue, &scene);
-                    Ok(Product::Uploaded(Box::new(gpu.map_err(|e| e.to_string())?)))
+                    Ok(Product::Uploaded(Box::new(handles.upload(&scene)?)))
                 });
             }
             Request::Path(path) => match CameraPath::load(&path) {
@@ -91,8 +90,45 @@ impl App {
                 };
                 self.state.tell(told.0, told.1);
             }
-            Request::Copy(_) | Request::Quit => {}
+            Request::Browse(surroundings) => self.browse(surroundings),
+            Request::Copy(_) | Request::Quit | Request::FullScreen(_) => {}
         }
+    }
+
+    /// Asks for a file by the system's dialog, which stays open beside the window. Scripts have no hands for it.
+    fn browse(&mut self, surroundings: bool) {
+        let Some(window) = self.screen.as_ref().map(|s| s.window.clone()).filter(|_| self.script.is_none()) else {
+            return;
+        };
+        let dialog = rfd::AsyncFileDialog::new().set_parent(&window);
+        let dialog = if surroundings {
+            dialog.set_title("Surroundings").add_filter("Lat-long pictures", &["hdr", "exr"])
+        } else {
+            let all = ["gltf", "glb", "obj", "hdr", "exr", "safetensors", "json"];
+            let dialog = dialog.set_title("Open").add_filter("Scenes", &all[..3]);
+            dialog.add_filter("All that can be opened", &all)
+        };
+        // Some systems want it made here, and all let it be waited for elsewhere.
+        let asked = dialog.pick_file();
+        let proxy = self.proxy.clone();
+        let wait = move || {
+            let chosen = pollster::block_on(asked).map(|file| file.path().to_owned());
+            let _ = proxy.send_event(Event::Chosen(chosen));
+        };
+        if let Err(e) = std::thread::Builder::new().name("file dialog".into()).spawn(wait) {
+            self.state.tell(format!("no thread for the file dialog: {e}"), true);
+        }
+    }
+
+    /// What the dialog gave: nothing, too, where there is neither a desktop portal nor zenity.
+    pub(super) fn hear_choice(&mut self, chosen: Option<PathBuf>) {
+        match chosen {
+            Some(path) => self.state.apply(Action::Open(path.display().to_string())),
+            None => {
+                self.state.tell("no file was chosen; on Linux the dialog needs xdg-desktop-portal or zenity", false)
+            }
+        }
+        self.redraw = true;
     }
 
     pub(super) fn spawn(

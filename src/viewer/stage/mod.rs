@@ -13,7 +13,10 @@ use super::state::{Stale, State};
 use crate::accel::SceneRays;
 use crate::gpu::{Gpu, readback, timing::Recorder};
 use crate::render::{DrawnCount, RenderError, Renderer, View as Eye, sampling};
-use crate::scene::{Camera, Scene, upload::SceneGpu};
+use crate::scene::{
+    Camera, Scene,
+    upload::{SceneGpu, TextureMemory},
+};
 use feature::Feature;
 use sides::Reference;
 use std::sync::Arc;
@@ -40,6 +43,7 @@ struct Sight {
 /// Everything on the GPU.
 pub struct Stage {
     pub gpu: Arc<Gpu>,
+    textures: TextureMemory,
     scene: Option<SceneGpu>,
     slots: [Option<Slot>; 2],
     show: ShowPass,
@@ -54,12 +58,13 @@ pub struct Stage {
 
 impl Stage {
     /// For windows of `format`.
-    pub fn new(gpu: Arc<Gpu>, format: wgpu::TextureFormat) -> Self {
+    pub fn new(gpu: Arc<Gpu>, format: wgpu::TextureFormat, textures: TextureMemory) -> Self {
         let show = ShowPass::new(&gpu.device, format);
         let sum = SumPass::new(&gpu.device, &gpu.queue);
         let flicker = FlickerPass::new(&gpu.device);
         Self {
             gpu,
+            textures,
             scene: None,
             slots: [None, None],
             show,
@@ -74,7 +79,7 @@ impl Stage {
 
     /// Device and queue for threads.
     pub fn handles(&self) -> Handles {
-        Handles { device: self.gpu.device.clone(), queue: self.gpu.queue.clone() }
+        Handles { device: self.gpu.device.clone(), queue: self.gpu.queue.clone(), textures: self.textures }
     }
 
     /// Another scene.
@@ -244,7 +249,7 @@ impl Stage {
             feature: self.feature.as_ref().map(|f| (&f.texture.view, f.range)),
             view: s.view,
             split: s.split.then_some(s.line),
-            ev: s.exposure,
+            ev: state.stops(),
             tonemap: s.tonemap,
             metres,
             origin,
@@ -261,7 +266,17 @@ impl Stage {
             rows.extend(slot.renderer.bytes().into_iter().map(|(name, bytes)| (format!("{prefix}{name}"), bytes)));
             rows.extend(slot.sums.as_ref().map(|s| (format!("{prefix}viewer.sum"), s.bytes())));
         }
-        rows.extend(self.scene.as_ref().map(|s| ("scene".into(), s.bytes())));
+        if let Some(scene) = &self.scene {
+            let textures = scene.texture_bytes();
+            rows.push(("scene".into(), scene.bytes() - textures.kept));
+            let whole = textures.full as f64 / f64::from(1 << 20);
+            let name = if textures.kept < textures.full {
+                format!("textures ({whole:.1} MiB whole)")
+            } else {
+                "textures".into()
+            };
+            rows.push((name, textures.kept));
+        }
         rows.extend(self.reference.as_ref().map(|r| ("reference".into(), r.radiance.bytes() + r.indirect.bytes())));
         rows.retain(|(_, bytes)| *bytes > 0);
         rows
@@ -273,7 +288,7 @@ impl Stage {
     /// Reading back failed.
     pub fn measure_flicker(&mut self, state: &State) -> Result<Option<f64>, readback::ReadbackError> {
         let Some(slot) = &self.slots[0] else { return Ok(None) };
-        let shown = (state.settings.exposure, state.settings.tonemap);
+        let shown = (state.stops(), state.settings.tonemap);
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         self.flicker.measure(device, queue, &slot.renderer.targets().hdr, shown, self.still > 1)
     }

@@ -1,6 +1,6 @@
 //! What stands on each side of the line: a renderer's picture or the live reference's.
 
-use super::Stage;
+use super::{Slot, Stage};
 use crate::gpu::readback;
 use crate::render::targets::Target;
 use crate::viewer::choice::{Side, Source};
@@ -97,8 +97,21 @@ impl Stage {
             _ => self.slots[0].as_ref(),
         };
         let Some(slot) = slot.filter(|_| self.still >= s.samples) else { return Ok(None) };
+        self.read(slot).map(Some)
+    }
+
+    /// Linear RGB of what the left renderer has drawn so far, read back; `None` before its first frame. Waits for the
+    /// GPU.
+    ///
+    /// # Errors
+    /// Reading back failed.
+    pub fn read_left(&self) -> Result<Option<Vec<f32>>, readback::ReadbackError> {
+        self.slots[0].as_ref().filter(|_| self.still > 0).map(|slot| self.read(slot)).transpose()
+    }
+
+    fn read(&self, slot: &Slot) -> Result<Vec<f32>, readback::ReadbackError> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
-        Ok(Some(match &slot.sums {
+        Ok(match &slot.sums {
             Some(sums) => {
                 let bytes = readback::texture(device, queue, &sums.current().texture)?;
                 let scale = 1.0 / self.still.max(1) as f32;
@@ -110,6 +123,6 @@ impl Stage {
                 let texels: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
                 texels.iter().flat_map(|p| [p[0].to_f32(), p[1].to_f32(), p[2].to_f32()]).collect()
             }
-        }))
+        })
     }
 }

@@ -1,7 +1,7 @@
 //! What can be asked of the viewer, and what the viewer asks of the world outside.
 
 use crate::render::tonemap_curve::Tonemap;
-use crate::scene::edit::LightEdit;
+use crate::scene::edit::{LightEdit, NewLight};
 use crate::viewer::choice::{Side, Source, View};
 use crate::viewer::navigate::Preset;
 use crate::viewer::state::Playback;
@@ -19,6 +19,8 @@ pub enum Action {
     Split,
     MoveSplit(f32),
     Exposure(f32),
+    /// Measures the exposure, or leaves it to the hand.
+    AutoExposure,
     Tonemap(Option<Tonemap>),
     Samples(u32),
     Help,
@@ -38,6 +40,16 @@ pub enum Action {
     Weights(Option<PathBuf>),
     Light(LightEdit),
     Sky(f32),
+    /// Turns the picture of the surroundings to this many degrees.
+    TurnSky(f32),
+    AddLight(NewLight),
+    /// A light that was added goes; one of the file's goes out.
+    RemoveLight(usize),
+    /// Asks for a file: to open, or (`true`) for the surroundings.
+    Browse(bool),
+    FullScreen,
+    /// Looks through a lens so long that parallels stay nearly parallel, or through the usual one.
+    LongLens,
     TurnSun {
         dx: f32,
         dy: f32,
@@ -81,6 +93,9 @@ pub enum Request {
     /// Writes the camera path that was just recorded.
     SavePath,
     Copy(String),
+    /// Shows the system's file dialog.
+    Browse(bool),
+    FullScreen(bool),
     Cancel,
     Quit,
 }

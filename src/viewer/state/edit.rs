@@ -3,7 +3,7 @@
 use super::{Request, Stale, State};
 use crate::scene::{
     Environment,
-    edit::{LightEdit, ObjectEdit},
+    edit::{LightEdit, NewLight, ObjectEdit},
 };
 use glam::Vec3;
 use std::sync::Arc;
@@ -13,20 +13,82 @@ impl State {
     /// Takes a picture of the surroundings from `path`.
     pub fn surround(&mut self, path: &std::path::Path, environment: Environment) {
         let Some(shown) = &mut self.shown else { return };
-        Arc::make_mut(&mut shown.scene).surround(environment);
+        self.messages.retain(|m| !m.error);
         shown.environment = Some(path.display().to_string());
+        shown.sky = Some((environment.clone(), 0.0));
+        self.take_sky(environment);
+    }
+
+    /// Takes surroundings; lights that were added stay, even where a default one goes.
+    fn take_sky(&mut self, environment: Environment) {
+        let Some(shown) = &mut self.shown else { return };
+        let scene = Arc::make_mut(&mut shown.scene);
+        let own = scene.lights.split_off(scene.lights.len().saturating_sub(shown.added));
+        scene.surround(environment);
+        scene.lights.extend(own);
         (self.stale.environment, self.stale.lights) = (true, true);
         self.version += 1;
+    }
+
+    /// Turns the picture of the surroundings.
+    pub(super) fn turn_sky(&mut self, degrees: f32) {
+        let Some((whole, turn)) = self.shown.as_mut().and_then(|s| s.sky.as_mut()) else { return };
+        *turn = if degrees.is_finite() { degrees } else { 0.0 };
+        let turned = whole.turned(*turn);
+        self.take_sky(turned);
+    }
+
+    /// Adds a light: a sun from behind the shoulder, others between the eye and what it looks at, as bright there as
+    /// 1 W/m².
+    pub(super) fn add_light(&mut self, kind: NewLight) {
+        let Some(light) = self.shown.as_ref().map(|s| s.scene.lights.len()) else { return };
+        let n = &self.navigator;
+        let [right, up, forward] = n.axes();
+        let distance = n.eye.distance(n.target);
+        let half = 0.5 * distance;
+        let none = LightEdit { light, kind: Some(kind), ..LightEdit::default() };
+        let position = Some((n.eye + forward * half + up * (0.3 * half)).to_array());
+        let edit = match kind {
+            NewLight::Sun => {
+                let direction = (forward * 0.8 - Vec3::Y * 0.9 + right * 0.45).normalize();
+                LightEdit { direction: Some(direction.to_array()), ..none }
+            }
+            NewLight::Point => LightEdit { position, strength: Some(half * half), size: Some(0.02 * distance), ..none },
+            NewLight::Spot => LightEdit {
+                position: Some((n.eye + up * (0.3 * half)).to_array()),
+                direction: Some((n.target - n.eye - up * (0.3 * half)).normalize_or(forward).to_array()),
+                strength: Some(distance * distance),
+                size: Some(0.02 * distance),
+                ..none
+            },
+        };
+        self.edit_light(&edit);
+        if let Some(shown) = &mut self.shown {
+            shown.added += shown.scene.lights.len() - light;
+        }
+    }
+
+    /// Takes an added light away; lights of the file keep their numbers, so they only go out.
+    pub(super) fn remove_light(&mut self, light: usize) {
+        let Some(shown) = &mut self.shown else { return };
+        let count = shown.scene.lights.len();
+        if light + shown.added < count {
+            return self.edit_light(&LightEdit { light, strength: Some(0.0), ..LightEdit::default() });
+        }
+        if light < count {
+            Arc::make_mut(&mut shown.scene).lights.remove(light);
+            shown.added -= 1;
+            self.stale.lights = true;
+            self.version += 1;
+        }
     }
 
     /// The same grey from everywhere.
     pub(super) fn set_sky(&mut self, radiance: f32) {
         let Some(shown) = &mut self.shown else { return };
         let radiance = radiance.clamp(0.0, 1e4);
-        Arc::make_mut(&mut shown.scene).surround(Environment::constant([radiance; 3]));
-        shown.environment = Some(radiance.to_string());
-        (self.stale.environment, self.stale.lights) = (true, true);
-        self.version += 1;
+        (shown.environment, shown.sky) = (Some(radiance.to_string()), None);
+        self.take_sky(Environment::constant([radiance; 3]));
     }
 
     pub(super) fn edit_light(&mut self, edit: &LightEdit) {
@@ -188,7 +250,7 @@ impl State {
         shown.lights.clone_from(&shown.original.lights);
         shown.unsettled = false;
         shown.moved.clear();
-        shown.environment = None;
+        (shown.environment, shown.sky, shown.added) = (None, None, 0);
         self.stale = Stale { lights: true, placements: true, environment: true };
         self.version += 1;
     }
@@ -198,8 +260,11 @@ impl State {
         let Some(shown) = &self.shown else { return Vec::new() };
         let pairs = shown.lights.iter().zip(&shown.scene.lights).enumerate();
         // Surroundings replace a default sun, and what stands there then is another light.
-        let pairs = pairs.filter(|(_, (from, to))| from.name == to.name);
-        pairs.filter_map(|(i, (from, to))| LightEdit::between(i, from, to)).collect()
+        let own = shown.scene.lights.len() - shown.added;
+        let pairs = pairs.filter(|(i, (from, to))| *i < own && from.name == to.name);
+        let changed = pairs.filter_map(|(i, (from, to))| LightEdit::between(i, from, to));
+        let added = shown.scene.lights.iter().enumerate().skip(own).map(|(i, light)| LightEdit::added(i, light));
+        changed.chain(added).collect()
     }
 }
 
@@ -316,6 +381,32 @@ mod tests {
         assert_eq!(state.light_edits(), [edit]);
         assert!(state.stale.lights && state.stale.placements);
         state.apply(Action::Undo);
+        assert_eq!(state.light_edits(), []);
+    }
+
+    #[test]
+    fn lights_come_and_go() {
+        let mut state = state();
+        let before = state.shown.as_ref().unwrap().scene.lights.clone();
+        for kind in NewLight::ALL {
+            state.apply(Action::AddLight(kind));
+        }
+        let edits = state.light_edits();
+        let mut again = (*state.shown.as_ref().unwrap().original).clone();
+        edits.iter().for_each(|e| e.to_string().parse::<LightEdit>().unwrap().apply(&mut again).unwrap());
+        let kinds = |lights: &[crate::scene::Light]| lights.iter().map(|l| l.kind).collect::<Vec<_>>();
+        assert_eq!(kinds(&again.lights), kinds(&state.shown.as_ref().unwrap().scene.lights));
+        // One in the middle of them goes; one of the file's goes out.
+        state.apply(Action::RemoveLight(before.len()));
+        state.apply(Action::RemoveLight(0));
+        let shown = state.shown.as_ref().unwrap();
+        assert_eq!((shown.scene.lights.len(), shown.added), (before.len() + 2, 2));
+        assert_eq!(LightEdit::of(0, &shown.scene.lights[0]).strength, Some(0.0));
+        // Surroundings keep what was added.
+        state.apply(Action::Sky(0.3));
+        assert_eq!(state.shown.as_ref().unwrap().added, 2);
+        state.apply(Action::Undo);
+        assert_eq!(kinds(&state.shown.as_ref().unwrap().scene.lights), kinds(&before));
         assert_eq!(state.light_edits(), []);
     }
 

@@ -10,7 +10,7 @@ use super::film::{self, Film, Recording};
 use super::navigate::{Navigator, Preset};
 use super::saved::Settings;
 use crate::render::tonemap_curve::Tonemap;
-use crate::scene::{Light, Scene, path::CameraPath};
+use crate::scene::{Environment, Light, Scene, look::FRAMING, path::CameraPath, upload::TextureMemory};
 pub use action::{Action, Request};
 pub use edit::{angles, from_angles};
 use std::collections::BTreeMap;
@@ -54,6 +54,10 @@ pub struct Shown {
     pub pose: Option<(usize, f32)>,
     /// The surroundings as `--environment` names them, if they are not the file's.
     pub environment: Option<String>,
+    /// The picture of them as it was loaded, and by how many degrees it is turned.
+    pub sky: Option<(Environment, f32)>,
+    /// How many of the lights were added by hand; they are the last.
+    pub added: usize,
 }
 
 /// All that the viewer knows of itself.
@@ -64,6 +68,8 @@ pub struct State {
     pub shown: Option<Shown>,
     pub selected: Option<usize>,
     pub help: bool,
+    /// The window has no frame and covers the screen.
+    pub full_screen: bool,
     /// Draws without end, to measure.
     pub measure: bool,
     pub stale: Stale,
@@ -76,6 +82,8 @@ pub struct State {
     pub preset: Option<Preset>,
     /// Networks store their numbers in 16 bits.
     pub half: bool,
+    /// How textures lie in the device's memory.
+    pub textures: TextureMemory,
     /// Numbers of `gather` that were fitted to the scene, where they are not its own.
     pub gather: Option<String>,
     /// Numbers of unseen light that were.
@@ -84,6 +92,10 @@ pub struct State {
     pub path: Option<CameraPath>,
     /// What is done with it.
     pub film: Film,
+    /// The exposure is measured in the picture, not set by hand.
+    pub auto_exposure: bool,
+    /// What was found, stops.
+    pub measured: Option<f32>,
     /// When the animation went on last, if it plays.
     pub animated: Option<Instant>,
     pub playback: Playback,
@@ -122,14 +134,21 @@ impl State {
     /// Shows a scene that was loaded as `spec`. The same scene again keeps camera and selection.
     pub fn show(&mut self, spec: String, scene: Arc<Scene>) {
         let same = self.shown.as_ref().is_some_and(|s| s.spec == spec);
+        // What did not load before is no news any more.
+        self.messages.retain(|m| !m.error);
         for warning in &scene.warnings {
             self.tell(warning.clone(), false);
         }
         if !same {
             self.navigator = Navigator { fly: self.navigator.fly, ..Navigator::default() };
             self.navigator.take(&scene, 0);
+            if scene.cameras.len() == 1 && scene.cameras[0].name == FRAMING {
+                let aspect = self.aspect();
+                self.navigator.first(&scene, aspect);
+            }
             self.selected = None;
             self.preset = None;
+            (self.auto_exposure, self.measured) = (scene.lightless, None);
         }
         self.selected = self.selected.filter(|&i| i < scene.instances.len());
         self.settings.remember(&spec);
@@ -144,9 +163,16 @@ impl State {
             variant: None,
             pose: None,
             environment: None,
+            sky: None,
+            added: 0,
         });
         self.stale = Stale::default();
         self.version += 1;
+    }
+
+    /// Stops by which the picture is brighter.
+    pub fn stops(&self) -> f32 {
+        if self.auto_exposure { self.measured.unwrap_or(0.0) } else { self.settings.exposure }
     }
 
     /// Width by height.
@@ -201,7 +227,15 @@ impl State {
                 }
             }
             A::MoveSplit(by) => self.settings.line = (self.settings.line + by).clamp(0.0, 1.0),
-            A::Exposure(ev) => self.settings.exposure = if ev.is_finite() { ev.clamp(-20.0, 20.0) } else { 0.0 },
+            A::Exposure(ev) => {
+                self.settings.exposure = if ev.is_finite() { ev.clamp(-20.0, 20.0) } else { 0.0 };
+                self.auto_exposure = false;
+            }
+            A::AutoExposure => {
+                // By hand it goes on from what was measured.
+                self.settings.exposure = self.stops();
+                (self.auto_exposure, self.measured) = (!self.auto_exposure, None);
+            }
             A::Tonemap(kind) => {
                 let next = (self.settings.tonemap.kind() as usize + 1) % Tonemap::ALL.len();
                 self.settings.tonemap = kind.unwrap_or(Tonemap::ALL[next]);
@@ -239,6 +273,15 @@ impl State {
             A::Weights(path) => self.requests.push(Request::Weights(path)),
             A::Light(edit) => self.edit_light(&edit),
             A::Sky(radiance) => self.set_sky(radiance),
+            A::TurnSky(degrees) => self.turn_sky(degrees),
+            A::AddLight(kind) => self.add_light(kind),
+            A::RemoveLight(light) => self.remove_light(light),
+            A::Browse(surroundings) => self.requests.push(Request::Browse(surroundings)),
+            A::FullScreen => {
+                self.full_screen = !self.full_screen;
+                self.requests.push(Request::FullScreen(self.full_screen));
+            }
+            A::LongLens => self.navigator.long_lens(),
             A::TurnSun { dx, dy } => self.turn_sun(dx, dy),
             A::Select(object) => self.selected = object,
             A::Move(by) => self.move_selected(by),

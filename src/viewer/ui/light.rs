@@ -1,7 +1,10 @@
 //! Lights and objects: listed, and changed in place.
 
 use super::{ORANGE, SKY};
-use crate::scene::{LightKind, edit::LightEdit};
+use crate::scene::{
+    LightKind,
+    edit::{LightEdit, NewLight},
+};
 use crate::viewer::state::{Action, State, angles, from_angles};
 use egui::{Color32, RichText, Sense, Stroke, Ui, Vec2};
 use glam::Vec3;
@@ -11,6 +14,7 @@ pub fn lights(ui: &mut Ui, state: &mut State) {
     let Some(shown) = &state.shown else { return };
     let lights = shown.scene.lights.clone();
     let environment = shown.scene.environment.clone();
+    let (own, turn) = (lights.len() - shown.added, shown.sky.as_ref().map(|s| s.1));
     if let Some(sun) = state.sun()
         && let LightKind::Directional { direction, .. } = lights[sun].kind
         && let Some(direction) = sky_disc(ui, direction)
@@ -32,12 +36,30 @@ pub fn lights(ui: &mut Ui, state: &mut State) {
             if let Some(edit) = light_grid(ui, i, &LightEdit::of(i, light)) {
                 state.apply(Action::Light(edit));
             }
+            let text = if i >= own { "Remove" } else { "Out" };
+            if ui.button(text).clicked() {
+                state.apply(Action::RemoveLight(i));
+            }
         });
     }
+    ui.horizontal(|ui| {
+        ui.label("add");
+        for kind in NewLight::ALL {
+            if ui.button(kind.name()).clicked() {
+                state.apply(Action::AddLight(kind));
+            }
+        }
+    });
     ui.separator();
     match &environment.image {
         Some(image) => {
             ui.add(egui::Label::new(format!("surroundings: {}", image.name)).truncate());
+            if let Some(mut turn) = turn {
+                let slider = egui::Slider::new(&mut turn, -180.0..=180.0).suffix("°").text("turned");
+                if ui.add(slider).changed() {
+                    state.apply(Action::TurnSky(turn));
+                }
+            }
         }
         None => {
             let mut grey = environment.radiance.iter().sum::<f32>() / 3.0;
@@ -47,9 +69,14 @@ pub fn lights(ui: &mut Ui, state: &mut State) {
             }
         }
     }
-    if ui.button("As in the file (U)").clicked() {
-        state.apply(Action::Undo);
-    }
+    ui.horizontal(|ui| {
+        if ui.button("Surroundings …").on_hover_text("a lat-long picture: .hdr or .exr").clicked() {
+            state.apply(Action::Browse(true));
+        }
+        if ui.button("As in the file (U)").clicked() {
+            state.apply(Action::Undo);
+        }
+    });
 }
 
 /// Controls of one light; the change if there was one.

@@ -112,7 +112,7 @@ pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
     hands::keyboard(ui, state);
     if state.settings.panel {
         if facts.software {
-            banner(ui, facts);
+            banner(ui, state, facts);
         }
         egui::Panel::bottom("status").resizable(false).show(ui, |ui| status(ui, state, facts));
         let height = ui.available_height();
@@ -143,12 +143,13 @@ fn pixel_aligned(rect: Rect, density: f32) -> Rect {
 }
 
 /// Says plainly that numbers are not a GPU's.
-fn banner(ui: &mut Ui, facts: &Facts<'_>) {
+fn banner(ui: &mut Ui, state: &State, facts: &Facts<'_>) {
     let frame = egui::Frame::new().fill(ORANGE).inner_margin(egui::Margin::symmetric(8, 3));
     egui::Panel::top("banner").resizable(false).frame(frame).show(ui, |ui| {
         let text = format!(
-            "Software rendering on the CPU ({}): pictures are right, times say nothing about a GPU.",
-            facts.adapter
+            "Software rendering on the CPU ({}): `{}` is right, but takes long, which says nothing about a GPU. M: others.",
+            facts.adapter,
+            state.settings.left.name()
         );
         ui.add(egui::Label::new(egui::RichText::new(text).color(Color32::BLACK)).truncate());
     });

@@ -18,11 +18,11 @@ pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
     room(ui, "Scene", true, &mut |ui, memory| scene(ui, state, memory));
     room(ui, "Method", true, &mut |ui, memory| method(ui, state, memory, facts));
     room(ui, "Picture", true, &mut |ui, _| picture(ui, state));
-    room(ui, "Times", true, &mut |ui, memory| times::times(ui, state, memory, facts));
-    room(ui, "Speed and accuracy", false, &mut |ui, memory| frontier::frontier(ui, state, memory, facts));
     room(ui, "Camera", false, &mut |ui, _| camera(ui, state));
     room(ui, "Light", false, &mut |ui, _| light::lights(ui, state));
     room(ui, "Objects", false, &mut |ui, _| light::objects(ui, state));
+    room(ui, "Times", false, &mut |ui, memory| times::times(ui, state, memory, facts));
+    room(ui, "Speed and accuracy", false, &mut |ui, memory| frontier::frontier(ui, state, memory, facts));
     room(ui, "GPU memory", false, &mut |ui, _| times::memory(ui, facts));
     room(ui, "Window", false, &mut |ui, _| window(ui, state));
 }
@@ -52,7 +52,10 @@ fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
     }
     ui.horizontal(|ui| {
         let hint = "file, interior, home:7";
-        let field = ui.add(egui::TextEdit::singleline(&mut memory.path).hint_text(hint).desired_width(200.0));
+        let field = ui.add(egui::TextEdit::singleline(&mut memory.path).hint_text(hint).desired_width(170.0));
+        if ui.button("…").on_hover_text("choose a file (Ctrl O)").clicked() {
+            state.apply(Action::Browse(false));
+        }
         let enter = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
         if (ui.button("Open").clicked() || enter) && !memory.path.trim().is_empty() {
             state.apply(Action::Open(memory.path.trim().into()));
@@ -231,10 +234,18 @@ fn reference(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
 fn picture(ui: &mut Ui, state: &mut State) {
     egui::Grid::new("picture").num_columns(2).show(ui, |ui| {
         ui.label("Exposure");
-        let mut ev = state.settings.exposure;
-        if ui.add(egui::Slider::new(&mut ev, -8.0..=8.0).suffix(" EV").max_decimals(2)).changed() {
-            state.apply(Action::Exposure(ev));
-        }
+        let mut ev = state.stops();
+        ui.horizontal(|ui| {
+            ui.spacing_mut().slider_width = 70.0;
+            if ui.add(egui::Slider::new(&mut ev, -8.0..=8.0).suffix(" EV").max_decimals(2)).changed() {
+                state.apply(Action::Exposure(ev));
+            }
+            let mut auto = state.auto_exposure;
+            let told = "measured whenever the picture comes to rest after a change of the scene (Shift .)";
+            if ui.checkbox(&mut auto, "auto").on_hover_text(told).changed() {
+                state.apply(Action::AutoExposure);
+            }
+        });
         ui.end_row();
         ui.label("Tonemap");
         let mut kind = state.settings.tonemap;
@@ -299,8 +310,13 @@ fn camera(ui: &mut Ui, state: &mut State) {
         let speed = &mut state.navigator.speed;
         ui.add(egui::DragValue::new(speed).range(least..=most).speed(drag).max_decimals(6).suffix(" m/s"));
     });
+    let mut long = state.navigator.is_long();
+    let told = "a lens of 2° from far away, so that parallels stay nearly parallel (O)";
+    if ui.checkbox(&mut long, "long lens").on_hover_text(told).changed() {
+        state.apply(Action::LongLens);
+    }
     let mut fov = state.navigator.fov;
-    if ui.add(egui::Slider::new(&mut fov, 5.0..=150.0).text("field of view").suffix("°")).changed() {
+    if ui.add(egui::Slider::new(&mut fov, 1.0..=150.0).text("field of view").suffix("°")).changed() {
         state.navigator.fov = fov;
         state.navigator.file_camera = None;
     }
@@ -329,6 +345,10 @@ fn window(ui: &mut Ui, state: &mut State) {
         egui::DragValue::new(&mut zoom).range(0.5..=4.0).speed(0.02).prefix("text × ").update_while_editing(false);
     if ui.add(drag).changed() {
         state.settings.zoom = zoom;
+    }
+    let mut full = state.full_screen;
+    if ui.checkbox(&mut full, "full screen (F11)").changed() {
+        state.apply(Action::FullScreen);
     }
     let mut measure = state.measure;
     if ui.checkbox(&mut measure, "draw without end, to measure (B)").changed() {
