@@ -4,6 +4,7 @@
 //! Ubuntu without any adapter it installs Mesa's CPU driver, saying so before it does.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 const USAGE: &str = "\
@@ -49,13 +50,14 @@ fn main() -> ExitCode {
 fn demo() -> Result<(), String> {
     let program = ["--release", "--bin", "bouncelight"];
     cargo(&[["build"].as_slice(), &program].concat())?;
-    make_sure_of_adapter(&["--release"])?;
+    make_sure_of_adapter(&built("release")?)?;
     cargo(&[["run", "--quiet"].as_slice(), &program, &["--", "demo"]].concat())
 }
 
 fn test() -> Result<(), String> {
-    cargo(&["build", "--bin", "bouncelight"])?;
-    make_sure_of_adapter(&[])?;
+    // The program as tests have it: `cargo build` would take other features of dependencies, and compile them twice.
+    cargo(&["test", "--workspace", "--no-run"])?;
+    make_sure_of_adapter(&built("debug")?)?;
     make_sure_of_display()?;
     // Tests append what they skip to this file: `tests/common`.
     let skips = std::env::current_exe().map_err(|e| format!("own path: {e}"))?.with_file_name("skips.txt");
@@ -81,11 +83,12 @@ fn print_skips(lines: &str) {
 
 /// Everything that the documentation projects, measured on the device at hand.
 fn gpu_report(mut args: Vec<String>) -> Result<(), String> {
-    let profile: &[&str] = if args.iter().any(|a| a == "--dev") { &[] } else { &["--release"] };
+    let dev = args.iter().any(|a| a == "--dev");
+    let profile: &[&str] = if dev { &[] } else { &["--release"] };
     args.retain(|a| a != "--dev");
     let build = ["build", "--bin", "bouncelight", "--example", "gpu_report"];
     cargo(&[&build, profile].concat())?;
-    make_sure_of_adapter(profile)?;
+    make_sure_of_adapter(&built(if dev { "debug" } else { "release" })?)?;
     // A source that is not committed has no name that others could find.
     let git = |words: &[&str]| command("git", words).output().ok().filter(|o| o.status.success());
     let clean = git(&["status", "--porcelain", "--untracked-files=no"]).is_some_and(|o| o.stdout.is_empty());
@@ -100,7 +103,8 @@ fn gpu_report(mut args: Vec<String>) -> Result<(), String> {
 /// Hosts in other languages; their tests are their own programs.
 fn hosts() -> Result<(), String> {
     cargo(&["build", "--bin", "bouncelight", "--example", "moderngl_twin", "--example", "export_scene"])?;
-    make_sure_of_adapter(&[])?;
+    let program = built("debug")?;
+    make_sure_of_adapter(&program)?;
     if Command::new("spirv-val").arg("--version").output().is_err()
         && std::path::Path::new("/etc/debian_version").exists()
     {
@@ -108,14 +112,12 @@ fn hosts() -> Result<(), String> {
         apt(&["install", "-y", "-q", "--no-install-recommends", "spirv-tools"])?;
     }
     cargo(&["test", "--test", "export"])?;
-    let own = std::env::current_exe().map_err(|e| format!("own path: {e}"))?;
-    // The folder of `cargo build`: xtask lies in it.
-    let built = own.parent().ok_or("own path has no folder")?;
-    let work = built.with_file_name("hosts");
+    let folder = program.parent().ok_or("the program has no folder")?;
+    let work = folder.with_file_name("hosts");
     std::fs::create_dir_all(&work).map_err(|e| format!("{}: {e}", work.display()))?;
     let text = |path: &std::path::Path| path.to_string_lossy().into_owned();
     let [program, twin, scene_writer] =
-        ["bouncelight", "examples/moderngl_twin", "examples/export_scene"].map(|p| text(&built.join(p)));
+        ["bouncelight", "examples/moderngl_twin", "examples/export_scene"].map(|p| text(&folder.join(p)));
     let (venv, glb) = (text(&work.join("venv")), text(&work.join("cornell.glb")));
     let python = format!("{venv}/bin/python");
     if !std::path::Path::new(&python).exists() {
@@ -151,9 +153,16 @@ fn ci() -> Result<(), String> {
     run(&mut command("bash", &[".ci/run"]))
 }
 
+/// The program as cargo has built it in the folder `profile`, beside which xtask lies.
+fn built(profile: &str) -> Result<PathBuf, String> {
+    let own = std::env::current_exe().map_err(|e| format!("own path: {e}"))?;
+    let target = own.ancestors().nth(2).ok_or("own path has no folder")?;
+    Ok(target.join(profile).join(format!("bouncelight{}", std::env::consts::EXE_SUFFIX)))
+}
+
 /// Makes sure that an adapter answers; installs Mesa's CPU driver where that is a matter of one package.
-fn make_sure_of_adapter(profile: &[&str]) -> Result<(), String> {
-    if doctor(profile)? {
+fn make_sure_of_adapter(program: &Path) -> Result<(), String> {
+    if doctor(program)? {
         return Ok(());
     }
     if !std::path::Path::new("/etc/debian_version").exists() {
@@ -162,7 +171,7 @@ fn make_sure_of_adapter(profile: &[&str]) -> Result<(), String> {
     eprintln!("xtask: no GPU adapter answers; installing mesa-vulkan-drivers (Vulkan on the CPU) with apt-get");
     apt(&["update", "-q"])?;
     apt(&["install", "-y", "-q", "--no-install-recommends", "mesa-vulkan-drivers"])?;
-    if doctor(profile)? { Ok(()) } else { Err("still no adapter after installing mesa-vulkan-drivers".into()) }
+    if doctor(program)? { Ok(()) } else { Err("still no adapter after installing mesa-vulkan-drivers".into()) }
 }
 
 /// The viewer's tests need an X server without a screen, and what a window under X loads at run time.
@@ -178,11 +187,9 @@ fn make_sure_of_display() -> Result<(), String> {
 }
 
 /// True when `bouncelight doctor` finds an adapter.
-fn doctor(profile: &[&str]) -> Result<bool, String> {
-    let mut args = vec!["run", "--quiet", "--bin", "bouncelight"];
-    args.extend(profile);
-    args.extend(["--", "doctor"]);
-    let status = command("cargo", &args).status().map_err(|e| format!("cargo: {e}"))?;
+fn doctor(program: &Path) -> Result<bool, String> {
+    let program = program.to_string_lossy();
+    let status = command(&program, &["doctor"]).status().map_err(|e| format!("{program}: {e}"))?;
     match status.code() {
         Some(0) => Ok(true),
         Some(NO_ADAPTER) => Ok(false),
