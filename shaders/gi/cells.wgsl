@@ -55,3 +55,13 @@ fn light_towards(light: CellLight, n: vec3f) -> vec3f {
     let direction = vec4f(n, 1.0);
     return max(vec3f(dot(light.red, direction), dot(light.green, direction), dot(light.blue, direction)), vec3f(0.0));
 }
+
+// Width of a cell at view distance z.
+fn cell_foot(z: f32) -> f32 {
+    return 2.0 * params.unproject.y * z * f32(CELL_SIDE) / f32(params.size.y);
+}
+
+// Cells across which what a lobe shows changes little: its width at what is as far from the mirror as the mirror from the eye.
+fn lobe_cells(roughness: f32) -> f32 {
+    return 0.5 * roughness * roughness / cell_foot(1.0);
+}

@@ -2,7 +2,7 @@
 
 use crate::common;
 use crate::edges::{FLOOR, LIGHT, PLATE, POLE, SIZE, WALL, bleeding, room};
-use crate::shot::{Hit, Shot, output, view};
+use crate::shot::{Hit, Shot, output, texture_with, view};
 use bouncelight::gi::cells::{self, CellsPass, NO_PIXEL};
 use bouncelight::gi::cpu::oct_decode;
 use bouncelight::gi::gather::bring::{BringPass, Brought};
@@ -64,7 +64,17 @@ fn bring_both(
     let mut encoder = device.create_command_encoder(&Default::default());
     let mut recorder = Recorder::new(&mut encoder);
     cells.record(&mut recorder, &bound);
-    let brought = Brought { light: &rows, glosses: &lobes, output: &light, gloss: &gloss };
+    // Nothing is smooth.
+    let mirrored = buffer(&vec![0; 8 * (shot.size[0] * shot.size[1]) as usize]);
+    let specular = view(&texture_with(device, queue, [1, 1], wgpu::TextureFormat::Rgba8Unorm, &[0; 4]));
+    let brought = Brought {
+        light: &rows,
+        glosses: &lobes,
+        specular: &specular,
+        mirrored: &mirrored,
+        output: &light,
+        gloss: &gloss,
+    };
     pass.record(&mut recorder, &bound, &cells, brought);
     queue.submit([encoder.finish()]);
     let read = |target| {
@@ -211,8 +221,8 @@ fn what_lobes_show_stays_on_surfaces_with_lobes() {
 fn costs_are_counted_for_the_whole_picture() {
     let size = [1024, 512];
     let (choose, bring) = (CellsPass::cost(size), BringPass::cost(size));
-    // 24 bytes a pixel have to move: depth, normal, both results.
-    assert!(bring.bytes > 24.0 * 524_288.0 && bring.bytes < 32.0 * 524_288.0, "{bring:?}");
+    // 28 bytes a pixel have to move: depth, normal, roughness, both results.
+    assert!(bring.bytes > 28.0 * 524_288.0 && bring.bytes < 36.0 * 524_288.0, "{bring:?}");
     assert!(bring.flops > 300.0 * 524_288.0 && bring.flops < 700.0 * 524_288.0, "{bring:?}");
     assert!(choose.bytes < bring.bytes && choose.flops < bring.flops);
 }

@@ -21,6 +21,7 @@ mod gather;
 mod glossy;
 mod glow;
 mod lamps;
+mod mirror;
 #[cfg(feature = "io")]
 mod real;
 mod screen;

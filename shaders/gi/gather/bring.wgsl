@@ -1,5 +1,6 @@
 //#import gi/inputs.wgsl
 //#import gi/cells.wgsl
+//#import gi/gather/lobe.wgsl
 
 // Directional light of the cells, and what their lobes show, brought to every pixel: bilinear where the surface goes on, and only from
 // cells of the pixel's own surface where it does not, the light evaluated for the pixel's own normal. All of it in f32.
@@ -12,6 +13,9 @@
 @group(1) @binding(2) var<storage, read> glosses: array<vec4f>;
 @group(1) @binding(3) var output: texture_storage_2d<rgba16float, write>;
 @group(1) @binding(4) var gloss_output: texture_storage_2d<rgba16float, write>;
+// F0 and roughness; and of smooth pixels what mirror.wgsl has found.
+@group(1) @binding(5) var specular_map: texture_2d<f32>;
+@group(1) @binding(6) var<storage, read> mirrored: array<vec2u>;
 // Cells on a side of what a workgroup reads: its own 8 / CELL_SIDE and two on each side.
 const STAGED = 8 / CELL_SIDE + 4;
 
@@ -123,6 +127,13 @@ fn light_of(here: Surface, place: vec2f) -> Brought {
     return Brought(mix(far.light, close.light, share), mix(far.gloss, close.gloss, share));
 }
 
+// What cells say that a lobe shows, and for the share `own` what the pixel's rays do, if there are any.
+fn sharper(gloss: vec3f, pixel: u32, own: f32) -> vec3f {
+    let packed = mirrored[pixel];
+    let found = vec4f(unpack2x16float(packed.x), unpack2x16float(packed.y));
+    return mix(gloss, found.rgb, select(0.0, own, found.a > 0.0));
+}
+
 @compute @workgroup_size(8, 8)
 fn bring(
     @builtin(global_invocation_id) id: vec3u,
@@ -142,6 +153,8 @@ fn bring(
         // A cell counts as lying at its middle, whichever pixel stands for it.
         let place = (vec2f(pixel) - f32(CELL_SIDE / 2)) / f32(CELL_SIDE) - vec2f(first);
         result = light_of(surface_of(pixel, z), place);
+        let own = mirrors(textureLoad(specular_map, pixel, 0));
+        if own > 0.0 { result.gloss = sharper(result.gloss, id.y * params.size.x + id.x, own); }
     }
     textureStore(output, pixel, vec4f(min(result.light, vec3f(LARGEST)), 1.0));
     textureStore(gloss_output, pixel, vec4f(min(result.gloss, vec3f(LARGEST)), 1.0));

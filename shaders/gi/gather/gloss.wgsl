@@ -1,15 +1,8 @@
 //#import gi/cells.wgsl
 //#import gi/gather/types.wgsl
+//#import gi/gather/lobe.wgsl
 
 // Rays into lobes: which cells send one, and when.
-
-// Lobes of this roughness and more show what the cell's directional light tells, and get no rays of their own.
-const ROUGHEST = 0.85;
-
-// Whether a surface (F0, roughness) has a lobe worth a ray.
-fn has_lobe(surface: vec4f) -> bool {
-    return surface.a < ROUGHEST && any(surface.rgb > vec3f(0.0));
-}
 
 // Squares of 2×2 cells.
 fn gloss_grid() -> vec2u {

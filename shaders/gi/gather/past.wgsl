@@ -43,11 +43,6 @@ fn lately_noise() -> f32 {
     return min(LATELY / (2.0 - LATELY), lately_share());
 }
 
-// Width of a cell at view distance z.
-fn cell_foot(z: f32) -> f32 {
-    return 2.0 * params.unproject.y * z * f32(CELL_SIDE) / f32(params.size.y);
-}
-
 // Distance from the plane, in cells, that counts as nothing.
 const BLUR_PLANE = 0.5;
 
@@ -64,9 +59,4 @@ fn same_surface(to: vec3f, n: vec3f, there: vec3f, strictness: f32) -> f32 {
     let f2 = facing * facing;
     let f8 = f2 * f2 * f2 * f2;
     return exp(-off_plane * off_plane) * f8 * f8;
-}
-
-// Cells across which what a lobe shows changes little: its width at what is as far from the mirror as the mirror from the eye.
-fn lobe_cells(roughness: f32) -> f32 {
-    return 0.5 * roughness * roughness / cell_foot(1.0);
 }

@@ -4,6 +4,7 @@
 //#import lib/sampling.wgsl
 //#import gi/gather/types.wgsl
 //#import gi/gather/gloss.wgsl
+//#import gi/gather/start.wgsl
 //#import gi/gather/look.wgsl
 
 // One ray from each cell of the picture into the half space above it, and where surfaces glow one shadow ray to a point of them; more
@@ -38,24 +39,6 @@ fn shared_exponent(c: vec3f) -> u32 {
     let exponent = clamp((bitcast<u32>(most) >> 23u) - 110u, 0u, 31u);
     let code = min(vec3u(max(c, vec3f(0.0)) * exp2(24.0 - f32(exponent)) + 0.5), vec3u(511u));
     return code.x | (code.y << 9u) | (code.z << 18u) | (exponent << 27u);
-}
-
-// A place of the picture from which a ray is sent.
-struct Start {
-    x: vec3f,
-    n: vec3f,
-    // Unit vector to the eye.
-    v: vec3f,
-}
-
-fn start_at(pixel: vec2i) -> Start {
-    let z = distance_at(pixel);
-    let n = world_normal_at(pixel);
-    let from_eye = offset_at(pixel, z);
-    // Above the surface, and towards the eye, where nothing is in between whatever the normal says.
-    // A depth whose steps are coarse at this distance asks for more.
-    let lift = max(LIFT, LIFT_STEPS * params.depth.w * z);
-    return Start(params.eye.xyz + from_eye * (1.0 - lift) + n * (lift * z), n, -normalize(from_eye));
 }
 
 fn record(ray: u32, found: Found, weight: vec3f, d: vec3f, glow: vec4f) {
@@ -98,8 +81,7 @@ fn gloss_numbers(square: vec2u) -> vec2f {
     return lattice(gather.frame >> 2u, pcg3(vec3u(square, 2u * (gather.frame & 3u) + 1u)).xy);
 }
 
-// The ray of a square of cells into the lobe of this frame's cell. What it finds is weighted so that its mean over the lobe is what
-// `env_brdf` has to be multiplied by.
+// The ray of a square of cells into the lobe of this frame's cell.
 fn gloss_ray(square: vec2u) {
     if any(square >= gloss_grid()) { return; }
     let ray = gloss_record(square);
@@ -113,25 +95,11 @@ fn gloss_ray(square: vec2u) {
     let surface = textureLoad(specular_map, pixel, 0);
     if !has_lobe(surface) { return; }
     let at = start_at(pixel);
-    let n_v = max(dot(at.n, at.v), 1e-4);
-    let frame = frame_around(at.n);
-    let v = at.v * frame;
-    let alpha = max(surface.a * surface.a, 1e-3);
-    let h = sample_visible_normal(vec3f(v.xy, max(v.z, 1e-4)), alpha, gloss_numbers(square));
-    let l = reflect(-v, h);
-    let share = env_brdf(surface.rgb, surface.a, n_v);
+    let lobe = lobe_ray(at, surface, gloss_numbers(square));
     var found = Found(vec3f(0.0), NONE, vec3f(0.0), FAR);
-    var weight = vec3f(0.0);
-    if l.z > 0.0 {
-        // Masking of both directions over that of v: height-correlated Smith.
-        let a2 = alpha * alpha;
-        let g_v = sqrt(n_v * n_v * (1.0 - a2) + a2);
-        let g_l = sqrt(l.z * l.z * (1.0 - a2) + a2);
-        let kept = l.z * (n_v + g_v) / (l.z * g_v + n_v * g_l);
-        weight = fresnel_of(surface.rgb, saturate(dot(v, h))) * lobe_gain(surface.rgb, surface.a, n_v) * kept
-            / max(share, vec3f(1e-4));
+    if any(lobe.weight > vec3f(0.0)) {
         let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
-        found = look(at.x, frame * l, ALONE, ray, ray, gather.round, !stands_in);
+        found = look(at.x, lobe.d, ALONE, ray, ray, gather.round, !stands_in);
     }
-    record(ray, found, weight, frame * l, vec4f(0.0));
+    record(ray, found, lobe.weight, lobe.d, vec4f(0.0));
 }

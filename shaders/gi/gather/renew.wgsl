@@ -27,7 +27,8 @@ fn evict(@builtin(global_invocation_id) id: vec3u) {
     // The last round's rays may have asked for this one.
     let is_asked = atomicLoad(&entry_lots[(gather.round & 1u) * slots + slot]) != NONE;
     if key != LEFT {
-        if asked == 0u || is_asked || gather.round + 1u - asked <= ENTRY_AGE { return; }
+        // What nobody has claimed was made by a ray that only reads.
+        if is_asked || (asked != 0u && gather.round + 1u - asked <= ENTRY_AGE) { return; }
         let begins = gather.rays + 2u * slots + slot;
         entry_asked[slot] = 0u;
         entry_queries[begins] = vec4u(0u);

@@ -3,6 +3,7 @@
 //#import gi/gather/types.wgsl
 //#import gi/gather/gloss.wgsl
 //#import gi/gather/past.wgsl
+//#import gi/gather/motion.wgsl
 
 // What a cell's ray found, with the light of its entry, mixed into the mean over the frames before, which is looked up where the
 // surface was then.
@@ -28,16 +29,6 @@ const SAME_PLANE = 0.75;
 
 fn from_shared_exponent(code: u32) -> vec3f {
     return vec3f(vec3u(code, code >> 9u, code >> 18u) & vec3u(511u)) * exp2(f32(i32(code >> 27u) - 24));
-}
-
-// Where the surface at this pixel was in the frame before, from here, in pixels.
-fn motion_of(pixel: vec2i) -> vec2f {
-    let motion = finite3(vec3f(textureLoad(motion_map, pixel, 0).xy, 0.0)).xy;
-    return (motion * params.motion.xy + params.motion.zw) * vec2f(params.size);
-}
-
-fn rests(motion: vec2f) -> bool {
-    return all(abs(motion) < vec2f(0.02));
 }
 
 // The mean where the surface at x, which faces n, was in the frame before; 0 frames where it was not to be seen.

@@ -10,8 +10,8 @@ use crate::gi::interface::technique::Cost;
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
 use crate::gi::stage::weights::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
-use crate::gpu::bind::{self, Binder};
-use crate::gpu::binding::{READ, STORE_HALF};
+use crate::gpu::bind::{self, Binder, Bound};
+use crate::gpu::binding::{LOAD, READ, STORE_HALF};
 use crate::gpu::{shaders, timing::Recorder};
 
 /// Sum of the four weights below which the 4×4 cells around are blended in.
@@ -48,6 +48,10 @@ pub struct Brought<'a> {
     pub light: &'a wgpu::Buffer,
     /// Of cells: what lobes show over their directional albedo (rgb); a: 1, or 0 without a lobe.
     pub glosses: &'a wgpu::Buffer,
+    /// Of pixels: F0 and roughness; a smaller texture: nothing is smooth.
+    pub specular: &'a wgpu::TextureView,
+    /// Of smooth pixels: what their own rays have found, four halves each.
+    pub mirrored: &'a wgpu::Buffer,
     /// `Rgba16Float`, storage, full size: E/π.
     pub output: &'a wgpu::TextureView,
     /// The same: what lobes show over their directional albedo.
@@ -57,7 +61,7 @@ pub struct Brought<'a> {
 impl BringPass {
     /// Compiles the shader.
     pub fn new(device: &wgpu::Device, inputs: &InputGroup) -> Self {
-        let binder = Binder::new(device, "gi.bring", &[READ, READ, READ, STORE_HALF, STORE_HALF]);
+        let binder = Binder::new(device, "gi.bring", &[READ, READ, READ, STORE_HALF, STORE_HALF, LOAD, READ]);
         let module = shaders::module_with(device, "gi.bring", &prelude());
         let pipeline = bind::pipeline(device, "gi.bring", &module, "bring", &[inputs.layout(), binder.layout()]);
         Self { pipeline, binder }
@@ -71,9 +75,10 @@ impl BringPass {
         cells: &CellsPass,
         brought: Brought<'_>,
     ) {
-        let Brought { light, glosses, output, gloss } = brought;
-        let group =
-            self.binder.group([cells.pixels().into(), light.into(), glosses.into(), output.into(), gloss.into()]);
+        let Brought { light, glosses, specular, mirrored, output, gloss } = brought;
+        let [pixels, light, glosses, mirrored] = [cells.pixels(), light, glosses, mirrored].map(Bound::from);
+        let [output, gloss, specular] = [output, gloss, specular].map(Bound::from);
+        let group = self.binder.group([pixels, light, glosses, output, gloss, specular, mirrored]);
         recorder.compute("gi.bring", |pass| {
             inputs.set(pass);
             pass.set_bind_group(1, &group, &[]);
@@ -95,10 +100,10 @@ impl BringPass {
     /// What the pass costs for a picture of `size` pixels. A pixel: 4 cells of 72 operations, its own place and normal 60, the means
     /// 36; a workgroup stages 36 cells of 60 operations and 96 bytes, most of which the chip's cache has, so that each cell comes
     /// from memory once. Pixels at edges that ask 16 cells (about 3 % of a picture) are counted with 1,000 more. Depth, normal and
-    /// both results: 24 bytes.
+    /// both results, roughness: 28 bytes.
     pub fn cost(size: [u32; 2]) -> Cost {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let flops = pixels * (4.0 * 72.0 + 60.0 + 36.0 + 36.0 * 60.0 / 64.0 + 30.0);
-        Cost::new("gi.bring", flops, pixels * 24.0 + cells::count(size) as f64 * 76.0)
+        Cost::new("gi.bring", flops, pixels * 28.0 + cells::count(size) as f64 * 76.0)
     }
 }

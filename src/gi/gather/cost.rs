@@ -21,6 +21,7 @@ const ENTRIES_MET: f64 = 4000.0;
 pub(super) fn costs(size: [u32; 2], options: &Options) -> Vec<Cost> {
     let slots = options.slots;
     let cells = cells::count(size) as f64;
+    let pixels = f64::from(size[0]) * f64::from(size[1]);
     let squares = store::squares(size) as f64;
     // Entries lie on surfaces: of half the edge there are four times as many, as far as the table holds them.
     let finer = Options::default().entry_scale / options.entry_scale;
@@ -36,6 +37,8 @@ pub(super) fn costs(size: [u32; 2], options: &Options) -> Vec<Cost> {
         // With the rays into lobes.
         Cost::new("gi.rays", (cells + squares) * flops, (cells + squares) * bytes).with_rays((cells + squares) * RAYS),
         Cost::new("gi.renew", entries * flops, entries * bytes + f64::from(slots) * 8.0).with_rays(entries * RAYS),
+        // Without smooth surfaces: each pixel's roughness. A picture full of mirrors has a look for every fourth pixel.
+        Cost::new("gi.mirror", pixels * 12.0, pixels * 4.0),
         Cost::new("gi.settle", cells * 150.0, cells * (2.0 * PAST as f64 + 112.0)),
         Cost::new("gi.blur", cells * 25.0 * 65.0, cells * (PAST as f64 + 80.0)),
         Cost::new("gi.smooth", cells * 25.0 * 60.0, cells * (24.0 + 3.0 * 48.0)),

@@ -15,6 +15,8 @@ use crate::gpu::timing::Recorder;
 /// A frame whose means are recorded, before its filter.
 pub struct Settled {
     inputs: BoundInputs,
+    /// F0 and roughness of pixels.
+    specular: wgpu::TextureView,
     /// What cells remember now, [`PAST`](super::PAST) bytes each: `Past` of `past.wgsl`.
     pub pasts: wgpu::Buffer,
     /// Group 1, and where the frame's parameters lie in it.
@@ -153,6 +155,11 @@ impl GatherGi {
             }
             self.renew.record(recorder, groups(offset), table(), slots);
         }
+        if inputs.specular.is_some() {
+            let own = [&keys, &lots, &queries, &entry_light, &Bound::from(&store.mirrored), &specular, &motion];
+            let squares = inputs.size.map(|n| n.div_ceil(2).div_ceil(8));
+            self.mirror.record(recorder, groups(offset), own.map(Clone::clone), [squares[0], squares[1], 1]);
+        }
         self.mean.record(recorder, alone(offset), history(), [w, h, 1]);
         self.round = params.round + 1;
         self.frame += 1;
@@ -160,7 +167,8 @@ impl GatherGi {
         self.stir = self.stir.saturating_sub(1);
         self.changing = self.changing.saturating_sub(1);
         let pasts = self.store.pasts[(self.frame & 1) as usize].clone();
-        Ok(Settled { inputs: bound, pasts, params: frame_params, offset })
+        let specular = inputs.specular.unwrap_or(&self.no_specular).clone();
+        Ok(Settled { inputs: bound, specular, pasts, params: frame_params, offset })
     }
 
     /// Records the rest of the frame: means averaged over neighbours, brought to full size. `guidance`:
@@ -182,7 +190,14 @@ impl GatherGi {
         let own = [&pasts, &blurred, &changes, &glosses, &guidance].map(Clone::clone);
         self.blur.record(recorder, groups, own, [w, h, 1]);
         self.smooth.record(recorder, groups, [pasts, blurred, light, guidance], [w, h, 1]);
-        let brought = Brought { light: &store.cell_light, glosses: &store.glosses, output, gloss: &store.gloss };
+        let brought = Brought {
+            light: &store.cell_light,
+            glosses: &store.glosses,
+            specular: &settled.specular,
+            mirrored: &store.mirrored,
+            output,
+            gloss: &store.gloss,
+        };
         self.bring.record(recorder, &settled.inputs, &self.cells, brought);
     }
 }

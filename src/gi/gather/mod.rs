@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Of each 2×2 cells one in turn sends a second ray, into its surface's lobe: what lobes show goes the same way beside the light
-//! ([`Technique::gloss`]).
+//! ([`Technique::gloss`]). Lobes narrower than cells get rays of their own, one a frame of each 2×2 pixels (`gi.mirror`).
 //!
 //! It asks what stands between, so it needs no constant for that. What it knows of a surface that a ray meets is one colour a
 //! triangle; how finely it knows the light between surfaces is the size of an entry's cell; the rest is noise, which frames and
@@ -99,6 +99,8 @@ pub struct GatherGi {
     /// Frees entries that no ray has met for long; binds what `renew` binds.
     evict: Pass,
     renew: Pass,
+    /// Rays of smooth pixels.
+    mirror: Pass,
     mean: Pass,
     blur: Pass,
     smooth: Pass,
@@ -183,6 +185,7 @@ impl GatherGi {
             evict: new(shared, ("gi.evict", "gi.renew", "evict"), &table),
             rays: new(shared, ("gi.rays", "gi.rays", "rays"), &[rw, rw, rw, READ, rw, LOAD]),
             renew: new(shared, ("gi.renew", "gi.renew", "renew"), &table),
+            mirror: new(shared, ("gi.mirror", "gi.mirror", "mirror"), &[rw, rw, rw, READ, rw, LOAD, LOAD]),
             recall: new(alone, ("gi.recall", "gi.settle", "recall"), &history),
             mean: new(alone, ("gi.settle", "gi.settle", "settle"), &history),
             blur: new(alone, ("gi.blur", "gi.blur", "blur"), &[READ, rw, rw, rw, READ]),
@@ -218,9 +221,9 @@ impl GatherGi {
 
     /// Bind groups made since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
-        let passes = [&self.recall, &self.evict, &self.rays, &self.renew, &self.mean, &self.blur, &self.smooth];
-        let made = passes.map(Pass::made);
-        self.inputs.made() + self.scene.made() + self.frame_params.made() + self.bring.made() + made.iter().sum::<u64>()
+        let rays = [&self.recall, &self.evict, &self.rays, &self.renew, &self.mirror];
+        let made = rays.into_iter().chain([&self.mean, &self.blur, &self.smooth]).map(Pass::made);
+        self.inputs.made() + self.scene.made() + self.frame_params.made() + self.bring.made() + made.sum::<u64>()
     }
 }
 
@@ -263,6 +266,7 @@ impl Technique for GatherGi {
         self.inputs.forget();
         self.scene.forget();
         self.recall.forget();
+        self.mirror.forget();
         self.mean.forget();
         self.bring.forget();
     }

@@ -27,6 +27,13 @@ pub(super) struct Store {
     /// What lobes show, of cells and of pixels.
     pub glosses: wgpu::Buffer,
     pub gloss: wgpu::TextureView,
+    /// What rays of smooth pixels have found, four halves a pixel: `mirrored` of `mirror.wgsl`.
+    pub mirrored: wgpu::Buffer,
+}
+
+/// Bytes of `mirrored` of pictures of `size` pixels.
+fn mirrored(size: [u32; 2]) -> u64 {
+    8 * size.map(|n| u64::from(n.max(1))).iter().product::<u64>()
 }
 
 impl Store {
@@ -68,6 +75,7 @@ impl Store {
             changes: buffer("gi.changes", 16 * cells),
             glosses: buffer("gi.glosses", 16 * cells),
             gloss: gloss(device, size),
+            mirrored: buffer("gi.mirrored", mirrored(size)),
         }
     }
 
@@ -76,10 +84,8 @@ impl Store {
         let (cells, slots) = (cells::count(size).max(1), u64::from(slots));
         let rays = cells + squares(size);
         let records = rays + (LOOKS - 1) * cells;
-        [16 * (rays + 4 * slots), 32 * slots, PAST * cells, RECORD * records, cells::light_bytes(size)]
-            .into_iter()
-            .max()
-            .unwrap_or(0)
+        let [queries, light, pasts, records] = [16 * (rays + 4 * slots), 32 * slots, PAST * cells, RECORD * records];
+        [queries, light, pasts, records, cells::light_bytes(size), mirrored(size)].into_iter().max().unwrap_or(0)
     }
 
     pub fn bytes(&self) -> u64 {
@@ -96,10 +102,12 @@ impl Store {
             changes,
             glosses,
             gloss,
+            mirrored,
         } = self;
         let texels = u64::from(gloss.texture().width()) * u64::from(gloss.texture().height());
-        let buffers = [keys, lots, queries, asked, light, records, a, b, cell_light, blurred, changes, glosses];
-        8 * texels + buffers.iter().map(|b| b.size()).sum::<u64>()
+        let table = [keys, lots, queries, asked, light];
+        let buffers = table.into_iter().chain([records, a, b, cell_light, blurred, changes, glosses, mirrored]);
+        8 * texels + buffers.map(|b| b.size()).sum::<u64>()
     }
 }
 

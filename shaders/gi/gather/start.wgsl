@@ -1,0 +1,52 @@
+//#import gi/inputs.wgsl
+//#import lib/brdf.wgsl
+//#import gi/cells.wgsl
+//#import gi/gather/types.wgsl
+
+// Where rays from the picture's surfaces begin, and which way they go into lobes.
+
+// A place of the picture from which a ray is sent.
+struct Start {
+    x: vec3f,
+    n: vec3f,
+    // Unit vector to the eye.
+    v: vec3f,
+}
+
+fn start_at(pixel: vec2i) -> Start {
+    let z = distance_at(pixel);
+    let n = world_normal_at(pixel);
+    let from_eye = offset_at(pixel, z);
+    // Above the surface, and towards the eye, where nothing is in between whatever the normal says.
+    // A depth whose steps are coarse at this distance asks for more.
+    let lift = max(LIFT, LIFT_STEPS * params.depth.w * z);
+    return Start(params.eye.xyz + from_eye * (1.0 - lift) + n * (lift * z), n, -normalize(from_eye));
+}
+
+// A direction of the half space above a surface; what its ray finds is weighted so that the mean over the lobe is what
+// `env_brdf` has to be multiplied by. No weight: no ray.
+struct LobeRay {
+    d: vec3f,
+    weight: vec3f,
+}
+
+// By two numbers `u` of [0, 1) into the lobe of the surface (F0, roughness) at a place.
+fn lobe_ray(at: Start, surface: vec4f, u: vec2f) -> LobeRay {
+    let n_v = max(dot(at.n, at.v), 1e-4);
+    let frame = frame_around(at.n);
+    let v = at.v * frame;
+    let alpha = max(surface.a * surface.a, 1e-3);
+    let h = sample_visible_normal(vec3f(v.xy, max(v.z, 1e-4)), alpha, u);
+    let l = reflect(-v, h);
+    var weight = vec3f(0.0);
+    if l.z > 0.0 {
+        // Masking of both directions over that of v: height-correlated Smith.
+        let a2 = alpha * alpha;
+        let g_v = sqrt(n_v * n_v * (1.0 - a2) + a2);
+        let g_l = sqrt(l.z * l.z * (1.0 - a2) + a2);
+        let kept = l.z * (n_v + g_v) / (l.z * g_v + n_v * g_l);
+        weight = fresnel_of(surface.rgb, saturate(dot(v, h))) * lobe_gain(surface.rgb, surface.a, n_v) * kept
+            / max(env_brdf(surface.rgb, surface.a, n_v), vec3f(1e-4));
+    }
+    return LobeRay(frame * l, weight);
+}

@@ -1,0 +1,101 @@
+//! Mirrors show what is off the screen pixel by pixel, at once and while the camera turns.
+
+use crate::build::{floor, look_at, material, quad, scene};
+use crate::gather::uploaded;
+use crate::{common, read_light, world};
+use bouncelight::gi::Method;
+use bouncelight::gpu::{Gpu, timing::Recorder};
+use bouncelight::render::capture::{CaptureOptions, Layer, capture};
+use bouncelight::render::{Renderer, View};
+use bouncelight::scene::{Camera, Environment, Scene};
+use glam::{Mat4, Vec3};
+
+const SIZE: [u32; 2] = [96, 64];
+const GLOW: f32 = 2.0;
+
+/// A metal floor before a glowing square that no picture here shows.
+fn room(roughness: f32) -> Scene {
+    let square = quad([-1.0, 1.5, -4.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]);
+    let mut s = scene(vec![floor(8.0, 0.0), square], vec![]);
+    s.materials = vec![material([1.0; 3]), material([0.0; 3])];
+    (s.materials[0].metallic, s.materials[0].roughness) = (1.0, roughness);
+    s.materials[1].emissive = [GLOW; 3];
+    s.meshes[1].material = 1;
+    s.environment = Environment::constant([0.0; 3]);
+    s
+}
+
+/// Above the floor, looking down; turned by so many radians.
+fn camera(turn: f32) -> Camera {
+    look_at([0.0, 1.5, 3.0], [3.5 * turn.sin(), 0.0, 3.0 - 3.5 * turn.cos()], 0.6)
+}
+
+/// Light that pixels show by their lobes over the lobes' albedo: the last of several frames, in each of which the camera turns.
+fn shown(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, frames: u32, turn: f32) -> Vec<f32> {
+    let gpu_scene = uploaded(gpu, scene);
+    for i in 0..frames {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let camera = camera(turn * (frames - 1 - i) as f32);
+        let view = View::new(&camera, SIZE, [0.0; 2]).with_seed(i);
+        renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, &gpu_scene, &view).expect("the frame is drawn");
+        gpu.queue.submit([encoder.finish()]);
+    }
+    let light = read_light(gpu, &renderer.targets().indirect_specular.texture);
+    let mut direct = world::renderer(gpu, SIZE, Method::Direct);
+    let layers = CaptureOptions { layers: &[Layer::GlossCol], ..Default::default() };
+    let frame = capture(gpu, &mut direct, &gpu_scene, &camera(0.0), layers).expect("draws");
+    let share = &frame.layer(Layer::GlossCol).expect("asked for").data;
+    light.iter().zip(share.chunks_exact(3)).map(|(l, s)| l[0] / s[0].max(1e-6)).collect()
+}
+
+/// How far each pixel's mirrored place lies inside the glowing square (metres; negative outside), None off the floor.
+fn inside() -> Vec<Option<f32>> {
+    let camera = camera(0.0);
+    let m = View::new(&camera, SIZE, [0.0; 2]).matrices();
+    let back = (Mat4::from_cols_array_2d(&m.clip_from_view) * Mat4::from_cols_array_2d(&m.view_from_world)).inverse();
+    let eye = Vec3::new(0.0, 1.5, 3.0);
+    let of = |i: u32| {
+        let (x, y) = ((i % SIZE[0]) as f32 + 0.5, (i / SIZE[0]) as f32 + 0.5);
+        let ndc = Vec3::new(2.0 * x / SIZE[0] as f32 - 1.0, 1.0 - 2.0 * y / SIZE[1] as f32, 0.5);
+        let d = (back.project_point3(ndc) - eye).normalize();
+        let floor = eye + d * (eye.y / -d.y);
+        if d.y >= 0.0 || floor.x.abs() > 7.9 || floor.z < -3.9 {
+            return None;
+        }
+        let t = (floor.z + 4.0) / -d.z;
+        let (x, y) = (floor.x + t * d.x, -t * d.y);
+        Some((1.0 - x.abs()).min(y - 1.5).min(3.5 - y))
+    };
+    (0..SIZE[0] * SIZE[1]).map(of).collect()
+}
+
+/// Share of the pixels, away from the square's rim by `margin` metres, that show what they mirror within a twentieth.
+fn right(light: &[f32], margin: f32) -> f64 {
+    let (mut right, mut all, mut bright) = (0, 0, 0);
+    for (l, inside) in light.iter().zip(inside()) {
+        let Some(inside) = inside.filter(|d| d.abs() > margin) else { continue };
+        let expected = if inside > 0.0 { GLOW } else { 0.0 };
+        bright += u32::from(inside > 0.0);
+        all += 1;
+        right += u32::from((l - expected).abs() < 0.05 * GLOW);
+    }
+    assert!(bright > 300 && all > 4000, "{bright} of {all} pixels mirror the square");
+    f64::from(right) / f64::from(all)
+}
+
+#[test]
+fn a_mirror_is_sharp_where_the_screen_knows_nothing() {
+    let Some(gpu) = common::gpu() else { return };
+    let method = || Method::Gather(Default::default());
+    let new = || world::renderer(&gpu, SIZE, method());
+    // A pixel sees 3 to 6 cm of the square; the lobe is as wide as one.
+    let rest = right(&shown(&gpu, &mut new(), &room(0.02), 8, 0.0), 0.06);
+    assert!(rest > 0.99, "at rest {rest}");
+    // One ray for four pixels.
+    let first = right(&shown(&gpu, &mut new(), &room(0.02), 1, 0.0), 0.12);
+    let turning = right(&shown(&gpu, &mut new(), &room(0.02), 12, 0.02), 0.12);
+    assert!(first > 0.99 && turning > 0.99, "first frame {first}, turning {turning}");
+    // Control: what cells know is not sharp enough, and a rough floor is none.
+    let rough = right(&shown(&gpu, &mut new(), &room(0.4), 8, 0.0), 0.06);
+    assert!(rough < 0.9, "a rough floor passes for a mirror: {rough}");
+}
