@@ -1,9 +1,9 @@
 //#import gi/inputs.wgsl
 //#import gi/cells.wgsl
 
-// Which pixel stands for each cell: its middle one, unless another surface stands before the middle's (or the middle
-// shows the background): then that surface's pixel nearest to the middle. What is in front is small and would often go
-// without any cell of its own; what is behind it is mostly seen by the cells around.
+// Which pixel stands for each cell: its middle one. In every second cell, as on a chessboard, what stands before the
+// middle's surface comes first: the nearest such pixel. What is in front is small and would often go without any cell of its
+// own; but between leaves what is behind needs cells, too. A middle without a surface gives way to any pixel that shows one.
 
 @group(1) @binding(0) var<storage, read_write> cell_pixels: array<u32>;
 
@@ -19,6 +19,7 @@ fn chosen(cell: vec2i) -> u32 {
     let z_middle = distance_at(middle);
     let p = world_position_at(middle, z_middle);
     let n = world_normal_at(middle);
+    let front_first = ((cell.x ^ cell.y) & 1) == 0;
     var best = select(NO_PIXEL, pack_pixel(middle), z_middle > 0.0);
     var least = 1e30;
     for (var y = first.y; y <= last.y; y++) {
@@ -27,7 +28,8 @@ fn chosen(cell: vec2i) -> u32 {
             let z = distance_at(pixel);
             let offset = pixel - middle;
             let score = z * (1.0 + CENTRED * f32(dot(offset, offset)));
-            let before = z < z_middle && dot(n, world_position_at(pixel, z) - p) > IN_FRONT * z_middle;
+            let before = front_first && z < z_middle
+                && dot(n, world_position_at(pixel, z) - p) > IN_FRONT * z_middle;
             if z > 0.0 && (before || z_middle <= 0.0) && score < least {
                 least = score;
                 best = pack_pixel(pixel);

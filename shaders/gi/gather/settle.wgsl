@@ -151,7 +151,27 @@ fn gloss_of(cell: vec2u, past: vec4f, roughness: f32, motion: vec2f, light: vec3
     return gloss;
 }
 
-// Before the rays: marks cells that are fresh.
+// The pixel of a cell that shows what the cell remembers, nearest to its middle; NO_PIXEL where none at rest does.
+fn pixel_showing(past: Past, cell: vec2u) -> u32 {
+    let first = CELL_SIDE * vec2i(cell);
+    var best = NO_PIXEL;
+    var least = 1000;
+    for (var i = 0; i < CELL_SIDE * CELL_SIDE; i++) {
+        let pixel = first + vec2i(i % CELL_SIDE, i / CELL_SIDE);
+        let from_middle = pixel - first - CELL_SIDE / 2;
+        let far = dot(from_middle, from_middle);
+        if any(pixel >= vec2i(params.size)) || far >= least || !rests(motion_of(pixel)) { continue; }
+        let z = distance_at(pixel);
+        if z > 0.0 && shows(past, world_position_at(pixel, z), world_normal_at(pixel), cell_foot(z)) {
+            least = far;
+            best = pack_pixel(pixel);
+        }
+    }
+    return best;
+}
+
+// Before the rays: marks cells that are fresh. At rest a cell goes on with the surface that it remembers as long as one of its pixels
+// shows it: jittered pictures of leaves, grids and edges have another one in its middle in every frame.
 @compute @workgroup_size(8, 8)
 fn recall(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= cell_grid()) { return; }
@@ -161,9 +181,12 @@ fn recall(@builtin(global_invocation_id) id: vec3u) {
     let pixel = unpack_pixel(packed);
     let z = distance_at(pixel);
     let x = world_position_at(pixel, z);
-    if past_of(id.xy, pixel, motion_of(pixel), x, world_normal_at(pixel), cell_foot(z)).frames <= 0.0 {
-        cell_pixels[cell] = packed | FRESH;
-    }
+    let motion = motion_of(pixel);
+    if past_of(id.xy, pixel, motion, x, world_normal_at(pixel), cell_foot(z)).frames > 0.0 { return; }
+    var goes_on = NO_PIXEL;
+    let past = past_at(cell);
+    if (gather.flags & GATHER_CUT) == 0u && past.frames > 0.0 && rests(motion) { goes_on = pixel_showing(past, id.xy); }
+    cell_pixels[cell] = select(goes_on, packed | FRESH, goes_on == NO_PIXEL);
 }
 
 // What one or several rays of a cell have found.

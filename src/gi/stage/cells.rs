@@ -1,7 +1,7 @@
 //! Cells of low-resolution light: which real pixel stands for each, so that a method gathers light once a cell.
 //!
-//! It is the middle one, unless another surface stands before the middle's: then that surface's pixel nearest to the
-//! middle. A cell that shows any surface has a pixel on one.
+//! It is the middle one; in every second cell, as on a chessboard, what stands before the middle's surface comes first:
+//! the nearest such pixel. A cell that shows any surface has a pixel on one.
 //!
 //! A method at low resolution records [`CellsPass`], then its own gather, which joins `gi/cells.wgsl` behind
 //! `gi/inputs.wgsl`, reads [`CellsPass::pixels`] and writes its light buffer ([`light_bytes`]), then
