@@ -25,7 +25,7 @@ pub fn of(scene: &Scene) -> impl Iterator<Item = ([Vec3; 3], Owner)> {
     let share = (ENOUGH / scene.instances.len().max(1)).max(FEW);
     let placed = scene.instances.iter().enumerate();
     let placed = placed.filter_map(|(n, i)| Some((n, i, scene.meshes.get(i.mesh)?)));
-    placed.flat_map(|(number, instance, mesh)| {
+    placed.flat_map(move |(number, instance, mesh)| {
         let world = Mat4::from_cols_array_2d(&instance.transform);
         let flipped = world.determinant() < 0.0;
         let step = if all <= ENOUGH { 1 } else { (mesh.indices.len() / 3).div_ceil(share).max(1) };
