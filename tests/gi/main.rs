@@ -4,6 +4,7 @@ mod below;
 mod bring;
 #[path = "../common/build.rs"]
 mod build;
+mod bumps;
 #[path = "../common/mod.rs"]
 mod common;
 mod contract;

@@ -173,7 +173,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
                 w *= kinship(own.near, other.near, share) * exp(share * other.trust);
             }
             sum += w * there.light;
-            vector += w * there.vector;
+            // Across each one's own normal: what lies along normals that differ is no gradient of light.
+            vector += w * (there.vector - there.n * dot(there.vector, there.n));
             total += w;
             lately += w * there.lately;
             let l = luminance(there.light);

@@ -41,6 +41,13 @@ fn blurred_at(cell: u32) -> Blurred {
     return Blurred(place.xyz, pasts[5u * cell].a, n, r.rgb, g, b, l, r.a);
 }
 
+// One channel of `CellLight` from (light along n) · n + gradient. Light from all of the half space alike gives a surface tilted by
+// θ (1 + cos θ)/2 of itself, not cos θ: what lies below its horizon gives nothing, rather than less than nothing.
+fn tilting(channel: vec3f, n: vec3f) -> vec4f {
+    let half = 0.5 * dot(channel, n);
+    return vec4f(channel - half * n, half);
+}
+
 @compute @workgroup_size(8, 8)
 fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= cell_grid()) { return; }
@@ -82,7 +89,7 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
         green /= total;
         blue /= total;
     }
-    light[3u * cell] = vec4f(red, 0.0);
-    light[3u * cell + 1u] = vec4f(green, 0.0);
-    light[3u * cell + 2u] = vec4f(blue, 0.0);
+    light[3u * cell] = tilting(red, here.n);
+    light[3u * cell + 1u] = tilting(green, here.n);
+    light[3u * cell + 2u] = tilting(blue, here.n);
 }
