@@ -58,25 +58,32 @@ impl Grid {
         grid
     }
 
-    /// Marks the cells of points spread over a triangle, at most half a cell apart.
-    fn add(&mut self, [a, b, c]: [Vec3; 3], instance: u32) {
-        let (ab, ac) = (b - a, c - a);
-        let longest = ab.length().max(ac.length()).max(b.distance(c));
-        let n = ((longest / (0.5 * self.cell)).ceil() as i64).clamp(1, 8 * SIDE as i64);
-        let facing = ab.cross(ac) * (0.5 / (n * n) as f32);
+    /// Marks the cells of points spread over a triangle, at most half a cell apart: rows along its longest edge, so that
+    /// a sliver takes no more of them than a line.
+    fn add(&mut self, corners: [Vec3; 3], instance: u32) {
+        let length = |i: usize| corners[i].distance(corners[(i + 1) % 3]);
+        let first = (0..3).max_by(|&i, &j| length(i).total_cmp(&length(j))).unwrap_or(0);
+        let [a, b, c] = [0, 1, 2].map(|i| corners[(first + i) % 3]);
+        let facing = 0.5 * (b - a).cross(c - a);
         let area = facing.length();
         if !area.is_finite() {
             return;
         }
-        for i in 0..n {
-            for j in 0..n - i {
-                let (u, v) = ((i as f32 + 1.0 / 3.0) / n as f32, (j as f32 + 1.0 / 3.0) / n as f32);
-                let Some(at) = self.index(self.place(a + ab * u + ac * v)) else { continue };
+        let steps = |length: f32| (length / (0.5 * self.cell)).ceil().clamp(1.0, 8.0 * SIDE);
+        let (along, rows) = (steps(length(first)), steps(2.0 * area / length(first).max(f32::MIN_POSITIVE)));
+        for row in 0..rows as u32 {
+            let t = (row as f32 + 0.5) / rows;
+            let (from, to) = (a.lerp(c, t), b.lerp(c, t));
+            let count = (along * (1.0 - t)).ceil();
+            // A row's share of the area falls evenly, to nothing at the corner.
+            let share = 2.0 * (1.0 - t) / (rows * count);
+            for i in 0..count as u32 {
+                let Some(at) = self.index(self.place(from.lerp(to, (i as f32 + 0.5) / count))) else { continue };
                 let cell = &mut self.cells[at];
-                cell.facing += facing;
-                cell.area += area;
+                cell.facing += share * facing;
+                cell.area += share * area;
                 cell.instance = instance;
-                cell.triangles = cell.triangles.saturating_add(u16::from(i == 0 && j == 0));
+                cell.triangles = cell.triangles.saturating_add(u16::from(row == 0 && i == 0));
             }
         }
     }
