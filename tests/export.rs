@@ -217,8 +217,8 @@ fn recorded(gpu: &Gpu, method: &Method, frames: usize) -> Vec<Vec<String>> {
         });
         texture.create_view(&Default::default())
     };
-    let [depth, normal, light] =
-        [F::R32Float, F::Rg16Float, F::Rgba16Float].map(|format| texture(format, U::TEXTURE_BINDING));
+    let [depth, normal, light, specular] =
+        [F::R32Float, F::Rg16Float, F::Rgba16Float, F::Rgba8Unorm].map(|format| texture(format, U::TEXTURE_BINDING));
     let output = texture(F::Rgba16Float, U::STORAGE_BINDING);
     let [x, y, z, w] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
     let camera = CameraMatrices {
@@ -229,6 +229,7 @@ fn recorded(gpu: &Gpu, method: &Method, frames: usize) -> Vec<Vec<String>> {
     let inputs = Inputs {
         albedo: Some(&light),
         direct: Some(&light),
+        specular: Some(&specular),
         lights: Some(lights),
         rays: uploaded.rays.as_ref().map(|scene| Rays { scene, environment: &uploaded.environment_view }),
         ..Inputs::new(SIZE, &depth, &normal, camera)

@@ -132,7 +132,9 @@ fn the_program_draws_poses_and_sequences() {
     fails(&["render", &file, "-o", &out, "--fixed-dt", "1/24"], 2, &["--fixed-dt"]);
     let Some(_) = common::gpu() else { return };
     let run = |more: &[&str]| {
-        let fixed = ["render", &file, "--size", "48x48", "--method", "direct", "--samples", "1", "--quiet"];
+        // A sequence keeps the exposure that its first frame asks for.
+        let fixed =
+            ["render", &file, "--size", "48x48", "--method", "direct", "--samples", "1", "--exposure", "0", "--quiet"];
         let done = bouncelight(&[&fixed, more].concat());
         assert!(done.status.success(), "{more:?}: {}", String::from_utf8_lossy(&done.stderr));
     };
