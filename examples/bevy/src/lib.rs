@@ -42,7 +42,8 @@ pub use pass::{Complaints, Views};
 pub const LUMENS_PER_WATT: f32 = 683.0;
 
 /// Gives cameras with [`Bouncelight`] the light that Bevy's lights leave out: every bounce, what glows, and the sky
-/// ([`GlobalAmbientLight`]). Opaque materials are drawn deferred from then on, which it reads albedo from.
+/// ([`GlobalAmbientLight`]). Opaque materials are drawn deferred from then on, which it reads albedo from: Bevy shows
+/// them to cameras with a [`DeferredPrepass`] alone.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct BouncelightPlugin {
     /// After eight frames of a camera asks [`bouncelight::gi::View::check`] whether what it was given makes sense,
@@ -85,9 +86,13 @@ impl Plugin for BouncelightPlugin {
     }
 }
 
-/// What the pass reads. Inserted, not required: a camera that is there already has samples and no HDR target.
-fn equip(added: On<Add<Bouncelight>>, mut commands: Commands) {
+/// What comes with [`Bouncelight`]. Inserted, not required: a camera that is there already has samples and no HDR target.
+pub fn equipment() -> impl Bundle {
     let none = AmbientLight { brightness: 0.0, ..Default::default() };
     let prepasses = (DepthPrepass, NormalPrepass, MotionVectorPrepass, DeferredPrepass);
-    commands.entity(added.entity).insert((prepasses, Hdr, Msaa::Off, none));
+    (prepasses, Hdr, Msaa::Off, none)
+}
+
+fn equip(added: On<Add<Bouncelight>>, mut commands: Commands) {
+    commands.entity(added.entity).insert(equipment());
 }

@@ -76,9 +76,12 @@ fn draw(args: &Args) -> Result<(), String> {
     }
     let camera = cameras(headless.app.world_mut()).ok_or("there is no camera")?;
     let drawing = headless.camera();
-    headless.app.world_mut().entity_mut(camera).insert((drawing, bevy::camera::Hdr, Msaa::Off));
-    let ambient = bevy::light::AmbientLight { brightness: 0.0, ..default() };
-    headless.app.world_mut().entity_mut(camera).insert(ambient);
+    let mut entity = headless.app.world_mut().entity_mut(camera);
+    entity.insert((drawing, bouncelight_bevy::equipment()));
+    // Bevy asks for a camera's target when the camera or its lens is new.
+    if let Some(mut lens) = entity.get_mut::<Projection>() {
+        lens.set_changed();
+    }
     let mut shots = Vec::new();
     if args.beside || !args.with {
         for _ in 0..8 {
