@@ -19,7 +19,7 @@ pub(crate) struct Host {
     pub(crate) renderer: Renderer,
     /// How the renderer's targets are to be read.
     pub(crate) conventions: Conventions,
-    world: World,
+    pub(crate) world: World,
     pub(crate) view: View,
     before: f32,
 }

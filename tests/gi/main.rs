@@ -20,6 +20,7 @@ mod foreign;
 mod gather;
 mod glossy;
 mod glow;
+mod in_flight;
 mod lamps;
 #[cfg(feature = "io")]
 mod real;

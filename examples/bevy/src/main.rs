@@ -5,10 +5,11 @@
 //! The picture is to be compared with `bouncelight render --tonemap none`: the file's lights cast shadows, lamps that
 //! stand for glowing surfaces are left out (rays find those), and 1 W/(m²·sr) is white.
 
-use bevy::gltf::GltfExtras;
+use bevy::gltf::{GltfExtras, GltfSceneExtras};
+use bevy::light::GlobalAmbientLight;
 use bevy::prelude::*;
 use bouncelight_bevy::headless::Headless;
-use bouncelight_bevy::{Bouncelight, BouncelightPlugin, Complaints};
+use bouncelight_bevy::{Bouncelight, BouncelightPlugin, Complaints, LUMENS_PER_WATT};
 use std::process::ExitCode;
 
 struct Args {
@@ -63,7 +64,8 @@ fn draw(args: &Args) -> Result<(), String> {
     };
     let mut headless = Headless::new(args.size, folder);
     headless.app.add_plugins(BouncelightPlugin { check: true });
-    headless.app.add_systems(Update, (correct::<PointLight>, correct::<SpotLight>, correct::<DirectionalLight>));
+    headless.app.insert_resource(GlobalAmbientLight { brightness: 0.0, ..default() });
+    headless.app.add_systems(Update, (correct::<PointLight>, correct::<SpotLight>, correct::<DirectionalLight>, sky));
     let assets = headless.app.world().resource::<AssetServer>().clone();
     let handle = assets.load(GltfAssetLabel::Scene(0).from_asset(file.to_owned()));
     headless.app.world_mut().spawn(WorldAssetRoot(handle.clone()));
@@ -111,6 +113,17 @@ fn correct<L: Lamp>(mut lamps: Query<(Entity, &mut L, Option<&GltfExtras>), Adde
         if extras.is_some_and(|e| e.value.contains("\"stands_in\":true")) {
             commands.entity(entity).despawn();
         }
+    }
+}
+
+/// The sky that bouncelight writes into a file, W/(m²·sr); others have none.
+fn sky(extras: Query<&GltfSceneExtras, Added<GltfSceneExtras>>, mut commands: Commands) {
+    for extras in &extras {
+        let Ok(value) = serde_json::from_str::<serde_json::Value>(&extras.value) else { continue };
+        let radiance = |i: usize| value["bouncelight"]["environment"][i].as_f64().unwrap_or_default() as f32;
+        let color = Color::linear_rgb(radiance(0), radiance(1), radiance(2));
+        commands.insert_resource(ClearColor(color));
+        commands.insert_resource(GlobalAmbientLight { color, brightness: LUMENS_PER_WATT, ..default() });
     }
 }
 

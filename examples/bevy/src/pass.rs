@@ -28,6 +28,7 @@ pub(crate) struct Lit {
 #[derive(Resource, Default)]
 pub struct Views {
     cameras: HashMap<Entity, Camera>,
+    specular: Option<wgpu::RenderPipeline>,
     composites: HashMap<wgpu::TextureFormat, wgpu::RenderPipeline>,
 }
 
@@ -37,6 +38,10 @@ struct Camera {
     pass: Option<Mutex<Pass>>,
     /// E/π.
     light: wgpu::TextureView,
+    /// F0 and roughness.
+    specular: wgpu::TextureView,
+    /// `Camera` of `composite.wgsl`.
+    matrices: wgpu::Buffer,
     checked: bool,
 }
 
@@ -91,22 +96,35 @@ pub(crate) fn prepare(
     views.cameras.retain(|entity, _| cameras.contains(*entity));
     for (entity, view) in &cameras {
         let format = view.target_format;
-        views.composites.entry(format).or_insert_with(|| composite(device, format));
+        let add = || screen(device, "composite", format, Some(ADD));
+        views.composites.entry(format).or_insert_with(add);
+        views.specular.get_or_insert_with(|| screen(device, "specular", SPECULAR, None));
         let size = [view.viewport.z, view.viewport.w];
         if views.cameras.get(&entity).is_some_and(|c| c.size == size) || size.contains(&0) {
             continue;
         }
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("bouncelight.light"),
-            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba16Float,
-            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
+        let texture = |label, format, usage| {
+            let texture = device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: usage | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            });
+            texture.create_view(&Default::default())
+        };
+        let light =
+            texture("bouncelight.light", wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::STORAGE_BINDING);
+        let specular = texture("bouncelight.specular", SPECULAR, wgpu::TextureUsages::RENDER_ATTACHMENT);
+        let matrices = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("bouncelight.camera"),
+            size: 48,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
         });
-        let light = texture.create_view(&Default::default());
         let made = match views.cameras.remove(&entity) {
             // It takes another size by itself.
             Some(before) => before.pass,
@@ -118,7 +136,7 @@ pub(crate) fn prepare(
                 }
             },
         };
-        views.cameras.insert(entity, Camera { size, pass: made, light, checked: false });
+        views.cameras.insert(entity, Camera { size, pass: made, light, specular, matrices, checked: false });
     }
 }
 
@@ -129,7 +147,7 @@ type Seen<'a> =
 fn inputs<'a>(
     view: &ExtractedView,
     textures: &'a ViewPrepassTextures,
-    depth: &'a wgpu::TextureView,
+    (depth, specular): (&'a wgpu::TextureView, &'a wgpu::TextureView),
     jitter: Option<&TemporalJitter>,
 ) -> Option<Inputs<'a>> {
     let size = [view.viewport.z, view.viewport.w];
@@ -152,62 +170,115 @@ fn inputs<'a>(
         ..Default::default()
     };
     let motion = textures.motion_vectors_view().map(|v| &**v);
-    Some(Inputs { motion, conventions, ..Inputs::new(size, depth, textures.normal_view()?, camera) })
+    let inputs = Inputs::new(size, depth, textures.normal_view()?, camera);
+    Some(Inputs { motion, specular: Some(specular), conventions, ..inputs })
 }
 
 /// Records the pass and adds what it finds to the picture.
 pub(crate) fn light(
     seen: ViewQuery<Seen<'static>, With<Bouncelight>>,
     (lit, views): (Option<Res<Lit>>, Res<Views>),
+    queue: Res<RenderQueue>,
     mut context: RenderContext,
 ) {
     let camera = views.cameras.get(&seen.entity());
     let (view, camera_of, target, textures, jitter) = seen.into_inner();
-    let (Some(lit), Some(camera)) = (lit, camera) else { return };
+    let (Some(lit), Some(camera), Some(first)) = (lit, camera, &views.specular) else { return };
     let (Some(pass), Some(gbuffer)) = (&camera.pass, textures.deferred_view()) else { return };
-    let Some(pipeline) = views.composites.get(&target.main_texture_format()) else { return };
+    let Some(last) = views.composites.get(&target.main_texture_format()) else { return };
     let Some(depth) = textures.depth_only_view() else { return };
 
     let mut pass = pass.lock().unwrap_or_else(PoisonError::into_inner);
     let depth = pass.depth(depth);
-    let Some(inputs) = inputs(view, textures, &depth, jitter) else { return };
-    if let Err(e) = pass.view.record(context.command_encoder(), &lit.world, &inputs, &camera.light) {
+    let Some(inputs) = inputs(view, textures, (&depth, &camera.specular), jitter) else { return };
+    let device = context.render_device().wgpu_device().clone();
+    let group = |pipeline: &wgpu::RenderPipeline, bound: &[wgpu::BindingResource<'_>]| {
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("bouncelight"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries(bound),
+        })
+    };
+    let texture = |view| wgpu::BindingResource::TextureView(view);
+    let to_specular = wgpu::RenderPassColorAttachment {
+        view: &camera.specular,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store: wgpu::StoreOp::Store },
+    };
+    let encoder = context.command_encoder();
+    draw(encoder, first, &group(first, &[texture(gbuffer)]), to_specular, 0.0);
+    if let Err(e) = pass.view.record(encoder, &lit.world, &inputs, &camera.light) {
         error_once!("{e}");
         return;
     }
-    let group = context.render_device().wgpu_device().create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("bouncelight.composite"),
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &[
-            wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(gbuffer) },
-            wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::TextureView(&camera.light) },
-        ],
-    });
-    let mut draw = context.command_encoder().begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("bouncelight.composite"),
-        color_attachments: &[Some(target.get_color_attachment())],
-        ..Default::default()
-    });
+    let gloss = pass.view.gloss();
+    queue.write_buffer(&camera.matrices, 0, bytemuck::cast_slice(&matrices(&inputs.camera, gloss.is_some())));
+    let bound = [
+        texture(gbuffer),
+        texture(&camera.light),
+        texture(gloss.unwrap_or(&camera.light)),
+        texture(inputs.normal),
+        camera.matrices.as_entire_binding(),
+    ];
     let scale = f64::from(LUMENS_PER_WATT * camera_of.exposure);
-    draw.set_blend_constant(wgpu::Color { r: scale, g: scale, b: scale, a: 0.0 });
-    draw.set_pipeline(pipeline);
-    draw.set_bind_group(0, &group, &[]);
-    draw.draw(0..3, 0..1);
+    draw(encoder, last, &group(last, &bound), target.get_color_attachment(), scale);
 }
 
-fn composite(device: &wgpu::Device, format: wgpu::TextureFormat) -> wgpu::RenderPipeline {
+fn entries<'a>(bound: &[wgpu::BindingResource<'a>]) -> Vec<wgpu::BindGroupEntry<'a>> {
+    (0..).zip(bound).map(|(binding, r)| wgpu::BindGroupEntry { binding, resource: r.clone() }).collect()
+}
+
+/// A triangle over the whole target.
+fn draw(
+    encoder: &mut wgpu::CommandEncoder,
+    pipeline: &wgpu::RenderPipeline,
+    group: &wgpu::BindGroup,
+    target: wgpu::RenderPassColorAttachment<'_>,
+    scale: f64,
+) {
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("bouncelight"),
+        color_attachments: &[Some(target)],
+        ..Default::default()
+    });
+    pass.set_blend_constant(wgpu::Color { r: scale, g: scale, b: scale, a: 0.0 });
+    pass.set_pipeline(pipeline);
+    pass.set_bind_group(0, group, &[]);
+    pass.draw(0..3, 0..1);
+}
+
+/// `Camera` of `composite.wgsl`.
+fn matrices(camera: &CameraMatrices, gloss: bool) -> [[f32; 4]; 3] {
+    let (view, p) = (Mat4::from_cols_array_2d(&camera.view_from_world), camera.clip_from_view);
+    let axis = |row: usize, over: f32, with: f32| (view.row(row).truncate() / over).extend(with).to_array();
+    [axis(0, p[0][0], p[2][0]), axis(1, p[1][1], p[2][1]), axis(2, 1.0, f32::from(u8::from(gloss)))]
+}
+
+const SPECULAR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// Times the blend constant, onto what is there.
+const ADD: wgpu::BlendState = {
+    let (operation, dst_factor) = (wgpu::BlendOperation::Add, wgpu::BlendFactor::One);
+    wgpu::BlendState {
+        color: wgpu::BlendComponent { src_factor: wgpu::BlendFactor::Constant, dst_factor, operation },
+        alpha: wgpu::BlendComponent { src_factor: wgpu::BlendFactor::Zero, dst_factor, operation },
+    }
+};
+
+fn screen(
+    device: &wgpu::Device,
+    entry: &str,
+    format: wgpu::TextureFormat,
+    blend: Option<wgpu::BlendState>,
+) -> wgpu::RenderPipeline {
+    let source = concat!(include_str!("../../../shaders/lib/brdf.wgsl"), include_str!("composite.wgsl"));
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("bouncelight.composite"),
-        source: wgpu::ShaderSource::Wgsl(include_str!("composite.wgsl").into()),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
     });
-    let add =
-        |src_factor, dst_factor| wgpu::BlendComponent { src_factor, dst_factor, operation: wgpu::BlendOperation::Add };
-    let blend = wgpu::BlendState {
-        color: add(wgpu::BlendFactor::Constant, wgpu::BlendFactor::One),
-        alpha: add(wgpu::BlendFactor::Zero, wgpu::BlendFactor::One),
-    };
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("bouncelight.composite"),
+        label: Some("bouncelight"),
         layout: None,
         vertex: wgpu::VertexState {
             module: &module,
@@ -220,13 +291,9 @@ fn composite(device: &wgpu::Device, format: wgpu::TextureFormat) -> wgpu::Render
         multisample: Default::default(),
         fragment: Some(wgpu::FragmentState {
             module: &module,
-            entry_point: None,
+            entry_point: Some(entry),
             compilation_options: Default::default(),
-            targets: &[Some(wgpu::ColorTargetState {
-                format,
-                blend: Some(blend),
-                write_mask: wgpu::ColorWrites::COLOR,
-            })],
+            targets: &[Some(wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL })],
         }),
         multiview_mask: None,
         cache: None,
@@ -251,7 +318,7 @@ pub(crate) fn check(
         }
         camera.checked = true;
         complaints.cameras += 1;
-        let found = inputs(view, textures, &depth, jitter);
+        let found = inputs(view, textures, (&depth, &camera.specular), jitter);
         let found = found.map(|i| pass.view.check(device.wgpu_device(), &lit.world, &i));
         let found: Vec<String> = match found.transpose() {
             Ok(found) => found.unwrap_or_default().iter().map(ToString::to_string).collect(),

@@ -5,15 +5,15 @@ mod error;
 pub mod technique;
 
 pub use conventions::{
-    AlbedoEncoding, Conventions, Depth, Jitter, LightScale, MotionJitter, MotionSense, MotionUnits, NormalEncoding,
-    NormalRange, NormalSpace,
+    AlbedoEncoding, Conventions, Depth, Forward, Jitter, LightScale, MotionJitter, MotionSense, MotionUnits,
+    NormalEncoding, NormalRange, NormalSpace,
 };
 pub use error::GiError;
 
 /// The camera's part of a method's inputs, column-major as in WGSL.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraMatrices {
-    /// View space (right-handed, looking down −Z) from world space.
+    /// View space (looking down −Z, unless [`Conventions::forward`] says otherwise) from world space.
     pub view_from_world: [[f32; 4]; 4],
     /// Clip space from view space: a perspective whose depth and jitter are as [`Conventions`] say.
     pub clip_from_view: [[f32; 4]; 4],
