@@ -19,7 +19,7 @@ pub(crate) struct Host {
     pub(crate) renderer: Renderer,
     /// How the renderer's targets are to be read.
     pub(crate) conventions: Conventions,
-    pub(crate) world: World,
+    world: World,
     pub(crate) view: View,
     before: f32,
 }
