@@ -14,7 +14,7 @@ usage: cargo xtask COMMAND
          error, REQUIRE_ALL=1 all that .ci/run installs)
   hosts  the pass in other renderers: exports, sets up Python with moderngl in target/hosts, runs examples/moderngl/test.py
          and a picture (needs python3 with venv, the network for pip, and EGL); then examples/bevy, its test and a picture
-         (some 330 crates, which two cores build in half an hour)
+         (some 280 crates, which two cores build in half an hour)
   gpu-report [--dev] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] [--triangles N,...] [--out FOLDER] [--no-pytorch]
          measures on this device all that docs/ projects: docs/measured/DEVICE.json and DEVICE.md, in less than eight minutes
          (--dev builds without release's optimisation: for rehearsals)
