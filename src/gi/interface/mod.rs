@@ -22,6 +22,16 @@ pub struct CameraMatrices {
 /// What a method reads. All textures have the same size and usage TEXTURE_BINDING; how their texels
 /// are to be read, [`Conventions`] say. [`Inputs::new`] has what every method needs; what is left
 /// out has the fallback that its field names.
+///
+/// ```
+/// use bouncelight::gi::{CameraMatrices, Conventions, Depth, Inputs};
+/// use bouncelight::wgpu::TextureView;
+///
+/// fn inputs<'a>([depth, normal, motion]: [&'a TextureView; 3], camera: CameraMatrices, cut: bool) -> Inputs<'a> {
+///     let conventions = Conventions { depth: Depth::Forward, ..Default::default() };
+///     Inputs { motion: Some(motion), conventions, reset: cut, ..Inputs::new([1280, 720], depth, normal, camera) }
+/// }
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
     /// Width and height of all textures, pixels.
