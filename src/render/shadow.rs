@@ -1,8 +1,8 @@
-//! Shadow maps of all lights: the passes that draw them. [`shadow_maps`](super::shadow_maps) says who gets how many.
+//! Shadow maps of all lights: the passes that draw them. `shadow_maps` says who gets how many.
 //!
 //! A sun gets cascades (layers of one array), a spot one map, a point light or a spot wider than 60° six faces (layers
 //! of another array). A map is drawn again when its camera has moved, or when something that it sees has moved or shows
-//! another lot ([`shadow_kept`](super::shadow_kept)). Memory is bounded: at most [`MAX_SUNS`] suns share 64 MiB (one
+//! another lot (`shadow_kept`). Memory is bounded: at most [`MAX_SUNS`] suns share 64 MiB (one
 //! alone has four maps of 2048², several have 1024²), and the local lights share [`MAX_LOCAL_LAYERS`] layers (1024² up
 //! to 24 of them, then 512²): 96 MiB. Where lights need more, those that give most to the view have shadows
 //! ([`light_choice`](super::light_choice)); the others shine without, and a warning says so once.
