@@ -30,6 +30,8 @@ const STORED_IN_VIEW = 8u;
 const STORED_SRGB = 16u;
 // Light is multiplied by an exposure.
 const STORED_EXPOSED = 32u;
+// In view space z points away from the eye.
+const STORED_AHEAD = 64u;
 
 // `gi::exposure::Exposure` is the Rust side and documents the fields.
 struct Exposure {
@@ -120,8 +122,14 @@ fn position_at(pixel: vec2i, distance: f32) -> vec3f {
     return params.gravity_from_view * (ray * distance);
 }
 
-// Unit normal as it is stored, in view space or in the world's.
+// Unit normal along the axes that it is stored along: the world's, or the camera's, which looks down -Z.
 fn stored_normal(pixel: vec2i) -> vec3f {
+    let n = stored_vector(pixel);
+    let turned = (params.flags & (STORED_IN_VIEW | STORED_AHEAD)) == (STORED_IN_VIEW | STORED_AHEAD);
+    return select(n, vec3f(n.xy, -n.z), turned);
+}
+
+fn stored_vector(pixel: vec2i) -> vec3f {
     var texel = finite3(textureLoad(normal_map, pixel, 0).rgb);
     if (params.flags & STORED_UNSIGNED) != 0u { texel = 2.0 * texel - 1.0; }
     if (params.flags & (STORED_XYZ | STORED_XY)) == 0u { return oct_decode(texel.xy); }

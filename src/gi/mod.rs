@@ -41,8 +41,8 @@ pub mod stage;
 pub(crate) mod world;
 
 pub use interface::{
-    AlbedoEncoding, CameraMatrices, Conventions, Depth, GiError, Inputs, Jitter, LightScale, Lights, MotionJitter,
-    MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Rays, technique,
+    AlbedoEncoding, CameraMatrices, Conventions, Depth, Forward, GiError, Inputs, Jitter, LightScale, Lights,
+    MotionJitter, MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Rays, technique,
 };
 pub use method::{Method, fitted, name};
 pub use neural::{cpu, features, memory, pack, pass, reconstruct};

@@ -5,8 +5,8 @@ use crate::foreign::{self, SIZE, Targets, Written, draw, gather, shot, world, wr
 use crate::shot::{texture_with, view};
 use crate::world::{difference, mean};
 use bouncelight::gi::{
-    AlbedoEncoding, Conventions, Depth, GiError, Inputs, Jitter, LightScale, Method, MotionJitter, MotionSense,
-    MotionUnits, NormalEncoding, NormalRange, NormalSpace, View,
+    AlbedoEncoding, CameraMatrices, Conventions, Depth, Forward, GiError, Inputs, Jitter, LightScale, Method,
+    MotionJitter, MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, View, World,
 };
 use bouncelight::gpu::Gpu;
 use half::f16;
@@ -80,6 +80,91 @@ fn depth_and_normals_in_every_convention() {
             }
         }
     }
+}
+
+#[test]
+fn cameras_that_look_down_plus_z() {
+    let Some(gpu) = common::gpu() else { return };
+    let own = Conventions::default();
+    let plain = still(&gpu, &Written::default(), &own);
+    let ahead = Conventions { forward: Forward::PositiveZ, ..own };
+    let off = difference(&still(&gpu, &Written { conventions: ahead, ..Default::default() }, &ahead), &plain);
+    println!("down +Z: {:.4} %", 100.0 * off);
+    assert!(off < 1e-4, "{off}");
+    // Depth 0 near and 1 far, and normals along the camera's axes in each encoding.
+    use {NormalEncoding as E, NormalRange as R};
+    for (encoding, range, format) in [
+        (E::Xyz, R::Signed, F::Rgba16Float),
+        (E::Octahedral, R::Unsigned, F::Rgb10a2Unorm),
+        (E::Xy, R::Signed, F::Rg16Float),
+    ] {
+        let conventions = Conventions {
+            depth: Depth::Forward,
+            normal_encoding: encoding,
+            normal_range: range,
+            normal_space: NormalSpace::View,
+            ..ahead
+        };
+        let how = Written { conventions, finite: true, normal: format };
+        let off = difference(&still(&gpu, &how, &conventions), &plain);
+        println!("normals {encoding:?} {range:?} down +Z: {:.3} %", 100.0 * off);
+        assert!(off < 0.03, "{encoding:?}: {off}");
+    }
+    // Negative controls: normals whose z is taken for the other side, and matrices that look the other way.
+    let view = Conventions { normal_encoding: E::Xyz, normal_space: NormalSpace::View, ..own };
+    let how = Written { conventions: view, normal: F::Rgba16Float, ..Default::default() };
+    let shot = shot(0, [0.0; 2]);
+    let mut targets = written(&gpu, &shot, &how, &shot.camera);
+    let (world, mut wrong) = (world(&gpu), gather(&gpu));
+    assert!(draw(&gpu, &mut wrong, Some(&world), &targets.inputs(ahead)).is_err(), "it looks down -Z");
+    targets.camera = turned(targets.camera);
+    let turned = Conventions { forward: Forward::PositiveZ, ..view };
+    let mut last = Vec::new();
+    for _ in 0..8 {
+        last = draw(&gpu, &mut wrong, Some(&world), &targets.inputs(turned)).expect("it draws");
+    }
+    assert!(difference(&last, &plain) > 0.05, "{}", difference(&last, &plain));
+}
+
+/// The same camera, looking down +Z.
+fn turned(mut camera: CameraMatrices) -> CameraMatrices {
+    camera.clip_from_view[2] = camera.clip_from_view[2].map(|v| -v);
+    camera.view_from_world.iter_mut().for_each(|column| column[2] = -column[2]);
+    camera
+}
+
+/// A host whose world is left-handed: everything is mirrored in z, and so the picture is the same.
+#[test]
+fn worlds_that_are_left_handed() {
+    let Some(gpu) = common::gpu() else { return };
+    let own = Conventions::default();
+    let shot = shot(0, [0.0; 2]);
+    // Other rays are sent in a mirrored world, so it takes frames.
+    let light = |world: &World, targets: &Targets, read: Conventions| {
+        let mut view = gather(&gpu);
+        let mut draw = || draw(&gpu, &mut view, Some(world), &targets.inputs(read)).expect("it draws");
+        std::iter::repeat_with(&mut draw).take(48).last().expect("a frame")
+    };
+    let plain = light(&foreign::world(&gpu), &written(&gpu, &shot, &Written::default(), &shot.camera), own);
+    let conventions = Conventions { normal_encoding: NormalEncoding::Xyz, ..own };
+    let how = Written { conventions, normal: F::Rgba16Float, ..Default::default() };
+    let mut targets = written(&gpu, &shot, &how, &shot.camera);
+    let mirrored = |p: [f32; 2]| {
+        let [x, y, z] = bouncelight::gi::cpu::oct_decode(p);
+        [x, y, -z, 0.0].map(f16::from_f32)
+    };
+    let normals: Vec<f16> = shot.buffers.normal.iter().flat_map(|n| mirrored(*n)).collect();
+    let bytes = bytemuck::cast_slice(&normals);
+    targets.normal = view(&texture_with(&gpu.device, &gpu.queue, SIZE, F::Rgba16Float, bytes));
+    targets.camera = turned(targets.camera);
+    targets.camera.view_from_world[2] = targets.camera.view_from_world[2].map(|v| -v);
+    let read = Conventions { forward: Forward::PositiveZ, ..conventions };
+    let [right, off] = [foreign::world(&gpu), foreign::mirrored_world(&gpu)]
+        .map(|world| difference(&light(&world, &targets, read), &plain));
+    println!("a left-handed world: {:.2} %; a right-handed one for it: {:.1} %", 100.0 * off, 100.0 * right);
+    assert!(off < 0.03, "{off}");
+    // Negative control: the world is not mirrored.
+    assert!(right > 0.08, "{right}");
 }
 
 /// Light of the last of some frames of a camera that moves, with a jitter each.

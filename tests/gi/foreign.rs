@@ -6,7 +6,9 @@ use crate::world::Block;
 use bouncelight::gi::{
     self, CameraMatrices, Conventions, Depth, GiError, Inputs, Instance, MeshSource, Method, Surface,
 };
-use bouncelight::gi::{MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, View, World, WorldOptions};
+use bouncelight::gi::{
+    Forward, MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, View, World, WorldOptions,
+};
 use bouncelight::gpu::Gpu;
 use bouncelight::scene::{Environment, LightKind};
 use glam::{Mat4, Vec2, Vec3};
@@ -46,14 +48,30 @@ pub fn placed((low, high, albedo): &Block) -> Instance {
 
 /// The room under a sun and a sky, prepared.
 pub fn world(gpu: &Gpu) -> World {
+    made(gpu, 1.0)
+}
+
+/// As a host has it whose world is left-handed: z the other way, corners in the other order, so that
+/// (b − a) × (c − a) points outwards again.
+pub fn mirrored_world(gpu: &Gpu) -> World {
+    made(gpu, -1.0)
+}
+
+fn made(gpu: &Gpu, z: f32) -> World {
     let mut world = World::new(&gpu.device, WorldOptions::default());
-    let (positions, indices) = cube();
+    let (mut positions, mut indices) = cube();
+    positions.iter_mut().for_each(|p| p[2] *= z);
+    if z < 0.0 {
+        indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
+    }
     let source = MeshSource::new(gi::Vertices::vec3(&positions), gi::Indices::U32(&indices));
     world.mesh(7, &source).expect("a cube");
     for (key, block) in (0..).zip(&ROOM) {
-        world.instance(key, placed(block)).expect("it is placed");
+        let mut instance = placed(block);
+        instance.transform[3][2] *= z;
+        world.instance(key, instance).expect("it is placed");
     }
-    let sun = LightKind::Directional { direction: [-0.5, -0.8, -0.4], irradiance: 3.0, angle: 0.0 };
+    let sun = LightKind::Directional { direction: [-0.5, -0.8, -0.4 * z], irradiance: 3.0, angle: 0.0 };
     world.lights(&[sun.into()]).expect("a sun");
     world.sky(&Environment::constant([0.2, 0.25, 0.3])).expect("a sky");
     world.prepare(&gpu.queue).expect("it fits");
@@ -136,6 +154,11 @@ pub fn written(gpu: &Gpu, shot: &Shot, how: &Written, before: &CameraMatrices) -
     };
     let mut camera = shot.camera;
     (camera.clip_from_view[2][2], camera.clip_from_view[3][2]) = (a, b);
+    let ahead = c.forward == Forward::PositiveZ;
+    if ahead {
+        camera.clip_from_view[2] = camera.clip_from_view[2].map(|v| -v);
+        camera.view_from_world.iter_mut().for_each(|column| column[2] = -column[2]);
+    }
     let depth = |texel: &f32| {
         let background = if c.depth == Depth::Reversed { 0.0 } else { 1.0 };
         let ndc = -a + b / (n / texel);
@@ -147,20 +170,16 @@ pub fn written(gpu: &Gpu, shot: &Shot, how: &Written, before: &CameraMatrices) -
     let normal = |oct: &[f32; 2]| {
         let mut v = Vec3::from(gi::cpu::oct_decode(*oct));
         if c.normal_space == NormalSpace::View {
-            v = turn * v;
+            v = turn * v * Vec3::new(1.0, 1.0, if ahead { -1.0 } else { 1.0 });
         }
         let v = match c.normal_encoding {
-            NormalEncoding::Octahedral => gi::cpu::oct_encode(v.to_array()),
-            _ => [v.x, v.y],
-        };
-        let z = match c.normal_encoding {
-            NormalEncoding::Xyz => {
-                let world = Vec3::from(gi::cpu::oct_decode(*oct));
-                if c.normal_space == NormalSpace::View { (turn * world).z } else { world.z }
+            NormalEncoding::Octahedral => {
+                let [x, y] = gi::cpu::oct_encode(v.to_array());
+                [x, y, 0.0]
             }
-            _ => 0.0,
+            NormalEncoding::Xyz => v.to_array(),
+            NormalEncoding::Xy => [v.x, v.y, 0.0],
         };
-        let v = [v[0], v[1], z];
         if c.normal_range == NormalRange::Unsigned { v.map(|x| 0.5 * x + 0.5) } else { v }
     };
     let texel = |oct: &[f32; 2]| -> Vec<u8> {

@@ -13,8 +13,9 @@ usage: cargo xtask COMMAND
   demo   draw the bundled interior with the shipped weights: out/demo.png and a timing table
   test   every test, and which were skipped (an adapter is made sure of first; REQUIRE_GPU=1 makes a missing one an
          error, REQUIRE_ALL=1 all that .ci/run installs)
-  hosts  the pass in hosts without wgpu, against the Rust pass: exports, sets up Python with moderngl in target/hosts, and
-         runs examples/moderngl/test.py and a picture (needs python3 with venv, the network for pip, and EGL)
+  hosts  the pass in other renderers: exports, sets up Python with moderngl in target/hosts, runs examples/moderngl/test.py
+         and a picture (needs python3 with venv, the network for pip, and EGL); then examples/bevy, its test and a picture
+         (some 280 crates, which two cores build in half an hour)
   gpu-report [--dev] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] [--triangles N,...] [--out FOLDER] [--no-pytorch]
          measures on this device all that docs/ projects: docs/measured/DEVICE.json and DEVICE.md, in less than eight minutes
          (--dev builds without release's optimisation: for rehearsals)
@@ -131,22 +132,35 @@ fn hosts() -> Result<(), String> {
         run(&mut command(&program, &[["-q", "export", "cornell"].as_slice(), &target].concat()))?;
         run(&mut command(&python, &["examples/moderngl/test.py", &folder, "cornell", &glb, &twin]))?;
     }
-    // The whole picture: our renderer's against this host's, and as a control without the light that the pass finds.
+    // The whole picture.
     let [folder, picture, ours] =
         ["moderngl-picture", "moderngl.png", "bouncelight.png"].map(|name| text(&work.join(name)));
     let size = ["--size", "384x384"];
     let target = ["-q", "export", "cornell", "--target", "glsl430", "-o", &folder];
     run(&mut command(&program, &[target.as_slice(), &size].concat()))?;
     run(&mut command(&python, &["examples/moderngl/main.py", &folder, &glb, &picture]))?;
-    let render = ["-q", "render", "cornell", "--tonemap", "none", "-o", &ours, "--reference", &picture];
-    let render = [render.as_slice(), &size, &["--metric", "flip", "--threshold", "0.05"]].concat();
-    match command(&program, &[render.as_slice(), &["--method", "direct"]].concat()).status() {
+    is_ours(&program, &picture, &ours)?;
+
+    // Bevy: a package of its own, which states a newer Rust than it needs.
+    let package = ["--manifest-path", "examples/bevy/Cargo.toml", "--ignore-rust-version", "--locked"];
+    cargo(&[["test"].as_slice(), &package].concat())?;
+    let picture = text(&work.join("bevy.png"));
+    cargo(&[["run"].as_slice(), &package, &["--", &glb, &picture]].concat())?;
+    is_ours(&program, &picture, &ours)
+}
+
+/// Compares a host's picture of `cornell` with our renderer's, and as a control with ours without the light that the
+/// pass finds.
+fn is_ours(program: &str, picture: &str, ours: &str) -> Result<(), String> {
+    let render = ["-q", "render", "cornell", "--size", "384x384", "--tonemap", "none", "-o", ours];
+    let render = [render.as_slice(), &["--reference", picture, "--metric", "flip", "--threshold", "0.05"]].concat();
+    match command(program, &[render.as_slice(), &["--method", "direct"]].concat()).status() {
         Ok(status) if status.code() == Some(ABOVE_THRESHOLD) => {
             eprintln!("xtask: without the pass it is, as it should")
         }
         other => return Err(format!("without the pass's light the pictures should differ: {other:?}")),
     }
-    run(&mut command(&program, &[render.as_slice(), &["--method", "gather", "--gi-frames", "64"]].concat()))
+    run(&mut command(program, &[render.as_slice(), &["--method", "gather", "--gi-frames", "64"]].concat()))
 }
 
 fn ci() -> Result<(), String> {

@@ -39,6 +39,8 @@ pub struct Conventions {
     pub motion_jitter: MotionJitter,
     /// Where the jitter stands.
     pub jitter: Jitter,
+    /// Which way the camera's matrices look.
+    pub forward: Forward,
 }
 
 /// What depth is near and far.
@@ -61,7 +63,7 @@ pub enum NormalEncoding {
     Octahedral,
     /// The vector, of any length.
     Xyz,
-    /// x and y of a unit vector in view space that points to the eye: z = √(1 − x² − y²).
+    /// x and y of a unit vector in view space that points to the eye, |z| = √(1 − x² − y²).
     Xy,
 }
 
@@ -81,7 +83,7 @@ pub enum NormalSpace {
     /// The world's.
     #[default]
     World,
-    /// The camera's: x right, y up, z to the eye
+    /// The camera's: x right, y up, z to the eye, or away from it with [`Forward::PositiveZ`]
     /// ([`CameraMatrices::view_from_world`](super::CameraMatrices)).
     View,
 }
@@ -146,4 +148,15 @@ pub enum Jitter {
     InProjection,
     /// Not in the projection: the picture was drawn this far to the right and down of it, pixels.
     Pixels([f32; 2]),
+}
+
+/// Which way view space looks. The world may be left-handed, too: its triangles then face where
+/// (b − a) × (c − a) points, as they do in a right-handed one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Forward {
+    /// Down −Z (OpenGL, Vulkan as glTF has it): w of a perspective is −z.
+    #[default]
+    NegativeZ,
+    /// Down +Z (Direct3D's left-handed matrices): w of a perspective is z.
+    PositiveZ,
 }

@@ -5,15 +5,15 @@ mod error;
 pub mod technique;
 
 pub use conventions::{
-    AlbedoEncoding, Conventions, Depth, Jitter, LightScale, MotionJitter, MotionSense, MotionUnits, NormalEncoding,
-    NormalRange, NormalSpace,
+    AlbedoEncoding, Conventions, Depth, Forward, Jitter, LightScale, MotionJitter, MotionSense, MotionUnits,
+    NormalEncoding, NormalRange, NormalSpace,
 };
 pub use error::GiError;
 
 /// The camera's part of a method's inputs, column-major as in WGSL.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraMatrices {
-    /// View space (right-handed, looking down −Z) from world space.
+    /// View space (looking down −Z, unless [`Conventions::forward`] says otherwise) from world space.
     pub view_from_world: [[f32; 4]; 4],
     /// Clip space from view space: a perspective whose depth and jitter are as [`Conventions`] say.
     pub clip_from_view: [[f32; 4]; 4],
@@ -22,6 +22,16 @@ pub struct CameraMatrices {
 /// What a method reads. All textures have the same size and usage TEXTURE_BINDING; how their texels
 /// are to be read, [`Conventions`] say. [`Inputs::new`] has what every method needs; what is left
 /// out has the fallback that its field names.
+///
+/// ```
+/// use bouncelight::gi::{CameraMatrices, Conventions, Depth, Inputs};
+/// use bouncelight::wgpu::TextureView;
+///
+/// fn inputs<'a>([depth, normal, motion]: [&'a TextureView; 3], camera: CameraMatrices, cut: bool) -> Inputs<'a> {
+///     let conventions = Conventions { depth: Depth::Forward, ..Default::default() };
+///     Inputs { motion: Some(motion), conventions, reset: cut, ..Inputs::new([1280, 720], depth, normal, camera) }
+/// }
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
     /// Width and height of all textures, pixels.

@@ -2,8 +2,8 @@
 //! into numbers.
 
 use crate::gi::interface::{
-    AlbedoEncoding, CameraMatrices, Conventions, Depth, GiError, Inputs, Jitter, LightScale, MotionJitter, MotionSense,
-    MotionUnits, NormalEncoding, NormalRange, NormalSpace,
+    AlbedoEncoding, CameraMatrices, Conventions, Depth, Forward, GiError, Inputs, Jitter, LightScale, MotionJitter,
+    MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace,
 };
 use glam::{Mat3, Mat4, Vec3};
 
@@ -20,6 +20,8 @@ const SRGB: u32 = 16;
 /// Light is multiplied by an exposure. A bit, since a factor of 1 would change how compilers round
 /// sums with light.
 const EXPOSED: u32 = 32;
+/// In view space they are along axes of which z points away from the eye.
+const AHEAD: u32 = 64;
 
 /// Pixels on a side of a cell; `CELL` in `shaders/gi/inputs.wgsl`.
 pub const CELL: u32 = 4;
@@ -103,7 +105,12 @@ impl Params {
             return Err(GiError::Size { size, reason: "it is empty".into() });
         }
         let mut p = Mat4::from_cols_array_2d(&camera.clip_from_view);
-        let view = Mat4::from_cols_array_2d(&camera.view_from_world);
+        let mut view = Mat4::from_cols_array_2d(&camera.view_from_world);
+        if c.forward == Forward::PositiveZ {
+            // The same camera, looking down −Z.
+            view = Mat4::from_scale(Vec3::new(1.0, 1.0, -1.0)) * view;
+            p.z_axis = -p.z_axis;
+        }
         if let Jitter::Pixels([x, y]) = c.jitter {
             // What is drawn at x / w moves by 2 x / width, and w is -z.
             p.z_axis.x -= 2.0 * x / size[0] as f32;
@@ -113,7 +120,10 @@ impl Params {
             return Err(GiError::Camera("a matrix holds NaN or infinity"));
         }
         if p.z_axis.w != -1.0 || p.w_axis.w != 0.0 {
-            return Err(GiError::Camera("the projection is no perspective that looks down -Z"));
+            return Err(GiError::Camera(match c.forward {
+                Forward::NegativeZ => "the projection is no perspective that looks down -Z",
+                Forward::PositiveZ => "the projection is no perspective that looks down +Z",
+            }));
         }
         if p.x_axis.x == 0.0 || p.y_axis.y == 0.0 {
             return Err(GiError::Camera("the projection has no width or no height"));
@@ -202,7 +212,9 @@ fn flags(c: &Conventions) -> Result<u32, GiError> {
         | bit(c.normal_range == NormalRange::Unsigned, UNSIGNED)
         | bit(c.normal_space == NormalSpace::View, IN_VIEW)
         | bit(c.albedo == AlbedoEncoding::Srgb, SRGB)
-        | bit(c.light != LightScale::Radiance, EXPOSED))
+        | bit(c.light != LightScale::Radiance, EXPOSED)
+        // Of x and y alone the prelude makes a normal that points to the eye.
+        | bit(c.forward == Forward::PositiveZ && c.normal_encoding != NormalEncoding::Xy, AHEAD))
 }
 
 fn light_scale(c: &Conventions) -> Result<f32, GiError> {
@@ -222,7 +234,8 @@ fn columns(m: Mat3) -> [[f32; 4]; 3] {
 /// The camera's frame with the tilt taken out: x = horizontal right, y = world up, z = horizontal
 /// backward. The network should not have to learn that down is down at every tilt. A camera that
 /// looks straight down or up has no horizontal backward; the top of its picture says which way is
-/// forward (down) or backward (up), which is the limit of tilting it there.
+/// forward (down) or backward (up), which is the limit of tilting it there. In a left-handed world
+/// the frame is left-handed, too, so that x is the picture's right.
 fn gravity_from_world(view_from_world: &Mat4) -> Result<Mat3, GiError> {
     let up = view_from_world.row(1).truncate().try_normalize();
     let back = view_from_world.row(2).truncate().try_normalize();
@@ -233,5 +246,6 @@ fn gravity_from_world(view_from_world: &Mat4) -> Result<Mat3, GiError> {
     let horizontal = if flat(back).length() > 1e-3 { flat(back) } else { flat(up) * -back.y.signum() };
     let z = horizontal.try_normalize().unwrap_or(Vec3::Z);
     let y = Vec3::Y;
-    Ok(Mat3::from_cols(y.cross(z), y, z).transpose())
+    let hand = Mat3::from_mat4(*view_from_world).determinant().signum();
+    Ok(Mat3::from_cols(hand * y.cross(z), y, z).transpose())
 }

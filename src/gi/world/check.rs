@@ -4,7 +4,7 @@
 
 use super::sample::{SIDE, Sample};
 use crate::gi::interface::{
-    Conventions, Depth, Inputs, MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace,
+    Conventions, Depth, Forward, Inputs, MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace,
 };
 use crate::gi::stage::inputs::Params;
 use glam::{Mat3, Vec2, Vec3};
@@ -129,7 +129,12 @@ impl Evidence<'_> {
         let score = |encoding, range, space, sign: Vec3| {
             let cosine = |s: &&Sample| {
                 let n = decode(Vec3::new(s.normal[0], s.normal[1], s.normal[2]), encoding, range) * sign;
-                let n = if space == NormalSpace::View { turn * n } else { n };
+                let ahead = self.inputs.conventions.forward == Forward::PositiveZ && encoding != NormalEncoding::Xy;
+                let n = match space {
+                    NormalSpace::World => n,
+                    NormalSpace::View if ahead => turn * Vec3::new(n.x, n.y, -n.z),
+                    NormalSpace::View => turn * n,
+                };
                 n.dot(Vec3::new(s.plane[0], s.plane[1], s.plane[2]))
             };
             flat.iter().map(cosine).sum::<f32>() / flat.len().max(1) as f32
@@ -229,7 +234,7 @@ impl Evidence<'_> {
     }
 }
 
-/// `stored_normal` of `shaders/gi/inputs.wgsl`.
+/// `stored_vector` of `shaders/gi/inputs.wgsl`.
 fn decode(texel: Vec3, encoding: NormalEncoding, range: NormalRange) -> Vec3 {
     let v = if range == NormalRange::Unsigned { 2.0 * texel - 1.0 } else { texel };
     match encoding {

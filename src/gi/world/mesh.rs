@@ -292,6 +292,18 @@ fn flatten(mesh: &mut Mesh) {
 }
 
 /// A mesh with its tree, ready for a [`World`](super::World). Made on any thread; it is `Send`.
+///
+/// ```
+/// use bouncelight::gi::{Indices, MeshSource, PreparedMesh, Vertices};
+/// let built = std::thread::spawn(|| {
+///     let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0f32], [1.0, 1.0, 0.0]];
+///     PreparedMesh::new(&MeshSource::new(Vertices::vec3(&corners), Indices::U16(&[0, 1, 2, 2, 1, 3])))
+/// });
+/// // Later: world.prepared(key, mesh).
+/// let mesh = built.join().expect("it does not panic")?;
+/// assert_eq!((mesh.triangles(), mesh.dropped()), (2, 0));
+/// # Ok::<_, bouncelight::gi::GiError>(())
+/// ```
 pub struct PreparedMesh {
     pub(super) part: MeshPart,
     pub(super) corners: Vec<[[f32; 3]; 3]>,

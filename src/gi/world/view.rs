@@ -11,6 +11,28 @@ use crate::gpu::timing::Recorder;
 
 /// What a method remembers of one camera's picture, and its passes. Make one for each camera; any
 /// number may share a [`World`], a device and a submission.
+///
+/// ```no_run
+/// use bouncelight::gi::{GiError, Inputs, View, World};
+/// use bouncelight::wgpu;
+///
+/// /// One submission for two cameras; in debug builds mistakes are named.
+/// fn both(
+///     (device, queue): (&wgpu::Device, &wgpu::Queue),
+///     (world, views): (&World, &mut [View; 2]),
+///     (inputs, outputs): ([&Inputs<'_>; 2], [&wgpu::TextureView; 2]),
+/// ) -> Result<(), GiError> {
+///     let mut encoder = device.create_command_encoder(&Default::default());
+///     for ((view, inputs), output) in views.iter_mut().zip(inputs).zip(outputs) {
+///         view.record(&mut encoder, world, inputs, output)?;
+///     }
+///     queue.submit([encoder.finish()]);
+///     if cfg!(debug_assertions) {
+///         views[0].check(device, world, inputs[0])?.iter().for_each(|c| eprintln!("{c}"));
+///     }
+///     Ok(())
+/// }
+/// ```
 pub struct View {
     queue: wgpu::Queue,
     technique: Box<dyn Technique>,
