@@ -186,7 +186,10 @@ fn real_scene(folder: &Path) -> (Scene, f32) {
             *radius = meta["point"][0][4].as_f64().expect("a radius") as f32;
         }
     }
-    (scene, meta["world"].as_f64().expect("a radiance") as f32)
+    let sky = meta["world"].as_f64().expect("a radiance") as f32;
+    // In the place of the sun that a file without lights gets.
+    scene.surround(scene::Environment::constant([sky; 3]));
+    (scene, sky)
 }
 
 /// A scene of the reference folder with the light's size, which its file cannot say.
