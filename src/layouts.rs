@@ -48,6 +48,7 @@ fn rows() -> Vec<(&'static str, Layout)> {
         row!("Frame", FrameUniform =>
             view_from_world, world_from_view, clip_from_world, clip_from_world_unjittered, previous_clip_from_world,
             tan_half, jitter, size, near, seed, environment, light_count, picture_only, texture_bias, tile_words,
+            backdrop,
         ),
         row!("Light", LightGpu =>
             position, kind, direction, range, color, radius, cone_scale, cone_offset, stands_in, chance,

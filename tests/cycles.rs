@@ -176,6 +176,22 @@ fn fixture(name: &str) -> Reference {
     Reference::read(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/cycles").join(name))
 }
 
+/// One of `reference/real`, with lamps of the size that its reference has; and the radiance of its sky.
+fn real_scene(folder: &Path) -> (Scene, f32) {
+    let meta = std::fs::read(folder.join("meta.json")).expect("it is there");
+    let meta: serde_json::Value = serde_json::from_slice(&meta).expect("it is JSON");
+    let mut scene = scene::gltf::load(&folder.join("scene.glb")).unwrap_or_else(|e| panic!("{e}"));
+    for light in &mut scene.lights {
+        if let LightKind::Point { radius, .. } = &mut light.kind {
+            *radius = meta["point"][0][4].as_f64().expect("a radius") as f32;
+        }
+    }
+    let sky = meta["world"].as_f64().expect("a radiance") as f32;
+    // In the place of the sun that a file without lights gets.
+    scene.surround(scene::Environment::constant([sky; 3]));
+    (scene, sky)
+}
+
 /// A scene of the reference folder with the light's size, which its file cannot say.
 fn reference_scene(shared: &Path, name: &str) -> Scene {
     let path = shared.join("reference/cycles").join(name).join("scene.glb");
@@ -215,6 +231,75 @@ fn layers_agree_with_the_reference_renders() {
     for name in ["paper_0002", "paper_0003", "paper_0004", "paper_0005", "point_201", "metal_301"] {
         let reference = Reference::read(&shared.join("reference/cycles").join(name).join("frame0000.exr"));
         compare(&gpu, name, &reference_scene(&shared, name), &reference, SKY, 4);
+    }
+}
+
+/// What the default of eight samples leaves of a hotel's carpet is 0.0123, so these have 16. Cycles counts the sky's own
+/// light as direct; up to that much may lack.
+#[test]
+fn real_scenes_have_the_colours_and_the_direct_light_of_cycles() {
+    let Some(gpu) = common::gpu() else { return };
+    for name in ["sampleroom", "apartment_day", "apartment_night", "hotel", "study", "city"] {
+        let Some(folder) = common::shared_path(&format!("reference/real/{name}")) else { return };
+        let reference = Reference::read(&folder.join("frame0000.exr"));
+        let (scene, sky) = real_scene(&folder);
+        let size = reference.size();
+        let frame = render(&gpu, &scene, &scene.cameras[0], size, 16);
+        let n = measure(&frame, &reference, sky);
+        println!("{name}: {n:.4?}");
+        assert!(n.color <= 0.012, "{name}: {n:?}");
+        // One has hardly any light but the sky's.
+        let direct = &frame.layer(Layer::DiffDir).expect("all layers are captured").data;
+        let lit = direct.iter().sum::<f32>() / direct.len() as f32 > 0.05 * sky;
+        assert!(!lit || n.direct <= 0.03, "{name}: {n:?}");
+        // A camera that looks elsewhere and lamps ten times as strong must be noticed.
+        let mut wrong = brighter(&scene, 10.0);
+        wrong.cameras[0] = turned(&scene.cameras[0], 2.0);
+        let frame = render(&gpu, &wrong, &scene.cameras[0], size, 1);
+        let bright = measure(&frame, &reference, sky);
+        let frame = render(&gpu, &wrong, &wrong.cameras[0], size, 1);
+        let away = measure(&frame, &reference, sky);
+        println!("{name}, brighter: {bright:.4?}\n{name}, turned: {away:.4?}");
+        assert!(away.color > 0.012, "{name}: a turned camera went unnoticed: {away:?}");
+        assert!(!lit || bright.direct > 0.03, "{name}: stronger lamps went unnoticed: {bright:?}");
+    }
+}
+
+/// Files without a Cycles' picture, beside the path tracer, whose colours are held to Cycles'.
+#[cfg(feature = "reference")]
+#[test]
+fn other_files_have_the_colours_of_the_path_tracer() {
+    use bouncelight::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
+    let Some(gpu) = common::gpu() else { return };
+    let kernel = Kernel::new(&gpu.device);
+    let size = [256, 128];
+    for file in [
+        "cornell_box_gltf/scene.gltf",
+        "cornell_box_obj/cornell_box.obj",
+        "pica_pica_mini_diorama/scene.gltf",
+        "meshopt/hotel.glb",
+        "meshopt/dream-apartment.glb",
+    ] {
+        let Some(path) = common::shared_path(&format!("real/{file}")) else { return };
+        let scene = scene::load(&path.to_string_lossy()).unwrap_or_else(|e| panic!("{e}"));
+        let packed = ReferenceScene::new(&gpu.device, &gpu.queue, &scene).expect("the scene packs");
+        let options = TracerOptions { samples: 64, layers: vec![Traced::DiffCol], ..Default::default() };
+        let subject = Subject { camera: &scene.cameras[0], size, points: None };
+        let mut tracer =
+            Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options).expect("it can be traced");
+        while tracer.step().expect("it traces") {}
+        let traced = tracer.finish().expect("it ends");
+        let truth = traced.layer(Traced::DiffCol).expect("it was asked for");
+        let off = |camera: &Camera, samples: u32| {
+            let frame = render(&gpu, &scene, camera, size, samples);
+            let ours = frame.layer(Layer::DiffCol).expect("all layers are captured");
+            let sum: f64 = ours.data.iter().zip(truth).map(|(a, b)| f64::from((a - b).abs())).sum();
+            sum / truth.len() as f64
+        };
+        let (own, wrong) = (off(&scene.cameras[0], 64), off(&turned(&scene.cameras[0], 2.0), 1));
+        println!("{file}: {own:.4}, turned {wrong:.4}");
+        assert!(own <= 0.012, "{file}: {own}");
+        assert!(wrong > 0.012, "{file}: a turned camera went unnoticed: {wrong}");
     }
 }
 

@@ -304,3 +304,39 @@ fn a_scene_looks_the_same_whatever_its_unit() {
     let off = differ(&picture(1.0, false, false, 1.0), &picture(1.0, false, false, 1.1));
     assert!(off > 0.03, "{off}");
 }
+
+#[test]
+fn a_backdrop_is_shown_blurred_or_hidden_and_lights_the_scene_in_any_case() {
+    use bouncelight::gi::Method;
+    use bouncelight::render::capture::{CaptureOptions, capture};
+    use bouncelight::render::{Backdrop, Renderer, RendererOptions};
+    use bouncelight::scene::{Environment, environment::EnvironmentImage, upload::SceneGpu};
+    let Some(gpu) = common::gpu() else { return };
+    let mut s = scene(vec![floor(1.0, 0.0)], vec![]);
+    // Black and white stripes, a degree wide.
+    let pixels: Vec<f32> = (0..360 * 180).flat_map(|i| [if i % 2 == 0 { 2.0 } else { 0.0 }; 3]).collect();
+    let image = EnvironmentImage { name: "stripes".into(), width: 360, height: 180, rgb: pixels };
+    s.environment = Environment::from_image(image).expect("a picture");
+    let camera = look_at([0.0, 1.0, 4.0], [0.0, 1.0, 0.0], 0.8);
+    let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &s).expect("it uploads");
+    let mut drawn = |backdrop: Backdrop| {
+        let options = RendererOptions { method: Method::Ambient, backdrop, ..Default::default() };
+        let mut renderer = Renderer::new(&gpu.device, &gpu.queue, [64, 64], options).expect("it builds");
+        let options = CaptureOptions { samples: 16, ..Default::default() };
+        capture(&gpu, &mut renderer, &uploaded, &camera, options).expect("it draws").beauty
+    };
+    let [shown, blurred, hidden] = Backdrop::ALL.map(&mut drawn);
+    let row = |p: &Picture| -> Vec<f32> { (0..64).map(|x| p.at(x, 8)[1]).collect() };
+    let spread = |v: Vec<f32>| {
+        let mean = v.iter().sum::<f32>() / v.len() as f32;
+        (mean, (v.iter().map(|x| (x - mean).powi(2)).sum::<f32>() / v.len() as f32).sqrt())
+    };
+    let [(a, as_is), (b, soft), (c, none)] = [&shown, &blurred, &hidden].map(|p| spread(row(p)));
+    assert!((a - 1.0).abs() < 0.1 && (b - 1.0).abs() < 0.1, "{a} {b}");
+    assert!(soft < 0.25 * as_is, "{soft} of {as_is}");
+    assert!((c - 0.05).abs() < 1e-3 && none < 1e-3, "{c} ± {none}");
+    // The floor knows nothing of it.
+    for p in [&blurred, &hidden] {
+        assert_eq!(p.at(32, 50), shown.at(32, 50));
+    }
+}

@@ -41,3 +41,5 @@ mod real_files;
 mod shared;
 #[path = "scene/specular.rs"]
 mod specular;
+#[path = "scene/units.rs"]
+mod units;

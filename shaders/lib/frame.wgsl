@@ -24,6 +24,8 @@ struct Frame {
     texture_bias: f32,
     // Words of a tile's list of lights (light_list.wgsl); 0 where there are no lists.
     tile_words: u32,
+    // What is seen beyond the scene: 0 the surroundings, 1 out of focus, 2 nothing.
+    backdrop: u32,
 }
 
 // Direction in view space of the ray through the sample point of `pixel`, scaled to z = -1.

@@ -10,6 +10,7 @@ use crate::{
         self, Camera, Environment, LightKind, LoadOptions, Scene,
         edit::{LightEdit, ObjectEdit},
         look::{FRAMING, Look},
+        units::{Units, Up},
         upload::TextureMemory,
     },
 };
@@ -38,6 +39,12 @@ pub struct Global {
     /// Buffers, textures and material libraries may lie outside the folder of the scene file that names them.
     #[arg(long, global = true)]
     pub allow_outside: bool,
+    /// Metres of a scene file's unit of length: 0.001 for one that counts in millimetres.
+    #[arg(long, global = true, default_value_t = 1.0, allow_hyphen_values = true, value_parser = parse_scale, value_name = "M")]
+    pub scale: f32,
+    /// Axis of a scene file that points up.
+    #[arg(long, global = true, value_enum, default_value = "y")]
+    pub up: UpName,
     /// How textures lie in the device's memory: `compressed` in blocks of a byte a texel (BC7) where the device has
     /// them, `full` with four bytes a texel, `auto` in blocks where a scene's would take more than 512 MiB.
     #[arg(long, global = true, value_enum, default_value = "auto")]
@@ -95,6 +102,15 @@ pub enum TexturesName {
     Compressed,
 }
 
+/// Axes that may point up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+#[allow(missing_docs, reason = "the variants are their own words on the command line")]
+pub enum UpName {
+    #[default]
+    Y,
+    Z,
+}
+
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 pub enum ProgressKind {
@@ -111,7 +127,8 @@ pub enum ProgressKind {
 impl Global {
     /// What a scene file may do.
     pub fn load_options(&self) -> LoadOptions {
-        LoadOptions { allow_outside: self.allow_outside }
+        let up = if self.up == UpName::Y { Up::Y } else { Up::Z };
+        LoadOptions { allow_outside: self.allow_outside, units: Units { scale: self.scale, up } }
     }
 
     /// How textures are uploaded.
@@ -369,6 +386,11 @@ pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
         [0, _] | [_, 0] => Err("width and height must be at least 1".into()),
         size => Ok(size),
     }
+}
+
+fn parse_scale(text: &str) -> Result<f32, String> {
+    let scale: f32 = text.parse().map_err(|e| format!("{e}"))?;
+    if (1e-9..=1e9).contains(&scale) { Ok(scale) } else { Err("a scale is between 1e-9 and 1e9".into()) }
 }
 
 fn parse_floats(text: &str) -> Result<Vec<f32>, String> {

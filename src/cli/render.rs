@@ -15,7 +15,7 @@ use crate::{
     gpu::Gpu,
     image_io, metrics,
     render::{
-        Blending, Exposure, Renderer, RendererOptions,
+        Backdrop, Blending, Exposure, Renderer, RendererOptions,
         capture::{CaptureOptions, Layer, Picture, capture_with},
         tonemap_curve::Tonemap,
     },
@@ -71,6 +71,9 @@ pub struct Args {
     /// as paths meet them, for layers and many samples. When absent: `stochastic` with --aov, else `sorted`.
     #[arg(long, value_name = "HOW")]
     blending: Option<Blending>,
+    /// What is seen beyond the scene, which the surroundings light in any case: `shown`, `blurred` or `hidden`.
+    #[arg(long, default_value = "shown", value_name = "HOW")]
+    backdrop: Backdrop,
     /// Stops by which a PNG is brighter, or `auto`: as many as make the mean of what is seen middle grey. When absent:
     /// `auto` for a file without any light, 0 for others and with --reference.
     #[arg(long, allow_hyphen_values = true, value_name = "EV|auto")]
@@ -247,8 +250,8 @@ impl<'a> Raster<'a> {
             _ => "none".into(),
         };
         let (asked, settles, needs_rays) = (method.name(), method.has_history(), method.needs_rays());
-        let options =
-            RendererOptions { method, taa: args.taa.is_some(), blending: args.blending(), ..Default::default() };
+        let (taa, blending, backdrop) = (args.taa.is_some(), args.blending(), args.backdrop);
+        let options = RendererOptions { method, taa, blending, backdrop, ..Default::default() };
         // Trees are built while the driver compiles shaders.
         let upload = || {
             let mut uploaded = SceneGpu::with_textures(&gpu.device, &gpu.queue, scene, textures)?;
@@ -362,6 +365,9 @@ fn check(args: &Args) -> Result<Format> {
             return Err(usage(
                 "--path and --frames draw with the rasteriser; trace single pictures with --eye or --time".into(),
             ));
+        }
+        if args.backdrop != Backdrop::Shown {
+            return Err(usage("--backdrop is the rasteriser's; --method reference shows the surroundings".into()));
         }
         if args.weights.is_some() {
             return Err(usage("--weights are a network's; --method reference traces paths and has none".into()));

@@ -4,6 +4,39 @@ use super::targets::{Target, Targets};
 use super::tool;
 use crate::gpu::timing::Recorder;
 
+/// What is seen where there is no surface. Surfaces are lit by the surroundings in any case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[repr(u32)]
+pub enum Backdrop {
+    /// The surroundings.
+    #[default]
+    Shown,
+    /// The surroundings, out of focus.
+    Blurred,
+    /// A dark grey.
+    Hidden,
+}
+
+impl Backdrop {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Shown, Self::Blurred, Self::Hidden];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        ["shown", "blurred", "hidden"][self as usize]
+    }
+}
+
+impl std::str::FromStr for Backdrop {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|b| b.name() == name);
+        found.ok_or_else(|| format!("`{name}` is none of: shown, blurred, hidden"))
+    }
+}
+
 /// hdr = albedo · (direct + indirect) + direct and indirect specular + emissive; background = environment.
 pub struct CompositePass {
     pipeline: wgpu::ComputePipeline,

@@ -4,7 +4,7 @@
 
 use super::RenderError;
 use super::blended::{BlendedInputs, BlendedPass, Blending};
-use super::composite::CompositePass;
+use super::composite::{Backdrop, CompositePass};
 use super::cull::DrawnCount;
 use super::deform::DeformPass;
 use super::direct::{DirectInputs, DirectPass};
@@ -43,6 +43,8 @@ pub struct RendererOptions {
     pub taa: bool,
     /// How surfaces are drawn that blend with what is behind.
     pub blending: Blending,
+    /// What is seen beyond the scene.
+    pub backdrop: Backdrop,
 }
 
 /// What is bound as long as the targets stay.
@@ -75,6 +77,7 @@ pub struct Renderer {
     indirect: Option<Box<dyn Technique>>,
     passes: Passes,
     lights: LightOptions,
+    backdrop: Backdrop,
     taa: Option<TaaPass>,
     /// Where objects were in the frame before.
     moved: Moved,
@@ -156,7 +159,7 @@ impl Renderer {
         let method = options.method.name();
         let device = device.clone();
         let (lighting, moved, drawn) = (None, Moved::default(), DrawnCount::default());
-        let (lights, last) = (options.lights, None);
+        let (lights, last, backdrop) = (options.lights, None, options.backdrop);
         Ok(Self {
             device,
             frame,
@@ -167,6 +170,7 @@ impl Renderer {
             indirect,
             passes,
             lights,
+            backdrop,
             taa,
             moved,
             last,
@@ -184,6 +188,11 @@ impl Renderer {
             }
         }
         Ok(())
+    }
+
+    /// What is seen beyond the scene from the next frame on.
+    pub fn set_backdrop(&mut self, backdrop: Backdrop) {
+        self.backdrop = backdrop;
     }
 
     /// The next frame has nothing to do with the last (a cut): no object has moved since, and
@@ -349,7 +358,7 @@ impl Renderer {
         self.last = Some(*view);
         let picture_only = !self.indirect.as_ref().is_some_and(|i| i.knows_scene(scene.rays.is_some()));
         let counts = [scene.lights.len() as u32, lighting.lists.words];
-        let uniform = view.uniform(&scene.environment, counts, picture_only);
+        let uniform = view.uniform(&scene.environment, counts, picture_only, self.backdrop);
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 
         let mut drawn = DrawnCount::default();

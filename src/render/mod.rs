@@ -29,6 +29,7 @@ pub(crate) mod tool;
 pub mod view;
 
 pub use blended::Blending;
+pub use composite::Backdrop;
 pub use cull::DrawnCount;
 pub use exposure::Exposure;
 pub use frame::{Renderer, RendererOptions};

@@ -3,6 +3,7 @@
 //! Reversed Z with an infinite far plane: depth = near / distance along the view axis, 1 at the near plane, 0 at
 //! infinity. Float depth is then equally precise everywhere (Reed 2015), and nothing is clipped far away.
 
+use super::composite::Backdrop;
 use crate::gi::CameraMatrices;
 use crate::scene::{Camera, Environment};
 use bytemuck::{Pod, Zeroable};
@@ -109,6 +110,7 @@ impl View {
         environment: &Environment,
         [light_count, tile_words]: [u32; 2],
         picture_only: bool,
+        backdrop: Backdrop,
     ) -> FrameUniform {
         FrameUniform {
             view_from_world: self.view_from_world,
@@ -127,7 +129,7 @@ impl View {
             // A sample has an n-th of the pixel's area, 1/√n of its width.
             texture_bias: -0.5 * (self.samples.max(1) as f32).log2(),
             tile_words,
-            pad: 0,
+            backdrop: backdrop as u32,
         }
     }
 }
@@ -162,5 +164,5 @@ pub struct FrameUniform {
     pub picture_only: u32,
     pub texture_bias: f32,
     pub tile_words: u32,
-    pub pad: u32,
+    pub backdrop: u32,
 }

@@ -4,6 +4,7 @@
 //! scene file's folder unless the user allows more ([`LoadOptions::allow_outside`]), only regular files are read (a
 //! device or pipe may never end), and sizes are known to fit before memory is taken.
 
+use super::units::Units;
 use crate::image_io::read_regular;
 use std::path::{Component, Path, PathBuf};
 
@@ -12,6 +13,8 @@ use std::path::{Component, Path, PathBuf};
 pub struct LoadOptions {
     /// Buffers, textures and material libraries may lie outside the folder of the file that names them.
     pub allow_outside: bool,
+    /// Its unit of length and its vertical.
+    pub units: Units,
 }
 
 /// The folder of a scene file, from which the names in it count.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{LoadOptions, Scene, SceneError, bundled, gltf, home, obj, paper_room};
+use super::{LoadOptions, Scene, SceneError, bundled, gltf, home, obj, paper_room, units};
 
 /// A stream of scenes: name, largest index, what makes one.
 type Stream = (&'static str, u32, fn(u32) -> Scene);
@@ -39,9 +39,13 @@ pub fn load_with(spec: &str, options: LoadOptions) -> Result<Scene, SceneError> 
     if path.is_dir() {
         return Err(SceneError::IsFolder { path: path.to_owned() });
     }
+    let told = |mut scene| {
+        units::tell(&mut scene, options.units);
+        scene
+    };
     match extension.as_str() {
-        "gltf" | "glb" => gltf::load_with(path, options),
-        "obj" => obj::load_with(path, options),
+        "gltf" | "glb" => gltf::load_with(path, options).map(told),
+        "obj" => obj::load_with(path, options).map(told),
         _ if path.is_file() => Err(SceneError::UnsupportedExtension { path: path.to_owned(), extension }),
         _ if extension.is_empty() && !spec.contains(std::path::is_separator) => {
             Err(SceneError::UnknownName { name: spec.to_owned(), known: bundled::NAMES.join(", ") })

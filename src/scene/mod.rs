@@ -46,6 +46,8 @@ pub mod sound;
 #[cfg(feature = "io")]
 mod texture;
 pub mod triangles;
+#[cfg(feature = "io")]
+pub mod units;
 
 pub use environment::Environment;
 #[cfg(feature = "io")]

@@ -33,6 +33,7 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError>
     let text = String::from_utf8_lossy(files::without_mark(&bytes));
     check(path, &text)?;
     let folder = &Folder::of(path, options);
+    let placed = options.units.matrix().to_cols_array_2d();
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let mut scene = Scene { name, ..Scene::default() };
 
@@ -80,11 +81,7 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError>
             })
         });
         let mesh = mesh(model, material, scene.materials[material].normal_texture);
-        scene.instances.push(Instance {
-            name: mesh.name.clone(),
-            mesh: scene.meshes.len(),
-            transform: glam::Mat4::IDENTITY.to_cols_array_2d(),
-        });
+        scene.instances.push(Instance { name: mesh.name.clone(), mesh: scene.meshes.len(), transform: placed });
         scene.meshes.push(mesh);
     }
     sound::settle(&mut scene, path)?;

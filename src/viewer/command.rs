@@ -2,7 +2,8 @@
 
 use super::choice::Source;
 use super::state::State;
-use crate::scene::upload::TextureMemory;
+use crate::render::Backdrop;
+use crate::scene::{units::Up, upload::TextureMemory};
 
 /// The line for the left side of the view. `output` is the file it writes, `view.png` if nobody says.
 pub fn line(state: &State, output: Option<&str>) -> String {
@@ -47,6 +48,12 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     if s.left == Source::Neural && state.half {
         flag("precision", "f16".into());
     }
+    if state.units.scale != 1.0 {
+        flag("scale", state.units.scale.to_string());
+    }
+    if state.units.up == Up::Z {
+        flag("up", "z".into());
+    }
     match state.textures {
         TextureMemory::Auto => {}
         TextureMemory::Full => flag("textures", "full".into()),
@@ -57,6 +64,9 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
         if let Some((_, turn)) = shown.sky.as_ref().filter(|(_, turn)| *turn != 0.0) {
             flag("environment-turn", turn.to_string());
         }
+    }
+    if s.backdrop != Backdrop::Shown && s.left != Source::Reference {
+        flag("backdrop", s.backdrop.name().into());
     }
     if let Some(name) = shown.variant.and_then(|n| shown.scene.variants.get(n)) {
         flag("variant", name.clone());

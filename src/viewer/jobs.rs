@@ -10,7 +10,7 @@ use crate::image_io;
 use crate::net::{format::Weights, gpu::Tuned, plan::Precision};
 use crate::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
 use crate::render::capture::{CaptureOptions, Layer, capture_with};
-use crate::render::{Renderer, RendererOptions};
+use crate::render::{Backdrop, Renderer, RendererOptions};
 use crate::scene::{
     self, Camera, Environment, Scene,
     upload::{SceneGpu, TextureMemory},
@@ -262,6 +262,7 @@ pub struct Shot {
     pub textures: TextureMemory,
     pub size: [u32; 2],
     pub samples: u32,
+    pub backdrop: Backdrop,
     pub ev: f32,
     pub tonemap: crate::render::tonemap_curve::Tonemap,
     pub metadata: image_io::Metadata,
@@ -286,6 +287,7 @@ impl Shot {
             textures: state.textures,
             size: state.size,
             samples: if s.left == Source::Reference { s.spp } else { s.samples },
+            backdrop: s.backdrop,
             ev: state.stops(),
             tonemap: s.tonemap,
             metadata,
@@ -314,7 +316,7 @@ pub fn capture(gpu: &crate::gpu::Gpu, shot: &Shot, progress: &Progress) -> Resul
         }
         progress.stage("capturing");
         let warmup = if method.has_history() { Method::SETTLED - 1 } else { 0 };
-        let options = RendererOptions { method, ..Default::default() };
+        let options = RendererOptions { method, backdrop: shot.backdrop, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, shot.size, options).map_err(|e| e.to_string())?;
         let layers: &[Layer] = if shot.is_exr() { &Layer::ALL } else { &[] };
         let options = CaptureOptions { samples: shot.samples, layers, warmup, ..Default::default() };

@@ -39,7 +39,7 @@ pub fn report(app: &App) -> Value {
         "view": s.view.name(), "left": s.left.name(), "right": s.right.name(), "split": s.split, "line": s.line,
         "instead": stage.and_then(|st| st.instead()).map(|(method, why)| format!("{method}: {why}")),
         "drawn": { "left": key(Side::Left), "right": key(Side::Right) },
-        "exposure": app.state.stops(), "auto_exposure": app.state.auto_exposure, "tonemap": s.tonemap.name(), "samples": s.samples,
+        "backdrop": s.backdrop.name(), "coarse": app.state.is_coarse(), "exposure": app.state.stops(), "auto_exposure": app.state.auto_exposure, "tonemap": s.tonemap.name(), "samples": s.samples,
         "still": stage.map_or(0, |st| st.still()),
         "full_screen": app.state.full_screen, "panel": s.panel, "help": app.state.help, "dark": s.dark, "zoom": s.zoom, "measure": app.state.measure,
         "feature": stage.and_then(|st| st.feature()).map(|f| f.0.to_string()),

@@ -1,7 +1,7 @@
 //! What is remembered from one day to the next. Scripted runs neither read nor write it.
 
 use super::choice::{Source, View};
-use crate::render::tonemap_curve::Tonemap;
+use crate::render::{Backdrop, tonemap_curve::Tonemap};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -28,6 +28,10 @@ pub struct Settings {
     pub tonemap: Tonemap,
     /// Frames that are averaged while nothing moves.
     pub samples: u32,
+    /// What is seen beyond the scene.
+    pub backdrop: Backdrop,
+    /// Half the resolution while the view moves, where frames are slow.
+    pub coarse: bool,
     /// Samples a pixel that the live reference stops at.
     pub spp: u32,
     pub panel: bool,
@@ -56,6 +60,8 @@ impl Default for Settings {
             exposure: 0.0,
             tonemap: Tonemap::Filmic,
             samples: 16,
+            backdrop: Backdrop::Shown,
+            coarse: true,
             spp: 256,
             panel: true,
             flicker: false,

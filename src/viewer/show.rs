@@ -40,6 +40,8 @@ pub struct ShowInputs<'a> {
     /// Whose G-buffer it is.
     pub renderer: &'a Renderer,
     pub sides: [SideView; 2],
+    /// Width and height of the picture, pixels.
+    pub size: [u32; 2],
     /// The network's input channel, if there is one.
     pub feature: Option<(&'a wgpu::TextureView, [f32; 2])>,
     pub view: View,
@@ -104,7 +106,7 @@ impl ShowPass {
         recorder.render("viewer.show", &[Some(attachment)], None, |pass| {
             let (Some(inputs), Some((_, group))) = (inputs, &self.bound) else { return };
             let [x, y] = inputs.origin;
-            let [w, h] = inputs.renderer.size();
+            let [w, h] = inputs.size;
             // A window that shrinks while its picture is being made cuts it off.
             let (all_w, all_h) = (target.texture().width(), target.texture().height());
             if x + 1 > all_w || y + 1 > all_h {
@@ -119,7 +121,7 @@ impl ShowPass {
     }
 
     fn bind(&mut self, queue: &wgpu::Queue, inputs: &ShowInputs<'_>) {
-        let [w, _] = inputs.renderer.size();
+        let [w, _] = inputs.size;
         let [left, right] = &inputs.sides;
         let (feature, range) = inputs.feature.unwrap_or((&self.blank, [0.0, 1.0]));
         let split = inputs.split.filter(|_| inputs.view.has_sides());

@@ -215,10 +215,10 @@ fn required_extensions() {
     let mut glb = Glb::triangle();
     glb.json["extensionsRequired"] = json!(["KHR_mesh_quantization", "KHR_texture_transform"]);
     assert!(glb.load().is_ok());
-    glb.json["extensionsUsed"] = json!(["KHR_texture_transform", "KHR_materials_sheen"]);
+    glb.json["extensionsUsed"] = json!(["KHR_texture_transform", "KHR_materials_iridescence"]);
     let scene = glb.load().expect("used is not required");
     let about = |word: &str| scene.warnings.iter().filter(|w| w.contains(word)).count();
-    assert_eq!((about("KHR_materials_sheen"), about("KHR_texture_transform")), (1, 0), "{:?}", scene.warnings);
+    assert_eq!((about("KHR_materials_iridescence"), about("KHR_texture_transform")), (1, 0), "{:?}", scene.warnings);
     // All of them in one message.
     glb.json["extensionsRequired"] = json!(["KHR_mesh_quantization", "ACME_secret", "ACME_other"]);
     refused(glb.load(), &["made.glb", "not supported: ACME_secret, ACME_other; export the file without"]);

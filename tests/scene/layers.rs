@@ -92,6 +92,31 @@ fn coats_reflect_before_the_surface_does() {
 }
 
 #[test]
+fn what_fibres_throw_back_is_scattered_and_the_rest_is_left() {
+    let cloth = |color: f32, rough: f32| {
+        let sheen = json!({"sheenColorFactor": [color, 0.0, 0.0], "sheenRoughnessFactor": rough});
+        with(json!({"KHR_materials_sheen": sheen}), [0.5, 0.5, 0.5, 1.0])
+    };
+    // The lobe's mean over all directions at roughness 0.6 is 0.1826.
+    let m = cloth(1.0, 0.6);
+    assert!((m.base_color[0] - (0.1826 + 0.8174 * 0.5)).abs() < 3e-3, "{:?}", m.base_color);
+    assert!((m.base_color[1] - 0.8174 * 0.5).abs() < 3e-3 && (m.f0 - 0.8174 * 0.04).abs() < 3e-4, "{m:?}");
+    // Negative controls: no colour is no sheen, and smooth fibres hardly throw anything back.
+    assert_eq!((cloth(0.0, 0.6).base_color[0], cloth(0.0, 0.6).f0), (0.5, 0.04));
+    assert!((cloth(1.0, 0.0).base_color[0] - 0.5).abs() < 0.01);
+    // A white surface stays white: no light is made.
+    let white = json!({"sheenColorFactor": [1.0, 1.0, 1.0], "sheenRoughnessFactor": 1.0});
+    close(with(json!({"KHR_materials_sheen": white}), [1.0; 4]).base_color[0], 1.0);
+    // With a picture of the surface's colour the sum is a picture.
+    let pbr = json!({"metallicFactor": 0.0, "baseColorTexture": {"index": 0}});
+    let sheen = json!({"KHR_materials_sheen": {"sheenColorFactor": [1.0, 1.0, 1.0], "sheenRoughnessFactor": 1.0}});
+    let scene = loaded(json!({"extensions": sheen, "pbrMetallicRoughness": pbr}), &[png([0, 0, 0, 255], 1, 1)]);
+    let image = &scene.images[scene.materials[0].base_color_texture.expect("a picture").image];
+    // 0.301 in sRGB.
+    assert!(image.rgba[0].abs_diff(149) <= 1, "{:?}", &image.rgba[..4]);
+}
+
+#[test]
 fn bad_layers_are_mended_and_told() {
     let read = |extensions: Value, images: &[Vec<u8>]| {
         let scene = loaded(json!({"extensions": extensions, "pbrMetallicRoughness": {"metallicFactor": 0.0}}), images);

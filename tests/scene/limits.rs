@@ -23,7 +23,7 @@ fn triangle(buffer: Option<&str>, image: &str) -> Vec<u8> {
 }
 
 fn load(path: &Path, allow_outside: bool) -> Result<Scene, SceneError> {
-    scene::load_with(path.to_str().expect("a path"), LoadOptions { allow_outside })
+    scene::load_with(path.to_str().expect("a path"), LoadOptions { allow_outside, ..LoadOptions::default() })
 }
 
 #[test]

@@ -14,6 +14,48 @@ use serde_json::json;
 use session::{mean, session, succeeds};
 use std::process::Command;
 
+/// What is seen beyond the scene, and half the resolution while the view moves on a slow device.
+#[test]
+fn backdrops_and_coarse_motion() {
+    let (Some(gpu), Some(display)) = (common::gpu(), Display::open()) else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let mut script = vec![
+        json!({ "wait": "loaded" }),
+        json!({ "wait": "idle" }),
+        json!({ "key": "P" }),
+        json!({ "wait": "idle" }),
+        json!({ "expect": { "/backdrop": "shown", "/coarse": false } }),
+        json!({ "screenshot": "shown.png" }),
+        json!({ "key": "Shift+O" }),
+        json!({ "key": "Shift+O" }),
+        json!({ "wait": "idle" }),
+        json!({ "expect": { "/backdrop": "hidden" } }),
+        json!({ "screenshot": "hidden.png" }),
+        json!({ "key": "K" }),
+        json!({ "expect": { "/copied": { "contains": "--backdrop=hidden" } } }),
+        json!({ "key": "Shift+O" }),
+        json!({ "key": "Z" }),
+    ];
+    if gpu.is_software() {
+        script.push(json!({ "expect": { "/coarse": true } }));
+    }
+    // There and back: what rests is whole again.
+    script.extend([
+        json!({ "drag": [[240, 150], [250, 150], [240, 150]] }),
+        json!({ "screenshot": "moving.png" }),
+        json!({ "wait": "idle" }),
+        json!({ "key": "C" }),
+        json!({ "wait": "idle" }),
+        json!({ "screenshot": "rests.png" }),
+    ]);
+    let arguments = ["interior", "--method", "gather", "--size", "960x600"];
+    succeeds(&session(&display, dir.path(), json!(script), &arguments));
+    let all = |name: &str| mean(&dir.path().join(name), 0..960, 0..600);
+    let apart = |a: &str, b: &str| (0..3).map(|c| (all(a)[c] - all(b)[c]).abs()).fold(0.0, f64::max);
+    assert!(apart("shown.png", "rests.png") < 0.5, "{:?} {:?}", all("shown.png"), all("rests.png"));
+    assert!(apart("shown.png", "moving.png") < 8.0, "{:?} {:?}", all("shown.png"), all("moving.png"));
+}
+
 /// The required half of the viewer in one session: loading, keys, orbiting, flying, light, objects,
 /// a file that is no scene, a dropped scene, sizes, loss of surface and device, and that nothing is
 /// drawn when nothing happens.

@@ -1,4 +1,4 @@
-//! `cargo xtask demo | test | hosts | gpu-report | ci`: set-up and checks; no product code.
+//! `cargo xtask demo | test | hosts | gpu-report | conformance | ci`: set-up and checks; no product code.
 //!
 //! Every command first makes sure of a wgpu adapter: it asks `bouncelight doctor`, and on Debian or
 //! Ubuntu without any adapter it installs Mesa's CPU driver, saying so before it does.
@@ -19,6 +19,8 @@ usage: cargo xtask COMMAND
   gpu-report [--dev] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] [--triangles N,...] [--out FOLDER] [--no-pytorch]
          measures on this device all that docs/ projects: docs/measured/DEVICE.json and DEVICE.md, in less than eight minutes
          (--dev builds without release's optimisation: for rehearsals)
+  conformance
+         docs/conformance.md: glTF feature by feature, the rasteriser beside the path tracer
   ci     what continuous integration runs (.ci/run)";
 
 /// Exit code with which `bouncelight doctor` says that there is no usable adapter.
@@ -33,6 +35,7 @@ fn main() -> ExitCode {
         "test" => test(),
         "hosts" => hosts(),
         "gpu-report" => gpu_report(std::env::args().skip(2).collect()),
+        "conformance" => conformance(),
         "ci" => ci(),
         _ => {
             eprintln!("{USAGE}");
@@ -99,6 +102,15 @@ fn gpu_report(mut args: Vec<String>) -> Result<(), String> {
     }
     let words: Vec<&str> = args.iter().map(String::as_str).collect();
     cargo(&[&["run", "--quiet", "--example", "gpu_report"], profile, &["--"], &words].concat())
+}
+
+/// The page of glTF's features, written by the test that holds their bounds.
+fn conformance() -> Result<(), String> {
+    cargo(&["build", "--bin", "bouncelight"])?;
+    make_sure_of_adapter(&[])?;
+    let words = ["test", "--test", "conformance", "--", "page", "--nocapture"];
+    // Tests run in their package's folder.
+    run(command("cargo", &words).env("CONFORMANCE_DOCS", "docs"))
 }
 
 /// Hosts in other languages; their tests are their own programs.

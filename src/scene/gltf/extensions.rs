@@ -4,7 +4,7 @@ use crate::scene::SceneError;
 use std::path::Path;
 
 /// Extensions that this loader has.
-const SUPPORTED: [&str; 21] = [
+const SUPPORTED: [&str; 22] = [
     super::area::NAME,
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -16,6 +16,7 @@ const SUPPORTED: [&str; 21] = [
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",

@@ -1,14 +1,15 @@
-//! What lies over a surface or is seen through it: KHR_materials_clearcoat, KHR_materials_transmission with
-//! KHR_materials_volume.
+//! What lies over a surface or is seen through it: KHR_materials_sheen, KHR_materials_clearcoat,
+//! KHR_materials_transmission with KHR_materials_volume.
 //!
-//! A [`Material`] is one opaque layer with coverage. So a coat becomes part of the surface's own reflectance, and what
+//! A [`Material`] is one opaque layer with coverage. So the light that fibres throw back becomes part of the surface's
+//! colour, a coat becomes part of its own reflectance, and what
 //! is transmitted goes straight on where the surface does not cover: nothing is refracted or scattered on its way, and
 //! its colour counts by the mean over red, green and blue. Rasteriser and path tracer draw the same surface. Textures
 //! count by their mean, with a warning.
 
 use super::Loader;
 use crate::scene::texture::{self, Use};
-use crate::scene::{AlphaMode, DIELECTRIC_F0, Material};
+use crate::scene::{AlphaMode, DIELECTRIC_F0, Image, Material, TextureRef};
 use serde_json::{Map, Value};
 
 type Extensions = Map<String, Value>;
@@ -33,6 +34,42 @@ impl Loader<'_> {
         // Of a metal the base colour is the reflectance.
         (0..3).for_each(|c| out.base_color[c] = (1.0 - coat) * out.base_color[c] + coat * metallic);
         out.roughness = (coat * coat_roughness + below * out.roughness) / (coat + below);
+    }
+
+    /// KHR_materials_sheen: fibres over the surface. What they throw back, in the mean over all directions, is scattered
+    /// like the surface's own diffuse light, which gets what they leave; that cloth is brightest at its rims is lost.
+    pub(super) fn sheen(&mut self, place: &str, extensions: &Extensions, out: &mut Material) {
+        let Some(sheen) = extensions.get("KHR_materials_sheen") else { return };
+        let channel = |c: usize| sheen["sheenColorFactor"].get(c).and_then(Value::as_f64).map_or(0.0, |v| v as f32);
+        let mut color = [0, 1, 2].map(|c| channel(c).clamp(0.0, 1.0));
+        if color == [0.0; 3] {
+            return;
+        }
+        let roughness = self.factor(place, sheen, "sheenRoughness", 3);
+        if let Some(mean) = self.mean_of(place, sheen, "sheenColorTexture", Use::Color) {
+            (0..3).for_each(|c| color[c] *= mean[c]);
+        }
+        let added = color.map(|c| c * fibres(roughness));
+        let left = 1.0 - added.iter().fold(0.0f32, |a, b| a.max(*b));
+        out.f0 *= left;
+        let base = out.base_color;
+        match out.base_color_texture {
+            None => (0..3).for_each(|c| out.base_color[c] = left * base[c] + added[c]),
+            // A factor cannot add: the sum is a picture of its own.
+            Some(old) => {
+                let key = format!("sheen {} {base:?} {added:?}", old.image);
+                let known = self.converted.get(&key).map(|k| k.0);
+                let image = known.unwrap_or_else(|| {
+                    let picture = summed(&self.scene.images[old.image], |c, v| left * base[c] * v + added[c]);
+                    self.scene.images.push(picture);
+                    let image = self.scene.images.len() - 1;
+                    self.converted.insert(key, (image, image, [0.0; 4]));
+                    image
+                });
+                out.base_color_texture = Some(TextureRef { image, ..old });
+                out.base_color = [1.0, 1.0, 1.0, base[3]];
+            }
+        }
     }
 
     /// KHR_materials_transmission, and the colour that KHR_materials_volume gives to what passes.
@@ -83,23 +120,47 @@ impl Loader<'_> {
             self.warn(place, &format!("has a {name}Factor of {factor}, which was clamped"));
         }
         let factor = factor.clamp(0.0, 1.0);
-        let slot = format!("{name}Texture");
-        let Some(index) = extension.get(&slot).and_then(|t| t.get("index")) else { return factor };
-        let known = index.as_u64().filter(|&i| (i as usize) < self.document.as_json().textures.len());
-        let Some(index) = known.filter(|_| factor > 0.0) else {
-            if factor > 0.0 {
-                self.warn(place, &format!("its {slot} does not exist"));
-            }
+        if factor == 0.0 {
             return factor;
+        }
+        let mean = self.mean_of(place, extension, &format!("{name}Texture"), Use::Data);
+        factor * mean.map_or(1.0, |mean| mean[channel])
+    }
+
+    /// Mean of the texture called `slot`, with a warning that it is all that counts; `None` where there is none.
+    fn mean_of(&mut self, place: &str, extension: &Value, slot: &str, kind: Use) -> Option<[f32; 4]> {
+        let index = extension.get(slot)?.get("index")?;
+        let known = index.as_u64().filter(|&i| (i as usize) < self.document.as_json().textures.len());
+        let Some(index) = known else {
+            self.warn(place, &format!("its {slot} does not exist"));
+            return None;
         };
-        let mean = texture::mean(&self.decode(place, index as usize, Use::Data))[channel];
-        self.warn(place, &format!("its {slot} counts by its mean, {mean:.3}"));
-        factor * mean
+        let mean = texture::mean(&self.decode(place, index as usize, kind));
+        let [r, g, b, a] = mean;
+        self.warn(place, &format!("its {slot} counts by its mean, {r:.3}, {g:.3}, {b:.3}, {a:.3}"));
+        Some(mean)
     }
 }
 
 fn number(extension: &Value, name: &str) -> Option<f32> {
     extension.get(name).and_then(Value::as_f64).map(|v| v as f32)
+}
+
+/// Share of light from a direction that fibres of a roughness throw back, in the mean over a hemisphere by the cosine:
+/// the "Charlie" lobe of KHR_materials_sheen with the shadowing of Estevez and Kulla (2017), integrated in steps of 0.1; the
+/// curve is off by 0.002 at most.
+fn fibres(roughness: f32) -> f32 {
+    0.0152 + roughness * (0.0171 + roughness * (0.6970 - 0.4283 * roughness))
+}
+
+/// A picture whose linear values went through `change`, colour by colour.
+fn summed(image: &Image, change: impl Fn(usize, f32) -> f32) -> Image {
+    let table = texture::srgb_table();
+    let mut out = image.clone();
+    for texel in out.rgba.chunks_exact_mut(4) {
+        (0..3).for_each(|c| texel[c] = texture::to_srgb(change(c, table[usize::from(texel[c])])));
+    }
+    out
 }
 
 /// Share of light that is left on its way through a body once, by Beer's law; all where it is thin or clear.

@@ -56,6 +56,7 @@ impl<'a> Loader<'a> {
         self.clean(&place, &mut out);
         let json = &self.document.as_json().materials[index];
         if let Some(extensions) = json.extensions.as_ref().map(|e| &e.others) {
+            self.sheen(&place, extensions, &mut out);
             self.clearcoat(&place, extensions, &mut out);
             self.transmission(&place, extensions, &mut out);
         }

@@ -21,6 +21,7 @@ mod pointer;
 mod source;
 mod specular;
 mod texture;
+mod units;
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -54,6 +55,7 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError>
         gltf::json::deserialize::from_slice(json).map_err(|e| SceneError::broken(path, "JSON", e.to_string()))?;
     extensions::check_required(path, &root)?;
     let mended = mend::mend(&mut root);
+    units::apply(&mut root, options.units);
     validate(path, &root)?;
     let document = gltf::Document::from_json_without_validation(root);
     let source = Source::open(path, &document, blob, options)?;

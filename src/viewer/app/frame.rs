@@ -8,6 +8,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
+/// Milliseconds from which on a frame is too slow to move by.
+const SLOW: f64 = 50.0;
+
 impl App {
     /// Draws the window, if it is to be seen. Tells when it wants to be called again by itself.
     pub fn frame(&mut self, event_loop: &ActiveEventLoop) {
@@ -164,6 +167,14 @@ impl App {
             return false;
         }
         let camera = self.state.navigator.camera(&shown.scene);
+        let track = if self.screen.as_ref().is_some_and(|s| s.profiler.is_some()) {
+            &self.meter.times.gpu
+        } else {
+            &self.meter.times.wall
+        };
+        // Frames of half the resolution take a quarter.
+        let most = if self.state.slow { SLOW / 4.0 } else { SLOW };
+        self.state.slow = track.spread().is_some_and(|s| s.median > most);
         let again = self.state.measure || self.meter.settling == 1;
         let mut encoder = stage.gpu.device.create_command_encoder(&Default::default());
         let profiler = self.screen.as_ref().and_then(|s| s.profiler.as_ref());

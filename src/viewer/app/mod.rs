@@ -114,6 +114,8 @@ pub fn run(options: Options) -> Result<(), ViewError> {
             _ => {}
         }
     }
+    // A script sees whole pictures unless it asks for others.
+    settings.coarse &= !scripted;
     if let Some(method) = options.method {
         settings.left = method;
     } else if options.weights.is_some() {
@@ -126,7 +128,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
     let event_loop =
         EventLoop::<Event>::with_user_event().build().map_err(|e| ViewError::NoDisplay(window_reason(&e)))?;
     let mut state = State::new(settings);
-    state.textures = options.textures;
+    (state.textures, state.units) = (options.textures, options.load.units);
     if let Some(text) = trouble {
         state.tell(text, true);
     }

@@ -12,7 +12,7 @@ use super::show::{ShowInputs, ShowPass, SumPass, Sums};
 use super::state::{Stale, State};
 use crate::accel::SceneRays;
 use crate::gpu::{Gpu, readback, timing::Recorder};
-use crate::render::{DrawnCount, RenderError, Renderer, View as Eye, sampling};
+use crate::render::{Backdrop, DrawnCount, RenderError, Renderer, View as Eye, sampling};
 use crate::scene::{
     Camera, Scene,
     upload::{SceneGpu, TextureMemory},
@@ -20,6 +20,7 @@ use crate::scene::{
 use feature::Feature;
 use sides::Reference;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// A side's renderer.
 struct Slot {
@@ -38,6 +39,8 @@ struct Sight {
     size: [u32; 2],
     keys: [Option<Key>; 2],
     samples: u32,
+    backdrop: Backdrop,
+    texel: u32,
 }
 
 /// Everything on the GPU.
@@ -54,7 +57,14 @@ pub struct Stage {
     sight: Option<Sight>,
     /// Frames averaged of this sight.
     still: u32,
+    /// Pixels that a texel of the renderers covers.
+    texel: u32,
+    /// When the camera moved last.
+    moved: Option<Instant>,
 }
+
+/// How long a view rests before it is drawn whole again.
+const REST: Duration = Duration::from_millis(200);
 
 impl Stage {
     /// For windows of `format`.
@@ -74,6 +84,8 @@ impl Stage {
             feature: None,
             sight: None,
             still: 0,
+            texel: 1,
+            moved: None,
         }
     }
 
@@ -165,7 +177,7 @@ impl Stage {
 
     /// True while another frame would change the picture.
     pub fn is_converging(&self, state: &State) -> bool {
-        self.scene.is_some() && self.slots[0].is_some() && self.still < state.settings.samples
+        self.scene.is_some() && self.slots[0].is_some() && (self.still < state.settings.samples || self.texel > 1)
     }
 
     /// Frames averaged so far.
@@ -186,6 +198,12 @@ impl Stage {
         again: bool,
     ) -> Result<bool, RenderError> {
         let Some(scene) = &self.scene else { return Ok(false) };
+        let moves = |old: &Sight| (old.transform, old.yfov) != (camera.transform, camera.yfov);
+        if self.sight.as_ref().is_some_and(moves) {
+            self.moved = Some(Instant::now());
+        }
+        let moving = self.moved.is_some_and(|at| at.elapsed() < REST);
+        let texel = if moving && state.is_coarse() { 2 } else { 1 };
         let sight = Sight {
             version: state.version,
             transform: camera.transform,
@@ -194,22 +212,27 @@ impl Stage {
             size: state.size,
             keys: [self.key(0), self.key(1)],
             samples: state.settings.samples,
+            backdrop: state.settings.backdrop,
+            texel,
         };
         if self.sight.as_ref() != Some(&sight) {
             self.sight = Some(sight);
             self.still = 0;
             self.feature = None;
         } else if self.still >= state.settings.samples {
-            if !again {
+            if !again && texel == 1 {
                 return Ok(false);
             }
             self.still = 0;
         }
+        self.texel = texel;
+        let size = state.size.map(|n| n.div_ceil(texel));
         let mut drawn = false;
         for slot in self.slots.iter_mut().flatten() {
-            slot.renderer.resize(state.size)?;
+            slot.renderer.resize(size)?;
+            slot.renderer.set_backdrop(state.settings.backdrop);
             // Sample by sample as a capture takes them.
-            let view = Eye::new(camera, state.size, sampling::offset(self.still, 0)).with_seed(self.still);
+            let view = Eye::new(camera, size, sampling::offset(self.still, 0)).with_seed(self.still);
             slot.renderer.record_frame(recorder, &self.gpu.queue, scene, &view, self.still == 0)?;
             if state.settings.samples > 1 {
                 let hdr = &slot.renderer.targets().hdr;
@@ -246,6 +269,7 @@ impl Stage {
         let inputs = self.slots[0].as_ref().filter(|_| drawn).map(|slot| ShowInputs {
             renderer: &slot.renderer,
             sides,
+            size: state.size,
             feature: self.feature.as_ref().map(|f| (&f.texture.view, f.range)),
             view: s.view,
             split: s.split.then_some(s.line),

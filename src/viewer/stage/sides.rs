@@ -73,7 +73,7 @@ impl Stage {
             Some(sums) => (sums.current().view.clone(), 1.0 / self.still.max(1) as f32),
             None => (t.hdr.view.clone(), 1.0),
         };
-        SideView { radiance, indirect: t.indirect.view.clone(), scale, texel: 1 }
+        SideView { radiance, indirect: t.indirect.view.clone(), scale, texel: self.texel }
     }
 
     /// The last report of the path tracer.
@@ -96,7 +96,7 @@ impl Stage {
             Side::Right if s.right != s.left => self.slots[1].as_ref(),
             _ => self.slots[0].as_ref(),
         };
-        let Some(slot) = slot.filter(|_| self.still >= s.samples) else { return Ok(None) };
+        let Some(slot) = slot.filter(|_| self.still >= s.samples && self.texel == 1) else { return Ok(None) };
         self.read(slot).map(Some)
     }
 

@@ -1,6 +1,6 @@
 //! What can be asked of the viewer, and what the viewer asks of the world outside.
 
-use crate::render::tonemap_curve::Tonemap;
+use crate::render::{Backdrop, tonemap_curve::Tonemap};
 use crate::scene::edit::{LightEdit, NewLight};
 use crate::viewer::choice::{Side, Source, View};
 use crate::viewer::navigate::Preset;
@@ -19,6 +19,11 @@ pub enum Action {
     Split,
     MoveSplit(f32),
     Exposure(f32),
+    /// Shows the surroundings, blurs or hides them.
+    Backdrop(Backdrop),
+    NextBackdrop,
+    /// Half the resolution while the view moves and frames are slow, or never.
+    Coarse,
     /// Measures the exposure, or leaves it to the hand.
     AutoExposure,
     Tonemap(Option<Tonemap>),

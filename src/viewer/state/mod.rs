@@ -9,8 +9,8 @@ use super::choice::{Side, Source, View};
 use super::film::{self, Film, Recording};
 use super::navigate::{Navigator, Preset};
 use super::saved::Settings;
-use crate::render::tonemap_curve::Tonemap;
-use crate::scene::{Environment, Light, Scene, look::FRAMING, path::CameraPath, upload::TextureMemory};
+use crate::render::{Backdrop, tonemap_curve::Tonemap};
+use crate::scene::{Environment, Light, Scene, look::FRAMING, path::CameraPath, units::Units, upload::TextureMemory};
 pub use action::{Action, Request};
 pub use edit::{angles, from_angles};
 use std::collections::BTreeMap;
@@ -70,6 +70,8 @@ pub struct State {
     pub help: bool,
     /// The window has no frame and covers the screen.
     pub full_screen: bool,
+    /// Frames take so long that moving the view is no pleasure.
+    pub slow: bool,
     /// Draws without end, to measure.
     pub measure: bool,
     pub stale: Stale,
@@ -84,6 +86,8 @@ pub struct State {
     pub half: bool,
     /// How textures lie in the device's memory.
     pub textures: TextureMemory,
+    /// Unit of length and vertical of scene files.
+    pub units: Units,
     /// Numbers of `gather` that were fitted to the scene, where they are not its own.
     pub gather: Option<String>,
     /// Numbers of unseen light that were.
@@ -120,6 +124,11 @@ impl State {
     /// With saved or default settings.
     pub fn new(settings: Settings) -> Self {
         Self { settings, size: [640, 360], ..Self::default() }
+    }
+
+    /// A view that moves is drawn at half the resolution.
+    pub fn is_coarse(&self) -> bool {
+        self.settings.coarse && self.slow && self.settings.view == View::Picture && !self.measure
     }
 
     /// Tells the user.
@@ -273,6 +282,12 @@ impl State {
             A::Weights(path) => self.requests.push(Request::Weights(path)),
             A::Light(edit) => self.edit_light(&edit),
             A::Sky(radiance) => self.set_sky(radiance),
+            A::Backdrop(backdrop) => self.settings.backdrop = backdrop,
+            A::NextBackdrop => {
+                let next = (self.settings.backdrop as usize + 1) % Backdrop::ALL.len();
+                self.settings.backdrop = Backdrop::ALL[next];
+            }
+            A::Coarse => self.settings.coarse = !self.settings.coarse,
             A::TurnSky(degrees) => self.turn_sky(degrees),
             A::AddLight(kind) => self.add_light(kind),
             A::RemoveLight(light) => self.remove_light(light),

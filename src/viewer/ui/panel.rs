@@ -1,7 +1,7 @@
 //! The panel's controls.
 
 use super::{Facts, Memory, frontier, light, source_box, times};
-use crate::render::tonemap_curve::Tonemap;
+use crate::render::{Backdrop, tonemap_curve::Tonemap};
 use crate::viewer::choice::{Side, Source, View};
 use crate::viewer::film::Film;
 use crate::viewer::navigate::Preset;
@@ -258,6 +258,17 @@ fn picture(ui: &mut Ui, state: &mut State) {
             state.apply(Action::Tonemap(Some(kind)));
         }
         ui.end_row();
+        ui.label("Backdrop");
+        let mut backdrop = state.settings.backdrop;
+        egui::ComboBox::from_id_salt("backdrop").selected_text(backdrop.name()).show_ui(ui, |ui| {
+            for b in Backdrop::ALL {
+                ui.selectable_value(&mut backdrop, b, b.name());
+            }
+        });
+        if backdrop != state.settings.backdrop {
+            state.apply(Action::Backdrop(backdrop));
+        }
+        ui.end_row();
         ui.label("Average");
         let mut samples = state.settings.samples;
         let drag = egui::DragValue::new(&mut samples).range(1..=4096).suffix(" frames at rest");
@@ -266,6 +277,11 @@ fn picture(ui: &mut Ui, state: &mut State) {
         }
         ui.end_row();
     });
+    let mut coarse = state.settings.coarse;
+    let told = "where a frame takes more than 50 ms (Z)";
+    if ui.checkbox(&mut coarse, "half the resolution while moving").on_hover_text(told).changed() {
+        state.apply(Action::Coarse);
+    }
     ui.horizontal_wrapped(|ui| {
         if ui.button("PNG (F12)").clicked() {
             state.apply(Action::Capture { exr: false });
