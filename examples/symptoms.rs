@@ -18,9 +18,10 @@ const ACROSS: usize = 3;
 const FRAMES: [u32; 2] = [48, 14];
 
 type Failure = Box<dyn std::error::Error>;
+type Mistake = fn(&mut Host);
 
 /// What is done to a host, and how many times its light is drawn; row by row.
-const MISTAKES: [(fn(&mut Host), f32); 6] = [
+const MISTAKES: [(Mistake, f32); 6] = [
     (|_| (), 1.0),
     // Depth is said to be of the clip space of OpenGL.
     (|host| host.conventions.depth = Depth::ForwardGl, 1.0),

@@ -248,5 +248,5 @@ fn tidy(tokens: &str) -> String {
     ] {
         text = text.replace(from, to);
     }
-    text.replace("->(", "-> (").replace(":(", ": (").replace(",(", ", (").replace("=(", "= (").replace("&'", "&'")
+    text.replace("->(", "-> (").replace(":(", ": (").replace(",(", ", (").replace("=(", "= (")
 }
