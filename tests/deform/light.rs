@@ -132,10 +132,10 @@ fn the_program_draws_poses_and_sequences() {
     fails(&["render", &file, "-o", &out, "--fixed-dt", "1/24"], 2, &["--fixed-dt"]);
     let Some(_) = common::gpu() else { return };
     let run = |more: &[&str]| {
-        // A sequence keeps the exposure that its first frame asks for.
-        let fixed =
-            ["render", &file, "--size", "48x48", "--method", "direct", "--samples", "1", "--exposure", "0", "--quiet"];
-        let done = bouncelight(&[&fixed, more].concat());
+        let fixed = ["render", &file, "--size", "48x48", "--method", "direct", "--samples", "1", "--quiet"];
+        // A sequence keeps the view and the exposure that its first frame asks for, a still has those of its moment.
+        let view = ["--eye", "0.5,1,4", "--look-at", "0,1,0", "--fov", "40", "--exposure", "0"];
+        let done = bouncelight(&[&fixed, view.as_slice(), more].concat());
         assert!(done.status.success(), "{more:?}: {}", String::from_utf8_lossy(&done.stderr));
     };
     let picture = |name: &str| std::fs::read(dir.path().join(name)).expect("it was drawn");
