@@ -21,7 +21,10 @@ async function start() {
   const renderer = new Renderer(device, scene, size, "rgba8unorm");
   const passes = {};
   // A network's shaders take long to compile, so a pass is loaded when it is asked for.
-  const loaded = async (name) => passes[name] ??= await Pass.load(device, `${data}/${name}`, renderer.inputs);
+  const loaded = (name) => passes[name] ??= Pass.load(device, `${data}/${name}`, renderer.inputs).catch((error) => {
+    delete passes[name];
+    throw error;
+  });
   const frame = (encoder, pass, shift) => {
     const view = renderer.view(shift);
     renderer.draw(encoder, view);
@@ -35,20 +38,39 @@ async function start() {
   context.configure({ device, format: "rgba8unorm" });
   const [select, split] = ["select", "input"].map((tag) => document.querySelector(tag));
   const times = {};
+  let [shown, waiting] = [null, ""];
+  // The pass before is shown while the one that was chosen is compiled, which may take minutes without a GPU.
+  const choose = async () => {
+    const name = select.value;
+    waiting = `${name} is being loaded and compiled`;
+    say(waiting);
+    try {
+      const pass = await loaded(name);
+      if (select.value !== name) return;
+      [shown, waiting] = [{ name, pass }, ""];
+    } catch (error) {
+      if (select.value === name) say(waiting = String(error));
+    }
+  };
+  select.onchange = choose;
   const loop = async () => {
-    const pass = await loaded(select.value);
-    const began = performance.now();
-    const encoder = device.createCommandEncoder();
-    frame(encoder, pass);
-    renderer.show(encoder, context.getCurrentTexture().createView(), pass, split.value * size[0]);
-    device.queue.submit([encoder.finish()]);
-    await device.queue.onSubmittedWorkDone();
-    const took = performance.now() - began;
-    times[select.value] = 0.9 * (times[select.value] ?? took) + 0.1 * took;
-    say(Object.entries(times).map(([name, ms]) => `${name} ${ms.toFixed(1)} ms a frame`).join(", "));
+    const { name, pass } = shown ?? {};
+    if (pass) {
+      const began = performance.now();
+      const encoder = device.createCommandEncoder();
+      frame(encoder, pass);
+      renderer.show(encoder, context.getCurrentTexture().createView(), pass, split.value * size[0]);
+      device.queue.submit([encoder.finish()]);
+      await device.queue.onSubmittedWorkDone();
+      const took = performance.now() - began;
+      times[name] = 0.9 * (times[name] ?? took) + 0.1 * took;
+      const measured = Object.entries(times).map(([name, ms]) => `${name} ${ms.toFixed(1)} ms a frame`);
+      if (!errors.length) say([...measured, waiting].filter(Boolean).join(", "));
+    }
     requestAnimationFrame(guarded);
   };
   const guarded = () => loop().catch((error) => say(String(error)));
+  choose();
   guarded();
 }
 
@@ -66,7 +88,7 @@ async function test(device, renderer, pass, frame, errors) {
   const bytesPerRow = 256 * Math.ceil(width / 64);
   const buffer = device.createBuffer({ size: bytesPerRow * height, usage: GPUBufferUsage.COPY_DST | GPUBufferUsage.MAP_READ });
   const encoder = device.createCommandEncoder();
-  renderer.show(encoder, texture.createView(), pass, query.has("raster") ? width : 0);
+  renderer.show(encoder, texture.createView(), pass, 0);
   encoder.copyTextureToBuffer({ texture }, { buffer, bytesPerRow }, [width, height]);
   device.queue.submit([encoder.finish()]);
   await buffer.mapAsync(GPUMapMode.READ);
