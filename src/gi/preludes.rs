@@ -17,6 +17,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.cells", super::stage::cells::prelude()),
         ("gi.rays", super::gather::prelude()),
         ("gi.renew", super::gather::prelude()),
+        ("gi.gradient", super::gather::prelude()),
         ("gi.mirror", super::gather::prelude()),
         ("gi.settle", super::gather::prelude()),
         ("gi.features", super::gather::prelude()),

@@ -36,6 +36,7 @@ const FILES: &[(&str, &str)] = &[
     ("gi.cells", "gi/choose.wgsl"),
     ("gi.rays", "gi/gather/rays.wgsl"),
     ("gi.renew", "gi/gather/renew.wgsl"),
+    ("gi.gradient", "gi/gather/gradient.wgsl"),
     ("gi.mirror", "gi/gather/mirror.wgsl"),
     ("gi.settle", "gi/gather/settle.wgsl"),
     ("gi.blur", "gi/gather/blur.wgsl"),

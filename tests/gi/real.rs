@@ -85,5 +85,5 @@ fn light_follows_a_ceiling_that_slides_away() {
     let ceiling = gone.instances.iter_mut().find(|i| i.name.contains("Plane_001")).expect("it has one");
     ceiling.transform[3][1] += 40.0;
     // A host says of lamps that they are others, of objects only that they moved: after twelve frames 14 % are left.
-    follows(&gpu, [&there, &gone], 20, |scene, to| scene.set_placements(&gpu.queue, to));
+    follows(&gpu, [&there, &gone], 6, |scene, to| scene.set_placements(&gpu.queue, to));
 }

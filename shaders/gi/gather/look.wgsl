@@ -181,8 +181,9 @@ fn is_lit(x: vec3f, chosen: Chosen, seed: u32) -> bool {
 // What the ray from o finds in direction d. n_d: cosine by which shadow rays to what glows were weighted there, ALONE where none were
 // sent. `query` is the ray's number among all of the frame, `name` what its random numbers are drawn by, which slots of the table must
 // not decide, since they go to who comes first; `round` is that which will update the entry, `glows`: whether what glows counts
-// where the ray meets it.
-fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, name: u32, round: u32, glows: bool) -> Found {
+// where the ray meets it. `height`: no surface whose plane o lies nearer to can be met but the one that the ray begins on, by a ray that
+// a shading normal sends below it: such light is lost.
+fn look(o: vec3f, d: vec3f, height: f32, n_d: f32, query: u32, name: u32, round: u32, glows: bool) -> Found {
     let seed = pcg3(vec3u(name, gather.round, 0x9e3779b9u));
     let hit = trace_seeded(o, d, FAR, false, seed.x);
     if hit.triangle == NO_TRIANGLE {
@@ -192,6 +193,7 @@ fn look(o: vec3f, d: vec3f, n_d: f32, query: u32, name: u32, round: u32, glows: 
     if (gather.flags & GATHER_NO_CAUSTICS) != 0u { surface.f0 = vec3f(0.0); }
     let front = trace_normal(hit);
     let facing = -dot(front, d);
+    if abs(facing) * hit.t < height { return Found(vec3f(0.0), NONE, vec3f(0.0), hit.t); }
     let side = select(-front, front, facing > 0.0);
     let n = met_normal(hit, side);
     var radiance = vec3f(0.0);

@@ -41,7 +41,7 @@ fn shown_by(pixel: vec2u) -> vec3f {
     if all(lobe.weight <= vec3f(0.0)) { return vec3f(0.0); }
     let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
     let name = gather.rays + pixel.y * params.size.x + pixel.x;
-    let found = look(at.x, lobe.d, ALONE, NONE, name, gather.round, !stands_in);
+    let found = look(at.x, lobe.d, 0.0, ALONE, NONE, name, gather.round, !stands_in);
     var radiance = found.radiance;
     if found.slot != NONE {
         radiance += found.back * entry_light[(gather.round & 1u) * (gather.mask + 1u) + found.slot].rgb;
@@ -64,7 +64,7 @@ fn mirror(@builtin(global_invocation_id) id: vec3u) {
     let found = shown_by(own);
     let n = world_normal_at(vec2i(own));
     let changing = (gather.flags & GATHER_CHANGING) != 0u;
-    let kept = (gather.flags & GATHER_CUT) == 0u && !(changing && gather.since == 0u);
+    let kept = (gather.flags & (GATHER_CUT | GATHER_CHANGED)) == 0u;
     let most = select(MOST_RAYS, MOST_CHANGING, changing);
     for (var i = 0u; i < 4u; i++) {
         let pixel = first + steps[i];

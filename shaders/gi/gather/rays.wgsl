@@ -5,15 +5,13 @@
 //#import gi/gather/types.wgsl
 //#import gi/gather/gloss.wgsl
 //#import gi/gather/start.wgsl
-//#import gi/gather/look.wgsl
+//#import gi/gather/send.wgsl
 
 // One ray from each cell of the picture into the half space above it, and where surfaces glow one shadow ray to a point of them; more
 // from cells of which nothing is remembered. Of each square of 2×2 cells one in turn sends a second ray into its lobe, if its surface has one.
 
 @group(2) @binding(3) var<storage, read> cell_pixels: array<u32>;
-// Three vectors a ray: radiance found and the entry's slot; what the entry's light is multiplied by (shared exponent), direction,
-// distance (0: none was sent); light of what glows, and its direction. First those of cells, then those into lobes,
-// then the further ones of cells that are fresh.
+// `send.wgsl` says what of. First those of cells, then those into lobes, then the further ones of cells that are fresh.
 @group(2) @binding(4) var<storage, read_write> records: array<vec4f>;
 // F0 and roughness.
 @group(2) @binding(5) var specular_map: texture_2d<f32>;
@@ -34,20 +32,6 @@ fn numbers(cell: vec2u, look: u32) -> vec2f {
     return lattice(((place - TURN * look) & 15u) + 16u * (gather.frame - look), shift);
 }
 
-fn shared_exponent(c: vec3f) -> u32 {
-    let most = max(max(c.x, c.y), max(c.z, 1e-9));
-    let exponent = clamp((bitcast<u32>(most) >> 23u) - 110u, 0u, 31u);
-    let code = min(vec3u(max(c, vec3f(0.0)) * exp2(24.0 - f32(exponent)) + 0.5), vec3u(511u));
-    return code.x | (code.y << 9u) | (code.z << 18u) | (exponent << 27u);
-}
-
-fn record(ray: u32, found: Found, weight: vec3f, d: vec3f, glow: vec4f) {
-    records[3u * ray] = vec4f(found.radiance * weight, bitcast<f32>(found.slot));
-    records[3u * ray + 1u] =
-        vec4f(bitcast<f32>(shared_exponent(found.back * weight)), bitcast<f32>(pack_normal(d)), found.distance, 0.0);
-    records[3u * ray + 2u] = glow;
-}
-
 // Layers of workgroups: first rays of cells, rays into lobes, further rays of fresh cells.
 @compute @workgroup_size(8, 8)
 fn rays(@builtin(global_invocation_id) id: vec3u) {
@@ -64,15 +48,7 @@ fn rays(@builtin(global_invocation_id) id: vec3u) {
     let at = start_at(unpack_pixel(packed));
     let d = cosine_direction(at.n, numbers(id.xy, look_number));
     let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
-    let found = look(at.x, d, max(dot(at.n, d), 1e-4), select(NONE, cell, ray == cell), ray, gather.round, !stands_in);
-    var glow = vec4f(0.0);
-    if gather.emitter_count > 0u && !stands_in {
-        let seed = pcg3(vec3u(ray, gather.round, 0x51ed270bu));
-        // Of an even white surface without gloss.
-        let chosen = choose_light(Place(at.x, at.n, at.n, vec3f(1.0), vec3f(0.0), 1.0), false, seed);
-        if is_lit(at.x, chosen, seed.z) { glow = vec4f(chosen.even, bitcast<f32>(pack_normal(chosen.l))); }
-    }
-    record(ray, found, vec3f(1.0), d, glow);
+    send(at.x, at.n, d, select(NONE, cell, ray == cell), ray, ray);
 }
 
 // The two numbers of a ray into a lobe. Each square has a lattice of its own: lobes are narrower than the hemisphere, a few rays fill
@@ -99,7 +75,7 @@ fn gloss_ray(square: vec2u) {
     var found = Found(vec3f(0.0), NONE, vec3f(0.0), FAR);
     if any(lobe.weight > vec3f(0.0)) {
         let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
-        found = look(at.x, lobe.d, ALONE, ray, ray, gather.round, !stands_in);
+        found = look(at.x, lobe.d, 0.0, ALONE, ray, ray, gather.round, !stands_in);
     }
     record(ray, found, lobe.weight, lobe.d, vec4f(0.0));
 }

@@ -72,7 +72,7 @@ fn renew(@builtin(global_invocation_id) id: vec3u) {
     let count = u32(before.a);
     let shift = pcg3(vec3u(key, 0x7f4a7c15u, 3u));
     let d = cosine_direction(n, lattice(gather.round, shift.xy));
-    let found = look(x, d, max(dot(n, d), 1e-4), gather.rays + even + slot, key, gather.round + 1u, true);
+    let found = look(x, d, 0.0, max(dot(n, d), 1e-4), gather.rays + even + slot, key, gather.round + 1u, true);
     var light = found.radiance;
     if found.slot != NONE { light += found.back * entry_light[even + found.slot].rgb; }
     // Each of the first rays counts for its number: the earlier ones met entries that knew nothing yet.

@@ -13,14 +13,29 @@ struct Start {
     v: vec3f,
 }
 
+// Above a surface that faces n, at distance z along the view, and towards the eye, where nothing is in between whatever the normal says.
+// A depth whose steps are coarse at this distance asks for more.
+fn lifted(from_eye: vec3f, n: vec3f, z: f32) -> vec3f {
+    let lift = lift_at(z);
+    return params.eye.xyz + from_eye * (1.0 - lift) + n * (lift * z);
+}
+
+// Share of the distance.
+fn lift_at(z: f32) -> f32 {
+    return max(LIFT, LIFT_STEPS * params.depth.w * z);
+}
+
+// What x lies above its surface at most, and a little.
+fn above(x: vec3f) -> f32 {
+    let d = distance(x, params.eye.xyz);
+    return 2.05 * d * lift_at(d);
+}
+
 fn start_at(pixel: vec2i) -> Start {
     let z = distance_at(pixel);
     let n = world_normal_at(pixel);
     let from_eye = offset_at(pixel, z);
-    // Above the surface, and towards the eye, where nothing is in between whatever the normal says.
-    // A depth whose steps are coarse at this distance asks for more.
-    let lift = max(LIFT, LIFT_STEPS * params.depth.w * z);
-    return Start(params.eye.xyz + from_eye * (1.0 - lift) + n * (lift * z), n, -normalize(from_eye));
+    return Start(lifted(from_eye, n, z), n, -normalize(from_eye));
 }
 
 // A direction of the half space above a surface; what its ray finds is weighted so that the mean over the lobe is what

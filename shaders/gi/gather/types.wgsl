@@ -50,6 +50,8 @@ const GATHER_NO_GLOSS = 64u;
 const GATHER_CHANGING = 128u;
 // A network says which cells are averaged.
 const GATHER_GUIDED = 256u;
+// Lights or objects have changed since the frame before.
+const GATHER_CHANGED = 512u;
 
 @group(1) @binding(0) var<uniform> gather: Gather;
 @group(1) @binding(1) var accel_blocks: texture_2d<u32>;

@@ -111,11 +111,13 @@ impl GatherGi {
         let table = || [&keys, &lots, &queries, &asked, &entry_light].map(Clone::clone);
 
         let (epoch, moves) = (inputs.lights.map_or(0, |l| l.epoch), rays.scene.moves());
+        let mut changed = false;
         if self.frame > 0 && !self.options.even {
+            changed = epoch != self.lights_epoch || moves != self.moves;
             if epoch != self.lights_epoch {
                 self.hurry = HURRY;
             }
-            if epoch != self.lights_epoch || moves != self.moves {
+            if changed {
                 (self.stir, self.changing) = (STIR, STIR);
             }
             // Entries have to come to know each other.
@@ -125,6 +127,9 @@ impl GatherGi {
         }
         (self.lights_epoch, self.moves) = (epoch, moves);
         let mut params = self.params(inputs, rays, guided)?;
+        if changed {
+            params.flags |= params::CHANGED;
+        }
         let [w, h] = cells_of(inputs.size).map(|n| n.div_ceil(8));
         let mut offset = self.params.write(queue, &params);
         let frame_params = self.frame_params.group([self.params.bound()]);
@@ -135,6 +140,14 @@ impl GatherGi {
         let motion = Bound::from(inputs.motion.unwrap_or(&self.no_motion));
         let own = [&pixels, &records, &entry_light, &before, &after, &changes, &motion, &specular];
         let history = || own.map(Clone::clone);
+        if changed {
+            // By the random numbers of the frame before.
+            let offset = self.params.write(queue, &Params { round: self.sent, ..params });
+            let own = [&keys, &lots, &queries, &before, &records].map(Clone::clone);
+            let squares = [w, h].map(|n| n.div_ceil(2));
+            self.gradient.record(recorder, groups(offset), own, [squares[0], squares[1], 1]);
+        }
+        self.sent = params.round;
         self.recall.record(recorder, alone(offset), history(), [w, h, 1]);
         let slots = [self.options.slots.div_ceil(64), 1, 1];
         self.evict.record(recorder, groups(offset), table(), slots);

@@ -93,7 +93,9 @@ pub struct GatherGi {
     /// Group 1 of passes that send no rays: the parameters alone.
     frame_params: Binder,
     cells: CellsPass,
-    /// Finds cells of which nothing is remembered; binds what `settle` binds.
+    /// Sends rays of the frame before once more, where something has changed.
+    gradient: Pass,
+    /// Finds cells of which nothing is remembered that still holds; binds what `settle` binds.
     recall: Pass,
     rays: Pass,
     /// Frees entries that no ray has met for long; binds what `renew` binds.
@@ -115,9 +117,10 @@ pub struct GatherGi {
     no_motion: wgpu::TextureView,
     /// Bound where the host names no specular reflectance: there is none.
     no_specular: wgpu::TextureView,
-    /// Frames since the last cut, rounds since the beginning.
+    /// Frames since the last cut, rounds since the beginning, and the round of the last frame's rays.
     frame: u32,
     round: u32,
+    sent: u32,
     /// The lights' state in the last frame, and frames for which cells forget at less evidence because it was another before.
     lights_epoch: u64,
     hurry: u32,
@@ -183,6 +186,7 @@ impl GatherGi {
         Self {
             cells: CellsPass::new(device, &inputs, size),
             evict: new(shared, ("gi.evict", "gi.renew", "evict"), &table),
+            gradient: new(shared, ("gi.gradient", "gi.gradient", "gradient"), &[rw, rw, rw, READ, rw]),
             rays: new(shared, ("gi.rays", "gi.rays", "rays"), &[rw, rw, rw, READ, rw, LOAD]),
             renew: new(shared, ("gi.renew", "gi.renew", "renew"), &table),
             mirror: new(shared, ("gi.mirror", "gi.mirror", "mirror"), &[rw, rw, rw, READ, rw, LOAD, LOAD]),
@@ -205,6 +209,7 @@ impl GatherGi {
             frame_params,
             frame: 0,
             round: 0,
+            sent: 0,
             lights_epoch: 0,
             hurry: 0,
             moves: 0,
@@ -221,7 +226,7 @@ impl GatherGi {
 
     /// Bind groups made since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
-        let rays = [&self.recall, &self.evict, &self.rays, &self.renew, &self.mirror];
+        let rays = [&self.gradient, &self.recall, &self.evict, &self.rays, &self.renew, &self.mirror];
         let made = rays.into_iter().chain([&self.mean, &self.blur, &self.smooth]).map(Pass::made);
         self.inputs.made() + self.scene.made() + self.frame_params.made() + self.bring.made() + made.sum::<u64>()
     }
@@ -265,6 +270,7 @@ impl Technique for GatherGi {
     fn forget(&mut self) {
         self.inputs.forget();
         self.scene.forget();
+        self.gradient.forget();
         self.recall.forget();
         self.mirror.forget();
         self.mean.forget();

@@ -24,6 +24,9 @@ pub(super) const CHANGING: u32 = 128;
 /// A network says which cells are averaged.
 pub(super) const GUIDED: u32 = 256;
 
+/// Lights or objects have changed since the frame before.
+pub(super) const CHANGED: u32 = 512;
+
 /// `Gather` of `shaders/gi/gather/types.wgsl`, which documents the fields.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]

@@ -1,0 +1,36 @@
+//#import gi/gather/types.wgsl
+//#import gi/gather/start.wgsl
+//#import gi/gather/look.wgsl
+
+// A ray from a surface, and what is written down of it. Whoever joins this file binds `records`, three vectors a ray: radiance found
+// and the entry's slot; what the entry's light is multiplied by (shared exponent), direction, distance (0: none was sent); light of
+// what glows, and its direction.
+
+fn shared_exponent(c: vec3f) -> u32 {
+    let most = max(max(c.x, c.y), max(c.z, 1e-9));
+    let exponent = clamp((bitcast<u32>(most) >> 23u) - 110u, 0u, 31u);
+    let code = min(vec3u(max(c, vec3f(0.0)) * exp2(24.0 - f32(exponent)) + 0.5), vec3u(511u));
+    return code.x | (code.y << 9u) | (code.z << 18u) | (exponent << 27u);
+}
+
+fn record(ray: u32, found: Found, weight: vec3f, d: vec3f, glow: vec4f) {
+    records[3u * ray] = vec4f(found.radiance * weight, bitcast<f32>(found.slot));
+    records[3u * ray + 1u] =
+        vec4f(bitcast<f32>(shared_exponent(found.back * weight)), bitcast<f32>(pack_normal(d)), found.distance, 0.0);
+    records[3u * ray + 2u] = glow;
+}
+
+// The ray from x along d, for the surface there that faces n, and where surfaces glow a shadow ray to a point of them. `ray` is what its
+// random numbers are drawn by, `query` its number if it may claim an entry, `to` where it is written down.
+fn send(x: vec3f, n: vec3f, d: vec3f, query: u32, ray: u32, to: u32) {
+    let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
+    let found = look(x, d, above(x), max(dot(n, d), 1e-4), query, ray, gather.round, !stands_in);
+    var glow = vec4f(0.0);
+    if gather.emitter_count > 0u && !stands_in {
+        let seed = pcg3(vec3u(ray, gather.round, 0x51ed270bu));
+        // Of an even white surface without gloss.
+        let chosen = choose_light(Place(x, n, n, vec3f(1.0), vec3f(0.0), 1.0), false, seed);
+        if is_lit(x, chosen, seed.z) { glow = vec4f(chosen.even, bitcast<f32>(pack_normal(chosen.l))); }
+    }
+    record(to, found, vec3f(1.0), d, glow);
+}
