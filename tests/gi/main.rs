@@ -21,6 +21,7 @@ mod foreign;
 mod gather;
 mod glossy;
 mod glow;
+mod gradient;
 mod in_flight;
 mod lamps;
 mod mirror;
