@@ -149,10 +149,10 @@ fn bumps() -> Vec<Feature> {
     let flat = |json: &mut Value| {
         json["materials"][0].as_object_mut().expect("a material").remove("normalTexture");
     };
-    let z = (1.0f32 - 0.4 * 0.4).sqrt();
+    let z = (1.0f32 - 0.6 * 0.6).sqrt();
     // u runs downwards here, so the map's red is down.
     let turned = card.clone().mapped(|[u, v]| [v, 1.0 - u]);
-    let mut given = bumped(&card, [0.4, 0.0], 1.0);
+    let mut given = bumped(&card, [0.6, 0.0], 1.0);
     let tangents: Vec<f32> = [0.0, 1.0, 0.0, 1.0].repeat(4);
     let at = given.floats("VEC4", &tangents);
     given.attribute("TANGENT", at);
@@ -174,14 +174,14 @@ fn bumps() -> Vec<Feature> {
     glow.json["materials"][0]["emissiveTexture"] = json!({"index": map});
     glow.json["materials"][0]["emissiveFactor"] = json!([0.9, 0.7, 0.8]);
     vec![
-        Feature::new("normal map", "leans to the right, without tangents", bumped(&card, [0.4, 0.0], 1.0), flat)
-            .twin(tilted(&card, [0.4, 0.0, z])),
-        Feature::new("normal map, turned", "texture coordinates run downwards", bumped(&turned, [0.4, 0.0], 1.0), flat)
-            .twin(tilted(&turned, [0.0, -0.4, z])),
+        Feature::new("normal map", "leans to the right, without tangents", bumped(&card, [0.6, 0.0], 1.0), flat)
+            .twin(tilted(&card, [0.6, 0.0, z])),
+        Feature::new("normal map, turned", "texture coordinates run downwards", bumped(&turned, [0.6, 0.0], 1.0), flat)
+            .twin(tilted(&turned, [0.0, -0.6, z])),
         Feature::new("tangents", "the file's own say that red is up", given, |json| {
             json["meshes"][0]["primitives"][0]["attributes"].as_object_mut().expect("attributes").remove("TANGENT");
         })
-        .twin(tilted(&card, [0.0, 0.4, z])),
+        .twin(tilted(&card, [0.0, 0.6, z])),
         Feature::new("normal scale", "three tenths as steep", bumped(&card, [0.8, 0.0], 0.3), |json| {
             json["materials"][0]["normalTexture"]["scale"] = json!(1.0);
         })

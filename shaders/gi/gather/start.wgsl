@@ -13,22 +13,29 @@ struct Start {
     v: vec3f,
 }
 
+// Steps of a pixel in which rasterisers place corners, at the coarsest that Vulkan allows (four bits; WebGPU says nothing). A
+// triangle's depth is that of a plane through the places: off by up to a step times its slope, which is a step along the normal.
+const SUBPIXEL = 1.0 / 16.0;
+
 // Above a surface that faces n, at distance z along the view, and towards the eye, where nothing is in between whatever the normal says.
-// A depth whose steps are coarse at this distance asks for more.
 fn lifted(from_eye: vec3f, n: vec3f, z: f32) -> vec3f {
     let lift = lift_at(z);
-    return params.eye.xyz + from_eye * (1.0 - lift) + n * (lift * z);
+    return params.eye.xyz + from_eye * (1.0 - lift) + n * (lift * z + step_at(z));
 }
 
-// Share of the distance.
+// Share of the distance. A depth whose steps are coarse at this distance asks for more.
 fn lift_at(z: f32) -> f32 {
     return max(LIFT, LIFT_STEPS * params.depth.w * z);
+}
+
+fn step_at(z: f32) -> f32 {
+    return cell_foot(z) * (SUBPIXEL / f32(CELL_SIDE));
 }
 
 // What x lies above its surface at most, and a little.
 fn above(x: vec3f) -> f32 {
     let d = distance(x, params.eye.xyz);
-    return 2.05 * d * lift_at(d);
+    return 2.05 * (d * lift_at(d) + step_at(d));
 }
 
 fn start_at(pixel: vec2i) -> Start {
