@@ -14,7 +14,8 @@ usage: cargo xtask COMMAND
   test   every test, and which were skipped (an adapter is made sure of first; REQUIRE_GPU=1 makes a missing one an
          error, REQUIRE_ALL=1 all that .ci/run installs)
   hosts  the pass in other renderers: exports, sets up Python with moderngl in target/hosts, runs examples/moderngl/test.py
-         and a picture (needs python3 with venv, the network for pip, and EGL); then examples/bevy, its test and a picture
+         and a picture (needs python3 with venv, the network for pip, and EGL); the page of examples/webgpu in Chromium, where
+         there is one; then examples/bevy, its test and a picture
          (some 280 crates, which two cores build in half an hour)
   gpu-report [--dev] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] [--triangles N,...] [--out FOLDER] [--no-pytorch]
          measures on this device all that docs/ projects: docs/measured/DEVICE.json and DEVICE.md, in less than eight minutes
@@ -152,6 +153,7 @@ fn hosts() -> Result<(), String> {
     run(&mut command(&program, &[target.as_slice(), &size].concat()))?;
     run(&mut command(&python, &["examples/moderngl/main.py", &folder, &glb, &picture]))?;
     is_ours(&program, &picture, &ours)?;
+    browser(&program, &python, &glb, &work)?;
 
     // Bevy: a package of its own, which states a newer Rust than it needs.
     let package = ["--manifest-path", "examples/bevy/Cargo.toml", "--ignore-rust-version", "--locked"];
@@ -159,6 +161,27 @@ fn hosts() -> Result<(), String> {
     let picture = text(&work.join("bevy.png"));
     cargo(&[["run"].as_slice(), &package, &["--", &glb, &picture]].concat())?;
     is_ours(&program, &picture, &ours)
+}
+
+/// The page of examples/webgpu in headless Chromium, on SwiftShader: at 128×128 steep surfaces have the worst depth. The network is
+/// left out: its shaders take SwiftShader two minutes and more to compile.
+fn browser(program: &str, python: &str, glb: &str, work: &Path) -> Result<(), String> {
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    let Some(chromium) = names.into_iter().find(|c| Command::new(c).arg("--version").output().is_ok()) else {
+        eprintln!("xtask: SKIP the page in a browser: no {}", names.join(", no "));
+        return Ok(());
+    };
+    for size in ["128x128", "192x192"] {
+        let data = work.join(format!("webgpu-{size}"));
+        std::fs::create_dir_all(&data).map_err(|e| format!("{}: {e}", data.display()))?;
+        std::fs::copy(glb, data.join("scene.glb")).map_err(|e| format!("{}: {e}", data.display()))?;
+        let folder = data.join("gather").to_string_lossy().into_owned();
+        run(&mut command(program, &["-q", "export", "cornell", "--size", size, "--target", "wgsl", "-o", &folder]))?;
+        let data = data.to_string_lossy().into_owned();
+        let test = ["examples/webgpu/test.py", &data, "cornell", "--program", program, "--chromium", chromium];
+        run(&mut command(python, &[test.as_slice(), &["--methods", "gather"]].concat()))?;
+    }
+    Ok(())
 }
 
 /// Compares a host's picture of `cornell` with our renderer's, and as a control with ours without the light that the
