@@ -105,7 +105,7 @@ fn an_empty_world_shows_the_sky() {
     let (mut world, mut lit) = (world(&gpu), gather(&gpu));
     let mut last = |world: &World| {
         let mut draw = || draw(&gpu, &mut lit, Some(world), &targets.inputs(Conventions::default()));
-        std::iter::repeat_with(&mut draw).take(8).last().expect("a frame").expect("it draws")
+        std::iter::repeat_with(&mut draw).take(32).last().expect("a frame").expect("it draws")
     };
     let full = last(&world);
     assert!(world.remove_mesh(7));

@@ -158,6 +158,7 @@ impl GatherGi {
         let rounds = match (self.frame, self.stir) {
             (0, _) => self.options.first_rounds.max(1),
             (1..=YOUNG, _) => ROUNDS_YOUNG,
+            _ if changed => ROUNDS_YOUNG,
             (_, 0) => 1,
             _ => 2,
         };

@@ -56,7 +56,8 @@ const HURRY: u32 = 8;
 const STIR: u32 = 24;
 const HURRIED: f32 = 2.5;
 
-/// After the first frame entries get so many rays each for so many frames: light between surfaces has come round by then.
+/// After the first frame entries get so many rays each for so many frames, and in a frame in which lights or objects change: light
+/// between surfaces has come round by then.
 const YOUNG: u32 = 8;
 const ROUNDS_YOUNG: u32 = 4;
 
