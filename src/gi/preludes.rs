@@ -19,6 +19,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.renew", super::gather::prelude()),
         ("gi.gradient", super::gather::prelude()),
         ("gi.mirror", super::gather::prelude()),
+        ("gi.recall", super::gather::prelude()),
         ("gi.settle", super::gather::prelude()),
         ("gi.features", super::gather::prelude()),
         ("gi.blur", super::gather::prelude()),

@@ -38,6 +38,7 @@ const FILES: &[(&str, &str)] = &[
     ("gi.renew", "gi/gather/renew.wgsl"),
     ("gi.gradient", "gi/gather/gradient.wgsl"),
     ("gi.mirror", "gi/gather/mirror.wgsl"),
+    ("gi.recall", "gi/gather/recall.wgsl"),
     ("gi.settle", "gi/gather/settle.wgsl"),
     ("gi.blur", "gi/gather/blur.wgsl"),
     ("gi.smooth", "gi/gather/smooth.wgsl"),

@@ -14,8 +14,8 @@ usage: cargo xtask COMMAND
   test   every test, and which were skipped (an adapter is made sure of first; REQUIRE_GPU=1 makes a missing one an
          error, REQUIRE_ALL=1 all that .ci/run installs)
   hosts  the pass in other renderers: exports, sets up Python with moderngl in target/hosts, runs examples/moderngl/test.py
-         and a picture (needs python3 with venv, the network for pip, and EGL); the page of examples/webgpu in Chromium, where
-         there is one; then examples/bevy, its test and a picture
+         and a picture (needs python3 with venv, the network for pip, and EGL); the page of examples/webgpu in Chromium,
+         where there is one; then examples/bevy, its test and a picture
          (some 280 crates, which two cores build in half an hour)
   gpu-report [--dev] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] [--triangles N,...] [--out FOLDER] [--no-pytorch]
          measures on this device all that docs/ projects: docs/measured/DEVICE.json and DEVICE.md, in less than eight minutes
@@ -163,8 +163,8 @@ fn hosts() -> Result<(), String> {
     is_ours(&program, &picture, &ours)
 }
 
-/// The page of examples/webgpu in headless Chromium, on SwiftShader: at 128×128 steep surfaces have the worst depth. The network is
-/// left out: its shaders take SwiftShader two minutes and more to compile.
+/// The page of examples/webgpu in headless Chromium, on SwiftShader: at 128×128 steep surfaces have the worst depth. The
+/// network is left out: its shaders take SwiftShader two minutes and more to compile.
 fn browser(program: &str, python: &str, glb: &str, work: &Path) -> Result<(), String> {
     let names = ["chromium", "chromium-browser", "google-chrome"];
     let Some(chromium) = names.into_iter().find(|c| Command::new(c).arg("--version").output().is_ok()) else {

@@ -18,7 +18,8 @@
 // Of each cell, with GATHER_GUIDED.
 @group(2) @binding(4) var<storage, read> guidance: array<vec4f>;
 
-// Frames from which on the narrow blur is enough, and the radii of both in cells.
+// Frames from which on the narrow blur is enough, and the radii of both in cells. What comes into view later has four rays a cell, and
+// neighbours that know their light: the wide blur would drown its own in theirs.
 const SETTLED = 6.0;
 const NARROW = 2;
 const WIDE = 4;
@@ -148,7 +149,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     let plane = strictness_at(here.x);
     let own = guidance_at(cell);
     let share = guided_share(here.frames);
-    var radius = select(WIDE, NARROW, here.frames >= SETTLED);
+    var radius = select(NARROW, WIDE, max(here.frames, f32(gather.frame)) < SETTLED);
     if (gather.flags & GATHER_NO_BLUR) != 0u { radius = 0; }
     var sum = vec3f(0.0);
     var vector = vec3f(0.0);
@@ -167,7 +168,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             if there.frames <= 0.0 { continue; }
             // Half at the rim: then each of the sixteen places of the rays' lattice counts the same.
             let rim = select(1.0, 0.5, abs(x) == radius && radius > 0) * select(1.0, 0.5, abs(y) == radius && radius > 0);
-            var w = rim * alike(here, there, plane) * min(there.frames, 16.0);
+            var w = rim * alike(here, there, plane) * clamp(there.frames, f32(LOOKS), 16.0);
             if (gather.flags & GATHER_GUIDED) != 0u {
                 let other = guidance_at(neighbour);
                 w *= kinship(own.near, other.near, share) * exp(share * other.trust);

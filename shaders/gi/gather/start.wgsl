@@ -22,7 +22,8 @@ const SUBPIXEL = 1.0 / 16.0;
 fn lifted(from_eye: vec3f, n: vec3f, z: f32) -> vec3f {
     let lift = lift_at(z);
     let cosine = dot(normalize(from_eye), n);
-    return params.eye.xyz + from_eye * (1.0 - lift) + n * (lift * z + step_at(z) * sqrt(max(1.0 - cosine * cosine, 0.0)));
+    let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
+    return params.eye.xyz + from_eye * (1.0 - lift) + n * (lift * z + step_at(z) * sine);
 }
 
 // Share of the distance. A depth whose steps are coarse at this distance asks for more.

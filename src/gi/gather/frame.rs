@@ -111,12 +111,13 @@ impl GatherGi {
         let table = || [&keys, &lots, &queries, &asked, &entry_light].map(Clone::clone);
 
         let (epoch, moves) = (inputs.lights.map_or(0, |l| l.epoch), rays.scene.moves());
-        let mut changed = false;
+        let (mut changed, mut rested) = (false, false);
         if self.frame > 0 && !self.options.even {
             changed = epoch != self.lights_epoch || moves != self.moves;
             if epoch != self.lights_epoch {
                 self.hurry = HURRY;
             }
+            rested = changed && self.changing == 0;
             if changed {
                 (self.stir, self.changing) = (STIR, STIR);
             }
@@ -157,6 +158,7 @@ impl GatherGi {
         self.rays.record(recorder, groups(offset), own, [w, h, layers]);
         let rounds = match (self.frame, self.stir) {
             (0, _) => self.options.first_rounds.max(1),
+            _ if rested => self.options.first_rounds.max(ROUNDS_YOUNG),
             (1..=YOUNG, _) => ROUNDS_YOUNG,
             _ if changed => ROUNDS_YOUNG,
             (_, 0) => 1,

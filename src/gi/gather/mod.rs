@@ -56,8 +56,8 @@ const HURRY: u32 = 8;
 const STIR: u32 = 24;
 const HURRIED: f32 = 2.5;
 
-/// After the first frame entries get so many rays each for so many frames, and in a frame in which lights or objects change: light
-/// between surfaces has come round by then.
+/// After the first frame entries get so many rays each for so many frames, and in a frame in which lights or objects
+/// change: light between surfaces has come round by then.
 const YOUNG: u32 = 8;
 const ROUNDS_YOUNG: u32 = 4;
 
@@ -191,7 +191,7 @@ impl GatherGi {
             rays: new(shared, ("gi.rays", "gi.rays", "rays"), &[rw, rw, rw, READ, rw, LOAD]),
             renew: new(shared, ("gi.renew", "gi.renew", "renew"), &table),
             mirror: new(shared, ("gi.mirror", "gi.mirror", "mirror"), &[rw, rw, rw, READ, rw, LOAD, LOAD]),
-            recall: new(alone, ("gi.recall", "gi.settle", "recall"), &history),
+            recall: new(alone, ("gi.recall", "gi.recall", "recall"), &history),
             mean: new(alone, ("gi.settle", "gi.settle", "settle"), &history),
             blur: new(alone, ("gi.blur", "gi.blur", "blur"), &[READ, rw, rw, rw, READ]),
             smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), &[READ, READ, rw, READ]),
