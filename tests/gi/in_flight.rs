@@ -103,10 +103,9 @@ fn an_empty_world_shows_the_sky() {
     let shot = shot(0, [0.0; 2]);
     let targets = written(&gpu, &shot, &Written::default(), &shot.camera);
     let (mut world, mut lit) = (world(&gpu), gather(&gpu));
-    // The brightest pixel has what noise is left of the light's direction: 0.336 after 32 frames, 0.305 after these.
     let mut last = |world: &World| {
         let mut draw = || draw(&gpu, &mut lit, Some(world), &targets.inputs(Conventions::default()));
-        std::iter::repeat_with(&mut draw).take(256).last().expect("a frame").expect("it draws")
+        std::iter::repeat_with(&mut draw).take(8).last().expect("a frame").expect("it draws")
     };
     let full = last(&world);
     assert!(world.remove_mesh(7));

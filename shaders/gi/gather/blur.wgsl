@@ -202,7 +202,11 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     vector /= max(total, 1e-30);
     // Radiance a + g·ω over the hemisphere has these moments; on a surface tilted by little it gives `mean` along the normal and
     // 8/3 of the vector's part across it.
-    let across = (8.0 / 3.0) * (vector - here.n * dot(vector, here.n)) / max(luminance(mean), 1e-30);
+    let beside = vector - here.n * dot(vector, here.n);
+    // Less the chance in it (James and Stein 1961): of a ray's squared length about n half lies across it.
+    let chance = 0.5 * squares / max(total, 1e-30) * parts / max(total * total, 1e-30);
+    let known = saturate(1.0 - chance / max(dot(beside, beside), 1e-30));
+    let across = (8.0 / 3.0) * known * beside / max(luminance(mean), 1e-30);
     let whole = here.n + across;
     glosses[cell] = shown(here, mean, across, gloss_around(id.xy, here, plane));
     light[3u * cell] = vec4f(mean.r * whole, variance);

@@ -9,7 +9,7 @@
 
 // The pixel of a cell, FRESH where `before` has nothing of its surface.
 @group(2) @binding(0) var<storage, read_write> cell_pixels: array<u32>;
-@group(2) @binding(1) var<storage, read> records: array<vec4f>;
+@group(2) @binding(1) var<storage, read_write> records: array<vec4f>;
 @group(2) @binding(2) var<storage, read> entry_light: array<vec4f>;
 // `Past` of the frame before and of this one, five vectors a cell.
 @group(2) @binding(3) var<storage, read> before: array<vec4f>;

@@ -28,18 +28,20 @@ fn brightness_of(ray: u32) -> f32 {
 
 // Squares to each side whose rays of the frame before were sent again, and are asked what has changed.
 const ASKED = 2;
-// A fresh cell has four rays, and the narrow blur averages those of sixteen.
-const FRESH_RAYS = 64.0;
+// Of a small surface fewer rays are sent again than this; then those around it are asked, too.
+const LEAST_ASKED = 4.0;
+// Cells that the narrow blur averages.
+const AVERAGED = 16.0;
 // Less than this share of the light is no change.
 const NO_CHANGE = 0.01;
 
-// Whether what is remembered of a surface that was at pixel `then` of the frame before is further from the truth than a few rays would
-// be: the square of what its light has changed by is more than their variance.
-fn is_outdated(past: Past, then: vec2f) -> bool {
+// Frames of new rays that what is remembered is still worth, of a surface that was at pixel `then` of the frame before: the square of
+// what its light has changed by is as much as the variance of so many.
+fn frames_worth(past: Past, then: vec2f) -> f32 {
     let middle = vec2i(floor(then / f32(2 * CELL_SIDE)));
-    var change = 0.0;
-    var squares = 0.0;
-    var count = 0.0;
+    // Sum, sum of squares and count of what rays have changed by: those from surfaces that face this way, and all.
+    var facing = vec3f(0.0);
+    var all = vec3f(0.0);
     for (var y = -ASKED; y <= ASKED; y++) {
         for (var x = -ASKED; x <= ASKED; x++) {
             let square = middle + vec2i(x, y);
@@ -48,18 +50,20 @@ fn is_outdated(past: Past, then: vec2f) -> bool {
             if any(place >= cell_grid()) { continue; }
             let cell = cell_index(place);
             let now = cell_record(cell, 2u);
-            let facing = unpack_normal(bitcast<u32>(before[5u * cell + 2u].w));
-            if records[3u * now + 1u].z <= 0.0 || dot(facing, past.n) < SAME_NORMAL { continue; }
-            let one = brightness_of(now) - brightness_of(cell_record(cell, 1u));
-            change += one;
-            squares += one * one;
-            count += 1.0;
+            if records[3u * now + 1u].z <= 0.0 { continue; }
+            let n = unpack_normal(bitcast<u32>(before[5u * cell + 2u].w));
+            let change = brightness_of(now) - brightness_of(cell_record(cell, 1u));
+            let one = vec3f(change, change * change, 1.0);
+            all += one;
+            if dot(n, past.n) >= SAME_NORMAL { facing += one; }
         }
     }
+    let asked = select(facing, all, facing.z < LEAST_ASKED);
     // Of two different rays the product, in the mean: the square without the noise of few rays.
-    let square = (change * change - squares) / max(count * (count - 1.0), 1.0);
+    let square = (asked.x * asked.x - asked.y) / max(asked.z * (asked.z - 1.0), 1.0);
     let l = luminance(past.light);
-    return square * FRESH_RAYS > max(past.square - l * l, 0.0) && square > NO_CHANGE * NO_CHANGE * l * l;
+    if square <= NO_CHANGE * NO_CHANGE * l * l { return past.frames; }
+    return max(past.square - l * l, 0.0) / (AVERAGED * square);
 }
 
 // At rest a cell goes on with the surface that it remembers as long as one of its pixels
@@ -85,8 +89,11 @@ fn recall(@builtin(global_invocation_id) id: vec3u) {
     }
     if goes_on == NO_PIXEL {
         goes_on = packed | FRESH;
-    } else if (gather.flags & GATHER_CHANGED) != 0u && is_outdated(past, vec2f(pixel) + motion) {
-        goes_on |= FRESH;
+    } else if (gather.flags & GATHER_CHANGED) != 0u {
+        let worth = frames_worth(past, vec2f(pixel) + motion);
+        // A fresh cell has as many rays at once.
+        if worth < f32(LOOKS) { goes_on |= FRESH; }
+        records[3u * cell_record(cell, 3u)].x = worth;
     }
     cell_pixels[cell] = goes_on;
 }

@@ -102,15 +102,18 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let n = world_normal_at(pixel);
     let motion = motion_of(pixel);
     var past = past_of(id.xy, pixel, motion, x, n, width);
+    let changed = (gather.flags & GATHER_CHANGED) != 0u;
     if fresh {
         past.frames = 0.0;
         past.gloss.a = min(past.gloss.a, GLOSS_HURRIED);
+    } else if changed {
+        // As recall.wgsl left it there.
+        past.frames = min(past.frames, records[3u * cell_record(cell, 3u)].x);
     }
     var most = gather.cell_frames;
     let changing = (gather.flags & GATHER_CHANGING) != 0u || !rests(motion);
     if changing && (gather.flags & GATHER_EVEN) == 0u { most = min(most, BRIEF); }
     // A fresh cell's first frame counts for its several rays; not just after a change, when what rays meet knows nothing of it yet.
-    let changed = (gather.flags & GATHER_CHANGED) != 0u;
     let frames = min(past.frames + f32(select(1u, LOOKS, fresh && !changed)), most);
     if fresh && changed {
         // Of one frame in which several rays were sent.

@@ -183,7 +183,7 @@ impl GatherGi {
         };
         let rw = READ_WRITE;
         let table = [rw, rw, rw, rw, rw];
-        let history = [rw, READ, READ, READ, rw, READ, LOAD, LOAD];
+        let history = [rw, rw, READ, READ, rw, READ, LOAD, LOAD];
         Self {
             cells: CellsPass::new(device, &inputs, size),
             evict: new(shared, ("gi.evict", "gi.renew", "evict"), &table),
