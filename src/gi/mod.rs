@@ -50,5 +50,6 @@ pub use preludes::example_preludes;
 pub use screen::{ambient, bitmask, occlusion, ssgi};
 pub use stage::{cells, exposure, exposure::ExposurePass, inputs};
 pub use world::{
-    Complaint, ImageSource, Indices, Instance, MeshSource, PreparedMesh, Surface, Vertices, View, World, WorldOptions,
+    BufferIndices, BufferMesh, BufferVertices, Complaint, ImageSource, Indices, Instance, MeshReadback, MeshSource,
+    PreparedMesh, Surface, Vertices, View, World, WorldOptions,
 };

@@ -26,6 +26,7 @@ mod in_flight;
 mod lamps;
 mod mirror;
 #[cfg(feature = "io")]
+mod readback;
 mod real;
 mod screen;
 mod shot;

@@ -8,11 +8,13 @@
 
 mod check;
 mod mesh;
+mod readback;
 pub(crate) mod sample;
 mod view;
 
 pub use check::Complaint;
 pub use mesh::{ImageSource, Indices, MeshSource, PreparedMesh, Surface, Vertices};
+pub use readback::{BufferIndices, BufferMesh, BufferVertices, MeshReadback};
 pub(super) use sample::prelude;
 pub use view::View;
 
