@@ -60,7 +60,7 @@ fn what_a_scene_names_stays_in_its_folder_unless_allowed() {
 fn given_surroundings_replace_the_default_sun() {
     let dir = tempfile::tempdir().unwrap();
     let scene = triangle(&dir, "a.gltf", r#""materials":[{}]"#);
-    assert!(warnings(&[&scene]).contains("a sun of 1 W/m²"));
+    assert!(warnings(&[&scene]).contains("a sun of 2.75 W/m²"));
     assert!(!warnings(&[&scene, "--environment", "0.5"]).contains("sun"));
     // There is no light to change any more, where without surroundings there is one.
     let light = ["--light", "0 strength=2", "--camera", "99", "-o", "never.png"];

@@ -13,6 +13,7 @@ use crate::{
     image_io::{self, Metadata},
     reference::{
         DEFAULT_CAP, JUDGED, Kernel, Layer, ReferenceScene, Subject, Traced, Tracer, TracerError, TracerOptions, job,
+        preview,
     },
     render::capture::{CapturedFrame, Picture},
     scene::{Camera, Scene},
@@ -57,6 +58,10 @@ pub struct Flags {
     /// N/2 in the cell), without pixel filter; the picture has a pixel for each cell.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     cells: Option<u32>,
+    /// Average noise away in the picture (not in layers), for a look at few samples: details of light go with it, and the
+    /// metadata says so. Not with --cells: what is averaged is no truth.
+    #[arg(long, conflicts_with = "cells")]
+    denoise: bool,
 }
 
 fn parse_error_bound(text: &str) -> Result<f64, String> {
@@ -86,6 +91,7 @@ impl Flags {
             ("--filter-glossy", self.filter_glossy.is_some()),
             ("--no-caustics", self.no_caustics),
             ("--cells", self.cells.is_some()),
+            ("--denoise", self.denoise),
         ]
         .into_iter()
         .find_map(|(name, given)| given.then_some(name))
@@ -97,6 +103,10 @@ impl Flags {
         let known = &Layer::ALL[1..];
         let mut layers = vec![Layer::Combined];
         layers.extend(aov.map(|text| parse_layers(text, known, Layer::name)).transpose()?.unwrap_or_default());
+        let asked = layers.len();
+        if self.denoise {
+            layers.extend(preview::READ.into_iter().filter(|l| !layers.contains(l)).collect::<Vec<_>>());
+        }
         let judged = if self.cells.is_some() { Layer::Gi } else { Layer::Combined };
         let samples = if self.until_error.is_some() { DEFAULT_CAP } else { DEFAULT_SPP };
         let options = TracerOptions {
@@ -112,7 +122,7 @@ impl Flags {
             layers,
             ..Default::default()
         };
-        Ok(Task { frame: size, cells: self.cells, options })
+        Ok(Task { frame: size, cells: self.cells, asked, denoise: self.denoise, options })
     }
 }
 
@@ -121,6 +131,9 @@ pub struct Task {
     /// Size of the frame, pixels.
     frame: [u32; 2],
     cells: Option<u32>,
+    /// Layers that were asked for; the options' further ones are for the denoiser.
+    asked: usize,
+    denoise: bool,
     options: TracerOptions,
 }
 
@@ -167,12 +180,21 @@ impl Task {
         }
         progress.finish();
         interrupt::check()?;
-        let traced = tracer.finish()?;
+        let mut traced = tracer.finish()?;
         if !global.quiet {
             eprintln!("{}", sentence(&traced));
         }
         if traced.dropped > 0 {
             eprintln!("warning: {} samples were no numbers and were left out", traced.dropped);
+        }
+        if self.denoise {
+            if let Some(picture) = preview::denoise(&traced, camera) {
+                traced.layers[0].1 = picture;
+            }
+            traced.layers.truncate(self.asked);
+            if !global.quiet {
+                eprintln!("denoised, for a look; nothing to judge pictures by");
+            }
         }
         Ok(self.drawn(traced))
     }
@@ -203,6 +225,7 @@ impl Task {
             ("ReferenceClamp", o.clamp.to_string()),
             ("ReferenceFilterGlossy", o.filter_glossy.to_string()),
             ("ReferenceCaustics", (o.flags & job::NO_CAUSTICS == 0).to_string()),
+            ("ReferenceDenoised", self.denoise.to_string()),
             ("ReferenceCells", self.cells.map_or("none".into(), |n| n.to_string())),
             ("ReferenceSeconds", format!("{:.3}", traced.seconds)),
             ("ReferenceSamplesPerSecond", format!("{:.0}", rate(traced))),
@@ -254,7 +277,7 @@ mod tests {
     use crate::gi::inputs::sample_pixel;
 
     fn task(frame: [u32; 2], cells: u32) -> Task {
-        Task { frame, cells: Some(cells), options: TracerOptions::default() }
+        Task { frame, cells: Some(cells), asked: 1, denoise: false, options: TracerOptions::default() }
     }
 
     #[test]

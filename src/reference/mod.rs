@@ -6,6 +6,7 @@ pub mod job;
 mod kernel;
 mod layers;
 mod noise;
+pub mod preview;
 pub mod scene;
 pub mod schedule;
 mod traced;

@@ -21,11 +21,12 @@ use super::{
     look::{self, Daylight, Look},
 };
 
-/// Irradiance of the default sun, W/m².
-pub const DEFAULT_SUN: f32 = 1.0;
+/// Irradiance of the default sun, W/m². With the sky a white surface that faces it has radiance 1 (0.875 + 0.125), which is what
+/// glTF's emission counts in: in weaker light a file's faint glow would outshine what it is beside.
+pub const DEFAULT_SUN: f32 = 2.75;
 
-/// Radiance of the sky that comes with the default sun, W/(m²·sr).
-pub const DEFAULT_SKY: f32 = 0.05;
+/// Radiance of the sky that comes with the default sun, W/(m²·sr): a seventh of the sun's on a white surface.
+pub const DEFAULT_SKY: f32 = 0.125;
 
 /// Irradiance of the sun that comes into a room, W/m².
 pub const INDOOR_SUN: f32 = 10.0;
