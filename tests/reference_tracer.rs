@@ -299,6 +299,22 @@ fn the_picture_is_the_sum_of_its_layers() {
 }
 
 #[test]
+fn rays_begin_at_the_near_plane() {
+    let Some(mut bench) = cornell() else { return };
+    let depths = |bench: &Bench| bench.trace([24, 24], None, all(1)).layer(Layer::Depth).unwrap().to_vec();
+    let least = |all: &[f32]| all.iter().copied().fold(f32::INFINITY, f32::min);
+    let whole = depths(&bench);
+    let hit: Vec<f32> = whole.iter().copied().filter(|d| *d < 100.0).collect();
+    let near = 0.5 * (least(&hit) + hit.iter().copied().fold(0.0, f32::max));
+    bench.camera.near = near;
+    let cut = depths(&bench);
+    assert!(least(&cut) >= near && cut.iter().any(|d| *d < 100.0), "{} before {near}", least(&cut));
+    // Negative control: there was something before it, and what lies behind has stayed.
+    assert!(least(&whole) < 0.9 * near);
+    assert!(whole.iter().zip(&cut).all(|(a, b)| *a < near || (a - b).abs() < 1e-4 * b));
+}
+
+#[test]
 fn chosen_points_agree_with_the_pixels_of_a_whole_picture() {
     // Every fourth pixel, as the network samples; the halves' difference gives each point's error bar.
     let size = [32u32, 32];

@@ -9,6 +9,8 @@ mod area;
 mod bad_input;
 #[path = "scene/bundled.rs"]
 mod bundled;
+#[path = "scene/cameras.rs"]
+mod cameras;
 #[path = "scene/compressed.rs"]
 mod compressed;
 #[path = "scene/defaults.rs"]

@@ -103,6 +103,11 @@ fn display(pixel: vec2u, side: u32) -> vec3f {
             let value = textureLoad(feature, vec2u(min(texel, size - 1.0)), 0);
             return select(vec3f(0.2), magma(value.x), inside && value.y > 0.0);
         }
+        case 12u: {
+            // Bright over dim is seen on any picture and where there is none.
+            let line = textureLoad(feature, min(pixel, textureDimensions(feature) - 1u), 0).x;
+            return mix(0.4 * radiance_shown(picture(pixel, side)), vec3f(1.0, 0.92, 0.78), 0.9 * line);
+        }
         default: { return radiance_shown(textureLoad(emissive_texture, pixel, 0).rgb); }
     }
 }

@@ -57,6 +57,7 @@ const FILES: &[(&str, &str)] = &[
     ("viewer.sum", "viewer/sum.wgsl"),
     ("viewer.flicker", "viewer/flicker.wgsl"),
     ("viewer.show", "viewer/show.wgsl"),
+    ("viewer.wires", "viewer/wires.wgsl"),
 ];
 
 /// Names of all shaders that there are.

@@ -32,7 +32,7 @@ use super::tool;
 use super::view::View;
 use crate::gpu::{shaders, timing::Recorder};
 use crate::scene::upload::{Draw, SceneGpu, material_layout, motion_layouts};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// What [`GbufferPass`] draws.
 #[derive(Clone, Copy)]
@@ -124,23 +124,33 @@ impl GbufferPass {
     }
 }
 
-/// Which pipeline a draw needs: culling (back, front for mirrored, none) × coverage.
+/// Which pipeline a draw needs: [`culled`] × coverage.
+fn variant(draw: &Draw, view: &View) -> usize {
+    culled(draw, view) + 3 * usize::from(draw.covered)
+}
+
+/// Which faces of a draw are left out: index into [`CULLED`].
 ///
 /// What is closed shows its outer faces alone from outside, whatever its material says: where an
 /// inner face meets an outer one at a silhouette, both cover a pixel at depths that only rounding
 /// tells apart, and the inner one would now and then win.
-fn variant(draw: &Draw, view: &View) -> usize {
-    let cull =
-        if draw.double_sided && !(draw.closed && is_outside(view, draw)) { 2 } else { usize::from(draw.mirrored) };
-    cull + 3 * usize::from(draw.covered)
+pub(crate) fn culled(draw: &Draw, view: &View) -> usize {
+    if draw.double_sided && !(draw.closed && is_outside(view, draw)) { 2 } else { usize::from(draw.mirrored) }
 }
 
-/// True where the eye is well outside a draw's bounds, so that its near plane cuts nothing open.
+/// Back faces, the front faces of what is mirrored, none.
+pub(crate) const CULLED: [Option<wgpu::Face>; 3] = [Some(wgpu::Face::Back), Some(wgpu::Face::Front), None];
+
+/// True where the eye is well outside a draw's bounds, and the near plane cuts nothing open.
 fn is_outside(view: &View, draw: &Draw) -> bool {
     let (low, high) = (Vec3::from(draw.bounds.0), Vec3::from(draw.bounds.1));
     let eye = Vec3::from(view.eye());
-    let margin = 0.05 * (high - low).length() + 3.0 * view.near;
-    eye.cmplt(low - margin).any() || eye.cmpgt(high + margin).any()
+    let margin = 0.05 * (high - low).length();
+    let beyond = |margin: f32| eye.cmplt(low - margin).any() || eye.cmpgt(high + margin).any();
+    // The near plane of a lens from afar lies right before the scene.
+    let back = Vec4::from(view.world_from_view[2]).truncate();
+    let nearest = (eye - 0.5 * (low + high)).dot(back) - (0.5 * (high - low)).dot(back.abs());
+    beyond(margin) && (beyond(margin + 3.0 * view.near) || nearest > view.near)
 }
 
 fn pipeline(
@@ -159,7 +169,7 @@ fn pipeline(
         tool::Drawn {
             buffers: &motion_layouts(),
             targets: &formats.map(|format| Some(format.into())),
-            cull: [Some(wgpu::Face::Back), Some(wgpu::Face::Front), None][variant % 3],
+            cull: CULLED[variant % 3],
             writes_depth: true,
             constants: &[("ALPHA", constant(variant >= 3)), ("SORTED", constant(blending == Blending::Sorted))],
         },

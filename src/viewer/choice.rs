@@ -37,11 +37,12 @@ pub enum View {
     Feature = 9,
     Emission = 10,
     Layer = 11,
+    Wireframe = 12,
 }
 
 impl View {
-    /// All of them: keys 1 to 9 and 0, then what only the list has.
-    pub const ALL: [View; 12] = [
+    /// All of them: keys 1 to 9 and 0, then what has other keys or stands in the list only.
+    pub const ALL: [View; 13] = [
         View::Picture,
         View::Albedo,
         View::Normal,
@@ -54,6 +55,7 @@ impl View {
         View::Feature,
         View::Emission,
         View::Layer,
+        View::Wireframe,
     ];
 
     /// Name in lists, scripts and saved state.
@@ -71,6 +73,7 @@ impl View {
             "feature",
             "emission",
             "layer",
+            "wireframe",
         ][self as usize]
     }
 
@@ -89,12 +92,13 @@ impl View {
             "what the network is given, lowest to highest",
             "emitted radiance",
             "channels of a layer of the network",
+            "edges of all triangles over the picture",
         ][self as usize]
     }
 
     /// True where both sides of the line differ.
     pub fn has_sides(self) -> bool {
-        matches!(self, View::Picture | View::Indirect)
+        matches!(self, View::Picture | View::Indirect | View::Wireframe)
     }
 }
 

@@ -40,6 +40,7 @@ pub const BINDINGS: &[Binding] = &[
     bind(Key::Num0, With::Shift, "network inputs, previous channel", |_| Action::Feature(-1)),
     bind(Key::L, With::Nothing, "network layers, next", |_| Action::Layer(1)),
     bind(Key::L, With::Shift, "network layers, previous", |_| Action::Layer(-1)),
+    bind(Key::J, With::Nothing, "wireframe", |_| Action::View(View::Wireframe)),
     bind(Key::M, With::Nothing, "next method", |_| Action::NextMethod(1)),
     bind(Key::M, With::Shift, "previous method", |_| Action::NextMethod(-1)),
     bind(Key::X, With::Nothing, "split the picture", |_| Action::Split),

@@ -33,6 +33,7 @@ mod state;
 mod stats;
 mod ui;
 mod watch;
+mod wires;
 
 use crate::gi::name::MethodName;
 use crate::gpu::{GpuError, GpuOptions};

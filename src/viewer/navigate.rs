@@ -87,7 +87,9 @@ impl Navigator {
         let (eye, forward) = (Vec3::from(camera.eye()), Vec3::from(camera.forward()));
         let (middle, radius) = sphere(scene);
         // The point of the view axis nearest to the scene's middle, but in front.
-        let distance = (middle - eye).dot(forward).clamp(0.1 * radius, 10.0 * radius);
+        // A long lens stands as much further away.
+        let longer = 1.0f32.max(0.4 / (0.5 * camera.yfov).tan());
+        let distance = (middle - eye).dot(forward).clamp(0.1 * radius, 10.0 * longer * radius);
         (self.eye, self.target) = (eye, eye + forward * distance);
         self.fov = camera.yfov.to_degrees();
         (self.speed, self.scale) = (0.4 * radius, radius);
@@ -299,6 +301,19 @@ mod tests {
         assert!((after[1].x / after[0].x - 1.0).abs() < 0.02 && before[1].x / before[0].x < 0.85);
         n.long_lens();
         assert!((n.eye - Vec3::new(0.0, 0.0, 3.0)).length() < 1e-3 && !n.is_long());
+    }
+
+    #[test]
+    fn a_lens_from_afar_turns_around_what_it_looks_at() {
+        let mut scene = scene();
+        let (middle, radius) = sphere(&scene);
+        // As an orthographic camera of a file is drawn.
+        let yfov = 1.0f32.to_radians();
+        let away = radius / (0.5 * yfov).tan();
+        scene.cameras[0] = Camera::look_at((middle + away * Vec3::Z).into(), middle.into(), yfov);
+        let mut n = Navigator::default();
+        n.take(&scene, 0);
+        assert!(n.target.distance(middle) < 0.01 * radius && n.is_long(), "{n:?}");
     }
 
     #[test]

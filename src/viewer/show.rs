@@ -42,7 +42,7 @@ pub struct ShowInputs<'a> {
     pub sides: [SideView; 2],
     /// Width and height of the picture, pixels.
     pub size: [u32; 2],
-    /// The network's input channel, if there is one.
+    /// The network's input channel, or a wireframe's lines, if there are any.
     pub feature: Option<(&'a wgpu::TextureView, [f32; 2])>,
     pub view: View,
     /// Share left of the line; `None` for the left side alone.

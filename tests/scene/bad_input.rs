@@ -194,6 +194,14 @@ fn references() {
     glb.json["cameras"] = json!([{"type": "perspective", "perspective": {"yfov": -1.0, "znear": 0.0}}]);
     let scene = glb.load().expect("an impossible lens is left out");
     assert!(scene.warnings.iter().any(|w| w.contains("lens")) && scene.cameras[0].name == "framing");
+    for [xmag, ymag] in [[0.0, 1.0], [1.0, 0.0], [-1.0, 1.0], [1.0, -2.0], [1e20, 1.0], [1.0, 1e20]] {
+        let lens = json!({"xmag": xmag, "ymag": ymag, "znear": 0.1, "zfar": 9.0});
+        glb.json["cameras"] = json!([{"type": "orthographic", "orthographic": lens}]);
+        let scene = glb.load().expect("a lens without size is left out");
+        let about: Vec<_> = scene.warnings.iter().filter(|w| w.contains("cameras[0]")).collect();
+        assert!(matches!(&about[..], [w] if w.contains("ymag") && w.contains("left out")), "{about:?}");
+        assert_eq!((scene.cameras.len(), &*scene.cameras[0].name), (1, "framing"));
+    }
     let mut glb = Glb::triangle();
     glb.json["nodes"] = json!([{"mesh": 0, "skin": 4}]);
     refused(glb.load(), &["nodes[0].skin"]);

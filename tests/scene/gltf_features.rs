@@ -267,12 +267,13 @@ fn lights_and_cameras() {
     assert_eq!((position, intensity, range), ([1.0, 2.0, 3.0], 2.0, Some(7.0)));
     let LightKind::Spot { direction, inner_angle, outer_angle, .. } = scene.lights[2].kind else { panic!("a spot") };
     assert!(close(&direction, &[0.0, -1.0, 0.0]) && close(&[inner_angle, outer_angle], &[0.1, 0.2]));
-    assert_eq!(scene.cameras.len(), 1);
+    assert_eq!(scene.cameras.len(), 2);
     let camera = &scene.cameras[0];
     assert_eq!((camera.yfov, camera.near, camera.far), (0.9, 0.01, f32::INFINITY));
     assert_eq!(camera.transform[0], [1.0, 0.0, 0.0, 0.0], "without the node's scale");
     assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
     assert!(scene.warnings[0].contains("orthographic") && scene.warnings[0].contains("flat"));
+    assert!(!scene.warnings[0].contains("left out"), "{}", scene.warnings[0]);
     assert_eq!(scene.environment.radiance, [0.0; 3], "a lit file keeps its black sky");
 }
 

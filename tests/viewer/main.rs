@@ -8,6 +8,7 @@ mod display;
 mod rays;
 mod session;
 mod switches;
+mod wires;
 
 use display::Display;
 use serde_json::json;

@@ -27,6 +27,7 @@ pub struct Settled {
 impl GatherGi {
     fn params(&self, inputs: &Inputs<'_>, rays: &Rays<'_>, guided: bool) -> Result<Params, GiError> {
         let counts = rays.scene.counts();
+        let camera = stage::inputs::Params::of(inputs, None)?;
         let flags = [
             (inputs.lights.is_some_and(|l| l.stand_in), params::STANDS_IN),
             (self.frame == 0, params::CUT),
@@ -39,13 +40,13 @@ impl GatherGi {
             (guided, params::GUIDED),
         ];
         Ok(Params {
-            eye: stage::inputs::Params::of(inputs, None)?.eye_position(),
+            eye: camera.eye_position(),
             frame: self.frame,
             light_count: inputs.lights.map_or(0, |l| l.count),
             emitter_count: counts.emitters as u32,
             inverse_power: rays.scene.inverse_power(),
             mask: self.options.slots - 1,
-            entry_scale: self.options.entry_scale,
+            entry_scale: self.options.entry_scale.min(widest(camera.tan_half_height())),
             round: self.round,
             cell_frames: self.options.cell_frames,
             entry_frames: if self.stir > 0 {
@@ -215,5 +216,32 @@ impl GatherGi {
             gloss: &store.gloss,
         };
         self.bring.record(recorder, &settled.inputs, &self.cells, brought);
+    }
+}
+
+/// The largest `entry_scale` for a lens, by the tangent of half its vertical field of view. Entries are between once
+/// and twice that times their distance wide, which a long lens's picture is not: they stay below half of its height.
+fn widest(tan_half: f32) -> f32 {
+    0.5 * tan_half
+}
+
+#[cfg(test)]
+mod tests {
+    use super::widest;
+    use crate::gi::gather::Options;
+
+    #[test]
+    fn entries_of_usual_lenses_are_as_ever_and_those_of_long_ones_are_below_half_the_picture() {
+        let scale = |degrees: f32| {
+            let tan = (0.5 * degrees.to_radians()).tan();
+            (Options::default().entry_scale.min(widest(tan)), tan)
+        };
+        for degrees in [14.3, 40.0, 90.0, 170.0] {
+            assert_eq!(scale(degrees).0, Options::default().entry_scale, "{degrees}°");
+        }
+        for degrees in [0.1, 1.0, 2.0, 14.2] {
+            let (s, tan) = scale(degrees);
+            assert!(s < Options::default().entry_scale && 2.0 * s <= 0.5 * (2.0 * tan), "{degrees}°: {s}");
+        }
     }
 }

@@ -157,6 +157,11 @@ impl Params {
         [self.eye[0], self.eye[1], self.eye[2]]
     }
 
+    /// Tangent of half the vertical field of view.
+    pub(crate) fn tan_half_height(&self) -> f32 {
+        self.unproject[1].abs()
+    }
+
     /// How far jitter and a lens that is off its axis shift the picture, texture coordinates.
     pub fn shift(&self) -> [f32; 2] {
         [-0.5 * self.unproject[2], 0.5 * self.unproject[3]]

@@ -6,6 +6,7 @@
 
 mod accessor;
 mod area;
+mod camera;
 mod deform;
 mod draco;
 mod extensions;
@@ -30,7 +31,7 @@ use glam::Mat4;
 use gltf::json::validation::{Error as Invalid, Validate};
 
 use super::files::{self, LoadOptions};
-use super::{Camera, Environment, Instance, Scene, SceneError, defaults, error, sound};
+use super::{Environment, Instance, Scene, SceneError, defaults, error, sound};
 use source::Source;
 
 /// Loads the file's default scene (else its first, else every root node) and fills in what is missing, as
@@ -138,6 +139,8 @@ pub(super) struct Loader<'a> {
     placed: Vec<instancing::Copy>,
     /// Skins and morph targets.
     deforming: deform::Deforming,
+    /// Cameras that are drawn by a long lens.
+    orthographic: Vec<camera::Orthographic>,
 }
 
 impl<'a> Loader<'a> {
@@ -155,6 +158,7 @@ impl<'a> Loader<'a> {
             converted: HashMap::new(),
             placed: Vec::new(),
             deforming: deform::Deforming::default(),
+            orthographic: Vec::new(),
         }
     }
 
@@ -209,6 +213,7 @@ impl<'a> Loader<'a> {
             stack.extend(children.into_iter().rev());
         }
         let deforms = self.resolve(&places);
+        self.move_back();
         self.animations(&walked, &places, carried, deforms);
         Ok(())
     }
@@ -245,22 +250,6 @@ impl<'a> Loader<'a> {
             self.area_light(node, &name, &place, world);
         }
         Ok(())
-    }
-
-    fn camera(&mut self, camera: &gltf::Camera, node: &str, world: Mat4) {
-        let place = format!("cameras[{}] '{node}'", camera.index());
-        let gltf::camera::Projection::Perspective(lens) = camera.projection() else {
-            return self.warn(&place, "is orthographic and left out; only perspective cameras are drawn");
-        };
-        let (yfov, near) = (lens.yfov(), lens.znear());
-        let usable = yfov > 0.0 && yfov < std::f32::consts::PI && near > 0.0 && near.is_finite();
-        let far = lens.zfar().filter(|&far| far > near).unwrap_or(f32::INFINITY);
-        let transform = Mat4::IDENTITY.to_cols_array_2d();
-        let mut camera = Camera { name: node.to_owned(), transform, yfov, near, far };
-        if !usable || !camera.place(world) {
-            return self.warn(&place, "has an impossible lens or transform and is left out");
-        }
-        self.scene.cameras.push(camera);
     }
 
     /// Reads the sky that [`super::export`] writes into the scene's extras; other files have none.

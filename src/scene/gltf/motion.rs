@@ -64,6 +64,7 @@ impl<'a> Loader<'a> {
         };
         let mut nodes = nodes.iter().map(rest).collect();
         let instances = self.with_copies(&mut nodes, instances);
+        let cameras = self.with_eyes(&mut nodes, cameras);
         self.scene.rig = Some(Rig { nodes, instances, cameras, lights, deforms, skins, animations });
     }
 

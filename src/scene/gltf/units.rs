@@ -13,6 +13,11 @@ pub(super) fn apply(root: &mut Root, units: Units) {
         lens.znear *= units.scale;
         lens.zfar = lens.zfar.map(|far| far * units.scale);
     }
+    for lens in root.cameras.iter_mut().filter_map(|c| c.orthographic.as_mut()) {
+        for length in [&mut lens.xmag, &mut lens.ymag, &mut lens.znear, &mut lens.zfar] {
+            *length *= units.scale;
+        }
+    }
     let lights = root.extensions.as_mut().and_then(|e| e.khr_lights_punctual.as_mut());
     for range in lights.into_iter().flat_map(|l| &mut l.lights).filter_map(|l| l.range.as_mut()) {
         *range *= units.scale;

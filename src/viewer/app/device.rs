@@ -7,7 +7,7 @@ use crate::viewer::live::Kept;
 use crate::viewer::screen::Screen;
 use crate::viewer::stage::Stage;
 use crate::viewer::state::Request;
-use crate::viewer::{ViewError, saved, window_reason};
+use crate::viewer::{ViewError, saved, window_reason, wires};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
@@ -55,6 +55,7 @@ impl App {
         let precision = self.options.precision;
         self.network = jobs::Network { precision, tuned, ..self.network.clone() };
         self.state.half = self.options.precision == crate::net::plan::Precision::F16;
+        self.state.lines(gpu.device.features().contains(wires::NEEDS));
         self.stage = Some(Stage::new(gpu, screen.format(), self.options.textures));
         self.screen = Some(screen);
         self.redraw = true;

@@ -4,12 +4,13 @@
 mod feature;
 mod sides;
 
-use super::choice::Side;
+use super::choice::{Side, View};
 use super::flicker::FlickerPass;
 use super::jobs::{Handles, Key};
 use super::navigate::sphere;
 use super::show::{ShowInputs, ShowPass, SumPass, Sums};
 use super::state::{Stale, State};
+use super::wires::WiresPass;
 use crate::accel::SceneRays;
 use crate::gpu::{Gpu, readback, timing::Recorder};
 use crate::render::{Backdrop, DrawnCount, RenderError, Renderer, View as Eye, sampling};
@@ -52,6 +53,10 @@ pub struct Stage {
     show: ShowPass,
     sum: SumPass,
     flicker: FlickerPass,
+    /// `None` where the device has no lines.
+    wires: Option<WiresPass>,
+    /// What the last frame was seen with, until its edges are drawn.
+    unwired: Option<Eye>,
     reference: Option<Reference>,
     feature: Option<Feature>,
     sight: Option<Sight>,
@@ -72,6 +77,7 @@ impl Stage {
         let show = ShowPass::new(&gpu.device, format);
         let sum = SumPass::new(&gpu.device, &gpu.queue);
         let flicker = FlickerPass::new(&gpu.device);
+        let wires = WiresPass::new(&gpu.device);
         Self {
             gpu,
             textures,
@@ -80,6 +86,8 @@ impl Stage {
             show,
             sum,
             flicker,
+            wires,
+            unwired: None,
             reference: None,
             feature: None,
             sight: None,
@@ -244,6 +252,7 @@ impl Stage {
             } else {
                 slot.sums = None;
             }
+            self.unwired = Some(view);
             drawn = true;
         }
         if drawn {
@@ -265,12 +274,24 @@ impl Stage {
         let sides = [self.side(state, Side::Left), self.side(state, Side::Right)];
         let s = &state.settings;
         let drawn = self.still > 0 && self.scene.is_some();
+        if s.view == View::Wireframe
+            && drawn
+            && let (Some(wires), Some(scene), Some(slot)) = (&mut self.wires, &self.scene, &self.slots[0])
+            && let Some(eye) = self.unwired.take()
+        {
+            wires.record(recorder, scene, &slot.renderer, &eye);
+        }
+        let lines = self.wires.as_ref().and_then(WiresPass::lines);
+        let feature = match s.view {
+            View::Wireframe => lines.map(|lines| (lines, [0.0, 1.0])),
+            _ => self.feature.as_ref().map(|f| (&f.texture.view, f.range)),
+        };
         let metres = state.shown.as_ref().map_or(1.0, |shown| 0.5 * sphere(&shown.original).1);
         let inputs = self.slots[0].as_ref().filter(|_| drawn).map(|slot| ShowInputs {
             renderer: &slot.renderer,
             sides,
             size: state.size,
-            feature: self.feature.as_ref().map(|f| (&f.texture.view, f.range)),
+            feature,
             view: s.view,
             split: s.split.then_some(s.line),
             ev: state.stops(),
@@ -301,6 +322,7 @@ impl Stage {
             };
             rows.push((name, textures.kept));
         }
+        rows.extend(self.wires.as_ref().map(|w| ("viewer.wires".into(), w.bytes())));
         rows.extend(self.reference.as_ref().map(|r| ("reference".into(), r.radiance.bytes() + r.indirect.bytes())));
         rows.retain(|(_, bytes)| *bytes > 0);
         rows

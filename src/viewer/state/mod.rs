@@ -84,6 +84,8 @@ pub struct State {
     pub preset: Option<Preset>,
     /// Networks store their numbers in 16 bits.
     pub half: bool,
+    /// The device draws no lines, and so no wireframes.
+    pub no_lines: bool,
     /// How textures lie in the device's memory.
     pub textures: TextureMemory,
     /// Unit of length and vertical of scene files.
@@ -105,6 +107,10 @@ pub struct State {
     pub playback: Playback,
 }
 
+/// Why there are no wireframes.
+pub const NO_LINES: &str =
+    "this device draws no wireframes: it has no lines in the place of triangles (POLYGON_MODE_LINE)";
+
 /// How an animation plays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Playback {
@@ -124,6 +130,14 @@ impl State {
     /// With saved or default settings.
     pub fn new(settings: Settings) -> Self {
         Self { settings, size: [640, 360], ..Self::default() }
+    }
+
+    /// Whether the device draws lines.
+    pub fn lines(&mut self, can: bool) {
+        self.no_lines = !can;
+        if self.no_lines && self.settings.view == View::Wireframe {
+            self.settings.view = View::Picture;
+        }
     }
 
     /// A view that moves is drawn at half the resolution.
@@ -206,6 +220,7 @@ impl State {
         let aspect = self.aspect();
         let scene = self.shown.as_ref().map(|s| s.scene.clone());
         match action {
+            A::View(View::Wireframe) if self.no_lines => self.tell(NO_LINES, true),
             A::View(view) => {
                 self.settings.view = view;
                 if view == View::Error && self.settings.left == self.settings.right {
@@ -433,6 +448,19 @@ mod tests {
         assert!(state.wants_reference());
         state.apply(Action::Escape);
         assert_eq!(state.requests, [Request::Cancel]);
+    }
+
+    #[test]
+    fn wireframes_are_refused_with_a_sentence_where_there_can_be_none() {
+        let mut state = state();
+        state.apply(Action::View(View::Wireframe));
+        assert_eq!((state.settings.view, state.messages.len()), (View::Wireframe, 0));
+        state.lines(false);
+        assert_eq!(state.settings.view, View::Picture, "a new device has none");
+        state.apply(Action::View(View::Albedo));
+        state.apply(Action::View(View::Wireframe));
+        assert_eq!(state.settings.view, View::Albedo);
+        assert!(state.messages.iter().any(|m| m.error && m.text == NO_LINES));
     }
 
     #[test]

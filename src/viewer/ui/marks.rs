@@ -27,6 +27,7 @@ pub(super) fn marks(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect) {
     } else {
         let text = match (s.view, facts.feature) {
             (View::Picture, _) => s.left.name().to_string(),
+            (View::Wireframe, _) => format!("wireframe over {}", s.left.name()),
             (View::Feature, Some((name, [low, high]))) => format!("{name}: {low:.3} to {high:.3}"),
             (View::Layer, Some((name, [low, high]))) => format!("{name}; all {low:.3} to {high:.3}"),
             (View::Layer, None) => "only `neural` has layers".into(),

@@ -5,7 +5,7 @@ use crate::render::{Backdrop, tonemap_curve::Tonemap};
 use crate::viewer::choice::{Side, Source, View};
 use crate::viewer::film::Film;
 use crate::viewer::navigate::Preset;
-use crate::viewer::state::{Action, State};
+use crate::viewer::state::{Action, NO_LINES, State};
 use egui::{RichText, Ui};
 
 /// All of it, from top to bottom.
@@ -136,7 +136,11 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
         let mut view = state.settings.view;
         egui::ComboBox::from_id_salt("view").selected_text(view.name()).width(130.0).show_ui(ui, |ui| {
             for v in View::ALL {
-                ui.selectable_value(&mut view, v, v.name()).on_hover_text(v.doc());
+                let can = v != View::Wireframe || !state.no_lines;
+                ui.add_enabled_ui(can, |ui| {
+                    let entry = ui.selectable_value(&mut view, v, v.name());
+                    entry.on_hover_text(v.doc()).on_disabled_hover_text(NO_LINES);
+                });
             }
         });
         if view != state.settings.view {
