@@ -40,6 +40,7 @@ fn flags_that_make_no_sense_exit_with_2() {
     traced(&["--clamp", "nan"], &["--clamp", "or above"]);
     traced(&["--cells", "0"], &["--cells"]);
     traced(&["--samples", "4"], &["--samples", "--spp"]);
+    traced(&["--cells", "4", "--denoise"], &["--cells", "--denoise"]);
     traced(&["--weights", "w.safetensors"], &["--weights", "network"]);
     traced(&["--aov", "Motion"], &["Motion", "Gi, Analytic"]);
     traced(&["--aov", "Depth,Depth"], &["twice"]);
@@ -91,6 +92,34 @@ fn pictures_tell_their_noise_and_how_they_were_made() {
     let (other, _) = render(dir.path(), "other.exr", &["--size", "20x12", "--spp", "5", "--aov", "all", "--quiet"]);
     assert_ne!(other.layer("").unwrap(), a.layer("").unwrap());
     assert_eq!(key(&other, "ReferenceBounces"), "unlimited unlimited unlimited");
+}
+
+/// A preview is nearer to the truth than what it is made of, as bright, and told; layers stay as they were traced.
+#[test]
+fn a_preview_is_nearer_to_the_truth_and_says_what_it_is() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let of = |name: &str, spp: &str, more: &[&str]| {
+        render(dir.path(), name, &[&["--size", "64x64", "--spp", spp, "--aov", "Gi,Normal"], more].concat())
+    };
+    let (truth, _) = of("truth.exr", "1024", &["--seed", "7"]);
+    let (noisy, said) = of("noisy.exr", "16", &[]);
+    assert!(!said.contains("denoised") && key(&noisy, "ReferenceDenoised") == "false");
+    let (preview, said) = of("preview.exr", "16", &["--denoise"]);
+    assert!(said.contains("denoised") && key(&preview, "ReferenceDenoised") == "true", "{said}");
+    for layer in ["Gi", "Normal"] {
+        assert_eq!(noisy.layer(layer).unwrap(), preview.layer(layer).unwrap());
+    }
+    assert_eq!(preview.layers.len(), noisy.layers.len(), "no layer that was not asked for");
+    let pixels = |l: &Layers| ["R", "G", "B"].map(|c| l.layer("").unwrap().channel(c).unwrap().to_vec()).concat();
+    let (truth, noisy, preview) = (pixels(&truth), pixels(&noisy), pixels(&preview));
+    let mean = |p: &[f32]| p.iter().sum::<f32>() / p.len() as f32;
+    let off = |p: &[f32]| p.iter().zip(&truth).map(|(a, b)| (a - b).abs()).sum::<f32>() / truth.iter().sum::<f32>();
+    println!("{:.1} % off, {:.1} % denoised", 100.0 * off(&noisy), 100.0 * off(&preview));
+    assert!(off(&preview) < 0.4 * off(&noisy), "{} of {}", off(&preview), off(&noisy));
+    assert!((mean(&preview) / mean(&truth) - 1.0).abs() < 0.03, "sparks are all that it takes away");
 }
 
 #[test]
