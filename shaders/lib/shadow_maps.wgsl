@@ -28,6 +28,9 @@ const NORMAL_OFFSET: f32 = 2.0;
 const BIAS: f32 = 0.4;
 // Least filter radius, texels; the bilinear comparison smooths by one more.
 const LEAST: f32 = 0.6;
+// Where a texel is compared at its own place, so much of the lift is left, as a share of the slope: for normals that are not quite
+// the surface's.
+const LEFT: f32 = 0.5;
 // Largest search radius: a share of the sun's map; the margin (in tangent units) that cube faces and spot maps have.
 const SUN_SEARCH: f32 = 0.25;
 const LOCAL_SEARCH: f32 = 0.14;
@@ -103,7 +106,8 @@ fn sun_disc(
         return textureSampleCompareLevel(sun_maps, shadow_compare, uv, view.layer, z + bias / view.range);
     }
     if blocked == SEARCH_TAPS { return 0.0; }
-    let radius = clamp(height / weight * tan_radius, LEAST * view.texel, search);
+    let radius = min(height / weight * tan_radius, search);
+    if radius < LEAST * view.texel { return sun_edge(view, z, uv, slope); }
     var lit = 0.0;
     for (var i = 0u; i < FILTER_TAPS; i++) {
         let offset = radius * tap(i, FILTER_TAPS, pattern);
@@ -111,6 +115,33 @@ fn sun_disc(
         lit += textureSampleCompareLevel(sun_maps, shadow_compare, uv + offset * to_uv, view.layer, reference);
     }
     return lit / f32(FILTER_TAPS);
+}
+
+// The edge of a shadow that is sharper than texels are: a quadratic spline over 3×3 of them, each compared with the receiver's plane
+// where the texel looks, which takes back most of the lift: light would come in where a wall meets a floor. A texel that looks past
+// the receiver, to what lies far below its plane, tells nothing of it: light would come in past the edges of walls without thickness.
+fn sun_edge(view: ShadowView, z: f32, uv: vec2f, slope: vec2f) -> f32 {
+    let place = uv * view.size;
+    let middle = floor(place);
+    let f = place - middle - 0.5;
+    let weights = array<vec2f, 3>(0.5 * (0.5 - f) * (0.5 - f), 0.75 - f * f, 0.5 * (0.5 + f) * (0.5 + f));
+    // The lift along the normal raised the plane by so many texels.
+    let raised = NORMAL_OFFSET * length(slope);
+    let over = (BIAS + LEFT * length(slope) - raised) * view.texel;
+    let under = -(NORMAL_OFFSET + length(slope) + raised) * view.texel;
+    var lit = 0.0;
+    var known = 0.0;
+    for (var i = 0; i < 9; i++) {
+        let step = vec2i(i % 3 - 1, i / 3 - 1);
+        let texel = clamp(vec2i(middle) + step, vec2i(0), vec2i(i32(view.size) - 1));
+        let offset = (vec2f(step) - f) / view.size / vec2f(view.scale, -view.scale);
+        let h = (textureLoad(sun_depths, texel, view.layer, 0).x - z) * view.range - dot(slope, offset);
+        if h < under { continue; }
+        let w = weights[step.x + 1].x * weights[step.y + 1].y;
+        known += w;
+        lit += select(w, 0.0, h > over);
+    }
+    return select(lit / max(known, 1e-6), 1.0, known == 0.0);
 }
 
 // Share of a point or spot light's source that `p` sees. `center`: the light, `radius`: of the source, metres.
