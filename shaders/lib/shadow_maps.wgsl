@@ -30,7 +30,7 @@ const BIAS: f32 = 0.4;
 const LEAST: f32 = 0.6;
 // Where a texel is compared at its own place, so much of the lift is left, as a share of the slope: for normals that are not quite
 // the surface's.
-const LEFT: f32 = 0.5;
+const LEFT: f32 = 1.0;
 // Largest search radius: a share of the sun's map; the margin (in tangent units) that cube faces and spot maps have.
 const SUN_SEARCH: f32 = 0.25;
 const LOCAL_SEARCH: f32 = 0.14;
