@@ -87,7 +87,7 @@ def strip(source, folder):
     target.write_bytes(out)
     for beside in source.parent.iterdir():
         if beside.name != source.name:
-            (folder / beside.name).symlink_to(beside)
+            (folder / beside.name).symlink_to(beside.resolve())
     return target
 
 
