@@ -28,7 +28,7 @@ REAL = "reference/real"
 # Name, file below the shared folder, author, what is hard, what differs from Khronos' picture.
 FILES = [
     ("hotel", f"{REAL}/hotel/scene.glb", '"Hotel Room Ege Carpets Lotus Wave Grey" by Aaron Openshaw (Sketchfab)', "a closed room in millimetres",
-     "ours stands in the room with sun through its window, Khronos' sees it small from outside through walls that face away; ours is worse in dashes of sunlight along the edges of the ceiling, and far corners are nearly black"),
+     "ours stands in the room with sun through its window, Khronos' sees it small from outside through walls that face away; ours is worse in far corners, which are nearly black"),
     ("apartment", f"{REAL}/apartment_day/scene.glb", '"Dream Apartment" by Mad_Huron (Sketchfab)', "rooms without ceilings",
      "ours looks down into the rooms, Khronos' at an outer wall from the side; both make room for the figure that stands apart, which ours shows edge-on, a line at the bottom, and Khronos' whole"),
     ("study", f"{REAL}/study/scene.glb", '"The Botanist\'s Study" by riikkakilpelainen (Sketchfab)', "a diorama with a glowing beam",
@@ -40,7 +40,7 @@ FILES = [
     ("pica", "real/pica_pica_mini_diorama/scene.gltf", '"PICA PICA - Mini Diorama 01" (skfb.ly/6C7pD) by SEED.EA, CC BY-NC 4.0', "an object of many parts",
      "ours shows the floor and most things, Khronos' looks along the floor from far; its clock is behind our pillar, colours are the same, and glossy walls mirror the room in ours, the sky in Khronos'"),
     ("cornell", "real/cornell_box_gltf/scene.gltf", "the Cornell box, data of Cornell University's program of computer graphics", "a box with a lamp",
-     "ours is twice as large and has shadows and the walls' colours on the boxes, Khronos' is evenly lit from the front; ours is worse in what the sun does not reach, which is blotched, and in a dashed line of sunlight up the left back edge"),
+     "ours is twice as large and has shadows and the walls' colours on the boxes, Khronos' is evenly lit from the front; ours is worse in what the sun does not reach, which is blotched, and in a few specks of sunlight up the left back edge"),
     ("cornell-obj", "real/cornell_box_obj/cornell_box.obj", "the same as OBJ, from the tests of the crate tobj", "surfaces without glow",
      "Khronos' reads no OBJ"),
     ("paper-room", "reference/cycles/paper_0002/scene.glb", "our own, after Harris-Dewey and Klein's room stream", "loose things in a box",
