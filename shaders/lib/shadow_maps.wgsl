@@ -28,8 +28,8 @@ const NORMAL_OFFSET: f32 = 2.0;
 const BIAS: f32 = 0.4;
 // Least filter radius, texels; the bilinear comparison smooths by one more.
 const LEAST: f32 = 0.6;
-// Where a texel is compared at its own place, so much of the lift is left, as a share of the slope: for normals that are not quite
-// the surface's.
+// Where a texel is compared at its own place, so much of the lift is left, as a share of the slope: for
+// normals that are not quite the surface's.
 const LEFT: f32 = 1.0;
 // Largest search radius: a share of the sun's map; the margin (in tangent units) that cube faces and spot maps have.
 const SUN_SEARCH: f32 = 0.25;
@@ -117,9 +117,10 @@ fn sun_disc(
     return lit / f32(FILTER_TAPS);
 }
 
-// The edge of a shadow that is sharper than texels are: a quadratic spline over 3×3 of them, each compared with the receiver's plane
-// where the texel looks, which takes back most of the lift: light would come in where a wall meets a floor. A texel that looks past
-// the receiver, to what lies far below its plane, tells nothing of it: light would come in past the edges of walls without thickness.
+// The edge of a shadow that is sharper than texels are: a quadratic spline over 3×3 of them, each compared
+// with the receiver's plane where the texel looks, which takes back most of the lift: light would come in
+// where a wall meets a floor. A texel that looks past the receiver, to what lies far below its plane, tells
+// nothing of it: light would come in past the edges of walls without thickness.
 fn sun_edge(view: ShadowView, z: f32, uv: vec2f, slope: vec2f) -> f32 {
     let place = uv * view.size;
     let middle = floor(place);

@@ -58,8 +58,8 @@ pub struct Flags {
     /// N/2 in the cell), without pixel filter; the picture has a pixel for each cell.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     cells: Option<u32>,
-    /// Average noise away in the picture (not in layers), for a look at few samples: details of light go with it, and the
-    /// metadata says so. Not with --cells: what is averaged is no truth.
+    /// Average noise away in the picture (not in layers), for a look at few samples: details of light go with
+    /// it, and the metadata says so. Not with --cells: what is averaged is no truth.
     #[arg(long, conflicts_with = "cells")]
     denoise: bool,
 }

@@ -21,8 +21,8 @@ use super::{
     look::{self, Daylight, Look},
 };
 
-/// Irradiance of the default sun, W/m². With the sky a white surface that faces it has radiance 1 (0.875 + 0.125), which is what
-/// glTF's emission counts in: in weaker light a file's faint glow would outshine what it is beside.
+/// Irradiance of the default sun, W/m². With the sky a white surface that faces it has radiance 1, seven eighths
+/// of it the sun's. That is what glTF's emission counts in: in weaker light a file's faint glow would outshine it.
 pub const DEFAULT_SUN: f32 = 2.75;
 
 /// Radiance of the sky that comes with the default sun, W/(m²·sr): a seventh of the sun's on a white surface.

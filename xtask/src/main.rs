@@ -163,8 +163,8 @@ fn hosts() -> Result<(), String> {
     is_ours(&program, &picture, &ours)
 }
 
-/// The page of examples/webgpu in headless Chromium, on SwiftShader: at 128×128 steep surfaces have the worst depth. The
-/// network is left out: its shaders take SwiftShader two minutes and more to compile.
+/// The page of examples/webgpu in headless Chromium, on SwiftShader: at 128×128 steep surfaces have the worst
+/// depth. The network is left out: its shaders take SwiftShader two minutes and more to compile.
 fn browser(program: &str, python: &str, glb: &str, work: &Path) -> Result<(), String> {
     let names = ["chromium", "chromium-browser", "google-chrome"];
     let Some(chromium) = names.into_iter().find(|c| Command::new(c).arg("--version").output().is_ok()) else {

@@ -18,13 +18,13 @@
 // Of each cell, with GATHER_GUIDED.
 @group(2) @binding(4) var<storage, read> guidance: array<vec4f>;
 
-// Frames from which on the narrow blur is enough, and the radii of both in cells. What comes into view later has four rays a cell, and
-// neighbours that know their light: the wide blur would drown its own in theirs.
+// Frames from which on the narrow blur is enough, and the radii of both in cells. What comes into view later
+// has four rays a cell, and neighbours that know their light: the wide blur would drown its own in theirs.
 const SETTLED = 6.0;
 const NARROW = 2;
 const WIDE = 4;
-// A change of light is one that is beyond what chance does once in e^CHANCE and beyond this share of the light; younger means than
-// this many frames follow by themselves.
+// A change of light is one that is beyond what chance does once in e^CHANCE and beyond this share of the
+// light; younger means than this many frames follow by themselves.
 const CHANCE = 9.7;
 const LEAST_CHANGE = 0.1;
 // The same for the sum over the cells of a workgroup, which knows more surely that a lamp was switched.
@@ -60,9 +60,10 @@ fn bright_ray(here: Past) -> f32 {
     return here.square / max(luminance(here.light), 1e-20);
 }
 
-// Whether the mean of lately differs from that of all frames by more than its noise, by Bernstein's inequality: where light comes
-// from a small bright place few rays meet it, and one of them (`most`) is farther from the mean than any bell curve allows. Where a
-// change is to be expected one such ray may pass for it.
+// Whether the mean of lately differs from that of all frames by more than its noise, by Bernstein's
+// inequality: where light comes from a small bright place few rays meet it, and one of them (`most`) is
+// farther from the mean than any bell curve allows. Where a change is to be expected one such ray may pass
+// for it.
 fn differs(all: f32, lately: f32, variance: f32, most: f32, least: f32) -> bool {
     let changing = (gather.flags & GATHER_CHANGING) != 0u;
     var sure = select(1.0, 0.45, changing && gather.since >= KNOWN);
@@ -74,7 +75,8 @@ fn differs(all: f32, lately: f32, variance: f32, most: f32, least: f32) -> bool 
 
 // One over the difference of roughness from which on two lobes show different things.
 const ALIKE = 5.0;
-// Share of the light's gradient that a lobe of roughness 0.5 sees (1 for a mirror), and the range of what is taken from it.
+// Share of the light's gradient that a lobe of roughness 0.5 sees (1 for a mirror), and the range of what is
+// taken from it.
 const SEEN = 0.87;
 const LEAST_TILT = 0.3;
 const MOST_TILT = 2.0;
@@ -106,9 +108,9 @@ fn gloss_around(id: vec2u, here: Past, plane: f32) -> vec4f {
     return sum;
 }
 
-// What the cell's lobe shows: what its rays have found (`gloss`, times weight), or for wide lobes, and where no ray was sent yet, the
-// cell's light with its gradient `across` towards the mirrored direction. Radiance a + 3/2 b·ω over the hemisphere has vector a n + b
-// where b lies in the plane.
+// What the cell's lobe shows: what its rays have found (`gloss`, times weight), or for wide lobes, and where no
+// ray was sent yet, the cell's light with its gradient `across` towards the mirrored direction. Radiance
+// a + 3/2 b·ω over the hemisphere has vector a n + b where b lies in the plane.
 fn shown(here: Past, mean: vec3f, across: vec3f, gloss: vec4f) -> vec4f {
     if here.roughness >= NO_LOBE { return vec4f(0.0); }
     let towards = normalize(here.x - params.eye.xyz);
@@ -167,7 +169,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             let there = past_at(neighbour);
             if there.frames <= 0.0 { continue; }
             // Half at the rim: then each of the sixteen places of the rays' lattice counts the same.
-            let rim = select(1.0, 0.5, abs(x) == radius && radius > 0) * select(1.0, 0.5, abs(y) == radius && radius > 0);
+            let rim = select(1.0, 0.5, abs(x) == radius && radius > 0)
+                * select(1.0, 0.5, abs(y) == radius && radius > 0);
             var w = rim * alike(here, there, plane) * clamp(there.frames, f32(LOOKS), 16.0);
             if (gather.flags & GATHER_GUIDED) != 0u {
                 let other = guidance_at(neighbour);
@@ -200,8 +203,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     let bright = luminance(sum) / max(total, 1e-30);
     let variance = max(squares / max(total, 1e-30) - bright * bright, 0.0) * parts / max(total * total, 1e-30);
     vector /= max(total, 1e-30);
-    // Radiance a + g·ω over the hemisphere has these moments; on a surface tilted by little it gives `mean` along the normal and
-    // 8/3 of the vector's part across it.
+    // Radiance a + g·ω over the hemisphere has these moments; on a surface tilted by little it gives `mean`
+    // along the normal and 8/3 of the vector's part across it.
     let beside = vector - here.n * dot(vector, here.n);
     // Less the chance in it (James and Stein 1961): of a ray's squared length about n half lies across it.
     let chance = 0.5 * squares / max(total, 1e-30) * parts / max(total * total, 1e-30);

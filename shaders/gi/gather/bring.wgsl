@@ -2,10 +2,10 @@
 //#import gi/cells.wgsl
 //#import gi/gather/lobe.wgsl
 
-// Directional light of the cells, and what their lobes show, brought to every pixel: bilinear where the surface goes on, and only from
-// cells of the pixel's own surface where it does not, the light evaluated for the pixel's own normal. All of it in f32.
-// A workgroup reads the cells around its 8x8 pixels once. The prelude holds CELL_SIDE and the tolerances
-// (gi::gather::bring documents them).
+// Directional light of the cells, and what their lobes show, brought to every pixel: bilinear where the
+// surface goes on, and only from cells of the pixel's own surface where it does not, the light evaluated for
+// the pixel's own normal. All of it in f32. A workgroup reads the cells around its 8x8 pixels once. The
+// prelude holds CELL_SIDE and the tolerances (gi::gather::bring documents them).
 
 @group(1) @binding(0) var<storage, read> cell_pixels: array<u32>;
 @group(1) @binding(1) var<storage, read> light: array<vec4f>;
@@ -73,8 +73,9 @@ struct Sum {
 // What one staged cell adds. A point of the same surface weighs 1. The tails are heavy on
 // purpose: where nothing agrees the least bad cell wins by ratio, without a branch and without a division by zero.
 //
-// A cell knows the light above its own horizon only. Where a pixel that looks elsewhere has nothing better, the cell's light
-// is taken for a direction between the two normals, `least_cosine` or more towards the cell's.
+// A cell knows the light above its own horizon only. Where a pixel that looks elsewhere has nothing better,
+// the cell's light is taken for a direction between the two normals, `least_cosine` or more towards the
+// cell's.
 fn tap(here: Surface, at: i32, spatial: f32, least_cosine: f32) -> Sum {
     let found = points[at];
     let off_plane = (dot(here.normal, found.xyz) - here.plane) * here.strictness;

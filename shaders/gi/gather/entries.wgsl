@@ -2,20 +2,23 @@
 //#import lib/sampling.wgsl
 //#import gi/gather/types.wgsl
 
-// The cache of light between surfaces: entries of a hash table, each for the places of one cell of a grid in the world that face
-// one of six ways. The grid's cells grow with the distance from the eye in powers of two. What an entry knows is irradiance
-// over π of everything but the lights, which whoever reads an entry adds at the place itself.
+// The cache of light between surfaces: entries of a hash table, each for the places of one cell of a grid in
+// the world that face one of six ways. The grid's cells grow with the distance from the eye in powers of two.
+// What an entry knows is irradiance over π of everything but the lights, which whoever reads an entry adds at
+// the place itself.
 //
-// An entry is made when a ray first meets its cell. Which of the rays that met it this frame says where the entry's own rays start
-// is drawn by lot (the lowest number wins, so that the same frame always has the same winner), so that its mean is one over the
-// cell's places as rays meet them, and no ray starts where none was: inside a wall, in the air, behind a corner.
+// An entry is made when a ray first meets its cell. Which of the rays that met it this frame says where the
+// entry's own rays start is drawn by lot (the lowest number wins, so that the same frame always has the same
+// winner), so that its mean is one over the cell's places as rays meet them, and no ray starts where none
+// was: inside a wall, in the air, behind a corner.
 
 // 0 for a free slot, LEFT for one whose entry has left while others that were put further on for it are still there.
 @group(2) @binding(0) var<storage, read_write> entry_keys: array<atomic<u32>>;
 // Two halves, for even and odd rounds: the winner's lot. Its low bits are an index into `entry_queries`.
 @group(2) @binding(1) var<storage, read_write> entry_lots: array<atomic<u32>>;
-// Where rays met a cell: position, and the packed normal of the side that they met. First those of the picture's cells, then of
-// entries' own rays for even and odd rounds, then where the entries' rays began in even and odd rounds (last word 0: nowhere yet).
+// Where rays met a cell: position, and the packed normal of the side that they met. First those of the
+// picture's cells, then of entries' own rays for even and odd rounds, then where the entries' rays began in
+// even and odd rounds (last word 0: nowhere yet).
 @group(2) @binding(2) var<storage, read_write> entry_queries: array<vec4u>;
 
 // Slots that are looked at before a place goes without an entry.
@@ -62,10 +65,11 @@ fn entry_slot(hash: vec2u) -> u32 {
     return NONE;
 }
 
-// Entries that one cell has at most, for places that do not see each other: both sides of a wall that stands on a floor, the
-// inside of a box.
+// Entries that one cell has at most, for places that do not see each other: both sides of a wall that stands
+// on a floor, the inside of a box.
 const ENTRY_ROOMS = 6u;
-// Both ends of the line that asks this are lifted by this share of the cell, so that it goes over what merely lies there.
+// Both ends of the line that asks this are lifted by this share of the cell, so that it goes over what merely
+// lies there.
 const ENTRY_LIFT = 0.02;
 
 // Whether nothing stands between x and where the rays of slot's entry began. An entry without rays is everybody's.
@@ -88,8 +92,8 @@ fn entry_of(x: vec3f, n: vec3f) -> u32 {
     return NONE;
 }
 
-// A ray with number `query` has met x, which faces n: the slot of its entry, which round `round` will update. Rays without a number
-// (NONE) read entries and say nothing of where they begin.
+// A ray with number `query` has met x, which faces n: the slot of its entry, which round `round` will update.
+// Rays without a number (NONE) read entries and say nothing of where they begin.
 fn ask_entry(x: vec3f, n: vec3f, query: u32, name: u32, round: u32) -> u32 {
     let slot = entry_of(x, n);
     if slot != NONE && query != NONE {

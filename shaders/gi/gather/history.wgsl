@@ -5,7 +5,8 @@
 //#import gi/gather/past.wgsl
 //#import gi/gather/motion.wgsl
 
-// What cells remembered after the frame before, and what rays have found: what `gi.recall` and `gi.settle` are bound to.
+// What cells remembered after the frame before, and what rays have found: what `gi.recall` and `gi.settle`
+// are bound to.
 
 // The pixel of a cell, FRESH where `before` has nothing of its surface.
 @group(2) @binding(0) var<storage, read_write> cell_pixels: array<u32>;

@@ -8,8 +8,8 @@
 //#import gi/gather/types.wgsl
 //#import gi/gather/entries.wgsl
 
-// What a ray finds: the sky, or a surface with the light of lamps and of what glows that it sends back, and the entry that knows
-// the rest of its light.
+// What a ray finds: the sky, or a surface with the light of lamps and of what glows that it sends back, and
+// the entry that knows the rest of its light.
 
 struct Found {
     // Radiance that is known at once.
@@ -42,8 +42,8 @@ struct Place {
     roughness: f32,
 }
 
-// Power of a lobe below this roughness is spread as if by this one: rays that happen to meet a mirrored lamp are not averaged
-// enough to show it as anything but a spark.
+// Power of a lobe below this roughness is spread as if by this one: rays that happen to meet a mirrored lamp
+// are not averaged enough to show it as anything but a spark.
 const LEAST_ROUGHNESS = 0.5;
 
 // Cosine of rays that alone find what glows: greater than any density of shadow rays.
@@ -77,7 +77,8 @@ fn chance_of(i: u32) -> f32 {
     return max(lights[i].chance - below, 1e-9);
 }
 
-// One of the analytic lights (where `lamps`) and of one point of what glows, by how bright the place would be without shadow.
+// One of the analytic lights (where `lamps`) and of one point of what glows, by how bright the place would be
+// without shadow.
 // `u` decides, `seed` gives further numbers.
 fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
     let u = unit_floats(seed);
@@ -85,12 +86,14 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
     var total = 0.0;
     var best = 0.0;
     var lot = u.x;
-    // The lengths of the lists are asked, too: Mesa's CPU driver compiles what uniforms alone branch on anew for each dispatch.
+    // The lengths of the lists are asked, too: Mesa's CPU driver compiles what uniforms alone branch on anew
+    // for each dispatch.
     let all = min(gather.light_count, arrayLength(&lights));
     let glowing = min(gather.emitter_count, arrayLength(&emitters));
     if lamps {
-        // A long list is looked at in places only, evenly spread over the lights' chances, and what is found there stands for
-        // the rest: resampled importance sampling (Talbot et al. 2005), right in the mean whatever the chances are.
+        // A long list is looked at in places only, evenly spread over the lights' chances, and what is found
+        // there stands for the rest: resampled importance sampling (Talbot et al. 2005), right in the mean
+        // whatever the chances are.
         let few = all <= CANDIDATES || lights[all - 1u].chance <= 0.0;
         let shift = unit_floats(pcg3(seed ^ vec3u(0x2c1b3c6du))).x;
         let looks = select(CANDIDATES, all, few);
@@ -178,11 +181,12 @@ fn is_lit(x: vec3f, chosen: Chosen, seed: u32) -> bool {
         && trace_seeded(x, chosen.l, chosen.reach, true, seed).triangle == NO_TRIANGLE;
 }
 
-// What the ray from o finds in direction d. n_d: cosine by which shadow rays to what glows were weighted there, ALONE where none were
-// sent. `query` is the ray's number among all of the frame, `name` what its random numbers are drawn by, which slots of the table must
-// not decide, since they go to who comes first; `round` is that which will update the entry, `glows`: whether what glows counts
-// where the ray meets it. `height`: no surface whose plane o lies nearer to can be met but the one that the ray begins on, by a ray that
-// a shading normal sends below it: such light is lost.
+// What the ray from o finds in direction d. n_d: cosine by which shadow rays to what glows were weighted
+// there, ALONE where none were sent. `query` is the ray's number among all of the frame, `name` what its
+// random numbers are drawn by, which slots of the table must not decide, since they go to who comes first;
+// `round` is that which will update the entry, `glows`: whether what glows counts where the ray meets it.
+// `height`: no surface whose plane o lies nearer to can be met but the one that the ray begins on, by a ray
+// that a shading normal sends below it: such light is lost.
 fn look(o: vec3f, d: vec3f, height: f32, n_d: f32, query: u32, name: u32, round: u32, glows: bool) -> Found {
     let seed = pcg3(vec3u(name, gather.round, 0x9e3779b9u));
     let hit = trace_seeded(o, d, FAR, false, seed.x);

@@ -32,7 +32,8 @@ fn past_from(a: vec4f, b: vec4f, c: vec4f, d: vec4f, e: vec4f) -> Past {
 // Weight of a new frame in `lately`: 95 % of a change are there after six frames.
 const LATELY = 0.4;
 
-// The same now: from the sixth frame after a change on each frame since counts for its number, so that `lately` comes to know.
+// The same now: from the sixth frame after a change on each frame since counts for its number, so that
+// `lately` comes to know.
 fn lately_share() -> f32 {
     let since = max(f32(gather.since), 6.0);
     return select(LATELY, min(LATELY, 2.0 / (since - 1.0)), (gather.flags & GATHER_CHANGING) != 0u);
@@ -52,7 +53,8 @@ fn strictness_at(x: vec3f) -> f32 {
     return 1.0 / (BLUR_PLANE * cell_foot(max(z, 1e-9)));
 }
 
-// How much a place counts that lies `to` away and faces `there`: that it is in the plane that faces n, and looks the same way.
+// How much a place counts that lies `to` away and faces `there`: that it is in the plane that faces n, and
+// looks the same way.
 fn same_surface(to: vec3f, n: vec3f, there: vec3f, strictness: f32) -> f32 {
     let off_plane = dot(to, n) * strictness;
     let facing = saturate(dot(there, n));

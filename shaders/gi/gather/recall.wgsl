@@ -35,8 +35,8 @@ const AVERAGED = 16.0;
 // Less than this share of the light is no change.
 const NO_CHANGE = 0.01;
 
-// Frames of new rays that what is remembered is still worth, of a surface that was at pixel `then` of the frame before: the square of
-// what its light has changed by is as much as the variance of so many.
+// Frames of new rays that what is remembered is still worth, of a surface that was at pixel `then` of the
+// frame before: the square of what its light has changed by is as much as the variance of so many.
 fn frames_worth(past: Past, then: vec2f) -> f32 {
     let middle = vec2i(floor(then / f32(2 * CELL_SIDE)));
     // Sum, sum of squares and count of what rays have changed by: those from surfaces that face this way, and all.

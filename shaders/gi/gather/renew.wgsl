@@ -4,8 +4,8 @@
 //#import gi/gather/entries.wgsl
 //#import gi/gather/look.wgsl
 
-// One ray for each entry of the cache, whose find is mixed into the entry's mean. The finds' own entries are read as they
-// were after the round before, so the order of threads does not matter.
+// One ray for each entry of the cache, whose find is mixed into the entry's mean. The finds' own entries are
+// read as they were after the round before, so the order of threads does not matter.
 
 // The round in which an entry was last asked for, from 1; 0 for never.
 @group(2) @binding(3) var<storage, read_write> entry_asked: array<u32>;
@@ -15,7 +15,8 @@
 // Rounds after which an entry that no ray has met leaves.
 const ENTRY_AGE = 32u;
 
-// Before the rays of a frame, so that none of them looks up what is about to leave: two runs would not agree on who came first.
+// Before the rays of a frame, so that none of them looks up what is about to leave: two runs would not agree
+// on who came first.
 @compute @workgroup_size(64)
 fn evict(@builtin(global_invocation_id) id: vec3u) {
     let slots = gather.mask + 1u;
@@ -36,7 +37,8 @@ fn evict(@builtin(global_invocation_id) id: vec3u) {
         entry_light[slot] = vec4f(0.0);
         entry_light[slots + slot] = vec4f(0.0);
     }
-    // Free if nobody can have been put further on for it. A neighbour that becomes free now frees this one a frame later.
+    // Free if nobody can have been put further on for it. A neighbour that becomes free now frees this one a
+    // frame later.
     let next = atomicLoad(&entry_keys[(slot + 1u) & gather.mask]);
     atomicStore(&entry_keys[slot], select(LEFT, 0u, next == 0u));
 }

@@ -2,9 +2,9 @@
 //#import gi/gather/start.wgsl
 //#import gi/gather/look.wgsl
 
-// A ray from a surface, and what is written down of it. Whoever joins this file binds `records`, three vectors a ray: radiance found
-// and the entry's slot; what the entry's light is multiplied by (shared exponent), direction, distance (0: none was sent); light of
-// what glows, and its direction.
+// A ray from a surface, and what is written down of it. Whoever joins this file binds `records`, three
+// vectors a ray: radiance found and the entry's slot; what the entry's light is multiplied by (shared
+// exponent), direction, distance (0: none was sent); light of what glows, and its direction.
 
 fn shared_exponent(c: vec3f) -> u32 {
     let most = max(max(c.x, c.y), max(c.z, 1e-9));
@@ -20,8 +20,9 @@ fn record(ray: u32, found: Found, weight: vec3f, d: vec3f, glow: vec4f) {
     records[3u * ray + 2u] = glow;
 }
 
-// The ray from x along d, for the surface there that faces n, and where surfaces glow a shadow ray to a point of them. `ray` is what its
-// random numbers are drawn by, `query` its number if it may claim an entry, `to` where it is written down.
+// The ray from x along d, for the surface there that faces n, and where surfaces glow a shadow ray to a point
+// of them. `ray` is what its random numbers are drawn by, `query` its number if it may claim an entry, `to`
+// where it is written down.
 fn send(x: vec3f, n: vec3f, d: vec3f, query: u32, ray: u32, to: u32) {
     let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
     let found = look(x, d, above(x), max(dot(n, d), 1e-4), query, ray, gather.round, !stands_in);

@@ -4,8 +4,8 @@
 //#import gi/gather/past.wgsl
 //#import gi/gather/guided.wgsl
 
-// Light of cells averaged with that of cells further away that differ by no more than noise: one à-trous step (Dammertz et al. 2010) whose
-// tolerance is the noise itself. Where means are known well it does nothing.
+// Light of cells averaged with that of cells further away that differ by no more than noise: one à-trous step
+// (Dammertz et al. 2010) whose tolerance is the noise itself. Where means are known well it does nothing.
 
 @group(2) @binding(0) var<storage, read> pasts: array<vec4f>;
 // What blur.wgsl wrote: directional light, with the variance of its luminance.
@@ -41,8 +41,9 @@ fn blurred_at(cell: u32) -> Blurred {
     return Blurred(place.xyz, pasts[5u * cell].a, n, r.rgb, g, b, l, r.a);
 }
 
-// One channel of `CellLight` from (light along n) · n + gradient. Light from all of the half space alike gives a surface tilted by
-// θ (1 + cos θ)/2 of itself, not cos θ: what lies below its horizon gives nothing, rather than less than nothing.
+// One channel of `CellLight` from (light along n) · n + gradient. Light from all of the half space alike
+// gives a surface tilted by θ (1 + cos θ)/2 of itself, not cos θ: what lies below its horizon gives nothing,
+// rather than less than nothing.
 fn tilting(channel: vec3f, n: vec3f) -> vec4f {
     let half = 0.5 * dot(channel, n);
     return vec4f(channel - half * n, half);
