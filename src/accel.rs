@@ -31,6 +31,7 @@ pub use emitters::EmitterGpu;
 pub use gpu::AccelGpu;
 pub(crate) use image::Reductions;
 pub use scene::{RayCounts, SceneRays};
+pub(crate) use surfaces::luminance;
 pub(crate) use trees::{MeshPart, corners};
 
 use thiserror::Error;

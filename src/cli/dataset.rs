@@ -62,7 +62,8 @@ pub struct Args {
     /// Width and height of the rasterised picture; the inputs have a quarter of it.
     #[arg(long, default_value = "1024x512", value_parser = super::args::parse_size, value_name = "WxH")]
     size: [u32; 2],
-    /// Path-trace the light to be learnt with so many samples for each cell; 0 leaves it out, for targets from Cycles.
+    /// Path-trace the light to be learnt with so many samples for each cell (with --moments: gather it with so many
+    /// rays); 0 leaves it out, for targets from Cycles.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=65_536), value_name = "N")]
     spp: u32,
     /// Frames of a still camera that method `gather`, the first guess, settles over before it is
@@ -77,8 +78,8 @@ pub struct Args {
     #[arg(long)]
     out: PathBuf,
     /// What a network that filters learns from, instead: moments at which what cells remember is kept, frames
-    /// after a cut or `pan` (at the end of six frames of a moving camera), such as 1,2,8,pan. --spp tells the
-    /// samples of the light.
+    /// after a cut or `pan` (at the end of six frames of a moving camera), such as 1,2,8,pan. The light to be
+    /// learnt is the mean of --spp of the same rays.
     #[arg(long, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST",
         conflicts_with_all = ["motion", "guides"])]
     moments: Vec<When>,
@@ -164,18 +165,17 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     };
     let options = RendererOptions { method, blending: Blending::Stochastic, ..Default::default() };
     let renderer = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
-    let kernel = (args.spp > 0).then(|| Kernel::new(&gpu.device));
+    let lessons = match args.moments.is_empty() {
+        true => None,
+        false => Some(Lessons::new(&gpu, &args)?),
+    };
+    let kernel = (args.spp > 0 && lessons.is_none()).then(|| Kernel::new(&gpu.device));
     let Args { spp, motion, guides, gi_frames, ref out, ref moments, .. } = args;
     if !moments.is_empty() && spp == 0 {
         return Err(usage("--moments need the light to be learnt: --spp N".into()));
     }
-    // Those of a still camera in the order in which they come, the pan last.
-    let mut moments = moments.clone();
-    moments.sort();
-    moments.dedup();
     let (out, listed) = (out.clone(), HashSet::new());
-    let mut writer =
-        Writer { gpu, renderer, kernel, spp, motion, guides, gi_frames, moments, reader: None, out, listed };
+    let mut writer = Writer { gpu, renderer, kernel, spp, motion, guides, gi_frames, lessons, out, listed };
     writer.open_list()?;
     match (args.recipe, &args.rooms, &args.scene) {
         (Recipe::PaperRoom | Recipe::PaperRoomVaried | Recipe::Home, Some(rooms), _) => {
@@ -194,7 +194,7 @@ fn announce(global: &Global, args: &Args, samples: usize) {
     let features = u64::from(FeatureSet::all().channels());
     let mut planes = features + 10 + if args.spp > 0 { 3 } else { 0 } + if args.motion { features + 2 } else { 0 };
     if !args.moments.is_empty() {
-        planes = 3 + args.moments.len() as u64 * moments::PLANES;
+        planes = 7 + args.moments.len() as u64 * moments::PLANES;
     }
     let guides = if args.guides { Guides::bytes(args.size) } else { 0 };
     let bytes = samples as u64 * (w * h * planes * 4 + guides + 1024);
@@ -216,12 +216,32 @@ struct Writer {
     motion: bool,
     guides: bool,
     gi_frames: u32,
-    /// What cells remember is written instead, at these moments.
-    moments: Vec<When>,
-    reader: Option<moments::Reader>,
+    /// What cells remember is written instead.
+    lessons: Option<Lessons>,
     out: PathBuf,
     /// Names in the list of checksums.
     listed: HashSet<String>,
+}
+
+/// What lessons of a filter are made with.
+struct Lessons {
+    /// Those of a still camera in the order in which they come, the pan last.
+    moments: Vec<When>,
+    reader: moments::Reader,
+    /// Gathers the light that is to be learnt.
+    teacher: Renderer,
+}
+
+impl Lessons {
+    fn new(gpu: &Gpu, args: &Args) -> Result<Self> {
+        let mut moments = args.moments.clone();
+        moments.sort();
+        moments.dedup();
+        let method = Method::Gather(gather::Options::PLAIN);
+        let options = RendererOptions { method, blending: Blending::Stochastic, ..Default::default() };
+        let teacher = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
+        Ok(Self { moments, reader: moments::Reader::new(&gpu.device), teacher })
+    }
 }
 
 /// A scene as both renderers want it.
@@ -244,7 +264,7 @@ impl Writer {
 
     /// Draws, traces and writes the sample `stem`; `seed` is the path tracer's.
     fn write(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32) -> Result<()> {
-        if !self.moments.is_empty() {
+        if self.lessons.is_some() {
             return self.write_lesson(stem, scene, camera, seed);
         }
         let sample = self.sample(&scene.raster, camera)?;
@@ -275,12 +295,11 @@ impl Writer {
     }
 
     fn write_lesson(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32) -> Result<()> {
-        let (Some(kernel), Some(traced)) = (&self.kernel, &scene.traced) else { return Ok(()) };
+        let Some(Lessons { moments, reader, teacher }) = &mut self.lessons else { return Ok(()) };
+        let drawn_by = (&mut self.renderer, teacher, reader);
+        let asked = (moments.as_slice(), self.spp, seed);
         let go_on = || !interrupt::requested();
-        let scene = (&scene.raster, traced, kernel);
-        let asked = (self.moments.as_slice(), self.spp, seed);
-        let reader = self.reader.get_or_insert_with(|| moments::Reader::new(&self.gpu.device));
-        let lesson = moments::lesson(&self.gpu, (&mut self.renderer, reader), scene, camera, asked, go_on)?;
+        let lesson = moments::lesson(&self.gpu, drawn_by, &scene.raster, camera, asked, go_on)?;
         interrupt::check()?;
         lesson.map_or(Ok(()), |lesson| self.save(stem, lesson.to_bytes()?))
     }
@@ -402,7 +421,7 @@ fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> R
         }
         let name = format!("{stem}_view{view}");
         if view % of == shard && !writer.has(&name)? {
-            if writer.moments.is_empty() {
+            if writer.lessons.is_none() {
                 writer.complete(&name, &uploaded, &camera, view, sample)?;
             } else {
                 writer.write_lesson(&name, &uploaded, &camera, view)?;

@@ -1,18 +1,22 @@
 //! What a network that filters learns from: what `gather` remembers of a view's cells at several moments of
-//! its settling, and the light that they are to show.
+//! its settling, and the light that they are to show: what the same rays find in the end.
+//!
+//! The light is `gather`'s own ([`Options::PLAIN`](crate::gi::gather::Options::PLAIN): nothing blurred, all frames
+//! alike) and not the path tracer's. A filter can take away noise and nothing else, so what `gather` is wrong about
+//! in the mean must not be learnt from the scenes that happen to be shown; and a ray that ends in the cache has a
+//! tenth of the noise of a path.
 
 use super::dataset::DatasetError;
 use crate::{
+    accel::luminance,
     gi::{
         ExposurePass,
-        cells::NO_PIXEL,
         gather::PAST,
-        inputs::{CELL, InputGroup, cells_of, sample_pixel},
+        inputs::{CELL, InputGroup, cells_of},
         memory::{CHANNELS, FeaturesPass, PITCH},
     },
     gpu::{Gpu, bind::Bound, readback, timing::Recorder},
     numbers::SplitMix,
-    reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions},
     render::{Renderer, View},
     scene::{Camera, upload::SceneGpu},
 };
@@ -24,12 +28,13 @@ use safetensors::{Dtype, tensor::TensorView};
 pub enum When {
     /// After so many frames of a still camera, the first of which follows a cut.
     Frames(u32),
-    /// At the end of [`PAN`] frames of a camera that turns and moves.
+    /// At the end of [`PAN`] frames of a camera that turns and moves, which stood still for [`STILL`] before.
     Pan,
 }
 
-/// Frames of a pan.
+/// Frames of a pan, and of rest before it: by then the blur is narrow, and what comes into view is younger than the rest.
 pub const PAN: u32 = 6;
+const STILL: u32 = 4;
 
 /// Planes that a moment takes: features, memory, light.
 pub const PLANES: u64 = CHANNELS as u64 + PAST / 4 + 12;
@@ -39,6 +44,8 @@ pub const PLANES: u64 = CHANNELS as u64 + PAST / 4 + 12;
 pub struct Moment {
     /// When it was.
     pub when: When,
+    /// Frames since the cut before it.
+    pub age: u32,
     /// What the network is given: [`CHANNELS`] planes.
     pub features: Vec<f32>,
     /// What cells remember: 20 planes, as `Past` lies in memory, the normal and the halves of its fourth
@@ -57,28 +64,30 @@ pub struct Lesson {
     pub moments: Vec<Moment>,
     /// Width of a cell at view distance 1 (`cell_foot`), and the eye and the direction of view in the world.
     pub view: [f32; 7],
-    /// E/π that a method must add at each cell's pixel, three planes; its noise: root mean square error of a
-    /// cell over the mean.
+    /// E/π on each cell's surface, three planes; its noise: root mean square error of a cell over the mean.
     pub light: Vec<f32>,
     /// See `light`.
     pub noise: f32,
+    /// Where that is in the world, three planes, and its normal's bits, as in [`Moment::past`].
+    pub place: Vec<f32>,
 }
 
-/// Draws and traces one view. `renderer`'s method gathers; `seed` decides the pan and the paths.
+/// Draws one view. `renderer`'s method gathers, and so does `teacher`'s, plainly, for `frames` frames; `seed` decides
+/// the pan.
 ///
 /// # Errors
-/// What drawing, tracing and reading back report; `None` where `go_on` said no.
+/// What drawing and reading back report; `None` where `go_on` said no.
 pub fn lesson(
     gpu: &Gpu,
-    (renderer, reader): (&mut Renderer, &mut Reader),
-    (raster, traced, kernel): (&SceneGpu, &ReferenceScene, &Kernel),
+    (renderer, teacher, reader): (&mut Renderer, &mut Renderer, &mut Reader),
+    raster: &SceneGpu,
     camera: &Camera,
-    (moments, samples, seed): (&[When], u32, u32),
+    (moments, frames, seed): (&[When], u32, u32),
     mut go_on: impl FnMut() -> bool,
 ) -> Result<Option<Lesson>, DatasetError> {
     let size = renderer.size();
+    let environment = raster.environment.radiance;
     let mut read = Vec::new();
-    let mut pixels = Vec::new();
     renderer.cut();
     let (mut drawn, mut fresh) = (0, true);
     for &when in moments {
@@ -103,43 +112,46 @@ pub fn lesson(
             fresh = false;
         }
         let view = View::new(camera, size, [0.0; 2]);
-        let (moment, own) = reader.read(gpu, renderer, &view, raster.environment.radiance, when)?;
-        pixels = own;
-        read.push(moment);
+        read.push(reader.read(gpu, renderer, &view, environment, when)?);
     }
-    let [w, h] = cells_of(size);
-    let points: Vec<[f32; 2]> = (0..h)
-        .flat_map(|y| (0..w).map(move |x| [x, y]))
-        .zip(&pixels)
-        .map(|(cell, &packed)| {
-            let pixel =
-                if packed == NO_PIXEL { sample_pixel(cell, size) } else { [packed & 0xffff, packed >> 16 & 0x7fff] };
-            pixel.map(|p| p as f32 + 0.5)
-        })
-        .collect();
-    let subject = Subject { camera, size, points: Some(&points) };
-    let options = TracerOptions { samples, seed, layers: vec![Layer::Gi], ..TracerOptions::default() };
-    let mut tracer = Tracer::new(&gpu.device, &gpu.queue, kernel, traced, subject, options)?;
-    while tracer.step()? {
+    teacher.cut();
+    for frame in 0..frames {
         if !go_on() {
             return Ok(None);
         }
+        draw(gpu, teacher, raster, camera, frame == 0)?;
     }
-    let traced = tracer.finish()?;
-    let gi = traced.layer(Layer::Gi).unwrap_or_default();
+    let view = View::new(camera, size, [0.0; 2]);
+    let taught = reader.read(gpu, teacher, &view, environment, When::Frames(frames))?.past;
+    let cells = cells_of(size);
+    let count = cells[0] as usize * cells[1] as usize;
     let place = Mat4::from_cols_array_2d(&camera.transform);
     let (eye, ahead) = (place.w_axis.truncate(), -place.z_axis.truncate().normalize_or(Vec3::Z));
     let foot = 2.0 * (0.5 * camera.yfov).tan() * CELL as f32 / size[1] as f32;
     Ok(Some(Lesson {
-        cells: [w, h],
+        cells,
         moments: read,
         view: [foot, eye.x, eye.y, eye.z, ahead.x, ahead.y, ahead.z],
-        light: (0..3).flat_map(|c| gi.iter().skip(c).step_by(3).copied()).collect(),
-        noise: traced.noise_of(Layer::Gi).map_or(f64::INFINITY, |n| n.pixel) as f32,
+        noise: noise_of(&taught, count),
+        light: taught[..3 * count].to_vec(),
+        place: taught[8 * count..12 * count].to_vec(),
     }))
 }
 
-/// The cameras of a pan that ends at `camera`: 0.2 to 2 degrees a frame about its vertical, up to 0.3 about its horizontal, and
+/// Root mean square error of a cell's luminance over the mean, of planes of what `count` cells remember.
+fn noise_of(past: &[f32], count: usize) -> f32 {
+    let plane = |i: usize| &past[i * count..(i + 1) * count];
+    let (mut error, mut sum, mut cells) = (0.0, 0.0, 0.0);
+    for i in (0..count).filter(|&i| plane(3)[i] > 0.0) {
+        let l = luminance(Vec3::new(plane(0)[i], plane(1)[i], plane(2)[i]));
+        error += f64::from((plane(7)[i] - l * l).max(0.0) / plane(3)[i]);
+        sum += f64::from(l);
+        cells += 1.0;
+    }
+    if sum > 0.0 { ((error / cells).sqrt() / (sum / cells)) as f32 } else { f32::INFINITY }
+}
+
+/// The cameras of a pan that ends at `camera`, those of the rest before it first: 0.2 to 2 degrees a frame about its vertical, up to 0.3 about its horizontal, and
 /// up to 0.04 metres of way, a frame.
 fn pan(camera: &Camera, seed: u32) -> Vec<Camera> {
     let mut numbers = SplitMix::new(0x9a70_0000_0000 | u64::from(seed));
@@ -149,8 +161,9 @@ fn pan(camera: &Camera, seed: u32) -> Vec<Camera> {
     let nod = between(-0.3, 0.3).to_radians();
     let step = Vec3::new(between(-0.02, 0.02), between(-0.01, 0.01), between(-0.03, 0.03));
     let own = Mat4::from_cols_array_2d(&camera.transform);
-    (0..PAN)
+    (0..STILL + PAN)
         .rev()
+        .map(|before| before.min(PAN))
         .map(|before| {
             let before = before as f32;
             let about = Quat::from_rotation_y(before * turn) * Quat::from_rotation_x(before * nod);
@@ -189,7 +202,7 @@ impl Reader {
         Self { inputs, exposure, features }
     }
 
-    /// The memory of the last frame, and the pixel of each cell.
+    /// The memory of the last frame.
     fn read(
         &mut self,
         gpu: &Gpu,
@@ -197,7 +210,7 @@ impl Reader {
         view: &View,
         environment: [f32; 3],
         when: When,
-    ) -> Result<(Moment, Vec<u32>), DatasetError> {
+    ) -> Result<Moment, DatasetError> {
         let (device, queue) = (&gpu.device, &gpu.queue);
         let Some(memory) = renderer.memory() else { return Err(crate::gi::GiError::Rays.into()) };
         let bound = self.inputs.bind(queue, &renderer.gi_inputs(view, environment))?;
@@ -219,14 +232,16 @@ impl Reader {
             Ok((0..channels).flat_map(|c| rows.iter().skip(c).step_by(pitch).copied()).collect())
         };
         let past = PAST as usize / 4;
-        let moment = Moment {
+        Ok(Moment {
             when,
+            age: match when {
+                When::Frames(frames) => frames,
+                When::Pan => STILL + PAN,
+            },
             features: planes(&target, PITCH as usize, CHANNELS as usize)?,
             past: planes(memory.pasts, past, past)?,
             shown: planes(memory.light, 12, 12)?,
-        };
-        let pixels = bytemuck::pod_collect_to_vec(&readback::buffer(device, queue, memory.pixels, 0, 4 * count)?);
-        Ok((moment, pixels))
+        })
     }
 }
 
@@ -242,8 +257,8 @@ impl When {
 
 impl Lesson {
     /// The lesson as a safetensors file, all f32: `features.WHEN` [15, h, w], `past.WHEN` [20, h, w],
-    /// `shown.WHEN` [12, h, w] of each moment (WHEN: frames, or `pan`); `light` [3, h, w], `noise` (one
-    /// number), `view` (seven).
+    /// `shown.WHEN` [12, h, w], `age.WHEN` (one number) of each moment (WHEN: frames, or `pan`); `light` [3, h, w], `noise` (one
+    /// number), `place` [4, h, w], `view` (seven).
     ///
     /// # Errors
     /// [`DatasetError::Serialize`].
@@ -252,10 +267,13 @@ impl Lesson {
         let mut tensors: Vec<(String, Vec<usize>, &[f32])> = vec![
             ("light".into(), vec![3, h, w], &self.light),
             ("noise".into(), vec![1], std::slice::from_ref(&self.noise)),
+            ("place".into(), vec![4, h, w], &self.place),
             ("view".into(), vec![7], &self.view),
         ];
-        for moment in &self.moments {
+        let ages: Vec<f32> = self.moments.iter().map(|m| m.age as f32).collect();
+        for (moment, age) in self.moments.iter().zip(&ages) {
             let name = moment.when.name();
+            tensors.push((format!("age.{name}"), vec![1], std::slice::from_ref(age)));
             for (what, values) in [("features", &moment.features), ("past", &moment.past), ("shown", &moment.shown)] {
                 tensors.push((format!("{what}.{name}"), vec![values.len() / (w * h), h, w], values));
             }

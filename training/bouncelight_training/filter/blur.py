@@ -4,8 +4,8 @@ import torch
 import torch.nn.functional as F
 
 LUMINANCE = torch.tensor([0.2126, 0.7152, 0.0722])
-# Of shaders/gi/gather/blur.wgsl and smooth.wgsl.
-SETTLED, NARROW, WIDE, STRIDE = 6, 2, 4, 4
+# Of shaders/gi/gather/blur.wgsl, types.wgsl and smooth.wgsl.
+SETTLED, NARROW, WIDE, LOOKS, STRIDE = 6, 2, 4, 4, 4
 # Of shaders/gi/gather/guided.wgsl: numbers of a cell (two are not read), frames up to which they count in full, and their limit.
 GUIDANCE, GUIDED_FRAMES, MOST_LOG = 12, 6.0, 4.0
 
@@ -45,15 +45,16 @@ def kinship(place, share, radius, stride):
 
 def blur(batch, near, trust):
     """Mean light [n,3,h,w] over neighbours, and the variance [n,h,w] of its luminance."""
-    radius = WIDE
+    narrow = torch.maximum(batch["frames"], batch["age"].view(-1, 1, 1) - 1) >= SETTLED
+    radius = NARROW if narrow.all() else WIDE
     with torch.no_grad():
         steps = torch.arange(-radius, radius + 1)
         reach = torch.maximum(steps.abs().view(-1, 1), steps.abs().view(1, -1)).reshape(1, -1, 1, 1)
-        own = torch.where(batch["frames"] >= SETTLED, NARROW, WIDE).unsqueeze(1)
+        own = torch.where(narrow, NARROW, WIDE).unsqueeze(1)
         rows, columns = steps.abs().view(-1, 1).expand(-1, 2 * radius + 1).reshape(1, -1, 1, 1), steps.abs().repeat(2 * radius + 1).view(1, -1, 1, 1)
         rim = torch.where(rows == own, 0.5, 1.0) * torch.where(columns == own, 0.5, 1.0) * (reach <= own)
         frames = around(batch["frames"].unsqueeze(1), radius)[:, 0]
-        fixed = rim * same_surface(batch, radius, 1) * frames.clamp(max=16)
+        fixed = rim * same_surface(batch, radius, 1) * frames.clamp(LOOKS, 16)
         light, square = around(batch["light"], radius), around(batch["square"].unsqueeze(1), radius)[:, 0]
     share = guided_share(batch)
     w = fixed * kinship(near, share, radius, 1) * torch.exp(share.unsqueeze(1) * around(trust.unsqueeze(1), radius)[:, 0])

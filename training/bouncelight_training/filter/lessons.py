@@ -12,6 +12,8 @@ from ..errors import TrainingError
 # Table `cells`, version 1 (src/gi/neural/memory.rs).
 TABLE = [("light", 1), ("chroma", 2), ("deviation", 1), ("frames", 1), ("lately", 1), ("nearness", 1), ("depth", 1), ("normal", 3), ("hit", 1), ("towards", 3)]
 CHANNELS = sum(n for _, n in TABLE)
+# Cosine between two normals above which a cell's two pixels are taken for one surface.
+SAME_NORMAL = 0.9
 # Root mean square error of a cell's target over the picture's mean above which the picture teaches nothing.
 MOST_NOISE = 2.0
 
@@ -43,11 +45,18 @@ class Lesson:
         self.strictness = 1 / (0.5 * foot * np.maximum(z, 1e-9))
         self.features, self.light, self.square, self.x, self.n, self.frames = file[f"features.{when}"], past[0:3], past[7], past[8:11], n, frames
         self.target, self.noise, self.base = file["light"], float(file["noise"][0]), 0.0
-        self.mask = (frames > 0) & np.isfinite(self.target).all(0)
+        self.age = float(file[f"age.{when}"][0])
+        # After a pan another pixel may stand for a cell than in the still pictures that the light is of.
+        same = np.abs(((file["place"][:3] - past[8:11]) * n).sum(0)) * self.strictness < 1
+        same &= (unpack_normals(file["place"][3]) * n).sum(0) > SAME_NORMAL
+        self.mask = (frames > 0) & np.isfinite(self.target).all(0) & same
         for field in ("features", "light", "square", "x", "n", "frames", "strictness", "shown", "target"):
             setattr(self, field, torch.from_numpy(np.ascontiguousarray(np.nan_to_num(getattr(self, field), posinf=0, neginf=0), np.float32)))
         self.x = self.x * (self.frames > 0)
         self.mask = torch.from_numpy(self.mask)
+        # `gather` lacks some of the light in its first frames, or has too much. A filter cannot mend that, and is not to
+        # learn to count bright cells for more: what is learnt is where light is, not how much there is in all.
+        self.target = self.target * float((self.shown * self.mask).sum() / (self.target * self.mask).sum().clamp(min=1e-20))
         self.mean = float((self.target * self.mask).sum() / (3 * self.mask.sum()).clamp(min=1))
 
 
@@ -73,6 +82,7 @@ def stacked(lessons):
     fields = ("features", "light", "square", "x", "n", "frames", "strictness", "target", "mask")
     batch = {field: torch.stack([getattr(lesson, field) for lesson in lessons]) for field in fields}
     batch["mean"] = torch.tensor([lesson.mean for lesson in lessons])
+    batch["age"] = torch.tensor([lesson.age for lesson in lessons])
     batch["noise"] = torch.tensor([lesson.noise for lesson in lessons])
     batch["base"] = torch.tensor([lesson.base for lesson in lessons])
     return batch

@@ -44,6 +44,7 @@ class Config:
     without: tuple = ()  # features of the table that are zeroed, for ablations
     minutes: float = 20.0
     batch: int = 4
+    crop: int = 48  # cells on a side of the windows that steps look at; 0: whole pictures
     learning_rate: float = 1e-3
     weight_decay: float = 1e-2
     ema: float = 0.998
@@ -118,6 +119,15 @@ def augmented(batch, rng):
     return batch | {"features": features}
 
 
+def cropped(batch, size, rng):
+    """A window of the batch, `size` cells on a side or what there is."""
+    if not size:
+        return batch
+    h, w = batch["mask"].shape[-2:]
+    y, x = (int(rng.integers(0, max(n - size, 0) + 1)) for n in (h, w))
+    return {k: v[..., y:y + size, x:x + size] if v.dim() > 1 else v for k, v in batch.items()}
+
+
 def validate(model, views, channels):
     """Pooled error of `gather`'s light and of the network's, by moment, and over all."""
     sums = {}
@@ -126,11 +136,11 @@ def validate(model, views, channels):
             batch = lessons.stacked([lesson])
             for which, answer in (("gather", None), ("network", model(batch["features"] * channels))):
                 shown, _ = blur.filtered(batch, answer)
-                below_above = pooled_error(shown.clamp(min=0) / lesson.mean, batch["target"] / lesson.mean, batch["mask"])
+                off, light = pooled_error(shown.clamp(min=0) / lesson.mean, batch["target"] / lesson.mean, batch["mask"])
                 for key in (lesson.when, "all"):
                     a, b = sums.get((key, which), (0, 0))
-                    sums[key, which] = (a + below_above[0], b + below_above[1])
-    return {f"{key} {which}": above / max(below, 1e-20) for (key, which), (above, below) in sums.items()}
+                    sums[key, which] = (a + off, b + light)
+    return {f"{key} {which}": off / max(light, 1e-20) for (key, which), (off, light) in sums.items()}
 
 
 class Run:
@@ -184,7 +194,7 @@ class Run:
         self.optimiser.zero_grad()
         for shape in shapes:
             own = [lesson for lesson in chosen if lesson.mask.shape == shape]
-            batch = augmented(lessons.stacked(own), rng)
+            batch = augmented(cropped(lessons.stacked(own), c.crop, rng), rng)
             answer = self.model(batch["features"] * self.channels)
             shown, first = blur.filtered(batch, answer)
             learnt = [batch[k] for k in ("target", "mask", "mean", "noise")]
