@@ -18,9 +18,10 @@
 // Of each cell, with GATHER_GUIDED.
 @group(2) @binding(4) var<storage, read> guidance: array<vec4f>;
 
-// Frames from which on the narrow blur is enough, and the radii of both in cells. What comes into view later
-// has four rays a cell, and neighbours that know their light: the wide blur would drown its own in theirs.
-const SETTLED = 6.0;
+// Rays of a mean, four of them in the first frame, from which on the narrow blur is enough, and the radii of both
+// in cells: the first five frames after a cut are blurred widely. What comes into view later has four rays a cell,
+// and neighbours that know their light: the wide blur would drown its own in theirs.
+const SETTLED = 9.0;
 const NARROW = 2;
 const WIDE = 4;
 // A change of light is one that is beyond what chance does once in e^CHANCE and beyond this share of the
