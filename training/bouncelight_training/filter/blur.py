@@ -5,7 +5,7 @@ import torch.nn.functional as F
 
 LUMINANCE = torch.tensor([0.2126, 0.7152, 0.0722])
 # Of shaders/gi/gather/blur.wgsl, types.wgsl and smooth.wgsl.
-SETTLED, NARROW, WIDE, LOOKS, STRIDE = 6, 2, 4, 4, 4
+SETTLED, NARROW, WIDE, LOOKS, STRIDE = 9, 2, 4, 4, 4
 # Of shaders/gi/gather/guided.wgsl: numbers of a cell (two are not read), frames up to which they count in full, and their limit.
 GUIDANCE, GUIDED_FRAMES, MOST_LOG = 12, 6.0, 4.0
 

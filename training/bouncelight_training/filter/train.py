@@ -28,6 +28,8 @@ from . import blur, lessons
 
 # Of the loss of `gather`: a picture that is right already teaches nothing.
 LEAST_BASE = 0.01
+# Sides of the squares of cells over which light is compared.
+POOLS = (1, 2, 4, 16)
 # A picture that has become so much worse counts no more than this.
 LOUD = 2.0
 FIELDS = ["step", "samples", "seconds", "learning_rate", "loss", "validation_error"]
@@ -77,12 +79,13 @@ def kept_channels(config):
 
 
 def loss_of(shown, target, mask, mean, noise):
-    """Square of the difference over light here and in the picture, of cells and of means over 2x2 and 4x4 of them: without bias on targets that
-    hold noise, and even to bright and dark: [n]. Each is weighed by how much of it the target's noise is; a place whose difference is beyond five
-    times both lights counts by the root: a firefly of the path tracer. shown, target [n,3,h,w], mask [n,h,w], mean and noise [n]."""
+    """Square of the difference over light here and in the picture, of cells and of means over 2x2, 4x4 and 16x16 of them: without bias on targets
+    that hold noise, and even to bright and dark: [n]. Each is weighed by its side, since noise goes with that and what is wrong in the mean does not:
+    a filter that trusts dark cells more has less noise and too little light. And by how much of it the target's noise is; a place whose difference is
+    beyond five times both lights counts by the root: a firefly. shown, target [n,3,h,w], mask [n,h,w], mean and noise [n]."""
     mean, weight = mean.view(-1, 1, 1, 1), mask.unsqueeze(1).to(shown.dtype)
     loss = 0.0
-    for size in (1, 2, 4):
+    for size in POOLS:
         share = F.avg_pool2d(weight, size)
         pooled = [F.avg_pool2d(x * weight, size) / share.clamp(min=1e-6) for x in (shown, target)]
         here = pooled[0].detach().clamp(min=0)
@@ -90,7 +93,7 @@ def loss_of(shown, target, mask, mean, noise):
         error, most = (pooled[0] - pooled[1]) ** 2 / scale, 25 * (here + mean) ** 2 / scale
         error = torch.where(error > most, torch.sqrt(error * most + 1e-12), error)
         means = (error * share).sum((1, 2, 3)) / (3 * share.sum((1, 2, 3))).clamp(min=1)
-        loss = loss + means * 0.02 / (0.02 + (noise / size) ** 2)
+        loss = loss + size * means * 0.02 / (0.02 + (noise / size) ** 2)
     return loss
 
 
