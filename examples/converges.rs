@@ -31,6 +31,9 @@ struct Asked {
 /// Reflectance of a channel from which on its light is compared.
 const LEAST_COLOUR: f32 = 0.01;
 
+/// Squared length of the mean normal of what paths see through a point from which on it is one surface.
+const ONE_SURFACE: f32 = 0.999;
+
 /// One cell that shows a surface: its pixel, and E/π of it.
 struct Cell {
     pixel: [u32; 2],
@@ -89,18 +92,24 @@ fn traced(
     let points: Vec<[f32; 2]> = cells.iter().map(|c| c.pixel.map(|p| p as f32 + 0.5)).collect();
     let subject = Subject { camera: &scene.cameras[0], size: asked.size, points: Some(&points) };
     let flags = if asked.gather.caustics { 0 } else { job::NO_CAUSTICS };
-    let options = TracerOptions { samples: asked.paths, seed: 20, flags, layers: vec![Layer::Gi, Layer::DiffCol], ..Default::default() };
+    let layers = vec![Layer::Gi, Layer::DiffCol, Layer::Normal];
+    let options = TracerOptions { samples: asked.paths, seed: 20, flags, layers, ..Default::default() };
     let mut tracer = Tracer::new(&gpu.device, &gpu.queue, kernel, &packed, subject, options)?;
     while tracer.step()? {}
     let traced = tracer.finish()?;
     let mut light = traced.layer(Layer::Gi).ok_or("it was asked for")?.to_vec();
     let colour = traced.layer(Layer::DiffCol).ok_or("it was asked for")?;
-    // A surface without a colour, metal or black, tells nothing of the light on it.
-    light.iter_mut().zip(colour).for_each(|(light, &colour)| {
-        if colour < LEAST_COLOUR {
-            *light = f32::NAN;
+    let normals = traced.layer(Layer::Normal).ok_or("it was asked for")?;
+    // A surface without a colour, metal or black, tells nothing of the light on it; and where paths see several surfaces through one
+    // point, by lot, a cell shows one of them.
+    for ((light, colour), n) in light.chunks_exact_mut(3).zip(colour.chunks_exact(3)).zip(normals.chunks_exact(3)) {
+        let several = n.iter().map(|c| c * c).sum::<f32>() < ONE_SURFACE;
+        for (light, &colour) in light.iter_mut().zip(colour) {
+            if several || colour < LEAST_COLOUR {
+                *light = f32::NAN;
+            }
         }
-    });
+    }
     let noise = traced.noise_of(Layer::Gi).map_or([f64::NAN; 2], |n| [n.pixel, n.picture]);
     Ok((light, noise))
 }
