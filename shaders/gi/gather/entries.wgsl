@@ -66,8 +66,8 @@ fn entry_slot(hash: vec2u) -> u32 {
 }
 
 // Entries that one cell has at most, for places that do not see each other: both sides of a wall that stands
-// on a floor, the inside of a box.
-const ENTRY_ROOMS = 6u;
+// on a floor, the inside of a box. Rays that meet further places go on to others (look.wgsl).
+const ENTRY_ROOMS = 3u;
 // Both ends of the line that asks this are lifted by this share of the cell, so that it goes over what merely
 // lies there.
 const ENTRY_LIFT = 0.02;

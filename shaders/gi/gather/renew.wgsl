@@ -43,35 +43,46 @@ fn evict(@builtin(global_invocation_id) id: vec3u) {
     atomicStore(&entry_keys[slot], select(LEFT, 0u, next == 0u));
 }
 
-@compute @workgroup_size(64)
-fn renew(@builtin(global_invocation_id) id: vec3u) {
+// Slots that a workgroup looks after, and those among them whose entries send a ray. Of eight slots about one is in use: rays of
+// a list without gaps keep all lanes of a processor busy.
+const SLOTS_IN_GROUP = 256u;
+var<workgroup> listed: array<u32, SLOTS_IN_GROUP>;
+var<workgroup> in_list: atomic<u32>;
+
+// Takes note of who met the entry in the slot last; whether it has a place to send a ray from.
+fn begins(slot: u32) -> bool {
     let slots = gather.mask + 1u;
-    let slot = id.x;
-    if slot >= slots { return; }
+    if slot >= slots { return false; }
     let odd = (gather.round & 1u) * slots;
-    let even = slots - odd;
     let key = atomicLoad(&entry_keys[slot]);
     let lot = atomicLoad(&entry_lots[odd + slot]);
-    if key == 0u || key == LEFT { return; }
+    if key == 0u || key == LEFT { return false; }
     // Where rays begin, then and now.
-    let begins = gather.rays + 2u * slots + slot;
-    var begin = entry_queries[begins + even];
+    let places = gather.rays + 2u * slots + slot;
+    var begin = entry_queries[places + slots - odd];
     var asked = entry_asked[slot];
-    let now = gather.round + 1u;
     if lot != NONE {
         begin = entry_queries[lot & ((1u << lot_bits()) - 1u)];
-        asked = now;
+        asked = gather.round + 1u;
         atomicStore(&entry_lots[odd + slot], NONE);
     } else if asked == 0u {
         // Made in this very round.
-        return;
+        return false;
     }
     entry_asked[slot] = asked;
-    entry_queries[begins + odd] = begin;
+    entry_queries[places + odd] = begin;
+    return true;
+}
+
+fn send_of(slot: u32) {
+    let slots = gather.mask + 1u;
+    let odd = (gather.round & 1u) * slots;
+    let even = slots - odd;
+    let key = atomicLoad(&entry_keys[slot]);
+    let begin = entry_queries[gather.rays + 2u * slots + slot + odd];
     let before = entry_light[even + slot];
     let x = bitcast<vec3f>(begin.xyz);
     let n = unpack_normal(begin.w);
-    let count = u32(before.a);
     let shift = pcg3(vec3u(key, 0x7f4a7c15u, 3u));
     let d = cosine_direction(n, lattice(gather.round, shift.xy));
     let found = look(x, d, 0.0, max(dot(n, d), 1e-4), gather.rays + even + slot, key, gather.round + 1u, true);
@@ -83,4 +94,11 @@ fn renew(@builtin(global_invocation_id) id: vec3u) {
     let n_rays = min(before.a + 1.0, 4.0 * gather.entry_frames);
     let share = max(4.0 / (n_rays + 3.0), 1.0 / gather.entry_frames);
     entry_light[odd + slot] = vec4f(mix(before.rgb, finite3(light), share), n_rays);
+}
+
+@compute @workgroup_size(SLOTS_IN_GROUP)
+fn renew(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) index: u32) {
+    if begins(id.x) { listed[atomicAdd(&in_list, 1u)] = id.x; }
+    workgroupBarrier();
+    if index < atomicLoad(&in_list) { send_of(listed[index]); }
 }

@@ -4,7 +4,7 @@ use super::bring::Brought;
 use super::params::{self, Params};
 use super::pass::Groups;
 use super::store::{self, Store};
-use super::{GatherGi, HURRIED, HURRY, LOOKS, ROUNDS_YOUNG, STIR, YOUNG};
+use super::{GatherGi, HURRIED, HURRY, LOOKS, ROUNDS_YOUNG, SLOTS_IN_GROUP, STIR, YOUNG};
 use crate::gi::interface::{GiError, Inputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -165,12 +165,13 @@ impl GatherGi {
             (_, 0) => 1,
             _ => 2,
         };
+        let groups_of_slots = [self.options.slots.div_ceil(SLOTS_IN_GROUP), 1, 1];
         for round in 0..rounds {
             if round > 0 {
                 params.round += 1;
                 offset = self.params.write(queue, &params);
             }
-            self.renew.record(recorder, groups(offset), table(), slots);
+            self.renew.record(recorder, groups(offset), table(), groups_of_slots);
         }
         if inputs.specular.is_some() {
             let own = [&keys, &lots, &queries, &entry_light, &Bound::from(&store.mirrored), &specular, &motion];

@@ -80,6 +80,9 @@ const STORAGE_BUFFERS: u32 = 8;
 /// Rays of a cell of which nothing is remembered; `LOOKS` of `types.wgsl`.
 const LOOKS: u64 = 4;
 
+/// Slots that a workgroup of `gi.renew` looks after; `SLOTS_IN_GROUP` of `renew.wgsl`.
+const SLOTS_IN_GROUP: u32 = 256;
+
 /// Bytes of what a cell's ray found.
 const RECORD: u64 = 48;
 
