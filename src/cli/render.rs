@@ -341,7 +341,7 @@ fn film(
     Ok(())
 }
 
-/// Faults that can be told before anything is drawn.
+/// Faults that can be found before anything is drawn.
 fn check(args: &Args) -> Result<Format> {
     let path = &args.output;
     let format = Format::of(path, args.tonemap)?;

@@ -34,9 +34,9 @@ pub struct Args {
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
     if args.watch {
-        // Where one is told, else where the sources of this very program lie.
-        let told = std::env::var_os("BOUNCELIGHT_SHADERS").map(PathBuf::from);
-        let shaders = told.unwrap_or_else(|| std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"));
+        // The folder that is named, else where the sources of this very program lie.
+        let named = std::env::var_os("BOUNCELIGHT_SHADERS").map(PathBuf::from);
+        let shaders = named.unwrap_or_else(|| std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"));
         crate::gpu::shaders::read_from(Some(shaders).filter(|s| s.is_dir()));
     }
     let options = Options {

@@ -1,7 +1,7 @@
 //! What a network that filters learns from: what `gather` remembers of a view's cells at several moments of
 //! its settling, and the light that they are to show.
 
-use super::dataset::DatasetError;
+use super::error::DatasetError;
 use crate::{
     gi::{
         ExposurePass,

@@ -42,7 +42,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// What `bouncelight view` was told.
+/// Arguments of `bouncelight view`.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// A file, a bundled scene, `paper-room:INDEX` or `home:INDEX`; the bundled interior when absent.
@@ -113,7 +113,7 @@ pub enum ViewError {
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// [`ViewError`]. Bad scenes and weights are told in the window instead.
+/// [`ViewError`]. Bad scenes and weights are reported in the window instead.
 pub fn run(options: Options) -> Result<(), ViewError> {
     app::run(options)
 }

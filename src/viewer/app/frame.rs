@@ -2,6 +2,7 @@
 
 use super::App;
 use crate::gpu::{readback, timing::Recorder};
+use crate::viewer::command;
 use crate::viewer::screen::Acquired;
 use crate::viewer::state::Request;
 use std::path::Path;
@@ -256,7 +257,8 @@ impl App {
         for request in std::mem::take(&mut self.state.requests) {
             match request {
                 Request::Quit => self.quit(event_loop),
-                Request::Copy(text) => {
+                Request::CopyCommand => {
+                    let text = command::line(&self.state, None);
                     self.overlay.egui.copy_text(text.clone());
                     if let Some(screen) = self.screen.as_mut().filter(|_| self.script.is_none()) {
                         screen.input.set_clipboard_text(text.clone());
