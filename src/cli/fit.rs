@@ -2,11 +2,12 @@
 //! network that has learned the scene.
 
 use super::{
-    args::{Global, SceneArgs, usage},
+    args::{Global, usage},
     compare::shown_bytes,
     error::CliError,
     interrupt,
     progress::Progress,
+    scene_args::SceneArgs,
     stdout::say,
 };
 use crate::{

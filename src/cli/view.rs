@@ -7,7 +7,8 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, `home:INDEX`, or a bundled scene; the bundled interior when absent.
+    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, `home:INDEX`, or a bundled scene; the bundled interior
+    /// when absent.
     scene: Option<String>,
     /// Weights of `neural`; the shipped ones when absent.
     #[arg(long, value_name = "W")]

@@ -48,7 +48,8 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     Ok(())
 }
 
-/// Whether a file could be written to `path`, found out without touching it, so that long work can fail before it starts.
+/// Whether a file could be written to `path`, found out without touching it, so that long work can fail before
+/// it starts.
 ///
 /// # Errors
 /// The path is a folder, or its folder does not exist.

@@ -139,8 +139,8 @@ pub fn lesson(
     }))
 }
 
-/// The cameras of a pan that ends at `camera`: 0.2 to 2 degrees a frame about its vertical, up to 0.3 about its horizontal, and
-/// up to 0.04 metres of way, a frame.
+/// The cameras of a pan that ends at `camera`: 0.2 to 2 degrees a frame about its vertical, up to 0.3 about its
+/// horizontal, and up to 0.04 metres of way, a frame.
 fn pan(camera: &Camera, seed: u32) -> Vec<Camera> {
     let mut numbers = SplitMix::new(0x9a70_0000_0000 | u64::from(seed));
     let mut between = |low: f32, high: f32| low + (high - low) * numbers.next();

@@ -76,6 +76,8 @@ pub struct Options {
 /// What the window system says, without where in its library's sources it says so.
 fn window_reason(error: &impl std::fmt::Display) -> String {
     let text = error.to_string();
+    // A sentence goes on behind it.
+    let text = text.trim_end_matches('.').to_owned();
     match text.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")) {
         Some((line, reason)) if line.bytes().all(|b| b.is_ascii_digit()) => reason.to_owned(),
         _ => text,

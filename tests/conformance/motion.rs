@@ -49,7 +49,8 @@ pub fn features() -> Vec<Feature> {
         "extensions": {"KHR_animation_pointer": {"pointer": "/nodes/0/rotation"}}});
     animate(&mut pointer, target, "VEC4", "LINEAR", &[0.0, 1.0], &turns);
 
-    // One target moves the upper corners, the other the left ones; 0.5 of the first by the mesh, 1 of the second by time.
+    // One target moves the upper corners, the other the left ones; 0.5 of the first by the mesh, 1 of the
+    // second by time.
     let card = Shape::card(1);
     let mut morph = of(&card);
     let upper = morph.floats("VEC3", &[0.4, -0.6, 0.8, 0.4, -0.6, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);

@@ -213,8 +213,8 @@ impl App {
         drawn
     }
 
-    /// Measures the exposure, if that is wished: in the first frame of a scene, and again at rest whenever something else
-    /// than the camera has changed meanwhile.
+    /// Measures the exposure, if that is wished: in the first frame of a scene, and again at rest whenever
+    /// something else than the camera has changed meanwhile.
     fn expose(&mut self) {
         let (Some(stage), Some(shown)) = (&self.stage, &self.state.shown) else { return };
         let first = self.state.measured.is_none() && stage.still() > 0;
