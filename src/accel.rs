@@ -132,11 +132,6 @@ impl Accel {
         self.blocks.len()
     }
 
-    /// Inner nodes among the blocks.
-    pub fn node_count(&self) -> usize {
-        self.blocks.iter().filter(|b| b[3] & wide::NODE != 0).count()
-    }
-
     /// Leaves that hold a triangle or two.
     pub fn leaf_count(&self) -> usize {
         self.blocks.iter().filter(|b| b[3] & wide::NODE == 0 && b.iter().any(|w| *w != 0)).count()

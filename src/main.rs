@@ -6,7 +6,7 @@ fn main() -> std::process::ExitCode {
 }
 
 /// Without a display, Mesa's layer that asks the desktop for its preferred card only complains, on
-/// standard error and past every `-q`. It is told by its environment, which a running program
+/// standard error and past every `-q`. It reads this from its environment, which a running program
 /// cannot change safely: the program starts anew with it.
 #[cfg(target_os = "linux")]
 fn quiet_mesa() {

@@ -18,7 +18,7 @@ fn usage_errors_exit_with_2() {
     let out = path(&dir, "x.png");
     fails(&["render", "interior", "-o", &out, "--size", "0x0"], 2, &["--size", "at least 1"]);
     fails(&["render", "interior", "-o", &out, "--size", "12"], 2, &["1024x512"]);
-    fails(&["render", "interior", "-o", &out, "--size", "-1x5"], 2, &["--size", "-1x5"]);
+    fails(&["render", "interior", "-o", &out, "--size", "-1x5"], 2, &["--size", "-1x5", "`-1` is no number of pixels"]);
     fails(&["render", "interior", "-o", &out, "--eye", "1,2,3"], 2, &["--look-at"]);
     fails(&["render", "interior", "-o", &out, "--eye", "1,2,3", "--look-at", "1,2,3"], 2, &["same point"]);
     fails(&["render", "interior", "-o", &out, "--camera", "99"], 2, &["--camera 99"]);

@@ -234,8 +234,8 @@ fn layers_agree_with_the_reference_renders() {
     }
 }
 
-/// What the default of eight samples leaves of a hotel's carpet is 0.0123, so these have 16. Cycles counts the sky's own
-/// light as direct; up to that much may lack.
+/// What the default of eight samples leaves of a hotel's carpet is 0.0123, so these have 16. Cycles counts the
+/// sky's own light as direct; up to that much may lack.
 #[test]
 fn real_scenes_have_the_colours_and_the_direct_light_of_cycles() {
     let Some(gpu) = common::gpu() else { return };

@@ -9,7 +9,7 @@ use bouncelight::gi::fitted::Fitted;
 use bouncelight::gi::name::MethodName;
 use bouncelight::net::format::Weights;
 use bouncelight::scene::{Scene, export};
-use bouncelight::study::fit::{Fit, FitOptions, Rung, Verdict, fit};
+use bouncelight::study::fit::{Candidate, Fit, FitOptions, Verdict, fit};
 use bouncelight::study::trial::{Trial, TrialOptions};
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -57,11 +57,11 @@ fn an_open_scene_under_an_even_sky_ends_at_ambient() {
     let found = fitted(&gpu, open(), &asked);
     let row = found.choice();
     println!("{}\n{}", found.table(&asked), found.why(&asked));
-    assert!(found.reached && matches!(row.rung, Rung::Ambient(_)) && row.worst <= 0.12, "{row:?}");
+    assert!(found.reached && matches!(row.candidate, Candidate::Ambient(_)) && row.worst <= 0.12, "{row:?}");
     assert!(found.floor() <= 0.25 * 0.12 * 1.05, "the reference is as good as the target needs: {}", found.floor());
     // What is dearer was not drawn; what is cheaper was, and was not enough.
     let verdict =
-        |name| found.rows.iter().filter(|r| r.rung.method_name() == name).map(|r| r.verdict).collect::<Vec<_>>();
+        |name| found.rows.iter().filter(|r| r.candidate.method_name() == name).map(|r| r.verdict).collect::<Vec<_>>();
     assert_eq!(verdict(MethodName::Direct), [Verdict::TooFar]);
     assert!(
         [MethodName::Ssgi, MethodName::Gather].iter().all(|m| verdict(*m).iter().all(|v| *v == Verdict::NotNeeded))
@@ -77,22 +77,30 @@ fn a_room_in_the_sun_needs_more_and_a_budget_says_how_much_it_gets() {
     println!("{}\n{}", found.table(&asked), found.why(&asked));
     let row = found.choice();
     // Negative control of the test above: the same search does not always end there.
-    assert!(found.reached && matches!(row.rung, Rung::Ssgi(_)) && asked.yardstick.is_met(row.worst), "{row:?}");
+    assert!(
+        found.reached && matches!(row.candidate, Candidate::Ssgi(_)) && asked.yardstick.is_met(row.worst),
+        "{row:?}"
+    );
     let worst = |at: usize| {
-        let ambient = found.rows.iter().filter(|r| matches!(r.rung, Rung::Ambient(_)));
+        let ambient = found.rows.iter().filter(|r| matches!(r.candidate, Candidate::Ambient(_)));
         ambient.map(|r| (r.verdict, r.worst)).nth(at).expect("the usual numbers and the room's own were tried")
     };
     let (usual, own) = (worst(0), worst(1));
     assert!(usual.0 == Verdict::TooFar && own.0 == Verdict::TooFar && own.1 < usual.1, "{usual:?} {own:?}");
     // Within a budget that `ssgi` exceeds, the nearest is taken and said not to be enough.
-    let cost = |found: &Fit, method| found.rows.iter().find(|r| r.rung.method_name() == method).and_then(|r| r.cost_ms);
+    let cost =
+        |found: &Fit, method| found.rows.iter().find(|r| r.candidate.method_name() == method).and_then(|r| r.cost_ms);
     let ambient = cost(&found, MethodName::Ambient).expect("costed");
     assert!(cost(&found, MethodName::Ssgi).is_some_and(|c| c > 1.01 * ambient));
     let poor = options("light=16%", Some(1.01 * ambient));
     let found = fitted(&gpu, room, &poor);
-    assert!(!found.reached && matches!(found.choice().rung, Rung::Ambient(_)), "{:?}", found.choice().rung);
+    assert!(
+        !found.reached && matches!(found.choice().candidate, Candidate::Ambient(_)),
+        "{:?}",
+        found.choice().candidate
+    );
     assert!((found.choice().worst - own.1).abs() < 0.02 * own.1);
-    let dear = found.rows.iter().find(|r| matches!(r.rung, Rung::Gather(_))).expect("listed");
+    let dear = found.rows.iter().find(|r| matches!(r.candidate, Candidate::Gather(_))).expect("listed");
     assert!(dear.verdict == Verdict::TooDear && dear.errors.is_empty());
     assert!(found.why(&poor).contains("out of reach within the budget"), "{}", found.why(&poor));
 }

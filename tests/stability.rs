@@ -1,4 +1,4 @@
-//! `bouncelight stability`: tests that the truth passes and its spoilt twin fails, verdicts,
+//! `bouncelight stability`: tests that the truth passes and its spoilt copy fails, verdicts,
 //! record, page, pictures, exit codes.
 #![cfg(feature = "cli")]
 

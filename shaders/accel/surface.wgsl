@@ -2,7 +2,7 @@
 //#import lib/octahedral.wgsl
 
 // What rays know of triangles: colours averaged over each, and the triangles that glow.
-// `accel::surfaces` and `accel::emitters` are the Rust side. Whoever joins this file binds
+// `accel::surfaces` and `accel::emitters` are the Rust side. The shader that imports this file binds
 // `surfaces: array<vec4u>`, `emitters: array<Emitter>` and `corner_normals: texture_2d<u32>`, a
 // texel for each triangle.
 

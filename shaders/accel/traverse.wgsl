@@ -2,7 +2,7 @@
 // of a block's words. A leaf may be an instance: the walk then goes on in that mesh's own tree, in
 // the mesh's own space, and comes back.
 
-// Whoever joins this file binds the blocks as `accel_blocks: texture_2d<u32>`.
+// The shader that imports this file binds the blocks as `accel_blocks: texture_2d<u32>`.
 
 const STACK_SIZE = 32u;
 const NO_TRIANGLE = 0xffffffffu;

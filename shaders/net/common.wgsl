@@ -1,4 +1,4 @@
-// What every kernel of a network is told. Tensors are NHWC, four channels a vector, inside one
+// Uniforms of every kernel of a network. Tensors are NHWC, four channels a vector, inside one
 // arena whose first vectors are zero: a tap outside the picture reads there, so inner loops have no
 // branch.
 

@@ -1,6 +1,6 @@
-//! Trees of meshes that deform: the tree that was built stays, its boxes follow the vertices (Lauterbach et al.,
-//! "RT-DEFORM: Interactive Ray Tracing of Dynamic Scenes using BVHs", RT 2006). Hits are those of a tree built anew; what
-//! a far pose costs is looser boxes.
+//! Trees of meshes that deform: the tree that was built stays, its boxes follow the vertices (Lauterbach et
+//! al., "RT-DEFORM: Interactive Ray Tracing of Dynamic Scenes using BVHs", RT 2006). Hits are those of a tree
+//! built anew; what a far pose costs is looser boxes.
 
 use super::wide::{self, Block, NODE};
 use super::{MAX_COORDINATE, surfaces};

@@ -86,8 +86,8 @@ pub(crate) struct MeshPart {
 }
 
 impl MeshPart {
-    /// Of a mesh of `scene`, and of how it deforms, if it does. One that disagrees in itself is not met: the upload of the
-    /// picture's part refuses it.
+    /// Of a mesh of `scene`, and of how it deforms, if it does. One that disagrees in itself is not met: the
+    /// upload of the picture's part refuses it.
     pub fn new(scene: &Scene, mesh: &Mesh, reductions: &Reductions, deform: Option<&Deform>) -> Self {
         if mesh.check(scene.materials.len()).is_err() {
             return Self::default();

@@ -2,8 +2,9 @@
 
 use super::stdout::say;
 use super::{
-    args::{Global, MethodName, PrecisionName, SceneArgs, replaced, usage},
+    args::{Global, MethodName, PrecisionName, replaced, usage},
     error::CliError,
+    scene_args::SceneArgs,
 };
 use crate::{
     gi::{Method, technique::Cost},

@@ -230,7 +230,7 @@ impl Shown {
         })
     }
 
-    /// A picture to judge a rendering of `size` pixels by. What makes that impossible is told here,
+    /// A picture to judge a rendering of `size` pixels by. What makes that impossible is reported here,
     /// before the rendering.
     pub fn reference(path: &Path, tonemap: Tonemap, ev: f32, size: [u32; 2], metric: &str) -> Result<Self> {
         let shown = Self::read(path, tonemap, ev)?;

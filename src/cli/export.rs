@@ -1,6 +1,7 @@
 //! `export`: what another host needs to run the pass itself.
 
-use super::args::{Global, MethodName, MethodParser, SceneArgs, usage};
+use super::args::{Global, MethodName, MethodParser, usage};
+use super::scene_args::SceneArgs;
 use super::stdout::say;
 use crate::export::{self, ExportError, Target};
 use anyhow::Result;

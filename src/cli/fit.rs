@@ -2,11 +2,12 @@
 //! network that has learned the scene.
 
 use super::{
-    args::{Global, SceneArgs, usage},
+    args::{Global, usage},
     compare::shown_bytes,
     error::CliError,
     interrupt,
     progress::Progress,
+    scene_args::SceneArgs,
     stdout::say,
 };
 use crate::{
@@ -277,8 +278,8 @@ fn report(folder: &Path, heading: &str, found: &Fit, options: &FitOptions, fitte
         page += &format!("![reference]({name})\n*reference: {fewest} to {most} samples a pixel*\n");
         for (number, row) in found.rows.iter().enumerate() {
             let Some(rgb) = row.pictures.get(i) else { continue };
-            let title = row.rung.name(&options.networks);
-            let name = format!("view{i}_{number}_{}.png", row.rung.method_name().name());
+            let title = row.candidate.name(&options.networks);
+            let name = format!("view{i}_{number}_{}.png", row.candidate.method_name().name());
             picture(&name, reference.size, rgb)?;
             page += &format!("\n![{title}]({name})\n*{title}: {}*\n", options.yardstick.show(row.errors[i]));
         }

@@ -21,6 +21,7 @@ mod log;
 mod progress;
 mod reference;
 mod render;
+mod scene_args;
 mod sequence;
 mod showing;
 mod stability;

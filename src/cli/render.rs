@@ -1,13 +1,15 @@
 //! `bouncelight render`: one picture of a scene, as PNG through a view transform or as EXR with layers.
 
 use super::{
-    args::{Global, MethodName, MethodParser, SceneArgs, usage},
+    args::{Global, MethodName, MethodParser, usage},
     compare::{Heat, Shown},
     drawn::{Drawn, Format, parse_layers},
     error::CliError,
     interrupt,
     progress::Progress,
-    reference, sequence,
+    reference,
+    scene_args::SceneArgs,
+    sequence,
     showing::Showing,
 };
 use crate::{
@@ -46,8 +48,8 @@ pub struct Args {
     weights: Option<PathBuf>,
     #[command(flatten)]
     fitted: super::fitted::Flag,
-    /// Jittered frames that are averaged through Cycles' pixel filter; 1 is the raw frame. When absent: 8; 1 with --aov,
-    /// with --taa, for frames of a sequence, and for the first frame after a cut (--gi-frames 1).
+    /// Jittered frames that are averaged through Cycles' pixel filter; 1 is the raw frame. When absent: 8; 1
+    /// with --aov, with --taa, for frames of a sequence, and for the first frame after a cut (--gi-frames 1).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     samples: Option<u32>,
     /// Real-time anti-aliasing over this many frames before the one that is written.
@@ -341,7 +343,7 @@ fn film(
     Ok(())
 }
 
-/// Faults that can be told before anything is drawn.
+/// Faults that can be found before anything is drawn.
 fn check(args: &Args) -> Result<Format> {
     let path = &args.output;
     let format = Format::of(path, args.tonemap)?;

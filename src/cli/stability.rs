@@ -72,7 +72,7 @@ impl Args {
     }
 }
 
-/// The method that `render` draws with unless told.
+/// The method that `render` draws with by default.
 const DEFAULT: MethodName = MethodName::Gather;
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
@@ -190,7 +190,7 @@ fn list(test: &stability::Test) {
 fn tell(finding: &Finding) {
     say!("{}: {}", finding.name, finding.question);
     if !finding.sound {
-        let why = finding.unsound.as_deref().unwrap_or("the truth fails it, or its spoilt twin passes");
+        let why = finding.unsound.as_deref().unwrap_or("the truth fails it, or its spoilt copy passes");
         say!("  this test says nothing here: {why}");
     }
     for (i, criterion) in finding.criteria.iter().enumerate() {

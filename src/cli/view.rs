@@ -7,7 +7,8 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, `home:INDEX`, or a bundled scene; the bundled interior when absent.
+    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, `home:INDEX`, or a bundled scene; the bundled interior
+    /// when absent.
     scene: Option<String>,
     /// Weights of `neural`; the shipped ones when absent.
     #[arg(long, value_name = "W")]
@@ -34,9 +35,9 @@ pub struct Args {
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
     if args.watch {
-        // Where one is told, else where the sources of this very program lie.
-        let told = std::env::var_os("BOUNCELIGHT_SHADERS").map(PathBuf::from);
-        let shaders = told.unwrap_or_else(|| std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"));
+        // The folder that is named, else where the sources of this very program lie.
+        let named = std::env::var_os("BOUNCELIGHT_SHADERS").map(PathBuf::from);
+        let shaders = named.unwrap_or_else(|| std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"));
         crate::gpu::shaders::read_from(Some(shaders).filter(|s| s.is_dir()));
     }
     let options = Options {

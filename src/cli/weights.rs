@@ -167,7 +167,7 @@ fn convert_file(args: &ConvertArgs) -> Result<()> {
 
 fn info(weights: &Weights, size: [u32; 2]) -> Result<()> {
     let cells = size.map(|n| n.div_ceil(weights.cell));
-    // Whatever the size, it can be told what it takes.
+    // What it takes is known for any size.
     let plan = Plan::with(&weights.graph, cells[0], cells[1], &Options { limit: u64::MAX, ..Default::default() })?;
     let [width, height] = plan.inner;
     let features: Vec<_> =

@@ -383,7 +383,7 @@ impl Package {
     }
 }
 
-/// Whether [`Package::write`] would take `folder`, told before any work.
+/// Whether [`Package::write`] would take `folder`, found out before any work.
 ///
 /// # Errors
 /// [`ExportError::Folder`].

@@ -130,7 +130,7 @@ pub fn read_exr(path: &Path) -> Result<Layers, ImageError> {
     Ok(Layers { path: path.into(), width, height, layers, metadata: metadata.into_iter().collect() })
 }
 
-/// What can be told before pixels are decoded: size, and whether all parts have the same one.
+/// What is known before pixels are decoded: size, and whether all parts have the same one.
 fn check_headers(path: &Path, meta: &MetaData) -> Result<(u32, u32), ImageError> {
     let first = meta.headers.first().ok_or_else(|| ImageError::broken(path, "EXR", "it has no parts"))?;
     let Vec2(width, height) = first.layer_size;

@@ -48,7 +48,8 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     Ok(())
 }
 
-/// Whether a file could be written to `path`, told without touching it, so that long work can fail before it starts.
+/// Whether a file could be written to `path`, found out without touching it, so that long work can fail before
+/// it starts.
 ///
 /// # Errors
 /// The path is a folder, or its folder does not exist.
@@ -71,20 +72,20 @@ pub(crate) const MAX_BYTES: u64 = u32::MAX as u64;
 /// # Errors
 /// The system's, or one of kind `InvalidInput` with a sentence.
 pub(crate) fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
-    let told = |text: String| std::io::Error::new(std::io::ErrorKind::InvalidInput, text);
+    let refused = |text: String| std::io::Error::new(std::io::ErrorKind::InvalidInput, text);
     // Asked before it is opened: opening a pipe waits for a writer.
     let about = std::fs::metadata(path)?;
     if !about.is_file() {
-        return Err(told("is no regular file but a folder, device or pipe".to_owned()));
+        return Err(refused("is no regular file but a folder, device or pipe".to_owned()));
     }
     if about.len() > MAX_BYTES {
-        return Err(told(format!("has {} bytes; at most {MAX_BYTES} are read", about.len())));
+        return Err(refused(format!("has {} bytes; at most {MAX_BYTES} are read", about.len())));
     }
     let mut bytes = Vec::with_capacity(about.len() as usize);
     // Files that grow while they are read, and some that have no honest size.
     std::fs::File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > MAX_BYTES {
-        return Err(told(format!("has more than {MAX_BYTES} bytes")));
+        return Err(refused(format!("has more than {MAX_BYTES} bytes")));
     }
     Ok(bytes)
 }

@@ -1,4 +1,4 @@
-//! How much noise is left, told from the difference of two independent halves, and when that is little enough.
+//! How much noise is left, estimated from the difference of two independent halves, and when that is little enough.
 //!
 //! The halves' means a and b are independent estimates of one number from n_a and n_b samples, so
 //! (a − b)² · n_a·n_b / (n_a + n_b)² is an unbiased estimate of the variance of their common mean,
@@ -11,7 +11,7 @@ pub struct Noise {
     /// Mean of the layer over points and channels.
     pub mean: f64,
     /// Root mean square error of a pixel, divided by `mean`. 0 where there is none at all, infinite
-    /// where it cannot be told.
+    /// where it cannot be estimated.
     pub pixel: f64,
     /// What `pixel` is at most, two standard errors of its own estimate away.
     pub pixel_at_most: f64,

@@ -8,7 +8,7 @@ use super::{
 /// Depth where nothing was hit, as Blender writes it, metres.
 pub const NO_DEPTH: f32 = 1e10;
 
-/// Layers whose noise is told.
+/// Layers whose noise is reported.
 pub const JUDGED: [Layer; 3] = [Layer::Combined, Layer::DiffInd, Layer::Gi];
 
 /// Layers of a picture or of a list of points, with their noise.

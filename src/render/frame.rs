@@ -1,4 +1,4 @@
-//! The frame, told in order: deform → shadow → gbuffer (→ lights) → direct → indirect → glossy → composite → blended
+//! The frame, pass by pass: deform → shadow → gbuffer (→ lights) → direct → indirect → glossy → composite → blended
 //! (→ taa). A display adds
 //! `tonemap` after it.
 

@@ -19,11 +19,11 @@
 //! | `indirect_specular` | `Rgba16Float` | radiance of the specular lobe under sky and bounces, W/(m²·sr) | 0 |
 //! | `hdr` | `Rgba16Float` | the picture: radiance, W/(m²·sr); a: 1 | the environment |
 //!
-//! The five colour attachments take exactly the 32 bytes a sample that WebGPU grants by default.
-//! Unlit materials have albedo and F0 of 0 and their colour in `emissive`. Motion vectors know
-//! where the camera was and where each object and each deforming vertex was ([`moved`](super::moved),
-//! [`deform`](super::deform)); they do not know of lights, nor of textures that move. The background's are 0 whatever the camera does: it follows
-//! from the view alone.
+//! The five colour attachments take exactly the 32 bytes a sample that WebGPU grants by default. Unlit
+//! materials have albedo and F0 of 0 and their colour in `emissive`. Motion vectors know where the camera was
+//! and where each object and each deforming vertex was ([`moved`](super::moved), [`deform`](super::deform));
+//! they do not know of lights, nor of textures that move. The background's are 0 whatever the camera does: it
+//! follows from the view alone.
 
 use super::blended::Blending;
 use super::cull::{Count, Volume};

@@ -15,9 +15,9 @@ use glam::Vec3;
 pub struct LightOptions {
     /// From so many lights on, tiles of 16×16 pixels have lists of those that can reach them.
     pub tiled_from: u32,
-    /// Of nine lights and more, lamps are left out where they are too far away to count: at any place, all that are left
-    /// out there would add up to no more than this share of the view's irradiance (geometric mean over where surfaces
-    /// may be, shadows not counted). 0 leaves none out.
+    /// Of nine lights and more, lamps are left out where they are too far away to count: at any place, all that
+    /// are left out there would add up to no more than this share of the view's irradiance (geometric mean over
+    /// where surfaces may be, shadows not counted). 0 leaves none out.
     ///
     /// 1/1024: with an exposure that shows the mean as middle grey (0.18) that is a radiance of 0.0002, and a step of 8
     /// bits above black is 0.0003.

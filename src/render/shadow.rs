@@ -9,34 +9,12 @@
 
 use super::cull::{Count, DrawnCount, Volume};
 use super::shadow_kept::Kept;
-pub use super::shadow_maps::ShadowMaps;
 use super::shadow_maps::{Audience, CAMERA_STRIDE};
+pub use super::shadow_maps::{MAX_LOCAL_LAYERS, MAX_SUNS, ShadowMaps, ShadowOptions};
 pub use super::shadow_view::ShadowViewGpu;
 use super::tool;
 use crate::gpu::{shaders, timing::Recorder};
 use crate::scene::upload::{SceneGpu, attribute_layouts, material_layout, position_layouts};
-
-/// Suns that cast shadows.
-pub const MAX_SUNS: u32 = 4;
-/// Maps that point and spot lights share.
-pub const MAX_LOCAL_LAYERS: u32 = 96;
-
-/// Sizes of shadow maps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ShadowOptions {
-    /// Side of a cascade's map for a single sun, texels; several suns get half. From 64 to 4096.
-    pub sun_size: u32,
-    /// Cascades a sun, 1 to 4.
-    pub cascades: u32,
-    /// Side of a local light's map, texels; many lights get half. From 64 to 2048.
-    pub local_size: u32,
-}
-
-impl Default for ShadowOptions {
-    fn default() -> Self {
-        Self { sun_size: 2048, cascades: 4, local_size: 1024 }
-    }
-}
 
 /// Draws depth from the lights.
 pub struct ShadowPass {

@@ -1,7 +1,6 @@
 //! The shadow maps of a scene: who has which, and what each sees.
 
 use super::light_choice::{Estimate, FEW, LightOptions, LightShadowGpu, NO_END, choose};
-use super::shadow::{MAX_LOCAL_LAYERS, MAX_SUNS, ShadowOptions};
 use super::shadow_kept::Kept;
 use super::shadow_sun::{self, Stage};
 use super::shadow_view::ShadowViewGpu;
@@ -10,6 +9,28 @@ use super::{cull::Volume, shadow_local};
 use crate::scene::upload::{LightGpu, SceneGpu, fits_one_map};
 use crate::scene::{Light, LightKind};
 use glam::Vec3;
+
+/// Suns that cast shadows.
+pub const MAX_SUNS: u32 = 4;
+/// Maps that point and spot lights share.
+pub const MAX_LOCAL_LAYERS: u32 = 96;
+
+/// Sizes of shadow maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShadowOptions {
+    /// Side of a cascade's map for a single sun, texels; several suns get half. From 64 to 4096.
+    pub sun_size: u32,
+    /// Cascades a sun, 1 to 4.
+    pub cascades: u32,
+    /// Side of a local light's map, texels; many lights get half. From 64 to 2048.
+    pub local_size: u32,
+}
+
+impl Default for ShadowOptions {
+    fn default() -> Self {
+        Self { sun_size: 2048, cascades: 4, local_size: 1024 }
+    }
+}
 
 /// Spacing of the cameras in their uniform buffer: the largest alignment a device may ask for.
 pub(super) const CAMERA_STRIDE: u64 = 256;
@@ -75,7 +96,7 @@ pub struct ShadowMaps {
     pub(super) group: wgpu::BindGroup,
     pub(super) camera_bytes: Vec<u8>,
     of_light: Vec<LightShadowGpu>,
-    told: bool,
+    warned: bool,
     /// All cascades.
     pub sun_view: wgpu::TextureView,
     /// All local maps.
@@ -157,7 +178,7 @@ impl ShadowMaps {
             held: vec![Vec::new(); lights],
             camera_bytes: vec![0; layers.len() * CAMERA_STRIDE as usize],
             of_light: Vec::with_capacity(lights),
-            told: false,
+            warned: false,
             plan,
             sun,
             local,
@@ -197,7 +218,7 @@ impl ShadowMaps {
         let (suns, locals) = (group(true, plan.sun_layers), group(false, plan.local_layers));
         let chosen: Vec<bool> = suns.iter().zip(&locals).map(|(a, b)| *a || *b).collect();
         self.hold(&chosen);
-        if scarce && !std::mem::replace(&mut self.told, true) {
+        if scarce && !std::mem::replace(&mut self.warned, true) {
             self.tell(scene, &counts);
         }
         self.fit(scene, view);

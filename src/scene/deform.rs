@@ -181,7 +181,8 @@ impl Deform {
                 let [r0, r1, r2] = self.blended(v);
                 p = Vec3::new(r0.dot(p.extend(1.0)), r1.dot(p.extend(1.0)), r2.dot(p.extend(1.0)));
                 let [r0, r1, r2] = [r0, r1, r2].map(Vec4::truncate);
-                // The cofactor matrix is the inverse transpose times the determinant: right for normals, never singular.
+                // The cofactor matrix is the inverse transpose times the determinant: right for normals, never
+                // singular.
                 let (c0, c1, c2) = (r1.cross(r2), r2.cross(r0), r0.cross(r1));
                 let mirror = if r0.dot(c0) < 0.0 { -1.0 } else { 1.0 };
                 n = Vec3::new(c0.dot(n), c1.dot(n), c2.dot(n)) * mirror;

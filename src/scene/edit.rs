@@ -89,7 +89,8 @@ pub enum EditError {
 }
 
 impl LightEdit {
-    /// What has to be said to add `light` as number `index`, which is as [`NewLight`] has it but for what can be changed.
+    /// What has to be said to add `light` as number `index`, which is as [`NewLight`] has it but for what can
+    /// be changed.
     pub fn added(index: usize, light: &Light) -> Self {
         let kind = match light.kind {
             LightKind::Directional { .. } => NewLight::Sun,

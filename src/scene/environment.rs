@@ -77,7 +77,7 @@ impl Environment {
     }
 
     /// Reads a Radiance HDR or an EXR picture. Single texels that no light can have are mended,
-    /// which is told in a sentence: overflown ones get the largest radiance that there is, negative
+    /// which one sentence reports: overflown ones get the largest radiance that there is, negative
     /// ones and such that are no numbers none.
     ///
     /// # Errors

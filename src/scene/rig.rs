@@ -187,8 +187,8 @@ impl Scene {
         known
     }
 
-    /// As [`Scene::pose`], but leaves the vertices of [`Scene::meshes`] where they are: what the GPU and rays need is in
-    /// [`Scene::deforms`]. For whoever draws one frame after the other.
+    /// As [`Scene::pose`], but leaves the vertices of [`Scene::meshes`] where they are: what the GPU and rays
+    /// need is in [`Scene::deforms`]. For whoever draws one frame after the other.
     pub fn pose_parts(&mut self, animation: usize, time: f32) -> bool {
         let Some(pose) = self.rig.as_ref().and_then(|rig| rig.pose(animation, time)) else { return false };
         self.instances.iter_mut().zip(pose.instances).for_each(|(instance, transform)| instance.transform = transform);

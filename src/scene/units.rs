@@ -44,7 +44,7 @@ impl Units {
     }
 }
 
-/// What has a longer side than this many metres, or a shorter one, is told to have a strange unit.
+/// What has a longer side than this many metres, or a shorter one, gets a warning about its unit.
 const STRANGE: [f32; 2] = [0.005, 1000.0];
 
 /// Says so where a file is so large or so small that its unit may be no metre and nobody has said what it is.

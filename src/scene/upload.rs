@@ -270,9 +270,9 @@ impl SceneGpu {
         Ok(())
     }
 
-    /// Takes over the placements of `scene` and how its meshes are deformed; instances, meshes and materials are those that
-    /// were uploaded. The next frame of each renderer has motion vectors for what is elsewhere than
-    /// in its last one.
+    /// Takes over the placements of `scene` and how its meshes are deformed; instances, meshes and materials
+    /// are those that were uploaded. The next frame of each renderer has motion vectors for what is elsewhere
+    /// than in its last one.
     pub fn set_placements(&mut self, queue: &wgpu::Queue, scene: &Scene) {
         let pose = pose_of(&scene.deforms);
         let deformed = pose.len() == self.pose.len() && pose != self.pose;

@@ -1,41 +1,21 @@
 //! One training sample: what the network is fed for a view, with the raw G-buffer values at the
 //! same sample points.
 
+pub use super::error::DatasetError;
 use super::guides::Guides;
 use crate::{
     gi::{
+        cpu::oct_decode,
         features::FeatureSet,
         inputs::sample_pixel,
         pack::{NetworkInputs, read_features},
     },
     gpu::{Gpu, readback, timing::Recorder},
-    render::{RenderError, Renderer, View},
+    render::{Renderer, View},
     scene::{Camera, upload::SceneGpu},
 };
 use half::f16;
 use safetensors::{Dtype, tensor::TensorView};
-use thiserror::Error;
-
-/// Why a sample could not be made.
-#[derive(Debug, Error)]
-pub enum DatasetError {
-    /// The frame could not be drawn.
-    #[error(transparent)]
-    Render(#[from] RenderError),
-    /// The GPU did not give the data.
-    #[error(transparent)]
-    Readback(#[from] readback::ReadbackError),
-    /// The GI pass did not give its inputs.
-    #[error(transparent)]
-    Gi(#[from] crate::gi::GiError),
-    /// The path tracer failed.
-    #[cfg(feature = "reference")]
-    #[error(transparent)]
-    Tracer(#[from] crate::reference::TracerError),
-    /// Serialisation failed.
-    #[error("cannot serialise the sample: {0}")]
-    Serialize(String),
-}
 
 /// What belongs to one view, at the network's resolution. Planes are `[channel][row][column]`.
 #[derive(Debug, Clone)]
@@ -108,7 +88,7 @@ pub fn frame(
         direct: cells
             .pick(&read(&targets.direct_diffuse.texture)?, |b: [u8; 8]| [half(&b), half(&b[2..]), half(&b[4..])]),
         albedo: cells.pick(&read(&targets.albedo.texture)?, |b: [u8; 4]| [srgb(b[0]), srgb(b[1]), srgb(b[2])]),
-        normal: cells.pick(&read(&targets.normal.texture)?, |b: [u8; 4]| octahedral(half(&b), half(&b[2..]))),
+        normal: cells.pick(&read(&targets.normal.texture)?, |b: [u8; 4]| oct_decode([half(&b), half(&b[2..])])),
         depth: depth.into_iter().map(|d| if d > 0.0 { camera.near / d } else { 0.0 }).collect(),
         inputs,
         guides: None,
@@ -201,12 +181,4 @@ impl Cells {
 /// Linear value of an sRGB byte (IEC 61966-2-1).
 fn srgb(byte: u8) -> f32 {
     crate::srgb::decode(f32::from(byte) / 255.0)
-}
-
-/// Unit vector from octahedral coordinates, as `oct_decode` in shaders/lib/octahedral.wgsl.
-pub(super) fn octahedral(x: f32, y: f32) -> [f32; 3] {
-    let z = 1.0 - x.abs() - y.abs();
-    let t = (-z).max(0.0);
-    let fold = |v: f32| if v >= 0.0 { v - t } else { v + t };
-    glam::Vec3::new(fold(x), fold(y), z).normalize().into()
 }

@@ -1,7 +1,8 @@
 //! What a training sample holds at full resolution, on request: guides for the way back from cells
 //! to pixels, and all that puts the picture together again once the light is known.
 
-use super::dataset::{DatasetError, octahedral};
+use super::error::DatasetError;
+use crate::gi::cpu::oct_decode;
 use crate::{
     gpu::{Gpu, readback},
     render::Targets,
@@ -54,7 +55,7 @@ impl Guides {
             .chunks_exact(2)
             .enumerate()
             .map(|(i, n)| {
-                let n = octahedral(n[0].to_f32(), n[1].to_f32());
+                let n = oct_decode([n[0].to_f32(), n[1].to_f32()]);
                 if on_surface(i) { n.map(f16::from_f32) } else { [f16::ZERO; 3] }
             })
             .collect();

@@ -4,6 +4,7 @@ pub mod bench;
 #[cfg(feature = "chart")]
 pub mod chart;
 pub mod dataset;
+mod error;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod fit;
 pub mod guides;

@@ -6,7 +6,7 @@
 //! in the mean must not be learnt from the scenes that happen to be shown; and a ray that ends in the cache has a
 //! tenth of the noise of a path.
 
-use super::dataset::DatasetError;
+use super::error::DatasetError;
 use crate::{
     accel::luminance,
     gi::{
@@ -151,8 +151,8 @@ fn noise_of(past: &[f32], count: usize) -> f32 {
     if sum > 0.0 { ((error / cells).sqrt() / (sum / cells)) as f32 } else { f32::INFINITY }
 }
 
-/// The cameras of a pan that ends at `camera`, those of the rest before it first: 0.2 to 2 degrees a frame about its vertical, up to 0.3 about its horizontal, and
-/// up to 0.04 metres of way, a frame.
+/// The cameras of a pan that ends at `camera`, those of the rest before it first: 0.2 to 2 degrees a frame about its
+/// vertical, up to 0.3 about its horizontal, and up to 0.04 metres of way, a frame.
 fn pan(camera: &Camera, seed: u32) -> Vec<Camera> {
     let mut numbers = SplitMix::new(0x9a70_0000_0000 | u64::from(seed));
     let mut between = |low: f32, high: f32| low + (high - low) * numbers.next();

@@ -1,7 +1,7 @@
 //! What a network learns: the light that a GI method must add, path-traced at the very points that
 //! its cells look at.
 
-use super::dataset::DatasetError;
+use super::error::DatasetError;
 use crate::{
     gi::inputs::{cells_of, sample_pixel},
     gpu::Gpu,

@@ -4,29 +4,24 @@
 mod samples;
 mod shot;
 
+pub use super::error::TrialError;
 use super::{
-    bench::{self, BenchError, BenchOptions, Measurement},
-    dataset::DatasetError,
+    bench::{self, BenchOptions, Measurement},
     hash, truth,
     truth::Reference,
 };
 use crate::{
     gi::Method,
     gpu::Gpu,
-    image_io::ImageError,
-    reference::{Kernel, PackError, ReferenceScene, TracerError, TracerOptions},
+    reference::{Kernel, ReferenceScene, TracerOptions},
     render::{
-        Blending, RenderError, Renderer, RendererOptions,
+        Blending, Renderer, RendererOptions,
         capture::{CaptureOptions, Layer, capture_with},
     },
-    scene::{
-        Camera, Scene,
-        upload::{SceneGpu, UploadError},
-    },
+    scene::{Camera, Scene, upload::SceneGpu},
 };
 pub use shot::{Edits, FrameChange, Settling, Shot};
 use std::path::PathBuf;
-use thiserror::Error;
 
 /// Layers of every [`Shot`] unless others are asked for.
 pub const LAYERS: [Layer; 6] =
@@ -52,43 +47,7 @@ impl Default for TrialOptions {
     }
 }
 
-/// Why a trial failed.
-#[derive(Debug, Error)]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
-pub enum TrialError {
-    /// The scene does not fit.
-    #[error(transparent)]
-    Upload(#[from] UploadError),
-    /// The path tracer cannot have the scene.
-    #[error(transparent)]
-    Pack(#[from] PackError),
-    /// The path tracer failed.
-    #[error(transparent)]
-    Tracer(#[from] TracerError),
-    /// A frame could not be drawn.
-    #[error(transparent)]
-    Render(#[from] RenderError),
-    /// A measurement failed.
-    #[error(transparent)]
-    Bench(#[from] BenchError),
-    /// What a network learns from could not be made.
-    #[error(transparent)]
-    Sample(#[from] DatasetError),
-    /// A file could not be written.
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    /// A reference could not be kept.
-    #[error("{}: the reference cannot be kept: {reason}", path.display())]
-    Kept { path: PathBuf, reason: String },
-    /// An edit of what is not there.
-    #[error("the scene has {count} instances, so there is no number {index}")]
-    Instance { index: usize, count: usize },
-    /// Whoever watches said so.
-    #[error("stopped")]
-    Stopped,
-}
-
-/// Told the share that is done of a picture or tracing, and asked whether to go on.
+/// Hears the share that is done of a picture or tracing, and says whether to go on.
 pub type Watch<'a> = Box<dyn Fn(f64) -> bool + 'a>;
 
 /// A scene on a device, ready to be drawn by any method.
@@ -115,7 +74,7 @@ impl<'a> Trial<'a> {
         Ok(Self { gpu, scene, uploaded, size, options, watch, kernel: None, packed: None, hash: None })
     }
 
-    /// From now on `watch` is told how far a picture or tracing is, and may stop it.
+    /// From now on `watch` hears how far a picture or tracing is, and may stop it.
     pub fn watched(mut self, watch: impl Fn(f64) -> bool + 'a) -> Self {
         self.watch = Box::new(watch);
         self

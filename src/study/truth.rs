@@ -1,7 +1,7 @@
 //! What methods are judged by: a path-traced picture with its layers and its stated noise, kept in
 //! a folder once it is traced.
 
-use super::{hash, trial::TrialError};
+use super::{error::TrialError, hash};
 use crate::{
     gpu::{Gpu, shaders},
     image_io,
@@ -68,7 +68,7 @@ pub fn until(layer: Layer, error: f64, most: u32, seed: u32) -> TracerOptions {
     TracerOptions { until_error: Some((layer, error)), ..samples(most, seed) }
 }
 
-/// Traces the picture. `go_on` is told the share that is done and asked whether to go on.
+/// Traces the picture. `go_on` hears the share that is done and asked whether to go on.
 ///
 /// # Errors
 /// What the tracer reports; [`TrialError::Stopped`].
@@ -126,7 +126,7 @@ pub(super) fn file_name(scene: &str, camera: &Camera, size: [u32; 2], options: &
 struct Facts {
     schema: u32,
     size: [u32; 2],
-    /// Mean, pixel, pixel_at_most, picture of each of `JUDGED`; what cannot be told is absent.
+    /// Mean, pixel, pixel_at_most, picture of each of `JUDGED`; what is unknown is absent.
     noise: [[Option<f64>; 4]; 3],
     samples: [u32; 2],
     seconds: f64,

@@ -251,7 +251,7 @@ pub fn renderer(handles: &Handles, plan: Plan, progress: &Progress) -> Result<Pr
     Ok(Product::Renderer { side: plan.side, key: plan.key, renderer })
 }
 
-/// What is captured: everything that the same line of `bouncelight render` would be told.
+/// What is captured: the arguments of `bouncelight render` that draw the same.
 pub struct Shot {
     pub output: PathBuf,
     pub source: Source,

@@ -42,7 +42,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// What `bouncelight view` was told.
+/// Arguments of `bouncelight view`.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// A file, a bundled scene, `paper-room:INDEX` or `home:INDEX`; the bundled interior when absent.
@@ -76,6 +76,8 @@ pub struct Options {
 /// What the window system says, without where in its library's sources it says so.
 fn window_reason(error: &impl std::fmt::Display) -> String {
     let text = error.to_string();
+    // A sentence goes on behind it.
+    let text = text.trim_end_matches('.').to_owned();
     match text.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")) {
         Some((line, reason)) if line.bytes().all(|b| b.is_ascii_digit()) => reason.to_owned(),
         _ => text,
@@ -113,7 +115,7 @@ pub enum ViewError {
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// [`ViewError`]. Bad scenes and weights are told in the window instead.
+/// [`ViewError`]. Bad scenes and weights are reported in the window instead.
 pub fn run(options: Options) -> Result<(), ViewError> {
     app::run(options)
 }

@@ -74,19 +74,19 @@ impl<'a> Painter<'a> {
     pub fn draw(&mut self, feature: &Feature) -> Drawn {
         let file = self.load(feature, &feature.with, false);
         let ours = self.rasterise(&file);
-        let twin = feature.twin.as_ref().map(|twin| self.load(feature, twin, true));
-        let traced = self.trace(twin.as_ref().unwrap_or(&file));
+        let equivalent = feature.equivalent.as_ref().map(|equivalent| self.load(feature, equivalent, true));
+        let traced = self.trace(equivalent.as_ref().unwrap_or(&file));
         let without = self.load(feature, &feature.without, false);
         let without = self.rasterise(&without);
         Drawn { ours, traced, without, warnings: file.warnings }
     }
 
-    fn load(&self, feature: &Feature, glb: &Glb, twin: bool) -> Scene {
+    fn load(&self, feature: &Feature, glb: &Glb, equivalent: bool) -> Scene {
         let mut scene = glb.load().unwrap_or_else(|e| panic!("{}: {e}", feature.name));
-        if let Some(time) = feature.time.filter(|_| !twin) {
+        if let Some(time) = feature.time.filter(|_| !equivalent) {
             scene.pose(0, time);
         }
-        if let Some(variant) = feature.variant.filter(|_| !twin) {
+        if let Some(variant) = feature.variant.filter(|_| !equivalent) {
             assert!(scene.choose_variant(variant), "{}: no variant {variant}", feature.name);
         }
         scene

@@ -109,11 +109,11 @@ fn accessors() -> Vec<Feature> {
     colored.json["accessors"][at]["normalized"] = json!(true);
     colored.attribute("COLOR_0", at);
     vec![
-        sparse.twin(of(&bent)),
-        strided.twin(of(&waved)),
-        short.twin(pictured(card, &letter(), None)),
-        Feature::new("triangle strip", "mode 5, without indices or normals", strip(5), plain).twin(copy(&quad)),
-        Feature::new("triangle fan", "mode 6, without indices or normals", strip(6), plain).twin(quad),
+        sparse.equivalent(of(&bent)),
+        strided.equivalent(of(&waved)),
+        short.equivalent(pictured(card, &letter(), None)),
+        Feature::new("triangle strip", "mode 5, without indices or normals", strip(5), plain).equivalent(copy(&quad)),
+        Feature::new("triangle fan", "mode 6, without indices or normals", strip(6), plain).equivalent(quad),
         Feature::new("vertex colours", "COLOR_0 in four bytes", colored, |json| {
             json["meshes"][0]["primitives"][0]["attributes"].as_object_mut().expect("attributes").remove("COLOR_0");
         }),
@@ -175,19 +175,19 @@ fn nodes() -> Vec<Feature> {
         Feature::new("nodes", "a matrix below a node with place, turn and scale", parents, |json| {
             json["nodes"][0].as_object_mut().expect("a node").remove("rotation");
         })
-        .twin(pictured(&baked, &letter(), None)),
+        .equivalent(pictured(&baked, &letter(), None)),
         Feature::new("negative scale", "a mirrored node of a single-sided mesh", mirrored, |json| {
             json["nodes"][0].as_object_mut().expect("a node").remove("scale");
         })
-        .twin(pictured(&turned, &letter(), None)),
+        .equivalent(pictured(&turned, &letter(), None)),
         Feature::new("EXT_mesh_gpu_instancing", "three copies with places and turns", copies, |json| {
             json["nodes"][0].as_object_mut().expect("a node").remove("extensions");
         })
-        .twin(three),
+        .equivalent(three),
         Feature::new("KHR_node_visibility", "a hidden node", hidden, |json| {
             json["nodes"][0].as_object_mut().expect("a node").remove("extensions");
         })
-        .twin(empty),
+        .equivalent(empty),
     ]
 }
 
@@ -236,11 +236,11 @@ fn packed() -> Vec<Feature> {
             let [a, b] = [position, normal].map(|at| json["accessors"][at]["bufferView"].clone());
             (json["accessors"][position]["bufferView"], json["accessors"][normal]["bufferView"]) = (b, a);
         })
-        .twin(of(&waved)),
+        .equivalent(of(&waved)),
         Feature::new("KHR_draco_mesh_compression", "Edgebreaker; colours and coordinates, too", draco, |json| {
             json["nodes"][0]["scale"] = json!([0.7, 0.7, 0.7]);
         })
-        .twin(plain),
+        .equivalent(plain),
     ]
 }
 

@@ -56,7 +56,7 @@ fn covered() -> Vec<Feature> {
     veil.json["materials"][0]["alphaMode"] = json!("BLEND");
     vec![
         Feature::new("alphaMode OPAQUE", "a texture's alpha counts for nothing", file("OPAQUE", false), mode("BLEND"))
-            .twin(file("OPAQUE", true)),
+            .equivalent(file("OPAQUE", true)),
         Feature::new("alphaMode MASK", "cut off below 0.7", cut, |json| {
             json["materials"][0]["alphaCutoff"] = json!(0.05);
         }),
@@ -77,7 +77,8 @@ fn sides() -> Vec<Feature> {
     towards.json["materials"][0]["doubleSided"] = json!(true);
     let sided = |double: bool| move |json: &mut Value| json["materials"][0]["doubleSided"] = json!(double);
     vec![
-        Feature::new("double sided", "seen from behind, lit as from the front", seen(true), sided(false)).twin(towards),
+        Feature::new("double sided", "seen from behind, lit as from the front", seen(true), sided(false))
+            .equivalent(towards),
         Feature::new("single sided", "from behind it is not there", seen(false), sided(true)),
     ]
 }
@@ -138,7 +139,11 @@ fn reflecting() -> Vec<Feature> {
                 json["materials"][0]["extensions"].as_object_mut().expect("some").remove("KHR_materials_specular");
             },
         )
-        .twin(ball(with([0.8, 0.45, 0.25], 0.7, json!({"KHR_materials_specular": {"specularFactor": 0.0}})))),
+        .equivalent(ball(with(
+            [0.8, 0.45, 0.25],
+            0.7,
+            json!({"KHR_materials_specular": {"specularFactor": 0.0}}),
+        ))),
         Feature::new(
             "KHR_materials_pbrSpecularGlossiness",
             "a red reflectance over green",
@@ -151,7 +156,7 @@ fn reflecting() -> Vec<Feature> {
             ball(with([0.9, 0.1, 0.9], 0.9, metal)),
             no_extensions,
         )
-        .twin(factors(1.0, 0.5)),
+        .equivalent(factors(1.0, 0.5)),
         Feature::new(
             "KHR_materials_clearcoat",
             "a smooth coat on a rough surface",
@@ -166,8 +171,8 @@ fn reflecting() -> Vec<Feature> {
             no_extensions,
         ),
         Feature::new("KHR_materials_emissive_strength", "six times the factor", glow(strong, 1.0), no_extensions)
-            .twin(glow(json!({}), 6.0)),
-        Feature { variant: Some(1), ..variants }.twin(ball(plain([0.1, 0.3, 0.8]))),
+            .equivalent(glow(json!({}), 6.0)),
+        Feature { variant: Some(1), ..variants }.equivalent(ball(plain([0.1, 0.3, 0.8]))),
     ]
 }
 

@@ -49,7 +49,8 @@ pub fn features() -> Vec<Feature> {
         "extensions": {"KHR_animation_pointer": {"pointer": "/nodes/0/rotation"}}});
     animate(&mut pointer, target, "VEC4", "LINEAR", &[0.0, 1.0], &turns);
 
-    // One target moves the upper corners, the other the left ones; 0.5 of the first by the mesh, 1 of the second by time.
+    // One target moves the upper corners, the other the left ones; 0.5 of the first by the mesh, 1 of the
+    // second by time.
     let card = Shape::card(1);
     let mut morph = of(&card);
     let upper = morph.floats("VEC3", &[0.4, -0.6, 0.8, 0.4, -0.6, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -68,19 +69,21 @@ pub fn features() -> Vec<Feature> {
     }
     vec![
         Feature::new("animation: STEP", "the place of the key before", step, mode("LINEAR"))
-            .twin(moved([0.5, 0.2, -0.5]))
+            .equivalent(moved([0.5, 0.2, -0.5]))
             .at(1.7),
-        Feature::new("animation: LINEAR", "turned along the shortest arc", linear, still).twin(turned(1.2)).at(0.5),
+        Feature::new("animation: LINEAR", "turned along the shortest arc", linear, still)
+            .equivalent(turned(1.2))
+            .at(0.5),
         Feature::new("animation: CUBICSPLINE", "a place between two keys with tangents", cubic, still)
-            .twin(moved([-0.1, 0.5, 0.0]))
+            .equivalent(moved([-0.1, 0.5, 0.0]))
             .at(0.5),
         Feature::new("KHR_animation_pointer", "a pointer to a node's rotation", pointer, still)
-            .twin(turned(0.6))
+            .equivalent(turned(0.6))
             .at(0.25),
         Feature::new("morph targets", "two, one by the mesh's weights, one in time", morph, |json| {
             json["meshes"][0]["primitives"][0].as_object_mut().expect("a primitive").remove("targets");
         })
-        .twin(of(&bent))
+        .equivalent(of(&bent))
         .at(1.0),
         skin(),
     ]
@@ -120,5 +123,5 @@ fn skin() -> Feature {
     Feature::new("skin", "two joints, one of them bent", glb, |json| {
         json["nodes"][5].as_object_mut().expect("a node").remove("rotation");
     })
-    .twin(of(&bent))
+    .equivalent(of(&bent))
 }

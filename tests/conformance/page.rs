@@ -28,7 +28,7 @@ on {}. Do not edit.
 Each line is a small file that the tests make (`tests/conformance`), with one feature in it, on a floor under a sun and a
 sky. **Off** is how far the rasteriser's picture (`gather`, 32 frames, eight samples: what `render` draws) is from the
 path tracer's ({} paths a pixel): the mean difference of display values, of 255, at {}×{} pixels; at most {BOUND}.
-Where the same picture can be said without the feature, the path tracer draws *that* file (**twin**: coordinates moved by
+Where the same picture can be said without the feature, the path tracer draws *that* file (**equivalent**: coordinates moved by
 hand, a dense accessor, vertex normals in the place of a map), so that what both would read wrongly shows; elsewhere both read
 the same file, and the number says that they draw the same surface. **Without** is the control: the
 rasteriser's picture of the file without the feature, or with another value of it, which must be off by at least {CONTROL}.
@@ -37,7 +37,7 @@ rasteriser's picture of the file without the feature, or with another value of i
 
 *Pairs in the order of the table: the rasteriser's picture left, the path tracer's right.*
 
-| | feature | the file | off | twin | without |
+| | feature | the file | off | equivalent | without |
 |---|---|---|---|---|---|
 ",
         gpu.sentence().trim_end_matches('.'),
@@ -46,12 +46,12 @@ rasteriser's picture of the file without the feature, or with another value of i
         SIZE[1],
     );
     for (i, (feature, drawn)) in drawn.iter().enumerate() {
-        let twin = if feature.twin.is_some() { "yes" } else { "" };
+        let equivalent = if feature.equivalent.is_some() { "yes" } else { "" };
         let (off, control) = (drawn.error(), drawn.control());
         let bold = if drawn.passes() { "" } else { "**" };
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {bold}{off:.2}{bold} | {twin} | {control:.1} |",
+            "| {} | {} | {} | {bold}{off:.2}{bold} | {equivalent} | {control:.1} |",
             i + 1,
             feature.name,
             feature.says

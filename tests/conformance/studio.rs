@@ -11,7 +11,7 @@ pub struct Feature {
     pub says: &'static str,
     pub with: Glb,
     /// The same picture without the feature, where that can be had: what the path tracer draws.
-    pub twin: Option<Glb>,
+    pub equivalent: Option<Glb>,
     /// The file without the feature, or with another value of it: the control.
     pub without: Glb,
     /// The moment of animation 0 that is drawn, seconds.
@@ -25,11 +25,11 @@ impl Feature {
     pub fn new(name: &'static str, says: &'static str, with: Glb, spoil: impl FnOnce(&mut Value)) -> Self {
         let mut without = copy(&with);
         spoil(&mut without.json);
-        Self { name, says, with, twin: None, without, time: None, variant: None }
+        Self { name, says, with, equivalent: None, without, time: None, variant: None }
     }
 
-    pub fn twin(self, twin: Glb) -> Self {
-        Self { twin: Some(twin), ..self }
+    pub fn equivalent(self, equivalent: Glb) -> Self {
+        Self { equivalent: Some(equivalent), ..self }
     }
 
     pub fn at(self, time: f32) -> Self {

@@ -44,11 +44,11 @@ fn placed() -> Vec<Feature> {
         Feature::new("KHR_texture_transform", "scale, turn and offset", moved, |json| {
             slot(json).as_object_mut().expect("a slot").remove("extensions");
         })
-        .twin(pictured(&card.clone().mapped(at), &letter(), None)),
+        .equivalent(pictured(&card.clone().mapped(at), &letter(), None)),
         Feature::new("second texture coordinates", "TEXCOORD_1, turned by a quarter", second(1), |json| {
             slot(json)["texCoord"] = json!(0);
         })
-        .twin(pictured(&card.clone().mapped(|[u, v]| [1.0 - v, u]), &letter(), None)),
+        .equivalent(pictured(&card.clone().mapped(|[u, v]| [1.0 - v, u]), &letter(), None)),
     ]
 }
 
@@ -74,22 +74,22 @@ fn samplers() -> Vec<Feature> {
     grey.json["materials"][0] = plain([0.5; 3]);
     vec![
         Feature::new("wrap: repeat", "coordinates from -0.5 to 1.5", wrapped(10497), spoil(33648))
-            .twin(large(|u| u.rem_euclid(1.0))),
+            .equivalent(large(|u| u.rem_euclid(1.0))),
         Feature::new("wrap: mirrored", "coordinates from -0.5 to 1.5", wrapped(33648), spoil(10497))
-            .twin(large(|u| if (0.0..1.0).contains(&u) { u } else { 1.0 - u.rem_euclid(1.0) })),
+            .equivalent(large(|u| if (0.0..1.0).contains(&u) { u } else { 1.0 - u.rem_euclid(1.0) })),
         Feature::new("wrap: clamp", "coordinates from -0.5 to 1.5", wrapped(33071), spoil(10497))
-            .twin(large(|u| u.clamp(0.004, 0.996))),
+            .equivalent(large(|u| u.clamp(0.004, 0.996))),
         Feature::new("filter: nearest", "8 by 8 texels, enlarged", pictured(&card, &coarse(8), Some(near)), |json| {
             json["samplers"][0] = json!({"magFilter": 9729});
         })
-        .twin(pictured(&card, &coarse(512), None)),
+        .equivalent(pictured(&card, &coarse(512), None)),
         Feature::new(
             "mip levels",
             "stripes of a texel, forty to a pixel, are the mean of light",
             pictured(&card.clone().mapped(|uv| uv.map(|c| 20.0 * c)), &fine, None),
             |json| *slot(json) = Value::Null,
         )
-        .twin(grey),
+        .equivalent(grey),
     ]
 }
 
@@ -118,13 +118,10 @@ fn files() -> Vec<Feature> {
     webp.json["textures"][0] = json!({"extensions": {"EXT_texture_webp": {"source": 0}}});
     webp.json["extensionsRequired"] = json!(["EXT_texture_webp"]);
     vec![
-        Feature::new("KHR_texture_basisu", "UASTC in KTX2", basis, |json| *slot(json) = Value::Null).twin(pictured(
-            &card,
-            &unpacked,
-            Some(near),
-        )),
+        Feature::new("KHR_texture_basisu", "UASTC in KTX2", basis, |json| *slot(json) = Value::Null)
+            .equivalent(pictured(&card, &unpacked, Some(near))),
         Feature::new("EXT_texture_webp", "without a picture beside it", webp, |json| *slot(json) = Value::Null)
-            .twin(pictured(&card, &letter(), None)),
+            .equivalent(pictured(&card, &letter(), None)),
     ]
 }
 
@@ -175,17 +172,17 @@ fn bumps() -> Vec<Feature> {
     glow.json["materials"][0]["emissiveFactor"] = json!([0.9, 0.7, 0.8]);
     vec![
         Feature::new("normal map", "leans to the right, without tangents", bumped(&card, [0.6, 0.0], 1.0), flat)
-            .twin(tilted(&card, [0.6, 0.0, z])),
+            .equivalent(tilted(&card, [0.6, 0.0, z])),
         Feature::new("normal map, turned", "texture coordinates run downwards", bumped(&turned, [0.6, 0.0], 1.0), flat)
-            .twin(tilted(&turned, [0.0, -0.6, z])),
+            .equivalent(tilted(&turned, [0.0, -0.6, z])),
         Feature::new("tangents", "the file's own say that red is up", given, |json| {
             json["meshes"][0]["primitives"][0]["attributes"].as_object_mut().expect("attributes").remove("TANGENT");
         })
-        .twin(tilted(&card, [0.0, 0.6, z])),
+        .equivalent(tilted(&card, [0.0, 0.6, z])),
         Feature::new("normal scale", "three tenths as steep", bumped(&card, [0.8, 0.0], 0.3), |json| {
             json["materials"][0]["normalTexture"]["scale"] = json!(1.0);
         })
-        .twin(tilted(&card, [0.24, 0.0, 0.6])),
+        .equivalent(tilted(&card, [0.24, 0.0, 0.6])),
         Feature::new("metallic-roughness texture", "metal and plastic, smooth and rough, in checks", rough, |json| {
             let pbr = &mut json["materials"][0]["pbrMetallicRoughness"];
             pbr.as_object_mut().expect("factors").remove("metallicRoughnessTexture");

@@ -8,8 +8,8 @@ use bouncelight::scene::Scene;
 use serde_json::json;
 use std::time::Instant;
 
-/// A tube of `around` × `along` quads about the y axis from 0 to 2, bound to both joints smoothly; no normals are given,
-/// so no triangle shares a vertex with another.
+/// A tube of `around` × `along` quads about the y axis from 0 to 2, bound to both joints smoothly; no normals
+/// are given, so no triangle shares a vertex with another.
 fn tube(around: usize, along: usize) -> Glb {
     let mut glb = Glb::new();
     let at = |i: usize, k: usize| {

@@ -29,7 +29,7 @@ fn small(gpu: &Gpu, change: impl FnOnce(&mut wgpu::Limits)) -> Gpu {
 }
 
 #[test]
-fn the_rung_below_draws_until_there_are_rays() {
+fn the_method_below_draws_until_there_are_rays() {
     let Some(gpu) = common::gpu() else { return };
     let room = room();
     let plain = SceneGpu::new(&gpu.device, &gpu.queue, &room).expect("the scene fits");
@@ -71,7 +71,7 @@ fn trees_are_counted_and_can_be_stopped() {
 }
 
 #[test]
-fn what_is_too_much_for_rays_is_drawn_by_the_rung_below() {
+fn what_is_too_much_for_rays_is_drawn_by_the_method_below() {
     let Some(gpu) = common::gpu() else { return };
     let room = room();
     // Ten million triangles, which nobody reads.

@@ -30,7 +30,8 @@ fn camera(turn: f32) -> Camera {
     look_at([0.0, 1.5, 3.0], [3.5 * turn.sin(), 0.0, 3.0 - 3.5 * turn.cos()], 0.6)
 }
 
-/// Light that pixels show by their lobes over the lobes' albedo: the last of several frames, in each of which the camera turns.
+/// Light that pixels show by their lobes over the lobes' albedo: the last of several frames, in each of which
+/// the camera turns.
 fn shown(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, frames: u32, turn: f32) -> Vec<f32> {
     let gpu_scene = uploaded(gpu, scene);
     for i in 0..frames {

@@ -43,7 +43,8 @@ fn mean(light: &[f32], of: &[bool]) -> f64 {
     sum / of.iter().filter(|of| **of).count().max(1) as f64
 }
 
-/// Changes one scene into the other and back, and asks for nine tenths of the change within `soon` frames, for all but 2 % within thirty.
+/// Changes one scene into the other and back, and asks for nine tenths of the change within `soon` frames, for
+/// all but 2 % within thirty.
 fn follows(gpu: &Gpu, scenes: [&Scene; 2], soon: u32, change: impl Fn(&mut SceneGpu, &Scene)) {
     let (light, same) = states(gpu, scenes);
     let [there, gone] = light.map(|l| mean(&l, &same));

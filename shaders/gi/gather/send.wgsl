@@ -2,7 +2,7 @@
 //#import gi/gather/start.wgsl
 //#import gi/gather/look.wgsl
 
-// A ray from a surface, and what is written down of it. Whoever joins this file binds `records`, three
+// A ray from a surface, and what is written down of it. The shader that imports this file binds `records`, three
 // vectors a ray: radiance found and the entry's slot; what the entry's light is multiplied by (shared
 // exponent), direction, distance (0: none was sent); light of what glows, and its direction.
 

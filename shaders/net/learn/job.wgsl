@@ -1,4 +1,4 @@
-// What every kernel of learning is told (`net::learn::tape::Job`), and where numbers lie: f32,
+// Uniforms of every learning kernel (`net::learn::tape::Job`), and where numbers lie: f32,
 // channel by channel, rows from the top.
 
 struct Job {

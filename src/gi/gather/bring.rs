@@ -1,10 +1,11 @@
-//! From light of cells to light at every pixel: a joint bilateral filter that evaluates each cell's light for the pixel's own
-//! normal, and takes what lobes show along.
+//! From light of cells to light at every pixel: a joint bilateral filter that evaluates each cell's light for
+//! the pixel's own normal, and takes what lobes show along.
 //!
-//! The four cells around a pixel are weighted bilinearly times how much their sample lies on the pixel's own surface:
-//! distance from the pixel's plane relative to the pixel's depth, and agreement of normals (the tolerances are
-//! [`reconstruct`](crate::gi::reconstruct)'s). Where those four mostly disagree the 4×4 cells around are blended in. Background pixels
-//! get 0. A workgroup reads each cell around its 8×8 pixels once, into its shared memory.
+//! The four cells around a pixel are weighted bilinearly times how much their sample lies on the pixel's own
+//! surface: distance from the pixel's plane relative to the pixel's depth, and agreement of normals (the
+//! tolerances are [`reconstruct`](crate::gi::reconstruct)'s). Where those four mostly disagree the 4×4 cells
+//! around are blended in. Background pixels get 0. A workgroup reads each cell around its 8×8 pixels once, into
+//! its shared memory.
 
 use crate::gi::interface::technique::Cost;
 use crate::gi::stage::cells::{self, CellsPass};
@@ -97,10 +98,10 @@ impl BringPass {
         self.binder.made()
     }
 
-    /// What the pass costs for a picture of `size` pixels. A pixel: 4 cells of 72 operations, its own place and normal 60, the means
-    /// 36; a workgroup stages 36 cells of 60 operations and 96 bytes, most of which the chip's cache has, so that each cell comes
-    /// from memory once. Pixels at edges that ask 16 cells (about 3 % of a picture) are counted with 1,000 more. Depth, normal and
-    /// both results, roughness: 28 bytes.
+    /// What the pass costs for a picture of `size` pixels. A pixel: 4 cells of 72 operations, its own place and
+    /// normal 60, the means 36; a workgroup stages 36 cells of 60 operations and 96 bytes, most of which the
+    /// chip's cache has, so that each cell comes from memory once. Pixels at edges that ask 16 cells (about 3 %
+    /// of a picture) are counted with 1,000 more. Depth, normal and both results, roughness: 28 bytes.
     pub fn cost(size: [u32; 2]) -> Cost {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let flops = pixels * (4.0 * 72.0 + 60.0 + 36.0 + 36.0 * 60.0 / 64.0 + 30.0);

@@ -5,9 +5,10 @@ use super::{Options, PAST, store};
 use crate::gi::interface::technique::Cost;
 use crate::gi::stage::cells::{self, CellsPass};
 
-/// Blocks that a look reads (nearest hit, line to a light, line to an entry's beginning), and steps of threads that wait for the
-/// slowest of their warp over steps that they take: means of eight scenes by `examples/rays --traffic`, the least 18, the most 97
-/// blocks. A block is eight boxes (170 operations) or two triangles.
+/// Blocks that a look reads (nearest hit, line to a light, line to an entry's beginning), and steps of threads
+/// that wait for the slowest of their warp over steps that they take: means of eight scenes by
+/// `examples/rays --traffic`, the least 18, the most 97 blocks. A block is eight boxes (170 operations) or two
+/// triangles.
 const BLOCKS: f64 = 27.0 + 8.0 + 11.0;
 const WAITING: f64 = 2.0;
 /// Bytes of the trees that come from memory for a look, by the same: they are few megabytes, most of which caches hold.

@@ -263,7 +263,7 @@ impl Technique for GatherGi {
 
     fn memory(&self) -> Option<Memory<'_>> {
         let pasts = &self.store.pasts[(self.frame & 1) as usize];
-        Some(Memory { pasts, light: &self.store.cell_light })
+        Some(Memory { pasts, pixels: self.cells.pixels(), light: &self.store.cell_light })
     }
 
     fn knows_scene(&self, rays: bool) -> bool {

@@ -6,7 +6,8 @@ use thiserror::Error;
 /// How light is gathered. The numbers that are choices stand in the table of `docs/gi.md`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Frames that a cell's mean remembers at rest; where it moves, or light or objects do, 128 at most (`BRIEF` in `settle.wgsl`).
+    /// Frames that a cell's mean remembers at rest; where it moves, or light or objects do, 128 at most
+    /// (`BRIEF` in `settle.wgsl`).
     pub cell_frames: f32,
     /// Rays that an entry's mean remembers.
     pub entry_frames: f32,
@@ -18,11 +19,11 @@ pub struct Options {
     pub first_rounds: u32,
     /// Whether means are blurred over neighbours.
     pub blur: bool,
-    /// Whether all frames of a mean count the same, however early, and a change of light shortens none: for asking what the
-    /// method converges to.
+    /// Whether all frames of a mean count the same, however early, and a change of light shortens none: for
+    /// asking what the method converges to.
     pub even: bool,
-    /// Whether surfaces that rays meet show their gloss. Pictures made by Cycles without "Reflective Caustics" are compared with those
-    /// made without it; light is missing then.
+    /// Whether surfaces that rays meet show their gloss. Pictures made by Cycles without "Reflective Caustics"
+    /// are compared with those made without it; light is missing then.
     pub caustics: bool,
 }
 

@@ -9,8 +9,8 @@ pub(super) fn squares(size: [u32; 2]) -> u64 {
 }
 
 pub(super) struct Store {
-    /// Of the table of entries, by slot: key; lots of both halves; queries of cells and of both halves' entries, and where both
-    /// halves' rays begin; when it was asked for; light of both halves.
+    /// Of the table of entries, by slot: key; lots of both halves; queries of cells and of both halves'
+    /// entries, and where both halves' rays begin; when it was asked for; light of both halves.
     pub keys: wgpu::Buffer,
     pub lots: wgpu::Buffer,
     pub queries: wgpu::Buffer,

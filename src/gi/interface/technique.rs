@@ -45,6 +45,8 @@ pub struct Instead<'a> {
 pub struct Memory<'a> {
     /// What cells remember: `Past` of `past.wgsl`, [`PAST`](crate::gi::gather::PAST) bytes each.
     pub pasts: &'a wgpu::Buffer,
+    /// The pixel that stands for each: [`cells`](crate::gi::stage::cells).
+    pub pixels: &'a wgpu::Buffer,
     /// The light that the frame shows, 48 bytes each.
     pub light: &'a wgpu::Buffer,
 }

@@ -81,7 +81,7 @@ impl NeuralGi {
         Self::with(device, queue, &weights.clone().into(), options)
     }
 
-    /// As [`NeuralGi::new`], told how the network runs.
+    /// As [`NeuralGi::new`], with options for how the network runs.
     ///
     /// # Errors
     /// As [`NeuralGi::new`].

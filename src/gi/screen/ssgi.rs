@@ -16,7 +16,7 @@ use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry
 use crate::gi::stage::inputs::{InputGroup, texture_entry};
 use crate::gpu::timing::Recorder;
 
-/// What the method may be told.
+/// Options of the method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SsgiOptions {
     /// How the depth buffer is walked.

@@ -50,7 +50,7 @@ pub struct Sum {
     pub bytes: u64,
 }
 
-/// What a kernel is told in its uniform about shapes; see `shaders/net/common.wgsl`.
+/// Shapes in a kernel's uniform; see `shaders/net/common.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Numbers {
     pub(super) pad: [i32; 2],

@@ -199,8 +199,9 @@ impl Learner {
         Err(LearnError::Diverged { step: self.steps, loss: stride.loss, norm: stride.norm })
     }
 
-    /// Relative error of the light in these pictures, as [`Stride::error`], by the network that [`Self::weights`] returns. Learns
-    /// nothing: the same for pictures that are never learnt from tells when to stop.
+    /// Relative error of the light in these pictures, as [`Stride::error`], by the network that
+    /// [`Self::weights`] returns. Learns nothing: the same for pictures that are never learnt from tells when
+    /// to stop.
     ///
     /// # Errors
     /// A meaning without a loss; the device was lost.
@@ -227,7 +228,8 @@ impl Learner {
         Ok(self.read(self.section(SECTIONS), RESULTS)?[4].sqrt())
     }
 
-    /// The slope of Σ `output_slopes` · output in each learnt number, for one input; both channel by channel. Learns nothing.
+    /// The slope of Σ `output_slopes` · output in each learnt number, for one input; both channel by channel.
+    /// Learns nothing.
     ///
     /// # Errors
     /// Lists of other lengths; the device was lost.

@@ -6,7 +6,7 @@ use crate::net::graph::{Activation, Conv2d, INPUT, Op, Shape};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// `Job` of `shaders/net/learn/job.wgsl`, where its fields are told.
+/// `Job` of `shaders/net/learn/job.wgsl`, which documents its fields.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[allow(missing_docs, reason = "documented in shaders/net/learn/job.wgsl")]

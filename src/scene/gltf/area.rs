@@ -1,4 +1,5 @@
-//! EXT_lights_area (a draft of Khronos; Babylon.js reads and writes it): flat lights, as surfaces that glow on one side.
+//! EXT_lights_area (a draft of Khronos; Babylon.js reads and writes it): flat lights, as surfaces that glow on
+//! one side.
 
 use super::Loader;
 use super::instancing::Copy;

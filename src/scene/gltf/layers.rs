@@ -36,8 +36,9 @@ impl Loader<'_> {
         out.roughness = (coat * coat_roughness + below * out.roughness) / (coat + below);
     }
 
-    /// KHR_materials_sheen: fibres over the surface. What they throw back, in the mean over all directions, is scattered
-    /// like the surface's own diffuse light, which gets what they leave; that cloth is brightest at its rims is lost.
+    /// KHR_materials_sheen: fibres over the surface. What they throw back, in the mean over all directions, is
+    /// scattered like the surface's own diffuse light, which gets what they leave; that cloth is brightest at
+    /// its rims is lost.
     pub(super) fn sheen(&mut self, place: &str, extensions: &Extensions, out: &mut Material) {
         let Some(sheen) = extensions.get("KHR_materials_sheen") else { return };
         let channel = |c: usize| sheen["sheenColorFactor"].get(c).and_then(Value::as_f64).map_or(0.0, |v| v as f32);
@@ -146,9 +147,9 @@ fn number(extension: &Value, name: &str) -> Option<f32> {
     extension.get(name).and_then(Value::as_f64).map(|v| v as f32)
 }
 
-/// Share of light from a direction that fibres of a roughness throw back, in the mean over a hemisphere by the cosine:
-/// the "Charlie" lobe of KHR_materials_sheen with the shadowing of Estevez and Kulla (2017), integrated in steps of 0.1; the
-/// curve is off by 0.002 at most.
+/// Share of light from a direction that fibres of a roughness throw back, in the mean over a hemisphere by the
+/// cosine: the "Charlie" lobe of KHR_materials_sheen with the shadowing of Estevez and Kulla (2017), integrated
+/// in steps of 0.1; the curve is off by 0.002 at most.
 fn fibres(roughness: f32) -> f32 {
     0.0152 + roughness * (0.0171 + roughness * (0.6970 - 0.4283 * roughness))
 }

@@ -1,8 +1,9 @@
 //! glTF 2.0: `.gltf` with external or embedded buffers, and `.glb`.
 //!
-//! The `gltf` crate parses the JSON and types it; container, buffers and accessors are read here, because the crate's
-//! readers panic or give up wholesale on the broken files that people have. What cannot be used for a reason that
-//! leaves a picture (a missing texture, a line primitive, a broken skin) becomes a warning; the rest is a [`SceneError`].
+//! The `gltf` crate parses the JSON and types it; container, buffers and accessors are read here, because the
+//! crate's readers panic or give up wholesale on the broken files that people have. What cannot be used for a
+//! reason that leaves a picture (a missing texture, a line primitive, a broken skin) becomes a warning; the
+//! rest is a [`SceneError`].
 
 mod accessor;
 mod area;
@@ -193,7 +194,8 @@ impl<'a> Loader<'a> {
         let mut seen = vec![false; document.nodes().len()];
         let mut stack: Vec<(gltf::Node, Mat4, Option<usize>, bool)> =
             roots.into_iter().rev().map(|n| (n, Mat4::IDENTITY, None, true)).collect();
-        // For animations: nodes in the order of this walk, and which of them each instance, camera and light belongs to.
+        // For animations: nodes in the order of this walk, and which of them each instance, camera and light
+        // belongs to.
         let (mut walked, mut carried, mut places) = (Vec::new(), motion::Carried::default(), HashMap::new());
         while let Some((node, parent, above, visible)) = stack.pop() {
             if std::mem::replace(&mut seen[node.index()], true) {

@@ -58,8 +58,8 @@ impl Grid {
         grid
     }
 
-    /// Marks the cells of points spread over a triangle, at most half a cell apart: rows along its longest edge, so that
-    /// a sliver takes no more of them than a line.
+    /// Marks the cells of points spread over a triangle, at most half a cell apart: rows along its longest
+    /// edge, so that a sliver takes no more of them than a line.
     fn add(&mut self, corners: [Vec3; 3], instance: u32) {
         let length = |i: usize| corners[i].distance(corners[(i + 1) % 3]);
         let first = (0..3).max_by(|&i, &j| length(i).total_cmp(&length(j))).unwrap_or(0);

@@ -1,8 +1,8 @@
 //! The first look: from where a scene is seen for which nobody says it, and what kind of place it is.
 //!
-//! A scene is an **interior** if most places in it where one can stand have walls and a ceiling around them, and no side
-//! of it is open enough to look in. There the camera stands in the room; everything else is seen whole, from a
-//! three-quarter view a little above, or from the side that lets one look deepest.
+//! A scene is an **interior** if most places in it where one can stand have walls and a ceiling around them,
+//! and no side of it is open enough to look in. There the camera stands in the room; everything else is seen
+//! whole, from a three-quarter view a little above, or from the side that lets one look deepest.
 
 mod extent;
 mod grid;
@@ -131,8 +131,8 @@ impl<'a> Look<'a> {
         outside::camera(self.scene, &self.core, back, yfov, aspect)
     }
 
-    /// How far away that is what one would turn around who looks through `camera`: the middle of what is framed, or where
-    /// one looks in a room.
+    /// How far away that is what one would turn around who looks through `camera`: the middle of what is
+    /// framed, or where one looks in a room.
     pub fn distance(&self, camera: &Camera) -> f32 {
         let (eye, forward) = (Vec3::from(camera.eye()), Vec3::from(camera.forward()));
         let size = self.core.size();
@@ -152,8 +152,8 @@ impl<'a> Look<'a> {
 /// Name of the camera that looks at a scene from outside for want of one in the file.
 pub const FRAMING: &str = "framing";
 
-/// The camera of a scene that brings none; `look` is its, if anything is placed in it. It shows everything in any picture
-/// at least as wide as high.
+/// The camera of a scene that brings none; `look` is its, if anything is placed in it. It shows everything in
+/// any picture at least as wide as high.
 pub fn first_camera(look: Option<&Look<'_>>) -> Camera {
     match look {
         Some(look) => look.camera(),

@@ -2,7 +2,7 @@
 //! a GTX 1050.
 //!
 //! Marks differ in shape as well as in colour (Okabe and Ito's palette), names stand beside them in
-//! black, and nothing is told by colour alone, so that the chart can be read in print and by the
+//! black, and nothing is shown by colour alone, so that the chart can be read in print and by the
 //! colour-blind.
 
 mod canvas;

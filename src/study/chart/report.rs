@@ -332,8 +332,8 @@ fn references(record: &Record) -> String {
     let _ = writeln!(
         text,
         "\nOurs are traced until a pixel's noise is surely not above {:.1} % of the mean, with at most {most} \
-         samples; noise is told by two halves of the samples. \
-         Below their own noise no error can be told.",
+         samples; noise is measured by two halves of the samples. \
+         Below their own noise no error can be measured.",
         100.0 * error
     );
     text

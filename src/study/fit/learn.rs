@@ -2,12 +2,12 @@
 //! from.
 //!
 //! Half of the time at most goes into pictures (`lessons`), the rest into steps (`net::learn`), as
-//! training takes them. What has been learnt is judged as every rung is, and stays only if it beats
+//! training takes them. What has been learnt is judged as every candidate is, and stays only if it beats
 //! `gather`, the network it began as, and what was chosen before, by more than the noise of the
 //! references explains. What is judged is the state that is best on views held out from the steps.
 
 use super::lessons::{self, Lessons};
-use super::{Fit, FitError, FitOptions, Network, Rung, Search};
+use super::{Candidate, Fit, FitError, FitOptions, Network, Search};
 use crate::{
     gi::pass::Neural,
     net::{format::Provenance, format::Weights, learn::Learner},
@@ -106,9 +106,10 @@ pub fn learn(
     learning: &Learning,
     told: &mut dyn FnMut(&str, f64),
 ) -> Result<Option<Vec<u8>>, FitError> {
-    let judged = |rung: &Rung| found.rows.iter().position(|r| r.rung == *rung && !r.errors.is_empty());
-    let start = Rung::Neural(learning.start);
-    let (Some(gather), Some(before)) = (judged(&Rung::Gather(Default::default())), judged(&start)) else {
+    let judged =
+        |candidate: &Candidate| found.rows.iter().position(|r| r.candidate == *candidate && !r.errors.is_empty());
+    let start = Candidate::Neural(learning.start);
+    let (Some(gather), Some(before)) = (judged(&Candidate::Gather(Default::default())), judged(&start)) else {
         return Ok(None);
     };
     let start = &options.networks[learning.start];
@@ -274,8 +275,8 @@ impl Fit {
 impl Search<'_, '_> {
     /// Tries the network of that index, which costs what that of row `like` does.
     fn judge(&mut self, network: usize, like: usize) -> Result<Option<usize>, FitError> {
-        self.costs.push((Rung::Neural(network), self.rows[like].cost_ms));
-        self.attempt(Rung::Neural(network), self.options.frames)
+        self.costs.push((Candidate::Neural(network), self.rows[like].cost_ms));
+        self.attempt(Candidate::Neural(network), self.options.frames)
     }
 }
 

@@ -1,11 +1,11 @@
 //! The cheapest method that is good enough for a scene: no more model than it needs.
 //!
-//! A few views are traced to the error that the target asks for and no further. Then rungs are
+//! A few views are traced to the error that the target asks for and no further. Then candidates are
 //! tried from the cheapest up, and the first that meets the target in every view ends the search;
 //! what is dearer is not tried. Free numbers: the light of `ambient` and `ssgi` is linear in two of
 //! them, so where the usual ones miss the target, the scene's own follow from three pictures a
 //! view. Of `gather` the usual ones are tried first: where they are good enough, cheaper ones are
-//! sought by bisection, where not, finer ones are rungs of their own. At last, for methods that
+//! sought by bisection, where not, finer ones are candidates of their own. At last, for methods that
 //! settle, the fewest frames that still meet the target are sought by bisection, too. Both
 //! bisections take it that error falls as cost rises; what they return has been measured to meet
 //! the target in any case.
@@ -22,7 +22,7 @@ mod yardstick;
 pub use error::FitError;
 pub use learn::{Learned, Learning, learn};
 pub use report::{Record, RecordRow};
-pub use rows::{Row, Rung, Verdict};
+pub use rows::{Candidate, Row, Verdict};
 pub use views::covering;
 pub use yardstick::{Metric, Yardstick};
 
@@ -137,15 +137,15 @@ struct Search<'a, 'b> {
     options: &'a FitOptions,
     views: Vec<Seen>,
     rows: Vec<Row>,
-    /// What rungs were found to cost.
-    costs: Vec<(Rung, Option<f64>)>,
+    /// What candidates were found to cost.
+    costs: Vec<(Candidate, Option<f64>)>,
     told: &'a mut dyn FnMut(&str, u32, u32),
     done: u32,
     expected: u32,
 }
 
 impl Search<'_, '_> {
-    /// Steps that there will be if nothing ends the search early: a reference or a rung in one view
+    /// Steps that there will be if nothing ends the search early: a reference or a candidate in one view
     /// each.
     fn guess(&self, views: usize) -> u32 {
         (views * (1 + 4 + FINER.len() + self.options.networks.len())) as u32
@@ -171,18 +171,18 @@ impl Search<'_, '_> {
 
     /// From the cheapest up to the first that is good enough.
     fn climb(&mut self) -> Result<Option<usize>, FitError> {
-        let finer = FINER.map(|entry_scale| Rung::Gather(gather::Options { entry_scale, ..Default::default() }));
-        let networks = (0..self.options.networks.len()).map(Rung::Neural);
-        let mut upper: Vec<Rung> = finer.into_iter().chain(networks).collect();
+        let finer = FINER.map(|entry_scale| Candidate::Gather(gather::Options { entry_scale, ..Default::default() }));
+        let networks = (0..self.options.networks.len()).map(Candidate::Neural);
+        let mut upper: Vec<Candidate> = finer.into_iter().chain(networks).collect();
         let mut ladder = vec![
-            Rung::Direct,
-            Rung::Ambient(Default::default()),
-            Rung::Ssgi(Default::default()),
-            Rung::Gather(Default::default()),
+            Candidate::Direct,
+            Candidate::Ambient(Default::default()),
+            Candidate::Ssgi(Default::default()),
+            Candidate::Gather(Default::default()),
         ];
         ladder.reverse();
-        while let Some(rung) = ladder.pop() {
-            let mut tried = self.attempt(rung, self.options.frames)?;
+        while let Some(candidate) = ladder.pop() {
+            let mut tried = self.attempt(candidate, self.options.frames)?;
             if tried.is_some_and(|row| self.rows[row].verdict == Verdict::TooFar)
                 && let Some(own) = self.own_numbers(tried)?
             {
@@ -190,33 +190,33 @@ impl Search<'_, '_> {
             }
             if let Some(enough) = tried.filter(|row| self.rows[*row].verdict == Verdict::GoodEnough) {
                 let rest = ladder.into_iter().rev().chain(upper);
-                let rest: Vec<Row> = rest.map(|rung| Row::blank(rung, Verdict::NotNeeded)).collect();
+                let rest: Vec<Row> = rest.map(|candidate| Row::blank(candidate, Verdict::NotNeeded)).collect();
                 self.rows.extend(rest);
                 return Ok(Some(enough));
             }
             if ladder.is_empty() && !upper.is_empty() {
                 // What these cost is not known before they are built.
                 let mut costed = Vec::new();
-                for rung in upper.drain(..) {
-                    let cost = self.cost(&rung)?;
-                    costed.push((cost.unwrap_or(f64::INFINITY), rung));
+                for candidate in upper.drain(..) {
+                    let cost = self.cost(&candidate)?;
+                    costed.push((cost.unwrap_or(f64::INFINITY), candidate));
                 }
                 costed.sort_by(|a, b| b.0.total_cmp(&a.0));
-                ladder.extend(costed.into_iter().map(|(_, rung)| rung));
+                ladder.extend(costed.into_iter().map(|(_, candidate)| candidate));
             }
         }
         Ok(None)
     }
 
-    /// A rung whose light is linear in two numbers, with those that suit these views best; `None`
+    /// A candidate whose light is linear in two numbers, with those that suit these views best; `None`
     /// for the others.
-    fn own_numbers(&mut self, row: Option<usize>) -> Result<Option<Rung>, FitError> {
-        let Some(rung) = row.map(|row| self.rows[row].rung.clone()) else { return Ok(None) };
+    fn own_numbers(&mut self, row: Option<usize>) -> Result<Option<Candidate>, FitError> {
+        let Some(candidate) = row.map(|row| self.rows[row].candidate.clone()) else { return Ok(None) };
         let mut problem = unseen::Problem::default();
         for view in 0..self.views.len() {
             let mut light = Vec::new();
             for numbers in unseen::ASKED {
-                let Some(asked) = rung.with_unseen(numbers) else { return Ok(None) };
+                let Some(asked) = candidate.with_unseen(numbers) else { return Ok(None) };
                 self.tell(&format!("{} in view {view}", asked.name(&self.options.networks)));
                 let method = asked.method(&self.options.networks);
                 let shot = self.trial.picture(&method, &self.views[view].camera, Settling::COLD)?;
@@ -224,12 +224,12 @@ impl Search<'_, '_> {
             }
             problem.add(&light, &self.views[view].reference);
         }
-        Ok(problem.solve().and_then(|own| rung.with_unseen(own)))
+        Ok(problem.solve().and_then(|own| candidate.with_unseen(own)))
     }
 
-    /// Cheaper numbers of a rung that is good enough, if they are, too; else the row itself.
+    /// Cheaper numbers of a candidate that is good enough, if they are, too; else the row itself.
     fn refine(&mut self, row: usize) -> Result<usize, FitError> {
-        let Rung::Gather(found) = &self.rows[row].rung else { return Ok(row) };
+        let Candidate::Gather(found) = &self.rows[row].candidate else { return Ok(row) };
         let own = gather::Options::default().entry_scale;
         if found.entry_scale < own {
             // The coarser ones have been tried on the way here.
@@ -239,8 +239,8 @@ impl Search<'_, '_> {
         let (mut best, mut low, mut high) = (row, 0, COARSER.len());
         while low < high {
             let middle = (low + high) / 2;
-            let rung = Rung::Gather(gather::Options { entry_scale: COARSER[middle], ..found });
-            match self.attempt(rung, self.options.frames)? {
+            let candidate = Candidate::Gather(gather::Options { entry_scale: COARSER[middle], ..found });
+            match self.attempt(candidate, self.options.frames)? {
                 Some(tried) if self.rows[tried].verdict == Verdict::GoodEnough => {
                     (best, low) = (tried, middle + 1);
                 }
@@ -261,7 +261,7 @@ impl Search<'_, '_> {
     /// The fewest frames after which the choice meets the target; where it never does, those that
     /// were asked for.
     fn settle(&mut self, chosen: usize, reached: bool) -> Result<(), FitError> {
-        let rung = self.rows[chosen].rung.clone();
+        let candidate = self.rows[chosen].candidate.clone();
         let most = self.rows[chosen].frames;
         if !reached || most <= 1 {
             return Ok(());
@@ -270,7 +270,7 @@ impl Search<'_, '_> {
         // To an eighth: noise would make a finer answer.
         while high - low > (high / 8).max(1) {
             let middle = (low + high) / 2;
-            let errors = self.errors(&rung, middle.max(1))?.map(|(errors, _)| errors);
+            let errors = self.errors(&candidate, middle.max(1))?.map(|(errors, _)| errors);
             let worst = errors.map_or(f64::NAN, |e| self.options.yardstick.worst(&e));
             let enough = self.options.yardstick.is_met(worst);
             self.rows[chosen].settling.push((middle.max(1), worst));
@@ -287,25 +287,25 @@ impl Search<'_, '_> {
         tried.min_by(|a, b| self.options.yardstick.order(a.1.worst, b.1.worst)).map(|(i, _)| i)
     }
 
-    /// Tries a rung in every view and adds its row; `None` where it is too dear or cannot draw the
+    /// Tries a candidate in every view and adds its row; `None` where it is too dear or cannot draw the
     /// scene.
-    fn attempt(&mut self, rung: Rung, frames: u32) -> Result<Option<usize>, FitError> {
-        let cost_ms = match self.cost(&rung)? {
+    fn attempt(&mut self, candidate: Candidate, frames: u32) -> Result<Option<usize>, FitError> {
+        let cost_ms = match self.cost(&candidate)? {
             Some(cost) => cost,
             None => {
-                let row = Row::blank(rung, Verdict::Cannot);
+                let row = Row::blank(candidate, Verdict::Cannot);
                 self.rows.push(row);
                 return Ok(None);
             }
         };
         if self.options.budget_ms.is_some_and(|budget| cost_ms > budget) {
-            let row = Row { cost_ms: Some(cost_ms), ..Row::blank(rung, Verdict::TooDear) };
+            let row = Row { cost_ms: Some(cost_ms), ..Row::blank(candidate, Verdict::TooDear) };
             self.rows.push(row);
             return Ok(None);
         }
-        let frames = if rung.settles(&self.options.networks) { frames } else { 1 };
-        let Some((errors, shots)) = self.errors(&rung, frames)? else {
-            let row = Row::blank(rung, Verdict::Cannot);
+        let frames = if candidate.settles(&self.options.networks) { frames } else { 1 };
+        let Some((errors, shots)) = self.errors(&candidate, frames)? else {
+            let row = Row::blank(candidate, Verdict::Cannot);
             self.rows.push(row);
             return Ok(None);
         };
@@ -313,18 +313,19 @@ impl Search<'_, '_> {
         let verdict = if self.options.yardstick.is_met(worst) { Verdict::GoodEnough } else { Verdict::TooFar };
         let bytes = shots.first().map_or(0, |s| s.bytes);
         let pictures = shots.iter().map(Shot::rgb).collect();
-        let row = Row { errors, worst, cost_ms: Some(cost_ms), bytes, frames, pictures, ..Row::blank(rung, verdict) };
+        let row =
+            Row { errors, worst, cost_ms: Some(cost_ms), bytes, frames, pictures, ..Row::blank(candidate, verdict) };
         self.rows.push(row);
         Ok(Some(self.rows.len() - 1))
     }
 
     /// The metric in every view, and the pictures; `None` where another method drew in its place.
-    fn errors(&mut self, rung: &Rung, frames: u32) -> Result<Option<Judged>, FitError> {
-        let method = rung.method(&self.options.networks);
+    fn errors(&mut self, candidate: &Candidate, frames: u32) -> Result<Option<Judged>, FitError> {
+        let method = candidate.method(&self.options.networks);
         let settling = Settling { frames, samples: self.options.yardstick.samples() };
         let (mut errors, mut shots) = (Vec::new(), Vec::new());
         for view in 0..self.views.len() {
-            self.tell(&format!("{} in view {view}, {frames} frames", rung.name(&self.options.networks)));
+            self.tell(&format!("{} in view {view}, {frames} frames", candidate.name(&self.options.networks)));
             let shot = self.trial.picture(&method, &self.views[view].camera, settling)?;
             if shot.instead.is_some() {
                 return Ok(None);
@@ -337,20 +338,20 @@ impl Search<'_, '_> {
     }
 
     /// Milliseconds of its own passes in the first view; `None` where it cannot draw the scene.
-    fn cost(&mut self, rung: &Rung) -> Result<Option<f64>, FitError> {
-        if *rung == Rung::Direct {
+    fn cost(&mut self, candidate: &Candidate) -> Result<Option<f64>, FitError> {
+        if *candidate == Candidate::Direct {
             return Ok(Some(0.0));
         }
-        if let Some((_, known)) = self.costs.iter().find(|(r, _)| r == rung) {
+        if let Some((_, known)) = self.costs.iter().find(|(r, _)| r == candidate) {
             return Ok(*known);
         }
-        let cost = self.find_cost(rung)?;
-        self.costs.push((rung.clone(), cost));
+        let cost = self.find_cost(candidate)?;
+        self.costs.push((candidate.clone(), cost));
         Ok(cost)
     }
 
-    fn find_cost(&mut self, rung: &Rung) -> Result<Option<f64>, FitError> {
-        let method = rung.method(&self.options.networks);
+    fn find_cost(&mut self, candidate: &Candidate) -> Result<Option<f64>, FitError> {
+        let method = candidate.method(&self.options.networks);
         let camera = self.views[0].camera.clone();
         if self.options.timed {
             let options = super::bench::BenchOptions { frames: 40, warmup: 20 };

@@ -21,7 +21,7 @@ pub struct Record {
     pub learned: Option<Learned>,
 }
 
-/// One rung.
+/// One candidate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordRow {
     /// The method, with its numbers or weights.
@@ -44,8 +44,8 @@ impl Fit {
     /// What is written beside the scene: `scene` is its hash, `device` the adapter's name.
     pub fn fitted(&self, options: &FitOptions, scene: String, size: [u32; 2], device: String) -> Fitted {
         let row = self.choice();
-        let weights = match row.rung {
-            super::Rung::Neural(index) => {
+        let weights = match row.candidate {
+            super::Candidate::Neural(index) => {
                 let network = &options.networks[index];
                 Some(FittedWeights { file: network.file.clone(), hash: network.neural.weights.hash_text() })
             }
@@ -56,9 +56,9 @@ impl Fit {
             schema: SCHEMA,
             program: env!("CARGO_PKG_VERSION").into(),
             scene,
-            method: row.rung.method_name(),
-            gather: row.rung.gather(),
-            unseen: row.rung.unseen().map(|u| u.words()),
+            method: row.candidate.method_name(),
+            gather: row.candidate.gather(),
+            unseen: row.candidate.unseen().map(|u| u.words()),
             frames: row.frames,
             weights,
             target: Target {
@@ -82,7 +82,7 @@ impl Fit {
     /// Everything for machines.
     pub fn record(&self, options: &FitOptions, fitted: Fitted) -> Record {
         let row = |r: &super::Row| RecordRow {
-            name: r.rung.name(&options.networks),
+            name: r.candidate.name(&options.networks),
             verdict: r.verdict.text(),
             errors: r.errors.clone(),
             cost_ms: r.cost_ms,
@@ -95,7 +95,7 @@ impl Fit {
         Record { schema: 1, fitted, references, rows, learned: self.learned.clone() }
     }
 
-    /// The table: a row for each rung, a column for each view.
+    /// The table: a row for each candidate, a column for each view.
     pub fn table(&self, options: &FitOptions) -> String {
         let mut text = String::new();
         // Writing into a text cannot fail.
@@ -110,7 +110,7 @@ impl Fit {
         writeln!(out, "| method | {} in{views} {ms} | |", yardstick.name())?;
         writeln!(out, "|---|{}---|---|", "---|".repeat(self.views.len()))?;
         for (i, row) in self.rows.iter().enumerate() {
-            let name = row.rung.name(&options.networks);
+            let name = row.candidate.name(&options.networks);
             let name = if i == self.chosen { format!("**{name}**") } else { name };
             let error = |view: usize| row.errors.get(view).map_or("-".into(), |e| yardstick.show(*e));
             let errors: String = (0..self.views.len()).map(|view| format!(" {} |", error(view))).collect();
@@ -128,7 +128,7 @@ impl Fit {
     /// What was chosen and why, in sentences.
     pub fn why(&self, options: &FitOptions) -> String {
         let (row, y) = (self.choice(), &options.yardstick);
-        let name = row.rung.name(&options.networks);
+        let name = row.candidate.name(&options.networks);
         let mut text = if self.reached {
             format!("`{name}` meets {} {} in every view (worst {}).", y.name(), y.show(y.target), y.show(row.worst))
         } else {
@@ -143,15 +143,15 @@ impl Fit {
         let below: Vec<String> = self
             .rows
             .iter()
-            .filter(|r| r.verdict == Verdict::TooFar && r.rung != row.rung)
-            .map(|r| format!("`{}` {}", r.rung.name(&options.networks), y.show(r.worst)))
+            .filter(|r| r.verdict == Verdict::TooFar && r.candidate != row.candidate)
+            .map(|r| format!("`{}` {}", r.candidate.name(&options.networks), y.show(r.worst)))
             .collect();
         // Cheaper ones are why it is this one; where nothing was good enough, all are.
         if !below.is_empty() {
             let _ = write!(text, " Not good enough: {}.", below.join(", "));
         }
         let dear = self.rows.iter().filter(|r| r.verdict == Verdict::TooDear);
-        let dear: Vec<String> = dear.map(|r| format!("`{}`", r.rung.name(&options.networks))).collect();
+        let dear: Vec<String> = dear.map(|r| format!("`{}`", r.candidate.name(&options.networks))).collect();
         if let (Some(budget), false) = (options.budget_ms, dear.is_empty()) {
             let _ = write!(text, " Over the budget of {budget} ms: {}.", dear.join(", "));
         }

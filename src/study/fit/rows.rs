@@ -5,7 +5,7 @@ use crate::gi::{Method, ambient::Unseen, gather, name::MethodName, pass};
 
 /// Something to try: a method with its numbers.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Rung {
+pub enum Candidate {
     /// No indirect light.
     Direct,
     /// Even light, with these numbers of what the picture does not show.
@@ -18,33 +18,33 @@ pub enum Rung {
     Neural(usize),
 }
 
-impl Rung {
+impl Candidate {
     /// The method.
     pub fn method(&self, networks: &[Network]) -> Method {
         match self {
-            Rung::Direct => Method::Direct,
-            Rung::Ambient(unseen) => Method::AmbientWith(*unseen),
-            Rung::Ssgi(unseen) => Method::SsgiWith(*unseen),
-            Rung::Gather(options) => Method::Gather(*options),
-            Rung::Neural(index) => Method::Neural(Box::new(networks[*index].neural.clone())),
+            Candidate::Direct => Method::Direct,
+            Candidate::Ambient(unseen) => Method::AmbientWith(*unseen),
+            Candidate::Ssgi(unseen) => Method::SsgiWith(*unseen),
+            Candidate::Gather(options) => Method::Gather(*options),
+            Candidate::Neural(index) => Method::Neural(Box::new(networks[*index].neural.clone())),
         }
     }
 
     /// The method's name on the command line.
     pub fn method_name(&self) -> MethodName {
         match self {
-            Rung::Direct => MethodName::Direct,
-            Rung::Ambient(_) => MethodName::Ambient,
-            Rung::Ssgi(_) => MethodName::Ssgi,
-            Rung::Gather(_) => MethodName::Gather,
-            Rung::Neural(_) => MethodName::Neural,
+            Candidate::Direct => MethodName::Direct,
+            Candidate::Ambient(_) => MethodName::Ambient,
+            Candidate::Ssgi(_) => MethodName::Ssgi,
+            Candidate::Gather(_) => MethodName::Gather,
+            Candidate::Neural(_) => MethodName::Neural,
         }
     }
 
     /// Numbers of `gather` that are not its own.
     pub fn gather(&self) -> Option<String> {
         match self {
-            Rung::Gather(options) => options.words(),
+            Candidate::Gather(options) => options.words(),
             _ => None,
         }
     }
@@ -52,7 +52,7 @@ impl Rung {
     /// Numbers of unseen light that are not those which methods have for every scene.
     pub fn unseen(&self) -> Option<Unseen> {
         match self {
-            Rung::Ambient(unseen) | Rung::Ssgi(unseen) => Some(*unseen).filter(|u| *u != Unseen::default()),
+            Candidate::Ambient(unseen) | Candidate::Ssgi(unseen) => Some(*unseen).filter(|u| *u != Unseen::default()),
             _ => None,
         }
     }
@@ -60,8 +60,8 @@ impl Rung {
     /// The same method with other numbers of unseen light, where it has them.
     pub fn with_unseen(&self, unseen: Unseen) -> Option<Self> {
         match self {
-            Rung::Ambient(_) => Some(Rung::Ambient(unseen)),
-            Rung::Ssgi(_) => Some(Rung::Ssgi(unseen)),
+            Candidate::Ambient(_) => Some(Candidate::Ambient(unseen)),
+            Candidate::Ssgi(_) => Some(Candidate::Ssgi(unseen)),
             _ => None,
         }
     }
@@ -69,10 +69,10 @@ impl Rung {
     /// For tables: the method, its numbers or its weights.
     pub fn name(&self, networks: &[Network]) -> String {
         match self {
-            Rung::Neural(index) => format!("neural {}", networks[*index].file.display()),
-            rung => match rung.gather().or(rung.unseen().map(|u| u.words())) {
-                Some(numbers) => format!("{} {numbers}", rung.method_name().name()),
-                None => rung.method_name().name().into(),
+            Candidate::Neural(index) => format!("neural {}", networks[*index].file.display()),
+            candidate => match candidate.gather().or(candidate.unseen().map(|u| u.words())) {
+                Some(numbers) => format!("{} {numbers}", candidate.method_name().name()),
+                None => candidate.method_name().name().into(),
             },
         }
     }
@@ -80,14 +80,14 @@ impl Rung {
     /// Whether its answer settles over frames.
     pub fn settles(&self, networks: &[Network]) -> bool {
         match self {
-            Rung::Gather(_) => true,
-            Rung::Neural(index) => pass::needs_guess(&networks[*index].neural.weights),
+            Candidate::Gather(_) => true,
+            Candidate::Neural(index) => pass::needs_guess(&networks[*index].neural.weights),
             _ => false,
         }
     }
 }
 
-/// What became of a rung.
+/// What became of a candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// It meets the target in every view.
@@ -118,11 +118,11 @@ impl Verdict {
     }
 }
 
-/// A rung and what came of it.
+/// A candidate and what came of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// What.
-    pub rung: Rung,
+    pub candidate: Candidate,
     /// Why it is or is not chosen.
     pub verdict: Verdict,
     /// The metric in each view; empty where it was not tried.
@@ -142,9 +142,9 @@ pub struct Row {
 }
 
 impl Row {
-    pub(super) fn blank(rung: Rung, verdict: Verdict) -> Self {
+    pub(super) fn blank(candidate: Candidate, verdict: Verdict) -> Self {
         Self {
-            rung,
+            candidate,
             verdict,
             errors: Vec::new(),
             worst: f64::NAN,

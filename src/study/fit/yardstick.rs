@@ -118,7 +118,7 @@ impl Yardstick {
     }
 
     /// What the metric would say of the reference's own noise, and how much that may move the
-    /// difference of two pictures (one standard deviation); 0 where that cannot be told.
+    /// difference of two pictures (one standard deviation); 0 where that is unknown.
     pub(super) fn noise(&self, reference: &truth::Reference) -> Result<[f64; 2], String> {
         match self.metric {
             Metric::Light => judge::light_error(reference.layer(Layer::Gi), reference)
@@ -144,7 +144,7 @@ impl Yardstick {
             Metric::Shown(name) => {
                 let flip = name == "flip";
                 let compared = judge::compare(&shot.rgb(), reference, flip).map_err(|e| e.to_string())?;
-                compared.value(name).ok_or_else(|| format!("`{name}` cannot be told here"))
+                compared.value(name).ok_or_else(|| format!("`{name}` cannot be computed here"))
             }
         }
     }

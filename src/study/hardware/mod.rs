@@ -103,7 +103,7 @@ pub enum HardwareError {
     Nothing,
 }
 
-/// A run under way: the clock, and what is told meanwhile.
+/// A run under way: the clock, and who hears of progress.
 struct Run<'a> {
     gpu: &'a Gpu,
     weights: &'a Weights,

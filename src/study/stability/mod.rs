@@ -4,7 +4,7 @@
 //! ```text
 //!  tests/*  one function a test, written against [`Play`]: "these frames, please" ─► looks ─► numbers
 //!  play     who draws them: a method, the path tracer, the paper's network; or the path tracer spoilt by a [`Fault`]
-//!  suite    runs test × subject; the path tracer must pass each test, and its spoilt twin must fail it
+//!  suite    runs test × subject; the path tracer must pass each test, and its spoilt copy must fail it
 //!  record   what JSON and tables are made of;  sheet: contact sheets and short sequences
 //! ```
 //!

@@ -124,7 +124,7 @@ fn tail(w: &mut String, record: &Record) -> std::fmt::Result {
          - 8K as a whole picture: `sizes` draws pictures as wide and as high as 8K, not both. `bench --size \
          7680x4320` does where memory allows.\n\
          - 8-bit networks: there are none. Another driver: one adapter draws all; `--adapter` and `--backend` choose \
-         it, and `tests/net` compares networks with the CPU twin.\n\
+         it, and `tests/net` compares networks with the CPU reference.\n\
          - InstanceNorm: the published generator's weights are not here. `paper` is our small run of its recipe, with \
          group norms and dropout as published.\n\
          - Temporal anti-aliasing: `tests/gi/taa.rs`."
@@ -137,7 +137,7 @@ fn tail(w: &mut String, record: &Record) -> std::fmt::Result {
     }
     let unsound: Vec<&str> = record.tests.iter().filter(|t| !t.sound).map(|t| t.name.as_str()).collect();
     if !unsound.is_empty() {
-        let why = "Tests that the truth does not pass, or that its spoilt twin does, and that say nothing";
+        let why = "Tests that the truth does not pass, or that its spoilt copy does, and that say nothing";
         writeln!(w, "- {why}: {}.", names(unsound))?;
     }
     Ok(())

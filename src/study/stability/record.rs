@@ -52,7 +52,7 @@ pub struct Finding {
     pub control: String,
     /// What is measured.
     pub criteria: Vec<Criterion>,
-    /// The truth passes and its spoilt twin does not: the test measures what it says.
+    /// The truth passes and its spoilt copy does not: the test measures what it says.
     pub sound: bool,
     /// Why the truth could not be had, if it could not.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -44,7 +44,7 @@ impl Script {
         self
     }
 
-    /// The next frame has nothing to do with the one before, and the method is told.
+    /// The next frame has nothing to do with the one before, and the method knows it.
     pub fn cut(mut self) -> Self {
         self.1.cut = true;
         self

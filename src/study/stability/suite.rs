@@ -24,7 +24,7 @@ pub struct SuiteOptions {
     pub resume: Option<PathBuf>,
 }
 
-/// What is told while it runs.
+/// Progress of a run.
 pub enum Event<'a> {
     /// A subject has begun a test.
     Begun {
@@ -64,7 +64,7 @@ impl<'a> Suite<'a> {
         self.options.tests.len() as u64 * (self.options.subjects.len() as u64 + 2)
     }
 
-    /// Runs all tests. What cannot be drawn is told in the record and loses nobody else's answer.
+    /// Runs all tests. What cannot be drawn is noted in the record and loses nobody else's answer.
     /// `go_on` is asked all the time.
     ///
     /// # Errors

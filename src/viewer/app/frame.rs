@@ -2,6 +2,7 @@
 
 use super::App;
 use crate::gpu::{readback, timing::Recorder};
+use crate::viewer::command;
 use crate::viewer::screen::Acquired;
 use crate::viewer::state::Request;
 use std::path::Path;
@@ -212,8 +213,8 @@ impl App {
         drawn
     }
 
-    /// Measures the exposure, if that is wished: in the first frame of a scene, and again at rest whenever something else
-    /// than the camera has changed meanwhile.
+    /// Measures the exposure, if that is wished: in the first frame of a scene, and again at rest whenever
+    /// something else than the camera has changed meanwhile.
     fn expose(&mut self) {
         let (Some(stage), Some(shown)) = (&self.stage, &self.state.shown) else { return };
         let first = self.state.measured.is_none() && stage.still() > 0;
@@ -256,7 +257,8 @@ impl App {
         for request in std::mem::take(&mut self.state.requests) {
             match request {
                 Request::Quit => self.quit(event_loop),
-                Request::Copy(text) => {
+                Request::CopyCommand => {
+                    let text = command::line(&self.state, None);
                     self.overlay.egui.copy_text(text.clone());
                     if let Some(screen) = self.screen.as_mut().filter(|_| self.script.is_none()) {
                         screen.input.set_clipboard_text(text.clone());

@@ -91,7 +91,7 @@ impl App {
                 self.state.tell(told.0, told.1);
             }
             Request::Browse(surroundings) => self.browse(surroundings),
-            Request::Copy(_) | Request::Quit | Request::FullScreen(_) => {}
+            Request::CopyCommand | Request::Quit | Request::FullScreen(_) => {}
         }
     }
 

@@ -97,7 +97,8 @@ pub enum Request {
     Path(PathBuf),
     /// Writes the camera path that was just recorded.
     SavePath,
-    Copy(String),
+    /// Copies the command line of this view.
+    CopyCommand,
     /// Shows the system's file dialog.
     Browse(bool),
     FullScreen(bool),

@@ -170,8 +170,8 @@ impl State {
         self.version += 1;
     }
 
-    /// Writes the vertices of what deforms, for whoever looks at meshes: clicks, the path tracer, files. Not done in each
-    /// frame of an animation, which the GPU moves by itself.
+    /// Writes the vertices of what deforms, for whoever looks at meshes: clicks, the path tracer, files. Not
+    /// done in each frame of an animation, which the GPU moves by itself.
     pub fn settle(&mut self) {
         if let Some(shown) = self.shown.as_mut().filter(|shown| shown.unsettled) {
             Arc::make_mut(&mut shown.scene).move_vertices();
@@ -196,7 +196,8 @@ impl State {
         animations.get(shown.pose.map_or(0, |p| p.0)).map(|a| a.end)
     }
 
-    /// Plays the animation that was chosen last from where it stands, from its beginning if it is at its end; or stops it.
+    /// Plays the animation that was chosen last from where it stands, from its beginning if it is at its end;
+    /// or stops it.
     pub(super) fn animate(&mut self, now: Instant) {
         let Some(end) = self.animation_end() else { return self.tell("this scene has no animation", false) };
         if self.animated.take().is_some() {

@@ -289,8 +289,7 @@ impl State {
                 self.requests.push(Request::Capture { exr });
             }
             A::CopyCommand => {
-                let text = super::command::line(self, None);
-                self.requests.push(Request::Copy(text));
+                self.requests.push(Request::CopyCommand);
                 self.tell("copied: the `bouncelight render` line of this view", false);
             }
             A::Open(path) => self.open(&path),
