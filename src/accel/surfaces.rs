@@ -94,7 +94,7 @@ pub fn from_shared_exponent(code: u32) -> Vec3 {
     Vec3::new((code & 511) as f32, (code >> 9 & 511) as f32, (code >> 18 & 511) as f32) * scale
 }
 
-/// Rec. 709.
+/// Luminance of Rec. 709.
 pub fn luminance(c: Vec3) -> f32 {
     c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }

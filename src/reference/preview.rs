@@ -6,6 +6,7 @@
 //! filter in space). Colour, emission and surroundings stay as they were traced.
 
 use super::{Layer, NO_DEPTH, Traced};
+use crate::accel::luminance;
 use crate::scene::Camera;
 use glam::Vec3;
 
@@ -76,10 +77,6 @@ impl Surfaces<'_> {
             self.is_there(j).then(|| (j, TAPS[(dx + 2) as usize] * TAPS[(dy + 2) as usize]))
         })
     }
-}
-
-fn luminance(c: Vec3) -> f32 {
-    c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
 /// The picture, RGBA, made of averaged light. `None` where a layer of [`READ`] is missing.

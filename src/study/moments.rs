@@ -28,7 +28,7 @@ use safetensors::{Dtype, tensor::TensorView};
 pub enum When {
     /// After so many frames of a still camera, the first of which follows a cut.
     Frames(u32),
-    /// At the end of [`PAN`] frames of a camera that turns and moves, which stood still for [`STILL`] before.
+    /// At the end of [`PAN`] frames of a camera that turns and moves, which stood still for four before.
     Pan,
 }
 

@@ -4,6 +4,7 @@
 
 use super::features::FeatureSet;
 use super::reconstruct::{Answer, LOST, MOST_ADDED, TRUST};
+use crate::accel::luminance;
 use crate::gi::screen::ambient::{BOUNCE, SKY};
 use crate::gi::stage::exposure::Exposure;
 use crate::gi::stage::inputs::{CELL, Params};
@@ -46,10 +47,6 @@ struct Surface {
 
 fn finite3(v: Vec3) -> Vec3 {
     Vec3::from_array(v.to_array().map(|x| if x.is_finite() { x } else { 0.0 }))
-}
-
-fn luminance(c: Vec3) -> f32 {
-    c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
 fn matrix(columns: &[[f32; 4]; 3]) -> Mat3 {
