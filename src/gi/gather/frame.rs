@@ -49,7 +49,7 @@ impl GatherGi {
             entry_scale: self.options.entry_scale.min(widest(camera.tan_half_height())),
             round: self.round,
             cell_frames: self.options.cell_frames,
-            entry_frames: if self.changing > 0 {
+            entry_frames: if self.stir > 0 {
                 self.options.entry_frames.min(HURRIED)
             } else {
                 self.options.entry_frames

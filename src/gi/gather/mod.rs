@@ -54,10 +54,9 @@ const LIFT_STEPS: f32 = 4.0;
 const HURRY: u32 = 8;
 
 /// Frames after the first, after a change of the lights, or after an object has moved, for which entries get
-/// two rays each; after a change they remember no more than [`HURRIED`]. Light between surfaces of albedo ρ goes
-/// with exp(−t (1 − ρ) 2 / HURRIED) then, by frames: of white ones' (0.8) 2 % are left after so many. With one
-/// ray a frame and a memory of eight it would take 160. New entries, which count each ray for the cube of its
-/// number (`renew.wgsl`), come as far in that time, of four times the rays.
+/// two rays each and remember no more than [`HURRIED`]. Light between surfaces of albedo ρ goes with exp(−t
+/// (1 − ρ) 2 / HURRIED) then, by frames: of white ones' (0.8) 2 % are left after so many. With one ray a
+/// frame and a memory of eight it would take 160.
 const STIR: u32 = 24;
 const HURRIED: f32 = 2.5;
 
