@@ -17,6 +17,8 @@ mod edges;
 mod embed;
 mod embedding;
 mod filter;
+#[cfg(feature = "reference")]
+mod fins;
 mod foreign;
 mod gather;
 mod glossy;
