@@ -16,7 +16,9 @@ pub struct Progress {
     what: String,
     kind: ProgressKind,
     bar: ProgressBar,
-    started: Instant,
+    /// When the first steps were done, and how many those were: what is left is not guessed by them, since
+    /// shaders are compiled and files read in them.
+    first_done: Option<(Instant, f64)>,
     last_line: Instant,
     /// Says what the program does until the first step is done; ends when this is dropped.
     first: Option<Sender<()>>,
@@ -56,7 +58,7 @@ impl Progress {
             ProgressStyle::with_template(template).expect("the template is a constant").progress_chars("█▌ "),
         );
         bar.set_message(what);
-        Self { what: what.into(), kind, bar, started: Instant::now(), last_line: Instant::now(), first: None }
+        Self { what: what.into(), kind, bar, first_done: None, last_line: Instant::now(), first: None }
     }
 
     /// As [`new`](Self::new) before anything is compiled; until the first step it says that this goes on.
@@ -101,9 +103,17 @@ impl Progress {
         let waited = self.last_line.elapsed() >= PLAIN_INTERVAL;
         if self.kind == ProgressKind::Plain && waited && done < total as f64 {
             self.last_line = Instant::now();
-            let left = self.started.elapsed().as_secs_f64() / done * (total as f64 - done).max(0.0);
-            let left = if done > 0.0 { format!("about {left:.0} s left") } else { "no guess yet".into() };
+            let left = match self.first_done {
+                Some((at, first)) if done > first => {
+                    let left = at.elapsed().as_secs_f64() / (done - first) * (total as f64 - done);
+                    format!("about {left:.0} s left")
+                }
+                _ => "no guess yet".into(),
+            };
             eprintln!("{done:.0}/{total} {}, {left}", self.what);
+        }
+        if self.first_done.is_none() && done > 0.0 {
+            self.first_done = Some((Instant::now(), done));
         }
     }
 

@@ -11,8 +11,7 @@ use bouncelight::scene::{Camera, Scene};
 /// A floor before a wall full of sunlit shelves. A tenth of a metre apart they are places that do not see each other, of which
 /// each cell of the table, half a metre and wider at this distance, has more than it has entries.
 fn shelves(pitch: f32) -> Scene {
-    let mut blocks =
-        vec![([-2.0, -0.1, -2.0], [2.0, 0.0, 2.0], GREY), ([-2.0, 0.0, -2.1], [2.0, 2.0, -2.0], [0.8; 3])];
+    let mut blocks = vec![([-2.0, -0.1, -2.0], [2.0, 0.0, 2.0], GREY), ([-2.0, 0.0, -2.1], [2.0, 2.0, -2.0], [0.8; 3])];
     for i in 1..(2.0 / pitch) as i32 {
         let y = pitch * i as f32;
         blocks.push(([-2.0, y - 0.01, -2.0], [2.0, y, -1.7], [0.8; 3]));

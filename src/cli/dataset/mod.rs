@@ -5,6 +5,8 @@
 //! stems: `training/cycles/paper_rooms.py` draws the same rooms from the same stream,
 //! `training/cycles/scene_file.py` reads the `views.json` written here.
 
+mod writer;
+
 use super::{
     args::{Global, usage},
     interrupt,
@@ -12,28 +14,20 @@ use super::{
     stdout::say,
 };
 use crate::{
-    gi::{Method, features::FeatureSet, gather, inputs::cells_of},
-    gpu::Gpu,
+    gi::{features::FeatureSet, inputs::cells_of},
     image_io::write_whole,
-    reference::{Kernel, ReferenceScene},
-    render::{Blending, Renderer, RendererOptions},
-    scene::{self, Camera, LightKind, Scene, home, paper_room, upload::SceneGpu},
+    scene::{self, Camera, LightKind, Scene, home, paper_room},
     study::{
-        dataset::{Next, Sample, frame, sample},
         guides::Guides,
         moments::{self, When},
-        motion, target, varied,
+        varied,
         views::{around, turned},
     },
 };
 use anyhow::{Context, Result};
 use serde_json::json;
-use sha2::{Digest, Sha256};
-use std::{
-    collections::HashSet,
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
+use writer::Writer;
 
 /// Rooms that pictures are judged on; training never sees them (docs/accuracy.md).
 const JUDGED: [u32; 10] = [0, 1, 10, 11, 12, 14, 27, 33, 37, 47];
@@ -159,24 +153,10 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make the folder {}", args.out.display()))?;
     interrupt::install()?;
     let gpu = global.open_gpu()?;
-    let method = match &args.weights {
-        Some(path) => Method::Neural(Box::new(super::args::load_weights(Some(path))?.into())),
-        None => Method::Gather(gather::Options::default()),
-    };
-    let options = RendererOptions { method, blending: Blending::Stochastic, ..Default::default() };
-    let renderer = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
-    let lessons = match args.moments.is_empty() {
-        true => None,
-        false => Some(Lessons::new(&gpu, &args)?),
-    };
-    let kernel = (args.spp > 0 && lessons.is_none()).then(|| Kernel::new(&gpu.device));
-    let Args { spp, motion, guides, gi_frames, ref out, ref moments, .. } = args;
-    if !moments.is_empty() && spp == 0 {
+    if !args.moments.is_empty() && args.spp == 0 {
         return Err(usage("--moments need the light to be learnt: --spp N".into()));
     }
-    let (out, listed) = (out.clone(), HashSet::new());
-    let mut writer = Writer { gpu, renderer, kernel, spp, motion, guides, gi_frames, lessons, out, listed };
-    writer.open_list()?;
+    let mut writer = Writer::open(gpu, &args)?;
     match (args.recipe, &args.rooms, &args.scene) {
         (Recipe::PaperRoom | Recipe::PaperRoomVaried | Recipe::Home, Some(rooms), _) => {
             many_rooms(global, &mut writer, rooms, &args)?
@@ -200,150 +180,6 @@ fn announce(global: &Global, args: &Args, samples: usize) {
     let bytes = samples as u64 * (w * h * planes * 4 + guides + 1024);
     if !global.quiet {
         eprintln!("{samples} samples, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
-    }
-}
-
-/// File with the SHA-256 of every sample, as `sha256sum -c` reads it.
-const LIST: &str = "SHA256SUMS";
-
-/// Draws samples and writes them; a file that exists is kept.
-struct Writer {
-    gpu: Gpu,
-    renderer: Renderer,
-    /// The path tracer, if it makes the targets.
-    kernel: Option<Kernel>,
-    spp: u32,
-    motion: bool,
-    guides: bool,
-    gi_frames: u32,
-    /// What cells remember is written instead.
-    lessons: Option<Lessons>,
-    out: PathBuf,
-    /// Names in the list of checksums.
-    listed: HashSet<String>,
-}
-
-/// What lessons of a filter are made with.
-struct Lessons {
-    /// Those of a still camera in the order in which they come, the pan last.
-    moments: Vec<When>,
-    reader: moments::Reader,
-    /// Gathers the light that is to be learnt.
-    teacher: Renderer,
-}
-
-impl Lessons {
-    fn new(gpu: &Gpu, args: &Args) -> Result<Self> {
-        let mut moments = args.moments.clone();
-        moments.sort();
-        moments.dedup();
-        let method = Method::Gather(gather::Options::PLAIN);
-        let options = RendererOptions { method, blending: Blending::Stochastic, ..Default::default() };
-        let teacher = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
-        Ok(Self { moments, reader: moments::Reader::new(&gpu.device), teacher })
-    }
-}
-
-/// A scene as both renderers want it.
-struct Uploaded {
-    raster: SceneGpu,
-    traced: Option<ReferenceScene>,
-}
-
-impl Writer {
-    fn upload(&self, scene: &Scene) -> Result<Uploaded> {
-        let mut raster = SceneGpu::new(&self.gpu.device, &self.gpu.queue, scene)?;
-        raster.trace(&self.gpu.device, &self.gpu.queue, scene)?;
-        let trace = |_| ReferenceScene::new(&self.gpu.device, &self.gpu.queue, scene);
-        Ok(Uploaded { raster, traced: self.kernel.as_ref().map(trace).transpose()? })
-    }
-
-    fn path(&self, stem: &str) -> PathBuf {
-        self.out.join(format!("{stem}.safetensors"))
-    }
-
-    /// Draws, traces and writes the sample `stem`; `seed` is the path tracer's.
-    fn write(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32) -> Result<()> {
-        if self.lessons.is_some() {
-            return self.write_lesson(stem, scene, camera, seed);
-        }
-        let sample = self.sample(&scene.raster, camera)?;
-        self.complete(stem, scene, camera, seed, sample)
-    }
-
-    /// Completes the sample that was drawn last, by what else of it is wanted, and writes it.
-    fn complete(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32, mut sample: Sample) -> Result<()> {
-        if self.guides {
-            sample.guides = Some(Guides::read(&self.gpu, self.renderer.targets(), camera.near)?);
-        }
-        if self.motion {
-            let size = self.renderer.size();
-            let moved = motion::stepped(camera, size, motion::median_distance(&sample), u64::from(seed));
-            // The guess goes on, as it does when a camera moves.
-            interrupt::check()?;
-            let next = frame(&self.gpu, &mut self.renderer, &scene.raster, &moved, 1)?;
-            let flow = motion::flow((&sample, camera), (&next, &moved), size);
-            sample.next = Some(Next { inputs: next.inputs, flow });
-        }
-        if let (Some(kernel), Some(traced)) = (&self.kernel, &scene.traced) {
-            let options = target::options(self.spp, seed);
-            let go_on = || !interrupt::requested();
-            sample.target = target::target(&self.gpu, kernel, traced, camera, self.renderer.size(), options, go_on)?;
-            interrupt::check()?;
-        }
-        self.save(stem, sample.to_bytes()?)
-    }
-
-    fn write_lesson(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32) -> Result<()> {
-        let Some(Lessons { moments, reader, teacher }) = &mut self.lessons else { return Ok(()) };
-        let drawn_by = (&mut self.renderer, teacher, reader);
-        let asked = (moments.as_slice(), self.spp, seed);
-        let go_on = || !interrupt::requested();
-        let lesson = moments::lesson(&self.gpu, drawn_by, &scene.raster, camera, asked, go_on)?;
-        interrupt::check()?;
-        lesson.map_or(Ok(()), |lesson| self.save(stem, lesson.to_bytes()?))
-    }
-
-    fn save(&mut self, stem: &str, bytes: Vec<u8>) -> Result<()> {
-        write_whole(&self.path(stem), &bytes)?;
-        self.list(stem, &bytes)
-    }
-
-    fn sample(&mut self, scene: &SceneGpu, camera: &Camera) -> Result<Sample> {
-        interrupt::check()?;
-        Ok(sample(&self.gpu, &mut self.renderer, scene, camera, self.gi_frames)?)
-    }
-
-    fn open_list(&mut self) -> Result<()> {
-        let text = std::fs::read_to_string(self.out.join(LIST)).unwrap_or_default();
-        self.listed = text.lines().filter_map(|l| l.split_once("  ")).map(|(_, name)| name.to_owned()).collect();
-        Ok(())
-    }
-
-    /// Adds a sample to the list of checksums. One write, so that several shards may share a folder.
-    fn list(&mut self, stem: &str, bytes: &[u8]) -> Result<()> {
-        let name = format!("{stem}.safetensors");
-        let sum: String = Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect();
-        let path = self.out.join(LIST);
-        let file = std::fs::OpenOptions::new().create(true).append(true).open(&path);
-        let line = format!("{sum}  {name}\n");
-        file.and_then(|mut f| f.write_all(line.as_bytes()))
-            .with_context(|| format!("cannot write {}", path.display()))?;
-        self.listed.insert(name);
-        Ok(())
-    }
-
-    /// Whether the sample is there; one that a kill left without its checksum gets it now.
-    fn has(&mut self, stem: &str) -> Result<bool> {
-        let path = self.path(stem);
-        if !path.exists() {
-            return Ok(false);
-        }
-        if !self.listed.contains(&format!("{stem}.safetensors")) {
-            let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-            self.list(stem, &bytes)?;
-        }
-        Ok(true)
     }
 }
 
@@ -421,11 +257,7 @@ fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> R
         }
         let name = format!("{stem}_view{view}");
         if view % of == shard && !writer.has(&name)? {
-            if writer.lessons.is_none() {
-                writer.complete(&name, &uploaded, &camera, view, sample)?;
-            } else {
-                writer.write_lesson(&name, &uploaded, &camera, view)?;
-            }
+            writer.write_drawn(&name, &uploaded, &camera, view, sample)?;
         }
         cameras.push(camera);
         progress.step();
@@ -442,7 +274,7 @@ fn record_views(writer: &Writer, stem: &str, spec: &str, seed: u64, cameras: &[C
     };
     let view = |c: &Camera| json!({ "world_from_camera": c.transform, "yfov": c.yfov });
     let record = json!({
-        "schema": 1, "scene": spec, "seed": seed, "size": writer.renderer.size(),
+        "schema": 1, "scene": spec, "seed": seed, "size": writer.size(),
         "views": cameras.iter().map(view).collect::<Vec<_>>(),
         "environment": scene.environment.radiance, "lights": scene.lights.iter().map(size).collect::<Vec<_>>(),
     });
