@@ -34,3 +34,5 @@ pub mod truth;
 #[cfg(feature = "io")]
 pub mod varied;
 pub mod views;
+#[cfg(all(feature = "io", feature = "reference"))]
+mod wrap;

@@ -10,6 +10,7 @@ use super::{
 use crate::study::{
     bench::AGREEMENT,
     projection::{self, EFFICIENCY, GTX_1050},
+    wrap::wrapped,
 };
 use std::fmt::Write;
 
@@ -172,7 +173,7 @@ pub fn page(record: &Record, metric: Metric, picture: &str) -> String {
         add(&mut text, "## What is missing\n");
         missing.iter().for_each(|line| add(&mut text, &format!("- {line}")));
     }
-    format!("{}\n", text.trim_end())
+    format!("{}\n", wrapped(&text).trim_end())
 }
 
 fn title(metric: Metric) -> &'static str {

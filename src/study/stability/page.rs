@@ -2,6 +2,7 @@
 //! with its threshold.
 
 use super::{Finding, Found, Record};
+use crate::study::wrap::wrapped;
 use std::fmt::Write;
 
 /// The page for a record. `command` is the line that makes it anew.
@@ -11,7 +12,7 @@ pub fn page(record: &Record, command: &str) -> String {
     // Writing to a string cannot fail.
     let _ = head(w, record, command).and_then(|()| table(w, record)).and_then(|()| failures(w, record));
     let _ = numbers(w, record).and_then(|()| tail(w, record));
-    text
+    wrapped(&text)
 }
 
 fn head(w: &mut String, record: &Record, command: &str) -> std::fmt::Result {
@@ -19,7 +20,7 @@ fn head(w: &mut String, record: &Record, command: &str) -> std::fmt::Result {
     writeln!(
         w,
         "Small scenes and short sequences, each with numbers that have a threshold. The path tracer takes every test, \
-         too, and passes it; the same pictures spoilt on\n\
+         too, and passes it; the same pictures spoilt on \
          purpose must fail it. Made by\n\n    {command}\n\n\
          which also leaves a contact sheet of each test and, where something moves, a short sequence. Do not edit: \
          the program writes this page (version {}, on {}, {} {}{}).\n",
