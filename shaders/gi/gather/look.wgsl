@@ -181,9 +181,10 @@ fn is_lit(x: vec3f, chosen: Chosen, seed: u32) -> bool {
         && trace_seeded(x, chosen.l, chosen.reach, true, seed).triangle == NO_TRIANGLE;
 }
 
-// Segments of a ray's way at most. Where it meets a place that no entry knows (more places of a cell do not see each other than
-// it has entries, or the table is full) it goes on, as that place's own ray would, to one that an entry knows: no light is
-// lost there. In a hotel room 2 % of the light come by such ways, so what a fifth segment would add is nothing.
+// Segments of a ray's way at most. Where it meets a place that no entry knows (more places of a cell do not see
+// each other than it has entries, or the table is full) it goes on, as that place's own ray would, to one that
+// an entry knows: no light is lost there. Of a wall full of shelves, or blinds, four segments lose 7 % of the
+// light, eight 3 %, sixteen 2 % (tests/gi/fins.rs).
 const SEGMENTS = 8u;
 
 // What the ray from o finds in direction d. n_d: cosine by which shadow rays to what glows were weighted
