@@ -207,10 +207,9 @@ pub fn capture_with(
     let mut beauty = vec![0.0; 4 * pixels];
     let mut sums: Vec<(Sum, Vec<f32>)> = needed.iter().map(|&s| (s, vec![0.0; s.channels * pixels])).collect();
     let decoder = Decoder::new(&gpu.device, renderer);
-    let mut draw = |i: u32, shadows: bool| -> Result<(), RenderError> {
+    let mut draw = |i: u32, offset: [f32; 2], shadows: bool| -> Result<(), RenderError> {
         let seed = options.seed.wrapping_mul(0x9e37_79b9).wrapping_add(i);
-        let view =
-            View::new(camera, size, sampling::offset(i, options.seed)).with_seed(seed).with_samples(options.samples);
+        let view = View::new(camera, size, offset).with_seed(seed).with_samples(options.samples);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, shadows)?;
         gpu.queue.submit([encoder.finish()]);
@@ -218,13 +217,14 @@ pub fn capture_with(
     };
     // Backwards, so that the picture's own sample is the one through the pixels' centres.
     for i in (1..=options.warmup).rev() {
-        draw(i, i == options.warmup)?;
+        draw(i, sampling::offset(i, options.seed), i == options.warmup)?;
         if !go_on() {
             return Ok(None);
         }
     }
     for i in 0..options.samples {
-        draw(i, i == 0 && options.warmup == 0)?;
+        let offset = sampling::offset_of(i, options.samples, options.seed);
+        draw(i, offset, i == 0 && options.warmup == 0)?;
         decoder.add(gpu, size, 0, &mut beauty, 4)?;
         for (sum, data) in &mut sums {
             if i == 0 || sum.filtered {

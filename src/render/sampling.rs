@@ -1,5 +1,7 @@
 //! Where in the pixel the samples of a picture lie: drawn from the filter itself, so that equal weights are right.
 
+use std::sync::{Mutex, OnceLock, PoisonError};
+
 /// Filter width of Cycles' default, pixels.
 pub const FILTER_WIDTH: f32 = 1.5;
 
@@ -21,6 +23,56 @@ pub fn offset(i: u32, seed: u32) -> [f32; 2] {
     })
 }
 
+/// Offset of sample `i` of a picture of `of` samples, pixels. Sample 0 is the pixel's centre; the others are those of
+/// [`offset`], moved and stretched so that all have the filter's mean and width: the first four of the sequence lie a
+/// fifth of a pixel to the left and above, and so would all that the picture shows.
+pub fn offset_of(i: u32, of: u32, seed: u32) -> [f32; 2] {
+    let others = of.saturating_sub(1);
+    // One other sample cannot have the filter's width and leave the mean where it is.
+    if i == 0 || others < 2 {
+        return offset(i, seed);
+    }
+    let [mean, scale] = moments(others, seed);
+    let at = offset(i, seed);
+    std::array::from_fn(|axis| ((at[axis] - mean[axis]) * scale[axis]).clamp(-FILTER_WIDTH, FILTER_WIDTH))
+}
+
+/// Mean of the samples 1 to `others`, and what their distance to it is to be multiplied by so that together with one in
+/// the centre they have the filter's second moment.
+fn moments(others: u32, seed: u32) -> [[f32; 2]; 2] {
+    static LAST: Mutex<Option<((u32, u32), [[f32; 2]; 2])>> = Mutex::new(None);
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((key, moments)) = *last
+        && key == (others, seed)
+    {
+        return moments;
+    }
+    let (mut sum, mut squares) = ([0.0f64; 2], [0.0f64; 2]);
+    for point in (1..=others).map(|i| offset(i, seed)) {
+        for axis in 0..2 {
+            sum[axis] += f64::from(point[axis]);
+            squares[axis] += f64::from(point[axis]).powi(2);
+        }
+    }
+    let n = f64::from(others);
+    let mean = sum.map(|s| s / n);
+    let wanted = second_moment() * (n + 1.0) / n;
+    let scale = |axis: usize| (wanted / (squares[axis] / n - mean[axis].powi(2)).max(1e-6)).sqrt();
+    let moments = [mean.map(|m| m as f32), [scale(0) as f32, scale(1) as f32]];
+    *last = Some(((others, seed), moments));
+    moments
+}
+
+/// Mean square distance from the centre along an axis under the filter, pixels².
+fn second_moment() -> f64 {
+    static MOMENT: OnceLock<f64> = OnceLock::new();
+    *MOMENT.get_or_init(|| {
+        let at = |i: usize| FILTER_WIDTH * (2.0 * (i as f32 + 0.5) / STEPS as f32 - 1.0);
+        let sum = |f: &dyn Fn(f32) -> f32| (0..STEPS).map(|i| f64::from(f(at(i)))).sum::<f64>();
+        sum(&|x| window(x) * x * x) / sum(&window)
+    })
+}
+
 /// Blackman-Harris window over [−w, w], about 0 at its ends and not meant beyond them, for the
 /// filter's nominal width w: Cycles stretches the window to twice its width setting.
 pub(crate) fn window(x: f32) -> f32 {
@@ -30,7 +82,7 @@ pub(crate) fn window(x: f32) -> f32 {
 
 /// Position below which a share `u` of the window's integral lies.
 pub(crate) fn inverse(u: f32) -> f32 {
-    static TABLE: std::sync::OnceLock<Vec<f32>> = std::sync::OnceLock::new();
+    static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
     let table = TABLE.get_or_init(|| {
         let at = |i: usize| FILTER_WIDTH * (2.0 * i as f32 / STEPS as f32 - 1.0);
         let mut sum = 0.0;
@@ -72,5 +124,24 @@ mod tests {
             assert!((square / (second / mass) - 1.0).abs() < 0.01, "axis {axis}: {square} against {}", second / mass);
         }
         assert_ne!(offset(1, 0), offset(1, 1));
+    }
+
+    #[test]
+    fn few_samples_have_the_filters_moments_too() {
+        for (of, seed) in [(3, 0), (4, 0), (4, 7), (5, 1), (8, 0), (16, 0), (64, 3)] {
+            let points: Vec<_> = (0..of).map(|i| offset_of(i, of, seed)).collect();
+            assert_eq!(points[0], [0.0, 0.0]);
+            for axis in 0..2 {
+                let sum = |f: &dyn Fn(f64) -> f64| points.iter().map(|p| f(f64::from(p[axis]))).sum::<f64>();
+                let (mean, square) = (sum(&|x| x) / f64::from(of), sum(&|x| x * x) / f64::from(of));
+                assert!(mean.abs() < 2e-3, "{of} samples, axis {axis}: mean {mean}");
+                assert!((square / second_moment() - 1.0).abs() < 0.02, "{of} samples, axis {axis}: {square}");
+            }
+            // Negative control: the sequence itself is off.
+            let first = (0..of).map(|i| f64::from(offset(i, seed)[0])).sum::<f64>() / f64::from(of);
+            assert!(of > 16 || first.abs() > 2e-3, "{of} {first}");
+        }
+        // What leaves no choice.
+        assert_eq!((offset_of(0, 1, 0), offset_of(1, 2, 0)), ([0.0; 2], offset(1, 0)));
     }
 }

@@ -240,7 +240,8 @@ impl Stage {
             slot.renderer.resize(size)?;
             slot.renderer.set_backdrop(state.settings.backdrop);
             // Sample by sample as a capture takes them.
-            let view = Eye::new(camera, size, sampling::offset(self.still, 0)).with_seed(self.still);
+            let offset = sampling::offset_of(self.still, state.settings.samples, 0);
+            let view = Eye::new(camera, size, offset).with_seed(self.still);
             slot.renderer.record_frame(recorder, &self.gpu.queue, scene, &view, self.still == 0)?;
             if state.settings.samples > 1 {
                 let hdr = &slot.renderer.targets().hdr;
