@@ -13,6 +13,7 @@ use crate::{
     scene::upload::SceneGpu,
     study::{
         bench::{BenchOptions, Measurement, measure},
+        count,
         layers::Layers,
         projection::{self, EFFICIENCY, GTX_1050},
         ratios::{self, Ratios},
@@ -44,6 +45,9 @@ pub struct Args {
     /// One row per network layer instead of one for the network.
     #[arg(long)]
     layers: bool,
+    /// Let shaders count, too, what they do in a frame at rest: operations, bytes, rays. Slow.
+    #[arg(long)]
+    count: bool,
     /// Write the record to this file.
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
@@ -200,6 +204,18 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         network,
     };
     print(&record, &gpu, args.layers);
+    if args.count {
+        for name in &names {
+            let method = match &fitted {
+                Some(fitted) => fitted.method()?,
+                None => name.method(global, args.weights.as_ref())?,
+            };
+            let options = RendererOptions { method, ..Default::default() };
+            let counted = count::frame(&gpu, &scene, &camera, args.scene.size, options, Method::SETTLED)?;
+            let said = record.methods.iter().find(|m| m.method == name.name()).map_or(&[][..], |m| &m.costs);
+            print_counted(name.name(), &counted, said);
+        }
+    }
     if let Some(layers) = &record.network {
         super::layers::print(layers);
     }
@@ -267,6 +283,18 @@ fn print(record: &Record, gpu: &Gpu, layers: bool) {
         let mib = |b: u64| b as f64 / (1 << 20) as f64;
         let parts = m.bytes.iter().filter(|(_, b)| *b > 0).map(|(n, b)| format!("{n} {:.1}", mib(*b)));
         say!("  {:.1} MiB of GPU memory: {}", mib(m.total_bytes()), parts.collect::<Vec<_>>().join(", "));
+    }
+}
+
+/// What shaders counted of a frame at rest, beside what the method says of itself.
+fn print_counted(method: &str, counted: &[Cost], said: &[Cost]) {
+    say!("\n{:<28}{:>10}{:>10}{:>10}{:>10}{:>10}", method, "MFLOP", "said", "MB", "said", "Mray");
+    for c in counted {
+        let said = said.iter().find(|s| s.pass == c.pass);
+        let said = |of: fn(&Cost) -> f64| said.map_or("-".into(), |s| format!("{:.2}", of(s) / 1e6));
+        let (flops, bytes, rays) = (c.flops / 1e6, c.bytes / 1e6, c.rays / 1e6);
+        let [flops_said, bytes_said] = [said(|s| s.flops), said(|s| s.bytes)];
+        say!("  {:<26}{flops:>10.2}{flops_said:>10}{bytes:>10.2}{bytes_said:>10}{rays:>10.3}", c.pass);
     }
 }
 

@@ -4,6 +4,10 @@ pub mod bind;
 pub(crate) mod binding;
 mod bound;
 mod choose;
+#[cfg(feature = "export")]
+pub(crate) mod count;
+#[cfg(feature = "export")]
+mod instrument;
 pub mod readback;
 pub mod shaders;
 pub(crate) mod tape;

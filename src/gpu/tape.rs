@@ -75,6 +75,11 @@ fn write(note: impl FnOnce(&mut Tape)) {
 
 /// Compiles WGSL.
 pub(crate) fn shader_module(device: &wgpu::Device, name: &str, text: String) -> wgpu::ShaderModule {
+    #[cfg(feature = "export")]
+    if let Some(module) = super::count::module(device, name, &text) {
+        write(|tape| tape.sources.push((module.clone(), Source { name: name.to_owned(), text })));
+        return module;
+    }
     let kept = RUNS.get().then(|| text.clone());
     let source = wgpu::ShaderSource::Wgsl(text.into());
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source });
@@ -84,12 +89,37 @@ pub(crate) fn shader_module(device: &wgpu::Device, name: &str, text: String) -> 
     module
 }
 
+/// Makes the layout of a pipeline of `module`.
+pub(crate) fn pipeline_layout(
+    device: &wgpu::Device,
+    label: &str,
+    module: &wgpu::ShaderModule,
+    layouts: &[Option<&wgpu::BindGroupLayout>],
+) -> wgpu::PipelineLayout {
+    let make = |layouts: &[Option<&wgpu::BindGroupLayout>]| {
+        let bind_group_layouts = layouts;
+        let label = Some(label);
+        device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label, bind_group_layouts, immediate_size: 0 })
+    };
+    #[cfg(feature = "export")]
+    if let Some(counted) = super::count::layout(module) {
+        let mut all = layouts.to_vec();
+        all.resize(super::count::GROUP, None);
+        all.push(Some(&counted));
+        return make(&all);
+    }
+    let _ = module;
+    make(layouts)
+}
+
 /// Makes a pipeline.
 pub(crate) fn compute_pipeline(
     device: &wgpu::Device,
     descriptor: &wgpu::ComputePipelineDescriptor<'_>,
 ) -> wgpu::ComputePipeline {
     let pipeline = device.create_compute_pipeline(descriptor);
+    #[cfg(feature = "export")]
+    super::count::pipeline(&pipeline, descriptor.module);
     write(|tape| {
         let source = tape.sources.iter().find(|(module, _)| module == descriptor.module).map(|s| s.1.clone());
         if let Some(source) = source {
@@ -142,6 +172,8 @@ impl<'a> Pass<'a> {
 
     /// As [`wgpu::ComputePass::dispatch_workgroups`].
     pub fn dispatch_workgroups(&mut self, x: u32, y: u32, z: u32) {
+        #[cfg(feature = "export")]
+        super::count::dispatch(&mut self.pass, self.pipeline.as_ref());
         self.pass.dispatch_workgroups(x, y, z);
         write(|tape| {
             // What was made before the tape began leaves an empty place, which `export` refuses.
