@@ -128,7 +128,7 @@ fn traffic(names: &str) -> Result<(), Box<dyn std::error::Error>> {
         let camera = scene.cameras.first().ok_or_else(|| format!("{name} has no camera"))?;
         let t = traffic::count(&scene, camera, [1024, 512])?;
         let [nearest, light, entry] = t.read;
-        // 170 operations a block, as `Technique::costs` counts them.
+        // 170 operations a block: the least, by hand. Shaders count 400 with what is around it (`bench --count`).
         let flops = t.asked / 64.0 * 170.0 * t.waiting / GTX_1050.flops;
         let ms = |bytes: f64| 1e3 * flops.max(bytes / GTX_1050.bandwidth) / EFFICIENCY;
         let [size, asked, fetched, missed] = [64.0 * t.blocks as f64, t.asked, t.fetched, t.missed].map(|b| b / 1e6);

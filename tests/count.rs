@@ -2,17 +2,18 @@
 
 mod common;
 
-use bouncelight::gi::technique::Cost;
 use bouncelight::gi::{Method, gather};
 use bouncelight::gpu::Gpu;
 use bouncelight::render::RendererOptions;
-use bouncelight::scene;
-use bouncelight::study::count::frame;
+use bouncelight::scene::{self, Scene};
+use bouncelight::study::count::{CountError, Still, frame};
+use bouncelight::study::projection::Cost;
 
 fn counted(gpu: &Gpu, method: Method, size: [u32; 2], frames: u32) -> Vec<Cost> {
     let room = scene::load("cornell").expect("bundled");
     let options = RendererOptions { method, ..Default::default() };
-    frame(gpu, &room, &room.cameras[0], size, options, frames).expect("counts")
+    let still = Still { scene: &room, camera: &room.cameras[0], size };
+    frame(gpu, still, options, frames).expect("counts")
 }
 
 fn of<'a>(costs: &'a [Cost], pass: &str) -> &'a Cost {
@@ -29,6 +30,26 @@ fn a_picture_of_four_times_as_many_pixels_takes_four_times_as_much() {
         assert!((flops - 4.0).abs() < 0.5 && (bytes - 4.0).abs() < 0.5, "{pass}: {flops}, {bytes}");
         assert_eq!(of(&large, pass).rays, 0.0);
     }
+}
+
+#[test]
+fn passes_that_find_no_light_are_counted_and_those_that_cannot_draw_are_not() {
+    let Some(gpu) = common::gpu() else { return };
+    let room = scene::load("cornell").expect("bundled");
+    let still = Still { scene: &room, camera: &room.cameras[0], size: [64, 32] };
+    let costs = |taa| {
+        let options = RendererOptions { taa, ..Default::default() };
+        frame(&gpu, still, options, 2).expect("counts")
+    };
+    let (off, on) = (costs(false), costs(true));
+    assert!(of(&on, "taa").flops > 0.0 && of(&on, "direct") == of(&off, "direct"));
+    // Negative control: what is off is not counted.
+    assert!(off.iter().all(|c| c.pass != "taa"), "{off:?}");
+    // Without triangles there are no rays, and another method draws.
+    let empty = Scene { instances: Vec::new(), ..room.clone() };
+    let options = RendererOptions { method: Method::Gather(Default::default()), ..Default::default() };
+    let refused = frame(&gpu, Still { scene: &empty, ..still }, options, 1).expect_err("there are no rays");
+    assert!(matches!(refused, CountError::Instead(_)), "{refused}");
 }
 
 #[test]

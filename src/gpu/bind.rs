@@ -85,7 +85,7 @@ pub fn pipeline(
     layouts: &[&wgpu::BindGroupLayout],
 ) -> wgpu::ComputePipeline {
     let layouts: Vec<_> = layouts.iter().map(|&l| Some(l)).collect();
-    let layout = tape::pipeline_layout(device, label, module, &layouts);
+    let layout = tape::pipeline_layout(device, label, &layouts);
     let descriptor = wgpu::ComputePipelineDescriptor {
         label: Some(label),
         layout: Some(&layout),

@@ -166,7 +166,7 @@ impl Gpu {
     }
 
     /// Another device on the same adapter, with room for a storage buffer more a stage.
-    #[cfg(feature = "export")]
+    #[cfg(feature = "reference")]
     pub(crate) fn for_counting(&self) -> Result<Self, GpuError> {
         Self::with_more(self.adapter.clone(), 1)
     }

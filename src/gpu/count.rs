@@ -1,28 +1,33 @@
-//! What compute passes do, counted while they run: while a [`Count`] is kept, shaders are compiled so that they count
-//! ([`instrument`](super::instrument)), and each dispatch has a place where its threads add up.
+//! What compute passes do, counted while they run: between [`Count::begin`] and [`Count::take`] each dispatch is done by
+//! a pipeline that counts ([`instrument`](super::instrument)), which adds up in a place of its own.
 
 use super::bound::Bound;
-pub(super) use super::instrument::GROUP;
-use super::instrument::{self, NUMBERS};
-use super::{readback, tape};
+use super::instrument::{self, GROUP, NUMBERS};
+use super::tape::{self, Made};
+use super::{Gpu, readback};
+use std::borrow::Cow;
 use std::cell::RefCell;
 
 /// Dispatches of a frame that there is room for, and bytes of each.
-const DISPATCHES: u64 = 1024;
+const DISPATCHES: usize = 4096;
 const STRIDE: u64 = 256;
 
 thread_local! {
-    static COUNT: RefCell<Option<Counter>> = const { RefCell::new(None) };
+    static COUNTER: RefCell<Option<Counter>> = const { RefCell::new(None) };
 }
 
+/// Groups and numbers of bindings.
+type Bindings = Vec<(u32, u32)>;
+
 struct Counter {
+    device: wgpu::Device,
+    sums: wgpu::Buffer,
     layout: wgpu::BindGroupLayout,
     group: wgpu::BindGroup,
-    /// Modules that count, and the bindings of their numbers.
-    modules: Vec<(wgpu::ShaderModule, Vec<(u32, u32)>)>,
-    pipelines: Vec<(wgpu::ComputePipeline, Vec<(u32, u32)>)>,
+    /// By those that do not count, the pipelines that do, and the bindings of their numbers; `None` where one cannot.
+    pipelines: Vec<(wgpu::ComputePipeline, Option<(wgpu::ComputePipeline, Bindings)>)>,
     /// Bindings of the numbers of each dispatch; `None` where it does not count.
-    dispatches: Vec<Option<Vec<(u32, u32)>>>,
+    dispatches: Vec<Option<Bindings>>,
 }
 
 /// What a dispatch did.
@@ -32,25 +37,78 @@ pub(crate) struct Counted {
     pub label: String,
     /// Operations of all threads, and the same where each of 32 takes as long as the slowest.
     pub operations: [f64; 2],
+    /// Rays into triangles.
     pub rays: f64,
-    /// Bytes of each binding: what was asked for, but no more than there is, since a byte that is there need not come
-    /// again.
+    /// Bytes of each binding, added up: what was asked for, but no more than there is, since what is there need not come
+    /// from memory twice.
     pub bytes: f64,
 }
 
-/// Counts on this thread until it is dropped. There is one at a time.
-pub(crate) struct Count {
-    tape: tape::Running,
-    sums: wgpu::Buffer,
-}
+/// Counts what is recorded on this thread by passes that were made since; there is one at a time.
+pub(crate) struct Count(tape::Running);
 
 impl Count {
-    /// Starts; `device` needs a storage buffer more a stage than shaders have without counting.
-    pub fn start(device: &wgpu::Device) -> Self {
+    /// From here on it is remembered of what pipelines are made.
+    pub fn start() -> Self {
+        Self(tape::Running::start())
+    }
+
+    /// Dispatches count from here on. The device needs room for a storage buffer more a stage than shaders have that
+    /// do not count.
+    pub fn begin(&mut self, device: &wgpu::Device) {
+        self.0.take();
+        COUNTER.set(Some(Counter::new(device.clone())));
+    }
+
+    /// What each dispatch did that was recorded since [`begin`](Self::begin) and submitted. Those of shaders that do
+    /// not count are left out.
+    pub fn take(&mut self, gpu: &Gpu) -> Result<Vec<Counted>, readback::ReadbackError> {
+        let Some(counter) = COUNTER.take() else { return Ok(Vec::new()) };
+        let words = readback::buffer(&gpu.device, &gpu.queue, &counter.sums, 0, counter.sums.size())?;
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&words);
+        let parts = words.chunks_exact(STRIDE as usize / 4).zip(counter.dispatches);
+        let found = self.0.take().into_iter().zip(parts).filter_map(|(dispatch, (words, bindings))| {
+            let number = |i: usize| f64::from(words[2 * i]) + f64::from(words[2 * i + 1]) * 2f64.powi(32);
+            let asked = |(i, (group, binding)): (usize, &(u32, u32))| {
+                let (_, bound, _) = dispatch.groups.iter().find(|g| g.0 == *group)?;
+                let (_, bound) = bound.iter().find(|b| b.0 == *binding)?;
+                let (unit, all) = size(bound);
+                Some((unit * number(instrument::FIRST + i)).min(all))
+            };
+            let bytes = bindings?.iter().enumerate().filter_map(asked).sum();
+            let operations = [number(0), number(NUMBERS)];
+            Some(Counted { label: dispatch.label, operations, rays: number(1), bytes })
+        });
+        Ok(found.collect())
+    }
+}
+
+impl Drop for Count {
+    fn drop(&mut self) {
+        COUNTER.set(None);
+    }
+}
+
+/// Bytes of one of the things that are counted of a binding, and of all of it.
+fn size(bound: &Bound) -> (f64, f64) {
+    match bound {
+        Bound::Buffer(buffer) => (1.0, buffer.size() as f64),
+        Bound::Slot(_, bytes) | Bound::Part(_, _, bytes) => (1.0, *bytes as f64),
+        Bound::View(view) => {
+            let texture = view.texture();
+            let texel = f64::from(texture.format().block_copy_size(None).unwrap_or(4));
+            let texels = f64::from(texture.width()) * f64::from(texture.height());
+            (texel, texel * texels * f64::from(texture.depth_or_array_layers()))
+        }
+    }
+}
+
+impl Counter {
+    fn new(device: wgpu::Device) -> Self {
         let sums = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("count.sums"),
-            size: DISPATCHES * STRIDE,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            size: DISPATCHES as u64 * STRIDE,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
         let entry = wgpu::BindGroupLayoutEntry {
@@ -71,103 +129,153 @@ impl Count {
             layout: &layout,
             entries: &[wgpu::BindGroupEntry { binding: 0, resource: part.resource() }],
         });
-        let (modules, pipelines, dispatches) = Default::default();
-        COUNT.set(Some(Counter { layout, group, modules, pipelines, dispatches }));
-        Self { tape: tape::Running::start(), sums }
+        Self { device, sums, layout, group, pipelines: Vec::new(), dispatches: Vec::new() }
     }
 
-    /// Forgets what was counted so far.
-    pub fn clear(&mut self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.clear_buffer(&self.sums, 0, None);
-        with(|counter| counter.dispatches.clear());
-        self.tape.take();
-    }
-
-    /// What each dispatch did that was recorded since the last call of [`clear`](Self::clear) and has run; those of
-    /// shaders that do not count are left out.
-    pub fn take(
-        &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-    ) -> Result<Vec<Counted>, readback::ReadbackError> {
-        let words = readback::buffer(device, queue, &self.sums, 0, self.sums.size())?;
-        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&words);
-        let bindings = with(|counter| std::mem::take(&mut counter.dispatches)).unwrap_or_default();
-        let found = self.tape.take().into_iter().zip(bindings).enumerate().filter_map(|(at, (dispatch, bindings))| {
-            let words = &words[at * STRIDE as usize / 4..];
-            let number = |i: usize| f64::from(words[2 * i]) + f64::from(words[2 * i + 1]) * 2f64.powi(32);
-            let asked = |(i, (group, binding)): (usize, &(u32, u32))| {
-                let (_, bound, _) = dispatch.groups.iter().find(|g| g.0 == *group)?;
-                let (_, bound) = bound.iter().find(|b| b.0 == *binding)?;
-                let (unit, all) = size(bound);
-                Some((unit * number(instrument::FIRST + i)).min(all))
-            };
-            let bytes = bindings?.iter().enumerate().filter_map(asked).sum();
-            let operations = [number(0), number(NUMBERS)];
-            Some(Counted { label: dispatch.label, operations, rays: number(1), bytes })
+    /// The pipeline that counts in the place of `made`. A network's layers are left alone: their plan says what they
+    /// do, and which of many kernels does it hangs on the device.
+    fn counting(&self, made: &Made) -> Option<(wgpu::ComputePipeline, Bindings)> {
+        let source = Some(&made.source).filter(|source| !source.name.starts_with("net."))?;
+        let found = instrument::counting(&source.text)?;
+        let label = Some(source.name.as_str());
+        let naga = wgpu::ShaderSource::Naga(Cow::Owned(found.module));
+        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source: naga });
+        let mut groups: Vec<_> = made.groups.iter().map(Option::as_ref).collect();
+        groups.resize(GROUP, None);
+        groups.push(Some(&self.layout));
+        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: &groups,
+            immediate_size: 0,
         });
-        Ok(found.collect())
+        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label,
+            layout: Some(&layout),
+            module: &module,
+            entry_point: Some(&made.entry),
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        Some((pipeline, found.bindings))
     }
-}
 
-impl Drop for Count {
-    fn drop(&mut self) {
-        COUNT.set(None);
-    }
-}
-
-/// Bytes of one of the things that are counted of a binding, and of all of it.
-fn size(bound: &Bound) -> (f64, f64) {
-    match bound {
-        Bound::Buffer(buffer) => (1.0, buffer.size() as f64),
-        Bound::Slot(_, bytes) | Bound::Part(_, _, bytes) => (1.0, *bytes as f64),
-        Bound::View(view) => {
-            let texture = view.texture();
-            let texel = f64::from(texture.format().block_copy_size(None).unwrap_or(4));
-            let texels = f64::from(texture.width()) * f64::from(texture.height());
-            (texel, texel * texels * f64::from(texture.depth_or_array_layers()))
+    fn found(&mut self, made: &Made) -> Option<(wgpu::ComputePipeline, Bindings)> {
+        if let Some((_, known)) = self.pipelines.iter().find(|(plain, _)| *plain == made.pipeline) {
+            return known.clone();
         }
+        let counting = self.counting(made);
+        self.pipelines.push((made.pipeline.clone(), counting.clone()));
+        counting
     }
 }
 
-fn with<T>(f: impl FnOnce(&mut Counter) -> T) -> Option<T> {
-    COUNT.with_borrow_mut(|counter| counter.as_mut().map(f))
+fn with(f: impl FnOnce(&mut Counter)) {
+    COUNTER.with_borrow_mut(|counter| counter.as_mut().map(f));
 }
 
-/// The module of `text` that counts; `None` where nobody counts or it cannot. Networks' layers are not among them:
-/// their plan says what they do.
-pub(super) fn module(device: &wgpu::Device, name: &str, text: &str) -> Option<wgpu::ShaderModule> {
+/// Sets the pipeline that counts in the place of the one that is about to be dispatched, and where.
+pub(super) fn before(pass: &mut wgpu::ComputePass<'_>, made: Option<&Made>) {
     with(|counter| {
-        let found = Some(text).filter(|_| !name.starts_with("net.")).and_then(instrument::counting)?;
-        let source = wgpu::ShaderSource::Naga(std::borrow::Cow::Owned(found.module));
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source });
-        counter.modules.push((module.clone(), found.bindings));
-        Some(module)
-    })
-    .flatten()
-}
-
-/// The layout of the sums' group, where `module` counts.
-pub(super) fn layout(module: &wgpu::ShaderModule) -> Option<wgpu::BindGroupLayout> {
-    with(|counter| counter.modules.iter().any(|(m, _)| m == module).then(|| counter.layout.clone())).flatten()
-}
-
-/// Remembers what a pipeline counts.
-pub(super) fn pipeline(pipeline: &wgpu::ComputePipeline, module: &wgpu::ShaderModule) {
-    with(|counter| {
-        let bindings = counter.modules.iter().find(|(m, _)| m == module).map(|(_, bindings)| bindings.clone());
-        counter.pipelines.extend(bindings.map(|bindings| (pipeline.clone(), bindings)));
+        let at = counter.dispatches.len();
+        let found = made.filter(|_| at < DISPATCHES).and_then(|made| counter.found(made));
+        counter.dispatches.push(found.map(|(pipeline, bindings)| {
+            pass.set_pipeline(&pipeline);
+            pass.set_bind_group(GROUP as u32, &counter.group, &[(at as u64 * STRIDE) as u32]);
+            bindings
+        }));
     });
 }
 
-/// Gives the next dispatch of `pipeline` its place.
-pub(super) fn dispatch(pass: &mut wgpu::ComputePass<'_>, pipeline: Option<&wgpu::ComputePipeline>) {
-    with(|counter| {
-        let bindings = counter.pipelines.iter().find(|(p, _)| Some(p) == pipeline).map(|(_, b)| b.clone());
-        if bindings.is_some() {
-            let at = (counter.dispatches.len() as u64).min(DISPATCHES - 1);
-            pass.set_bind_group(GROUP as u32, &counter.group, &[(at * STRIDE) as u32]);
+/// Sets the pipeline again that the pass itself has set.
+pub(super) fn after(pass: &mut wgpu::ComputePass<'_>, made: Option<&Made>) {
+    with(|_| {
+        if let Some(made) = made {
+            pass.set_pipeline(&made.pipeline);
         }
-        counter.dispatches.push(bindings);
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::timing::Recorder;
+    use crate::gpu::{GpuOptions, bind, binding};
+
+    /// Thread i of 128 goes round i times: a comparison, a sum and a step each, and a comparison at the end. Every
+    /// second one does four operations more.
+    const LOOP: &str = "
+@group(0) @binding(0) var<storage, read> given: array<f32>;
+@group(0) @binding(1) var<storage, read_write> made: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    var sum = 0.0;
+    for (var i = 0u; i < id.x; i++) {
+        sum += given[i];
+    }
+    var all = vec4f(sum);
+    if (id.x & 1u) == 1u {
+        all = all * 2.0;
+    }
+    made[id.x] = all;
+}
+";
+
+    fn counted(gpu: &Gpu, text: &str) -> Counted {
+        let buffer = |size| {
+            let usage = wgpu::BufferUsages::STORAGE;
+            let descriptor = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false };
+            gpu.device.create_buffer(&descriptor)
+        };
+        let mut count = Count::start();
+        let mut binder = bind::Binder::new(&gpu.device, "test", &[binding::READ, binding::READ_WRITE]);
+        let module = tape::shader_module(&gpu.device, "test", text.into());
+        let pipeline = bind::pipeline(&gpu.device, "test", &module, "main", &[binder.layout()]);
+        let group = binder.group([(&buffer(4 * 200)).into(), (&buffer(16 * 200)).into()]);
+        count.begin(&gpu.device);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        Recorder::new(&mut encoder).compute("test", |pass| {
+            pass.set_bind_group(0, &group, &[]);
+            pass.set_pipeline(&pipeline);
+            pass.dispatch_workgroups(2, 1, 1);
+        });
+        gpu.queue.submit([encoder.finish()]);
+        let mut found = count.take(gpu).expect("read");
+        assert_eq!(found.len(), 1);
+        found.remove(0)
+    }
+
+    #[test]
+    fn a_loop_of_known_length_is_counted_to_the_operation() {
+        let gpu = match Gpu::open(&GpuOptions::default()).and_then(|gpu| gpu.for_counting()) {
+            Ok(gpu) => gpu,
+            Err(e) => {
+                assert!(std::env::var_os("REQUIRE_GPU").is_none(), "{e}");
+                return println!("SKIP: {e}");
+            }
+        };
+        let found = counted(&gpu, LOOP);
+        let rounds = 128.0 * 127.0 / 2.0;
+        // After the loop: a comparison that ends it, a bit and whether it is set, and a vector's product.
+        assert_eq!(found.operations[0], 3.0 * rounds + 128.0 * 3.0 + 64.0 * 4.0);
+        // The last thread of each 32 is the slowest, and an odd one.
+        let slowest = [31.0, 63.0, 95.0, 127.0].map(|rounds| 32.0 * (3.0 * rounds + 3.0 + 4.0));
+        assert_eq!(found.operations[1], slowest.iter().sum::<f64>());
+        // Of what is read there are 200 numbers only; of what is written, 128 vectors.
+        assert_eq!((found.bytes, found.rays), (4.0 * 200.0 + 16.0 * 128.0, 0.0));
+        // Negative controls: an operation more in the loop; half of the rounds; half of what is written.
+        let other = |from: &str, to: &str| {
+            assert!(LOOP.contains(from));
+            counted(&gpu, &LOOP.replace(from, to))
+        };
+        let more = other("sum += given[i];", "sum += given[i] * 3.0;");
+        assert_eq!(more.operations[0], found.operations[0] + rounds);
+        let fewer = other("i++", "i += 2u");
+        assert!(fewer.operations[0] < found.operations[0] && fewer.operations[1] < found.operations[1]);
+        let narrow = other("    made[id.x] = all;", "    if id.x < 64u { made[id.x] = all; }");
+        assert_eq!(found.bytes - narrow.bytes, 16.0 * 64.0);
+        // A ray is a call of the function of that name.
+        let traced = LOOP.replace("given[i]", "f32(trace_seeded(i))") + "fn trace_seeded(x: u32) -> u32 { return x; }";
+        assert_eq!(counted(&gpu, &traced).rays, rounds);
+    }
 }

@@ -354,6 +354,6 @@ mod tests {
                 seen += 1;
             }
         }
-        assert!(seen > 20, "{seen}");
+        assert!(seen >= 20, "{seen}");
     }
 }

@@ -4,9 +4,9 @@ pub mod bind;
 pub(crate) mod binding;
 mod bound;
 mod choose;
-#[cfg(feature = "export")]
+#[cfg(feature = "reference")]
 pub(crate) mod count;
-#[cfg(feature = "export")]
+#[cfg(feature = "reference")]
 mod instrument;
 pub mod readback;
 pub mod shaders;

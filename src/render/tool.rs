@@ -55,7 +55,7 @@ pub(crate) fn compute_with(
     layouts: &[Option<&wgpu::BindGroupLayout>],
 ) -> wgpu::ComputePipeline {
     let module = crate::gpu::shaders::module(device, name);
-    let layout = tape::pipeline_layout(device, name, &module, layouts);
+    let layout = tape::pipeline_layout(device, name, layouts);
     let descriptor = wgpu::ComputePipelineDescriptor {
         label: Some(name),
         layout: Some(&layout),

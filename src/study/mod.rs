@@ -3,7 +3,7 @@
 pub mod bench;
 #[cfg(feature = "chart")]
 pub mod chart;
-#[cfg(feature = "export")]
+#[cfg(feature = "reference")]
 pub mod count;
 pub mod dataset;
 mod error;

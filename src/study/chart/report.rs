@@ -26,7 +26,7 @@ pub fn csv(record: &Record) -> String {
         let scene = record.scenes.iter().find(|s| s.name == unit.scene);
         let (kind, weights) = entry.map_or(("", ""), |e| (kind(e.kind), e.weights.as_deref().unwrap_or("")));
         let size = scene.map_or(record.size, |s| s.size);
-        let sum = |f: fn(&crate::gi::technique::Cost) -> f64| unit.costs.iter().map(f).sum::<f64>();
+        let sum = |f: fn(&crate::study::projection::Cost) -> f64| unit.costs.iter().map(f).sum::<f64>();
         let states: [(&str, &Option<Scores>, &Option<Time>); 2] =
             [("settled", &unit.scores, &unit.time), ("cold", &unit.cold, &unit.cold_time)];
         for (state, scores, time) in states {
