@@ -233,13 +233,7 @@ impl Reader<'_> {
             },
             Expression::Select { .. } | Expression::Derivative { .. } => size(handle),
             Expression::Relational { argument, .. } => size(argument),
-            Expression::As { convert, .. } => {
-                if convert.is_some() {
-                    size(handle)
-                } else {
-                    0
-                }
-            }
+            Expression::As { convert: Some(_), .. } => size(handle),
             Expression::Math { fun, arg, .. } => math(fun, size(arg), size(handle)),
             _ => 0,
         };

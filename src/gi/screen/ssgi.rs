@@ -62,7 +62,7 @@ impl SsgiGi {
         use wgpu::TextureFormat::{Rgba16Float, Rgba32Float};
         let inputs = InputGroup::new(device);
         let exposure = ExposurePass::new(device, &inputs);
-        let (march, prelude) = (options.march, options.prelude());
+        let prelude = options.prelude();
         let entries = [storage_entry(0, true), write_entry(1, Rgba16Float), write_entry(2, Rgba16Float)];
         let radiance = Kernel::new(device, &inputs, "gi.radiance", &prelude, &entries);
         let entries =
