@@ -196,7 +196,8 @@ fn how(record: &Record, metric: Metric) -> String {
          camera on, {} samples \
          a pixel; the first frame has one. Time: a whole frame, rasteriser included, median of {frames} frames after \
          {warmup}; {}. \
-         Counted (GFLOP, MB, rays) and projected: only the passes that find and add indirect light. \
+         Counted (GFLOP, MB, rays) and projected, with what threads wait for each other: only the passes that find and \
+         add indirect light, in the last of the settled frames. \
          \"Against paths\": how many times as long our path tracer takes to come as near on this device.{}\n",
         record.sound_scenes(),
         record.samples,
