@@ -33,6 +33,7 @@ pub(crate) struct Dispatch {
 }
 
 /// A pipeline, and what it was made of.
+#[cfg_attr(not(feature = "reference"), allow(dead_code, reason = "only who counts makes pipelines anew"))]
 pub(super) struct Made {
     pub pipeline: wgpu::ComputePipeline,
     pub source: Source,
