@@ -1,5 +1,5 @@
 //! One bounce in screen space: every pixel gathers what the pixels around it send on, by visibility bitmask
-//! ([`bitmask`]), and unseen light (the sky and a stand-in for later bounces,
+//! ([`bitmask`](super::bitmask)), and unseen light (the sky and a stand-in for later bounces,
 //! [`ambient`]) through what nothing blocks.
 //!
 //! What it cannot do: anything off the screen or hidden in it. A red wall lights the floor until it
