@@ -281,10 +281,11 @@ fn print_costs(costs: &[Cost], layers: bool) {
     let ms = format!("{} ms", GTX_1050.name);
     say!("  {:<26}{:>10}{:>10}{:>10}{:>10}{ms:>14}", "counted, at rest", "MFLOP", "waiting", "MB", "Mray");
     let row = |name: &str, of: &[&Cost]| {
-        let sum = |part: fn(&Cost) -> f64| of.iter().map(|c| part(c)).sum::<f64>() / 1e6;
+        // A sum of nothing is -0.
+        let sum = |part: fn(&Cost) -> f64| of.iter().map(|c| part(c)).sum::<f64>() / 1e6 + 0.0;
         let [flops, waited] = [sum(|c| c.flops), sum(|c| c.waited)];
         let [bytes, rays] = [sum(|c| c.bytes), sum(|c| c.rays)];
-        let ms = of.iter().map(|c| projection::pass_ms(c, &GTX_1050, EFFICIENCY)).sum::<f64>();
+        let ms = of.iter().map(|c| projection::pass_ms(c, &GTX_1050, EFFICIENCY)).sum::<f64>() + 0.0;
         say!("  {name:<26}{flops:>10.2}{waited:>10.2}{bytes:>10.2}{rays:>10.4}{ms:>14.3}");
     };
     let network: Vec<_> = costs.iter().filter(|c| !layers && c.pass.starts_with("net.")).collect();
