@@ -10,7 +10,6 @@
 
 use bouncelight::accel::RayCaster;
 use bouncelight::gpu::{Gpu, GpuOptions};
-use bouncelight::study::projection::{EFFICIENCY, GTX_1050};
 use bouncelight::study::rays::{KINDS, RayScene, RayTest};
 use bouncelight::study::traffic;
 use std::fmt::Write;
@@ -116,30 +115,23 @@ fn logarithm(rows: &[Row], kind: usize) -> (f64, f64, f64) {
     (my - xy / xx * mx, xy / xx, xy * xy / (xx * yy))
 }
 
-/// What a frame of `gather` at 1024×512 reads of each scene's trees, and what reading and walking alone would take.
+/// What a frame of `gather` at 1024×512 reads of each scene's trees.
 fn traffic(names: &str) -> Result<(), Box<dyn std::error::Error>> {
     println!(
         "| scene | trees, MB | looks | blocks a look: nearest, to the light, to the entry | in all, MB | not near, MB \
-         | from memory, MB | steps with waiting | GTX 1050, ms, projected | without caches |"
+         | from memory, MB | steps with waiting |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|");
     for name in names.split(',') {
         let scene = bouncelight::scene::load(name)?;
         let camera = scene.cameras.first().ok_or_else(|| format!("{name} has no camera"))?;
         let t = traffic::count(&scene, camera, [1024, 512])?;
         let [nearest, light, entry] = t.read;
-        // 170 operations a block, as `Technique::costs` counts them.
-        let flops = t.asked / 64.0 * 170.0 * t.waiting / GTX_1050.flops;
-        let ms = |bytes: f64| 1e3 * flops.max(bytes / GTX_1050.bandwidth) / EFFICIENCY;
         let [size, asked, fetched, missed] = [64.0 * t.blocks as f64, t.asked, t.fetched, t.missed].map(|b| b / 1e6);
         println!(
             "| {name} | {size:.1} | {} | {nearest:.1}, {light:.1}, {entry:.1} | {asked:.0} | {fetched:.0} | \
-            {missed:.1} \
-             | {:.2} | {:.2} | {:.2} |",
-            t.looks,
-            t.waiting,
-            ms(t.missed),
-            ms(t.asked)
+            {missed:.1} | {:.2} |",
+            t.looks, t.waiting
         );
     }
     Ok(())

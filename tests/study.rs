@@ -7,6 +7,7 @@ use bouncelight::gi::Method;
 use bouncelight::render::capture::Layer;
 use bouncelight::scene::{self, Environment, LightKind};
 use bouncelight::study::judge::{compare, light_error};
+use bouncelight::study::projection::{EFFICIENCY, GTX_1050, total_ms};
 use bouncelight::study::trial::{Edits, FrameChange, Settling, Trial, TrialError, TrialOptions};
 use bouncelight::study::truth;
 
@@ -41,7 +42,9 @@ fn pictures_are_judged_by_a_kept_reference() {
         assert_eq!((shot.drawn_by, shot.instead.as_ref()), (method.name(), None));
         let light = light_error(&shot.added(), &truth).expect("there is light").error;
         let seen = compare(&shot.rgb(), &truth, false).expect("sizes agree");
-        (light, seen.display.psnr, shot.projected_ms(), shot.settled)
+        let costs = trial.count(&method, &camera).expect("counted");
+        let projected = total_ms(&costs, &GTX_1050, EFFICIENCY);
+        (light, seen.display.psnr, projected, shot.settled)
     };
     let (direct, ambient) = (of(Method::Direct), of(Method::Ambient));
     let gather = of(Method::Gather(Default::default()));

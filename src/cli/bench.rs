@@ -7,14 +7,15 @@ use super::{
     scene_args::SceneArgs,
 };
 use crate::{
-    gi::{Method, technique::Cost},
+    gi::Method,
     gpu::Gpu,
     render::{DrawnCount, Renderer, RendererOptions, cull::Count},
     scene::upload::SceneGpu,
     study::{
         bench::{BenchOptions, Measurement, measure},
+        count,
         layers::Layers,
-        projection::{self, EFFICIENCY, GTX_1050},
+        projection::{self, Cost, EFFICIENCY, GTX_1050},
         ratios::{self, Ratios},
     },
 };
@@ -44,6 +45,10 @@ pub struct Args {
     /// One row per network layer instead of one for the network.
     #[arg(long)]
     layers: bool,
+    /// Let shaders count, too, what they do in a frame at rest: operations, bytes, rays. With --layers, one row per
+    /// network layer.
+    #[arg(long)]
+    count: bool,
     /// Write the record to this file.
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
@@ -132,22 +137,11 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let gpu = global.open_gpu()?;
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
     let all = || args.method.as_ref().map_or(MethodName::REAL_TIME.to_vec(), |m| m.0.clone());
-    let mut names = fitted.as_ref().map_or_else(all, |f| vec![f.method]);
+    let names = fitted.as_ref().map_or_else(all, |f| vec![f.method]);
     if let (Some(f), false) = (&fitted, global.quiet) {
         eprintln!("method `{}`, as fitted to {}; --method all measures all", f.method.name(), args.scene.scene);
     }
-    if names.iter().any(|n| n.needs_rays())
-        && let Err(e) = uploaded.trace(&gpu.device, &gpu.queue, &scene)
-    {
-        // Asked for alone it is an error; among others it is left out, as numbers of another method would be no answer.
-        names.retain(|n| !n.needs_rays());
-        if names.is_empty() {
-            return Err(e.into());
-        }
-        eprintln!("warning: methods that send rays are not measured: {e}");
-    }
-    let options = BenchOptions { frames: args.frames, warmup: args.warmup };
-    let mut renderers = Vec::new();
+    let mut methods = Vec::new();
     for name in &names {
         let mut method = match &fitted {
             Some(fitted) => fitted.method()?,
@@ -156,10 +150,22 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         if let Method::Neural(neural) = &mut method {
             neural.network.precision = global.precision.precision();
         }
-        let method = super::tuned::tuned(method, &gpu, global.quiet);
-        let options = RendererOptions { method, ..Default::default() };
-        renderers.push(Renderer::new(&gpu.device, &gpu.queue, args.scene.size, options)?);
+        methods.push(super::tuned::tuned(method, &gpu, global.quiet));
     }
+    if methods.iter().any(Method::needs_rays)
+        && let Err(e) = uploaded.trace(&gpu.device, &gpu.queue, &scene)
+    {
+        // Asked for alone it is an error; among others it is left out, as numbers of another method would be no answer.
+        methods.retain(|m| !m.needs_rays());
+        if methods.is_empty() {
+            return Err(e.into());
+        }
+        eprintln!("warning: methods that send rays are not measured: {e}");
+    }
+    let options = BenchOptions { frames: args.frames, warmup: args.warmup };
+    let with = |method: &Method| RendererOptions { method: method.clone(), ..Default::default() };
+    let make = |method| Renderer::new(&gpu.device, &gpu.queue, args.scene.size, with(method));
+    let mut renderers = methods.iter().map(make).collect::<Result<Vec<_>, _>>()?;
     let mut rounds = Vec::new();
     for _ in 0..args.rounds {
         let turn = |renderer| measure(&gpu, renderer, &uploaded, &camera, options);
@@ -176,7 +182,14 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         frames: args.frames,
         ratios: ratios::of(&rounds),
     };
-    let methods = rounds.pop().unwrap_or_default();
+    let mut measured = rounds.pop().unwrap_or_default();
+    if args.count {
+        for (method, measured) in methods.iter().zip(&mut measured) {
+            let frames = if method.has_history() { Method::SETTLED } else { 1 };
+            let still = count::Still { scene: &scene, camera: &camera, size: args.scene.size };
+            measured.costs = count::frame(&gpu, still, with(method), frames)?;
+        }
+    }
     let network = if args.layers && names.contains(&MethodName::Neural) {
         let fitted = fitted.as_ref().and_then(|f| f.weights.as_ref()).map(|w| w.file.clone());
         let weights = super::args::load_weights(args.weights.as_ref().or(fitted.as_ref()))?;
@@ -196,7 +209,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         precision: global.precision,
         frames: args.frames,
         warmup: args.warmup,
-        methods,
+        methods: measured,
         network,
     };
     print(&record, &gpu, args.layers);
@@ -253,21 +266,35 @@ fn print(record: &Record, gpu: &Gpu, layers: bool) {
         if let Some(apart) = m.disagreement() {
             say!("  GPU time and wall clock are {:.0}% apart: trust the wall clock on this adapter", apart * 100.0);
         }
-        let sum = |part: fn(&Cost) -> f64| m.costs.iter().map(part).sum::<f64>();
-        say!(
-            "  indirect light by count: {:.3} GFLOP, {:.1} MB; projected, not measured: {:.2} ms on a {} at \
-            {:.0}% of its peaks",
-            sum(|c| c.flops) / 1e9,
-            sum(|c| c.bytes) / 1e6,
-            projection::total_ms(&m.costs, &GTX_1050, EFFICIENCY),
-            GTX_1050.name,
-            EFFICIENCY * 100.0
-        );
         print_drawn(&m.drawn);
         let mib = |b: u64| b as f64 / (1 << 20) as f64;
         let parts = m.bytes.iter().filter(|(_, b)| *b > 0).map(|(n, b)| format!("{n} {:.1}", mib(*b)));
         say!("  {:.1} MiB of GPU memory: {}", mib(m.total_bytes()), parts.collect::<Vec<_>>().join(", "));
+        if !m.costs.is_empty() {
+            print_costs(&m.costs, layers);
+        }
     }
+}
+
+/// What shaders counted of a frame at rest; without `layers` the network's layers are one row.
+fn print_costs(costs: &[Cost], layers: bool) {
+    let ms = format!("{} ms", GTX_1050.name);
+    say!("  {:<26}{:>10}{:>10}{:>10}{:>10}{ms:>14}", "counted, at rest", "MFLOP", "waiting", "MB", "Mray");
+    let row = |name: &str, of: &[&Cost]| {
+        // A sum of nothing is -0.
+        let sum = |part: fn(&Cost) -> f64| of.iter().map(|c| part(c)).sum::<f64>() / 1e6 + 0.0;
+        let [flops, waited] = [sum(|c| c.flops), sum(|c| c.waited)];
+        let [bytes, rays] = [sum(|c| c.bytes), sum(|c| c.rays)];
+        let ms = of.iter().map(|c| projection::pass_ms(c, &GTX_1050, EFFICIENCY)).sum::<f64>() + 0.0;
+        say!("  {name:<26}{flops:>10.2}{waited:>10.2}{bytes:>10.2}{rays:>10.4}{ms:>14.3}");
+    };
+    let network: Vec<_> = costs.iter().filter(|c| !layers && c.pass.starts_with("net.")).collect();
+    costs.iter().filter(|c| layers || !c.pass.starts_with("net.")).for_each(|c| row(&c.pass, &[c]));
+    if !network.is_empty() {
+        row("net (all layers)", &network);
+    }
+    row("indirect light in all", &costs.iter().filter(|c| projection::is_indirect(&c.pass)).collect::<Vec<_>>());
+    say!("  milliseconds are projected, not measured: {:.0}% of that card's peaks", EFFICIENCY * 100.0);
 }
 
 /// What the last frame drew and left out.

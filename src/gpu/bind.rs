@@ -85,11 +85,7 @@ pub fn pipeline(
     layouts: &[&wgpu::BindGroupLayout],
 ) -> wgpu::ComputePipeline {
     let layouts: Vec<_> = layouts.iter().map(|&l| Some(l)).collect();
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(label),
-        bind_group_layouts: &layouts,
-        immediate_size: 0,
-    });
+    let layout = tape::pipeline_layout(device, label, &layouts);
     let descriptor = wgpu::ComputePipelineDescriptor {
         label: Some(label),
         layout: Some(&layout),

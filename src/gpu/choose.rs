@@ -162,9 +162,21 @@ impl Gpu {
     /// large as the adapter grants, and timestamps where it has them. Nothing here needs the larger buffers but larger
     /// problems: wide networks on large pictures, scenes of many millions of triangles.
     pub fn from_adapter(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
+        Self::with_more(adapter, 0)
+    }
+
+    /// Another device on the same adapter, with room for a storage buffer more a stage.
+    #[cfg(feature = "reference")]
+    pub(crate) fn for_counting(&self) -> Result<Self, GpuError> {
+        Self::with_more(self.adapter.clone(), 1)
+    }
+
+    /// As [`from_adapter`](Self::from_adapter), with so many storage buffers a stage more.
+    fn with_more(adapter: wgpu::Adapter, buffers: u32) -> Result<Self, GpuError> {
         let info = adapter.get_info();
         let granted = adapter.limits();
         let mut limits = wgpu::Limits::default().or_worse_values_from(&granted);
+        limits.max_storage_buffers_per_shader_stage += buffers;
         limits.max_buffer_size = granted.max_buffer_size;
         limits.max_storage_buffer_binding_size = granted.max_storage_buffer_binding_size;
         let descriptor = wgpu::DeviceDescriptor {

@@ -4,6 +4,10 @@ pub mod bind;
 pub(crate) mod binding;
 mod bound;
 mod choose;
+#[cfg(feature = "reference")]
+pub(crate) mod count;
+#[cfg(feature = "reference")]
+mod instrument;
 pub mod readback;
 pub mod shaders;
 pub(crate) mod tape;

@@ -1,5 +1,5 @@
 //! A tape of what compute passes are: while one runs on this thread, shaders, pipelines, bind groups and dispatches are
-//! written down as they are made, for `export`. Without one, each function here is wgpu's own and a look at a flag.
+//! written down as they are made, for `export` and for [`count`](super::count). Without one, each function here is wgpu's own and a look at a flag.
 
 use super::bound::Bound;
 use std::cell::{Cell, RefCell};
@@ -21,7 +21,7 @@ pub(crate) type Group = Vec<(u32, Bound)>;
 
 /// One dispatch as it was recorded.
 #[derive(Debug, Clone)]
-#[cfg_attr(not(feature = "export"), allow(dead_code, reason = "only `export` starts a tape and reads it"))]
+#[cfg_attr(not(feature = "export"), allow(dead_code, reason = "not all who read a tape read all of it"))]
 pub(crate) struct Dispatch {
     /// Of the compute pass.
     pub label: String,
@@ -32,19 +32,29 @@ pub(crate) struct Dispatch {
     pub groups: Vec<(u32, Group, u32)>,
 }
 
+/// A pipeline, and what it was made of.
+#[cfg_attr(not(feature = "reference"), allow(dead_code, reason = "only who counts makes pipelines anew"))]
+pub(super) struct Made {
+    pub pipeline: wgpu::ComputePipeline,
+    pub source: Source,
+    pub entry: String,
+    pub groups: Vec<Option<wgpu::BindGroupLayout>>,
+}
+
 #[derive(Default)]
 struct Tape {
     sources: Vec<(wgpu::ShaderModule, Source)>,
-    pipelines: Vec<(wgpu::ComputePipeline, Source, String)>,
+    layouts: Vec<(wgpu::PipelineLayout, Vec<Option<wgpu::BindGroupLayout>>)>,
+    pipelines: Vec<Made>,
     groups: Vec<(wgpu::BindGroup, Group)>,
     dispatches: Vec<Dispatch>,
 }
 
 /// A tape that runs on this thread until it is dropped. There is one at a time.
-#[cfg(feature = "export")]
+#[cfg(any(feature = "export", feature = "reference"))]
 pub(crate) struct Running(());
 
-#[cfg(feature = "export")]
+#[cfg(any(feature = "export", feature = "reference"))]
 impl Running {
     /// Starts.
     pub fn start() -> Self {
@@ -59,11 +69,17 @@ impl Running {
     }
 }
 
-#[cfg(feature = "export")]
+#[cfg(any(feature = "export", feature = "reference"))]
 impl Drop for Running {
     fn drop(&mut self) {
         RUNS.set(false);
         TAPE.take();
+    }
+}
+
+impl Tape {
+    fn made(&self, pipeline: Option<&wgpu::ComputePipeline>) -> Option<&Made> {
+        self.pipelines.iter().find(|made| Some(&made.pipeline) == pipeline)
     }
 }
 
@@ -84,6 +100,19 @@ pub(crate) fn shader_module(device: &wgpu::Device, name: &str, text: String) -> 
     module
 }
 
+/// Makes the layout of a pipeline.
+pub(crate) fn pipeline_layout(
+    device: &wgpu::Device,
+    label: &str,
+    groups: &[Option<&wgpu::BindGroupLayout>],
+) -> wgpu::PipelineLayout {
+    let descriptor =
+        wgpu::PipelineLayoutDescriptor { label: Some(label), bind_group_layouts: groups, immediate_size: 0 };
+    let layout = device.create_pipeline_layout(&descriptor);
+    write(|tape| tape.layouts.push((layout.clone(), groups.iter().map(|g| g.cloned()).collect())));
+    layout
+}
+
 /// Makes a pipeline.
 pub(crate) fn compute_pipeline(
     device: &wgpu::Device,
@@ -92,9 +121,11 @@ pub(crate) fn compute_pipeline(
     let pipeline = device.create_compute_pipeline(descriptor);
     write(|tape| {
         let source = tape.sources.iter().find(|(module, _)| module == descriptor.module).map(|s| s.1.clone());
+        let groups = tape.layouts.iter().find(|(layout, _)| Some(layout) == descriptor.layout).map(|l| l.1.clone());
         if let Some(source) = source {
             let entry = descriptor.entry_point.unwrap_or_default().to_owned();
-            tape.pipelines.push((pipeline.clone(), source, entry));
+            let groups = groups.unwrap_or_default();
+            tape.pipelines.push(Made { pipeline: pipeline.clone(), source, entry, groups });
         }
     });
     pipeline
@@ -142,11 +173,15 @@ impl<'a> Pass<'a> {
 
     /// As [`wgpu::ComputePass::dispatch_workgroups`].
     pub fn dispatch_workgroups(&mut self, x: u32, y: u32, z: u32) {
+        #[cfg(feature = "reference")]
+        write(|tape| super::count::before(&mut self.pass, tape.made(self.pipeline.as_ref())));
         self.pass.dispatch_workgroups(x, y, z);
         write(|tape| {
             // What was made before the tape began leaves an empty place, which `export` refuses.
-            let pipeline = tape.pipelines.iter().find(|(p, ..)| Some(p) == self.pipeline.as_ref());
-            let known = pipeline.map(|(_, source, entry)| (source.clone(), entry.clone()));
+            let made = tape.made(self.pipeline.as_ref());
+            #[cfg(feature = "reference")]
+            super::count::after(&mut self.pass, made);
+            let known = made.map(|made| (made.source.clone(), made.entry.clone()));
             let (source, entry) = known.unwrap_or((Source { name: String::new(), text: String::new() }, String::new()));
             let group = |(index, group, offset): &(u32, wgpu::BindGroup, u32)| {
                 let bound = tape.groups.iter().find(|(g, _)| g == group);

@@ -23,10 +23,11 @@ use crate::gi::{
     self,
     features::FeatureSet,
     method, pack,
-    technique::{self, Cost, Technique},
+    technique::{self, Technique},
 };
 use crate::gpu::timing::Recorder;
 use crate::net::gpu::Tap;
+use crate::net::plan::Plan;
 use crate::scene::upload::SceneGpu;
 
 /// How a [`Renderer`] is made.
@@ -229,14 +230,9 @@ impl Renderer {
         self.method
     }
 
-    /// Counted cost of the passes that find and add indirect light.
-    pub fn costs(&self) -> Vec<Cost> {
-        let mut costs = self.indirect.as_ref().map(|i| i.costs(self.targets.size)).unwrap_or_default();
-        if let Some(indirect) = &self.indirect {
-            costs.extend(GlossyPass::costs(self.targets.size, indirect.gloss().is_some()));
-        }
-        costs.extend(self.taa.as_ref().map(|_| TaaPass::cost(self.targets.size)));
-        costs
+    /// What the method's network does, step by step, where one runs.
+    pub fn plan(&self) -> Option<&Plan> {
+        self.indirect.as_ref()?.plan()
     }
 
     /// Width and height of the targets, pixels.

@@ -16,7 +16,6 @@
 //! mean.
 
 use super::{Targets, tool};
-use crate::gi::technique::Cost;
 use crate::gpu::bind::Binder;
 use crate::gpu::timing::Recorder;
 
@@ -170,20 +169,5 @@ impl GlossyPass {
             pass.set_bind_group(2, &sky, &[]);
             tool::dispatch(pass, size);
         });
-    }
-
-    /// What the passes cost for a picture of `size` pixels without smooth surfaces; `rays`: the
-    /// method has sent rays into lobes. `gi.lit`: a quarter of the pixels with 140 operations and
-    /// 40 bytes, then levels of 8 bytes read and written, and copied. `gi.glossy`: split sum 110
-    /// and look-ups 60; without rays of lobes each ray marches all of its 21 steps of 16
-    /// operations, with a track of 110 and 60 around it. Depth, normal, specular, indirect or what
-    /// lobes show and the result, and the lit picture once.
-    pub fn costs(size: [u32; 2], rays: bool) -> [Cost; 2] {
-        let pixels = f64::from(size[0]) * f64::from(size[1]);
-        let (march, lit) = if rays { (0.0, 0.0) } else { (21.0 * 16.0 + 170.0, 8.0 / 3.0) };
-        [
-            Cost::new("gi.lit", pixels * (0.25 * 140.0 + 24.0 / 12.0), pixels * (0.25 * 40.0 + 8.0 / 3.0 * 4.0)),
-            Cost::new("gi.glossy", pixels * (170.0 + march), pixels * (28.0 + lit)),
-        ]
     }
 }

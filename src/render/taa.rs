@@ -16,7 +16,6 @@ use super::sampling;
 use super::targets::{Target, Targets};
 use super::tool;
 use super::view::View;
-use crate::gi::technique::Cost;
 use crate::gpu::timing::Recorder;
 use crate::scene::upload::SceneGpu;
 
@@ -176,12 +175,5 @@ impl TaaPass {
     pub fn bytes(&self) -> Vec<(&'static str, u64)> {
         let Some(t) = &self.textures else { return Vec::new() };
         [&t.current].into_iter().chain(&t.history).chain(&t.distance).map(|t| (t.name, t.bytes())).collect()
-    }
-
-    /// What a moving frame of `size` pixels costs: statistics of 9 colours, 16 taps of history, 18 depths. Reads depth,
-    /// motion, frame, history and its distance, writes picture, history and distance.
-    pub fn cost(size: [u32; 2]) -> Cost {
-        let pixels = f64::from(size[0]) * f64::from(size[1]);
-        Cost::new("taa", pixels * (9.0 * 32.0 + 16.0 * 8.0 + 160.0), pixels * (4.0 + 4.0 + 8.0 + 8.0 + 4.0 + 20.0))
     }
 }

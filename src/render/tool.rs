@@ -1,6 +1,7 @@
 //! Short forms for what every pass says to wgpu.
 
 pub(crate) use crate::gpu::binding::*;
+use crate::gpu::tape;
 
 /// A bind group layout entry for one stage set, numbered by the list it stands in.
 pub(crate) fn layout(
@@ -27,7 +28,7 @@ pub(crate) fn group(
         .zip(resources)
         .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
         .collect();
-    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+    tape::bind_group(device, &wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
 }
 
 /// A target as something to bind.
@@ -53,19 +54,17 @@ pub(crate) fn compute_with(
     entry: &str,
     layouts: &[Option<&wgpu::BindGroupLayout>],
 ) -> wgpu::ComputePipeline {
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(name),
-        bind_group_layouts: layouts,
-        immediate_size: 0,
-    });
-    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+    let module = crate::gpu::shaders::module(device, name);
+    let layout = tape::pipeline_layout(device, name, layouts);
+    let descriptor = wgpu::ComputePipelineDescriptor {
         label: Some(name),
         layout: Some(&layout),
-        module: &crate::gpu::shaders::module(device, name),
+        module: &module,
         entry_point: Some(entry),
         compilation_options: Default::default(),
         cache: None,
-    })
+    };
+    tape::compute_pipeline(device, &descriptor)
 }
 
 /// Dispatches enough 8×8 workgroups for `size`.

@@ -2,13 +2,13 @@
 //! clock beside them.
 
 use crate::{
-    gi::technique::Cost,
     gpu::{
         Gpu,
         timing::{self, Recorder},
     },
     render::{DrawnCount, RenderError, Renderer, View},
     scene::{Camera, upload::SceneGpu},
+    study::projection::{Cost, is_indirect},
 };
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -55,8 +55,7 @@ pub struct Measurement {
     pub wall_ms: Spread,
     /// Resident GPU bytes by owner.
     pub bytes: Vec<(String, u64)>,
-    /// Counted cost of the passes that find and add indirect light; empty in records from before it
-    /// was counted.
+    /// What passes of a frame at rest do, where somebody has counted it (`study::count`).
     #[serde(default)]
     pub costs: Vec<Cost>,
     /// Draw calls, triangles and shadow maps of the last frame.
@@ -77,9 +76,8 @@ impl Measurement {
     /// where there are no timestamps or they do not agree with the clock.
     pub fn own_ms(&self) -> Option<f64> {
         self.gpu_ms.filter(|_| self.disagreement().is_none())?;
-        let counted = |pass: &str| self.costs.iter().any(|c| c.pass == pass);
         // A sum of nothing is -0.
-        Some(self.passes.iter().filter(|p| counted(&p.pass)).map(|p| p.ms.median).sum::<f64>() + 0.0)
+        Some(self.passes.iter().filter(|p| is_indirect(&p.pass)).map(|p| p.ms.median).sum::<f64>() + 0.0)
     }
 
     /// Resident GPU bytes in all.
@@ -181,7 +179,7 @@ fn measure_frames(
         passes: per_pass(&frames),
         gpu_ms: (!sums.is_empty()).then(|| spread(sums)),
         wall_ms: spread(wall),
-        costs: renderer.costs(),
+        costs: Vec::new(),
         drawn: renderer.drawn(),
         bytes: renderer
             .bytes()

@@ -45,6 +45,9 @@ pub enum TrialError {
     /// A measurement failed.
     #[error(transparent)]
     Bench(#[from] super::bench::BenchError),
+    /// Nothing could be counted.
+    #[error(transparent)]
+    Count(#[from] super::count::CountError),
     /// What a network learns from could not be made.
     #[error(transparent)]
     Sample(#[from] DatasetError),

@@ -3,6 +3,8 @@
 pub mod bench;
 #[cfg(feature = "chart")]
 pub mod chart;
+#[cfg(feature = "reference")]
+pub mod count;
 pub mod dataset;
 mod error;
 #[cfg(all(feature = "io", feature = "reference"))]

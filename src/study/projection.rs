@@ -1,7 +1,43 @@
 //! What counted work would take on a card that nobody here owns: a roofline with one efficiency.
 //! Never a measurement; whoever prints it says so.
 
-use crate::gi::technique::Cost;
+use serde::{Deserialize, Serialize};
+
+/// Arithmetic and memory traffic of one pass: of a frame's counted by its shaders (`study::count`), of a network's
+/// layers and of the plan that they follow.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// The pass's label, as in the timing table.
+    pub pass: String,
+    /// Operations of all threads, on floats, integers and comparisons; a multiply-add counts 2, a transcendental or
+    /// division 4.
+    pub flops: f64,
+    /// Operations that threads let pass while they wait for the slowest of their 32. They take a card's time, too.
+    #[serde(default)]
+    pub waited: f64,
+    /// Bytes that move between memory and the chip: what shaders ask of each binding, but of none more than it has.
+    pub bytes: f64,
+    /// Rays into the scene's triangles, those that only ask whether something stands between included.
+    #[serde(default)]
+    pub rays: f64,
+}
+
+impl Cost {
+    /// A row of the table, of which no thread waits for another.
+    pub fn new(pass: &str, flops: f64, bytes: f64) -> Self {
+        Self { pass: pass.into(), flops, waited: 0.0, bytes, rays: 0.0 }
+    }
+
+    /// The same with so many rays.
+    pub fn with_rays(self, rays: f64) -> Self {
+        Self { rays, ..self }
+    }
+}
+
+/// Whether a pass of that label finds or adds indirect light.
+pub fn is_indirect(pass: &str) -> bool {
+    pass.starts_with("gi.") || pass.starts_with("net.")
+}
 
 /// A card by its data sheet.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,9 +58,9 @@ pub const GTX_1050: Card = Card { name: "GTX 1050", flops: 1.86e12, bandwidth: 1
 /// convolutions).
 pub const EFFICIENCY: f64 = 0.35;
 
-/// Milliseconds of one pass: arithmetic or traffic, whichever takes longer.
+/// Milliseconds of one pass: arithmetic with waiting or traffic, whichever takes longer.
 pub fn pass_ms(cost: &Cost, card: &Card, efficiency: f64) -> f64 {
-    1e3 * (cost.flops / card.flops).max(cost.bytes / card.bandwidth) / efficiency
+    1e3 * ((cost.flops + cost.waited) / card.flops).max(cost.bytes / card.bandwidth) / efficiency
 }
 
 /// Milliseconds of all passes, one after the other.
@@ -44,5 +80,7 @@ mod tests {
         // Two passes cannot hide behind each other, one pass's two halves can.
         assert!((total_ms(&[arithmetic, memory], &GTX_1050, 1.0) - 2.0).abs() < 1e-9);
         assert!((pass_ms(&Cost::new("c", 1.86e9, 112e6), &GTX_1050, 1.0) - 1.0).abs() < 1e-9);
+        let waited = Cost { waited: 0.93e9, ..Cost::new("d", 0.93e9, 56e6) };
+        assert!((pass_ms(&waited, &GTX_1050, 1.0) - 1.0).abs() < 1e-9);
     }
 }

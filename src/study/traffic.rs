@@ -23,7 +23,7 @@ const NEAR: usize = 768;
 const FAR: usize = 16_384;
 /// Ways of a set, in both.
 const WAYS: usize = 16;
-/// Entries that are in use, as in `Technique::costs`.
+/// Entries that are looked at, of all that there may be.
 const ENTRIES: usize = 4000;
 
 /// What was read. A look is a ray for the nearest hit, a line to a light, a line to an entry's

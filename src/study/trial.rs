@@ -7,7 +7,9 @@ mod shot;
 pub use super::error::TrialError;
 use super::{
     bench::{self, BenchOptions, Measurement},
-    hash, truth,
+    count, hash,
+    projection::{self, Cost},
+    truth,
     truth::Reference,
 };
 use crate::{
@@ -292,6 +294,25 @@ impl<'a> Trial<'a> {
         Ok(bench::measure_cuts(self.gpu, &mut renderer, &self.uploaded, camera, options)?)
     }
 
+    /// What the passes that find and add indirect light do in a frame of a still camera, settled over
+    /// [`Method::SETTLED`] frames where the method does.
+    ///
+    /// # Errors
+    /// [`TrialError::Count`].
+    pub fn count(&self, method: &Method, camera: &Camera) -> Result<Vec<Cost>, TrialError> {
+        let frames = if method.has_history() { Method::SETTLED } else { 1 };
+        let still = count::Still { scene: &self.scene, camera, size: self.size };
+        let mut costs = count::frame(self.gpu, still, self.renderer_options(method), frames)?;
+        costs.retain(|c| projection::is_indirect(&c.pass));
+        Ok(costs)
+    }
+
+    fn renderer_options(&self, method: &Method) -> RendererOptions {
+        // What is judged is compared with paths, which meet such surfaces by lot.
+        let blending = Blending::Stochastic;
+        RendererOptions { method: method.clone(), taa: self.options.taa, blending, ..Default::default() }
+    }
+
     /// A renderer that knows nothing yet; rays are made when the first method asks for them.
     fn renderer(&mut self, method: &Method) -> Result<Renderer, TrialError> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
@@ -299,10 +320,7 @@ impl<'a> Trial<'a> {
             // Where they cannot be had, the method below draws, and each shot says so.
             let _ = self.uploaded.trace(device, queue, &self.scene);
         }
-        // What is judged is compared with paths, which meet such surfaces by lot.
-        let blending = Blending::Stochastic;
-        let options = RendererOptions { method: method.clone(), taa: self.options.taa, blending, ..Default::default() };
-        Ok(Renderer::new(device, queue, self.size, options)?)
+        Ok(Renderer::new(device, queue, self.size, self.renderer_options(method))?)
     }
 
     fn shoot(
@@ -329,7 +347,6 @@ impl<'a> Trial<'a> {
             drawn_by: renderer.drawn_by(),
             instead,
             settled: renderer.settled(),
-            costs: renderer.costs(),
             bytes,
             without: None,
         })

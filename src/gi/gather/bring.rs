@@ -7,7 +7,6 @@
 //! around are blended in. Background pixels get 0. A workgroup reads each cell around its 8×8 pixels once, into
 //! its shared memory.
 
-use crate::gi::interface::technique::Cost;
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
 use crate::gi::stage::weights::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
@@ -96,15 +95,5 @@ impl BringPass {
     /// Bind groups made so far.
     pub fn made(&self) -> u64 {
         self.binder.made()
-    }
-
-    /// What the pass costs for a picture of `size` pixels. A pixel: 4 cells of 72 operations, its own place and
-    /// normal 60, the means 36; a workgroup stages 36 cells of 60 operations and 96 bytes, most of which the
-    /// chip's cache has, so that each cell comes from memory once. Pixels at edges that ask 16 cells (about 3 %
-    /// of a picture) are counted with 1,000 more. Depth, normal and both results, roughness: 28 bytes.
-    pub fn cost(size: [u32; 2]) -> Cost {
-        let pixels = f64::from(size[0]) * f64::from(size[1]);
-        let flops = pixels * (4.0 * 72.0 + 60.0 + 36.0 + 36.0 * 60.0 / 64.0 + 30.0);
-        Cost::new("gi.bring", flops, pixels * 28.0 + cells::count(size) as f64 * 76.0)
     }
 }

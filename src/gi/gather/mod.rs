@@ -18,7 +18,6 @@
 //! the rest is noise, which frames and neighbours average away. `docs/gi.md` says what it cannot do.
 
 pub mod bring;
-mod cost;
 mod frame;
 mod options;
 mod params;
@@ -29,7 +28,7 @@ pub use frame::Settled;
 pub use options::{Options, OptionsError};
 pub use params::Params;
 
-use crate::gi::interface::technique::{Cost, Memory, Technique};
+use crate::gi::interface::technique::{Memory, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage;
 use crate::gi::stage::cells::{self, CellsPass};
@@ -293,9 +292,5 @@ impl Technique for GatherGi {
 
     fn bytes(&self) -> u64 {
         self.inputs.bytes() + self.cells.bytes() + self.store.bytes()
-    }
-
-    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
-        cost::costs(size, &self.options)
     }
 }

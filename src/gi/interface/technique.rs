@@ -1,35 +1,9 @@
-//! What all methods share: the trait that a frame drives them by, and what a pass costs by count.
+//! What all methods share: the trait that a frame drives them by.
 
 use super::{GiError, Inputs};
 use crate::gpu::timing::Recorder;
 use crate::net::gpu::Tap;
-use serde::{Deserialize, Serialize};
-
-/// Arithmetic and memory traffic of one pass, counted by hand from its loops and formats.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Cost {
-    /// The pass's label, as in the timing table.
-    pub pass: String,
-    /// Floating-point operations; a multiply-add counts 2, a transcendental or division 4.
-    pub flops: f64,
-    /// Bytes that have to move between memory and the chip at least once.
-    pub bytes: f64,
-    /// Rays into the scene's triangles, those that only ask whether something stands between included.
-    #[serde(default)]
-    pub rays: f64,
-}
-
-impl Cost {
-    /// A row of the table.
-    pub fn new(pass: &str, flops: f64, bytes: f64) -> Self {
-        Self { pass: pass.into(), flops, bytes, rays: 0.0 }
-    }
-
-    /// The same with so many rays.
-    pub fn with_rays(self, rays: f64) -> Self {
-        Self { rays, ..self }
-    }
-}
+use crate::net::plan::Plan;
 
 /// What draws in a method's place.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,6 +86,11 @@ pub trait Technique: Send {
         Vec::new()
     }
 
+    /// What the network does, step by step, where one runs.
+    fn plan(&self) -> Option<&Plan> {
+        None
+    }
+
     /// What a layer of the network makes of `inputs`, which must be those of the last recording;
     /// `None` where there is no such layer.
     ///
@@ -129,7 +108,4 @@ pub trait Technique: Send {
 
     /// Bind groups and rebuilds since the start; stands still in steady frames.
     fn allocations(&self) -> u64;
-
-    /// What each pass costs for a picture of `size` pixels, in frame order.
-    fn costs(&self, size: [u32; 2]) -> Vec<Cost>;
 }

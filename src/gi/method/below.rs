@@ -1,11 +1,12 @@
 //! A method that needs rays, and the method below it, which draws where there are none: while trees
 //! are built, in a scene or on a device that is too large or too small for them.
 
-use crate::gi::interface::technique::{Cost, Instead, Memory, Technique};
+use crate::gi::interface::technique::{Instead, Memory, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::screen::ssgi::{SsgiGi, SsgiOptions};
 use crate::gpu::timing::Recorder;
 use crate::net::gpu::Tap;
+use crate::net::plan::Plan;
 
 /// The method, or why the device cannot have it, with what draws instead.
 pub(super) struct OrBelow {
@@ -81,6 +82,10 @@ impl Technique for OrBelow {
         self.above.as_ref().map(|a| a.layers()).unwrap_or_default()
     }
 
+    fn plan(&self) -> Option<&Plan> {
+        self.drew()?.plan()
+    }
+
     fn read_layer(&mut self, inputs: &Inputs<'_>, layer: usize) -> Result<Option<Tap>, GiError> {
         self.above.as_mut().map_or(Ok(None), |a| a.read_layer(inputs, layer))
     }
@@ -123,9 +128,5 @@ impl Technique for OrBelow {
 
     fn bytes(&self) -> u64 {
         self.above.as_ref().map_or(0, |a| a.bytes()) + self.below.as_ref().map_or(0, |b| b.bytes())
-    }
-
-    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
-        self.drew().map(|d| d.costs(size)).unwrap_or_default()
     }
 }

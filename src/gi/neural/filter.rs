@@ -11,7 +11,7 @@
 use super::memory::{self, FeaturesPass};
 use super::trained::Neural;
 use crate::gi::gather::{GUIDANCE, GatherGi};
-use crate::gi::interface::technique::{Cost, Memory, Technique};
+use crate::gi::interface::technique::{Memory, Technique};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage;
 use crate::gi::stage::exposure::ExposurePass;
@@ -20,6 +20,7 @@ use crate::gpu::bind::Bound;
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
 use crate::net::gpu::{Binding, Network, Setup, Tap};
+use crate::net::plan::Plan;
 
 /// The output's meaning in weights files.
 pub const MEANING: &str = "filter";
@@ -178,23 +179,8 @@ impl Technique for FilterGi {
         self.inputs.bytes() + self.exposure.bytes() + self.network.bytes() + self.gather.bytes()
     }
 
-    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
-        let count = |size| cells_of(size).map(f64::from).iter().product::<f64>();
-        let (cells, scale) = (count(size), count(size) / count(self.size));
-        let mut costs = self.gather.costs(size);
-        // The filter reads three vectors more of each tap's cell, once from memory, and weighs by two exponentials.
-        for cost in &mut costs {
-            if ["gi.blur", "gi.smooth"].contains(&cost.pass.as_str()) {
-                cost.flops += cells * 25.0 * 25.0;
-                cost.bytes += cells * GUIDANCE as f64;
-            }
-        }
-        costs.push(stage::exposure::cost(size));
-        costs.push(Cost::new("gi.features", cells * 90.0, cells * (80.0 + 4.0 * f64::from(memory::PITCH))));
-        costs.extend(self.network.plan().steps.iter().map(|step| {
-            Cost::new(&format!("net.{}", step.name), scale * step.flops as f64, scale * step.traffic as f64)
-        }));
-        costs
+    fn plan(&self) -> Option<&Plan> {
+        Some(self.network.plan())
     }
 }
 

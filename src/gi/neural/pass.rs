@@ -23,13 +23,14 @@ use super::reconstruct::ReconstructPass;
 use super::trained::check_weights;
 pub use super::trained::{Neural, needs_guess};
 use crate::gi::gather::GatherGi;
-use crate::gi::interface::technique::{Cost, Technique};
+use crate::gi::interface::technique::Technique;
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::exposure::ExposurePass;
-use crate::gi::stage::inputs::{InputGroup, cells_of};
+use crate::gi::stage::inputs::InputGroup;
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
 use crate::net::gpu::{Network, Tap};
+use crate::net::plan::Plan;
 
 /// What the host chooses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -238,27 +239,6 @@ impl NeuralGi {
         self.inputs.bytes() + self.exposure.bytes() + self.rebuilt.network.bytes() + gather
     }
 
-    /// What each pass costs for a picture of the present size; for another one the network's layers are scaled by the
-    /// number of cells.
-    pub fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
-        let area = |[w, h]: [u32; 2]| f64::from(w) * f64::from(h);
-        let (pixels, cells) = (area(size), area(cells_of(size)));
-        let scale = cells / area(cells_of(self.rebuilt.size));
-        let plan = self.rebuilt.network.plan();
-        let features = f64::from(4 * self.features.padded());
-        let mut costs = self.gather.as_ref().map(|gather| gather.costs(size)).unwrap_or_default();
-        // With a first guess: 8 bytes more a pixel and a cell, and twice the numbers of a cell.
-        let guess = f64::from(8 * u8::from(self.gather.is_some()));
-        costs.push(crate::gi::stage::exposure::cost(size));
-        costs.push(Cost::new("gi.pack", cells * 300.0, cells * (features + guess + 28.0 + 64.0)));
-        costs.extend(plan.steps.iter().map(|step| {
-            Cost::new(&format!("net.{}", step.name), scale * step.flops as f64, scale * step.traffic as f64)
-        }));
-        let bytes = pixels * (16.0 + guess) + cells * (16.0 + 2.0 * guess);
-        costs.push(Cost::new("gi.reconstruct", pixels * 350.0, bytes));
-        costs
-    }
-
     /// Bind groups and rebuilds since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
         let gather = self.gather.as_ref().map_or(0, GatherGi::allocations);
@@ -318,7 +298,7 @@ impl Technique for NeuralGi {
         self.bytes()
     }
 
-    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
-        self.costs(size)
+    fn plan(&self) -> Option<&Plan> {
+        Some(self.network().plan())
     }
 }

@@ -5,13 +5,13 @@
 
 use super::bitmask::{March, bind};
 use super::occlusion::OcclusionPass;
-use crate::gi::interface::technique::{Cost, Technique};
+use crate::gi::interface::technique::Technique;
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::ViewCache;
 use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry};
 use crate::gi::stage::inputs::{InputGroup, check_output, texture_entry};
-use crate::gpu::shaders;
 use crate::gpu::timing::Recorder;
+use crate::gpu::{shaders, tape};
 use std::str::FromStr;
 
 /// Light where a network's cells cannot answer (E/π, linear Rec.709), as a multiple of the exposure `s`: what
@@ -152,15 +152,14 @@ impl Technique for AmbientGi {
             self.outputs.clear();
         }
         let group = self.outputs.get([output], || {
-            Ok::<_, GiError>(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("gi.ambient"),
-                layout: &self.layout,
-                entries: &[
-                    wgpu::BindGroupEntry { binding: 0, resource: self.exposure.buffer().as_entire_binding() },
-                    wgpu::BindGroupEntry { binding: 1, resource: bind(self.occlusion.visibility()) },
-                    wgpu::BindGroupEntry { binding: 2, resource: bind(output) },
-                ],
-            }))
+            let entries = [
+                wgpu::BindGroupEntry { binding: 0, resource: self.exposure.buffer().as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: bind(self.occlusion.visibility()) },
+                wgpu::BindGroupEntry { binding: 2, resource: bind(output) },
+            ];
+            let label = Some("gi.ambient");
+            let descriptor = wgpu::BindGroupDescriptor { label, layout: &self.layout, entries: &entries };
+            Ok::<_, GiError>(tape::bind_group(&self.device, &descriptor))
         })?;
         self.exposure.record(recorder, &bound);
         self.occlusion.record(recorder, &bound);
@@ -175,12 +174,6 @@ impl Technique for AmbientGi {
 
     fn set_frame(&mut self, queue: &wgpu::Queue, frame: u32) {
         self.occlusion.set_frame(queue, frame);
-    }
-
-    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
-        let pixels = f64::from(size[0]) * f64::from(size[1]);
-        let [gather, full] = self.occlusion.costs(size);
-        vec![exposure::cost(size), gather, full, Cost::new("gi.ambient", pixels * 8.0, pixels * 16.0)]
     }
 
     fn forget(&mut self) {

@@ -5,11 +5,10 @@
 //! and rounding follow a fixed pattern of 4×4 texels, which the mean of 4×4 texels on the way back cancels; without
 //! history the pattern never moves, so a still picture stays still to the bit.
 
-use crate::gi::interface::technique::Cost;
 use crate::gi::stage::exposure;
 use crate::gi::stage::exposure::storage_entry;
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
-use crate::gpu::shaders;
+use crate::gpu::{shaders, tape};
 
 /// How far, how densely and how thickly the depth buffer is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,26 +55,11 @@ impl March {
     pub fn looks(&self) -> u32 {
         2 * self.slices * self.steps
     }
-
-    /// What a gather costs: about 115 operations a look (two positions, two arc cosines, two sector borders) plus
-    /// `more`, 90 a slice; reads depth and normal and, of each look, mostly from caches, `texel` bytes of every pixel
-    /// once; writes 16 bytes.
-    pub(crate) fn cost(&self, pass: &str, size: [u32; 2], more: f64, texel: f64) -> Cost {
-        let [w, h] = half_of(size).map(f64::from);
-        let flops = f64::from(self.looks()) * (115.0 + more) + f64::from(self.slices) * 90.0 + 60.0;
-        Cost::new(pass, w * h * flops, w * h * (4.0 * texel + 4.0 + 16.0))
-    }
 }
 
 /// Width and height of the half resolution, texels.
 pub fn half_of(size: [u32; 2]) -> [u32; 2] {
     size.map(|n| n.div_ceil(2))
-}
-
-/// What the way back from half resolution costs: 16 taps of about 28 operations a pixel.
-pub(crate) fn full_cost(pass: &str, size: [u32; 2], written: f64) -> Cost {
-    let pixels = f64::from(size[0]) * f64::from(size[1]);
-    Cost::new(pass, pixels * (16.0 * 28.0 + 30.0), pixels * (4.0 + 4.0 + 4.0 + written))
 }
 
 /// Which frame's pattern is used: a uniform of 16 bytes.
@@ -178,11 +162,8 @@ impl Kernel {
             .zip(resources)
             .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
             .collect();
-        device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(self.label),
-            layout: &self.layout,
-            entries: &entries,
-        })
+        let descriptor = wgpu::BindGroupDescriptor { label: Some(self.label), layout: &self.layout, entries: &entries };
+        tape::bind_group(device, &descriptor)
     }
 
     /// Records the stage over `size` texels.

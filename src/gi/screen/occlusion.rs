@@ -4,8 +4,7 @@
 //! What it cannot do: see what is off the screen or behind what is seen. A surface's thickness is assumed
 //! ([`March::thickness`]), so light passes behind thick things and is held back behind thin ones.
 
-use super::bitmask::{self, Kernel, March, Pattern, Stage, bind, half_of, pattern_entry, write_entry};
-use crate::gi::interface::technique::Cost;
+use super::bitmask::{Kernel, March, Pattern, Stage, bind, half_of, pattern_entry, write_entry};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup, texture_entry};
 use crate::gpu::timing::Recorder;
 
@@ -13,7 +12,6 @@ use crate::gpu::timing::Recorder;
 /// [`visibility`](Self::visibility) as `texture_2d<f32>` (unfilterable, r) and [`record`](Self::record) it first.
 pub struct OcclusionPass {
     device: wgpu::Device,
-    march: March,
     gather: Kernel,
     full: Kernel,
     pattern: Pattern,
@@ -33,7 +31,6 @@ impl OcclusionPass {
         let full = Kernel::new(device, inputs, "gi.occlusion_full", "", &full);
         Self {
             device: device.clone(),
-            march,
             gather,
             full,
             pattern: Pattern::new(device),
@@ -87,10 +84,5 @@ impl OcclusionPass {
     /// Bind groups made so far.
     pub fn made(&self) -> u64 {
         self.made
-    }
-
-    /// What both stages cost for a picture of `size` pixels.
-    pub fn costs(&self, size: [u32; 2]) -> [Cost; 2] {
-        [self.march.cost("gi.occlusion", size, 0.0, 4.0), bitmask::full_cost("gi.occlusion_full", size, 4.0)]
     }
 }

@@ -1,5 +1,5 @@
 //! One bounce in screen space: every pixel gathers what the pixels around it send on, by visibility bitmask
-//! ([`bitmask`]), and unseen light (the sky and a stand-in for later bounces,
+//! ([`bitmask`](super::bitmask)), and unseen light (the sky and a stand-in for later bounces,
 //! [`ambient`]) through what nothing blocks.
 //!
 //! What it cannot do: anything off the screen or hidden in it. A red wall lights the floor until it
@@ -8,11 +8,11 @@
 //! and receive through their neighbours.
 
 use super::ambient;
-use super::bitmask::{self, Kernel, March, Pattern, Stage, bind, half_of, pattern_entry, write_entry};
-use crate::gi::interface::technique::{Cost, Technique};
+use super::bitmask::{Kernel, March, Pattern, Stage, bind, half_of, pattern_entry, write_entry};
+use crate::gi::interface::technique::Technique;
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::ViewCache;
-use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry};
+use crate::gi::stage::exposure::{ExposurePass, output_entry, storage_entry};
 use crate::gi::stage::inputs::{InputGroup, texture_entry};
 use crate::gpu::timing::Recorder;
 
@@ -43,7 +43,6 @@ impl SsgiOptions {
 /// The method.
 pub struct SsgiGi {
     device: wgpu::Device,
-    march: March,
     inputs: InputGroup,
     exposure: ExposurePass,
     radiance: Kernel,
@@ -63,7 +62,7 @@ impl SsgiGi {
         use wgpu::TextureFormat::{Rgba16Float, Rgba32Float};
         let inputs = InputGroup::new(device);
         let exposure = ExposurePass::new(device, &inputs);
-        let (march, prelude) = (options.march, options.prelude());
+        let prelude = options.prelude();
         let entries = [storage_entry(0, true), write_entry(1, Rgba16Float), write_entry(2, Rgba16Float)];
         let radiance = Kernel::new(device, &inputs, "gi.radiance", &prelude, &entries);
         let entries =
@@ -72,7 +71,6 @@ impl SsgiGi {
         let full = Kernel::new(device, &inputs, "gi.ssgi_full", "", &[texture_entry(0), output_entry(1)]);
         Self {
             device: device.clone(),
-            march,
             inputs,
             exposure,
             radiance,
@@ -145,17 +143,5 @@ impl Technique for SsgiGi {
 
     fn bytes(&self) -> u64 {
         self.inputs.bytes() + self.exposure.bytes() + self.fine.bytes() + self.coarse.bytes() + self.half.bytes() + 16
-    }
-
-    fn costs(&self, size: [u32; 2]) -> Vec<Cost> {
-        let pixels = f64::from(size[0]) * f64::from(size[1]);
-        vec![
-            exposure::cost(size),
-            // Depth, albedo, emission and direct light of every pixel; 8 bytes written every fourth.
-            Cost::new("gi.radiance", pixels * 22.0, pixels * (24.0 + 2.0)),
-            // A look also decodes a normal and reads 8 bytes of a quarter of the pixels.
-            self.march.cost("gi.ssgi", size, 35.0, 4.0 + 4.0 + 2.0),
-            bitmask::full_cost("gi.ssgi_full", size, 8.0),
-        ]
     }
 }

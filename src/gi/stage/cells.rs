@@ -15,7 +15,6 @@
 
 use super::exposure::{pipeline, storage_entry};
 use super::inputs::{BoundInputs, CELL, InputGroup, cells_of};
-use crate::gi::interface::technique::Cost;
 use crate::gpu::timing::Recorder;
 use crate::gpu::{shaders, tape};
 
@@ -90,12 +89,6 @@ impl CellsPass {
     /// GPU memory, bytes.
     pub fn bytes(&self) -> u64 {
         self.pixels.size()
-    }
-
-    /// What the pass costs for a picture of `size` pixels: 45 operations and one depth a pixel.
-    pub fn cost(size: [u32; 2]) -> Cost {
-        let pixels = f64::from(size[0]) * f64::from(size[1]);
-        Cost::new("gi.cells", pixels * 45.0, pixels * 4.0 + count(size) as f64 * 8.0)
     }
 }
 

@@ -3,7 +3,6 @@
 
 use super::inputs::{BoundInputs, InputGroup};
 use crate::gi::interface::GiError;
-use crate::gi::interface::technique::Cost;
 use crate::gpu::timing::Recorder;
 use crate::gpu::{bind, readback, shaders, tape};
 
@@ -95,12 +94,6 @@ impl ExposurePass {
     pub fn bytes(&self) -> u64 {
         self.partials.size() + self.result.size()
     }
-}
-
-/// What the pass costs: one sample a cell (28 bytes of texels, about 55 operations).
-pub(crate) fn cost(size: [u32; 2]) -> Cost {
-    let [w, h] = super::inputs::cells_of(size).map(f64::from);
-    Cost::new("gi.exposure", w * h * 55.0, w * h * 28.0)
 }
 
 /// Reads an exposure back. Submits and waits: for tools and tests.

@@ -18,10 +18,10 @@ pub mod sweep;
 
 use super::{
     bench::{BenchError, Spread},
+    projection::Cost,
     trial::TrialError,
 };
 use crate::{
-    gi::technique::Cost,
     gpu::Gpu,
     image_io::ImageError,
     metrics::MetricError,

@@ -2,7 +2,6 @@
 
 use super::ChartError;
 use crate::{
-    gi::technique::Cost,
     gpu::{Gpu, timing::Recorder},
     net::{
         convert::{self, Arch, Norm},
@@ -11,7 +10,7 @@ use crate::{
     },
     study::{
         bench::{self, BenchOptions, Spread},
-        projection::{self, EFFICIENCY, GTX_1050},
+        projection::{self, Cost, EFFICIENCY, GTX_1050},
     },
 };
 use serde::{Deserialize, Serialize};

@@ -26,7 +26,7 @@ pub fn csv(record: &Record) -> String {
         let scene = record.scenes.iter().find(|s| s.name == unit.scene);
         let (kind, weights) = entry.map_or(("", ""), |e| (kind(e.kind), e.weights.as_deref().unwrap_or("")));
         let size = scene.map_or(record.size, |s| s.size);
-        let sum = |f: fn(&crate::gi::technique::Cost) -> f64| unit.costs.iter().map(f).sum::<f64>();
+        let sum = |f: fn(&crate::study::projection::Cost) -> f64| unit.costs.iter().map(f).sum::<f64>();
         let states: [(&str, &Option<Scores>, &Option<Time>); 2] =
             [("settled", &unit.scores, &unit.time), ("cold", &unit.cold, &unit.cold_time)];
         for (state, scores, time) in states {
@@ -196,7 +196,8 @@ fn how(record: &Record, metric: Metric) -> String {
          camera on, {} samples \
          a pixel; the first frame has one. Time: a whole frame, rasteriser included, median of {frames} frames after \
          {warmup}; {}. \
-         Counted (GFLOP, MB, rays) and projected: only the passes that find and add indirect light. \
+         Counted (GFLOP, MB, rays) and projected, with what threads wait for each other: only the passes that find and \
+         add indirect light, in the last of the settled frames. \
          \"Against paths\": how many times as long our path tracer takes to come as near on this device.{}\n",
         record.sound_scenes(),
         record.samples,

@@ -8,7 +8,7 @@ use super::{
     published::{self, PIXELS},
 };
 use crate::{
-    gi::{Method, technique::Cost},
+    gi::Method,
     gpu::Gpu,
     metrics::{Comparison, MetricError},
     reference,
@@ -16,6 +16,7 @@ use crate::{
     study::{
         bench::{Measurement, Spread},
         judge::{self, LightError},
+        projection::Cost,
         trial::{Settling, Shot, Trial},
         truth::{self, Reference},
     },
@@ -52,12 +53,13 @@ impl Stage<'_> {
                     cold = (Some(self.judged(&first)?), Some(time(&measured)));
                 }
                 let measured = self.trial.measure(method, &self.camera, plan.bench)?;
+                let costs = if shot.instead.is_none() { self.trial.count(method, &self.camera)? } else { Vec::new() };
                 Ok(Found {
                     scores: self.judged(&shot)?,
                     cold: cold.0,
                     time: time(&measured),
                     cold_time: cold.1,
-                    costs: shot.costs,
+                    costs,
                     bytes: measured.total_bytes(),
                     instead: shot.instead,
                 })

@@ -136,7 +136,7 @@ pub fn rows(record: &Record, metric: Metric) -> Vec<Row> {
             };
             let mean =
                 |f: &dyn Fn(&Unit) -> f64| units.iter().map(|u| f(u)).sum::<f64>() / units.len().max(1) as f64 + 0.0;
-            let counted = |f: fn(&crate::gi::technique::Cost) -> f64| mean(&|u| u.costs.iter().map(f).sum::<f64>());
+            let counted = |f: fn(&crate::study::projection::Cost) -> f64| mean(&|u| u.costs.iter().map(f).sum::<f64>());
             let wall: Vec<&Spread> = units.iter().filter_map(|u| Some(&u.time.as_ref()?.wall_ms)).collect();
             let judged = units.iter().filter(|u| u.scores.as_ref().is_some_and(|s| metric.of(s).is_some())).count();
             Row {

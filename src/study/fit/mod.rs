@@ -27,7 +27,9 @@ pub use views::covering;
 pub use yardstick::{Metric, Yardstick};
 
 use super::{
-    trial::{Settling, Shot, Trial},
+    count::CountError,
+    projection::{self, EFFICIENCY, GTX_1050},
+    trial::{Settling, Shot, Trial, TrialError},
     truth::Reference,
 };
 use crate::{
@@ -367,7 +369,10 @@ impl Search<'_, '_> {
             let bare = self.trial.measure(&crate::gi::Method::Direct, &camera, options)?;
             return Ok(Some((measured.wall_ms.median - bare.wall_ms.median).max(0.0)));
         }
-        let shot = self.trial.picture(&method, &camera, Settling::COLD)?;
-        Ok(shot.instead.is_none().then(|| shot.projected_ms()))
+        match self.trial.count(&method, &camera) {
+            Ok(costs) => Ok(Some(projection::total_ms(&costs, &GTX_1050, EFFICIENCY))),
+            Err(TrialError::Count(CountError::Instead(_))) => Ok(None),
+            Err(e) => Err(e.into()),
+        }
     }
 }

@@ -9,7 +9,8 @@ use crate::{
     scene::{Camera, Scene, upload::SceneGpu},
     study::{
         bench::{BenchError, BenchOptions, Measurement, measure},
-        projection::Card,
+        count,
+        projection::{Card, is_indirect},
     },
 };
 use serde::{Deserialize, Serialize};
@@ -103,8 +104,13 @@ fn rows(
             }
         };
         let seconds = SHARE * run.left();
-        let measured = one(gpu, with, &uploaded, camera, size, seconds);
-        let Some((measured, frames)) = run.kept(&what, measured) else { continue };
+        let measured = one(gpu, with.clone(), &uploaded, camera, size, seconds);
+        let Some((mut measured, frames)) = run.kept(&what, measured) else { continue };
+        let settling = if with.has_history() { Method::SETTLED } else { 1 };
+        let options = RendererOptions { method: with, ..Default::default() };
+        let counted = count::frame(gpu, count::Still { scene, camera, size }, options, settling);
+        measured.costs = run.kept(&format!("{what}, counts"), counted).unwrap_or_default();
+        measured.costs.retain(|c| is_indirect(&c.pass));
         let direct = rows.first().map_or(measured.wall_ms.median, |r| r.measured.wall_ms.median);
         let (own_ms, timing) = own(&measured, direct);
         rows.push(FrameRow {
@@ -166,11 +172,10 @@ fn label(precision: Precision) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gi::technique::Cost;
     use crate::study::bench::{PassTime, Spread};
 
     #[test]
-    fn a_methods_own_passes_are_those_that_are_counted() {
+    fn a_methods_own_passes_find_and_add_indirect_light() {
         let at = |ms| Spread { median: ms, p95: ms };
         let pass = |pass: &str, ms| PassTime { pass: pass.into(), ms: at(ms) };
         let mut m = Measurement {
@@ -179,7 +184,7 @@ mod tests {
             gpu_ms: Some(at(4.5)),
             wall_ms: at(4.6),
             bytes: Vec::new(),
-            costs: vec![Cost::new("gi.ambient", 1.0, 1.0), Cost::new("gi.glossy", 1.0, 1.0)],
+            costs: Vec::new(),
             drawn: Default::default(),
         };
         assert_eq!(own(&m, 3.0), (1.5, Timing::Timestamps));

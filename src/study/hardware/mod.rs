@@ -16,7 +16,7 @@ pub use frames::FrameRow;
 pub use network::NetworkRow;
 pub use parts::{RayRow, TracerRow};
 
-use super::projection::{self, Card, EFFICIENCY, GTX_1050};
+use super::projection::{self, Card, Cost, EFFICIENCY, GTX_1050};
 use crate::gpu::Gpu;
 use crate::net::{
     format::{Weights, WeightsError},
@@ -222,7 +222,7 @@ pub struct Projected {
 impl Projected {
     /// Of `costs` that took `measured` milliseconds on a device with the peaks of `card`; none
     /// where nothing was counted or timed.
-    fn of(costs: &[crate::gi::technique::Cost], measured: f64, card: &Card) -> Option<Self> {
+    fn of(costs: &[Cost], measured: f64, card: &Card) -> Option<Self> {
         let here_ms = projection::total_ms(costs, card, EFFICIENCY);
         let gtx_1050_ms = projection::total_ms(costs, &GTX_1050, EFFICIENCY);
         let ratio = measured / here_ms;
@@ -238,7 +238,6 @@ impl Projected {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gi::technique::Cost;
 
     #[test]
     fn a_projection_is_set_against_what_was_measured() {

@@ -1,10 +1,9 @@
 //! What is asked of a trial, and what comes back.
 
 use crate::{
-    gi::{Method, technique::Cost},
+    gi::Method,
     render::capture::{CapturedFrame, Layer, Picture},
     scene::{Camera, Environment, Light},
-    study::projection,
 };
 
 /// How long a still camera looks, and how finely.
@@ -71,8 +70,6 @@ pub struct Shot {
     pub instead: Option<String>,
     /// Frames that the answer has settled over, for methods with a history.
     pub settled: Option<u32>,
-    /// Counted cost of the passes that find and add indirect light.
-    pub costs: Vec<Cost>,
     /// GPU memory of everything, bytes.
     pub bytes: u64,
     /// DiffDir of `direct` where this picture's is another: methods that know the scene leave
@@ -105,11 +102,5 @@ impl Shot {
         let Some(without) = &self.without else { return found.clone() };
         let own = &self.layer(Layer::DiffDir).data;
         found.iter().zip(own).zip(without).map(|((found, own), without)| found + own - without).collect()
-    }
-
-    /// What a GTX 1050 would take for the method by count, milliseconds: a projection, never a
-    /// measurement.
-    pub fn projected_ms(&self) -> f64 {
-        projection::total_ms(&self.costs, &projection::GTX_1050, projection::EFFICIENCY)
     }
 }
