@@ -23,6 +23,8 @@
 
 // Slots that are looked at before a place goes without an entry.
 const ENTRY_PROBES = 12u;
+// Of the lot of an entry that no ray of the picture's cells has met, entries' rays alone.
+const BY_ENTRIES = 0x80000000u;
 // No entry's key, which are all odd.
 const LEFT = 2u;
 
@@ -98,7 +100,10 @@ fn ask_entry(x: vec3f, n: vec3f, query: u32, name: u32, round: u32) -> u32 {
     let slot = entry_of(x, n);
     if slot != NONE && query != NONE {
         entry_queries[query] = vec4u(bitcast<vec3u>(x), pack_normal(n));
-        let lot = (pcg3(vec3u(name, round, 0x2545f491u)).x << lot_bits()) | query;
+        var lot = (pcg3(vec3u(name, round, 0x2545f491u)).x << (lot_bits() + 1u)) >> 1u;
+        lot |= query;
+        // The picture's own rays come before those of entries, which tell what the light between surfaces is.
+        if query >= gather.rays { lot |= BY_ENTRIES; }
         atomicMin(&entry_lots[(round & 1u) * (gather.mask + 1u) + slot], lot);
     }
     return slot;

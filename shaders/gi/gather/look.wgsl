@@ -183,9 +183,10 @@ fn is_lit(x: vec3f, chosen: Chosen, seed: u32) -> bool {
 
 // Segments of a ray's way at most. Where it meets a place that no entry knows (more places of a cell do not see
 // each other than it has entries, or the table is full) it goes on, as that place's own ray would, to one that
-// an entry knows: no light is lost there. Of a wall full of shelves, or blinds, four segments lose 7 % of the
-// light, eight 3 %, sixteen 2 % (tests/gi/fins.rs).
-const SEGMENTS = 8u;
+// an entry knows. Of a wall full of shelves, or blinds, four segments lose 7 % of the light, eight 3 %
+// (tests/gi/fins.rs); but of the rays that a processor sends side by side all wait for the longest, and with
+// eight a city takes a sixth more time (docs/log/2026-11-25-counts.md).
+const SEGMENTS = 4u;
 
 // What the ray from o finds in direction d. n_d: cosine by which shadow rays to what glows were weighted
 // there, ALONE where none were sent. `query` is the ray's number among all of the frame, `name` what its

@@ -49,7 +49,11 @@ const SLOTS_IN_GROUP = 256u;
 var<workgroup> listed: array<u32, SLOTS_IN_GROUP>;
 var<workgroup> in_list: atomic<u32>;
 
-// Takes note of who met the entry in the slot last; whether it has a place to send a ray from.
+// Rounds for each ray of an entry that the picture's own rays do not meet. Of the entries of a city or a flat four fifths are
+// such, and what they know is a share of what others know.
+const FURTHER = 4u;
+
+// Takes note of who met the entry in the slot last; whether it is to send a ray.
 fn begins(slot: u32) -> bool {
     let slots = gather.mask + 1u;
     if slot >= slots { return false; }
@@ -71,6 +75,11 @@ fn begins(slot: u32) -> bool {
     }
     entry_asked[slot] = asked;
     entry_queries[places + odd] = begin;
+    let far = lot >= BY_ENTRIES && (gather.flags & GATHER_ALL_ENTRIES) == 0u;
+    if far && ((key >> 1u) + gather.round) % FURTHER != 0u {
+        entry_light[odd + slot] = entry_light[slots - odd + slot];
+        return false;
+    }
     return true;
 }
 

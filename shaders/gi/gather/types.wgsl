@@ -52,6 +52,8 @@ const GATHER_CHANGING = 128u;
 const GATHER_GUIDED = 256u;
 // Lights or objects have changed since the frame before.
 const GATHER_CHANGED = 512u;
+// Every entry sends a ray in each round, whoever met it: light has changed lately, or all frames are to be alike.
+const GATHER_ALL_ENTRIES = 1024u;
 
 @group(1) @binding(0) var<uniform> gather: Gather;
 @group(1) @binding(1) var accel_blocks: texture_2d<u32>;

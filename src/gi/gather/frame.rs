@@ -38,6 +38,7 @@ impl GatherGi {
             (inputs.specular.is_none(), params::NO_GLOSS),
             (self.changing > 0, params::CHANGING),
             (guided, params::GUIDED),
+            (self.frame == 0 || self.stir > 0 || self.options.even, params::ALL_ENTRIES),
         ];
         Ok(Params {
             eye: camera.eye_position(),

@@ -26,6 +26,8 @@ pub(super) const GUIDED: u32 = 256;
 
 /// Lights or objects have changed since the frame before.
 pub(super) const CHANGED: u32 = 512;
+/// Every entry sends a ray in each round, whoever met it.
+pub(super) const ALL_ENTRIES: u32 = 1024;
 
 /// `Gather` of `shaders/gi/gather/types.wgsl`, which documents the fields.
 #[repr(C)]
