@@ -1,6 +1,6 @@
 //! Where in the pixel the samples of a picture lie: drawn from the filter itself, so that equal weights are right.
 
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::OnceLock;
 
 /// Filter width of Cycles' default, pixels.
 pub const FILTER_WIDTH: f32 = 1.5;
@@ -28,8 +28,8 @@ pub fn offset(i: u32, seed: u32) -> [f32; 2] {
 /// fifth of a pixel to the left and above, and so would all that the picture shows.
 pub fn offset_of(i: u32, of: u32, seed: u32) -> [f32; 2] {
     let others = of.saturating_sub(1);
-    // One other sample cannot have the filter's width and leave the mean where it is.
-    if i == 0 || others < 2 {
+    // One other sample cannot have the filter's width and leave the mean where it is; more than a thousand do by themselves.
+    if i == 0 || !(2..=1024).contains(&others) {
         return offset(i, seed);
     }
     let [mean, scale] = moments(others, seed);
@@ -40,13 +40,6 @@ pub fn offset_of(i: u32, of: u32, seed: u32) -> [f32; 2] {
 /// Mean of the samples 1 to `others`, and what their distance to it is to be multiplied by so that together with one in
 /// the centre they have the filter's second moment.
 fn moments(others: u32, seed: u32) -> [[f32; 2]; 2] {
-    static LAST: Mutex<Option<((u32, u32), [[f32; 2]; 2])>> = Mutex::new(None);
-    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((key, moments)) = *last
-        && key == (others, seed)
-    {
-        return moments;
-    }
     let (mut sum, mut squares) = ([0.0f64; 2], [0.0f64; 2]);
     for point in (1..=others).map(|i| offset(i, seed)) {
         for axis in 0..2 {
@@ -58,9 +51,7 @@ fn moments(others: u32, seed: u32) -> [[f32; 2]; 2] {
     let mean = sum.map(|s| s / n);
     let wanted = second_moment() * (n + 1.0) / n;
     let scale = |axis: usize| (wanted / (squares[axis] / n - mean[axis].powi(2)).max(1e-6)).sqrt();
-    let moments = [mean.map(|m| m as f32), [scale(0) as f32, scale(1) as f32]];
-    *last = Some(((others, seed), moments));
-    moments
+    [mean.map(|m| m as f32), [scale(0) as f32, scale(1) as f32]]
 }
 
 /// Mean square distance from the centre along an axis under the filter, pixels².
