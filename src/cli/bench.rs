@@ -185,9 +185,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let mut measured = rounds.pop().unwrap_or_default();
     if args.count {
         for (method, measured) in methods.iter().zip(&mut measured) {
-            let frames = if method.has_history() { Method::SETTLED } else { 1 };
             let still = count::Still { scene: &scene, camera: &camera, size: args.scene.size };
-            measured.costs = count::frame(&gpu, still, with(method), frames)?;
+            measured.costs = count::frame(&gpu, still, with(method), method.frames_to_settle())?;
         }
     }
     let network = if args.layers && names.contains(&MethodName::Neural) {

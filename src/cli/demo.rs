@@ -56,7 +56,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     image_io::check_writable(&args.output)?;
     interrupt::install()?;
     let (shown, timed) = methods()?;
-    let frames = |m: &Method| SAMPLES + if m.has_history() { Method::SETTLED - 1 } else { 0 };
+    let frames = |m: &Method| SAMPLES + m.frames_to_settle() - 1;
     let mut progress = Progress::compiling(global, "frames", shown.iter().map(|m| u64::from(frames(m))).sum());
     let gpu = global.open_gpu()?;
     let scene = scene::load("interior")?;

@@ -1,5 +1,5 @@
-//! What compute passes do, counted while they run: between [`Count::begin`] and [`Count::take`] each dispatch is done by
-//! a pipeline that counts ([`instrument`](super::instrument)), which adds up in a place of its own.
+//! What compute passes do, counted while they run: between [`Count::begin`] and [`Count::take`] each dispatch is done
+//! by a pipeline that counts ([`instrument`](super::instrument)), which adds up in a place of its own.
 
 use super::bound::Bound;
 use super::instrument::{self, GROUP, NUMBERS};
@@ -39,8 +39,8 @@ pub(crate) struct Counted {
     pub operations: [f64; 2],
     /// Rays into triangles.
     pub rays: f64,
-    /// Bytes of each binding, added up: what was asked for, but no more than there is, since what is there need not come
-    /// from memory twice.
+    /// Bytes of each binding, added up: what was asked for, but no more than there is, since what is there need not
+    /// come from memory twice.
     pub bytes: f64,
 }
 

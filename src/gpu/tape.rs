@@ -1,5 +1,6 @@
 //! A tape of what compute passes are: while one runs on this thread, shaders, pipelines, bind groups and dispatches are
-//! written down as they are made, for `export` and for [`count`](super::count). Without one, each function here is wgpu's own and a look at a flag.
+//! written down as they are made, for `export` and for [`count`](super::count). Without one, each function here is
+//! wgpu's own and a look at a flag.
 
 use super::bound::Bound;
 use std::cell::{Cell, RefCell};

@@ -28,7 +28,8 @@ pub fn offset(i: u32, seed: u32) -> [f32; 2] {
 /// fifth of a pixel to the left and above, and so would all that the picture shows.
 pub fn offset_of(i: u32, of: u32, seed: u32) -> [f32; 2] {
     let others = of.saturating_sub(1);
-    // One other sample cannot have the filter's width and leave the mean where it is; more than a thousand do by themselves.
+    // One other sample cannot have the filter's width and leave the mean where it is; more than a thousand do by
+    // themselves.
     if i == 0 || !(2..=1024).contains(&others) {
         return offset(i, seed);
     }

@@ -300,9 +300,8 @@ impl<'a> Trial<'a> {
     /// # Errors
     /// [`TrialError::Count`].
     pub fn count(&self, method: &Method, camera: &Camera) -> Result<Vec<Cost>, TrialError> {
-        let frames = if method.has_history() { Method::SETTLED } else { 1 };
         let still = count::Still { scene: &self.scene, camera, size: self.size };
-        let mut costs = count::frame(self.gpu, still, self.renderer_options(method), frames)?;
+        let mut costs = count::frame(self.gpu, still, self.renderer_options(method), method.frames_to_settle())?;
         costs.retain(|c| projection::is_indirect(&c.pass));
         Ok(costs)
     }

@@ -315,7 +315,7 @@ pub fn capture(gpu: &crate::gpu::Gpu, shot: &Shot, progress: &Progress) -> Resul
             let _ = scene.trace(&gpu.device, &gpu.queue, &shot.scene);
         }
         progress.stage("capturing");
-        let warmup = if method.has_history() { Method::SETTLED - 1 } else { 0 };
+        let warmup = method.frames_to_settle() - 1;
         let options = RendererOptions { method, backdrop: shot.backdrop, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, shot.size, options).map_err(|e| e.to_string())?;
         let layers: &[Layer] = if shot.is_exr() { &Layer::ALL } else { &[] };

@@ -38,6 +38,11 @@ impl Method {
     /// Frames of a still camera after which a picture counts as settled, for methods with a history.
     pub const SETTLED: u32 = 32;
 
+    /// Frames of a still camera after which a picture by this method counts as settled.
+    pub fn frames_to_settle(&self) -> u32 {
+        if self.has_history() { Self::SETTLED } else { 1 }
+    }
+
     /// The method's name on the command line.
     pub fn name(&self) -> &'static str {
         match self {

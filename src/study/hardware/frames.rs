@@ -106,7 +106,7 @@ fn rows(
         let seconds = SHARE * run.left();
         let measured = one(gpu, with.clone(), &uploaded, camera, size, seconds);
         let Some((mut measured, frames)) = run.kept(&what, measured) else { continue };
-        let settling = if with.has_history() { Method::SETTLED } else { 1 };
+        let settling = with.frames_to_settle();
         let options = RendererOptions { method: with, ..Default::default() };
         let counted = count::frame(gpu, count::Still { scene, camera, size }, options, settling);
         measured.costs = run.kept(&format!("{what}, counts"), counted).unwrap_or_default();
