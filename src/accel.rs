@@ -1,6 +1,6 @@
 //! Triangles in trees, for rays: built on the CPU, traversed in `shaders/accel/traverse.wgsl`.
 //! [`Accel`] is one tree over triangles of the world, as the path tracer has it; [`SceneRays`] has
-//! a tree for each mesh and one over instances, which may move.
+//! a tree for each mesh, or for several that are in one place, and one over instances, which may move.
 //!
 //! An eight-wide tree with quantised child boxes, after Ylitie, Karras and Laine ("Efficient
 //! Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017), collapsed from a

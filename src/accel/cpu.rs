@@ -2,8 +2,9 @@
 
 use glam::{Mat3, Vec3};
 
+use super::trees::{SceneTrees, apart};
 use super::wide::{Block, INSTANCE, NODE};
-use super::{Accel, AccelError, scene, trees::SceneTrees};
+use super::{Accel, AccelError, scene};
 use crate::scene::Scene;
 
 /// Where a ray meets a triangle.
@@ -178,7 +179,11 @@ fn stops(open: u32, triangle: u32, seed: u32) -> bool {
 }
 
 /// The blocks of [`SceneRays`](super::SceneRays) without a device: trees of meshes below a tree over instances.
-pub struct SceneBlocks(SceneTrees);
+pub struct SceneBlocks {
+    trees: SceneTrees,
+    /// Of meshes that share a tree, where each is.
+    instances: Vec<Option<u32>>,
+}
 
 impl SceneBlocks {
     /// Builds the trees of `scene`.
@@ -187,7 +192,8 @@ impl SceneBlocks {
     /// [`AccelError::TooManyTriangles`].
     pub fn new(scene: &Scene) -> Result<Self, AccelError> {
         Accel::check_count(scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum())?;
-        let mut blocks = Self(SceneTrees::build(scene, &|_, _| true)?);
+        let trees = SceneTrees::build(scene, &|_, _| true, false)?;
+        let mut blocks = Self { trees, instances: Vec::new() };
         blocks.place(scene);
         Ok(blocks)
     }
@@ -195,7 +201,12 @@ impl SceneBlocks {
     /// Takes over where the instances of `scene` are and how its meshes are deformed, as
     /// [`SceneRays::place`](super::SceneRays::place) does.
     pub fn place(&mut self, scene: &Scene) {
-        let SceneTrees { blocks, meshes, top_room, .. } = &mut self.0;
+        if apart(&self.trees.meshes, &scene.instances)
+            && let Ok(alone) = SceneTrees::build(scene, &|_, _| true, true)
+        {
+            self.trees = alone;
+        }
+        let SceneTrees { blocks, meshes, top_room, .. } = &mut self.trees;
         for deform in &scene.deforms {
             let Some(mesh) = meshes.get_mut(deform.mesh) else { continue };
             if mesh.follow(deform)
@@ -208,11 +219,16 @@ impl SceneBlocks {
         let placed = scene::placed(meshes, scene.instances.iter().map(|i| (i.mesh, i.transform)));
         let top = scene::top(&placed, *top_room);
         blocks[..top.len()].copy_from_slice(&top);
+        self.instances = vec![None; meshes.len()];
+        let shares = |mesh: usize| meshes.iter().any(|m| m.together.contains(&mesh));
+        for (number, instance) in (0..).zip(&scene.instances).filter(|(_, i)| shares(i.mesh)) {
+            self.instances[instance.mesh] = Some(number);
+        }
     }
 
     /// Blocks in all.
     pub fn count(&self) -> usize {
-        self.0.blocks.len()
+        self.trees.blocks.len()
     }
 
     /// The nearest hit (any hit where `any`) with 0 < t < `t_max`, and the number of its instance;
@@ -226,8 +242,10 @@ impl SceneBlocks {
         seed: u32,
         seen: &mut impl FnMut(u32),
     ) -> Option<(AccelHit, u32)> {
-        let mut walk = Walk::new(&self.0.blocks, t_max, any, seed);
+        let mut walk = Walk::new(&self.trees.blocks, t_max, any, seed);
         walk.tree(0, origin.into(), direction.into(), seen);
-        walk.best
+        let (hit, number) = walk.best?;
+        let mesh = self.trees.meshes.partition_point(|m| m.first_triangle <= hit.triangle) - 1;
+        Some((hit, self.instances[mesh].unwrap_or(number)))
     }
 }

@@ -1,11 +1,11 @@
-//! The triangles of a scene as rays meet them: a tree for each mesh, made once and on all of the
-//! machine's threads, and a tree over the instances, made anew whenever something moves. One
-//! texture holds both; what a ray needs to know of a triangle (`surfaces`) and the triangles that
-//! glow (`emitters`) are storage buffers.
+//! The triangles of a scene as rays meet them: a tree for each mesh, or for several that are in one place each
+//! and the same, made once and on all of the machine's threads, and a tree over the instances, made anew
+//! whenever something moves. One texture holds both; what a ray needs to know of a triangle (`surfaces`) and the
+//! triangles that glow (`emitters`) are storage buffers.
 
 use super::emitters::{self, EmitterGpu};
 use super::gpu::{self, ROW};
-use super::trees::{MeshPart, MeshTree, SceneTrees};
+use super::trees::{MeshPart, MeshTree, SceneTrees, apart};
 use super::wide::{Block, INSTANCE, WORDS};
 use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, surfaces};
 use crate::scene::Scene;
@@ -71,7 +71,7 @@ impl SceneRays {
     ) -> Result<Self, AccelError> {
         // What cannot fit is not built first.
         check(device, scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum())?;
-        let mut rays = Self::of_trees(device, queue, SceneTrees::build(scene, progress)?)?;
+        let mut rays = Self::of_trees(device, queue, SceneTrees::build(scene, progress, false)?)?;
         rays.place(queue, scene);
         Ok(rays)
     }
@@ -119,8 +119,22 @@ impl SceneRays {
     }
 
     /// Takes over where the instances of `scene` are and how its meshes are deformed; they are those that this was made
-    /// of. True when buffers were made anew and have to be bound again.
+    /// of. True when buffers were made anew and have to be bound again. Where one of several that shared a tree has gone,
+    /// all trees are made anew first: four seconds of one core for a million triangles.
     pub fn place(&mut self, queue: &wgpu::Queue, scene: &Scene) -> bool {
+        let mut anew = false;
+        if apart(&self.meshes, &scene.instances) {
+            // Who moves one part may move others.
+            let trees = SceneTrees::build(scene, &|_, _| true, true);
+            match trees.and_then(|trees| Self::of_trees(&self.device, queue, trees)) {
+                Ok(mut made) => {
+                    made.succeed(self);
+                    *self = made;
+                    anew = true;
+                }
+                Err(e) => tracing::warn!("what shares a tree stays in one place for rays: {e}"),
+            }
+        }
         for deform in &scene.deforms {
             let Some(mesh) = self.meshes.get_mut(deform.mesh) else { continue };
             if !mesh.follow(deform) {
@@ -132,7 +146,7 @@ impl SceneRays {
                 gpu::write(queue, self.normals.texture(), mesh.first_triangle, &own.normals);
             }
         }
-        self.put(queue, scene.instances.iter().map(|i| (i.mesh, i.transform)))
+        self.put(queue, scene.instances.iter().map(|i| (i.mesh, i.transform))) || anew
     }
 
     /// The same of a list of instances: the mesh or part of each, and where it is.
@@ -148,7 +162,8 @@ impl SceneRays {
         }
         let placed = placed(&self.meshes, instances);
         let top = top(&placed, self.top_room);
-        self.counts.instances = placed.len().min(most_placed(self.top_room));
+        let with = placed.iter().map(|p| self.meshes[p.mesh].together.len().max(1));
+        self.counts.instances = with.take(most_placed(self.top_room)).sum();
         self.counts.left_out = count - self.counts.instances;
         self.accel.write(queue, 0, &top);
 

@@ -7,7 +7,7 @@ use super::refit::Refit;
 use super::wide::{Block, NODE, WORDS};
 use super::{Accel, AccelError, build, surfaces, threads};
 use crate::scene::deform::{Deform, Joint, Vertices};
-use crate::scene::{Material, Mesh, Scene, octahedral::octahedral_word};
+use crate::scene::{Instance, Material, Mesh, Scene, octahedral::octahedral_word};
 use glam::Vec3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -21,6 +21,8 @@ pub(super) struct MeshTree {
     pub glows: Vec<Glow>,
     /// Of a mesh that deforms.
     pub refit: Option<Box<Deforming>>,
+    /// Meshes whose triangles lie in this tree, too, this one among them; none but in a tree of several.
+    pub together: Vec<usize>,
 }
 
 /// A tree that follows a pose.
@@ -83,6 +85,8 @@ pub(crate) struct MeshPart {
     glows: Vec<Glow>,
     /// Vertices of each triangle of a mesh that deforms.
     deforming: Option<Vec<[u32; 3]>>,
+    /// Meshes whose triangles the tree holds, one after the other; none where they are this one's.
+    together: Vec<usize>,
 }
 
 impl MeshPart {
@@ -92,11 +96,9 @@ impl MeshPart {
         if mesh.check(scene.materials.len()).is_err() {
             return Self::default();
         }
-        let surfaces = surfaces::of_mesh(scene, mesh, reductions);
         let corners = corners(mesh);
-        let glows = emitters::glowing(&surfaces, &corners);
+        let part = Self::without_tree(scene, mesh, reductions, &corners);
         let triangles = || mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);
-        let normals = Arc::new(normals(triangles(), &mesh.normals));
         let deform = deform.filter(|d| d.check(mesh).is_ok());
         let accel = match deform.map(|d| d.shape.places()) {
             Some(places) => {
@@ -105,14 +107,38 @@ impl MeshPart {
             }
             None => build::build(&corners),
         };
-        Self { accel: accel.into(), normals, surfaces, glows, deforming: deform.map(|_| triangles().collect()) }
+        Self { accel: accel.into(), deforming: deform.map(|_| triangles().collect()), ..part }
+    }
+
+    fn without_tree(scene: &Scene, mesh: &Mesh, reductions: &Reductions, corners: &[[[f32; 3]; 3]]) -> Self {
+        let surfaces = surfaces::of_mesh(scene, mesh, reductions);
+        let triangles = mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);
+        let normals = Arc::new(normals(triangles, &mesh.normals));
+        Self { normals, glows: emitters::glowing(&surfaces, corners), surfaces, ..Self::default() }
+    }
+
+    /// Of meshes that are in one place, with one tree, which the first of them has. `done` hears of each.
+    fn of_all(scene: &Scene, meshes: &[usize], reductions: &Reductions, done: impl Fn()) -> Vec<Self> {
+        let mut all = Vec::new();
+        let mut parts: Vec<Self> = Vec::with_capacity(meshes.len());
+        for &i in meshes {
+            let mesh = &scene.meshes[i];
+            let own = corners(mesh);
+            parts.push(Self::without_tree(scene, mesh, reductions, &own));
+            all.extend(own);
+            done();
+        }
+        let glows = parts.iter_mut().flat_map(|p| std::mem::take(&mut p.glows)).collect();
+        let first = &mut parts[0];
+        (first.accel, first.glows, first.together) = (build::build(&all).into(), glows, meshes.to_vec());
+        parts
     }
 
     /// The same triangles, with the corners that it was made of, of another material without pictures.
     pub fn of_material(&self, material: &Material, corners: &[[[f32; 3]; 3]]) -> Self {
         let surfaces = vec![surfaces::plain(material); self.surfaces.len()];
         let glows = emitters::glowing(&surfaces, corners);
-        Self { accel: self.accel.clone(), normals: self.normals.clone(), surfaces, glows, deforming: None }
+        Self { accel: self.accel.clone(), normals: self.normals.clone(), surfaces, glows, ..Self::default() }
     }
 
     /// Triangles, those that no ray can hit among them.
@@ -131,28 +157,84 @@ pub(crate) fn corners(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
     mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize])).collect()
 }
 
+/// Meshes by the trees they share: those that are met in one place each, all in the same, share one, since the trees of
+/// what lies side by side overlap, and a ray walks through all of them. Files cut what is one thing by its materials.
+/// What deforms, cannot be met or shows in several places has its own, and where something is animated whatever hangs on
+/// another node. The first of each is the least; `alone`: none share.
+fn shared(scene: &Scene, alone: bool) -> Vec<Vec<usize>> {
+    let mut places = vec![Vec::new(); scene.meshes.len()];
+    for (i, instance) in scene.instances.iter().enumerate() {
+        if let Some(of) = places.get_mut(instance.mesh) {
+            of.push(i);
+        }
+    }
+    let node = |i: usize| scene.rig.as_ref().and_then(|r| r.instances.get(i).copied());
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    let mut known = std::collections::HashMap::new();
+    for (mesh, places) in places.iter().enumerate() {
+        let sound = || {
+            let of = &scene.meshes[mesh];
+            of.check(scene.materials.len()).is_ok() && scene.deform_of(mesh).is_none() && can_be_met(of)
+        };
+        if let [place] = places[..]
+            && !alone
+            && sound()
+        {
+            let key = (scene.instances[place].transform.map(|c| c.map(f32::to_bits)), node(place));
+            let group = *known.entry(key).or_insert(groups.len());
+            if group < groups.len() {
+                groups[group].push(mesh);
+                continue;
+            }
+        }
+        groups.push(vec![mesh]);
+    }
+    groups
+}
+
+/// Whether there is a triangle that a ray can hit. Indices were checked.
+fn can_be_met(mesh: &Mesh) -> bool {
+    let corner = |i: &u32| mesh.positions[*i as usize];
+    mesh.indices.chunks_exact(3).any(|t| build::is_good(&[corner(&t[0]), corner(&t[1]), corner(&t[2])]))
+}
+
 impl SceneTrees {
     /// Builds them on all of the machine's threads. `progress` as in
-    /// [`SceneRays::with_progress`](super::SceneRays::with_progress).
-    pub fn build(scene: &Scene, progress: &(dyn Fn(usize, usize) -> bool + Sync)) -> Result<Self, AccelError> {
+    /// [`SceneRays::with_progress`](super::SceneRays::with_progress); `alone`: a tree for each mesh.
+    pub fn build(
+        scene: &Scene,
+        progress: &(dyn Fn(usize, usize) -> bool + Sync),
+        alone: bool,
+    ) -> Result<Self, AccelError> {
         let reductions = Reductions::new(scene);
         let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(!progress(0, scene.meshes.len())));
-        let part = |&(index, mesh): &(usize, &Mesh)| {
-            if stopped.load(Ordering::Relaxed) {
-                return MeshPart::default();
-            }
-            let part = MeshPart::new(scene, mesh, &reductions, scene.deform_of(index));
+        let one_done = || {
             if !progress(done.fetch_add(1, Ordering::Relaxed) + 1, scene.meshes.len()) {
                 stopped.store(true, Ordering::Relaxed);
             }
-            part
         };
-        let all: Vec<(usize, &Mesh)> = scene.meshes.iter().enumerate().collect();
-        let parts = threads::map(&all, |m| m.1.indices.len(), part);
+        let groups = shared(scene, alone);
+        let make = |group: &Vec<usize>| {
+            if stopped.load(Ordering::Relaxed) {
+                return Vec::new();
+            }
+            if let [mesh] = group[..] {
+                let part = MeshPart::new(scene, &scene.meshes[mesh], &reductions, scene.deform_of(mesh));
+                one_done();
+                return vec![part];
+            }
+            MeshPart::of_all(scene, group, &reductions, one_done)
+        };
+        let size = |group: &Vec<usize>| group.iter().map(|&m| scene.meshes[m].indices.len()).sum();
+        let made = threads::map(&groups, size, make);
         if stopped.into_inner() {
             return Err(AccelError::Stopped);
         }
         drop(reductions);
+        let mut parts = vec![MeshPart::default(); scene.meshes.len()];
+        for (mesh, part) in groups.iter().flatten().zip(made.into_iter().flatten()) {
+            parts[*mesh] = part;
+        }
         Ok(Self::join(parts, scene.instances.len()))
     }
 
@@ -161,37 +243,66 @@ impl SceneTrees {
         let top_room = top_blocks(instances);
         let mut blocks = Vec::with_capacity(top_room + parts.iter().map(|p| p.accel.block_count() + 8).sum::<usize>());
         blocks.resize(top_room, [0; WORDS]);
-        let mut surfaces = Vec::with_capacity(parts.iter().map(|p| p.surfaces.len()).sum());
-        let mut normals = Vec::with_capacity(surfaces.capacity());
+        let surfaces: Vec<_> = parts.iter().flat_map(|p| p.surfaces.iter().copied()).collect();
+        let normals = parts.iter().flat_map(|p| p.normals.iter().copied()).collect();
+        let firsts: Vec<usize> =
+            parts.iter().scan(0, |sum, p| Some(std::mem::replace(sum, *sum + p.surfaces.len()))).collect();
+        let sizes: Vec<usize> = parts.iter().map(|p| p.surfaces.len()).collect();
         let mut meshes = Vec::with_capacity(parts.len());
-        for part in parts {
+        for (part, &first) in parts.into_iter().zip(&firsts) {
             let root = blocks.len().next_multiple_of(8);
             blocks.resize(root, [0; WORDS]);
-            blocks.extend(part.accel.blocks.iter().map(|b| moved(b, root as u32, &part.surfaces)));
+            // What stands in the tree as one list of triangles lies among those of all meshes.
+            let numbers: Vec<u32> = part
+                .together
+                .iter()
+                .flat_map(|&m| firsts[m] - first..firsts[m] - first + sizes[m])
+                .map(|i| i as u32)
+                .collect();
+            let number = |i: u32| numbers.get(i as usize).copied().unwrap_or(i);
+            blocks.extend(part.accel.blocks.iter().map(|b| moved(b, root as u32, &surfaces[first..], number)));
             let refit = part.deforming.map(|triangles| {
                 let tree = Refit::new(&blocks[root..], root as u32, triangles, part.surfaces.clone());
                 Box::new(Deforming { tree, last: None, vertices: Vertices::default(), normals: Vec::new() })
             });
             meshes.push(MeshTree {
                 root: root as u32,
-                first_triangle: surfaces.len() as u32,
+                first_triangle: first as u32,
                 bounds: bounds(&part.accel),
                 glows: part.glows,
                 refit,
+                together: part.together,
             });
-            surfaces.extend(part.surfaces.iter().map(surfaces::Surface::packed));
-            normals.extend(part.normals.iter());
         }
+        let surfaces = surfaces.iter().map(surfaces::Surface::packed).collect();
         Self { blocks, surfaces, normals, meshes, top_room }
     }
 }
 
-/// A block of a mesh's tree at its place in the texture.
-fn moved(block: &Block, root: u32, surfaces: &[surfaces::Surface]) -> Block {
+/// Whether something that shares a tree has gone to another place than the rest of it.
+pub(super) fn apart(meshes: &[MeshTree], instances: &[Instance]) -> bool {
+    if meshes.iter().all(|m| m.together.is_empty()) {
+        return false;
+    }
+    let mut places = vec![None; meshes.len()];
+    for instance in instances {
+        if let Some(place) = places.get_mut(instance.mesh) {
+            *place = Some(instance.transform);
+        }
+    }
+    meshes.iter().any(|m| m.together.iter().any(|&other| places[other] != places[m.together[0]]))
+}
+
+/// A block of a mesh's tree at its place in the texture, its triangles by the numbers that `number` gives them among
+/// `surfaces`.
+fn moved(block: &Block, root: u32, surfaces: &[surfaces::Surface], number: impl Fn(u32) -> u32) -> Block {
     let mut block = *block;
     if block[3] & NODE != 0 {
         block[3] += root;
     } else if block.iter().any(|w| *w != 0) {
+        for at in [7, 11] {
+            block[at] = block[at] & 0xff00_0000 | number(block[at] & 0x00ff_ffff);
+        }
         let open = |word: u32| surfaces[(word & 0x00ff_ffff) as usize].open();
         block[15] = open(block[7]) | open(block[11]) << 8;
     }

@@ -77,41 +77,104 @@ fn instances_are_met_where_they_stand_and_where_they_go() {
     assert!(different(&gpu, &caster, &rays, &moved) < 1e-3);
 }
 
-/// The walk that is counted on the CPU meets what the one list holds, instances and numbers of
-/// triangles included; any hit reads no more than the nearest one does.
+/// How many of 2,000 rays meet something else by the walk on the CPU than in the one list of all triangles, instances and
+/// numbers of triangles included; and the blocks that a ray reads. Any hit reads no more than the nearest one does.
+fn walked_wrongly(blocks: &SceneBlocks, scene: &Scene, world: &[Triangle]) -> (usize, f64) {
+    let accel = Accel::build(world).unwrap();
+    let sent = random_rays(2000, 1.5, 3);
+    let sizes = scene.meshes.iter().map(|m| m.indices.len() as u32 / 3).collect::<Vec<_>>();
+    let mut read = 0;
+    let off = |ray: &&bouncelight::accel::RayGpu| {
+        let (mut nearest, mut any) = (0, 0);
+        let walk = |any, n: &mut usize| blocks.walk(ray.origin, ray.direction, (ray.t_max, any), 0, &mut |_| *n += 1);
+        let (found, some) = (walk(false, &mut nearest), walk(true, &mut any));
+        assert!(found.is_some() == some.is_some() && any <= nearest);
+        read += nearest;
+        match (accel.closest(ray.origin, ray.direction, ray.t_max), found) {
+            (None, found) => found.is_some(),
+            (Some(_), None) => true,
+            (Some(e), Some((hit, instance))) => {
+                // In the one list an instance's triangles follow those of the instances before it.
+                let mesh = scene.instances[instance as usize].mesh;
+                let before = |n: usize, of: &dyn Fn(usize) -> usize| (0..n).map(|i| sizes[of(i)]).sum::<u32>();
+                let in_mesh = hit.triangle - before(mesh, &|i| i);
+                let in_list = before(instance as usize, &|i| scene.instances[i].mesh) + in_mesh;
+                (e.t - hit.t).abs() > 1e-4 * (1.0 + e.t) || in_list != e.triangle
+            }
+        }
+    };
+    let wrong = sent.iter().filter(off).count();
+    (wrong, read as f64 / sent.len() as f64)
+}
+
 #[test]
 fn the_walk_through_instances_on_the_cpu_is_the_same() {
     let (scene, world) = placed();
-    let wrong = |blocks: &SceneBlocks| {
-        let accel = Accel::build(&world).unwrap();
-        let sent = random_rays(2000, 1.5, 3);
-        let sizes = scene.meshes.iter().map(|m| m.indices.len() as u32 / 3).collect::<Vec<_>>();
-        let off = |ray: &&bouncelight::accel::RayGpu| {
-            let (mut nearest, mut any) = (0, 0);
-            let walk =
-                |any, n: &mut usize| blocks.walk(ray.origin, ray.direction, (ray.t_max, any), 0, &mut |_| *n += 1);
-            let (found, some) = (walk(false, &mut nearest), walk(true, &mut any));
-            assert!(found.is_some() == some.is_some() && any <= nearest);
-            match (accel.closest(ray.origin, ray.direction, ray.t_max), found) {
-                (None, found) => found.is_some(),
-                (Some(_), None) => true,
-                (Some(e), Some((hit, instance))) => {
-                    // In the one list an instance's triangles follow those of the instances before it.
-                    let mesh = scene.instances[instance as usize].mesh;
-                    let before = |n: usize, of: &dyn Fn(usize) -> usize| (0..n).map(|i| sizes[of(i)]).sum::<u32>();
-                    let in_mesh = hit.triangle - before(mesh, &|i| i);
-                    let in_list = before(instance as usize, &|i| scene.instances[i].mesh) + in_mesh;
-                    (e.t - hit.t).abs() > 1e-4 * (1.0 + e.t) || in_list != e.triangle
-                }
-            }
-        };
-        sent.iter().filter(off).count()
-    };
-    assert!(wrong(&SceneBlocks::new(&scene).unwrap()) <= 2);
+    assert!(walked_wrongly(&SceneBlocks::new(&scene).unwrap(), &scene, &world).0 <= 2);
     // Negative control: the blocks of a scene that has moved.
     let mut moved = scene.clone();
     moved.instances.iter_mut().for_each(|i| i.transform[3][0] += 0.4);
-    assert!(wrong(&SceneBlocks::new(&moved).unwrap()) > 200);
+    assert!(walked_wrongly(&SceneBlocks::new(&moved).unwrap(), &scene, &world).0 > 200);
+}
+
+/// Six meshes in one place, among others a seventh that stands in two.
+fn parts_of_one() -> Scene {
+    let mut scene = Scene { materials: vec![Material::default()], ..Default::default() };
+    let turn = Quat::from_axis_angle(Vec3::new(0.3, 0.9, 0.1).normalize(), 0.7);
+    let at = |x: f32| Mat4::from_scale_rotation_translation(Vec3::new(0.7, 0.5, -0.6), turn, Vec3::new(x, 0.1, 0.2));
+    for k in 0..7 {
+        scene.meshes.push(mesh(&soup(if k == 3 { 5 } else { 120 }, 0.4, k + 30)));
+        let mut put = |x| {
+            let transform = at(x).to_cols_array_2d();
+            scene.instances.push(Instance { name: String::new(), mesh: k as usize, transform });
+        };
+        put(if k == 3 { -0.8 } else { 0.0 });
+        if k == 3 {
+            put(0.9);
+        }
+    }
+    scene
+}
+
+#[test]
+fn meshes_in_one_place_share_a_tree_until_one_goes() {
+    let mut scene = parts_of_one();
+    let world = world_triangles(&scene);
+    let mut blocks = SceneBlocks::new(&scene).unwrap();
+    let (wrong, read) = walked_wrongly(&blocks, &scene, &world);
+    assert!(wrong <= 2, "{wrong}");
+    // Where each is a hair off the others all have their own.
+    let mut apart = scene.clone();
+    for (k, instance) in apart.instances.iter_mut().enumerate() {
+        instance.transform[3][1] += 1e-6 * k as f32;
+    }
+    let (wrong, of_seven) = walked_wrongly(&SceneBlocks::new(&apart).unwrap(), &apart, &world);
+    assert!(wrong <= 2 && read < 0.7 * of_seven, "{wrong}: {read} blocks a ray, {of_seven} of seven trees");
+
+    // One part goes.
+    scene.instances[1].transform[3][0] += 0.5;
+    let world = world_triangles(&scene);
+    assert!(walked_wrongly(&blocks, &scene, &world).0 > 20, "who has not heard of it");
+    blocks.place(&scene);
+    assert!(walked_wrongly(&blocks, &scene, &world).0 <= 2);
+
+    let Some(gpu) = crate::common::gpu() else { return };
+    let caster = RayCaster::new(&gpu.device);
+    let mut scene = parts_of_one();
+    let mut rays = SceneRays::new(&gpu.device, &gpu.queue, &scene).expect("they fit");
+    assert!(different(&gpu, &caster, &rays, &world_triangles(&scene)) < 1e-3);
+    assert_eq!((rays.counts().instances, rays.counts().left_out), (8, 0));
+    let (id, moves) = (rays.id(), rays.moves());
+    // All go: the tree stays.
+    scene.instances.iter_mut().for_each(|i| i.transform[3][2] += 0.3);
+    assert!(!rays.place(&gpu.queue, &scene));
+    assert!(different(&gpu, &caster, &rays, &world_triangles(&scene)) < 1e-3);
+    scene.instances[1].transform[3][0] += 0.5;
+    assert!(different(&gpu, &caster, &rays, &world_triangles(&scene)) > 0.02);
+    assert!(rays.place(&gpu.queue, &scene), "what is bound is another");
+    assert!(different(&gpu, &caster, &rays, &world_triangles(&scene)) < 1e-3);
+    assert_eq!((rays.counts().instances, rays.counts().left_out), (8, 0));
+    assert!(rays.id() == id && rays.moves() > moves + 1);
 }
 
 #[test]
