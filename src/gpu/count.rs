@@ -7,14 +7,11 @@ use super::tape::{self, Made};
 use super::{Gpu, readback};
 use std::borrow::Cow;
 use std::cell::RefCell;
+use std::rc::Rc;
 
 /// Dispatches of a frame that there is room for, and bytes of each.
 const DISPATCHES: usize = 4096;
 const STRIDE: u64 = 256;
-
-thread_local! {
-    static COUNTER: RefCell<Option<Counter>> = const { RefCell::new(None) };
-}
 
 /// Groups and numbers of bindings.
 type Bindings = Vec<(u32, u32)>;
@@ -45,29 +42,36 @@ pub(crate) struct Counted {
 }
 
 /// Counts what is recorded on this thread by passes that were made since; there is one at a time.
-pub(crate) struct Count(tape::Running);
+pub(crate) struct Count {
+    tape: tape::Running,
+    counter: Option<Rc<RefCell<Counter>>>,
+}
 
 impl Count {
     /// From here on it is remembered of what pipelines are made.
     pub fn start() -> Self {
-        Self(tape::Running::start())
+        Self { tape: tape::Running::start(), counter: None }
     }
 
     /// Dispatches count from here on. The device needs room for a storage buffer more a stage than shaders have that
     /// do not count.
     pub fn begin(&mut self, device: &wgpu::Device) {
-        self.0.take();
-        COUNTER.set(Some(Counter::new(device.clone())));
+        self.tape.take();
+        let counter = Rc::new(RefCell::new(Counter::new(device.clone())));
+        self.tape.listen(Some(counter.clone()));
+        self.counter = Some(counter);
     }
 
     /// What each dispatch did that was recorded since [`begin`](Self::begin) and submitted. Those of shaders that do
     /// not count are left out.
     pub fn take(&mut self, gpu: &Gpu) -> Result<Vec<Counted>, readback::ReadbackError> {
-        let Some(counter) = COUNTER.take() else { return Ok(Vec::new()) };
+        self.tape.listen(None);
+        let Some(counter) = self.counter.take() else { return Ok(Vec::new()) };
+        let counter = counter.borrow();
         let words = readback::buffer(&gpu.device, &gpu.queue, &counter.sums, 0, counter.sums.size())?;
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(&words);
-        let parts = words.chunks_exact(STRIDE as usize / 4).zip(counter.dispatches);
-        let found = self.0.take().into_iter().zip(parts).filter_map(|(dispatch, (words, bindings))| {
+        let parts = words.chunks_exact(STRIDE as usize / 4).zip(&counter.dispatches);
+        let found = self.tape.take().into_iter().zip(parts).filter_map(|(dispatch, (words, bindings))| {
             let number = |i: usize| f64::from(words[2 * i]) + f64::from(words[2 * i + 1]) * 2f64.powi(32);
             let asked = |(i, (group, binding)): (usize, &(u32, u32))| {
                 let (_, bound, _) = dispatch.groups.iter().find(|g| g.0 == *group)?;
@@ -75,17 +79,11 @@ impl Count {
                 let (unit, all) = size(bound);
                 Some((unit * number(instrument::FIRST + i)).min(all))
             };
-            let bytes = bindings?.iter().enumerate().filter_map(asked).sum();
+            let bytes = bindings.as_ref()?.iter().enumerate().filter_map(asked).sum();
             let operations = [number(0), number(NUMBERS)];
             Some(Counted { label: dispatch.label, operations, rays: number(1), bytes })
         });
         Ok(found.collect())
-    }
-}
-
-impl Drop for Count {
-    fn drop(&mut self) {
-        COUNTER.set(None);
     }
 }
 
@@ -169,30 +167,17 @@ impl Counter {
     }
 }
 
-fn with(f: impl FnOnce(&mut Counter)) {
-    COUNTER.with_borrow_mut(|counter| counter.as_mut().map(f));
-}
-
-/// Sets the pipeline that counts in the place of the one that is about to be dispatched, and where.
-pub(super) fn before(pass: &mut wgpu::ComputePass<'_>, made: Option<&Made>) {
-    with(|counter| {
-        let at = counter.dispatches.len();
-        let found = made.filter(|_| at < DISPATCHES).and_then(|made| counter.found(made));
-        counter.dispatches.push(found.map(|(pipeline, bindings)| {
+impl tape::Listener for Counter {
+    /// Sets the pipeline that counts in the place of the one that is about to be dispatched, and where.
+    fn before(&mut self, pass: &mut wgpu::ComputePass<'_>, made: Option<&Made>) {
+        let at = self.dispatches.len();
+        let found = made.filter(|_| at < DISPATCHES).and_then(|made| self.found(made));
+        self.dispatches.push(found.map(|(pipeline, bindings)| {
             pass.set_pipeline(&pipeline);
-            pass.set_bind_group(GROUP as u32, &counter.group, &[(at as u64 * STRIDE) as u32]);
+            pass.set_bind_group(GROUP as u32, &self.group, &[(at as u64 * STRIDE) as u32]);
             bindings
         }));
-    });
-}
-
-/// Sets the pipeline again that the pass itself has set.
-pub(super) fn after(pass: &mut wgpu::ComputePass<'_>, made: Option<&Made>) {
-    with(|_| {
-        if let Some(made) = made {
-            pass.set_pipeline(&made.pipeline);
-        }
-    });
+    }
 }
 
 #[cfg(test)]
@@ -274,8 +259,18 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         assert!(fewer.operations[0] < found.operations[0] && fewer.operations[1] < found.operations[1]);
         let narrow = other("    made[id.x] = all;", "    if id.x < 64u { made[id.x] = all; }");
         assert_eq!(found.bytes - narrow.bytes, 16.0 * 64.0);
+        // Who works before a barrier and who works behind it wait for each other.
+        let halves = LOOP.replace("    var all = vec4f(sum);", "    workgroupBarrier();\n    var all = vec4f(sum);");
+        let met = counted(&gpu, &halves);
+        assert_eq!(met.operations[0], found.operations[0]);
+        let behind = "(id.x & 1u) == 1u";
+        assert_eq!(met.operations[1], found.operations[1], "the slowest are the slowest on both sides");
+        let turned = [LOOP, &halves].map(|text| counted(&gpu, &text.replace(behind, "(id.x & 31u) == 0u")));
+        assert_eq!(turned[1].operations[0], turned[0].operations[0]);
+        // Of four times 32 the first does four operations more, the last goes round most often.
+        assert_eq!(turned[1].operations[1] - turned[0].operations[1], 4.0 * 32.0 * 4.0);
         // A ray is a call of the function of that name.
-        let traced = LOOP.replace("given[i]", "f32(trace_seeded(i))") + "fn trace_seeded(x: u32) -> u32 { return x; }";
+        let traced = LOOP.replace("given[i]", "f32(walk_begin(i))") + "fn walk_begin(x: u32) -> u32 { return x; }";
         assert_eq!(counted(&gpu, &traced).rays, rounds);
     }
 }

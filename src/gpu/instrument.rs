@@ -18,7 +18,7 @@ pub const GROUP: usize = 3;
 pub const NUMBERS: usize = 26;
 pub const FIRST: usize = 2;
 /// A function of each ray.
-const RAY: &str = "trace_seeded";
+const RAY: &str = "walk_begin";
 
 /// A shader that counts, and what it counts.
 pub struct Counting {
@@ -47,14 +47,15 @@ pub fn counting(text: &str) -> Option<Counting> {
         return None;
     }
     let named = |name: &str| module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name)).map(|(h, _)| h);
-    let (add, end) = (named("counted_add")?, named("counted_end")?);
+    let calls = Calls { add: named("counted_add")?, meet: named("counted_meet")? };
+    let (start, end) = (named("counted_start")?, named("counted_end")?);
 
     let own = |f: &Function| f.name.as_ref().is_some_and(|n| n.starts_with("counted_"));
     let handles: Vec<_> = module.functions.iter().filter(|(_, f)| !own(f)).map(|(h, _)| h).collect();
     for handle in handles {
         let mut function = std::mem::take(&mut module.functions[handle]);
         let ray = function.name.as_deref() == Some(RAY);
-        count_in(&module, &mut function, add, &bindings, u32::from(ray))?;
+        count_in(&module, &mut function, calls, &bindings, u32::from(ray))?;
         module.functions[handle] = function;
     }
     let word = module.types.insert(Type { name: None, inner: TypeInner::Scalar(Scalar::U32) }, Span::UNDEFINED);
@@ -63,14 +64,14 @@ pub fn counting(text: &str) -> Option<Counting> {
             continue;
         }
         let mut inner = std::mem::take(&mut module.entry_points[i].function);
-        count_in(&module, &mut inner, add, &bindings, 0)?;
-        module.entry_points[i].function = around(&mut module, inner, end, word);
+        count_in(&module, &mut inner, calls, &bindings, 0)?;
+        module.entry_points[i].function = around(&mut module, inner, [start, end], word);
     }
     Some(Counting { module, bindings })
 }
 
-/// An entry point that calls what was one, and then `end`.
-fn around(module: &mut Module, mut inner: Function, end: Handle<Function>, word: Handle<Type>) -> Function {
+/// An entry point that calls what was one between `start` and `end`.
+fn around(module: &mut Module, mut inner: Function, ends: [Handle<Function>; 2], word: Handle<Type>) -> Function {
     let index = Binding::BuiltIn(BuiltIn::LocalInvocationIndex);
     let mut outer = Function { name: inner.name.clone(), arguments: inner.arguments.clone(), ..Function::default() };
     inner.name = inner.name.map(|n| format!("counted_{n}"));
@@ -86,19 +87,20 @@ fn around(module: &mut Module, mut inner: Function, end: Handle<Function>, word:
     let arguments: Vec<_> = (0..count).map(&mut argument).collect();
     let thread = arguments.get(place).copied().unwrap_or_else(|| argument(place as u32));
     let call = |function, arguments| Statement::Call { function, arguments, result: None };
-    outer.body = Block::from_vec(vec![call(inner, arguments), call(end, vec![thread])]);
+    outer.body = Block::from_vec(vec![call(ends[0], vec![thread]), call(inner, arguments), call(ends[1], vec![])]);
     outer.body.push(Statement::Return { value: None }, Span::UNDEFINED);
     outer
 }
 
-/// Puts calls of `add` into a function. `rays` are those that each call of it is.
-fn count_in(
-    module: &Module,
-    function: &mut Function,
+/// What is called: with each straight piece, and where threads wait for each other.
+#[derive(Clone, Copy)]
+struct Calls {
     add: Handle<Function>,
-    bindings: &[(u32, u32)],
-    rays: u32,
-) -> Option<()> {
+    meet: Handle<Function>,
+}
+
+/// Puts the calls into a function. `rays` are those that each call of it is.
+fn count_in(module: &Module, function: &mut Function, calls: Calls, bindings: &[(u32, u32)], rays: u32) -> Option<()> {
     let before = function.expressions.clone();
     let context = ResolveContext::with_locals(module, &function.local_variables, &function.arguments);
     let mut types = Typifier::new();
@@ -106,7 +108,7 @@ fn count_in(
         types.grow(handle, &before, &context).ok()?;
     }
     let reader = Reader { module, expressions: &before, types: &types, bindings };
-    let mut writer = Writer { reader, expressions: &mut function.expressions, add };
+    let mut writer = Writer { reader, expressions: &mut function.expressions, calls };
     let mut sum = [0; NUMBERS];
     sum[1] = rays;
     function.body = writer.block(std::mem::take(&mut function.body), sum);
@@ -119,7 +121,7 @@ type Sum = [u32; NUMBERS];
 struct Writer<'a> {
     reader: Reader<'a>,
     expressions: &'a mut naga::Arena<Expression>,
-    add: Handle<Function>,
+    calls: Calls,
 }
 
 impl Writer<'_> {
@@ -145,6 +147,11 @@ impl Writer<'_> {
                     self.inside(body, &mut sum, &mut out);
                     self.inside(continuing, &mut sum, &mut out);
                 }
+                Statement::ControlBarrier(_) | Statement::WorkGroupUniformLoad { .. } => {
+                    self.calls(&mut sum, &mut out);
+                    let meet = Statement::Call { function: self.calls.meet, arguments: vec![], result: None };
+                    out.push(meet, Span::UNDEFINED);
+                }
                 _ if jumps => self.calls(&mut sum, &mut out),
                 _ => {}
             }
@@ -165,7 +172,7 @@ impl Writer<'_> {
         for (number, n) in std::mem::replace(sum, [0; NUMBERS]).into_iter().enumerate().filter(|(_, n)| *n > 0) {
             let arguments = [number as u32, n]
                 .map(|v| self.expressions.append(Expression::Literal(Literal::U32(v)), Span::UNDEFINED));
-            let call = Statement::Call { function: self.add, arguments: arguments.to_vec(), result: None };
+            let call = Statement::Call { function: self.calls.add, arguments: arguments.to_vec(), result: None };
             out.push(call, Span::UNDEFINED);
         }
     }

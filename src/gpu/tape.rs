@@ -1,6 +1,6 @@
 //! A tape of what compute passes are: while one runs on this thread, shaders, pipelines, bind groups and dispatches are
-//! written down as they are made, for `export` and for [`count`](super::count). Without one, each function here is
-//! wgpu's own and a look at a flag.
+//! written down as they are made, for `export` and for whoever listens. Without one, each function here is wgpu's own
+//! and a look at a flag.
 
 use super::bound::Bound;
 use std::cell::{Cell, RefCell};
@@ -42,8 +42,17 @@ pub(super) struct Made {
     pub groups: Vec<Option<wgpu::BindGroupLayout>>,
 }
 
+/// Hears of each dispatch, and may set another pipeline for it.
+#[cfg(feature = "reference")]
+pub(super) trait Listener {
+    /// It is about to be recorded. `made` is `None` where the pipeline was made before the tape began.
+    fn before(&mut self, pass: &mut wgpu::ComputePass<'_>, made: Option<&Made>);
+}
+
 #[derive(Default)]
 struct Tape {
+    #[cfg(feature = "reference")]
+    listener: Option<std::rc::Rc<RefCell<dyn Listener>>>,
     sources: Vec<(wgpu::ShaderModule, Source)>,
     layouts: Vec<(wgpu::PipelineLayout, Vec<Option<wgpu::BindGroupLayout>>)>,
     pipelines: Vec<Made>,
@@ -62,6 +71,12 @@ impl Running {
         TAPE.take();
         RUNS.set(true);
         Self(())
+    }
+
+    /// From here on `listener` hears of dispatches, or nobody does.
+    #[cfg(feature = "reference")]
+    pub(super) fn listen(&mut self, listener: Option<std::rc::Rc<RefCell<dyn Listener>>>) {
+        TAPE.with_borrow_mut(|tape| tape.listener = listener);
     }
 
     /// Dispatches since the start or the last call, in order.
@@ -175,13 +190,19 @@ impl<'a> Pass<'a> {
     /// As [`wgpu::ComputePass::dispatch_workgroups`].
     pub fn dispatch_workgroups(&mut self, x: u32, y: u32, z: u32) {
         #[cfg(feature = "reference")]
-        write(|tape| super::count::before(&mut self.pass, tape.made(self.pipeline.as_ref())));
+        write(|tape| {
+            if let Some(listener) = &tape.listener {
+                listener.borrow_mut().before(&mut self.pass, tape.made(self.pipeline.as_ref()));
+            }
+        });
         self.pass.dispatch_workgroups(x, y, z);
         write(|tape| {
             // What was made before the tape began leaves an empty place, which `export` refuses.
             let made = tape.made(self.pipeline.as_ref());
             #[cfg(feature = "reference")]
-            super::count::after(&mut self.pass, made);
+            if let Some(made) = made.filter(|_| tape.listener.is_some()) {
+                self.pass.set_pipeline(&made.pipeline);
+            }
             let known = made.map(|made| (made.source.clone(), made.entry.clone()));
             let (source, entry) = known.unwrap_or((Source { name: String::new(), text: String::new() }, String::new()));
             let group = |(index, group, offset): &(u32, wgpu::BindGroup, u32)| {
