@@ -40,6 +40,9 @@ struct TraceRay {
     along: vec3f,
     // 7 for a ray towards +x, +y, +z: flips a child's place into its rank; the highest rank is visited first.
     octant: u32,
+    // Bits of the ranks of children 0 to 3, within their half, and by how much that half is shifted.
+    rank_bits: vec4u,
+    low_half: u32,
 }
 
 fn trace_ray(origin: vec3f, direction: vec3f) -> TraceRay {
@@ -53,13 +56,15 @@ fn trace_ray(origin: vec3f, direction: vec3f) -> TraceRay {
     let b = unit.x * unit.y * a;
     let across = vec3f(1.0 + s * unit.x * unit.x * a, s * b, -s * unit.x);
     let up = vec3f(b, s + unit.y * unit.y * a, -unit.y);
-    return TraceRay(origin, 1.0 / safe, across, up, direction / dot(direction, direction), octant);
+    let rank_bits = vec4u(1u) << (vec4u(0u, 1u, 2u, 3u) ^ vec4u(octant & 3u));
+    let low_half = select(0u, 4u, (octant & 4u) != 0u);
+    return TraceRay(origin, 1.0 / safe, across, up, direction / dot(direction, direction), octant, rank_bits, low_half);
 }
 
 // The four bytes of a word as planes: distances along the ray, as integers, which are in the same
 // order where they are positive.
 fn planes(word: u32, scale: f32, offset: f32) -> vec4i {
-    let bytes = vec4f(vec4i((vec4u(word) >> vec4u(0u, 8u, 16u, 24u)) & vec4u(255u)));
+    let bytes = vec4f(bitcast<vec4i>((vec4u(word) >> vec4u(0u, 8u, 16u, 24u)) & vec4u(255u)));
     return bitcast<vec4i>(fma(bytes, vec4f(scale), vec4f(offset)));
 }
 
@@ -106,143 +111,183 @@ fn trace(origin: vec3f, direction: vec3f, t_max: f32, any: bool) -> Hit {
 
 // As `trace`; triangles that let a share of rays through do so by `seed`.
 fn trace_seeded(origin: vec3f, direction: vec3f, t_max: f32, any: bool, seed: u32) -> Hit {
-    var ray = trace_ray(origin, direction);
-    // Bits of the ranks of children 0 to 3, within their half.
-    var rank_bits = vec4u(1u) << (vec4u(0u, 1u, 2u, 3u) ^ vec4u(ray.octant & 3u));
-    var low_half = select(0u, 4u, (ray.octant & 4u) != 0u);
-    var t = t_max;
+    var walk: Walk;
+    walk_begin(&walk, origin, direction, t_max, any, seed);
+    while walk_step(&walk) {}
+    return walk_hit(&walk);
+}
+
+// A ray on its way through the trees, so that who has many of them can go on with the next as soon as one is through.
+struct Walk {
+    origin: vec3f,
+    direction: vec3f,
+    any: bool,
+    seed: u32,
+    // In the space of the instance, inside of one.
+    ray: TraceRay,
+    // Up to where it has met nothing, or what it has met.
+    t: f32,
     // Inside an instance: its block, the number of its mesh's first triangle, and what was on the stack before.
-    var instance = NO_TRIANGLE;
-    var first_triangle = 0u;
-    var floor_depth = 0u;
-    var found_instance = NO_TRIANGLE;
-    var found_leaf = 0u;
-    var found_first = 0u;
+    instance: u32,
+    first_triangle: u32,
+    floor_depth: u32,
+    found_instance: u32,
+    found_leaf: u32,
+    found_first: u32,
     // Number and place of the triangle hit, and the weights of its corners as they lie in the block.
-    var found = NO_TRIANGLE;
-    var weights = vec2f(0.0);
-    var stack: array<u32, STACK_SIZE>;
-    var depth = 0u;
+    found: u32,
+    weights: vec2f,
     // Children that were met and wait: block of the first one in the high 24 bits, their ranks in the low 8.
-    var group = 1u << ray.octant;
-    loop {
-        // The highest bit, by way of a float's exponent: cheaper than firstLeadingBit on CPUs.
-        let rank = (bitcast<u32>(f32(i32(group & 255u))) >> 23u) - 127u;
-        let block = (group >> 8u) + (rank ^ ray.octant);
-        group &= ~(1u << rank);
-        let at = vec2u((block & 2047u) << 2u, block >> 11u);
-        let head = textureLoad(accel_blocks, at, 0);
-        let x = textureLoad(accel_blocks, at + vec2u(1u, 0u), 0);
-        let y = textureLoad(accel_blocks, at + vec2u(2u, 0u), 0);
-        let z = textureLoad(accel_blocks, at + vec2u(3u, 0u), 0);
-        if (head.w & INSTANCE) != 0u {
-            if (group & 255u) != 0u {
-                stack[depth] = group;
-                depth += 1u;
-            }
-            floor_depth = depth;
-            instance = block;
-            first_triangle = x.w;
-            let rows = mat3x3f(bitcast<vec3f>(head.xyz), bitcast<vec3f>(x.xyz), bitcast<vec3f>(y.xyz));
-            // Lengths of the direction stay what they are, so t goes on.
-            ray = trace_ray(origin * rows + bitcast<vec3f>(z.xyz), direction * rows);
-            rank_bits = vec4u(1u) << (vec4u(0u, 1u, 2u, 3u) ^ vec4u(ray.octant & 3u));
-            low_half = select(0u, 4u, (ray.octant & 4u) != 0u);
-            group = ((head.w & BLOCK) << 8u) | (1u << ray.octant);
-            continue;
-        }
-        if head.w != 0u {
-            let step = bitcast<vec3f>((head.xyz & vec3u(255u)) << vec3u(23u));
-            let corner = vec3f(bitcast<vec3i>(head.xyz) >> vec3u(8u)) * step;
-            let scale = step * ray.inverse;
-            let offset = (corner - ray.origin) * ray.inverse;
-            let near_x = select(x.zw, x.xy, (ray.octant & 4u) != 0u);
-            let far_x = select(x.xy, x.zw, (ray.octant & 4u) != 0u);
-            let near_y = select(y.zw, y.xy, (ray.octant & 2u) != 0u);
-            let far_y = select(y.xy, y.zw, (ray.octant & 2u) != 0u);
-            let near_z = select(z.zw, z.xy, (ray.octant & 1u) != 0u);
-            let far_z = select(z.xy, z.zw, (ray.octant & 1u) != 0u);
-            let nearest = bitcast<i32>(t);
-            let low = boxes_met(vec3u(near_x.x, near_y.x, near_z.x), vec3u(far_x.x, far_y.x, far_z.x), scale, offset,
-                nearest);
-            let high = boxes_met(vec3u(near_x.y, near_y.y, near_z.y), vec3u(far_x.y, far_y.y, far_z.y), scale,
-                offset, nearest);
-            let met = (or_all(select(vec4u(0u), rank_bits, low)) << low_half)
-                | (or_all(select(vec4u(0u), rank_bits, high)) << (4u - low_half));
-            if met != 0u {
-                if (group & 255u) != 0u {
-                    stack[depth] = group;
-                    depth += 1u;
-                }
-                group = (head.w << 8u) | met;
-            }
-        } else {
-            let p = bitcast<vec3f>(head.xyz) - ray.origin;
-            let q = bitcast<vec3f>(x.xyz) - ray.origin;
-            let r = bitcast<vec3f>(y.xyz) - ray.origin;
-            let s = bitcast<vec3f>(z.xyz) - ray.origin;
-            // Corners in the ray's frame. Edges shared by two triangles give both the same products, so no ray passes
-            // between them (after Woop, Benthin and Wald 2013).
-            let a = vec2f(dot(p, ray.across), dot(p, ray.up));
-            let b = vec2f(dot(q, ray.across), dot(q, ray.up));
-            let c = vec2f(dot(r, ray.across), dot(r, ray.up));
-            let d = vec2f(dot(s, ray.across), dot(s, ray.up));
-            let depths = vec4f(dot(p, ray.along), dot(q, ray.along), dot(r, ray.along), dot(s, ray.along));
-            let bc = c.x * b.y - c.y * b.x;
-            let ca = a.x * c.y - a.y * c.x;
-            let ab = b.x * a.y - b.y * a.x;
-            let cd = d.x * c.y - d.y * c.x;
-            let da = a.x * d.y - a.y * d.x;
-            let sum1 = bc + ca + ab;
-            let t1 = (bc * depths.x + ca * depths.y + ab * depths.z) / sum1;
-            let inside1 = (bc >= 0.0 && ca >= 0.0 && ab >= 0.0) || (bc <= 0.0 && ca <= 0.0 && ab <= 0.0);
-            if inside1 && t1 > 0.0 && t1 < t && trace_stops(z.w & 255u, first_triangle + (x.w & BLOCK), seed) {
-                t = t1;
-                found = x.w;
-                found_leaf = block;
-                found_instance = instance;
-                found_first = first_triangle;
-                weights = vec2f(ca, ab) / sum1;
-            }
-            let sum2 = cd + da - ca;
-            let t2 = (cd * depths.x + da * depths.z - ca * depths.w) / sum2;
-            let inside2 = (cd >= 0.0 && da >= 0.0 && ca <= 0.0) || (cd <= 0.0 && da <= 0.0 && ca >= 0.0);
-            if inside2 && t2 > 0.0 && t2 < t && trace_stops((z.w >> 8u) & 255u, first_triangle + (y.w & BLOCK), seed) {
-                t = t2;
-                found = y.w;
-                found_leaf = block | SECOND;
-                found_instance = instance;
-                found_first = first_triangle;
-                weights = vec2f(da, -ca) / sum2;
-            }
-            if any && found != NO_TRIANGLE {
-                break;
-            }
-        }
-        if (group & 255u) == 0u {
-            if depth == floor_depth && instance != NO_TRIANGLE {
-                instance = NO_TRIANGLE;
-                first_triangle = 0u;
-                floor_depth = 0u;
-                ray = trace_ray(origin, direction);
-                rank_bits = vec4u(1u) << (vec4u(0u, 1u, 2u, 3u) ^ vec4u(ray.octant & 3u));
-                low_half = select(0u, 4u, (ray.octant & 4u) != 0u);
-            }
-            if depth == 0u {
-                break;
-            }
-            depth -= 1u;
-            group = stack[depth];
-        }
+    group: u32,
+    depth: u32,
+    stack: array<u32, STACK_SIZE>,
+}
+
+fn walk_begin(w: ptr<function, Walk>, origin: vec3f, direction: vec3f, t_max: f32, any: bool, seed: u32) {
+    (*w).origin = origin;
+    (*w).direction = direction;
+    (*w).any = any;
+    (*w).seed = seed;
+    (*w).ray = trace_ray(origin, direction);
+    (*w).t = t_max;
+    (*w).instance = NO_TRIANGLE;
+    (*w).first_triangle = 0u;
+    (*w).floor_depth = 0u;
+    (*w).found = NO_TRIANGLE;
+    (*w).group = 1u << (*w).ray.octant;
+    (*w).depth = 0u;
+}
+
+// One block further; false where the way ends.
+fn walk_step(w: ptr<function, Walk>) -> bool {
+    // The highest bit, by way of a float's exponent: cheaper than firstLeadingBit on CPUs.
+    let rank = (bitcast<u32>(f32(i32((*w).group & 255u))) >> 23u) - 127u;
+    let block = ((*w).group >> 8u) + (rank ^ (*w).ray.octant);
+    (*w).group &= ~(1u << rank);
+    let at = vec2u((block & 2047u) << 2u, block >> 11u);
+    let head = textureLoad(accel_blocks, at, 0);
+    let x = textureLoad(accel_blocks, at + vec2u(1u, 0u), 0);
+    let y = textureLoad(accel_blocks, at + vec2u(2u, 0u), 0);
+    let z = textureLoad(accel_blocks, at + vec2u(3u, 0u), 0);
+    if (head.w & INSTANCE) != 0u {
+        walk_wait(w);
+        (*w).floor_depth = (*w).depth;
+        (*w).instance = block;
+        (*w).first_triangle = x.w;
+        let rows = mat3x3f(bitcast<vec3f>(head.xyz), bitcast<vec3f>(x.xyz), bitcast<vec3f>(y.xyz));
+        // Lengths of the direction stay what they are, so t goes on.
+        (*w).ray = trace_ray((*w).origin * rows + bitcast<vec3f>(z.xyz), (*w).direction * rows);
+        (*w).group = ((head.w & BLOCK) << 8u) | (1u << (*w).ray.octant);
+        return true;
     }
-    if found == NO_TRIANGLE {
-        return Hit(t, NO_TRIANGLE, vec2f(0.0), NO_TRIANGLE, 0u);
+    if head.w != 0u {
+        let met = walk_boxes(w, head, x, y, z);
+        if met != 0u {
+            walk_wait(w);
+            (*w).group = (head.w << 8u) | met;
+        }
+    } else {
+        walk_triangles(w, block, head, x, y, z);
+        if (*w).any && (*w).found != NO_TRIANGLE { return false; }
     }
+    if ((*w).group & 255u) == 0u {
+        if (*w).depth == (*w).floor_depth && (*w).instance != NO_TRIANGLE {
+            (*w).instance = NO_TRIANGLE;
+            (*w).first_triangle = 0u;
+            (*w).floor_depth = 0u;
+            (*w).ray = trace_ray((*w).origin, (*w).direction);
+        }
+        if (*w).depth == 0u { return false; }
+        (*w).depth -= 1u;
+        (*w).group = (*w).stack[(*w).depth];
+    }
+    return true;
+}
+
+// What is left of the group waits on the stack.
+fn walk_wait(w: ptr<function, Walk>) {
+    if ((*w).group & 255u) != 0u {
+        (*w).stack[(*w).depth] = (*w).group;
+        (*w).depth += 1u;
+    }
+}
+
+// Ranks of a node's children whose boxes the ray meets before what it has met.
+fn walk_boxes(w: ptr<function, Walk>, head: vec4u, x: vec4u, y: vec4u, z: vec4u) -> u32 {
+    let ray = (*w).ray;
+    let step = bitcast<vec3f>((head.xyz & vec3u(255u)) << vec3u(23u));
+    let corner = vec3f(bitcast<vec3i>(head.xyz) >> vec3u(8u)) * step;
+    let scale = step * ray.inverse;
+    let offset = (corner - ray.origin) * ray.inverse;
+    let near_x = select(x.zw, x.xy, (ray.octant & 4u) != 0u);
+    let far_x = select(x.xy, x.zw, (ray.octant & 4u) != 0u);
+    let near_y = select(y.zw, y.xy, (ray.octant & 2u) != 0u);
+    let far_y = select(y.xy, y.zw, (ray.octant & 2u) != 0u);
+    let near_z = select(z.zw, z.xy, (ray.octant & 1u) != 0u);
+    let far_z = select(z.xy, z.zw, (ray.octant & 1u) != 0u);
+    let nearest = bitcast<i32>((*w).t);
+    let low = boxes_met(vec3u(near_x.x, near_y.x, near_z.x), vec3u(far_x.x, far_y.x, far_z.x), scale, offset,
+        nearest);
+    let high = boxes_met(vec3u(near_x.y, near_y.y, near_z.y), vec3u(far_x.y, far_y.y, far_z.y), scale,
+        offset, nearest);
+    return (or_all(select(vec4u(0u), ray.rank_bits, low)) << ray.low_half)
+        | (or_all(select(vec4u(0u), ray.rank_bits, high)) << (4u - ray.low_half));
+}
+
+// Both triangles of a leaf.
+fn walk_triangles(w: ptr<function, Walk>, block: u32, head: vec4u, x: vec4u, y: vec4u, z: vec4u) {
+    let ray = (*w).ray;
+    let p = bitcast<vec3f>(head.xyz) - ray.origin;
+    let q = bitcast<vec3f>(x.xyz) - ray.origin;
+    let r = bitcast<vec3f>(y.xyz) - ray.origin;
+    let s = bitcast<vec3f>(z.xyz) - ray.origin;
+    // Corners in the ray's frame. Edges shared by two triangles give both the same products, so no ray passes
+    // between them (after Woop, Benthin and Wald 2013).
+    let a = vec2f(dot(p, ray.across), dot(p, ray.up));
+    let b = vec2f(dot(q, ray.across), dot(q, ray.up));
+    let c = vec2f(dot(r, ray.across), dot(r, ray.up));
+    let d = vec2f(dot(s, ray.across), dot(s, ray.up));
+    let depths = vec4f(dot(p, ray.along), dot(q, ray.along), dot(r, ray.along), dot(s, ray.along));
+    let bc = c.x * b.y - c.y * b.x;
+    let ca = a.x * c.y - a.y * c.x;
+    let ab = b.x * a.y - b.y * a.x;
+    let cd = d.x * c.y - d.y * c.x;
+    let da = a.x * d.y - a.y * d.x;
+    let sum1 = bc + ca + ab;
+    let t1 = (bc * depths.x + ca * depths.y + ab * depths.z) / sum1;
+    let inside1 = (bc >= 0.0 && ca >= 0.0 && ab >= 0.0) || (bc <= 0.0 && ca <= 0.0 && ab <= 0.0);
+    if inside1 && t1 > 0.0 && t1 < (*w).t && trace_stops(z.w & 255u, (*w).first_triangle + (x.w & BLOCK), (*w).seed) {
+        (*w).t = t1;
+        (*w).found = x.w;
+        (*w).found_leaf = block;
+        (*w).found_instance = (*w).instance;
+        (*w).found_first = (*w).first_triangle;
+        (*w).weights = vec2f(ca, ab) / sum1;
+    }
+    let sum2 = cd + da - ca;
+    let t2 = (cd * depths.x + da * depths.z - ca * depths.w) / sum2;
+    let inside2 = (cd >= 0.0 && da >= 0.0 && ca <= 0.0) || (cd <= 0.0 && da <= 0.0 && ca >= 0.0);
+    if inside2 && t2 > 0.0 && t2 < (*w).t
+        && trace_stops((z.w >> 8u) & 255u, (*w).first_triangle + (y.w & BLOCK), (*w).seed) {
+        (*w).t = t2;
+        (*w).found = y.w;
+        (*w).found_leaf = block | SECOND;
+        (*w).found_instance = (*w).instance;
+        (*w).found_first = (*w).first_triangle;
+        (*w).weights = vec2f(da, -ca) / sum2;
+    }
+}
+
+// What was met, once the way has ended.
+fn walk_hit(w: ptr<function, Walk>) -> Hit {
+    let found = (*w).found;
+    if found == NO_TRIANGLE { return Hit((*w).t, NO_TRIANGLE, vec2f(0.0), NO_TRIANGLE, 0u); }
     // Back to the triangle's own order of corners.
     let place = found >> 24u;
+    let weights = (*w).weights;
     let first = 1.0 - weights.x - weights.y;
     let uv = select(select(weights, vec2f(weights.y, first), place == 1u), vec2f(first, weights.x), place == 2u);
-    return Hit(t, found_first + (found & BLOCK), uv, found_instance, found_leaf);
+    return Hit((*w).t, (*w).found_first + (found & BLOCK), uv, (*w).found_instance, (*w).found_leaf);
 }
 
 // A normal of the instance's mesh in the space of the ray, of any length.

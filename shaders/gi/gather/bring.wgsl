@@ -43,8 +43,13 @@ fn stage(index: u32, first: vec2i) {
     let pixel = unpack_pixel(packed);
     points[index] = vec4f(offset_at(pixel, distance_at(pixel)), 1.0);
     normals[index] = world_normal_at(pixel);
-    lights[index] = CellLight(light[3u * row], light[3u * row + 1u], light[3u * row + 2u]);
-    gleams[index] = glosses[row];
+    lights[index] =
+        CellLight(finite4(light[3u * row]), finite4(light[3u * row + 1u]), finite4(light[3u * row + 2u]));
+    gleams[index] = finite4(glosses[row]);
+}
+
+fn finite4(v: vec4f) -> vec4f {
+    return vec4f(finite3(v.xyz), finite(v.w));
 }
 
 struct Surface {
@@ -85,17 +90,18 @@ fn tap(here: Surface, at: i32, spatial: f32, least_cosine: f32) -> Sum {
     let weight = found.w * spatial * max(facing / (lorentz * lorentz), WEIGHT_FLOOR);
     var direction = here.normal;
     if least_cosine > 0.0 { direction += max(least_cosine - cosine, 0.0) * normals[at]; }
-    let arrives = finite3(light_towards(lights[at], direction));
-    return Sum(vec4f(arrives, 1.0) * weight, vec4f(finite3(gleams[at].rgb), 1.0) * (gleams[at].a * weight));
+    let arrives = light_towards(lights[at], direction);
+    return Sum(vec4f(arrives, 1.0) * weight, vec4f(gleams[at].rgb, 1.0) * (gleams[at].a * weight));
 }
 
-// Tent-weighted sum over the 2r x 2r cells around `place` (in cells, from the first staged one).
+// Tent-weighted sum over the 2r x 2r cells around `place` (in cells, from the first staged one), r being 1 or 2.
 fn gather(here: Surface, place: vec2f, radius: i32, least_cosine: f32) -> Sum {
     let base = vec2i(floor(place)) - (radius - 1);
+    let slope = 1.0 / f32(radius);
     var sum = Sum();
     for (var i = 0; i < 4 * radius * radius; i++) {
-        let cell = base + vec2i(i % (2 * radius), i / (2 * radius));
-        let tent = 1.0 - abs(vec2f(cell) - place) / f32(radius);
+        let cell = base + vec2i(i & (2 * radius - 1), i >> u32(radius));
+        let tent = 1.0 - abs(vec2f(cell) - place) * slope;
         let one = tap(here, cell.y * STAGED + cell.x, tent.x * tent.y, least_cosine);
         sum.light += one.light;
         sum.gloss += one.gloss;
@@ -116,16 +122,16 @@ fn mean(sum: Sum) -> Brought {
     return Brought(e, sum.gloss.rgb / sum.gloss.a);
 }
 
-fn light_of(here: Surface, place: vec2f) -> Brought {
-    let near = gather(here, place, 1, 0.0);
-    if near.light.a >= TRUST {
-        return mean(near);
-    }
-    // The four cells around this pixel lie on other surfaces: look further out, and blend so that no seam shows.
-    let far = mean(gather(here, place, 2, LEAST_COSINE));
-    let close = mean(near);
-    let share = near.light.a / TRUST;
-    return Brought(mix(far.light, close.light, share), mix(far.gloss, close.gloss, share));
+// Pixels of the workgroup whose four cells lie on other surfaces, and what these say: such pixels look further out. In
+// a list, since threads side by side would all wait for each of them.
+var<workgroup> further: array<u32, 64>;
+var<workgroup> further_count: atomic<u32>;
+var<workgroup> nearby: array<Sum, 64>;
+
+// Where a pixel lies in cells, from the first staged one. A cell counts as lying at its middle, whichever pixel stands
+// for it.
+fn place_of(pixel: vec2i, first: vec2i) -> vec2f {
+    return (vec2f(pixel) - f32(CELL_SIDE / 2)) / f32(CELL_SIDE) - vec2f(first);
 }
 
 // What cells say that a lobe shows, and for the share `own` what the pixel's rays do, if there are any.
@@ -133,6 +139,14 @@ fn sharper(gloss: vec3f, pixel: u32, own: f32) -> vec3f {
     let packed = mirrored[pixel];
     let found = vec4f(unpack2x16float(packed.x), unpack2x16float(packed.y));
     return mix(gloss, found.rgb, select(0.0, own, found.a > 0.0));
+}
+
+fn answer(pixel: vec2i, brought: Brought) {
+    var gloss = brought.gloss;
+    let own = mirrors(textureLoad(specular_map, pixel, 0));
+    if own > 0.0 { gloss = sharper(gloss, u32(pixel.y) * params.size.x + u32(pixel.x), own); }
+    textureStore(output, pixel, vec4f(min(brought.light, vec3f(LARGEST)), 1.0));
+    textureStore(gloss_output, pixel, vec4f(min(gloss, vec3f(LARGEST)), 1.0));
 }
 
 @compute @workgroup_size(8, 8)
@@ -144,19 +158,30 @@ fn bring(
     let first = vec2i(group.xy) * (8 / CELL_SIDE) - 2;
     stage(index, first);
     workgroupBarrier();
-    if any(id.xy >= params.size) {
-        return;
+    if all(id.xy < params.size) {
+        let pixel = vec2i(id.xy);
+        let z = distance_at(pixel);
+        if z > 0.0 {
+            let near = gather(surface_of(pixel, z), place_of(pixel, first), 1, 0.0);
+            if near.light.a >= TRUST {
+                answer(pixel, mean(near));
+            } else {
+                nearby[index] = near;
+                further[atomicAdd(&further_count, 1u)] = index;
+            }
+        } else {
+            textureStore(output, pixel, vec4f(vec3f(0.0), 1.0));
+            textureStore(gloss_output, pixel, vec4f(vec3f(0.0), 1.0));
+        }
     }
-    let pixel = vec2i(id.xy);
-    let z = distance_at(pixel);
-    var result = Brought();
-    if z > 0.0 {
-        // A cell counts as lying at its middle, whichever pixel stands for it.
-        let place = (vec2f(pixel) - f32(CELL_SIDE / 2)) / f32(CELL_SIDE) - vec2f(first);
-        result = light_of(surface_of(pixel, z), place);
-        let own = mirrors(textureLoad(specular_map, pixel, 0));
-        if own > 0.0 { result.gloss = sharper(result.gloss, id.y * params.size.x + id.x, own); }
-    }
-    textureStore(output, pixel, vec4f(min(result.light, vec3f(LARGEST)), 1.0));
-    textureStore(gloss_output, pixel, vec4f(min(result.gloss, vec3f(LARGEST)), 1.0));
+    workgroupBarrier();
+    if index >= atomicLoad(&further_count) { return; }
+    let at = further[index];
+    let pixel = 8 * vec2i(group.xy) + vec2i(i32(at & 7u), i32(at >> 3u));
+    let near = nearby[at];
+    // Blended so that no seam shows.
+    let far = mean(gather(surface_of(pixel, distance_at(pixel)), place_of(pixel, first), 2, LEAST_COSINE));
+    let close = mean(near);
+    let share = near.light.a / TRUST;
+    answer(pixel, Brought(mix(far.light, close.light, share), mix(far.gloss, close.gloss, share)));
 }

@@ -1,4 +1,3 @@
-//#import accel/traverse.wgsl
 //#import lib/sampling.wgsl
 //#import gi/gather/types.wgsl
 
@@ -18,7 +17,7 @@
 @group(2) @binding(1) var<storage, read_write> entry_lots: array<atomic<u32>>;
 // Where rays met a cell: position, and the packed normal of the side that they met. First those of the
 // picture's cells, then of entries' own rays for even and odd rounds, then where the entries' rays began in
-// even and odd rounds (last word 0: nowhere yet).
+// even and odd rounds (last word 0: nowhere yet); behind all, what workgroups remember of their rays (look.wgsl).
 @group(2) @binding(2) var<storage, read_write> entry_queries: array<vec4u>;
 
 // Slots that are looked at before a place goes without an entry.
@@ -74,37 +73,38 @@ const ENTRY_ROOMS = 3u;
 // lies there.
 const ENTRY_LIFT = 0.02;
 
-// Whether nothing stands between x and where the rays of slot's entry began. An entry without rays is everybody's.
-fn sees_entry(slot: u32, x: vec3f, n: vec3f, size: f32) -> bool {
+// Of a place that asks, the line to where the rays of an entry began: nothing stands in it if the place sees that.
+struct EntryLine {
+    slot: u32,
+    // No length: the entry is everybody's, or the place itself.
+    start: vec3f,
+    to: vec3f,
+}
+
+// Room `room` of the cell of place x that faces n.
+fn entry_room(x: vec3f, n: vec3f, room: u32) -> EntryLine {
+    let cell = entry_cell(x, n);
+    let slot = entry_slot(vec2u(cell.hash.x + room * 0x9e3779b9u, (cell.hash.y + room * 0x7f4a7c16u) | 1u));
+    var line = EntryLine(slot, x, vec3f(0.0));
+    if slot == NONE { return line; }
     let slots = gather.mask + 1u;
     let begin = entry_queries[gather.rays + 2u * slots + (1u - (gather.round & 1u)) * slots + slot];
-    if begin.w == 0u { return true; }
-    let start = x + n * (ENTRY_LIFT * size);
-    let to = bitcast<vec3f>(begin.xyz) + unpack_normal(begin.w) * (ENTRY_LIFT * size) - start;
-    return dot(to, to) < 1e-6 * size * size || trace(start, to, 1.0, true).triangle == NO_TRIANGLE;
+    if begin.w == 0u { return line; }
+    let lift = ENTRY_LIFT * cell.size;
+    line.start = x + n * lift;
+    line.to = bitcast<vec3f>(begin.xyz) + unpack_normal(begin.w) * lift - line.start;
+    if dot(line.to, line.to) < 1e-6 * cell.size * cell.size { line.to = vec3f(0.0); }
+    return line;
 }
 
-// The entry of place x that faces n: of its cell the first whose place sees this one.
-fn entry_of(x: vec3f, n: vec3f) -> u32 {
-    let cell = entry_cell(x, n);
-    for (var room = 0u; room < ENTRY_ROOMS; room++) {
-        let slot = entry_slot(vec2u(cell.hash.x + room * 0x9e3779b9u, (cell.hash.y + room * 0x7f4a7c16u) | 1u));
-        if slot == NONE || sees_entry(slot, x, n, cell.size) { return slot; }
-    }
-    return NONE;
-}
-
-// A ray with number `query` has met x, which faces n: the slot of its entry, which round `round` will update.
+// A ray with number `query` has met x, which faces n and whose entry is in `slot`: round `round` will update it.
 // Rays without a number (NONE) read entries and say nothing of where they begin.
-fn ask_entry(x: vec3f, n: vec3f, query: u32, name: u32, round: u32) -> u32 {
-    let slot = entry_of(x, n);
-    if slot != NONE && query != NONE {
-        entry_queries[query] = vec4u(bitcast<vec3u>(x), pack_normal(n));
-        var lot = (pcg3(vec3u(name, round, 0x2545f491u)).x << (lot_bits() + 1u)) >> 1u;
-        lot |= query;
-        // The picture's own rays come before those of entries, which tell what the light between surfaces is.
-        if query >= gather.rays { lot |= BY_ENTRIES; }
-        atomicMin(&entry_lots[(round & 1u) * (gather.mask + 1u) + slot], lot);
-    }
-    return slot;
+fn claim_entry(slot: u32, x: vec3f, n: vec3f, query: u32, name: u32, round: u32) {
+    if query == NONE { return; }
+    entry_queries[query] = vec4u(bitcast<vec3u>(x), pack_normal(n));
+    var lot = (pcg3(vec3u(name, round, 0x2545f491u)).x << (lot_bits() + 1u)) >> 1u;
+    lot |= query;
+    // The picture's own rays come before those of entries, which tell what the light between surfaces is.
+    if query >= gather.rays { lot |= BY_ENTRIES; }
+    atomicMin(&entry_lots[(round & 1u) * (gather.mask + 1u) + slot], lot);
 }

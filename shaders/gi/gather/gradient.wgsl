@@ -14,21 +14,50 @@
 @group(2) @binding(3) var<storage, read> before: array<vec4f>;
 @group(2) @binding(4) var<storage, read_write> records: array<vec4f>;
 
-@compute @workgroup_size(8, 8)
-fn gradient(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= gloss_grid()) { return; }
-    let place = gloss_cell(id.xy);
-    if any(place >= cell_grid()) { return; }
+var<private> block: vec2u;
+
+// Whether the square's cell has sent a ray whose surface is remembered.
+fn has_ray(square: vec2u) -> bool {
+    if any(square >= gloss_grid()) { return false; }
+    let place = gloss_cell(square);
+    if any(place >= cell_grid()) { return false; }
     let cell = cell_index(place);
+    records[3u * cell_record(cell, 2u) + 1u].z = 0.0;
+    return before[5u * cell].a > 0.0;
+}
+
+fn begin(at: u32, job: u32) -> bool {
+    let cell = cell_index(gloss_cell(place_of(block, job)));
     let then = cell_record(cell, 1u);
-    let now = cell_record(cell, 2u);
-    records[3u * now + 1u].z = 0.0;
-    if before[5u * cell].a <= 0.0 { return; }
-    let at = before[5u * cell + 2u];
-    let n = unpack_normal(bitcast<u32>(at.w));
-    let from_eye = at.xyz - params.eye.xyz;
+    let place = before[5u * cell + 2u];
+    let n = unpack_normal(bitcast<u32>(place.w));
+    let from_eye = place.xyz - params.eye.xyz;
     let z = dot(from_eye, -vec3f(params.world_from_view[2]));
     let x = lifted(from_eye, n, max(z, 1e-9));
     for (var i = 0u; i < 3u; i++) { records[3u * then + i] = records[3u * cell + i]; }
-    send(x, n, unpack_normal(bitcast<u32>(records[3u * cell + 1u].y)), NONE, cell, now);
+    let d = unpack_normal(bitcast<u32>(records[3u * cell + 1u].y));
+    send(at, x, n, d, NONE, cell, cell_record(cell, 2u));
+    return true;
+}
+
+fn finish(at: u32) {
+    record(at);
+}
+
+@compute @workgroup_size(WALKERS)
+fn gradient(
+    @builtin(workgroup_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    group = id.x;
+    let blocks = blocks_of(gloss_grid());
+    for (var i = id.x; i < blocks.x * blocks.y; i += groups.x) {
+        block = vec2u(i % blocks.x, i / blocks.x);
+        no_jobs(thread);
+        for (var job = thread; job < JOBS; job += WALKERS) {
+            if has_ray(place_of(block, job)) { note_job(job); }
+        }
+        look(thread, gather.round, (gather.flags & GATHER_STANDS_IN) == 0u);
+    }
 }

@@ -1,12 +1,12 @@
-//#import accel/traverse.wgsl
 //#import gi/inputs.wgsl
 //#import lib/brdf.wgsl
 //#import lib/environment.wgsl
-//#import lib/lights.wgsl
 //#import lib/sampling.wgsl
 //#import accel/surface.wgsl
 //#import gi/gather/types.wgsl
+//#import gi/gather/light.wgsl
 //#import gi/gather/entries.wgsl
+//#import gi/gather/queue.wgsl
 
 // What a ray finds: the sky, or a surface with the light of lamps and of what glows that it sends back, and
 // the entry that knows the rest of its light.
@@ -21,165 +21,8 @@ struct Found {
     distance: f32,
 }
 
-// A light that a shadow ray is sent to, chosen among all by what it would give.
-struct Chosen {
-    // Unit vector, and how far.
-    l: vec3f,
-    reach: f32,
-    // What arrives along it, cosine and brdf multiplied in, over the chance of the choice.
-    radiance: vec3f,
-    // Irradiance over π, likewise.
-    even: vec3f,
-}
-
-// A place that is lit: with the side that it shows, and what it sends back towards v.
-struct Place {
-    x: vec3f,
-    n: vec3f,
-    v: vec3f,
-    diffuse: vec3f,
-    f0: vec3f,
-    roughness: f32,
-}
-
-// Power of a lobe below this roughness is spread as if by this one: rays that happen to meet a mirrored lamp
-// are not averaged enough to show it as anything but a spark.
-const LEAST_ROUGHNESS = 0.5;
-
 // Cosine of rays that alone find what glows: greater than any density of shadow rays.
 const ALONE = 1e12;
-
-fn weight_of(c: vec3f) -> f32 {
-    return dot(c, vec3f(0.2126, 0.7152, 0.0722));
-}
-
-fn sends_back(p: Place, l: vec3f, n_l: f32, irradiance: vec3f) -> vec3f {
-    return irradiance * n_l * (p.diffuse / PI + ggx(p.n, p.v, l, p.f0, p.roughness));
-}
-
-// Lights of a long list that are looked at; `scene::upload::CANDIDATES`.
-const CANDIDATES = 8u;
-
-// The light that number `at` of [0, 1) draws.
-fn drawn_light(at: f32) -> u32 {
-    var low = 0u;
-    var high = gather.light_count - 1u;
-    while low < high {
-        let middle = (low + high) / 2u;
-        if at < lights[middle].chance { high = middle; } else { low = middle + 1u; }
-    }
-    return low;
-}
-
-fn chance_of(i: u32) -> f32 {
-    var below = 0.0;
-    if i > 0u { below = lights[i - 1u].chance; }
-    return max(lights[i].chance - below, 1e-9);
-}
-
-// One of the analytic lights (where `lamps`) and of one point of what glows, by how bright the place would be
-// without shadow.
-// `u` decides, `seed` gives further numbers.
-fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
-    let u = unit_floats(seed);
-    var chosen = Chosen(vec3f(0.0), 0.0, vec3f(0.0), vec3f(0.0));
-    var total = 0.0;
-    var best = 0.0;
-    var lot = u.x;
-    // The lengths of the lists are asked, too: Mesa's CPU driver compiles what uniforms alone branch on anew
-    // for each dispatch.
-    let all = min(gather.light_count, arrayLength(&lights));
-    let glowing = min(gather.emitter_count, arrayLength(&emitters));
-    if lamps {
-        // A long list is looked at in places only, evenly spread over the lights' chances, and what is found
-        // there stands for the rest: resampled importance sampling (Talbot et al. 2005), right in the mean
-        // whatever the chances are.
-        let few = all <= CANDIDATES || lights[all - 1u].chance <= 0.0;
-        let shift = unit_floats(pcg3(seed ^ vec3u(0x2c1b3c6du))).x;
-        let looks = select(CANDIDATES, all, few);
-        for (var k = 0u; k < looks; k++) {
-            var i = k;
-            if !few { i = drawn_light((f32(k) + shift) / f32(CANDIDATES)); }
-            let light = lights[i];
-            if light.stands_in != 0u { continue; }
-            let s = sample_light(light, p.x);
-            let n_l = dot(p.n, s.l);
-            if n_l <= 0.0 { continue; }
-            let value = sends_back(p, s.l, n_l, s.irradiance);
-            var w = weight_of(value);
-            if !(w > 0.0) { continue; }
-            let bright = w;
-            if !few { w /= f32(CANDIDATES) * chance_of(i); }
-            total += w;
-            // Weighted reservoir of one, with one random number that is used up bit by bit.
-            let take = w / total;
-            if lot < take {
-                lot /= take;
-                best = bright;
-                chosen = Chosen(s.l, f32(i), value, s.irradiance * (n_l / PI));
-            } else {
-                lot = (lot - take) / max(1.0 - take, 1e-7);
-            }
-        }
-    }
-    var towards_light = best > 0.0;
-    if glowing > 0u {
-        let more = unit_floats(pcg3(seed ^ vec3u(0x68bc21ebu)));
-        let scaled = u.y * f32(glowing);
-        let first = min(u32(scaled), glowing - 1u);
-        let at = select(emitters[first].other, first, more.z < emitters[first].threshold);
-        let e = emitters[at];
-        let r = sqrt(more.x);
-        let y = e.origin + e.edge1 * (r * (1.0 - more.y)) + e.edge2 * (r * more.y);
-        let across = cross(e.edge1, e.edge2);
-        let to = y - p.x;
-        let d2 = max(dot(to, to), 1e-20);
-        let l = to * inverseSqrt(d2);
-        let facing = -dot(across, l) * inverseSqrt(max(dot(across, across), 1e-38));
-        let n_l = dot(p.n, l);
-        if n_l > 0.0 && (facing > 0.0 || ((e.flags & MET_DOUBLE_SIDED) != 0u && facing != 0.0)) {
-            let density = e.by_area * gather.inverse_power * d2 / abs(facing);
-            // Against cosine-distributed rays that meet the same surface (balance heuristic; Veach 1997).
-            let irradiance = e.radiance / (density + n_l / PI);
-            let value = sends_back(p, l, n_l, irradiance);
-            let w = weight_of(value);
-            if w > 0.0 {
-                total += w;
-                if lot * total < w {
-                    best = w;
-                    towards_light = false;
-                    // Short of the surface itself.
-                    chosen = Chosen(l, sqrt(d2) * 0.999, value, irradiance * (n_l / PI));
-                }
-            }
-        }
-    }
-    if best <= 0.0 { return Chosen(vec3f(0.0), 0.0, vec3f(0.0), vec3f(0.0)); }
-    if towards_light {
-        // A point of the light's disc.
-        let light = lights[u32(chosen.reach)];
-        let a = 2.0 * PI * u.y;
-        let disc = light.radius * sqrt(u.z) * vec3f(cos(a), sin(a), 0.0);
-        if light.kind == LIGHT_SUN {
-            chosen.l = normalize(frame_around(-light.direction) * (disc + vec3f(0.0, 0.0, 1.0)));
-            chosen.reach = FAR;
-        } else {
-            let to = light.position + frame_around(chosen.l) * disc - p.x;
-            chosen.reach = length(to);
-            chosen.l = to / max(chosen.reach, 1e-20);
-        }
-    }
-    let gain = total / best;
-    chosen.radiance *= gain;
-    chosen.even *= gain;
-    return chosen;
-}
-
-// Whether nothing stands between x and what was chosen.
-fn is_lit(x: vec3f, chosen: Chosen, seed: u32) -> bool {
-    return chosen.reach > 0.0
-        && trace_seeded(x, chosen.l, chosen.reach, true, seed).triangle == NO_TRIANGLE;
-}
 
 // Segments of a ray's way at most. Where it meets a place that no entry knows (more places of a cell do not see
 // each other than it has entries, or the table is full) it goes on, as that place's own ray would, to one that
@@ -188,55 +31,308 @@ fn is_lit(x: vec3f, chosen: Chosen, seed: u32) -> bool {
 // eight a city takes a sixth more time (docs/log/2026-11-25-counts.md).
 const SEGMENTS = 4u;
 
-// What the ray from o finds in direction d. n_d: cosine by which shadow rays to what glows were weighted
-// there, ALONE where none were sent. `query` is the ray's number among all of the frame, `name` what its
-// random numbers are drawn by, which slots of the table must not decide, since they go to who comes first;
-// `round` is that which will update the entry, `glows`: whether what glows counts where the ray meets it.
-// `height`: no surface whose plane o lies nearer to can be met but the one that the ray begins on, by a ray
-// that a shading normal sends below it: such light is lost.
-fn look(o: vec3f, d: vec3f, height: f32, n_d: f32, query: u32, name: u32, round: u32, glows: bool) -> Found {
-    var seed = pcg3(vec3u(name, gather.round, 0x9e3779b9u));
-    var start = o;
-    var along = d;
-    var cosine = n_d;
-    var found = Found(vec3f(0.0), NONE, vec3f(1.0), FAR);
-    for (var segment = 0u; segment < SEGMENTS; segment++) {
-        let hit = trace_seeded(start, along, FAR, false, seed.x);
-        let sky = hit.triangle == NO_TRIANGLE;
-        if segment == 0u && !sky { found.distance = hit.t; }
-        if sky {
-            found.radiance += found.back * finite3(environment_radiance(along));
-            break;
-        }
-        var surface = met(hit.triangle);
-        if (gather.flags & GATHER_NO_CAUSTICS) != 0u { surface.f0 = vec3f(0.0); }
-        let front = trace_normal(hit);
-        let facing = -dot(front, along);
-        if segment == 0u && abs(facing) * hit.t < height { break; }
-        let side = select(-front, front, facing > 0.0);
-        let n = met_normal(hit, side);
-        let counts = (glows || segment > 0u) && (facing > 0.0 || (surface.flags & MET_DOUBLE_SIDED) != 0u);
-        if counts && any(surface.emission > vec3f(0.0)) {
-            let density = surface.by_area * gather.inverse_power * hit.t * hit.t / max(abs(facing), 1e-6);
-            found.radiance += found.back * surface.emission * (cosine / PI) / (cosine / PI + density);
-        }
-        let n_v = max(-dot(n, along), 1e-4);
-        let lobe = env_brdf(surface.f0, surface.roughness, n_v);
-        let most = max(surface.f0.x, max(surface.f0.y, surface.f0.z));
-        let diffuse = surface.diffuse * (1.0 - diffuse_loss(most, surface.roughness, n_v));
-        let back = diffuse + lobe;
-        if all(back <= vec3f(0.0)) || (surface.flags & MET_UNLIT) != 0u { break; }
-        let x = off(start + along * hit.t, side, hit.t);
-        let place = Place(x, n, -along, diffuse, surface.f0, max(surface.roughness, LEAST_ROUGHNESS));
-        let chosen = choose_light(place, true, pcg3(seed));
-        if is_lit(x, chosen, seed.y) { found.radiance += found.back * chosen.radiance; }
-        found.back *= back;
-        found.slot = ask_entry(x, n, query, name, round);
-        if found.slot != NONE { break; }
-        seed = pcg3(seed ^ vec3u(0x85ebca6bu));
-        start = x;
-        along = cosine_direction(n, unit_floats(pcg3(seed ^ vec3u(0x27d4eb2fu))).xy);
-        cosine = max(dot(n, along), 1e-4);
+// A ray with all that follows from what it meets is a way. A workgroup has as many as rays that it sends at once; any
+// of its threads takes each a stage further, so that those that do the same stand side by side.
+
+// What a way waits for: what its ray meets; whether the light chosen there is seen; whether the place where an entry's
+// rays began is; whether a point that glows is seen from where it sets out.
+const NEAREST = 0u;
+const SHADOW = 1u;
+const ENTRY = 2u;
+const GLOW = 3u;
+
+// What is remembered of a way: nine vectors behind the places of all entries in `entry_queries`.
+const PARTS = 9u;
+// Where its ray begins, from the first hit on the last place that it has met; stage, segments behind it and rooms of
+// the place's cell that were asked, a byte each.
+const PLACE = 0u;
+// Direction; cosine by which shadow rays to what glows were weighted where it begins, ALONE where none were sent.
+const COURSE = 1u;
+// The side that the place shows; slot of the entry that is being asked, at the end of that which knows the rest.
+const SIDE = 2u;
+// What its chances are drawn by; no surface whose plane the beginning lies nearer to than this can be met but the one
+// that it begins on, by a ray that a shading normal sends below it: such light is lost.
+const CHANCES = 3u;
+// Radiance found; distance of the first hit.
+const RADIANCE = 4u;
+// What the rest is multiplied by; direction in which it set out.
+const BACK = 5u;
+// What the chosen light sends if it is seen; what the shader that sent it calls it.
+const LIGHT = 6u;
+// What glows, by a shadow ray from where it set out, and its direction.
+const GLOWS = 7u;
+// The ray's number among all of the frame, NONE if it claims no entry; what its random numbers are drawn by, which
+// slots of the table must not decide, since they go to who comes first.
+const NAMES = 8u;
+
+// Number of the workgroup.
+var<private> group: u32;
+
+// What the workgroup has to do, and how much of it is done or being done.
+const JOBS = 1024u;
+// Sixteen bits each.
+var<workgroup> jobs: array<atomic<u32>, JOBS / 2u>;
+var<workgroup> jobs_noted: atomic<u32>;
+var<workgroup> jobs_taken: atomic<u32>;
+// Ways that look for an entry, and ways at their end.
+var<workgroup> asking: array<u32, WALKS>;
+var<workgroup> asking_count: atomic<u32>;
+var<workgroup> ended: array<u32, WALKS>;
+var<workgroup> ended_count: atomic<u32>;
+
+fn part_at(at: u32, part: u32) -> u32 {
+    return gather.rays + 4u * (gather.mask + 1u) + (group * WALKS + at) * PARTS + part;
+}
+
+fn part_of(at: u32, part: u32) -> vec4u {
+    return entry_queries[part_at(at, part)];
+}
+
+fn keep(at: u32, part: u32, v: vec3f, w: u32) {
+    keep_bits(at, part, vec4u(bitcast<vec3u>(v), w));
+}
+
+fn keep_bits(at: u32, part: u32, bits: vec4u) {
+    entry_queries[part_at(at, part)] = bits;
+}
+
+// Way `at` from o along d. `n_d` is its cosine, `height` the height of COURSE and CHANCES; what it finds is weighted by
+// `weight`, and taken down as that of `job`. Its ray is still to be put.
+fn set_out(at: u32, o: vec3f, d: vec3f, n_d: f32, height: f32, query: u32, name: u32, weight: vec3f, job: u32) {
+    let seed = pcg3(vec3u(name, gather.round, 0x9e3779b9u));
+    keep(at, PLACE, o, NEAREST);
+    keep(at, COURSE, d, bitcast<u32>(n_d));
+    keep(at, SIDE, vec3f(0.0), NONE);
+    keep_bits(at, CHANCES, vec4u(seed, bitcast<u32>(height)));
+    keep(at, RADIANCE, vec3f(0.0), bitcast<u32>(FAR));
+    keep(at, BACK, weight, pack_normal(d));
+    keep(at, LIGHT, vec3f(0.0), job);
+    keep(at, GLOWS, vec3f(0.0), 0u);
+    keep_bits(at, NAMES, vec4u(query, name, 0u, 0u));
+}
+
+// What way `at` has found, at its end.
+fn found_by(at: u32) -> Found {
+    let radiance = part_of(at, RADIANCE);
+    let back = part_of(at, BACK);
+    let slot = part_of(at, SIDE).w;
+    return Found(bitcast<vec3f>(radiance.xyz), slot, bitcast<vec3f>(back.xyz), bitcast<f32>(radiance.w));
+}
+
+fn job_of(at: u32) -> u32 {
+    return part_of(at, LIGHT).w;
+}
+
+// Before the workgroup notes its jobs, numbers below 65,536. All threads call this, and `look`.
+fn no_jobs(thread: u32) {
+    workgroupBarrier();
+    for (var i = thread; i < JOBS / 2u; i += WALKERS) { atomicStore(&jobs[i], 0u); }
+    if thread == 0u {
+        atomicStore(&jobs_noted, 0u);
+        atomicStore(&jobs_taken, 0u);
     }
-    return found;
+    workgroupBarrier();
+}
+
+fn note_job(job: u32) {
+    let i = atomicAdd(&jobs_noted, 1u);
+    atomicOr(&jobs[i / 2u], job << (16u * (i & 1u)));
+}
+
+// Does the jobs, a way each; as soon as a way is at its end another sets out in its place, so that there are rays
+// enough for all threads. The shader that imports this file says what a job is: `begin(at, job) -> bool` sends way
+// `at` on it (false: it is at its end at once), `finish(at)` takes down what it found. `round` is that which will update the
+// entries, `glows`: whether what glows counts where rays from the beginning meet it.
+fn look(thread: u32, round: u32, glows: bool) {
+    workgroupBarrier();
+    for (var at = thread; at < WALKS; at += WALKERS) { take_job(at); }
+    loop {
+        if !walk_all(thread) { break; }
+        for (var i = thread; i < sent_nearest; i += WALKERS) { arrive(sent(i), glows); }
+        for (var i = sent_nearest + thread; i < sent_all; i += WALKERS) { see(sent(i), round); }
+        meet();
+        for (var i = thread; i < atomicLoad(&asking_count); i += WALKERS) { ask(asking[i], round); }
+        meet();
+        for (var i = thread; i < atomicLoad(&ended_count); i += WALKERS) {
+            finish(ended[i]);
+            take_job(ended[i]);
+        }
+        workgroupBarrier();
+        if thread == 0u {
+            atomicStore(&asking_count, 0u);
+            atomicStore(&ended_count, 0u);
+        }
+    }
+}
+
+// The next job that there is for way `at`.
+fn take_job(at: u32) {
+    loop {
+        let i = atomicAdd(&jobs_taken, 1u);
+        if i >= atomicLoad(&jobs_noted) { return; }
+        let job = (atomicLoad(&jobs[i / 2u]) >> (16u * (i & 1u))) & 0xffffu;
+        if begin(at, job) { return; }
+    }
+}
+
+fn end(at: u32) {
+    ended[atomicAdd(&ended_count, 1u)] = at;
+}
+
+fn ask_next(at: u32) {
+    asking[atomicAdd(&asking_count, 1u)] = at;
+}
+
+// The ray of way `at` has met something, or the sky.
+fn arrive(at: u32, glows: bool) {
+    let hit = walked(at);
+    let place = part_of(at, PLACE);
+    let course = part_of(at, COURSE);
+    let along = bitcast<vec3f>(course.xyz);
+    let cosine = bitcast<f32>(course.w);
+    let back_part = part_of(at, BACK);
+    let weight = bitcast<vec3f>(back_part.xyz);
+    let so_far = part_of(at, RADIANCE);
+    var radiance = bitcast<vec3f>(so_far.xyz);
+    if hit.triangle == NO_TRIANGLE {
+        keep(at, RADIANCE, radiance + weight * finite3(environment_radiance(along)), so_far.w);
+        end(at);
+        return;
+    }
+    let first = ((place.w >> 8u) & 255u) == 0u;
+    let distance = select(so_far.w, bitcast<u32>(hit.t), first);
+    var surface = met(hit.triangle);
+    if (gather.flags & GATHER_NO_CAUSTICS) != 0u { surface.f0 = vec3f(0.0); }
+    let front = trace_normal(hit);
+    let facing = -dot(front, along);
+    let chances = part_of(at, CHANCES);
+    if first && abs(facing) * hit.t < bitcast<f32>(chances.w) {
+        keep(at, RADIANCE, radiance, distance);
+        end(at);
+        return;
+    }
+    let side = select(-front, front, facing > 0.0);
+    let n = met_normal(hit, side);
+    let counts = (glows || !first) && (facing > 0.0 || (surface.flags & MET_DOUBLE_SIDED) != 0u);
+    if counts && any(surface.emission > vec3f(0.0)) {
+        let density = surface.by_area * gather.inverse_power * hit.t * hit.t / max(abs(facing), 1e-6);
+        radiance += weight * surface.emission * (cosine / PI) / (cosine / PI + density);
+    }
+    keep(at, RADIANCE, radiance, distance);
+    let n_v = max(-dot(n, along), 1e-4);
+    let lobe = env_brdf(surface.f0, surface.roughness, n_v);
+    let most = max(surface.f0.x, max(surface.f0.y, surface.f0.z));
+    let diffuse = surface.diffuse * (1.0 - diffuse_loss(most, surface.roughness, n_v));
+    let back = diffuse + lobe;
+    if all(back <= vec3f(0.0)) || (surface.flags & MET_UNLIT) != 0u {
+        end(at);
+        return;
+    }
+    let x = off(bitcast<vec3f>(place.xyz) + along * hit.t, side, hit.t);
+    let here = Place(x, n, -along, diffuse, surface.f0, max(surface.roughness, LEAST_ROUGHNESS));
+    let chosen = choose_light(here, true, pcg3(chances.xyz));
+    keep(at, SIDE, n, NONE);
+    keep(at, BACK, weight * back, back_part.w);
+    // The rooms of another cell.
+    keep(at, PLACE, x, (place.w & 0xff00u) | SHADOW);
+    if chosen.reach > 0.0 {
+        keep(at, LIGHT, weight * chosen.radiance, job_of(at));
+        put(at, x, chosen.l, chosen.reach, true, chances.y);
+    } else {
+        ask_next(at);
+    }
+}
+
+// The line of way `at` is free, or not.
+fn see(at: u32, round: u32) {
+    let free = walked(at).triangle == NO_TRIANGLE;
+    let place = part_of(at, PLACE);
+    let stage = place.w & 255u;
+    if stage == GLOW {
+        if !free { keep(at, GLOWS, vec3f(0.0), 0u); }
+        keep(at, PLACE, bitcast<vec3f>(place.xyz), NEAREST);
+        send_on(at);
+        return;
+    }
+    if stage == SHADOW {
+        if free {
+            let light = bitcast<vec3f>(part_of(at, LIGHT).xyz);
+            let so_far = part_of(at, RADIANCE);
+            keep(at, RADIANCE, bitcast<vec3f>(so_far.xyz) + light, so_far.w);
+        }
+    } else if free {
+        let side = part_of(at, SIDE);
+        claim(at, side.w, bitcast<vec3f>(place.xyz), bitcast<vec3f>(side.xyz), round);
+        end(at);
+        return;
+    } else {
+        keep(at, PLACE, bitcast<vec3f>(place.xyz), place.w + 0x10000u);
+    }
+    ask_next(at);
+}
+
+fn claim(at: u32, slot: u32, x: vec3f, n: vec3f, round: u32) {
+    let names = part_of(at, NAMES);
+    claim_entry(slot, x, n, names.x, names.y, round);
+}
+
+// The next ray of way `at`.
+fn send_on(at: u32) {
+    let place = part_of(at, PLACE);
+    put(at, bitcast<vec3f>(place.xyz), bitcast<vec3f>(part_of(at, COURSE).xyz), FAR, false, part_of(at, CHANCES).x);
+}
+
+// Sends the ray of way `at`, which has just set out, if what it finds counts; else the way is at its end.
+fn goes(at: u32, weight: vec3f) -> bool {
+    if any(weight > vec3f(0.0)) {
+        send_on(at);
+        return true;
+    }
+    finish(at);
+    return false;
+}
+
+// Way `at` asks the next room of its place's cell.
+fn ask(at: u32, round: u32) {
+    let place = part_of(at, PLACE);
+    let x = bitcast<vec3f>(place.xyz);
+    let n = bitcast<vec3f>(part_of(at, SIDE).xyz);
+    let room = place.w >> 16u;
+    if room < ENTRY_ROOMS {
+        let line = entry_room(x, n, room);
+        if line.slot != NONE {
+            keep(at, SIDE, n, line.slot);
+            if any(line.to != vec3f(0.0)) {
+                keep(at, PLACE, x, (place.w & 0xffff00u) | ENTRY);
+                put(at, line.start, line.to, 1.0, true, 0u);
+            } else {
+                claim(at, line.slot, x, n, round);
+                end(at);
+            }
+            return;
+        }
+    }
+    keep(at, SIDE, n, NONE);
+    let segment = ((place.w >> 8u) & 255u) + 1u;
+    if segment == SEGMENTS {
+        end(at);
+        return;
+    }
+    let chances = part_of(at, CHANCES);
+    let seed = pcg3(chances.xyz ^ vec3u(0x85ebca6bu));
+    let along = cosine_direction(n, unit_floats(pcg3(seed ^ vec3u(0x27d4eb2fu))).xy);
+    keep_bits(at, CHANCES, vec4u(seed, chances.w));
+    keep(at, COURSE, along, bitcast<u32>(max(dot(n, along), 1e-4)));
+    keep(at, PLACE, x, (segment << 8u) | NEAREST);
+    put(at, x, along, FAR, false, seed.x);
+}
+
+// Blocks of 32×32 places that a grid is cut into.
+fn blocks_of(grid: vec2u) -> vec2u {
+    return (grid + 31u) / 32u;
+}
+
+// Place of job `i` in such a block; 64 jobs that follow each other are a square.
+fn place_of(block: vec2u, i: u32) -> vec2u {
+    return 32u * block + vec2u((i & 7u) | ((i >> 3u) & 24u), ((i >> 3u) & 7u) | ((i >> 5u) & 24u));
 }

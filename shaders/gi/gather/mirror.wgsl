@@ -35,44 +35,51 @@ fn is_smooth(pixel: vec2u) -> bool {
     return all(pixel < params.size) && mirrors(surface_at(pixel)) > 0.0 && distance_at(vec2i(pixel)) > 0.0;
 }
 
-// What the pixel's lobe shows in one direction.
-fn shown_by(pixel: vec2u) -> vec3f {
-    let at = start_at(vec2i(pixel));
-    let shift = pcg3(vec3u(pixel, 0x6a09e667u)).xy;
-    let lobe = lobe_ray(at, surface_at(pixel), lattice(gather.frame >> 2u, shift));
-    if all(lobe.weight <= vec3f(0.0)) { return vec3f(0.0); }
-    let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
-    let name = gather.rays + pixel.y * params.size.x + pixel.x;
-    let found = look(at.x, lobe.d, 0.0, ALONE, NONE, name, gather.round, !stands_in);
-    var radiance = found.radiance;
-    if found.slot != NONE {
-        radiance += found.back * entry_light[(gather.round & 1u) * (gather.mask + 1u) + found.slot].rgb;
-    }
-    return min(finite3(radiance * lobe.weight), vec3f(LARGEST));
-}
+// Pixels of a square of 2×2, in the order in which they have their turns.
+const STEPS = array<vec2u, 4>(vec2u(0u, 0u), vec2u(1u, 1u), vec2u(1u, 0u), vec2u(0u, 1u));
 
-@compute @workgroup_size(8, 8)
-fn mirror(@builtin(global_invocation_id) id: vec3u) {
-    let first = 2u * id.xy;
-    if any(first >= params.size) { return; }
-    // The next smooth pixel in turn.
-    var steps = array<vec2u, 4>(vec2u(0u, 0u), vec2u(1u, 1u), vec2u(1u, 0u), vec2u(0u, 1u));
+// The next smooth pixel of a square in turn; the picture's size where there is none.
+fn turn_of(first: vec2u) -> vec2u {
     var own = params.size;
     for (var i = 0u; i < 4u; i++) {
-        let pixel = first + steps[(gather.frame + 3u - i) & 3u];
+        let pixel = first + STEPS[(gather.frame + 3u - i) & 3u];
         if is_smooth(pixel) { own = pixel; }
     }
-    if any(own >= params.size) { return; }
-    let found = shown_by(own);
+    return own;
+}
+
+var<private> block: vec2u;
+
+// Into the lobe of a square's next pixel, in one direction.
+fn begin(at: u32, job: u32) -> bool {
+    let pixel = turn_of(2u * place_of(block, job));
+    let start = start_at(vec2i(pixel));
+    let shift = pcg3(vec3u(pixel, 0x6a09e667u)).xy;
+    let lobe = lobe_ray(start, surface_at(pixel), lattice(gather.frame >> 2u, shift));
+    let name = gather.rays + pixel.y * params.size.x + pixel.x;
+    set_out(at, start.x, lobe.d, ALONE, 0.0, NONE, name, lobe.weight, job);
+    return goes(at, lobe.weight);
+}
+
+// What the square shows then.
+fn finish(at: u32) {
+    let first = 2u * place_of(block, job_of(at));
+    let own = turn_of(first);
+    let by_ray = found_by(at);
+    var radiance = by_ray.radiance;
+    if by_ray.slot != NONE {
+        radiance += by_ray.back * entry_light[(gather.round & 1u) * (gather.mask + 1u) + by_ray.slot].rgb;
+    }
+    let found = min(finite3(radiance), vec3f(LARGEST));
     let n = world_normal_at(vec2i(own));
     let changing = (gather.flags & GATHER_CHANGING) != 0u;
     let kept = (gather.flags & (GATHER_CUT | GATHER_CHANGED)) == 0u;
     let most = select(MOST_RAYS, MOST_CHANGING, changing);
     for (var i = 0u; i < 4u; i++) {
-        let pixel = first + steps[i];
+        let pixel = first + STEPS[i];
         if !is_smooth(pixel) { continue; }
-        let at = pixel.y * params.size.x + pixel.x;
-        let packed = select(vec2u(0u), mirrored[at], kept & rests(motion_of(vec2i(pixel))));
+        let i_pixel = pixel.y * params.size.x + pixel.x;
+        let packed = select(vec2u(0u), mirrored[i_pixel], kept & rests(motion_of(vec2i(pixel))));
         var here = vec4f(unpack2x16float(packed.x), unpack2x16float(packed.y));
         if all(pixel == own) {
             // Each ray counts for its number, since entries come to know more.
@@ -81,6 +88,24 @@ fn mirror(@builtin(global_invocation_id) id: vec3u) {
         } else if here.a < 1.0 && dot(world_normal_at(vec2i(pixel)), n) > SAME_SIDE {
             here = vec4f(found, A_NEIGHBOUR);
         }
-        mirrored[at] = vec2u(pack2x16float(here.rg), pack2x16float(here.ba));
+        mirrored[i_pixel] = vec2u(pack2x16float(here.rg), pack2x16float(here.ba));
+    }
+}
+
+@compute @workgroup_size(WALKERS)
+fn mirror(
+    @builtin(workgroup_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    group = id.x;
+    let blocks = blocks_of((params.size + 1u) / 2u);
+    for (var i = id.x; i < blocks.x * blocks.y; i += groups.x) {
+        block = vec2u(i % blocks.x, i / blocks.x);
+        no_jobs(thread);
+        for (var job = thread; job < JOBS; job += WALKERS) {
+            if any(turn_of(2u * place_of(block, job)) < params.size) { note_job(job); }
+        }
+        look(thread, gather.round, (gather.flags & GATHER_STANDS_IN) == 0u);
     }
 }

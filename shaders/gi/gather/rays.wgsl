@@ -34,50 +34,82 @@ fn numbers(cell: vec2u, look: u32) -> vec2f {
     return lattice(((place - TURN * look) & 15u) + 16u * (gather.frame - look), shift);
 }
 
-// Layers of workgroups: first rays of cells, rays into lobes, further rays of fresh cells.
-@compute @workgroup_size(8, 8)
-fn rays(@builtin(global_invocation_id) id: vec3u) {
-    if id.z == 1u {
-        gloss_ray(id.xy);
-        return;
-    }
-    if any(id.xy >= cell_grid()) { return; }
-    let cell = cell_index(id.xy);
-    let packed = cell_pixels[cell];
-    let look_number = max(id.z, 1u) - 1u;
-    if packed == NO_PIXEL || (look_number > 0u && (packed & FRESH) == 0u) { return; }
-    let ray = cell_record(cell, look_number);
-    let at = start_at(unpack_pixel(packed));
-    let d = cosine_direction(at.n, numbers(id.xy, look_number));
-    let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
-    send(at.x, at.n, d, select(NONE, cell, ray == cell), ray, ray);
-}
-
 // The two numbers of a ray into a lobe. Each square has a lattice of its own: lobes are narrower than the
 // hemisphere, a few rays fill them, and what a blur of few cells leaves is noise, not a pattern.
 fn gloss_numbers(square: vec2u) -> vec2f {
     return lattice(gather.frame >> 2u, pcg3(vec3u(square, 2u * (gather.frame & 3u) + 1u)).xy);
 }
 
-// The ray of a square of cells into the lobe of this frame's cell.
-fn gloss_ray(square: vec2u) {
-    if any(square >= gloss_grid()) { return; }
-    let ray = gloss_record(square);
-    records[3u * ray + 1u].z = 0.0;
-    if (gather.flags & GATHER_NO_GLOSS) != 0u { return; }
+// Whether the square of cells sends a ray into the lobe of this frame's cell.
+fn has_gloss(square: vec2u) -> bool {
+    if any(square >= gloss_grid()) { return false; }
+    records[3u * gloss_record(square) + 1u].z = 0.0;
     let cell = gloss_cell(square);
-    if any(cell >= cell_grid()) { return; }
+    if (gather.flags & GATHER_NO_GLOSS) != 0u || any(cell >= cell_grid()) { return false; }
     let packed = cell_pixels[cell_index(cell)];
-    if packed == NO_PIXEL { return; }
-    let pixel = unpack_pixel(packed);
-    let surface = textureLoad(specular_map, pixel, 0);
-    if !has_lobe(surface) { return; }
-    let at = start_at(pixel);
-    let lobe = lobe_ray(at, surface, gloss_numbers(square));
-    var found = Found(vec3f(0.0), NONE, vec3f(0.0), FAR);
-    if any(lobe.weight > vec3f(0.0)) {
-        let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
-        found = look(at.x, lobe.d, 0.0, ALONE, ray, ray, gather.round, !stands_in);
+    return packed != NO_PIXEL && has_lobe(textureLoad(specular_map, unpack_pixel(packed), 0));
+}
+
+fn gloss_ray(at: u32, square: vec2u) -> bool {
+    let ray = gloss_record(square);
+    let pixel = unpack_pixel(cell_pixels[cell_index(gloss_cell(square))]);
+    let start = start_at(pixel);
+    let lobe = lobe_ray(start, textureLoad(specular_map, pixel, 0), gloss_numbers(square));
+    set_out(at, start.x, lobe.d, ALONE, 0.0, ray, ray, lobe.weight, ray);
+    return goes(at, lobe.weight);
+}
+
+// Whether a cell sends ray `look_number`.
+fn has_ray(cell: vec2u, look_number: u32) -> bool {
+    if any(cell >= cell_grid()) { return false; }
+    let packed = cell_pixels[cell_index(cell)];
+    return packed != NO_PIXEL && (look_number == 0u || (packed & FRESH) != 0u);
+}
+
+fn cell_ray(at: u32, at_cell: vec2u, look_number: u32) {
+    let cell = cell_index(at_cell);
+    let ray = cell_record(cell, look_number);
+    let start = start_at(unpack_pixel(cell_pixels[cell]));
+    let d = cosine_direction(start.n, numbers(at_cell, look_number));
+    send(at, start.x, start.n, d, select(NONE, cell, ray == cell), ray, ray);
+}
+
+// A layer of blocks each: first rays of cells, rays into lobes, further rays of fresh cells.
+var<private> block: vec3u;
+
+fn look_number() -> u32 {
+    return max(block.z, 1u) - 1u;
+}
+
+fn begin(at: u32, job: u32) -> bool {
+    let place = place_of(block.xy, job);
+    if block.z == 1u { return gloss_ray(at, place); }
+    cell_ray(at, place, look_number());
+    return true;
+}
+
+fn finish(at: u32) {
+    record(at);
+}
+
+@compute @workgroup_size(WALKERS)
+fn rays(
+    @builtin(workgroup_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    group = id.x;
+    let blocks = blocks_of(cell_grid());
+    let layer = blocks.x * blocks.y;
+    for (var i = id.x; i < (1u + LOOKS) * layer; i += groups.x) {
+        block = vec3u(i % blocks.x, (i / blocks.x) % blocks.y, i / layer);
+        no_jobs(thread);
+        for (var job = thread; job < JOBS; job += WALKERS) {
+            let place = place_of(block.xy, job);
+            var wanted = false;
+            if block.z == 1u { wanted = has_gloss(place); } else { wanted = has_ray(place, look_number()); }
+            if wanted { note_job(job); }
+        }
+        look(thread, gather.round, (gather.flags & GATHER_STANDS_IN) == 0u);
     }
-    record(ray, found, lobe.weight, lobe.d, vec4f(0.0));
 }

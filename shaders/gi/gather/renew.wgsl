@@ -43,14 +43,8 @@ fn evict(@builtin(global_invocation_id) id: vec3u) {
     atomicStore(&entry_keys[slot], select(LEFT, 0u, next == 0u));
 }
 
-// Slots that a workgroup looks after, and those among them whose entries send a ray. Of eight slots about one is in use: rays of
-// a list without gaps keep all lanes of a processor busy.
-const SLOTS_IN_GROUP = 256u;
-var<workgroup> listed: array<u32, SLOTS_IN_GROUP>;
-var<workgroup> in_list: atomic<u32>;
-
-// Rounds for each ray of an entry that the picture's own rays do not meet. Of the entries of a city or a flat four fifths are
-// such, and what they know is a share of what others know.
+// Rounds for each ray of an entry that the picture's own rays do not meet. Of the entries of a city or a flat four
+// fifths are such, and what they know is a share of what others know.
 const FURTHER = 4u;
 
 // Takes note of who met the entry in the slot last; whether it is to send a ray.
@@ -83,18 +77,34 @@ fn begins(slot: u32) -> bool {
     return true;
 }
 
-fn send_of(slot: u32) {
+// First of the slots that the workgroup looks after, as many at once as it can have jobs.
+var<private> first_slot: u32;
+
+// The ray of an entry.
+fn begin(at: u32, job: u32) -> bool {
+    let slot = first_slot + job;
     let slots = gather.mask + 1u;
     let odd = (gather.round & 1u) * slots;
     let even = slots - odd;
     let key = atomicLoad(&entry_keys[slot]);
-    let begin = entry_queries[gather.rays + 2u * slots + slot + odd];
-    let before = entry_light[even + slot];
-    let x = bitcast<vec3f>(begin.xyz);
-    let n = unpack_normal(begin.w);
+    let place = entry_queries[gather.rays + 2u * slots + slot + odd];
+    let n = unpack_normal(place.w);
     let shift = pcg3(vec3u(key, 0x7f4a7c15u, 3u));
     let d = cosine_direction(n, lattice(gather.round, shift.xy));
-    let found = look(x, d, 0.0, max(dot(n, d), 1e-4), gather.rays + even + slot, key, gather.round + 1u, true);
+    let query = gather.rays + even + slot;
+    set_out(at, bitcast<vec3f>(place.xyz), d, max(dot(n, d), 1e-4), 0.0, query, key, vec3f(1.0), job);
+    send_on(at);
+    return true;
+}
+
+// What it has found goes into the mean.
+fn finish(at: u32) {
+    let slot = first_slot + job_of(at);
+    let slots = gather.mask + 1u;
+    let odd = (gather.round & 1u) * slots;
+    let even = slots - odd;
+    let before = entry_light[even + slot];
+    let found = found_by(at);
     var light = found.radiance;
     if found.slot != NONE { light += found.back * entry_light[even + found.slot].rgb; }
     // Each of the first rays counts for the cube of its number: the earlier ones met entries that knew nothing yet.
@@ -105,9 +115,20 @@ fn send_of(slot: u32) {
     entry_light[odd + slot] = vec4f(mix(before.rgb, finite3(light), share), n_rays);
 }
 
-@compute @workgroup_size(SLOTS_IN_GROUP)
-fn renew(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) index: u32) {
-    if begins(id.x) { listed[atomicAdd(&in_list, 1u)] = id.x; }
-    workgroupBarrier();
-    if index < atomicLoad(&in_list) { send_of(listed[index]); }
+// Of eight slots about one is in use, so first it is noted which.
+@compute @workgroup_size(WALKERS)
+fn renew(
+    @builtin(workgroup_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    group = id.x;
+    for (var i = id.x; i * JOBS <= gather.mask; i += groups.x) {
+        first_slot = i * JOBS;
+        no_jobs(thread);
+        for (var job = thread; job < JOBS; job += WALKERS) {
+            if begins(first_slot + job) { note_job(job); }
+        }
+        look(thread, gather.round + 1u, true);
+    }
 }

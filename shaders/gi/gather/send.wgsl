@@ -13,25 +13,32 @@ fn shared_exponent(c: vec3f) -> u32 {
     return code.x | (code.y << 9u) | (code.z << 18u) | (exponent << 27u);
 }
 
-fn record(ray: u32, found: Found, weight: vec3f, d: vec3f, glow: vec4f) {
-    records[3u * ray] = vec4f(found.radiance * weight, bitcast<f32>(found.slot));
-    records[3u * ray + 1u] =
-        vec4f(bitcast<f32>(shared_exponent(found.back * weight)), bitcast<f32>(pack_normal(d)), found.distance, 0.0);
-    records[3u * ray + 2u] = glow;
+// What way `at` has found becomes its record.
+fn record(at: u32) {
+    let found = found_by(at);
+    let to = job_of(at);
+    let glow = part_of(at, GLOWS);
+    records[3u * to] = vec4f(found.radiance, bitcast<f32>(found.slot));
+    records[3u * to + 1u] =
+        vec4f(bitcast<f32>(shared_exponent(found.back)), bitcast<f32>(part_of(at, BACK).w), found.distance, 0.0);
+    records[3u * to + 2u] = bitcast<vec4f>(glow);
 }
 
-// The ray from x along d, for the surface there that faces n, and where surfaces glow a shadow ray to a point
-// of them. `ray` is what its random numbers are drawn by, `query` its number if it may claim an entry, `to`
-// where it is written down.
-fn send(x: vec3f, n: vec3f, d: vec3f, query: u32, ray: u32, to: u32) {
-    let stands_in = (gather.flags & GATHER_STANDS_IN) != 0u;
-    let found = look(x, d, above(x), max(dot(n, d), 1e-4), query, ray, gather.round, !stands_in);
-    var glow = vec4f(0.0);
-    if gather.emitter_count > 0u && !stands_in {
+// Way `at`: the ray from x along d, for the surface there that faces n, and where surfaces glow a shadow ray to a
+// point of them. `ray` is what its random numbers are drawn by, `query` its number if it may claim an entry, `to` its
+// record.
+fn send(at: u32, x: vec3f, n: vec3f, d: vec3f, query: u32, ray: u32, to: u32) {
+    set_out(at, x, d, max(dot(n, d), 1e-4), above(x), query, ray, vec3f(1.0), to);
+    if gather.emitter_count > 0u && (gather.flags & GATHER_STANDS_IN) == 0u {
         let seed = pcg3(vec3u(ray, gather.round, 0x51ed270bu));
         // Of an even white surface without gloss.
         let chosen = choose_light(Place(x, n, n, vec3f(1.0), vec3f(0.0), 1.0), false, seed);
-        if is_lit(x, chosen, seed.z) { glow = vec4f(chosen.even, bitcast<f32>(pack_normal(chosen.l))); }
+        if chosen.reach > 0.0 {
+            keep(at, PLACE, x, GLOW);
+            keep(at, GLOWS, chosen.even, pack_normal(chosen.l));
+            put(at, x, chosen.l, chosen.reach, true, seed.z);
+            return;
+        }
     }
-    record(to, found, vec3f(1.0), d, glow);
+    send_on(at);
 }

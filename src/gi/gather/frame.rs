@@ -4,7 +4,7 @@ use super::bring::Brought;
 use super::params::{self, Params};
 use super::pass::Groups;
 use super::store::{self, Store};
-use super::{GatherGi, HURRIED, HURRY, LOOKS, ROUNDS_YOUNG, SLOTS_IN_GROUP, STIR, YOUNG};
+use super::{GatherGi, HURRIED, HURRY, ROUNDS_YOUNG, STIR, YOUNG, work};
 use crate::gi::interface::{GiError, Inputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -147,17 +147,14 @@ impl GatherGi {
             // By the random numbers of the frame before.
             let offset = self.params.write(queue, &Params { round: self.sent, ..params });
             let own = [&keys, &lots, &queries, &before, &records].map(Clone::clone);
-            let squares = [w, h].map(|n| n.div_ceil(2));
-            self.gradient.record(recorder, groups(offset), own, [squares[0], squares[1], 1]);
+            self.gradient.record(recorder, groups(offset), own, [work::of_squares(inputs.size), 1, 1]);
         }
         self.sent = params.round;
         self.recall.record(recorder, alone(offset), history(), [w, h, 1]);
         let slots = [self.options.slots.div_ceil(64), 1, 1];
         self.evict.record(recorder, groups(offset), table(), slots);
-        // The second layer of workgroups sends rays into lobes, those above further ones of fresh cells.
-        let layers = 1 + LOOKS as u32;
         let own = [&keys, &lots, &queries, &pixels, &records, &specular].map(Clone::clone);
-        self.rays.record(recorder, groups(offset), own, [w, h, layers]);
+        self.rays.record(recorder, groups(offset), own, [work::of_cells(inputs.size), 1, 1]);
         let rounds = match (self.frame, self.stir) {
             (0, _) => self.options.first_rounds.max(1),
             _ if rested => self.options.first_rounds.max(ROUNDS_YOUNG),
@@ -166,18 +163,18 @@ impl GatherGi {
             (_, 0) => 1,
             _ => 2,
         };
-        let groups_of_slots = [self.options.slots.div_ceil(SLOTS_IN_GROUP), 1, 1];
+        let of_slots = [work::of_slots(self.options.slots), 1, 1];
         for round in 0..rounds {
             if round > 0 {
                 params.round += 1;
                 offset = self.params.write(queue, &params);
             }
-            self.renew.record(recorder, groups(offset), table(), groups_of_slots);
+            self.renew.record(recorder, groups(offset), table(), of_slots);
         }
         if inputs.specular.is_some() {
             let own = [&keys, &lots, &queries, &entry_light, &Bound::from(&store.mirrored), &specular, &motion];
-            let squares = inputs.size.map(|n| n.div_ceil(2).div_ceil(8));
-            self.mirror.record(recorder, groups(offset), own.map(Clone::clone), [squares[0], squares[1], 1]);
+            let of_pixels = [work::of_pixels(inputs.size), 1, 1];
+            self.mirror.record(recorder, groups(offset), own.map(Clone::clone), of_pixels);
         }
         self.mean.record(recorder, alone(offset), history(), [w, h, 1]);
         self.round = params.round + 1;

@@ -23,6 +23,7 @@ mod options;
 mod params;
 mod pass;
 mod store;
+mod work;
 
 pub use frame::Settled;
 pub use options::{Options, OptionsError};
@@ -78,8 +79,9 @@ const STORAGE_BUFFERS: u32 = 8;
 /// Rays of a cell of which nothing is remembered; `LOOKS` of `types.wgsl`.
 const LOOKS: u64 = 4;
 
-/// Slots that a workgroup of `gi.renew` looks after; `SLOTS_IN_GROUP` of `renew.wgsl`.
-const SLOTS_IN_GROUP: u32 = 256;
+/// Bytes that a workgroup remembers of its rays: of 256, nine vectors each (`WALKS` of `queue.wgsl`, `PARTS` of
+/// `look.wgsl`).
+const WAYS: u64 = 256 * 9 * 16;
 
 /// Bytes of what a cell's ray found.
 const RECORD: u64 = 48;

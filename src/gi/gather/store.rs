@@ -1,6 +1,6 @@
 //! What `gather` keeps from frame to frame, and between the passes of one.
 
-use super::{LOOKS, PAST, RECORD};
+use super::{LOOKS, PAST, RECORD, WAYS, work};
 use crate::gi::stage::{cells, inputs::cells_of};
 
 /// Squares of 2×2 cells, each of which sends one ray a frame into a lobe.
@@ -10,7 +10,7 @@ pub(super) fn squares(size: [u32; 2]) -> u64 {
 
 pub(super) struct Store {
     /// Of the table of entries, by slot: key; lots of both halves; queries of cells and of both halves'
-    /// entries, and where both halves' rays begin; when it was asked for; light of both halves.
+    /// entries, where both halves' rays begin, and what workgroups remember of their rays; when it was asked for; light of both halves.
     pub keys: wgpu::Buffer,
     pub lots: wgpu::Buffer,
     pub queries: wgpu::Buffer,
@@ -34,6 +34,13 @@ pub(super) struct Store {
 /// Bytes of `mirrored` of pictures of `size` pixels.
 fn mirrored(size: [u32; 2]) -> u64 {
     8 * size.map(|n| u64::from(n.max(1))).iter().product::<u64>()
+}
+
+/// Bytes of `queries`.
+fn queries(size: [u32; 2], slots: u64) -> u64 {
+    let rays = cells::count(size).max(1) + squares(size);
+    let groups = work::of_pixels(size).max(work::of_cells(size)).max(work::of_slots(slots as u32));
+    16 * (rays + 4 * slots) + u64::from(groups) * WAYS
 }
 
 impl Store {
@@ -65,7 +72,7 @@ impl Store {
         Self {
             keys: buffer("gi.entry_keys", 4 * slots),
             lots,
-            queries: buffer("gi.entry_queries", 16 * (rays + 4 * slots)),
+            queries: buffer("gi.entry_queries", queries(size, slots)),
             asked: buffer("gi.entry_asked", 4 * slots),
             light: buffer("gi.entry_light", 32 * slots),
             records: buffer("gi.records", RECORD * records),
@@ -84,8 +91,11 @@ impl Store {
         let (cells, slots) = (cells::count(size).max(1), u64::from(slots));
         let rays = cells + squares(size);
         let records = rays + (LOOKS - 1) * cells;
-        let [queries, light, pasts, records] = [16 * (rays + 4 * slots), 32 * slots, PAST * cells, RECORD * records];
-        [queries, light, pasts, records, cells::light_bytes(size), mirrored(size)].into_iter().max().unwrap_or(0)
+        let [light, pasts, records] = [32 * slots, PAST * cells, RECORD * records];
+        [queries(size, slots), light, pasts, records, cells::light_bytes(size), mirrored(size)]
+            .into_iter()
+            .max()
+            .unwrap_or(0)
     }
 
     pub fn bytes(&self) -> u64 {
