@@ -28,7 +28,7 @@ const ALONE = 1e12;
 // each other than it has entries, or the table is full) it goes on, as that place's own ray would, to one that
 // an entry knows. Of a wall full of shelves, or blinds, four segments lose 7 % of the light, eight 3 %
 // (tests/gi/fins.rs); but of the rays that a processor sends side by side all wait for the longest, and with
-// eight a city takes a sixth more time (docs/log/2026-11-25-counts.md).
+// eight a city takes a ninth more time (docs/log/2026-11-25-lists.md).
 const SEGMENTS = 4u;
 
 // A ray with all that follows from what it meets is a way. A workgroup has as many as rays that it sends at once; any
