@@ -118,9 +118,9 @@ impl SceneRays {
         (self.id, self.moves) = (before.id, self.moves.max(before.moves) + 1);
     }
 
-    /// Takes over where the instances of `scene` are and how its meshes are deformed; they are those that this was made
-    /// of. True when buffers were made anew and have to be bound again. Where one of several that shared a tree has gone,
-    /// all trees are made anew first: four seconds of one core for a million triangles.
+    /// Takes over where the instances of `scene` are and how its meshes are deformed; they are those that this was
+    /// made of. True when buffers were made anew and have to be bound again. Where one of several that shared a tree
+    /// has gone, all trees are made anew first: four seconds of one core for a million triangles.
     pub fn place(&mut self, queue: &wgpu::Queue, scene: &Scene) -> bool {
         let mut anew = false;
         if apart(&self.meshes, &scene.instances) {

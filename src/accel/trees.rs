@@ -157,10 +157,10 @@ pub(crate) fn corners(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
     mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize])).collect()
 }
 
-/// Meshes by the trees they share: those that are met in one place each, all in the same, share one, since the trees of
-/// what lies side by side overlap, and a ray walks through all of them. Files cut what is one thing by its materials.
-/// What deforms, cannot be met or shows in several places has its own, and where something is animated whatever hangs on
-/// another node. The first of each is the least; `alone`: none share.
+/// Meshes by the trees they share: those that are met in one place each, all in the same, share one, since the trees
+/// of what lies side by side overlap, and a ray walks through all of them. Files cut what is one thing by its
+/// materials. What deforms, cannot be met or shows in several places has its own, and where something is animated
+/// whatever hangs on another node. The first of each is the least; `alone`: none share.
 fn shared(scene: &Scene, alone: bool) -> Vec<Vec<usize>> {
     let mut places = vec![Vec::new(); scene.meshes.len()];
     for (i, instance) in scene.instances.iter().enumerate() {

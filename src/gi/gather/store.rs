@@ -10,7 +10,8 @@ pub(super) fn squares(size: [u32; 2]) -> u64 {
 
 pub(super) struct Store {
     /// Of the table of entries, by slot: key; lots of both halves; queries of cells and of both halves'
-    /// entries, where both halves' rays begin, and what workgroups remember of their rays; when it was asked for; light of both halves.
+    /// entries, where both halves' rays begin, and what workgroups remember of their rays; when it was asked for;
+    /// light of both halves.
     pub keys: wgpu::Buffer,
     pub lots: wgpu::Buffer,
     pub queries: wgpu::Buffer,

@@ -15,8 +15,8 @@ fn blocks(grid: [u32; 2]) -> u32 {
     grid[0].div_ceil(BLOCK).saturating_mul(grid[1].div_ceil(BLOCK))
 }
 
-/// Workgroups of `gi.rays`: a layer of blocks for rays of cells, one for rays into lobes, the others for further rays of
-/// fresh cells.
+/// Workgroups of `gi.rays`: a layer of blocks for rays of cells, one for rays into lobes, the others for further
+/// rays of fresh cells.
 pub fn of_cells(size: [u32; 2]) -> u32 {
     blocks(cells_of(size)).saturating_mul(1 + LOOKS as u32).clamp(1, GROUPS)
 }
