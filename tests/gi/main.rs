@@ -27,6 +27,7 @@ mod gradient;
 mod in_flight;
 mod lamps;
 mod mirror;
+mod noise;
 #[cfg(feature = "io")]
 mod readback;
 mod real;

@@ -90,7 +90,8 @@ class Alone(unittest.TestCase):
         x = torch.stack([torch.arange(w).float().expand(h, w), torch.arange(h).float().view(-1, 1).expand(h, w), torch.zeros(h, w)])
         light = torch.where(torch.arange(w) < w // 2, 1.0, 0.1).expand(3, h, w)
         batch = {"x": x[None], "n": torch.tensor([0.0, 0, 1]).view(1, 3, 1, 1).expand(1, 3, h, w), "light": light[None], "square": (light[0] ** 2)[None],
-                 "frames": torch.full((1, h, w), 4.0), "age": torch.tensor([4.0]), "strictness": torch.full((1, h, w), 2.0)}
+                 "frames": torch.full((1, h, w), 4.0), "age": torch.tensor([4.0]), "strictness": torch.full((1, h, w), 2.0),
+                 "nearness": torch.zeros(1, h, w)}
         plain, _ = blur.filtered(batch)
         apart = torch.zeros(1, blur.GUIDANCE, h, w)
         apart[:, 0] = apart[:, 4] = torch.where(torch.arange(w) < w // 2, 0.0, 100.0)

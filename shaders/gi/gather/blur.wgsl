@@ -1,19 +1,20 @@
 //#import gi/inputs.wgsl
 //#import gi/cells.wgsl
 //#import gi/gather/types.wgsl
-//#import gi/gather/gloss.wgsl
+//#import gi/gather/gleam.wgsl
 //#import gi/gather/past.wgsl
 //#import gi/gather/guided.wgsl
 
 // Means of cells blurred over neighbours on the same surface, as directional light (`CellLight`).
 
 @group(2) @binding(0) var<storage, read> pasts: array<vec4f>;
-// First word's a: the variance of the mean's luminance.
+// First word's a: the variance of the mean's luminance; second's: which part of the light few rays have brought
+// (`past.wgsl`, `pack_rare`).
 @group(2) @binding(1) var<storage, read_write> light: array<vec4f>;
 // Where light has changed: what it is now (rgb; a: 1), else 0.
 @group(2) @binding(2) var<storage, read_write> changes: array<vec4f>;
 
-// What lobes show over `env_brdf` (a: 1), 0 on surfaces without.
+// What rays into lobes have found, times weight (a).
 @group(2) @binding(3) var<storage, read_write> glosses: array<vec4f>;
 // Of each cell, with GATHER_GUIDED.
 @group(2) @binding(4) var<storage, read> guidance: array<vec4f>;
@@ -33,6 +34,14 @@ const LEAST_REGION = 0.05;
 const LEAST_KNOWN = 5.0;
 // Frames after a change from which on two deviations are enough. While something moves there are none.
 const KNOWN = 2u;
+
+// A cell whose few bright rays bring more than this share of the mean over its neighbourhood is seen as a blotch: three
+// times the least contrast of a soft edge that an eye sees, some 3 %. Light counts as brought by few rays where it would
+// take no more than so many alike (Kish's effective number, squared sum over sum of squares), and not at all from as
+// many as MANY on.
+const BLOTCH = 0.1;
+const FEW = 4.0;
+const MANY = 8.0;
 
 fn past_at(cell: u32) -> Past {
     let i = 5u * cell;
@@ -74,51 +83,88 @@ fn differs(all: f32, lately: f32, variance: f32, most: f32, least: f32) -> bool 
     return abs(lately - all) > sure * (noise + least * max(all, lately));
 }
 
-// One over the difference of roughness from which on two lobes show different things.
-const ALIKE = 5.0;
-// Share of the light's gradient that a lobe of roughness 0.5 sees (1 for a mirror), and the range of what is
-// taken from it.
-const SEEN = 0.87;
-const LEAST_TILT = 0.3;
-const MOST_TILT = 2.0;
-// From here to ROUGHEST the light's gradient takes over from rays.
-const ROUGH = 0.7;
-
 // How much of a neighbour counts: that it lies in the same plane and faces the same way.
 fn alike(here: Past, there: Past, plane: f32) -> f32 {
     return same_surface(there.x - here.x, here.n, there.n, plane);
 }
 
-// What rays into lobes around have found, times weight (a). Over a wide lobe's breadth every second cell is asked.
+// What rays into lobes around have found, times weight (a). Over a wide lobe's breadth every second cell is asked, all
+// of which have the same turn (`gloss_cell`); smooth.wgsl brings the four turns together.
 fn gloss_around(id: vec2u, here: Past, plane: f32) -> vec4f {
     if here.roughness >= ROUGHEST { return vec4f(0.0); }
     let breadth = lobe_cells(here.roughness);
-    let sharp = 0.5 / max(breadth * breadth, 1e-3);
-    let stride = select(1, 2, breadth >= f32(2 * NARROW));
+    let stride = lobe_stride(here.roughness);
+    let aside = exp(-min(f32(stride * stride) * 0.5 / max(breadth * breadth, 1e-3), 60.0));
+    let outer = aside * aside * aside * aside;
+    let falls = array<f32, 3>(1.0, aside, select(outer, balanced(aside, outer), stride == 1));
     var sum = vec4f(0.0);
     for (var i = 0; i < 25; i++) {
-        let step = stride * vec2i(i % 5 - 2, i / 5 - 2);
-        let at = vec2i(id) + step;
+        let tap = vec2i(i % 5 - 2, i / 5 - 2);
+        let at = vec2i(id) + stride * tap;
         if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
         let there = past_at(cell_index(vec2u(at)));
         if there.frames <= 0.0 { continue; }
-        let same = saturate(1.0 - ALIKE * abs(there.roughness - here.roughness));
-        let w = alike(here, there, plane) * same * exp(-min(sharp * f32(step.x * step.x + step.y * step.y), 60.0));
+        let w = alike(here, there, plane) * as_rough(here, there.roughness) * falls[abs(tap.x)] * falls[abs(tap.y)];
         sum += w * there.gloss.a * vec4f(there.gloss.rgb, 1.0);
     }
     return sum;
 }
 
-// What the cell's lobe shows: what its rays have found (`gloss`, times weight), or for wide lobes, and where no
-// ray was sent yet, the cell's light with its gradient `across` towards the mirrored direction. Radiance
-// a + 3/2 b·ω over the hemisphere has vector a n + b where b lies in the plane.
-fn shown(here: Past, mean: vec3f, across: vec3f, gloss: vec4f) -> vec4f {
-    if here.roughness >= NO_LOBE { return vec4f(0.0); }
-    let towards = normalize(here.x - params.eye.xyz);
-    let along = dot(across, towards - here.n * dot(here.n, towards));
-    let around = mean * clamp(1.0 + 1.5 * SEEN * along, LEAST_TILT, MOST_TILT);
-    if gloss.a <= 0.0 { return vec4f(around, 1.0); }
-    return vec4f(mix(gloss.rgb / gloss.a, around, smoothstep(ROUGH, ROUGHEST, here.roughness)), 1.0);
+// What the outer two of a row of five count so that they and the middle one together count as much as those between,
+// whose turn is the other: else each cell shows its own turn's noise, which is a pattern. At most `outer`.
+fn balanced(aside: f32, outer: f32) -> f32 {
+    return clamp(aside - 0.5, 0.0, outer);
+}
+
+// Half at the rim: then each of the sixteen places of the rays' lattice counts the same.
+fn at_rim(step: vec2i, radius: i32) -> f32 {
+    let outermost = (abs(step) == vec2i(radius)) & vec2<bool>(radius > 0);
+    return select(1.0, 0.5, outermost.x) * select(1.0, 0.5, outermost.y);
+}
+
+// How much a neighbour counts in the mean.
+fn counts(here: Past, there: Past, neighbour: u32, own: Guidance, plane: f32) -> f32 {
+    var w = alike(here, there, plane) * as_near(here.nearness, here.frames, there.nearness, there.frames) * clamp(there.frames, f32(LOOKS), 16.0);
+    if (gather.flags & GATHER_GUIDED) != 0u {
+        let other = guidance_at(neighbour);
+        let share = guided_share(here.frames);
+        w *= kinship(own.near, other.near, share) * exp(share * other.trust);
+    }
+    return w;
+}
+
+// Of a neighbourhood: light times weight, weight, mean of squares and the like.
+struct Usual {
+    light: vec3f,
+    total: f32,
+    squares: f32,
+    parts: f32,
+}
+
+// The neighbourhood without cells whose few bright rays would be seen as a blotch. `mean`: luminance of the others;
+// `total`: weight of all.
+fn without_rare(id: vec2u, here: Past, own: Guidance, plane: f32, radius: i32, mean: f32, total: f32) -> Usual {
+    var sum = Usual();
+    for (var y = -radius; y <= radius; y++) {
+        for (var x = -radius; x <= radius; x++) {
+            let at = vec2i(id) + vec2i(x, y);
+            if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
+            let neighbour = cell_index(vec2u(at));
+            let there = past_at(neighbour);
+            if there.frames <= 0.0 { continue; }
+            let w = at_rim(vec2i(x, y), radius) * counts(here, there, neighbour, own, plane);
+            let l = luminance(there.light);
+            let rays = there.frames * l * l / max(there.square, 1e-30);
+            let brings = w * (l - mean) / max(mean * total, 1e-30);
+            let rare = saturate(brings / BLOTCH - 1.0) * saturate((MANY - rays) / (MANY - FEW));
+            let kept = w * (1.0 - rare);
+            sum.light += kept * there.light;
+            sum.total += kept;
+            sum.squares += kept * there.square;
+            sum.parts += kept * kept / there.frames;
+        }
+    }
+    return sum;
 }
 
 @compute @workgroup_size(8, 8)
@@ -151,7 +197,6 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     }
     let plane = strictness_at(here.x);
     let own = guidance_at(cell);
-    let share = guided_share(here.frames);
     var radius = select(NARROW, WIDE, max(here.frames, f32(gather.frame)) < SETTLED);
     if (gather.flags & GATHER_NO_BLUR) != 0u { radius = 0; }
     var sum = vec3f(0.0);
@@ -162,6 +207,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     var most = 0.0;
     var squares = 0.0;
     var parts = 0.0;
+    // What the cell that brings most does, and its weight.
+    var brightest = vec2f(0.0);
     for (var y = -radius; y <= radius; y++) {
         for (var x = -radius; x <= radius; x++) {
             let at = vec2i(id.xy) + vec2i(x, y);
@@ -169,20 +216,14 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             let neighbour = cell_index(vec2u(at));
             let there = past_at(neighbour);
             if there.frames <= 0.0 { continue; }
-            // Half at the rim: then each of the sixteen places of the rays' lattice counts the same.
-            let rim = select(1.0, 0.5, abs(x) == radius && radius > 0)
-                * select(1.0, 0.5, abs(y) == radius && radius > 0);
-            var w = rim * alike(here, there, plane) * clamp(there.frames, f32(LOOKS), 16.0);
-            if (gather.flags & GATHER_GUIDED) != 0u {
-                let other = guidance_at(neighbour);
-                w *= kinship(own.near, other.near, share) * exp(share * other.trust);
-            }
+            let w = at_rim(vec2i(x, y), radius) * counts(here, there, neighbour, own, plane);
             sum += w * there.light;
             // Across each one's own normal: what lies along normals that differ is no gradient of light.
             vector += w * (there.vector - there.n * dot(there.vector, there.n));
             total += w;
             lately += w * there.lately;
             let l = luminance(there.light);
+            if w * l > brightest.x { brightest = vec2f(w * l, w); }
             noise += w * w * max(there.square - l * l, 0.0);
             most = max(most, w * bright_ray(there));
             squares += w * there.square;
@@ -200,9 +241,18 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             mean = now;
         }
     }
+    // What few rays have brought stands apart.
+    var usual = Usual(sum, total, squares, parts);
+    var rare = vec3f(0.0);
+    let others = (luminance(sum) - brightest.x) / max(total - brightest.y, 1e-30);
+    if changes[cell].a == 0.0 && brightest.x - others * brightest.y > BLOTCH * others * total {
+        usual = without_rare(id.xy, here, own, plane, radius, others, total);
+        rare = saturate(1.0 - usual.light / max(usual.total * mean, vec3f(1e-30)));
+    }
     // Variance of the mean: that of single rays here and around, over how many they are.
-    let bright = luminance(sum) / max(total, 1e-30);
-    let variance = max(squares / max(total, 1e-30) - bright * bright, 0.0) * parts / max(total * total, 1e-30);
+    let weight = max(usual.total, 1e-30);
+    let bright = luminance(usual.light) / weight;
+    let variance = max(usual.squares / weight - bright * bright, 0.0) * usual.parts / (weight * weight);
     vector /= max(total, 1e-30);
     // Radiance a + g·ω over the hemisphere has these moments; on a surface tilted by little it gives `mean`
     // along the normal and 8/3 of the vector's part across it.
@@ -212,8 +262,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     let known = saturate(1.0 - chance / max(dot(beside, beside), 1e-30));
     let across = (8.0 / 3.0) * known * beside / max(luminance(mean), 1e-30);
     let whole = here.n + across;
-    glosses[cell] = shown(here, mean, across, gloss_around(id.xy, here, plane));
+    glosses[cell] = gloss_around(id.xy, here, plane);
     light[3u * cell] = vec4f(mean.r * whole, variance);
-    light[3u * cell + 1u] = vec4f(mean.g * whole, 0.0);
+    light[3u * cell + 1u] = vec4f(mean.g * whole, pack_rare(rare));
     light[3u * cell + 2u] = vec4f(mean.b * whole, 0.0);
 }

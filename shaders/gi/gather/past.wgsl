@@ -62,3 +62,28 @@ fn same_surface(to: vec3f, n: vec3f, there: vec3f, strictness: f32) -> f32 {
     let f8 = f2 * f2 * f2 * f2;
     return exp(-off_plane * off_plane) * f8 * f8;
 }
+
+// A share of the hemisphere that no eye sees the lack of (Weber).
+const NO_NEARNESS = 0.01;
+
+// Variance of a nearness after so many frames, at most: that of rays which meet either the next thing or nothing.
+fn chance_of_nearness(nearness: f32, frames: f32) -> f32 {
+    return nearness * (1.0 - nearness) / frames + NO_NEARNESS * NO_NEARNESS;
+}
+
+// Whether as much is near to one cell as to another, as far as their rays can tell: light beside a thing that stands on
+// a surface is other than that of the surface around, whatever a few rays of it were.
+fn as_near(here: f32, frames: f32, there: f32, frames_there: f32) -> f32 {
+    let apart = there - here;
+    let chance = chance_of_nearness(here, frames) + chance_of_nearness(there, frames_there);
+    return exp(-min(0.5 * apart * apart / chance, 60.0));
+}
+
+// Shares of light, a byte a colour, as a number that is neither denormal nor NaN.
+fn pack_rare(share: vec3f) -> f32 {
+    return bitcast<f32>(pack4x8unorm(vec4f(share, 0.25)));
+}
+
+fn unpack_rare(word: f32) -> vec3f {
+    return unpack4x8unorm(bitcast<u32>(word)).rgb;
+}

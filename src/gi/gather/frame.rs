@@ -199,16 +199,16 @@ impl GatherGi {
         let store = &self.store;
         let guidance = guidance.unwrap_or_else(|| Bound::from(&self.no_guidance));
         let pasts = Bound::from(&settled.pasts);
-        let [changes, glosses, blurred, light] =
-            [&store.changes, &store.glosses, &store.blurred, &store.cell_light].map(Bound::from);
+        let [changes, glosses, gleams, blurred, light] =
+            [&store.changes, &store.glosses, &store.gleams, &store.blurred, &store.cell_light].map(Bound::from);
         let [w, h] = settled.inputs.cells.map(|n| n.div_ceil(8));
         let groups = Groups { inputs: &settled.inputs, scene: &settled.params, offset: settled.offset };
         let own = [&pasts, &blurred, &changes, &glosses, &guidance].map(Clone::clone);
         self.blur.record(recorder, groups, own, [w, h, 1]);
-        self.smooth.record(recorder, groups, [pasts, blurred, light, guidance], [w, h, 1]);
+        self.smooth.record(recorder, groups, [pasts, blurred, light, guidance, glosses, gleams], [w, h, 1]);
         let brought = Brought {
             light: &store.cell_light,
-            glosses: &store.glosses,
+            glosses: &store.gleams,
             specular: &settled.specular,
             mirrored: &store.mirrored,
             output,

@@ -204,7 +204,7 @@ impl GatherGi {
             recall: new(alone, ("gi.recall", "gi.recall", "recall"), &history),
             mean: new(alone, ("gi.settle", "gi.settle", "settle"), &history),
             blur: new(alone, ("gi.blur", "gi.blur", "blur"), &[READ, rw, rw, rw, READ]),
-            smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), &[READ, READ, rw, READ]),
+            smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), &[READ, READ, rw, READ, READ, rw]),
             bring: BringPass::new(device, &inputs),
             store: Store::new(device, size, options.slots),
             checked: size,

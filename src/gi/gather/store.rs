@@ -25,8 +25,9 @@ pub(super) struct Store {
     pub blurred: wgpu::Buffer,
     /// Of cells: what light has changed to.
     pub changes: wgpu::Buffer,
-    /// What lobes show, of cells and of pixels.
+    /// What rays into lobes of cells found, over neighbours; what lobes show, of cells and of pixels.
     pub glosses: wgpu::Buffer,
+    pub gleams: wgpu::Buffer,
     pub gloss: wgpu::TextureView,
     /// What rays of smooth pixels have found, four halves a pixel: `mirrored` of `mirror.wgsl`.
     pub mirrored: wgpu::Buffer,
@@ -82,6 +83,7 @@ impl Store {
             blurred: buffer("gi.blurred", cells::light_bytes(size)),
             changes: buffer("gi.changes", 16 * cells),
             glosses: buffer("gi.glosses", 16 * cells),
+            gleams: buffer("gi.gleams", 16 * cells),
             gloss: gloss(device, size),
             mirrored: buffer("gi.mirrored", mirrored(size)),
         }
@@ -112,12 +114,13 @@ impl Store {
             blurred,
             changes,
             glosses,
+            gleams,
             gloss,
             mirrored,
         } = self;
         let texels = u64::from(gloss.texture().width()) * u64::from(gloss.texture().height());
         let table = [keys, lots, queries, asked, light];
-        let buffers = table.into_iter().chain([records, a, b, cell_light, blurred, changes, glosses, mirrored]);
+        let buffers = table.into_iter().chain([records, a, b, cell_light, blurred, changes, glosses, gleams, mirrored]);
         8 * texels + buffers.map(|b| b.size()).sum::<u64>()
     }
 }

@@ -6,6 +6,8 @@ import torch.nn.functional as F
 LUMINANCE = torch.tensor([0.2126, 0.7152, 0.0722])
 # Of shaders/gi/gather/blur.wgsl, types.wgsl and smooth.wgsl.
 SETTLED, NARROW, WIDE, LOOKS, STRIDE = 9, 2, 4, 4, 4
+# Of past.wgsl and blur.wgsl: a nearness that is none; what is seen as a blotch, and how few rays are few.
+NO_NEARNESS, BLOTCH, FEW, MANY = 0.01, 0.1, 4.0, 8.0
 # Of shaders/gi/gather/guided.wgsl: numbers of a cell (two are not read), frames up to which they count in full, and their limit.
 GUIDANCE, GUIDED_FRAMES, MOST_LOG = 12, 6.0, 4.0
 
@@ -43,8 +45,29 @@ def kinship(place, share, radius, stride):
     return 1 / (1 + (apart * apart).sum(1)) ** 2
 
 
+def as_near(batch, radius, stride):
+    """[n,k,h,w]: whether as much is near to the cells around as to each, as far as their rays can tell."""
+    nearness = batch["nearness"]
+    chance = nearness * (1 - nearness) / batch["frames"].clamp(min=1) + NO_NEARNESS ** 2
+    apart = around(nearness.unsqueeze(1), radius, stride)[:, 0] - nearness.unsqueeze(1)
+    chance = around(chance.unsqueeze(1), radius, stride)[:, 0] + chance.unsqueeze(1)
+    return torch.exp(-(0.5 * apart * apart / chance).clamp(max=60))
+
+
+def without_rare(w, light, square, frames, total):
+    """Share of each neighbour [n,k,h,w] that is kept: none of what few bright rays have brought, where it would be seen."""
+    bright = (light * LUMINANCE.view(1, 3, 1, 1, 1)).sum(1)
+    most, place = (w * bright).max(1)
+    others = ((w * bright).sum(1) - most) / (total - w.gather(1, place.unsqueeze(1))[:, 0]).clamp(min=1e-30)
+    seen = most - others * w.gather(1, place.unsqueeze(1))[:, 0] > BLOTCH * others * total
+    rays = frames * bright * bright / square.clamp(min=1e-30)
+    brings = w * (bright - others.unsqueeze(1)) / (others * total).clamp(min=1e-30).unsqueeze(1)
+    rare = (brings / BLOTCH - 1).clamp(0, 1) * ((MANY - rays) / (MANY - FEW)).clamp(0, 1)
+    return 1 - rare * seen.unsqueeze(1)
+
+
 def blur(batch, near, trust):
-    """Mean light [n,3,h,w] over neighbours, and the variance [n,h,w] of its luminance."""
+    """Mean light [n,3,h,w] over neighbours, the variance [n,h,w] of its luminance, and which part of it [n,3,h,w] few rays have brought."""
     narrow = torch.maximum(batch["frames"], batch["age"].view(-1, 1, 1) - 1) >= SETTLED
     radius = NARROW if narrow.all() else WIDE
     with torch.no_grad():
@@ -54,30 +77,39 @@ def blur(batch, near, trust):
         rows, columns = steps.abs().view(-1, 1).expand(-1, 2 * radius + 1).reshape(1, -1, 1, 1), steps.abs().repeat(2 * radius + 1).view(1, -1, 1, 1)
         rim = torch.where(rows == own, 0.5, 1.0) * torch.where(columns == own, 0.5, 1.0) * (reach <= own)
         frames = around(batch["frames"].unsqueeze(1), radius)[:, 0]
-        fixed = rim * same_surface(batch, radius, 1) * frames.clamp(LOOKS, 16)
+        fixed = rim * same_surface(batch, radius, 1) * as_near(batch, radius, 1) * frames.clamp(LOOKS, 16)
         light, square = around(batch["light"], radius), around(batch["square"].unsqueeze(1), radius)[:, 0]
     share = guided_share(batch)
     w = fixed * kinship(near, share, radius, 1) * torch.exp(share.unsqueeze(1) * around(trust.unsqueeze(1), radius)[:, 0])
     total = w.sum(1).clamp(min=1e-30)
     mean = (w.unsqueeze(1) * light).sum(2) / total.unsqueeze(1)
+    w = w * without_rare(w, light, square, frames, total)
+    total = w.sum(1).clamp(min=1e-30)
+    kept = (w.unsqueeze(1) * light).sum(2) / total.unsqueeze(1)
+    rare = (1 - kept / mean.clamp(min=1e-30)).clamp(0, 1)
+    # A byte, as the shaders hand it on.
+    rare = rare + (torch.floor(rare * 255 + 0.5) / 255 - rare).detach()
     squares = (w * square).sum(1) / total
     parts = (w * w / frames.clamp(min=1)).sum(1) / (total * total).clamp(min=1e-30)
-    return mean, (squares - luminance(mean) ** 2).clamp(min=0) * parts
+    return mean, (squares - luminance(kept) ** 2).clamp(min=0) * parts, rare
 
 
-def smooth(batch, mean, variance, far, tolerance):
-    """One à-trous step over cells that differ by no more than noise."""
+def smooth(batch, mean, variance, rare, far, tolerance):
+    """One à-trous step over cells that differ by no more than noise; what few rays have brought over all of the surface."""
     taps = torch.tensor([1 / 6, 2 / 3, 1, 2 / 3, 1 / 6])
     weights = (taps.view(-1, 1) * taps.view(1, -1)).reshape(1, -1, 1, 1)
+    mean, rare = (1 - rare) * mean, rare * mean
     bright = luminance(mean)
     apart = around(bright.unsqueeze(1), 2, STRIDE)[:, 0] - bright.unsqueeze(1)
     share = guided_share(batch)
     noise = 2 * torch.exp(share * tolerance).unsqueeze(1) * (variance.unsqueeze(1) + around(variance.unsqueeze(1), 2, STRIDE)[:, 0])
     with torch.no_grad():
-        same = weights * same_surface(batch, 2, STRIDE)
-        same[:, 12] = 0
+        surface = same_surface(batch, 2, STRIDE)
+        surface[:, 12] = 0
+        same = weights * surface * as_near(batch, 2, STRIDE)
     w = same * torch.exp(-(apart * apart / noise.clamp(min=1e-30)).clamp(max=60)) * kinship(far, share, 2, STRIDE)
-    return (mean + (w.unsqueeze(1) * around(mean, 2, STRIDE)).sum(2)) / (1 + w.sum(1)).unsqueeze(1)
+    spread = (rare + (surface.unsqueeze(1) * around(rare, 2, STRIDE)).sum(2)) / (1 + surface.sum(1)).unsqueeze(1)
+    return spread + (mean + (w.unsqueeze(1) * around(mean, 2, STRIDE)).sum(2)) / (1 + w.sum(1)).unsqueeze(1)
 
 
 def filtered(batch, answer=None):
@@ -86,7 +118,7 @@ def filtered(batch, answer=None):
         answer = torch.zeros(len(batch["frames"]), GUIDANCE, *batch["frames"].shape[1:])
     near, far = answer[:, :4], answer[:, 4:8]
     trust, tolerance = (answer[:, c].clamp(-MOST_LOG, MOST_LOG) for c in (8, 9))
-    mean, variance = blur(batch, near, trust)
+    mean, variance, rare = blur(batch, near, trust)
     # A difference of means squared over a variance of nothing has no slope worth having.
     least = 1e-8 * (luminance(mean) ** 2).detach()
-    return smooth(batch, mean, torch.maximum(variance, least), far, tolerance), mean
+    return smooth(batch, mean, torch.maximum(variance, least), rare, far, tolerance), mean

@@ -30,8 +30,8 @@ def unpack_normals(bits):
 
 
 class Lesson:
-    """One moment of one view, as tensors of one picture: `features` [15,h,w], `light`, `x`, `n` [3,h,w], `frames`, `square`, `strictness`
-    [h,w]; what is to be learnt, `target` [3,h,w], and where (`mask` [h,w]); `shown` [3,h,w]: what `gather` itself shows."""
+    """One moment of one view, as tensors of one picture: `features` [15,h,w], `light`, `x`, `n` [3,h,w], `frames`, `square`, `strictness`,
+    `nearness` [h,w]; what is to be learnt, `target` [3,h,w], and where (`mask` [h,w]); `shown` [3,h,w]: what `gather` itself shows."""
 
     def __init__(self, file, when, name):
         self.name, self.when = name, when
@@ -45,12 +45,14 @@ class Lesson:
         self.strictness = 1 / (0.5 * foot * np.maximum(z, 1e-9))
         self.features, self.light, self.square, self.x, self.n, self.frames = file[f"features.{when}"], past[0:3], past[7], past[8:11], n, frames
         self.target, self.noise, self.base = file["light"], float(file["noise"][0]), 0.0
+        # Halves of a word: roughness, nearness.
+        self.nearness = (np.ascontiguousarray(file[f"past.{when}"][15]).view(np.uint32) >> 16).astype(np.uint16).view(np.float16)
         self.age = float(file[f"age.{when}"][0])
         # After a pan another pixel may stand for a cell than in the still pictures that the light is of.
         same = np.abs(((file["place"][:3] - past[8:11]) * n).sum(0)) * self.strictness < 1
         same &= (unpack_normals(file["place"][3]) * n).sum(0) > SAME_NORMAL
         self.mask = (frames > 0) & np.isfinite(self.target).all(0) & same
-        for field in ("features", "light", "square", "x", "n", "frames", "strictness", "shown", "target"):
+        for field in ("features", "light", "square", "x", "n", "frames", "strictness", "nearness", "shown", "target"):
             setattr(self, field, torch.from_numpy(np.ascontiguousarray(np.nan_to_num(getattr(self, field), posinf=0, neginf=0), np.float32)))
         self.x = self.x * (self.frames > 0)
         self.mask = torch.from_numpy(self.mask)
@@ -79,7 +81,7 @@ def read(folder):
 
 def stacked(lessons):
     """A batch: one tensor of every field."""
-    fields = ("features", "light", "square", "x", "n", "frames", "strictness", "target", "mask")
+    fields = ("features", "light", "square", "x", "n", "frames", "strictness", "nearness", "target", "mask")
     batch = {field: torch.stack([getattr(lesson, field) for lesson in lessons]) for field in fields}
     batch["mean"] = torch.tensor([lesson.mean for lesson in lessons])
     batch["age"] = torch.tensor([lesson.age for lesson in lessons])
