@@ -67,7 +67,7 @@ pub const CELLS_V1: &[FeatureRow] = &[
     row("deviation", 1, &["log1p_over_light"]),
     row("frames", 1, &["inverse_root"]),
     row("lately", 1, &["difference_over_sum"]),
-    row("nearness", 1, &["width_over_length"]),
+    row("nearness", 1, &["twice_width_over_length"]),
     row("depth", 1, &["log_over_mean"]),
     row("normal", 3, &["gravity_frame"]),
     row("hit", 1, &["flag"]),

@@ -122,9 +122,14 @@ fn at_rim(step: vec2i, radius: i32) -> f32 {
     return select(1.0, 0.5, outermost.x) * select(1.0, 0.5, outermost.y);
 }
 
-// How much a neighbour counts in the mean.
+// How much a neighbour counts in the mean: that it is the same surface, and that as much is near to it as to the cell,
+// as far as their rays can tell. Light beside a thing that stands on a surface is other than that of the surface
+// around, whatever a few rays of it were.
 fn counts(here: Past, there: Past, neighbour: u32, own: Guidance, plane: f32) -> f32 {
-    var w = alike(here, there, plane) * as_near(here.nearness, here.frames, there.nearness, there.frames) * clamp(there.frames, f32(LOOKS), 16.0);
+    let nearer = there.nearness - here.nearness;
+    let chance = chance_of_nearness(here.nearness, here.frames) + chance_of_nearness(there.nearness, there.frames);
+    var w = alike(here, there, plane) * exp(-min(0.5 * nearer * nearer / chance, 60.0))
+        * clamp(there.frames, f32(LOOKS), 16.0);
     if (gather.flags & GATHER_GUIDED) != 0u {
         let other = guidance_at(neighbour);
         let share = guided_share(here.frames);
@@ -245,7 +250,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     var usual = Usual(sum, total, squares, parts);
     var rare = vec3f(0.0);
     let others = (luminance(sum) - brightest.x) / max(total - brightest.y, 1e-30);
-    if changes[cell].a == 0.0 && brightest.x - others * brightest.y > BLOTCH * others * total {
+    if radius > 0 && changes[cell].a == 0.0 && brightest.x - others * brightest.y > BLOTCH * others * total {
         usual = without_rare(id.xy, here, own, plane, radius, others, total);
         rare = saturate(1.0 - usual.light / max(usual.total * mean, vec3f(1e-30)));
     }

@@ -16,7 +16,7 @@ struct Past {
     lately: vec3f,
     // Of the cell's surface now; NO_LOBE where it mirrors nothing.
     roughness: f32,
-    // How near what the cell's rays meet is: mean of w / (w + distance), w the cell's width.
+    // How near what the cell's rays meet is: mean of 2w / (2w + distance), w the cell's width.
     nearness: f32,
     // What the lobe shows over `env_brdf`, and rays in it.
     gloss: vec4f,
@@ -71,17 +71,13 @@ fn chance_of_nearness(nearness: f32, frames: f32) -> f32 {
     return nearness * (1.0 - nearness) / frames + NO_NEARNESS * NO_NEARNESS;
 }
 
-// Whether as much is near to one cell as to another, as far as their rays can tell: light beside a thing that stands on
-// a surface is other than that of the surface around, whatever a few rays of it were.
-fn as_near(here: f32, frames: f32, there: f32, frames_there: f32) -> f32 {
-    let apart = there - here;
-    let chance = chance_of_nearness(here, frames) + chance_of_nearness(there, frames_there);
-    return exp(-min(0.5 * apart * apart / chance, 60.0));
-}
-
 // Shares of light, a byte a colour, as a number that is neither denormal nor NaN.
 fn pack_rare(share: vec3f) -> f32 {
     return bitcast<f32>(pack4x8unorm(vec4f(share, 0.25)));
+}
+
+fn is_rare(word: f32) -> bool {
+    return (bitcast<u32>(word) & 0xffffffu) != 0u;
 }
 
 fn unpack_rare(word: f32) -> vec3f {

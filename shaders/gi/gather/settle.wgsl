@@ -60,10 +60,14 @@ struct Arrived {
     nearness: f32,
 }
 
+// Cells within which something counts as near: as far as the narrow blur reaches.
+const NEAR = 2.0;
+
 // `width` of the cell.
 fn arrived_by(ray: u32, width: f32) -> Arrived {
     let glow = records[3u * ray + 2u];
-    let nearness = 2.0 * width / (2.0 * width + records[3u * ray + 1u].z);
+    let near = NEAR * width;
+    let nearness = near / (near + records[3u * ray + 1u].z);
     let found = found_by(ray);
     let vector = luminance(found) * unpack_normal(bitcast<u32>(records[3u * ray + 1u].y))
         + luminance(glow.rgb) * unpack_normal(bitcast<u32>(glow.w));

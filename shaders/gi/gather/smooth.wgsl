@@ -28,28 +28,39 @@ struct Blurred {
     // 0 frames: shows nothing.
     frames: f32,
     n: vec3f,
-    // Without what few rays have brought, `rare` with nothing else: a column a colour.
+    // Without what few rays have brought: a column a colour.
     light: mat3x3f,
-    rare: mat3x3f,
     // Of `light`.
     luminance: f32,
     variance: f32,
     nearness: f32,
+    chance: f32,
+    // Whether few rays have brought some.
+    rare: bool,
+}
+
+// Without what few rays have brought, or that alone.
+fn part_of(cell: u32, rare: bool) -> mat3x3f {
+    var light = mat3x3f(blurred[3u * cell].rgb, blurred[3u * cell + 1u].rgb, blurred[3u * cell + 2u].rgb);
+    let word = blurred[3u * cell + 1u].a;
+    if is_rare(word) || rare {
+        let share = select(1.0 - unpack_rare(word), unpack_rare(word), rare);
+        light = mat3x3f(share.r * light[0], share.g * light[1], share.b * light[2]);
+    }
+    return light;
 }
 
 fn blurred_at(cell: u32) -> Blurred {
     let place = pasts[5u * cell + 2u];
     let n = unpack_normal(bitcast<u32>(place.w));
-    let r = blurred[3u * cell];
-    let g = blurred[3u * cell + 1u];
-    let b = blurred[3u * cell + 2u];
-    let rare = unpack_rare(g.a);
-    let light = mat3x3f((1.0 - rare.r) * r.rgb, (1.0 - rare.g) * g.rgb, (1.0 - rare.b) * b.rgb);
+    let frames = pasts[5u * cell].a;
+    let light = part_of(cell, false);
+    let nearness = unpack2x16float(bitcast<u32>(pasts[5u * cell + 3u].a)).y;
     // The light along the normal.
     let l = luminance(n * light);
     return Blurred(
-        place.xyz, pasts[5u * cell].a, n, light, mat3x3f(rare.r * r.rgb, rare.g * g.rgb, rare.b * b.rgb), l, r.a,
-        unpack2x16float(bitcast<u32>(pasts[5u * cell + 3u].a)).y
+        place.xyz, frames, n, light, l, blurred[3u * cell].a, nearness, chance_of_nearness(nearness, frames),
+        is_rare(blurred[3u * cell + 1u].a)
     );
 }
 
@@ -84,6 +95,31 @@ fn gloss_of(id: vec2u, here: Past) -> vec4f {
     return sum;
 }
 
+// Cell that tap `i` of 25 asks, NO_CELL outside the picture.
+fn tap_at(id: vec2u, i: i32) -> u32 {
+    let at = vec2i(id) + SMOOTH_STRIDE * vec2i(i % 5 - 2, i / 5 - 2);
+    if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { return NO_CELL; }
+    return cell_index(vec2u(at));
+}
+
+const NO_CELL = 0xffffffffu;
+
+// What few rays have brought, averaged over all of the surface that the taps reach.
+fn rare_around(id: vec2u, here: Past) -> mat3x3f {
+    let strictness = strictness_at(here.x);
+    var sum = mat3x3f();
+    var total = 0.0;
+    for (var i = 0; i < 25; i++) {
+        let other = tap_at(id, i);
+        if other == NO_CELL || pasts[5u * other].a <= 0.0 { continue; }
+        let place = pasts[5u * other + 2u];
+        let w = same_surface(place.xyz - here.x, here.n, unpack_normal(bitcast<u32>(place.w)), strictness);
+        sum += w * part_of(other, true);
+        total += w;
+    }
+    return sum * (1.0 / max(total, 1e-30));
+}
+
 @compute @workgroup_size(8, 8)
 fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= cell_grid()) { return; }
@@ -95,41 +131,38 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
         own = guidance_from(guidance[3u * cell], guidance[3u * cell + 1u], guidance[3u * cell + 2u]);
     }
     var light_here = here.light;
-    var rare = here.rare;
+    var any_rare = here.rare;
+    let past = past_at(cell);
     if here.frames > 0.0 && (gather.flags & GATHER_NO_BLUR) == 0u {
         let strictness = strictness_at(here.x);
         let taps = array<f32, 3>(1.0, 2.0 / 3.0, 1.0 / 6.0);
         var total = 1.0;
-        var rare_total = 1.0;
         for (var i = 0; i < 25; i++) {
-            let step = vec2i(i % 5 - 2, i / 5 - 2);
-            let at = vec2i(id.xy) + SMOOTH_STRIDE * step;
-            if all(step == vec2i(0)) || any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
-            let other = cell_index(vec2u(at));
+            let other = tap_at(id.xy, i);
+            if i == 12 || other == NO_CELL { continue; }
             let there = blurred_at(other);
             if there.frames <= 0.0 { continue; }
+            any_rare = any_rare || there.rare;
             let apart = there.luminance - here.luminance;
             // Two means of the same light differ by their two variances.
             let noise = 2.0 * exp(share * own.tolerance) * (here.variance + there.variance);
-            let same = same_surface(there.x - here.x, here.n, there.n, strictness);
-            var w = taps[abs(step.x)] * taps[abs(step.y)] * exp(-min(apart * apart / max(noise, 1e-30), 60.0));
-            w *= same * as_near(here.nearness, here.frames, there.nearness, there.frames);
+            let nearer = there.nearness - here.nearness;
+            let unlike = apart * apart / max(noise, 1e-30)
+                + 0.5 * nearer * nearer / (here.chance + there.chance);
+            var w = taps[abs(i % 5 - 2)] * taps[abs(i / 5 - 2)] * exp(-min(unlike, 60.0));
+            w *= same_surface(there.x - here.x, here.n, there.n, strictness);
             if (gather.flags & GATHER_GUIDED) != 0u {
                 w *= kinship(own.far, finite4(guidance[3u * other + 1u]), share);
             }
             light_here += w * there.light;
             total += w;
-            rare += same * there.rare;
-            rare_total += same;
         }
         light_here *= 1.0 / total;
-        rare *= 1.0 / rare_total;
     }
-    light_here += rare;
+    if any_rare { light_here += rare_around(id.xy, past); }
     let mean = here.n * light_here;
     let vector = light_here * vec3f(0.2126, 0.7152, 0.0722);
     let across = vector / max(luminance(mean), 1e-30) - here.n;
-    let past = past_at(cell);
     gleams[cell] = shown(past, mean, across, gloss_of(id.xy, past));
     light[3u * cell] = tilting(light_here[0], here.n);
     light[3u * cell + 1u] = tilting(light_here[1], here.n);

@@ -17,7 +17,7 @@ use crate::gpu::{shaders, timing::Recorder};
 /// | `deviation` | ln(1 + standard deviation of single frames / L) |
 /// | `frames` | 1/√(frames in the mean) |
 /// | `lately` | (short mean − L) / (short mean + L) |
-/// | `nearness` | mean of w/(w + length of the cell's rays), w the cell's width |
+/// | `nearness` | mean of 2w/(2w + length of the cell's rays), w the cell's width |
 /// | `depth` | ln(z/m) clamped to ±4, z the distance along the view axis |
 /// | `normal` | unit normal in the gravity frame: horizontal right, up, horizontal backward |
 /// | `hit` | 1 |
