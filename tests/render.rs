@@ -340,3 +340,30 @@ fn a_backdrop_is_shown_blurred_or_hidden_and_lights_the_scene_in_any_case() {
         assert_eq!(p.at(32, 50), shown.at(32, 50));
     }
 }
+
+/// A wall that the sun grazes at 15° is as bright at its foot as above, whatever of the floor a shadow map shows beside
+/// it; right below a board that keeps the sun off it is dark.
+#[test]
+fn a_grazed_wall_has_no_dark_line_at_its_foot_and_no_bright_one_below_a_board() {
+    let Some(gpu) = common::gpu() else { return };
+    let travels = Vec3::new(-0.86, -0.44, -0.26).normalize();
+    let board = quad([-8.0, 0.8, 0.0], [16.0, 0.0, 0.0], [0.0, 0.0, 0.1]);
+    let wall = quad([-8.0, 0.0, 0.0], [16.0, 0.0, 0.0], [0.0, 0.8, 0.0]);
+    let s = scene(vec![floor(8.0, 0.0), wall, board], vec![sun(travels.into(), 1.0, 0.004)]);
+    let frame = render(&gpu, &s, &look_at([0.0, 0.4, 1.6], [0.0, 0.4, 0.0], 0.6), [96, 96], 1);
+    let (light, place) = (frame.layer(Layer::DiffDir).unwrap(), frame.layer(Layer::Position).unwrap());
+    // The wall's rows between two heights, least and greatest over what the angle gives.
+    let between = |low: f32, high: f32| {
+        let rows = place.data.chunks_exact(3).zip(light.data.chunks_exact(3));
+        let on = rows.filter(|(p, _)| p[2].abs() < 1e-3 && p[1] > low && p[1] < high);
+        let over: Vec<f32> = on.map(|(_, e)| e[0] * PI / -travels.z).collect();
+        assert!(over.len() > 90, "{}", over.len());
+        (over.iter().copied().fold(f32::MAX, f32::min), over.iter().copied().fold(0.0, f32::max))
+    };
+    let (foot, above, below) = (between(0.0, 0.06), between(0.2, 0.5), between(0.72, 0.799));
+    println!("foot {foot:?}, above {above:?}, below the board {below:?}");
+    // The board's shadow ends 0.17 m below it.
+    assert!(above.0 > 0.99 && above.1 < 1.01);
+    assert!(foot.0 > 0.97 && foot.1 < 1.01, "{foot:?}");
+    assert!(below.1 < 0.02, "{below:?}");
+}

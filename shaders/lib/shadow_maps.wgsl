@@ -119,7 +119,8 @@ fn sun_disc(
 
 // The edge of a shadow that is sharper than texels are: a quadratic spline over 3×3 of them, each compared
 // with the receiver's plane where the texel looks, which takes back most of the lift: light would come in
-// where a wall meets a floor. A texel that looks past the receiver, to what lies far below its plane, tells
+// where a wall meets a floor. What is no nearer to the light than the receiver itself stands beside it and not
+// before it, such as the floor before a wall that the sun grazes. A texel that looks past the receiver, to what lies far below its plane, tells
 // nothing of it: light would come in past the edges of walls without thickness.
 fn sun_edge(view: ShadowView, z: f32, uv: vec2f, slope: vec2f) -> f32 {
     let place = uv * view.size;
@@ -129,6 +130,8 @@ fn sun_edge(view: ShadowView, z: f32, uv: vec2f, slope: vec2f) -> f32 {
     // The lift along the normal raised the plane by so many texels.
     let raised = NORMAL_OFFSET * length(slope);
     let over = (BIAS + LEFT * length(slope) - raised) * view.texel;
+    // And the receiver itself by so much towards the light.
+    let lifted = raised / (1.0 + dot(slope, slope)) * view.texel;
     let under = -(NORMAL_OFFSET + length(slope) + raised) * view.texel;
     var lit = 0.0;
     var known = 0.0;
@@ -136,11 +139,12 @@ fn sun_edge(view: ShadowView, z: f32, uv: vec2f, slope: vec2f) -> f32 {
         let step = vec2i(i % 3 - 1, i / 3 - 1);
         let texel = clamp(vec2i(middle) + step, vec2i(0), vec2i(i32(view.size) - 1));
         let offset = (vec2f(step) - f) / view.size / vec2f(view.scale, -view.scale);
-        let h = (textureLoad(sun_depths, texel, view.layer, 0).x - z) * view.range - dot(slope, offset);
+        let above = (textureLoad(sun_depths, texel, view.layer, 0).x - z) * view.range;
+        let h = above - dot(slope, offset);
         if h < under { continue; }
         let w = weights[step.x + 1].x * weights[step.y + 1].y;
         known += w;
-        lit += select(w, 0.0, h > over);
+        lit += select(w, 0.0, h > over && above + lifted > BIAS * view.texel);
     }
     return select(lit / max(known, 1e-6), 1.0, known == 0.0);
 }
