@@ -35,3 +35,28 @@ pub fn of_pixels(size: [u32; 2]) -> u32 {
 pub fn of_slots(slots: u32) -> u32 {
     slots.div_ceil(JOBS).clamp(1, GROUPS)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{LOOKS, WAYS};
+    use super::{BLOCK, JOBS};
+
+    /// A constant of a shader.
+    fn constant(source: &str, name: &str) -> u64 {
+        let start = format!("const {name} = ");
+        let line = source.lines().find_map(|l| l.strip_prefix(&start)).expect("the shader has it");
+        line.trim_end_matches(';').trim_end_matches('u').parse().expect("a whole number")
+    }
+
+    #[test]
+    fn buffers_and_groups_are_what_shaders_fill() {
+        let look = include_str!("../../../shaders/gi/gather/look.wgsl");
+        let queue = include_str!("../../../shaders/gi/gather/queue.wgsl");
+        let types = include_str!("../../../shaders/gi/gather/types.wgsl");
+        assert_eq!(constant(look, "JOBS"), u64::from(JOBS));
+        assert_eq!(16 * constant(queue, "WALKS") * constant(look, "PARTS"), WAYS);
+        assert_eq!(constant(types, "LOOKS"), LOOKS);
+        let blocks = format!("return (grid + {}u) / {BLOCK}u;", BLOCK - 1);
+        assert!(look.contains(&blocks), "{blocks}");
+    }
+}

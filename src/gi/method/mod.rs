@@ -6,7 +6,8 @@ pub mod name;
 
 use super::gather::{self, GatherGi};
 use super::interface::{GiError, technique::Technique};
-use super::neural::filter::{FilterGi, is_filter};
+use super::neural::filter::FilterGi;
+use super::neural::is_filter;
 use super::neural::pass::{self, NeuralGi, Options};
 use super::screen::{
     ambient::{AmbientGi, Unseen},

@@ -9,7 +9,7 @@
 //! is twice the answer, and an answer of zeros is `gather` itself.
 
 use super::memory::{self, FeaturesPass};
-use super::trained::Neural;
+use super::trained::{FILTER, Neural};
 use crate::gi::gather::{GUIDANCE, GatherGi};
 use crate::gi::interface::technique::{Memory, Technique};
 use crate::gi::interface::{GiError, Inputs};
@@ -22,15 +22,8 @@ use crate::net::format::Weights;
 use crate::net::gpu::{Binding, Network, Setup, Tap};
 use crate::net::plan::Plan;
 
-/// The output's meaning in weights files.
-pub const MEANING: &str = "filter";
 /// Numbers of a cell: two places in spaces of four dimensions; trust, tolerance, and two that are not read.
 pub const CHANNELS: u32 = GUIDANCE as u32 / 4;
-
-/// Whether the weights are those of a network that filters.
-pub fn is_filter(weights: &Weights) -> bool {
-    weights.output.meaning == MEANING
-}
 
 /// The method at work.
 pub struct FilterGi {
@@ -97,7 +90,7 @@ fn check(weights: &Weights) -> Result<(), GiError> {
         return wrong("(all)", format!("list is {}; a filter is given the whole table", found.join(", ")));
     }
     if weights.output.channels != CHANNELS {
-        return Err(GiError::Output(format!("{} channels of `{MEANING}`", weights.output.channels)));
+        return Err(GiError::Output(format!("{} channels of `{FILTER}`", weights.output.channels)));
     }
     Ok(())
 }

@@ -9,3 +9,5 @@ pub mod pass;
 mod rebuilt;
 pub mod reconstruct;
 mod trained;
+
+pub(crate) use trained::is_filter;

@@ -9,10 +9,18 @@ use crate::net::format::Weights;
 use crate::net::gpu::{self, Tuned};
 use std::sync::Arc;
 
+/// What the output of a network that filters means, in weights files.
+pub const FILTER: &str = "filter";
+
+/// Whether the weights are those of a network that filters.
+pub fn is_filter(weights: &Weights) -> bool {
+    weights.output.meaning == FILTER
+}
+
 /// Whether weights have method `gather` run before or around them, and so need
 /// [`Inputs::rays`](crate::gi::Inputs::rays).
 pub fn needs_guess(weights: &Weights) -> bool {
-    super::filter::is_filter(weights)
+    is_filter(weights)
         || weights.output.meaning == Answer::Gain.name()
         || weights.inputs.iter().any(|f| f.name == "guess")
 }
