@@ -1,12 +1,14 @@
-//! Is `gather` right, noise and filters aside? Each cell of a small picture with some thousand rays, one a frame, and nothing
-//! blurred or forgotten, against as many paths from the same points by the path tracer.
+//! Is `gather` right, noise and filters aside? Each cell of a small picture with some thousand
+//! rays, one a frame, and nothing blurred or forgotten, against as many paths from the same points
+//! by the path tracer.
 //!
 //!     cargo run --release --example converges -- SCENE|FOLDER… [--gather plain,…] [--frames N] [--paths N] [--size WxH]
 //!                                                [--no-caustics] [--csv FILE] [--shaders FOLDER]
 //!
-//! Both speak of one point a cell: that of the pixel which stands for it. Printed are all of the light over that of the paths (what is to
-//! be 1), the mean difference of single points, and the paths' own noise in both. With --csv a line a point: scene, x and y of
-//! the pixel, then light of cells and of paths, red, green and blue each. Scenes are as in `bouncelight chart`.
+//! Both speak of one point a cell: that of the pixel which stands for it. Printed are all of the
+//! light over that of the paths (what is to be 1), the mean difference of single points, and the
+//! paths' own noise in both. With --csv a line a point: scene, x and y of the pixel, then light of
+//! cells and of paths, red, green and blue each. Scenes are as in `bouncelight chart`.
 
 use bouncelight::gi::cells::NO_PIXEL;
 use bouncelight::gi::gather::{Options, PAST};
@@ -40,8 +42,8 @@ struct Cell {
     light: [f32; 3],
 }
 
-/// What cells' rays have found in the later half of so many frames of a still camera; in the earlier one the light between
-/// surfaces comes round.
+/// What cells' rays have found in the later half of so many frames of a still camera; in the
+/// earlier one the light between surfaces comes round.
 fn gathered(gpu: &Gpu, scene: &Scene, asked: &Asked) -> Result<Vec<Cell>, Box<dyn Error>> {
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
     uploaded.trace(&gpu.device, &gpu.queue, scene)?;
@@ -100,8 +102,8 @@ fn traced(
     let mut light = traced.layer(Layer::Gi).ok_or("it was asked for")?.to_vec();
     let colour = traced.layer(Layer::DiffCol).ok_or("it was asked for")?;
     let normals = traced.layer(Layer::Normal).ok_or("it was asked for")?;
-    // A surface without a colour, metal or black, tells nothing of the light on it; and where paths see several surfaces through one
-    // point, by lot, a cell shows one of them.
+    // A surface without a colour, metal or black, tells nothing of the light on it; and where paths
+    // see several surfaces through one point, by lot, a cell shows one of them.
     for ((light, colour), n) in light.chunks_exact_mut(3).zip(colour.chunks_exact(3)).zip(normals.chunks_exact(3)) {
         let several = n.iter().map(|c| c * c).sum::<f32>() < ONE_SURFACE;
         for (light, &colour) in light.iter_mut().zip(colour) {

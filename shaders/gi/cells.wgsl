@@ -61,7 +61,8 @@ fn cell_foot(z: f32) -> f32 {
     return 2.0 * params.unproject.y * z * f32(CELL_SIDE) / f32(params.size.y);
 }
 
-// Cells across which what a lobe shows changes little: its width at what is as far from the mirror as the mirror from the eye.
+// Cells across which what a lobe shows changes little: its width at what is as far from the mirror
+// as the mirror from the eye.
 fn lobe_cells(roughness: f32) -> f32 {
     return 0.5 * roughness * roughness / cell_foot(1.0);
 }

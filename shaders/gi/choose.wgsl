@@ -1,9 +1,10 @@
 //#import gi/inputs.wgsl
 //#import gi/cells.wgsl
 
-// Which pixel stands for each cell: its middle one. In every second cell, as on a chessboard, what stands before the
-// middle's surface comes first: the nearest such pixel. What is in front is small and would often go without any cell of its
-// own; but between leaves what is behind needs cells, too. A middle without a surface gives way to any pixel that shows one.
+// Which pixel stands for each cell: its middle one. In every second cell, as on a chessboard, what
+// stands before the middle's surface comes first: the nearest such pixel. What is in front is small
+// and would often go without any cell of its own; but between leaves what is behind needs cells,
+// too. A middle without a surface gives way to any pixel that shows one.
 
 @group(1) @binding(0) var<storage, read_write> cell_pixels: array<u32>;
 

@@ -117,11 +117,12 @@ fn sun_disc(
     return lit / f32(FILTER_TAPS);
 }
 
-// The edge of a shadow that is sharper than texels are: a quadratic spline over 3×3 of them, each compared
-// with the receiver's plane where the texel looks, which takes back most of the lift: light would come in
-// where a wall meets a floor. What is no nearer to the light than the receiver itself stands beside it and not
-// before it, such as the floor before a wall that the sun grazes. A texel that looks past the receiver, to what lies far below its plane, tells
-// nothing of it: light would come in past the edges of walls without thickness.
+// The edge of a shadow that is sharper than texels are: a quadratic spline over 3×3 of them, each
+// compared with the receiver's plane where the texel looks, which takes back most of the lift:
+// light would come in where a wall meets a floor. What is no nearer to the light than the receiver
+// itself stands beside it and not before it, such as the floor before a wall that the sun grazes. A
+// texel that looks past the receiver, to what lies far below its plane, tells nothing of it: light
+// would come in past the edges of walls without thickness.
 fn sun_edge(view: ShadowView, z: f32, uv: vec2f, slope: vec2f) -> f32 {
     let place = uv * view.size;
     let middle = floor(place);

@@ -70,10 +70,11 @@ fn in_disc(u: vec2f) -> vec2f {
     return r * vec2f(cos(angle), sin(angle));
 }
 
-// A point off the surface at p on the side of n, so that rays from there do not meet the surface again: steps in units of
-// the last place, not metres (Wächter and Binder 2019, Ray Tracing Gems 6). Near 0 these are too small, and a length is taken:
-// theirs, which suits places up to 16 units from the origin, and more in proportion where the place is further away along
-// another axis, since the hit's rounding grows with that (scenes in millimetres).
+// A point off the surface at p on the side of n, so that rays from there do not meet the surface
+// again: steps in units of the last place, not metres (Wächter and Binder 2019, Ray Tracing Gems
+// 6). Near 0 these are too small, and a length is taken: theirs, which suits places up to 16 units
+// from the origin, and more in proportion where the place is further away along another axis, since
+// the hit's rounding grows with that (scenes in millimetres).
 fn off_surface(p: vec3f, n: vec3f) -> vec3f {
     let steps = vec3i(n * 256.0);
     let moved = bitcast<vec3f>(bitcast<vec3i>(p) + select(steps, -steps, p < vec3f(0.0)));

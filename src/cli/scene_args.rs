@@ -118,8 +118,8 @@ impl SceneArgs {
         }
     }
 
-    /// Moves everything to `time` of animation `animation`, seconds, but the vertices that only the CPU needs; changes by
-    /// hand stay.
+    /// Moves everything to `time` of animation `animation`, seconds, but the vertices that only the
+    /// CPU needs; changes by hand stay.
     pub fn move_to(&self, scene: &mut Scene, animation: usize, time: f32) -> Result<()> {
         scene.pose_parts(animation, time);
         self.edit(scene)

@@ -32,7 +32,8 @@ pub enum When {
     Pan,
 }
 
-/// Frames of a pan, and of rest before it: by then the blur is narrow, and what comes into view is younger than the rest.
+/// Frames of a pan, and of rest before it: by then the blur is narrow, and what comes into view is
+/// younger than the rest.
 pub const PAN: u32 = 6;
 const STILL: u32 = 4;
 
@@ -256,9 +257,9 @@ impl When {
 }
 
 impl Lesson {
-    /// The lesson as a safetensors file, all f32: `features.WHEN` [15, h, w], `past.WHEN` [20, h, w],
-    /// `shown.WHEN` [12, h, w], `age.WHEN` (one number) of each moment (WHEN: frames, or `pan`); `light` [3, h, w], `noise` (one
-    /// number), `place` [4, h, w], `view` (seven).
+    /// The lesson as a safetensors file, all f32: `features.WHEN` [15, h, w], `past.WHEN` [20, h,
+    /// w], `shown.WHEN` [12, h, w], `age.WHEN` (one number) of each moment (WHEN: frames, or
+    /// `pan`); `light` [3, h, w], `noise` (one number), `place` [4, h, w], `view` (seven).
     ///
     /// # Errors
     /// [`DatasetError::Serialize`].

@@ -3,8 +3,9 @@
 /// Width of a line of prose in docs/, in characters.
 const WIDTH: usize = 112;
 
-/// The Markdown text with its paragraphs and list items broken into lines of at most 112 characters. Tables, headings, pictures
-/// and what is set as code stay as they are, so does a word that is longer.
+/// The Markdown text with its paragraphs and list items broken into lines of at most 112
+/// characters. Tables, headings, pictures and what is set as code stay as they are, so does a word
+/// that is longer.
 pub fn wrapped(page: &str) -> String {
     let mut out = String::with_capacity(page.len() + page.len() / 50);
     let mut fenced = false;

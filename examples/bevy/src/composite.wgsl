@@ -1,5 +1,6 @@
-// What lobes reflect, read from Bevy's deferred G-buffer for the pass; and what the pass found, added to the picture: the
-// blend constant is the exposure. `shaders/lib/brdf.wgsl` stands before this.
+// What lobes reflect, read from Bevy's deferred G-buffer for the pass; and what the pass found,
+// added to the picture: the blend constant is the exposure. `shaders/lib/brdf.wgsl` stands before
+// this.
 
 struct Camera {
     // The world's axes right and up over 1/p00 and 1/p11 of the projection, with p02 and p12.

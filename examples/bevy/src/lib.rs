@@ -86,7 +86,8 @@ impl Plugin for BouncelightPlugin {
     }
 }
 
-/// What comes with [`Bouncelight`]. Inserted, not required: a camera that is there already has samples and no HDR target.
+/// What comes with [`Bouncelight`]. Inserted, not required: a camera that is there already has
+/// samples and no HDR target.
 pub fn equipment() -> impl Bundle {
     let none = AmbientLight { brightness: 0.0, ..Default::default() };
     let prepasses = (DepthPrepass, NormalPrepass, MotionVectorPrepass, DeferredPrepass);

@@ -35,10 +35,10 @@ const LEAST_KNOWN = 5.0;
 // Frames after a change from which on two deviations are enough. While something moves there are none.
 const KNOWN = 2u;
 
-// A cell whose few bright rays bring more than this share of the mean over its neighbourhood is seen as a blotch: three
-// times the least contrast of a soft edge that an eye sees, some 3 %. Light counts as brought by few rays where it would
-// take no more than so many alike (Kish's effective number, squared sum over sum of squares), and not at all from as
-// many as MANY on.
+// A cell whose few bright rays bring more than this share of the mean over its neighbourhood is
+// seen as a blotch: three times the least contrast of a soft edge that an eye sees, some 3 %. Light
+// counts as brought by few rays where it would take no more than so many alike (Kish's effective
+// number, squared sum over sum of squares), and not at all from as many as MANY on.
 const BLOTCH = 0.1;
 const FEW = 4.0;
 const MANY = 8.0;

@@ -26,9 +26,10 @@ fn lobe_stride(roughness: f32) -> i32 {
     return select(1, 2, lobe_cells(roughness) >= BROAD);
 }
 
-// What the cell's lobe shows over `env_brdf` (a: 1), 0 without one: what rays have found (`gloss`, times weight), or for
-// wide lobes, and where no ray was sent yet, the cell's light with its gradient `across` towards the mirrored direction.
-// Radiance a + 3/2 b·ω over the hemisphere has vector a n + b where b lies in the plane.
+// What the cell's lobe shows over `env_brdf` (a: 1), 0 without one: what rays have found (`gloss`,
+// times weight), or for wide lobes, and where no ray was sent yet, the cell's light with its
+// gradient `across` towards the mirrored direction. Radiance a + 3/2 b·ω over the hemisphere has
+// vector a n + b where b lies in the plane.
 fn shown(here: Past, mean: vec3f, across: vec3f, gloss: vec4f) -> vec4f {
     if here.frames <= 0.0 || here.roughness >= NO_LOBE { return vec4f(0.0); }
     let towards = normalize(here.x - params.eye.xyz);

@@ -139,10 +139,11 @@ fn note_job(job: u32) {
     atomicOr(&jobs[i / 2u], job << (16u * (i & 1u)));
 }
 
-// Does the jobs, a way each; as soon as a way is at its end another sets out in its place, so that there are rays
-// enough for all threads. The shader that imports this file says what a job is: `begin(at, job) -> bool` sends way
-// `at` on it (false: it is at its end at once), `finish(at)` takes down what it found. `round` is that which will update the
-// entries, `glows`: whether what glows counts where rays from the beginning meet it.
+// Does the jobs, a way each; as soon as a way is at its end another sets out in its place, so that
+// there are rays enough for all threads. The shader that imports this file says what a job is:
+// `begin(at, job) -> bool` sends way `at` on it (false: it is at its end at once), `finish(at)`
+// takes down what it found. `round` is that which will update the entries, `glows`: whether what
+// glows counts where rays from the beginning meet it.
 fn look(thread: u32, round: u32, glows: bool) {
     workgroupBarrier();
     for (var at = thread; at < WALKS; at += WALKERS) { take_job(at); }

@@ -10,9 +10,10 @@
 //!  rays ──► gather ─► guess ──┴───┴──────────────────────────►┘
 //! ```
 //!
-//! Weights whose answer is a gain on the first guess ([`Answer::Gain`](super::reconstruct::Answer::Gain)) have method `gather` run
-//! before them, need the scene's triangles as it does, and settle over frames as it does; weights
-//! that answer light itself need the G-buffer alone.
+//! Weights whose answer is a gain on the first guess
+//! ([`Answer::Gain`](super::reconstruct::Answer::Gain)) have method `gather` run before them, need
+//! the scene's triangles as it does, and settle over frames as it does; weights that answer light
+//! itself need the G-buffer alone.
 //!
 //! What the method cannot do: see [`crate::gi`].
 
