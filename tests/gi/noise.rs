@@ -98,6 +98,33 @@ fn turns_of_cells_leave_no_pattern_in_rough_lobes() {
     assert!(roughness_of(&striped) > 0.07);
 }
 
+/// A floor whose shading normals lean by 40°, as those of coarse meshes and bumps do, under an even sky.
+fn leaning_floor(lean: f32) -> Scene {
+    let mut ground = floor(8.0, 0.0);
+    let (sine, cosine) = lean.to_radians().sin_cos();
+    ground.normals = vec![[0.0, cosine, sine]; ground.normals.len()];
+    let mut s = scene(vec![ground], vec![]);
+    s.materials = vec![material([0.02; 3])];
+    s.environment = Environment::constant([1.0; 3]);
+    s.cameras = vec![look_at([0.0, 3.0, 4.0], [0.0, 0.0, 0.0], 0.6)];
+    s
+}
+
+/// What cells beside each other have found is averaged over the plane that they lie in, not over the one that shading
+/// normals tell, in which hardly two rows of them lie.
+#[test]
+fn leaning_normals_leave_no_bands() {
+    let Some(gpu) = common::gpu() else { return };
+    let drawn = |blur: bool| {
+        let method = Method::Gather(Options { blur, ..Default::default() });
+        of_cells(&lit(&gpu, &mut world::renderer(&gpu, SIZE, method), &leaning_floor(40.0), 16).0.data)
+    };
+    let [shown, rays] = [true, false].map(|blur| roughness_of(&drawn(blur)));
+    println!("{shown:.4}, without blur {rays:.4}");
+    // By the plane of shading normals: 0.77 of it.
+    assert!(shown < 0.6 * rays, "{shown} of {rays}");
+}
+
 /// A black wall of 15 cm on a black floor under an even sky: x from a long wall of height h the floor sees
 /// (1 + x/√(x² + h²))/2 of the sky. The wall is 2.6 cells high, and the blur five wide.
 #[test]

@@ -9,7 +9,7 @@
 
 @group(2) @binding(0) var<storage, read> pasts: array<vec4f>;
 // First word's a: the variance of the mean's luminance; second's: which part of the light few rays have brought
-// (`past.wgsl`, `pack_rare`).
+// (`past.wgsl`, `pack_rare`); third's: the side of the cell's plane.
 @group(2) @binding(1) var<storage, read_write> light: array<vec4f>;
 // Where light has changed: what it is now (rgb; a: 1), else 0.
 @group(2) @binding(2) var<storage, read_write> changes: array<vec4f>;
@@ -83,14 +83,36 @@ fn differs(all: f32, lately: f32, variance: f32, most: f32, least: f32) -> bool 
     return abs(lately - all) > sure * (noise + least * max(all, lately));
 }
 
+// The plane in which neighbours have to lie: its side, and one over the distance that counts as little, 1/m.
+struct Plane {
+    side: vec3f,
+    strictness: f32,
+}
+
+// Step to a cell beside one; 0 where it shows nothing.
+fn step_to(here: Past, at: vec2i) -> vec3f {
+    if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { return vec3f(0.0); }
+    let i = 5u * cell_index(vec2u(at));
+    if pasts[i].a <= 0.0 { return vec3f(0.0); }
+    return pasts[i + 2u].xyz - here.x;
+}
+
+fn side_at(id: vec2u, here: Past) -> vec3f {
+    let at = vec2i(id);
+    return plane_normal(
+        step_to(here, at - vec2i(1, 0)), step_to(here, at + vec2i(1, 0)),
+        step_to(here, at - vec2i(0, 1)), step_to(here, at + vec2i(0, 1)), here.n
+    );
+}
+
 // How much of a neighbour counts: that it lies in the same plane and faces the same way.
-fn alike(here: Past, there: Past, plane: f32) -> f32 {
-    return same_surface(there.x - here.x, here.n, there.n, plane);
+fn alike(here: Past, there: Past, plane: Plane) -> f32 {
+    return same_surface(there.x - here.x, plane.side, here.n, there.n, plane.strictness);
 }
 
 // What rays into lobes around have found, times weight (a). Over a wide lobe's breadth every second cell is asked, all
 // of which have the same turn (`gloss_cell`); smooth.wgsl brings the four turns together.
-fn gloss_around(id: vec2u, here: Past, plane: f32) -> vec4f {
+fn gloss_around(id: vec2u, here: Past, plane: Plane) -> vec4f {
     if here.roughness >= ROUGHEST { return vec4f(0.0); }
     let breadth = lobe_cells(here.roughness);
     let stride = lobe_stride(here.roughness);
@@ -125,7 +147,7 @@ fn at_rim(step: vec2i, radius: i32) -> f32 {
 // How much a neighbour counts in the mean: that it is the same surface, and that as much is near to it as to the cell,
 // as far as their rays can tell. Light beside a thing that stands on a surface is other than that of the surface
 // around, whatever a few rays of it were.
-fn counts(here: Past, there: Past, neighbour: u32, own: Guidance, plane: f32) -> f32 {
+fn counts(here: Past, there: Past, neighbour: u32, own: Guidance, plane: Plane) -> f32 {
     let nearer = there.nearness - here.nearness;
     let chance = chance_of_nearness(here.nearness, here.frames) + chance_of_nearness(there.nearness, there.frames);
     var w = alike(here, there, plane) * exp(-min(0.5 * nearer * nearer / chance, 60.0))
@@ -146,9 +168,9 @@ struct Usual {
     parts: f32,
 }
 
-// The neighbourhood without cells whose few bright rays would be seen as a blotch. `mean`: luminance of the others;
+// The neighbourhood without cells whose few bright rays would be seen as a blotch. `mean`: luminance without the brightest;
 // `total`: weight of all.
-fn without_rare(id: vec2u, here: Past, own: Guidance, plane: f32, radius: i32, mean: f32, total: f32) -> Usual {
+fn without_rare(id: vec2u, here: Past, own: Guidance, plane: Plane, radius: i32, mean: f32, total: f32) -> Usual {
     var sum = Usual();
     for (var y = -radius; y <= radius; y++) {
         for (var x = -radius; x <= radius; x++) {
@@ -200,7 +222,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
         glosses[cell] = vec4f(0.0);
         return;
     }
-    let plane = strictness_at(here.x);
+    let plane = Plane(side_at(id.xy, here), strictness_at(here.x));
     let own = guidance_at(cell);
     var radius = select(NARROW, WIDE, max(here.frames, f32(gather.frame)) < SETTLED);
     if (gather.flags & GATHER_NO_BLUR) != 0u { radius = 0; }
@@ -212,7 +234,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     var most = 0.0;
     var squares = 0.0;
     var parts = 0.0;
-    // What the cell that brings most does, and its weight.
+    // What the cell of few rays that brings most does, and its weight.
     var brightest = vec2f(0.0);
     for (var y = -radius; y <= radius; y++) {
         for (var x = -radius; x <= radius; x++) {
@@ -228,7 +250,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             total += w;
             lately += w * there.lately;
             let l = luminance(there.light);
-            if w * l > brightest.x { brightest = vec2f(w * l, w); }
+            if w * l > brightest.x && there.frames * l * l < MANY * there.square { brightest = vec2f(w * l, w); }
             noise += w * w * max(there.square - l * l, 0.0);
             most = max(most, w * bright_ray(there));
             squares += w * there.square;
@@ -270,5 +292,5 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     glosses[cell] = gloss_around(id.xy, here, plane);
     light[3u * cell] = vec4f(mean.r * whole, variance);
     light[3u * cell + 1u] = vec4f(mean.g * whole, pack_rare(rare));
-    light[3u * cell + 2u] = vec4f(mean.b * whole, 0.0);
+    light[3u * cell + 2u] = vec4f(mean.b * whole, bitcast<f32>(pack_normal(plane.side)));
 }

@@ -44,6 +44,8 @@ fn lately_noise() -> f32 {
     return min(LATELY / (2.0 - LATELY), lately_share());
 }
 
+// A plane whose side is farther than this from the shading normal (60°) is none of its surface.
+const LEAST_COSINE_OF_PLANE = 0.5;
 // Distance from the plane, in cells, that counts as nothing.
 const BLUR_PLANE = 0.5;
 
@@ -53,10 +55,31 @@ fn strictness_at(x: vec3f) -> f32 {
     return 1.0 / (BLUR_PLANE * cell_foot(max(z, 1e-9)));
 }
 
-// How much a place counts that lies `to` away and faces `there`: that it is in the plane that faces n, and
-// looks the same way.
-fn same_surface(to: vec3f, n: vec3f, there: vec3f, strictness: f32) -> f32 {
-    let off_plane = dot(to, n) * strictness;
+// The side that a surface's plane shows, from the places of the cells beside one: shading normals of coarse meshes and of
+// bumps lean away from it. The nearer one of each two is on the same surface if any is. Where what comes out is far
+// from the shading normal neither is, and that has to do.
+fn plane_normal(left: vec3f, right: vec3f, above: vec3f, below: vec3f, n: vec3f) -> vec3f {
+    let across = nearer(left, right);
+    let down = nearer(above, below);
+    let side = cross(across, down);
+    let size = dot(side, side);
+    if size <= 1e-12 * dot(across, across) * dot(down, down) { return n; }
+    let unit = side * inverseSqrt(size);
+    let cosine = dot(unit, n);
+    return select(n, unit * sign(cosine), abs(cosine) > LEAST_COSINE_OF_PLANE);
+}
+
+// The shorter of two steps away from a place, the first one turned round; one that there is none of is 0.
+fn nearer(back: vec3f, ahead: vec3f) -> vec3f {
+    let b = dot(back, back);
+    let a = dot(ahead, ahead);
+    return select(ahead, -back, b > 0.0 && (b < a || a == 0.0));
+}
+
+// How much a place counts that lies `to` away and faces `there`: that it is in the plane with that side, and
+// looks the way n does.
+fn same_surface(to: vec3f, side: vec3f, n: vec3f, there: vec3f, strictness: f32) -> f32 {
+    let off_plane = dot(to, side) * strictness;
     let facing = saturate(dot(there, n));
     let f2 = facing * facing;
     let f8 = f2 * f2 * f2 * f2;

@@ -79,7 +79,7 @@ fn past_at(cell: u32) -> Past {
 
 // What rays into lobes have found, times weight (a). Where every second cell was asked, neighbours of all four turns
 // count alike, the cell's own in the middle.
-fn gloss_of(id: vec2u, here: Past) -> vec4f {
+fn gloss_of(id: vec2u, here: Past, side: vec3f) -> vec4f {
     if lobe_stride(here.roughness) == 1 { return glosses[cell_index(id)]; }
     let strictness = strictness_at(here.x);
     var sum = vec4f(0.0);
@@ -89,7 +89,7 @@ fn gloss_of(id: vec2u, here: Past) -> vec4f {
         if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
         let there = past_at(cell_index(vec2u(at)));
         if there.frames <= 0.0 { continue; }
-        let same = same_surface(there.x - here.x, here.n, there.n, strictness) * as_rough(here, there.roughness);
+        let same = same_surface(there.x - here.x, side, here.n, there.n, strictness) * as_rough(here, there.roughness);
         sum += same / f32((1 + abs(step.x)) * (1 + abs(step.y))) * glosses[cell_index(vec2u(at))];
     }
     return sum;
@@ -105,7 +105,7 @@ fn tap_at(id: vec2u, i: i32) -> u32 {
 const NO_CELL = 0xffffffffu;
 
 // What few rays have brought, averaged over all of the surface that the taps reach.
-fn rare_around(id: vec2u, here: Past) -> mat3x3f {
+fn rare_around(id: vec2u, here: Past, side: vec3f) -> mat3x3f {
     let strictness = strictness_at(here.x);
     var sum = mat3x3f();
     var total = 0.0;
@@ -113,7 +113,7 @@ fn rare_around(id: vec2u, here: Past) -> mat3x3f {
         let other = tap_at(id, i);
         if other == NO_CELL || pasts[5u * other].a <= 0.0 { continue; }
         let place = pasts[5u * other + 2u];
-        let w = same_surface(place.xyz - here.x, here.n, unpack_normal(bitcast<u32>(place.w)), strictness);
+        let w = same_surface(place.xyz - here.x, side, here.n, unpack_normal(bitcast<u32>(place.w)), strictness);
         sum += w * part_of(other, true);
         total += w;
     }
@@ -133,6 +133,7 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     var light_here = here.light;
     var any_rare = here.rare;
     let past = past_at(cell);
+    let side = unpack_normal(bitcast<u32>(blurred[3u * cell + 2u].a));
     if here.frames > 0.0 && (gather.flags & GATHER_NO_BLUR) == 0u {
         let strictness = strictness_at(here.x);
         let taps = array<f32, 3>(1.0, 2.0 / 3.0, 1.0 / 6.0);
@@ -150,7 +151,7 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
             let unlike = apart * apart / max(noise, 1e-30)
                 + 0.5 * nearer * nearer / (here.chance + there.chance);
             var w = taps[abs(i % 5 - 2)] * taps[abs(i / 5 - 2)] * exp(-min(unlike, 60.0));
-            w *= same_surface(there.x - here.x, here.n, there.n, strictness);
+            w *= same_surface(there.x - here.x, side, here.n, there.n, strictness);
             if (gather.flags & GATHER_GUIDED) != 0u {
                 w *= kinship(own.far, finite4(guidance[3u * other + 1u]), share);
             }
@@ -159,11 +160,11 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
         }
         light_here *= 1.0 / total;
     }
-    if any_rare { light_here += rare_around(id.xy, past); }
+    if any_rare { light_here += rare_around(id.xy, past, side); }
     let mean = here.n * light_here;
     let vector = light_here * vec3f(0.2126, 0.7152, 0.0722);
     let across = vector / max(luminance(mean), 1e-30) - here.n;
-    gleams[cell] = shown(past, mean, across, gloss_of(id.xy, past));
+    gleams[cell] = shown(past, mean, across, gloss_of(id.xy, past, side));
     light[3u * cell] = tilting(light_here[0], here.n);
     light[3u * cell + 1u] = tilting(light_here[1], here.n);
     light[3u * cell + 2u] = tilting(light_here[2], here.n);

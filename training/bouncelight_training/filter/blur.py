@@ -6,8 +6,8 @@ import torch.nn.functional as F
 LUMINANCE = torch.tensor([0.2126, 0.7152, 0.0722])
 # Of shaders/gi/gather/blur.wgsl, types.wgsl and smooth.wgsl.
 SETTLED, NARROW, WIDE, LOOKS, STRIDE = 9, 2, 4, 4, 4
-# Of past.wgsl and blur.wgsl: a nearness that is none; what is seen as a blotch, and how few rays are few.
-NO_NEARNESS, BLOTCH, FEW, MANY = 0.01, 0.1, 4.0, 8.0
+# Of past.wgsl and blur.wgsl: a nearness that is none; a plane that is another surface's; what is seen as a blotch, and how few rays are few.
+NO_NEARNESS, LEAST_COSINE_OF_PLANE, BLOTCH, FEW, MANY = 0.01, 0.5, 0.1, 4.0, 8.0
 # Of shaders/gi/gather/guided.wgsl: numbers of a cell (two are not read), frames up to which they count in full, and their limit.
 GUIDANCE, GUIDED_FRAMES, MOST_LOG = 12, 6.0, 4.0
 
@@ -24,11 +24,31 @@ def around(x, radius, stride=1):
     return F.unfold(x, k, dilation=stride, padding=radius * stride).view(n, c, k * k, h, w)
 
 
+def plane_side(batch):
+    """[n,3,h,w]: the side that each cell's plane shows, from the places of the cells beside it (`plane_normal` of past.wgsl)."""
+    x, normal = batch["x"], batch["n"]
+    there = around(batch["frames"].unsqueeze(1), 1) > 0
+    steps = (around(x, 1) - x.unsqueeze(2)) * there
+
+    def nearer(back, ahead):
+        b, a = (back * back).sum(1, keepdim=True), (ahead * ahead).sum(1, keepdim=True)
+        return torch.where((b > 0) & ((b < a) | (a == 0)), -back, ahead)
+
+    # Rows of three: above, beside, below.
+    across, down = nearer(steps[:, :, 3], steps[:, :, 5]), nearer(steps[:, :, 1], steps[:, :, 7])
+    side = torch.linalg.cross(across, down, dim=1)
+    size = (side * side).sum(1, keepdim=True)
+    flat = size <= 1e-12 * (across * across).sum(1, keepdim=True) * (down * down).sum(1, keepdim=True)
+    unit = side * size.clamp(min=1e-38).rsqrt()
+    cosine = (unit * normal).sum(1, keepdim=True)
+    return torch.where(flat | (cosine.abs() <= LEAST_COSINE_OF_PLANE), normal, unit * cosine.sign())
+
+
 def same_surface(batch, radius, stride):
     """[n,k,h,w]: how much the cells around lie in the cell's plane and face its way; 0 where they show nothing."""
     x, normal = batch["x"], batch["n"]
     to = around(x, radius, stride) - x.unsqueeze(2)
-    off_plane = (to * normal.unsqueeze(2)).sum(1) * batch["strictness"].unsqueeze(1)
+    off_plane = (to * plane_side(batch).unsqueeze(2)).sum(1) * batch["strictness"].unsqueeze(1)
     facing = (around(normal, radius, stride) * normal.unsqueeze(2)).sum(1).clamp(0, 1)
     there = around(batch["frames"].unsqueeze(1), radius, stride)[:, 0] > 0
     return torch.exp(-(off_plane * off_plane).clamp(max=80)) * facing ** 16 * there
@@ -57,10 +77,11 @@ def as_near(batch, radius, stride):
 def without_rare(w, light, square, frames, total):
     """Share of each neighbour [n,k,h,w] that is kept: none of what few bright rays have brought, where it would be seen."""
     bright = (light * LUMINANCE.view(1, 3, 1, 1, 1)).sum(1)
-    most, place = (w * bright).max(1)
-    others = ((w * bright).sum(1) - most) / (total - w.gather(1, place.unsqueeze(1))[:, 0]).clamp(min=1e-30)
-    seen = most - others * w.gather(1, place.unsqueeze(1))[:, 0] > BLOTCH * others * total
     rays = frames * bright * bright / square.clamp(min=1e-30)
+    most, place = torch.where(rays < MANY, w * bright, torch.zeros(())).max(1)
+    weight = torch.where(most > 0, w.gather(1, place.unsqueeze(1))[:, 0], torch.zeros(()))
+    others = ((w * bright).sum(1) - most) / (total - weight).clamp(min=1e-30)
+    seen = most - others * weight > BLOTCH * others * total
     brings = w * (bright - others.unsqueeze(1)) / (others * total).clamp(min=1e-30).unsqueeze(1)
     rare = (brings / BLOTCH - 1).clamp(0, 1) * ((MANY - rays) / (MANY - FEW)).clamp(0, 1)
     return 1 - rare * seen.unsqueeze(1)

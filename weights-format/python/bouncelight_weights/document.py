@@ -23,7 +23,7 @@ SCREEN_V1 = {
 }
 CELLS_V1 = {
     "light": (1, ("over_sum_with_exposure",)), "chroma": (2, ("differences_over_sum",)), "deviation": (1, ("log1p_over_light",)),
-    "frames": (1, ("inverse_root",)), "lately": (1, ("difference_over_sum",)), "nearness": (1, ("width_over_length",)),
+    "frames": (1, ("inverse_root",)), "lately": (1, ("difference_over_sum",)), "nearness": (1, ("twice_width_over_length",)),
     "depth": (1, ("log_over_mean",)), "normal": (3, ("gravity_frame",)), "hit": (1, ("flag",)), "towards": (3, ("gravity_frame",)),
 }
 IMAGES_V1 = {name: (3, _PICTURE) for name in ("depth", "direct", "diffuse", "normal")}
