@@ -89,12 +89,15 @@ struct Plane {
     strictness: f32,
 }
 
-// Step to a cell beside one; 0 where it shows nothing.
+// Step to a cell beside one; 0 where it shows nothing, or what looks elsewhere.
 fn step_to(here: Past, at: vec2i) -> vec3f {
     if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { return vec3f(0.0); }
     let i = 5u * cell_index(vec2u(at));
-    if pasts[i].a <= 0.0 { return vec3f(0.0); }
-    return pasts[i + 2u].xyz - here.x;
+    let place = pasts[i + 2u];
+    if pasts[i].a <= 0.0 || dot(unpack_normal(bitcast<u32>(place.w)), here.n) <= LEAST_COSINE_OF_PLANE {
+        return vec3f(0.0);
+    }
+    return place.xyz - here.x;
 }
 
 fn side_at(id: vec2u, here: Past) -> vec3f {

@@ -27,7 +27,7 @@ def around(x, radius, stride=1):
 def plane_side(batch):
     """[n,3,h,w]: the side that each cell's plane shows, from the places of the cells beside it (`plane_normal` of past.wgsl)."""
     x, normal = batch["x"], batch["n"]
-    there = around(batch["frames"].unsqueeze(1), 1) > 0
+    there = (around(batch["frames"].unsqueeze(1), 1) > 0) & ((around(normal, 1) * normal.unsqueeze(2)).sum(1, keepdim=True) > LEAST_COSINE_OF_PLANE)
     steps = (around(x, 1) - x.unsqueeze(2)) * there
 
     def nearer(back, ahead):
