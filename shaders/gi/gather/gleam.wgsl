@@ -3,7 +3,7 @@
 //#import gi/gather/lobe.wgsl
 //#import gi/gather/past.wgsl
 
-// What lobes of cells show.
+// What lobes of cells show. The shader that imports this binds what cells remember as `pasts`.
 
 // One over the difference of roughness from which on two lobes show different things.
 const ALIKE = 5.0;
@@ -16,6 +16,12 @@ const MOST_TILT = 2.0;
 const ROUGH = 0.7;
 // Breadth of a lobe, in cells, from which on every second cell is asked.
 const BROAD = 4.0;
+
+// What a cell remembers.
+fn past_at(cell: u32) -> Past {
+    let i = 5u * cell;
+    return past_from(pasts[i], pasts[i + 1u], pasts[i + 2u], pasts[i + 3u], pasts[i + 4u]);
+}
 
 fn as_rough(here: Past, roughness: f32) -> f32 {
     return saturate(1.0 - ALIKE * abs(roughness - here.roughness));

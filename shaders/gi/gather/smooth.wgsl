@@ -72,11 +72,6 @@ fn tilting(channel: vec3f, n: vec3f) -> vec4f {
     return vec4f(channel - half * n, half);
 }
 
-fn past_at(cell: u32) -> Past {
-    let i = 5u * cell;
-    return past_from(pasts[i], pasts[i + 1u], pasts[i + 2u], pasts[i + 3u], pasts[i + 4u]);
-}
-
 // What rays into lobes have found, times weight (a). Where every second cell was asked, neighbours of all four turns
 // count alike, the cell's own in the middle.
 fn gloss_of(id: vec2u, here: Past, side: vec3f) -> vec4f {
