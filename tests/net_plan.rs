@@ -339,12 +339,12 @@ fn moments_of_every_kernel_fit() {
                 };
                 let step = plan.steps.iter().find(|s| s.moments.is_some()).unwrap();
                 let room = plan.tensors[step.moments.unwrap()].shape.width;
-                let ways = [Source::Lanes, Source::Uniform, Source::Storage, Source::Staged].into_iter();
-                let ways = ways.flat_map(|w| (1..=4).map(move |v| Permutation::new(w, w == Source::Lanes, v)));
+                let ways = [Source::Uniform, Source::Storage, Source::Staged].into_iter();
+                let ways = ways.flat_map(|w| (1..=4).map(move |v| Permutation::new(w, v)));
                 let cut = ways.clone().map(|p| Permutation { parts: 2, ..p });
                 let variants = ways.chain(cut).map(Variant::Fixed).chain([Variant::Auto, Variant::Plain]);
                 for (variant, software) in variants.flat_map(|v| [(v, true), (v, false)]) {
-                    let facts = Facts { lanes: true, software, half: true, words: true };
+                    let facts = Facts { software, half: true };
                     let choice = Choice { variant, tuned: &Tuned::new(), facts };
                     let kernel = Kernel::choose(&plan, step, &choice);
                     assert!(

@@ -18,7 +18,7 @@ fn compact_network_at_256x128() {
     println!("{}", gpu.sentence());
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/weights-format/fixtures/unet.safetensors");
     let weights = Weights::load(path.as_ref()).unwrap();
-    let variants = [Variant::Plain, Variant::Fixed(Permutation::new(Source::Uniform, false, 2)), Variant::Auto];
+    let variants = [Variant::Plain, Variant::Fixed(Permutation::new(Source::Uniform, 2)), Variant::Auto];
     let networks = variants.map(|v| {
         let options = Options { variant: v, ..Options::default() };
         Network::new(&gpu.device, &gpu.queue, &weights, [256, 128], options).unwrap()

@@ -1,9 +1,6 @@
 // The arena in 32 bits: one element is a vector.
 @group(0) @binding(1) var<storage, read_write> arena: array<vec4f>;
 
-// A texture with a vector of this precision in each texel.
-alias Texels = texture_storage_2d<rgba32float, read>;
-
 // Elements of a vector that is 32 bits in either arena.
 const FULL = 1u;
 

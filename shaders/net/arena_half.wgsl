@@ -1,9 +1,6 @@
 // The arena in 16 bits: one element is a vector of four halves. Values beyond their range become the largest half.
 @group(0) @binding(1) var<storage, read_write> arena: array<vec2u>;
 
-// A texture with a vector of this precision in each texel.
-alias Texels = texture_storage_2d<rgba16float, read>;
-
 // Elements of a vector that is 32 bits in either arena.
 const FULL = 2u;
 

@@ -1,7 +1,7 @@
 // What the blocked convolutions share: a thread makes two columns by four rows of pixels and
 // VECTORS (1 to 4) vectors of output channels of them. Tiles are counted row by row through the
 // whole picture, so a workgroup of a small picture is full too. From the prelude: KERNEL_W,
-// KERNEL_H, VECTORS; place.wgsl and whole.wgsl or parts.wgsl come before, make.wgsl after.
+// KERNEL_H, VECTORS; place.wgsl and whole.wgsl or measured.wgsl come before, make.wgsl after.
 
 const TILE = vec2u(2u, 4u);
 
@@ -30,19 +30,10 @@ fn sum(s: Eight, m: mat4x4f, v: Eight) -> Eight {
 
 // Adds one input vector of each pixel under one tap, whose VECTORS matrices begin at `at`.
 fn take(at: u32, v: Eight) {
-    if VECTORS == 1u {
-        a = sum(a, weight(at), v);
-    } else {
-        let two = pair(at);
-        a = sum(a, two.first, v);
-        b = sum(b, two.second, v);
-    }
-    if VECTORS == 3u { c = sum(c, weight(at + 2u), v); }
-    if VECTORS == 4u {
-        let two = pair(at + 2u);
-        c = sum(c, two.first, v);
-        d = sum(d, two.second, v);
-    }
+    a = sum(a, weight(at), v);
+    if VECTORS > 1u { b = sum(b, weight(at + 1u), v); }
+    if VECTORS > 2u { c = sum(c, weight(at + 2u), v); }
+    if VECTORS > 3u { d = sum(d, weight(at + 3u), v); }
 }
 
 // Begins the sums with the bias.

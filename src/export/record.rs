@@ -96,7 +96,7 @@ fn plain(method: &Method, target: Target) -> Method {
     let mut method = method.clone();
     if let Method::Neural(neural) = &mut method {
         let weights = if target == Target::Glsl430 { Source::Storage } else { Source::Uniform };
-        neural.network.variant = Variant::Fixed(Permutation::new(weights, false, 2));
+        neural.network.variant = Variant::Fixed(Permutation::new(weights, 2));
         neural.network.precision = crate::net::plan::Precision::F32;
         neural.tuned = Default::default();
     }

@@ -209,16 +209,11 @@ impl Gpu {
 }
 
 /// Optional features that are used when present: timestamps for the timing tables, compressed textures for scenes with
-/// many of them, lines in the place of triangles for the viewer's wireframes, the others for some of the network's
-/// kernels.
+/// many of them, lines in the place of triangles for the viewer's wireframes, arithmetic in 16 bits for some of the
+/// network's kernels.
 pub fn wanted_features() -> wgpu::Features {
     use wgpu::Features;
-    Features::TIMESTAMP_QUERY
-        | Features::SUBGROUP
-        | Features::SHADER_F16
-        | Features::SHADER_INT64
-        | Features::TEXTURE_COMPRESSION_BC
-        | Features::POLYGON_MODE_LINE
+    Features::TIMESTAMP_QUERY | Features::SHADER_F16 | Features::TEXTURE_COMPRESSION_BC | Features::POLYGON_MODE_LINE
 }
 
 /// All adapters that fit the backend choice, best first, with the words for what was searched. GL is only asked when

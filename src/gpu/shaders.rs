@@ -7,6 +7,7 @@ mod join;
 mod net;
 
 pub use join::{Joined, folder, read_from};
+pub use net::{NetFamily, NetKernel};
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -62,12 +63,7 @@ const FILES: &[(&str, &str)] = &[
 
 /// Names of all shaders that there are.
 pub fn names() -> impl Iterator<Item = String> {
-    FILES.iter().map(|(name, _)| (*name).to_owned()).chain(net::names())
-}
-
-/// Names of the network's shaders.
-pub fn net_names() -> impl Iterator<Item = String> {
-    net::names()
+    FILES.iter().map(|(name, _)| (*name).to_owned()).chain(NetKernel::all().map(NetKernel::name))
 }
 
 /// Shader `name` behind `prelude` (lines of `const`), and where its lines come from.
@@ -76,7 +72,9 @@ pub fn net_names() -> impl Iterator<Item = String> {
 /// If there is no shader of that name, or none of a file that is imported: mistakes in the code that asks.
 pub fn joined(name: &str, prelude: &str) -> Joined {
     let file = FILES.iter().find(|(n, _)| *n == name).map(|(_, file)| vec![(*file).to_owned()]);
-    let files = file.or_else(|| net::files(name)).unwrap_or_else(|| panic!("no shader named {name}"));
+    let files = file
+        .or_else(|| NetKernel::all().find(|k| k.name() == name).map(NetKernel::files))
+        .unwrap_or_else(|| panic!("no shader named {name}"));
     let joined = Joined::new(prelude, files.iter().map(String::as_str));
     // A file that is being edited may name anything; the compiler then says what is missing.
     assert!(joined.missing.is_empty() || folder().is_some(), "{name}: no such files: {:?}", joined.missing);

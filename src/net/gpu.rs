@@ -18,7 +18,7 @@ use super::format::Weights;
 use super::graph::Graph;
 use super::plan::{Plan, PlanError, Precision};
 use crate::gpu::timing::Recorder;
-use build::{Layer, Memory, Trained};
+use build::{Layer, Memory};
 pub use examples::example_preludes;
 pub use kernel::{Bound, Choice, Kernel, Numbers, Part, Sum};
 pub use layer::Filter;
@@ -198,20 +198,9 @@ impl Network {
 
     fn upload(&self, queue: &wgpu::Queue, weights: &Weights) {
         for (layer, step) in self.layers.iter().zip(&self.plan.steps) {
-            if matches!(layer.weights, Trained::None) {
-                continue;
-            }
+            let Some(buffer) = &layer.weights else { continue };
             let parts = pack::pack(weights, step, &layer.kernel);
-            for (i, (bytes, offset)) in parts.iter().zip(layer.offsets()).enumerate() {
-                match &layer.weights {
-                    Trained::None => {}
-                    Trained::Buffer(buffer) => queue.write_buffer(buffer, offset, bytes),
-                    Trained::Textures(textures) => {
-                        let layout = rows_of(layer.kernel.texel());
-                        queue.write_texture(textures[i].as_image_copy(), bytes, layout, textures[i].size());
-                    }
-                }
-            }
+            parts.iter().zip(layer.offsets()).for_each(|(bytes, offset)| queue.write_buffer(buffer, offset, bytes));
         }
     }
 
@@ -235,16 +224,6 @@ impl Network {
     /// Records one step alone, for measurements: its input is whatever lies in the arena.
     pub fn record_step(&self, step: usize, recorder: &mut Recorder<'_>) {
         let layer = &self.layers[step];
-        for (&[first, rows], mirror) in layer.copied.iter().zip(self.memory.mirror.iter().cycle()) {
-            let element = build::element(&self.plan);
-            let mut layout = rows_of(element);
-            layout.offset = u64::from(first) * permutation::ROW * element;
-            let from = wgpu::TexelCopyBufferInfo { buffer: &self.memory.arena, layout };
-            let mut to = mirror.as_image_copy();
-            to.origin.y = first;
-            let size = wgpu::Extent3d { height: rows, ..mirror.size() };
-            recorder.encoder().copy_buffer_to_texture(from, to, size);
-        }
         recorder.compute(&layer.label, |pass| {
             pass.set_pipeline(&layer.pipeline);
             for (bind_group, part) in layer.bind_groups.iter().zip(&layer.kernel.parts) {
@@ -268,7 +247,7 @@ impl Network {
 
     /// GPU memory of tensors, weights and uniforms, bytes.
     pub fn bytes(&self) -> u64 {
-        self.memory.bytes() + self.layers.iter().map(|l| l.weights.bytes()).sum::<u64>()
+        self.memory.bytes() + self.layers.iter().filter_map(|l| l.weights.as_ref()).map(wgpu::Buffer::size).sum::<u64>()
     }
 
     /// Dispatches, memory, FLOPs.
@@ -285,10 +264,4 @@ impl Network {
         let tensor = &self.plan.tensors[index];
         Binding { buffer: &self.memory.arena, offset: tensor.offset, size: tensor.bytes() }
     }
-}
-
-/// Rows of [`permutation::ROW`] texels of `texel` bytes, one after the other.
-fn rows_of(texel: u64) -> wgpu::TexelCopyBufferLayout {
-    let bytes = (permutation::ROW * texel) as u32;
-    wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(bytes), rows_per_image: None }
 }

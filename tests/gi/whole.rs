@@ -72,7 +72,7 @@ fn a_frames_network_runs_as_asked() {
     let excess = largest_excess(&stored, &reference);
     assert!(stored != reference && excess < 3e-2, "16 bits differ, but little: {excess}");
 
-    let wish = Permutation::new(Source::Storage, false, 1);
+    let wish = Permutation::new(Source::Storage, 1);
     let tuned = Neural { tuned: Arc::new([(guessed.0.clone(), wish)].into()), ..full };
     assert_ne!(guessed.1, Some(wish), "otherwise the next check shows nothing");
     let gi = made(&tuned);

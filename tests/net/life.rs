@@ -225,16 +225,14 @@ fn wide_layers_agree_with_the_cpu_twin() {
         let input = hashed::input("x", channels, size);
         let by_cpu = cpu::run(&weights, &input).unwrap();
         let staged = |vectors, parts, half| {
-            Variant::Fixed(Permutation { parts, half, ..Permutation::new(Source::Staged, false, vectors) })
+            Variant::Fixed(Permutation { parts, half, ..Permutation::new(Source::Staged, vectors) })
         };
-        let lanes = Variant::Fixed(Permutation { parts: 5, ..Permutation::new(Source::Lanes, true, 4) });
         let full = Options::default();
         let half = Options { precision: Precision::F16, ..full };
         for options in [
             full,
             Options { variant: staged(2, 1, false), ..full },
             Options { variant: staged(2, 16, false), ..full },
-            Options { variant: lanes, ..full },
             Options { variant: staged(1, 7, false), ..half },
             Options { variant: staged(2, 4, true), ..half },
         ] {

@@ -48,8 +48,8 @@ fn tensor(file: &SafeTensors<'_>, name: &str) -> Tensor {
 }
 
 /// One permutation of the convolutions.
-fn fixed(weights: Source, mirror: bool, vectors: u32) -> Variant {
-    Variant::Fixed(Permutation::new(weights, mirror, vectors))
+fn fixed(weights: Source, vectors: u32) -> Variant {
+    Variant::Fixed(Permutation::new(weights, vectors))
 }
 
 /// Inputs and PyTorch's outputs of a fixture.
@@ -116,7 +116,7 @@ fn the_cpu_twin_agrees_with_pytorch() {
 fn every_kernel_agrees_with_pytorch_and_with_the_cpu_twin() {
     let Some(gpu) = common::gpu() else { return };
     let mut seen = 0;
-    for variant in [Variant::Plain, fixed(Source::Storage, false, 2), Variant::Auto] {
+    for variant in [Variant::Plain, fixed(Source::Storage, 2), Variant::Auto] {
         let mut worst = 0f32;
         for name in NAMES {
             let weights = Weights::load(&fixture(&format!("{name}.safetensors"))).unwrap();

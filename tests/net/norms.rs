@@ -58,8 +58,7 @@ fn what_a_convolution_measures_is_what_a_step_of_its_own_does() {
         (8, json!([up(8, 20, 4, 2), norm("c", 20, 2)])),
         (5, json!([up(5, 6, 2, 3), norm("c", 6, 6)])),
     ];
-    let staged = |vectors, parts| Permutation { parts, ..Permutation::new(Source::Staged, false, vectors) };
-    let lanes = |vectors, parts| Permutation { parts, ..Permutation::new(Source::Lanes, true, vectors) };
+    let staged = |vectors, parts| Permutation { parts, ..Permutation::new(Source::Staged, vectors) };
     let full = Options::default();
     let half = Options { precision: Precision::F16, ..full };
     let plain = Options { variant: Variant::Plain, ..full };
@@ -68,8 +67,8 @@ fn what_a_convolution_measures_is_what_a_step_of_its_own_does() {
         let weights = hashed::network(&graph(channels, ops));
         // Each case meets half of the ways, and each way three cases.
         let variants = match i % 2 {
-            0 => [Variant::Fixed(staged(2, 2)), Variant::Fixed(lanes(2, 1)), fixed(Source::Storage, true, 2)],
-            _ => [Variant::Fixed(staged(1, 1)), Variant::Fixed(lanes(4, 2)), fixed(Source::Uniform, false, 3)],
+            0 => [Variant::Fixed(staged(2, 2)), fixed(Source::Uniform, 2), fixed(Source::Storage, 2)],
+            _ => [Variant::Fixed(staged(1, 1)), fixed(Source::Storage, 4), fixed(Source::Uniform, 3)],
         };
         let ways = variants.map(|variant| Options { variant, ..full }).into_iter().chain([full, plain, half]);
         let ways = ways.chain([Options { variant: variants[0], ..half }]);
@@ -136,10 +135,8 @@ fn norms_of_large_means_are_sound() {
         assert!(e <= 2e-3, "{groups} groups: {e}");
         let far = far(groups, conv(6, 6, 1, 1));
         let by_cpu = cpu::run(&far, &near).unwrap();
-        let parts = |weights| {
-            Variant::Fixed(Permutation { parts: 2, ..Permutation::new(weights, weights == Source::Lanes, 2) })
-        };
-        for variant in [Variant::Auto, fixed(Source::Uniform, false, 2), parts(Source::Staged), parts(Source::Lanes)] {
+        let parts = Variant::Fixed(Permutation { parts: 2, ..Permutation::new(Source::Staged, 2) });
+        for variant in [Variant::Auto, fixed(Source::Uniform, 2), parts] {
             let (found, measured) =
                 run(&gpu, &Pipelines::default(), &far, &near, Options { variant, ..Options::default() });
             let e = error(&found.data, &by_cpu.data);

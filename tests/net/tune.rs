@@ -7,8 +7,8 @@ use bouncelight::net::tune::{Cache, CacheError, MAX_TEXT, VERSION, tune};
 use bouncelight::wgpu::{AdapterInfo, Backend, DeviceType};
 use std::sync::Arc;
 
-const GOOD: &str = r#"{"version": 4, "devices": {"a | Vulkan | d 1": {"layer": {"permutation":
-    {"weights": "uniform", "mirror": false, "vectors": 2}, "ms": 0.5}}}}"#;
+const GOOD: &str = r#"{"version": 5, "devices": {"a | Vulkan | d 1": {"layer": {"permutation":
+    {"weights": "uniform", "vectors": 2}, "ms": 0.5}}}}"#;
 
 fn info(name: &str, driver_info: &str) -> AdapterInfo {
     let mut info = AdapterInfo::new(DeviceType::Other, Backend::Vulkan);
@@ -20,9 +20,9 @@ fn info(name: &str, driver_info: &str) -> AdapterInfo {
 fn a_cache_survives_its_text_and_knows_its_device() {
     let cache = Cache::parse(GOOD).unwrap();
     assert_eq!(Cache::parse(&cache.text()).unwrap(), cache);
-    assert_eq!(VERSION, 4, "adapt the texts here");
+    assert_eq!(VERSION, 5, "adapt the texts here");
     let known = cache.tuned(&info("a", "1"));
-    assert_eq!(known["layer"], Permutation::new(Source::Uniform, false, 2));
+    assert_eq!(known["layer"], Permutation::new(Source::Uniform, 2));
     // Negative control: another adapter, another driver.
     assert!(cache.tuned(&info("b", "1")).is_empty() && cache.tuned(&info("a", "2")).is_empty());
 }
@@ -54,7 +54,7 @@ fn foreign_caches_are_refused() {
         assert!(matches!(Cache::parse(&GOOD.replace(from, to)), Err(CacheError::Numbers(_))), "{to}");
     }
     assert!(Cache::parse(&GOOD.replace("\"ms\": 0.5", "\"ms\": 1e999")).is_err());
-    assert!(matches!(Cache::parse(&GOOD.replace(": 4,", ": 2,")), Err(CacheError::Version { found: 2 })));
+    assert!(matches!(Cache::parse(&GOOD.replace(": 5,", ": 4,")), Err(CacheError::Version { found: 4 })));
     assert!(matches!(Cache::parse(&" ".repeat(MAX_TEXT + 1)), Err(CacheError::Long(_))));
 }
 
@@ -90,8 +90,8 @@ fn wishes_that_cannot_be_met_do_no_harm() {
     let plain = Network::new(&gpu.device, &gpu.queue, &weights, size, Options::default()).unwrap();
     let layer = plain.kernels().next().unwrap().layer.unwrap().to_string();
     for wish in [
-        Permutation { parts: 4000, half: true, ..Permutation::new(Source::Lanes, false, 4000) },
-        Permutation::new(Source::Uniform, true, 0),
+        Permutation { parts: 4000, half: true, ..Permutation::new(Source::Staged, 4000) },
+        Permutation::new(Source::Uniform, 0),
     ] {
         let tuned: Arc<Tuned> = Arc::new([(layer.clone(), wish)].into());
         let network =
@@ -99,7 +99,7 @@ fn wishes_that_cannot_be_met_do_no_harm() {
         assert!(error(&run_network(&gpu, &network, &input), &reference) <= TOLERANCE, "{wish:?}");
     }
     // Negative control: the permutation that is asked for is the one that runs.
-    let Variant::Fixed(wanted) = fixed(Source::Storage, true, 1) else { unreachable!() };
+    let Variant::Fixed(wanted) = fixed(Source::Storage, 1) else { unreachable!() };
     let options = Options { variant: Variant::Fixed(wanted), ..Options::default() };
     let network = Network::new(&gpu.device, &gpu.queue, &weights, size, options).unwrap();
     assert_eq!(network.kernels().next().unwrap().permutation, Some(wanted));
@@ -115,7 +115,7 @@ fn a_corrupt_cache_is_told_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let cache = folder.path().join("deep/tuned.json");
     std::fs::create_dir_all(cache.parent().unwrap()).unwrap();
-    std::fs::write(&cache, "{\"version\": 4, \"dev").unwrap();
+    std::fs::write(&cache, "{\"version\": 5, \"dev").unwrap();
     let run = || {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_bouncelight"));
         command.args(["weights", "tune", "--size", "8x8"]).arg(fixture("conv1x1.safetensors"));

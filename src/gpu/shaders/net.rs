@@ -1,112 +1,172 @@
-//! The network's shaders: families of kernels, each in variants, and the files that a variant is made of.
+//! The network's shaders: what a kernel is, the name and the files that follow from it.
 
-/// Without and with the moments of what a kernel makes (`_measured`).
-const ENDS: &[&str] = &["", "_measured"];
-const ONE: &[&str] = &[""];
-/// In 32 bits and in 16 (`_half`).
-const WIDTHS: &[&str] = &["", "_half"];
-/// What reads tensors from a texture (`_mirror`), and writes them in words of 64 bits (`_words`).
-const MIRRORED: &[&str] = &["", "_half", "_mirror", "_mirror_words", "_mirror_half"];
-/// `_wide` has its weights in a storage buffer; `_lanes` reads these, too, from a texture, and the
-/// threads of a subgroup share them out.
-const BLOCKED: &[&str] = &[
-    "",
-    "_wide",
-    "_half",
-    "_mirror",
-    "_mirror_words",
-    "_mirror_wide",
-    "_mirror_half",
-    "_lanes",
-    "_lanes_words",
-    "_lanes_half",
-];
-/// `_parts` cuts the sum over input channels, and `sum` adds it up.
-const PARTS: &[&str] = &["_lanes_parts", "_lanes_parts_half"];
-/// Copies tensors and weights into a workgroup's memory first; `_arithmetic` multiplies in 16 bits.
-const STAGED: &[&str] = &["", "_half", "_arithmetic_half"];
-const STAGED_PARTS: &[&str] = &["_parts", "_parts_half", "_arithmetic_parts_half"];
-
-/// Family, its variants, and what each may end with.
-const FAMILIES: &[(&str, &[&str], &[&str])] = &[
-    ("conv_plain", WIDTHS, ENDS),
-    ("conv3x3", BLOCKED, ENDS),
-    ("conv3x3", PARTS, ONE),
-    ("conv_any", BLOCKED, ENDS),
-    ("conv_any", PARTS, ONE),
-    ("conv_staged", STAGED, ENDS),
-    ("conv_staged", STAGED_PARTS, ONE),
-    ("sum", WIDTHS, ENDS),
-    ("upsample", MIRRORED, ONE),
-    ("nearest", WIDTHS, ONE),
-    ("add", MIRRORED, ONE),
-    ("window", WIDTHS, ONE),
-    ("moments", &["", "_half", "_mirror", "_mirror_half"], ONE),
-    ("merge", WIDTHS, ONE),
-    ("norm", MIRRORED, ONE),
-    ("batch_norm", MIRRORED, ONE),
-    ("peak", ONE, ONE),
-    ("shuffle", WIDTHS, ONE),
-];
-
-/// Names of all of them, `net.FAMILY_VARIANT`. They need a prelude; `net::gpu::example_preludes`
-/// gives one of each kind.
-pub(super) fn names() -> impl Iterator<Item = String> {
-    FAMILIES.iter().flat_map(|(family, variants, ends)| {
-        variants.iter().flat_map(move |v| ends.iter().map(move |e| format!("net.{family}{v}{e}")))
-    })
+/// What a kernel does; its file is called so, but for norms, which share one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum NetFamily {
+    /// One pixel and four channels a thread; the yardstick.
+    ConvPlain,
+    /// 3×3, stride 1.
+    Conv3x3,
+    /// Any convolution.
+    ConvAny,
+    /// Any, with tensors and weights copied into a workgroup's memory first.
+    ConvStaged,
+    /// Adds up a convolution that was cut into parts.
+    Sum,
+    /// Bilinear resampling.
+    Upsample,
+    /// Repeats pixels.
+    Nearest,
+    /// Copies, with what follows every kernel.
+    Add,
+    /// Cuts out.
+    Window,
+    /// Moments of tiles, for norms.
+    Moments,
+    /// Mean, scale and shift from moments.
+    Merge,
+    /// Applies them.
+    Norm,
+    /// Applies trained ones.
+    BatchNorm,
+    /// Operations a second that a device can do.
+    Peak,
+    /// Channels to pixels, or back.
+    Shuffle,
 }
 
-/// The files of the shader `name`, in order; nothing where there is no such shader.
-pub(super) fn files(name: &str) -> Option<Vec<String>> {
-    let variant = |(family, variants, ends): &(&'static str, &[&str], &[&str])| {
-        let rest = name.strip_prefix("net.")?.strip_prefix(family)?;
-        let known = variants.iter().any(|v| rest.strip_prefix(v).is_some_and(|end| ends.contains(&end)));
-        known.then(|| (*family, rest.to_owned()))
-    };
-    let (family, rest) = FAMILIES.iter().find_map(variant)?;
-    let parts = parts(family, |word| rest.split('_').any(|w| w == word));
-    Some(parts.iter().map(|part| format!("net/{part}.wgsl")).collect())
+use NetFamily::*;
+
+const FAMILIES: [NetFamily; 15] = [
+    ConvPlain, Conv3x3, ConvAny, ConvStaged, Sum, Upsample, Nearest, Add, Window, Moments, Merge, Norm, BatchNorm,
+    Peak, Shuffle,
+];
+
+impl NetFamily {
+    fn name(self) -> &'static str {
+        match self {
+            ConvPlain => "conv_plain",
+            Conv3x3 => "conv3x3",
+            ConvAny => "conv_any",
+            ConvStaged => "conv_staged",
+            Sum => "sum",
+            Upsample => "upsample",
+            Nearest => "nearest",
+            Add => "add",
+            Window => "window",
+            Moments => "moments",
+            Merge => "merge",
+            Norm => "norm",
+            BatchNorm => "batch_norm",
+            Peak => "peak",
+            Shuffle => "shuffle",
+        }
+    }
+
+    /// Whether it is a convolution.
+    pub fn convolves(self) -> bool {
+        matches!(self, ConvPlain | Conv3x3 | ConvAny | ConvStaged)
+    }
+
+    /// Whether skip, activation and dropout may follow.
+    pub fn finishes(self) -> bool {
+        !matches!(self, Window | Moments | Merge | Peak)
+    }
 }
 
-/// What a variant of `family` is made of; `has` tells the words of the variant's name.
-fn parts(family: &'static str, has: impl Fn(&str) -> bool) -> Vec<&'static str> {
-    // The first word that the name has; the last is for names that have none.
-    let by = |choices: &[(&str, &'static str)], otherwise| {
-        choices.iter().find(|(word, _)| has(word)).map_or(otherwise, |(_, part)| *part)
-    };
-    let convolution = family.starts_with("conv");
-    let mut parts = vec![
-        "common",
-        by(&[("half", "arena_half"), ("words", "arena_words")], "arena_full"),
-        by(&[("mirror", "load_mirror"), ("lanes", "load_mirror"), ("half", "load_half")], "load_full"),
-    ];
-    if !["window", "moments", "merge", "peak"].contains(&family) {
-        parts.push("epilogue");
+/// A kernel of a network, without the numbers of its prelude.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct NetKernel {
+    /// What it does.
+    pub family: NetFamily,
+    /// Tensors and weights are stored in 16 bits.
+    pub half: bool,
+    /// Weights lie in a storage buffer; in 16 bits they always do.
+    pub wide: bool,
+    /// Products are taken in 16 bits.
+    pub arithmetic: bool,
+    /// The sum over input channels is cut into parts.
+    pub parts: bool,
+    /// It writes the moments of what it makes.
+    pub measured: bool,
+}
+
+impl NetKernel {
+    /// The plainest of a family.
+    pub const fn new(family: NetFamily) -> Self {
+        Self { family, half: false, wide: false, arithmetic: false, parts: false, measured: false }
     }
-    if convolution {
-        parts.extend([by(&[("measured", "measured"), ("parts", "parts")], "whole"), "place"]);
+
+    /// All that there are.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let ways = (0..32u32).map(|bits| [1, 2, 4, 8, 16].map(|bit| bits & bit != 0));
+        FAMILIES.into_iter().flat_map(move |family| {
+            let kernels = ways.clone().map(move |[half, wide, arithmetic, parts, measured]| Self {
+                family,
+                half,
+                wide,
+                arithmetic,
+                parts,
+                measured,
+            });
+            kernels.filter(|k| k.exists())
+        })
     }
-    let weights = [("lanes", "weights_lanes"), ("half", "weights_half"), ("wide", "weights_storage")];
-    match family {
-        "conv_plain" => parts.extend([by(&weights, "weights_storage"), family]),
-        "conv_staged" => parts.extend([
-            by(&[("arithmetic", "arithmetic_half")], "arithmetic_full"),
-            by(&[("half", "columns_half")], "columns_full"),
-            family,
-        ]),
-        "conv3x3" if has("lanes") => {
-            let rows = by(&[("half", "conv3x3_pairs")], "conv3x3_fours");
-            parts.extend([by(&weights, "weights_uniform"), "conv3x3_rows", rows, "make"]);
+
+    fn exists(self) -> bool {
+        let blocked = matches!(self.family, Conv3x3 | ConvAny);
+        let staged = self.family == ConvStaged;
+        (!self.half || self.family != Peak)
+            && (!self.wide || blocked && !self.half)
+            && (!self.arithmetic || staged && self.half)
+            && (!self.parts || staged && !self.measured)
+            && (!self.measured || self.family.convolves() || self.family == Sum)
+    }
+
+    /// `net.` and what it is: also the label of its pipeline.
+    pub fn name(self) -> String {
+        let words = [
+            (self.wide, "_wide"),
+            (self.arithmetic, "_arithmetic"),
+            (self.parts, "_parts"),
+            (self.half, "_half"),
+            (self.measured, "_measured"),
+        ];
+        let words: String = words.into_iter().filter_map(|(has, word)| has.then_some(word)).collect();
+        format!("net.{}{words}", self.family.name())
+    }
+
+    /// The files that it is made of, in order. It needs a prelude; `net::gpu::example_preludes` gives one of each kind.
+    pub(super) fn files(self) -> Vec<String> {
+        let half = |full: &'static str, half: &'static str| if self.half { half } else { full };
+        let mut files = vec!["common", half("arena_full", "arena_half"), half("load_full", "load_half")];
+        if self.family.finishes() {
+            files.push("epilogue");
         }
-        "conv_any" if has("lanes") => parts.extend([by(&weights, "weights_uniform"), "tile", family, "make"]),
-        "conv3x3" | "conv_any" => {
-            parts.extend([by(&weights, "weights_uniform"), "pair", "threads", "tile", family, "make"]);
+        let ends = match (self.measured, self.parts) {
+            (true, _) => "measured",
+            (_, true) => "parts",
+            _ => "whole",
+        };
+        if self.family.convolves() {
+            files.extend([ends, "place"]);
         }
-        "norm" => parts.extend(["scale_measured", "scale"]),
-        "batch_norm" => parts.extend(["scale_fixed", "scale"]),
-        "sum" if has("measured") => parts.extend(["measured", "sum_measured"]),
-        _ => parts.push(family),
+        match self.family {
+            ConvPlain => files.extend([half("weights_storage", "weights_half"), "conv_plain"]),
+            ConvStaged => files.extend([
+                if self.arithmetic { "arithmetic_half" } else { "arithmetic_full" },
+                half("columns_full", "columns_half"),
+                "conv_staged",
+            ]),
+            Conv3x3 | ConvAny => {
+                let full = if self.wide { "weights_storage" } else { "weights_uniform" };
+                files.extend([half(full, "weights_half"), "tile", self.family.name(), "make"]);
+            }
+            Norm => files.extend(["scale_measured", "scale"]),
+            BatchNorm => files.extend(["scale_fixed", "scale"]),
+            Sum if self.measured => files.extend(["measured", "sum_measured"]),
+            _ => files.push(self.family.name()),
+        }
+        files.iter().map(|file| format!("net/{file}.wgsl")).collect()
     }
-    parts
 }

@@ -1,7 +1,6 @@
 //! Buffers, pipelines and bind groups of a network.
 
 use super::kernel::{Bound, Kernel, Numbers, Part};
-use super::permutation::ROW;
 use super::pipelines::Pipelines;
 use super::{NetError, Options};
 use crate::gpu::tape;
@@ -51,79 +50,23 @@ pub(super) struct Layer {
     pub label: String,
     pub kernel: Kernel,
     pub pipeline: wgpu::ComputePipeline,
-    pub weights: Trained,
+    /// Trained numbers.
+    pub weights: Option<wgpu::Buffer>,
     /// One for each part of the kernel.
     pub bind_groups: Vec<wgpu::BindGroup>,
     /// What adds up the parts that the kernel has made.
     pub sum: Option<(wgpu::ComputePipeline, wgpu::BindGroup)>,
-    /// First rows and numbers of rows of the mirror that the step reads.
-    pub copied: Vec<[u32; 2]>,
 }
 
-/// Where a layer's trained numbers are.
-pub(super) enum Trained {
-    /// It has none.
-    None,
-    /// Those of all parts, at [`Layer::offsets`].
-    Buffer(wgpu::Buffer),
-    /// One for each part, rows of [`ROW`] texels.
-    Textures(Vec<wgpu::Texture>),
-}
-
-impl Trained {
-    /// Room for what a kernel reads.
-    fn new(device: &wgpu::Device, label: &str, kernel: &Kernel) -> Self {
-        let each = kernel.bound_bytes();
-        let parts = kernel.parts.len() as u64;
-        match kernel.bound {
-            Bound::None => Trained::None,
-            Bound::Texture => {
-                let rows = (each / (ROW * kernel.texel())) as u32;
-                Trained::Textures((0..parts).map(|_| texture(device, label, rows, kernel.texel())).collect())
-            }
-            bound => {
-                let uniform = bound == Bound::Uniform;
-                let kind = if uniform { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
-                let size = each.next_multiple_of(SLOT) * parts;
-                Trained::Buffer(buffer(
-                    device,
-                    label,
-                    size,
-                    kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-                ))
-            }
-        }
-    }
-
-    /// Bytes on the GPU.
-    pub fn bytes(&self) -> u64 {
-        match self {
-            Trained::None => 0,
-            Trained::Buffer(buffer) => buffer.size(),
-            Trained::Textures(textures) => textures.iter().map(texture_bytes).sum(),
-        }
-    }
-}
-
-/// Bytes of a texture as [`texture`] makes them.
-pub(super) fn texture_bytes(texture: &wgpu::Texture) -> u64 {
-    let texel = texture.format().block_copy_size(None).unwrap_or(0);
-    u64::from(texture.width()) * u64::from(texture.height()) * u64::from(texel)
-}
-
-/// A texture of `rows` rows of [`ROW`] vectors.
-fn texture(device: &wgpu::Device, label: &str, rows: u32, texel: u64) -> wgpu::Texture {
-    let (width, height) = (ROW as u32, rows.max(1));
-    device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: if texel == 8 { wgpu::TextureFormat::Rgba16Float } else { wgpu::TextureFormat::Rgba32Float },
-        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    })
+/// Room for the trained numbers of all parts of a kernel, at [`Layer::offsets`]; nothing where it has none.
+fn trained(device: &wgpu::Device, label: &str, kernel: &Kernel) -> Option<wgpu::Buffer> {
+    let place = match kernel.bound {
+        Bound::None => return None,
+        Bound::Uniform => wgpu::BufferUsages::UNIFORM,
+        _ => wgpu::BufferUsages::STORAGE,
+    };
+    let size = kernel.bound_bytes().next_multiple_of(SLOT) * kernel.parts.len() as u64;
+    Some(buffer(device, label, size, place | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC))
 }
 
 /// Bytes of one element of the arena.
@@ -167,17 +110,13 @@ pub(super) fn check_limits(device: &wgpu::Device, plan: &Plan, kernels: &[Kernel
             if needed > granted { Err(error) } else { Ok(()) }
         };
         let bytes = kernel.bound_bytes();
-        if kernel.bound == Bound::Texture {
-            // `permutation` has seen that they fit.
-        } else if kernel.bound == Bound::Uniform {
+        if kernel.bound == Bound::Uniform {
             check("max_uniform_buffer_binding_size", limits.max_uniform_buffer_binding_size, bytes)?;
         } else {
             check("max_storage_buffer_binding_size", limits.max_storage_buffer_binding_size, bytes)?;
         }
-        if kernel.bound != Bound::Texture {
-            let all = bytes.next_multiple_of(SLOT) * kernel.parts.len() as u64;
-            check("max_buffer_size", limits.max_buffer_size, all)?;
-        }
+        let all = bytes.next_multiple_of(SLOT) * kernel.parts.len() as u64;
+        check("max_buffer_size", limits.max_buffer_size, all)?;
         let sum = kernel.sum.iter().flat_map(|s| s.groups);
         let most = kernel.parts.iter().flat_map(|p| kernel.workgroups(p)).chain(sum).max().unwrap_or(0);
         let granted = limits.max_compute_workgroups_per_dimension;
@@ -263,8 +202,6 @@ pub(super) struct Memory {
     pub arena: wgpu::Buffer,
     /// The uniforms of all dispatches.
     pub steps: wgpu::Buffer,
-    /// The arena in a texture, where a kernel reads it so.
-    pub mirror: Option<wgpu::Texture>,
     /// Parts of sums, where a convolution works in parts.
     pub partial: Option<wgpu::Buffer>,
 }
@@ -273,16 +210,11 @@ impl Memory {
     /// For a plan and the kernels chosen for it.
     pub fn new(device: &wgpu::Device, plan: &Plan, kernels: &[Kernel]) -> Self {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-        let row = ROW * element(plan);
-        let mirrored = kernels.iter().any(|k| k.mirror);
-        // Copies take whole rows.
-        let bytes = if mirrored { plan.arena_bytes.next_multiple_of(row) } else { plan.arena_bytes };
         let partial = kernels.iter().filter_map(|k| k.sum.as_ref()).map(|s| s.bytes).max();
         Self {
             // wgpu clears new buffers; the kernels count on the zeros at the beginning.
-            arena: buffer(device, "net.arena", bytes, usage),
+            arena: buffer(device, "net.arena", plan.arena_bytes, usage),
             steps: steps_buffer(device, kernels),
-            mirror: mirrored.then(|| texture(device, "net.mirror", (bytes / row) as u32, element(plan))),
             partial: partial.map(|bytes| {
                 buffer(device, "net.partial", bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)
             }),
@@ -291,8 +223,7 @@ impl Memory {
 
     /// On the GPU.
     pub fn bytes(&self) -> u64 {
-        let mirror = self.mirror.as_ref().map_or(0, texture_bytes);
-        self.arena.size() + self.steps.size() + mirror + self.partial.as_ref().map_or(0, wgpu::Buffer::size)
+        self.arena.size() + self.steps.size() + self.partial.as_ref().map_or(0, wgpu::Buffer::size)
     }
 }
 
@@ -307,10 +238,8 @@ pub(super) fn layers(
     let mut slot = 0;
     let layer = |(step, kernel): (&Step, Kernel)| {
         let label = format!("net.{}", step.name);
-        let weights = Trained::new(device, &label, &kernel);
-        let (pipeline, layout) = pipelines.get(device, &kernel.shader, &kernel.prelude);
-        let read = [Some(step.input), step.skip].into_iter().flatten().filter(|_| kernel.mirror);
-        let copied: Vec<_> = read.map(|t| rows(plan, t)).collect();
+        let weights = trained(device, &label, &kernel);
+        let (pipeline, layout) = pipelines.get(device, kernel.shader, &kernel.prelude);
         let first_slot = slot;
         let whole = |buffer, offset, size| {
             let size = wgpu::BufferSize::new(size);
@@ -329,42 +258,21 @@ pub(super) fn layers(
             ]
         };
         let partial = kernel.sum.as_ref().and(memory.partial.as_ref()).map(|b| (4, b.as_entire_binding()));
-        let bind_group = |(part, offset): (usize, u64)| {
+        let bind_group = |offset: u64| {
             let mut resources = shared(slot);
-            // What reads the mirror and writes parts of sums does not touch the arena.
-            resources.truncate(if kernel.mirror && kernel.sum.is_some() { 1 } else { 2 });
-            let view = |t: &wgpu::Texture| t.create_view(&Default::default());
-            let trained = match &weights {
-                Trained::Textures(textures) => Some(view(&textures[part])),
-                _ => None,
-            };
-            let mirrored = memory.mirror.as_ref().filter(|_| kernel.mirror).map(view);
-            if let Trained::Buffer(buffer) = &weights {
-                resources.push((2, whole(buffer, offset, kernel.bound_bytes())));
-            }
-            resources.extend(trained.iter().map(|v| (2, wgpu::BindingResource::TextureView(v))));
-            resources.extend(mirrored.iter().map(|v| (3, wgpu::BindingResource::TextureView(v))));
+            resources.extend(weights.as_ref().map(|b| (2, whole(b, offset, kernel.bound_bytes()))));
             resources.extend(partial.clone());
             slot += 1;
             group(&layout, resources)
         };
-        let bind_groups = offsets(&kernel).enumerate().map(bind_group).collect();
+        let bind_groups = offsets(&kernel).map(bind_group).collect();
         let sum = kernel.sum.as_ref().map(|sum| {
-            let (pipeline, layout) = pipelines.get(device, &sum.shader, &sum.prelude);
+            let (pipeline, layout) = pipelines.get(device, sum.shader, &sum.prelude);
             let mut resources = shared(first_slot);
             resources.extend(partial.clone());
             (pipeline, group(&layout, resources))
         });
-        Layer { label, kernel, pipeline, weights, bind_groups, sum, copied }
+        Layer { label, kernel, pipeline, weights, bind_groups, sum }
     };
     plan.steps.iter().zip(kernels).map(layer).collect()
-}
-
-/// First row and number of rows of the mirror that hold tensor `t`.
-fn rows(plan: &Plan, t: usize) -> [u32; 2] {
-    let tensor = &plan.tensors[t];
-    let row = ROW * element(plan);
-    let end = tensor.offset + tensor.shape.pixels() * u64::from(tensor.pitch) * element(plan);
-    let (first, end) = (tensor.offset / row, end.min(plan.arena_bytes).div_ceil(row));
-    [first as u32, (end - first) as u32]
 }

@@ -9,6 +9,7 @@ use super::super::plan::{Kind, Plan, Precision, Step};
 use super::kernel::{Bound, Choice, GROUP, Kernel, Part, Prelude, Sum, in_rows};
 use super::layer::{Filter, Layer, Stage, THREADS};
 use super::permutation::{Permutation, Source, Variant};
+use crate::gpu::shaders::{NetFamily, NetKernel};
 use crate::net::graph::Shape;
 
 /// Vectors side by side in a workgroup that adds up and measures, as in `sum_measured.wgsl`.
@@ -24,14 +25,14 @@ struct Phases {
 }
 
 impl Kernel {
-    /// Fills in what a convolution needs and names its shader.
+    /// Fills in what a convolution needs, and its shader but for the family, which it answers.
     pub(super) fn convolution(
         &mut self,
         prelude: &mut Prelude,
         step: &Step,
         plan: &Plan,
         choice: &Choice<'_>,
-    ) -> String {
+    ) -> NetFamily {
         let out = plan.tensors[step.output].shape;
         let Phases { filter, pad, base } = self.phases(step, plan, choice);
         let group = channels_of_a_group(step.kind, plan.tensors[step.input].shape, out);
@@ -39,18 +40,12 @@ impl Kernel {
         let layer = Layer { filter, out_vectors: out.vectors(), size, precision: plan.precision };
         let permutation = layer.permutation(choice.variant, choice.tuned, plan, choice.facts);
         let row = matches!(step.kind, Kind::Conv { kernel: [3, 3], stride: 1, nearest: 1, padding, .. } if padding == Padding::all(1));
-        if row && permutation.is_some_and(|p| p.weights == Source::Lanes) {
-            // In 16 bits the larger transform would cost accuracy.
-            self.winograd = if plan.precision == Precision::F16 { 2 } else { 4 };
-        }
-        let filter = if self.winograd > 0 { Filter { taps: [3, self.winograd + 2], ..filter } } else { filter };
         (self.filter, self.layer, self.permutation) = (Some(filter), Some(layer), permutation);
-        let plain = Permutation::new(Source::Storage, false, out.vectors().min(2));
-        let Permutation { weights, mirror, vectors, parts, half } = permutation.unwrap_or(plain);
+        let plain = Permutation::new(Source::Storage, out.vectors().min(2));
+        let Permutation { weights, vectors, parts, half } = permutation.unwrap_or(plain);
         let staged = weights == Source::Staged;
-        (self.mirror, self.vectors) = (mirror, if staged { 1 } else { vectors });
+        self.vectors = if staged { 1 } else { vectors };
         self.bound = match weights {
-            Source::Lanes => Bound::Texture,
             Source::Uniform => Bound::Uniform,
             Source::Storage | Source::Staged if plan.precision == Precision::F16 => Bound::Half,
             Source::Storage | Source::Staged => Bound::Storage,
@@ -79,15 +74,15 @@ impl Kernel {
         if parts > 1 {
             let vectors = out.pixels() as u32 * out.vectors();
             let [mut x, mut y] = in_rows(vectors.div_ceil(THREADS));
-            let half = if plan.precision == Precision::F16 { "_half" } else { "" };
             let mut text = prelude.text();
-            let mut measured = "";
-            if step.moments.is_some() {
+            let measured = step.moments.is_some();
+            if measured {
                 (x, y) = ((out.pixels() as u32).div_ceil(THREADS), out.vectors().div_ceil(SUM_COLUMNS));
-                (self.numbers.tiles, measured) = (x, "_measured");
+                self.numbers.tiles = x;
                 text += &format!("const THREADS = {THREADS}u;\nconst MADE = 1u;\n");
             }
-            let (shader, bytes) = (format!("net.sum{half}{measured}"), layer.partial_bytes(parts));
+            let shader = NetKernel { half: self.shader.half, measured, ..NetKernel::new(NetFamily::Sum) };
+            let bytes = layer.partial_bytes(parts);
             self.sum = Some(Sum { shader, prelude: text, groups: [x, y, 1], bytes });
         }
         prelude.add("KERNEL_H", filter.taps[0]);
@@ -99,7 +94,7 @@ impl Kernel {
         if uniform {
             prelude.add("MATRICES", (self.bound_bytes() / super::permutation::MATRIX) as u32);
         }
-        let cut = if parts > 1 { "_parts" } else { "" };
+        self.shader.parts = parts > 1;
         let [columns, rows] = size.map(|edge| edge.div_ceil(filter.spread));
         // Each phase's workgroups in x and y measure what they make.
         let phases = filter.spread * filter.spread;
@@ -111,7 +106,7 @@ impl Kernel {
             self.groups = [columns.div_ceil(GROUP[0]), rows.div_ceil(GROUP[1])];
             self.parts.iter_mut().for_each(|p| p.depth *= vectors);
             self.numbers.tiles = tiles(self);
-            return "conv_plain".into();
+            return NetFamily::ConvPlain;
         }
         if staged {
             let stage = Stage::of(&layer, vectors);
@@ -123,25 +118,19 @@ impl Kernel {
             // A workgroup makes several of the blocks as they are stored.
             self.numbers.blocks = out.vectors().div_ceil(stage.columns * vectors);
             self.parts[0].depth = self.numbers.blocks * filter.spread * filter.spread * parts;
-            let arithmetic = if half { "_arithmetic" } else { "" };
+            self.shader.arithmetic = half;
             prelude.feature = if half { "enable f16;\n" } else { "" };
-            return format!("conv_staged{arithmetic}{cut}");
+            return NetFamily::ConvStaged;
         }
-        let [wide, high] = if self.winograd > 0 { [4, 4] } else { [2, 4] };
+        let [wide, high] = [2, 4];
         // A processor needs no more threads than its vectors are wide, and smaller groups share
         // small pictures out better.
         let threads = if choice.facts.software { THREADS / 4 } else { THREADS };
         prelude.add("THREADS", threads);
         self.groups = in_rows((columns.div_ceil(wide) * rows.div_ceil(high)).div_ceil(threads));
         self.numbers.tiles = tiles(self);
-        let family = if row { "conv3x3" } else { "conv_any" };
-        let input = if mirror && self.bound != Bound::Texture { "_mirror" } else { "" };
-        let weights = match self.bound {
-            Bound::Texture => "_lanes",
-            Bound::Storage => "_wide",
-            _ => "",
-        };
-        format!("{family}{input}{weights}{cut}")
+        self.shader.wide = self.bound == Bound::Storage;
+        if row { NetFamily::Conv3x3 } else { NetFamily::ConvAny }
     }
 
     /// The taps and phases of a step.

@@ -1,8 +1,8 @@
 //! A kernel of a step: which shader with which numbers, what it binds and how many workgroups it takes. Pure.
 
-use super::super::plan::{Plan, Precision};
 use super::layer::{Filter, Layer};
-use super::permutation::{Facts, MATRIX, Permutation, ROW, Tuned, Variant, mirrors};
+use super::permutation::{Facts, MATRIX, Permutation, Tuned, Variant};
+use crate::gpu::shaders::NetKernel;
 
 /// Threads of a workgroup in x and y, as in the shaders.
 pub(super) const GROUP: [u32; 2] = [16, 4];
@@ -20,8 +20,6 @@ pub enum Bound {
     Storage,
     /// Matrices in a storage buffer, 16 bits.
     Half,
-    /// Matrices in a texture, a column a texel.
-    Texture,
     /// Vectors for each four channels in a storage buffer: how many of them.
     Vectors(u32),
 }
@@ -40,8 +38,8 @@ pub struct Part {
 /// A second dispatch, which adds up what the first has made in parts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Sum {
-    /// Name, one of `gpu::shaders::net_names`.
-    pub shader: String,
+    /// Shader.
+    pub shader: NetKernel,
     /// Generated `const` lines.
     pub prelude: String,
     /// Workgroups.
@@ -72,8 +70,8 @@ pub struct Numbers {
 /// How one step runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Kernel {
-    /// Name, one of `gpu::shaders::net_names`.
-    pub shader: String,
+    /// Shader.
+    pub shader: NetKernel,
     /// Generated `const` lines.
     pub prelude: String,
     /// What else is bound.
@@ -84,13 +82,8 @@ pub struct Kernel {
     pub layer: Option<Layer>,
     /// For convolutions of an enlarged input whose taps are merged: the factor and the padding before.
     pub enlarged: Option<(u32, [i32; 2])>,
-    /// Weights of 3×3 taps come transformed for Winograd's F(n, 3) along rows, 3×(n + 2) matrices:
-    /// n, or 0 where they do not.
-    pub winograd: u32,
     /// For blocked convolutions.
     pub permutation: Option<Permutation>,
-    /// It reads its input and its skip from the mirror.
-    pub mirror: bool,
     /// Vectors of output channels of a block of weights.
     pub vectors: u32,
     /// Dispatches.
@@ -116,11 +109,6 @@ impl Kernel {
         self.numbers.tiles
     }
 
-    /// Bytes of a texel of weights.
-    pub fn texel(&self) -> u64 {
-        if self.layer.is_some_and(|l| l.precision == Precision::F16) { 8 } else { 16 }
-    }
-
     /// Bytes of weights that one dispatch binds.
     pub fn bound_bytes(&self) -> u64 {
         let matrices = self.filter.map_or(0, |f| f.matrices(self.vectors)) * u64::from(self.blocks_per_part);
@@ -130,7 +118,6 @@ impl Kernel {
             Bound::Storage => matrices * MATRIX,
             Bound::Half => matrices * MATRIX / 2,
             // Whole rows.
-            Bound::Texture => (matrices * 4).next_multiple_of(ROW) * self.texel(),
             Bound::Vectors(n) => u64::from(n) * 16,
         }
     }
@@ -149,18 +136,6 @@ pub struct Choice<'a> {
     pub tuned: &'a Tuned,
     /// What the device can do.
     pub facts: Facts,
-}
-
-impl Choice<'_> {
-    /// Kernels that are no convolutions read from the mirror: on processors, unless one kind of kernel is asked for.
-    pub(super) fn mirrors(&self, plan: &Plan) -> bool {
-        let wanted = match self.variant {
-            Variant::Auto => self.facts.software,
-            Variant::Fixed(permutation) => permutation.mirror,
-            Variant::Plain => false,
-        };
-        wanted && mirrors(plan)
-    }
 }
 
 /// Lines before a shader's text: `const`s, and the optional feature that it needs.

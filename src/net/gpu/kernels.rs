@@ -4,6 +4,7 @@ use super::super::graph::AddAt;
 use super::super::plan::{Kind, Plan, Precision, Step};
 use super::kernel::{Bound, Choice, GROUP, Kernel, Numbers, Part, Prelude, in_rows};
 use super::layer::THREADS;
+use crate::gpu::shaders::{NetFamily, NetKernel};
 
 /// Rows that a thread of `scale.wgsl` makes.
 const ROWS_OF_SCALE: u32 = 8;
@@ -43,15 +44,13 @@ impl Kernel {
             group_inputs: 0,
         };
         let mut kernel = Kernel {
-            shader: String::new(),
+            shader: NetKernel { half, ..NetKernel::new(NetFamily::Add) },
             prelude: String::new(),
             bound: Bound::None,
             filter: None,
             layer: None,
             enlarged: None,
-            winograd: 0,
             permutation: None,
-            mirror: false,
             vectors: 0,
             parts: vec![Part { first_block: 0, blocks: 0, depth: out.vectors() }],
             sum: None,
@@ -59,7 +58,7 @@ impl Kernel {
             numbers,
             blocks_per_part: 0,
         };
-        let shader: String = match step.kind {
+        let family = match step.kind {
             Kind::Conv { .. } | Kind::Transposed { .. } => kernel.convolution(&mut prelude, step, plan, choice),
             Kind::Upsample => {
                 let double = [input.shape.width * 2, input.shape.height * 2] == [out.width, out.height];
@@ -69,24 +68,24 @@ impl Kernel {
                     let blocks = |edge: u32, group: u32| (edge / 2 + 1).div_ceil(group);
                     kernel.groups = [blocks(out.width, GROUP[0]), blocks(out.height, GROUP[1])];
                 }
-                "upsample".into()
+                NetFamily::Upsample
             }
-            Kind::Nearest => "nearest".into(),
-            Kind::Copy => "add".into(),
+            Kind::Nearest => NetFamily::Nearest,
+            Kind::Copy => NetFamily::Add,
             Kind::Window { left, top, clamp, channel } => {
                 kernel.numbers.pad = [left as i32, top as i32];
                 prelude.add("CLAMP", clamp.into());
                 prelude.add("IN_FULL", input.full.into());
                 prelude.add("OUT_FULL", output.full.into());
                 kernel.parts[0].depth = (channel % 4 + input.shape.channels).div_ceil(4);
-                "window".into()
+                NetFamily::Window
             }
             Kind::Moments => {
                 // At most 2^26 pixels and 1,024 vectors.
                 kernel.numbers.tiles = out.width;
                 kernel.groups = in_rows((out.width * input.shape.vectors()).div_ceil(THREADS));
                 kernel.parts[0].depth = 1;
-                "moments".into()
+                NetFamily::Moments
             }
             Kind::Merge { groups, .. } => {
                 // The moments' picture says how many channels there are.
@@ -99,36 +98,25 @@ impl Kernel {
                 kernel.groups = [groups, 1];
                 kernel.parts[0].depth = 1;
                 kernel.bound = Bound::Vectors(2 * picture.vectors());
-                "merge".into()
+                NetFamily::Merge
             }
-            Kind::Scale { fixed: false } => "norm".into(),
+            Kind::Scale { fixed: false } => NetFamily::Norm,
             Kind::Scale { fixed: true } => {
                 kernel.bound = Bound::Vectors(3 * out.vectors());
-                "batch_norm".into()
+                NetFamily::BatchNorm
             }
             Kind::Shuffle(factor) | Kind::Unshuffle(factor) => {
                 prelude.add("FACTOR", factor);
                 prelude.add("DOWN", matches!(step.kind, Kind::Unshuffle(_)).into());
-                "shuffle".into()
+                NetFamily::Shuffle
             }
         };
         if matches!(step.kind, Kind::Scale { .. }) {
             prelude.add("IN_FULL", (half && input.full).into());
             kernel.groups[1] = out.height.div_ceil(GROUP[1] * ROWS_OF_SCALE);
         }
-        let light = matches!(step.kind, Kind::Upsample | Kind::Copy | Kind::Moments | Kind::Scale { .. });
-        // What is in 32 bits whatever the plan's precision has no mirror.
-        let same = step.reads().all(|t| !half || !plan.tensors[t].full || Some(t) == step.second);
-        let mirror = if light && same && choice.mirrors(plan) { "_mirror" } else { "" };
-        kernel.mirror |= !mirror.is_empty();
-        let reads_mirror = ["_lanes", "_mirror"].iter().any(|end| format!("{shader}{mirror}").ends_with(end));
-        let kind = match (half, reads_mirror && choice.facts.words && step.kind != Kind::Moments) {
-            (true, _) => "_half",
-            (false, true) => "_words",
-            (false, false) => "",
-        };
-        let measured = if step.moments.is_some() && kernel.sum.is_none() { "_measured" } else { "" };
-        kernel.shader = format!("net.{shader}{mirror}{kind}{measured}");
+        kernel.shader.family = family;
+        kernel.shader.measured = step.moments.is_some() && kernel.sum.is_none();
         kernel.prelude = prelude.text();
         kernel
     }

@@ -6,7 +6,7 @@
 //! kernels input vectors come within taps.) All blocks of one phase come before those of the next.
 //! Channels that only pad, and inputs outside an output's group, are zero. A transposed convolution
 //! of stride s is s² ordinary ones, each of which makes every s-th pixel (its phase) in both
-//! directions. Where the kernel works by Winograd's F(n, 3), three neighbouring taps become n + 2.
+//! directions.
 
 use super::kernel::{Bound, Kernel, Part};
 use super::layer::Filter;
@@ -57,16 +57,6 @@ fn fixed(weights: &Weights, op: &Op) -> Vec<Vec<f32>> {
     vec![weights.values(op.name(), "running_mean").to_vec(), scale.collect(), bias]
 }
 
-/// Three neighbouring taps as Winograd's F(2, 3) or F(4, 3) wants them (Lavin and Gray 2016).
-fn winograd(n: u32, left: f64, middle: f64, right: f64) -> [f64; 6] {
-    let (outer, far) = (left + right, left + 4.0 * right);
-    if n == 2 {
-        return [left, (outer + middle) / 2.0, (outer - middle) / 2.0, right, 0.0, 0.0];
-    }
-    let [near, wide] = [middle / 6.0, middle / 12.0];
-    [left / 4.0, -outer / 6.0 - near, near - outer / 6.0, far / 24.0 + wide, far / 24.0 - wide, right]
-}
-
 /// A convolution's numbers, a folded batch norm multiplied in.
 struct Layer<'a> {
     weight: &'a [f32],
@@ -85,7 +75,6 @@ struct Layer<'a> {
     pad: [i32; 2],
     base: [i32; 2],
     enlarged: Option<(u32, [i32; 2])>,
-    winograd: u32,
 }
 
 impl<'a> Layer<'a> {
@@ -117,7 +106,6 @@ impl<'a> Layer<'a> {
             pad: kernel_choice.numbers.pad,
             base: kernel_choice.numbers.base,
             enlarged: kernel_choice.enlarged,
-            winograd: kernel_choice.winograd,
         }
     }
 
@@ -133,11 +121,6 @@ impl<'a> Layer<'a> {
                 return 0.0;
             }
             let first = (o * inputs + i % inputs) * kh * kw;
-            if self.winograd > 0 {
-                let [left, middle, right] = [0, 1, 2].map(|x| f64::from(self.weight[first + ky * kw + x]));
-                let mixed = winograd(self.winograd, left, middle, right)[kx];
-                return (f64::from(self.scale[o]) * mixed) as f32;
-            }
             let Some((factor, pad)) = self.enlarged else {
                 return self.scale[o] * self.weight[first + ky * kw + kx];
             };
@@ -170,7 +153,7 @@ impl<'a> Layer<'a> {
     }
 
     fn part(&self, part: &Part, kernel: &Kernel) -> Vec<u8> {
-        let half = kernel.bound == Bound::Half || (kernel.bound == Bound::Texture && kernel.texel() == 8);
+        let half = kernel.bound == Bound::Half;
         let vectors = kernel.vectors as usize;
         let mut bytes = Vec::with_capacity(kernel.bound_bytes() as usize);
         let mut put = |value: f32| {

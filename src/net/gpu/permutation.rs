@@ -6,10 +6,6 @@ use super::layer::{Layer, Stage};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// Elements in a row of a texture that holds the arena or weights.
-pub const ROW: u64 = 2048;
-/// Most rows: WebGPU's default limit of a texture's edge.
-const MAX_ROWS: u64 = 8192;
 /// WebGPU's default limit of one uniform binding.
 const MAX_UNIFORM: u64 = 64 << 10;
 /// Workgroups that keep a large GPU busy: some for each of its processors.
@@ -34,9 +30,6 @@ pub enum Source {
     Uniform,
     /// In a storage buffer.
     Storage,
-    /// In a texture, shared out among the threads of a subgroup: an optional feature. Reads the
-    /// input from the mirror too.
-    Lanes,
     /// In a storage buffer, and with the input staged in the memory of a workgroup.
     Staged,
 }
@@ -47,12 +40,10 @@ pub enum Source {
 pub struct Permutation {
     /// Where its weights lie.
     pub weights: Source,
-    /// It reads its input from a copy of the arena in a texture.
-    pub mirror: bool,
     /// Vectors of output channels a thread, 1 to 4, staged at most 2.
     pub vectors: u32,
     /// Parts into which the sum over input channels is cut, so that small pictures have work for
-    /// more workgroups; staged and lanes only.
+    /// more workgroups; staged only.
     #[serde(default = "one")]
     pub parts: u32,
     /// Products are taken in 16 bits, of four input channels each, and added up in 32: an optional
@@ -68,8 +59,8 @@ fn one() -> u32 {
 
 impl Permutation {
     /// In one part, in 32 bits.
-    pub const fn new(weights: Source, mirror: bool, vectors: u32) -> Self {
-        Self { weights, mirror, vectors, parts: 1, half: false }
+    pub const fn new(weights: Source, vectors: u32) -> Self {
+        Self { weights, vectors, parts: 1, half: false }
     }
 }
 
@@ -78,11 +69,9 @@ impl std::fmt::Display for Permutation {
         let weights = match self.weights {
             Source::Uniform => "uniform",
             Source::Storage => "storage",
-            Source::Lanes => "lanes",
             Source::Staged => "staged",
         };
-        let mirror = if self.mirror && self.weights != Source::Lanes { " mirror" } else { "" };
-        write!(f, "{weights}{mirror} 8×{}", 4 * self.vectors)?;
+        write!(f, "{weights} 8×{}", 4 * self.vectors)?;
         if self.parts > 1 {
             write!(f, " /{}", self.parts)?;
         }
@@ -105,26 +94,18 @@ pub enum Variant {
 /// What the choice of kernels depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Facts {
-    /// Threads can exchange values within subgroups of at least eight.
-    pub lanes: bool,
     /// The adapter runs on the processor.
     pub software: bool,
     /// Shaders can calculate in 16 bits.
     pub half: bool,
-    /// Shaders on the processor can store words of 64 bits.
-    pub words: bool,
 }
 
 impl Facts {
     /// Of a device.
     pub fn of(device: &wgpu::Device) -> Self {
-        let info = device.adapter_info();
-        let software = info.device_type == wgpu::DeviceType::Cpu;
         Self {
-            lanes: device.features().contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= 8,
-            software,
+            software: device.adapter_info().device_type == wgpu::DeviceType::Cpu,
             half: device.features().contains(wgpu::Features::SHADER_F16),
-            words: software && device.features().contains(wgpu::Features::SHADER_INT64),
         }
     }
 }
@@ -133,25 +114,20 @@ impl Facts {
 pub type Tuned = HashMap<String, Permutation>;
 
 impl Layer {
-    /// Every permutation worth timing here, the guess first. On processors buffers are several
-    /// times slower than textures, a workgroup's memory is no faster than any other, 16-bit
-    /// arithmetic is converted, and a few workgroups are enough: all that is left out there.
+    /// Every permutation worth timing here, the guess first. On processors a workgroup's memory is no
+    /// faster than any other, 16-bit arithmetic is converted, and a few workgroups are enough: all that
+    /// is left out there.
     pub fn candidates(&self, plan: &Plan, facts: Facts) -> Vec<Permutation> {
         let mut vectors: Vec<u32> = (1..=self.out_vectors.min(4)).collect();
         vectors.sort_by_key(|v| self.rounds(*v));
         vectors.truncate(2);
         let mut wanted = Vec::new();
         for vectors in vectors {
-            for weights in [Source::Lanes, Source::Uniform, Source::Storage] {
-                let mirrors = [true, false].into_iter().filter(|mirror| *mirror || !facts.software);
-                wanted.extend(mirrors.map(|mirror| Permutation::new(weights, mirror, vectors)));
-            }
+            wanted.extend([Source::Uniform, Source::Storage].map(|weights| Permutation::new(weights, vectors)));
         }
         if !facts.software {
             for half in [false, true] {
-                wanted.extend(
-                    [1, 2].map(|vectors| Permutation { half, ..Permutation::new(Source::Staged, false, vectors) }),
-                );
+                wanted.extend([1, 2].map(|vectors| Permutation { half, ..Permutation::new(Source::Staged, vectors) }));
             }
         }
         let cut = wanted.clone().into_iter().filter(|_| !facts.software);
@@ -189,16 +165,15 @@ impl Layer {
         width * height * u64::from(self.out_vectors) * u64::from(parts) * 16
     }
 
-    /// What is known without timing. On processors loads are dear, and textures and shared weights
-    /// the cheapest of them. Of GPUs nothing is known yet: 8×8 a thread, uniform weights.
+    /// What is known without timing: uniform weights. On processors loads are dear, and as few as can be
+    /// the best. Of GPUs nothing is known yet: 8×8 a thread.
     pub fn guess(&self, plan: &Plan, facts: Facts) -> Permutation {
-        let wanted = if facts.software {
-            let best = (1..=self.out_vectors.min(4)).rev().min_by_key(|v| self.rounds(*v)).unwrap_or(1);
-            Permutation::new(Source::Lanes, true, best)
+        let vectors = if facts.software {
+            (1..=self.out_vectors.min(4)).rev().min_by_key(|v| self.rounds(*v)).unwrap_or(1)
         } else {
-            Permutation::new(Source::Uniform, false, self.out_vectors.min(2))
+            self.out_vectors.min(2)
         };
-        self.fitted(wanted, plan, facts)
+        self.fitted(Permutation::new(Source::Uniform, vectors), plan, facts)
     }
 
     /// Cost of all blocks of `vectors` output vectors: of each the loads, which weigh about as much
@@ -214,14 +189,9 @@ impl Layer {
         while self.filter.group_vectors < self.out_vectors && !self.filter.group_vectors.is_multiple_of(vectors) {
             vectors -= 1;
         }
-        let mirror = mirrors(plan);
         let grouped = self.filter.group_vectors < self.out_vectors;
         let matrices = self.filter.matrices(vectors);
-        let blocks = self.out_vectors.div_ceil(vectors) * self.filter.spread * self.filter.spread;
-        // Weights of 3×3 taps take up to twice as much when they are transformed.
-        let texels = matrices * u64::from(blocks) * 4 * 2;
         let weights = match wanted.weights {
-            Source::Lanes if facts.lanes && mirror && texels.div_ceil(ROW) <= MAX_ROWS => Source::Lanes,
             Source::Staged if !grouped && self.stored_blocks() <= self.storage_blocks(1).min(MAX_STAGED) => {
                 Source::Staged
             }
@@ -233,12 +203,10 @@ impl Layer {
         let most = ((MAX_PARTIAL / self.partial_bytes(1).max(1)) as u32)
             .clamp(1, MAX_PARTS)
             .min(self.filter.in_vectors.max(1));
-        let cut = staged || weights == Source::Lanes;
         Permutation {
             weights,
-            mirror: weights == Source::Lanes || (mirror && wanted.mirror && !staged),
             vectors: if staged { vectors.min(2) } else { vectors },
-            parts: if cut { wanted.parts.clamp(1, most) } else { 1 },
+            parts: if staged { wanted.parts.clamp(1, most) } else { 1 },
             half: staged && wanted.half && facts.half && plan.precision == Precision::F16,
         }
     }
@@ -275,10 +243,4 @@ impl Layer {
             }),
         }
     }
-}
-
-/// The plan's arena fits into a mirror.
-pub(super) fn mirrors(plan: &Plan) -> bool {
-    let element = if plan.precision == Precision::F16 { 8 } else { 16 };
-    plan.arena_bytes.div_ceil(element * ROW) <= MAX_ROWS
 }

@@ -1,13 +1,14 @@
 //! Compiled kernels.
 
 use super::kernel::Kernel;
-use crate::gpu::{shaders, tape};
+use crate::gpu::shaders::{self, NetKernel};
+use crate::gpu::tape;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A pipeline and the layout of its bind group.
 pub(super) type Compiled = (wgpu::ComputePipeline, wgpu::BindGroupLayout);
-type Map = HashMap<(String, String), Compiled>;
+type Map = HashMap<(NetKernel, String), Compiled>;
 
 /// Compiled kernels of one device, by shader and `const` lines: steps that agree in both share a
 /// pipeline. A clone is the same collection; networks that were given the same one compile nothing
@@ -37,7 +38,7 @@ impl Pipelines {
         if Arc::strong_count(&self.0) > 1 {
             return;
         }
-        let used = |(shader, prelude): &(String, String)| {
+        let used = |(shader, prelude): &(NetKernel, String)| {
             kernels.iter().any(|k| {
                 let sum = k.sum.as_ref().is_some_and(|s| s.shader == *shader && s.prelude == *prelude);
                 sum || (k.shader == *shader && k.prelude == *prelude)
@@ -47,12 +48,13 @@ impl Pipelines {
     }
 
     /// The pipeline of a shader behind its `const` lines.
-    pub(super) fn get(&self, device: &wgpu::Device, shader: &str, prelude: &str) -> Compiled {
+    pub(super) fn get(&self, device: &wgpu::Device, shader: NetKernel, prelude: &str) -> Compiled {
         let make = || {
+            let name = shader.name();
             let descriptor = wgpu::ComputePipelineDescriptor {
-                label: Some(shader),
+                label: Some(&name),
                 layout: None,
-                module: &shaders::module_with(device, shader, prelude),
+                module: &shaders::module_with(device, &name, prelude),
                 entry_point: Some("main"),
                 compilation_options: Default::default(),
                 cache: None,
@@ -61,6 +63,6 @@ impl Pipelines {
             let layout = pipeline.get_bind_group_layout(0);
             (pipeline, layout)
         };
-        self.map().entry((shader.to_string(), prelude.to_string())).or_insert_with(make).clone()
+        self.map().entry((shader, prelude.to_string())).or_insert_with(make).clone()
     }
 }
