@@ -20,6 +20,7 @@ pub struct Args {
     #[arg(long)]
     watch: bool,
     /// Run the steps of this file instead of waiting for hands (docs/viewer.md); reads and saves no settings.
+    #[cfg(feature = "script")]
     #[arg(long, value_name = "JSON")]
     script: Option<PathBuf>,
     /// Settings to begin with instead of the saved ones, as `view.json` holds them; nothing is saved then.
@@ -46,6 +47,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         weights: args.weights,
         method: args.method,
         watch: args.watch,
+        #[cfg(feature = "script")]
         script: args.script,
         settings: args.settings,
         size: args.size,

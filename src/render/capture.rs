@@ -1,7 +1,7 @@
 //! A finished picture in memory: N jittered frames averaged, with the layers that Blender's passes would hold.
 
 use super::view::View;
-use super::{RenderError, Renderer, sampling, tool};
+use super::{Purpose, RenderError, Renderer, sampling, tool};
 use crate::gpu::{Gpu, readback, timing::Recorder};
 use crate::scene::Camera;
 use crate::scene::upload::SceneGpu;
@@ -207,24 +207,25 @@ pub fn capture_with(
     let mut beauty = vec![0.0; 4 * pixels];
     let mut sums: Vec<(Sum, Vec<f32>)> = needed.iter().map(|&s| (s, vec![0.0; s.channels * pixels])).collect();
     let decoder = Decoder::new(&gpu.device, renderer);
-    let mut draw = |i: u32, offset: [f32; 2], shadows: bool| -> Result<(), RenderError> {
+    let mut draw = |i: u32, offset: [f32; 2], purpose: Purpose| -> Result<(), RenderError> {
         let seed = options.seed.wrapping_mul(0x9e37_79b9).wrapping_add(i);
         let view = View::new(camera, size, offset).with_seed(seed).with_samples(options.samples);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, shadows)?;
+        renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, purpose)?;
         gpu.queue.submit([encoder.finish()]);
         Ok(())
     };
     // Backwards, so that the picture's own sample is the one through the pixels' centres.
     for i in (1..=options.warmup).rev() {
-        draw(i, sampling::offset(i, options.seed), i == options.warmup)?;
+        draw(i, sampling::offset(i, options.seed), Purpose::WarmUp { first: i == options.warmup })?;
         if !go_on() {
             return Ok(None);
         }
     }
     for i in 0..options.samples {
         let offset = sampling::offset_of(i, options.samples, options.seed);
-        draw(i, offset, i == 0 && options.warmup == 0)?;
+        let new = i == 0 && options.warmup == 0;
+        draw(i, offset, if new { Purpose::Picture } else { Purpose::FurtherSample })?;
         decoder.add(gpu, size, 0, &mut beauty, 4)?;
         for (sum, data) in &mut sums {
             if i == 0 || sum.filtered {

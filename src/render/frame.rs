@@ -66,6 +66,18 @@ struct Lighting {
     sky: wgpu::BindGroup,
 }
 
+/// What a frame is drawn for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// To be seen.
+    Picture,
+    /// Another sample of the picture before: shadow maps stay as they are and, without temporal anti-aliasing, to which
+    /// each sample is a frame, motion vectors of objects.
+    FurtherSample,
+    /// To be remembered: targets hold no picture after it. `first`: of a picture.
+    WarmUp { first: bool },
+}
+
 /// The rasteriser. The host owns device, queue and encoder; a steady frame allocates nothing on the GPU.
 pub struct Renderer {
     device: wgpu::Device,
@@ -325,21 +337,20 @@ impl Renderer {
         scene: &SceneGpu,
         view: &View,
     ) -> Result<(), RenderError> {
-        self.record_frame(recorder, queue, scene, view, true)
+        self.record_frame(recorder, queue, scene, view, Purpose::Picture)
     }
 
-    /// As [`Renderer::record`]; without `shadows` the maps stay as the previous frame left them,
-    /// which is right for further samples of one picture; without temporal anti-aliasing, to which
-    /// each sample is a frame, so do motion vectors of objects.
+    /// As [`Renderer::record`], no more than `purpose` needs.
     pub(crate) fn record_frame(
         &mut self,
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,
         scene: &SceneGpu,
         view: &View,
-        shadows: bool,
+        purpose: Purpose,
     ) -> Result<(), RenderError> {
         let size = self.targets.size;
+        let new_picture = matches!(purpose, Purpose::Picture | Purpose::WarmUp { first: true });
         let known = self.lighting.take().filter(|l| l.scene == scene.id);
         let fresh = known.is_none();
         let mut lighting = known.unwrap_or_else(|| self.lighting(scene));
@@ -358,24 +369,31 @@ impl Renderer {
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 
         let mut drawn = DrawnCount::default();
-        if shadows || self.taa.is_some() || !self.moved.knows(scene) {
+        if new_picture || self.taa.is_some() || !self.moved.knows(scene) {
             self.moved.follow(&self.device, queue, scene);
             self.passes.deform.record(recorder, queue, scene);
         }
-        if shadows || fresh {
+        if new_picture || fresh {
             let audience = Audience { scene, view, options: &self.lights, stand_ins: picture_only };
             self.passes.shadow.record(recorder, queue, &audience, &mut lighting.maps, &mut drawn);
         }
         let (before, deformed) = (self.moved.before(scene), self.passes.deform.before());
         let inputs = GbufferInputs { scene, before, deformed, view };
         self.passes.gbuffer.record(recorder, inputs, &self.targets, &mut drawn.camera);
-        self.passes.lights.record(recorder, &self.picture.lights, &lighting.lists);
-        let inputs = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
-        self.passes.direct.record(recorder, inputs);
         let mut inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene));
         if let Some(lights) = &mut inputs.lights {
             lights.stand_in &= picture_only;
         }
+        // What a frame leaves behind has no history of pictures but that of temporal anti-aliasing.
+        if let (Purpose::WarmUp { .. }, Some(indirect), None) = (purpose, &mut self.indirect, &self.taa)
+            && indirect.warm_up(recorder, queue, &inputs)?
+        {
+            (self.lighting, self.drawn) = (Some(lighting), drawn);
+            return Ok(());
+        }
+        self.passes.lights.record(recorder, &self.picture.lights, &lighting.lists);
+        let direct = DirectInputs { picture: &self.picture.direct, lights: &lighting.group, size };
+        self.passes.direct.record(recorder, direct);
         if let (Some(indirect), Some(taa)) = (&mut self.indirect, &self.taa) {
             indirect.set_frame(queue, taa.frames());
         }

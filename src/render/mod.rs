@@ -32,6 +32,7 @@ pub use blended::Blending;
 pub use composite::Backdrop;
 pub use cull::DrawnCount;
 pub use exposure::Exposure;
+pub(crate) use frame::Purpose;
 pub use frame::{Renderer, RendererOptions};
 pub use light_choice::LightOptions;
 pub use targets::Targets;

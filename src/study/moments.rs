@@ -17,7 +17,7 @@ use crate::{
     },
     gpu::{Gpu, bind::Bound, readback, timing::Recorder},
     numbers::SplitMix,
-    render::{Renderer, View},
+    render::{Purpose, Renderer, View},
     scene::{Camera, upload::SceneGpu},
 };
 use glam::{Mat4, Quat, Vec3};
@@ -109,7 +109,7 @@ pub fn lesson(
                 return Ok(None);
             }
             // Nothing but the camera moves: one frame's shadow maps do for all.
-            draw(gpu, renderer, raster, camera, fresh)?;
+            draw(gpu, renderer, raster, camera, if fresh { Purpose::Picture } else { Purpose::FurtherSample })?;
             fresh = false;
         }
         let view = View::new(camera, size, [0.0; 2]);
@@ -120,7 +120,7 @@ pub fn lesson(
         if !go_on() {
             return Ok(None);
         }
-        draw(gpu, teacher, raster, camera, frame == 0)?;
+        draw(gpu, teacher, raster, camera, if frame == 0 { Purpose::Picture } else { Purpose::FurtherSample })?;
     }
     let view = View::new(camera, size, [0.0; 2]);
     let taught = reader.read(gpu, teacher, &view, environment, When::Frames(frames))?.past;
@@ -179,11 +179,11 @@ fn draw(
     renderer: &mut Renderer,
     scene: &SceneGpu,
     camera: &Camera,
-    shadows: bool,
+    purpose: Purpose,
 ) -> Result<(), DatasetError> {
     let view = View::new(camera, renderer.size(), [0.0; 2]);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, shadows)?;
+    renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, scene, &view, purpose)?;
     gpu.queue.submit([encoder.finish()]);
     Ok(())
 }

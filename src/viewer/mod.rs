@@ -10,7 +10,7 @@
 //!
 //! `state` knows neither window nor wgpu; `ui` turns hands into its actions; `stage` holds the
 //! GPU's side; `app` brings them together and draws only when something has changed. `script`
-//! drives all of it for tests. `docs/viewer.md` is for users.
+//! drives all of it for tests, whose feature it is. `docs/viewer.md` is for users.
 
 mod app;
 mod choice;
@@ -23,9 +23,11 @@ mod keys;
 mod live;
 mod navigate;
 mod pick;
+#[cfg(feature = "script")]
 mod report;
 mod saved;
 mod screen;
+#[cfg(feature = "script")]
 mod script;
 pub(crate) mod show;
 mod stage;
@@ -56,6 +58,7 @@ pub struct Options {
     /// Load scene, weights and, in a checkout, shaders again when their files change.
     pub watch: bool,
     /// Steps to run instead of waiting for hands; then no settings are read or saved.
+    #[cfg(feature = "script")]
     pub script: Option<PathBuf>,
     /// Settings to begin with instead of the saved ones; then none are saved.
     pub settings: Option<PathBuf>,

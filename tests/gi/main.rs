@@ -37,6 +37,7 @@ mod sky_sun;
 mod stages;
 mod surroundings;
 mod taa;
+mod warm_up;
 mod weights;
 mod whole;
 mod world;

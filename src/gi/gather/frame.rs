@@ -24,6 +24,18 @@ pub struct Settled {
     offset: u32,
 }
 
+impl Settled {
+    fn groups(&self) -> Groups<'_> {
+        Groups { inputs: &self.inputs, scene: &self.params, offset: self.offset }
+    }
+
+    /// Of passes of a thread a cell.
+    fn workgroups(&self) -> [u32; 3] {
+        let [w, h] = self.inputs.cells.map(|n| n.div_ceil(8));
+        [w, h, 1]
+    }
+}
+
 impl GatherGi {
     fn params(&self, inputs: &Inputs<'_>, rays: &Rays<'_>, guided: bool) -> Result<Params, GiError> {
         let counts = rays.scene.counts();
@@ -187,6 +199,15 @@ impl GatherGi {
         Ok(Settled { inputs: bound, specular, pasts, params: frame_params, offset })
     }
 
+    /// Averages means over neighbours and finds where light has changed, which the next frame asks.
+    pub(super) fn blur(&mut self, recorder: &mut Recorder<'_>, settled: &Settled, guidance: Bound) {
+        let store = &self.store;
+        let [pasts, blurred, changes, glosses] =
+            [&settled.pasts, &store.blurred, &store.changes, &store.glosses].map(Bound::from);
+        let own = [pasts, blurred, changes, glosses, guidance];
+        self.blur.record(recorder, settled.groups(), own, settled.workgroups());
+    }
+
     /// Records the rest of the frame: means averaged over neighbours, brought to full size. `guidance`:
     /// [`GUIDANCE`](super::GUIDANCE) bytes a cell.
     pub fn filter(
@@ -196,16 +217,13 @@ impl GatherGi {
         guidance: Option<Bound>,
         output: &wgpu::TextureView,
     ) {
-        let store = &self.store;
         let guidance = guidance.unwrap_or_else(|| Bound::from(&self.no_guidance));
-        let pasts = Bound::from(&settled.pasts);
-        let [changes, glosses, gleams, blurred, light] =
-            [&store.changes, &store.glosses, &store.gleams, &store.blurred, &store.cell_light].map(Bound::from);
-        let [w, h] = settled.inputs.cells.map(|n| n.div_ceil(8));
-        let groups = Groups { inputs: &settled.inputs, scene: &settled.params, offset: settled.offset };
-        let own = [&pasts, &blurred, &changes, &glosses, &guidance].map(Clone::clone);
-        self.blur.record(recorder, groups, own, [w, h, 1]);
-        self.smooth.record(recorder, groups, [pasts, blurred, light, guidance, glosses, gleams], [w, h, 1]);
+        self.blur(recorder, settled, guidance.clone());
+        let store = &self.store;
+        let [pasts, blurred, light, glosses, gleams] =
+            [&settled.pasts, &store.blurred, &store.cell_light, &store.glosses, &store.gleams].map(Bound::from);
+        let own = [pasts, blurred, light, guidance, glosses, gleams];
+        self.smooth.record(recorder, settled.groups(), own, settled.workgroups());
         let brought = Brought {
             light: &store.cell_light,
             glosses: &store.gleams,

@@ -34,7 +34,7 @@ use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage;
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::InputGroup;
-use crate::gpu::bind::Binder;
+use crate::gpu::bind::{Binder, Bound};
 use crate::gpu::binding::{LOAD, READ, READ_WRITE};
 use crate::gpu::timing::Recorder;
 use bring::BringPass;
@@ -255,6 +255,18 @@ impl Technique for GatherGi {
         let settled = self.settle(recorder, queue, inputs, false)?;
         self.filter(recorder, &settled, None, output);
         Ok(())
+    }
+
+    fn warm_up(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+    ) -> Result<bool, GiError> {
+        let settled = self.settle(recorder, queue, inputs, false)?;
+        // Where light has changed cells are told by their neighbours.
+        self.blur(recorder, &settled, Bound::from(&self.no_guidance));
+        Ok(true)
     }
 
     fn gloss(&self) -> Option<&wgpu::TextureView> {

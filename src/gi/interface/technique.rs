@@ -41,6 +41,21 @@ pub trait Technique: Send {
         output: &wgpu::TextureView,
     ) -> Result<(), GiError>;
 
+    /// Records what later frames remember of this one and nothing that only this one shows: output and
+    /// [`gloss`](Technique::gloss) stay as they were, direct light is not read. True when it did; a method that needs
+    /// whole frames says false, and nothing was recorded.
+    ///
+    /// # Errors
+    /// As [`Technique::record`].
+    fn warm_up(
+        &mut self,
+        _recorder: &mut Recorder<'_>,
+        _queue: &wgpu::Queue,
+        _inputs: &Inputs<'_>,
+    ) -> Result<bool, GiError> {
+        Ok(false)
+    }
+
     /// Number of the frame for methods that may vary their patterns because a history averages frames; 0 without one.
     fn set_frame(&mut self, _queue: &wgpu::Queue, _frame: u32) {}
 

@@ -62,6 +62,23 @@ impl Technique for OrBelow {
         below.record(recorder, queue, inputs, output)
     }
 
+    fn warm_up(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+    ) -> Result<bool, GiError> {
+        let Ok(above) = &mut self.above else { return Ok(false) };
+        match above.warm_up(recorder, queue, inputs) {
+            // The whole frame will be drawn by the method below, and say why.
+            Err(GiError::Rays | GiError::Device(_)) => Ok(false),
+            recorded => {
+                (self.why, self.too_small) = (None, false);
+                recorded
+            }
+        }
+    }
+
     fn instead(&self) -> Option<Instead<'_>> {
         Some(Instead { method: "ssgi", why: self.why.as_deref()? })
     }

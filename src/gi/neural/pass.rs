@@ -259,6 +259,18 @@ impl Technique for NeuralGi {
         self.record_stages(recorder, inputs, output)
     }
 
+    fn warm_up(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+    ) -> Result<bool, GiError> {
+        if inputs.size != self.rebuilt.size {
+            self.resize(inputs.size)?;
+        }
+        self.gather.as_mut().map_or(Ok(false), |gather| gather.warm_up(recorder, queue, inputs))
+    }
+
     fn cut(&mut self) {
         self.cut();
     }

@@ -7,6 +7,7 @@ mod meter;
 mod overlay;
 mod reference;
 mod sides;
+#[cfg(feature = "script")]
 mod steps;
 mod work;
 
@@ -16,6 +17,7 @@ use super::judge::Verdict;
 use super::live::{Report, Subjects};
 use super::saved::{self, Settings};
 use super::screen::Screen;
+#[cfg(feature = "script")]
 use super::script::Script;
 use super::stage::Stage;
 use super::state::{Action, State};
@@ -25,6 +27,8 @@ use meter::Meter;
 use overlay::Overlay;
 use reference::Tracing;
 use std::collections::HashSet;
+#[cfg(not(feature = "script"))]
+use std::convert::Infallible as Script;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
@@ -45,8 +49,6 @@ pub enum Event {
 
 /// Time between two looks for GPU times that have not arrived.
 const POLL: Duration = Duration::from_millis(20);
-/// Time between two steps of a script.
-const STEP: Duration = Duration::from_millis(8);
 
 /// Everything.
 pub struct App {
@@ -71,9 +73,8 @@ pub struct App {
     pub meter: Meter,
     pub script: Option<Script>,
     pub scripted: Vec<egui::Event>,
-    next_step: Instant,
-    /// Frames drawn when the last step was made.
-    step_frame: u64,
+    #[cfg(feature = "script")]
+    pace: steps::Pace,
     pub screenshot: Option<PathBuf>,
     watch: Watch,
     next_look: Instant,
@@ -92,13 +93,15 @@ pub struct App {
     pub scene_frames: u64,
     pub copied: Option<String>,
     pub captured: Option<String>,
-    minimised: bool,
     end: Option<Result<(), ViewError>>,
 }
 
 /// Opens the window and runs until it is closed.
 pub fn run(options: Options) -> Result<(), ViewError> {
+    #[cfg(feature = "script")]
     let script = options.script.as_deref().map(Script::load).transpose().map_err(ViewError::Script)?;
+    #[cfg(not(feature = "script"))]
+    let script: Option<Script> = None;
     let scripted = script.is_some();
     let mut settings = Settings::default();
     let mut trouble = None;
@@ -150,8 +153,8 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         meter: Meter::default(),
         script,
         scripted: Vec::new(),
-        next_step: now,
-        step_frame: 0,
+        #[cfg(feature = "script")]
+        pace: steps::Pace::new(now),
         screenshot: None,
         watch: Watch::default(),
         next_look: now,
@@ -167,7 +170,6 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         scene_frames: 0,
         copied: None,
         captured: None,
-        minimised: false,
         end: None,
         options,
     };
@@ -201,6 +203,7 @@ impl App {
     }
 
     /// True while nothing is at work and nothing would change the picture.
+    #[cfg(feature = "script")]
     pub fn is_idle(&self) -> bool {
         let converging = self.stage.as_ref().is_none_or(|s| s.is_converging(&self.state));
         let tracing = self.state.wants_reference()
@@ -312,13 +315,8 @@ impl ApplicationHandler<Event> for App {
         self.again |= due(self.tracing.judge_at);
         // Where frames are drawn anyway, they decide themselves when numbers are due.
         self.redraw |= due(self.overlay.due()) && !self.again && !self.requested;
-        // One frame after the other: also where held keys let the window draw without end.
-        let seen = self.frames > self.step_frame || !(self.requested || self.redraw || self.again);
-        if self.script.is_some() && now >= self.next_step && self.scripted.is_empty() && seen {
-            self.next_step = now + STEP;
-            self.step_frame = self.frames;
-            self.step(event_loop);
-        }
+        #[cfg(feature = "script")]
+        self.step_when_due(now, event_loop);
         if self.redraw || self.again {
             self.request_redraw();
         }
@@ -328,7 +326,8 @@ impl ApplicationHandler<Event> for App {
             self.overlay.due().filter(|_| !self.again),
             (self.meter.timed_frames > 0).then(|| now + POLL),
             self.options.watch.then_some(self.next_look),
-            self.script.is_some().then(|| now + STEP),
+            #[cfg(feature = "script")]
+            self.script.is_some().then(|| now + steps::STEP),
         ];
         match next.into_iter().flatten().min() {
             Some(at) => event_loop.set_control_flow(ControlFlow::WaitUntil(at)),

@@ -102,6 +102,7 @@ impl Overlay {
     }
 
     /// True while numbers wait to be shown.
+    #[cfg(feature = "script")]
     pub fn is_stale(&self) -> bool {
         self.stale
     }

@@ -30,6 +30,7 @@ pub struct Tracing {
 
 impl Tracing {
     /// True while a comparison is due or at work.
+    #[cfg(feature = "script")]
     pub fn is_judging(&self) -> bool {
         self.judging.is_some() || self.judge_at.is_some()
     }

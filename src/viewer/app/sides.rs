@@ -69,6 +69,7 @@ impl App {
     }
 
     /// True while a method on show waits for trees that nobody has begun to build.
+    #[cfg(feature = "script")]
     pub(super) fn will_build_rays(&self) -> bool {
         let Some(stage) = &self.stage else { return false };
         let sources = self.state.sources();

@@ -13,7 +13,7 @@ use super::state::{Stale, State};
 use super::wires::WiresPass;
 use crate::accel::SceneRays;
 use crate::gpu::{Gpu, readback, timing::Recorder};
-use crate::render::{Backdrop, DrawnCount, RenderError, Renderer, View as Eye, sampling};
+use crate::render::{Backdrop, DrawnCount, Purpose, RenderError, Renderer, View as Eye, sampling};
 use crate::scene::{
     Camera, Scene,
     upload::{SceneGpu, TextureMemory},
@@ -242,7 +242,8 @@ impl Stage {
             // Sample by sample as a capture takes them.
             let offset = sampling::offset_of(self.still, state.settings.samples, 0);
             let view = Eye::new(camera, size, offset).with_seed(self.still);
-            slot.renderer.record_frame(recorder, &self.gpu.queue, scene, &view, self.still == 0)?;
+            let purpose = if self.still == 0 { Purpose::Picture } else { Purpose::FurtherSample };
+            slot.renderer.record_frame(recorder, &self.gpu.queue, scene, &view, purpose)?;
             if state.settings.samples > 1 {
                 let hdr = &slot.renderer.targets().hdr;
                 let sums = match slot.sums.take().filter(|s| s.fits(hdr)) {

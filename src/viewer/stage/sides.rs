@@ -77,6 +77,7 @@ impl Stage {
     }
 
     /// The last report of the path tracer.
+    #[cfg(feature = "script")]
     pub fn reference(&self) -> Option<&Found> {
         self.reference.as_ref().map(|r| &r.found)
     }
