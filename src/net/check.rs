@@ -1,7 +1,8 @@
 //! One operator judged by itself, whatever the picture's size: its numbers, and the channels of what it reads.
 
-use super::graph::{GraphError, MAX_CHANNELS, MAX_JOINED, MAX_KERNEL, MAX_PAD, MAX_SCALE, MAX_STRIDE};
+use super::graph_error::GraphError;
 use super::op::{Activation, Op};
+use super::tensor::{MAX_CHANNELS, MAX_JOINED, MAX_KERNEL, MAX_PAD, MAX_SCALE, MAX_STRIDE};
 
 /// Reports a whole number outside `min..=max`.
 pub(super) fn range(errors: &mut Vec<GraphError>, op: &str, what: &'static str, value: u32, min: u32, max: u32) {

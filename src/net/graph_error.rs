@@ -1,6 +1,6 @@
 //! What can be wrong with a graph.
 
-use super::graph::Shape;
+use super::tensor::Shape;
 use thiserror::Error;
 
 /// What is wrong with a graph. `op` is the operator's name.

@@ -34,6 +34,7 @@ mod shape;
 mod shipped;
 mod spec;
 mod stored;
+mod tensor;
 pub mod tune;
 mod write;
 

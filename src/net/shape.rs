@@ -1,7 +1,8 @@
 //! The shape that an operator gives, once every tensor that it reads has one.
 
-use super::graph::{GraphError, MAX_EDGE, Shape};
+use super::graph_error::GraphError;
 use super::op::{Op, Upsample};
+use super::tensor::{MAX_EDGE, Shape};
 
 /// Shape of `op`'s output; `of` knows the shapes of its inputs. The graph has passed [`super::graph::Graph::check`].
 pub(super) fn infer(op: &Op, of: impl Fn(&str) -> Shape) -> Result<Shape, GraphError> {

@@ -25,6 +25,8 @@ use std::time::{Duration, Instant};
 
 /// Longest that a step may wait.
 const PATIENCE: Duration = Duration::from_secs(180);
+/// Time between two steps.
+pub const STEP: Duration = Duration::from_millis(8);
 
 /// One step; exactly one of the fields but `button` and `keys` is given.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -100,6 +102,9 @@ pub struct Script {
     frames: u64,
     pointer: Pos2,
     saved: BTreeMap<String, Value>,
+    /// When the next step may be made, and frames that the window had drawn at the last.
+    next: Instant,
+    drawn: u64,
 }
 
 /// What a frame begins with.
@@ -128,7 +133,18 @@ impl Script {
         }
         let steps = steps.into_iter().enumerate().collect();
         let (pending, pointer) = (VecDeque::new(), Pos2::ZERO);
-        Ok(Self { steps, pending, since: Instant::now(), frames: 0, pointer, saved: BTreeMap::new() })
+        let (now, saved) = (Instant::now(), BTreeMap::new());
+        Ok(Self { steps, pending, since: now, frames: 0, pointer, saved, next: now, drawn: 0 })
+    }
+
+    /// Whether the next step may be made, `drawn` frames after the beginning: one frame after the other, also where
+    /// held keys let the window draw without end. `quiet`: nothing waits to be drawn.
+    pub fn is_due(&mut self, now: Instant, drawn: u64, quiet: bool) -> bool {
+        let due = now >= self.next && (quiet || drawn > self.drawn);
+        if due {
+            (self.next, self.drawn) = (now + STEP, drawn);
+        }
+        due
     }
 
     /// What the next frame begins with. `state` is how things stand after the last one.

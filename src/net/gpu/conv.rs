@@ -52,7 +52,6 @@ impl Kernel {
         };
         let blocks = out.vectors().div_ceil(self.vectors);
         let all = blocks * filter.spread * filter.spread;
-        let uniform = self.bound == Bound::Uniform;
         // As many blocks a dispatch as a binding of weights, and its workgroups in z, allow; staged
         // kernels need all at once.
         let bound = match self.bound {
@@ -91,9 +90,6 @@ impl Kernel {
         prelude.add("SPREAD", filter.spread);
         prelude.add("NEAREST", filter.nearest);
         prelude.add("VECTORS", vectors);
-        if uniform {
-            prelude.add("MATRICES", (self.bound_bytes() / super::permutation::MATRIX) as u32);
-        }
         self.shader.parts = parts > 1;
         let [columns, rows] = size.map(|edge| edge.div_ceil(filter.spread));
         // Each phase's workgroups in x and y measure what they make.

@@ -7,7 +7,7 @@ pub fn example_preludes() -> Vec<(String, String)> {
     let mut examples = Vec::new();
     let lines =
         |pairs: &[(&str, u32)]| -> String { pairs.iter().map(|(n, v)| format!("const {n} = {v}u;\n")).collect() };
-    let common = lines(&[("MATRICES", 256), ("THREADS", 64)]);
+    let common = lines(&[("THREADS", 64)]);
     for shader in NetKernel::all() {
         let epilogues: &[[u32; 3]] = match shader {
             _ if !shader.family.finishes() => &[[0, 0, 0]],

@@ -1,7 +1,7 @@
 //! A kernel of a step: which shader with which numbers, what it binds and how many workgroups it takes. Pure.
 
 use super::layer::{Filter, Layer};
-use super::permutation::{Facts, MATRIX, Permutation, Tuned, Variant};
+use super::permutation::{Facts, MATRIX, MAX_UNIFORM, Permutation, Tuned, Variant};
 use crate::gpu::shaders::NetKernel;
 
 /// Threads of a workgroup in x and y, as in the shaders.
@@ -114,7 +114,9 @@ impl Kernel {
         let matrices = self.filter.map_or(0, |f| f.matrices(self.vectors)) * u64::from(self.blocks_per_part);
         match self.bound {
             Bound::None => 0,
-            Bound::Uniform => matrices.next_power_of_two() * MATRIX,
+            // As long whatever the layer has of them: an array's length is part of a shader's text, and each text is
+            // compiled.
+            Bound::Uniform => MAX_UNIFORM,
             Bound::Storage => matrices * MATRIX,
             Bound::Half => matrices * MATRIX / 2,
             // Whole rows.

@@ -6,8 +6,8 @@ use super::layer::{Layer, Stage};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// WebGPU's default limit of one uniform binding.
-const MAX_UNIFORM: u64 = 64 << 10;
+/// WebGPU's default limit of one uniform binding, bytes; what kernels with uniform weights bind.
+pub const MAX_UNIFORM: u64 = 64 << 10;
 /// Workgroups that keep a large GPU busy: some for each of its processors.
 const CROWD: u32 = 256;
 /// Most parts of a sum.
@@ -165,15 +165,9 @@ impl Layer {
         width * height * u64::from(self.out_vectors) * u64::from(parts) * 16
     }
 
-    /// What is known without timing: uniform weights. On processors loads are dear, and as few as can be
-    /// the best. Of GPUs nothing is known yet: 8×8 a thread.
+    /// What is taken without timing: uniform weights, 8×8 a thread.
     pub fn guess(&self, plan: &Plan, facts: Facts) -> Permutation {
-        let vectors = if facts.software {
-            (1..=self.out_vectors.min(4)).rev().min_by_key(|v| self.rounds(*v)).unwrap_or(1)
-        } else {
-            self.out_vectors.min(2)
-        };
-        self.fitted(Permutation::new(Source::Uniform, vectors), plan, facts)
+        self.fitted(Permutation::new(Source::Uniform, self.out_vectors.min(2)), plan, facts)
     }
 
     /// Cost of all blocks of `vectors` output vectors: of each the loads, which weigh about as much

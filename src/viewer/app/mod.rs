@@ -73,8 +73,6 @@ pub struct App {
     pub meter: Meter,
     pub script: Option<Script>,
     pub scripted: Vec<egui::Event>,
-    #[cfg(feature = "script")]
-    pace: steps::Pace,
     pub screenshot: Option<PathBuf>,
     watch: Watch,
     next_look: Instant,
@@ -153,8 +151,6 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         meter: Meter::default(),
         script,
         scripted: Vec::new(),
-        #[cfg(feature = "script")]
-        pace: steps::Pace::new(now),
         screenshot: None,
         watch: Watch::default(),
         next_look: now,
@@ -316,7 +312,13 @@ impl ApplicationHandler<Event> for App {
         // Where frames are drawn anyway, they decide themselves when numbers are due.
         self.redraw |= due(self.overlay.due()) && !self.again && !self.requested;
         #[cfg(feature = "script")]
-        self.step_when_due(now, event_loop);
+        {
+            let quiet = !(self.requested || self.redraw || self.again);
+            let drawn = self.frames;
+            if self.scripted.is_empty() && self.script.as_mut().is_some_and(|s| s.is_due(now, drawn, quiet)) {
+                self.step(event_loop);
+            }
+        }
         if self.redraw || self.again {
             self.request_redraw();
         }
@@ -327,7 +329,7 @@ impl ApplicationHandler<Event> for App {
             (self.meter.timed_frames > 0).then(|| now + POLL),
             self.options.watch.then_some(self.next_look),
             #[cfg(feature = "script")]
-            self.script.is_some().then(|| now + steps::STEP),
+            self.script.is_some().then(|| now + super::script::STEP),
         ];
         match next.into_iter().flatten().min() {
             Some(at) => event_loop.set_control_flow(ControlFlow::WaitUntil(at)),

@@ -4,37 +4,11 @@ use super::App;
 use crate::viewer::report;
 use crate::viewer::script::Order;
 use crate::viewer::state::Action;
-use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 
-/// Time between two steps.
-pub(super) const STEP: Duration = Duration::from_millis(8);
-
-/// When the next step may be made.
-pub(super) struct Pace {
-    next: Instant,
-    /// Frames drawn when the last was made.
-    frame: u64,
-}
-
-impl Pace {
-    pub fn new(now: Instant) -> Self {
-        Self { next: now, frame: 0 }
-    }
-}
-
 impl App {
-    /// Makes the next step of the script, one frame after the other: also where held keys let the window draw without
-    /// end.
-    pub(super) fn step_when_due(&mut self, now: Instant, event_loop: &ActiveEventLoop) {
-        let seen = self.frames > self.pace.frame || !(self.requested || self.redraw || self.again);
-        if self.script.is_some() && now >= self.pace.next && self.scripted.is_empty() && seen {
-            self.pace = Pace { next: now + STEP, frame: self.frames };
-            self.step(event_loop);
-        }
-    }
-
-    fn step(&mut self, event_loop: &ActiveEventLoop) {
+    /// The next step of the script.
+    pub(super) fn step(&mut self, event_loop: &ActiveEventLoop) {
         let Some(mut script) = self.script.take() else { return };
         let turn = script.turn(&report::report(self));
         self.script = Some(script);
