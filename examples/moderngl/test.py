@@ -1,5 +1,5 @@
-"""python test.py EXPORT SCENE SCENE.glb TWIN [FRAMES]: draws frames with this folder's renderer and a camera that moves, runs the
-exported pass on them, has the Rust pass run on the same bytes (TWIN is `twin.rs`, built), and compares. Then the same
+"""python test.py EXPORT SCENE SCENE.glb YARDSTICK [FRAMES]: draws frames with this folder's renderer and a camera that moves, runs the
+exported pass on them, has the Rust pass run on the same bytes (YARDSTICK is `yardstick.rs`, built), and compares. Then the same
 with mistakes, each of which must be noticed."""
 
 import json
@@ -15,7 +15,7 @@ from gi_pass import Pass, camera_values
 from renderer import Renderer
 from scene import Scene
 
-# What of the textures the Rust pass is given, as bytes of the formats in `twin.rs`.
+# What of the textures the Rust pass is given, as bytes of the formats in `yardstick.rs`.
 INPUTS = ["depth", "normal", "albedo", "emissive", "direct", "motion", "specular"]
 # Of the tonemapped light: the mean must be within a step of 8 bits, and so must this share of all numbers.
 STEP, SHARE = 1 / 255, 0.99
@@ -79,7 +79,7 @@ def differences(a, b):
 
 
 def main():
-    export, name, glb, twin = sys.argv[1:5]
+    export, name, glb, yardstick = sys.argv[1:5]
     # Half of them in motion, where rounding decides which rays count as a change: after 8 in all a hundredth of the
     # numbers is more than a step off, after 16 two thousandths.
     count = int(sys.argv[5]) if len(sys.argv) > 5 else 16
@@ -90,7 +90,7 @@ def main():
         drawn.write(Path(folder))
         rust = []
         for _ in range(2):
-            subprocess.run([twin, name, manifest["method"], folder], check=True)
+            subprocess.run([yardstick, name, manifest["method"], folder], check=True)
             light = np.fromfile(Path(folder) / "rust.output", "f2").reshape(drawn.size[1], drawn.size[0], 4)
             rust.append(light)
     failed = []

@@ -116,7 +116,7 @@ fn exposure_is_exact_over_many_cells() {
 }
 
 #[test]
-fn ambient_is_its_twin_and_linear() {
+fn ambient_is_its_cpu_reference_and_linear() {
     let Some(gpu) = common::gpu() else { return };
     for (seed, size) in SIZES.into_iter().enumerate() {
         let shot = Shot::random(size, seed as u64);
@@ -141,7 +141,7 @@ fn ambient_is_its_twin_and_linear() {
 }
 
 #[test]
-fn pack_is_its_twin() {
+fn pack_is_its_cpu_reference() {
     let Some(gpu) = common::gpu() else { return };
     let few = FeatureSet::new([("normal", 3), ("depth", 1), ("sky", 3)]).expect("in order");
     let mut compared = 0;
@@ -214,7 +214,7 @@ fn by_cpu<const N: usize>(shot: &Shot, answers: &[[f32; N]]) -> Vec<[f32; 3]> {
     picture.reconstruct(&picture.exposure(), if N == 6 { Answer::Gain } else { Answer::Light }, &six)
 }
 
-fn same_as_twin<const N: usize>(gpu: &Gpu, shot: &Shot, mut answers: Vec<[f32; N]>) {
+fn same_as_reference<const N: usize>(gpu: &Gpu, shot: &Shot, mut answers: Vec<[f32; N]>) {
     if answers.len() > 1 {
         answers[1] = std::array::from_fn(|c| [f32::NAN, 90.0, -90.0][c % 3]);
     }
@@ -231,20 +231,20 @@ fn same_as_twin<const N: usize>(gpu: &Gpu, shot: &Shot, mut answers: Vec<[f32; N
 }
 
 #[test]
-fn reconstruct_is_its_twin() {
+fn reconstruct_is_its_cpu_reference() {
     let Some(gpu) = common::gpu() else { return };
     for (seed, size) in SIZES.into_iter().enumerate() {
         let shot = Shot::random(size, 200 + seed as u64);
         let mut r = Random(7);
         let [w, h] = shot.cells();
         let mut number = |scale: f32, offset: f32| scale * r.unit() + offset;
-        same_as_twin(
+        same_as_reference(
             &gpu,
             &shot,
             (0..w * h).map(|_| [number(3.0, -2.0), number(1.0, 0.0), number(-1.0, 0.0)]).collect(),
         );
         let six = |_| std::array::from_fn::<f32, 6, _>(|c| if c < 3 { number(0.5, -0.3) } else { number(0.16, -0.12) });
-        same_as_twin(&gpu, &shot, (0..w * h).map(six).collect());
+        same_as_reference(&gpu, &shot, (0..w * h).map(six).collect());
     }
 }
 

@@ -199,7 +199,7 @@ fn dropout_drops_the_same_values_everywhere() {
 /// Layers as wide as the paper's, whose weights fit no uniform binding: as chosen here, staged, and
 /// with their sums in parts.
 #[test]
-fn wide_layers_agree_with_the_cpu_twin() {
+fn wide_layers_agree_with_the_cpu_reference() {
     let Some(gpu) = common::gpu() else { return };
     let pipelines = Pipelines::default();
     let norm = |c: u32| {

@@ -98,7 +98,7 @@ fn run_network(gpu: &Gpu, network: &Network, input: &Tensor) -> Tensor {
 }
 
 #[test]
-fn the_cpu_twin_agrees_with_pytorch() {
+fn the_cpu_reference_agrees_with_pytorch() {
     let mut seen = 0;
     for name in NAMES {
         let weights = Weights::load(&fixture(&format!("{name}.safetensors"))).unwrap();
@@ -113,7 +113,7 @@ fn the_cpu_twin_agrees_with_pytorch() {
 }
 
 #[test]
-fn every_kernel_agrees_with_pytorch_and_with_the_cpu_twin() {
+fn every_kernel_agrees_with_pytorch_and_with_the_cpu_reference() {
     let Some(gpu) = common::gpu() else { return };
     let mut seen = 0;
     for variant in [Variant::Plain, fixed(Source::Storage, 2), Variant::Auto] {

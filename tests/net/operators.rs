@@ -16,7 +16,7 @@ pub const TOLERANCE: f32 = 1e-4;
 pub const TOLERANCE_HALF: f32 = 5e-3;
 
 #[test]
-fn the_cpu_twin_agrees_with_pytorch_on_every_operator() {
+fn the_cpu_reference_agrees_with_pytorch_on_every_operator() {
     let (cases, metadata) = cases("operators.safetensors");
     let graphs = graphs(&metadata.unwrap());
     assert_eq!(graphs.keys().collect::<Vec<_>>(), cases.keys().collect::<Vec<_>>());

@@ -6,7 +6,7 @@ use bouncelight::net::plan::Precision;
 /// Each layer's result is what the CPU reference computes when its graph ends there; of the shipped
 /// network, whose concatenations are slices of one tensor and whose layers share memory.
 #[test]
-fn every_layer_can_be_read_as_the_cpu_twin_computes_it() {
+fn every_layer_can_be_read_as_the_cpu_reference_computes_it() {
     let Some(gpu) = common::gpu() else { return };
     let weights = Weights::shipped().unwrap();
     let shape = Shape { channels: weights.graph.input_channels, width: 24, height: 16 };

@@ -117,7 +117,7 @@ fn conformance() -> Result<(), String> {
 
 /// Hosts in other languages; their tests are their own programs.
 fn hosts() -> Result<(), String> {
-    cargo(&["build", "--bin", "bouncelight", "--example", "moderngl_twin", "--example", "export_scene"])?;
+    cargo(&["build", "--bin", "bouncelight", "--example", "moderngl_yardstick", "--example", "export_scene"])?;
     let program = built("debug")?;
     make_sure_of_adapter(&program)?;
     if Command::new("spirv-val").arg("--version").output().is_err()
@@ -131,8 +131,8 @@ fn hosts() -> Result<(), String> {
     let work = folder.with_file_name("hosts");
     std::fs::create_dir_all(&work).map_err(|e| format!("{}: {e}", work.display()))?;
     let text = |path: &std::path::Path| path.to_string_lossy().into_owned();
-    let [program, twin, scene_writer] =
-        ["bouncelight", "examples/moderngl_twin", "examples/export_scene"].map(|p| text(&folder.join(p)));
+    let [program, yardstick, scene_writer] =
+        ["bouncelight", "examples/moderngl_yardstick", "examples/export_scene"].map(|p| text(&folder.join(p)));
     let (venv, glb) = (text(&work.join("venv")), text(&work.join("cornell.glb")));
     let python = format!("{venv}/bin/python");
     if !std::path::Path::new(&python).exists() {
@@ -144,7 +144,7 @@ fn hosts() -> Result<(), String> {
         let folder = text(&work.join(format!("moderngl-{method}")));
         let target = ["--method", method, "--target", "glsl430", "--size", "160x96", "-o", &folder];
         run(&mut command(&program, &[["-q", "export", "cornell"].as_slice(), &target].concat()))?;
-        run(&mut command(&python, &["examples/moderngl/test.py", &folder, "cornell", &glb, &twin]))?;
+        run(&mut command(&python, &["examples/moderngl/test.py", &folder, "cornell", &glb, &yardstick]))?;
     }
     // The whole picture.
     let [folder, picture, ours] =

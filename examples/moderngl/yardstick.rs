@@ -1,6 +1,6 @@
 //! The pass as Rust runs it, on the inputs that `test.py` has drawn: its yardstick.
 //!
-//!     cargo run --example moderngl_twin -- SCENE gather|neural FOLDER
+//!     cargo run --example moderngl_yardstick -- SCENE gather|neural FOLDER
 //!
 //! FOLDER holds `inputs.json` and for each frame K the textures' bytes as `K.NAME`; the light of the last frame is
 //! written there as `rust.output` (`Rgba16Float`, rows from the top).
@@ -41,7 +41,7 @@ struct Camera {
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [scene, method, folder] = &args[..] else {
-        return Err("usage: moderngl_twin SCENE gather|neural FOLDER".into());
+        return Err("usage: moderngl_yardstick SCENE gather|neural FOLDER".into());
     };
     let (scene, folder) = (scene::load(scene)?, Path::new(folder));
     let method = match method.as_str() {
