@@ -29,7 +29,8 @@ fn tree(bencher: Bencher, count: u32) {
     bencher.counter(divan::counter::ItemsCount::new(triangles.len())).bench(|| Accel::build(black_box(&triangles)));
 }
 
-/// A paper room's objects turned into rows, and the tree over them made anew: what a frame with something moving pays.
+/// A paper room's objects turned into rows, and the tree over them made anew: what a frame with
+/// something moving pays.
 #[divan::bench(max_time = 5)]
 fn place_instances(bencher: Bencher) {
     let Ok(gpu) = Gpu::open(&GpuOptions::default()) else {

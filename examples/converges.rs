@@ -33,7 +33,8 @@ struct Asked {
 /// Reflectance of a channel from which on its light is compared.
 const LEAST_COLOUR: f32 = 0.01;
 
-/// Squared length of the mean normal of what paths see through a point from which on it is one surface.
+/// Squared length of the mean normal of what paths see through a point from which on it is one
+/// surface.
 const ONE_SURFACE: f32 = 0.999;
 
 /// One cell that shows a surface: its pixel, and E/π of it.

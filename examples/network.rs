@@ -37,7 +37,8 @@ fn main() -> Result<(), Failure> {
         match line?.as_str() {
             "run" => {
                 let place = network.input();
-                // Within a frame the input is made where the network reads it, so bringing it there is not timed.
+                // Within a frame the input is made where the network reads it, so bringing it there
+                // is not timed.
                 gpu.queue.write_buffer(place.buffer, place.offset, bytemuck::cast_slice(&input));
                 gpu.queue.submit([]);
                 gpu.device.poll(PollType::wait_indefinitely())?;

@@ -1,4 +1,5 @@
-//! What mistakes of a host look like: `docs/images/symptoms.png`, drawn by the host of `examples/embed`.
+//! What mistakes of a host look like: `docs/images/symptoms.png`, drawn by the host of
+//! `examples/embed`.
 //!
 //!     cargo run --release --example symptoms -- docs/images/symptoms.png
 

@@ -1,7 +1,8 @@
 //! An EXR's picture through a view transform, as PNG: `cargo run --example tonemap -- in.exr
 //! out.png [filmic|agx|neutral|none]`.
 //!
-//! The same curve as `bouncelight render`, for pictures from elsewhere, such as a path tracer's reference.
+//! The same curve as `bouncelight render`, for pictures from elsewhere, such as a path tracer's
+//! reference.
 
 use bouncelight::{image_io, render::tonemap_curve::Tonemap};
 use std::path::Path;

@@ -1,6 +1,7 @@
 //! Triangles in trees, for rays: built on the CPU, traversed in `shaders/accel/traverse.wgsl`.
 //! [`Accel`] is one tree over triangles of the world, as the path tracer has it; [`SceneRays`] has
-//! a tree for each mesh, or for several that are in one place, and one over instances, which may move.
+//! a tree for each mesh, or for several that are in one place, and one over instances, which may
+//! move.
 //!
 //! An eight-wide tree with quantised child boxes, after Ylitie, Karras and Laine ("Efficient
 //! Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017), collapsed from a
@@ -36,10 +37,12 @@ pub(crate) use trees::{MeshPart, corners};
 
 use thiserror::Error;
 
-/// The most triangles a structure takes: building needs 250 to 500 bytes for each, so 2 to 4 GB here.
+/// The most triangles a structure takes: building needs 250 to 500 bytes for each, so 2 to 4 GB
+/// here.
 pub const MAX_TRIANGLES: u64 = 1 << 23;
 
-/// Coordinates farther from the origin than this (metres) are left out like non-finite ones: their products overflow.
+/// Coordinates farther from the origin than this (metres) are left out like non-finite ones: their
+/// products overflow.
 pub const MAX_COORDINATE: f32 = 1e12;
 
 /// Levels that a tree of triangles has at most.
@@ -100,7 +103,8 @@ pub enum AccelError {
     },
 }
 
-/// Triangles in an order and with boxes around them that let a ray find what it hits in logarithmic time.
+/// Triangles in an order and with boxes around them that let a ray find what it hits in logarithmic
+/// time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Accel {
     blocks: Vec<wide::Block>,
@@ -112,7 +116,8 @@ pub struct Accel {
 }
 
 impl Accel {
-    /// Fails when `triangles` is more than [`Accel::build`] takes. For callers that would first have to make them all.
+    /// Fails when `triangles` is more than [`Accel::build`] takes. For callers that would first
+    /// have to make them all.
     pub fn check_count(triangles: u64) -> Result<(), AccelError> {
         if triangles > MAX_TRIANGLES { Err(AccelError::TooManyTriangles { triangles }) } else { Ok(()) }
     }

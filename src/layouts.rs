@@ -1,5 +1,6 @@
-//! Every struct that shaders and Rust share lies the same in both: each struct of each shader's uniform and storage
-//! variables must be one of these rows, field by field. A struct without a row fails.
+//! Every struct that shaders and Rust share lies the same in both: each struct of each shader's
+//! uniform and storage variables must be one of these rows, field by field. A struct without a row
+//! fails.
 
 use crate::gpu::shaders;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
@@ -13,8 +14,8 @@ struct Layout {
     fields: BTreeMap<String, usize>,
 }
 
-/// A row: name in the shaders, Rust struct, fields; `a as "b"` where the shader calls field `a` `b`; `size`
-/// where Rust pads.
+/// A row: name in the shaders, Rust struct, fields; `a as "b"` where the shader calls field `a`
+/// `b`; `size` where Rust pads.
 macro_rules! row {
     ($name:literal, $rust:ty => $($field:ident $(as $other:literal)?),+ $(,)?) => {
         row!($name, $rust, size size_of::<$rust>() => $($field $(as $other)?),+)
@@ -29,9 +30,9 @@ macro_rules! row {
     (@name $field:ident $other:literal) => { $other };
 }
 
-/// Structs that no Rust struct matches: shaders alone write and read the first two, the table of the third is
-/// written as a list of numbers before its materials, and the others are a few words, written where they are
-/// bound.
+/// Structs that no Rust struct matches: shaders alone write and read the first two, the table of
+/// the third is written as a list of numbers before its materials, and the others are a few words,
+/// written where they are bound.
 const WITHOUT_ROW: [&str; 6] = ["Matrix", "Partial", "MaterialStore", "ShadowCamera", "Options", "Flicker"];
 
 /// What follows the first element of an array in Rust, which shaders name one by one.

@@ -1,4 +1,5 @@
-//! The `bouncelight` program: parse the command line, run the subcommand, turn errors into exit codes.
+//! The `bouncelight` program: parse the command line, run the subcommand, turn errors into exit
+//! codes.
 
 fn main() -> std::process::ExitCode {
     quiet_mesa();

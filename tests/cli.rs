@@ -261,7 +261,8 @@ fn a_reference_above_the_threshold_exits_with_5() {
     assert_eq!(dark.status.code(), Some(5), "{}", String::from_utf8_lossy(&dark.stderr));
     assert!(Path::new(&diff).exists() && Path::new(&again).exists(), "the pictures are kept for a look");
 
-    // Against its own radiance any exposure is right; FLIP tells another light, and so does its map.
+    // Against its own radiance any exposure is right; FLIP tells another light, and so does its
+    // map.
     let (linear, lit) = (path(&dir, "linear.exr"), path(&dir, "lit.png"));
     assert!(with(&[&linear]).status.success());
     let flip = ["--reference", &linear, "--metric", "flip", "--threshold", "0.01", "--diff", &diff];
@@ -315,7 +316,8 @@ fn bench_prints_passes_and_writes_a_record_that_it_can_compare_with() {
 #[test]
 fn gl_draws_the_same_picture_as_vulkan() {
     let dir = tempfile::tempdir().unwrap();
-    // The Cornell box has six local shadow maps, the room four cascades: shapes that GL could mistake for a cube map.
+    // The Cornell box has six local shadow maps, the room four cascades: shapes that GL could
+    // mistake for a cube map.
     for scene in ["cornell", "paper-room:2"] {
         let mut files = Vec::new();
         for backend in ["vulkan", "gl"] {

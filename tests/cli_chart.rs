@@ -1,4 +1,5 @@
-//! `bouncelight chart` from the command line: a small chart, taken up again, with a scene that fails.
+//! `bouncelight chart` from the command line: a small chart, taken up again, with a scene that
+//! fails.
 #![cfg(feature = "cli")]
 
 mod common;
@@ -80,7 +81,8 @@ fn a_small_chart_is_made_and_taken_up_again() {
         assert!((ms(old) / ms(new) - 1.0).abs() < 1e-12, "{old} {new}");
     }
     assert!(String::from_utf8_lossy(&again.get_output().stderr).find("warning").is_none());
-    // One more method leaves the others alone; a scene that cannot be read fails at the end and loses nothing.
+    // One more method leaves the others alone; a scene that cannot be read fails at the end and
+    // loses nothing.
     let broken = folder.path().join("broken.glb");
     std::fs::write(&broken, "no scene").expect("writable");
     let scenes = format!("cornell,paper-room:7,{}", broken.display());

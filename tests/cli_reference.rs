@@ -1,4 +1,5 @@
-//! `render --method reference` as a user meets it: flags, metadata, exit codes, files that appear or do not.
+//! `render --method reference` as a user meets it: flags, metadata, exit codes, files that appear
+//! or do not.
 
 mod common;
 #[path = "common/program.rs"]
@@ -94,7 +95,8 @@ fn pictures_tell_their_noise_and_how_they_were_made() {
     assert_eq!(key(&other, "ReferenceBounces"), "unlimited unlimited unlimited");
 }
 
-/// A preview is nearer to the truth than what it is made of, as bright, and told; layers stay as they were traced.
+/// A preview is nearer to the truth than what it is made of, as bright, and told; layers stay as
+/// they were traced.
 #[test]
 fn a_preview_is_nearer_to_the_truth_and_says_what_it_is() {
     if common::gpu().is_none() {

@@ -1,4 +1,5 @@
-//! `bouncelight compare` as a user meets it: names, numbers, heat maps, records, layers, errors. Needs no adapter.
+//! `bouncelight compare` as a user meets it: names, numbers, heat maps, records, layers, errors.
+//! Needs no adapter.
 #![cfg(feature = "cli")]
 
 use assert_cmd::Command;

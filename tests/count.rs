@@ -1,4 +1,5 @@
-//! What shaders count while they draw, against what is known of a frame and what methods say of themselves.
+//! What shaders count while they draw, against what is known of a frame and what methods say of
+//! themselves.
 
 mod common;
 
@@ -56,7 +57,8 @@ fn passes_that_find_no_light_are_counted_and_those_that_cannot_draw_are_not() {
 fn rays_are_those_that_a_frame_at_rest_sends() {
     let Some(gpu) = common::gpu() else { return };
     let costs = counted(&gpu, Method::Gather(gather::Options::default()), [128, 64], 12);
-    // A look a cell and one for each 2×2: the nearest hit, a line to a light, a line to where an entry's rays begin.
+    // A look a cell and one for each 2×2: the nearest hit, a line to a light, a line to where an
+    // entry's rays begin.
     let looks = 32.0 * 16.0 * 1.25;
     let rays = of(&costs, "gi.rays").rays;
     assert!(rays > looks && rays <= 3.0 * looks, "{rays} rays for {looks} looks");

@@ -1,5 +1,5 @@
-//! What is left out because it cannot be seen changes no picture, and shadow maps that stay are those that
-//! would be drawn.
+//! What is left out because it cannot be seen changes no picture, and shadow maps that stay are
+//! those that would be drawn.
 
 #[path = "common/build.rs"]
 mod build;

@@ -1,5 +1,5 @@
-//! G-buffer and direct light against Blender's Cycles: committed fixtures of sunlight alone, and the folder of
-//! reference renders where there is one.
+//! G-buffer and direct light against Blender's Cycles: committed fixtures of sunlight alone, and
+//! the folder of reference renders where there is one.
 #![cfg(feature = "io")]
 
 #[path = "common/build.rs"]
@@ -39,7 +39,8 @@ impl Reference {
         }
     }
 
-    /// Whether no light at all reaches the pixel: faces that coincide with others, which Cycles shows black.
+    /// Whether no light at all reaches the pixel: faces that coincide with others, which Cycles
+    /// shows black.
     fn is_black(&self, x: usize, y: usize) -> bool {
         self.diff_ind.as_ref().is_some_and(|indirect| {
             [indirect, &self.diff_dir].iter().all(|light| pixel(light, x, y).iter().all(|v| *v == 0.0))
@@ -62,7 +63,8 @@ struct Numbers {
     depth: f64,
     /// Mean distance of DiffDir to the allowed interval over its mean, away from shadow edges.
     direct: f64,
-    /// The same over all pixels with some albedo, shadow edges and silhouettes included; for the tables.
+    /// The same over all pixels with some albedo, shadow edges and silhouettes included; for the
+    /// tables.
     everywhere: f64,
     /// Share of the pixels that counted for `direct`.
     counted: f64,
@@ -89,7 +91,8 @@ fn measure(frame: &CapturedFrame, reference: &Reference, sky: f32) -> Numbers {
             let theirs = Vec3::new(n[0], n[2], -n[1]).normalize_or_zero();
             let angle = Vec3::from_slice(normal.at(x, y)).normalize_or_zero().angle_between(theirs);
             good_normals += usize::from(angle.to_degrees() < 2.0);
-            // Cycles' unfiltered passes come from its first sample, which goes through the pixel's centre as ours.
+            // Cycles' unfiltered passes come from its first sample, which goes through the pixel's
+            // centre as ours.
             let z = depth.at(x, y)[0];
             let theirs = pixel(&reference.depth, x, y)[0];
             good_depths += usize::from((z / theirs - 1.0).abs() < 0.005);
@@ -141,10 +144,12 @@ fn measure(frame: &CapturedFrame, reference: &Reference, sky: f32) -> Numbers {
     }
 }
 
-/// Stricter than asked for (5 %), so that a light 15 % too bright is noticed even where the sky's share hides a part.
+/// Stricter than asked for (5 %), so that a light 15 % too bright is noticed even where the sky's
+/// share hides a part.
 const DIRECT: f64 = 0.002;
 
-/// `normals`: share of pixels that must agree; silhouettes, where both are averages, weigh more in small pictures.
+/// `normals`: share of pixels that must agree; silhouettes, where both are averages, weigh more in
+/// small pictures.
 fn within(n: &Numbers, normals: f64) -> bool {
     n.color <= 0.006 && n.normal >= normals && n.depth >= 0.999 && n.direct <= DIRECT
 }
@@ -192,7 +197,8 @@ fn fixture(name: &str) -> Reference {
     Reference::read(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/cycles").join(name))
 }
 
-/// One of `reference/real`, with lamps of the size that its reference has; and the radiance of its sky.
+/// One of `reference/real`, with lamps of the size that its reference has; and the radiance of its
+/// sky.
 fn real_scene(folder: &Path) -> (Scene, f32) {
     let meta = std::fs::read(folder.join("meta.json")).expect("it is there");
     let meta: serde_json::Value = serde_json::from_slice(&meta).expect("it is JSON");
@@ -250,8 +256,8 @@ fn layers_agree_with_the_reference_renders() {
     }
 }
 
-/// A hotel's carpet has more detail than a few samples show, so these have 16. Cycles counts the sky's own light as
-/// direct; up to that much may lack.
+/// A hotel's carpet has more detail than a few samples show, so these have 16. Cycles counts the
+/// sky's own light as direct; up to that much may lack.
 #[test]
 fn real_scenes_have_the_colours_and_the_direct_light_of_cycles() {
     let Some(gpu) = common::gpu() else { return };

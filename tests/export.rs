@@ -124,8 +124,9 @@ fn shaders_of_every_target_validate_and_bind_what_the_manifest_says() {
                         let info = validated(&module, &shader.name);
                         (module, Some(info))
                     }
-                    // naga reads its own SPIR-V with other signs of integers, which its validator refuses;
-                    // `spirv-val` judges it below. There is nothing in it that the entry point does not use.
+                    // naga reads its own SPIR-V with other signs of integers, which its validator
+                    // refuses; `spirv-val` judges it below. There is nothing in it that the entry
+                    // point does not use.
                     Target::Spirv => {
                         let module = naga::front::spv::parse_u8_slice(bytes, &Default::default());
                         (module.unwrap_or_else(|e| panic!("{}: {e}", shader.name)), None)

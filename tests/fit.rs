@@ -190,7 +190,8 @@ fn what_cannot_be_is_told() {
     assert!(!folder.path().join("a.png").exists());
 }
 
-/// What a network has learned is kept where it wins, with its weights beside the record; where it does not, nothing is.
+/// What a network has learned is kept where it wins, with its weights beside the record; where it
+/// does not, nothing is.
 #[test]
 fn a_network_learns_the_scene_and_stays_only_if_it_wins() {
     if common::gpu().is_none() {

@@ -1,5 +1,5 @@
-//! FLIP and HDR-FLIP against NVIDIA's own evaluator on committed pictures (fixtures/metrics/flip/make.py), and against
-//! plain reason.
+//! FLIP and HDR-FLIP against NVIDIA's own evaluator on committed pictures
+//! (fixtures/metrics/flip/make.py), and against plain reason.
 
 use bouncelight::metrics::{
     MetricError, Picture,
@@ -120,7 +120,8 @@ mod against_the_reference {
         }
     }
 
-    /// Negative controls: what a wrong implementation might forget moves the numbers beyond the tolerance.
+    /// Negative controls: what a wrong implementation might forget moves the numbers beyond the
+    /// tolerance.
     #[test]
     fn mistakes_would_be_noticed() {
         let pair = &pairs("ldr", 8)[0];
@@ -129,7 +130,8 @@ mod against_the_reference {
                 off(&flip(picture(a, pair.width), picture(b, pair.width), ppd).expect("comparable"), pair);
             assert!(mean > 2e-5 || pixel > 4e-4, "{mean:e} {pixel:e}");
         };
-        // One level in one channel of one pixel; another viewing distance; linear values taken for display values.
+        // One level in one channel of one pixel; another viewing distance; linear values taken for
+        // display values.
         let mut touched = pair.a.clone();
         touched[3 * (20 * pair.width + 30) + 1] += 1.0 / 255.0;
         tell(&touched, &pair.b, pair.ppd);
@@ -192,7 +194,8 @@ fn it_is_the_same_seen_in_a_mirror_or_turned() {
 
 #[test]
 fn the_eye_forgives_from_afar() {
-    // Fine noise against its own mean: a viewer further away (more pixels in a degree) sees less of it.
+    // Fine noise against its own mean: a viewer further away (more pixels in a degree) sees less of
+    // it.
     let grain: Vec<f32> = noise(64 * 48, 6).into_iter().flat_map(|v| [0.4 + 0.2 * v; 3]).collect();
     let flat = vec![0.5; grain.len()];
     let at = |ppd| flip(picture(&grain, 64), picture(&flat, 64), ppd).expect("comparable").mean();

@@ -290,7 +290,8 @@ fn inner_faces_of_closed_bodies_are_seen_from_inside_only() {
     assert!(differ(&both, &one) > 100, "a single triangle has two sides");
 }
 
-/// Coverage of layers over a black board, pixel by pixel: its mean with its standard deviation over pixels.
+/// Coverage of layers over a black board, pixel by pixel: its mean with its standard deviation over
+/// pixels.
 #[test]
 fn layers_cover_their_share_and_many_frames_know_it_well() {
     let Some(gpu) = common::gpu() else { return };
@@ -322,7 +323,8 @@ fn layers_cover_their_share_and_many_frames_know_it_well() {
         assert!((mean - 0.3).abs() < 0.01 && spread < 0.8 * drawn, "{samples}: {mean} ± {spread} {drawn}");
         assert!(samples < 16 || spread < 0.5 * drawn, "{samples}: {mean} ± {spread} {drawn}");
     }
-    // Layers are independent in every pixel, or coverages would not multiply: the same threshold gives 0.3 again.
+    // Layers are independent in every pixel, or coverages would not multiply: the same threshold
+    // gives 0.3 again.
     let (mean, spread) = covered(&[0.3, 0.3], 1024);
     println!("two layers: {mean:.4} ± {spread:.4}");
     assert!((mean - 0.51).abs() < 0.01 && spread < 0.02, "{mean} ± {spread}");

@@ -1,4 +1,5 @@
-//! Picture files: what is written reads back, what is broken is refused in words, nothing is left half-written.
+//! Picture files: what is written reads back, what is broken is refused in words, nothing is left
+//! half-written.
 #![cfg(feature = "io")]
 
 mod common;

@@ -1,10 +1,11 @@
-//! What is depended on may be given on: licences and sources as `deny.toml` allows them, for those who have no
-//! `cargo deny`. Asks `cargo metadata` for all packages of all features and platforms.
+//! What is depended on may be given on: licences and sources as `deny.toml` allows them, for those
+//! who have no `cargo deny`. Asks `cargo metadata` for all packages of all features and platforms.
 
 use serde_json::Value;
 use std::process::Command;
 
-/// Whether an SPDX expression can be met with what is allowed. A slash is the older way to write OR.
+/// Whether an SPDX expression can be met with what is allowed. A slash is the older way to write
+/// OR.
 fn is_met(expression: &str, allowed: &dyn Fn(&str) -> bool) -> bool {
     let spaced = expression.replace('(', " ( ").replace(')', " ) ").replace('/', " OR ").replace(" WITH ", "_WITH_");
     let words: Vec<String> = spaced.split_whitespace().map(|w| w.replace("_WITH_", " WITH ")).collect();

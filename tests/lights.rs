@@ -1,4 +1,5 @@
-//! Many lights: lists of tiles leave out nothing that is seen, and shadows go to the lamps that matter.
+//! Many lights: lists of tiles leave out nothing that is seen, and shadows go to the lamps that
+//! matter.
 
 #[path = "common/build.rs"]
 mod build;
@@ -19,7 +20,8 @@ fn random(seed: &mut u32) -> f32 {
     (*seed >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Slabs on a floor of `spread` times 200 m, and `count` lamps above it: bare ones, ones with a range, spots.
+/// Slabs on a floor of `spread` times 200 m, and `count` lamps above it: bare ones, ones with a
+/// range, spots.
 fn yard(count: u32, spread: f32) -> Scene {
     let mut meshes = vec![floor(100.0 * spread, 0.0)];
     for k in 0..30 {
@@ -60,7 +62,8 @@ fn shoot(gpu: &Gpu, scene: &Scene, lights: LightOptions, blending: Blending) -> 
     capture(gpu, &mut renderer, &uploaded, &camera(), CaptureOptions::default()).unwrap().beauty
 }
 
-/// Largest difference of what is shown, in steps of 8 bits, with an exposure that shows the mean as middle grey.
+/// Largest difference of what is shown, in steps of 8 bits, with an exposure that shows the mean as
+/// middle grey.
 fn steps(a: &Picture, b: &Picture) -> f32 {
     let rgb = |p: &Picture| -> Vec<f32> { p.data.chunks_exact(4).flat_map(|p| p[..3].to_vec()).collect() };
     let (a, b) = (rgb(a), rgb(b));

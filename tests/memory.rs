@@ -1,7 +1,7 @@
 //! Frame after frame takes no more memory: neither we nor the driver keep anything of a frame that
-//! is over. Drivers may: Mesa's for CPUs compiles a shader anew for each draw where uniforms alone decide
-//! which way it goes, and keeps them all (`gather`: 31 MB a frame, before its shaders asked otherwise). A
-//! process of its own, since all of it is measured.
+//! is over. Drivers may: Mesa's for CPUs compiles a shader anew for each draw where uniforms alone
+//! decide which way it goes, and keeps them all (`gather`: 31 MB a frame, before its shaders asked
+//! otherwise). A process of its own, since all of it is measured.
 #![cfg(target_os = "linux")]
 
 mod common;

@@ -1,4 +1,5 @@
-//! Metrics against scikit-image and SciPy on committed pictures (fixtures/metrics/make.py), and against plain reason.
+//! Metrics against scikit-image and SciPy on committed pictures (fixtures/metrics/make.py), and
+//! against plain reason.
 
 use bouncelight::metrics::{
     self, Comparison, FlipMaps, LayerComparison, MetricError, NAMES, Options, Picture, Views, compare, compare_with,
@@ -56,7 +57,8 @@ mod against_scikit_image {
         pairs
     }
 
-    /// Relative difference; of numbers below 0.001, which equal pictures give, a thousand times the absolute one.
+    /// Relative difference; of numbers below 0.001, which equal pictures give, a thousand times the
+    /// absolute one.
     fn off(value: f64, want: f64) -> f64 {
         (value - want).abs() / want.abs().max(1e-3)
     }
@@ -149,10 +151,12 @@ fn values_known_by_hand() {
     // A flat channel stretches to 0 and not to NaN.
     let flat = compare_both(&a, &b, 8);
     assert_eq!((flat.paper.l1, flat.paper.fid), (0.0, 0.0));
-    // Flat greys have no variance, so SSIM is its luminance term: 2·0.5·0.6 over 0.5² + 0.6², K1 = 0.01.
+    // Flat greys have no variance, so SSIM is its luminance term: 2·0.5·0.6 over 0.5² + 0.6², K1 =
+    // 0.01.
     assert!((flat.display.ssim - 0.6001 / 0.6101).abs() < 1e-6);
-    // Red is 1 in a share of the pixels and 0 elsewhere, the other channels are flat: the distance is that of two
-    // Gaussians on a line, (p − q)² + (σp − σq)², with covariances that have no inverse.
+    // Red is 1 in a share of the pixels and 0 elsewhere, the other channels are flat: the distance
+    // is that of two Gaussians on a line, (p − q)² + (σp − σq)², with covariances that have no
+    // inverse.
     let share = |count: usize| -> Vec<f32> { (0..100).flat_map(|i| [f32::from(i < count), 0.3, 0.7]).collect() };
     let (few, many) = (share(20), share(50));
     let sigma = |p: f64| (p * (1.0 - p) * 100.0 / 99.0).sqrt();

@@ -178,7 +178,8 @@ fn the_motions_of_camera_and_objects_add_up() {
     right(&draw(&gpu, &mut renderer, &uploaded, next).errors(&second, &second));
 }
 
-/// A mirrored transform winds the other way, so its instance is drawn after the others: slots change hands.
+/// A mirrored transform winds the other way, so its instance is drawn after the others: slots
+/// change hands.
 #[test]
 fn instances_keep_their_past_when_draws_are_sorted_anew() {
     let Some(gpu) = common::gpu() else { return };

@@ -71,8 +71,8 @@ fn extent(plan: &Plan, t: &Tensor) -> (u64, u64) {
     (t.offset, t.offset + vectors * t.vector_bytes())
 }
 
-/// No two tensors that live at one time share bytes, except a step that overwrites what it reads, and a part of a
-/// concatenation.
+/// No two tensors that live at one time share bytes, except a step that overwrites what it reads,
+/// and a part of a concatenation.
 fn check_memory(graph: &Graph, plan: &Plan) {
     for (i, a) in plan.tensors.iter().enumerate() {
         assert_eq!(plan.tensors[a.root].offset % ALIGN, 0);
@@ -192,7 +192,8 @@ fn sums_fuse_where_they_may() {
     check_memory(&sums, &plan);
 }
 
-/// A batch norm that is not folded rounds once, as one that is: what it alone reads of a convolution stays in 32 bits.
+/// A batch norm that is not folded rounds once, as one that is: what it alone reads of a
+/// convolution stays in 32 bits.
 #[test]
 fn what_a_batch_norm_reads_is_not_rounded() {
     let norm = serde_json::json!({"name": "n", "input": "a", "output": "n", "channels": 4});
@@ -221,7 +222,8 @@ fn errors_name_the_operator() {
     assert!(matches!(error, PlanError::TooLarge { .. }), "{error}");
 }
 
-/// A random graph: each operator reads tensors made before it; sums and concatenations only where sizes agree.
+/// A random graph: each operator reads tensors made before it; sums and concatenations only where
+/// sizes agree.
 fn random_graph(choices: &[(u8, u8, u8)], [width, height]: [u32; 2]) -> Graph {
     let mut graph = Graph { input_channels: 3, ops: Vec::new(), output: String::new() };
     let mut made = vec![("input".to_string(), Shape { channels: 3, height, width })];

@@ -9,8 +9,8 @@ use bouncelight::net::format::Weights;
 use bouncelight::net::gpu::{Network, Options, Permutation, Source, Variant};
 use std::time::Instant;
 
-/// The compact network at a 1024×512 picture, each family of kernels, minimum of several synchronised runs, interleaved
-/// so that other work on the machine hits all alike.
+/// The compact network at a 1024×512 picture, each family of kernels, minimum of several
+/// synchronised runs, interleaved so that other work on the machine hits all alike.
 #[test]
 #[ignore = "a measurement"]
 fn compact_network_at_256x128() {

@@ -23,8 +23,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// A bright rare spike, a path's usual sample, a tiny one, and one of either sign; each is an integer times a power of
-// two, so that the host makes the very same number.
+// A bright rare spike, a path's usual sample, a tiny one, and one of either sign; each is an
+// integer times a power of two, so that the host makes the very same number.
 fn value_of(point: u32, i: u32) -> vec4f {
     let h = pcg(point * 1000003u + i);
     let u = f32(h >> 8u) / 16777216.0;
@@ -46,7 +46,8 @@ fn value_of(point: u32, i: u32) -> [f64; 4] {
     [spike, u, u / 1024.0, u - 0.5]
 }
 
-/// Runs `main` of `body` behind the film's shader in dispatches of `step` samples; gives film and plain sums.
+/// Runs `main` of `body` behind the film's shader in dispatches of `step` samples; gives film and
+/// plain sums.
 fn run(gpu: &Gpu, body: &str, samples: u32, step: u32) -> (Vec<f32>, Vec<f32>) {
     let text =
         [include_str!("../shaders/lib/hash.wgsl"), include_str!("../shaders/reference/film.wgsl"), body].concat();

@@ -1,4 +1,5 @@
-//! The path tracer's light transport: strategies agree, nothing counts twice, sides and coverage are as documented.
+//! The path tracer's light transport: strategies agree, nothing counts twice, sides and coverage
+//! are as documented.
 #![cfg(feature = "reference")]
 
 #[path = "common/build.rs"]
@@ -57,7 +58,8 @@ fn apart(a: &[(f64, f64); 8], b: &[(f64, f64); 8]) -> f64 {
     (0..4).map(|k| (a[k].0 - b[k].0).abs() / (a[k].1.powi(2) + b[k].1.powi(2)).sqrt().max(1e-9)).fold(0.0, f64::max)
 }
 
-/// Light from a picture of the surroundings alone, most of it from a spot that rays hardly find by chance.
+/// Light from a picture of the surroundings alone, most of it from a spot that rays hardly find by
+/// chance.
 fn sky_with_a_bright_spot() -> Scene {
     let mut s = everything_shines();
     s.lights.clear();
@@ -180,7 +182,8 @@ fn all_strategies_agree() {
 #[test]
 fn camera_rays_pass_back_faces_and_shadow_rays_do_not() {
     let Some(gpu) = common::gpu() else { return };
-    // A floor that faces up, and above the eye's way a sheet whose front faces up, too: from below it is not seen.
+    // A floor that faces up, and above the eye's way a sheet whose front faces up, too: from below
+    // it is not seen.
     let mut s = scene(vec![floor(4.0, 0.0), floor(1.0, 2.0)], vec![sun([0.0, -1.0, 0.0], 3.0, 0.0)]);
     s.materials[0].double_sided = false;
     let down = look_at([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 0.5);

@@ -134,7 +134,8 @@ fn every_sample_counts_once_and_layers_are_divided_as_blender_does() {
         assert_eq!(at(Layer::Env, i), [x, y, 1.5], "background, and the filter's default width");
         assert_eq!(at(Layer::Normal, i), [0.0, 0.25 * y, 0.0]);
         assert_eq!((at(Layer::Depth, i), at(Layer::Position, i)), (vec![i as f32], vec![1.0, 2.0, 3.0]));
-        // The sum of its parts. Diffuse blue has light without colour, which no layer can hold: 0.125 u.
+        // The sum of its parts. Diffuse blue has light without colour, which no layer can hold:
+        // 0.125 u.
         let part = |d, a, b, c: usize| f64::from(at(d, i)[c]) * f64::from(at(a, i)[c] + at(b, i)[c]);
         for c in 0..3 {
             let sum = part(Layer::DiffCol, Layer::DiffDir, Layer::DiffInd, c)
@@ -293,7 +294,8 @@ fn the_picture_is_the_sum_of_its_layers() {
     assert!(worst < 1e-5, "{worst}");
     assert!(brightest > 1.0 && lit > 1000, "{brightest}, {lit}: there is light, bounced too");
     assert!(layer(Layer::Depth).iter().any(|d| *d < 100.0) && traced.dropped == 0);
-    // Bands of the real kernel, too: random numbers are keyed by the pixel, and sums do not depend on the cutting.
+    // Bands of the real kernel, too: random numbers are keyed by the pixel, and sums do not depend
+    // on the cutting.
     let bands = bench.trace([24, 24], None, TracerOptions { band: 128, dispatch: Duration::from_millis(1), ..all(4) });
     assert_eq!(bands.layers, traced.layers);
 }
@@ -316,7 +318,8 @@ fn rays_begin_at_the_near_plane() {
 
 #[test]
 fn chosen_points_agree_with_the_pixels_of_a_whole_picture() {
-    // Every fourth pixel, as the network samples; the halves' difference gives each point's error bar.
+    // Every fourth pixel, as the network samples; the halves' difference gives each point's error
+    // bar.
     let size = [32u32, 32];
     let list: Vec<[f32; 2]> =
         (0..64).map(|i| [(4 * (i % 8) + 2) as f32 + 0.5, (4 * (i / 8) + 2) as f32 + 0.5]).collect();
@@ -348,7 +351,8 @@ fn chosen_points_agree_with_the_pixels_of_a_whole_picture() {
         let values: Vec<f64> = runs.iter().map(of).collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let noise = runs.iter().map(|t| t.noise_of(Layer::Gi).unwrap()).map(|n| n.pixel * n.mean).sum::<f64>();
-        // Error of a mean over 64 points and four runs, from the halves' noise of one point in one run.
+        // Error of a mean over 64 points and four runs, from the halves' noise of one point in one
+        // run.
         (mean, noise / 4.0 / (64.0f64 * 4.0).sqrt())
     };
     let (a, b) = (means(&points, &|p| p), means(&whole, &pixel));

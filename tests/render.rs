@@ -101,7 +101,8 @@ fn a_quads_shadow_falls_where_it_should() {
     let Some(gpu) = common::gpu() else { return };
     let casters = vec![floor(50.0, 0.0), quad([-1.0, 3.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, -2.0])];
     let camera = look_at([3.0, 2.0, 8.0], [3.0, 0.0, 0.0], 0.9);
-    // The shadow is the quad moved by 3 m along x under the sun; under the lamp at (0, 6, 0) it is twice as large.
+    // The shadow is the quad moved by 3 m along x under the sun; under the lamp at (0, 6, 0) it is
+    // twice as large.
     let lamp = spot([0.0, 6.0, 0.0], [0.3, -1.0, 0.0], 0.7, 0.9, 0.01);
     for (light, at, half) in [
         (sun([1.0, -1.0, 0.0], 1.0, 0.005), 3.0, 1.0),
@@ -341,8 +342,8 @@ fn a_backdrop_is_shown_blurred_or_hidden_and_lights_the_scene_in_any_case() {
     }
 }
 
-/// A wall that the sun grazes at 15° is as bright at its foot as above, whatever of the floor a shadow map shows beside
-/// it; right below a board that keeps the sun off it is dark.
+/// A wall that the sun grazes at 15° is as bright at its foot as above, whatever of the floor a
+/// shadow map shows beside it; right below a board that keeps the sun off it is dark.
 #[test]
 fn a_grazed_wall_has_no_dark_line_at_its_foot_and_no_bright_one_below_a_board() {
     let Some(gpu) = common::gpu() else { return };

@@ -1,5 +1,5 @@
-//! Scenes: the paper's stream, homes, glTF and OBJ with everything that can be wrong in them, bundled scenes,
-//! round trips.
+//! Scenes: the paper's stream, homes, glTF and OBJ with everything that can be wrong in them,
+//! bundled scenes, round trips.
 #![cfg(feature = "io")]
 
 mod common;

@@ -1,4 +1,5 @@
-//! Every shader of the table parses and validates. (`src/layouts.rs` compares their structs with those of Rust.)
+//! Every shader of the table parses and validates. (`src/layouts.rs` compares their structs with
+//! those of Rust.)
 
 use bouncelight::gpu::shaders;
 

@@ -72,7 +72,8 @@ fn gather_passes_what_ambient_fails_and_every_control_fails() {
     assert!(sheet.height > 4 * 128 && sheet.pixels.iter().any(|v| *v > 0.5));
 }
 
-/// The truth itself passes in units a thousand times as large, and what a slow history shows in a doorway is noticed.
+/// The truth itself passes in units a thousand times as large, and what a slow history shows in a
+/// doorway is noticed.
 #[test]
 fn units_and_doorway_say_something() {
     let Some(gpu) = common::gpu() else { return };
@@ -85,7 +86,8 @@ fn units_and_doorway_say_something() {
     }
 }
 
-/// Objects that move change the light between surfaces that stand still (half a minute: 150 frames of white rooms).
+/// Objects that move change the light between surfaces that stand still (half a minute: 150 frames
+/// of white rooms).
 #[test]
 fn a_door_that_is_shut_leaves_a_dark_room() {
     let Some(gpu) = common::gpu() else { return };

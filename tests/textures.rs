@@ -124,8 +124,8 @@ fn filter(x: f32) -> f32 {
     0.35875 - 0.48829 * v.cos() + 0.14128 * (2.0 * v).cos() - 0.01168 * (3.0 * v).cos()
 }
 
-/// Many samples of a pixel show what the pixel's filter shows of a texture, and not a texture that mip levels had
-/// filtered before.
+/// Many samples of a pixel show what the pixel's filter shows of a texture, and not a texture that
+/// mip levels had filtered before.
 #[test]
 fn textures_are_filtered_once() {
     let Some(gpu) = common::gpu() else { return };
@@ -232,7 +232,8 @@ fn small_bumps_are_rough() {
     assert!(bumpy < 0.2 && flat > 0.3, "{bumpy} {flat}");
 }
 
-/// Soft colours with edges, as photographs have them; bumps as a normal map; roughness and metal in patches.
+/// Soft colours with edges, as photographs have them; bumps as a normal map; roughness and metal in
+/// patches.
 fn photograph(x: u32, y: u32) -> [u8; 4] {
     let (u, v) = (x as f32 / 64.0, y as f32 / 64.0);
     let grain = ((x * 7919 + y * 104_729) % 17) as f32 / 17.0 - 0.5;
@@ -257,7 +258,8 @@ fn picture(at: fn(u32, u32) -> [u8; 4]) -> Vec<[u8; 4]> {
     (0..64 * 64).map(|i| at(i % 64, i / 64)).collect()
 }
 
-/// What BC7 loses by kind of map, with the settings that the upload uses (the crate's encoder for the CPU is the same).
+/// What BC7 loses by kind of map, with the settings that the upload uses (the crate's encoder for
+/// the CPU is the same).
 #[test]
 fn blocks_lose_little_of_any_kind_of_map() {
     use block_compression::{BC7Settings, CompressionVariant, decode, encode};

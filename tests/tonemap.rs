@@ -1,12 +1,15 @@
-//! The tonemap curves against colours that went through Blender's own views, and the shader against the CPU form.
+//! The tonemap curves against colours that went through Blender's own views, and the shader against
+//! the CPU form.
 
 mod common;
 
 use bouncelight::render::tonemap_curve::Tonemap;
 
-/// Rows of samples.bin: linear r g b, then what Blender shows through Filmic, AgX and Khronos PBR Neutral.
+/// Rows of samples.bin: linear r g b, then what Blender shows through Filmic, AgX and Khronos PBR
+/// Neutral.
 const ROWS: usize = 4400;
-/// The first rows are pixels of rendered scenes, the others cover 2^-14 to 2^14 and every saturation.
+/// The first rows are pixels of rendered scenes, the others cover 2^-14 to 2^14 and every
+/// saturation.
 const SCENE_ROWS: usize = 2100;
 
 fn samples() -> Vec<[f32; 12]> {

@@ -1,4 +1,5 @@
-//! The training package's own tests, where Python with PyTorch and OpenEXR is at hand; a visible skip elsewhere.
+//! The training package's own tests, where Python with PyTorch and OpenEXR is at hand; a visible
+//! skip elsewhere.
 
 mod common;
 

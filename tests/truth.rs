@@ -1,7 +1,8 @@
 //! Every method against a path-traced picture: 64×32 points of four rooms, each with 4,096 paths
 //! (`tests/fixtures/truth`).
 //!
-//! Takes a minute and a half on two cores: four rooms by four methods, two of which settle over 32 frames.
+//! Takes a minute and a half on two cores: four rooms by four methods, two of which settle over 32
+//! frames.
 //!
 //! The fixtures are made by `cargo test --release --test truth -- --ignored make_the_truth`.
 #![cfg(all(feature = "reference", feature = "io"))]
@@ -28,7 +29,8 @@ const SEED: u32 = 20;
 /// Frames of a still camera before `gather` is read.
 const FRAMES: u32 = 32;
 
-/// One of the paper's rooms, an interior with windows, the same at night, and the room with metal in it.
+/// One of the paper's rooms, an interior with windows, the same at night, and the room with metal
+/// in it.
 fn rooms() -> [(&'static str, Scene); 4] {
     let room = || scene::load("paper-room:7").expect("made by code");
     let interior = || scene::load("interior").expect("bundled");
@@ -135,7 +137,8 @@ fn blocks(light: &[f32]) -> Vec<f32> {
     sums
 }
 
-/// Σ|Δ| / Σ truth of blocks. Where the truth has no diffuse light at all (metal, the sky) nothing is compared.
+/// Σ|Δ| / Σ truth of blocks. Where the truth has no diffuse light at all (metal, the sky) nothing
+/// is compared.
 fn error(found: &[f32], truth: &[f32]) -> f32 {
     let lit = |i: usize| truth[i / 3 * 3..][..3].iter().any(|v| *v > 0.0);
     let found: Vec<f32> = found.iter().enumerate().map(|(i, v)| if lit(i) { *v } else { 0.0 }).collect();
@@ -172,7 +175,8 @@ fn methods_are_as_near_to_the_truth_as_they_were() {
             if of != "gather" {
                 continue;
             }
-            // Negative controls: light that is a fifth too much or too little, and normals on the wrong side, are seen.
+            // Negative controls: light that is a fifth too much or too little, and normals on the
+            // wrong side, are seen.
             let scaled = |k: f32| error(&found.iter().map(|v| k * v).collect::<Vec<_>>(), &truth);
             assert!(100.0 * scaled(1.2).max(scaled(0.8)) > allowed[k], "{name}: a fifth of the light goes unseen");
             if name == "room" {

@@ -1,4 +1,5 @@
-//! Panes and other veils: drawn over the picture in order, with the light that many frames by lot have.
+//! Panes and other veils: drawn over the picture in order, with the light that many frames by lot
+//! have.
 
 #[path = "common/build.rs"]
 mod build;
@@ -25,7 +26,8 @@ fn sorted() -> RendererOptions {
     RendererOptions { method: Method::Direct, ..Default::default() }
 }
 
-/// A wall at z = 0 and panes before it, at the distances and with the unlit colours and coverages given.
+/// A wall at z = 0 and panes before it, at the distances and with the unlit colours and coverages
+/// given.
 fn panes(given: &[(f32, [f32; 3], f32)]) -> Scene {
     let at = |z: f32| quad([-9.0, -9.0, z], [18.0, 0.0, 0.0], [0.0, 18.0, 0.0]);
     let mut s = scene([0.0].into_iter().chain(given.iter().map(|p| p.0)).map(at).collect(), Vec::new());

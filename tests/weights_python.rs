@@ -1,4 +1,5 @@
-//! The Python package and this reader: each reads what the other writes, and both find the same faults.
+//! The Python package and this reader: each reads what the other writes, and both find the same
+//! faults.
 
 mod common;
 #[path = "weights_fuzz/corpus.rs"]

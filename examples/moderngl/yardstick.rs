@@ -2,8 +2,8 @@
 //!
 //!     cargo run --example moderngl_yardstick -- SCENE gather|neural FOLDER
 //!
-//! FOLDER holds `inputs.json` and for each frame K the textures' bytes as `K.NAME`; the light of the last frame is
-//! written there as `rust.output` (`Rgba16Float`, rows from the top).
+//! FOLDER holds `inputs.json` and for each frame K the textures' bytes as `K.NAME`; the light of
+//! the last frame is written there as `rust.output` (`Rgba16Float`, rows from the top).
 
 use bouncelight::gi::pass::Neural;
 use bouncelight::gi::{CameraMatrices, Conventions, Depth, Inputs, Lights, Method, Rays, method};

@@ -2,9 +2,9 @@
 //#import lib/octahedral.wgsl
 
 // What rays know of triangles: colours averaged over each, and the triangles that glow.
-// `accel::surfaces` and `accel::emitters` are the Rust side. The shader that imports this file binds
-// `surfaces: array<vec4u>`, `emitters: array<Emitter>` and `corner_normals: texture_2d<u32>`, a
-// texel for each triangle.
+// `accel::surfaces` and `accel::emitters` are the Rust side. The shader that imports this file
+// binds `surfaces: array<vec4u>`, `emitters: array<Emitter>` and `corner_normals: texture_2d<u32>`,
+// a texel for each triangle.
 
 struct Emitter {
     origin: vec3f,
@@ -40,7 +40,8 @@ fn met(triangle: u32) -> Met {
     return Met(d.rgb * d.rgb, f.rgb * f.rgb, e, d.a, packed.y >> 24u, bitcast<f32>(packed.w));
 }
 
-// Unit normal that the mesh gives the place of the hit, in the space of the ray, on the given side of the triangle.
+// Unit normal that the mesh gives the place of the hit, in the space of the ray, on the given side
+// of the triangle.
 fn met_normal(hit: Hit, side: vec3f) -> vec3f {
     let corners = textureLoad(corner_normals, vec2u(hit.triangle & 8191u, hit.triangle >> 13u), 0);
     var n = (1.0 - hit.uv.x - hit.uv.y) * oct_decode(unpack2x16snorm(corners.x))

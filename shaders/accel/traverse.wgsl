@@ -6,7 +6,8 @@
 
 const STACK_SIZE = 32u;
 const NO_TRIANGLE = 0xffffffffu;
-// Components of a direction closer to zero than this are moved away from it, so that their inverse is finite.
+// Components of a direction closer to zero than this are moved away from it, so that their inverse
+// is finite.
 const TINY = 1e-18;
 // Units in the last place by which a box's far end is moved away, against rounding.
 const SLACK = 8;
@@ -19,8 +20,8 @@ const SECOND = 0x80000000u;
 struct Hit {
     // Distance in lengths of the direction.
     t: f32,
-    // Index in the order in which triangles were given (of all meshes, one after the other, where there are instances);
-    // NO_TRIANGLE where nothing was hit.
+    // Index in the order in which triangles were given (of all meshes, one after the other, where
+    // there are instances); NO_TRIANGLE where nothing was hit.
     triangle: u32,
     // Barycentric weights of the second and third corner.
     uv: vec2f,
@@ -38,9 +39,11 @@ struct TraceRay {
     across: vec3f,
     up: vec3f,
     along: vec3f,
-    // 7 for a ray towards +x, +y, +z: flips a child's place into its rank; the highest rank is visited first.
+    // 7 for a ray towards +x, +y, +z: flips a child's place into its rank; the highest rank is
+    // visited first.
     octant: u32,
-    // Bits of the ranks of children 0 to 3, within their half, and by how much that half is shifted.
+    // Bits of the ranks of children 0 to 3, within their half, and by how much that half is
+    // shifted.
     rank_bits: vec4u,
     low_half: u32,
 }
@@ -92,7 +95,8 @@ fn trace_word(block: u32, word: u32) -> vec4u {
     return textureLoad(accel_blocks, vec2u(((block & 2047u) << 2u) + word, block >> 11u), 0);
 }
 
-// A number of [0, 1) for whether a ray with `seed` goes through a triangle that lets a share of all rays through.
+// A number of [0, 1) for whether a ray with `seed` goes through a triangle that lets a share of all
+// rays through.
 fn trace_chance(triangle: u32, seed: u32) -> f32 {
     var v = (triangle ^ seed) * 747796405u + 2891336453u;
     v = ((v >> ((v >> 28u) + 4u)) ^ v) * 277803737u;
@@ -104,7 +108,8 @@ fn trace_stops(open: u32, triangle: u32, seed: u32) -> bool {
     return open == 0u || trace_chance(triangle, seed) * 255.0 >= f32(open);
 }
 
-// The first hit found (`any`) or the nearest one (otherwise) with 0 < t < t_max. Both sides of triangles are hit.
+// The first hit found (`any`) or the nearest one (otherwise) with 0 < t < t_max. Both sides of
+// triangles are hit.
 fn trace(origin: vec3f, direction: vec3f, t_max: f32, any: bool) -> Hit {
     return trace_seeded(origin, direction, t_max, any, 0u);
 }
@@ -117,7 +122,8 @@ fn trace_seeded(origin: vec3f, direction: vec3f, t_max: f32, any: bool, seed: u3
     return walk_hit(&walk);
 }
 
-// A ray on its way through the trees, so that who has many of them can go on with the next as soon as one is through.
+// A ray on its way through the trees, so that who has many of them can go on with the next as soon
+// as one is through.
 struct Walk {
     origin: vec3f,
     direction: vec3f,
@@ -127,17 +133,20 @@ struct Walk {
     ray: TraceRay,
     // Up to where it has met nothing, or what it has met.
     t: f32,
-    // Inside an instance: its block, the number of its mesh's first triangle, and what was on the stack before.
+    // Inside an instance: its block, the number of its mesh's first triangle, and what was on the
+    // stack before.
     instance: u32,
     first_triangle: u32,
     floor_depth: u32,
     found_instance: u32,
     found_leaf: u32,
     found_first: u32,
-    // Number and place of the triangle hit, and the weights of its corners as they lie in the block.
+    // Number and place of the triangle hit, and the weights of its corners as they lie in the
+    // block.
     found: u32,
     weights: vec2f,
-    // Children that were met and wait: block of the first one in the high 24 bits, their ranks in the low 8.
+    // Children that were met and wait: block of the first one in the high 24 bits, their ranks in
+    // the low 8.
     group: u32,
     depth: u32,
     stack: array<u32, STACK_SIZE>,
@@ -241,8 +250,8 @@ fn walk_triangles(w: ptr<function, Walk>, block: u32, head: vec4u, x: vec4u, y: 
     let q = bitcast<vec3f>(x.xyz) - ray.origin;
     let r = bitcast<vec3f>(y.xyz) - ray.origin;
     let s = bitcast<vec3f>(z.xyz) - ray.origin;
-    // Corners in the ray's frame. Edges shared by two triangles give both the same products, so no ray passes
-    // between them (after Woop, Benthin and Wald 2013).
+    // Corners in the ray's frame. Edges shared by two triangles give both the same products, so no
+    // ray passes between them (after Woop, Benthin and Wald 2013).
     let a = vec2f(dot(p, ray.across), dot(p, ray.up));
     let b = vec2f(dot(q, ray.across), dot(q, ray.up));
     let c = vec2f(dot(r, ray.across), dot(r, ray.up));

@@ -1,7 +1,8 @@
 //#import gi/inputs.wgsl
 //#import gi/unseen.wgsl
 
-// The simplest method: every surface receives the same light from all around, as far as what stands near lets it.
+// The simplest method: every surface receives the same light from all around, as far as what stands
+// near lets it.
 
 // SKY and BOUNCE come from the prelude (gi::ambient documents them).
 @group(1) @binding(0) var<storage, read> exposure: Exposure;
@@ -16,7 +17,8 @@ fn ambient(@builtin(global_invocation_id) id: vec3u) {
     let pixel = vec2i(id.xy);
     var light = vec3f(0.0);
     if distance_at(pixel) > 0.0 {
-        // Occlusion maps are not applied here: composite applies them to every method's light, once.
+        // Occlusion maps are not applied here: composite applies them to every method's light,
+        // once.
         light = min(unseen_light() * textureLoad(visibility, pixel, 0).r, vec3f(LARGEST));
     }
     textureStore(output, pixel, vec4f(light, 1.0));

@@ -1,13 +1,15 @@
 //#import gi/inputs.wgsl
 
-// Which directions over a surface point the depth buffer blocks: a visibility bitmask (Therrien, Levesque and Gilet
-// 2023). The hemisphere is cut into slices through the eye's ray; a slice is walked to both sides in the depth
-// buffer, and every texel there blocks the angles between its front and a back that is assumed THICKNESS behind it.
+// Which directions over a surface point the depth buffer blocks: a visibility bitmask (Therrien,
+// Levesque and Gilet 2023). The hemisphere is cut into slices through the eye's ray; a slice is
+// walked to both sides in the depth buffer, and every texel there blocks the angles between its
+// front and a back that is assumed THICKNESS behind it.
 //
-// Two things differ from the paper. The 32 sectors of a slice are not equally wide: each holds the same share of the
-// slice's cosine-weighted light, so that counting bits integrates E/pi without weights, exactly for even light. And a
-// step that lies near the one before it blocks all angles between the two, and half as much again beyond it: a wall
-// must not fall apart between steps, nor end at the last one that met it.
+// Two things differ from the paper. The 32 sectors of a slice are not equally wide: each holds the
+// same share of the slice's cosine-weighted light, so that counting bits integrates E/pi without
+// weights, exactly for even light. And a step that lies near the one before it blocks all angles
+// between the two, and half as much again beyond it: a wall must not fall apart between steps, nor
+// end at the last one that met it.
 //
 // The prelude (gi::bitmask) holds SLICES, STEPS, REACH, RADIUS, THICKNESS, GROWTH, JOIN. Group 1
 // binding 0 is the pattern.
@@ -52,8 +54,9 @@ struct Seen {
     bits: u32,         // sectors that it blocks; 0: nothing there
 }
 
-// Three numbers of [0, 1) for each of the 4x4 texels of the pattern: sixteenths in Bayer's order, permuted by odd
-// multipliers so that the three do not repeat each other, and moved by the frame (R3 sequence, Roberts 2018).
+// Three numbers of [0, 1) for each of the 4x4 texels of the pattern: sixteenths in Bayer's order,
+// permuted by odd multipliers so that the three do not repeat each other, and moved by the frame
+// (R3 sequence, Roberts 2018).
 fn ordered(texel: vec2i) -> vec3f {
     let a = vec2u(texel) & vec2u(3u);
     let x = a.x ^ a.y;
@@ -72,7 +75,8 @@ fn receiver_at(texel: vec2i, z: f32) -> Receiver {
     return Receiver(pixel, position, normal_at(pixel), -normalize(position), reach, shift);
 }
 
-// Share of light below `angle`, measured from the eye's direction: the integral of cos(t - tilt) |sin t|.
+// Share of light below `angle`, measured from the eye's direction: the integral of cos(t -
+// tilt) |sin t|.
 fn arc(slice: Slice, angle: f32) -> f32 {
     let turned = 2.0 * angle - slice.tilt;
     return 0.25 * (slice.cos_tilt - cos(turned) + 2.0 * angle * slice.sin_tilt);
@@ -118,8 +122,8 @@ fn angle_to(here: Receiver, offset: vec3f) -> f32 {
     return acos(clamp(dot(offset, here.to_eye) / max(length(offset), 1e-9), -1.0, 1.0));
 }
 
-// Step `k` of STEPS to one side (1 or -1) of the slice, after the step `last` there. Steps grow geometrically from one
-// texel to the reach.
+// Step `k` of STEPS to one side (1 or -1) of the slice, after the step `last` there. Steps grow
+// geometrically from one texel to the reach.
 fn look(here: Receiver, slice: Slice, side: f32, k: i32, last: ptr<function, Last>) -> Seen {
     let t = (f32(k) + here.shift.y) / f32(STEPS);
     let farthest = max(REACH * f32(max(params.size.x, params.size.y)), FIRST);

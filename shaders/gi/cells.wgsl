@@ -1,9 +1,9 @@
 //#import lib/octahedral.wgsl
 //#import gi/inputs.wgsl
 
-// Low-resolution directional light: which pixel stands for a cell, where that pixel is, and what a cell's light says
-// about a direction. A gather joins this file behind gi/inputs.wgsl; the prelude (`gi::stage::cells::prelude`) holds
-// CELL_SIDE, the pixels on a side of a cell.
+// Low-resolution directional light: which pixel stands for a cell, where that pixel is, and what a
+// cell's light says about a direction. A gather joins this file behind gi/inputs.wgsl; the prelude
+// (`gi::stage::cells::prelude`) holds CELL_SIDE, the pixels on a side of a cell.
 
 // A cell without any surface, in `cell_pixels`.
 const NO_PIXEL = 0xffffffffu;
@@ -11,8 +11,8 @@ const NO_PIXEL = 0xffffffffu;
 // Beside a pixel: nothing is remembered of the surface there.
 const FRESH = 0x80000000u;
 
-// One cell's light, a vec4f a colour channel: E/π(n) = max(0, channel.w + dot(channel.xyz, n)), n a world-space unit
-// normal near the cell's own.
+// One cell's light, a vec4f a colour channel: E/π(n) = max(0, channel.w + dot(channel.xyz, n)), n a
+// world-space unit normal near the cell's own.
 struct CellLight {
     red: vec4f,
     green: vec4f,

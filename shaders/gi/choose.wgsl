@@ -8,9 +8,11 @@
 
 @group(1) @binding(0) var<storage, read_write> cell_pixels: array<u32>;
 
-// Height above the middle's plane, relative to the view distance, from which a pixel is another surface in front.
+// Height above the middle's plane, relative to the view distance, from which a pixel is another
+// surface in front.
 const IN_FRONT = 0.01;
-// How much nearer a pixel has to be, relatively, to outweigh one pixel's (squared) distance from the middle.
+// How much nearer a pixel has to be, relatively, to outweigh one pixel's (squared) distance from
+// the middle.
 const CENTRED = 0.001;
 
 fn chosen(cell: vec2i) -> u32 {

@@ -1,9 +1,10 @@
 //#import gi/inputs.wgsl
 
-// One exposure for the picture: what light there is on average, by which every radiance that the network sees is
-// divided and every light it answers is multiplied. Two levels of fixed order, so that the same picture gives the same
-// bits: up to 256 groups sum strided cells, one group sums the groups. At 8K a thread adds 32 numbers and the trees
-// add 16 more levels, so f32 keeps about six digits; one running f32 sum over 2 million cells would not.
+// One exposure for the picture: what light there is on average, by which every radiance that the
+// network sees is divided and every light it answers is multiplied. Two levels of fixed order, so
+// that the same picture gives the same bits: up to 256 groups sum strided cells, one group sums the
+// groups. At 8K a thread adds 32 numbers and the trees add 16 more levels, so f32 keeps about six
+// digits; one running f32 sum over 2 million cells would not.
 
 struct Partial {
     light: f32,      // luminance of direct light and emission
@@ -86,7 +87,8 @@ fn finish(@builtin(local_invocation_index) index: u32) {
         let cells = f32(cell_count());
         var s = total.light / cells + luminance(params.environment.rgb);
         var inv_s = 0.0;
-        // Below this nothing a half float holds could come out; exactly zero keeps "lights off" exact.
+        // Below this nothing a half float holds could come out; exactly zero keeps "lights off"
+        // exact.
         if s <= 1e-20 {
             s = 0.0;
         } else {

@@ -3,8 +3,9 @@
 //#import gi/gather/types.wgsl
 //#import gi/gather/past.wgsl
 
-// What a network that filters is given of each cell: table `cells`, version 1 (`gi::neural::memory` documents
-// the channels), NHWC. All of it keeps its value when all light is multiplied by one number.
+// What a network that filters is given of each cell: table `cells`, version 1 (`gi::neural::memory`
+// documents the channels), NHWC. All of it keeps its value when all light is multiplied by one
+// number.
 
 @group(1) @binding(0) var<storage, read> pasts: array<vec4f>;
 @group(1) @binding(1) var<storage, read> exposure: Exposure;

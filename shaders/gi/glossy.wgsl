@@ -22,7 +22,8 @@ const HALF_MAX: f32 = 65504.0;
 const STEPS_ROUGH = 16;
 const STEPS_SMOOTH = 48;
 const HALVINGS = 5;
-// Depth of everything on the screen, relative to its view distance: a ray that passes further behind goes on.
+// Depth of everything on the screen, relative to its view distance: a ray that passes further
+// behind goes on.
 const THICKNESS = 0.05;
 // A ray starts this far above its surface, relative to the view distance.
 const LIFT = 0.002;
@@ -72,7 +73,8 @@ fn pixel_of(place: vec3f) -> vec2u {
     return vec2u(clamp(place.xy, vec2f(0.0), vec2f(frame.size) - 1.0));
 }
 
-// Where along the track (0 to 1) a ray towards `r` goes behind something that faces it; negative for nowhere.
+// Where along the track (0 to 1) a ray towards `r` goes behind something that faces it; negative
+// for nowhere.
 fn march(track: Track, r: vec3f, steps: i32) -> f32 {
     let length = distance(track.start.xy, track.end.xy);
     if length < NEXT_PIXEL { return -1.0; }
@@ -137,8 +139,8 @@ fn found(track: Track, u: f32, p: vec3f, r: vec3f, cone: f32) -> Hit {
     return Hit(color.rgb / max(color.a, 1e-3), trust);
 }
 
-// What a ray that found nothing may see beyond the picture's border (rgb), and how likely (a): the surroundings where
-// only they are seen there, else more of the same.
+// What a ray that found nothing may see beyond the picture's border (rgb), and how likely (a): the
+// surroundings where only they are seen there, else more of the same.
 fn beyond(track: Track, r: vec3f) -> vec4f {
     let border = vec2f(frame.size) * 0.04;
     let color = blurred_at(clamp(track.end.xy, border, vec2f(frame.size) - border), BORDER_LEVEL);
@@ -170,7 +172,8 @@ fn reflected(pixel: vec2u, depth: f32, n: vec3f, roughness: f32) -> vec3f {
         return mix(lobe, hit.radiance, sharp * hit.trust);
     }
     let around = textureLoad(indirect, pixel, 0).rgb;
-    // A lobe that fills the hemisphere shows what the surface's own side receives, and no ray tells it better.
+    // A lobe that fills the hemisphere shows what the surface's own side receives, and no ray tells
+    // it better.
     let narrow = 1.0 - smoothstep(0.6, 1.0, roughness);
     let hit = on_picture(p, n, r, z, roughness);
     let guess = beyond(track_of(p + n * (LIFT * z), r), r);

@@ -21,7 +21,8 @@ struct Params {
     pad: vec2u,
 }
 
-// Normals are vectors, or x and y of such, not octahedral; they are v / 2 + 1/2; they are in view space.
+// Normals are vectors, or x and y of such, not octahedral; they are v / 2 + 1/2; they are in view
+// space.
 const STORED_XYZ = 1u;
 const STORED_XY = 2u;
 const STORED_UNSIGNED = 4u;
@@ -101,7 +102,8 @@ fn emissive_at(pixel: vec2i) -> vec3f {
 // Diffuse reflectance.
 fn albedo_at(pixel: vec2i) -> vec3f {
     let texel = finite3(textureLoad(albedo_map, pixel, 0).rgb);
-    // The texel is asked, too: Mesa's CPU driver compiles what uniforms alone branch on anew for each dispatch.
+    // The texel is asked, too: Mesa's CPU driver compiles what uniforms alone branch on anew for
+    // each dispatch.
     if all(texel <= vec3f(0.0)) | ((params.flags & STORED_SRGB) == 0u) { return texel; }
     return select(pow((texel + 0.055) / 1.055, vec3f(2.4)), texel / 12.92, texel <= vec3f(0.04045));
 }
@@ -122,7 +124,8 @@ fn position_at(pixel: vec2i, distance: f32) -> vec3f {
     return params.gravity_from_view * (ray * distance);
 }
 
-// Unit normal along the axes that it is stored along: the world's, or the camera's, which looks down -Z.
+// Unit normal along the axes that it is stored along: the world's, or the camera's, which looks
+// down -Z.
 fn stored_normal(pixel: vec2i) -> vec3f {
     let n = stored_vector(pixel);
     let turned = (params.flags & (STORED_IN_VIEW | STORED_AHEAD)) == (STORED_IN_VIEW | STORED_AHEAD);

@@ -1,8 +1,9 @@
 //#import gi/inputs.wgsl
 //#import gi/bitmask.wgsl
 
-// How much of the near field's light reaches a surface: cosine-weighted visibility at half resolution.
-// r: visibility, 0 to 1; a: distance along the view axis in metres, 0 on the background.
+// How much of the near field's light reaches a surface: cosine-weighted visibility at half
+// resolution. r: visibility, 0 to 1; a: distance along the view axis in metres, 0 on the
+// background.
 
 @group(1) @binding(1) var output: texture_storage_2d<rgba32float, write>;
 

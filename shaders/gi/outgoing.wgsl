@@ -5,7 +5,8 @@
 // What both stages of gi/glossy read (group 0), and the light that a pixel's surface sends out.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL backends would refuse one.
+// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL
+// backends would refuse one.
 @group(0) @binding(1) var depth_texture: texture_2d<f32>;
 @group(0) @binding(2) var normal_texture: texture_2d<f32>;
 @group(0) @binding(3) var specular_texture: texture_2d<f32>;
@@ -24,8 +25,8 @@ fn lobe_share(pixel: vec2u, n: vec3f) -> vec3f {
     return env_brdf(surface.rgb, surface.a, dot(n, to_eye(frame, pixel)));
 }
 
-// Radiance of a hit pixel, taken as the same in every direction: diffuse and emitted light, and its own reflections by
-// the split sum.
+// Radiance of a hit pixel, taken as the same in every direction: diffuse and emitted light, and its
+// own reflections by the split sum.
 fn outgoing(pixel: vec2u) -> vec3f {
     let albedo = textureLoad(albedo_texture, pixel, 0);
     let around = textureLoad(indirect, pixel, 0).rgb * albedo.a;

@@ -1,7 +1,8 @@
 //#import gi/inputs.wgsl
 
-// G-buffer to network input: one thread writes all features of one cell, NHWC, padded with zeros to whole vec4.
-// The prelude gives each feature its first channel (-1 when the weights do not use it) and PADDED.
+// G-buffer to network input: one thread writes all features of one cell, NHWC, padded with zeros to
+// whole vec4. The prelude gives each feature its first channel (-1 when the weights do not use it)
+// and PADDED.
 
 @group(1) @binding(0) var<storage, read> exposure: Exposure;
 @group(1) @binding(1) var<storage, read_write> features: array<vec4f>;
@@ -27,7 +28,8 @@ fn compress(radiance: vec3f) -> vec3f {
     return log(1.0 + radiance * exposure.inv_s);
 }
 
-// How far the cell's other pixels are from its sample, in e-folds of distance, at most 1; background counts as 1.
+// How far the cell's other pixels are from its sample, in e-folds of distance, at most 1;
+// background counts as 1.
 fn spread_of(cell: vec2i, z: f32) -> f32 {
     var spread = 0.0;
     let last = min(CELL * cell + CELL, vec2i(params.size));

@@ -20,8 +20,8 @@ struct Surface {
     distance: f32,
 }
 
-// 1 for a point of the same surface. The tails are heavy on purpose: where nothing agrees the least bad tap wins by
-// ratio, without a branch and without a division by zero.
+// 1 for a point of the same surface. The tails are heavy on purpose: where nothing agrees the least
+// bad tap wins by ratio, without a branch and without a division by zero.
 fn agreement(here: Surface, pixel: vec2i, z: f32) -> f32 {
     let offset = position_at(pixel, z) - here.position;
     let off_plane = abs(dot(here.normal, offset)) / (PLANE_TOLERANCE * here.distance);
@@ -91,7 +91,8 @@ fn light_of(pixel: vec2i, here: Surface, base: vec3f) -> vec3f {
     if near.weight >= TRUST {
         return light(near, base);
     }
-    // The four cells around this pixel lie on other surfaces: look further out, and blend so that no seam shows.
+    // The four cells around this pixel lie on other surfaces: look further out, and blend so that
+    // no seam shows.
     var wide = gather(here, place, 2);
     if wide.weight < LOST {
         wide = gather(here, place, 4);

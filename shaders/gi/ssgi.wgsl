@@ -2,16 +2,18 @@
 //#import gi/bitmask.wgsl
 //#import gi/unseen.wgsl
 
-// One bounce in screen space at half resolution: what each step's surface sends on, weighted by the sectors that it is
-// the first to block; through sectors that nothing blocks comes unseen light. Because the sectors hold equal shares of
-// cosine-weighted light, counting bits gives E/pi. a: distance along the view axis in metres, 0 on the background.
+// One bounce in screen space at half resolution: what each step's surface sends on, weighted by the
+// sectors that it is the first to block; through sectors that nothing blocks comes unseen light.
+// Because the sectors hold equal shares of cosine-weighted light, counting bits gives E/pi. a:
+// distance along the view axis in metres, 0 on the background.
 
 @group(1) @binding(1) var<storage, read> exposure: Exposure;
 @group(1) @binding(2) var fine: texture_2d<f32>;     // radiance over 2x2 pixels
 @group(1) @binding(3) var coarse: texture_2d<f32>;   // and over 8x8
 @group(1) @binding(4) var output: texture_storage_2d<rgba32float, write>;
 
-// Distance in pixels from which a step reads the coarse radiance: steps are about half as long as their distance.
+// Distance in pixels from which a step reads the coarse radiance: steps are about half as long as
+// their distance.
 const COARSE = 16.0;
 
 // Light of one step's texel that reaches the receiver through the sectors `fresh`.
@@ -19,7 +21,8 @@ fn sent(seen: Seen, fresh: u32) -> vec3f {
     if fresh == 0u {
         return vec3f(0.0);
     }
-    // A surface that is seen from its front by the eye but from behind by the receiver blocks and sends nothing.
+    // A surface that is seen from its front by the eye but from behind by the receiver blocks and
+    // sends nothing.
     let faces = dot(normal_at(seen.pixel), seen.offset) < 0.0;
     var radiance = vec3f(0.0);
     if seen.pixels < COARSE {

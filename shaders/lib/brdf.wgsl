@@ -24,7 +24,8 @@ fn split_sum(roughness: f32, n_dot_v: f32) -> vec2f {
     return vec2f(clamp(scale, 0.0, 1.0 - b), b);
 }
 
-// How much of F0 a metal's curve is: below 0.1 (index 1.9) none, which is a dielectric, above 0.3 all.
+// How much of F0 a metal's curve is: below 0.1 (index 1.9) none, which is a dielectric, above 0.3
+// all.
 fn metal_part(f0: vec3f) -> f32 {
     return saturate((max(f0.x, max(f0.y, f0.z)) - 0.1) / 0.2);
 }
@@ -73,7 +74,8 @@ fn diffuse_loss(f0: f32, roughness: f32, n_dot_v: f32) -> f32 {
     return max(dielectric_lobe(vec3f(f0), roughness, n_dot_v).x, f0 * metal_part(vec3f(f0)));
 }
 
-// Directional albedo of the specular lobe: how much of an even environment it shows. 0 for F0 = 0, which marks unlit.
+// Directional albedo of the specular lobe: how much of an even environment it shows. 0 for F0 = 0,
+// which marks unlit.
 fn env_brdf(f0: vec3f, roughness: f32, n_dot_v: f32) -> vec3f {
     let dielectric = dielectric_lobe(f0, roughness, n_dot_v);
     let part = metal_part(f0);
@@ -97,7 +99,8 @@ fn fresnel_dielectric(index: f32, c: f32) -> f32 {
     return 0.5 * a * a * (1.0 + b * b);
 }
 
-// Schlick's curve, and for dielectrics the true one, which is up to a quarter brighter between 45° and 65°.
+// Schlick's curve, and for dielectrics the true one, which is up to a quarter brighter between 45°
+// and 65°.
 fn fresnel_of(f0: vec3f, c: f32) -> vec3f {
     let most = max(f0.x, max(f0.y, f0.z));
     let q = 1.0 - c;
@@ -108,7 +111,8 @@ fn fresnel_of(f0: vec3f, c: f32) -> vec3f {
     return schlick + dielectric * (fresnel_dielectric(index_of(most), c) - most - (saturate(50.0 * most) - most) * q5);
 }
 
-// GGX, single scattering: D * V * F, in 1/sr; multiply by n.l and the light, and for metals by `lobe_gain`.
+// GGX, single scattering: D * V * F, in 1/sr; multiply by n.l and the light, and for metals by
+// `lobe_gain`.
 fn ggx(n: vec3f, v: vec3f, l: vec3f, f0: vec3f, roughness: f32) -> vec3f {
     let h = normalize(v + l);
     let n_l = saturate(dot(n, l));
@@ -117,7 +121,8 @@ fn ggx(n: vec3f, v: vec3f, l: vec3f, f0: vec3f, roughness: f32) -> vec3f {
     let v_h = saturate(dot(v, h));
     let alpha = max(roughness * roughness, 1e-3);
     let a2 = alpha * alpha;
-    // 1 - n_h^2 from the cross product: the plain form loses all digits near the peak of a smooth surface.
+    // 1 - n_h^2 from the cross product: the plain form loses all digits near the peak of a smooth
+    // surface.
     let c = cross(n, h);
     let d_root = a2 * n_h * n_h + dot(c, c);
     let d = a2 / (PI * d_root * d_root);

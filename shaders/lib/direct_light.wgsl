@@ -31,7 +31,8 @@ fn pattern_of(pixel: vec2u) -> Pattern {
     return Pattern(6.2831853 * hash01(pixel.x, pixel.y, frame.seed, 1u), hash01(pixel.x, pixel.y, frame.seed, 2u));
 }
 
-// At p, which faces n, to an eye at v; `surface`: F0 and roughness. `before`: p lies before what the G-buffer shows.
+// At p, which faces n, to an eye at v; `surface`: F0 and roughness. `before`: p lies before what
+// the G-buffer shows.
 fn direct_light(
     p: vec3f, n: vec3f, v: vec3f, surface: vec4f, pixel: vec2u, before: bool,
 ) -> DirectLight {

@@ -1,6 +1,6 @@
-// Which lights can reach a tile of 16x16 pixels: a bit for each, 32 a word, two lists a tile: for what the
-// G-buffer shows there, and for whatever is before it. A list has room for all lights, so that none is left out
-// however many there are.
+// Which lights can reach a tile of 16x16 pixels: a bit for each, 32 a word, two lists a tile: for
+// what the G-buffer shows there, and for whatever is before it. A list has room for all lights, so
+// that none is left out however many there are.
 
 struct LightShadow {
     // First shadow view and how many; none means unshadowed.

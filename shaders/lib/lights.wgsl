@@ -16,7 +16,8 @@ struct Light {
     color: vec3f,
     // Metres (point, spot), or the tangent of half the angular diameter (sun).
     radius: f32,
-    // The cone's ramp: saturate(cos * scale + offset)², the form that KHR_lights_punctual recommends.
+    // The cone's ramp: saturate(cos * scale + offset)², the form that KHR_lights_punctual
+    // recommends.
     cone_scale: f32,
     cone_offset: f32,
     // 1 for a light that stands for a surface that glows: rays meet the surface itself.

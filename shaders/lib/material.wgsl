@@ -1,7 +1,9 @@
-// A material and its textures; in Rust `scene::upload::MaterialGpu`. Bind group 1 of the geometry passes.
+// A material and its textures; in Rust `scene::upload::MaterialGpu`. Bind group 1 of the geometry
+// passes.
 
 struct TextureUse {
-    // Rows of uv' = M (u, v, 1); w of the first row is the coordinate set, w of the second 1 where a texture is bound.
+    // Rows of uv' = M (u, v, 1); w of the first row is the coordinate set, w of the second 1 where
+    // a texture is bound.
     row0: vec4f,
     row1: vec4f,
 }
@@ -14,7 +16,8 @@ struct Material {
     roughness: f32,
     normal_scale: f32,
     occlusion_strength: f32,
-    // Alpha below it is discarded; 0 for opaque; 2 marks stochastic coverage, 3 a veil, which may be blended instead.
+    // Alpha below it is discarded; 0 for opaque; 2 marks stochastic coverage, 3 a veil, which may
+    // be blended instead.
     alpha_cutoff: f32,
     // Reflectance of a dielectric at normal incidence.
     f0: f32,
@@ -53,7 +56,8 @@ fn is_veil() -> bool {
     return material.alpha_cutoff > 2.5;
 }
 
-// Alpha below which a fragment is dropped: the mask's cutoff, or `random` in (0, 1] for stochastic coverage.
+// Alpha below which a fragment is dropped: the mask's cutoff, or `random` in (0, 1] for stochastic
+// coverage.
 fn cutoff(random: f32) -> f32 {
     return select(material.alpha_cutoff, random + 1e-7, material.alpha_cutoff > 1.5);
 }

@@ -6,7 +6,8 @@ fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
     return vec4f(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 
-// What a fragment writes for a display-encoded colour; linear_target is 1 where the target encodes sRGB itself.
+// What a fragment writes for a display-encoded colour; linear_target is 1 where the target encodes
+// sRGB itself.
 fn screen_color(shown: vec3f, linear_target: u32) -> vec4f {
     if linear_target == 0u {
         return vec4f(shown, 1.0);

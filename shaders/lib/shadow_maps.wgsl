@@ -22,16 +22,19 @@ struct ShadowView {
 
 const SEARCH_TAPS: u32 = 16u;
 const FILTER_TAPS: u32 = 24u;
-// The receiver is lifted along its normal by so many texels: the reach of a bilinear comparison, with some spare.
+// The receiver is lifted along its normal by so many texels: the reach of a bilinear comparison,
+// with some spare.
 const NORMAL_OFFSET: f32 = 2.0;
-// What the lift leaves over on surfaces that face the light squarely, texels: rounding of the stored depth.
+// What the lift leaves over on surfaces that face the light squarely, texels: rounding of the
+// stored depth.
 const BIAS: f32 = 0.4;
 // Least filter radius, texels; the bilinear comparison smooths by one more.
 const LEAST: f32 = 0.6;
-// Where a texel is compared at its own place, so much of the lift is left, as a share of the slope: for
-// normals that are not quite the surface's.
+// Where a texel is compared at its own place, so much of the lift is left, as a share of the slope:
+// for normals that are not quite the surface's.
 const LEFT: f32 = 1.0;
-// Largest search radius: a share of the sun's map; the margin (in tangent units) that cube faces and spot maps have.
+// Largest search radius: a share of the sun's map; the margin (in tangent units) that cube faces
+// and spot maps have.
 const SUN_SEARCH: f32 = 0.25;
 const LOCAL_SEARCH: f32 = 0.14;
 // Beyond this slope against the light the receiver's plane is not extrapolated.
@@ -57,7 +60,8 @@ fn row_of(m: mat4x4f, i: u32) -> vec3f {
     return vec3f(m[0][i], m[1][i], m[2][i]);
 }
 
-// Share of the sun's disc that `p` sees. `n`: surface normal, `l`: unit vector to the light, `tan_radius`: of the disc.
+// Share of the sun's disc that `p` sees. `n`: surface normal, `l`: unit vector to the light,
+// `tan_radius`: of the disc.
 fn sun_visibility(first: u32, count: u32, p: vec3f, n: vec3f, l: vec3f, tan_radius: f32, pattern: Pattern) -> f32 {
     let n_l = saturate(dot(n, l));
     let sine = sqrt(1.0 - n_l * n_l);
@@ -65,7 +69,8 @@ fn sun_visibility(first: u32, count: u32, p: vec3f, n: vec3f, l: vec3f, tan_radi
         let view = shadow_views[i];
         let c = (view.clip_from_world * vec4f(p + n * (NORMAL_OFFSET * view.texel * sine), 1.0)).xyz;
         let uv = c.xy * vec2f(0.5, -0.5) + 0.5;
-        // How far off a blocker can stand and still cover a part of the disc: as far as the highest caster allows.
+        // How far off a blocker can stand and still cover a part of the disc: as far as the highest
+        // caster allows.
         let search = clamp((1.0 - c.z) * view.range * tan_radius, 1.5 * view.texel, SUN_SEARCH / view.scale);
         // The first cascade that holds the point and that reach; the last one has to do.
         let reach = select(search * view.scale, 0.0, i + 1u == first + count);
@@ -94,7 +99,8 @@ fn sun_disc(
         let stored = textureLoad(sun_depths, texel_of(uv + offset * to_uv, view.size), view.layer, 0).x;
         let h = (stored - z) * view.range;
         if h > max(dot(slope, offset), 0.0) + bias {
-            // Blockers inside the cone to the light count; the others only where there is none inside.
+            // Blockers inside the cone to the light count; the others only where there is none
+            // inside.
             let w = select(0.01, 1.0, h * tan_radius + 1.5 * view.texel >= length(offset));
             blocked += 1u;
             height += h * w;
@@ -150,7 +156,8 @@ fn sun_edge(view: ShadowView, z: f32, uv: vec2f, slope: vec2f) -> f32 {
     return select(lit / max(known, 1e-6), 1.0, known == 0.0);
 }
 
-// Share of a point or spot light's source that `p` sees. `center`: the light, `radius`: of the source, metres.
+// Share of a point or spot light's source that `p` sees. `center`: the light, `radius`: of the
+// source, metres.
 fn local_visibility(first: u32, count: u32, p: vec3f, n: vec3f, center: vec3f, radius: f32, pattern: Pattern) -> f32 {
     let away = p - center;
     var index = first;

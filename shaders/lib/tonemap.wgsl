@@ -1,5 +1,5 @@
-// From scene light to display values. src/render/tonemap_curve.rs is the CPU form, same names and constants, and says
-// where they come from and how near Blender they stand.
+// From scene light to display values. src/render/tonemap_curve.rs is the CPU form, same names and
+// constants, and says where they come from and how near Blender they stand.
 
 // Display-encoded sRGB in [0, 1] of linear Rec.709 light. kind: 0 filmic, 1 agx, 2 neutral, 3 none
 // (sRGB with clamping).

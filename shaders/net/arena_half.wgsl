@@ -1,4 +1,5 @@
-// The arena in 16 bits: one element is a vector of four halves. Values beyond their range become the largest half.
+// The arena in 16 bits: one element is a vector of four halves. Values beyond their range become
+// the largest half.
 @group(0) @binding(1) var<storage, read_write> arena: array<vec2u>;
 
 // Elements of a vector that is 32 bits in either arena.

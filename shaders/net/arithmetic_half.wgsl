@@ -1,4 +1,5 @@
-// Products of a matrix and a vector, four numbers each, in 16 bits (an optional feature); their sums stay in 32.
+// Products of a matrix and a vector, four numbers each, in 16 bits (an optional feature); their
+// sums stay in 32.
 alias Four = vec4<f16>;
 alias Matrix = mat4x4<f16>;
 

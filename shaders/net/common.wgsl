@@ -10,15 +10,18 @@ struct Step {
     output: u32,
     skip: u32,
     second: u32,
-    // Columns and rows of padding at the left and the top; of phase p (see place.wgsl) ⌊(p + base) / SPREAD⌋ less.
+    // Columns and rows of padding at the left and the top; of phase p (see place.wgsl) ⌊(p + base)
+    // / SPREAD⌋ less.
     pad: vec2i,
     base: vec2i,
-    // First block of output channels of this dispatch, counted through the phases, and blocks of a phase.
+    // First block of output channels of this dispatch, counted through the phases, and blocks of a
+    // phase.
     first_block: u32,
     blocks: u32,
     // Parts into which the sum over input channels is split.
     parts: u32,
-    // Channels of the input; four-channel vectors of it that one output reads; vectors from pixel to pixel.
+    // Channels of the input; four-channel vectors of it that one output reads; vectors from pixel
+    // to pixel.
     in_channels: u32,
     in_vectors: u32,
     in_pitch: u32,
@@ -27,9 +30,11 @@ struct Step {
     out_vectors: u32,
     out_pitch: u32,
     skip_pitch: u32,
-    // Output channels that read the same input channels; in a norm, channels with common statistics.
+    // Output channels that read the same input channels; in a norm, channels with common
+    // statistics.
     group: u32,
-    // Dropout: the operator's random stream, values below the threshold are dropped, the others multiplied by `keep`.
+    // Dropout: the operator's random stream, values below the threshold are dropped, the others
+    // multiplied by `keep`.
     stream: u32,
     threshold: u32,
     keep: f32,

@@ -1,5 +1,5 @@
-// Any convolution: 1×1 and strided ones, whose taps share little, and each phase of a transposed one. From the prelude:
-// KERNEL_W, KERNEL_H, STRIDE.
+// Any convolution: 1×1 and strided ones, whose taps share little, and each phase of a transposed
+// one. From the prelude: KERNEL_W, KERNEL_H, STRIDE.
 
 fn convolve(first: u32, count: u32) {
     let s = i32(STRIDE);

@@ -30,7 +30,8 @@ fn dropped(v: vec4f, first: u32) -> vec4f {
     return kept;
 }
 
-// Finishes vector `vector` of output pixel `pixel`, counted row by row, and answers with what it has become.
+// Finishes vector `vector` of output pixel `pixel`, counted row by row, and answers with what it
+// has become.
 fn finish(value: vec4f, pixel: u32, vector: u32) -> vec4f {
     var v = value;
     if ADD == 1u { v += load(step.skip + pixel * step.skip_pitch + vector); }

@@ -1,5 +1,5 @@
-// The entry point of the blocked convolutions, whose tile comes from tile.wgsl: TILE, begin, convolve, write. From
-// the prelude: THREADS, of a workgroup.
+// The entry point of the blocked convolutions, whose tile comes from tile.wgsl: TILE, begin,
+// convolve, write. From the prelude: THREADS, of a workgroup.
 
 // First input vector that a block from output vector `vector` on reads. Where groups begin within a
 // vector it reads neighbours too, with weights of zero.
@@ -8,8 +8,8 @@ fn first_read(vector: u32) -> u32 {
     return min(first, (step.in_channels + 3u) / 4u - step.in_vectors);
 }
 
-// `convolve(first, count)` adds what the taps see of `count` input vectors, the weights of this block of output
-// channels beginning at `first`.
+// `convolve(first, count)` adds what the taps see of `count` input vectors, the weights of this
+// block of output channels beginning at `first`.
 @compute @workgroup_size(THREADS)
 fn main(
     @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,

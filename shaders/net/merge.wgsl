@@ -1,5 +1,5 @@
-// The second level of a norm: one workgroup merges the tiles of all channels of a group, two at a time (Chan, Golub and
-// LeVeque 1983), and writes mean, scale and shift of each of its channels.
+// The second level of a norm: one workgroup merges the tiles of all channels of a group, two at a
+// time (Chan, Golub and LeVeque 1983), and writes mean, scale and shift of each of its channels.
 
 // Weights of all channels, then biases.
 @group(0) @binding(2) var<storage, read> trained: array<vec4f>;

@@ -1,5 +1,5 @@
-// Arithmetic without loads: what a device can do at best. Eight independent chains of vectors a thread, 128 rounds of
-// 32 numbers · 2 operations. The chains run to 2, so no number gets small.
+// Arithmetic without loads: what a device can do at best. Eight independent chains of vectors a
+// thread, 128 rounds of 32 numbers · 2 operations. The chains run to 2, so no number gets small.
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     var a = vec4f(f32(id.x)); var b = a + 0.1; var c = a + 0.2; var d = a + 0.3;

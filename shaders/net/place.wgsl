@@ -31,7 +31,8 @@ fn padding(phase: vec2u) -> vec2i {
     return step.pad - (n - ((n % s) + s) % s) / s;
 }
 
-// Index of the first vector of pixel (x, y) of the tensor at `inputs`, or of the arena's zeros outside the picture.
+// Index of the first vector of pixel (x, y) of the tensor at `inputs`, or of the arena's zeros
+// outside the picture.
 fn vector_of(inputs: u32, x: i32, y: i32) -> u32 {
     let size = vec2i(step.in_size * NEAREST);
     let inside = x >= 0 && y >= 0 && x < size.x && y < size.y;

@@ -9,7 +9,8 @@ const TILE = vec2u(2u, 4u);
 struct Eight { p0: vec4f, p1: vec4f, p2: vec4f, p3: vec4f, p4: vec4f, p5: vec4f, p6: vec4f, p7: vec4f }
 
 var<private> place: Place;
-// The tile's first pixel among those of its phase, and where the channels begin that the group reads.
+// The tile's first pixel among those of its phase, and where the channels begin that the group
+// reads.
 var<private> corner: vec2u;
 var<private> inputs: u32;
 // The tile's sums: one `Eight` an output vector.
@@ -18,7 +19,8 @@ var<private> b: Eight;
 var<private> c: Eight;
 var<private> d: Eight;
 
-// Index of the first vector that the group reads of pixel (x, y), or of the arena's zeros outside the picture.
+// Index of the first vector that the group reads of pixel (x, y), or of the arena's zeros outside
+// the picture.
 fn tap(x: i32, y: i32) -> u32 { return vector_of(inputs, x, y); }
 
 fn all_of(v: vec4f) -> Eight { return Eight(v, v, v, v, v, v, v, v); }

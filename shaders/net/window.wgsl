@@ -26,7 +26,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         v = source(pixel, id.z);
         let skipped = first_lane();
         if skipped > 0u {
-            // Lanes `skipped` and after come from this vector, those before from the end of the last one.
+            // Lanes `skipped` and after come from this vector, those before from the end of the
+            // last one.
             var before = vec4f(0.0);
             if id.z > 0u { before = source(pixel, id.z - 1u); }
             var moved = vec4f(0.0);

@@ -3,9 +3,10 @@
 //#import reference/random.wgsl
 //#import reference/surface.wgsl
 
-// The specular lobe: GGX with the light that single scattering loses given back (Kulla and Conty 2017 as in Cycles'
-// Principled): white metal keeps all light at every roughness. Its dielectric part has the true Fresnel curve of the
-// material's index, as the rasteriser's `ggx` and Cycles have it and as `env_brdf` was fitted to. Metal has Schlick's.
+// The specular lobe: GGX with the light that single scattering loses given back (Kulla and Conty
+// 2017 as in Cycles' Principled): white metal keeps all light at every roughness. Its dielectric
+// part has the true Fresnel curve of the material's index, as the rasteriser's `ggx` and Cycles
+// have it and as `env_brdf` was fitted to. Metal has Schlick's.
 
 // Mean of the Fresnel curve over the cosine-weighted hemisphere: Kulla and Conty's fit, scaled to
 // be exact for index 1.5.
@@ -13,7 +14,8 @@ fn mean_fresnel(index: f32) -> f32 {
     return min(1.0258 * (index - 1.0) / (4.08567 + 1.00071 * index), 1.0);
 }
 
-// Schlick's curve from a metal's colour, with the factor for the lost light; q5: 1 - v.h to the fifth.
+// Schlick's curve from a metal's colour, with the factor for the lost light; q5: 1 - v.h to the
+// fifth.
 fn fresnel_metal(s: Surface, f0: vec3f, q5: f32) -> vec3f {
     let mean = f0 + (1.0 - f0) / 21.0;
     let again = mean * s.mean / (1.0 - mean * (1.0 - s.mean));

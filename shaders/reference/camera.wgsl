@@ -11,7 +11,8 @@ fn point_at(point: u32) -> vec2f {
     return vec2f(vec2u(point % job.size.x, point / job.size.x)) + 0.5;
 }
 
-// Offset of a sample from its point, pixels: drawn from the filter itself, so that all samples weigh the same.
+// Offset of a sample from its point, pixels: drawn from the filter itself, so that all samples
+// weigh the same.
 fn filter_offset(u: vec2f) -> vec2f {
     let p = u * f32(FILTER_STEPS - 1u);
     let i = min(vec2u(p), vec2u(FILTER_STEPS - 2u));
@@ -37,7 +38,8 @@ fn culled(triangle: u32, direction: vec3f) -> bool {
         && dot(front_normal(corners_of(triangle)), direction) >= 0.0;
 }
 
-// True where a ray goes through the triangle that it hit: culled for the camera, or let through by its alpha.
+// True where a ray goes through the triangle that it hit: culled for the camera, or let through by
+// its alpha.
 fn passes(hit: Hit, direction: vec3f, from_camera: bool, salt: u32) -> bool {
     if from_camera && culled(hit.triangle, direction) { return true; }
     if (scene.flags & SCENE_COVERED) == 0u { return false; }

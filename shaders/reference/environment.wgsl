@@ -39,7 +39,8 @@ fn cell_density(cell: vec2u) -> f32 {
     return chance * size.x / (2.0 * PI * max(rows.x - rows.y, 1e-9));
 }
 
-// Density with which `sample_lights` goes in direction l from a surface; `n_l`: cosine to its normal.
+// Density with which `sample_lights` goes in direction l from a surface; `n_l`: cosine to its
+// normal.
 fn environment_density(l: vec3f, n_l: f32) -> f32 {
     if scene.environment_size.x == 0u { return environment_share() * max(n_l, 0.0) / PI; }
     let size = scene.environment_cells;

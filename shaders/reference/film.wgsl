@@ -1,4 +1,5 @@
-// The film of one half-buffer: sums over the samples of each point that stay exact over millions of samples.
+// The film of one half-buffer: sums over the samples of each point that stay exact over millions of
+// samples.
 //
 // A point has 16 vec4f: 8 sums and the 8 carries that belong to them. A sum is the pair sum +
 // carry; every addition is Knuth's TwoSum, whose rounding error goes into the carry (Ogita, Rump

@@ -6,9 +6,10 @@
 //#import reference/surface.wgsl
 //#import reference/environment.wgsl
 
-// Light samples. Suns are discs at infinity, point and spot lights discs that face the shaded point (as Cycles' soft
-// falloff has them), glowing triangles themselves, the surroundings a sphere at infinity. Densities are in 1/sr and
-// contain the chance of having chosen the light; 0 stands for a light without size, which no ray can hit.
+// Light samples. Suns are discs at infinity, point and spot lights discs that face the shaded point
+// (as Cycles' soft falloff has them), glowing triangles themselves, the surroundings a sphere at
+// infinity. Densities are in 1/sr and contain the chance of having chosen the light; 0 stands for a
+// light without size, which no ray can hit.
 
 const FAR: f32 = 1e30;
 const TRIANGLE_BIT: u32 = 0x80000000u;
@@ -160,7 +161,8 @@ fn triangle_density(triangle: u32, t: f32, l: vec3f) -> f32 {
     return bitcast<f32>(triangles[4u * triangle + 3u].z) * (1.0 - environment_share()) * t * t / max(facing, 1e-9);
 }
 
-// How much a light's radiance counts where the ray hit it by chance `hit`, and could have been sampled with `sampled`.
+// How much a light's radiance counts where the ray hit it by chance `hit`, and could have been
+// sampled with `sampled`.
 fn hit_weight(hit: f32, sampled: f32) -> f32 {
     if (job.flags & JOB_LIGHTS_ONLY) != 0u { return 0.0; }
     if (job.flags & (JOB_HITS_ONLY | JOB_COUNT_TWICE)) != 0u { return 1.0; }
@@ -175,7 +177,8 @@ fn sample_weight(sampled: f32, hit: f32) -> f32 {
     return 1.0 / (1.0 + q * q);
 }
 
-// Weighted radiance of the analytic lights that a ray scattered with density `pdf` meets before distance t.
+// Weighted radiance of the analytic lights that a ray scattered with density `pdf` meets before
+// distance t.
 fn analytic_hits(origin: vec3f, l: vec3f, t: f32, pdf: f32) -> vec3f {
     var sum = vec3f(0.0);
     for (var i = 0u; i < scene.light_count; i++) {

@@ -25,7 +25,8 @@ const RAY_PATH: u32 = 0u;
 const RAY_LIGHT: u32 = 1u;
 const RAY_ANALYTIC: u32 = 2u;
 
-// A sample is given up after so many rays: only clouds of transparent surfaces or closed white mirrors get there.
+// A sample is given up after so many rays: only clouds of transparent surfaces or closed white
+// mirrors get there.
 const MOST_RAYS: u32 = 4096u;
 
 @compute @workgroup_size(64)
@@ -217,7 +218,8 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 }
             }
         }
-        // The analytic lights once more as the rasteriser has them, where the light sample does not tell.
+        // The analytic lights once more as the rasteriser has them, where the light sample does not
+        // tell.
         if vertex == 0u && apart && scene.light_count > 0u && lum.x + lum.y > 0.0 {
             analytic = sample_rasterised(s, base, pair);
         }

@@ -24,7 +24,8 @@ fn start_random(point: u32, sample: u32) {
     random_sample = sample;
 }
 
-// Owen scrambling of a number whose bits are reversed (Laine and Karras 2011 with Vegdahl's constants).
+// Owen scrambling of a number whose bits are reversed (Laine and Karras 2011 with Vegdahl's
+// constants).
 fn scramble_reversed(x: u32, seed: u32) -> u32 {
     var v = x ^ (x * 0x3d20adeau);
     v += seed;
@@ -55,7 +56,8 @@ fn random2(pair: u32) -> vec2f {
     return vec2f(unit_float(x), unit_float(y));
 }
 
-// One plain random number of [0, 1) for whether a ray passes a triangle; `salt` tells rays of one path apart.
+// One plain random number of [0, 1) for whether a ray passes a triangle; `salt` tells rays of one
+// path apart.
 fn random_pass(triangle: u32, salt: u32) -> f32 {
     return unit_float(pcg3(vec3u(random_point ^ salt, random_sample, triangle)).z);
 }

@@ -6,7 +6,8 @@
 //#import reference/surface.wgsl
 //#import reference/lights.wgsl
 
-// Direct light as the rasteriser reckons it: from the light's centre, with its shadow by a point of its disc.
+// Direct light as the rasteriser reckons it: from the light's centre, with its shadow by a point of
+// its disc.
 
 struct Rasterised {
     // Diffuse light with the albedo multiplied in, and the specular lobe's.
@@ -31,7 +32,8 @@ struct RasterisedRay {
     light: Rasterised,
 }
 
-// Light of one of all analytic lights, stand-ins included, and the shadow ray that decides about it.
+// Light of one of all analytic lights, stand-ins included, and the shadow ray that decides about
+// it.
 fn sample_rasterised(s: Surface, origin: vec3f, pair: u32) -> RasterisedRay {
     let choice = choose(scene.analytic_table, scene.light_count, random2(pair + PAIR_ANALYTIC));
     let light = light_at(choice.id);

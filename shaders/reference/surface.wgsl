@@ -61,7 +61,8 @@ fn texel_at(use_: ImageUse, p: vec2i) -> vec4f {
     return vec4f(linear, v.a);
 }
 
-// The image at texture coordinates, filtered as the sampler says, finest level; `otherwise` where there is none.
+// The image at texture coordinates, filtered as the sampler says, finest level; `otherwise` where
+// there is none.
 fn image_at(use_: ImageUse, uv: vec4f, otherwise: vec4f) -> vec4f {
     if use_.texel == NONE { return otherwise; }
     let p = vec3f(select(uv.xy, uv.zw, (use_.bits & 16u) != 0u), 1.0);
@@ -108,19 +109,22 @@ struct Surface {
     side: vec3f,
     // Shading normal, turned to that side as the rasteriser turns it.
     n: vec3f,
-    // Unit vector to where the ray came from, bent above the shading normal's horizon where it lay below.
+    // Unit vector to where the ray came from, bent above the shading normal's horizon where it lay
+    // below.
     v: vec3f,
     n_v: f32,
     albedo: vec3f,
     base: vec3f,
     metallic: f32,
     roughness: f32,
-    // Reflectance of the dielectric at normal incidence: the largest of the three colours', and all three.
+    // Reflectance of the dielectric at normal incidence: the largest of the three colours', and all
+    // three.
     f0: f32,
     f0_color: vec3f,
     // Directional albedo of the specular lobe.
     gloss: vec3f,
-    // What the single-scattering lobe loses over what it keeps, and the mean of what it keeps over directions.
+    // What the single-scattering lobe loses over what it keeps, and the mean of what it keeps over
+    // directions.
     missing: f32,
     mean: f32,
     // Width of the lobe.

@@ -1,4 +1,5 @@
-// What the path tracer reads. Group 0 is the scene (`reference::scene`), group 1 the film (`reference::job`).
+// What the path tracer reads. Group 0 is the scene (`reference::scene`), group 1 the film
+// (`reference::job`).
 
 // In Rust: `reference::scene::SceneInfo`.
 struct SceneInfo {
@@ -12,10 +13,12 @@ struct SceneInfo {
     truth_count: u32,
     // Alias table over the analytic lights (`light_count` entries): first vector.
     analytic_table: u32,
-    // Chance that a light sample goes to the surroundings, and the same when lights are sampled only.
+    // Chance that a light sample goes to the surroundings, and the same when lights are sampled
+    // only.
     environment_share: f32,
     environment_share_alone: f32,
-    // Picture of the surroundings in `texels`, three floats a texel: first word and size; width 0 for none.
+    // Picture of the surroundings in `texels`, three floats a texel: first word and size; width 0
+    // for none.
     environment_texels: u32,
     // Its alias table: first vector in `lights`.
     environment_table: u32,
@@ -67,7 +70,8 @@ struct ImageUse {
     // Index of the first texel in `texels`; 0xffffffff for no image.
     texel: u32,
     row1: vec3f,
-    // Bits 0-1 and 2-3: wrap in u and v (0 repeat, 1 mirror, 2 clamp); 4: second coordinate set; 5: sRGB; 6: nearest.
+    // Bits 0-1 and 2-3: wrap in u and v (0 repeat, 1 mirror, 2 clamp); 4: second coordinate set; 5:
+    // sRGB; 6: nearest.
     bits: u32,
     size: vec2u,
     pad: vec2u,

@@ -31,7 +31,8 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> @location(0) ve
     let pixel = vec2u(in.position.xy);
     let v = to_eye(frame, pixel);
     let direct = direct_light(in.world, s.normal, v, s.specular, pixel, true);
-    // Light from all around is taken to be that of what is behind, or the sky's: no cell looks out from here.
+    // Light from all around is taken to be that of what is behind, or the sky's: no cell looks out
+    // from here.
     let open = textureLoad(emitted, pixel, 0).a <= 0.0;
     let around = select(textureLoad(indirect, pixel, 0).rgb, frame.environment, open) * s.shade;
     let mirrored = env_brdf(s.specular.rgb, s.specular.a, max(dot(s.normal, v), 0.0));

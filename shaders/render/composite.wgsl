@@ -2,10 +2,12 @@
 //#import lib/environment.wgsl
 //#import lib/hash.wgsl
 
-// Puts light and surface together: hdr = albedo (direct + indirect) + direct and indirect specular + emissive.
+// Puts light and surface together: hdr = albedo (direct + indirect) + direct and indirect
+// specular + emissive.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL backends would refuse one.
+// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL
+// backends would refuse one.
 @group(0) @binding(1) var depth_texture: texture_2d<f32>;
 @group(0) @binding(2) var albedo_texture: texture_2d<f32>;
 @group(0) @binding(3) var emissive_texture: texture_2d<f32>;
@@ -49,7 +51,8 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     var radiance = vec3f(0.0);
     if depth > 0.0 {
         let albedo = textureLoad(albedo_texture, id.xy, 0);
-        // Occlusion maps darken what comes from all around, not the analytic lights (glTF 2.0, 3.9.3).
+        // Occlusion maps darken what comes from all around, not the analytic lights (glTF 2.0,
+        // 3.9.3).
         radiance = albedo.rgb * (textureLoad(direct_diffuse, id.xy, 0).rgb
             + textureLoad(indirect, id.xy, 0).rgb * albedo.a)
             + textureLoad(direct_specular, id.xy, 0).rgb

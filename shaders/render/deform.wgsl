@@ -1,7 +1,7 @@
 //#import lib/octahedral.wgsl
 
-// Vertices of a deforming mesh: morph targets, then the mean of the joints' matrices. `scene/deform.rs` does the same
-// on the CPU.
+// Vertices of a deforming mesh: morph targets, then the mean of the joints' matrices.
+// `scene/deform.rs` does the same on the CPU.
 
 // Where the words of a mesh are in `shape`, and its numbers in `pose`.
 struct Deforming {
@@ -10,7 +10,8 @@ struct Deforming {
     count: u32,
     // Five words a vertex: place, normal, tangent.
     rest: u32,
-    // Where each vertex's deltas begin, and the end: count + 1 words; in deltas of ten words from `deltas` on.
+    // Where each vertex's deltas begin, and the end: count + 1 words; in deltas of ten words from
+    // `deltas` on.
     first: u32,
     deltas: u32,
     // Six words a set: four joints of 16 bits, four weights.
@@ -24,7 +25,8 @@ struct Deforming {
     pad: u32,
 }
 
-// No uniform: what a shader branches on by uniforms alone Mesa's CPU driver compiles anew for each dispatch.
+// No uniform: what a shader branches on by uniforms alone Mesa's CPU driver compiles anew for each
+// dispatch.
 @group(0) @binding(0) var<storage, read> mesh: Deforming;
 @group(0) @binding(1) var<storage, read> shape: array<u32>;
 @group(0) @binding(2) var<storage, read> pose: array<f32>;
@@ -78,7 +80,8 @@ fn moved(v: u32) -> Moved {
         }
     }
     let q = vec4f(p, 1.0);
-    // The cofactor matrix is the inverse transpose times the determinant: right for normals, never singular.
+    // The cofactor matrix is the inverse transpose times the determinant: right for normals, never
+    // singular.
     let c0 = cross(r1.xyz, r2.xyz);
     let c1 = cross(r2.xyz, r0.xyz);
     let c2 = cross(r0.xyz, r1.xyz);

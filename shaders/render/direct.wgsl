@@ -5,7 +5,8 @@
 // Direct light of the analytic lights: E/π without albedo, and the radiance of the specular lobe.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL backends would refuse one.
+// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL
+// backends would refuse one.
 @group(0) @binding(1) var depth_texture: texture_2d<f32>;
 @group(0) @binding(2) var normal_texture: texture_2d<f32>;
 @group(0) @binding(3) var specular_texture: texture_2d<f32>;

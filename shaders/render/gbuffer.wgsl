@@ -45,7 +45,8 @@ override SORTED: bool = false;
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     let s = surface_at(in, facing);
-    // Depth of the surface at the pixel's centre, wherever in the pixel this frame looks: linear on a plane.
+    // Depth of the surface at the pixel's centre, wherever in the pixel this frame looks: linear on
+    // a plane.
     let centre = in.position.z - dot(frame.jitter, vec2f(dpdx(in.position.z), dpdy(in.position.z)));
     if ALPHA {
         // Chosen, not branched, as in `surface_at`.
@@ -66,10 +67,10 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> Fields {
     return out;
 }
 
-// What the coverage of a layer is asked against, in (0, 1]. Over the frames of a pixel it is an additive
-// recurrence near the golden ratio's, so that their mean converges with their number and not its root. Each
-// layer of a pixel begins elsewhere and goes on by another step, so that coverages multiply; layers are told
-// apart by instance, side and depth.
+// What the coverage of a layer is asked against, in (0, 1]. Over the frames of a pixel it is an
+// additive recurrence near the golden ratio's, so that their mean converges with their number and
+// not its root. Each layer of a pixel begins elsewhere and goes on by another step, so that
+// coverages multiply; layers are told apart by instance, side and depth.
 fn coverage_threshold(in: Varying, facing: bool, depth: f32) -> f32 {
     let q = vec2u(in.position.xy);
     // In steps of 0.3 %, more than what rounding leaves of a surface's depth from frame to frame.

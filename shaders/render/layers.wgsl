@@ -2,9 +2,9 @@
 //#import lib/octahedral.wgsl
 //#import lib/brdf.wgsl
 
-// Decodes one layer of the G-buffer for a band of rows into linear floats, for capture. Which layer: `options.layer`,
-// numbered as `render::capture::Layer`. Light layers leave as products with the surface colour; the division, which
-// Blender makes after filtering, happens on the CPU.
+// Decodes one layer of the G-buffer for a band of rows into linear floats, for capture. Which
+// layer: `options.layer`, numbered as `render::capture::Layer`. Light layers leave as products with
+// the surface colour; the division, which Blender makes after filtering, happens on the CPU.
 
 struct Options {
     layer: u32,
@@ -14,7 +14,8 @@ struct Options {
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL backends would refuse one.
+// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL
+// backends would refuse one.
 @group(0) @binding(1) var depth_texture: texture_2d<f32>;
 @group(0) @binding(2) var normal_texture: texture_2d<f32>;
 @group(0) @binding(3) var albedo_texture: texture_2d<f32>;
@@ -50,7 +51,8 @@ fn decode(pixel: vec2u) -> vec4f {
     let specular = textureLoad(specular_texture, pixel, 0);
     let around = textureLoad(indirect, pixel, 0).rgb * albedo.a;
     let gloss = env_brdf(specular.rgb, specular.a, dot(n, to_eye(frame, pixel)));
-    // A channel that eight bits round to 0 still tells what light falls on it; on metal no channel does.
+    // A channel that eight bits round to 0 still tells what light falls on it; on metal no channel
+    // does.
     let weight = select(vec3f(0.0), max(albedo.rgb, vec3f(1.0 / 4096.0)), any(albedo.rgb > vec3f(0.0)));
     switch options.layer {
         case 1u: { return vec4f(weight * textureLoad(direct_diffuse, pixel, 0).rgb, 1.0); }

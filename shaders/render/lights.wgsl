@@ -3,11 +3,13 @@
 //#import lib/lights.wgsl
 //#import lib/light_list.wgsl
 
-// Which lights can reach what a tile of 16x16 pixels shows: by the box around the tile's points, the box around their
-// normals, each light's reach and a spot's cone. What is left out gives no light at any of these points.
+// Which lights can reach what a tile of 16x16 pixels shows: by the box around the tile's points,
+// the box around their normals, each light's reach and a spot's cone. What is left out gives no
+// light at any of these points.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL backends would refuse one.
+// Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL
+// backends would refuse one.
 @group(0) @binding(1) var depth_texture: texture_2d<f32>;
 @group(0) @binding(2) var normal_texture: texture_2d<f32>;
 @group(1) @binding(0) var<storage, read> lights: array<Light>;

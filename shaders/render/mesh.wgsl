@@ -1,6 +1,7 @@
 //#import lib/octahedral.wgsl
 
-// The vertex stage of everything that draws surfaces with their materials: gbuffer.wgsl and atlas.wgsl.
+// The vertex stage of everything that draws surfaces with their materials: gbuffer.wgsl and
+// atlas.wgsl.
 
 struct Vertex {
     @location(0) position: vec3f,
@@ -24,7 +25,8 @@ struct Varying {
     @location(4) world: vec3f,
     // Sign of the transform's determinant: a mirrored object turns its front faces round.
     @location(5) @interpolate(flat) mirror: f32,
-    // Where the surface was in the frame before, minus where it is, metres; 0 in passes that do not ask.
+    // Where the surface was in the frame before, minus where it is, metres; 0 in passes that do not
+    // ask.
     @location(6) back: vec3f,
     // Which instance of all that are drawn; 0 in passes that do not ask.
     @location(7) @interpolate(flat) instance: u32,
@@ -34,7 +36,8 @@ struct Varying {
 fn placed(v: Vertex, clip_from_world: mat4x4f) -> Varying {
     let p = vec4f(v.position, 1.0);
     let world = vec3f(dot(v.row0, p), dot(v.row1, p), dot(v.row2, p));
-    // The cofactor matrix is the inverse transpose times the determinant: right for normals, never singular.
+    // The cofactor matrix is the inverse transpose times the determinant: right for normals, never
+    // singular.
     let c0 = cross(v.row1.xyz, v.row2.xyz);
     let c1 = cross(v.row2.xyz, v.row0.xyz);
     let c2 = cross(v.row0.xyz, v.row1.xyz);

@@ -52,7 +52,8 @@ fn surface_at(in: Varying, facing: bool) -> Surface {
     let n_v = dot(n, normalize(v));
     let share = diffuse_loss(material.f0, roughness, max(n_v, 0.0));
     let darkened = select(0.0, material.occlusion_strength, frame.picture_only != 0u);
-    // Chosen, not branched: Mesa's CPU driver compiles what uniforms alone branch on anew for each draw.
+    // Chosen, not branched: Mesa's CPU driver compiles what uniforms alone branch on anew for each
+    // draw.
     let unlit = material.unlit != 0u;
     let specular = vec4f(mix(material.f0 * material.specular_tint.rgb, color, metallic), roughness);
     return Surface(
@@ -62,14 +63,16 @@ fn surface_at(in: Varying, facing: bool) -> Surface {
     );
 }
 
-// Variance of slopes along one axis of normals that differ, from √(1 − r) of a normal map's alpha: that of the
-// von Mises-Fisher distribution whose mean has length r (Banerjee et al. 2005), at most 1 (normals all over the place).
+// Variance of slopes along one axis of normals that differ, from √(1 − r) of a normal map's alpha:
+// that of the von Mises-Fisher distribution whose mean has length r (Banerjee et al. 2005), at most
+// 1 (normals all over the place).
 fn slope_variance(short: f32) -> f32 {
     let r = 1.0 - short * short;
     return min((1.0 - r * r) / max(r * (3.0 - r * r), 1e-3), 1.0);
 }
 
-// Roughness of microfacets on a surface whose normals differ: α² is twice the variance of slopes, and variances add.
+// Roughness of microfacets on a surface whose normals differ: α² is twice the variance of slopes,
+// and variances add.
 fn rougher(roughness: f32, spread: f32) -> f32 {
     let alpha = roughness * roughness;
     return sqrt(sqrt(min(alpha * alpha + 2.0 * spread, 1.0)));

@@ -30,7 +30,8 @@ const STILL = 1;
 const MOVING = 2;
 
 const HALF_MAX: f32 = 65504.0;
-// Frames in the mean: a half float counts to 2048; a moving picture loses sharpness with each fetch.
+// Frames in the mean: a half float counts to 2048; a moving picture loses sharpness with each
+// fetch.
 const MOST_STILL = 2000.0;
 const MOST_MOVING = 10.0;
 // Width of the neighbourhood's box in standard deviations (Salvi 2016 has 1).

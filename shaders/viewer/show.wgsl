@@ -3,7 +3,8 @@
 //#import lib/screen.wgsl
 //#import lib/tonemap.wgsl
 
-// What the window shows: a picture or one of the things it was made from, on both sides of a line that can be dragged.
+// What the window shows: a picture or one of the things it was made from, on both sides of a line
+// that can be dragged.
 
 struct Show {
     // Where the picture begins in the window, pixels.
@@ -124,7 +125,8 @@ fn radiance_shown(radiance: vec3f) -> vec3f {
     return tonemap(show.kind, radiance * show.exposure);
 }
 
-// `metrics::heat_color`: black over purple and orange to pale yellow, to be read without red-green vision.
+// `metrics::heat_color`: black over purple and orange to pale yellow, to be read without red-green
+// vision.
 fn magma(value: f32) -> vec3f {
     let t = saturate(value);
     let high = vec3f(5.234, -5.416, -12.442);

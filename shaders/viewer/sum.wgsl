@@ -1,4 +1,5 @@
-// Adds a frame to the sum of the frames of a view that stands still; the first one replaces what was there.
+// Adds a frame to the sum of the frames of a view that stands still; the first one replaces what
+// was there.
 
 @group(0) @binding(0) var frame: texture_2d<f32>;
 @group(0) @binding(1) var before: texture_2d<f32>;

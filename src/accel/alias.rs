@@ -1,7 +1,7 @@
 //! Choosing one of many by a table: Walker's alias method.
 
-/// Entries (threshold, other entry, chance, id), the integers as bits: entry i with a second number below the threshold
-/// gives i, else the other entry.
+/// Entries (threshold, other entry, chance, id), the integers as bits: entry i with a second number
+/// below the threshold gives i, else the other entry.
 pub(crate) fn alias(choices: &[(u32, f64)]) -> Vec<[f32; 4]> {
     let n = choices.len();
     let mut scaled: Vec<f64> = choices.iter().map(|c| c.1 * n as f64).collect();

@@ -43,7 +43,8 @@ pub(super) fn build(triangles: &[Triangle]) -> Accel {
     build_with(triangles, None)
 }
 
-/// The same of triangles that will move: those without area may get one, and corners meet where `places` says so.
+/// The same of triangles that will move: those without area may get one, and corners meet where
+/// `places` says so.
 pub(super) fn build_deforming(triangles: &[Triangle], places: &pairs::Places) -> Accel {
     build_with(triangles, Some(places))
 }
@@ -110,7 +111,8 @@ fn most_alike(boxes: &[Aabb]) -> usize {
     keys.chunk_by(|a, b| a == b).map(<[_]>::len).max().unwrap_or(0)
 }
 
-/// A tree by halving at the median along the longest axis of the centres: log₂ n levels whatever the boxes are.
+/// A tree by halving at the median along the longest axis of the centres: log₂ n levels whatever
+/// the boxes are.
 fn halved(boxes: &[Aabb]) -> Bvh2 {
     let mut order = (0..boxes.len() as u32).collect::<Vec<_>>();
     let mut nodes = Vec::with_capacity(2 * boxes.len());

@@ -18,7 +18,8 @@ pub struct AccelHit {
     pub uv: [f32; 2],
 }
 
-/// Components of a direction closer to zero than this are moved away from it, so that their inverse is finite.
+/// Components of a direction closer to zero than this are moved away from it, so that their inverse
+/// is finite.
 const TINY: f32 = 1e-18;
 
 /// Relative enlargement of a slab's far end, against rounding.
@@ -106,7 +107,8 @@ impl Accel {
         self.walk(origin, direction, t_max).0
     }
 
-    /// Blocks that [`Accel::closest`] looks at, in the GPU's order, so that this is also the GPU's number.
+    /// Blocks that [`Accel::closest`] looks at, in the GPU's order, so that this is also the GPU's
+    /// number.
     pub fn visits(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32) -> usize {
         self.walk(origin, direction, t_max).1
     }
@@ -123,7 +125,8 @@ struct Walk<'a> {
     blocks: &'a [Block],
     /// Ends at the first hit.
     any: bool,
-    /// Decides which triangles that let a share of rays through stop this one, as in `traverse.wgsl`.
+    /// Decides which triangles that let a share of rays through stop this one, as in
+    /// `traverse.wgsl`.
     seed: u32,
     nearest: f32,
     /// With the number of its instance.
@@ -178,7 +181,8 @@ fn stops(open: u32, triangle: u32, seed: u32) -> bool {
     open == 0 || (((v >> 22) ^ v) >> 8) as f32 / 16_777_216.0 * 255.0 >= open as f32
 }
 
-/// The blocks of [`SceneRays`](super::SceneRays) without a device: trees of meshes below a tree over instances.
+/// The blocks of [`SceneRays`](super::SceneRays) without a device: trees of meshes below a tree
+/// over instances.
 pub struct SceneBlocks {
     trees: SceneTrees,
     /// Of meshes that share a tree, where each is.

@@ -1,4 +1,5 @@
-//! Triangles that glow, in the world, with a table from which a light sample chooses one by its power.
+//! Triangles that glow, in the world, with a table from which a light sample chooses one by its
+//! power.
 
 use super::alias::alias;
 use super::build;

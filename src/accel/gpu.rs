@@ -6,7 +6,8 @@
 use super::wide::{Block, WORDS};
 use super::{Accel, AccelError};
 
-/// Blocks in a row of the texture, four texels each, as in `traverse.wgsl`. Every WebGPU device has textures this wide.
+/// Blocks in a row of the texture, four texels each, as in `traverse.wgsl`. Every WebGPU device has
+/// textures this wide.
 pub(super) const ROW: u32 = 2048;
 
 /// Texels of a block, 16 bytes each.

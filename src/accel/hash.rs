@@ -12,7 +12,8 @@ pub(crate) fn map<K, V>(count: usize) -> Map<K, V> {
     HashMap::with_capacity_and_hasher(count, Seeded(RandomState::new().hash_one(0u8)))
 }
 
-/// Begins every hash with a number that no file can know, so that none can be made whose keys all collide.
+/// Begins every hash with a number that no file can know, so that none can be made whose keys all
+/// collide.
 #[derive(Clone)]
 pub(crate) struct Seeded(u64);
 

@@ -11,9 +11,11 @@ pub(super) type Triangle = [[f32; 3]; 3];
 /// One triangle, or two that share the edge from the first corner to the third.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair {
-    /// The first triangle is corners 0, 1, 2; the second is 0, 2, 3. A single triangle has its third corner twice.
+    /// The first triangle is corners 0, 1, 2; the second is 0, 2, 3. A single triangle has its
+    /// third corner twice.
     pub corners: [[f32; 3]; 4],
-    /// Number of each triangle, and how many places its own corner 0 stands to the right of this pair's corner 0.
+    /// Number of each triangle, and how many places its own corner 0 stands to the right of this
+    /// pair's corner 0.
     pub triangles: [(u32, u32); 2],
 }
 
@@ -59,9 +61,9 @@ fn half_area(triangles: &[&Triangle]) -> f32 {
     triangles.iter().flat_map(|t| t.iter()).fold(Aabb::empty(), |mut sum, p| *sum.extend(Vec3A::from(*p))).half_area()
 }
 
-/// Joins the triangles `kept`. Each takes the free neighbour with which it fills the smallest box, if visiting that box
-/// costs less than visiting both triangles' own. Corners are the same where they are in one place, or where `places`
-/// says so.
+/// Joins the triangles `kept`. Each takes the free neighbour with which it fills the smallest box,
+/// if visiting that box costs less than visiting both triangles' own. Corners are the same where
+/// they are in one place, or where `places` says so.
 pub(super) fn join(triangles: &[Triangle], kept: &[u32], places: Option<&Places>) -> Vec<Pair> {
     let edge_of = |index: u32, start: usize| match places {
         Some(places) => [start, (start + 1) % 3].map(|k| [places[index as usize][k], 0, 0]),

@@ -1,6 +1,6 @@
-//! Trees of meshes that deform: the tree that was built stays, its boxes follow the vertices (Lauterbach et
-//! al., "RT-DEFORM: Interactive Ray Tracing of Dynamic Scenes using BVHs", RT 2006). Hits are those of a tree
-//! built anew; what a far pose costs is looser boxes.
+//! Trees of meshes that deform: the tree that was built stays, its boxes follow the vertices
+//! (Lauterbach et al., "RT-DEFORM: Interactive Ray Tracing of Dynamic Scenes using BVHs", RT 2006).
+//! Hits are those of a tree built anew; what a far pose costs is looser boxes.
 
 use super::wide::{self, Block, NODE};
 use super::{MAX_COORDINATE, surfaces};
@@ -13,7 +13,8 @@ pub(super) struct Refit {
     /// As they lie in the texture from `root` on.
     pub blocks: Vec<Block>,
     pub root: u32,
-    /// Of each node the children that hold something, a bit each; of a leaf 1 where it holds triangles.
+    /// Of each node the children that hold something, a bit each; of a leaf 1 where it holds
+    /// triangles.
     held: Vec<u8>,
     /// Vertices of each triangle.
     pub triangles: Vec<[u32; 3]>,
@@ -38,8 +39,8 @@ impl Refit {
         Self { blocks: blocks.to_vec(), root, held, triangles, surfaces, boxes: Vec::new() }
     }
 
-    /// Moves the corners to `positions`, vertices of the mesh, and all boxes after them. Answers the box around
-    /// everything; `None` where there is nothing.
+    /// Moves the corners to `positions`, vertices of the mesh, and all boxes after them. Answers
+    /// the box around everything; `None` where there is nothing.
     pub fn follow(&mut self, positions: &[[f32; 3]]) -> Option<(Vec3, Vec3)> {
         self.boxes.clear();
         self.boxes.resize(self.blocks.len(), Aabb::empty());
@@ -72,7 +73,8 @@ impl Refit {
     }
 }
 
-/// Corners of the two triangles of a leaf, see [`Pair`](super::pairs::Pair). What cannot be met is put in one point.
+/// Corners of the two triangles of a leaf, see [`Pair`](super::pairs::Pair). What cannot be met is
+/// put in one point.
 fn corners(block: &Block, triangles: &[[u32; 3]], positions: &[[f32; 3]]) -> [[f32; 3]; 4] {
     let corner = |word: u32, k: usize| {
         // How many places the triangle's own corner 0 stands to the right.

@@ -1,7 +1,7 @@
-//! The triangles of a scene as rays meet them: a tree for each mesh, or for several that are in one place each
-//! and the same, made once and on all of the machine's threads, and a tree over the instances, made anew
-//! whenever something moves. One texture holds both; what a ray needs to know of a triangle (`surfaces`) and the
-//! triangles that glow (`emitters`) are storage buffers.
+//! The triangles of a scene as rays meet them: a tree for each mesh, or for several that are in one
+//! place each and the same, made once and on all of the machine's threads, and a tree over the
+//! instances, made anew whenever something moves. One texture holds both; what a ray needs to know
+//! of a triangle (`surfaces`) and the triangles that glow (`emitters`) are storage buffers.
 
 use super::emitters::{self, EmitterGpu};
 use super::gpu::{self, ROW};
@@ -23,7 +23,8 @@ pub struct RayCounts {
     pub triangles: usize,
     /// Instances that rays can meet.
     pub instances: usize,
-    /// Instances that they cannot: of a mesh without area, or with a transform that is singular or not finite.
+    /// Instances that they cannot: of a mesh without area, or with a transform that is singular or
+    /// not finite.
     pub left_out: usize,
     /// Glowing triangles, of all instances.
     pub emitters: usize,
@@ -31,7 +32,8 @@ pub struct RayCounts {
     pub bytes: u64,
 }
 
-/// A scene's triangles on the GPU. Instances may move ([`SceneRays::place`]); after any other change it is made again.
+/// A scene's triangles on the GPU. Instances may move ([`SceneRays::place`]); after any other
+/// change it is made again.
 pub struct SceneRays {
     /// Tells scenes apart.
     id: u64,
@@ -118,9 +120,10 @@ impl SceneRays {
         (self.id, self.moves) = (before.id, self.moves.max(before.moves) + 1);
     }
 
-    /// Takes over where the instances of `scene` are and how its meshes are deformed; they are those that this was
-    /// made of. True when buffers were made anew and have to be bound again. Where one of several that shared a tree
-    /// has gone, all trees are made anew first: four seconds of one core for a million triangles.
+    /// Takes over where the instances of `scene` are and how its meshes are deformed; they are
+    /// those that this was made of. True when buffers were made anew and have to be bound again.
+    /// Where one of several that shared a tree has gone, all trees are made anew first: four
+    /// seconds of one core for a million triangles.
     pub fn place(&mut self, queue: &wgpu::Queue, scene: &Scene) -> bool {
         let mut anew = false;
         if apart(&self.meshes, &scene.instances) {
@@ -214,7 +217,8 @@ impl SceneRays {
         &self.emitters
     }
 
-    /// One over the sum of luminance × area × sides of all glowing triangles; 0 where nothing glows.
+    /// One over the sum of luminance × area × sides of all glowing triangles; 0 where nothing
+    /// glows.
     pub fn inverse_power(&self) -> f32 {
         self.inverse_power
     }

@@ -44,7 +44,8 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// What the shader reads; colours by their square roots in 8 bits, emission with 9 bits a channel and one exponent.
+    /// What the shader reads; colours by their square roots in 8 bits, emission with 9 bits a
+    /// channel and one exponent.
     pub fn packed(&self) -> Packed {
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
         let root = |c: Vec3| byte(c.x.sqrt()) | byte(c.y.sqrt()) << 8 | byte(c.z.sqrt()) << 16;
@@ -62,7 +63,8 @@ impl Surface {
         from_shared_exponent(shared_exponent(self.emission)) * ((255 - self.open()) as f32 / 255.0)
     }
 
-    /// Luminance of that times sides, by which light samples choose among glowing triangles of one area.
+    /// Luminance of that times sides, by which light samples choose among glowing triangles of one
+    /// area.
     pub fn glow_by_area(&self) -> f32 {
         let sides = if self.flags & DOUBLE_SIDED != 0 { 2.0 } else { 1.0 };
         luminance(self.glow()) * sides
@@ -74,7 +76,8 @@ impl Surface {
     }
 }
 
-/// Red, green and blue with 9 bits each and one exponent of 5, as `Rgb9e5Ufloat` (Vulkan's specification) has them.
+/// Red, green and blue with 9 bits each and one exponent of 5, as `Rgb9e5Ufloat` (Vulkan's
+/// specification) has them.
 pub fn shared_exponent(c: Vec3) -> u32 {
     let c = c.max(Vec3::ZERO).min(Vec3::splat(65408.0));
     let c = if c.is_finite() { c } else { Vec3::ZERO };
@@ -181,7 +184,8 @@ fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 
         let rgb = Vec3::from(std::array::from_fn(|c| (base[c] * m.base_color[c] * color(c)).clamp(0.0, 1.0)));
         let alpha = match m.alpha_mode {
             AlphaMode::Opaque => 1.0,
-            // The reduced picture's alpha is the share of texels above the cutoff, vertex colours aside.
+            // The reduced picture's alpha is the share of texels above the cutoff, vertex colours
+            // aside.
             AlphaMode::Mask { .. } if base_use.is_some() => base[3],
             AlphaMode::Mask { cutoff } => f32::from(u8::from(m.base_color[3] * color(3) >= cutoff)),
             AlphaMode::Blend => (base[3] * m.base_color[3] * color(3)).clamp(0.0, 1.0),

@@ -1,4 +1,5 @@
-//! The CPU's part of [`SceneRays`](super::SceneRays): a tree for each mesh, and what rays know of its triangles.
+//! The CPU's part of [`SceneRays`](super::SceneRays): a tree for each mesh, and what rays know of
+//! its triangles.
 
 use super::emitters::{self, Glow};
 use super::gpu::ROW;
@@ -21,7 +22,8 @@ pub(super) struct MeshTree {
     pub glows: Vec<Glow>,
     /// Of a mesh that deforms.
     pub refit: Option<Box<Deforming>>,
-    /// Meshes whose triangles lie in this tree, too, this one among them; none but in a tree of several.
+    /// Meshes whose triangles lie in this tree, too, this one among them; none but in a tree of
+    /// several.
     pub together: Vec<usize>,
 }
 
@@ -35,7 +37,8 @@ pub(super) struct Deforming {
 }
 
 impl MeshTree {
-    /// Brings the tree into the pose of `deform`, its mesh's; false where it is in that pose or does not deform.
+    /// Brings the tree into the pose of `deform`, its mesh's; false where it is in that pose or
+    /// does not deform.
     pub fn follow(&mut self, deform: &Deform) -> bool {
         let Some(own) = self.refit.as_deref_mut() else { return false };
         if own.last.as_ref().is_some_and(|(joints, weights)| *joints == deform.joints && *weights == deform.weights) {
@@ -76,7 +79,8 @@ fn top_blocks(count: usize) -> usize {
     (8 * count + 16).next_multiple_of(ROW as usize)
 }
 
-/// What one mesh becomes, on any thread: all that rays know of it, but where it lies among the others.
+/// What one mesh becomes, on any thread: all that rays know of it, but where it lies among the
+/// others.
 #[derive(Default, Clone)]
 pub(crate) struct MeshPart {
     accel: Arc<Accel>,
@@ -90,8 +94,8 @@ pub(crate) struct MeshPart {
 }
 
 impl MeshPart {
-    /// Of a mesh of `scene`, and of how it deforms, if it does. One that disagrees in itself is not met: the
-    /// upload of the picture's part refuses it.
+    /// Of a mesh of `scene`, and of how it deforms, if it does. One that disagrees in itself is not
+    /// met: the upload of the picture's part refuses it.
     pub fn new(scene: &Scene, mesh: &Mesh, reductions: &Reductions, deform: Option<&Deform>) -> Self {
         if mesh.check(scene.materials.len()).is_err() {
             return Self::default();
@@ -117,7 +121,8 @@ impl MeshPart {
         Self { normals, glows: emitters::glowing(&surfaces, corners), surfaces, ..Self::default() }
     }
 
-    /// Of meshes that are in one place, with one tree, which the first of them has. `done` hears of each.
+    /// Of meshes that are in one place, with one tree, which the first of them has. `done` hears of
+    /// each.
     fn of_all(scene: &Scene, meshes: &[usize], reductions: &Reductions, done: impl Fn()) -> Vec<Self> {
         let mut all = Vec::new();
         let mut parts: Vec<Self> = Vec::with_capacity(meshes.len());
@@ -134,7 +139,8 @@ impl MeshPart {
         parts
     }
 
-    /// The same triangles, with the corners that it was made of, of another material without pictures.
+    /// The same triangles, with the corners that it was made of, of another material without
+    /// pictures.
     pub fn of_material(&self, material: &Material, corners: &[[[f32; 3]; 3]]) -> Self {
         let surfaces = vec![surfaces::plain(material); self.surfaces.len()];
         let glows = emitters::glowing(&surfaces, corners);
@@ -157,10 +163,11 @@ pub(crate) fn corners(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
     mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize])).collect()
 }
 
-/// Meshes by the trees they share: those that are met in one place each, all in the same, share one, since the trees
-/// of what lies side by side overlap, and a ray walks through all of them. Files cut what is one thing by its
-/// materials. What deforms, cannot be met or shows in several places has its own, and where something is animated
-/// whatever hangs on another node. The first of each is the least; `alone`: none share.
+/// Meshes by the trees they share: those that are met in one place each, all in the same, share
+/// one, since the trees of what lies side by side overlap, and a ray walks through all of them.
+/// Files cut what is one thing by its materials. What deforms, cannot be met or shows in several
+/// places has its own, and where something is animated whatever hangs on another node. The first of
+/// each is the least; `alone`: none share.
 fn shared(scene: &Scene, alone: bool) -> Vec<Vec<usize>> {
     let mut places = vec![Vec::new(); scene.meshes.len()];
     for (i, instance) in scene.instances.iter().enumerate() {
@@ -200,7 +207,8 @@ fn can_be_met(mesh: &Mesh) -> bool {
 
 impl SceneTrees {
     /// Builds them on all of the machine's threads. `progress` as in
-    /// [`SceneRays::with_progress`](super::SceneRays::with_progress); `alone`: a tree for each mesh.
+    /// [`SceneRays::with_progress`](super::SceneRays::with_progress); `alone`: a tree for each
+    /// mesh.
     pub fn build(
         scene: &Scene,
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
@@ -293,8 +301,8 @@ pub(super) fn apart(meshes: &[MeshTree], instances: &[Instance]) -> bool {
     meshes.iter().any(|m| m.together.iter().any(|&other| places[other] != places[m.together[0]]))
 }
 
-/// A block of a mesh's tree at its place in the texture, its triangles by the numbers that `number` gives them among
-/// `surfaces`.
+/// A block of a mesh's tree at its place in the texture, its triangles by the numbers that `number`
+/// gives them among `surfaces`.
 fn moved(block: &Block, root: u32, surfaces: &[surfaces::Surface], number: impl Fn(u32) -> u32) -> Block {
     let mut block = *block;
     if block[3] & NODE != 0 {

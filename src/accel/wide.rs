@@ -1,7 +1,8 @@
 //! From a binary tree to blocks of eight children.
 //!
-//! A block is 16 words, four texels, one cache line: an inner node or a leaf. The eight children of a node are eight
-//! blocks in a row, so a child needs no pointer of its own; places without a child hold a leaf that nothing hits.
+//! A block is 16 words, four texels, one cache line: an inner node or a leaf. The eight children of
+//! a node are eight blocks in a row, so a child needs no pointer of its own; places without a child
+//! hold a leaf that nothing hits.
 //!
 //! | words | node | leaf |
 //! |---|---|---|
@@ -162,7 +163,8 @@ pub(super) fn leaf_block(pair: &Pair) -> Block {
     block
 }
 
-/// The blocks of `tree`, whose leaves `leaf` makes of the number of what is in them; the first one is the root.
+/// The blocks of `tree`, whose leaves `leaf` makes of the number of what is in them; the first one
+/// is the root.
 pub(super) fn blocks(tree: &Bvh2, leaf: impl Fn(usize) -> Block) -> Vec<Block> {
     // Parents before their children.
     let mut order = vec![0u32];

@@ -87,7 +87,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     Ok(())
 }
 
-/// Runs on the GPU, or on the slow CPU reference where there is none or the picture is too large for it, saying so.
+/// Runs on the GPU, or on the slow CPU reference where there is none or the picture is too large
+/// for it, saying so.
 fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> Result<Tensor> {
     let dropout = args.dropout;
     let slow = |reason: &dyn std::fmt::Display| {

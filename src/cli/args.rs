@@ -34,7 +34,8 @@ pub struct Global {
     /// Only errors.
     #[arg(short, long, global = true)]
     pub quiet: bool,
-    /// Buffers, textures and material libraries may lie outside the folder of the scene file that names them.
+    /// Buffers, textures and material libraries may lie outside the folder of the scene file that
+    /// names them.
     #[arg(long, global = true)]
     pub allow_outside: bool,
     /// Metres of a scene file's unit of length: 0.001 for one that counts in millimetres.
@@ -43,8 +44,9 @@ pub struct Global {
     /// Axis of a scene file that points up.
     #[arg(long, global = true, value_enum, default_value = "y")]
     pub up: UpName,
-    /// How textures lie in the device's memory: `compressed` in blocks of a byte a texel (BC7) where the device has
-    /// them, `full` with four bytes a texel, `auto` in blocks where a scene's would take more than 512 MiB.
+    /// How textures lie in the device's memory: `compressed` in blocks of a byte a texel (BC7)
+    /// where the device has them, `full` with four bytes a texel, `auto` in blocks where a scene's
+    /// would take more than 512 MiB.
     #[arg(long, global = true, value_enum, default_value = "auto")]
     pub textures: TexturesName,
     /// More log lines; twice for yet more.
@@ -153,7 +155,8 @@ impl Global {
     /// Opens the device and says on standard error which one it is.
     pub fn open_gpu(&self) -> Result<Gpu> {
         let gpu = Gpu::open(&self.gpu_options())?;
-        // Whatever the driver refuses later is no fault of the user's, but it deserves a sentence, not a stack trace.
+        // Whatever the driver refuses later is no fault of the user's, but it deserves a sentence,
+        // not a stack trace.
         gpu.device.on_uncaptured_error(std::sync::Arc::new(|e| {
             eprintln!(
                 "error: the GPU driver refused a command; `bouncelight doctor` lists other adapters\n{}",
@@ -196,7 +199,8 @@ impl TypedValueParser for MethodParser {
 }
 
 impl MethodName {
-    /// The real-time method with its weights: `weights`, or the shipped ones. `tuned` adds what a device is needed for.
+    /// The real-time method with its weights: `weights`, or the shipped ones. `tuned` adds what a
+    /// device is needed for.
     pub fn method(self, global: &Global, weights: Option<&PathBuf>) -> Result<Method> {
         match (self.plain(), self) {
             (Some(method), _) => Ok(method),
@@ -210,7 +214,8 @@ impl MethodName {
     }
 }
 
-/// The weights in `path`, or the shipped ones of that name; without a path those shipped as the default.
+/// The weights in `path`, or the shipped ones of that name; without a path those shipped as the
+/// default.
 pub fn load_weights(path: Option<&PathBuf>) -> Result<Weights> {
     Ok(Weights::find(path.map(PathBuf::as_path))?)
 }

@@ -1,4 +1,5 @@
-//! `bouncelight bench`: GPU time per pass, wall clock per frame, resident bytes; against a saved base if asked.
+//! `bouncelight bench`: GPU time per pass, wall clock per frame, resident bytes; against a saved
+//! base if asked.
 
 use super::stdout::say;
 use super::{
@@ -45,17 +46,19 @@ pub struct Args {
     /// One row per network layer instead of one for the network.
     #[arg(long)]
     layers: bool,
-    /// Let shaders count, too, what they do in a frame at rest: operations, bytes, rays. With --layers, one row per
-    /// network layer.
+    /// Let shaders count, too, what they do in a frame at rest: operations, bytes, rays.
+    /// With --layers, one row per network layer.
     #[arg(long)]
     count: bool,
     /// Write the record to this file.
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
-    /// Take turns: every method so many times, which makes ratios of times that hold on a busy machine.
+    /// Take turns: every method so many times, which makes ratios of times that hold on a busy
+    /// machine.
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
-    /// Write the ratios of method to method and pass to pass to this file, a base for --compare on other machines.
+    /// Write the ratios of method to method and pass to pass to this file, a base for --compare on
+    /// other machines.
     #[arg(long, value_name = "F")]
     ratios: Option<PathBuf>,
     /// A record written earlier, on this device, to compare with; or ratios, on a device of that
@@ -155,7 +158,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     if methods.iter().any(Method::needs_rays)
         && let Err(e) = uploaded.trace(&gpu.device, &gpu.queue, &scene)
     {
-        // Asked for alone it is an error; among others it is left out, as numbers of another method would be no answer.
+        // Asked for alone it is an error; among others it is left out, as numbers of another method
+        // would be no answer.
         methods.retain(|m| !m.needs_rays());
         if methods.is_empty() {
             return Err(e.into());
@@ -312,7 +316,8 @@ fn print_drawn(drawn: &DrawnCount) {
     );
 }
 
-/// Rows of the table; without `layers` the network's layers are one row (whose p95 is a sum of p95s, an upper bound).
+/// Rows of the table; without `layers` the network's layers are one row (whose p95 is a sum of
+/// p95s, an upper bound).
 fn rows(m: &Measurement, layers: bool) -> Vec<(String, f64, f64)> {
     let mut rows: Vec<(String, f64, f64)> = Vec::new();
     for p in &m.passes {

@@ -1,4 +1,5 @@
-//! `bouncelight compare A B`: the paper's four metrics and today's, a heat map, a JSON record; or one layer of two EXR.
+//! `bouncelight compare A B`: the paper's four metrics and today's, a heat map, a JSON record; or
+//! one layer of two EXR.
 
 use super::args::usage;
 use super::stdout::say;
@@ -20,16 +21,19 @@ pub struct Args {
     a: PathBuf,
     /// The reference.
     b: PathBuf,
-    /// Which metric to print: `all`, `paper` (its four), or one by name. docs/metrics.md explains them.
+    /// Which metric to print: `all`, `paper` (its four), or one by name. docs/metrics.md explains
+    /// them.
     #[arg(long, default_value = "all", value_parser = parse_metric)]
     metric: String,
     /// View transform of EXR pictures for the metrics on display values.
     #[arg(long, default_value = "filmic")]
     tonemap: Tonemap,
-    /// Compare this layer of two EXR instead of the pictures, as linear values: relmse, mre, bias, mae.
+    /// Compare this layer of two EXR instead of the pictures, as linear values: relmse, mre, bias,
+    /// mae.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["tonemap", "pixels_per_degree", "heatmap_metric"])]
     layer: Option<String>,
-    /// Pixels in a degree of the field of view, for flip and hdrflip: 67 is a 0.7 m wide 4K display 0.7 m away.
+    /// Pixels in a degree of the field of view, for flip and hdrflip: 67 is a 0.7 m wide 4K display
+    /// 0.7 m away.
     #[arg(long, default_value_t = flip::PIXELS_PER_DEGREE, value_parser = parse_pixels_per_degree, value_name = "PPD")]
     pixels_per_degree: f32,
     /// Write a picture of where they differ, in magma.
@@ -230,8 +234,8 @@ impl Shown {
         })
     }
 
-    /// A picture to judge a rendering of `size` pixels by. What makes that impossible is reported here,
-    /// before the rendering.
+    /// A picture to judge a rendering of `size` pixels by. What makes that impossible is reported
+    /// here, before the rendering.
     pub fn reference(path: &Path, tonemap: Tonemap, ev: f32, size: [u32; 2], metric: &str) -> Result<Self> {
         let shown = Self::read(path, tonemap, ev)?;
         let size = size.map(|n| n as usize);
@@ -245,7 +249,8 @@ impl Shown {
         Ok(shown)
     }
 
-    /// Linear RGB, shown `ev` stops brighter through the view transform, in 8-bit steps as a saved picture would be.
+    /// Linear RGB, shown `ev` stops brighter through the view transform, in 8-bit steps as a saved
+    /// picture would be.
     pub fn linear(name: String, size: [usize; 2], linear: Vec<f32>, ev: f32, tonemap: Tonemap) -> Self {
         let display = shown_bytes(&linear, ev, tonemap).into_iter().map(|b| f32::from(b) / 255.0).collect();
         Self { name, size, display, linear: Some(linear) }
@@ -256,7 +261,8 @@ impl Shown {
         Ok(metrics::compare_with(self.views()?, reference.views()?, options)?)
     }
 
-    /// sRGB bytes of where this picture differs from `reference`; `None` for FLIP maps that `maps` lacks.
+    /// sRGB bytes of where this picture differs from `reference`; `None` for FLIP maps that `maps`
+    /// lacks.
     pub fn heat_map(&self, reference: &Shown, heat: Heat, maps: &FlipMaps) -> Result<Option<Vec<u8>>> {
         Ok(match heat {
             Heat::Flip => maps.flip.as_ref().map(|m| m.heat_map()),

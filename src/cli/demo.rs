@@ -1,4 +1,5 @@
-//! `bouncelight demo`: the bundled interior by three methods beside Cycles' picture of it, and a timing table.
+//! `bouncelight demo`: the bundled interior by three methods beside Cycles' picture of it, and a
+//! timing table.
 
 use super::{args::Global, interrupt, progress::Progress, stdout::say};
 use crate::{

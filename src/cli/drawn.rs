@@ -47,7 +47,8 @@ impl Drawn {
         self.frame.beauty.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
     }
 
-    /// Stops by which it is to be shown brighter; `background` is the colour where nothing is, if it is one.
+    /// Stops by which it is to be shown brighter; `background` is the colour where nothing is, if
+    /// it is one.
     pub fn stops(&self, exposure: Exposure, background: Option<[f32; 3]>) -> f32 {
         match exposure {
             Exposure::Stops(stops) => stops,
@@ -55,8 +56,8 @@ impl Drawn {
         }
     }
 
-    /// Writes it whole or not at all, with the device, the command line and its facts as metadata; a PNG `stops`
-    /// brighter.
+    /// Writes it whole or not at all, with the device, the command line and its facts as metadata;
+    /// a PNG `stops` brighter.
     pub fn write(&self, gpu: &Gpu, output: &Path, format: Format, stops: f32) -> Result<()> {
         let beauty = &self.frame.beauty;
         let [width, height] = [beauty.width as u32, beauty.height as u32];

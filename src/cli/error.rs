@@ -54,7 +54,8 @@ pub enum CliError {
     Interrupted,
 }
 
-/// `error` and its causes as one sentence. A cause whose words the one before has said already is left out.
+/// `error` and its causes as one sentence. A cause whose words the one before has said already is
+/// left out.
 pub fn sentence(error: &anyhow::Error) -> String {
     let mut words = String::new();
     for cause in error.chain().map(ToString::to_string) {

@@ -17,7 +17,8 @@ pub struct Flag {
 }
 
 impl Flag {
-    /// The record of the scene called `spec`, if there is one; whether it is up to date is [`fresh`]'s business.
+    /// The record of the scene called `spec`, if there is one; whether it is up to date is
+    /// [`fresh`]'s business.
     pub fn read(&self, spec: &str) -> Result<Option<Fitted>> {
         match &self.gi {
             Some(none) if none == Path::new("none") => Ok(None),

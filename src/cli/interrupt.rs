@@ -1,4 +1,5 @@
-//! Ctrl-C and SIGTERM: long work looks at a flag between steps and ends with exit code 130, nothing half-written.
+//! Ctrl-C and SIGTERM: long work looks at a flag between steps and ends with exit code 130, nothing
+//! half-written.
 
 use super::error::CliError;
 use anyhow::{Context, Result};

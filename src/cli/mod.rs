@@ -58,7 +58,8 @@ enum Command {
     Chart(chart::Args),
     /// Compare two pictures with the paper's metrics and the usual ones.
     Compare(compare::Args),
-    /// Test methods where they are known to fail: light switched, doors shut, walls of 2 cm, and so on.
+    /// Test methods where they are known to fail: light switched, doors shut, walls of 2 cm, and so
+    /// on.
     Stability(stability::Args),
     /// Write network inputs of the paper's rooms, for training.
     Dataset(dataset::Args),
@@ -66,11 +67,13 @@ enum Command {
     Fit(fit::Args),
     /// Run a network on G-buffer pictures from elsewhere.
     Apply(apply::Args),
-    /// Write what a host without wgpu needs to run the pass: shaders, buffers and how to dispatch them.
+    /// Write what a host without wgpu needs to run the pass: shaders, buffers and how to dispatch
+    /// them.
     Export(export::Args),
     /// Look into a weights file, check it, or make one from a published generator's state.
     Weights(weights::Args),
-    /// Draw the bundled interior by three methods beside Cycles' picture, and say where the time goes.
+    /// Draw the bundled interior by three methods beside Cycles' picture, and say where the time
+    /// goes.
     Demo(demo::Args),
     /// Say which adapter is used, what it can do, and what to install when there is none.
     Doctor(doctor::Args),
@@ -98,7 +101,8 @@ pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) => {
-            // Help and version are results; everything else is a usage error, which clap also exits with 2 for.
+            // Help and version are results; everything else is a usage error, which clap also exits
+            // with 2 for.
             let _ = e.print();
             return ExitCode::from(if e.use_stderr() { error::USAGE } else { 0 });
         }

@@ -16,15 +16,16 @@ pub struct Progress {
     what: String,
     kind: ProgressKind,
     bar: ProgressBar,
-    /// When the first steps were done, and how many those were: what is left is not guessed by them, since
-    /// shaders are compiled and files read in them.
+    /// When the first steps were done, and how many those were: what is left is not guessed by
+    /// them, since shaders are compiled and files read in them.
     first_done: Option<(Instant, f64)>,
     last_line: Instant,
     /// Says what the program does until the first step is done; ends when this is dropped.
     first: Option<Sender<()>>,
 }
 
-/// What there is to say before the first step: a driver without a shader cache compiles for half a minute.
+/// What there is to say before the first step: a driver without a shader cache compiles for half a
+/// minute.
 fn compiling() -> String {
     format!("compiling shaders ({} so far)", crate::gpu::shaders::compiled())
 }
@@ -61,7 +62,8 @@ impl Progress {
         Self { what: what.into(), kind, bar, first_done: None, last_line: Instant::now(), first: None }
     }
 
-    /// As [`new`](Self::new) before anything is compiled; until the first step it says that this goes on.
+    /// As [`new`](Self::new) before anything is compiled; until the first step it says that this
+    /// goes on.
     pub fn compiling(global: &Global, what: &'static str, total: u64) -> Self {
         let mut progress = Self::new(global, what, total);
         match progress.kind {

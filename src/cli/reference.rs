@@ -26,14 +26,16 @@ const DEFAULT_SPP: u32 = 64;
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "With --method reference")]
 pub struct Flags {
-    /// Samples a pixel, 64 when absent; with --until-error the most there may be, 65536 when absent.
+    /// Samples a pixel, 64 when absent; with --until-error the most there may be, 65536 when
+    /// absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
     /// Stop once the noise of a pixel (root mean square, divided by the mean) is surely not above
     /// E, such as 0.05; of the picture, or with --cells of the light that a GI method must add.
     #[arg(long, value_name = "E", value_parser = parse_error_bound, allow_hyphen_values = true)]
     until_error: Option<f64>,
-    /// Limit of indirect contributions, as Cycles' clamp; 0 for none. Takes fireflies away, and energy.
+    /// Limit of indirect contributions, as Cycles' clamp; 0 for none. Takes fireflies away, and
+    /// energy.
     #[arg(long, value_name = "C", value_parser = parse_limit, allow_hyphen_values = true)]
     clamp: Option<f32>,
     /// Most bounces in all, as Blender counts them; without limit when absent.
@@ -58,8 +60,8 @@ pub struct Flags {
     /// N/2 in the cell), without pixel filter; the picture has a pixel for each cell.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     cells: Option<u32>,
-    /// Average noise away in the picture (not in layers), for a look at few samples: details of light go with
-    /// it, and the metadata says so. Not with --cells: what is averaged is no truth.
+    /// Average noise away in the picture (not in layers), for a look at few samples: details of
+    /// light go with it, and the metadata says so. Not with --cells: what is averaged is no truth.
     #[arg(long, conflicts_with = "cells")]
     denoise: bool,
 }

@@ -1,4 +1,5 @@
-//! `bouncelight render`: one picture of a scene, as PNG through a view transform or as EXR with layers.
+//! `bouncelight render`: one picture of a scene, as PNG through a view transform or as EXR with
+//! layers.
 
 use super::{
     args::{Global, MethodName, MethodParser, usage},
@@ -29,7 +30,8 @@ use crate::{
 use anyhow::Result;
 use std::path::PathBuf;
 
-/// Samples of a picture where none are asked for: edges without steps, and what is half covered without grain.
+/// Samples of a picture where none are asked for: edges without steps, and what is half covered
+/// without grain.
 const PICTURE_SAMPLES: u32 = 8;
 
 #[derive(Debug, clap::Args)]
@@ -48,8 +50,9 @@ pub struct Args {
     weights: Option<PathBuf>,
     #[command(flatten)]
     fitted: super::fitted::Flag,
-    /// Jittered frames that are averaged through Cycles' pixel filter; 1 is the raw frame. When absent: 8; 1
-    /// with --aov, with --taa, for frames of a sequence, and for the first frame after a cut (--gi-frames 1).
+    /// Jittered frames that are averaged through Cycles' pixel filter; 1 is the raw frame. When
+    /// absent: 8; 1 with --aov, with --taa, for frames of a sequence, and for the first frame after
+    /// a cut (--gi-frames 1).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     samples: Option<u32>,
     /// Real-time anti-aliasing over this many frames before the one that is written.
@@ -59,7 +62,8 @@ pub struct Args {
     /// `neural`): 1 is the first after a cut. 32 when absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     gi_frames: Option<u32>,
-    /// Numbers of `gather` other than its own, such as `blur=0,cell_frames=256`; `plain` forgets and blurs nothing.
+    /// Numbers of `gather` other than its own, such as `blur=0,cell_frames=256`; `plain` forgets
+    /// and blurs nothing.
     #[arg(long, value_name = "NAME=VALUE,...")]
     gather: Option<gather::Options>,
     /// Light of what the picture does not show, for `ambient` and `ssgi`: shares of the sky's and
@@ -69,15 +73,17 @@ pub struct Args {
     /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
     #[arg(long, value_name = "LAYERS")]
     aov: Option<String>,
-    /// Surfaces that blend with what is behind: `sorted` are drawn over the picture without grain, `stochastic` by lot,
-    /// as paths meet them, for layers and many samples. When absent: `stochastic` with --aov, else `sorted`.
+    /// Surfaces that blend with what is behind: `sorted` are drawn over the picture without grain,
+    /// `stochastic` by lot, as paths meet them, for layers and many samples. When absent:
+    /// `stochastic` with --aov, else `sorted`.
     #[arg(long, value_name = "HOW")]
     blending: Option<Blending>,
-    /// What is seen beyond the scene, which the surroundings light in any case: `shown`, `blurred` or `hidden`.
+    /// What is seen beyond the scene, which the surroundings light in any case: `shown`, `blurred`
+    /// or `hidden`.
     #[arg(long, default_value = "shown", value_name = "HOW")]
     backdrop: Backdrop,
-    /// Stops by which a PNG is brighter, or `auto`: as many as make the mean of what is seen middle grey. When absent:
-    /// `auto` for a file without any light, 0 for others and with --reference.
+    /// Stops by which a PNG is brighter, or `auto`: as many as make the mean of what is seen middle
+    /// grey. When absent: `auto` for a file without any light, 0 for others and with --reference.
     #[arg(long, allow_hyphen_values = true, value_name = "EV|auto")]
     exposure: Option<Exposure>,
     /// View transform of a PNG.
@@ -92,10 +98,12 @@ pub struct Args {
     /// Metric of the comparison.
     #[arg(long, default_value = "mae", requires = "reference", value_parser = metrics::NAMES.map(|(n, _)| n))]
     metric: String,
-    /// On the wrong side of it (above; below for psnr and the ssims; bias by its size) the exit code is 5.
+    /// On the wrong side of it (above; below for psnr and the ssims; bias by its size) the exit
+    /// code is 5.
     #[arg(long, requires = "reference", value_name = "T")]
     threshold: Option<f64>,
-    /// Picture of where they differ: FLIP's map for flip and hdrflip, else the mean difference up to a quarter.
+    /// Picture of where they differ: FLIP's map for flip and hdrflip, else the mean difference up
+    /// to a quarter.
     #[arg(long, requires = "reference", value_name = "PNG")]
     diff: Option<PathBuf>,
     #[command(flatten)]
@@ -200,7 +208,8 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
         Task::Trace(task) => task.run(global, &gpu, &scene, &camera)?,
         Task::Rasterise(method, layers) => {
             let method = super::tuned::tuned(method, &gpu, global.quiet);
-            // Says from here on what the program does: without a shader cache nothing is drawn for half a minute.
+            // Says from here on what the program does: without a shader cache nothing is drawn for
+            // half a minute.
             let progress = Progress::compiling(global, if sequence.is_some() { "frames" } else { "samples" }, 1);
             let mut raster = Raster::new(&args, (&gpu, global.textures()), &scene, method, layers)?;
             if let Some(sequence) = sequence {

@@ -13,7 +13,8 @@ use std::path::PathBuf;
 /// Which scene, how it is lit, and from where it is seen.
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, `home:INDEX`, or a bundled scene (interior, cornell).
+    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, `home:INDEX`, or a bundled scene (interior,
+    /// cornell).
     pub scene: String,
     /// Width and height in pixels.
     #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH")]
@@ -30,7 +31,8 @@ pub struct SceneArgs {
     /// Vertical field of view in degrees.
     #[arg(long, value_name = "D")]
     pub fov: Option<f32>,
-    /// The surroundings: radiance as `R,G,B` or one number for grey, or a lat-long picture (.hdr, .exr).
+    /// The surroundings: radiance as `R,G,B` or one number for grey, or a lat-long picture (.hdr,
+    /// .exr).
     #[arg(long, value_parser = parse_surroundings, value_name = "R,G,B|FILE")]
     pub environment: Option<Surroundings>,
     /// Turns the picture of the surroundings about the vertical, the way from +X to +Z.
@@ -45,7 +47,8 @@ pub struct SceneArgs {
     /// Variant of materials, by name or number from 0.
     #[arg(long, value_name = "NAME|N")]
     pub variant: Option<String>,
-    /// Animation of the file, by name or number from 0, that moves objects, skins, lights and cameras.
+    /// Animation of the file, by name or number from 0, that moves objects, skins, lights and
+    /// cameras.
     #[arg(long, value_name = "NAME|N")]
     pub animation: Option<String>,
     /// Time in the animation, seconds; of a sequence the time of frame 0.

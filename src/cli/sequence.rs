@@ -13,8 +13,8 @@ pub struct SequenceFlags {
     /// name holds `{frame}` or `{frame:04}`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "look_at", "camera", "reference", "taa"])]
     path: Option<PathBuf>,
-    /// Which frames of the path or of --animation, from A to before B; all of a path when absent. The animation goes on
-    /// from frame to frame.
+    /// Which frames of the path or of --animation, from A to before B; all of a path when absent.
+    /// The animation goes on from frame to frame.
     #[arg(long, value_name = "A..B", conflicts_with_all = ["reference", "taa"], value_parser = parse_frames)]
     frames: Option<Range<u32>>,
     /// Seconds from one frame to the next, such as 1/24; 1/60 when absent.
@@ -42,8 +42,8 @@ impl SequenceFlags {
         self.path.is_some() || self.frames.is_some()
     }
 
-    /// The sequence that is asked for, if one is. `output` is the pattern of the files' names; the scene is `animated`
-    /// or stands still.
+    /// The sequence that is asked for, if one is. `output` is the pattern of the files' names; the
+    /// scene is `animated` or stands still.
     pub fn sequence(&self, output: &Path, animated: bool) -> Result<Option<Sequence>> {
         if !self.is_given() {
             let text = "--fixed-dt belongs to the frames of --path or --frames".to_owned();
@@ -91,7 +91,8 @@ impl Sequence {
     }
 }
 
-/// The name of frame `number`: `{frame}` or `{frame:04}` of `pattern` becomes its number, padded with zeros.
+/// The name of frame `number`: `{frame}` or `{frame:04}` of `pattern` becomes its number, padded
+/// with zeros.
 pub fn name(pattern: &Path, number: u32) -> PathBuf {
     let text = pattern.to_string_lossy();
     let found = text.find("{frame").and_then(|start| Some((start, start + text[start..].find('}')?)));

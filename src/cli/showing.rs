@@ -15,7 +15,8 @@ pub(super) struct Showing {
 }
 
 impl Showing {
-    /// `asked` is what the command line says; `compared` that the picture is held against another one.
+    /// `asked` is what the command line says; `compared` that the picture is held against another
+    /// one.
     pub fn new(asked: Option<Exposure>, compared: bool, format: Format, scene: &Scene, quiet: bool) -> Self {
         let by_file = if scene.lightless && !compared { Exposure::Auto } else { Exposure::Stops(0.0) };
         let exposure = asked.unwrap_or(by_file);

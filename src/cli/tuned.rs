@@ -27,7 +27,8 @@ pub fn path() -> Option<PathBuf> {
     folder.map(|f| f.join("bouncelight").join("tuned.json"))
 }
 
-/// The cache in `path`; an empty one where there is none, and, with a warning, where there is something else.
+/// The cache in `path`; an empty one where there is none, and, with a warning, where there is
+/// something else.
 pub fn load(path: &Path, quiet: bool) -> Cache {
     let read = || -> Result<Option<Cache>> {
         let file = match std::fs::File::open(path) {

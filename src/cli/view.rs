@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, `home:INDEX`, or a bundled scene; the bundled interior
-    /// when absent.
+    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, `home:INDEX`, or a bundled scene; the
+    /// bundled interior when absent.
     scene: Option<String>,
     /// Weights of `neural`; the shipped ones when absent.
     #[arg(long, value_name = "W")]
@@ -19,11 +19,13 @@ pub struct Args {
     /// Load scene and weights again when their files change; in a checkout, shaders, too.
     #[arg(long)]
     watch: bool,
-    /// Run the steps of this file instead of waiting for hands (docs/viewer.md); reads and saves no settings.
+    /// Run the steps of this file instead of waiting for hands (docs/viewer.md); reads and saves no
+    /// settings.
     #[cfg(feature = "script")]
     #[arg(long, value_name = "JSON")]
     script: Option<PathBuf>,
-    /// Settings to begin with instead of the saved ones, as `view.json` holds them; nothing is saved then.
+    /// Settings to begin with instead of the saved ones, as `view.json` holds them; nothing is
+    /// saved then.
     #[arg(long, value_name = "JSON")]
     settings: Option<PathBuf>,
     /// Width and height of the window, points.

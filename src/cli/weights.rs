@@ -36,7 +36,8 @@ enum Command {
         /// A weights file, or `small`, the shipped one.
         file: PathBuf,
     },
-    /// Time the ways in which each convolution can run on this device, and remember the fastest for later runs.
+    /// Time the ways in which each convolution can run on this device, and remember the fastest for
+    /// later runs.
     Tune {
         file: PathBuf,
         /// Width and height of the picture in pixels.
@@ -61,7 +62,8 @@ struct ConvertArgs {
     /// Whose generator it is.
     #[arg(long, value_enum)]
     arch: ArchName,
-    /// Normalisation that it was trained with. `instance` for a batch norm network is how it runs in training mode.
+    /// Normalisation that it was trained with. `instance` for a batch norm network is how it runs
+    /// in training mode.
     #[arg(long, value_enum)]
     norm: NormName,
     /// How weights of convolutions are stored.

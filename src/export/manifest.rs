@@ -1,5 +1,5 @@
-//! What `bouncelight.json` says: how a host without wgpu makes, binds and dispatches the pass. `docs/embedding.md`,
-//! "Without wgpu", tells it in words.
+//! What `bouncelight.json` says: how a host without wgpu makes, binds and dispatches the pass.
+//! `docs/embedding.md`, "Without wgpu", tells it in words.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -119,14 +119,16 @@ pub struct Binding {
     pub group: u32,
     /// WGSL's `@binding`.
     pub binding: u32,
-    /// GLSL's `layout(binding = …)`, counted for each kind alone: uniform blocks, storage blocks, samplers, images.
+    /// GLSL's `layout(binding = …)`, counted for each kind alone: uniform blocks, storage blocks,
+    /// samplers, images.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slot: Option<u32>,
     /// The variable's name in WGSL.
     pub name: String,
     /// `uniform`, `read-only-storage`, `storage`, `texture`, `storage-texture`.
     pub kind: String,
-    /// Of a texture: `float` or `uint`; of a storage texture its format; of a buffer the struct's name, if it is one.
+    /// Of a texture: `float` or `uint`; of a storage texture its format; of a buffer the struct's
+    /// name, if it is one.
     #[serde(rename = "type", default, skip_serializing_if = "Option::is_none")]
     pub holds: Option<String>,
     /// Of a buffer: least bytes.
@@ -160,7 +162,8 @@ pub struct Bound {
     pub bytes: Option<u64>,
 }
 
-/// What a frame does: all writes, then its dispatches in order, each of which sees what those before wrote.
+/// What a frame does: all writes, then its dispatches in order, each of which sees what those
+/// before wrote.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// Uniforms to write first.
@@ -189,7 +192,8 @@ pub struct Write {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Value {
-    /// A number of the host's: `frame`, `round`, `round + 1` …, or `camera.` and a name of `docs/embedding.md`.
+    /// A number of the host's: `frame`, `round`, `round + 1` …, or `camera.` and a name of
+    /// `docs/embedding.md`.
     Host(String),
     /// A constant.
     Number(f64),

@@ -1,6 +1,7 @@
-//! The pass for hosts without wgpu: a few frames are recorded as any host records them, on a tape (`gpu::tape`), and
-//! what was dispatched with which resources is written down: shaders in the host's language, buffers and textures with
-//! what they hold at first, and a [`Manifest`] that says how to bind and dispatch them.
+//! The pass for hosts without wgpu: a few frames are recorded as any host records them, on a tape
+//! (`gpu::tape`), and what was dispatched with which resources is written down: shaders in the
+//! host's language, buffers and textures with what they hold at first, and a [`Manifest`] that says
+//! how to bind and dispatch them.
 //!
 //! ```text
 //!  Scene ─► SceneGpu, Technique ─► record a few frames ─► tape ─► Package: bouncelight.json, shaders/, data/

@@ -9,8 +9,8 @@ use crate::gpu::tape::Source;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Structs that the host writes each frame, and their members that are not the same in every frame: `camera` is what
-/// the view decides, the others are counters.
+/// Structs that the host writes each frame, and their members that are not the same in every frame:
+/// `camera` is what the view decides, the others are counters.
 const HOST: [(&str, &[&str]); 2] = [
     ("Params", &["unproject", "depth", "gravity_from_view", "gravity_from_world", "world_from_view", "eye"]),
     ("Gather", &["eye", "frame", "round"]),
@@ -339,7 +339,8 @@ fn value(bytes: &[u8], kind: &str) -> Value {
     Value::Numbers(places.into_iter().map(number).collect())
 }
 
-/// From which frame on they repeat, every one or every two; known when they have done so eight times.
+/// From which frame on they repeat, every one or every two; known when they have done so eight
+/// times.
 fn steady(frames: &[Frame]) -> Option<Steady> {
     let repeats = |period: usize| {
         let from =
@@ -350,7 +351,8 @@ fn steady(frames: &[Frame]) -> Option<Steady> {
 }
 
 impl Package {
-    /// Writes all into `folder`, which is new, empty, or an earlier export that is replaced: whole or not at all.
+    /// Writes all into `folder`, which is new, empty, or an earlier export that is replaced: whole
+    /// or not at all.
     ///
     /// # Errors
     /// [`ExportError::Folder`], [`ExportError::Write`].

@@ -91,7 +91,8 @@ pub(super) fn record(
     Ok(Recording { size, frames, host: host.collect() })
 }
 
-/// A network by kernels that need no feature and copy nothing. OpenGL promises 16 KB of uniforms only.
+/// A network by kernels that need no feature and copy nothing. OpenGL promises 16 KB of uniforms
+/// only.
 fn plain(method: &Method, target: Target) -> Method {
     let mut method = method.clone();
     if let Method::Neural(neural) = &mut method {

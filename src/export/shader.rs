@@ -25,7 +25,8 @@ impl Parsed {
     pub fn new(name: &str, text: &str) -> Result<Self, ExportError> {
         let wrong = |message: String| ExportError::Shader { shader: name.to_owned(), message };
         let module = naga::front::wgsl::parse_str(text).map_err(|e| wrong(e.emit_to_string(text)))?;
-        // WebGPU has packing of halves; naga counts it as a capability because some old OpenGL has not.
+        // WebGPU has packing of halves; naga counts it as a capability because some old OpenGL has
+        // not.
         let mut validator = Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32);
         let info = validator.validate(&module).map_err(|e| wrong(e.emit_to_string(text)))?;
         Ok(Self { module, info })
@@ -142,7 +143,8 @@ impl Parsed {
                     entry_point: entry.to_owned(),
                     multiview: None,
                 };
-                // As wgpu has them on OpenGL: what lies beyond a buffer GLSL itself leaves undefined.
+                // As wgpu has them on OpenGL: what lies beyond a buffer GLSL itself leaves
+                // undefined.
                 let policies = BoundsCheckPolicies {
                     image_load: BoundsCheckPolicy::ReadZeroSkipWrite,
                     ..BoundsCheckPolicies::default()

@@ -1,15 +1,18 @@
-//! Global-illumination methods, cheapest first. Each turns the G-buffer and the analytic lights' direct light into
-//! one full-resolution texture: the diffuse light that direct lighting misses (sky and every bounce), as E/π.
+//! Global-illumination methods, cheapest first. Each turns the G-buffer and the analytic lights'
+//! direct light into one full-resolution texture: the diffuse light that direct lighting misses
+//! (sky and every bounce), as E/π.
 //!
 //! # What each method does, and what it cannot do
 //!
-//! [`ambient`] gives every surface one light from all around (the sky, and the mean of what the picture's surfaces send
-//! on, times two constants fitted to the training scenes), dimmed by ambient occlusion ([`occlusion`]).
-//! It cannot say where light is: no wall bleeds its colour, a closed room gets the sky's light, and two views of one
-//! room disagree because each has its own mean.
+//! [`ambient`] gives every surface one light from all around (the sky, and the mean of what the
+//! picture's surfaces send on, times two constants fitted to the training scenes), dimmed by
+//! ambient occlusion ([`occlusion`]). It cannot say where light is: no wall bleeds its colour, a
+//! closed room gets the sky's light, and two views of one room disagree because each has its own
+//! mean.
 //!
-//! [`ssgi`] gathers what the pixels around a pixel send on, by visibility bitmask ([`bitmask`]), and `ambient`'s light
-//! through what nothing blocks. It cannot do anything off the screen or hidden in it.
+//! [`ssgi`] gathers what the pixels around a pixel send on, by visibility bitmask ([`bitmask`]),
+//! and `ambient`'s light through what nothing blocks. It cannot do anything off the screen or
+//! hidden in it.
 //!
 //! [`gather`] sends one ray a cell and frame into the scene's triangles and reads a cache of light
 //! in the world where it ends. It asks what stands between; what is left is noise, which frames and

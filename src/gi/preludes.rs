@@ -2,7 +2,8 @@
 
 use super::neural::features::FeatureSet;
 
-/// Each shader of `gi/` that needs a prelude, with examples of it, for the validation of every permutation.
+/// Each shader of `gi/` that needs a prelude, with examples of it, for the validation of every
+/// permutation.
 pub fn example_preludes() -> Vec<(&'static str, String)> {
     let few = FeatureSet::new([("direct", 3), ("depth", 1), ("hit", 1)]).expect("rows of the table in order");
     vec![

@@ -25,7 +25,8 @@ pub(crate) const LOAD_ARRAY: wgpu::BindingType = texture(LOADED, wgpu::TextureVi
 pub(crate) const COMPARE_ARRAY: wgpu::BindingType =
     texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2Array);
 
-// Depth, too: GLSL has no plain load from a depth texture, so the GL backends would refuse `Depth` here.
+// Depth, too: GLSL has no plain load from a depth texture, so the GL backends would refuse `Depth`
+// here.
 const LOADED: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
 
 const fn texture(

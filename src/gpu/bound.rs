@@ -26,7 +26,8 @@ impl From<&wgpu::TextureView> for Bound {
 }
 
 impl Bound {
-    /// What a group's entry holds; `None` for samplers and lists, which compute passes here do without.
+    /// What a group's entry holds; `None` for samplers and lists, which compute passes here do
+    /// without.
     pub(super) fn of(resource: &wgpu::BindingResource<'_>) -> Option<Self> {
         match resource {
             wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size }) => {

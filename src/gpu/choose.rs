@@ -1,7 +1,8 @@
-//! Device choice: hardware Vulkan/Metal/DX12, then hardware GL, then software Vulkan, then software GL.
+//! Device choice: hardware Vulkan/Metal/DX12, then hardware GL, then software Vulkan, then software
+//! GL.
 //!
-//! `WGPU_BACKEND` and `WGPU_ADAPTER_NAME` are obeyed; explicit options win over them. Every request is answered by
-//! an adapter or by a [`GpuError`] that lists what was found and how to get one.
+//! `WGPU_BACKEND` and `WGPU_ADAPTER_NAME` are obeyed; explicit options win over them. Every request
+//! is answered by an adapter or by a [`GpuError`] that lists what was found and how to get one.
 
 use thiserror::Error;
 
@@ -38,7 +39,8 @@ impl Backend {
 pub struct GpuOptions {
     /// Backend; [`Backend::Auto`] also lets `WGPU_BACKEND` decide.
     pub backend: Backend,
-    /// Part of the adapter's name (any case), or `cpu` for a software adapter; `None` lets `WGPU_ADAPTER_NAME` decide.
+    /// Part of the adapter's name (any case), or `cpu` for a software adapter; `None` lets
+    /// `WGPU_ADAPTER_NAME` decide.
     pub adapter: Option<String>,
 }
 
@@ -91,7 +93,8 @@ pub fn fix() -> &'static str {
     }
 }
 
-/// A device with what is known about it. Hosts that embed the passes bring their own device and never need this.
+/// A device with what is known about it. Hosts that embed the passes bring their own device and
+/// never need this.
 pub struct Gpu {
     /// The adapter.
     pub adapter: wgpu::Adapter,
@@ -121,11 +124,12 @@ impl Gpu {
         Self::from_adapter(adapter)
     }
 
-    /// Opens the best device that fits `options` and can present to `window`, with the surface of that window and the
-    /// instance that made it, from which a lost surface can be made anew.
+    /// Opens the best device that fits `options` and can present to `window`, with the surface of
+    /// that window and the instance that made it, from which a lost surface can be made anew.
     ///
     /// # Errors
-    /// [`GpuError`]; [`GpuError::NoSurface`] where adapters exist but none can show pictures in this window.
+    /// [`GpuError`]; [`GpuError::NoSurface`] where adapters exist but none can show pictures in
+    /// this window.
     pub fn open_for_window<W>(
         options: &GpuOptions,
         window: &W,
@@ -158,9 +162,10 @@ impl Gpu {
         })
     }
 
-    /// Opens a device on `adapter` with WebGPU's default limits (or the adapter's own where they are lower), buffers as
-    /// large as the adapter grants, and timestamps where it has them. Nothing here needs the larger buffers but larger
-    /// problems: wide networks on large pictures, scenes of many millions of triangles.
+    /// Opens a device on `adapter` with WebGPU's default limits (or the adapter's own where they
+    /// are lower), buffers as large as the adapter grants, and timestamps where it has them.
+    /// Nothing here needs the larger buffers but larger problems: wide networks on large pictures,
+    /// scenes of many millions of triangles.
     pub fn from_adapter(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
         Self::with_more(adapter, 0)
     }
@@ -208,16 +213,17 @@ impl Gpu {
     }
 }
 
-/// Optional features that are used when present: timestamps for the timing tables, compressed textures for scenes with
-/// many of them, lines in the place of triangles for the viewer's wireframes, arithmetic in 16 bits for some of the
-/// network's kernels.
+/// Optional features that are used when present: timestamps for the timing tables, compressed
+/// textures for scenes with many of them, lines in the place of triangles for the viewer's
+/// wireframes, arithmetic in 16 bits for some of the network's kernels.
 pub fn wanted_features() -> wgpu::Features {
     use wgpu::Features;
     Features::TIMESTAMP_QUERY | Features::SHADER_F16 | Features::TEXTURE_COMPRESSION_BC | Features::POLYGON_MODE_LINE
 }
 
-/// All adapters that fit the backend choice, best first, with the words for what was searched. GL is only asked when
-/// nothing else is hardware and GL might be: opening it looks for window systems, which takes time and prints.
+/// All adapters that fit the backend choice, best first, with the words for what was searched. GL
+/// is only asked when nothing else is hardware and GL might be: opening it looks for window
+/// systems, which takes time and prints.
 pub fn candidates(options: &GpuOptions) -> Result<(String, Vec<wgpu::Adapter>), GpuError> {
     let (searched, found) = candidates_of(options, &|| None)?;
     Ok((searched, found.into_iter().map(|(_, adapter)| adapter).collect()))

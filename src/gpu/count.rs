@@ -1,5 +1,6 @@
-//! What compute passes do, counted while they run: between [`Count::begin`] and [`Count::take`] each dispatch is done
-//! by a pipeline that counts ([`instrument`](super::instrument)), which adds up in a place of its own.
+//! What compute passes do, counted while they run: between [`Count::begin`] and [`Count::take`]
+//! each dispatch is done by a pipeline that counts ([`instrument`](super::instrument)), which adds
+//! up in a place of its own.
 
 use super::bound::Bound;
 use super::instrument::{self, GROUP, NUMBERS};
@@ -21,7 +22,8 @@ struct Counter {
     sums: wgpu::Buffer,
     layout: wgpu::BindGroupLayout,
     group: wgpu::BindGroup,
-    /// By those that do not count, the pipelines that do, and the bindings of their numbers; `None` where one cannot.
+    /// By those that do not count, the pipelines that do, and the bindings of their numbers; `None`
+    /// where one cannot.
     pipelines: Vec<(wgpu::ComputePipeline, Option<(wgpu::ComputePipeline, Bindings)>)>,
     /// Bindings of the numbers of each dispatch; `None` where it does not count.
     dispatches: Vec<Option<Bindings>>,
@@ -36,8 +38,8 @@ pub(crate) struct Counted {
     pub operations: [f64; 2],
     /// Rays into triangles.
     pub rays: f64,
-    /// Bytes of each binding, added up: what was asked for, but no more than there is, since what is there need not
-    /// come from memory twice.
+    /// Bytes of each binding, added up: what was asked for, but no more than there is, since what
+    /// is there need not come from memory twice.
     pub bytes: f64,
 }
 
@@ -53,8 +55,8 @@ impl Count {
         Self { tape: tape::Running::start(), counter: None }
     }
 
-    /// Dispatches count from here on. The device needs room for a storage buffer more a stage than shaders have that
-    /// do not count.
+    /// Dispatches count from here on. The device needs room for a storage buffer more a stage than
+    /// shaders have that do not count.
     pub fn begin(&mut self, device: &wgpu::Device) {
         self.tape.take();
         let counter = Rc::new(RefCell::new(Counter::new(device.clone())));
@@ -62,8 +64,8 @@ impl Count {
         self.counter = Some(counter);
     }
 
-    /// What each dispatch did that was recorded since [`begin`](Self::begin) and submitted. Those of shaders that do
-    /// not count are left out.
+    /// What each dispatch did that was recorded since [`begin`](Self::begin) and submitted. Those
+    /// of shaders that do not count are left out.
     pub fn take(&mut self, gpu: &Gpu) -> Result<Vec<Counted>, readback::ReadbackError> {
         self.tape.listen(None);
         let Some(counter) = self.counter.take() else { return Ok(Vec::new()) };
@@ -130,8 +132,8 @@ impl Counter {
         Self { device, sums, layout, group, pipelines: Vec::new(), dispatches: Vec::new() }
     }
 
-    /// The pipeline that counts in the place of `made`. A network's layers are left alone: their plan says what they
-    /// do, and which of many kernels does it hangs on the device.
+    /// The pipeline that counts in the place of `made`. A network's layers are left alone: their
+    /// plan says what they do, and which of many kernels does it hangs on the device.
     fn counting(&self, made: &Made) -> Option<(wgpu::ComputePipeline, Bindings)> {
         let source = Some(&made.source).filter(|source| !source.name.starts_with("net."))?;
         let found = instrument::counting(&source.text)?;
@@ -168,7 +170,8 @@ impl Counter {
 }
 
 impl tape::Listener for Counter {
-    /// Sets the pipeline that counts in the place of the one that is about to be dispatched, and where.
+    /// Sets the pipeline that counts in the place of the one that is about to be dispatched, and
+    /// where.
     fn before(&mut self, pass: &mut wgpu::ComputePass<'_>, made: Option<&Made>) {
         let at = self.dispatches.len();
         let found = made.filter(|_| at < DISPATCHES).and_then(|made| self.found(made));
@@ -186,8 +189,8 @@ mod tests {
     use crate::gpu::timing::Recorder;
     use crate::gpu::{GpuOptions, bind, binding};
 
-    /// Thread i of 128 goes round i times: a comparison, a sum and a step each, and a comparison at the end. Every
-    /// second one does four operations more.
+    /// Thread i of 128 goes round i times: a comparison, a sum and a step each, and a comparison at
+    /// the end. Every second one does four operations more.
     const LOOP: &str = "
 @group(0) @binding(0) var<storage, read> given: array<f32>;
 @group(0) @binding(1) var<storage, read_write> made: array<vec4f>;
@@ -241,14 +244,16 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         };
         let found = counted(&gpu, LOOP);
         let rounds = 128.0 * 127.0 / 2.0;
-        // After the loop: a comparison that ends it, a bit and whether it is set, and a vector's product.
+        // After the loop: a comparison that ends it, a bit and whether it is set, and a vector's
+        // product.
         assert_eq!(found.operations[0], 3.0 * rounds + 128.0 * 3.0 + 64.0 * 4.0);
         // The last thread of each 32 is the slowest, and an odd one.
         let slowest = [31.0, 63.0, 95.0, 127.0].map(|rounds| 32.0 * (3.0 * rounds + 3.0 + 4.0));
         assert_eq!(found.operations[1], slowest.iter().sum::<f64>());
         // Of what is read there are 200 numbers only; of what is written, 128 vectors.
         assert_eq!((found.bytes, found.rays), (4.0 * 200.0 + 16.0 * 128.0, 0.0));
-        // Negative controls: an operation more in the loop; half of the rounds; half of what is written.
+        // Negative controls: an operation more in the loop; half of the rounds; half of what is
+        // written.
         let other = |from: &str, to: &str| {
             assert!(LOOP.contains(from));
             counted(&gpu, &LOOP.replace(from, to))

@@ -1,9 +1,10 @@
-//! A compute shader that counts what it does: operations, rays, and what it asks of each binding. naga reads it; each
-//! straight piece of its code gets a call that adds what the piece holds, its entry points one that hands the sums over
-//! (`counted.wgsl`).
+//! A compute shader that counts what it does: operations, rays, and what it asks of each binding.
+//! naga reads it; each straight piece of its code gets a call that adds what the piece holds, its
+//! entry points one that hands the sums over (`counted.wgsl`).
 //!
-//! An operation is one number of an arithmetic, comparison, selection or conversion; integers count like floats, a
-//! multiply-add 2, a division or transcendental function 4; addresses, moves and signs are free.
+//! An operation is one number of an arithmetic, comparison, selection or conversion; integers count
+//! like floats, a multiply-add 2, a division or transcendental function 4; addresses, moves and
+//! signs are free.
 
 use naga::front::Typifier;
 use naga::proc::ResolveContext;
@@ -23,12 +24,13 @@ const RAY: &str = "walk_begin";
 /// A shader that counts, and what it counts.
 pub struct Counting {
     pub module: Module,
-    /// Group, binding of what each number from [`FIRST`] on belongs to. Of buffers it is bytes, of textures texels.
+    /// Group, binding of what each number from [`FIRST`] on belongs to. Of buffers it is bytes, of
+    /// textures texels.
     pub bindings: Vec<(u32, u32)>,
 }
 
-/// The shader `text` with its compute entry points counting; `None` where it has none, names more bindings than there
-/// are numbers, or is not understood (the driver's own message then says why).
+/// The shader `text` with its compute entry points counting; `None` where it has none, names more
+/// bindings than there are numbers, or is not understood (the driver's own message then says why).
 pub fn counting(text: &str) -> Option<Counting> {
     // Directives stay in front.
     let directive = |l: &&str| ["enable ", "requires ", "diagnostic"].iter().any(|d| l.starts_with(d)) || l.is_empty();

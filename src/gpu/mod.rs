@@ -1,4 +1,5 @@
-//! The GPU as the rest of the house sees it: a chosen device, shader sources, bind groups, readback, timing.
+//! The GPU as the rest of the house sees it: a chosen device, shader sources, bind groups,
+//! readback, timing.
 
 pub mod bind;
 pub(crate) mod binding;

@@ -31,7 +31,8 @@ pub enum ReadbackError {
     },
 }
 
-/// Reads `size` bytes of `buffer` from `offset` (both multiples of 4; usage COPY_SRC). Submits and waits.
+/// Reads `size` bytes of `buffer` from `offset` (both multiples of 4; usage COPY_SRC). Submits and
+/// waits.
 pub fn buffer(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
@@ -46,7 +47,8 @@ pub fn buffer(
     map(device, &staging, "buffer")
 }
 
-/// Reads mip 0, layer 0 of `texture` (usage COPY_SRC) as tightly packed rows from the top. Submits and waits.
+/// Reads mip 0, layer 0 of `texture` (usage COPY_SRC) as tightly packed rows from the top. Submits
+/// and waits.
 pub fn texture(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture) -> Result<Vec<u8>, ReadbackError> {
     let format = texture.format();
     let aspect = if format.has_depth_aspect() { wgpu::TextureAspect::DepthOnly } else { wgpu::TextureAspect::All };

@@ -1,7 +1,7 @@
 //! The one table of shaders: each is a plain WGSL file, and those that it imports ([`Joined`]).
 //!
-//! Numbers come in as `override` constants or as a generated prelude of `const` lines ([`module_with`]), never by
-//! templates inside a body.
+//! Numbers come in as `override` constants or as a generated prelude of `const` lines
+//! ([`module_with`]), never by templates inside a body.
 
 mod join;
 mod net;
@@ -69,7 +69,8 @@ pub fn names() -> impl Iterator<Item = String> {
 /// Shader `name` behind `prelude` (lines of `const`), and where its lines come from.
 ///
 /// # Panics
-/// If there is no shader of that name, or none of a file that is imported: mistakes in the code that asks.
+/// If there is no shader of that name, or none of a file that is imported: mistakes in the code
+/// that asks.
 pub fn joined(name: &str, prelude: &str) -> Joined {
     let file = FILES.iter().find(|(n, _)| *n == name).map(|(_, file)| vec![(*file).to_owned()]);
     let files = file
@@ -102,7 +103,8 @@ pub fn compiled() -> u32 {
     COMPILED.load(Ordering::Relaxed)
 }
 
-/// Shaders compiled while files were read from a folder, by name: whoever edits them wants to know where a mistake is.
+/// Shaders compiled while files were read from a folder, by name: whoever edits them wants to know
+/// where a mistake is.
 static EDITED: Mutex<Vec<(String, Joined)>> = Mutex::new(Vec::new());
 
 /// A driver's `message` about a shader, with file and line where a shader from a folder is meant.

@@ -1,6 +1,6 @@
-//! A tape of what compute passes are: while one runs on this thread, shaders, pipelines, bind groups and dispatches are
-//! written down as they are made, for `export` and for whoever listens. Without one, each function here is wgpu's own
-//! and a look at a flag.
+//! A tape of what compute passes are: while one runs on this thread, shaders, pipelines, bind
+//! groups and dispatches are written down as they are made, for `export` and for whoever listens.
+//! Without one, each function here is wgpu's own and a look at a flag.
 
 use super::bound::Bound;
 use std::cell::{Cell, RefCell};
@@ -45,7 +45,8 @@ pub(super) struct Made {
 /// Hears of each dispatch, and may set another pipeline for it.
 #[cfg(feature = "reference")]
 pub(super) trait Listener {
-    /// It is about to be recorded. `made` is `None` where the pipeline was made before the tape began.
+    /// It is about to be recorded. `made` is `None` where the pipeline was made before the tape
+    /// began.
     fn before(&mut self, pass: &mut wgpu::ComputePass<'_>, made: Option<&Made>);
 }
 
@@ -178,7 +179,8 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// As [`wgpu::ComputePass::set_bind_group`]; a dynamic offset is that of the group's first binding.
+    /// As [`wgpu::ComputePass::set_bind_group`]; a dynamic offset is that of the group's first
+    /// binding.
     pub fn set_bind_group(&mut self, index: u32, group: &wgpu::BindGroup, offsets: &[u32]) {
         self.pass.set_bind_group(index, group, offsets);
         if RUNS.get() {

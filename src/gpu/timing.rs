@@ -1,10 +1,11 @@
-//! GPU time per pass: a [`Recorder`] pairs a command encoder with an optional profiler, so that every pass is
-//! written once and timed when somebody asks.
+//! GPU time per pass: a [`Recorder`] pairs a command encoder with an optional profiler, so that
+//! every pass is written once and timed when somebody asks.
 
 pub use super::tape::Pass;
 use wgpu_profiler::{GpuProfiler, GpuTimerQueryResult};
 
-/// Records passes into an encoder and, when it has a profiler, their timestamps under the pass's label.
+/// Records passes into an encoder and, when it has a profiler, their timestamps under the pass's
+/// label.
 pub struct Recorder<'a> {
     encoder: &'a mut wgpu::CommandEncoder,
     profiler: Option<&'a GpuProfiler>,

@@ -1,7 +1,8 @@
 //! Multi-layer EXR under Blender's pass names, one part, ZIP blocks of 16 rows.
 //!
-//! Depth, position and motion are 32-bit floats because half floats would move surfaces by up to a two-thousandth of
-//! their distance; every other layer is half (11 bits of precision, largest value 65504).
+//! Depth, position and motion are 32-bit floats because half floats would move surfaces by up to a
+//! two-thousandth of their distance; every other layer is half (11 bits of precision, largest value
+//! 65504).
 
 use super::{ImageError, Layer, Layers, check_size, read_all, write_whole};
 use ::exr::meta::MetaData;
@@ -18,8 +19,9 @@ pub(super) const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// Pass names that are stored as full floats.
 const FULL_FLOAT: [&str; 3] = ["Depth", "Position", "Motion"];
 
-/// Writes `layers` (each channel `width · height` values, rows from the top) into one EXR with `metadata` as text
-/// attributes. The root layer has the empty name. `-` is standard output. The file appears whole or not at all.
+/// Writes `layers` (each channel `width · height` values, rows from the top) into one EXR with
+/// `metadata` as text attributes. The root layer has the empty name. `-` is standard output. The
+/// file appears whole or not at all.
 ///
 /// # Errors
 /// No pixels or layers, a channel of the wrong length or twice, or a failed write.
@@ -78,8 +80,8 @@ pub fn write_exr(
 /// Values are as stored, see [`Layers::check_finite`].
 ///
 /// # Errors
-/// Missing, empty, truncated or foreign file; too many pixels; deep data, subsampled channels, parts of different sizes
-/// or an unknown compression.
+/// Missing, empty, truncated or foreign file; too many pixels; deep data, subsampled channels,
+/// parts of different sizes or an unknown compression.
 pub fn read_exr(path: &Path) -> Result<Layers, ImageError> {
     let bytes = read_all(path)?;
     if !bytes.starts_with(&MAGIC) {

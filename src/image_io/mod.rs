@@ -25,7 +25,8 @@ pub const MAX_PIXELS: u64 = 1 << 27;
 /// Most samples (pixels × channels) that a file may claim: 2 GiB as f32.
 pub const MAX_SAMPLES: u64 = 1 << 29;
 
-/// Keys and texts that travel with a picture: adapter, driver, version, weights hash, command line, ...
+/// Keys and texts that travel with a picture: adapter, driver, version, weights hash, command line,
+/// ...
 pub type Metadata = Vec<(String, String)>;
 
 /// Interleaved pixels.
@@ -42,7 +43,8 @@ pub struct Image {
 }
 
 impl Image {
-    /// The first three channels of each pixel, `3 · width · height` values; one channel is repeated.
+    /// The first three channels of each pixel, `3 · width · height` values; one channel is
+    /// repeated.
     pub fn to_rgb(&self) -> Vec<f32> {
         let channels = self.channels as usize;
         let pick = |p: &[f32]| [p[0], p[1.min(channels - 1)], p[2.min(channels - 1)]];
@@ -98,15 +100,17 @@ pub struct Layers {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Layers in the file's order; channels are sorted R G B A or X Y Z W where they have these names.
+    /// Layers in the file's order; channels are sorted R G B A or X Y Z W where they have these
+    /// names.
     pub layers: Vec<Layer>,
     /// Text attributes, sorted by key.
     pub metadata: Metadata,
 }
 
 impl Layers {
-    /// The layer called `name`; `DiffDir` also finds `ViewLayer.DiffDir`, and the beauty (`""` or `Combined`) is found
-    /// as root, `Combined` or `ViewLayer.Combined`. The first one counts where several view layers have it.
+    /// The layer called `name`; `DiffDir` also finds `ViewLayer.DiffDir`, and the beauty (`""` or
+    /// `Combined`) is found as root, `Combined` or `ViewLayer.Combined`. The first one counts where
+    /// several view layers have it.
     ///
     /// # Errors
     /// [`ImageError::NoLayer`], which lists what there is.
@@ -141,8 +145,8 @@ impl Layers {
         })
     }
 
-    /// Checks that the layer called `name` holds numbers only. Reading does not check by itself: a background depth
-    /// is rightly infinite in many files.
+    /// Checks that the layer called `name` holds numbers only. Reading does not check by itself: a
+    /// background depth is rightly infinite in many files.
     ///
     /// # Errors
     /// [`ImageError::NonFinite`] with the first place and the count; [`ImageError::NoLayer`].

@@ -7,11 +7,13 @@ use std::path::Path;
 
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// Writes display-encoded sRGB bytes (`3 · width · height`, rows from the top) with `metadata` as tEXt chunks, or
-/// iTXt where a text is not Latin-1. `-` is standard output. The file appears whole or not at all.
+/// Writes display-encoded sRGB bytes (`3 · width · height`, rows from the top) with `metadata` as
+/// tEXt chunks, or iTXt where a text is not Latin-1. `-` is standard output. The file appears whole
+/// or not at all.
 ///
 /// # Errors
-/// No pixels, wrong length, a metadata key that PNG does not allow (1 to 79 Latin-1 characters), or a failed write.
+/// No pixels, wrong length, a metadata key that PNG does not allow (1 to 79 Latin-1 characters), or
+/// a failed write.
 pub fn write_png(
     path: &Path,
     width: u32,
@@ -76,8 +78,9 @@ pub fn write_apng(path: &Path, size: [u32; 2], frames: &[&[u8]], frame_ms: u16) 
     write_whole(path, &file)
 }
 
-/// Reads a PNG of any kind as f32 in [0, 1], display-encoded as stored: 3 channels, or 4 where it has transparency.
-/// Grey and palette pictures are widened to RGB; 8 bits divide by 255, 16 bits by 65535.
+/// Reads a PNG of any kind as f32 in [0, 1], display-encoded as stored: 3 channels, or 4 where it
+/// has transparency. Grey and palette pictures are widened to RGB; 8 bits divide by 255, 16 bits
+/// by 65535.
 ///
 /// # Errors
 /// Missing, empty, truncated or foreign file; more than [`MAX_PIXELS`](super::MAX_PIXELS).
@@ -102,7 +105,8 @@ pub fn decode_png(path: &Path, bytes: &[u8]) -> Result<(Image, Metadata), ImageE
         return Err(ImageError::NotThisFormat { path: path.into(), expected: "a PNG" });
     }
     let broken = |e: png::DecodingError| ImageError::broken(path, "PNG", e);
-    // Size is checked from the header alone; the limit holds for what compressed text and profiles unpack to.
+    // Size is checked from the header alone; the limit holds for what compressed text and profiles
+    // unpack to.
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     let (width, height) = decoder.read_header_info().map_err(broken)?.size();
     check_size(path, u64::from(width), u64::from(height), 4)?;

@@ -1,12 +1,15 @@
-//! Files are written whole or not at all: into a temporary file in the same folder, which then takes the name.
+//! Files are written whole or not at all: into a temporary file in the same folder, which then
+//! takes the name.
 
 use super::ImageError;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes `bytes` to `path`, replacing what was there only when every byte has arrived; `-` is standard output.
+/// Writes `bytes` to `path`, replacing what was there only when every byte has arrived; `-` is
+/// standard output.
 ///
-/// Devices and pipes cannot be replaced and are written directly; a symbolic link keeps pointing where it does.
+/// Devices and pipes cannot be replaced and are written directly; a symbolic link keeps pointing
+/// where it does.
 ///
 /// # Errors
 /// Every error names the path; the old file, if any, is then untouched.
@@ -48,8 +51,8 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     Ok(())
 }
 
-/// Whether a file could be written to `path`, found out without touching it, so that long work can fail before
-/// it starts.
+/// Whether a file could be written to `path`, found out without touching it, so that long work can
+/// fail before it starts.
 ///
 /// # Errors
 /// The path is a folder, or its folder does not exist.

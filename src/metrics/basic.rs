@@ -1,4 +1,5 @@
-//! PSNR, mean absolute error and the relative errors of radiance. The second picture is the reference.
+//! PSNR, mean absolute error and the relative errors of radiance. The second picture is the
+//! reference.
 
 use super::{LinearMetrics, MetricError, Picture};
 

@@ -86,7 +86,8 @@ pub struct HdrFlip {
     pub exposures: Exposures,
 }
 
-/// Metrics of one layer of two files; serialises to the record that `compare --layer --json` writes.
+/// Metrics of one layer of two files; serialises to the record that `compare --layer --json`
+/// writes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LayerComparison {
     /// Version of this record.

@@ -21,8 +21,8 @@ pub fn heat_color(t: f32) -> [u8; 3] {
     })
 }
 
-/// `3 · width · height` sRGB bytes of the mean |a − b| over the channels of each pixel; `full_scale` and more is the
-/// brightest colour.
+/// `3 · width · height` sRGB bytes of the mean |a − b| over the channels of each pixel;
+/// `full_scale` and more is the brightest colour.
 ///
 /// # Errors
 /// Different sizes.

@@ -1,9 +1,11 @@
-//! The four numbers of Harris-Dewey and Klein 2021 (arXiv 2110.12039), as their published code computes them.
+//! The four numbers of Harris-Dewey and Klein 2021 (arXiv 2110.12039), as their published code
+//! computes them.
 //!
-//! Pictures are display values in [0, 1] (8-bit sRGB after Blender's Filmic view). Before anything else each channel of
-//! each picture is stretched on its own to its own minimum and maximum. That hides exposure errors and magnifies small
-//! ones, so these numbers never stand alone. "FID" is not the Inception distance but the Fréchet distance between the
-//! Gaussians of the two pictures' RGB values.
+//! Pictures are display values in [0, 1] (8-bit sRGB after Blender's Filmic view). Before anything
+//! else each channel of each picture is stretched on its own to its own minimum and maximum. That
+//! hides exposure errors and magnifies small ones, so these numbers never stand alone. "FID" is not
+//! the Inception distance but the Fréchet distance between the Gaussians of the two pictures' RGB
+//! values.
 
 use super::ssim::ssim_of_channels;
 use super::{MetricError, Picture};
@@ -60,7 +62,8 @@ pub fn fid(a: Picture<'_>, b: Picture<'_>) -> Result<f64, MetricError> {
         return Err(MetricError::TooSmall { metric: "FID", least: "2 pixels", width, height });
     }
     let ((ma, ca), (mb, cb)) = (gaussian(&stretch(a)), gaussian(&stretch(b)));
-    // (Ca Cb)^½ has the eigenvalues of the symmetric (Ca^½ Cb Ca^½)^½, which needs no complex arithmetic.
+    // (Ca Cb)^½ has the eigenvalues of the symmetric (Ca^½ Cb Ca^½)^½, which needs no complex
+    // arithmetic.
     let root = square_root(ca);
     let (values, _) = eigen(product(product(root, cb), root));
     let cross: f64 = values.iter().map(|v| v.max(0.0).sqrt()).sum();
@@ -99,7 +102,8 @@ fn square_root(m: Matrix) -> Matrix {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| vectors[i][k] * roots[k] * vectors[j][k]).sum()))
 }
 
-/// Eigenvalues and eigenvectors (columns) of a symmetric matrix by Jacobi rotations; 3×3 settles in a few sweeps.
+/// Eigenvalues and eigenvectors (columns) of a symmetric matrix by Jacobi rotations; 3×3 settles in
+/// a few sweeps.
 fn eigen(mut m: Matrix) -> ([f64; 3], Matrix) {
     let mut vectors = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     for _ in 0..30 {

@@ -5,7 +5,8 @@ use thiserror::Error;
 /// Why two pictures cannot be compared.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum MetricError {
-    /// The number of values is not `3 · width · height` (of a layer: a multiple of its pixels), or there is no pixel.
+    /// The number of values is not `3 · width · height` (of a layer: a multiple of its pixels), or
+    /// there is no pixel.
     #[error("picture `{picture}` has {values} values, which do not make {width}×{height} pixels")]
     Shape {
         /// Name given by the caller.

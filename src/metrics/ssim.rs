@@ -1,13 +1,15 @@
-//! Structural similarity over a 7×7 uniform window, as scikit-image's `structural_similarity` computes it by default:
-//! sample covariance, K1 = 0.01, K2 = 0.03, mean over the windows that lie inside, then over the channels.
-//! (Wang, Bovik, Sheikh, Simoncelli 2004, with a uniform in place of a Gaussian window.)
+//! Structural similarity over a 7×7 uniform window, as scikit-image's `structural_similarity`
+//! computes it by default: sample covariance, K1 = 0.01, K2 = 0.03, mean over the windows that lie
+//! inside, then over the channels. (Wang, Bovik, Sheikh, Simoncelli 2004, with a uniform in place
+//! of a Gaussian window.)
 
 use super::{MetricError, Picture};
 
 /// Edge of the window, pixels.
 pub const SSIM_WINDOW: usize = 7;
 
-/// SSIM of two pictures whose values span `data_range`: 1 for display values as they are; see [`super::paper::ssim`].
+/// SSIM of two pictures whose values span `data_range`: 1 for display values as they are; see
+/// [`super::paper::ssim`].
 ///
 /// # Errors
 /// Different sizes; fewer than 7 pixels in width or height.

@@ -1,7 +1,7 @@
 //! Functions of one value, as the weights file spells them.
 
-/// Function applied to each value. In the file a word (`"relu"`), or an object for the one with a number
-/// (`{"leaky_relu": 0.2}`).
+/// Function applied to each value. In the file a word (`"relu"`), or an object for the one with a
+/// number (`{"leaky_relu": 0.2}`).
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Activation {

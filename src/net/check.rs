@@ -1,4 +1,5 @@
-//! One operator judged by itself, whatever the picture's size: its numbers, and the channels of what it reads.
+//! One operator judged by itself, whatever the picture's size: its numbers, and the channels of
+//! what it reads.
 
 use super::graph_error::GraphError;
 use super::op::{Activation, Op};
@@ -70,7 +71,8 @@ pub(super) fn fields(op: &Op, errors: &mut Vec<GraphError>) {
     }
 }
 
-/// Channels of what `op` writes, if they follow from what is known; reports inputs with other channels than declared.
+/// Channels of what `op` writes, if they follow from what is known; reports inputs with other
+/// channels than declared.
 pub(super) fn channels(op: &Op, of: impl Fn(&str) -> Option<u32>, errors: &mut Vec<GraphError>) -> Option<u32> {
     let name = op.name();
     let mut want = |tensor: &str, wanted: Option<u32>| {
@@ -123,7 +125,8 @@ pub(super) fn channels(op: &Op, of: impl Fn(&str) -> Option<u32>, errors: &mut V
         Op::PixelUnshuffle(o) => of(&o.input).map(|n| n.saturating_mul(o.factor.saturating_mul(o.factor))),
         Op::Dropout(o) => of(&o.input),
     };
-    // Only these two make channels out of thin air; the others' are judged as fields or are an input's.
+    // Only these two make channels out of thin air; the others' are judged as fields or are an
+    // input's.
     if let (Op::Concat(_) | Op::PixelUnshuffle(_), Some(n)) = (op, out) {
         range(errors, name, "channels", n, 1, MAX_CHANNELS);
     }

@@ -28,8 +28,9 @@ pub enum Norm {
     Group,
     /// Each channel of the picture by itself; with or without weight and bias, as the keys say.
     Instance,
-    /// Batch norm with its running statistics. What such a network computes in PyTorch's *training* mode with one
-    /// picture, as both published programs run it, is instance norm: convert it as that.
+    /// Batch norm with its running statistics. What such a network computes in PyTorch's *training*
+    /// mode with one picture, as both published programs run it, is instance norm: convert it as
+    /// that.
     Batch,
 }
 

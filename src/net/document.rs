@@ -1,4 +1,5 @@
-//! The JSON document of a weights file: what its fields may say, checked before the tensors are looked at.
+//! The JSON document of a weights file: what its fields may say, checked before the tensors are
+//! looked at.
 
 use super::graph::{Graph, GraphError};
 use super::op::Op;
@@ -20,8 +21,8 @@ pub struct Feature {
     pub name: String,
     /// Channels.
     pub channels: u32,
-    /// How the field's values become channels, normalisation included. Files of version 1 leave it out; it is then
-    /// filled in from the table, `plain` in table `free`.
+    /// How the field's values become channels, normalisation included. Files of version 1 leave it
+    /// out; it is then filled in from the table, `plain` in table `free`.
     #[serde(default)]
     pub encoding: String,
 }
@@ -60,7 +61,8 @@ pub(super) struct Document<'a> {
     pub inputs: Vec<Feature>,
     pub cell: u32,
     pub output: Output,
-    /// Text, not values: a value takes up to 32 times its text, and most of a document is its graph.
+    /// Text, not values: a value takes up to 32 times its text, and most of a document is its
+    /// graph.
     #[serde(borrow)]
     graph: Vec<&'a RawValue>,
     /// Text for the same reason.
@@ -100,7 +102,8 @@ pub(super) fn parse<'a>(
         problems.push(Problem::Document("the key is missing, so this file holds no bouncelight network".into()));
         return None;
     };
-    // What is skipped or kept as text below is not looked at in full, and a half of a surrogate pair is no JSON.
+    // What is skipped or kept as text below is not looked at in full, and a half of a surrogate
+    // pair is no JSON.
     if text.contains("\\u")
         && let Err(e) = serde_json::from_str::<serde_json::Value>(text)
     {
@@ -224,7 +227,8 @@ fn check_inputs(document: &mut Document<'_>, problems: &mut Vec<Problem>) {
     }
 }
 
-/// Sizes are judged at an odd probe size, because a mistake in the levels of a U-Net shows only there.
+/// Sizes are judged at an odd probe size, because a mistake in the levels of a U-Net shows only
+/// there.
 fn check_output(output: &Output, graph: &Graph, problems: &mut Vec<Problem>) {
     match graph.inner_size(253, 131).and_then(|[w, h]| graph.shapes(w, h)) {
         Err(e) => problems.push(Problem::Graph(e)),
@@ -244,7 +248,8 @@ fn check_output(output: &Output, graph: &Graph, problems: &mut Vec<Problem>) {
 /// Longest text of one operator: it becomes values before it becomes an [`Op`].
 const MAX_OP_TEXT: usize = 64 << 10;
 
-/// An operator's kind and name; refuses a field that stands twice, which reading into values would hide.
+/// An operator's kind and name; refuses a field that stands twice, which reading into values would
+/// hide.
 #[derive(Default)]
 struct Keys {
     op: Option<String>,

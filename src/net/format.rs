@@ -1,5 +1,6 @@
-//! Reader of weights files (`weights-format/README.md` is the specification): a safetensors file whose metadata key
-//! `bouncelight` holds one JSON document with inputs, output, graph and provenance.
+//! Reader of weights files (`weights-format/README.md` is the specification): a safetensors file
+//! whose metadata key `bouncelight` holds one JSON document with inputs, output, graph and
+//! provenance.
 //!
 //! Everything is checked before memory is taken for a tensor, and all faults are reported at once.
 //! No input makes it panic.
@@ -36,7 +37,8 @@ pub struct Weights {
     pub graph: Graph,
     /// How the numbers were made; free-form.
     pub provenance: Provenance,
-    /// 64-bit FNV-1a of the file's bytes: identifies the file in a picture's metadata, protects against nothing.
+    /// 64-bit FNV-1a of the file's bytes: identifies the file in a picture's metadata, protects
+    /// against nothing.
     pub content_hash: u64,
     pub(super) tensors: BTreeMap<String, WeightTensor>,
 }
@@ -47,7 +49,8 @@ impl Weights {
         Self::parse(path, &Self::read_bytes(path)?)
     }
 
-    /// The bytes of a file that may be one of weights: an ordinary file of at most [`MAX_FILE`] bytes.
+    /// The bytes of a file that may be one of weights: an ordinary file of at most [`MAX_FILE`]
+    /// bytes.
     pub fn read_bytes(path: &Path) -> Result<Vec<u8>, WeightsError> {
         let io = |source| WeightsError::Io { path: path.into(), source };
         let meta = std::fs::metadata(path).map_err(io)?;
@@ -65,7 +68,8 @@ impl Weights {
         Self::parse(Path::new("(memory)"), bytes)
     }
 
-    /// Values of tensor `NAME.LEAF`; empty where the graph has none, as the bias of a convolution without.
+    /// Values of tensor `NAME.LEAF`; empty where the graph has none, as the bias of a convolution
+    /// without.
     pub fn values(&self, name: &str, leaf: &str) -> &[f32] {
         self.tensors.get(&format!("{name}.{leaf}")).map_or(&[], |t| &t.data)
     }
@@ -75,7 +79,8 @@ impl Weights {
         &self.tensors
     }
 
-    /// The same network with the weights of its convolutions to be stored as `dtype`; vectors become F32.
+    /// The same network with the weights of its convolutions to be stored as `dtype`; vectors
+    /// become F32.
     pub fn stored_as(mut self, dtype: Dtype) -> Self {
         for tensor in self.tensors.values_mut() {
             tensor.stored = if tensor.shape.len() == 4 { dtype } else { Dtype::F32 };

@@ -1,7 +1,9 @@
-//! Host side of the network's kernels: one arena, pipelines and bind groups built once, one compute pass a step.
+//! Host side of the network's kernels: one arena, pipelines and bind groups built once, one compute
+//! pass a step.
 //!
-//! The caller fills [`Network::input`] (all channels, padding included, as zeros), records, and reads
-//! [`Network::output`]. Recording allocates nothing. The input's memory is reused by later layers.
+//! The caller fills [`Network::input`] (all channels, padding included, as zeros), records, and
+//! reads [`Network::output`]. Recording allocates nothing. The input's memory is reused by later
+//! layers.
 
 pub(crate) mod build;
 mod conv;
@@ -118,8 +120,8 @@ pub struct Network {
 }
 
 impl Network {
-    /// Builds pipelines, uploads weights, allocates the arena for an input of `size` (width, height).
-    /// `setup`: [`Options`] alone, or a whole [`Setup`].
+    /// Builds pipelines, uploads weights, allocates the arena for an input of `size` (width,
+    /// height). `setup`: [`Options`] alone, or a whole [`Setup`].
     ///
     /// # Errors
     /// [`NetError`] when the graph does not take the size, or the device grants too little.
@@ -161,7 +163,8 @@ impl Network {
         Self::new(device, queue, weights, size, Setup { options, tuned, pipelines })
     }
 
-    /// The same network with what a tuner has found in the meantime. Pipelines that serve again are kept.
+    /// The same network with what a tuner has found in the meantime. Pipelines that serve again are
+    /// kept.
     ///
     /// # Errors
     /// As [`Network::new`]; then the old network is gone.
@@ -175,7 +178,8 @@ impl Network {
         Self::new(device, queue, weights, [plan.width, plan.height], Setup { options, tuned, pipelines })
     }
 
-    /// Replaces the trained numbers from the queue's next submission on. Allocates nothing on the GPU.
+    /// Replaces the trained numbers from the queue's next submission on. Allocates nothing on the
+    /// GPU.
     ///
     /// # Errors
     /// [`NetError::OtherGraph`] when the weights are for another graph.
@@ -187,7 +191,8 @@ impl Network {
         Ok(())
     }
 
-    /// Another seed for dropout, from the queue's next submission on; nothing happens to a network without dropout.
+    /// Another seed for dropout, from the queue's next submission on; nothing happens to a network
+    /// without dropout.
     pub fn set_seed(&mut self, queue: &wgpu::Queue, seed: u32) {
         if self.options.dropout.is_some() {
             self.options.dropout = Some(seed);

@@ -1,7 +1,8 @@
-//! The network's topology: named operators in execution order, shape inference, parameter and FLOP counts.
+//! The network's topology: named operators in execution order, shape inference, parameter and FLOP
+//! counts.
 //!
-//! Pure: no file, no GPU. A graph is in single-assignment form: every operator writes one tensor with a name of its
-//! own and reads tensors that were written before it, or [`INPUT`].
+//! Pure: no file, no GPU. A graph is in single-assignment form: every operator writes one tensor
+//! with a name of its own and reads tensors that were written before it, or [`INPUT`].
 
 use super::check;
 pub use super::graph_error::GraphError;
@@ -33,7 +34,8 @@ impl Graph {
             errors.push(GraphError::Empty);
         }
         check::range(&mut errors, INPUT, "channels", self.input_channels, 1, MAX_CHANNELS);
-        // `None`: written, but by an operator whose own input is unknown, so nothing follows from it.
+        // `None`: written, but by an operator whose own input is unknown, so nothing follows from
+        // it.
         let mut known: HashMap<&str, Option<u32>> = HashMap::from([(INPUT, Some(self.input_channels))]);
         let mut names = HashSet::new();
         for op in &self.ops {
@@ -111,8 +113,9 @@ impl Graph {
         Ok(made.map_or([width, height], |(_, shape)| [shape.width, shape.height]))
     }
 
-    /// Whether `out` is as large as it should be for `size`. That is a linear function of the size for a network of
-    /// convolutions and resamplings, and two sizes that most strides divide show which.
+    /// Whether `out` is as large as it should be for `size`. That is a linear function of the size
+    /// for a network of convolutions and resamplings, and two sizes that most strides divide show
+    /// which.
     fn keeps_edges(&self, size: [u32; 2], out: [u32; 2]) -> bool {
         const PROBE: i64 = 3072;
         let probe = |edge: i64| self.output_edges([edge as u32; 2]).map(|out| out.map(i64::from));
@@ -123,7 +126,8 @@ impl Graph {
         })
     }
 
-    /// Edge of the output that is kept of `output` pixels when `edge` of `inner` pixels of the input were the picture.
+    /// Edge of the output that is kept of `output` pixels when `edge` of `inner` pixels of the
+    /// input were the picture.
     pub fn cropped(output: u32, edge: u32, inner: u32) -> u32 {
         (u64::from(output) * u64::from(edge)).div_ceil(u64::from(inner.max(1))) as u32
     }

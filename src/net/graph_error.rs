@@ -116,7 +116,8 @@ pub enum GraphError {
 }
 
 impl GraphError {
-    /// The operator that it is about; `input` for the input's own size, the output's tensor where nothing writes it.
+    /// The operator that it is about; `input` for the input's own size, the output's tensor where
+    /// nothing writes it.
     pub fn op(&self) -> &str {
         match self {
             GraphError::Empty => "",

@@ -1,16 +1,16 @@
 //! The safetensors container: an 8-byte length, a JSON header, the tensors' bytes.
 //!
-//! Parsed here and not by the `safetensors` crate because that one keeps the last of two tensors with one name and
-//! stops at the first fault; this one reports every fault. Nothing is allocated from a number in the file before the
-//! number has been held against the file's size.
+//! Parsed here and not by the `safetensors` crate because that one keeps the last of two tensors
+//! with one name and stops at the first fault; this one reports every fault. Nothing is allocated
+//! from a number in the file before the number has been held against the file's size.
 
 use super::problem::{Problem, WeightsError};
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
 use std::collections::{BTreeMap, btree_map::Entry};
 use std::path::Path;
 
-/// Longest header, bytes. The largest network's takes under a hundredth; safetensors itself allows 100 MB, which a
-/// hostile file could turn into gigabytes of small objects.
+/// Longest header, bytes. The largest network's takes under a hundredth; safetensors itself allows
+/// 100 MB, which a hostile file could turn into gigabytes of small objects.
 pub(super) const MAX_HEADER: u64 = 8 << 20;
 /// Most tensors.
 pub(super) const MAX_TENSORS: usize = 8192;

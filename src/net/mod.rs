@@ -6,7 +6,8 @@
 //! - [`graph`] and [`op`]: topology, shape inference, parameter and FLOP counts.
 //! - [`pictures`]: four pictures as a network's input, and its output as a picture.
 //! - [`plan`]: which dispatches run and where each tensor lives in one arena.
-//! - [`cpu`]: the slow, obvious CPU reference; every kernel is tested against it and against PyTorch.
+//! - [`cpu`]: the slow, obvious CPU reference; every kernel is tested against it and against
+//!   PyTorch.
 //! - [`gpu`]: the WGSL kernels' host side.
 //! - [`learn`]: the way back through the shipped network's operators, for fitting it to a scene.
 //!

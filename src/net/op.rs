@@ -1,5 +1,6 @@
-//! The operators a network is made of, with their fields as the weights file spells them. What follows from the fields
-//! (tensors, counts) is in [`super::op_facts`], what the sizes are in [`super::graph`].
+//! The operators a network is made of, with their fields as the weights file spells them. What
+//! follows from the fields (tensors, counts) is in [`super::op_facts`], what the sizes are in
+//! [`super::graph`].
 
 pub use super::activation::Activation;
 use serde::{Deserialize, Serialize};
@@ -15,7 +16,8 @@ pub enum AddAt {
     AfterActivation,
 }
 
-/// Zeros around a picture. In the file one number for all four sides, or `[left, top, right, bottom]`.
+/// Zeros around a picture. In the file one number for all four sides, or
+/// `[left, top, right, bottom]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(from = "Sides", into = "Sides")]
 pub struct Padding {
@@ -63,14 +65,16 @@ impl From<Padding> for Sides {
     }
 }
 
-/// Defines operators: every struct has `name`, for labels and tensors, and `output`, the tensor written.
+/// Defines operators: every struct has `name`, for labels and tensors, and `output`, the tensor
+/// written.
 macro_rules! operators {
     ($($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $type:ty),* $(,)? })*) => { $(
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
-            /// Operator's name (PyTorch's module name where it has trained numbers): label, and prefix of its tensors.
+            /// Operator's name (PyTorch's module name where it has trained numbers): label, and
+            /// prefix of its tensors.
             pub name: String,
             $($(#[$field_doc])* pub $field: $type,)*
             /// Tensor written.
@@ -80,8 +84,9 @@ macro_rules! operators {
 }
 
 operators! {
-    /// Cross-correlation with zero padding, then bias, then optional skip and activation. Tensors: `NAME.weight`
-    /// [out, in / groups, kh, kw] and, unless `bias` is false, `NAME.bias` (out values).
+    /// Cross-correlation with zero padding, then bias, then optional skip and activation. Tensors:
+    /// `NAME.weight` [out, in / groups, kh, kw] and, unless `bias` is false, `NAME.bias` (out
+    /// values).
     Conv2d {
         /// Tensor read.
         input: String,
@@ -114,8 +119,9 @@ operators! {
         add_at: AddAt,
     }
 
-    /// Transposed convolution as PyTorch's `ConvTranspose2d`: edge (n − 1) · stride − 2 · padding + kernel +
-    /// output_padding. Tensors: `NAME.weight` [in, out, kh, kw] and, unless `bias` is false, `NAME.bias` (out values).
+    /// Transposed convolution as PyTorch's `ConvTranspose2d`: edge (n − 1) · stride − 2 · padding +
+    /// kernel + output_padding. Tensors: `NAME.weight` [in, out, kh, kw] and, unless `bias` is
+    /// false, `NAME.bias` (out values).
     ConvTranspose2d {
         /// Tensor read.
         input: String,
@@ -179,8 +185,9 @@ operators! {
         activation: Activation,
     }
 
-    /// Batch norm at inference: (x − running_mean) / √(running_var + eps) · weight + bias for each channel. Tensors:
-    /// `NAME.running_mean`, `NAME.running_var` and, if `affine`, `NAME.weight`, `NAME.bias`.
+    /// Batch norm at inference: (x − running_mean) / √(running_var + eps) · weight + bias for each
+    /// channel. Tensors: `NAME.running_mean`, `NAME.running_var` and, if `affine`, `NAME.weight`,
+    /// `NAME.bias`.
     BatchNorm {
         /// Tensor read.
         input: String,
@@ -197,8 +204,8 @@ operators! {
         activation: Activation,
     }
 
-    /// As batch norm, with mean and (biased) variance of this picture's channel. Tensors, if `affine`: `NAME.weight`,
-    /// `NAME.bias`.
+    /// As batch norm, with mean and (biased) variance of this picture's channel. Tensors, if
+    /// `affine`: `NAME.weight`, `NAME.bias`.
     InstanceNorm {
         /// Tensor read.
         input: String,
@@ -242,8 +249,8 @@ operators! {
         activation: Activation,
     }
 
-    /// `pixel_shuffle`: channels become pixels, [c·f², h, w] → [c, h·f, w·f]; `pixel_unshuffle`: the inverse. Orders as
-    /// PyTorch's.
+    /// `pixel_shuffle`: channels become pixels, [c·f², h, w] → [c, h·f, w·f]; `pixel_unshuffle`:
+    /// the inverse. Orders as PyTorch's.
     PixelShuffle {
         /// Tensor read.
         input: String,

@@ -1,4 +1,5 @@
-//! What follows from an operator's fields: how it is spelt and parsed, what it reads, its trained tensors, its counts.
+//! What follows from an operator's fields: how it is spelt and parsed, what it reads, its trained
+//! tensors, its counts.
 
 use super::graph::Shape;
 use super::op::{Activation, Op};
@@ -22,7 +23,8 @@ pub const KINDS: [&str; 14] = [
 ];
 
 impl Op {
-    /// The operator `kind` from its fields (without `op`); `None` for a kind that is not in [`KINDS`].
+    /// The operator `kind` from its fields (without `op`); `None` for a kind that is not in
+    /// [`KINDS`].
     pub fn parse(kind: &str, fields: serde_json::Value) -> Option<serde_json::Result<Op>> {
         use serde_json::from_value as read;
         Some(match kind {
@@ -113,7 +115,8 @@ impl Op {
         }
     }
 
-    /// Trained numbers. Running means and variances of batch norm are not among them, as in PyTorch.
+    /// Trained numbers. Running means and variances of batch norm are not among them, as in
+    /// PyTorch.
     pub fn parameters(&self) -> u64 {
         let trained = self.tensors().into_iter().filter(|(name, _)| !name.contains(".running_"));
         trained.map(|(_, shape)| shape.iter().product::<u64>()).sum()

@@ -6,7 +6,8 @@ use std::time::Instant;
 /// Measured peaks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// Floating-point operations a second in 32 bits, multiplications and additions without a load between them.
+    /// Floating-point operations a second in 32 bits, multiplications and additions without a load
+    /// between them.
     pub flops: f64,
     /// Bytes read and written a second by the driver's copy of a buffer.
     pub bytes: f64,
@@ -18,7 +19,8 @@ const OPERATIONS: f64 = 128.0 * 32.0 * 2.0;
 const COPY: u64 = 32 << 20;
 const TURNS: usize = 30;
 
-/// Measures by the clock, the fastest of several turns. Takes about a second on a processor, and 64 MiB.
+/// Measures by the clock, the fastest of several turns. Takes about a second on a processor, and 64
+/// MiB.
 pub fn measure(device: &wgpu::Device, queue: &wgpu::Queue) -> Peak {
     let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
     let buffer = |label| {

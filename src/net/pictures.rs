@@ -1,4 +1,5 @@
-//! Networks on four pictures from elsewhere: from display values to the input tensor, and back from the output.
+//! Networks on four pictures from elsewhere: from display values to the input tensor, and back from
+//! the output.
 
 use super::cpu::Tensor;
 use super::format::Weights;
@@ -118,7 +119,8 @@ fn encoding(name: &str, values: &[f32]) -> [f32; 2] {
     }
 }
 
-/// The picture that `output` of meaning `display_signed` holds: (y + 1) / 2 in [0, 1], RGB interleaved.
+/// The picture that `output` of meaning `display_signed` holds: (y + 1) / 2 in [0, 1], RGB
+/// interleaved.
 pub fn picture(output: &Tensor) -> Vec<f32> {
     let pixels = output.shape.pixels() as usize;
     let shown = |p: usize| (0..3).map(move |c| ((output.data[c * pixels + p] + 1.0) / 2.0).clamp(0.0, 1.0));

@@ -1,4 +1,5 @@
-//! From a graph to what the GPU does: the list of dispatches and each tensor's place in one arena. Pure.
+//! From a graph to what the GPU does: the list of dispatches and each tensor's place in one arena.
+//! Pure.
 //!
 //! Bias, activation, dropout, sums, batch norms, zero padding and enlarging by a whole factor run
 //! inside the operator before or after them where its kernel has room (`fuse`). A concatenation is
@@ -18,7 +19,8 @@ use std::collections::HashMap;
 use thiserror::Error;
 pub use types::{Kind, Options, Precision, Row, Step, TILE, Tensor};
 
-/// Offsets of whole tensors in the arena are multiples of this: WebGPU's default alignment of storage bindings.
+/// Offsets of whole tensors in the arena are multiples of this: WebGPU's default alignment of
+/// storage bindings.
 pub const ALIGN: u64 = 256;
 /// Largest arena on a device of WebGPU's default limits: one storage binding.
 pub const MAX_ARENA: u64 = 128 << 20;
@@ -69,7 +71,8 @@ pub struct Plan {
     pub steps: Vec<Step>,
     /// Index of the output tensor.
     pub output: usize,
-    /// Bytes at the arena's beginning that are always zero: what a kernel reads outside the picture.
+    /// Bytes at the arena's beginning that are always zero: what a kernel reads outside the
+    /// picture.
     pub zero_bytes: u64,
     /// Size of the arena.
     pub arena_bytes: u64,
@@ -254,7 +257,8 @@ impl<'a> Builder<'a> {
             Work::Norm { groups, eps } => Some(self.measure(node, inputs[0], groups, eps)),
             _ => None,
         };
-        // What a batch norm of its own scales is rounded but once, after it, as if it had been folded into the weights.
+        // What a batch norm of its own scales is rounded but once, after it, as if it had been
+        // folded into the weights.
         let mut readers = nodes.iter().filter(|n| n.inputs.iter().chain(&n.skip).any(|t| *t == node.output));
         let unrounded = node.is_conv()
             && node.output != self.graph.output
@@ -291,7 +295,8 @@ impl<'a> Builder<'a> {
         output
     }
 
-    /// One copy for each input. [`Builder::slice`] takes away those that their makers can write in place.
+    /// One copy for each input. [`Builder::slice`] takes away those that their makers can write in
+    /// place.
     fn concat(&mut self, node: &Node, inputs: &[usize], shape: Shape) {
         let output = self.output(node.op, shape, false);
         let name = self.graph.ops[node.op].name();

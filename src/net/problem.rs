@@ -272,7 +272,8 @@ impl Problem {
 }
 
 impl WeightsError {
-    /// Every fault as code and subject. A file that cannot be read as a container has one, without a subject.
+    /// Every fault as code and subject. A file that cannot be read as a container has one, without
+    /// a subject.
     pub fn faults(&self) -> Vec<(&'static str, String)> {
         let one = |code| vec![(code, String::new())];
         match self {

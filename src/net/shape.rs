@@ -4,7 +4,8 @@ use super::graph_error::GraphError;
 use super::op::{Op, Upsample};
 use super::tensor::{MAX_EDGE, Shape};
 
-/// Shape of `op`'s output; `of` knows the shapes of its inputs. The graph has passed [`super::graph::Graph::check`].
+/// Shape of `op`'s output; `of` knows the shapes of its inputs. The graph has passed
+/// [`super::graph::Graph::check`].
 pub(super) fn infer(op: &Op, of: impl Fn(&str) -> Shape) -> Result<Shape, GraphError> {
     let name = op.name();
     let shape = match op {

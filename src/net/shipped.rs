@@ -16,7 +16,8 @@ impl Weights {
         Self::from_bytes(FILE)
     }
 
-    /// The weights in `path`; the shipped ones without a path, and for `small` where there is no such file.
+    /// The weights in `path`; the shipped ones without a path, and for `small` where there is no
+    /// such file.
     ///
     /// # Errors
     /// As [`Weights::load`].

@@ -1,4 +1,5 @@
-//! Names, versions, limits and feature tables of the weights format: the numbers of `weights-format/README.md`.
+//! Names, versions, limits and feature tables of the weights format: the numbers of
+//! `weights-format/README.md`.
 
 use std::ops::RangeInclusive;
 
@@ -46,7 +47,8 @@ const fn row(name: &'static str, channels: u32, encodings: &'static [&'static st
     FeatureRow { name, channels, encodings }
 }
 
-/// Table `screen`, version 1: one real pixel for each cell of the picture; `gi::features` says what the encodings are.
+/// Table `screen`, version 1: one real pixel for each cell of the picture; `gi::features` says what
+/// the encodings are.
 pub const SCREEN_V1: &[FeatureRow] = &[
     row("direct", 3, &["log1p_over_exposure"]),
     row("outgoing", 3, &["log1p_over_exposure"]),
@@ -60,7 +62,8 @@ pub const SCREEN_V1: &[FeatureRow] = &[
     row("guess", 3, &["log1p_over_exposure"]),
 ];
 
-/// Table `cells`, version 1: what `gather` remembers of each cell; `gi::neural::memory` says what the encodings are.
+/// Table `cells`, version 1: what `gather` remembers of each cell; `gi::neural::memory` says what
+/// the encodings are.
 pub const CELLS_V1: &[FeatureRow] = &[
     row("light", 1, &["over_sum_with_exposure"]),
     row("chroma", 2, &["differences_over_sum"]),
@@ -74,8 +77,9 @@ pub const CELLS_V1: &[FeatureRow] = &[
     row("towards", 3, &["gravity_frame"]),
 ];
 
-/// `v` = value of an 8-bit picture / 255. `signed`: 2v − 1. `signed_stretched`: 2(v − min)/(max − min) − 1 with the
-/// picture's own smallest and largest value of all channels, −1 for a picture of one value. `unit`: v.
+/// `v` = value of an 8-bit picture / 255. `signed`: 2v − 1. `signed_stretched`: 2(v − min)/(max −
+/// min) − 1 with the picture's own smallest and largest value of all channels, −1 for a picture of
+/// one value. `unit`: v.
 const PICTURE: &[&str] = &["signed", "signed_stretched", "unit"];
 
 /// Table `images`, version 1: pictures as they are shown, pixel by pixel, in any order.

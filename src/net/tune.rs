@@ -1,4 +1,5 @@
-//! The tuner: times the permutations of each convolution on the device at hand and remembers the fastest.
+//! The tuner: times the permutations of each convolution on the device at hand and remembers the
+//! fastest.
 //!
 //! What it remembers is a [`Cache`], JSON text by device, driver and layer shape; where that lies
 //! is the host's business. All permutations give the same result up to rounding, so a wrong cache
@@ -15,7 +16,8 @@ use std::sync::Arc;
 use std::time::Instant;
 use thiserror::Error;
 
-/// Version of the kernels that a cache speaks of. To be raised with every change that moves their times.
+/// Version of the kernels that a cache speaks of. To be raised with every change that moves their
+/// times.
 pub const VERSION: u32 = 5;
 /// Longest text that is read as a cache, bytes.
 pub const MAX_TEXT: usize = 4 << 20;

@@ -35,8 +35,8 @@ struct Stored<'a> {
 }
 
 impl Weights {
-    /// The file's bytes, each tensor in the number type that it says ([`WeightTensor::stored`]). Nothing is checked:
-    /// [`Weights::from_bytes`] does that.
+    /// The file's bytes, each tensor in the number type that it says ([`WeightTensor::stored`]).
+    /// Nothing is checked: [`Weights::from_bytes`] does that.
     pub fn to_bytes(&self) -> Vec<u8> {
         let Self { name, licence, table, inputs, cell, output, graph, provenance, .. } = self;
         let graph = &graph.ops;

@@ -122,7 +122,8 @@ impl Film {
         queue.submit([encoder.finish()]);
     }
 
-    /// Reads the first `points` points and shows each to `visit`: its number and the sums of both halves. Blocks.
+    /// Reads the first `points` points and shows each to `visit`: its number and the sums of both
+    /// halves. Blocks.
     pub fn read(
         &self,
         device: &wgpu::Device,

@@ -1,5 +1,5 @@
-//! What one dispatch of the path tracer is asked to do: the uniform at group 1, binding 0 of `reference.path` and
-//! `reference.first_hit`.
+//! What one dispatch of the path tracer is asked to do: the uniform at group 1, binding 0 of
+//! `reference.path` and `reference.first_hit`.
 
 use crate::render::View;
 use crate::scene::Camera;
@@ -18,7 +18,8 @@ pub struct Job {
     pub tan_half: [f32; 2],
     /// Size of the whole picture, pixels. Points are given in these coordinates.
     pub size: [u32; 2],
-    /// Number of the first point of this dispatch; point i is pixel (i % width, i / width) unless [`POINTS`] is set.
+    /// Number of the first point of this dispatch; point i is pixel (i % width, i / width) unless
+    /// [`POINTS`] is set.
     pub first_point: u32,
     /// How many points this dispatch advances.
     pub point_count: u32,
@@ -34,12 +35,13 @@ pub struct Job {
     pub half: u32,
     /// Mode flags, see the constants of this module.
     pub flags: u32,
-    /// Width of the Blackman-Harris pixel filter as Cycles counts it (1.5 by default), pixels; 0 sends every sample
-    /// through the point itself.
+    /// Width of the Blackman-Harris pixel filter as Cycles counts it (1.5 by default), pixels; 0
+    /// sends every sample through the point itself.
     pub filter_width: f32,
     /// Distance of the near plane along the view axis, metres.
     pub near: f32,
-    /// Contributions after the first bounce are limited to a sum of r, g, b of three times this; 0 for no limit.
+    /// Contributions after the first bounce are limited to a sum of r, g, b of three times this; 0
+    /// for no limit.
     pub clamp: f32,
     /// Most bounces in all, as Blender counts them; [`UNLIMITED`] for none.
     pub bounces: u32,
@@ -57,18 +59,20 @@ pub struct Job {
 
 /// Flag: points come from the list at group 1, binding 1.
 pub const POINTS: u32 = 1;
-/// Flag: only the analytic lights' direct light (those included that stand in for surfaces), exactly as the rasteriser
-/// reckons it; no sky, no bounce.
+/// Flag: only the analytic lights' direct light (those included that stand in for surfaces),
+/// exactly as the rasteriser reckons it; no sky, no bounce.
 pub const ANALYTIC_ONLY: u32 = 2;
 /// Flag: surfaces are Lambertian with their base colour as albedo; no specular lobe. For proofs.
 pub const LAMBERT: u32 = 4;
 /// Flag: light is found by sampling lights only. For proofs.
 pub const LIGHTS_ONLY: u32 = 8;
-/// Flag: light is found by rays that happen to hit it only. Lights without size give nothing. For proofs.
+/// Flag: light is found by rays that happen to hit it only. Lights without size give nothing. For
+/// proofs.
 pub const HITS_ONLY: u32 = 16;
 /// Flag: both strategies count in full, which is wrong. The negative control of proofs.
 pub const COUNT_TWICE: u32 = 32;
-/// Flag: plain hashed random numbers in place of Owen-scrambled Sobol points. For measuring what the latter gain.
+/// Flag: plain hashed random numbers in place of Owen-scrambled Sobol points. For measuring what
+/// the latter gain.
 pub const PLAIN_RANDOM: u32 = 64;
 /// Flag: surfaces that are met by a diffusely scattered ray show no specular lobe, as in Cycles
 /// without "Reflective Caustics" (metals are black there, and nothing is taken from the diffuse
@@ -95,7 +99,8 @@ impl Job {
     }
 }
 
-/// Layout of group 1: the job, the points, the film of one half (or the output of `reference.first_hit`).
+/// Layout of group 1: the job, the points, the film of one half (or the output of
+/// `reference.first_hit`).
 pub fn film_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
         binding,

@@ -25,8 +25,8 @@ impl Kernel {
         Self::from_wgsl(device, &shaders::source("reference.path", ""), &shaders::source("reference.first_hit", ""))
     }
 
-    /// Kernels of one's own with the entry points `path` and `first_hit` and the same bindings: what tests of the host
-    /// trace with, since they want to know every value.
+    /// Kernels of one's own with the entry points `path` and `first_hit` and the same bindings:
+    /// what tests of the host trace with, since they want to know every value.
     pub fn from_wgsl(device: &wgpu::Device, path: &str, first_hit: &str) -> Self {
         let layout = job::film_layout(device);
         let scene = ReferenceScene::layout(device);
@@ -75,7 +75,8 @@ impl Kernel {
         })
     }
 
-    /// Runs one kernel on `points` points (one workgroup when there are none) and waits until it is done.
+    /// Runs one kernel on `points` points (one workgroup when there are none) and waits until it is
+    /// done.
     pub(super) fn run(
         &self,
         device: &wgpu::Device,

@@ -1,4 +1,5 @@
-//! From sums over samples to Blender's layers: light divided by colour, the picture, the light a GI method must add.
+//! From sums over samples to Blender's layers: light divided by colour, the picture, the light a GI
+//! method must add.
 
 use super::film::Sums;
 
@@ -97,8 +98,8 @@ impl Layer {
         matches!(self, Layer::Depth | Layer::Position)
     }
 
-    /// The layer of one point from its sums over `samples` samples. Depth and Position are not in the film and give 0;
-    /// [`Layer::Combined`] gives red, green and blue.
+    /// The layer of one point from its sums over `samples` samples. Depth and Position are not in
+    /// the film and give 0; [`Layer::Combined`] gives red, green and blue.
     pub(super) fn value(self, sums: &Sums, samples: u32) -> [f64; 3] {
         let n = f64::from(samples.max(1));
         let mean = |v: [f64; 3]| v.map(|v| v / n);

@@ -1,4 +1,5 @@
-//! How much noise is left, estimated from the difference of two independent halves, and when that is little enough.
+//! How much noise is left, estimated from the difference of two independent halves, and when that
+//! is little enough.
 //!
 //! The halves' means a and b are independent estimates of one number from n_a and n_b samples, so
 //! (a − b)² · n_a·n_b / (n_a + n_b)² is an unbiased estimate of the variance of their common mean,
@@ -24,8 +25,8 @@ pub struct Noise {
 pub struct Tally {
     points: f64,
     mean: f64,
-    /// Sums over points of the squared error (averaged over channels), of its square, and of the squared error of the
-    /// channels' average.
+    /// Sums over points of the squared error (averaged over channels), of its square, and of the
+    /// squared error of the channels' average.
     squares: f64,
     fourths: f64,
     grey: f64,
@@ -34,7 +35,8 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Adds a point: its value from all samples, the values of both halves and their numbers of samples.
+    /// Adds a point: its value from all samples, the values of both halves and their numbers of
+    /// samples.
     pub fn add(&mut self, value: [f64; 3], halves: [[f64; 3]; 2], samples: [u32; 2]) {
         let [a, b] = samples.map(f64::from);
         self.points += 1.0;

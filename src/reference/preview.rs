@@ -1,9 +1,9 @@
-//! Noise averaged away for a look at a picture of few samples; never for a truth, since what is averaged is
-//! no longer unbiased.
+//! Noise averaged away for a look at a picture of few samples; never for a truth, since what is
+//! averaged is no longer unbiased.
 //!
-//! Light divided by colour is averaged over neighbours on the same plane by five à-trous steps, whose
-//! tolerance is the noise that each pixel's surroundings show (Dammertz et al. 2010; Schied et al. 2017, its
-//! filter in space). Colour, emission and surroundings stay as they were traced.
+//! Light divided by colour is averaged over neighbours on the same plane by five à-trous steps,
+//! whose tolerance is the noise that each pixel's surroundings show (Dammertz et al. 2010; Schied
+//! et al. 2017, its filter in space). Colour, emission and surroundings stay as they were traced.
 
 use super::{Layer, NO_DEPTH, Traced};
 use crate::accel::luminance;
@@ -65,7 +65,8 @@ impl Surfaces<'_> {
         facing * (-off.abs() / foot.max(f32::MIN_POSITIVE)).exp()
     }
 
-    /// Pixels with a surface within two taps to each side of `i`: their index, and the taps' weight.
+    /// Pixels with a surface within two taps to each side of `i`: their index, and the taps'
+    /// weight.
     fn around(&self, i: usize, step: i32) -> impl Iterator<Item = (usize, f32)> + '_ {
         let [width, height] = self.size;
         let (x, y) = (i as i32 % width, i as i32 / width);
@@ -133,8 +134,8 @@ fn averaged(surfaces: &Surfaces<'_>, light: Vec<Vec3>) -> Vec<Vec3> {
     light
 }
 
-/// Light whose sparks are as bright as their neighbours allow, and the variance of each pixel's luminance,
-/// told from its neighbours.
+/// Light whose sparks are as bright as their neighbours allow, and the variance of each pixel's
+/// luminance, told from its neighbours.
 fn without_sparks(surfaces: &Surfaces<'_>, light: Vec<Vec3>) -> (Vec<Vec3>, Vec<f32>) {
     let one = |i: usize| {
         if !surfaces.is_there(i) {

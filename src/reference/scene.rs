@@ -1,12 +1,14 @@
-//! A [`Scene`] as the path tracer wants it: world-space triangles in one list, attributes, materials, everything that
-//! shines with tables to choose from, texels. Group 0 of `reference.path` and `reference.first_hit`.
+//! A [`Scene`] as the path tracer wants it: world-space triangles in one list, attributes,
+//! materials, everything that shines with tables to choose from, texels. Group 0 of
+//! `reference.path` and `reference.first_hit`.
 //!
-//! Sides: rays from the camera pass the back faces of single-sided materials, as the rasteriser culls them; all other
-//! rays hit both sides, as shadow maps hold both. A single-sided surface glows on its front only. Masked and blended
-//! materials let rays of every kind through with probability 1 − coverage. Occlusion maps are left out: occlusion is
-//! found by tracing. Unlit surfaces show their colour to the camera and are black to all other rays.
-//! Lights with [`Light::stands_in`](crate::scene::Light::stands_in) are left out of the truth, where the surfaces they
-//! stand for shine themselves.
+//! Sides: rays from the camera pass the back faces of single-sided materials, as the rasteriser
+//! culls them; all other rays hit both sides, as shadow maps hold both. A single-sided surface
+//! glows on its front only. Masked and blended materials let rays of every kind through with
+//! probability 1 − coverage. Occlusion maps are left out: occlusion is found by tracing. Unlit
+//! surfaces show their colour to the camera and are black to all other rays. Lights with
+//! [`Light::stands_in`](crate::scene::Light::stands_in) are left out of the truth, where the
+//! surfaces they stand for shine themselves.
 
 mod lights;
 mod materials;
@@ -104,7 +106,8 @@ pub struct ReferenceScene {
 }
 
 impl ReferenceScene {
-    /// Flattens `scene`, builds its acceleration structure and uploads both. Takes seconds for millions of triangles.
+    /// Flattens `scene`, builds its acceleration structure and uploads both. Takes seconds for
+    /// millions of triangles.
     ///
     /// # Errors
     /// [`PackError`]; memory is only taken once the sizes are known to fit.
@@ -246,7 +249,8 @@ impl Limits {
     }
 }
 
-/// A buffer with `data` in it, never empty and large enough for one element of any of the shader's arrays.
+/// A buffer with `data` in it, never empty and large enough for one element of any of the shader's
+/// arrays.
 fn filled(
     device: &wgpu::Device,
     queue: &wgpu::Queue,

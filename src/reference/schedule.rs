@@ -1,5 +1,5 @@
-//! How the work is cut into dispatches: short ones, since a driver's watchdog kills what takes about two seconds, and a
-//! viewer wants its frame. No wgpu here.
+//! How the work is cut into dispatches: short ones, since a driver's watchdog kills what takes
+//! about two seconds, and a viewer wants its frame. No wgpu here.
 //!
 //! A pass gives every point the same number of samples of one half; a pass that takes too long for
 //! one dispatch is cut by points. Passes grow: the first gives one sample, later ones several,
@@ -216,7 +216,8 @@ impl Schedule {
 mod tests {
     use super::*;
 
-    /// Runs to `goal` on a device whose time for a chunk is `seconds`; gives every chunk with its time.
+    /// Runs to `goal` on a device whose time for a chunk is `seconds`; gives every chunk with its
+    /// time.
     fn run(schedule: &mut Schedule, goal: u32, seconds: impl Fn(Chunk) -> f64) -> Vec<(Chunk, f64)> {
         let mut chunks = Vec::new();
         while let Some(chunk) = schedule.next(goal) {

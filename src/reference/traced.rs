@@ -72,8 +72,8 @@ impl Traced {
         Ok(())
     }
 
-    /// Writes what the film holds of points `first..first + count` into the layers. `samples` tells how many samples a
-    /// point (counted from `first`) has in each half.
+    /// Writes what the film holds of points `first..first + count` into the layers. `samples` tells
+    /// how many samples a point (counted from `first`) has in each half.
     pub(super) fn fill(
         &mut self,
         (device, queue): (&wgpu::Device, &wgpu::Queue),
@@ -101,7 +101,8 @@ impl Traced {
         Ok(gathered)
     }
 
-    /// Writes the output of `reference.first_hit` (position and depth of each point from `first` on).
+    /// Writes the output of `reference.first_hit` (position and depth of each point from `first`
+    /// on).
     pub(super) fn fill_first_hits(&mut self, first: usize, hits: &[[f32; 4]]) {
         for (layer, data) in self.layers.iter_mut().filter(|(l, _)| l.is_first_hit()) {
             let channels = layer.channels().len();
@@ -125,7 +126,8 @@ pub(super) struct Gathered {
 impl Gathered {
     fn add(&mut self, sums: &Sums, halves: [&Sums; 2], samples: [u32; 2]) {
         for (layer, tally) in JUDGED.iter().zip(&mut self.tallies) {
-            // Light per colour is only there where there is colour; the rest would thin the mean out.
+            // Light per colour is only there where there is colour; the rest would thin the mean
+            // out.
             if *layer == Layer::Combined || sums.diff_col.iter().any(|c| *c > 0.0) {
                 let value = layer.value(sums, samples[0] + samples[1]);
                 tally.add(value, [0, 1].map(|h| layer.value(halves[h], samples[h])), samples);

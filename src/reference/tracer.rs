@@ -44,8 +44,9 @@ pub struct Subject<'a> {
 pub struct TracerOptions {
     /// Samples for each point; with `until_error` the most there may be.
     pub samples: u32,
-    /// Stops as soon as the root mean square error of a point of this layer, divided by the layer's mean, is surely not
-    /// above this. One of [`JUDGED`]. Each band of a large picture stops on its own.
+    /// Stops as soon as the root mean square error of a point of this layer, divided by the layer's
+    /// mean, is surely not above this. One of [`JUDGED`]. Each band of a large picture stops on its
+    /// own.
     pub until_error: Option<(Layer, f64)>,
     /// Seed; the same seed gives the same result on the same device.
     pub seed: u32,
@@ -184,13 +185,15 @@ impl Tracer {
             samples_before: None,
             options,
         };
-        // Many drivers compile when a kernel runs for the first time; that is no measure of how fast it is.
+        // Many drivers compile when a kernel runs for the first time; that is no measure of how
+        // fast it is.
         tracer.dispatch(Entry::Path, &tracer.job)?;
         tracer.begin_band()?;
         Ok(tracer)
     }
 
-    /// Runs one short dispatch; false when there is nothing left to do. Blocks until the GPU is done with it.
+    /// Runs one short dispatch; false when there is nothing left to do. Blocks until the GPU is
+    /// done with it.
     ///
     /// # Errors
     /// The device was lost or could not be read.
@@ -236,7 +239,8 @@ impl Tracer {
         self.traced.traced
     }
 
-    /// How many samples a point will probably get: those asked for, or as many as the error bound seems to need.
+    /// How many samples a point will probably get: those asked for, or as many as the error bound
+    /// seems to need.
     pub fn expected_samples(&self) -> u64 {
         self.expected.into()
     }
@@ -250,7 +254,8 @@ impl Tracer {
         (f64::from(self.band.0) + f64::from(self.band.1) * band) / f64::from(self.points)
     }
 
-    /// The layers as they are by now, with the noise that is left. Points that no sample reached yet are 0. Blocks.
+    /// The layers as they are by now, with the noise that is left. Points that no sample reached
+    /// yet are 0. Blocks.
     ///
     /// # Errors
     /// The device was lost or could not be read.

@@ -8,16 +8,17 @@ use crate::gpu::{shaders, timing::Recorder};
 use crate::scene::upload::{Draw, SceneGpu, attribute_layouts, material_layout};
 use glam::Vec3;
 
-/// How veils are drawn: panes, smoke and whatever else covers a share of what is behind (glTF's `BLEND`, transmission).
-/// Cut-outs (leaves on a sheet that is called `BLEND`) are drawn by lot in either case.
+/// How veils are drawn: panes, smoke and whatever else covers a share of what is behind (glTF's
+/// `BLEND`, transmission). Cut-outs (leaves on a sheet that is called `BLEND`) are drawn by lot in
+/// either case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Blending {
-    /// Over the picture, objects from far to near: no grain. What is wholly covered is in the G-buffer. Light from all
-    /// around is that of the surface behind.
+    /// Over the picture, objects from far to near: no grain. What is wholly covered is in the
+    /// G-buffer. Light from all around is that of the surface behind.
     #[default]
     Sorted,
-    /// By lot in the G-buffer, whose means over many frames are those of the path tracer: every pass sees the surface,
-    /// and whatever order triangles have is right. Single frames are grainy.
+    /// By lot in the G-buffer, whose means over many frames are those of the path tracer: every
+    /// pass sees the surface, and whatever order triangles have is right. Single frames are grainy.
     Stochastic,
 }
 
@@ -57,7 +58,8 @@ pub struct BlendedPass {
 }
 
 impl BlendedPass {
-    /// Builds the pipelines. `lights`: from [`DirectPass::light_layout`](super::direct::DirectPass::light_layout).
+    /// Builds the pipelines. `lights`: from
+    /// [`DirectPass::light_layout`](super::direct::DirectPass::light_layout).
     pub fn new(device: &wgpu::Device, lights: &wgpu::BindGroupLayout) -> Self {
         let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
         let layout = tool::layout(device, "render.blended", stages, &[tool::UNIFORM, tool::LOAD, tool::LOAD]);
@@ -91,7 +93,8 @@ impl BlendedPass {
         tool::group(device, "render.blended", &self.layout, &resources)
     }
 
-    /// Draws over `hdr`, and adds to `count`; nothing is recorded where nothing that blends is to be seen.
+    /// Draws over `hdr`, and adds to `count`; nothing is recorded where nothing that blends is to
+    /// be seen.
     pub fn record(&self, recorder: &mut Recorder<'_>, inputs: BlendedInputs<'_>, count: &mut Count) {
         let BlendedInputs { scene, view, .. } = inputs;
         let eye = Vec3::from(view.eye());

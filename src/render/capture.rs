@@ -1,4 +1,5 @@
-//! A finished picture in memory: N jittered frames averaged, with the layers that Blender's passes would hold.
+//! A finished picture in memory: N jittered frames averaged, with the layers that Blender's passes
+//! would hold.
 
 use super::view::View;
 use super::{Purpose, RenderError, Renderer, sampling, tool};
@@ -27,7 +28,8 @@ pub enum Layer {
     Emit = 7,
     /// World-space shading normal (Y up).
     Normal = 8,
-    /// Distance along the view axis, metres, of the sample at the pixel's centre; 1e10 where nothing was hit.
+    /// Distance along the view axis, metres, of the sample at the pixel's centre; 1e10 where
+    /// nothing was hit.
     Depth = 9,
     /// World position of the sample at the pixel's centre, metres (Y up).
     Position = 10,
@@ -85,7 +87,8 @@ impl Layer {
         Self::ALL.into_iter().find(|l| l.name() == name)
     }
 
-    /// Averages over an edge would name points and depths that are nowhere, so these take the centre's sample.
+    /// Averages over an edge would name points and depths that are nowhere, so these take the
+    /// centre's sample.
     fn is_unfiltered(self) -> bool {
         matches!(self, Layer::Depth | Layer::Position | Layer::Motion)
     }
@@ -173,8 +176,8 @@ impl CapturedFrame {
     }
 }
 
-/// Draws `scene` as `camera` sees it at the renderer's size: sample 0 through the pixels' centres, the others spread by
-/// the filter, all with equal weight. Blocks until the picture is in memory.
+/// Draws `scene` as `camera` sees it at the renderer's size: sample 0 through the pixels' centres,
+/// the others spread by the filter, all with equal weight. Blocks until the picture is in memory.
 pub fn capture(
     gpu: &Gpu,
     renderer: &mut Renderer,
@@ -322,7 +325,8 @@ impl Decoder {
         Self { pipeline, picture, output, options, buffer, rows }
     }
 
-    /// Adds layer number `layer` of the frame just drawn to `sum`, which has `channels` values a pixel.
+    /// Adds layer number `layer` of the frame just drawn to `sum`, which has `channels` values a
+    /// pixel.
     fn add(&self, gpu: &Gpu, size: [u32; 2], layer: u32, sum: &mut [f32], channels: usize) -> Result<(), RenderError> {
         let band = self.rows as usize * size[0] as usize * channels;
         for (i, sum) in sum.chunks_mut(band).enumerate() {

@@ -37,7 +37,8 @@ impl std::str::FromStr for Backdrop {
     }
 }
 
-/// hdr = albedo · (direct + indirect) + direct and indirect specular + emissive; background = environment.
+/// hdr = albedo · (direct + indirect) + direct and indirect specular + emissive; background =
+/// environment.
 pub struct CompositePass {
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,

@@ -1,22 +1,25 @@
-//! Which instances a camera or a shadow map can see, by their bounds in the world, and how much of a frame that leaves.
+//! Which instances a camera or a shadow map can see, by their bounds in the world, and how much of
+//! a frame that leaves.
 //!
-//! What is kept is conservative: an instance is left out where its box lies wholly beyond one side of the pyramid or
-//! box that is seen. Between a light and what it shines on nothing is cut away: a map's volume begins at the lamp, or
-//! at the top of the scene for a sun.
+//! What is kept is conservative: an instance is left out where its box lies wholly beyond one side
+//! of the pyramid or box that is seen. Between a light and what it shines on nothing is cut away: a
+//! map's volume begins at the lamp, or at the top of the scene for a sun.
 
 use crate::scene::upload::{Bounds, Draw, SceneGpu};
 use glam::{Mat4, Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Instances that are not seen are drawn none the less between two that are, where they have no more triangles than
-/// this in all: a draw call of its own costs a driver more. (A rule of thumb: a microsecond of a CPU, in which a card
-/// sets up a thousand triangles.)
+/// Instances that are not seen are drawn none the less between two that are, where they have no
+/// more triangles than this in all: a draw call of its own costs a driver more. (A rule of thumb: a
+/// microsecond of a CPU, in which a card sets up a thousand triangles.)
 const WORTH_A_DRAW: u64 = 128;
-/// Share of a plane's terms that rounding may have taken: bounds as near as that to it count as before it.
+/// Share of a plane's terms that rounding may have taken: bounds as near as that to it count as
+/// before it.
 const ROUNDING: f32 = 1e-5;
 
-/// What a camera or a map sees: inside of five planes and, for lamps that reach only so far, of a sphere.
+/// What a camera or a map sees: inside of five planes and, for lamps that reach only so far, of a
+/// sphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Volume {
     /// Inside is where `dot(xyz, p) + w` is not negative.
@@ -26,7 +29,8 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// What is seen through a reversed-Z projection (1 at the near plane, nothing cut away far off).
+    /// What is seen through a reversed-Z projection (1 at the near plane, nothing cut away far
+    /// off).
     pub fn new(clip_from_world: &[[f32; 4]; 4]) -> Self {
         let m = Mat4::from_cols_array_2d(clip_from_world);
         let [x, y, z, w] = [m.row(0), m.row(1), m.row(2), m.row(3)];
@@ -91,7 +95,8 @@ impl std::ops::AddAssign for Count {
 }
 
 impl Count {
-    /// Passes on the runs of `draw`'s instances that are to be drawn because `volume` meets one of them, and counts.
+    /// Passes on the runs of `draw`'s instances that are to be drawn because `volume` meets one of
+    /// them, and counts.
     pub(crate) fn runs(&mut self, scene: &SceneGpu, draw: &Draw, volume: &Volume, mut each: impl FnMut(Range<u32>)) {
         let triangles = u64::from(draw.indices.end - draw.indices.start) / 3;
         let seen = |slot: &u32| scene.slots.get(*slot as usize).is_none_or(|s| volume.meets(&s.bounds));
@@ -129,8 +134,8 @@ mod tests {
     use crate::render::View;
     use crate::scene::Camera;
 
-    /// Against points: whatever box has a point that projects into the picture is met, and of those that have none in
-    /// many draws most are not.
+    /// Against points: whatever box has a point that projects into the picture is met, and of those
+    /// that have none in many draws most are not.
     #[test]
     fn what_can_be_seen_is_met_and_what_cannot_mostly_not() {
         let view = View::new(&Camera::look_at([3.0, 2.0, 5.0], [0.0, 1.0, -2.0], 0.9), [160, 90], [0.3, -0.2]);

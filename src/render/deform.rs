@@ -1,9 +1,10 @@
 //! Moves the vertices of deforming meshes: morph targets and skins, see [`crate::scene::deform`].
 //!
-//! Positions, normals and tangents are written into the scene's own vertex buffers, so that shadows, the G-buffer and
-//! veils draw what has moved without knowing of it; any renderer may do so, for all write the same. Where vertices were
-//! in the frame before is each renderer's own memory, as with [`moved`](super::moved): what it showed last, kept as a
-//! few numbers a joint, is evaluated again into a buffer of its own. While the pose stays nothing is recorded.
+//! Positions, normals and tangents are written into the scene's own vertex buffers, so that
+//! shadows, the G-buffer and veils draw what has moved without knowing of it; any renderer may do
+//! so, for all write the same. Where vertices were in the frame before is each renderer's own
+//! memory, as with [`moved`](super::moved): what it showed last, kept as a few numbers a joint, is
+//! evaluated again into a buffer of its own. While the pose stays nothing is recorded.
 
 use super::tool;
 use crate::gpu::timing::Recorder;

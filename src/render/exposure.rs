@@ -1,8 +1,10 @@
-//! How many stops brighter a picture is shown than its light says: as many as somebody asks for, or measured.
+//! How many stops brighter a picture is shown than its light says: as many as somebody asks for, or
+//! measured.
 //!
-//! The measure is that of a camera: the geometric mean of the luminance of what is in the picture becomes
-//! middle grey, 0.18, unless that drove the brightest tenth of it above 1, which is a diffuse white in full
-//! light. The darkest and the brightest fiftieth do not count, nor does a background of one colour.
+//! The measure is that of a camera: the geometric mean of the luminance of what is in the picture
+//! becomes middle grey, 0.18, unless that drove the brightest tenth of it above 1, which is a
+//! diffuse white in full light. The darkest and the brightest fiftieth do not count, nor does a
+//! background of one colour.
 
 use std::str::FromStr;
 
@@ -41,9 +43,9 @@ impl FromStr for Exposure {
     }
 }
 
-/// Stops by which a picture of scene-linear radiance is to be shown brighter, in hundredths; 0 for one in which
-/// nothing shines. `pixels` have `channels` values each, red, green and blue first; such as are `background`,
-/// to a hundredth, do not count.
+/// Stops by which a picture of scene-linear radiance is to be shown brighter, in hundredths; 0 for
+/// one in which nothing shines. `pixels` have `channels` values each, red, green and blue first;
+/// such as are `background`, to a hundredth, do not count.
 pub fn measure(pixels: &[f32], channels: usize, background: Option<[f32; 3]>) -> f32 {
     let near = |p: &[f32], b: [f32; 3]| (0..3).all(|c| (p[c] - b[c]).abs() <= 0.01 * b[c]);
     let luminance = |p: &[f32]| 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2];

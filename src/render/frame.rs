@@ -1,6 +1,5 @@
-//! The frame, pass by pass: deform → shadow → gbuffer (→ lights) → direct → indirect → glossy → composite → blended
-//! (→ taa). A display adds
-//! `tonemap` after it.
+//! The frame, pass by pass: deform → shadow → gbuffer (→ lights) → direct → indirect → glossy →
+//! composite → blended (→ taa). A display adds `tonemap` after it.
 
 use super::RenderError;
 use super::blended::{BlendedInputs, BlendedPass, Blending};
@@ -39,8 +38,9 @@ pub struct RendererOptions {
     pub shadow: ShadowOptions,
     /// What is done where there are many lights.
     pub lights: LightOptions,
-    /// Temporal anti-aliasing ([`TaaPass`]): `hdr` is the mean over frames. Views should then be jittered by
-    /// [`sampling::offset`](super::sampling::offset) of the frame's number. Off, nothing of it exists.
+    /// Temporal anti-aliasing ([`TaaPass`]): `hdr` is the mean over frames. Views should then be
+    /// jittered by [`sampling::offset`](super::sampling::offset) of the frame's number. Off,
+    /// nothing of it exists.
     pub taa: bool,
     /// How surfaces are drawn that blend with what is behind.
     pub blending: Blending,
@@ -71,14 +71,15 @@ struct Lighting {
 pub(crate) enum Purpose {
     /// To be seen.
     Picture,
-    /// Another sample of the picture before: shadow maps stay as they are and, without temporal anti-aliasing, to which
-    /// each sample is a frame, motion vectors of objects.
+    /// Another sample of the picture before: shadow maps stay as they are and, without temporal
+    /// anti-aliasing, to which each sample is a frame, motion vectors of objects.
     FurtherSample,
     /// To be remembered: targets hold no picture after it. `first`: of a picture.
     WarmUp { first: bool },
 }
 
-/// The rasteriser. The host owns device, queue and encoder; a steady frame allocates nothing on the GPU.
+/// The rasteriser. The host owns device, queue and encoder; a steady frame allocates nothing on the
+/// GPU.
 pub struct Renderer {
     device: wgpu::Device,
     frame: wgpu::Buffer,
@@ -222,7 +223,8 @@ impl Renderer {
         self.last = None;
     }
 
-    /// Frames that the method's answer has settled over since the last cut; `None` where it does not settle.
+    /// Frames that the method's answer has settled over since the last cut; `None` where it does
+    /// not settle.
     pub fn settled(&self) -> Option<u32> {
         self.indirect.as_ref().and_then(|i| i.settled())
     }
@@ -329,7 +331,8 @@ impl Renderer {
     /// that point there.
     ///
     /// # Errors
-    /// [`RenderError::Gi`] when the GI method cannot work with this camera; the encoder then holds half a frame.
+    /// [`RenderError::Gi`] when the GI method cannot work with this camera; the encoder then holds
+    /// half a frame.
     pub fn record(
         &mut self,
         recorder: &mut Recorder<'_>,

@@ -19,11 +19,12 @@
 //! | `indirect_specular` | `Rgba16Float` | radiance of the specular lobe under sky and bounces, W/(m²·sr) | 0 |
 //! | `hdr` | `Rgba16Float` | the picture: radiance, W/(m²·sr); a: 1 | the environment |
 //!
-//! The five colour attachments take exactly the 32 bytes a sample that WebGPU grants by default. Unlit
-//! materials have albedo and F0 of 0 and their colour in `emissive`. Motion vectors know where the camera was
-//! and where each object and each deforming vertex was ([`moved`](super::moved), [`deform`](super::deform));
-//! they do not know of lights, nor of textures that move. The background's are 0 whatever the camera does: it
-//! follows from the view alone.
+//! The five colour attachments take exactly the 32 bytes a sample that WebGPU grants by default.
+//! Unlit materials have albedo and F0 of 0 and their colour in `emissive`. Motion vectors know
+//! where the camera was and where each object and each deforming vertex was
+//! ([`moved`](super::moved), [`deform`](super::deform)); they do not know of lights, nor of
+//! textures that move. The background's are 0 whatever the camera does: it follows from the view
+//! alone.
 
 use super::blended::Blending;
 use super::cull::{Count, Volume};
@@ -42,8 +43,8 @@ pub struct GbufferInputs<'a> {
     /// Its instances as they were in the frame before
     /// ([`Moved::before`](super::moved::Moved::before)); `scene.instances` where nothing moves.
     pub before: &'a wgpu::Buffer,
-    /// Its deforming vertices as they were then ([`DeformPass::before`](super::deform::DeformPass::before)), if they
-    /// were elsewhere.
+    /// Its deforming vertices as they were then
+    /// ([`DeformPass::before`](super::deform::DeformPass::before)), if they were elsewhere.
     pub deformed: Option<&'a wgpu::Buffer>,
     /// Who sees it.
     pub view: &'a View,
@@ -71,7 +72,8 @@ impl GbufferPass {
         Self { pipelines, frame }
     }
 
-    /// Clears the G-buffer and draws into it what the view sees of a scene, which is added to `count`.
+    /// Clears the G-buffer and draws into it what the view sees of a scene, which is added to
+    /// `count`.
     pub fn record(&self, recorder: &mut Recorder<'_>, inputs: GbufferInputs<'_>, targets: &Targets, count: &mut Count) {
         let GbufferInputs { scene, before, deformed, view } = inputs;
         let colors =

@@ -1,5 +1,5 @@
-//! Specular light of sky and bounces: the split sum's share of what one ray along the mirrored direction finds on the
-//! screen, blurred by the lobe's width.
+//! Specular light of sky and bounces: the split sum's share of what one ray along the mirrored
+//! direction finds on the screen, blurred by the lobe's width.
 //!
 //! Where the method has sent rays into lobes
 //! ([`Technique::gloss`](crate::gi::technique::Technique::gloss)), what they found is shown, and
@@ -11,9 +11,9 @@
 //! finds nothing takes the diffuse light of the surface's own side, mixed with what the picture
 //! shows where the ray leaves it.
 //!
-//! Under even light the result is exactly the split sum. What it cannot do: show what is hidden or outside the picture,
-//! spread a rough lobe over a corner (it looks along one direction), and show reflections in reflections but for their
-//! mean.
+//! Under even light the result is exactly the split sum. What it cannot do: show what is hidden or
+//! outside the picture, spread a rough lobe over a corner (it looks along one direction), and show
+//! reflections in reflections but for their mean.
 
 use super::{Targets, tool};
 use crate::gpu::bind::Binder;
@@ -39,10 +39,11 @@ pub struct GlossyPass {
 /// The lit picture and all bindings of one set of targets.
 pub struct GlossyPicture {
     surfaces: wgpu::BindGroup,
-    /// Each level's group and texture; the first is filled from the targets, the others from the one before.
+    /// Each level's group and texture; the first is filled from the targets, the others from the
+    /// one before.
     levels: Vec<(wgpu::BindGroup, wgpu::Texture)>,
-    /// All levels in one texture, for look-ups. Not written in place: OpenGL ignores stores to a level of a texture
-    /// while another of its levels is bound for reading.
+    /// All levels in one texture, for look-ups. Not written in place: OpenGL ignores stores to a
+    /// level of a texture while another of its levels is bound for reading.
     chain: wgpu::Texture,
     trace: wgpu::BindGroup,
 }

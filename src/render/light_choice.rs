@@ -1,9 +1,10 @@
-//! What each light gives to a view, reckoned on the CPU: who gets shadow maps where there are not enough for all, and
-//! from what distance on a lamp is left out.
+//! What each light gives to a view, reckoned on the CPU: who gets shadow maps where there are not
+//! enough for all, and from what distance on a lamp is left out.
 //!
-//! Nobody reads back what a frame shows, so that the same view has the same picture however fast frames come. Instead
-//! light is taken at points where surfaces may be: on rays through the picture, at distances in even steps of their
-//! logarithm within the scene's bounds. Walls between are not known: a lamp behind one counts for what it would give.
+//! Nobody reads back what a frame shows, so that the same view has the same picture however fast
+//! frames come. Instead light is taken at points where surfaces may be: on rays through the
+//! picture, at distances in even steps of their logarithm within the scene's bounds. Walls between
+//! are not known: a lamp behind one counts for what it would give.
 
 use super::view::View;
 use crate::scene::upload::{Bounds, LightGpu};
@@ -15,12 +16,13 @@ use glam::Vec3;
 pub struct LightOptions {
     /// From so many lights on, tiles of 16×16 pixels have lists of those that can reach them.
     pub tiled_from: u32,
-    /// Of nine lights and more, lamps are left out where they are too far away to count: at any place, all that
-    /// are left out there would add up to no more than this share of the view's irradiance (geometric mean over
-    /// where surfaces may be, shadows not counted). 0 leaves none out.
+    /// Of nine lights and more, lamps are left out where they are too far away to count: at any
+    /// place, all that are left out there would add up to no more than this share of the view's
+    /// irradiance (geometric mean over where surfaces may be, shadows not counted). 0 leaves none
+    /// out.
     ///
-    /// 1/1024: with an exposure that shows the mean as middle grey (0.18) that is a radiance of 0.0002, and a step of 8
-    /// bits above black is 0.0003.
+    /// 1/1024: with an exposure that shows the mean as middle grey (0.18) that is a radiance of
+    /// 0.0002, and a step of 8 bits above black is 0.0003.
     pub cut: f32,
 }
 
@@ -51,7 +53,8 @@ pub(super) const NO_END: f32 = 1e18;
 /// Rays across and down, and points on each.
 const RAYS: [u32; 2] = [8, 6];
 const STEPS: u32 = 6;
-/// Points are on average as far from a light as this share of their distance from the eye: they stand for all between.
+/// Points are on average as far from a light as this share of their distance from the eye: they
+/// stand for all between.
 const SPREAD: f32 = 0.05;
 /// What a spot counts for beside its cone, since points are far between.
 const BESIDE: f32 = 0.05;
@@ -85,7 +88,8 @@ impl Estimate {
         Self { given, mean }
     }
 
-    /// From what distance on a lamp of `light`'s strength is left out, if `lamps` share what may be.
+    /// From what distance on a lamp of `light`'s strength is left out, if `lamps` share what may
+    /// be.
     pub fn reach(&self, light: &LightGpu, lamps: usize, cut: f32) -> f32 {
         let least = cut * self.mean / lamps.max(1) as f32;
         let most = Vec3::from(light.color).max_element();
@@ -93,7 +97,8 @@ impl Estimate {
     }
 }
 
-/// Points where surfaces may be, each with the square of the distance within which it stands for others.
+/// Points where surfaces may be, each with the square of the distance within which it stands for
+/// others.
 fn points(view: &View, (low, high): Bounds) -> Vec<(Vec3, f32)> {
     let (low, high, eye) = (Vec3::from(low), Vec3::from(high), Vec3::from(view.eye()));
     let mut points = Vec::with_capacity((RAYS[0] * RAYS[1] * STEPS) as usize);
@@ -102,7 +107,8 @@ fn points(view: &View, (low, high): Bounds) -> Vec<(Vec3, f32)> {
         let ndc = [at(i % RAYS[0], RAYS[0]), at(i / RAYS[0], RAYS[1])];
         let along = view.frustum_point(ndc, 1.0) - eye;
         let (a, b) = ((low - eye) / along, (high - eye) / along);
-        // Where a ray runs along a side's plane these are infinite, or no numbers, which minimum and maximum pass over.
+        // Where a ray runs along a side's plane these are infinite, or no numbers, which minimum
+        // and maximum pass over.
         let near = a.min(b).to_array().into_iter().fold(0.0, f32::max);
         let far = a.max(b).to_array().into_iter().fold(f32::INFINITY, f32::min);
         if !(far > near && far.is_finite()) {
@@ -117,8 +123,8 @@ fn points(view: &View, (low, high): Bounds) -> Vec<(Vec3, f32)> {
     points
 }
 
-/// Irradiance of `light` around `p`, facing it, W/m²: as `sample_light` in `shaders/lib/lights.wgsl`, but no more than
-/// at the distance whose square is `soft`.
+/// Irradiance of `light` around `p`, facing it, W/m²: as `sample_light` in
+/// `shaders/lib/lights.wgsl`, but no more than at the distance whose square is `soft`.
 fn irradiance(light: &LightGpu, p: Vec3, soft: f32) -> f32 {
     let strength = Vec3::from(light.color).dot(Vec3::new(0.2126, 0.7152, 0.0722));
     if light.kind == 0 {
@@ -139,8 +145,8 @@ fn irradiance(light: &LightGpu, p: Vec3, soft: f32) -> f32 {
     e
 }
 
-/// Who gets shadow maps: those that give most, as long as there are maps. `maps`: how many each needs; `held`: who has
-/// some now.
+/// Who gets shadow maps: those that give most, as long as there are maps. `maps`: how many each
+/// needs; `held`: who has some now.
 pub(super) fn choose(given: &[f32], maps: &[u32], held: &[bool], room: u32) -> Vec<bool> {
     let worth = |i: usize| given[i] * if held[i] { KEEPS } else { 1.0 };
     let mut order: Vec<usize> = (0..given.len()).filter(|&i| maps[i] > 0).collect();

@@ -1,5 +1,5 @@
-//! Lists of the lights that can reach what each tile of 16×16 pixels shows (compute): 8 bytes a tile for each
-//! 32 lights.
+//! Lists of the lights that can reach what each tile of 16×16 pixels shows (compute): 8 bytes a
+//! tile for each 32 lights.
 
 use super::shadow::ShadowMaps;
 use super::targets::Targets;

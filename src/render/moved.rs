@@ -1,5 +1,5 @@
-//! Where objects were in the frame before: rows of the world-from-object matrices, slot by slot as those of
-//! [`SceneGpu::instances`], for motion vectors.
+//! Where objects were in the frame before: rows of the world-from-object matrices, slot by slot as
+//! those of [`SceneGpu::instances`], for motion vectors.
 //!
 //! What "before" means depends on who drew: two renderers may show one scene, each at its own pace,
 //! and placements may change more than once between two frames. So each renderer remembers what its
@@ -44,7 +44,8 @@ impl Moved {
         self.last = Some(now);
     }
 
-    /// The rows before this frame's: for the last slot of [`motion_layouts`](crate::scene::upload::motion_layouts).
+    /// The rows before this frame's: for the last slot of
+    /// [`motion_layouts`](crate::scene::upload::motion_layouts).
     pub fn before<'a>(&'a self, scene: &'a SceneGpu) -> &'a wgpu::Buffer {
         self.buffer.as_ref().filter(|_| self.is_moving(scene)).unwrap_or(&scene.instances)
     }

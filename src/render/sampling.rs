@@ -1,4 +1,5 @@
-//! Where in the pixel the samples of a picture lie: drawn from the filter itself, so that equal weights are right.
+//! Where in the pixel the samples of a picture lie: drawn from the filter itself, so that equal
+//! weights are right.
 
 use std::sync::OnceLock;
 
@@ -8,8 +9,9 @@ pub const FILTER_WIDTH: f32 = 1.5;
 /// Steps of the tabulated integral.
 const STEPS: usize = 1024;
 
-/// Offset of sample `i` from the pixel's centre, pixels. Sample 0 is the centre; the others follow the R2 sequence
-/// (Roberts 2018) through the inverse integral of Cycles' Blackman-Harris filter. `seed` shifts them.
+/// Offset of sample `i` from the pixel's centre, pixels. Sample 0 is the centre; the others follow
+/// the R2 sequence (Roberts 2018) through the inverse integral of Cycles' Blackman-Harris filter.
+/// `seed` shifts them.
 pub fn offset(i: u32, seed: u32) -> [f32; 2] {
     if i == 0 {
         return [0.0; 2];
@@ -23,13 +25,14 @@ pub fn offset(i: u32, seed: u32) -> [f32; 2] {
     })
 }
 
-/// Offset of sample `i` of a picture of `of` samples, pixels. Sample 0 is the pixel's centre; the others are those of
-/// [`offset`], moved and stretched so that all have the filter's mean and width: the first four of the sequence lie a
-/// fifth of a pixel to the left and above, and so would all that the picture shows.
+/// Offset of sample `i` of a picture of `of` samples, pixels. Sample 0 is the pixel's centre; the
+/// others are those of [`offset`], moved and stretched so that all have the filter's mean and
+/// width: the first four of the sequence lie a fifth of a pixel to the left and above, and so would
+/// all that the picture shows.
 pub fn offset_of(i: u32, of: u32, seed: u32) -> [f32; 2] {
     let others = of.saturating_sub(1);
-    // One other sample cannot have the filter's width and leave the mean where it is; more than a thousand do by
-    // themselves.
+    // One other sample cannot have the filter's width and leave the mean where it is; more than a
+    // thousand do by themselves.
     if i == 0 || !(2..=1024).contains(&others) {
         return offset(i, seed);
     }
@@ -38,8 +41,8 @@ pub fn offset_of(i: u32, of: u32, seed: u32) -> [f32; 2] {
     std::array::from_fn(|axis| ((at[axis] - mean[axis]) * scale[axis]).clamp(-FILTER_WIDTH, FILTER_WIDTH))
 }
 
-/// Mean of the samples 1 to `others`, and what their distance to it is to be multiplied by so that together with one in
-/// the centre they have the filter's second moment.
+/// Mean of the samples 1 to `others`, and what their distance to it is to be multiplied by so that
+/// together with one in the centre they have the filter's second moment.
 fn moments(others: u32, seed: u32) -> [[f32; 2]; 2] {
     let (mut sum, mut squares) = ([0.0f64; 2], [0.0f64; 2]);
     for point in (1..=others).map(|i| offset(i, seed)) {

@@ -1,10 +1,11 @@
 //! Shadow maps of all lights: the passes that draw them. `shadow_maps.rs` says who gets how many.
 //!
-//! A sun gets cascades (layers of one array), a spot one map, a point light or a spot wider than 60° six faces (layers
-//! of another array). A map is drawn again when its camera has moved, or when something that it sees has moved or shows
-//! another lot (`shadow_kept.rs`). Memory is bounded: at most [`MAX_SUNS`] suns share 64 MiB (one
-//! alone has four maps of 2048², several have 1024²), and the local lights share [`MAX_LOCAL_LAYERS`] layers (1024² up
-//! to 24 of them, then 512²): 96 MiB. Where lights need more, those that give most to the view have shadows
+//! A sun gets cascades (layers of one array), a spot one map, a point light or a spot wider than
+//! 60° six faces (layers of another array). A map is drawn again when its camera has moved, or when
+//! something that it sees has moved or shows another lot (`shadow_kept.rs`). Memory is bounded: at
+//! most [`MAX_SUNS`] suns share 64 MiB (one alone has four maps of 2048², several have 1024²), and
+//! the local lights share [`MAX_LOCAL_LAYERS`] layers (1024² up to 24 of them, then 512²): 96 MiB.
+//! Where lights need more, those that give most to the view have shadows
 //! ([`light_choice`](super::light_choice)); the others shine without, and a warning says so once.
 
 use super::cull::{Count, DrawnCount, Volume};
@@ -87,8 +88,8 @@ impl ShadowPass {
         })
     }
 
-    /// Gives the maps to lights of `audience.scene`, fits them to what is seen and draws those that do not hold already
-    /// what they would, which is added to `count`.
+    /// Gives the maps to lights of `audience.scene`, fits them to what is seen and draws those that
+    /// do not hold already what they would, which is added to `count`.
     pub(super) fn record(
         &self,
         recorder: &mut Recorder<'_>,

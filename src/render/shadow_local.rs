@@ -1,16 +1,19 @@
-//! Perspective shadow views of spot lights (one map) and of point lights and wide spots (six faces of a cube).
+//! Perspective shadow views of spot lights (one map) and of point lights and wide spots (six faces
+//! of a cube).
 
 use super::shadow_view::ShadowViewGpu;
 use glam::{Mat4, Vec3, Vec4};
 
-/// What faces and cones show beyond their edge, in tangent units, so that filters never reach outside.
-/// `LOCAL_SEARCH` in `shaders/lib/shadow_maps.wgsl` stays below it.
+/// What faces and cones show beyond their edge, in tangent units, so that filters never reach
+/// outside. `LOCAL_SEARCH` in `shaders/lib/shadow_maps.wgsl` stays below it.
 const MARGIN: f32 = 0.15;
 
-/// Near plane of lamps without a size, as a share of the scene's extent: floats keep all distances beyond it.
+/// Near plane of lamps without a size, as a share of the scene's extent: floats keep all distances
+/// beyond it.
 const LEAST_NEAR: f32 = 1e-6;
 
-/// Near plane of a lamp: what is inside the lamp itself casts no shadow. `extent`: the scene's diagonal.
+/// Near plane of a lamp: what is inside the lamp itself casts no shadow. `extent`: the scene's
+/// diagonal.
 pub(super) fn near(radius: f32, extent: f32) -> f32 {
     (0.5 * radius).max(LEAST_NEAR * extent).max(f32::MIN_POSITIVE)
 }

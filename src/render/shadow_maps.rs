@@ -194,7 +194,8 @@ impl ShadowMaps {
         vec![("shadow_sun", bytes(&self.sun)), ("shadow_local", bytes(&self.local))]
     }
 
-    /// Gives maps to the lights that matter, fits them to what is seen, and writes what shaders know of it.
+    /// Gives maps to the lights that matter, fits them to what is seen, and writes what shaders
+    /// know of it.
     pub(super) fn allot(&mut self, queue: &wgpu::Queue, audience: &Audience<'_>) {
         let Audience { scene, view, options, stand_ins } = *audience;
         let lights: Vec<LightGpu> = scene.lights.iter().map(LightGpu::new).collect();
@@ -334,8 +335,9 @@ fn nearest(scene: &SceneGpu, view: &View) -> Option<f32> {
     distances.filter(|&d| d > 0.0).reduce(f32::min)
 }
 
-/// Layers to allocate for `used` ones. wgpu's GL backend guesses what an array is from its shape: one layer becomes a
-/// plain texture and a square multiple of six a cube map, neither of which binds as the array that the shader reads.
+/// Layers to allocate for `used` ones. wgpu's GL backend guesses what an array is from its shape:
+/// one layer becomes a plain texture and a square multiple of six a cube map, neither of which
+/// binds as the array that the shader reads.
 fn array_layers(used: u32) -> u32 {
     let layers = used.max(2);
     if layers.is_multiple_of(6) { layers + 1 } else { layers }

@@ -1,6 +1,7 @@
-//! Cascades of a sun: squares in the light's plane that cover what the camera sees of the scene, each reaching the same
-//! number of times as far as the one before it. All lengths are taken from the scene's own extent: a city and a doll's
-//! house have the same cascades, and so has a file in millimetres.
+//! Cascades of a sun: squares in the light's plane that cover what the camera sees of the scene,
+//! each reaching the same number of times as far as the one before it. All lengths are taken from
+//! the scene's own extent: a city and a doll's house have the same cascades, and so has a file in
+//! millimetres.
 
 use super::shadow_view::ShadowViewGpu;
 use super::view::View;
@@ -9,10 +10,11 @@ use glam::{Mat4, Vec2, Vec3, Vec4};
 
 /// Texels that a map keeps free around what it covers, for the filter's reach.
 const MARGIN: f32 = 12.0;
-/// The first cascade's beginning as a share of the last one's end: at least this, so that what is right before the
-/// eye leaves something for the rest …
+/// The first cascade's beginning as a share of the last one's end: at least this, so that what is
+/// right before the eye leaves something for the rest …
 const LEAST_NEAR: f32 = 1.0 / 1024.0;
-/// … at most this, which all four cascades of a room deserve; and this where nothing is known to be near.
+/// … at most this, which all four cascades of a room deserve; and this where nothing is known to be
+/// near.
 const MOST_NEAR: f32 = 1.0 / 16.0;
 const USUAL_NEAR: f32 = 1.0 / 64.0;
 
@@ -23,7 +25,8 @@ pub(super) struct Stage {
     high: Vec3,
     /// The scene's diagonal.
     extent: f32,
-    /// Distances along the view axis: what is seen begins behind the first, the first cascade ends by the second …
+    /// Distances along the view axis: what is seen begins behind the first, the first cascade ends
+    /// by the second …
     begin: f32,
     near: f32,
     /// … and the last one at this, the scene's farthest corner.
@@ -31,8 +34,9 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// Of a scene within `bounds`. `nearest`: distance of the nearest thing that is seen, if known. Distances are in
-    /// steps, so that a camera that goes about does not stretch the maps all the time.
+    /// Of a scene within `bounds`. `nearest`: distance of the nearest thing that is seen, if known.
+    /// Distances are in steps, so that a camera that goes about does not stretch the maps all the
+    /// time.
     pub fn new(view: &View, bounds: Option<Bounds>, nearest: Option<f32>) -> Self {
         let (low, high) = bounds.map_or((Vec3::ZERO, Vec3::ZERO), |(low, high)| (low.into(), high.into()));
         let extent = low.distance(high).max(1e-12);
@@ -161,7 +165,8 @@ mod tests {
             let one = made(1.0);
             let texels: Vec<f32> = one.iter().map(|c| c.texel).collect();
             println!("{size}, nearest {nearest:?}: {texels:?}");
-            // Towards the horizon, on the ground: never missing, and no coarser than a 40th of the distance.
+            // Towards the horizon, on the ground: never missing, and no coarser than a 40th of the
+            // distance.
             let far = (size.x - eye.x).min(size.z - eye.z) / Vec2::new(1.0, 1.0).length();
             for step in 0..=40 {
                 let d = far * (0.002f32).powf(1.0 - step as f32 / 40.0);

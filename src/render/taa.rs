@@ -1,4 +1,5 @@
-//! Temporal anti-aliasing and the history behind it: the mean over frames, each of which samples its pixels elsewhere.
+//! Temporal anti-aliasing and the history behind it: the mean over frames, each of which samples
+//! its pixels elsewhere.
 //!
 //! A camera that stands still in a scene that does not change averages without end, so the picture
 //! converges to the filtered one and stops moving. Otherwise the mean is fetched along the motion
@@ -40,8 +41,9 @@ pub(crate) struct Blend {
 }
 
 impl Blend {
-    /// The pixel filter at the samples that lie around a pixel's centre in a frame that is jittered by `jitter` pixels.
-    /// Summed over frames they are the filter's integral, whichever way the jitter goes.
+    /// The pixel filter at the samples that lie around a pixel's centre in a frame that is jittered
+    /// by `jitter` pixels. Summed over frames they are the filter's integral, whichever way the
+    /// jitter goes.
     fn new(mode: Mode, jitter: [f32; 2]) -> Self {
         let whole = jitter.map(f32::round);
         let weights = |axis: usize| {
@@ -149,8 +151,8 @@ impl TaaPass {
         self.last.as_ref().map_or(*view, |last| view.after(&last.view))
     }
 
-    /// Records the pass: `hdr` of the targets becomes the mean of this frame ([`current`](Self::current)) and history.
-    /// `scene` is what the frame shows.
+    /// Records the pass: `hdr` of the targets becomes the mean of this frame
+    /// ([`current`](Self::current)) and history. `scene` is what the frame shows.
     pub fn record(&mut self, recorder: &mut Recorder<'_>, queue: &wgpu::Queue, scene: &SceneGpu, view: &View) {
         let Some(textures) = &self.textures else { return };
         let mode = match &self.last {

@@ -1,5 +1,5 @@
-//! All textures of a picture's size. They are made anew on resize only. [`gbuffer`](super::gbuffer) says field by
-//! field what the texels mean.
+//! All textures of a picture's size. They are made anew on resize only. [`gbuffer`](super::gbuffer)
+//! says field by field what the texels mean.
 
 use super::RenderError;
 

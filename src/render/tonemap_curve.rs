@@ -1,9 +1,11 @@
-//! From scene light to display values: the CPU form of `shaders/lib/tonemap.wgsl`, same names, same constants.
+//! From scene light to display values: the CPU form of `shaders/lib/tonemap.wgsl`, same names, same
+//! constants.
 //!
-//! Filmic and AgX stand near Blender's views of these names (look None, display sRGB). Filmic's constants are fitted to
-//! greys and bright colours sent through Blender 4.5's own transform. AgX is not fitted: its steps and matrices are the
-//! published ones (inset as in Blender's configuration), Neutral is Khronos' specification.
-//! `tests/fixtures/tonemap/make.py` fits, and measures against Blender what is left, in parts of 255:
+//! Filmic and AgX stand near Blender's views of these names (look None, display sRGB). Filmic's
+//! constants are fitted to greys and bright colours sent through Blender 4.5's own transform. AgX
+//! is not fitted: its steps and matrices are the published ones (inset as in Blender's
+//! configuration), Neutral is Khronos' specification. `tests/fixtures/tonemap/make.py` fits, and
+//! measures against Blender what is left, in parts of 255:
 //!
 //! | | rendered references: mean, worst 99.9th percentile | all colours to 2⁶: mean, 99.9th percentile |
 //! |---|---|---|
@@ -60,7 +62,8 @@ impl Tonemap {
         }
     }
 
-    /// [`Self::apply`] to interleaved pixels, rounded to bytes; values beyond the last whole pixel are left out.
+    /// [`Self::apply`] to interleaved pixels, rounded to bytes; values beyond the last whole pixel
+    /// are left out.
     pub fn apply_to_bytes(self, rgb: &[f32]) -> Vec<u8> {
         let byte = |v: f32| (v * 255.0 + 0.5) as u8;
         rgb.chunks_exact(3).flat_map(|p| self.apply([p[0], p[1], p[2]]).map(byte)).collect()
@@ -90,8 +93,9 @@ impl FromStr for Tonemap {
 /// Largest half float: what a picture can hold.
 const LIGHT_MAX: f32 = 65504.0;
 
-/// Black lies at 2^-12.47, white 16.5 stops above. Far above white Blender's table desaturates: the darker channels are
-/// drawn towards the brightest. Then one curve for each channel over the logarithm, here a fitted rational function.
+/// Black lies at 2^-12.47, white 16.5 stops above. Far above white Blender's table desaturates: the
+/// darker channels are drawn towards the brightest. Then one curve for each channel over the
+/// logarithm, here a fitted rational function.
 fn filmic(light: [f32; 3]) -> [f32; 3] {
     let peak = max3(light).min(5898.24);
     let share = (4.018_064e-5 * (peak.powf(1.216_194_7) - 19.186_78)).clamp(0.0, 1.0);
@@ -122,8 +126,8 @@ const AGX_BACK: [[f32; 3]; 3] = [
 /// Luminance of Rec.709 primaries as AgX weighs them.
 const AGX_LUMA: [f32; 3] = [0.206_759_49, 0.658_125_3, 0.135_115_2];
 
-/// Inset primaries, sigmoid over −10 … +6.5 stops around middle grey, three fifths of the hue held, outset primaries,
-/// negative channels raised while the light stays the same.
+/// Inset primaries, sigmoid over −10 … +6.5 stops around middle grey, three fifths of the hue held,
+/// outset primaries, negative channels raised while the light stays the same.
 fn agx(light: [f32; 3]) -> [f32; 3] {
     let inset = mul(AGX_INTO, light).map(|v| v.max(1e-10));
     let formed = inset.map(agx_sigmoid);
@@ -142,8 +146,8 @@ fn agx(light: [f32; 3]) -> [f32; 3] {
     raised.map(|v| srgb::encode(v * scale))
 }
 
-/// Hyperbolas of power 1.5 below and above middle grey, where display value and slope are given (0.18^(1/2.4), 2.4);
-/// decoded by the power 2.4.
+/// Hyperbolas of power 1.5 below and above middle grey, where display value and slope are given
+/// (0.18^(1/2.4), 2.4); decoded by the power 2.4.
 fn agx_sigmoid(v: f32) -> f32 {
     let t = ((v / 0.18).log2() / 16.5 + 10.0 / 16.5).clamp(0.0, 1.0);
     let a = 2.4 * (t - 10.0 / 16.5);
@@ -161,8 +165,8 @@ fn agx_weight(c: [f32; 3]) -> f32 {
     high - low + luma
 }
 
-/// Khronos PBR Neutral: takes the 4 % reflection of dielectrics away, keeps colours as they are up to 0.76 and bends
-/// what is brighter towards 1 while desaturating it.
+/// Khronos PBR Neutral: takes the 4 % reflection of dielectrics away, keeps colours as they are up
+/// to 0.76 and bends what is brighter towards 1 while desaturating it.
 fn neutral(light: [f32; 3]) -> [f32; 3] {
     let low = min3(light);
     let offset = if low < 0.08 { low - 6.25 * low * low } else { 0.04 };

@@ -72,7 +72,8 @@ pub(crate) fn dispatch(pass: &mut crate::gpu::timing::Pass<'_>, size: [u32; 2]) 
     pass.dispatch_workgroups(size[0].div_ceil(8), size[1].div_ceil(8), 1);
 }
 
-/// A pipeline that draws the fragments of shader `name` over a whole target of `format`; it needs `lib/screen.wgsl`.
+/// A pipeline that draws the fragments of shader `name` over a whole target of `format`; it needs
+/// `lib/screen.wgsl`.
 pub(crate) fn screen(
     device: &wgpu::Device,
     name: &str,

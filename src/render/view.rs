@@ -1,7 +1,8 @@
 //! A camera seen by the GPU: matrices for a picture size and a sub-pixel offset.
 //!
-//! Reversed Z with an infinite far plane: depth = near / distance along the view axis, 1 at the near plane, 0 at
-//! infinity. Float depth is then equally precise everywhere (Reed 2015), and nothing is clipped far away.
+//! Reversed Z with an infinite far plane: depth = near / distance along the view axis, 1 at the
+//! near plane, 0 at infinity. Float depth is then equally precise everywhere (Reed 2015), and
+//! nothing is clipped far away.
 
 use super::composite::Backdrop;
 use crate::gi::CameraMatrices;
@@ -26,7 +27,8 @@ pub struct View {
     pub clip_from_world: [[f32; 4]; 4],
     /// Clip space from world space without jitter: what motion vectors refer to.
     pub clip_from_world_unjittered: [[f32; 4]; 4],
-    /// The previous frame's `clip_from_world_unjittered`; equal to this frame's until [`View::after`] says otherwise.
+    /// The previous frame's `clip_from_world_unjittered`; equal to this frame's until
+    /// [`View::after`] says otherwise.
     pub previous_clip_from_world: [[f32; 4]; 4],
     /// Half extents of the image plane at distance 1.
     pub tan_half: [f32; 2],
@@ -34,13 +36,15 @@ pub struct View {
     pub near: f32,
     /// Number of the frame; rotates the stochastic patterns (soft shadows, coverage).
     pub seed: u32,
-    /// Samples of a pixel that are averaged, this one among them: each stands for as much less of what textures show.
+    /// Samples of a pixel that are averaged, this one among them: each stands for as much less of
+    /// what textures show.
     pub samples: u32,
 }
 
 impl View {
-    /// The view of `camera` on a picture of `size` pixels, sampled `jitter` pixels off each pixel's centre.
-    /// Sides of zero count as 1. The horizontal field of view follows from the vertical one and the picture's shape.
+    /// The view of `camera` on a picture of `size` pixels, sampled `jitter` pixels off each pixel's
+    /// centre. Sides of zero count as 1. The horizontal field of view follows from the vertical one
+    /// and the picture's shape.
     pub fn new(camera: &Camera, size: [u32; 2], jitter: [f32; 2]) -> Self {
         let size = size.map(|s| s.max(1));
         let (w, h) = (size[0] as f32, size[1] as f32);
@@ -50,7 +54,8 @@ impl View {
         let world_from_view = Mat4::from_cols_array_2d(&camera.transform);
         let view_from_world = world_from_view.inverse();
         let plain = projection(tan_half, near, [0.0; 2]);
-        // Moving the sample point right moves the picture left; y points down in pixels and up in clip space.
+        // Moving the sample point right moves the picture left; y points down in pixels and up in
+        // clip space.
         let clip_from_view = projection(tan_half, near, [-2.0 * jitter[0] / w, 2.0 * jitter[1] / h]);
         let clip_from_world_unjittered = (plain * view_from_world).to_cols_array_2d();
         Self {
@@ -98,7 +103,8 @@ impl View {
         [x, y, z]
     }
 
-    /// World position of the point at view-space distance `z` along the axis, `ndc` in [−1, 1] (y up).
+    /// World position of the point at view-space distance `z` along the axis, `ndc` in [−1, 1] (y
+    /// up).
     pub(crate) fn frustum_point(&self, ndc: [f32; 2], z: f32) -> Vec3 {
         let p = Vec3::new(ndc[0] * self.tan_half[0] * z, ndc[1] * self.tan_half[1] * z, -z);
         Mat4::from_cols_array_2d(&self.world_from_view).transform_point3(p)

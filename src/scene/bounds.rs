@@ -4,8 +4,8 @@ use glam::{Mat4, Vec3};
 
 use super::{Instance, Mesh, Scene};
 
-/// Lowest and highest corner of the box, parallel to the axes, around every placed vertex that a triangle uses;
-/// `None` where nothing is placed.
+/// Lowest and highest corner of the box, parallel to the axes, around every placed vertex that a
+/// triangle uses; `None` where nothing is placed.
 pub fn world_bounds(scene: &Scene) -> Option<([f32; 3], [f32; 3])> {
     let boxes = scene.instances.iter().filter_map(|i| instance_bounds(i, scene.meshes.get(i.mesh)?));
     boxes.reduce(|a, b| {
@@ -26,8 +26,8 @@ pub fn instance_bounds(instance: &Instance, mesh: &Mesh) -> Option<([f32; 3], [f
     (low.x <= high.x).then(|| (low.into(), high.into()))
 }
 
-/// As [`instance_bounds`], for whoever draws one pose after the other without the CPU's vertices: of what deforms, the
-/// box around all that its joints hold.
+/// As [`instance_bounds`], for whoever draws one pose after the other without the CPU's vertices:
+/// of what deforms, the box around all that its joints hold.
 pub fn posed_bounds(instance: &Instance, scene: &Scene) -> Option<([f32; 3], [f32; 3])> {
     let Some(deform) = scene.deform_of(instance.mesh) else {
         return instance_bounds(instance, scene.meshes.get(instance.mesh)?);

@@ -4,16 +4,18 @@ use glam::{Mat4, Vec3};
 
 use super::Camera;
 
-/// Near plane of a camera that was not made by a file, as a share of the distance to what it looks at.
+/// Near plane of a camera that was not made by a file, as a share of the distance to what it looks
+/// at.
 const NEAR: f32 = 1e-5;
 
 impl Camera {
-    /// A camera at `eye` that looks at `target` with +Y up (−Z up where it looks straight down or up).
+    /// A camera at `eye` that looks at `target` with +Y up (−Z up where it looks straight down or
+    /// up).
     ///
-    /// `yfov` is the vertical field of view in radians. The near plane is at a 100,000th of the distance,
-    /// whatever the unit: whoever looks at the horizon still sees what is before the eye, and depth, which is
-    /// reversed and a float, is no coarser for it. The far plane is infinite. When `eye` equals `target` the
-    /// camera looks along −Z.
+    /// `yfov` is the vertical field of view in radians. The near plane is at a 100,000th of the
+    /// distance, whatever the unit: whoever looks at the horizon still sees what is before the eye,
+    /// and depth, which is reversed and a float, is no coarser for it. The far plane is infinite.
+    /// When `eye` equals `target` the camera looks along −Z.
     pub fn look_at(eye: [f32; 3], target: [f32; 3], yfov: f32) -> Camera {
         let (eye, target) = (Vec3::from(eye), Vec3::from(target));
         let distance = eye.distance(target);

@@ -21,11 +21,13 @@ use super::{
     look::{self, Daylight, Look},
 };
 
-/// Irradiance of the default sun, W/m². With the sky a white surface that faces it has radiance 1, seven eighths
-/// of it the sun's. That is what glTF's emission counts in: in weaker light a file's faint glow would outshine it.
+/// Irradiance of the default sun, W/m². With the sky a white surface that faces it has radiance 1,
+/// seven eighths of it the sun's. That is what glTF's emission counts in: in weaker light a file's
+/// faint glow would outshine it.
 pub const DEFAULT_SUN: f32 = 2.75;
 
-/// Radiance of the sky that comes with the default sun, W/(m²·sr): a seventh of the sun's on a white surface.
+/// Radiance of the sky that comes with the default sun, W/(m²·sr): a seventh of the sun's on a
+/// white surface.
 pub const DEFAULT_SKY: f32 = 0.125;
 
 /// Irradiance of the sun that comes into a room, W/m².
@@ -34,14 +36,16 @@ pub const INDOOR_SUN: f32 = 10.0;
 /// Radiance of the sky outside a room, W/(m²·sr).
 pub const INDOOR_SKY: f32 = 0.6;
 
-/// Irradiance by emitters, averaged over the box around the scene, from which on they are its light, W/m². A diffuse
-/// surface of albedo 0.8 then has the radiance 0.005, a 200th of what the view transform shows as white.
+/// Irradiance by emitters, averaged over the box around the scene, from which on they are its
+/// light, W/m². A diffuse surface of albedo 0.8 then has the radiance 0.005, a 200th of what the
+/// view transform shows as white.
 pub const ENOUGH: f32 = 0.02;
 
 /// How many emitters at most get a light.
 const MAX_PROXIES: usize = 4;
 
-/// Adds a camera if there is none, then light if there is none; says so in the warnings where it matters.
+/// Adds a camera if there is none, then light if there is none; says so in the warnings where it
+/// matters.
 pub fn complete(scene: &mut Scene) {
     let look = if scene.cameras.is_empty() || scene.lights.is_empty() { Look::new(scene) } else { None };
     let first = scene.cameras.first().cloned().unwrap_or_else(|| look::first_camera(look.as_ref()));
@@ -142,7 +146,8 @@ fn irradiance(scene: &Scene, emitters: &[Emitter]) -> f32 {
     if walls > 0.0 { flux / walls } else { 0.0 }
 }
 
-/// Where the light of a sun goes that stands behind the left shoulder of whoever looks through `camera`.
+/// Where the light of a sun goes that stands behind the left shoulder of whoever looks through
+/// `camera`.
 fn over_the_shoulder(camera: &Camera) -> Vec3 {
     let flat = |column: usize| {
         let [x, _, z, _] = camera.transform[column];
@@ -169,10 +174,10 @@ fn luminance(rgb: Vec3) -> f32 {
 
 /// Lights that stand in for the surfaces of largest flux.
 ///
-/// A surface that faces one way becomes a spot light just off its centre, with glTF's ramp from the axis to 90°, which
-/// is the square of the cosine where the surface itself has the cosine; its intensity on the axis is the surface's,
-/// radiance times area. A surface that faces all ways becomes a point light with a quarter of that, the mean of any
-/// convex body.
+/// A surface that faces one way becomes a spot light just off its centre, with glTF's ramp from the
+/// axis to 90°, which is the square of the cosine where the surface itself has the cosine; its
+/// intensity on the axis is the surface's, radiance times area. A surface that faces all ways
+/// becomes a point light with a quarter of that, the mean of any convex body.
 pub fn proxy_lights(scene: &Scene) -> Vec<Light> {
     lights(scene, emitters(scene))
 }
@@ -196,8 +201,8 @@ fn emitters(scene: &Scene) -> Vec<Emitter> {
     scene.instances.iter().filter_map(|i| emitter(scene, i, &radiances)).collect()
 }
 
-/// Share of a surface that is there, on average: a beam of light that covers 3 % of what is behind it sends 3 % of its
-/// glow.
+/// Share of a surface that is there, on average: a beam of light that covers 3 % of what is behind
+/// it sends 3 % of its glow.
 fn coverage(scene: &Scene, material: &Material) -> f32 {
     if material.alpha_mode == AlphaMode::Opaque {
         return 1.0;

@@ -1,8 +1,9 @@
 //! Meshes whose vertices move: morph targets, then a skin (glTF 2.0, sections 3.7.2.2 and 3.7.3.3).
 //!
-//! A [`Shape`] is what never changes of such a mesh, a [`Deform`] how it stands now: a matrix for each joint and a
-//! weight for each target. Whoever draws moves the vertices on the GPU (`render/deform.rs`); here they are moved for
-//! what the CPU asks of them: rays, bounds, files, the path tracer. Both do the same arithmetic.
+//! A [`Shape`] is what never changes of such a mesh, a [`Deform`] how it stands now: a matrix for
+//! each joint and a weight for each target. Whoever draws moves the vertices on the GPU
+//! (`render/deform.rs`); here they are moved for what the CPU asks of them: rays, bounds, files,
+//! the path tracer. Both do the same arithmetic.
 
 use super::{Mesh, Scene};
 use bytemuck::{Pod, Zeroable};
@@ -10,8 +11,8 @@ use glam::{Vec3, Vec4};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Rows of a matrix whose fourth row is 0, 0, 0, 1: from where a vertex is at rest to where its joint has it, both in
-/// the space of the instance.
+/// Rows of a matrix whose fourth row is 0, 0, 0, 1: from where a vertex is at rest to where its
+/// joint has it, both in the space of the instance.
 pub type Joint = [[f32; 4]; 3];
 
 /// What a morph target adds to a vertex at weight 1.
@@ -102,8 +103,8 @@ impl Shape {
         }
     }
 
-    /// Numbers that are the same for vertices that stand in one place and always will: where triangles meet, whatever
-    /// the file repeats for its textures' sake.
+    /// Numbers that are the same for vertices that stand in one place and always will: where
+    /// triangles meet, whatever the file repeats for its textures' sake.
     pub fn places(&self) -> Vec<u32> {
         let mut known: HashMap<Vec<u32>, u32> = HashMap::with_capacity(self.rest.positions.len());
         let place = |v: usize| {
@@ -181,8 +182,8 @@ impl Deform {
                 let [r0, r1, r2] = self.blended(v);
                 p = Vec3::new(r0.dot(p.extend(1.0)), r1.dot(p.extend(1.0)), r2.dot(p.extend(1.0)));
                 let [r0, r1, r2] = [r0, r1, r2].map(Vec4::truncate);
-                // The cofactor matrix is the inverse transpose times the determinant: right for normals, never
-                // singular.
+                // The cofactor matrix is the inverse transpose times the determinant: right for
+                // normals, never singular.
                 let (c0, c1, c2) = (r1.cross(r2), r2.cross(r0), r0.cross(r1));
                 let mirror = if r0.dot(c0) < 0.0 { -1.0 } else { 1.0 };
                 n = Vec3::new(c0.dot(n), c1.dot(n), c2.dot(n)) * mirror;
@@ -209,8 +210,8 @@ impl Deform {
         rows
     }
 
-    /// A box around all vertices, larger where joints blend or targets pull: it asks joints, not vertices. `None`
-    /// without vertices.
+    /// A box around all vertices, larger where joints blend or targets pull: it asks joints, not
+    /// vertices. `None` without vertices.
     pub fn bounds(&self) -> Option<([f32; 3], [f32; 3])> {
         let (mut swing_low, mut swing_high) = (Vec3::ZERO, Vec3::ZERO);
         for ((low, high), &w) in self.shape.swing.iter().zip(&self.weights) {
@@ -220,7 +221,8 @@ impl Deform {
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for &(joint, a, b) in &self.shape.reach {
             let (a, b) = (a + swing_low, b + swing_high);
-            // A vertex is a mean of where its joints have it, so it is within the box around their boxes.
+            // A vertex is a mean of where its joints have it, so it is within the box around their
+            // boxes.
             let corners = (0..8).map(|i| Vec3::select(glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), a, b));
             for p in corners {
                 let p = match self.joints.get(joint) {
@@ -248,7 +250,8 @@ impl Scene {
         self.deforms.iter().find(|d| d.mesh == mesh)
     }
 
-    /// Writes the vertices of all deforming meshes as they stand now, for whoever reads [`Scene::meshes`].
+    /// Writes the vertices of all deforming meshes as they stand now, for whoever reads
+    /// [`Scene::meshes`].
     pub fn move_vertices(&mut self) {
         for deform in &self.deforms {
             let Some(mesh) = self.meshes.get_mut(deform.mesh) else { continue };

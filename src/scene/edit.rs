@@ -1,4 +1,5 @@
-//! Small changes of a scene as text: what the viewer does to lights and objects, and `bouncelight render` repeats.
+//! Small changes of a scene as text: what the viewer does to lights and objects, and
+//! `bouncelight render` repeats.
 //!
 //! A light: `INDEX key=value …` with the keys `color`, `strength` (W/m² of a sun, W/sr of other
 //! lights), `direction`, `position` and `size` (angle of a sun in radians, radius of other lights
@@ -89,8 +90,8 @@ pub enum EditError {
 }
 
 impl LightEdit {
-    /// What has to be said to add `light` as number `index`, which is as [`NewLight`] has it but for what can
-    /// be changed.
+    /// What has to be said to add `light` as number `index`, which is as [`NewLight`] has it but
+    /// for what can be changed.
     pub fn added(index: usize, light: &Light) -> Self {
         let kind = match light.kind {
             LightKind::Directional { .. } => NewLight::Sun,

@@ -1,8 +1,10 @@
-//! Light from beyond the scene: one radiance from everywhere, or a picture of the whole sphere of directions.
+//! Light from beyond the scene: one radiance from everywhere, or a picture of the whole sphere of
+//! directions.
 //!
-//! Pictures are lat-long (equirectangular), as panorama cameras and sky libraries deliver them. The row tells the angle
-//! from +Y, the column the turn about it; the middle column looks along +X and columns to its right turn towards +Z.
-//! Blender (whose +X is the same axis) and three.js read such pictures in the same way.
+//! Pictures are lat-long (equirectangular), as panorama cameras and sky libraries deliver them. The
+//! row tells the angle from +Y, the column the turn about it; the middle column looks along +X and
+//! columns to its right turn towards +Z. Blender (whose +X is the same axis) and three.js read such
+//! pictures in the same way.
 
 mod sun;
 
@@ -15,8 +17,8 @@ use thiserror::Error;
 /// What rays see that hit nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Environment {
-    /// Radiance from every direction, W/(m²·sr); with an image, its mean over the sphere of directions, which is what
-    /// methods use that know no directions.
+    /// Radiance from every direction, W/(m²·sr); with an image, its mean over the sphere of
+    /// directions, which is what methods use that know no directions.
     pub radiance: [f32; 3],
     /// Radiance by direction.
     pub image: Option<Arc<EnvironmentImage>>,
@@ -119,7 +121,8 @@ const BRIGHTEST_HALF: f32 = 65_504.0;
 const BRIGHTEST: f32 = 1e9;
 
 impl EnvironmentImage {
-    /// Mends up to a hundredth of the radiances and tells how many; a picture with more is left for others to refuse.
+    /// Mends up to a hundredth of the radiances and tells how many; a picture with more is left for
+    /// others to refuse.
     pub fn mend(&mut self) -> Option<String> {
         let bad = |v: f32| !(0.0..=BRIGHTEST).contains(&v);
         let count = self.rgb.iter().filter(|v| bad(**v)).count();
@@ -153,8 +156,8 @@ impl EnvironmentImage {
         sum.map(|s| s as f32)
     }
 
-    /// The same turned about the vertical by `turns` whole turns, the way from +X to +Z; columns in between are
-    /// interpolated.
+    /// The same turned about the vertical by `turns` whole turns, the way from +X to +Z; columns in
+    /// between are interpolated.
     pub fn turned(&self, turns: f32) -> Self {
         let width = self.width as usize;
         let shift = turns.rem_euclid(1.0) * self.width as f32;
@@ -170,8 +173,8 @@ impl EnvironmentImage {
         Self { name: self.name.clone(), rgb, ..*self }
     }
 
-    /// Radiance from `direction` (unit vector, away from the eye), bilinear, wrapping around and held at the poles;
-    /// `shaders/lib/environment.wgsl` says the same.
+    /// Radiance from `direction` (unit vector, away from the eye), bilinear, wrapping around and
+    /// held at the poles; `shaders/lib/environment.wgsl` says the same.
     pub fn radiance(&self, direction: [f32; 3]) -> [f32; 3] {
         let [u, v] = coordinates(direction);
         let (x, y) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);

@@ -1,4 +1,5 @@
-//! What can go wrong while a scene is found, read or written. Every variant names the file and, inside it, the place.
+//! What can go wrong while a scene is found, read or written. Every variant names the file and,
+//! inside it, the place.
 
 use std::path::{Path, PathBuf};
 

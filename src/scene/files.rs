@@ -1,8 +1,9 @@
 //! Reading files that a scene names, with limits.
 //!
-//! A scene file comes from anywhere, and what it names is read before anybody looks at it. So names must stay in the
-//! scene file's folder unless the user allows more ([`LoadOptions::allow_outside`]), only regular files are read (a
-//! device or pipe may never end), and sizes are known to fit before memory is taken.
+//! A scene file comes from anywhere, and what it names is read before anybody looks at it. So names
+//! must stay in the scene file's folder unless the user allows more
+//! ([`LoadOptions::allow_outside`]), only regular files are read (a device or pipe may never end),
+//! and sizes are known to fit before memory is taken.
 
 use super::units::Units;
 use crate::image_io::read_regular;
@@ -11,7 +12,8 @@ use std::path::{Component, Path, PathBuf};
 /// What a loader may do on behalf of a file.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct LoadOptions {
-    /// Buffers, textures and material libraries may lie outside the folder of the file that names them.
+    /// Buffers, textures and material libraries may lie outside the folder of the file that names
+    /// them.
     pub allow_outside: bool,
     /// Its unit of length and its vertical.
     pub units: Units,
@@ -48,7 +50,8 @@ impl Folder {
         })
     }
 
-    /// By its words first, so that nothing is learnt about what lies outside, then with links followed.
+    /// By its words first, so that nothing is learnt about what lies outside, then with links
+    /// followed.
     fn holds(&self, path: &Path) -> bool {
         let absolute = |p: &Path| std::path::absolute(p).map(|p| flattened(&p)).unwrap_or_default();
         if !absolute(path).starts_with(absolute(&self.path)) {

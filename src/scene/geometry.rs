@@ -13,8 +13,8 @@ pub(crate) enum Topology {
     Fan,
 }
 
-/// Indices of a triangle list with the winding that glTF 2.0, section 3.7.2.1, gives strips and fans.
-/// Corners left over at the end are dropped, and so are a strip's degenerate triangles.
+/// Indices of a triangle list with the winding that glTF 2.0, section 3.7.2.1, gives strips and
+/// fans. Corners left over at the end are dropped, and so are a strip's degenerate triangles.
 pub(crate) fn triangle_list(indices: &[u32], topology: Topology) -> Vec<u32> {
     let triangles = indices.len().saturating_sub(2);
     match topology {
@@ -45,8 +45,8 @@ fn unshare(mesh: &mut Mesh) {
     mesh.indices = (0..indices.len() as u32).collect();
 }
 
-/// Replaces the normals by those of the triangles, as glTF asks where a file has none. Tangents are dropped with them.
-/// A triangle without area gets +Y, so that normals stay finite.
+/// Replaces the normals by those of the triangles, as glTF asks where a file has none. Tangents are
+/// dropped with them. A triangle without area gets +Y, so that normals stay finite.
 pub(crate) fn make_flat_normals(mesh: &mut Mesh) {
     mesh.normals.clear();
     mesh.tangents.clear();
@@ -99,9 +99,10 @@ impl Geometry for Soup<'_> {
     }
 }
 
-/// Makes tangents after MikkTSpace, which is what normal maps are baked for. `transform` is the normal texture's
-/// KHR_texture_transform; the map's own axes are the transformed ones. The mesh must have normals and the `uv_set`;
-/// without that set it is left as it is. Vertices are unshared, because a tangent belongs to a corner.
+/// Makes tangents after MikkTSpace, which is what normal maps are baked for. `transform` is the
+/// normal texture's KHR_texture_transform; the map's own axes are the transformed ones. The mesh
+/// must have normals and the `uv_set`; without that set it is left as it is. Vertices are unshared,
+/// because a tangent belongs to a corner.
 pub(crate) fn make_tangents(mesh: &mut Mesh, uv_set: u8, transform: [[f32; 3]; 2]) {
     let source = if uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
     if source.is_empty() || mesh.indices.is_empty() {

@@ -1,5 +1,5 @@
-//! KTX2 textures in Basis Universal's encodings (KHR_texture_basisu): ETC1S and UASTC, the latter packed by Zstandard
-//! or not. The `basisu` crate decodes; this file keeps hostile sizes from it.
+//! KTX2 textures in Basis Universal's encodings (KHR_texture_basisu): ETC1S and UASTC, the latter
+//! packed by Zstandard or not. The `basisu` crate decodes; this file keeps hostile sizes from it.
 
 use basisu::{DecodeFlags, Error, TargetFormat, Transcoder};
 
@@ -17,10 +17,12 @@ pub(super) fn is_ktx2(bytes: &[u8]) -> bool {
 /// A decoded level: the picture's size, the level's width and height, its RGBA.
 pub(super) type Decoded = ([u32; 2], u32, u32, Vec<u8>);
 
-/// The largest level with no side above `kept_side`, or the smallest that there is; mip levels are made anew at upload.
+/// The largest level with no side above `kept_side`, or the smallest that there is; mip levels are
+/// made anew at upload.
 ///
 /// # Errors
-/// A sentence without subject. No side may exceed `most_side`, nor the decoded picture `most_bytes`.
+/// A sentence without subject. No side may exceed `most_side`, nor the decoded picture
+/// `most_bytes`.
 pub(super) fn decode(bytes: &[u8], most_side: u32, kept_side: u32, most_bytes: u64) -> Result<Decoded, String> {
     let cut_off = || format!("is a KTX2 file cut off after {} bytes", bytes.len());
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));

@@ -10,9 +10,9 @@ type Stream = (&'static str, u32, fn(u32) -> Scene);
 const STREAMS: [Stream; 2] =
     [("paper-room", paper_room::MAX_INDEX, paper_room::scene), ("home", home::MAX_INDEX, home::scene)];
 
-/// Loads what `spec` names: a `.gltf`, `.glb` or `.obj` path, `paper-room:INDEX` (see [`paper_room`]),
-/// `home:INDEX` (see [`home`]), or one of [`bundled::NAMES`]. The result has at least one camera and one source
-/// of light; see [`super::defaults`].
+/// Loads what `spec` names: a `.gltf`, `.glb` or `.obj` path, `paper-room:INDEX` (see
+/// [`paper_room`]), `home:INDEX` (see [`home`]), or one of [`bundled::NAMES`]. The result has at
+/// least one camera and one source of light; see [`super::defaults`].
 ///
 /// # Errors
 /// [`SceneError`], which names the file and the place in it.

@@ -12,7 +12,8 @@ pub(crate) struct Level<'a> {
 }
 
 impl Level<'_> {
-    /// The next mip level: averages of 2×2 pixels in linear light, the last row or column dropped when odd.
+    /// The next mip level: averages of 2×2 pixels in linear light, the last row or column dropped
+    /// when odd.
     pub fn halved(&self, space: ColorSpace) -> Level<'static> {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
         let decode: Vec<f32> = (0..=255u8).map(|b| decode(b, space)).collect();
@@ -37,15 +38,17 @@ impl Level<'_> {
     }
 }
 
-/// A normal map as it is drawn: alpha holds √(1 − r), r the length of the mean of the normals that a texel stands for
-/// (Toksvig 2005). None are averaged at full size, so r is 1 whatever the length that eight bits leave of a normal.
+/// A normal map as it is drawn: alpha holds √(1 − r), r the length of the mean of the normals that
+/// a texel stands for (Toksvig 2005). None are averaged at full size, so r is 1 whatever the length
+/// that eight bits leave of a normal.
 pub(crate) fn normals<'a>(level: &Level<'a>) -> Level<'a> {
     let mut rgba = level.rgba.to_vec();
     rgba.iter_mut().skip(3).step_by(4).for_each(|a| *a = 0);
     Level { width: level.width, height: level.height, rgba: Cow::Owned(rgba) }
 }
 
-/// The next mip level of [`normals`]: directions of means of 2×2 normals, and how much shorter than 1 those are.
+/// The next mip level of [`normals`]: directions of means of 2×2 normals, and how much shorter than
+/// 1 those are.
 pub(crate) fn halved_normals(level: &Level<'_>) -> Level<'static> {
     let (width, height) = ((level.width / 2).max(1), (level.height / 2).max(1));
     let mean = |x: u32, y: u32| {

@@ -1,8 +1,10 @@
-//! What is drawn, as plain data: meshes, instances, materials, images, lights, cameras, environment.
+//! What is drawn, as plain data: meshes, instances, materials, images, lights, cameras,
+//! environment.
 //!
-//! Scene space is glTF's: right-handed, +Y up, metres; cameras look down −Z. Colours are linear Rec.709.
-//! Light is radiometric (W/m², W/sr, W/(m²·sr)); photometric file units are divided by 683 lm/W at the border.
-//! Nothing here knows wgpu except [`upload`], which turns a [`Scene`] into GPU buffers.
+//! Scene space is glTF's: right-handed, +Y up, metres; cameras look down −Z. Colours are linear
+//! Rec.709. Light is radiometric (W/m², W/sr, W/(m²·sr)); photometric file units are divided by 683
+//! lm/W at the border. Nothing here knows wgpu except [`upload`], which turns a [`Scene`] into GPU
+//! buffers.
 
 pub mod upload;
 
@@ -82,16 +84,19 @@ pub struct Scene {
     pub deforms: Vec<deform::Deform>,
     /// How the objects move, if they do; see [`Scene::pose`].
     pub rig: Option<rig::Rig>,
-    /// The sun and the sky are those that the loader adds where a file has no light; see [`Scene::surround`].
+    /// The sun and the sky are those that the loader adds where a file has no light; see
+    /// [`Scene::surround`].
     pub default_light: bool,
-    /// The file has no lights, only glow if anything, so nobody knows how bright pictures of it are meant to be: they
-    /// are exposed by measure unless somebody says otherwise.
+    /// The file has no lights, only glow if anything, so nobody knows how bright pictures of it are
+    /// meant to be: they are exposed by measure unless somebody says otherwise.
     pub lightless: bool,
-    /// What was mended or left out while loading, one plain sentence each, naming the file and place.
+    /// What was mended or left out while loading, one plain sentence each, naming the file and
+    /// place.
     pub warnings: Vec<String>,
 }
 
-/// Triangles with per-vertex attributes. All vertex arrays have the length of `positions` or are empty.
+/// Triangles with per-vertex attributes. All vertex arrays have the length of `positions` or are
+/// empty.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
     /// Name in the file, for messages.
@@ -187,12 +192,14 @@ pub struct Material {
     pub metallic: f32,
     /// Perceptual roughness; GGX α is its square.
     pub roughness: f32,
-    /// Reflectance of a dielectric at normal incidence: 0.04 for index 1.5; 0 leaves a purely diffuse surface
-    /// (KHR_materials_ior, KHR_materials_specular). Metals take their base colour instead. Where it is coloured, the
-    /// largest of the three, which is what the diffuse light loses.
+    /// Reflectance of a dielectric at normal incidence: 0.04 for index 1.5; 0 leaves a purely
+    /// diffuse surface (KHR_materials_ior, KHR_materials_specular). Metals take their base colour
+    /// instead. Where it is coloured, the largest of the three, which is what the diffuse light
+    /// loses.
     pub f0: f32,
-    /// Colour of that reflectance, the largest component 1: `f0 · specular_tint` at normal incidence, white at grazing
-    /// angles. White but for files with KHR_materials_specular or KHR_materials_pbrSpecularGlossiness.
+    /// Colour of that reflectance, the largest component 1: `f0 · specular_tint` at normal
+    /// incidence, white at grazing angles. White but for files with KHR_materials_specular or
+    /// KHR_materials_pbrSpecularGlossiness.
     pub specular_tint: [f32; 3],
     /// Green multiplies roughness, blue multiplies metallic (linear image).
     pub metallic_roughness_texture: Option<TextureRef>,
@@ -400,11 +407,13 @@ pub struct Camera {
     pub far: f32,
 }
 
-/// Reflectance at normal incidence of a dielectric of index 1.5, which is what glTF materials have by default.
+/// Reflectance at normal incidence of a dielectric of index 1.5, which is what glTF materials have
+/// by default.
 pub const DIELECTRIC_F0: f32 = 0.04;
 
 /// Lumens per watt by which glTF's photometric light units are divided.
 pub const LUMENS_PER_WATT: f32 = 683.0;
 
-/// Angular diameter that a directional light gets when its file gives none: the real sun's, radians.
+/// Angular diameter that a directional light gets when its file gives none: the real sun's,
+/// radians.
 pub const SUN_ANGLE: f32 = 0.00918;

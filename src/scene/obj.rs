@@ -1,8 +1,9 @@
 //! Wavefront OBJ with its MTL, through `tobj`.
 //!
-//! OBJ has no physical material model, so the nearest of glTF's is taken: Kd and map_Kd are the base colour, Ns the
-//! roughness of a Blinn-Phong lobe of that exponent, Ke emitted radiance, d alpha; Pr and Pm (the PBR extension) win
-//! where a file has them. Surfaces are double-sided, because OBJ says nothing about sides.
+//! OBJ has no physical material model, so the nearest of glTF's is taken: Kd and map_Kd are the
+//! base colour, Ns the roughness of a Blinn-Phong lobe of that exponent, Ke emitted radiance, d
+//! alpha; Pr and Pm (the PBR extension) win where a file has them. Surfaces are double-sided,
+//! because OBJ says nothing about sides.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -15,8 +16,8 @@ use super::{
     AlphaMode, Instance, Material, Mesh, Sampler, Scene, SceneError, TextureRef, defaults, error, geometry, sound,
 };
 
-/// Loads an OBJ file, its material libraries and textures, and fills in what is missing, as [`super::defaults`] says.
-/// A missing library, material or texture is a warning.
+/// Loads an OBJ file, its material libraries and textures, and fills in what is missing, as
+/// [`super::defaults`] says. A missing library, material or texture is a warning.
 ///
 /// # Errors
 /// [`SceneError`] naming the file and the line.
@@ -89,7 +90,8 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError>
     Ok(scene)
 }
 
-/// Finds what `tobj` would report without a line, or let through: numbers that are none, faces without vertices.
+/// Finds what `tobj` would report without a line, or let through: numbers that are none, faces
+/// without vertices.
 fn check(path: &Path, text: &str) -> Result<(), SceneError> {
     let mut counts = [0i64; 3];
     for (i, line) in text.lines().enumerate() {
@@ -214,7 +216,8 @@ impl Textures<'_> {
     }
 
     fn texture(&mut self, scene: &mut Scene, statement: &str, usage: Use) -> TextureRef {
-        // Options such as `-s 2 2 1` come before the name; names without options may contain spaces.
+        // Options such as `-s 2 2 1` come before the name; names without options may contain
+        // spaces.
         let statement = statement.trim();
         let name =
             if statement.starts_with('-') { statement.rsplit(' ').next().unwrap_or(statement) } else { statement };

@@ -1,8 +1,10 @@
 //! Unit vectors in two numbers, as `shaders/lib/octahedral.wgsl` reads them.
 
-/// The octahedral code of `v`, two signed normalised numbers of 16 bits; that of +Z where `v` has no direction.
+/// The octahedral code of `v`, two signed normalised numbers of 16 bits; that of +Z where `v` has
+/// no direction.
 ///
-/// Source: Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 3(2), 2014.
+/// Source: Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors",
+/// JCGT 3(2), 2014.
 pub(crate) fn octahedral(v: [f32; 3]) -> [i16; 2] {
     let v = v.map(f64::from);
     let sum = v.iter().map(|c| c.abs()).sum::<f64>();

@@ -1,8 +1,10 @@
-//! The seed paper's scenes, exactly: room INDEX of the stream that its authors drew with Python's `random.seed(0)`.
+//! The seed paper's scenes, exactly: room INDEX of the stream that its authors drew with Python's
+//! `random.seed(0)`.
 //!
-//! Harris-Dewey and Klein 2021 (arXiv 2110.12039). A room is 50 to 250 of Blender's default primitives scattered
-//! between four coloured walls on a coloured floor, lit by a sun and a grey sky. The recipe stands in Blender's
-//! coordinates (Z up) and is turned to ours, (x, y, z) → (x, z, −y), at the very end, as Blender's glTF exporter does.
+//! Harris-Dewey and Klein 2021 (arXiv 2110.12039). A room is 50 to 250 of Blender's default
+//! primitives scattered between four coloured walls on a coloured floor, lit by a sun and a grey
+//! sky. The recipe stands in Blender's coordinates (Z up) and is turned to ours, (x, y, z) → (x, z,
+//! −y), at the very end, as Blender's glTF exporter does.
 
 use std::f64::consts::PI;
 
@@ -12,8 +14,8 @@ use rand_mt::Mt;
 use super::shapes::{self, Shape};
 use super::{Camera, Environment, Instance, Light, LightKind, Material, Mesh, SUN_ANGLE, Scene};
 
-/// The largest index that [`super::load`] accepts. The authors used 2,509 scenes; drawing the stream takes a second
-/// about every hundred thousand.
+/// The largest index that [`super::load`] accepts. The authors used 2,509 scenes; drawing the
+/// stream takes a second about every hundred thousand.
 pub const MAX_INDEX: u32 = 65_535;
 
 /// Radiance of the grey sky in every room, W/(m²·sr).
@@ -104,9 +106,11 @@ fn to_f32(matrix: DMat4) -> [[f32; 4]; 4] {
     matrix.as_mat4().to_cols_array_2d()
 }
 
-/// Room `index` of the stream. Drawing it takes time proportional to `index`, about a millisecond for a hundred.
+/// Room `index` of the stream. Drawing it takes time proportional to `index`, about a millisecond
+/// for a hundred.
 ///
-/// The camera's field of view is the one that makes pictures twice as wide as high show what the authors' show.
+/// The camera's field of view is the one that makes pictures twice as wide as high show what the
+/// authors' show.
 pub fn scene(index: u32) -> Scene {
     let mut rng = Python::seed_zero();
     for _ in 0..index {

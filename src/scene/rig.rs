@@ -1,5 +1,5 @@
-//! Animations of nodes over time, as glTF has them: where they are, and with them objects, cameras, lights, joints of
-//! skins and weights of morph targets.
+//! Animations of nodes over time, as glTF has them: where they are, and with them objects, cameras,
+//! lights, joints of skins and weights of morph targets.
 
 mod channel;
 
@@ -81,13 +81,15 @@ pub struct Pose {
     pub cameras: Vec<[[f32; 4]; 4]>,
     /// Of each of [`Rig::lights`].
     pub lights: Vec<[[f32; 4]; 4]>,
-    /// Of each of [`Rig::deforms`]: joints, weights, and whether its instances stand at the origin, see [`joints`].
+    /// Of each of [`Rig::deforms`]: joints, weights, and whether its instances stand at the origin,
+    /// see [`joints`].
     pub deforms: Vec<(Vec<Joint>, Vec<f32>, bool)>,
 }
 
-/// Matrices of a skin's joints in the space of its mesh's node, as glTF defines them: the node's own place cancels out.
-/// `joints`: world transform and inverse bind matrix of each. True beside them where the node has no inverse; then the
-/// vertices are in the world, and the mesh has to stand at its origin.
+/// Matrices of a skin's joints in the space of its mesh's node, as glTF defines them: the node's
+/// own place cancels out. `joints`: world transform and inverse bind matrix of each. True beside
+/// them where the node has no inverse; then the vertices are in the world, and the mesh has to
+/// stand at its origin.
 pub fn joints<'a>(node: Mat4, joints: impl Iterator<Item = (Mat4, &'a [[f32; 4]; 4])>) -> (Vec<Joint>, bool) {
     let inverse = Some(node.as_dmat4().inverse()).filter(|m| m.is_finite() && node.determinant() != 0.0);
     let from_world = inverse.unwrap_or(DMat4::IDENTITY);
@@ -99,7 +101,8 @@ pub fn joints<'a>(node: Mat4, joints: impl Iterator<Item = (Mat4, &'a [[f32; 4];
 }
 
 impl Rig {
-    /// Where everything is in animation `animation` at `time`, seconds; `None` if there is no such animation.
+    /// Where everything is in animation `animation` at `time`, seconds; `None` if there is no such
+    /// animation.
     pub fn pose(&self, animation: usize, time: f32) -> Option<Pose> {
         let animation = self.animations.get(animation)?;
         let mut nodes = self.nodes.clone();
@@ -148,8 +151,8 @@ impl Rig {
 }
 
 impl Camera {
-    /// Puts the camera where a node is, whose scale and shear are not a camera's. False, and nothing is done, where the
-    /// node has no rotation.
+    /// Puts the camera where a node is, whose scale and shear are not a camera's. False, and
+    /// nothing is done, where the node has no rotation.
     pub(super) fn place(&mut self, world: Mat4) -> bool {
         let (_, rotation, position) = world.to_scale_rotation_translation();
         let sound = rotation.is_finite() && rotation.length_squared() >= 0.5 && position.is_finite();
@@ -161,7 +164,8 @@ impl Camera {
 }
 
 impl LightKind {
-    /// Puts the light where a node is, shining along its −Z. False, and nothing is done, where that is nowhere.
+    /// Puts the light where a node is, shining along its −Z. False, and nothing is done, where that
+    /// is nowhere.
     pub(super) fn place(&mut self, world: Mat4) -> bool {
         let to = world.w_axis.truncate();
         let Some(along) = world.transform_vector3(Vec3::NEG_Z).try_normalize().filter(|_| to.is_finite()) else {
@@ -177,8 +181,8 @@ impl LightKind {
 }
 
 impl Scene {
-    /// Puts objects, cameras, lights and vertices where animation `animation` has them at `time`, seconds. False if
-    /// there is no such animation.
+    /// Puts objects, cameras, lights and vertices where animation `animation` has them at `time`,
+    /// seconds. False if there is no such animation.
     pub fn pose(&mut self, animation: usize, time: f32) -> bool {
         let known = self.pose_parts(animation, time);
         if known {
@@ -187,8 +191,8 @@ impl Scene {
         known
     }
 
-    /// As [`Scene::pose`], but leaves the vertices of [`Scene::meshes`] where they are: what the GPU and rays
-    /// need is in [`Scene::deforms`]. For whoever draws one frame after the other.
+    /// As [`Scene::pose`], but leaves the vertices of [`Scene::meshes`] where they are: what the
+    /// GPU and rays need is in [`Scene::deforms`]. For whoever draws one frame after the other.
     pub fn pose_parts(&mut self, animation: usize, time: f32) -> bool {
         let Some(pose) = self.rig.as_ref().and_then(|rig| rig.pose(animation, time)) else { return false };
         self.instances.iter_mut().zip(pose.instances).for_each(|(instance, transform)| instance.transform = transform);

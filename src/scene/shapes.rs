@@ -1,7 +1,8 @@
 //! Blender's default mesh primitives with flat normals, in our Y-up coordinates.
 //!
-//! Vertex positions are those of Blender 4.5's `mesh.primitive_*_add` without arguments, (x, y, z) → (x, z, −y).
-//! Faces share no vertices, so each has its own normal; polygons are cut into fans from their first corner.
+//! Vertex positions are those of Blender 4.5's `mesh.primitive_*_add` without arguments, (x, y, z)
+//! → (x, z, −y). Faces share no vertices, so each has its own normal; polygons are cut into fans
+//! from their first corner.
 
 use std::f64::consts::TAU;
 
@@ -144,7 +145,8 @@ fn uv_sphere() -> Vec<Polygon> {
 }
 
 fn ico_sphere() -> Vec<Polygon> {
-    // Blender's table of the twelve corners, in two-hundredths of the radius; it is rounded and normalised again.
+    // Blender's table of the twelve corners, in two-hundredths of the radius; it is rounded and
+    // normalised again.
     let upper = [[55.277, -170.128], [-144.72, -105.144], [-144.72, 105.144], [55.277, 170.128], [178.885, 0.0]];
     let mut corners = vec![DVec3::Z, DVec3::NEG_Z];
     for [x, y] in upper {

@@ -4,7 +4,8 @@ use super::{Scene, SceneError, bounds};
 use glam::{DMat4, DVec3, Mat4};
 use std::path::Path;
 
-/// How far from the origin, metres, something may be: products of three such lengths are still finite floats.
+/// How far from the origin, metres, something may be: products of three such lengths are still
+/// finite floats.
 pub const MAX_DISTANCE: f32 = 1e12;
 
 /// Leaves out what lies beyond [`MAX_DISTANCE`], with a warning.

@@ -6,7 +6,8 @@ use super::{ColorSpace, Image, ktx2, mips::Level};
 use image::DynamicImage;
 use std::borrow::Cow;
 
-/// What a texture is used for; decides how its bytes are read and what stands in for it when it is broken.
+/// What a texture is used for; decides how its bytes are read and what stands in for it when it is
+/// broken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum Use {
     /// Base colour and emission: sRGB.
@@ -28,11 +29,12 @@ impl Use {
 /// No side of a texture may be longer.
 const MAX_SIDE: u32 = 16_384;
 
-/// Larger ones are halved as they are read: WebGPU grants no more by default, and a picture of 16,384² would keep a
-/// gigabyte.
+/// Larger ones are halved as they are read: WebGPU grants no more by default, and a picture of
+/// 16,384² would keep a gigabyte.
 const KEPT_SIDE: u32 = 8192;
 
-/// Bytes of all decoded images of a scene together: thousands of small files can hold large pictures.
+/// Bytes of all decoded images of a scene together: thousands of small files can hold large
+/// pictures.
 pub(crate) const MAX_TOTAL: u64 = 4 << 30;
 
 /// Whether a scene that has `images` may have another.
@@ -44,15 +46,16 @@ pub(crate) fn room(images: &[Image], most: u64) -> Result<(), String> {
     if taken < most { Ok(()) } else { Err(format!("is left out: the scene's images already take {taken} bytes")) }
 }
 
-/// No texture may need more to be decoded, as the `image` crate has it: 16,384² pixels of four bytes, and what a
-/// decoder keeps beside them.
+/// No texture may need more to be decoded, as the `image` crate has it: 16,384² pixels of four
+/// bytes, and what a decoder keeps beside them.
 const MAX_DECODED: u64 = (1 << 30) + (64 << 20);
 
 /// Nor may the level of a KTX2 file that is kept: a few bytes can claim to be any of them.
 const MAX_TRANSCODED: u64 = 512 << 20;
 
-/// Decodes PNG, JPEG, WebP, BMP, TGA, HDR or KTX2 bytes (told apart by content, then by the name's ending). What is
-/// larger than [`KEPT_SIDE`] is halved until it is not, and a sentence without subject tells it.
+/// Decodes PNG, JPEG, WebP, BMP, TGA, HDR or KTX2 bytes (told apart by content, then by the name's
+/// ending). What is larger than [`KEPT_SIDE`] is halved until it is not, and a sentence without
+/// subject tells it.
 ///
 /// # Errors
 /// A sentence without subject, such as "the file is empty (0 bytes)".
@@ -115,8 +118,8 @@ fn halved(image: &DynamicImage, space: ColorSpace) -> Level<'static> {
     Level { width, height, rgba: Cow::Owned(rgba) }
 }
 
-/// An 8×8 checker that nobody overlooks: magenta and black for colours, smooth and rough for data, tilted to the left
-/// and to the right for normals.
+/// An 8×8 checker that nobody overlooks: magenta and black for colours, smooth and rough for data,
+/// tilted to the left and to the right for normals.
 pub(crate) fn stand_in(name: &str, usage: Use) -> Image {
     let tiles: [[u8; 4]; 2] = match usage {
         Use::Color => [[255, 0, 255, 255], [0, 0, 0, 255]],

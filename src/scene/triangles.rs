@@ -17,8 +17,9 @@ const ENOUGH: usize = 1_000_000;
 /// Triangles of an instance that are always taken: walls and furniture have few.
 const FEW: usize = 64;
 
-/// Corners, counter-clockwise seen from the front, and whose they are; what refers to something that is not there is
-/// left out. All of up to a million triangles; of a scene with more, of each instance every so many.
+/// Corners, counter-clockwise seen from the front, and whose they are; what refers to something
+/// that is not there is left out. All of up to a million triangles; of a scene with more, of each
+/// instance every so many.
 pub fn of(scene: &Scene) -> impl Iterator<Item = ([Vec3; 3], Owner)> {
     let of_instance = |i: &Instance| scene.meshes.get(i.mesh).map_or(0, |m| m.indices.len() / 3);
     let all: usize = scene.instances.iter().map(of_instance).sum();

@@ -47,7 +47,8 @@ impl Units {
 /// What has a longer side than this many metres, or a shorter one, gets a warning about its unit.
 const STRANGE: [f32; 2] = [0.005, 1000.0];
 
-/// Says so where a file is so large or so small that its unit may be no metre and nobody has said what it is.
+/// Says so where a file is so large or so small that its unit may be no metre and nobody has said
+/// what it is.
 pub(super) fn tell(scene: &mut Scene, units: Units) {
     let Some((low, high)) = world_bounds(scene).filter(|_| units.scale == 1.0) else { return };
     let size = (Vec3::from(high) - Vec3::from(low)).max_element();

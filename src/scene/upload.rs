@@ -1,8 +1,10 @@
-//! A [`Scene`] on the GPU: vertex and index buffers, materials with their textures, lights, and the list of draws.
+//! A [`Scene`] on the GPU: vertex and index buffers, materials with their textures, lights, and the
+//! list of draws.
 //!
-//! A vertex takes 48 bytes: 12 in the position stream, which is all that opaque shadow casters read, and 36 in the
-//! attribute stream (normal 4, tangent 8, two texture coordinate sets 16, colour 8). An instance takes 48 bytes (three
-//! rows of the world-from-object matrix), a light 64, a material 256.
+//! A vertex takes 48 bytes: 12 in the position stream, which is all that opaque shadow casters
+//! read, and 36 in the attribute stream (normal 4, tangent 8, two texture coordinate sets 16,
+//! colour 8). An instance takes 48 bytes (three rows of the world-from-object matrix), a light 64,
+//! a material 256.
 
 mod closed;
 mod compress;
@@ -82,8 +84,8 @@ pub enum UploadError {
     },
 }
 
-/// A scene on the GPU. Lights, the surroundings and placements can be changed in place; upload again after any other
-/// change.
+/// A scene on the GPU. Lights, the surroundings and placements can be changed in place; upload
+/// again after any other change.
 pub struct SceneGpu {
     /// Tells uploads apart, so that bind groups can be kept as long as the scene stays.
     pub id: u64,
@@ -95,8 +97,8 @@ pub struct SceneGpu {
     pub indices: wgpu::Buffer,
     /// Rows of the world-from-object matrices, grouped by draw.
     pub instances: wgpu::Buffer,
-    /// Number of the placements: another one whenever an instance has moved or deformed, or taken another's slot in
-    /// `instances`.
+    /// Number of the placements: another one whenever an instance has moved or deformed, or taken
+    /// another's slot in `instances`.
     pub placement: u64,
     /// Bounds and version of each entry of `instances`.
     pub slots: Vec<Slot>,
@@ -119,7 +121,8 @@ pub struct SceneGpu {
     pub bounds: Option<([f32; 3], [f32; 3])>,
     /// The triangles as rays meet them, once [`SceneGpu::trace`] has made them.
     pub rays: Option<SceneRays>,
-    /// Why there can be none, once [`SceneGpu::trace`] has found out: one sentence without a full stop.
+    /// Why there can be none, once [`SceneGpu::trace`] has found out: one sentence without a full
+    /// stop.
     pub no_rays: Option<String>,
     /// What was mended on the way, one sentence each.
     pub warnings: Vec<String>,
@@ -140,7 +143,8 @@ pub struct SceneGpu {
 }
 
 impl SceneGpu {
-    /// Uploads `scene`. Images larger than the device allows are halved until they fit, with a warning.
+    /// Uploads `scene`. Images larger than the device allows are halved until they fit, with a
+    /// warning.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Self, UploadError> {
         Self::with_textures(device, queue, scene, TextureMemory::Auto)
     }
@@ -205,7 +209,8 @@ impl SceneGpu {
     /// place.
     ///
     /// # Errors
-    /// [`AccelError`] when the scene has more triangles than rays can have; [`SceneGpu::no_rays`] says the same.
+    /// [`AccelError`] when the scene has more triangles than rays can have; [`SceneGpu::no_rays`]
+    /// says the same.
     pub fn trace(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<(), AccelError> {
         match SceneRays::new(device, queue, scene) {
             Ok(rays) => self.rays = Some(rays),
@@ -229,7 +234,8 @@ impl SceneGpu {
         }
     }
 
-    /// Takes over the lights of `scene`. In place where their kinds stay, so that shadow maps stay, too.
+    /// Takes over the lights of `scene`. In place where their kinds stay, so that shadow maps stay,
+    /// too.
     ///
     /// Whatever else of `scene` has changed is left as it is here.
     pub fn set_lights(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) {
@@ -270,9 +276,9 @@ impl SceneGpu {
         Ok(())
     }
 
-    /// Takes over the placements of `scene` and how its meshes are deformed; instances, meshes and materials
-    /// are those that were uploaded. The next frame of each renderer has motion vectors for what is elsewhere
-    /// than in its last one.
+    /// Takes over the placements of `scene` and how its meshes are deformed; instances, meshes and
+    /// materials are those that were uploaded. The next frame of each renderer has motion vectors
+    /// for what is elsewhere than in its last one.
     pub fn set_placements(&mut self, queue: &wgpu::Queue, scene: &Scene) {
         let pose = pose_of(&scene.deforms);
         let deformed = pose.len() == self.pose.len() && pose != self.pose;
@@ -294,7 +300,8 @@ impl SceneGpu {
         self.bounds = self.draws.iter().map(|d| d.bounds).reduce(mesh::union);
     }
 
-    /// Rows of the world-from-object matrices in the order of `instances`, each with its instance's index in the scene.
+    /// Rows of the world-from-object matrices in the order of `instances`, each with its instance's
+    /// index in the scene.
     pub fn placed(&self) -> &[(u32, Rows)] {
         &self.placed
     }
@@ -314,7 +321,8 @@ impl SceneGpu {
         self.id = NEXT.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Bytes of the materials' textures, before and after they were compressed; they are part of [`SceneGpu::bytes`].
+    /// Bytes of the materials' textures, before and after they were compressed; they are part of
+    /// [`SceneGpu::bytes`].
     pub fn texture_bytes(&self) -> TextureBytes {
         self.textures
     }
@@ -325,7 +333,8 @@ impl SceneGpu {
     }
 }
 
-/// The surroundings as a lat-long picture ([`SceneGpu::environment_view`]), a sun in it left where it is.
+/// The surroundings as a lat-long picture ([`SceneGpu::environment_view`]), a sun in it left where
+/// it is.
 pub(crate) fn whole_sky(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
@@ -337,7 +346,8 @@ pub(crate) fn whole_sky(
 /// Number of the next upload.
 static NEXT: AtomicU64 = AtomicU64::new(1);
 
-/// True where alpha decides about coverage, so that the pass needs a fragment stage that can discard.
+/// True where alpha decides about coverage, so that the pass needs a fragment stage that can
+/// discard.
 fn is_covered(mode: AlphaMode) -> bool {
     mode != AlphaMode::Opaque
 }

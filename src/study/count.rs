@@ -42,9 +42,9 @@ pub struct Still<'a> {
     pub size: [u32; 2],
 }
 
-/// Draws `frames` frames of a still camera, and says what the compute passes of the last did, in its order; on a device
-/// of its own, which has room for the sums. Passes that draw triangles are left out, and the layers of a network are
-/// those of its plan ([`Plan`](crate::net::plan::Plan)).
+/// Draws `frames` frames of a still camera, and says what the compute passes of the last did, in
+/// its order; on a device of its own, which has room for the sums. Passes that draw triangles are
+/// left out, and the layers of a network are those of its plan ([`Plan`](crate::net::plan::Plan)).
 ///
 /// # Errors
 /// [`CountError`].

@@ -23,10 +23,10 @@ pub struct LightError {
     /// What `error` would be of the reference's own noise, were ours perfect; an estimate from its
     /// two halves.
     pub floor: f64,
-    /// Standard deviation that the reference's noise gives the difference of two pictures' errors, at
-    /// most. A block's noise moves its |ours − reference| by no more than itself, so it moves the
-    /// difference by no more than twice that; over N independent blocks: 2 σ / √N, whatever share of
-    /// the noise each of them has.
+    /// Standard deviation that the reference's noise gives the difference of two pictures' errors,
+    /// at most. A block's noise moves its |ours − reference| by no more than itself, so it moves
+    /// the difference by no more than twice that; over N independent blocks: 2 σ / √N, whatever
+    /// share of the noise each of them has.
     pub doubt: f64,
 }
 

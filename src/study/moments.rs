@@ -1,10 +1,11 @@
-//! What a network that filters learns from: what `gather` remembers of a view's cells at several moments of
-//! its settling, and the light that they are to show: what the same rays find in the end.
+//! What a network that filters learns from: what `gather` remembers of a view's cells at several
+//! moments of its settling, and the light that they are to show: what the same rays find in the
+//! end.
 //!
-//! The light is `gather`'s own ([`Options::PLAIN`](crate::gi::gather::Options::PLAIN): nothing blurred, all frames
-//! alike) and not the path tracer's. A filter can take away noise and nothing else, so what `gather` is wrong about
-//! in the mean must not be learnt from the scenes that happen to be shown; and a ray that ends in the cache has a
-//! tenth of the noise of a path.
+//! The light is `gather`'s own ([`Options::PLAIN`](crate::gi::gather::Options::PLAIN): nothing
+//! blurred, all frames alike) and not the path tracer's. A filter can take away noise and nothing
+//! else, so what `gather` is wrong about in the mean must not be learnt from the scenes that happen
+//! to be shown; and a ray that ends in the cache has a tenth of the noise of a path.
 
 use super::error::DatasetError;
 use crate::{
@@ -28,7 +29,8 @@ use safetensors::{Dtype, tensor::TensorView};
 pub enum When {
     /// After so many frames of a still camera, the first of which follows a cut.
     Frames(u32),
-    /// At the end of [`PAN`] frames of a camera that turns and moves, which stood still for four before.
+    /// At the end of [`PAN`] frames of a camera that turns and moves, which stood still for four
+    /// before.
     Pan,
 }
 
@@ -49,8 +51,8 @@ pub struct Moment {
     pub age: u32,
     /// What the network is given: [`CHANNELS`] planes.
     pub features: Vec<f32>,
-    /// What cells remember: 20 planes, as `Past` lies in memory, the normal and the halves of its fourth
-    /// vector as bits.
+    /// What cells remember: 20 planes, as `Past` lies in memory, the normal and the halves of its
+    /// fourth vector as bits.
     pub past: Vec<f32>,
     /// The light that `gather` shows of each cell: three vectors, 12 planes.
     pub shown: Vec<f32>,
@@ -63,9 +65,11 @@ pub struct Lesson {
     pub cells: [u32; 2],
     /// In the order in which they were asked for.
     pub moments: Vec<Moment>,
-    /// Width of a cell at view distance 1 (`cell_foot`), and the eye and the direction of view in the world.
+    /// Width of a cell at view distance 1 (`cell_foot`), and the eye and the direction of view in
+    /// the world.
     pub view: [f32; 7],
-    /// E/π on each cell's surface, three planes; its noise: root mean square error of a cell over the mean.
+    /// E/π on each cell's surface, three planes; its noise: root mean square error of a cell over
+    /// the mean.
     pub light: Vec<f32>,
     /// See `light`.
     pub noise: f32,
@@ -73,8 +77,8 @@ pub struct Lesson {
     pub place: Vec<f32>,
 }
 
-/// Draws one view. `renderer`'s method gathers, and so does `teacher`'s, plainly, for `frames` frames; `seed` decides
-/// the pan.
+/// Draws one view. `renderer`'s method gathers, and so does `teacher`'s, plainly, for `frames`
+/// frames; `seed` decides the pan.
 ///
 /// # Errors
 /// What drawing and reading back report; `None` where `go_on` said no.
@@ -139,7 +143,8 @@ pub fn lesson(
     }))
 }
 
-/// Root mean square error of a cell's luminance over the mean, of planes of what `count` cells remember.
+/// Root mean square error of a cell's luminance over the mean, of planes of what `count` cells
+/// remember.
 fn noise_of(past: &[f32], count: usize) -> f32 {
     let plane = |i: usize| &past[i * count..(i + 1) * count];
     let (mut error, mut sum, mut cells) = (0.0, 0.0, 0.0);
@@ -152,8 +157,9 @@ fn noise_of(past: &[f32], count: usize) -> f32 {
     if sum > 0.0 { ((error / cells).sqrt() / (sum / cells)) as f32 } else { f32::INFINITY }
 }
 
-/// The cameras of a pan that ends at `camera`, those of the rest before it first: 0.2 to 2 degrees a frame about its
-/// vertical, up to 0.3 about its horizontal, and up to 0.04 metres of way, a frame.
+/// The cameras of a pan that ends at `camera`, those of the rest before it first: 0.2 to 2 degrees
+/// a frame about its vertical, up to 0.3 about its horizontal, and up to 0.04 metres of way, a
+/// frame.
 fn pan(camera: &Camera, seed: u32) -> Vec<Camera> {
     let mut numbers = SplitMix::new(0x9a70_0000_0000 | u64::from(seed));
     let mut between = |low: f32, high: f32| low + (high - low) * numbers.next();

@@ -3,21 +3,24 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Arithmetic and memory traffic of one pass: of a frame's counted by its shaders (`study::count`), of a network's
-/// layers and of the plan that they follow.
+/// Arithmetic and memory traffic of one pass: of a frame's counted by its shaders (`study::count`),
+/// of a network's layers and of the plan that they follow.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// The pass's label, as in the timing table.
     pub pass: String,
-    /// Operations of all threads, on floats, integers and comparisons; a multiply-add counts 2, a transcendental or
-    /// division 4.
+    /// Operations of all threads, on floats, integers and comparisons; a multiply-add counts 2, a
+    /// transcendental or division 4.
     pub flops: f64,
-    /// Operations that threads let pass while they wait for the slowest of their 32. They take a card's time, too.
+    /// Operations that threads let pass while they wait for the slowest of their 32. They take a
+    /// card's time, too.
     #[serde(default)]
     pub waited: f64,
-    /// Bytes that move between memory and the chip: what shaders ask of each binding, but of none more than it has.
+    /// Bytes that move between memory and the chip: what shaders ask of each binding, but of none
+    /// more than it has.
     pub bytes: f64,
-    /// Rays into the scene's triangles, those that only ask whether something stands between included.
+    /// Rays into the scene's triangles, those that only ask whether something stands between
+    /// included.
     #[serde(default)]
     pub rays: f64,
 }

@@ -294,8 +294,8 @@ impl<'a> Trial<'a> {
         Ok(bench::measure_cuts(self.gpu, &mut renderer, &self.uploaded, camera, options)?)
     }
 
-    /// What the passes that find and add indirect light do in a frame of a still camera, settled over
-    /// [`Method::SETTLED`] frames where the method does.
+    /// What the passes that find and add indirect light do in a frame of a still camera, settled
+    /// over [`Method::SETTLED`] frames where the method does.
     ///
     /// # Errors
     /// [`TrialError::Count`].

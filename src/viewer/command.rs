@@ -5,7 +5,8 @@ use super::state::State;
 use crate::render::Backdrop;
 use crate::scene::{units::Up, upload::TextureMemory};
 
-/// The line for the left side of the view. `output` is the file it writes, `view.png` if nobody says.
+/// The line for the left side of the view. `output` is the file it writes, `view.png` if nobody
+/// says.
 pub fn line(state: &State, output: Option<&str>) -> String {
     let words = words(state, output.unwrap_or("view.png"));
     let quoted: Vec<String> = words.iter().map(|w| quote(w)).collect();

@@ -1,5 +1,5 @@
-//! Long work on threads of its own: loading, building, capturing. Each job tells how far it is and can be cancelled;
-//! what it has made comes back to the window as an event.
+//! Long work on threads of its own: loading, building, capturing. Each job tells how far it is and
+//! can be cancelled; what it has made comes back to the window as an event.
 
 use super::choice::Source;
 use super::command;
@@ -80,7 +80,8 @@ pub enum Kind {
     Capture,
 }
 
-/// What decides how a renderer has to be built: source, and how often weights, scene file and shaders were replaced.
+/// What decides how a renderer has to be built: source, and how often weights, scene file and
+/// shaders were replaced.
 pub type Key = (Source, u64);
 
 /// What a job has made.

@@ -1,4 +1,5 @@
-//! The path tracer beside the window: on a thread of its own, in short dispatches, telling what it has found so far.
+//! The path tracer beside the window: on a thread of its own, in short dispatches, telling what it
+//! has found so far.
 
 use super::jobs::Handles;
 use crate::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions};
@@ -7,7 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Most points that are traced live: 256 bytes for each in two buffers, read back for every picture.
+/// Most points that are traced live: 256 bytes for each in two buffers, read back for every
+/// picture.
 const MOST_POINTS: u64 = 1 << 19;
 /// Least time between two pictures.
 const PICTURES: Duration = Duration::from_millis(500);

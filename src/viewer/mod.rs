@@ -47,7 +47,8 @@ use thiserror::Error;
 /// Arguments of `bouncelight view`.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// A file, a bundled scene, `paper-room:INDEX` or `home:INDEX`; the bundled interior when absent.
+    /// A file, a bundled scene, `paper-room:INDEX` or `home:INDEX`; the bundled interior when
+    /// absent.
     pub scene: Option<String>,
     /// What scene files may name.
     pub load: crate::scene::LoadOptions,

@@ -39,7 +39,8 @@ impl Preset {
     }
 }
 
-/// The camera as hands move it: an eye that looks at a target, level, or one of the file's cameras as it is.
+/// The camera as hands move it: an eye that looks at a target, level, or one of the file's cameras
+/// as it is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Navigator {
     /// Where the eye is, metres.
@@ -132,7 +133,8 @@ impl Navigator {
         self.moved();
     }
 
-    /// Eye and target slide so that what lies at the target follows the pointer over a window of `height` points.
+    /// Eye and target slide so that what lies at the target follows the pointer over a window of
+    /// `height` points.
     pub fn pan(&mut self, dx: f32, dy: f32, height: f32) {
         let metres = 2.0 * (0.5 * self.fov.to_radians()).tan() * self.back().length() / height.max(1.0);
         let [right, up, _] = self.axes();
@@ -148,8 +150,8 @@ impl Navigator {
         self.moved();
     }
 
-    /// Changes between a lens of 2°, for which parallels are nearly parallel, and the usual one; what is at the target
-    /// keeps its size.
+    /// Changes between a lens of 2°, for which parallels are nearly parallel, and the usual one;
+    /// what is at the target keeps its size.
     pub fn long_lens(&mut self) {
         let half = |degrees: f32| (0.5 * degrees.to_radians()).tan();
         let to = if self.is_long() { 45.0 } else { LONG };
@@ -180,7 +182,8 @@ impl Navigator {
         self.moved();
     }
 
-    /// All of the scene in view, from where one looks now; in a room, as much of it as one sees from inside.
+    /// All of the scene in view, from where one looks now; in a room, as much of it as one sees
+    /// from inside.
     pub fn fit(&mut self, scene: &Scene, aspect: f32) {
         let back = self.back();
         self.frame(scene, aspect, |room| if room { level(back) } else { back.normalize_or(Vec3::Z) });
@@ -279,7 +282,8 @@ mod tests {
     fn a_pan_moves_the_target_with_the_pointer() {
         let mut n = Navigator::default();
         n.pan(0.0, 100.0, 200.0);
-        // Half the window's height is tan(22.5°)·3 metres; dragging down brings down what was above.
+        // Half the window's height is tan(22.5°)·3 metres; dragging down brings down what was
+        // above.
         assert!((n.target.y - 3.0 * 22.5f32.to_radians().tan()).abs() < 1e-4, "{}", n.target.y);
     }
 

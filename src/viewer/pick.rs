@@ -1,4 +1,5 @@
-//! Which object lies under the pointer: every triangle is tried, which takes milliseconds for a click.
+//! Which object lies under the pointer: every triangle is tried, which takes milliseconds for a
+//! click.
 
 use crate::render::View;
 use crate::scene::{Scene, bounds::instance_bounds};
@@ -88,7 +89,8 @@ mod tests {
         let (object, distance) = pick(&scene, origin, direction).unwrap();
         assert_eq!(object, 1);
         assert!((distance - 2.0).abs() < 1e-4);
-        // Above the tip of the nearer one and below that of none: the corner of the picture hits nothing.
+        // Above the tip of the nearer one and below that of none: the corner of the picture hits
+        // nothing.
         let (origin, direction) = ray(&view, [1.0, 1.0]);
         assert_eq!(pick(&scene, origin, direction), None);
     }

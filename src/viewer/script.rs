@@ -137,8 +137,9 @@ impl Script {
         Ok(Self { steps, pending, since: now, frames: 0, pointer, saved, next: now, drawn: 0 })
     }
 
-    /// Whether the next step may be made, `drawn` frames after the beginning: one frame after the other, also where
-    /// held keys let the window draw without end. `quiet`: nothing waits to be drawn.
+    /// Whether the next step may be made, `drawn` frames after the beginning: one frame after the
+    /// other, also where held keys let the window draw without end. `quiet`: nothing waits to be
+    /// drawn.
     pub fn is_due(&mut self, now: Instant, drawn: u64, quiet: bool) -> bool {
         let due = now >= self.next && (quiet || drawn > self.drawn);
         if due {

@@ -1,4 +1,5 @@
-//! The viewer's two passes: `sum` averages frames of a view that stands still, `show` draws what the window shows.
+//! The viewer's two passes: `sum` averages frames of a view that stands still, `show` draws what
+//! the window shows.
 
 use super::choice::View;
 use crate::gpu::timing::Recorder;
@@ -85,7 +86,8 @@ impl ShowPass {
         SideView { radiance: self.blank.clone(), indirect: self.blank.clone(), scale: 1.0, texel: 1 << 16 }
     }
 
-    /// Clears `target` to `clear` and draws the picture into its place; nothing but the colour without `inputs`.
+    /// Clears `target` to `clear` and draws the picture into its place; nothing but the colour
+    /// without `inputs`.
     pub fn record(
         &mut self,
         recorder: &mut Recorder<'_>,

@@ -22,7 +22,8 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Whether any of `files` has changed since the last look; a file seen for the first time has not.
+    /// Whether any of `files` has changed since the last look; a file seen for the first time has
+    /// not.
     fn changed(&mut self, files: &[PathBuf]) -> bool {
         let mut any = false;
         for file in files {
@@ -38,7 +39,8 @@ impl Watch {
         any
     }
 
-    /// What has changed of a scene with what it refers to, of weights, and of the shaders under `shaders`.
+    /// What has changed of a scene with what it refers to, of weights, and of the shaders under
+    /// `shaders`.
     pub fn look(&mut self, spec: Option<&str>, weights: Option<&Path>, shaders: Option<&Path>) -> Vec<Changed> {
         let mut changed = Vec::new();
         if let Some(spec) = spec.filter(|s| Path::new(s).is_file())

@@ -8,8 +8,9 @@ use crate::scene::upload::{SceneGpu, position_layouts};
 /// What a device needs to draw lines where it would fill triangles.
 pub const NEEDS: wgpu::Features = wgpu::Features::POLYGON_MODE_LINE;
 
-/// By how much an edge is nearer than the surface that it belongs to: this many steps of a float's depth, and as many
-/// times what depth changes by from pixel to pixel, since a line's pixels lie beside those of the surface.
+/// By how much an edge is nearer than the surface that it belongs to: this many steps of a float's
+/// depth, and as many times what depth changes by from pixel to pixel, since a line's pixels lie
+/// beside those of the surface.
 const NEARER: (i32, f32) = (64, 1.5);
 
 /// Draws edges against the depth of the last frame.

@@ -1,4 +1,5 @@
-//! Trees of meshes under a tree of instances: rays must meet what they meet where all triangles stand in one list.
+//! Trees of meshes under a tree of instances: rays must meet what they meet where all triangles
+//! stand in one list.
 
 use crate::oracle::*;
 use bouncelight::accel::{Accel, RayCaster, SceneBlocks, SceneRays};
@@ -77,9 +78,9 @@ fn instances_are_met_where_they_stand_and_where_they_go() {
     assert!(different(&gpu, &caster, &rays, &moved) < 1e-3);
 }
 
-/// How many of 2,000 rays meet something else by the walk on the CPU than in the one list of all triangles,
-/// instances and numbers of triangles included; and the blocks that a ray reads. Any hit reads no more than the
-/// nearest one does.
+/// How many of 2,000 rays meet something else by the walk on the CPU than in the one list of all
+/// triangles, instances and numbers of triangles included; and the blocks that a ray reads. Any hit
+/// reads no more than the nearest one does.
 fn walked_wrongly(blocks: &SceneBlocks, scene: &Scene, world: &[Triangle]) -> (usize, f64) {
     let accel = Accel::build(world).unwrap();
     let sent = random_rays(2000, 1.5, 3);

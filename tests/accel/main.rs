@@ -1,4 +1,5 @@
-//! The path tracer's rays hit what they must: against brute force, against leaks, at odd places and scales.
+//! The path tracer's rays hit what they must: against brute force, against leaks, at odd places and
+//! scales.
 #![cfg(feature = "reference")]
 
 #[path = "../common/mod.rs"]
@@ -55,7 +56,8 @@ fn scale_and_place_do_not_matter() {
     }
 }
 
-/// A grid of axis-parallel quads: flat boxes, rays along axes, in planes and along borders of boxes.
+/// A grid of axis-parallel quads: flat boxes, rays along axes, in planes and along borders of
+/// boxes.
 #[test]
 fn rays_along_axes_and_from_surfaces() {
     let mut triangles: Vec<Triangle> = Vec::new();
@@ -162,7 +164,8 @@ fn any_hit_agrees_with_the_nearest() {
     assert!(blocked > 200 && blocked < 4800, "{blocked} of 5000 blocked");
 }
 
-/// Barycentric weights give the point that the distance gives, for single triangles and for those that share a leaf.
+/// Barycentric weights give the point that the distance gives, for single triangles and for those
+/// that share a leaf.
 #[test]
 fn weights_and_distance_name_the_same_point() {
     let bench = Bench::new();
@@ -235,7 +238,8 @@ fn bad_triangles_are_left_out_and_counted() {
     let rays = random_rays(500, 1.0, 2);
     triangles[3..8].fill([[9.0; 3]; 3]);
     assert_eq!(disagreements(&triangles, &rays, &on_cpu(&accel, &rays), 1.0), 0);
-    // Needles, which are nearly degenerate, neither break the tree nor give anything but finite hits.
+    // Needles, which are nearly degenerate, neither break the tree nor give anything but finite
+    // hits.
     let needles: Vec<Triangle> =
         (0..200).map(|i| [[0.0; 3], [1.0, i as f32 * 1e-7, 0.0], [1.0, i as f32 * 1e-7, 1e-7]]).collect();
     let accel = Accel::build(&needles).unwrap();
@@ -269,7 +273,8 @@ fn too_many_triangles_are_refused_with_the_number() {
     assert!(Accel::check_count(MAX_TRIANGLES).is_ok());
 }
 
-/// Triangles nested in one another by powers of two, and a thousand in one place: the tree stays within the stack.
+/// Triangles nested in one another by powers of two, and a thousand in one place: the tree stays
+/// within the stack.
 #[test]
 fn the_tree_is_never_deeper_than_the_stack() {
     let nested: Vec<Triangle> = (-38..38)

@@ -109,7 +109,8 @@ pub fn center(p: &Picture, n: usize) -> f32 {
     sum / (n * n) as f32
 }
 
-/// Writes `p` as PNG into the folder that `BOUNCELIGHT_PICTURES` names, for looking at; nothing without it.
+/// Writes `p` as PNG into the folder that `BOUNCELIGHT_PICTURES` names, for looking at; nothing
+/// without it.
 pub fn show(name: &str, p: &Picture, scale: f32) {
     let Some(folder) = std::env::var_os("BOUNCELIGHT_PICTURES") else { return };
     let encode = |v: f32| {

@@ -10,7 +10,8 @@ pub fn bouncelight(args: &[&str]) -> Output {
     command.args(args).output().expect("the program starts")
 }
 
-/// Runs and checks the exit code and that standard error holds every one of `words`; never a panic message.
+/// Runs and checks the exit code and that standard error holds every one of `words`; never a panic
+/// message.
 #[track_caller]
 pub fn fails(args: &[&str], code: i32, words: &[&str]) {
     let out = bouncelight(args);

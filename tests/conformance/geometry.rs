@@ -193,7 +193,8 @@ fn nodes() -> Vec<Feature> {
 
 fn packed() -> Vec<Feature> {
     let waved = Shape::card(12).moved(wave);
-    // The thing's positions and normals, packed; the unpacked ones are a fallback buffer without bytes.
+    // The thing's positions and normals, packed; the unpacked ones are a fallback buffer without
+    // bytes.
     let mut meshopt = of(&waved);
     for name in ["POSITION", "NORMAL"] {
         let at = attribute(&meshopt, name);

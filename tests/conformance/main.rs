@@ -1,8 +1,8 @@
-//! One feature of glTF a fixture, made here: what the rasteriser draws beside what the path tracer draws. Where
-//! the same picture can be said without the feature (coordinates moved by hand, a dense accessor, vertex
-//! normals in the place of a map), the path tracer draws that file, so that a feature that both read wrongly
-//! shows. The control is the file without the feature, or with another value of it: it must be farther off than
-//! any bound allows.
+//! One feature of glTF a fixture, made here: what the rasteriser draws beside what the path tracer
+//! draws. Where the same picture can be said without the feature (coordinates moved by hand, a
+//! dense accessor, vertex normals in the place of a map), the path tracer draws that file, so that
+//! a feature that both read wrongly shows. The control is the file without the feature, or with
+//! another value of it: it must be farther off than any bound allows.
 //!
 //! `cargo xtask conformance` draws them larger and writes `docs/conformance.md`.
 #![cfg(feature = "reference")]

@@ -39,7 +39,8 @@ pub fn features() -> Vec<Feature> {
     let mut linear = copy(&turned(0.0));
     let turns = [turn([0.0, 0.0, 1.0], 0.0), turn([0.0, 0.0, 1.0], 2.4)].concat();
     animate(&mut linear, node("rotation"), "VEC4", "LINEAR", &[0.0, 1.0], &turns);
-    // In-tangent, value, out-tangent of each key; half-way the Hermite spline is the mean plus an eighth of (out - in).
+    // In-tangent, value, out-tangent of each key; half-way the Hermite spline is the mean plus an
+    // eighth of (out - in).
     let spline = [0.0, 0.0, 0.0, -0.6, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, -2.0, 0.0, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0];
     let mut cubic = of(&Shape::ball());
     animate(&mut cubic, node("translation"), "VEC3", "CUBICSPLINE", &[0.0, 1.0], &spline);
@@ -49,8 +50,8 @@ pub fn features() -> Vec<Feature> {
         "extensions": {"KHR_animation_pointer": {"pointer": "/nodes/0/rotation"}}});
     animate(&mut pointer, target, "VEC4", "LINEAR", &[0.0, 1.0], &turns);
 
-    // One target moves the upper corners, the other the left ones; 0.5 of the first by the mesh, 1 of the
-    // second by time.
+    // One target moves the upper corners, the other the left ones; 0.5 of the first by the mesh, 1
+    // of the second by time.
     let card = Shape::card(1);
     let mut morph = of(&card);
     let upper = morph.floats("VEC3", &[0.4, -0.6, 0.8, 0.4, -0.6, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);

@@ -16,12 +16,14 @@ pub enum Coded {
     TwoSets,
 }
 
-/// Height at which a vertex belongs to both joints, and how much of it to the second: exact in bytes and words.
+/// Height at which a vertex belongs to both joints, and how much of it to the second: exact in
+/// bytes and words.
 pub const SHARED: [f32; 3] = [0.4, 0.2, 0.8];
 
-/// A strip in the plane z = 0, from y = 0 to 2 and 0.2 wide, in `rows` rows of quads, under a node that is
-/// moved aside. Of its two joints one is at its foot and one in the middle, y = 1: what is above belongs to it,
-/// what is at the middle to both, by 0.2 and 0.8. Nodes: 0 the mesh's, 1 and 2 the joints.
+/// A strip in the plane z = 0, from y = 0 to 2 and 0.2 wide, in `rows` rows of quads, under a node
+/// that is moved aside. Of its two joints one is at its foot and one in the middle, y = 1: what is
+/// above belongs to it, what is at the middle to both, by 0.2 and 0.8. Nodes: 0 the mesh's, 1 and 2
+/// the joints.
 pub fn strip(rows: usize, coded: Coded) -> Glb {
     let mut glb = Glb::new();
     let heights: Vec<f32> = (0..=rows).map(|r| 2.0 * r as f32 / rows as f32).collect();
@@ -47,7 +49,8 @@ pub fn strip(rows: usize, coded: Coded) -> Glb {
     glb
 }
 
-/// Gives mesh 0 a skin of joints at y = 0 and y = 1 on a node moved aside, each vertex by `weights` to the second.
+/// Gives mesh 0 a skin of joints at y = 0 and y = 1 on a node moved aside, each vertex by `weights`
+/// to the second.
 pub fn skin(glb: &mut Glb, coded: Coded, weights: &[f32]) {
     let count = weights.len();
     let pairs = weights.iter().map(|w| [1.0 - w, *w]);
@@ -129,8 +132,9 @@ pub fn also(glb: &mut Glb, target: Value, kind: &str, times: &[f32], values: &[f
     push(&mut animation["channels"], json!({"sampler": sampler, "target": target}));
 }
 
-/// A box without a lid, open to the sky, and a lid on a hinge: closed in its bind pose, at 1 s of its animation
-/// it stands open. Inside it is grey and 2 m wide, 1 m high; the hinge is the joint's axis along z at x = −1, y
+/// A box without a lid, open to the sky, and a lid on a hinge: closed in its bind pose, at 1 s of
+/// its animation it stands open. Inside it is grey and 2 m wide, 1 m high; the hinge is the joint's
+/// axis along z at x = −1, y
 /// = 1.
 pub fn chest() -> Glb {
     let mut glb = Glb::new();

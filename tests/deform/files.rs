@@ -19,7 +19,8 @@ fn world(scene: &Scene, mesh: usize) -> Vec<(Vec3, Vec3)> {
     mesh.positions.iter().zip(&mesh.normals).map(|(p, n)| (m.transform_point3((*p).into()), normal(n))).collect()
 }
 
-/// Where the strip's vertices are when its knee is turned by `q`: the second joint turns about (0, 1, 0).
+/// Where the strip's vertices are when its knee is turned by `q`: the second joint turns about (0,
+/// 1, 0).
 fn bent(rows: usize, q: Quat) -> Vec<(Vec3, Vec3)> {
     let about = |p: Vec3| q * (p - Vec3::Y) + Vec3::Y;
     let [_, first, second] = SHARED;
@@ -67,7 +68,8 @@ fn turned_faces_turn_their_normals() {
     bends(&mut glb, 0, 1.0);
     let mut scene = load(&glb);
     scene.pose(0, 1.0);
-    // The blended matrix of a turn about x by the share w: rows (0, 1 − w + w cos, −w sin), (0, w sin, 1 − w + w cos).
+    // The blended matrix of a turn about x by the share w: rows (0, 1 − w + w cos, −w sin), (0, w
+    // sin, 1 − w + w cos).
     let (c, s) = (0.2 + 0.8 * 1f32.cos(), 0.8 * 1f32.sin());
     let expected = [Vec3::Z, Vec3::new(0.0, -s, c).normalize(), Vec3::new(0.0, -1f32.sin(), 1f32.cos())];
     for (row, expected) in expected.into_iter().enumerate() {
@@ -76,7 +78,8 @@ fn turned_faces_turn_their_normals() {
     }
 }
 
-/// A file without animations is drawn as its nodes stand, not as it was bound; what cannot move is an ordinary mesh.
+/// A file without animations is drawn as its nodes stand, not as it was bound; what cannot move is
+/// an ordinary mesh.
 #[test]
 fn a_skin_at_rest_follows_its_nodes() {
     let mut glb = strip(4, Coded::Floats);
@@ -92,13 +95,15 @@ fn a_skin_at_rest_follows_its_nodes() {
     scene.pose(0, 1.0);
     let expected = bent(4, Quat::from_array(turn(2, 1.2)));
     assert!(world(&scene, 0).iter().zip(&expected).all(|(a, b)| a.0.distance(b.0) < 1e-5));
-    // Without inverse bind matrices they are the identity: the knee's vertices turn about the origin and rise by one.
+    // Without inverse bind matrices they are the identity: the knee's vertices turn about the
+    // origin and rise by one.
     let mut glb = strip(4, Coded::Floats);
     glb.json["skins"][0].as_object_mut().expect("a skin").remove("inverseBindMatrices");
     assert!((world(&load(&glb), 0).last().expect("a vertex").0 - Vec3::new(0.1, 3.0, 0.0)).length() < 1e-5);
 }
 
-/// One mesh under two nodes with other skins stands in two poses, and in a third where a node has none.
+/// One mesh under two nodes with other skins stands in two poses, and in a third where a node has
+/// none.
 #[test]
 fn nodes_that_share_a_mesh_deform_it_apart() {
     let mut glb = strip(4, Coded::Floats);
@@ -414,7 +419,8 @@ fn broken_skins_and_targets_are_told_and_left_out() {
     for (name, change, place, word) in cases {
         told(name, &morphed, change, place, word);
     }
-    // A skin that does not exist is a dangling reference, and a circle of nodes no tree: errors as ever.
+    // A skin that does not exist is a dangling reference, and a circle of nodes no tree: errors as
+    // ever.
     let mut glb = skinned();
     glb.json["nodes"][0]["skin"] = json!(7);
     assert!(glb.load().expect_err("no such skin").to_string().contains("nodes[0].skin"));

@@ -87,7 +87,8 @@ fn the_path_tracer_sees_the_pose() {
     assert!(open > 0.1 && shut < 1e-6);
 }
 
-/// A picture of a pose is the same whether vertices were moved by the CPU when the file was read or by the GPU.
+/// A picture of a pose is the same whether vertices were moved by the CPU when the file was read or
+/// by the GPU.
 #[test]
 fn pictures_of_a_pose_are_one_picture() {
     let Some(gpu) = common::gpu() else { return };
@@ -133,7 +134,8 @@ fn the_program_draws_poses_and_sequences() {
     let Some(_) = common::gpu() else { return };
     let run = |more: &[&str]| {
         let fixed = ["render", &file, "--size", "48x48", "--method", "direct", "--samples", "1", "--quiet"];
-        // A sequence keeps the view and the exposure that its first frame asks for, a still has those of its moment.
+        // A sequence keeps the view and the exposure that its first frame asks for, a still has
+        // those of its moment.
         let view = ["--eye", "0.5,1,4", "--look-at", "0,1,0", "--fov", "40", "--exposure", "0"];
         let done = bouncelight(&[&fixed, view.as_slice(), more].concat());
         assert!(done.status.success(), "{more:?}: {}", String::from_utf8_lossy(&done.stderr));

@@ -1,4 +1,5 @@
-//! What the GPU makes of a pose: vertices as the CPU has them, and motion vectors that say where they were.
+//! What the GPU makes of a pose: vertices as the CPU has them, and motion vectors that say where
+//! they were.
 
 use crate::build::{direct_only, look_at};
 use crate::common;
@@ -58,8 +59,9 @@ fn triangles(scene: &Scene, time: f32) -> Vec<[Vec3; 3]> {
     scene.instances.iter().flat_map(of).collect()
 }
 
-/// Largest error of motion (pixels) if the frame shows the scene at `now` and the one before it showed `before`: each
-/// pixel's place on its triangle is followed back. Pixels at rims are left out. And the largest motion that is right.
+/// Largest error of motion (pixels) if the frame shows the scene at `now` and the one before it
+/// showed `before`: each pixel's place on its triangle is followed back. Pixels at rims are left
+/// out. And the largest motion that is right.
 fn error(scene: &Scene, view: &View, motion: &[[f32; 2]], now: f32, before: f32) -> (f32, f32) {
     let (here, there) = (triangles(scene, now), triangles(scene, before));
     let matrix = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m);
@@ -85,7 +87,8 @@ fn error(scene: &Scene, view: &View, motion: &[[f32; 2]], now: f32, before: f32)
         let mut hits: Vec<_> = here.iter().enumerate().filter_map(|(k, t)| Some((k, meet(t)?))).collect();
         hits.sort_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let Some(&(k, (t, u, v))) = hits.first() else { continue };
-        // At rims something else may be drawn, and where the strip is folded into itself either side.
+        // At rims something else may be drawn, and where the strip is folded into itself either
+        // side.
         if u.min(v).min(1.0 - u - v) < 0.02 || hits.get(1).is_some_and(|next| next.1.0 - t < 1e-3) {
             continue;
         }

@@ -8,8 +8,8 @@ use bouncelight::scene::Scene;
 use serde_json::json;
 use std::time::Instant;
 
-/// A tube of `around` × `along` quads about the y axis from 0 to 2, bound to both joints smoothly; no normals
-/// are given, so no triangle shares a vertex with another.
+/// A tube of `around` × `along` quads about the y axis from 0 to 2, bound to both joints smoothly;
+/// no normals are given, so no triangle shares a vertex with another.
 fn tube(around: usize, along: usize) -> Glb {
     let mut glb = Glb::new();
     let at = |i: usize, k: usize| {
@@ -135,7 +135,8 @@ fn what_is_closed_at_rest_opens() {
     assert!(apart(&found, &hits(&anew(&scene, 0.0), &all)) > 50, "the triangle is met");
 }
 
-/// The same on the GPU, whose texture is written in place among the trees of other meshes; and what it takes.
+/// The same on the GPU, whose texture is written in place among the trees of other meshes; and what
+/// it takes.
 #[test]
 fn the_device_has_the_refitted_tree() {
     let Some(gpu) = common::gpu() else { return };

@@ -85,7 +85,8 @@ fn what_is_too_much_for_rays_is_drawn_by_the_method_below() {
     assert!(mean(&go_on(&gpu, &mut renderer, &scene, &room.cameras[0], 1)) > 0.0);
     assert_eq!(renderer.drawn_by(), "ssgi");
 
-    // A device whose bindings are too few, and two on which they are too small: for the picture, for the scene.
+    // A device whose bindings are too few, and two on which they are too small: for the picture,
+    // for the scene.
     let frame = |gpu: &Gpu, size: [u32; 2], scene: &SceneGpu| {
         let method = Method::Gather(Options { slots: 1024, ..Default::default() });
         let options = RendererOptions { method, ..Default::default() };

@@ -1,4 +1,5 @@
-//! Cells and their way back to full resolution: constants come back, light stays on its surface, directions count.
+//! Cells and their way back to full resolution: constants come back, light stays on its surface,
+//! directions count.
 
 use crate::common;
 use crate::edges::{FLOOR, LIGHT, PLATE, POLE, SIZE, WALL, bleeding, room};
@@ -146,9 +147,9 @@ fn a_cell_that_shows_a_surface_has_a_pixel_on_one_and_every_second_on_the_one_in
             continue;
         };
         assert!(inside(pixel) && surfaces[pixel] != usize::MAX);
-        // Before the wall alone the pole or the plate has every second cell; of three surfaces either front one
-        // may, and the floor may lie nearer than a foot that stands on it. The other cells have what their
-        // middle shows.
+        // Before the wall alone the pole or the plate has every second cell; of three surfaces
+        // either front one may, and the floor may lie nearer than a foot that stands on it. The
+        // other cells have what their middle shows.
         let middle = (cy * n + n / 2) * width + cx * n + n / 2;
         let front_first = (cx ^ cy) & 1 == 0;
         let kinds: std::collections::BTreeSet<_> = shown.iter().copied().collect();

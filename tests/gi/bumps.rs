@@ -7,8 +7,8 @@ use bouncelight::gi::gather::Options;
 use bouncelight::scene::{ColorSpace, Environment, Image, Sampler, TextureRef};
 use glam::Vec3;
 
-/// A black board under an even sky, its texels' normals tilted by 15° in one of four ways each: every pixel
-/// sees (1 + cos 15°)/2 of the sky, since the board hides the rest.
+/// A black board under an even sky, its texels' normals tilted by 15° in one of four ways each:
+/// every pixel sees (1 + cos 15°)/2 of the sky, since the board hides the rest.
 #[test]
 fn tilted_pixels_get_what_their_half_space_sends() {
     let Some(gpu) = common::gpu() else { return };

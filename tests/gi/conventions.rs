@@ -110,7 +110,8 @@ fn cameras_that_look_down_plus_z() {
         println!("normals {encoding:?} {range:?} down +Z: {:.3} %", 100.0 * off);
         assert!(off < 0.03, "{encoding:?}: {off}");
     }
-    // Negative controls: normals whose z is taken for the other side, and matrices that look the other way.
+    // Negative controls: normals whose z is taken for the other side, and matrices that look the
+    // other way.
     let view = Conventions { normal_encoding: E::Xyz, normal_space: NormalSpace::View, ..own };
     let how = Written { conventions: view, normal: F::Rgba16Float, ..Default::default() };
     let shot = shot(0, [0.0; 2]);

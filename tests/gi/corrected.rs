@@ -27,7 +27,8 @@ fn an_untrained_network_is_gather() {
     println!("untrained {:.4} % from the guess, with a gain of 0.05 {:.2} %", 100.0 * none, 100.0 * five);
     // Half floats.
     assert!(none < 1e-3 && five > 0.03, "{none} {five}");
-    // A gain of ln 1.25 in red is a quarter more red and nothing else; of 9 it is what the limit says.
+    // A gain of ln 1.25 in red is a quarter more red and nothing else; of 9 it is what the limit
+    // says.
     for (gain, factor) in [(1.25f32.ln(), 1.25), (9.0, MOST_GAIN.exp())] {
         let red = corrected(&gpu, [gain, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0);
         let times = |i: usize| if i.is_multiple_of(3) { factor } else { 1.0 };

@@ -1,5 +1,5 @@
-//! Networks that guide the filter of `gather`: by networks that answer the same everywhere, or what chance
-//! makes of a cell.
+//! Networks that guide the filter of `gather`: by networks that answer the same everywhere, or what
+//! chance makes of a cell.
 
 use crate::common;
 use crate::weights::{constant_filter, linear_bytes, random_filter};

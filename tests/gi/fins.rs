@@ -1,4 +1,5 @@
-//! Places of one cell of the table beyond its entries: rays that meet them go on, and no light is lost.
+//! Places of one cell of the table beyond its entries: rays that meet them go on, and no light is
+//! lost.
 
 use crate::common;
 use crate::gather::lit;
@@ -8,8 +9,9 @@ use bouncelight::gi::gather::Options;
 use bouncelight::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions};
 use bouncelight::scene::{Camera, Scene};
 
-/// A floor before a wall full of sunlit shelves. A tenth of a metre apart they are places that do not see each
-/// other, of which each cell of the table, half a metre and wider at this distance, has more than it has entries.
+/// A floor before a wall full of sunlit shelves. A tenth of a metre apart they are places that do
+/// not see each other, of which each cell of the table, half a metre and wider at this distance,
+/// has more than it has entries.
 fn shelves(pitch: f32) -> Scene {
     let mut blocks = vec![([-2.0, -0.1, -2.0], [2.0, 0.0, 2.0], GREY), ([-2.0, 0.0, -2.1], [2.0, 2.0, -2.0], [0.8; 3])];
     for i in 1..(2.0 / pitch) as i32 {
@@ -45,8 +47,9 @@ fn light_from_places_that_no_entry_knows_is_not_lost() {
     let [many, one] = [0.1, 1.0].map(|pitch| light(&shelves(pitch)));
     println!("rays, paths: {many:?} from many shelves, {one:?} from one");
     let share = |[rays, paths]: [f64; 2]| rays / paths;
-    // A ray that stops at the first such place finds 66 % of it, one of four segments 93 %, of sixteen 98 %. What
-    // those lack is at shelves as thin as the lift of the lines that entries are asked by.
+    // A ray that stops at the first such place finds 66 % of it, one of four segments 93 %, of
+    // sixteen 98 %. What those lack is at shelves as thin as the lift of the lines that entries are
+    // asked by.
     assert!((share(many) - 1.0).abs() < 0.08 && (share(one) - 1.0).abs() < 0.02, "{many:?}, {one:?}");
     // Negative control: the shelves take light away.
     assert!(share([one[0], many[1]]) > 1.5);

@@ -51,8 +51,8 @@ pub fn world(gpu: &Gpu) -> World {
     made(gpu, 1.0)
 }
 
-/// As a host has it whose world is left-handed: z the other way, corners in the other order, so that
-/// (b − a) × (c − a) points outwards again.
+/// As a host has it whose world is left-handed: z the other way, corners in the other order, so
+/// that (b − a) × (c − a) points outwards again.
 pub fn mirrored_world(gpu: &Gpu) -> World {
     made(gpu, -1.0)
 }

@@ -110,8 +110,8 @@ fn share_of_wall(p: [f32; 3], eye: [f32; 3], roughness: f32) -> f64 {
     on / all
 }
 
-/// What was not seen before has four rays a cell, what was has one: its light is half as far from the settled
-/// one, or less.
+/// What was not seen before has four rays a cell, what was has one: its light is half as far from
+/// the settled one, or less.
 #[test]
 fn what_is_new_in_the_picture_has_more_rays() {
     let Some(gpu) = common::gpu() else { return };
@@ -138,7 +138,8 @@ fn what_is_new_in_the_picture_has_more_rays() {
     let (first, later) = (off(&look(0.0), 1, 0..96), off(&look(0.0), 3, 0..96));
     println!("a frame's light is {:.1} % off where it is the first, {:.1} % later", 100.0 * first, 100.0 * later);
     assert!(first < 0.5 * later && later > 0.2);
-    // After a turn by 20 degrees the same holds of what has come in from the side, and no more in the frame after.
+    // After a turn by 20 degrees the same holds of what has come in from the side, and no more in
+    // the frame after.
     let (new, old) = (off(&look(0.35), 1, 0..16), off(&look(0.35), 1, 0..16));
     println!("after a turn {:.1} % in what is new, {:.1} % a frame later", 100.0 * new, 100.0 * old);
     assert!(new < 0.5 * old);
@@ -179,7 +180,8 @@ fn lobes_show_what_is_off_the_screen() {
     }
 }
 
-/// In a closed room whose walls all glow and send back ρ of what they get, there is glow / (1 − ρ) everywhere.
+/// In a closed room whose walls all glow and send back ρ of what they get, there is glow / (1 − ρ)
+/// everywhere.
 #[test]
 fn a_glowing_room_is_the_series_of_its_albedo() {
     let Some(gpu) = common::gpu() else { return };
@@ -246,7 +248,8 @@ fn twice_the_light_is_twice_the_answer_and_none_is_none() {
     assert_eq!(once, light(&gpu, method(), [64, 48], &build(1.0), 6));
 }
 
-/// A lamp that is switched: nine tenths of the change within six frames, less than 2 % of the old light after thirty.
+/// A lamp that is switched: nine tenths of the change within six frames, less than 2 % of the old
+/// light after thirty.
 #[test]
 fn light_follows_a_switch() {
     let Some(gpu) = common::gpu() else { return };

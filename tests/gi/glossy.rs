@@ -1,4 +1,5 @@
-//! Reflections of bounced light under a given diffuse light: even light, a mirror, darkness, linearity.
+//! Reflections of bounced light under a given diffuse light: even light, a mirror, darkness,
+//! linearity.
 
 use crate::build::{floor, look_at, material, quad, scene};
 use crate::shot::{Write, texture_with};
@@ -21,7 +22,8 @@ fn give(gpu: &Gpu, recorder: &mut Recorder<'_>, source: &wgpu::Texture, target: 
     recorder.render("given", &[Some(attachment)], None, |pass| write.draw(pass));
 }
 
-/// `indirect_specular` and the colour of the lobe (GlossCol) of each pixel, when `light` gives the diffuse light.
+/// `indirect_specular` and the colour of the lobe (GlossCol) of each pixel, when `light` gives the
+/// diffuse light.
 fn shine(
     gpu: &Gpu,
     scene: &Scene,
@@ -71,7 +73,8 @@ fn even_light_gives_exactly_the_split_sum() {
         for metallic in [0.0, 1.0] {
             let wall = quad([-8.0, 0.0, -4.0], [16.0, 0.0, 0.0], [0.0, 3.0, 0.0]);
             let mut s = scene(vec![floor(8.0, 0.0), wall], vec![]);
-            // The wall sends on all that it receives; metal only as well as the split sum's fit has it.
+            // The wall sends on all that it receives; metal only as well as the split sum's fit has
+            // it.
             s.materials.push(s.materials[0].clone());
             s.meshes[1].material = 1;
             (s.materials[0].metallic, s.materials[0].roughness) = (metallic, roughness);
@@ -82,7 +85,8 @@ fn even_light_gives_exactly_the_split_sum() {
                 let pairs = specular.iter().flatten().zip(&share);
                 pairs.map(|(l, c)| (l - light * c).abs()).fold(0.0, f32::max)
             };
-            // Albedo and F0 have eight bits, and the share of a lobe and its diffuse rest add up to 1 only so far.
+            // Albedo and F0 have eight bits, and the share of a lobe and its diffuse rest add up to
+            // 1 only so far.
             assert!(off(0.5) < 0.02, "roughness {roughness}, metallic {metallic}: {}", off(0.5));
             assert!(off(0.55) > 0.03 || metallic == 0.0, "a tenth more is noticed");
         }
@@ -164,7 +168,8 @@ fn a_mirror_shows_what_stands_behind_it_at_the_right_place() {
     let glow = [2.0, 0.0, 0.5];
     let (s, camera) = mirror(0.05, glow);
     let (specular, share) = shine(&gpu, &s, &camera, SIZE, |_| [0.0; 3]);
-    // Where the picture of the mirrored square is: its corners below the floor, seen through the same camera.
+    // Where the picture of the mirrored square is: its corners below the floor, seen through the
+    // same camera.
     let view = View::new(&camera, SIZE, [0.0; 2]).matrices();
     let matrix =
         glam::Mat4::from_cols_array_2d(&view.clip_from_view) * glam::Mat4::from_cols_array_2d(&view.view_from_world);

@@ -45,7 +45,8 @@ fn layer(frame: &CapturedFrame, layer: Layer) -> &[f32] {
     &frame.layer(layer).expect("it was asked for").data
 }
 
-/// A wide sheet close above a floor, so that light samples and rays that happen to meet it share the work.
+/// A wide sheet close above a floor, so that light samples and rays that happen to meet it share
+/// the work.
 #[test]
 fn a_sheet_with_holes_sends_what_its_coverage_says() {
     let Some(gpu) = common::gpu() else { return };
@@ -188,7 +189,8 @@ fn triangles_that_cannot_be_are_not_there() {
             mesh.indices.extend([first, first + 1, first + 2]);
         }
     }
-    // The picture's part may clip what is far out in its own way, so both are drawn with the good one's.
+    // The picture's part may clip what is far out in its own way, so both are drawn with the good
+    // one's.
     let light = |rays_of: &Scene| {
         let mut scene = uploaded(&gpu, &good);
         scene.trace(&gpu.device, &gpu.queue, rays_of).expect("the rest fits");

@@ -9,8 +9,8 @@ use bouncelight::scene::{Camera, Scene};
 
 const SIZE: [u32; 2] = [96, 64];
 
-/// The share of cells that remember no more than this frame's rays after 30 frames at rest and one after
-/// instance `moved` went up by 40 m.
+/// The share of cells that remember no more than this frame's rays after 30 frames at rest and one
+/// after instance `moved` went up by 40 m.
 fn begun_anew(gpu: &Gpu, scene: &Scene, moved: Option<usize>) -> f64 {
     let mut renderer = world::renderer(gpu, SIZE, world::gather());
     let mut drawn = uploaded(gpu, scene);

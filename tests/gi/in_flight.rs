@@ -1,5 +1,5 @@
-//! What a host exchanges while frames are under way: the network of a view, the meshes of a world; and a world that is
-//! empty or would be too large.
+//! What a host exchanges while frames are under way: the network of a view, the meshes of a world;
+//! and a world that is empty or would be too large.
 
 use crate::common;
 use crate::foreign::{SIZE, Written, cube, draw, gather, shot, world, written};
@@ -38,8 +38,8 @@ fn weights_are_exchanged_in_flight() {
     let (old, new) = (|| random_filter(2.0), || constant_filter([0.5; 12]));
     let [old_alone, new_alone] = [(old(), 4), (new(), 1)].map(|(w, n)| alone(&gpu, w, &world, &inputs, n));
 
-    // Nothing is waited for: three frames submitted, the fourth and the other network's first recorded into one
-    // encoder, the old view dropped before that is submitted.
+    // Nothing is waited for: three frames submitted, the fourth and the other network's first
+    // recorded into one encoder, the old view dropped before that is submitted.
     let [last, first] = [(); 2].map(|()| output(&gpu.device, SIZE));
     let mut lit = made(&gpu, old());
     for _ in 0..3 {
@@ -61,7 +61,8 @@ fn weights_are_exchanged_in_flight() {
     assert!(mean(&old_alone) > 0.01 && apart > 0.005, "{apart}");
 }
 
-/// A frame that is recorded keeps the triangles that it was recorded with, whatever the world has by then.
+/// A frame that is recorded keeps the triangles that it was recorded with, whatever the world has
+/// by then.
 #[test]
 fn meshes_are_exchanged_between_recording_and_submission() {
     let Some(gpu) = common::gpu() else { return };
@@ -120,7 +121,8 @@ fn an_empty_world_shows_the_sky() {
     assert!(difference(&full, &empty) > 0.1);
 }
 
-/// Two to the 31 indices are refused by their number, before anything is copied: the pages are never touched.
+/// Two to the 31 indices are refused by their number, before anything is copied: the pages are
+/// never touched.
 #[test]
 fn more_indices_than_rays_can_have() {
     let indices = vec![0u16; 1 << 31];

@@ -33,7 +33,8 @@ fn lights(count: usize) -> Vec<LightKind> {
     all
 }
 
-/// Upper and lower half of the picture; with `whole` each light of the list is looked at wherever a ray ends.
+/// Upper and lower half of the picture; with `whole` each light of the list is looked at wherever a
+/// ray ends.
 fn means(gpu: &Gpu, scene: &Scene, whole: bool, frames: u32) -> [f64; 2] {
     // Small maps: direct light is not what is asked about.
     let shadow = ShadowOptions { sun_size: 64, cascades: 1, local_size: 64 };

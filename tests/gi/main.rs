@@ -1,4 +1,5 @@
-//! `gi/` against its CPU reference, against arithmetic and against the laws it promises, on hand-made G-buffers.
+//! `gi/` against its CPU reference, against arithmetic and against the laws it promises, on
+//! hand-made G-buffers.
 
 mod below;
 mod bring;

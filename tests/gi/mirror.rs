@@ -30,8 +30,8 @@ fn camera(turn: f32) -> Camera {
     look_at([0.0, 1.5, 3.0], [3.5 * turn.sin(), 0.0, 3.0 - 3.5 * turn.cos()], 0.6)
 }
 
-/// Light that pixels show by their lobes over the lobes' albedo: the last of several frames, in each of which
-/// the camera turns.
+/// Light that pixels show by their lobes over the lobes' albedo: the last of several frames, in
+/// each of which the camera turns.
 fn shown(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, frames: u32, turn: f32) -> Vec<f32> {
     let gpu_scene = uploaded(gpu, scene);
     for i in 0..frames {
@@ -49,7 +49,8 @@ fn shown(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, frames: u32, turn: f
     light.iter().zip(share.chunks_exact(3)).map(|(l, s)| l[0] / s[0].max(1e-6)).collect()
 }
 
-/// How far each pixel's mirrored place lies inside the glowing square (metres; negative outside), None off the floor.
+/// How far each pixel's mirrored place lies inside the glowing square (metres; negative outside),
+/// None off the floor.
 fn inside() -> Vec<Option<f32>> {
     let camera = camera(0.0);
     let m = View::new(&camera, SIZE, [0.0; 2]).matrices();
@@ -70,7 +71,8 @@ fn inside() -> Vec<Option<f32>> {
     (0..SIZE[0] * SIZE[1]).map(of).collect()
 }
 
-/// Share of the pixels, away from the square's rim by `margin` metres, that show what they mirror within a twentieth.
+/// Share of the pixels, away from the square's rim by `margin` metres, that show what they mirror
+/// within a twentieth.
 fn right(light: &[f32], margin: f32) -> f64 {
     let (mut right, mut all, mut bright) = (0, 0, 0);
     for (l, inside) in light.iter().zip(inside()) {

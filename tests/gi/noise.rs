@@ -1,4 +1,5 @@
-//! What few rays have found, as averages over cells show it: no blotches, no pattern, and contacts kept.
+//! What few rays have found, as averages over cells show it: no blotches, no pattern, and contacts
+//! kept.
 
 use crate::build::{floor, look_at, material, point, quad, scene};
 use crate::gather::lit;
@@ -22,8 +23,8 @@ fn of_cells(data: &[f32]) -> Vec<f64> {
     (0..CELLS[0] * CELLS[1]).map(at).collect()
 }
 
-/// A black floor below a small white square that a lamp next to it lights: few rays meet the square, and what they
-/// find is some thousand times what the floor has.
+/// A black floor below a small white square that a lamp next to it lights: few rays meet the
+/// square, and what they find is some thousand times what the floor has.
 fn lamp_at_a_shade() -> Scene {
     let shade = quad([-0.05, 2.0, -0.05], [0.1, 0.0, 0.0], [0.0, 0.0, 0.1]);
     let mut s = scene(vec![floor(6.0, 0.0), shade], vec![point([0.0, 1.9, 0.0], 10.0, 0.0)]);
@@ -52,7 +53,8 @@ fn what_one_bright_ray_brings_is_no_blotch_and_is_not_lost() {
     assert!(brightest(&rays) > 20.0, "{}", brightest(&rays));
 }
 
-/// How much cells differ from those beside them, root mean square over the mean, away from the picture's border.
+/// How much cells differ from those beside them, root mean square over the mean, away from the
+/// picture's border.
 fn roughness_of(cells: &[f64]) -> f64 {
     let (mut squares, mut sum, mut count) = (0.0, 0.0, 0.0);
     for y in 3..CELLS[1] - 3 {
@@ -84,8 +86,8 @@ fn rough_metal(gpu: &Gpu, frames: u32) -> Vec<f64> {
     of_cells(&frame.layer(Layer::GlossInd).expect("asked for").data)
 }
 
-/// Of each 2×2 cells one in turn sends a ray into its lobe; which one it was is not to be seen. (Each cell with the
-/// noise of its own turn: 0.55.)
+/// Of each 2×2 cells one in turn sends a ray into its lobe; which one it was is not to be seen.
+/// (Each cell with the noise of its own turn: 0.55.)
 #[test]
 fn turns_of_cells_leave_no_pattern_in_rough_lobes() {
     let Some(gpu) = common::gpu() else { return };
@@ -98,7 +100,8 @@ fn turns_of_cells_leave_no_pattern_in_rough_lobes() {
     assert!(roughness_of(&striped) > 0.07);
 }
 
-/// A floor whose shading normals lean by 40°, as those of coarse meshes and bumps do, under an even sky.
+/// A floor whose shading normals lean by 40°, as those of coarse meshes and bumps do, under an even
+/// sky.
 fn leaning_floor(lean: f32) -> Scene {
     let mut ground = floor(8.0, 0.0);
     let (sine, cosine) = lean.to_radians().sin_cos();
@@ -110,8 +113,8 @@ fn leaning_floor(lean: f32) -> Scene {
     s
 }
 
-/// What cells beside each other have found is averaged over the plane that they lie in, not over the one that shading
-/// normals tell, in which hardly two rows of them lie.
+/// What cells beside each other have found is averaged over the plane that they lie in, not over
+/// the one that shading normals tell, in which hardly two rows of them lie.
 #[test]
 fn leaning_normals_leave_no_bands() {
     let Some(gpu) = common::gpu() else { return };
@@ -125,8 +128,8 @@ fn leaning_normals_leave_no_bands() {
     assert!(shown < 0.6 * rays, "{shown} of {rays}");
 }
 
-/// A black wall of 15 cm on a black floor under an even sky: x from a long wall of height h the floor sees
-/// (1 + x/√(x² + h²))/2 of the sky. The wall is 2.6 cells high, and the blur five wide.
+/// A black wall of 15 cm on a black floor under an even sky: x from a long wall of height h the
+/// floor sees (1 + x/√(x² + h²))/2 of the sky. The wall is 2.6 cells high, and the blur five wide.
 #[test]
 fn light_at_the_foot_of_a_wall_is_not_averaged_with_that_of_the_floor_around() {
     let Some(gpu) = common::gpu() else { return };
@@ -156,7 +159,8 @@ fn light_at_the_foot_of_a_wall_is_not_averaged_with_that_of_the_floor_around() {
     let far = over(&light.data, 1.0, 4.0, high);
     assert!((far - 1.0).abs() < 0.03, "{far}");
     assert!((over(&light.data, 1.0, 4.0, 0.5 * high) - 1.0).abs() > 0.06, "a wall half as high");
-    // Nearer to it cells are coarser than the light; what they know without any blur is the measure there.
+    // Nearer to it cells are coarser than the light; what they know without any blur is the measure
+    // there.
     let [shown, known] = [&light, &drawn(Options::PLAIN, 512).0].map(|l| over(&l.data, 0.0, 1.0, high));
     println!("{far:.3}; in the nearest cell {shown:.3}, without blur {known:.3}");
     assert!((shown / known - 1.0).abs() < 0.03, "{shown}, {known}");

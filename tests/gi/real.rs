@@ -43,8 +43,8 @@ fn mean(light: &[f32], of: &[bool]) -> f64 {
     sum / of.iter().filter(|of| **of).count().max(1) as f64
 }
 
-/// Changes one scene into the other and back, and asks for nine tenths of the change within `soon` frames, for
-/// all but 2 % within thirty.
+/// Changes one scene into the other and back, and asks for nine tenths of the change within `soon`
+/// frames, for all but 2 % within thirty.
 fn follows(gpu: &Gpu, scenes: [&Scene; 2], soon: u32, change: impl Fn(&mut SceneGpu, &Scene)) {
     let (light, same) = states(gpu, scenes);
     let [there, gone] = light.map(|l| mean(&l, &same));
@@ -85,6 +85,7 @@ fn light_follows_a_ceiling_that_slides_away() {
     let mut gone = there.clone();
     let ceiling = gone.instances.iter_mut().find(|i| i.name.contains("Plane_001")).expect("it has one");
     ceiling.transform[3][1] += 40.0;
-    // A host says of lamps that they are others, of objects only that they moved: after twelve frames 14 % are left.
+    // A host says of lamps that they are others, of objects only that they moved: after twelve
+    // frames 14 % are left.
     follows(&gpu, [&there, &gone], 6, |scene, to| scene.set_placements(&gpu.queue, to));
 }

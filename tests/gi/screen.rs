@@ -1,4 +1,5 @@
-//! Occlusion and light of the screen against rays: cosine-weighted rays into the very geometry that the picture shows.
+//! Occlusion and light of the screen against rays: cosine-weighted rays into the very geometry that
+//! the picture shows.
 
 use crate::shot::{Hit, Random, Shot, output, view};
 use crate::{common, read_light};
@@ -57,7 +58,8 @@ pub fn shot(trace: Trace) -> (Shot, Vec<usize>) {
     Shot::traced(SIZE, EYE, TARGET, trace)
 }
 
-/// Cosine-weighted share of the hemisphere over the point under `pixel` that hits nothing, and that hits the wall.
+/// Cosine-weighted share of the hemisphere over the point under `pixel` that hits nothing, and that
+/// hits the wall.
 fn rays(shot: &Shot, trace: Trace, pixel: [u32; 2], r: &mut Random) -> [f32; 2] {
     rays_within(shot, trace, pixel, f32::INFINITY, r)
 }
@@ -174,7 +176,8 @@ fn corner_and_contact_darken_as_rays_say() {
 #[test]
 fn an_endless_wall_takes_its_form_factor() {
     let Some(gpu) = common::gpu() else { return };
-    // The wall of the corner with sides far off the picture: blocked = ½ (1 − d / √(d² + h²)) at distance d.
+    // The wall of the corner with sides far off the picture: blocked = ½ (1 − d / √(d² + h²)) at
+    // distance d.
     let trace: Trace = |o, d| {
         let floor = plane(o, d, Vec3::ZERO, Vec3::Y, FLOOR).filter(|(_, h)| h.point.z > -4.0);
         let wall = plane(o, d, Vec3::new(0.0, 0.0, -4.0), Vec3::Z, WALL).filter(|(_, h)| h.point.y < 3.0);
@@ -227,7 +230,8 @@ fn a_red_wall_lights_the_floor_by_its_form_factor_while_it_is_in_view() {
     assert!((sum[0] / sum[1] - 1.0).abs() < 0.15 && error / sum[1] < 0.25, "{sum:?} {error}");
     assert!(surfaces.iter().zip(&light).all(|(s, l)| *s != usize::MAX || *l == [0.0; 3]), "background gets nothing");
 
-    // What the method cannot do: turned away from the wall, the floor before the camera gets nothing from it.
+    // What the method cannot do: turned away from the wall, the floor before the camera gets
+    // nothing from it.
     let eye = Vec3::new(0.0, 2.2, -3.9);
     let (mut away, _) = Shot::traced(SIZE, eye, Vec3::new(0.0, 0.0, 2.0), corner);
     away.buffers.direct.fill([0.0; 3]);

@@ -1,4 +1,5 @@
-//! Hand-made pictures for the tests of `gi/`: G-buffers as CPU arrays, traced or random, and their upload.
+//! Hand-made pictures for the tests of `gi/`: G-buffers as CPU arrays, traced or random, and their
+//! upload.
 
 use bouncelight::gi::cpu::{GBuffer, Picture, oct_encode};
 use bouncelight::gi::inputs::{Params, cells_of};
@@ -19,7 +20,8 @@ impl Random {
     }
 }
 
-/// One picture, already rounded to the textures' precision, so that the CPU reference sees what the GPU sees.
+/// One picture, already rounded to the textures' precision, so that the CPU reference sees what the
+/// GPU sees.
 #[derive(Clone)]
 pub struct Shot {
     pub size: [u32; 2],
@@ -38,7 +40,8 @@ fn byte(x: f32) -> u8 {
     (x.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
-/// A camera at `eye` looking at `target`, 60 degrees high, infinite reversed Z, with a jitter in ndc.
+/// A camera at `eye` looking at `target`, 60 degrees high, infinite reversed Z, with a jitter in
+/// ndc.
 pub fn camera(size: [u32; 2], eye: Vec3, target: Vec3, jitter: [f32; 2]) -> CameraMatrices {
     let focal = 1.0 / 30f32.to_radians().tan();
     let aspect = size[0] as f32 / size[1] as f32;
@@ -101,7 +104,8 @@ impl Shot {
         shot
     }
 
-    /// Traces every pixel centre; returns the shot and the surface of each pixel (`usize::MAX` = background).
+    /// Traces every pixel centre; returns the shot and the surface of each pixel (`usize::MAX` =
+    /// background).
     pub fn traced(
         size: [u32; 2],
         eye: Vec3,
@@ -158,7 +162,8 @@ impl Shot {
         let wide =
             |v: &[[f32; 3]]| v.iter().flat_map(|c| [c[0], c[1], c[2], 1.0].map(f16::from_f32)).collect::<Vec<_>>();
         let normal: Vec<f16> = b.normal.iter().flatten().map(|x| f16::from_f32(*x)).collect();
-        // Linear bytes: drivers decode sRGB only to about 1e-3, which would hide the shader's own error.
+        // Linear bytes: drivers decode sRGB only to about 1e-3, which would hide the shader's own
+        // error.
         let albedo: Vec<u8> = b.albedo.iter().flatten().map(|x| byte(*x)).collect();
         let make = |format, bytes: &[u8]| texture_with(device, queue, self.size, format, bytes);
         let raw_depth = make(F::R32Float, bytemuck::cast_slice(&b.depth));
@@ -262,14 +267,16 @@ const WRITE: &str = "
     return textureLoad(source, vec2i(at.xy), 0);
 }";
 
-/// Draws one texture's texels into a target that takes no copies: a depth texture, or a colour texture of the frame.
+/// Draws one texture's texels into a target that takes no copies: a depth texture, or a colour
+/// texture of the frame.
 pub struct Write {
     pipeline: wgpu::RenderPipeline,
     group: wgpu::BindGroup,
 }
 
 impl Write {
-    /// Texels of `source`; the target's format is `Depth32Float`, which takes red, or `Rgba16Float`.
+    /// Texels of `source`; the target's format is `Depth32Float`, which takes red, or
+    /// `Rgba16Float`.
     pub fn new(device: &wgpu::Device, source: &wgpu::Texture, format: wgpu::TextureFormat) -> Self {
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: None,

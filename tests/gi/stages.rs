@@ -63,7 +63,8 @@ fn close(a: f32, b: f32, tolerance: f32) -> bool {
     (a - b).abs() <= tolerance * b.abs().max(1.0)
 }
 
-/// Rounding to half floats, which drivers may do towards zero, costs 2^-10 of the value; what differs beyond that.
+/// Rounding to half floats, which drivers may do towards zero, costs 2^-10 of the value; what
+/// differs beyond that.
 pub fn largest_excess(gpu: &[[f32; 3]], by_cpu: &[[f32; 3]]) -> f32 {
     assert_eq!(gpu.len(), by_cpu.len());
     let excess = |a: f32, b: f32| {
@@ -103,7 +104,8 @@ fn exposure_is_the_mean_light() {
 #[test]
 fn exposure_is_exact_over_many_cells() {
     let Some(gpu) = common::gpu() else { return };
-    // A bright spot, then millions of dim pixels: a running f32 sum would lose the dim ones' last digits.
+    // A bright spot, then millions of dim pixels: a running f32 sum would lose the dim ones' last
+    // digits.
     let mut shot = Shot::empty([2048, 2048]);
     shot.buffers.depth.fill(0.05);
     shot.buffers.direct.fill([crate::shot::half(0.001); 3]);

@@ -79,7 +79,8 @@ fn a_shining_wall_behind_the_camera_lights_the_room() {
     };
     let mut gather = renderer(&gpu, [48, 32], gather());
     let [none, once, twice] = [0.0, 1.0, 2.0].map(|r| light(&gpu, &mut gather, &build(r)));
-    // 18 of 144 m² shine; with even light all over the room, of which half is reflected, E/π is 18 / 144 / (1 - 0.5).
+    // 18 of 144 m² shine; with even light all over the room, of which half is reflected, E/π is 18
+    // / 144 / (1 - 0.5).
     println!("E/π by a shining wall: {:.3}, even light would be 0.25", mean(&once));
     assert!((0.165..0.2).contains(&mean(&once)), "{}", mean(&once));
     let doubled: Vec<f32> = once.iter().map(|x| 2.0 * x).collect();

@@ -181,7 +181,8 @@ fn resize_cut_and_another_scene_leave_no_ghost() {
     on.uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &second).expect("the scene fits");
     assert_eq!(on.frame(&other, 40), plain, "another scene");
 
-    // A cut that nobody told of: distances and the neighbourhood's colours throw the old picture out.
+    // A cut that nobody told of: distances and the neighbourhood's colours throw the old picture
+    // out.
     let mut on = Stage::new(&gpu, &second, Method::Direct, true);
     (0..6).for_each(|i| drop(on.frame(&camera, i)));
     let old = on.frame(&camera, 12);

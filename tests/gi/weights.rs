@@ -6,7 +6,8 @@ use safetensors::tensor::{Dtype, TensorView};
 
 use crate::shot::Random;
 
-/// The bytes of the file. `replace` changes one word of its document, for files that must be refused.
+/// The bytes of the file. `replace` changes one word of its document, for files that must be
+/// refused.
 pub fn bytes(replace: Option<(&str, &str)>) -> Vec<u8> {
     let screen = FeatureSet::screen();
     let used = FEATURES.iter().filter(|f| screen.offset(f.name).is_some());
@@ -48,7 +49,8 @@ pub fn weights() -> Weights {
     Weights::from_bytes(&bytes(None)).expect("a sound file")
 }
 
-/// Weights that answer the same six numbers everywhere: a gain and a rest on what method `gather` says.
+/// Weights that answer the same six numbers everywhere: a gain and a rest on what method `gather`
+/// says.
 pub fn constant_gain(answer: [f32; 6]) -> Weights {
     linear("screen", SCREEN_V1, "gain_and_rest_on_guess", &[0.0; 6 * 24], &answer)
 }

@@ -1,4 +1,5 @@
-//! `NeuralGi` as a whole: its answer, the laws of light, bad input, and what it does to a host's device.
+//! `NeuralGi` as a whole: its answer, the laws of light, bad input, and what it does to a host's
+//! device.
 
 use crate::common;
 use crate::shot::{Random, Shot, output, view};
@@ -158,7 +159,8 @@ fn a_host_keeps_its_device() {
     let read = || bouncelight::gpu::readback::texture(&device, &queue, &target).expect("readable");
     let mut encoder = device.create_command_encoder(&Default::default());
     gi.record(&mut encoder, &textures.inputs(&shot), &view(&target)).expect("records");
-    // Reading submits commands of its own, but not the recorded ones: those are the host's to submit.
+    // Reading submits commands of its own, but not the recorded ones: those are the host's to
+    // submit.
     assert!(read().iter().all(|b| *b == 0), "record must not submit");
     queue.submit([encoder.finish()]);
     assert!(read().iter().any(|b| *b != 0), "submitted by the host, the light is there");

@@ -1,4 +1,5 @@
-//! Light from beyond the screen, by `gather`, against the laws it promises; and the rooms that other tests draw, too.
+//! Light from beyond the screen, by `gather`, against the laws it promises; and the rooms that
+//! other tests draw, too.
 
 use crate::common;
 use bouncelight::gi::Method;

@@ -9,7 +9,8 @@ use safetensors::SafeTensors;
 use serde_json::json;
 use std::path::Path;
 
-/// Largest error of a tensor's gradients, relative to the largest of them: rounding of the differences.
+/// Largest error of a tensor's gradients, relative to the largest of them: rounding of the
+/// differences.
 const ALLOWED: f32 = 1e-3;
 /// Step of a weight. The networks are piecewise linear in each, so that nothing but a bend within
 /// the step makes a difference wrong.

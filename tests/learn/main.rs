@@ -1,4 +1,5 @@
-//! Learning: gradients against finite differences of the CPU reference and against PyTorch, and what a few steps do.
+//! Learning: gradients against finite differences of the CPU reference and against PyTorch, and
+//! what a few steps do.
 
 #[path = "../common/mod.rs"]
 mod common;

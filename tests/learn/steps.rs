@@ -1,4 +1,5 @@
-//! What steps do to a network: nothing without them, the same twice, less loss on a target that can be met.
+//! What steps do to a network: nothing without them, the same twice, less loss on a target that can
+//! be met.
 
 use super::{common, hashed, learner};
 use bouncelight::gpu::Gpu;
@@ -41,7 +42,8 @@ fn what_can_be_met_is_met_and_two_runs_are_the_same() {
     let (weights, losses) = learnt(&gpu, &examples, 60);
     let (first, last) = (losses[0], losses[59]);
     println!("{first} to {last}");
-    // The answer is a gain of ln 1.2 everywhere, which the last layer's biases can give by themselves: no loss at all.
+    // The answer is a gain of ln 1.2 everywhere, which the last layer's biases can give by
+    // themselves: no loss at all.
     assert!(first > 0.01 && last < 0.02 * first, "{first} to {last}");
     assert_eq!(weights.to_bytes(), learnt(&gpu, &examples, 60).0.to_bytes(), "two runs are the same to the bit");
     // Asking what the error is on other pictures teaches nothing.

@@ -1,4 +1,5 @@
-//! Networks and inputs whose numbers are a hash of their names, as `weights-format/fixtures/operators` describes them.
+//! Networks and inputs whose numbers are a hash of their names, as
+//! `weights-format/fixtures/operators` describes them.
 
 use bouncelight::net::cpu::Tensor;
 use bouncelight::net::format::{KEY, Weights};
@@ -78,7 +79,8 @@ pub struct Case {
 }
 
 impl Case {
-    /// max |Δ| / max |reference|; infinite for another number of values and for anything not finite.
+    /// max |Δ| / max |reference|; infinite for another number of values and for anything not
+    /// finite.
     pub fn error(&self, found: &Tensor) -> f32 {
         let picked = |i| found.data[i * STRIDE % found.data.len()];
         let found = if self.samples { (0..SAMPLES).map(picked).collect() } else { found.data.clone() };

@@ -120,7 +120,8 @@ fn every_kernel_agrees_with_pytorch_and_with_the_cpu_reference() {
         let mut worst = 0f32;
         for name in NAMES {
             let weights = Weights::load(&fixture(&format!("{name}.safetensors"))).unwrap();
-            // Every network compiles its own pipelines; the other variants need the whole net at one size only.
+            // Every network compiles its own pipelines; the other variants need the whole net at
+            // one size only.
             let few = name == "unet" && variant != Variant::Auto;
             for (input, reference) in cases(name).into_iter().take(if few { 1 } else { usize::MAX }) {
                 let found = run_gpu(&gpu, &weights, &input, Options { variant, ..Options::default() });
@@ -146,7 +147,8 @@ fn a_perturbed_weight_is_noticed() {
         let view = file.tensor(tensor).unwrap();
         let place = view.data().as_ptr() as usize - bytes.as_ptr() as usize;
         let each = view.data().len() / view.shape().iter().product::<usize>();
-        // The kernel's centre, first channels: the tap that every pixel meets. The sign is in the value's last byte.
+        // The kernel's centre, first channels: the tap that every pixel meets. The sign is in the
+        // value's last byte.
         let centre = view.shape()[2] * view.shape()[3] / 2;
         bytes[place + (centre + 1) * each - 1] ^= 0x80;
         let weights = Weights::from_bytes(&bytes).unwrap();

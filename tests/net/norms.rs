@@ -97,7 +97,8 @@ fn what_a_convolution_measures_is_what_a_step_of_its_own_does() {
     assert!(apart > TOLERANCE_HALF, "{apart}");
 }
 
-/// A convolution that only adds 4000 to each value, so that the norm after it sees values far from zero.
+/// A convolution that only adds 4000 to each value, so that the norm after it sees values far from
+/// zero.
 fn far(groups: u32, conv: Value) -> Weights {
     let graph = graph(6, json!([conv, norm("c", 6, groups)]));
     let mut bytes = hashed::file(&graph, 6);
@@ -150,7 +151,8 @@ fn norms_of_large_means_are_sound() {
     }
 }
 
-/// Two norms of one picture, one of them after another reader has seen it, and dropout before the norm.
+/// Two norms of one picture, one of them after another reader has seen it, and dropout before the
+/// norm.
 #[test]
 fn what_is_measured_once_serves_two_norms() {
     let Some(gpu) = common::gpu() else { return };

@@ -73,7 +73,8 @@ fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usiz
 
 const FULL: Options = Options { variant: Variant::Auto, precision: Precision::F32, dropout: None, fuse: true };
 
-/// Each kind of weights with each width. Uniform weights do not exist in 16 bits: storage takes their place.
+/// Each kind of weights with each width. Uniform weights do not exist in 16 bits: storage takes
+/// their place.
 fn permutations() -> Vec<Variant> {
     let blocked = (1..=4).flat_map(|vectors| [Source::Uniform, Source::Storage].map(|weights| fixed(weights, vectors)));
     let staged =
@@ -83,7 +84,8 @@ fn permutations() -> Vec<Variant> {
     blocked.chain(staged).collect()
 }
 
-/// What a permutation of the convolutions may get wrong: their taps, steps, sides, groups, and channels that pad.
+/// What a permutation of the convolutions may get wrong: their taps, steps, sides, groups, and
+/// channels that pad.
 fn shapes(graph: &Graph) -> BTreeSet<String> {
     let enlarged = graph.ops.iter().any(|op| op.kind() == "upsample_nearest");
     let shape = |op: &Op| match op {

@@ -95,7 +95,8 @@ fn the_papers_generator_at_full_width() {
     }
 }
 
-/// Negative control: the same network without its skips' order, or with another norm, is another network.
+/// Negative control: the same network without its skips' order, or with another norm, is another
+/// network.
 #[test]
 fn another_norm_is_noticed() {
     let (cases, _) = cases("networks.safetensors");
@@ -140,7 +141,8 @@ fn small_pictures_can_fill_a_gpu() {
     assert!(small > 2 && starved > small, "{small} {starved}");
 }
 
-/// Weights of all phases of a transposed convolution that are more than one binding holds go into several dispatches.
+/// Weights of all phases of a transposed convolution that are more than one binding holds go into
+/// several dispatches.
 #[test]
 fn weights_are_bound_in_pieces_that_fit() {
     let up = serde_json::json!({"op": "conv_transpose2d", "name": "u", "input": "input", "output": "y",

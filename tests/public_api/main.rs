@@ -1,10 +1,11 @@
-//! The library's public items, as `docs/public-api.txt` lists them: what changes there changes what others have built
-//! on, so it is changed by hand and said in CHANGELOG.md. Renew the list by
+//! The library's public items, as `docs/public-api.txt` lists them: what changes there changes what
+//! others have built on, so it is changed by hand and said in CHANGELOG.md. Renew the list by
 //!
 //!     RENEW=1 cargo test --test public_api
 //!
-//! Read from the sources by `syn`, since rustdoc's JSON needs a nightly compiler. What macros would make public is not
-//! seen; there is none. The program (`cli`) and its window (`viewer`) are no library and not listed.
+//! Read from the sources by `syn`, since rustdoc's JSON needs a nightly compiler. What macros would
+//! make public is not seen; there is none. The program (`cli`) and its window (`viewer`) are no
+//! library and not listed.
 
 mod items;
 mod modules;

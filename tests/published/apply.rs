@@ -1,4 +1,5 @@
-//! Pictures through the networks: against PyTorch's outputs, through the program, with the authors' own pictures.
+//! Pictures through the networks: against PyTorch's outputs, through the program, with the authors'
+//! own pictures.
 
 use super::common;
 use super::convert::{converted, named, norm};
@@ -191,7 +192,8 @@ fn what_cannot_be_applied() {
     );
 }
 
-/// The authors' pictures, a quarter in size, with a narrow generator, against PyTorch on the same files.
+/// The authors' pictures, a quarter in size, with a narrow generator, against PyTorch on the same
+/// files.
 #[test]
 fn the_authors_pictures() {
     let Some(shared) = common::shared() else { return };

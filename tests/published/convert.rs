@@ -40,7 +40,8 @@ fn the_papers_generator_has_its_size() {
     assert_eq!(graph.check(), []);
     // 54.41 M in convolutions, the rest in norms.
     assert_eq!(graph.parameters(), 54_413_315 + 9_856);
-    // By hand, convolutions at 1024×512: 34.69 GFLOP down, 62.88 up, 6.44 in the last one; norms and the like add 0.2.
+    // By hand, convolutions at 1024×512: 34.69 GFLOP down, 62.88 up, 6.44 in the last one; norms
+    // and the like add 0.2.
     let flops = graph.flops(1024, 512).unwrap() as f64 / 1e9;
     assert!((104.0..104.4).contains(&flops), "{flops} GFLOP");
     let wide = arch::graph(Arch::DeepIllumination, Norm::Batch, 128, true);

@@ -1,4 +1,5 @@
-//! State dicts whose numbers follow from their names, as `weights-format/fixtures/published.py` makes them.
+//! State dicts whose numbers follow from their names, as `weights-format/fixtures/published.py`
+//! makes them.
 
 use std::collections::BTreeMap;
 

@@ -35,7 +35,8 @@ impl Agreement {
         let channels = |f: &dyn Fn(&Value) -> f64| -> Vec<f64> {
             pixels.iter().map(|p| p.iter().map(f).sum::<f64>() / 3.0 / level).collect()
         };
-        // A pixel's two estimates of the same difference are independent: they tell the bias's noise.
+        // A pixel's two estimates of the same difference are independent: they tell the bias's
+        // noise.
         let first = channels(&|v| v.ours[0] - v.theirs[0]);
         let second = channels(&|v| v.ours[1] - v.theirs[1]);
         let products: Vec<f64> = channels(&|v| {
@@ -56,7 +57,8 @@ impl Agreement {
         self.square.value <= bound * bound + 2.0 * self.square.error
     }
 
-    /// Root of the mean square difference, which bounds the mean absolute one from above; noise below 0 counts as 0.
+    /// Root of the mean square difference, which bounds the mean absolute one from above; noise
+    /// below 0 counts as 0.
     pub fn rms(&self) -> f64 {
         self.square.value.max(0.0).sqrt()
     }
@@ -67,7 +69,8 @@ impl Agreement {
     }
 }
 
-/// Means over groups of pixels; `tile` says to which group a pixel belongs. Groups of fewer than `least` are left out.
+/// Means over groups of pixels; `tile` says to which group a pixel belongs. Groups of fewer than
+/// `least` are left out.
 pub fn tiles(pixels: &[[Value; 3]], tile: &[usize], least: usize) -> Vec<[Value; 3]> {
     let count = tile.iter().max().map_or(0, |m| m + 1);
     let mut sums = vec![([Value::default(); 3], 0usize); count];

@@ -44,7 +44,8 @@ fn triangles_without_area_do_no_harm() {
     light.assert_is("furnace with flat triangles", 2.0);
 }
 
-/// Vertices that are no numbers: refused by name, or left out so that the rest of the scene is as without them.
+/// Vertices that are no numbers: refused by name, or left out so that the rest of the scene is as
+/// without them.
 #[test]
 fn vertices_that_are_no_numbers_are_refused_or_left_out() {
     let Some(lab) = lab() else { return };
@@ -60,7 +61,8 @@ fn vertices_that_are_no_numbers_are_refused_or_left_out() {
             Err(e) => assert!(e.to_string().contains("spoilt"), "{bad}: {e}"),
             Ok(_) => {
                 let light = radiance(&scene, [0.3, -0.4, 0.5], [1.0, 0.2, 0.0]).expect("there is a lab");
-                // A surface through the furnace that glows and reflects like its walls is as good as none.
+                // A surface through the furnace that glows and reflects like its walls is as good
+                // as none.
                 light.assert_is(&format!("furnace with vertices at {bad}"), 2.0);
             }
         }
@@ -96,8 +98,8 @@ fn empty_and_dark_scenes() {
     assert_eq!(radiance(&dark, [2.0, 2.0, 2.0], [0.0; 3]).map(|m| m.value), Some(0.0));
 }
 
-/// A camera inside a solid sees its dark inside; one on a surface, or with walls within its near plane, sees something
-/// finite.
+/// A camera inside a solid sees its dark inside; one on a surface, or with walls within its near
+/// plane, sees something finite.
 #[test]
 fn a_camera_inside_a_wall_sees_darkness() {
     let mut scene = scene(vec![(body(Shape::Cube, 1.0, false), lambert(0.8))], vec![sun([0.3, -1.0, 0.2], 1.0, 0.01)]);

@@ -1,9 +1,10 @@
-//! The path tracer against Blender's Cycles on the reference folder, under Cycles' own limits (12 bounces, 4 diffuse, 4
-//! glossy, clamp 10), metals included.
+//! The path tracer against Blender's Cycles on the reference folder, under Cycles' own limits (12
+//! bounces, 4 diffuse, 4 glossy, clamp 10), metals included.
 //!
-//! The reference renders have 64 samples a pixel, which leaves DiffInd 13 % of noise. `tests/fixtures/cycles/second_*`
-//! hold one pixel in 128 of a second render with another seed, so that the difference can be told without any noise
-//! (`agreement.rs`). The default test looks at those 4096 pixels; the whole pictures are behind `--ignored`.
+//! The reference renders have 64 samples a pixel, which leaves DiffInd 13 % of noise.
+//! `tests/fixtures/cycles/second_*` hold one pixel in 128 of a second render with another seed, so
+//! that the difference can be told without any noise (`agreement.rs`). The default test looks at
+//! those 4096 pixels; the whole pictures are behind `--ignored`.
 
 use crate::agreement::{Agreement, Value, tiles};
 use crate::harness::{Lab, Options, Traced, lab};
@@ -185,7 +186,8 @@ fn light_is_that_of_cycles() {
         squares.push(answers.layers[1].2.square.value);
         biases.push(answers.layers[1].1.bias.value);
 
-        // 6 % more indirect light, or 8 % more on the left and less on the right, which leaves the mean alone.
+        // 6 % more indirect light, or 8 % more on the left and less on the right, which leaves the
+        // mean alone.
         let brighter = compare(&t, &reference, &s, |_, _| [1.0, 1.06]);
         assert!(!brighter.good(), "{name}: 6 % more indirect light went unnoticed: {brighter:?}");
         let tilted = compare(&t, &reference, &s, |x, _| if x < w / 2 { [1.08; 2] } else { [0.92; 2] });
@@ -199,8 +201,9 @@ fn light_is_that_of_cycles() {
     assert!(all <= RMS * RMS && bias.abs() <= BIAS, "{squares:?} {biases:?}");
 }
 
-/// `BOUNCELIGHT_SECOND=out/second cargo test --release --test reference -- --ignored --nocapture whole_pictures`, where
-/// the folder holds the whole second renders that `tests/fixtures/cycles/second.py` makes. `BOUNCELIGHT_SPP` (default
+/// `BOUNCELIGHT_SECOND=out/second cargo test --release --test reference -- --ignored --nocapture whole_pictures`,
+/// where the folder holds the whole second renders that `tests/fixtures/cycles/second.py` makes.
+/// `BOUNCELIGHT_SPP` (default
 /// 64) samples a pixel, `BOUNCELIGHT_SCENES` a list of scenes instead of all.
 #[test]
 #[ignore = "minutes; needs the whole second renders"]
@@ -234,7 +237,8 @@ fn whole_pictures_are_those_of_cycles() {
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
-/// Differences of both layers over the layer's mean, averaged over 4×4 pixels: grey for none, ±20 % black and white.
+/// Differences of both layers over the layer's mean, averaged over 4×4 pixels: grey for none, ±20 %
+/// black and white.
 fn pictures(name: &str, t: &Traced, reference: &Layers, second: &Layers) {
     let [w, h] = [reference.width as usize, reference.height as usize];
     for (which, layer) in ["DiffDir", "DiffInd"].into_iter().enumerate() {

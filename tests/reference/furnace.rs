@@ -9,8 +9,9 @@ use bouncelight::scene::shapes::Shape;
 
 const SIZE: [u32; 2] = [64, 64];
 
-/// Inside a closed body of albedo ρ that glows evenly with radiance 1, light goes round as 1 + ρ + ρ² + … = 1/(1 − ρ):
-/// of this 1 is seen at once, ρ is direct light and ρ²/(1 − ρ) is indirect. The body's shape does not matter.
+/// Inside a closed body of albedo ρ that glows evenly with radiance 1, light goes round as 1 + ρ +
+/// ρ² + … = 1/(1 − ρ): of this 1 is seen at once, ρ is direct light and ρ²/(1 − ρ) is indirect. The
+/// body's shape does not matter.
 #[test]
 fn a_closed_sphere_glows_with_one_over_one_minus_albedo() {
     let Some(lab) = lab() else { return };
@@ -128,7 +129,8 @@ fn a_closed_room_swallows_what_its_ceiling_emits() {
         for face in 0..6 {
             let mut target = [0.0; 3];
             target[face / 2] = if face % 2 == 0 { -1.0 } else { 1.0 };
-            // A right angle of view from the middle shows just one face, every part of it at the same scale.
+            // A right angle of view from the middle shows just one face, every part of it at the
+            // same scale.
             let eye = camera([0.0; 3], target, std::f32::consts::FRAC_PI_2);
             let samples = if bounces.is_some() { 16 } else { 64 };
             let options = Options { samples, seed: face as u32, bounces, lambert: true, ..Default::default() };

@@ -1,5 +1,5 @@
-//! Light sources against closed forms: rectangles, suns, lamps; and the laws that hold for any scene: light adds up,
-//! and the way back is the way there.
+//! Light sources against closed forms: rectangles, suns, lamps; and the laws that hold for any
+//! scene: light adds up, and the way back is the way there.
 
 use crate::harness::{Lab, Options, Strategy, Sums, Traced, lab};
 use crate::scenes::*;
@@ -20,7 +20,8 @@ fn above() -> Camera {
     camera([0.0, 6.0, 3.0], [0.0, 0.0, 0.0], 0.5)
 }
 
-/// What the floor's direct light is, as a mean over the points, for the irradiance `e` at each of them.
+/// What the floor's direct light is, as a mean over the points, for the irradiance `e` at each of
+/// them.
 fn floor_light(points: &[[f32; 2]], e: impl Fn(DVec3) -> f64) -> f64 {
     let camera = above();
     let place = |&p| on_plane(&camera, SIZE, p, DVec3::ZERO, DVec3::Y);
@@ -87,8 +88,8 @@ fn sunlight_goes_with_the_cosine() {
     }
 }
 
-/// A lamp without size, and one of radius 0.3 as Cycles has it: a disc that faces the point lit, which gives
-/// I·cos/(d² + r²) where all of it is above the horizon.
+/// A lamp without size, and one of radius 0.3 as Cycles has it: a disc that faces the point lit,
+/// which gives I·cos/(d² + r²) where all of it is above the horizon.
 #[test]
 fn lamps_go_with_the_inverse_square() {
     let Some(lab) = lab() else { return };
@@ -142,7 +143,8 @@ fn seen(lab: &Lab, scene: &Scene, seed: u32) -> Traced {
     lab.trace(scene, &eye, SIZE, &grid(SIZE, 16), &Options { samples: 64, seed, ..Default::default() })
 }
 
-/// Each light alone, summed, is all of them together; twice the light is twice the picture; none is none.
+/// Each light alone, summed, is all of them together; twice the light is twice the picture; none is
+/// none.
 #[test]
 fn light_adds_up() {
     let Some(lab) = lab() else { return };
@@ -189,7 +191,8 @@ impl Patch {
         cuboid(self.center, self.half, false, materials)
     }
 
-    /// Width, height and a camera whose picture the face fills exactly, so that even points of it are even on the face.
+    /// Width, height and a camera whose picture the face fills exactly, so that even points of it
+    /// are even on the face.
     fn squarely(&self) -> ([f32; 2], Camera) {
         let axis = self.face / 2;
         let mut normal = glam::Vec3::ZERO;
@@ -204,8 +207,8 @@ impl Patch {
     }
 }
 
-/// The power that patch B gets from a glowing patch A, all bounces in a furnished room included, is what A gets from
-/// B glowing likewise (Helmholtz).
+/// The power that patch B gets from a glowing patch A, all bounces in a furnished room included, is
+/// what A gets from B glowing likewise (Helmholtz).
 #[test]
 fn the_way_back_is_the_way_there() {
     let Some(lab) = lab() else { return };
@@ -235,6 +238,7 @@ fn the_way_back_is_the_way_there() {
     let off = there - back;
     assert!(off.value.abs() <= SIGMAS * off.error, "{there:?} there, {back:?} back");
     assert!(SIGMAS * off.error < 0.04 * there.value, "{off:?} is too coarse");
-    // The patches' areas differ by 2.5, so forgetting them is noticed; and so is 4 % more on one side.
+    // The patches' areas differ by 2.5, so forgetting them is noticed; and so is 4 % more on one
+    // side.
     assert!((off + there * 0.04).value.abs() > SIGMAS * off.error);
 }

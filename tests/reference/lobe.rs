@@ -1,6 +1,7 @@
-//! The specular lobe's shape: what a floor shows of a small sun, direction by direction, against GGX written down here
-//! once more in double precision, with the energy that single scattering loses found by brute-force quadrature.
-//! (The furnaces test the lobe's sum over all directions, which a lobe of the wrong width would pass.)
+//! The specular lobe's shape: what a floor shows of a small sun, direction by direction, against
+//! GGX written down here once more in double precision, with the energy that single scattering
+//! loses found by brute-force quadrature. (The furnaces test the lobe's sum over all directions,
+//! which a lobe of the wrong width would pass.)
 
 use crate::harness::{Options, lab};
 use crate::scenes::*;
@@ -17,8 +18,9 @@ fn distribution_and_visibility(alpha: f64, n_h: f64, n_l: f64, n_v: f64) -> f64 
     d / (1.0 + lambda(n_l) + lambda(n_v)) / (4.0 * n_l * n_v)
 }
 
-/// Share of the light towards `mu` that the lobe with perfect reflection keeps: the sum of D·V·n_l over the hemisphere
-/// of half vectors, with the density of the half vector taken along so that narrow lobes are met.
+/// Share of the light towards `mu` that the lobe with perfect reflection keeps: the sum of D·V·n_l
+/// over the hemisphere of half vectors, with the density of the half vector taken along so that
+/// narrow lobes are met.
 fn kept(alpha: f64, mu: f64) -> f64 {
     const N: usize = 200;
     let v = DVec3::new((1.0 - mu * mu).sqrt(), 0.0, mu);

@@ -1,4 +1,5 @@
-//! Scenes with known answers, built in code, and rays and polygons in double precision to compute those answers with.
+//! Scenes with known answers, built in code, and rays and polygons in double precision to compute
+//! those answers with.
 
 use bouncelight::scene::shapes::{self, Shape};
 use bouncelight::scene::{Camera, Instance, Light, LightKind, Material, Mesh, Scene};
@@ -63,7 +64,8 @@ pub fn scene(parts: Vec<(Mesh, Material)>, lights: Vec<Light>) -> Scene {
     scene
 }
 
-/// The six faces of a box, each with its material: −x, +x, −y, +y, −z, +z. Fronts face outwards, or `inside`.
+/// The six faces of a box, each with its material: −x, +x, −y, +y, −z, +z. Fronts face outwards, or
+/// `inside`.
 pub fn cuboid(center: [f32; 3], half: [f32; 3], inside: bool, materials: [Material; 6]) -> Vec<(Mesh, Material)> {
     let mut parts = Vec::new();
     for (face, material) in materials.into_iter().enumerate() {
@@ -107,12 +109,14 @@ pub fn camera(eye: [f32; 3], target: [f32; 3], yfov: f32) -> Camera {
     Camera::look_at(eye, target, yfov)
 }
 
-/// `n`² points of a picture of `size` pixels, one in each cell of a grid, at fixed offsets within the cells.
+/// `n`² points of a picture of `size` pixels, one in each cell of a grid, at fixed offsets within
+/// the cells.
 pub fn grid(size: [u32; 2], n: usize) -> Vec<[f32; 2]> {
     let cell = DVec2::new(f64::from(size[0]), f64::from(size[1])) / n as f64;
     (0..n * n)
         .map(|i| {
-            // Multiples of the golden ratio's two-dimensional kin (Roberts 2018) fill the cells evenly.
+            // Multiples of the golden ratio's two-dimensional kin (Roberts 2018) fill the cells
+            // evenly.
             let within = DVec2::new(i as f64 * 0.754_877_666_2, i as f64 * 0.569_840_290_9).fract();
             let p = (DVec2::new((i % n) as f64, (i / n) as f64) + within) * cell;
             [p.x as f32, p.y as f32]
@@ -136,8 +140,9 @@ pub fn on_plane(camera: &Camera, size: [u32; 2], point: [f32; 2], origin: DVec3,
     o + d * ((origin - o).dot(n) / d.dot(n))
 }
 
-/// Irradiance at `p` with normal `n` from a polygon of radiance 1 that lies wholly above the horizon (Lambert 1760):
-/// half the sum over the edges of the angle they subtend, times the cosine between n and the edge's plane's normal.
+/// Irradiance at `p` with normal `n` from a polygon of radiance 1 that lies wholly above the
+/// horizon (Lambert 1760): half the sum over the edges of the angle they subtend, times the cosine
+/// between n and the edge's plane's normal.
 pub fn polygon_irradiance(p: DVec3, n: DVec3, corners: &[DVec3]) -> f64 {
     let r: Vec<DVec3> = corners.iter().map(|c| (c - p).normalize()).collect();
     let sum: f64 = (0..r.len())
@@ -158,7 +163,8 @@ fn the_polygon_formula_gives_known_form_factors() {
     let expected = (x * x.atan() + x * x.atan()) / std::f64::consts::TAU;
     let found = polygon_irradiance(DVec3::ZERO, DVec3::Y, &square) / std::f64::consts::PI;
     assert!((found - expected).abs() < 1e-12, "{found} {expected}");
-    // The mean over a unit square below it is the form factor of parallel squares, 0.1998 (B-1, C-11).
+    // The mean over a unit square below it is the form factor of parallel squares, 0.1998 (B-1,
+    // C-11).
     let n = 64;
     let mean = (0..n * n)
         .map(|i| DVec3::new((i % n) as f64 + 0.5, 0.0, (i / n) as f64 + 0.5) / n as f64)

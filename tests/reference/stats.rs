@@ -1,9 +1,10 @@
 //! Error bars from two independent halves of the samples.
 //!
-//! Point i of n has the mean `a[i]` of the first half and `b[i]` of the second. Both have the same expectation and the
-//! same variance, and are independent, so ((a − b)/2)² has the expectation Var((a + b)/2): each point tells its own
-//! noise, whatever the picture does from point to point. The mean over the points has the standard error
-//! √Σ((a − b)/2)² / n. With 64 points that is known to 1/√128 = 9 %, with 256 to 4 %.
+//! Point i of n has the mean `a[i]` of the first half and `b[i]` of the second. Both have the same
+//! expectation and the same variance, and are independent, so ((a − b)/2)² has the expectation
+//! Var((a + b)/2): each point tells its own noise, whatever the picture does from point to point.
+//! The mean over the points has the standard error √Σ((a − b)/2)² / n. With 64 points that is known
+//! to 1/√128 = 9 %, with 256 to 4 %.
 
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -42,7 +43,8 @@ impl Mean {
         ((self.value - expected).abs() - 1e-5 * expected.abs()).max(0.0) / self.error.max(1e-300)
     }
 
-    /// Fails unless `expected` is within the error bar, the bar is short enough to see 2 %, and 2 % more is seen.
+    /// Fails unless `expected` is within the error bar, the bar is short enough to see 2 %, and 2 %
+    /// more is seen.
     pub fn assert_is(&self, what: &str, expected: f64) {
         println!(
             "{what}: {:.6} ± {:.6} (expected {expected:.6}, {:.1} σ, {:+.3} %)",

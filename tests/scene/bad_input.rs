@@ -1,11 +1,13 @@
-//! Every kind of broken input is an error that names the file and the place, or a warning; never a panic.
+//! Every kind of broken input is an error that names the file and the place, or a warning; never a
+//! panic.
 
 use bouncelight::scene::{self, SceneError, export};
 use serde_json::json;
 
 use crate::glb::{Glb, load_bytes, put};
 
-/// Asserts that loading failed and that the message holds all the words, the file's name first among them.
+/// Asserts that loading failed and that the message holds all the words, the file's name first
+/// among them.
 #[track_caller]
 fn refused(result: Result<scene::Scene, SceneError>, words: &[&str]) {
     let message = match result {

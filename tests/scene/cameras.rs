@@ -80,7 +80,8 @@ fn its_planes_cut_what_the_files_cut() {
         assert!(depth(&camera, plane - 0.01) < 1.0 && depth(&camera, plane + 0.01) > 1.0, "{znear}: {camera:?}");
         assert!((camera.far - camera.near - 20.0 + znear).abs() < 1e-2, "{camera:?}");
     }
-    // A camera in a deep scene: nothing lies behind the eye, and nothing is shown at more than twice its size.
+    // A camera in a deep scene: nothing lies behind the eye, and nothing is shown at more than
+    // twice its size.
     let mut glb = squares(lens(0.1, 0.1, 1e4));
     glb.json["nodes"][0]["scale"] = json!([1.0, 1.0, 2000.0]);
     glb.json["nodes"][1]["translation"] = json!([0.0, 0.0, 1000.0]);

@@ -1,5 +1,5 @@
-//! KHR_draco_mesh_compression and KHR_texture_basisu, against what the encoders' own decoders unpack
-//! (`tests/fixtures/compressed/make.mjs`).
+//! KHR_draco_mesh_compression and KHR_texture_basisu, against what the encoders' own decoders
+//! unpack (`tests/fixtures/compressed/make.mjs`).
 
 use bouncelight::scene::{ColorSpace, Image, Mesh, Scene, SceneError};
 use serde_json::{Value, json};

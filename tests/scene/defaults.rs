@@ -39,7 +39,8 @@ fn the_camera_looks_into_the_open_side() {
         let forward = Vec3::from(first(&scene).forward());
         assert!(forward.dot(turn * Vec3::NEG_Z) > 0.7, "turned {quarter} times: {forward}");
     }
-    // Negative control: a closed cube is seen from the front, at an angle and from above, whichever way it is turned.
+    // Negative control: a closed cube is seen from the front, at an angle and from above, whichever
+    // way it is turned.
     let closed = one(shapes::flat(Shape::Cube), Material::default(), Mat4::IDENTITY);
     let [x, y, z] = first(&closed).forward();
     assert!(z < -0.6 && x.abs() > 0.4 && y < -0.2, "{x} {y} {z}");

@@ -13,8 +13,8 @@ fn load(glb: &Glb) -> Scene {
     scene
 }
 
-/// KHR_mesh_quantization without `normalized`: whole numbers that the node's matrix brings to size, as gltfpack and
-/// gltf-transform write them.
+/// KHR_mesh_quantization without `normalized`: whole numbers that the node's matrix brings to size,
+/// as gltfpack and gltf-transform write them.
 #[test]
 fn quantised_positions_are_scaled_by_their_node() {
     for (component, width) in [(5121u32, 1), (5123, 2), (5120, 1), (5122, 2)] {
@@ -66,7 +66,8 @@ fn webp_textures_are_read() {
         assert_eq!((image.width, image.height, &image.rgba[..4]), (3, 2, &[12, 34, 56, 255][..]));
         assert!(!scene.warnings.iter().any(|w| w.contains("exture")), "{:?}", scene.warnings);
     }
-    // Negative control: without the extension the PNG counts; with a wrong one it does, too, and is told.
+    // Negative control: without the extension the PNG counts; with a wrong one it does, too, and is
+    // told.
     glb.json["textures"] = json!([{"source": 0}]);
     assert_eq!(load(&glb).images[0].width, 5);
     glb.json["textures"] = json!([{"source": 0, "extensions": {"EXT_texture_webp": {"source": 7}}}]);

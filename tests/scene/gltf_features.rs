@@ -83,7 +83,8 @@ fn strips_fans_and_unindexed() {
 fn quantised_and_sparse_accessors() {
     let mut glb = Glb::triangle();
     glb.json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
-    // Positions as normalised i16 in a stride of 8, normals as i8, texture coordinates as u16, colours as u8 RGB.
+    // Positions as normalised i16 in a stride of 8, normals as i8, texture coordinates as u16,
+    // colours as u8 RGB.
     let positions = [[0i16, 0, 0, 99], [32767, 0, 0, 99], [0, -32768, 0, 99]];
     let bytes: Vec<u8> = positions.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
     let p = glb.accessor("VEC3", 5122, 3, &bytes);

@@ -1,4 +1,5 @@
-//! Flats and streets made by code: the same again, fit to be looked at, of every kind, and closed where they should be.
+//! Flats and streets made by code: the same again, fit to be looked at, of every kind, and closed
+//! where they should be.
 
 use crate::shared::assert_sound;
 use bouncelight::accel::SceneBlocks;

@@ -16,7 +16,8 @@ fn close(a: f32, b: f32) {
     assert!((a - b).abs() < 1e-4, "{a} is not {b}");
 }
 
-/// Diffusely scattered, reflected and transmitted light of the whole surface at normal incidence; red.
+/// Diffusely scattered, reflected and transmitted light of the whole surface at normal incidence;
+/// red.
 fn shares(m: &Material) -> [f32; 3] {
     let covered = if m.alpha_mode == AlphaMode::Blend { m.base_color[3] } else { 1.0 };
     [covered * m.base_color[0] * (1.0 - m.f0), covered * m.f0 * m.specular_tint[0], 1.0 - covered]

@@ -156,7 +156,8 @@ fn a_byte_order_mark_is_no_content() {
     let obj = format!("{mark}v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     assert_eq!(load_bytes("a.obj", obj.as_bytes()).expect("loads").meshes[0].positions.len(), 3);
     let mut glb = Glb::triangle();
-    // The triangle as JSON alone: positions as zeros with sparse values would do, a data URI is shorter.
+    // The triangle as JSON alone: positions as zeros with sparse values would do, a data URI is
+    // shorter.
     let data = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAEAAAACAAAA";
     glb.json["buffers"] = json!([{"byteLength": 48, "uri": format!("data:x;base64,{data}")}]);
     let text = format!("{mark}{}", glb.json);

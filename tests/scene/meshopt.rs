@@ -1,5 +1,5 @@
-//! Files with EXT_meshopt_compression and KHR_meshopt_compression. That every mode and filter unpacks as meshoptimizer
-//! has it is tested beside the decoder, on the same cases.
+//! Files with EXT_meshopt_compression and KHR_meshopt_compression. That every mode and filter
+//! unpacks as meshoptimizer has it is tested beside the decoder, on the same cases.
 
 use bouncelight::scene::{self, Scene, SceneError};
 use serde_json::{Value, json};
@@ -96,7 +96,8 @@ fn broken_compression_is_refused_with_its_place() {
 
 #[test]
 fn files_made_by_gltfpack_load() {
-    // Triangles and bounds as the files' accessors announce them, without the hotel's primitive of lines.
+    // Triangles and bounds as the files' accessors announce them, without the hotel's primitive of
+    // lines.
     let apartment = ([0.443_761, -0.099_278, -11.433_722], [12.805_583, 2.680_519, -0.129_991]);
     let hotel = ([6791.5, -66.1975, -11_129.199], [13_274.5, 2130.74, -1134.32]);
     for (name, meshes, triangles, (low, high)) in

@@ -46,7 +46,8 @@ fn what_is_too_far_is_left_out_beside_what_is_not() {
     assert!(scene.cameras[0].eye()[0].abs() < 10.0, "the camera frames what is left");
 }
 
-/// A triangle of half a square metre that glows with this radiance in a large room of another material.
+/// A triangle of half a square metre that glows with this radiance in a large room of another
+/// material.
 fn glowing(radiance: f32) -> Scene {
     let mut glb = Glb::triangle();
     glb.json["materials"] = json!([{"emissiveFactor": [1.0, 1.0, 1.0],
@@ -97,7 +98,8 @@ fn given_surroundings_replace_default_sky_and_sun() {
     let lights = cornell.lights.len();
     cornell.surround(Environment::constant([0.1; 3]));
     assert_eq!((cornell.lights.len(), lights > 0), (lights, true));
-    // A faint glow, too faint to be the light beside nothing, is stood for under a sky that somebody gave.
+    // A faint glow, too faint to be the light beside nothing, is stood for under a sky that
+    // somebody gave.
     let mut faint = glowing(0.5);
     faint.surround(Environment::constant([0.1; 3]));
     assert!(faint.lights.len() == 1 && faint.lights[0].stands_in, "{:?}", faint.lights);

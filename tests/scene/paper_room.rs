@@ -1,4 +1,5 @@
-//! The paper's stream against Python's own random numbers, Blender's own vertices, and Blender's exported rooms.
+//! The paper's stream against Python's own random numbers, Blender's own vertices, and Blender's
+//! exported rooms.
 
 use bouncelight::scene::{self, LightKind, Scene, paper_room};
 use glam::{DMat3, DMat4, DQuat, DVec3, Mat4, Vec3};
@@ -22,7 +23,8 @@ fn y_up(v: DVec3) -> DVec3 {
     DVec3::new(v.x, v.z, -v.y)
 }
 
-/// Largest difference between a room and what the fixture says of it: (colours, vertex positions, camera).
+/// Largest difference between a room and what the fixture says of it: (colours, vertex positions,
+/// camera).
 fn compare(scene: &Scene, room: &Value, primitives: &Value) -> [f64; 3] {
     let objects = room["objects"].as_array().expect("objects");
     assert_eq!(scene.instances.len(), objects.len() + 5);
@@ -35,7 +37,8 @@ fn compare(scene: &Scene, room: &Value, primitives: &Value) -> [f64; 3] {
     for (i, object) in objects.iter().enumerate() {
         let shape = object[0].as_str().expect("a shape's name");
         let angle = |k: usize| number(&object[k]).to_radians();
-        // Turned one axis after the other by quaternions, not by the product of matrices that the library forms.
+        // Turned one axis after the other by quaternions, not by the product of matrices that the
+        // library forms.
         let turn =
             DQuat::from_rotation_z(angle(6)) * DQuat::from_rotation_y(angle(5)) * DQuat::from_rotation_x(angle(4));
         let at = DVec3::new(number(&object[1]), number(&object[2]), number(&object[3]));
@@ -78,7 +81,8 @@ fn rooms_are_those_that_python_draws() {
         println!("room {index}: colours {:.1e}, vertices {:.1e}, camera {:.1e}", worst[0], worst[1], worst[2]);
         assert!(worst.iter().all(|w| *w < 1e-4), "room {index}: {worst:?}");
     }
-    // Negative control: one object's colour, one position and the camera, each a little off, are noticed.
+    // Negative control: one object's colour, one position and the camera, each a little off, are
+    // noticed.
     let room = &numbers["7"];
     let mut off = paper_room::scene(7);
     off.materials[3].base_color[1] += 2e-4;

@@ -1,4 +1,5 @@
-//! Reflectance of dielectrics in glTF: KHR_materials_specular with KHR_materials_ior, and specular-glossiness.
+//! Reflectance of dielectrics in glTF: KHR_materials_specular with KHR_materials_ior, and
+//! specular-glossiness.
 
 use bouncelight::scene::{Material, Scene, export, load};
 use serde_json::{Value, json};
@@ -47,7 +48,8 @@ fn specular_and_ior_multiply_as_the_extension_says() {
     close(f0(&material(specular(json!({"specularColorFactor": [2.0, 1.0, 0.5]})))), [0.08, 0.04, 0.02]);
     // Colours above 1 are allowed, reflectance above 1 is not.
     close(f0(&material(specular(json!({"specularColorFactor": [50.0, 5.0, 0.0]})))), [1.0, 0.2, 0.0]);
-    // What gltf-transform writes for specular-glossiness: an index of 1000 and the specular colour as it is.
+    // What gltf-transform writes for specular-glossiness: an index of 1000 and the specular colour
+    // as it is.
     let converted = |color: [f32; 3]| {
         let m = json!({"KHR_materials_ior": {"ior": 1000.0}, "KHR_materials_specular": {"specularColorFactor": color}});
         material(m)
@@ -114,7 +116,8 @@ fn specular_glossiness_without_textures_is_exact() {
 
 #[test]
 fn specular_glossiness_textures_become_metallic_roughness() {
-    // Left gold that is smooth, right a red dielectric that is half rough; sRGB 55 is a reflectance of 0.038.
+    // Left gold that is smooth, right a red dielectric that is half rough; sRGB 55 is a reflectance
+    // of 0.038.
     let picture = |left: [u8; 4], right: [u8; 4]| {
         let mut out = Vec::new();
         let mut encoder = png::Encoder::new(&mut out, 2, 1);

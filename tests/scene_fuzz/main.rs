@@ -1,7 +1,8 @@
-//! Hostile glTF files, plain and compressed (meshopt, Draco, Basis Universal): no panic, no hang, bounded memory.
+//! Hostile glTF files, plain and compressed (meshopt, Draco, Basis Universal): no panic, no hang,
+//! bounded memory.
 //!
-//! `SCENE_FUZZ_CASES` and `SCENE_FUZZ_SEED` make a longer run; `docs/log/2026-11-24-compressed.md` records one. The
-//! allocator counts for the whole program, so this binary has one test.
+//! `SCENE_FUZZ_CASES` and `SCENE_FUZZ_SEED` make a longer run; `docs/log/2026-11-24-compressed.md`
+//! records one. The allocator counts for the whole program, so this binary has one test.
 #![cfg(feature = "io")]
 
 #[path = "../deform/figures.rs"]
@@ -33,8 +34,9 @@ static MEMORY: PeakAlloc = PeakAlloc;
 /// Cases of an ordinary test run.
 const CASES: u64 = 100_000;
 const SEED: u64 = 20_261_124;
-/// Longest that one file may take. The honest ones take less than a millisecond; a loaded machine may stop any of them
-/// for a while, and a picture of the largest size that is allowed takes its time to be cleared.
+/// Longest that one file may take. The honest ones take less than a millisecond; a loaded machine
+/// may stop any of them for a while, and a picture of the largest size that is allowed takes its
+/// time to be cleared.
 const SLOWEST: Duration = Duration::from_secs(5);
 /// What a picture may need to be decoded (docs/scenes.md), and room for the rest.
 const MOST_MEMORY: usize = (512 + 64) << 20;
@@ -100,7 +102,8 @@ fn corpus() -> Vec<Glb> {
     ]
 }
 
-/// A few bytes flipped, replaced, cut or moved; mostly near the front of something, where the numbers are that matter.
+/// A few bytes flipped, replaced, cut or moved; mostly near the front of something, where the
+/// numbers are that matter.
 fn spoil_bytes(bytes: &mut Vec<u8>, starts: &[usize], random: &mut Random) {
     for _ in 0..1 + random.below(6) {
         if bytes.is_empty() {

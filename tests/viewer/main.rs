@@ -1,4 +1,5 @@
-//! `bouncelight view` for real: a window under Xvfb on whatever adapter answers, driven by scripts with mouse and keys.
+//! `bouncelight view` for real: a window under Xvfb on whatever adapter answers, driven by scripts
+//! with mouse and keys.
 
 #![recursion_limit = "512"]
 
@@ -125,7 +126,8 @@ fn a_session_with_mouse_and_keys() {
     ]);
     let out = session(&display, dir.path(), script, &["cornell", "--method", "ambient", "--size", "480x300"]);
     succeeds(&out);
-    // The box's floor points up: half red, full green, half blue. The picture itself shows no such colour.
+    // The box's floor points up: half red, full green, half blue. The picture itself shows no such
+    // colour.
     let (x, y) = (60..100, 245..255);
     let normal = mean(&dir.path().join("normal.png"), x, y);
     assert!(normal[1] > normal[0] + 20.0 || normal[2] > 100.0, "{normal:?}");
@@ -136,7 +138,8 @@ fn a_session_with_mouse_and_keys() {
     assert!(!dir.path().join("config").exists(), "scripted runs save nothing");
 }
 
-/// F12, Shift+F12, and the command line that draws the very same picture, edits of lights and objects included.
+/// F12, Shift+F12, and the command line that draws the very same picture, edits of lights and
+/// objects included.
 #[test]
 fn the_copied_command_draws_the_same_picture() {
     let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };

@@ -22,8 +22,8 @@ fn sky(rgbe: [u8; 4]) -> Vec<u8> {
     file
 }
 
-/// Weights by file and broken; the network's layers and inputs as pictures; a split between two raster methods; the
-/// frontier's dots; the flicker meter; light theme.
+/// Weights by file and broken; the network's layers and inputs as pictures; a split between two
+/// raster methods; the frontier's dots; the flicker meter; light theme.
 #[test]
 fn methods_weights_and_views_switch_at_run_time() {
     let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
@@ -109,7 +109,8 @@ fn a_split_shows_two_raster_methods() {
     assert!(corner[2] > 150.0 && corner[2] > corner[0] + 50.0, "the sky is blue: {corner:?}");
 }
 
-/// `--watch`: the scene, the weights and a shader change; what is broken is told and the old state stays.
+/// `--watch`: the scene, the weights and a shader change; what is broken is told and the old state
+/// stays.
 #[test]
 fn watched_files_are_loaded_again_and_broken_ones_told() {
     let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
@@ -246,7 +247,8 @@ fn a_camera_path_is_recorded_and_played() {
     assert_eq!(render("3..3").status.code(), Some(2));
 }
 
-/// A file with an animation and two variants: both change the picture, and the copied command draws what is seen.
+/// A file with an animation and two variants: both change the picture, and the copied command draws
+/// what is seen.
 #[test]
 fn animations_play_and_variants_change_materials() {
     let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };

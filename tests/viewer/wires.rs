@@ -6,8 +6,8 @@ use crate::session::{mean, session, succeeds};
 use serde_json::json;
 use std::path::Path;
 
-/// A square of 2 m at z = 0 whose diagonal rises to the right, before one of 1 m, seen from z = 3. It is placed by its
-/// node: in the mesh it lies a metre further left.
+/// A square of 2 m at z = 0 whose diagonal rises to the right, before one of 1 m, seen from z = 3.
+/// It is placed by its node: in the mesh it lies a metre further left.
 fn file(folder: &Path) {
     let square = |x: f32, half: f32, z: f32| {
         [[x - half, -half], [x + half, -half], [x + half, half], [x - half, half]].map(|[x, y]| [x, y, z])
@@ -73,7 +73,8 @@ fn edges_are_lines_and_faces_are_not() {
     let light = |name: &str, x: std::ops::Range<u32>, y: std::ops::Range<u32>| {
         mean(&dir.path().join(name), x, y).iter().sum::<f64>() / 3.0
     };
-    // 75 pixels a metre: edges at columns 125 and 275, rows 75 and 225; the diagonal goes through the middle.
+    // 75 pixels a metre: edges at columns 125 and 275, rows 75 and 225; the diagonal goes through
+    // the middle.
     for name in ["wires.png", "split.png"] {
         let face = light(name, 140..170, 85..115);
         for x in [125, 275] {

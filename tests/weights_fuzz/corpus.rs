@@ -57,7 +57,8 @@ fn tensor(name: &str, dtype: &str, shape: &[u64]) -> Tensor {
     (name.into(), dtype.into(), shape.into(), each.repeat(values as usize))
 }
 
-/// Two small networks: one of plain convolutions on the screen's features, one with every operator and number type.
+/// Two small networks: one of plain convolutions on the screen's features, one with every operator
+/// and number type.
 pub fn weights() -> Vec<File> {
     let small = json!({
         "version": 1, "licence": "CC0-1.0", "table": {"name": "screen", "version": 1}, "cell": 4,

@@ -1,4 +1,5 @@
-//! Hostile weights files and state dicts: no panic, no hang, no memory beyond a small multiple of the file.
+//! Hostile weights files and state dicts: no panic, no hang, no memory beyond a small multiple of
+//! the file.
 //!
 //! `WEIGHTS_FUZZ_CASES` and `WEIGHTS_FUZZ_SEED` make a longer run; `weights-format/README.md`
 //! records one. The allocator counts for the whole program, so this binary has one test.
@@ -27,8 +28,9 @@ const SEED: u64 = 20_260_101;
 /// stop any of them for a while.
 const SLOWEST: Duration = Duration::from_secs(3);
 
-/// Most memory that reading a file may take: bytes become f32, which is four times as much, plus one tensor of scales;
-/// JSON text becomes objects of at most a few dozen times its length; then tables, messages and the like.
+/// Most memory that reading a file may take: bytes become f32, which is four times as much, plus
+/// one tensor of scales; JSON text becomes objects of at most a few dozen times its length; then
+/// tables, messages and the like.
 fn allowed(file: usize, header: usize) -> usize {
     5 * (file - header) + 48 * header + (64 << 10)
 }
@@ -139,7 +141,8 @@ fn hostile_files() {
     println!("seed {seed}: {cases} cases in {:.1} s, {} accepted", started.elapsed().as_secs_f64(), tally.accepted);
     println!("slowest {:?}, {:.0} % of the allowed memory at most", tally.slowest, 100.0 * tally.fullest);
     println!("{refused} faults: {:?}", tally.refused);
-    // The harness reaches everything: some mutations are harmless, and every kind of fault comes up.
+    // The harness reaches everything: some mutations are harmless, and every kind of fault comes
+    // up.
     assert!(tally.accepted > cases / 100, "hardly any mutation is harmless");
     let codes = ["document", "version", "unknown-operator", "operator", "graph", "feature", "missing", "unexpected"];
     let more =

@@ -144,7 +144,8 @@ fn spoil_bytes(bytes: &mut Vec<u8>, files: &[File], random: &mut Random) {
                 bytes.swap(at, other);
             }
         }
-        // Half of the time the length is put right again, so that mutations get past the first check.
+        // Half of the time the length is put right again, so that mutations get past the first
+        // check.
         if random.below(2) == 0 && bytes.len() > 8 {
             let end = bytes.iter().rposition(|b| *b == b'}').unwrap_or(8).max(8);
             let length = if random.below(2) == 0 { header as u64 - 8 } else { end as u64 - 7 };

@@ -1,4 +1,5 @@
-//! `cargo xtask demo | test | hosts | gpu-report | conformance | ci`: set-up and checks; no product code.
+//! `cargo xtask demo | test | hosts | gpu-report | conformance | ci`: set-up and checks; no product
+//! code.
 //!
 //! Every command first makes sure of a wgpu adapter: it asks `bouncelight doctor`, and on Debian or
 //! Ubuntu without any adapter it installs Mesa's CPU driver, saying so before it does.
@@ -61,7 +62,8 @@ fn demo() -> Result<(), String> {
 }
 
 fn test() -> Result<(), String> {
-    // The program as tests have it: `cargo build` would take other features of dependencies, and compile them twice.
+    // The program as tests have it: `cargo build` would take other features of dependencies, and
+    // compile them twice.
     cargo(&["test", "--workspace", "--no-run"])?;
     make_sure_of_adapter(&built("debug")?)?;
     make_sure_of_display()?;
@@ -164,8 +166,9 @@ fn hosts() -> Result<(), String> {
     is_ours(&program, &picture, &ours)
 }
 
-/// The page of examples/webgpu in headless Chromium, on SwiftShader: at 128×128 steep surfaces have the worst
-/// depth. The network is left out: its shaders take SwiftShader two minutes and more to compile.
+/// The page of examples/webgpu in headless Chromium, on SwiftShader: at 128×128 steep surfaces have
+/// the worst depth. The network is left out: its shaders take SwiftShader two minutes and more to
+/// compile.
 fn browser(program: &str, python: &str, glb: &str, work: &Path) -> Result<(), String> {
     let names = ["chromium", "chromium-browser", "google-chrome"];
     let Some(chromium) = names.into_iter().find(|c| Command::new(c).arg("--version").output().is_ok()) else {
@@ -185,8 +188,8 @@ fn browser(program: &str, python: &str, glb: &str, work: &Path) -> Result<(), St
     Ok(())
 }
 
-/// Compares a host's picture of `cornell` with our renderer's, and as a control with ours without the light that the
-/// pass finds.
+/// Compares a host's picture of `cornell` with our renderer's, and as a control with ours without
+/// the light that the pass finds.
 fn is_ours(program: &str, picture: &str, ours: &str) -> Result<(), String> {
     let render = ["-q", "render", "cornell", "--size", "384x384", "--tonemap", "none", "-o", ours];
     let render = [render.as_slice(), &["--reference", picture, "--metric", "flip", "--threshold", "0.05"]].concat();
@@ -210,8 +213,9 @@ fn built(profile: &str) -> Result<PathBuf, String> {
     Ok(target.join(profile).join(format!("bouncelight{}", std::env::consts::EXE_SUFFIX)))
 }
 
-/// Makes sure that an adapter answers; installs Mesa's CPU driver for Vulkan where that is a matter of one package.
-/// It is preferred to OpenGL's, which compiles the same shaders in minutes instead of seconds.
+/// Makes sure that an adapter answers; installs Mesa's CPU driver for Vulkan where that is a matter
+/// of one package. It is preferred to OpenGL's, which compiles the same shaders in minutes instead
+/// of seconds.
 fn make_sure_of_adapter(program: &Path) -> Result<(), String> {
     let found = doctor(program)?;
     if found == Adapter::Good {
@@ -240,7 +244,8 @@ fn make_sure_of_adapter(program: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// The viewer's tests need an X server without a screen, and what a window under X loads at run time.
+/// The viewer's tests need an X server without a screen, and what a window under X loads at run
+/// time.
 fn make_sure_of_display() -> Result<(), String> {
     let runs = |program: &str| Command::new(program).arg("-help").output().is_ok();
     if runs("Xvfb") || !std::path::Path::new("/etc/debian_version").exists() {
@@ -270,7 +275,8 @@ fn doctor(program: &Path) -> Result<Adapter, String> {
     let text = String::from_utf8_lossy(&found.stdout);
     print!("{text}");
     match found.status.code() {
-        // The sentence about the adapter: its name, its backend, and that it is software when it is.
+        // The sentence about the adapter: its name, its backend, and that it is software when it
+        // is.
         Some(0) if text.contains(" (Gl, ") && text.contains("software rendering") => Ok(Adapter::SlowGl),
         Some(0) => Ok(Adapter::Good),
         Some(NO_ADAPTER) => Ok(Adapter::None),
@@ -293,7 +299,8 @@ fn cargo(args: &[&str]) -> Result<(), String> {
 fn command(program: &str, args: &[&str]) -> Command {
     let mut command = Command::new(program);
     command.args(args).current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
-    // Without a display, Mesa's layer that asks the desktop for its preferred card can only complain.
+    // Without a display, Mesa's layer that asks the desktop for its preferred card can only
+    // complain.
     if ["DISPLAY", "WAYLAND_DISPLAY"].iter().all(|name| std::env::var_os(name).is_none()) {
         command.env("NODEVICE_SELECT", "1");
     }

@@ -1,6 +1,6 @@
-//! What rays meet, read in Bevy's main world: meshes and pictures once, on tasks; places, surfaces, lights and sky each
-//! frame. Trees of rays are built from meshes on the CPU, so a mesh must stay in the main world
-//! (`RenderAssetUsages::default()`, as glTF files are loaded).
+//! What rays meet, read in Bevy's main world: meshes and pictures once, on tasks; places, surfaces,
+//! lights and sky each frame. Trees of rays are built from meshes on the CPU, so a mesh must stay
+//! in the main world (`RenderAssetUsages::default()`, as glTF files are loaded).
 
 use crate::{Bouncelight, LUMENS_PER_WATT};
 use bevy::camera::Exposure;
@@ -20,8 +20,8 @@ use bouncelight::scene::{Environment, Light, LightKind};
 /// Angular diameter of the sun, radians: Bevy's has none.
 const SUN: f32 = 0.0093;
 
-/// Meshes that are drawn with one material share a tree; a material with pictures, or a mesh with colours, makes
-/// triangles of their own.
+/// Meshes that are drawn with one material share a tree; a material with pictures, or a mesh with
+/// colours, makes triangles of their own.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 struct Key {
     mesh: AssetId<Mesh>,
@@ -176,7 +176,8 @@ impl Known {
         gone.extend(self.meshes.extract_if(|key, _| stale(key)).map(|(_, (id, _))| id));
     }
 
-    /// Key in the world; begins to build what is new. `None` while its pictures are loaded, and for what cannot be.
+    /// Key in the world; begins to build what is new. `None` while its pictures are loaded, and for
+    /// what cannot be.
     fn id(&mut self, key: Key, job: impl FnOnce() -> Option<Result<Job, String>>) -> Option<u64> {
         if let Some((id, made)) = self.meshes.get(&key) {
             return (!matches!(made, Made::Refused)).then_some(*id);
@@ -271,7 +272,8 @@ fn job(mesh: &Mesh, own: Option<(&StandardMaterial, Surface)>, images: &Assets<I
     Some(Ok(job))
 }
 
-/// Eight bits a channel; alpha as the material takes it. `None` for what is compressed or floating-point.
+/// Eight bits a channel; alpha as the material takes it. `None` for what is compressed or
+/// floating-point.
 fn picture(image: &Image, alpha: AlphaMode) -> Option<Picture> {
     let format = image.texture_descriptor.format;
     let converted;
@@ -352,7 +354,8 @@ fn surface(material: &StandardMaterial, exposure: f32) -> Surface {
 }
 
 impl Lamps<'_, '_> {
-    /// Lumens over the whole sphere and lux, as Bevy has them (a spot's lumens are those of a point, too).
+    /// Lumens over the whole sphere and lux, as Bevy has them (a spot's lumens are those of a
+    /// point, too).
     fn lights(&self) -> Vec<Light> {
         let candela = |lumens: f32| lumens / (4.0 * std::f32::consts::PI * LUMENS_PER_WATT);
         let light = |color: Color, kind| {

@@ -23,8 +23,9 @@ pub struct Headless {
 }
 
 impl Headless {
-    /// Bevy's plugins without a window; `folder` holds its assets. Nothing is left to chance: pipelines are compiled
-    /// before they are used, and a frame is drawn when [`Headless::frame`] returns.
+    /// Bevy's plugins without a window; `folder` holds its assets. Nothing is left to chance:
+    /// pipelines are compiled before they are used, and a frame is drawn when [`Headless::frame`]
+    /// returns.
     pub fn new(size: [u32; 2], folder: &str) -> Self {
         let mut app = App::new();
         let plugins = DefaultPlugins
@@ -33,7 +34,8 @@ impl Headless {
             .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
             .disable::<PipelinedRenderingPlugin>();
         app.add_plugins(plugins).insert_resource(ClearColor(Color::BLACK));
-        // What files hold is spawned by reflection; Bevy's default features do this (`reflect_auto_register`).
+        // What files hold is spawned by reflection; Bevy's default features do this
+        // (`reflect_auto_register`).
         app.world().resource::<AppTypeRegistry>().write().register_derived_types();
         let mut image = Image::new_target_texture(size[0], size[1], TextureFormat::Rgba8UnormSrgb, None);
         image.asset_usage = RenderAssetUsages::default();
@@ -60,7 +62,8 @@ impl Headless {
         self.app.update();
     }
 
-    /// Draws frames until `ready` and until rays have all meshes; false if that takes more than `frames`.
+    /// Draws frames until `ready` and until rays have all meshes; false if that takes more than
+    /// `frames`.
     pub fn wait(&mut self, frames: usize, ready: impl Fn(&mut World) -> bool) -> bool {
         for _ in 0..frames {
             self.frame();

@@ -18,8 +18,8 @@
 //!  lights, sky: `collect`        (`collect::take`)  (`pass::prepare`)       ─► `pass::light`: View::record, composite
 //! ```
 //!
-//! Bevy's light is photometric and the pass's radiometric: what comes in is divided by [`LUMENS_PER_WATT`], what goes
-//! out multiplied by it and by the camera's exposure.
+//! Bevy's light is photometric and the pass's radiometric: what comes in is divided by
+//! [`LUMENS_PER_WATT`], what goes out multiplied by it and by the camera's exposure.
 
 mod collect;
 pub mod headless;
@@ -41,18 +41,19 @@ pub use pass::{Complaints, Views};
 /// Lumens of a watt of light, as this crate has it.
 pub const LUMENS_PER_WATT: f32 = 683.0;
 
-/// Gives cameras with [`Bouncelight`] the light that Bevy's lights leave out: every bounce, what glows, and the sky
-/// ([`GlobalAmbientLight`]). Opaque materials are drawn deferred from then on, which it reads albedo from: Bevy shows
-/// them to cameras with a [`DeferredPrepass`] alone.
+/// Gives cameras with [`Bouncelight`] the light that Bevy's lights leave out: every bounce, what
+/// glows, and the sky ([`GlobalAmbientLight`]). Opaque materials are drawn deferred from then on,
+/// which it reads albedo from: Bevy shows them to cameras with a [`DeferredPrepass`] alone.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct BouncelightPlugin {
-    /// After eight frames of a camera asks [`bouncelight::gi::View::check`] whether what it was given makes sense,
-    /// and logs what it finds. Waits for the GPU: for tests and debug builds.
+    /// After eight frames of a camera asks [`bouncelight::gi::View::check`] whether what it was
+    /// given makes sense, and logs what it finds. Waits for the GPU: for tests and debug builds.
     pub check: bool,
 }
 
-/// Lights what this camera shows. With it come a deferred, depth, normal and motion prepass and an HDR target; samples
-/// of edges go ([`Msaa::Off`]), and so does the camera's share of [`GlobalAmbientLight`], which rays find.
+/// Lights what this camera shows. With it come a deferred, depth, normal and motion prepass and an
+/// HDR target; samples of edges go ([`Msaa::Off`]), and so does the camera's share of
+/// [`GlobalAmbientLight`], which rays find.
 #[derive(Component, ExtractComponent, Debug, Clone, Copy, Default)]
 #[extract_app(RenderApp)]
 pub struct Bouncelight;

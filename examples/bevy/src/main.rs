@@ -2,8 +2,9 @@
 //!
 //!     bouncelight_bevy SCENE.glb OUT.png [--size WxH] [--frames N] [--without | --beside]
 //!
-//! The picture is to be compared with `bouncelight render --tonemap none`: the file's lights cast shadows, lamps that
-//! stand for glowing surfaces are left out (rays find those), and 1 W/(m²·sr) is white.
+//! The picture is to be compared with `bouncelight render --tonemap none`: the file's lights cast
+//! shadows, lamps that stand for glowing surfaces are left out (rays find those), and 1 W/(m²·sr)
+//! is white.
 
 use bevy::gltf::{GltfExtras, GltfSceneExtras};
 use bevy::light::GlobalAmbientLight;

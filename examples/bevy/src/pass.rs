@@ -1,5 +1,5 @@
-//! The render world's side: the world on the GPU, a view for each camera, and in schedule `Core3d` the pass and its
-//! composite.
+//! The render world's side: the world on the GPU, a view for each camera, and in schedule `Core3d`
+//! the pass and its composite.
 
 use crate::{Bouncelight, LUMENS_PER_WATT};
 use bevy::core_pipeline::prepass::ViewPrepassTextures;
@@ -47,7 +47,8 @@ struct Camera {
 
 struct Pass {
     view: View,
-    /// Bevy makes another view of the same depth each frame; what a pass binds it remembers by view.
+    /// Bevy makes another view of the same depth each frame; what a pass binds it remembers by
+    /// view.
     depth: Option<wgpu::TextureView>,
 }
 
@@ -59,14 +60,16 @@ impl Pass {
 }
 
 impl Views {
-    /// Bind groups and rebuilds of all cameras' passes since the start; stands still in steady frames.
+    /// Bind groups and rebuilds of all cameras' passes since the start; stands still in steady
+    /// frames.
     pub fn allocations(&self) -> u64 {
         let of = |c: &Camera| Some(c.pass.as_ref()?.lock().unwrap_or_else(PoisonError::into_inner).view.allocations());
         self.cameras.values().filter_map(of).sum()
     }
 }
 
-/// What [`View::check`] said of each camera, once it was asked (`BouncelightPlugin::check`), in the render world.
+/// What [`View::check`] said of each camera, once it was asked (`BouncelightPlugin::check`), in the
+/// render world.
 #[derive(Resource, Default, Debug)]
 pub struct Complaints {
     /// Cameras that were checked.
@@ -143,7 +146,8 @@ pub(crate) fn prepare(
 type Seen<'a> =
     (&'a ExtractedView, &'a ExtractedCamera, &'a ViewTarget, &'a ViewPrepassTextures, Option<&'a TemporalJitter>);
 
-/// Bevy's conventions: depth reversed with the far plane at infinity, normals in the world, motion from the past.
+/// Bevy's conventions: depth reversed with the far plane at infinity, normals in the world, motion
+/// from the past.
 fn inputs<'a>(
     view: &ExtractedView,
     textures: &'a ViewPrepassTextures,

@@ -1,5 +1,5 @@
-//! Light follows what Bevy's world does: objects that move, materials that change, what is no more. Needs a GPU or
-//! Mesa's CPU driver.
+//! Light follows what Bevy's world does: objects that move, materials that change, what is no more.
+//! Needs a GPU or Mesa's CPU driver.
 
 use bevy::prelude::*;
 use bevy::render::RenderApp;

@@ -9,8 +9,8 @@
 // Means of cells blurred over neighbours on the same surface, as directional light (`CellLight`).
 
 @group(2) @binding(0) var<storage, read> pasts: array<vec4f>;
-// First word's a: the variance of the mean's luminance; second's: which part of the light few rays have brought
-// (`past.wgsl`, `pack_rare`); third's: the side of the cell's plane.
+// First word's a: the variance of the mean's luminance; second's: which part of the light few rays
+// have brought (`past.wgsl`, `pack_rare`); third's: the side of the cell's plane.
 @group(2) @binding(1) var<storage, read_write> light: array<vec4f>;
 // Where light has changed: what it is now (rgb; a: 1), else 0.
 @group(2) @binding(2) var<storage, read_write> changes: array<vec4f>;
@@ -20,9 +20,10 @@
 // Of each cell, with GATHER_GUIDED.
 @group(2) @binding(4) var<storage, read> guidance: array<vec4f>;
 
-// Rays of a mean, four of them in the first frame, from which on the narrow blur is enough, and the radii of both
-// in cells: the first five frames after a cut are blurred widely. What comes into view later has four rays a cell,
-// and neighbours that know their light: the wide blur would drown its own in theirs.
+// Rays of a mean, four of them in the first frame, from which on the narrow blur is enough, and the
+// radii of both in cells: the first five frames after a cut are blurred widely. What comes into
+// view later has four rays a cell, and neighbours that know their light: the wide blur would drown
+// its own in theirs.
 const SETTLED = 9.0;
 const NARROW = 2;
 const WIDE = 4;
@@ -41,11 +42,13 @@ fn guidance_at(cell: u32) -> Guidance {
     return guidance_from(guidance[i], guidance[i + 1u], guidance[i + 2u]);
 }
 
-// Of the cells of a workgroup: luminance of all frames, of lately, its noise, and the most that one ray has in it.
+// Of the cells of a workgroup: luminance of all frames, of lately, its noise, and the most that one
+// ray has in it.
 var<workgroup> of_cells: array<vec4f, 64>;
 var<workgroup> region: vec4f;
 
-// The plane in which neighbours have to lie: its side, and one over the distance that counts as little, 1/m.
+// The plane in which neighbours have to lie: its side, and one over the distance that counts as
+// little, 1/m.
 struct Plane {
     side: vec3f,
     strictness: f32,
@@ -75,8 +78,9 @@ fn alike(here: Past, there: Past, plane: Plane) -> f32 {
     return same_surface(there.x - here.x, plane.side, here.n, there.n, plane.strictness);
 }
 
-// What rays into lobes around have found, times weight (a). Over a wide lobe's breadth every second cell is asked, all
-// of which have the same turn (`gloss_cell`); smooth.wgsl brings the four turns together.
+// What rays into lobes around have found, times weight (a). Over a wide lobe's breadth every second
+// cell is asked, all of which have the same turn (`gloss_cell`); smooth.wgsl brings the four turns
+// together.
 fn gloss_around(id: vec2u, here: Past, plane: Plane) -> vec4f {
     if here.roughness >= ROUGHEST { return vec4f(0.0); }
     let breadth = lobe_cells(here.roughness);
@@ -97,8 +101,9 @@ fn gloss_around(id: vec2u, here: Past, plane: Plane) -> vec4f {
     return sum;
 }
 
-// What the outer two of a row of five count so that they and the middle one together count as much as those between,
-// whose turn is the other: else each cell shows its own turn's noise, which is a pattern. At most `outer`.
+// What the outer two of a row of five count so that they and the middle one together count as much
+// as those between, whose turn is the other: else each cell shows its own turn's noise, which is a
+// pattern. At most `outer`.
 fn balanced(aside: f32, outer: f32) -> f32 {
     return clamp(aside - 0.5, 0.0, outer);
 }
@@ -109,9 +114,9 @@ fn at_rim(step: vec2i, radius: i32) -> f32 {
     return select(1.0, 0.5, outermost.x) * select(1.0, 0.5, outermost.y);
 }
 
-// How much a neighbour counts in the mean: that it is the same surface, and that as much is near to it as to the cell,
-// as far as their rays can tell. Light beside a thing that stands on a surface is other than that of the surface
-// around, whatever a few rays of it were.
+// How much a neighbour counts in the mean: that it is the same surface, and that as much is near to
+// it as to the cell, as far as their rays can tell. Light beside a thing that stands on a surface
+// is other than that of the surface around, whatever a few rays of it were.
 fn counts(here: Past, there: Past, neighbour: u32, own: Guidance, plane: Plane) -> f32 {
     let nearer = there.nearness - here.nearness;
     let chance = chance_of_nearness(here.nearness, here.frames) + chance_of_nearness(there.nearness, there.frames);
@@ -133,8 +138,8 @@ struct Usual {
     parts: f32,
 }
 
-// The neighbourhood without cells whose few bright rays would be seen as a blotch. `mean`: luminance without the brightest;
-// `total`: weight of all.
+// The neighbourhood without cells whose few bright rays would be seen as a blotch. `mean`:
+// luminance without the brightest; `total`: weight of all.
 fn without_rare(id: vec2u, here: Past, own: Guidance, plane: Plane, radius: i32, mean: f32, total: f32) -> Usual {
     var sum = Usual();
     for (var y = -radius; y <= radius; y++) {
@@ -210,7 +215,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             if there.frames <= 0.0 { continue; }
             let w = at_rim(vec2i(x, y), radius) * counts(here, there, neighbour, own, plane);
             sum += w * there.light;
-            // Across each one's own normal: what lies along normals that differ is no gradient of light.
+            // Across each one's own normal: what lies along normals that differ is no gradient of
+            // light.
             vector += w * (there.vector - there.n * dot(there.vector, there.n));
             total += w;
             lately += w * there.lately;
@@ -223,7 +229,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
         }
     }
     var mean = sum / max(total, 1e-30);
-    // The mean of lately against that of all frames: its own noise, from that of single frames, allows for so much.
+    // The mean of lately against that of all frames: its own noise, from that of single frames,
+    // allows for so much.
     if here.frames > LEAST_KNOWN && (gather.flags & GATHER_EVEN) == 0u {
         let now = lately / max(total, 1e-30);
         let variance = noise * lately_noise() / max(total * total, 1e-30);
@@ -246,10 +253,11 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     let bright = luminance(usual.light) / weight;
     let variance = max(usual.squares / weight - bright * bright, 0.0) * usual.parts / (weight * weight);
     vector /= max(total, 1e-30);
-    // Radiance a + g·ω over the hemisphere has these moments; on a surface tilted by little it gives `mean`
-    // along the normal and 8/3 of the vector's part across it.
+    // Radiance a + g·ω over the hemisphere has these moments; on a surface tilted by little it
+    // gives `mean` along the normal and 8/3 of the vector's part across it.
     let beside = vector - here.n * dot(vector, here.n);
-    // Less the chance in it (James and Stein 1961): of a ray's squared length about n half lies across it.
+    // Less the chance in it (James and Stein 1961): of a ray's squared length about n half lies
+    // across it.
     let chance = 0.5 * squares / max(total, 1e-30) * parts / max(total * total, 1e-30);
     let known = saturate(1.0 - chance / max(dot(beside, beside), 1e-30));
     let across = (8.0 / 3.0) * known * beside / max(luminance(mean), 1e-30);

@@ -2,10 +2,11 @@
 //#import gi/cells.wgsl
 //#import gi/gather/lobe.wgsl
 
-// Directional light of the cells, and what their lobes show, brought to every pixel: bilinear where the
-// surface goes on, and only from cells of the pixel's own surface where it does not, the light evaluated for
-// the pixel's own normal. All of it in f32. A workgroup reads the cells around its 8x8 pixels once. The
-// prelude holds CELL_SIDE and the tolerances (gi::gather::bring documents them).
+// Directional light of the cells, and what their lobes show, brought to every pixel: bilinear where
+// the surface goes on, and only from cells of the pixel's own surface where it does not, the light
+// evaluated for the pixel's own normal. All of it in f32. A workgroup reads the cells around its
+// 8x8 pixels once. The prelude holds CELL_SIDE and the tolerances (gi::gather::bring documents
+// them).
 
 @group(1) @binding(0) var<storage, read> cell_pixels: array<u32>;
 @group(1) @binding(1) var<storage, read> light: array<vec4f>;
@@ -19,13 +20,15 @@
 // Cells on a side of what a workgroup reads: its own 8 / CELL_SIDE and two on each side.
 const STAGED = 8 / CELL_SIDE + 4;
 
-// A cell's surface point (a: 1, or 0 where there is none), normal, light and gloss. 36 cells of 96 bytes at most.
+// A cell's surface point (a: 1, or 0 where there is none), normal, light and gloss. 36 cells of 96
+// bytes at most.
 var<workgroup> points: array<vec4f, STAGED * STAGED>;
 var<workgroup> normals: array<vec3f, STAGED * STAGED>;
 var<workgroup> lights: array<CellLight, STAGED * STAGED>;
 var<workgroup> gleams: array<vec4f, STAGED * STAGED>;
 
-// Thread `index` brings one cell of the square that begins at cell `first`. Cells beyond the picture count as empty.
+// Thread `index` brings one cell of the square that begins at cell `first`. Cells beyond the
+// picture count as empty.
 fn stage(index: u32, first: vec2i) {
     if index >= u32(STAGED * STAGED) {
         return;
@@ -75,12 +78,13 @@ struct Sum {
     gloss: vec4f,
 }
 
-// What one staged cell adds. A point of the same surface weighs 1. The tails are heavy on
-// purpose: where nothing agrees the least bad cell wins by ratio, without a branch and without a division by zero.
+// What one staged cell adds. A point of the same surface weighs 1. The tails are heavy on purpose:
+// where nothing agrees the least bad cell wins by ratio, without a branch and without a division by
+// zero.
 //
-// A cell knows the light above its own horizon only. Where a pixel that looks elsewhere has nothing better,
-// the cell's light is taken for a direction between the two normals, `least_cosine` or more towards the
-// cell's.
+// A cell knows the light above its own horizon only. Where a pixel that looks elsewhere has nothing
+// better, the cell's light is taken for a direction between the two normals, `least_cosine` or more
+// towards the cell's.
 fn tap(here: Surface, at: i32, spatial: f32, least_cosine: f32) -> Sum {
     let found = points[at];
     let off_plane = (dot(here.normal, found.xyz) - here.plane) * here.strictness;
@@ -94,7 +98,8 @@ fn tap(here: Surface, at: i32, spatial: f32, least_cosine: f32) -> Sum {
     return Sum(vec4f(arrives, 1.0) * weight, vec4f(gleams[at].rgb, 1.0) * (gleams[at].a * weight));
 }
 
-// Tent-weighted sum over the 2r x 2r cells around `place` (in cells, from the first staged one), r being 1 or 2.
+// Tent-weighted sum over the 2r x 2r cells around `place` (in cells, from the first staged one), r
+// being 1 or 2.
 fn gather(here: Surface, place: vec2f, radius: i32, least_cosine: f32) -> Sum {
     let base = vec2i(floor(place)) - (radius - 1);
     let slope = 1.0 / f32(radius);
@@ -122,19 +127,20 @@ fn mean(sum: Sum) -> Brought {
     return Brought(e, sum.gloss.rgb / sum.gloss.a);
 }
 
-// Pixels of the workgroup whose four cells lie on other surfaces, and what these say: such pixels look further out. In
-// a list, since threads side by side would all wait for each of them.
+// Pixels of the workgroup whose four cells lie on other surfaces, and what these say: such pixels
+// look further out. In a list, since threads side by side would all wait for each of them.
 var<workgroup> further: array<u32, 64>;
 var<workgroup> further_count: atomic<u32>;
 var<workgroup> nearby: array<Sum, 64>;
 
-// Where a pixel lies in cells, from the first staged one. A cell counts as lying at its middle, whichever pixel stands
-// for it.
+// Where a pixel lies in cells, from the first staged one. A cell counts as lying at its middle,
+// whichever pixel stands for it.
 fn place_of(pixel: vec2i, first: vec2i) -> vec2f {
     return (vec2f(pixel) - f32(CELL_SIDE / 2)) / f32(CELL_SIDE) - vec2f(first);
 }
 
-// What cells say that a lobe shows, and for the share `own` what the pixel's rays do, if there are any.
+// What cells say that a lobe shows, and for the share `own` what the pixel's rays do, if there are
+// any.
 fn sharper(gloss: vec3f, pixel: u32, own: f32) -> vec3f {
     let packed = mirrored[pixel];
     let found = vec4f(unpack2x16float(packed.x), unpack2x16float(packed.y));

@@ -1,23 +1,26 @@
 //#import lib/sampling.wgsl
 //#import gi/gather/types.wgsl
 
-// The cache of light between surfaces: entries of a hash table, each for the places of one cell of a grid in
-// the world that face one of six ways. The grid's cells grow with the distance from the eye in powers of two.
-// What an entry knows is irradiance over π of everything but the lights, which whoever reads an entry adds at
-// the place itself.
+// The cache of light between surfaces: entries of a hash table, each for the places of one cell of
+// a grid in the world that face one of six ways. The grid's cells grow with the distance from the
+// eye in powers of two. What an entry knows is irradiance over π of everything but the lights,
+// which whoever reads an entry adds at the place itself.
 //
-// An entry is made when a ray first meets its cell. Which of the rays that met it this frame says where the
-// entry's own rays start is drawn by lot (the lowest number wins, so that the same frame always has the same
-// winner), so that its mean is one over the cell's places as rays meet them, and no ray starts where none
-// was: inside a wall, in the air, behind a corner.
+// An entry is made when a ray first meets its cell. Which of the rays that met it this frame says
+// where the entry's own rays start is drawn by lot (the lowest number wins, so that the same frame
+// always has the same winner), so that its mean is one over the cell's places as rays meet them,
+// and no ray starts where none was: inside a wall, in the air, behind a corner.
 
-// 0 for a free slot, LEFT for one whose entry has left while others that were put further on for it are still there.
+// 0 for a free slot, LEFT for one whose entry has left while others that were put further on for it
+// are still there.
 @group(2) @binding(0) var<storage, read_write> entry_keys: array<atomic<u32>>;
-// Two halves, for even and odd rounds: the winner's lot. Its low bits are an index into `entry_queries`.
+// Two halves, for even and odd rounds: the winner's lot. Its low bits are an index into
+// `entry_queries`.
 @group(2) @binding(1) var<storage, read_write> entry_lots: array<atomic<u32>>;
-// Where rays met a cell: position, and the packed normal of the side that they met. First those of the
-// picture's cells, then of entries' own rays for even and odd rounds, then where the entries' rays began in
-// even and odd rounds (last word 0: nowhere yet); behind all, what workgroups remember of their rays (look.wgsl).
+// Where rays met a cell: position, and the packed normal of the side that they met. First those of
+// the picture's cells, then of entries' own rays for even and odd rounds, then where the entries'
+// rays began in even and odd rounds (last word 0: nowhere yet); behind all, what workgroups
+// remember of their rays (look.wgsl).
 @group(2) @binding(2) var<storage, read_write> entry_queries: array<vec4u>;
 
 // Slots that are looked at before a place goes without an entry.
@@ -51,7 +54,8 @@ fn entry_cell(x: vec3f, n: vec3f) -> EntryCell {
     return EntryCell(vec2u(h.x, h.y | 1u), size);
 }
 
-// The slot with this hash; a new one where there is none yet. NONE where the table is full around there.
+// The slot with this hash; a new one where there is none yet. NONE where the table is full around
+// there.
 fn entry_slot(hash: vec2u) -> u32 {
     for (var i = 0u; i < ENTRY_PROBES; i++) {
         let slot = (hash.x + i) & gather.mask;
@@ -66,14 +70,16 @@ fn entry_slot(hash: vec2u) -> u32 {
     return NONE;
 }
 
-// Entries that one cell has at most, for places that do not see each other: both sides of a wall that stands
-// on a floor, the inside of a box. Rays that meet further places go on to others (look.wgsl).
+// Entries that one cell has at most, for places that do not see each other: both sides of a wall
+// that stands on a floor, the inside of a box. Rays that meet further places go on to others
+// (look.wgsl).
 const ENTRY_ROOMS = 3u;
-// Both ends of the line that asks this are lifted by this share of the cell, so that it goes over what merely
-// lies there.
+// Both ends of the line that asks this are lifted by this share of the cell, so that it goes over
+// what merely lies there.
 const ENTRY_LIFT = 0.02;
 
-// Of a place that asks, the line to where the rays of an entry began: nothing stands in it if the place sees that.
+// Of a place that asks, the line to where the rays of an entry began: nothing stands in it if the
+// place sees that.
 struct EntryLine {
     slot: u32,
     // No length: the entry is everybody's, or the place itself.
@@ -97,14 +103,15 @@ fn entry_room(x: vec3f, n: vec3f, room: u32) -> EntryLine {
     return line;
 }
 
-// A ray with number `query` has met x, which faces n and whose entry is in `slot`: round `round` will update it.
-// Rays without a number (NONE) read entries and say nothing of where they begin.
+// A ray with number `query` has met x, which faces n and whose entry is in `slot`: round `round`
+// will update it. Rays without a number (NONE) read entries and say nothing of where they begin.
 fn claim_entry(slot: u32, x: vec3f, n: vec3f, query: u32, name: u32, round: u32) {
     if query == NONE { return; }
     entry_queries[query] = vec4u(bitcast<vec3u>(x), pack_normal(n));
     var lot = (pcg3(vec3u(name, round, 0x2545f491u)).x << (lot_bits() + 1u)) >> 1u;
     lot |= query;
-    // The picture's own rays come before those of entries, which tell what the light between surfaces is.
+    // The picture's own rays come before those of entries, which tell what the light between
+    // surfaces is.
     if query >= gather.rays { lot |= BY_ENTRIES; }
     atomicMin(&entry_lots[(round & 1u) * (gather.mask + 1u) + slot], lot);
 }

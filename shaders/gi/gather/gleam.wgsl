@@ -7,8 +7,8 @@
 
 // One over the difference of roughness from which on two lobes show different things.
 const ALIKE = 5.0;
-// Share of the light's gradient that a lobe of roughness 0.5 sees (1 for a mirror), and the range of what is
-// taken from it.
+// Share of the light's gradient that a lobe of roughness 0.5 sees (1 for a mirror), and the range
+// of what is taken from it.
 const SEEN = 0.87;
 const LEAST_TILT = 0.3;
 const MOST_TILT = 2.0;

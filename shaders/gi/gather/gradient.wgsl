@@ -5,10 +5,10 @@
 //#import gi/gather/start.wgsl
 //#import gi/gather/send.wgsl
 
-// Where lights or objects have just changed: of each square of 2×2 cells one sends the ray of the frame
-// before once more, from where it began and with the same random numbers. What it finds now, less what it
-// found then, is what has changed, without noise: a temporal gradient (Schied, Peters and Dachsbacher 2018).
-// Both are written where a fresh cell has its further rays.
+// Where lights or objects have just changed: of each square of 2×2 cells one sends the ray of the
+// frame before once more, from where it began and with the same random numbers. What it finds now,
+// less what it found then, is what has changed, without noise: a temporal gradient (Schied, Peters
+// and Dachsbacher 2018). Both are written where a fresh cell has its further rays.
 
 // Five vectors a cell: `Past` of the frame before.
 @group(2) @binding(3) var<storage, read> before: array<vec4f>;

@@ -1,8 +1,8 @@
-// What a network says of a cell, three vectors, the last two numbers of which are not read; all zeros is the
-// filter without one.
+// What a network says of a cell, three vectors, the last two numbers of which are not read; all
+// zeros is the filter without one.
 struct Guidance {
-    // Places of the cell in two spaces: cells count for each other by 1/(1 + distance²)² there, among its
-    // neighbours and among those further away.
+    // Places of the cell in two spaces: cells count for each other by 1/(1 + distance²)² there,
+    // among its neighbours and among those further away.
     near: vec4f,
     far: vec4f,
     // Logarithms: how much it counts for its neighbours, how much noise it allows for.
@@ -10,8 +10,8 @@ struct Guidance {
     tolerance: f32,
 }
 
-// Frames up to which what a network says counts in full; from there on the blur is narrow, and noise less. Later by
-// so much less.
+// Frames up to which what a network says counts in full; from there on the blur is narrow, and
+// noise less. Later by so much less.
 const GUIDED_FRAMES = 6.0;
 const MOST_LOG = 4.0;
 

@@ -5,8 +5,8 @@
 //#import gi/gather/past.wgsl
 //#import gi/gather/motion.wgsl
 
-// What cells remembered after the frame before, and what rays have found: what `gi.recall` and `gi.settle`
-// are bound to.
+// What cells remembered after the frame before, and what rays have found: what `gi.recall` and
+// `gi.settle` are bound to.
 
 // The pixel of a cell, FRESH where `before` has nothing of its surface.
 @group(2) @binding(0) var<storage, read_write> cell_pixels: array<u32>;
@@ -23,7 +23,8 @@
 
 // Least sum of bilinear weights of cells that show the same surface.
 const LEAST_PAST = 0.05;
-// Cosine between normals and distance from the plane, in cells, up to which a cell shows the same surface.
+// Cosine between normals and distance from the plane, in cells, up to which a cell shows the same
+// surface.
 const SAME_NORMAL = 0.8;
 const SAME_PLANE = 0.75;
 
@@ -31,7 +32,8 @@ fn from_shared_exponent(code: u32) -> vec3f {
     return vec3f(vec3u(code, code >> 9u, code >> 18u) & vec3u(511u)) * exp2(f32(i32(code >> 27u) - 24));
 }
 
-// The mean where the surface at x, which faces n, was in the frame before; 0 frames where it was not to be seen.
+// The mean where the surface at x, which faces n, was in the frame before; 0 frames where it was
+// not to be seen.
 fn past_of(cell: vec2u, pixel: vec2i, motion: vec2f, x: vec3f, n: vec3f, foot: f32) -> Past {
     let none = Past(vec3f(0.0), 0.0, vec3f(0.0), 0.0, x, n, vec3f(0.0), NO_LOBE, 0.0, vec4f(0.0));
     var past = none;

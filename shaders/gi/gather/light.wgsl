@@ -27,8 +27,8 @@ struct Place {
     roughness: f32,
 }
 
-// Power of a lobe below this roughness is spread as if by this one: rays that happen to meet a mirrored lamp
-// are not averaged enough to show it as anything but a spark.
+// Power of a lobe below this roughness is spread as if by this one: rays that happen to meet a
+// mirrored lamp are not averaged enough to show it as anything but a spark.
 const LEAST_ROUGHNESS = 0.5;
 
 fn weight_of(c: vec3f) -> f32 {
@@ -59,23 +59,22 @@ fn chance_of(i: u32) -> f32 {
     return max(lights[i].chance - below, 1e-9);
 }
 
-// One of the analytic lights (where `lamps`) and of one point of what glows, by how bright the place would be
-// without shadow.
-// `u` decides, `seed` gives further numbers.
+// One of the analytic lights (where `lamps`) and of one point of what glows, by how bright the
+// place would be without shadow. `u` decides, `seed` gives further numbers.
 fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
     let u = unit_floats(seed);
     var chosen = Chosen(vec3f(0.0), 0.0, vec3f(0.0), vec3f(0.0));
     var total = 0.0;
     var best = 0.0;
     var lot = u.x;
-    // The lengths of the lists are asked, too: Mesa's CPU driver compiles what uniforms alone branch on anew
-    // for each dispatch.
+    // The lengths of the lists are asked, too: Mesa's CPU driver compiles what uniforms alone
+    // branch on anew for each dispatch.
     let all = min(gather.light_count, arrayLength(&lights));
     let glowing = min(gather.emitter_count, arrayLength(&emitters));
     if lamps {
-        // A long list is looked at in places only, evenly spread over the lights' chances, and what is found
-        // there stands for the rest: resampled importance sampling (Talbot et al. 2005), right in the mean
-        // whatever the chances are.
+        // A long list is looked at in places only, evenly spread over the lights' chances, and what
+        // is found there stands for the rest: resampled importance sampling (Talbot et al. 2005),
+        // right in the mean whatever the chances are.
         let few = all <= CANDIDATES || lights[all - 1u].chance <= 0.0;
         let shift = unit_floats(pcg3(seed ^ vec3u(0x2c1b3c6du))).x;
         let looks = select(CANDIDATES, all, few);
@@ -121,7 +120,8 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
         let n_l = dot(p.n, l);
         if n_l > 0.0 && (facing > 0.0 || ((e.flags & MET_DOUBLE_SIDED) != 0u && facing != 0.0)) {
             let density = e.by_area * gather.inverse_power * d2 / abs(facing);
-            // Against cosine-distributed rays that meet the same surface (balance heuristic; Veach 1997).
+            // Against cosine-distributed rays that meet the same surface (balance heuristic; Veach
+            // 1997).
             let irradiance = e.radiance / (density + n_l / PI);
             let value = sends_back(p, l, n_l, irradiance);
             let w = weight_of(value);

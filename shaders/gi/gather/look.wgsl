@@ -8,8 +8,8 @@
 //#import gi/gather/entries.wgsl
 //#import gi/gather/queue.wgsl
 
-// What a ray finds: the sky, or a surface with the light of lamps and of what glows that it sends back, and
-// the entry that knows the rest of its light.
+// What a ray finds: the sky, or a surface with the light of lamps and of what glows that it sends
+// back, and the entry that knows the rest of its light.
 
 struct Found {
     // Radiance that is known at once.
@@ -24,18 +24,20 @@ struct Found {
 // Cosine of rays that alone find what glows: greater than any density of shadow rays.
 const ALONE = 1e12;
 
-// Segments of a ray's way at most. Where it meets a place that no entry knows (more places of a cell do not see
-// each other than it has entries, or the table is full) it goes on, as that place's own ray would, to one that
-// an entry knows. Of a wall full of shelves, or blinds, four segments lose 7 % of the light, eight 3 %
-// (tests/gi/fins.rs); but of the rays that a processor sends side by side all wait for the longest, and with
-// eight a city takes a ninth more time (docs/log/2026-11-25-lists.md).
+// Segments of a ray's way at most. Where it meets a place that no entry knows (more places of a
+// cell do not see each other than it has entries, or the table is full) it goes on, as that place's
+// own ray would, to one that an entry knows. Of a wall full of shelves, or blinds, four segments
+// lose 7 % of the light, eight 3 % (tests/gi/fins.rs); but of the rays that a processor sends side
+// by side all wait for the longest, and with eight a city takes a ninth more time
+// (docs/log/2026-11-25-lists.md).
 const SEGMENTS = 4u;
 
-// A ray with all that follows from what it meets is a way. A workgroup has as many as rays that it sends at once; any
-// of its threads takes each a stage further, so that those that do the same stand side by side.
+// A ray with all that follows from what it meets is a way. A workgroup has as many as rays that it
+// sends at once; any of its threads takes each a stage further, so that those that do the same
+// stand side by side.
 
-// What a way waits for: what its ray meets; whether the light chosen there is seen; whether the place where an entry's
-// rays began is; whether a point that glows is seen from where it sets out.
+// What a way waits for: what its ray meets; whether the light chosen there is seen; whether the
+// place where an entry's rays began is; whether a point that glows is seen from where it sets out.
 const NEAREST = 0u;
 const SHADOW = 1u;
 const ENTRY = 2u;
@@ -43,15 +45,18 @@ const GLOW = 3u;
 
 // What is remembered of a way: nine vectors behind the places of all entries in `entry_queries`.
 const PARTS = 9u;
-// Where its ray begins, from the first hit on the last place that it has met; stage, segments behind it and rooms of
-// the place's cell that were asked, a byte each.
+// Where its ray begins, from the first hit on the last place that it has met; stage, segments
+// behind it and rooms of the place's cell that were asked, a byte each.
 const PLACE = 0u;
-// Direction; cosine by which shadow rays to what glows were weighted where it begins, ALONE where none were sent.
+// Direction; cosine by which shadow rays to what glows were weighted where it begins, ALONE where
+// none were sent.
 const COURSE = 1u;
-// The side that the place shows; slot of the entry that is being asked, at the end of that which knows the rest.
+// The side that the place shows; slot of the entry that is being asked, at the end of that which
+// knows the rest.
 const SIDE = 2u;
-// What its chances are drawn by; no surface whose plane the beginning lies nearer to than this can be met but the one
-// that it begins on, by a ray that a shading normal sends below it: such light is lost.
+// What its chances are drawn by; no surface whose plane the beginning lies nearer to than this can
+// be met but the one that it begins on, by a ray that a shading normal sends below it: such light
+// is lost.
 const CHANCES = 3u;
 // Radiance found; distance of the first hit.
 const RADIANCE = 4u;
@@ -61,8 +66,8 @@ const BACK = 5u;
 const LIGHT = 6u;
 // What glows, by a shadow ray from where it set out, and its direction.
 const GLOWS = 7u;
-// The ray's number among all of the frame, NONE if it claims no entry; what its random numbers are drawn by, which
-// slots of the table must not decide, since they go to who comes first.
+// The ray's number among all of the frame, NONE if it claims no entry; what its random numbers are
+// drawn by, which slots of the table must not decide, since they go to who comes first.
 const NAMES = 8u;
 
 // Number of the workgroup.
@@ -96,8 +101,8 @@ fn keep_bits(at: u32, part: u32, bits: vec4u) {
     entry_queries[part_at(at, part)] = bits;
 }
 
-// Way `at` from o along d. `n_d` is its cosine, `height` the height of COURSE and CHANCES; what it finds is weighted by
-// `weight`, and taken down as that of `job`. Its ray is still to be put.
+// Way `at` from o along d. `n_d` is its cosine, `height` the height of COURSE and CHANCES; what it
+// finds is weighted by `weight`, and taken down as that of `job`. Its ray is still to be put.
 fn set_out(at: u32, o: vec3f, d: vec3f, n_d: f32, height: f32, query: u32, name: u32, weight: vec3f, job: u32) {
     let seed = pcg3(vec3u(name, gather.round, 0x9e3779b9u));
     keep(at, PLACE, o, NEAREST);
@@ -283,7 +288,8 @@ fn send_on(at: u32) {
     put(at, bitcast<vec3f>(place.xyz), bitcast<vec3f>(part_of(at, COURSE).xyz), FAR, false, part_of(at, CHANCES).x);
 }
 
-// Sends the ray of way `at`, which has just set out, if what it finds counts; else the way is at its end.
+// Sends the ray of way `at`, which has just set out, if what it finds counts; else the way is at
+// its end.
 fn goes(at: u32, weight: vec3f) -> bool {
     if any(weight > vec3f(0.0)) {
         send_on(at);

@@ -7,14 +7,14 @@
 //#import gi/gather/start.wgsl
 //#import gi/gather/look.wgsl
 
-// What smooth surfaces show, pixel by pixel: of each square of 2×2 pixels one in turn sends a ray into its
-// lobe. At rest each pixel keeps a mean of its own rays; until it has one, and where the picture moves, it
-// shows what its square's ray has found.
+// What smooth surfaces show, pixel by pixel: of each square of 2×2 pixels one in turn sends a ray
+// into its lobe. At rest each pixel keeps a mean of its own rays; until it has one, and where the
+// picture moves, it shows what its square's ray has found.
 
 // Two halves, for even and odd rounds: `entry_light` of renew.wgsl.
 @group(2) @binding(3) var<storage, read> entry_light: array<vec4f>;
-// Of each pixel four halves: what its lobe shows over `env_brdf`, and rays in it. 0: nothing is known;
-// A_NEIGHBOUR: of another pixel.
+// Of each pixel four halves: what its lobe shows over `env_brdf`, and rays in it. 0: nothing is
+// known; A_NEIGHBOUR: of another pixel.
 @group(2) @binding(4) var<storage, read_write> mirrored: array<vec2u>;
 // F0 and roughness.
 @group(2) @binding(5) var specular_map: texture_2d<f32>;

@@ -1,6 +1,7 @@
 //#import gi/inputs.wgsl
 
-// How surfaces move over the picture. The shader that imports this file binds `motion_map: texture_2d<f32>`.
+// How surfaces move over the picture. The shader that imports this file binds
+// `motion_map: texture_2d<f32>`.
 
 // Where the surface at this pixel was in the frame before, from here, in pixels.
 fn motion_of(pixel: vec2i) -> vec2f {

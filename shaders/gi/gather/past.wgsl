@@ -6,13 +6,15 @@ struct Past {
     // Irradiance over π on the cell's surface; frames in it.
     light: vec3f,
     frames: f32,
-    // Mean of luminance times direction of what arrived; mean square of the luminance of single frames.
+    // Mean of luminance times direction of what arrived; mean square of the luminance of single
+    // frames.
     vector: vec3f,
     square: f32,
     // World space.
     x: vec3f,
     n: vec3f,
-    // The same light as a mean that forgets within a few frames, which tells when light has changed.
+    // The same light as a mean that forgets within a few frames, which tells when light has
+    // changed.
     lately: vec3f,
     // Of the cell's surface now; NO_LOBE where it mirrors nothing.
     roughness: f32,
@@ -32,8 +34,8 @@ fn past_from(a: vec4f, b: vec4f, c: vec4f, d: vec4f, e: vec4f) -> Past {
 // Weight of a new frame in `lately`: 95 % of a change are there after six frames.
 const LATELY = 0.4;
 
-// The same now: from the sixth frame after a change on each frame since counts for its number, so that
-// `lately` comes to know.
+// The same now: from the sixth frame after a change on each frame since counts for its number, so
+// that `lately` comes to know.
 fn lately_share() -> f32 {
     let since = max(f32(gather.since), 6.0);
     return select(LATELY, min(LATELY, 2.0 / (since - 1.0)), (gather.flags & GATHER_CHANGING) != 0u);
@@ -44,7 +46,8 @@ fn lately_noise() -> f32 {
     return min(LATELY / (2.0 - LATELY), lately_share());
 }
 
-// A cell beside one, or a plane, that looks elsewhere by more than this (60°) is none of its surface.
+// A cell beside one, or a plane, that looks elsewhere by more than this (60°) is none of its
+// surface.
 const LEAST_COSINE_OF_PLANE = 0.5;
 // Distance from the plane, in cells, that counts as nothing.
 const BLUR_PLANE = 0.5;
@@ -55,9 +58,10 @@ fn strictness_at(x: vec3f) -> f32 {
     return 1.0 / (BLUR_PLANE * cell_foot(max(z, 1e-9)));
 }
 
-// The side that a surface's plane shows, from the places of the cells beside one: shading normals of coarse meshes and of
-// bumps lean away from it. The nearer one of each two is on the same surface if any is. Where what comes out is far
-// from the shading normal neither is, and that has to do.
+// The side that a surface's plane shows, from the places of the cells beside one: shading normals
+// of coarse meshes and of bumps lean away from it. The nearer one of each two is on the same
+// surface if any is. Where what comes out is far from the shading normal neither is, and that has
+// to do.
 fn plane_normal(left: vec3f, right: vec3f, above: vec3f, below: vec3f, n: vec3f) -> vec3f {
     let across = nearer(left, right);
     let down = nearer(above, below);
@@ -69,15 +73,16 @@ fn plane_normal(left: vec3f, right: vec3f, above: vec3f, below: vec3f, n: vec3f)
     return select(n, unit * sign(cosine), abs(cosine) > LEAST_COSINE_OF_PLANE);
 }
 
-// The shorter of two steps away from a place, the first one turned round; one that there is none of is 0.
+// The shorter of two steps away from a place, the first one turned round; one that there is none of
+// is 0.
 fn nearer(back: vec3f, ahead: vec3f) -> vec3f {
     let b = dot(back, back);
     let a = dot(ahead, ahead);
     return select(ahead, -back, b > 0.0 && (b < a || a == 0.0));
 }
 
-// How much a place counts that lies `to` away and faces `there`: that it is in the plane with that side, and
-// looks the way n does.
+// How much a place counts that lies `to` away and faces `there`: that it is in the plane with that
+// side, and looks the way n does.
 fn same_surface(to: vec3f, side: vec3f, n: vec3f, there: vec3f, strictness: f32) -> f32 {
     let off_plane = dot(to, side) * strictness;
     let facing = saturate(dot(there, n));
@@ -89,7 +94,8 @@ fn same_surface(to: vec3f, side: vec3f, n: vec3f, there: vec3f, strictness: f32)
 // A share of the hemisphere that no eye sees the lack of (Weber).
 const NO_NEARNESS = 0.01;
 
-// Variance of a nearness after so many frames, at most: that of rays which meet either the next thing or nothing.
+// Variance of a nearness after so many frames, at most: that of rays which meet either the next
+// thing or nothing.
 fn chance_of_nearness(nearness: f32, frames: f32) -> f32 {
     return nearness * (1.0 - nearness) / frames + NO_NEARNESS * NO_NEARNESS;
 }

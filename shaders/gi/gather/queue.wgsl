@@ -1,17 +1,19 @@
 //#import accel/traverse.wgsl
 
-// Rays that a workgroup sends together. Rays differ much in length, and threads side by side wait for the longest of
-// theirs. So all share one list of rays, several for each thread: whose ray is through the trees goes on with the next.
+// Rays that a workgroup sends together. Rays differ much in length, and threads side by side wait
+// for the longest of theirs. So all share one list of rays, several for each thread: whose ray is
+// through the trees goes on with the next.
 
 // Threads of a workgroup, and rays that it sends at once.
 const WALKERS = 64u;
 const WALKS = 256u;
 
-// Rays by number, then what each has met: origin and reach (negative: any hit will do), direction and seed; t,
-// triangle and weights, instance and leaf.
+// Rays by number, then what each has met: origin and reach (negative: any hit will do), direction
+// and seed; t, triangle and weights, instance and leaf.
 var<workgroup> walks: array<vec4u, 2u * WALKS>;
-// Numbers of those to be sent, and in the other half of those that were sent last: from the front those that ask for
-// the nearest hit, from the back those that any will do for, so that threads side by side have as many of either.
+// Numbers of those to be sent, and in the other half of those that were sent last: from the front
+// those that ask for the nearest hit, from the back those that any will do for, so that threads
+// side by side have as many of either.
 var<workgroup> lists: array<u32, 2u * WALKS>;
 var<workgroup> waiting_nearest: atomic<u32>;
 var<workgroup> waiting_any: atomic<u32>;

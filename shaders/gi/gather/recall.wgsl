@@ -1,8 +1,10 @@
 //#import gi/gather/history.wgsl
 
-// Before the rays: marks cells that are fresh, since nothing is remembered of them, or nothing that still holds.
+// Before the rays: marks cells that are fresh, since nothing is remembered of them, or nothing that
+// still holds.
 
-// The pixel of a cell that shows what the cell remembers, nearest to its middle; NO_PIXEL where none at rest does.
+// The pixel of a cell that shows what the cell remembers, nearest to its middle; NO_PIXEL where
+// none at rest does.
 fn pixel_showing(past: Past, cell: vec2u) -> u32 {
     let first = CELL_SIDE * vec2i(cell);
     var best = NO_PIXEL;
@@ -26,7 +28,8 @@ fn brightness_of(ray: u32) -> f32 {
     return luminance(found_by(ray) + records[3u * ray + 2u].rgb);
 }
 
-// Squares to each side whose rays of the frame before were sent again, and are asked what has changed.
+// Squares to each side whose rays of the frame before were sent again, and are asked what has
+// changed.
 const ASKED = 2;
 // Of a small surface fewer rays are sent again than this; then those around it are asked, too.
 const LEAST_ASKED = 4.0;
@@ -35,11 +38,13 @@ const AVERAGED = 16.0;
 // Less than this share of the light is no change.
 const NO_CHANGE = 0.01;
 
-// Frames of new rays that what is remembered is still worth, of a surface that was at pixel `then` of the
-// frame before: the square of what its light has changed by is as much as the variance of so many.
+// Frames of new rays that what is remembered is still worth, of a surface that was at pixel `then`
+// of the frame before: the square of what its light has changed by is as much as the variance of so
+// many.
 fn frames_worth(past: Past, then: vec2f) -> f32 {
     let middle = vec2i(floor(then / f32(2 * CELL_SIDE)));
-    // Sum, sum of squares and count of what rays have changed by: those from surfaces that face this way, and all.
+    // Sum, sum of squares and count of what rays have changed by: those from surfaces that face
+    // this way, and all.
     var facing = vec3f(0.0);
     var all = vec3f(0.0);
     for (var y = -ASKED; y <= ASKED; y++) {
@@ -66,8 +71,8 @@ fn frames_worth(past: Past, then: vec2f) -> f32 {
     return max(past.square - l * l, 0.0) / (AVERAGED * square);
 }
 
-// At rest a cell goes on with the surface that it remembers as long as one of its pixels
-// shows it: jittered pictures of leaves, grids and edges have another one in its middle in every frame.
+// At rest a cell goes on with the surface that it remembers as long as one of its pixels shows it:
+// jittered pictures of leaves, grids and edges have another one in its middle in every frame.
 @compute @workgroup_size(8, 8)
 fn recall(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= cell_grid()) { return; }

@@ -4,8 +4,8 @@
 //#import gi/gather/entries.wgsl
 //#import gi/gather/look.wgsl
 
-// One ray for each entry of the cache, whose find is mixed into the entry's mean. The finds' own entries are
-// read as they were after the round before, so the order of threads does not matter.
+// One ray for each entry of the cache, whose find is mixed into the entry's mean. The finds' own
+// entries are read as they were after the round before, so the order of threads does not matter.
 
 // The round in which an entry was last asked for, from 1; 0 for never.
 @group(2) @binding(3) var<storage, read_write> entry_asked: array<u32>;
@@ -15,8 +15,8 @@
 // Rounds after which an entry that no ray has met leaves.
 const ENTRY_AGE = 32u;
 
-// Before the rays of a frame, so that none of them looks up what is about to leave: two runs would not agree
-// on who came first.
+// Before the rays of a frame, so that none of them looks up what is about to leave: two runs would
+// not agree on who came first.
 @compute @workgroup_size(64)
 fn evict(@builtin(global_invocation_id) id: vec3u) {
     let slots = gather.mask + 1u;
@@ -37,14 +37,14 @@ fn evict(@builtin(global_invocation_id) id: vec3u) {
         entry_light[slot] = vec4f(0.0);
         entry_light[slots + slot] = vec4f(0.0);
     }
-    // Free if nobody can have been put further on for it. A neighbour that becomes free now frees this one a
-    // frame later.
+    // Free if nobody can have been put further on for it. A neighbour that becomes free now frees
+    // this one a frame later.
     let next = atomicLoad(&entry_keys[(slot + 1u) & gather.mask]);
     atomicStore(&entry_keys[slot], select(LEFT, 0u, next == 0u));
 }
 
-// Rounds for each ray of an entry that the picture's own rays do not meet. Of the entries of a city or a flat four
-// fifths are such, and what they know is a share of what others know.
+// Rounds for each ray of an entry that the picture's own rays do not meet. Of the entries of a city
+// or a flat four fifths are such, and what they know is a share of what others know.
 const FURTHER = 4u;
 
 // Takes note of who met the entry in the slot last; whether it is to send a ray.
@@ -107,9 +107,9 @@ fn finish(at: u32) {
     let found = found_by(at);
     var light = found.radiance;
     if found.slot != NONE { light += found.back * entry_light[even + found.slot].rgb; }
-    // Each of the first rays counts for the cube of its number: the earlier ones met entries that knew nothing yet.
-    // Of the light between surfaces of albedo ρ n^(-4 (1 - ρ)) is missing then after n rays, and noise is that of
-    // 7/16 n of them.
+    // Each of the first rays counts for the cube of its number: the earlier ones met entries that
+    // knew nothing yet. Of the light between surfaces of albedo ρ n^(-4 (1 - ρ)) is missing then
+    // after n rays, and noise is that of 7/16 n of them.
     let n_rays = min(before.a + 1.0, 4.0 * gather.entry_frames);
     let share = max(4.0 / (n_rays + 3.0), 1.0 / gather.entry_frames);
     entry_light[odd + slot] = vec4f(mix(before.rgb, finite3(light), share), n_rays);

@@ -2,9 +2,10 @@
 //#import gi/gather/start.wgsl
 //#import gi/gather/look.wgsl
 
-// A ray from a surface, and what is written down of it. The shader that imports this file binds `records`, three
-// vectors a ray: radiance found and the entry's slot; what the entry's light is multiplied by (shared
-// exponent), direction, distance (0: none was sent); light of what glows, and its direction.
+// A ray from a surface, and what is written down of it. The shader that imports this file binds
+// `records`, three vectors a ray: radiance found and the entry's slot; what the entry's light is
+// multiplied by (shared exponent), direction, distance (0: none was sent); light of what glows, and
+// its direction.
 
 fn shared_exponent(c: vec3f) -> u32 {
     let most = max(max(c.x, c.y), max(c.z, 1e-9));
@@ -24,9 +25,9 @@ fn record(at: u32) {
     records[3u * to + 2u] = bitcast<vec4f>(glow);
 }
 
-// Way `at`: the ray from x along d, for the surface there that faces n, and where surfaces glow a shadow ray to a
-// point of them. `ray` is what its random numbers are drawn by, `query` its number if it may claim an entry, `to` its
-// record.
+// Way `at`: the ray from x along d, for the surface there that faces n, and where surfaces glow a
+// shadow ray to a point of them. `ray` is what its random numbers are drawn by, `query` its number
+// if it may claim an entry, `to` its record.
 fn send(at: u32, x: vec3f, n: vec3f, d: vec3f, query: u32, ray: u32, to: u32) {
     set_out(at, x, d, max(dot(n, d), 1e-4), above(x), query, ray, vec3f(1.0), to);
     if gather.emitter_count > 0u && (gather.flags & GATHER_STANDS_IN) == 0u {

@@ -1,13 +1,13 @@
 //#import gi/gather/history.wgsl
 
-// What a cell's ray found, with the light of its entry, mixed into the mean over the frames before, which is
-// looked up where the surface was then.
+// What a cell's ray found, with the light of its entry, mixed into the mean over the frames before,
+// which is looked up where the surface was then.
 
 // Frames in which the light between surfaces settles.
 const YOUNG = 16.0;
-// Share of a frame in a mean, by its number. The first frames count for less, each for its number, since they
-// know least of the light between surfaces; from YOUNG on all count the same. `more` is what the first one
-// counts for beyond that.
+// Share of a frame in a mean, by its number. The first frames count for less, each for its number,
+// since they know least of the light between surfaces; from YOUNG on all count the same. `more` is
+// what the first one counts for beyond that.
 fn share_of_frame(number: f32, more: f32) -> f32 {
     let weight = min(number, YOUNG);
     return weight / (0.5 * weight * (weight + 1.0) + more + YOUNG * (number - weight));
@@ -19,14 +19,15 @@ const BRIEF = 128.0;
 const GLOSS_RAYS = 32.0;
 const GLOSS_HURRIED = 4.0;
 
-// A ray into a lobe that is wider than this (roughness) counts no more than so many times the light on the
-// surface or the mean of the rays before: few rays fill such a lobe, and one spark would stay for seconds.
+// A ray into a lobe that is wider than this (roughness) counts no more than so many times the light
+// on the surface or the mean of the rays before: few rays fill such a lobe, and one spark would
+// stay for seconds.
 const SPARKS = 0.3;
 const BRIGHTEST = 12.0;
 
-// The mean of what rays into the cell's lobe have found, with this frame's, if it is the cell's turn. What a
-// lobe shows slides over a surface that moves on the screen, by half of its way where the mirrored is as far
-// as the mirror; so many frames count as slide across the lobe.
+// The mean of what rays into the cell's lobe have found, with this frame's, if it is the cell's
+// turn. What a lobe shows slides over a surface that moves on the screen, by half of its way where
+// the mirrored is as far as the mirror; so many frames count as slide across the lobe.
 fn gloss_of(cell: vec2u, past: vec4f, roughness: f32, motion: vec2f, light: vec3f) -> vec4f {
     if roughness >= ROUGHEST { return vec4f(0.0); }
     var most = select(GLOSS_RAYS, GLOSS_HURRIED, (gather.flags & GATHER_LIGHTS_CHANGED) != 0u);
@@ -118,8 +119,8 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     var most = gather.cell_frames;
     let changing = (gather.flags & GATHER_CHANGING) != 0u || !rests(motion);
     if changing && (gather.flags & GATHER_EVEN) == 0u { most = min(most, BRIEF); }
-    // A fresh cell's first frame counts for its several rays; not just after a change, when what rays meet
-    // knows nothing of it yet.
+    // A fresh cell's first frame counts for its several rays; not just after a change, when what
+    // rays meet knows nothing of it yet.
     let frames = min(past.frames + f32(select(1u, LOOKS, fresh && !changed)), most);
     if fresh && changed {
         // Of one frame in which several rays were sent.
@@ -135,7 +136,8 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let surface = textureLoad(specular_map, pixel, 0);
     let roughness = select(NO_LOBE, surface.a, any(surface.rgb > vec3f(0.0)));
     let lately = mix(past.lately, arrived.light, select(max(lately_share(), 1.0 / frames), 1.0, fresh));
-    // At rest a bright ray comes into the mean over some frames, all of it in the end, and not as a spark.
+    // At rest a bright ray comes into the mean over some frames, all of it in the end, and not as a
+    // spark.
     let whole = changing || frames <= YOUNG || (gather.flags & GATHER_EVEN) != 0u;
     let mean = mix(past.light, select(lately, arrived.light, whole), share);
     let now = Past(

@@ -4,10 +4,11 @@
 //#import gi/gather/gleam.wgsl
 //#import gi/gather/guided.wgsl
 
-// Light of cells averaged with that of cells further away that differ by no more than noise: one à-trous step
-// (Dammertz et al. 2010) whose tolerance is the noise itself. Where means are known well it does nothing. The part
-// of the light that few rays have brought goes to all of the surface around alike, since the next such ray may come
-// anywhere there: none of it is lost, and none is seen as a blotch.
+// Light of cells averaged with that of cells further away that differ by no more than noise: one
+// à-trous step (Dammertz et al. 2010) whose tolerance is the noise itself. Where means are known
+// well it does nothing. The part of the light that few rays have brought goes to all of the surface
+// around alike, since the next such ray may come anywhere there: none of it is lost, and none is
+// seen as a blotch.
 
 @group(2) @binding(0) var<storage, read> pasts: array<vec4f>;
 // What blur.wgsl wrote: directional light, with the variance of its luminance.
@@ -15,7 +16,8 @@
 @group(2) @binding(2) var<storage, read_write> light: array<vec4f>;
 // Of each cell, with GATHER_GUIDED.
 @group(2) @binding(3) var<storage, read> guidance: array<vec4f>;
-// What rays into lobes have found, times weight (a), and what lobes show over `env_brdf` (a: 1), 0 on surfaces without.
+// What rays into lobes have found, times weight (a), and what lobes show over `env_brdf` (a: 1), 0
+// on surfaces without.
 @group(2) @binding(4) var<storage, read> glosses: array<vec4f>;
 @group(2) @binding(5) var<storage, read_write> gleams: array<vec4f>;
 
@@ -64,16 +66,16 @@ fn blurred_at(cell: u32) -> Blurred {
     );
 }
 
-// One channel of `CellLight` from (light along n) · n + gradient. Light from all of the half space alike
-// gives a surface tilted by θ (1 + cos θ)/2 of itself, not cos θ: what lies below its horizon gives nothing,
-// rather than less than nothing.
+// One channel of `CellLight` from (light along n) · n + gradient. Light from all of the half space
+// alike gives a surface tilted by θ (1 + cos θ)/2 of itself, not cos θ: what lies below its horizon
+// gives nothing, rather than less than nothing.
 fn tilting(channel: vec3f, n: vec3f) -> vec4f {
     let half = 0.5 * dot(channel, n);
     return vec4f(channel - half * n, half);
 }
 
-// What rays into lobes have found, times weight (a). Where every second cell was asked, neighbours of all four turns
-// count alike, the cell's own in the middle.
+// What rays into lobes have found, times weight (a). Where every second cell was asked, neighbours
+// of all four turns count alike, the cell's own in the middle.
 fn gloss_of(id: vec2u, here: Past, side: vec3f) -> vec4f {
     if lobe_stride(here.roughness) == 1 { return glosses[cell_index(id)]; }
     let strictness = strictness_at(here.x);

@@ -13,13 +13,14 @@ struct Start {
     v: vec3f,
 }
 
-// Steps of a pixel in which rasterisers place corners, at the coarsest that Vulkan allows (four bits; WebGPU
-// says nothing). A triangle's depth is that of a plane through the places: off by up to a step times its
-// slope, which is a step times the sine of the angle between the normal and the view, along the normal.
+// Steps of a pixel in which rasterisers place corners, at the coarsest that Vulkan allows (four
+// bits; WebGPU says nothing). A triangle's depth is that of a plane through the places: off by up
+// to a step times its slope, which is a step times the sine of the angle between the normal and the
+// view, along the normal.
 const SUBPIXEL = 1.0 / 16.0;
 
-// Above a surface that faces n, at distance z along the view, and towards the eye, where nothing is in
-// between whatever the normal says.
+// Above a surface that faces n, at distance z along the view, and towards the eye, where nothing is
+// in between whatever the normal says.
 fn lifted(from_eye: vec3f, n: vec3f, z: f32) -> vec3f {
     let lift = lift_at(z);
     let cosine = dot(normalize(from_eye), n);
@@ -49,8 +50,8 @@ fn start_at(pixel: vec2i) -> Start {
     return Start(lifted(from_eye, n, z), n, -normalize(from_eye));
 }
 
-// A direction of the half space above a surface; what its ray finds is weighted so that the mean over the lobe is what
-// `env_brdf` has to be multiplied by. No weight: no ray.
+// A direction of the half space above a surface; what its ray finds is weighted so that the mean
+// over the lobe is what `env_brdf` has to be multiplied by. No weight: no ray.
 struct LobeRay {
     d: vec3f,
     weight: vec3f,

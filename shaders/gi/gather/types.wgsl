@@ -27,7 +27,8 @@ struct Gather {
     entry_frames: f32,
     // Lights of this list stand for surfaces that glow: these light no cell a second time.
     flags: u32,
-    // Cells of the picture. Queries and records of rays into lobes come after theirs, queries of entries after both.
+    // Cells of the picture. Queries and records of rays into lobes come after theirs, queries of
+    // entries after both.
     cells: u32,
     // Rays of cells and into lobes.
     rays: u32,
@@ -52,7 +53,8 @@ const GATHER_CHANGING = 128u;
 const GATHER_GUIDED = 256u;
 // Lights or objects have changed since the frame before.
 const GATHER_CHANGED = 512u;
-// Every entry sends a ray in each round, whoever met it: light has changed lately, or all frames are to be alike.
+// Every entry sends a ray in each round, whoever met it: light has changed lately, or all frames
+// are to be alike.
 const GATHER_ALL_ENTRIES = 1024u;
 
 @group(1) @binding(0) var<uniform> gather: Gather;
@@ -66,7 +68,8 @@ const GATHER_ALL_ENTRIES = 1024u;
 // Rays of a cell of which nothing is remembered. The others have one.
 const LOOKS = 4u;
 
-// Where ray `look` of a cell stands among the records: the first rays of all cells and those into lobes come first.
+// Where ray `look` of a cell stands among the records: the first rays of all cells and those into
+// lobes come first.
 fn cell_record(cell: u32, look: u32) -> u32 {
     return select(gather.rays + (look - 1u) * gather.cells + cell, cell, look == 0u);
 }
@@ -90,7 +93,8 @@ fn cosine_direction(n: vec3f, u: vec2f) -> vec3f {
     return frame_around(n) * vec3f(r * cos(a), r * sin(a), sqrt(max(1.0 - u.x, 0.0)));
 }
 
-// Point `i` of the rank-1 lattice of the plastic number (Roberts 2018), shifted; whole numbers lose no digits.
+// Point `i` of the rank-1 lattice of the plastic number (Roberts 2018), shifted; whole numbers lose
+// no digits.
 fn lattice(i: u32, shift: vec2u) -> vec2f {
     return vec2f((vec2u(3242174889u, 2447445414u) * i + shift) >> vec2u(8u)) / 16777216.0;
 }
@@ -99,8 +103,8 @@ fn unit_floats(bits: vec3u) -> vec3f {
     return vec3f(bits >> vec3u(8u)) / 16777216.0;
 }
 
-// Off a surface at p, which a ray of length t found, on the side of n: further than rounding on the way there and in an
-// instance's space can be wrong.
+// Off a surface at p, which a ray of length t found, on the side of n: further than rounding on the
+// way there and in an instance's space can be wrong.
 fn off(p: vec3f, n: vec3f, t: f32) -> vec3f {
     let a = abs(p);
     return p + n * (max(max(a.x, a.y), a.z) * 4e-6 + t * 1e-5);

@@ -7,7 +7,8 @@ const THREADS = 256u;
 
 var<workgroup> sums: array<f32, THREADS>;
 
-// One workgroup: the norm of all gradients, and what they are multiplied with so that it is at most CLIP.
+// One workgroup: the norm of all gradients, and what they are multiplied with so that it is at most
+// CLIP.
 @compute @workgroup_size(THREADS)
 fn norm(@builtin(local_invocation_index) local: u32) {
     var sum = 0.0;

@@ -1,4 +1,5 @@
-// The sum of two tensors, its activation, and the way back to both; `activation` of conv.wgsl comes between.
+// The sum of two tensors, its activation, and the way back to both; `activation` of conv.wgsl comes
+// between.
 //#import net/learn/job.wgsl
 
 fn elements() -> u32 { return job.out_size.x * job.out_size.y * job.out_channels; }

@@ -10,7 +10,8 @@ struct Job {
     in_channels: u32,
     out_channels: u32,
     stride: u32,
-    // First values of the tensors in `values` and `slopes`; of what is read from `picture` where a loss is meant.
+    // First values of the tensors in `values` and `slopes`; of what is read from `picture` where a
+    // loss is meant.
     input: u32,
     other: u32,
     output: u32,
@@ -38,7 +39,8 @@ const NONE = 0xffffffffu;
 // results: the step's loss, what a picture's slopes are multiplied with, the gradients' norm, what
 // they are multiplied with, the loss as if no picture were too loud.
 @group(0) @binding(3) var<storage, read_write> numbers: array<f32>;
-// Guess and target (three planes each, light in units of the exposure) and which cells count (one plane).
+// Guess and target (three planes each, light in units of the exposure) and which cells count (one
+// plane).
 @group(0) @binding(4) var<storage, read> picture: array<f32>;
 
 const FIRST_MOMENT = 1u;
@@ -47,7 +49,8 @@ const AVERAGE = 3u;
 const GRADIENT = 4u;
 const RESULT = 5u;
 
-// The element that a thread of a workgroup of 64 makes; there may be more workgroups than one dimension holds.
+// The element that a thread of a workgroup of 64 makes; there may be more workgroups than one
+// dimension holds.
 fn element(group: vec3u, groups: vec3u, local: u32) -> u32 {
     return (group.y * groups.x + group.x) * 64u + local;
 }

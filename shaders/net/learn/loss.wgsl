@@ -26,7 +26,8 @@ fn relative(found: f32, channel: u32, cell: u32) -> vec2f {
 
 var<workgroup> sums: array<vec2f, THREADS>;
 
-// One workgroup: the picture's loss is added to the step's, and what its slopes are to be multiplied with is written.
+// One workgroup: the picture's loss is added to the step's, and what its slopes are to be
+// multiplied with is written.
 @compute @workgroup_size(THREADS)
 fn measure(@builtin(local_invocation_index) local: u32) {
     var sum = vec2f(0.0);

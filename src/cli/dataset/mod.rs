@@ -46,8 +46,8 @@ pub struct Args {
     /// A scene file or bundled scene (recipe scene).
     #[arg(long, required_if_eq("recipe", "scene"))]
     scene: Option<String>,
-    /// Views of each room (directions into which the full turn is cut; of a home, its cameras) or of the
-    /// scene (drawn around its own camera).
+    /// Views of each room (directions into which the full turn is cut; of a home, its cameras) or
+    /// of the scene (drawn around its own camera).
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     views: u32,
     /// Seed of the views of recipe scene.
@@ -56,8 +56,8 @@ pub struct Args {
     /// Width and height of the rasterised picture; the inputs have a quarter of it.
     #[arg(long, default_value = "1024x512", value_parser = super::args::parse_size, value_name = "WxH")]
     size: [u32; 2],
-    /// Path-trace the light to be learnt with so many samples for each cell (with --moments: gather it with so many
-    /// rays); 0 leaves it out, for targets from Cycles.
+    /// Path-trace the light to be learnt with so many samples for each cell (with --moments: gather
+    /// it with so many rays); 0 leaves it out, for targets from Cycles.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=65_536), value_name = "N")]
     spp: u32,
     /// Frames of a still camera that method `gather`, the first guess, settles over before it is
@@ -71,25 +71,27 @@ pub struct Args {
     /// Folder for the samples; those that exist are kept, so a stopped run goes on where it was.
     #[arg(long)]
     out: PathBuf,
-    /// What a network that filters learns from, instead: moments at which what cells remember is kept, frames
-    /// after a cut or `pan` (at the end of six frames of a moving camera), such as 1,2,8,pan. The light to be
-    /// learnt is the mean of --spp of the same rays.
+    /// What a network that filters learns from, instead: moments at which what cells remember is
+    /// kept, frames after a cut or `pan` (at the end of six frames of a moving camera), such as
+    /// 1,2,8,pan. The light to be learnt is the mean of --spp of the same rays.
     #[arg(long, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST",
         conflicts_with_all = ["motion", "guides"])]
     moments: Vec<When>,
-    /// Weights of a network that filters, whose light is kept beside what cells remember (with --moments):
-    /// what it makes of them in the program.
+    /// Weights of a network that filters, whose light is kept beside what cells remember
+    /// (with --moments): what it makes of them in the program.
     #[arg(long, requires = "moments", value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// Also draw a second frame of each view from a camera that has moved a little, for training's temporal term.
+    /// Also draw a second frame of each view from a camera that has moved a little, for training's
+    /// temporal term.
     #[arg(long)]
     motion: bool,
     /// Also keep the picture at full resolution: guides for the way back from cells to pixels, and
     /// what puts the picture together again (32 bytes a pixel).
     #[arg(long)]
     guides: bool,
-    /// Also write each room as a `.glb` with a `_views.json` beside it, for targets from Cycles (recipes paper-room and
-    /// paper-room-varied; recipe scene always writes the views, and the scene is there).
+    /// Also write each room as a `.glb` with a `_views.json` beside it, for targets from Cycles
+    /// (recipes paper-room and paper-room-varied; recipe scene always writes the views, and the
+    /// scene is there).
     #[arg(long)]
     export: bool,
     /// Allow rooms that are kept for judging.
@@ -170,7 +172,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 /// Says before the work begins what it will take up.
 fn announce(global: &Global, args: &Args, samples: usize) {
     let [w, h] = cells_of(args.size).map(u64::from);
-    // Features, direct light, albedo, normal, depth, and the light to be learnt; about 1 KB of header.
+    // Features, direct light, albedo, normal, depth, and the light to be learnt; about 1 KB of
+    // header.
     let features = u64::from(FeatureSet::all().channels());
     let mut planes = features + 10 + if args.spp > 0 { 3 } else { 0 } + if args.motion { features + 2 } else { 0 };
     if !args.moments.is_empty() {
@@ -234,7 +237,8 @@ fn many_rooms(global: &Global, writer: &mut Writer, Rooms(rooms): &Rooms, args: 
     Ok(())
 }
 
-/// Views in which much of the picture is closer than this part of the scene's size stand in front of a wall or in one.
+/// Views in which much of the picture is closer than this part of the scene's size stand in front
+/// of a wall or in one.
 const TOO_CLOSE: f32 = 0.03;
 
 fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> Result<()> {
@@ -266,7 +270,8 @@ fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> R
     record_views(writer, &stem, spec, args.seed, &cameras, &scene)
 }
 
-/// Writes where the cameras stand, and what glTF has no field for, so whoever renders the targets needs it from here.
+/// Writes where the cameras stand, and what glTF has no field for, so whoever renders the targets
+/// needs it from here.
 fn record_views(writer: &Writer, stem: &str, spec: &str, seed: u64, cameras: &[Camera], scene: &Scene) -> Result<()> {
     let size = |l: &scene::Light| match l.kind {
         LightKind::Directional { angle, .. } => json!({ "name": l.name, "angle": angle }),

@@ -179,7 +179,8 @@ impl Writer {
         Ok(())
     }
 
-    /// Adds a sample to the list of checksums. One write, so that several shards may share a folder.
+    /// Adds a sample to the list of checksums. One write, so that several shards may share a
+    /// folder.
     fn list(&mut self, stem: &str, bytes: &[u8]) -> Result<()> {
         let name = format!("{stem}.safetensors");
         let sum: String = Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect();

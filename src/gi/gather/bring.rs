@@ -1,11 +1,11 @@
-//! From light of cells to light at every pixel: a joint bilateral filter that evaluates each cell's light for
-//! the pixel's own normal, and takes what lobes show along.
+//! From light of cells to light at every pixel: a joint bilateral filter that evaluates each cell's
+//! light for the pixel's own normal, and takes what lobes show along.
 //!
-//! The four cells around a pixel are weighted bilinearly times how much their sample lies on the pixel's own
-//! surface: distance from the pixel's plane relative to the pixel's depth, and agreement of normals (the
-//! tolerances are [`reconstruct`](crate::gi::reconstruct)'s). Where those four mostly disagree the 4×4 cells
-//! around are blended in. Background pixels get 0. A workgroup reads each cell around its 8×8 pixels once, into
-//! its shared memory.
+//! The four cells around a pixel are weighted bilinearly times how much their sample lies on the
+//! pixel's own surface: distance from the pixel's plane relative to the pixel's depth, and
+//! agreement of normals (the tolerances are [`reconstruct`](crate::gi::reconstruct)'s). Where those
+//! four mostly disagree the 4×4 cells around are blended in. Background pixels get 0. A workgroup
+//! reads each cell around its 8×8 pixels once, into its shared memory.
 
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
@@ -17,7 +17,8 @@ use crate::gpu::{shaders, timing::Recorder};
 /// Sum of the four weights below which the 4×4 cells around are blended in.
 const TRUST: f32 = 0.3;
 
-/// Least cosine to a cell's own normal for which its light is evaluated where no cell agrees with a pixel.
+/// Least cosine to a cell's own normal for which its light is evaluated where no cell agrees with a
+/// pixel.
 const LEAST_COSINE: f32 = 0.5;
 
 /// The constants as WGSL.

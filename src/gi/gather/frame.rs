@@ -74,8 +74,8 @@ impl GatherGi {
         })
     }
 
-    /// Records the frame up to the cells' means; then [`filter`](Self::filter) is due. `guided`: whether it
-    /// gets a network's guidance.
+    /// Records the frame up to the cells' means; then [`filter`](Self::filter) is due. `guided`:
+    /// whether it gets a network's guidance.
     ///
     /// # Errors
     /// [`GiError`] when the inputs do not fit; then nothing was recorded.
@@ -208,8 +208,8 @@ impl GatherGi {
         self.blur.record(recorder, settled.groups(), own, settled.workgroups());
     }
 
-    /// Records the rest of the frame: means averaged over neighbours, brought to full size. `guidance`:
-    /// [`GUIDANCE`](super::GUIDANCE) bytes a cell.
+    /// Records the rest of the frame: means averaged over neighbours, brought to full size.
+    /// `guidance`: [`GUIDANCE`](super::GUIDANCE) bytes a cell.
     pub fn filter(
         &mut self,
         recorder: &mut Recorder<'_>,
@@ -236,8 +236,9 @@ impl GatherGi {
     }
 }
 
-/// The largest `entry_scale` for a lens, by the tangent of half its vertical field of view. Entries are between once
-/// and twice that times their distance wide, which a long lens's picture is not: they stay below half of its height.
+/// The largest `entry_scale` for a lens, by the tangent of half its vertical field of view. Entries
+/// are between once and twice that times their distance wide, which a long lens's picture is not:
+/// they stay below half of its height.
 fn widest(tan_half: f32) -> f32 {
     0.5 * tan_half
 }

@@ -1,6 +1,6 @@
-//! The method `gather`: one ray a cell and frame into the scene's triangles, lit where it ends by the lights
-//! (a shadow ray each) and by a cache of light in the world; averaged over frames, blurred over neighbours,
-//! brought to full resolution.
+//! The method `gather`: one ray a cell and frame into the scene's triangles, lit where it ends by
+//! the lights (a shadow ray each) and by a cache of light in the world; averaged over frames,
+//! blurred over neighbours, brought to full resolution.
 //!
 //! ```text
 //! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.smooth ─► gi.bring ─► E/π, gloss
@@ -9,13 +9,14 @@
 //!        gi.evict ─► table of entries ─► gi.renew ┘   one ray an entry, several rounds in a first frame
 //! ```
 //!
-//! Of each 2×2 cells one in turn sends a second ray, into its surface's lobe: what lobes show goes the same
-//! way beside the light ([`Technique::gloss`]). Lobes narrower than cells get rays of their own, one a frame
-//! of each 2×2 pixels (`gi.mirror`).
+//! Of each 2×2 cells one in turn sends a second ray, into its surface's lobe: what lobes show goes
+//! the same way beside the light ([`Technique::gloss`]). Lobes narrower than cells get rays of
+//! their own, one a frame of each 2×2 pixels (`gi.mirror`).
 //!
-//! It asks what stands between, so it needs no constant for that. What it knows of a surface that a ray meets
-//! is one colour a triangle; how finely it knows the light between surfaces is the size of an entry's cell;
-//! the rest is noise, which frames and neighbours average away. `docs/gi.md` says what it cannot do.
+//! It asks what stands between, so it needs no constant for that. What it knows of a surface that a
+//! ray meets is one colour a triangle; how finely it knows the light between surfaces is the size
+//! of an entry's cell; the rest is noise, which frames and neighbours average away. `docs/gi.md`
+//! says what it cannot do.
 
 pub mod bring;
 mod frame;
@@ -42,26 +43,27 @@ use params::ParamsRing;
 use pass::Pass;
 use store::Store;
 
-/// A ray begins this share of the view distance off its surface: half along the way to the eye, half along
-/// the normal. At 1024 × 512 and 60° a three-hundredth of a cell's width, and 500 times the rounding of the
-/// depth.
+/// A ray begins this share of the view distance off its surface: half along the way to the eye,
+/// half along the normal. At 1024 × 512 and 60° a three-hundredth of a cell's width, and 500 times
+/// the rounding of the depth.
 const LIFT: f32 = 3e-5;
 
 /// It begins no nearer than so many steps of the depth's texels.
 const LIFT_STEPS: f32 = 4.0;
 
-/// Frames after a change of the lights for which cells let go of what they remember at less evidence.
+/// Frames after a change of the lights for which cells let go of what they remember at less
+/// evidence.
 const HURRY: u32 = 8;
 
-/// Frames after the first, after a change of the lights, or after an object has moved, for which entries get
-/// two rays each and remember no more than [`HURRIED`]. Light between surfaces of albedo ρ goes with exp(−t
-/// (1 − ρ) 2 / HURRIED) then, by frames: of white ones' (0.8) 2 % are left after so many. With one ray a
-/// frame and a memory of eight it would take 160.
+/// Frames after the first, after a change of the lights, or after an object has moved, for which
+/// entries get two rays each and remember no more than [`HURRIED`]. Light between surfaces of
+/// albedo ρ goes with exp(−t (1 − ρ) 2 / HURRIED) then, by frames: of white ones' (0.8) 2 % are
+/// left after so many. With one ray a frame and a memory of eight it would take 160.
 const STIR: u32 = 24;
 const HURRIED: f32 = 2.5;
 
-/// After the first frame entries get so many rays each for so many frames, and in a frame in which lights or objects
-/// change: light between surfaces has come round by then.
+/// After the first frame entries get so many rays each for so many frames, and in a frame in which
+/// lights or objects change: light between surfaces has come round by then.
 const YOUNG: u32 = 8;
 const ROUNDS_YOUNG: u32 = 4;
 
@@ -70,7 +72,8 @@ pub fn prelude() -> String {
     format!("{}const LIFT = f32({LIFT:?});\nconst LIFT_STEPS = f32({LIFT_STEPS:?});\n", cells::prelude())
 }
 
-/// Most bits of a lot that may name a query (`lot_bits` of `entries.wgsl`): ten are left to draw by.
+/// Most bits of a lot that may name a query (`lot_bits` of `entries.wgsl`): ten are left to draw
+/// by.
 const LOT_BITS: u32 = 22;
 
 /// Storage buffers that `gi.rays` and `gi.renew` bind: as many as every WebGPU device has.
@@ -79,8 +82,8 @@ const STORAGE_BUFFERS: u32 = 8;
 /// Rays of a cell of which nothing is remembered; `LOOKS` of `types.wgsl`.
 const LOOKS: u64 = 4;
 
-/// Bytes that a workgroup remembers of its rays: of 256, nine vectors each (`WALKS` of `queue.wgsl`, `PARTS` of
-/// `look.wgsl`).
+/// Bytes that a workgroup remembers of its rays: of 256, nine vectors each (`WALKS` of
+/// `queue.wgsl`, `PARTS` of `look.wgsl`).
 const WAYS: u64 = 256 * 9 * 16;
 
 /// Bytes of what a cell's ray found.
@@ -126,16 +129,17 @@ pub struct GatherGi {
     no_motion: wgpu::TextureView,
     /// Bound where the host names no specular reflectance: there is none.
     no_specular: wgpu::TextureView,
-    /// Frames since the last cut, rounds since the beginning, and the round of the last frame's rays.
+    /// Frames since the last cut, rounds since the beginning, and the round of the last frame's
+    /// rays.
     frame: u32,
     round: u32,
     sent: u32,
-    /// The lights' state in the last frame, and frames for which cells forget at less evidence because it was
-    /// another before.
+    /// The lights' state in the last frame, and frames for which cells forget at less evidence
+    /// because it was another before.
     lights_epoch: u64,
     hurry: u32,
-    /// Where objects were in the last frame, and frames for which entries forget quickly because lights or
-    /// objects changed before.
+    /// Where objects were in the last frame, and frames for which entries forget quickly because
+    /// lights or objects changed before.
     moves: u64,
     stir: u32,
     /// Frames for which light may be expected to change for the same reasons.

@@ -6,24 +6,25 @@ use thiserror::Error;
 /// How light is gathered. The numbers that are choices stand in the table of `docs/gi.md`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Frames that a cell's mean remembers at rest; where it moves, or light or objects do, 128 at most
-    /// (`BRIEF` in `settle.wgsl`).
+    /// Frames that a cell's mean remembers at rest; where it moves, or light or objects do, 128 at
+    /// most (`BRIEF` in `settle.wgsl`).
     pub cell_frames: f32,
     /// Rays that an entry's mean remembers.
     pub entry_frames: f32,
     /// Slots of the table of entries, a power of two.
     pub slots: u32,
-    /// Size of an entry's cell over its distance from the eye, before it is rounded up to a power of two.
+    /// Size of an entry's cell over its distance from the eye, before it is rounded up to a power
+    /// of two.
     pub entry_scale: f32,
     /// Rounds of entries in the first frame after a cut.
     pub first_rounds: u32,
     /// Whether means are blurred over neighbours.
     pub blur: bool,
-    /// Whether all frames of a mean count the same, however early, and a change of light shortens none: for
-    /// asking what the method converges to.
+    /// Whether all frames of a mean count the same, however early, and a change of light shortens
+    /// none: for asking what the method converges to.
     pub even: bool,
-    /// Whether surfaces that rays meet show their gloss. Pictures made by Cycles without "Reflective Caustics"
-    /// are compared with those made without it; light is missing then.
+    /// Whether surfaces that rays meet show their gloss. Pictures made by Cycles without
+    /// "Reflective Caustics" are compared with those made without it; light is missing then.
     pub caustics: bool,
 }
 
@@ -43,8 +44,9 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Cells forget nothing and nothing is blurred: for asking what the method converges to. (Entries that remember
-    /// n rays take n / (1 − albedo) rounds to forget that they once knew nothing of each other.)
+    /// Cells forget nothing and nothing is blurred: for asking what the method converges to.
+    /// (Entries that remember n rays take n / (1 − albedo) rounds to forget that they once knew
+    /// nothing of each other.)
     pub const PLAIN: Self = Self {
         cell_frames: 1e9,
         entry_frames: 8.0,

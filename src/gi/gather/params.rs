@@ -1,4 +1,5 @@
-//! What changes from round to round, in a ring of uniform slots: a host may record several views into one submission.
+//! What changes from round to round, in a ring of uniform slots: a host may record several views
+//! into one submission.
 
 use crate::gpu::bind::Bound;
 use bytemuck::{Pod, Zeroable};
@@ -52,8 +53,8 @@ pub struct Params {
 
 /// Uniform offsets are multiples of this under WebGPU's default limits.
 const STRIDE: u64 = 256;
-/// Rounds between two submissions that keep their own parameters: as many views as `InputGroup` allows, with a
-/// few first frames among them.
+/// Rounds between two submissions that keep their own parameters: as many views as `InputGroup`
+/// allows, with a few first frames among them.
 const SLOTS: u32 = 128;
 
 pub(super) struct ParamsRing {

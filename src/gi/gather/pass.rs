@@ -5,8 +5,8 @@ use crate::gi::stage::inputs::{BoundInputs, InputGroup};
 use crate::gpu::bind::{self, Binder, Bound};
 use crate::gpu::{shaders, timing::Recorder};
 
-/// A pipeline with group 2 of its own; group 0 are the method's inputs, group 1 its parameters and, for passes
-/// that send rays, the scene.
+/// A pipeline with group 2 of its own; group 0 are the method's inputs, group 1 its parameters and,
+/// for passes that send rays, the scene.
 pub(super) struct Pass {
     label: &'static str,
     pipeline: wgpu::ComputePipeline,
@@ -23,7 +23,8 @@ pub(super) struct Groups<'a> {
 }
 
 impl Pass {
-    /// The pass `label` by entry point `entry` of shader `shader`, whose group 2 has bindings of `types`.
+    /// The pass `label` by entry point `entry` of shader `shader`, whose group 2 has bindings of
+    /// `types`.
     pub fn new(
         device: &wgpu::Device,
         (inputs, scene): (&InputGroup, &Binder),

@@ -9,15 +9,16 @@ pub(super) fn squares(size: [u32; 2]) -> u64 {
 }
 
 pub(super) struct Store {
-    /// Of the table of entries, by slot: key; lots of both halves; queries of cells and of both halves'
-    /// entries, where both halves' rays begin, and what workgroups remember of their rays; when it was asked for;
-    /// light of both halves.
+    /// Of the table of entries, by slot: key; lots of both halves; queries of cells and of both
+    /// halves' entries, where both halves' rays begin, and what workgroups remember of their rays;
+    /// when it was asked for; light of both halves.
     pub keys: wgpu::Buffer,
     pub lots: wgpu::Buffer,
     pub queries: wgpu::Buffer,
     pub asked: wgpu::Buffer,
     pub light: wgpu::Buffer,
-    /// Of cells: what rays found; what is remembered, before and after this frame in turns; the light that is shown.
+    /// Of cells: what rays found; what is remembered, before and after this frame in turns; the
+    /// light that is shown.
     pub records: wgpu::Buffer,
     pub pasts: [wgpu::Buffer; 2],
     pub cell_light: wgpu::Buffer,
@@ -25,7 +26,8 @@ pub(super) struct Store {
     pub blurred: wgpu::Buffer,
     /// Of cells: what light has changed to.
     pub changes: wgpu::Buffer,
-    /// What rays into lobes of cells found, over neighbours; what lobes show, of cells and of pixels.
+    /// What rays into lobes of cells found, over neighbours; what lobes show, of cells and of
+    /// pixels.
     pub glosses: wgpu::Buffer,
     pub gleams: wgpu::Buffer,
     pub gloss: wgpu::TextureView,

@@ -3,20 +3,21 @@
 use super::LOOKS;
 use crate::gi::stage::inputs::cells_of;
 
-/// Jobs that a workgroup has at once: `JOBS` of `look.wgsl`. Of cells or squares they are 32×32 beside each other.
+/// Jobs that a workgroup has at once: `JOBS` of `look.wgsl`. Of cells or squares they are 32×32
+/// beside each other.
 const JOBS: u32 = BLOCK * BLOCK;
 const BLOCK: u32 = 32;
 
-/// Workgroups of a pass at most; those that have more to do go on with it one after the other. Of each of a GTX 1050's
-/// five multiprocessors six fill the memory.
+/// Workgroups of a pass at most; those that have more to do go on with it one after the other. Of
+/// each of a GTX 1050's five multiprocessors six fill the memory.
 const GROUPS: u32 = 256;
 
 fn blocks(grid: [u32; 2]) -> u32 {
     grid[0].div_ceil(BLOCK).saturating_mul(grid[1].div_ceil(BLOCK))
 }
 
-/// Workgroups of `gi.rays`: a layer of blocks for rays of cells, one for rays into lobes, the others for further
-/// rays of fresh cells.
+/// Workgroups of `gi.rays`: a layer of blocks for rays of cells, one for rays into lobes, the
+/// others for further rays of fresh cells.
 pub fn of_cells(size: [u32; 2]) -> u32 {
     blocks(cells_of(size)).saturating_mul(1 + LOOKS as u32).clamp(1, GROUPS)
 }

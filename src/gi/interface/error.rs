@@ -72,7 +72,8 @@ pub enum GiError {
         /// What it has.
         found: String,
     },
-    /// The weights name an input feature that this program does not have, or in another shape or order.
+    /// The weights name an input feature that this program does not have, or in another shape or
+    /// order.
     #[error("the weights' input feature `{name}` {reason}")]
     Feature {
         /// The feature's name in the weights file.

@@ -13,7 +13,8 @@ pub use error::GiError;
 /// The camera's part of a method's inputs, column-major as in WGSL.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraMatrices {
-    /// View space (looking down −Z, unless [`Conventions::forward`] says otherwise) from world space.
+    /// View space (looking down −Z, unless [`Conventions::forward`] says otherwise) from world
+    /// space.
     pub view_from_world: [[f32; 4]; 4],
     /// Clip space from view space: a perspective whose depth and jitter are as [`Conventions`] say.
     pub clip_from_view: [[f32; 4]; 4],

@@ -25,11 +25,11 @@ pub struct Memory<'a> {
     pub light: &'a wgpu::Buffer,
 }
 
-/// A method at work: G-buffer in, indirect diffuse light (E/π) out. Allocates only when size or views are new.
-/// `Send`, so that a viewer can build one on another thread.
+/// A method at work: G-buffer in, indirect diffuse light (E/π) out. Allocates only when size or
+/// views are new. `Send`, so that a viewer can build one on another thread.
 pub trait Technique: Send {
-    /// Records all of the method's passes: `output` (`Rgba16Float`, usage STORAGE_BINDING, the inputs' size) becomes
-    /// the light that direct lighting misses; 0 on the background.
+    /// Records all of the method's passes: `output` (`Rgba16Float`, usage STORAGE_BINDING, the
+    /// inputs' size) becomes the light that direct lighting misses; 0 on the background.
     ///
     /// # Errors
     /// [`GiError`] when inputs or output do not fit; then nothing was recorded.
@@ -41,9 +41,9 @@ pub trait Technique: Send {
         output: &wgpu::TextureView,
     ) -> Result<(), GiError>;
 
-    /// Records what later frames remember of this one and nothing that only this one shows: output and
-    /// [`gloss`](Technique::gloss) stay as they were, direct light is not read. True when it did; a method that needs
-    /// whole frames says false, and nothing was recorded.
+    /// Records what later frames remember of this one and nothing that only this one shows: output
+    /// and [`gloss`](Technique::gloss) stay as they were, direct light is not read. True when it
+    /// did; a method that needs whole frames says false, and nothing was recorded.
     ///
     /// # Errors
     /// As [`Technique::record`].
@@ -56,7 +56,8 @@ pub trait Technique: Send {
         Ok(false)
     }
 
-    /// Number of the frame for methods that may vary their patterns because a history averages frames; 0 without one.
+    /// Number of the frame for methods that may vary their patterns because a history averages
+    /// frames; 0 without one.
     fn set_frame(&mut self, _queue: &wgpu::Queue, _frame: u32) {}
 
     /// The next frame has nothing to do with the last: what is remembered of pixels is of no use.
@@ -74,7 +75,8 @@ pub trait Technique: Send {
         false
     }
 
-    /// The method that drew the last frame in this one's place, and why; `None` where it drew itself.
+    /// The method that drew the last frame in this one's place, and why; `None` where it drew
+    /// itself.
     fn instead(&self) -> Option<Instead<'_>> {
         None
     }

@@ -1,4 +1,5 @@
-//! What `bouncelight fit` has found good enough for a scene: the file `SCENE.gi.toml`, and the method that it names.
+//! What `bouncelight fit` has found good enough for a scene: the file `SCENE.gi.toml`, and the
+//! method that it names.
 
 use super::{Method, name::MethodName};
 use crate::gi::{ambient::Unseen, gather, pass::Neural};
@@ -16,7 +17,8 @@ pub struct Fitted {
     pub schema: u32,
     /// Version of the program that wrote it.
     pub program: String,
-    /// Hash of the scene as it was fitted, light included. With another one it is time to ask again.
+    /// Hash of the scene as it was fitted, light included. With another one it is time to ask
+    /// again.
     pub scene: String,
     /// The method.
     pub method: MethodName,
@@ -27,7 +29,8 @@ pub struct Fitted {
     /// --unseen` takes them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unseen: Option<String>,
-    /// Frames of a still camera after which the target was met, for methods that settle; 1 for others.
+    /// Frames of a still camera after which the target was met, for methods that settle; 1 for
+    /// others.
     pub frames: u32,
     /// The network's weights, for `neural`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -130,7 +133,8 @@ impl Fitted {
     /// The method that it names; reads weights.
     ///
     /// # Errors
-    /// [`FittedError`] for weights that are not there, or not those that were measured, and numbers that cannot be.
+    /// [`FittedError`] for weights that are not there, or not those that were measured, and numbers
+    /// that cannot be.
     pub fn method(&self) -> Result<Method, FittedError> {
         let broken = |problem: String| FittedError::Broken { path: Self::path("SCENE"), problem };
         self.check().map_err(broken)?;

@@ -36,7 +36,8 @@ pub enum Method {
 }
 
 impl Method {
-    /// Frames of a still camera after which a picture counts as settled, for methods with a history.
+    /// Frames of a still camera after which a picture counts as settled, for methods with a
+    /// history.
     pub const SETTLED: u32 = 32;
 
     /// Frames of a still camera after which a picture by this method counts as settled.
@@ -70,8 +71,8 @@ impl Method {
     }
 }
 
-/// Makes the method that `method` names, for pictures of `size` pixels; `None` for [`Method::Direct`], which adds no
-/// light.
+/// Makes the method that `method` names, for pictures of `size` pixels; `None` for
+/// [`Method::Direct`], which adds no light.
 ///
 /// # Errors
 /// [`GiError`] when a network does not fit this program or the device.

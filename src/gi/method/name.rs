@@ -1,4 +1,5 @@
-//! Where a picture's indirect light comes from, by name: the one list that command line, window and studies share.
+//! Where a picture's indirect light comes from, by name: the one list that command line, window and
+//! studies share.
 
 use super::Method;
 use serde::{Deserialize, Serialize};

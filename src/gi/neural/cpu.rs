@@ -14,7 +14,8 @@ use glam::{IVec2, Mat3, Vec2, Vec3, Vec3Swizzles};
 /// Largest value that is stored in the half-float output.
 pub const LARGEST: f32 = 65000.0;
 
-/// What the input textures hold, as plain numbers, row-major from the top; each list has `width × height` entries.
+/// What the input textures hold, as plain numbers, row-major from the top; each list has
+/// `width × height` entries.
 #[derive(Debug, Clone, Default)]
 pub struct GBuffer {
     /// Reversed-Z depth; 0 on the background.
@@ -231,7 +232,8 @@ impl<'a> Picture<'a> {
         spread.min(1.0)
     }
 
-    /// `gi.reconstruct`: E/π of every pixel from `answers`, one a cell: y or g, and r (zeros for [`Answer::Light`]).
+    /// `gi.reconstruct`: E/π of every pixel from `answers`, one a cell: y or g, and r (zeros for
+    /// [`Answer::Light`]).
     pub fn reconstruct(&self, exposure: &Exposure, answer: Answer, answers: &[[f32; 6]]) -> Vec<[f32; 3]> {
         let light = |pixel| {
             let distance = self.distance_at(pixel);

@@ -1,5 +1,5 @@
-//! The network's input features as data: table `screen`, version 1. Weights name the ones they use; the pack shader
-//! gets their channel offsets as a generated prelude.
+//! The network's input features as data: table `screen`, version 1. Weights name the ones they use;
+//! the pack shader gets their channel offsets as a generated prelude.
 
 use crate::gi::interface::GiError;
 
@@ -64,8 +64,8 @@ impl FeatureSet {
     /// The set that a weights file names, as (name, channels).
     ///
     /// # Errors
-    /// [`GiError::Feature`] for an unknown name, a wrong number of channels, a repetition or another order than the
-    /// table's, and for no feature at all.
+    /// [`GiError::Feature`] for an unknown name, a wrong number of channels, a repetition or
+    /// another order than the table's, and for no feature at all.
     pub fn new<'a>(inputs: impl IntoIterator<Item = (&'a str, u32)>) -> Result<Self, GiError> {
         let wrong = |name: &str, reason: String| Err(GiError::Feature { name: name.into(), reason });
         let mut set = Self { offsets: [None; FEATURES.len()], channels: 0 };
@@ -114,7 +114,8 @@ impl FeatureSet {
         FEATURES.iter().zip(self.offsets).filter(|(_, offset)| offset.is_some()).map(|(f, _)| f.name)
     }
 
-    /// The `const` lines for `gi.pack`: first channel of each feature, -1 when unused, and `PADDED`.
+    /// The `const` lines for `gi.pack`: first channel of each feature, -1 when unused, and
+    /// `PADDED`.
     pub fn prelude(&self) -> String {
         let mut text = String::new();
         for (feature, offset) in FEATURES.iter().zip(self.offsets) {

@@ -5,8 +5,8 @@
 //!                                    └► gi.features ─► U-Net (net.*) ──► ▲ guidance
 //! ```
 //!
-//! The network never says light, it says which cells' light is averaged: darkness stays dark, twice the light
-//! is twice the answer, and an answer of zeros is `gather` itself.
+//! The network never says light, it says which cells' light is averaged: darkness stays dark, twice
+//! the light is twice the answer, and an answer of zeros is `gather` itself.
 
 use super::memory::{self, FeaturesPass};
 use super::trained::{FILTER, Neural};
@@ -22,7 +22,8 @@ use crate::net::format::Weights;
 use crate::net::gpu::{Binding, Network, Setup, Tap};
 use crate::net::plan::Plan;
 
-/// Numbers of a cell: two places in spaces of four dimensions; trust, tolerance, and two that are not read.
+/// Numbers of a cell: two places in spaces of four dimensions; trust, tolerance, and two that are
+/// not read.
 pub const CHANNELS: u32 = GUIDANCE as u32 / 4;
 
 /// The method at work.
@@ -40,7 +41,8 @@ pub struct FilterGi {
 }
 
 impl FilterGi {
-    /// Compiles all pipelines, uploads the weights and makes the buffers for pictures of `size` pixels.
+    /// Compiles all pipelines, uploads the weights and makes the buffers for pictures of `size`
+    /// pixels.
     ///
     /// # Errors
     /// [`GiError::Feature`] or [`GiError::Output`] when the weights speak of something else,

@@ -1,4 +1,5 @@
-//! What a network that filters is given: of each cell what `gather` remembers of it. Table `cells`, version 1.
+//! What a network that filters is given: of each cell what `gather` remembers of it. Table `cells`,
+//! version 1.
 
 use crate::gi::stage::exposure::ExposurePass;
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
@@ -7,8 +8,9 @@ use crate::gpu::binding::{READ, READ_WRITE};
 use crate::gpu::{shaders, timing::Recorder};
 
 /// Table `cells` v1: (name, channels), in channel order. s and m (e^ln_m) are
-/// [`Exposure`](crate::gi::stage::exposure::Exposure)'s, L the luminance of the cell's mean light. All are 0
-/// where a cell shows no surface, and none changes when all light is multiplied by one number.
+/// [`Exposure`](crate::gi::stage::exposure::Exposure)'s, L the luminance of the cell's mean light.
+/// All are 0 where a cell shows no surface, and none changes when all light is multiplied by one
+/// number.
 ///
 /// | name | what it holds |
 /// |---|---|
@@ -56,8 +58,8 @@ impl FeaturesPass {
         Self { pipeline: bind::pipeline(device, "gi.features", &module, "features", &layouts), binder }
     }
 
-    /// Records the pass into `target` (f32, [`PITCH`] numbers a cell, row by row); `pasts` is what cells
-    /// remember, and the exposure must have been recorded before.
+    /// Records the pass into `target` (f32, [`PITCH`] numbers a cell, row by row); `pasts` is what
+    /// cells remember, and the exposure must have been recorded before.
     pub fn record(
         &mut self,
         recorder: &mut Recorder<'_>,

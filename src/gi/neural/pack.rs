@@ -122,7 +122,8 @@ pub fn read_features(
 /// Size of the packed features, bytes.
 ///
 /// # Errors
-/// [`GiError::Size`] when the device cannot bind as much (WebGPU's default is 128 MiB) or the picture is empty.
+/// [`GiError::Size`] when the device cannot bind as much (WebGPU's default is 128 MiB) or the
+/// picture is empty.
 pub(crate) fn feature_bytes(device: &wgpu::Device, features: &FeatureSet, size: [u32; 2]) -> Result<u64, GiError> {
     if size.contains(&0) {
         return Err(GiError::Size { size, reason: "it is empty".into() });

@@ -36,13 +36,15 @@ use crate::net::plan::Plan;
 /// What the host chooses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// Width and height of the pictures to come, pixels. A recording of another size rebuilds the buffers.
+    /// Width and height of the pictures to come, pixels. A recording of another size rebuilds the
+    /// buffers.
     pub size: [u32; 2],
 }
 
-/// The embeddable pass. Keeps clones of device and queue (both are handles) to rebuild on a change of size and to
-/// write its parameters; parameters become visible to the GPU with the host's next submission, and up to
-/// [`SLOTS`](crate::gi::stage::inputs::SLOTS) recordings may go into one submission.
+/// The embeddable pass. Keeps clones of device and queue (both are handles) to rebuild on a change
+/// of size and to write its parameters; parameters become visible to the GPU with the host's next
+/// submission, and up to [`SLOTS`](crate::gi::stage::inputs::SLOTS) recordings may go into one
+/// submission.
 pub struct NeuralGi {
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -72,8 +74,9 @@ impl NeuralGi {
     /// Compiles all pipelines, uploads the weights and makes the buffers for `options.size`.
     ///
     /// # Errors
-    /// [`GiError::Feature`] or [`GiError::Output`] when the weights speak of something else than light on this
-    /// program's features, [`GiError::Size`] and [`GiError::Network`] when the size does not fit the device.
+    /// [`GiError::Feature`] or [`GiError::Output`] when the weights speak of something else than
+    /// light on this program's features, [`GiError::Size`] and [`GiError::Network`] when the size
+    /// does not fit the device.
     pub fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
@@ -112,8 +115,9 @@ impl NeuralGi {
         })
     }
 
-    /// Records all stages: `output` (`Rgba16Float`, usage STORAGE_BINDING, the inputs' size) becomes the light that
-    /// direct lighting misses, as E/π; 0 on the background. Allocates only when the size or the views are new.
+    /// Records all stages: `output` (`Rgba16Float`, usage STORAGE_BINDING, the inputs' size)
+    /// becomes the light that direct lighting misses, as E/π; 0 on the background. Allocates only
+    /// when the size or the views are new.
     ///
     /// # Errors
     /// [`GiError`] when inputs or output do not fit; then nothing was recorded.
@@ -126,8 +130,8 @@ impl NeuralGi {
         self.record_stages(&mut Recorder::new(encoder), inputs, output)
     }
 
-    /// Like [`record`](Self::record), for a frame that times each stage: `gi.exposure`, `gi.pack`, `net.*`,
-    /// `gi.reconstruct`.
+    /// Like [`record`](Self::record), for a frame that times each stage: `gi.exposure`, `gi.pack`,
+    /// `net.*`, `gi.reconstruct`.
     ///
     /// # Errors
     /// As [`record`](Self::record).
@@ -198,19 +202,22 @@ impl NeuralGi {
         self.gather.as_ref().map(|_| &self.rebuilt.guess)
     }
 
-    /// The next recording has nothing to do with the last (a cut of the camera): the first guess settles anew.
+    /// The next recording has nothing to do with the last (a cut of the camera): the first guess
+    /// settles anew.
     pub fn cut(&mut self) {
         if let Some(gather) = &mut self.gather {
             gather.cut();
         }
     }
 
-    /// Recordings that the first guess has settled over since the last cut; `None` for weights without one.
+    /// Recordings that the first guess has settled over since the last cut; `None` for weights
+    /// without one.
     pub fn settled(&self) -> Option<u32> {
         self.gather.as_ref().and_then(|gather| gather.settled())
     }
 
-    /// Lets go of the remembered texture views, and so of the textures; call it when targets are rebuilt.
+    /// Lets go of the remembered texture views, and so of the textures; call it when targets are
+    /// rebuilt.
     pub fn forget(&mut self) {
         self.inputs.forget();
         self.reconstruct.forget();
@@ -247,7 +254,8 @@ impl NeuralGi {
     }
 }
 
-// What a frame of our own sees; hosts that embed the pass use its own methods and need not know the trait.
+// What a frame of our own sees; hosts that embed the pass use its own methods and need not know the
+// trait.
 impl Technique for NeuralGi {
     fn record(
         &mut self,

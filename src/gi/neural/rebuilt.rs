@@ -1,4 +1,5 @@
-//! What of a network's method depends on the size of the picture: its tensors, its input, the first guess.
+//! What of a network's method depends on the size of the picture: its tensors, its input, the first
+//! guess.
 
 use super::features::FeatureSet;
 use super::pack::{self, PackPass};

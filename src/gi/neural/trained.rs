@@ -30,7 +30,8 @@ pub fn needs_guess(weights: &Weights) -> bool {
 pub struct Neural {
     /// The trained numbers.
     pub weights: Weights,
-    /// Kernels and storage. Dropout does not belong into frames; with a seed every frame has the same.
+    /// Kernels and storage. Dropout does not belong into frames; with a seed every frame has the
+    /// same.
     pub network: gpu::Options,
     /// What a tuner has found on this device; empty without one.
     pub tuned: Arc<Tuned>,

@@ -1,9 +1,10 @@
-//! What the screen-space methods share: how the depth buffer is walked (`shaders/gi/bitmask.wgsl`), and textures of
-//! half resolution with their way back (`shaders/gi/half.wgsl`).
+//! What the screen-space methods share: how the depth buffer is walked (`shaders/gi/bitmask.wgsl`),
+//! and textures of half resolution with their way back (`shaders/gi/half.wgsl`).
 //!
-//! A texel of half resolution stands for pixel (2i+1, 2j+1) (or the last row or column). The gather's directions, steps
-//! and rounding follow a fixed pattern of 4×4 texels, which the mean of 4×4 texels on the way back cancels; without
-//! history the pattern never moves, so a still picture stays still to the bit.
+//! A texel of half resolution stands for pixel (2i+1, 2j+1) (or the last row or column). The
+//! gather's directions, steps and rounding follow a fixed pattern of 4×4 texels, which the mean of
+//! 4×4 texels on the way back cancels; without history the pattern never moves, so a still picture
+//! stays still to the bit.
 
 use crate::gi::stage::exposure;
 use crate::gi::stage::exposure::storage_entry;
@@ -19,15 +20,18 @@ pub struct March {
     pub steps: u32,
     /// Length of the walk as a share of the picture's longer side.
     pub reach: f32,
-    /// Nothing further from the receiver than this counts, as a multiple of its view distance; the outer half fades.
+    /// Nothing further from the receiver than this counts, as a multiple of its view distance; the
+    /// outer half fades.
     pub radius: f32,
     /// How far behind its front a surface ends at least, as a share of its distance from the eye. A
     /// depth buffer does not tell; rooms of 100 m with objects of 2 m gave 2 %.
     pub thickness: f32,
-    /// The same as a share of its distance from the receiver: the depth buffer is known as densely as it is sampled.
+    /// The same as a share of its distance from the receiver: the depth buffer is known as densely
+    /// as it is sampled.
     pub growth: f32,
-    /// Steps that are nearer to each other than this share of their distance from the receiver lie on one surface, and
-    /// the angles between them are blocked, too. A geometric step that stays on a wall is 0.2 to 0.5.
+    /// Steps that are nearer to each other than this share of their distance from the receiver lie
+    /// on one surface, and the angles between them are blocked, too. A geometric step that stays on
+    /// a wall is 0.2 to 0.5.
     pub join: f32,
 }
 

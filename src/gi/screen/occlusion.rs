@@ -1,15 +1,18 @@
-//! Ambient occlusion: how much of the light that comes from all around reaches a surface past what stands near it,
-//! by visibility bitmask at half resolution, brought back to full resolution along the surface's own plane.
+//! Ambient occlusion: how much of the light that comes from all around reaches a surface past what
+//! stands near it, by visibility bitmask at half resolution, brought back to full resolution along
+//! the surface's own plane.
 //!
-//! What it cannot do: see what is off the screen or behind what is seen. A surface's thickness is assumed
-//! ([`March::thickness`]), so light passes behind thick things and is held back behind thin ones.
+//! What it cannot do: see what is off the screen or behind what is seen. A surface's thickness is
+//! assumed ([`March::thickness`]), so light passes behind thick things and is held back behind thin
+//! ones.
 
 use super::bitmask::{Kernel, March, Pattern, Stage, bind, half_of, pattern_entry, write_entry};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup, texture_entry};
 use crate::gpu::timing::Recorder;
 
 /// Finds visibility. Other methods make one, call [`fit`](Self::fit) when the size changes, bind
-/// [`visibility`](Self::visibility) as `texture_2d<f32>` (unfilterable, r) and [`record`](Self::record) it first.
+/// [`visibility`](Self::visibility) as `texture_2d<f32>` (unfilterable, r) and
+/// [`record`](Self::record) it first.
 pub struct OcclusionPass {
     device: wgpu::Device,
     gather: Kernel,
@@ -55,7 +58,8 @@ impl OcclusionPass {
         fresh
     }
 
-    /// Cosine-weighted visibility of the near field at full resolution, `R32Float`, 0 to 1, 1 on the background.
+    /// Cosine-weighted visibility of the near field at full resolution, `R32Float`, 0 to 1, 1 on
+    /// the background.
     ///
     /// # Panics
     /// Before [`fit`](Self::fit).
@@ -63,7 +67,8 @@ impl OcclusionPass {
         self.visibility.get()
     }
 
-    /// Moves the pattern of the gather; 0, the pattern of a picture on its own, unless a history averages frames.
+    /// Moves the pattern of the gather; 0, the pattern of a picture on its own, unless a history
+    /// averages frames.
     pub fn set_frame(&self, queue: &wgpu::Queue, frame: u32) {
         self.pattern.set(queue, frame);
     }

@@ -1,6 +1,6 @@
-//! One bounce in screen space: every pixel gathers what the pixels around it send on, by visibility bitmask
-//! ([`bitmask`](super::bitmask)), and unseen light (the sky and a stand-in for later bounces,
-//! [`ambient`]) through what nothing blocks.
+//! One bounce in screen space: every pixel gathers what the pixels around it send on, by visibility
+//! bitmask ([`bitmask`](super::bitmask)), and unseen light (the sky and a stand-in for later
+//! bounces, [`ambient`]) through what nothing blocks.
 //!
 //! What it cannot do: anything off the screen or hidden in it. A red wall lights the floor until it
 //! leaves the picture; a roof that is not in view is sky; the back of a lamp shade is dark.

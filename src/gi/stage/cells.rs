@@ -1,11 +1,12 @@
-//! Cells of low-resolution light: which real pixel stands for each, so that a method gathers light once a cell.
+//! Cells of low-resolution light: which real pixel stands for each, so that a method gathers light
+//! once a cell.
 //!
-//! It is the middle one; in every second cell, as on a chessboard, what stands before the middle's surface comes first:
-//! the nearest such pixel. A cell that shows any surface has a pixel on one.
+//! It is the middle one; in every second cell, as on a chessboard, what stands before the middle's
+//! surface comes first: the nearest such pixel. A cell that shows any surface has a pixel on one.
 //!
-//! A method at low resolution records [`CellsPass`], then its own gather, which joins `gi/cells.wgsl` behind
-//! `gi/inputs.wgsl`, reads [`CellsPass::pixels`] and writes its light buffer ([`light_bytes`]), then
-//! `gi.bring` of the method `gather`.
+//! A method at low resolution records [`CellsPass`], then its own gather, which joins
+//! `gi/cells.wgsl` behind `gi/inputs.wgsl`, reads [`CellsPass::pixels`] and writes its light buffer
+//! ([`light_bytes`]), then `gi.bring` of the method `gather`.
 //!
 //! # The light buffer
 //! Three `vec4f` a cell, one a colour channel: `(bx, by, bz, a)` means E/π(n) = max(0, a + b·n) for
@@ -18,7 +19,8 @@ use super::inputs::{BoundInputs, CELL, InputGroup, cells_of};
 use crate::gpu::timing::Recorder;
 use crate::gpu::{shaders, tape};
 
-/// What `cell_pixels` holds for a cell that shows the background only; `NO_PIXEL` in `shaders/gi/cells.wgsl`.
+/// What `cell_pixels` holds for a cell that shows the background only; `NO_PIXEL` in
+/// `shaders/gi/cells.wgsl`.
 pub const NO_PIXEL: u32 = u32::MAX;
 
 /// Cells of a picture of `size` pixels.
@@ -60,7 +62,8 @@ impl CellsPass {
         Self { device: device.clone(), pipeline, layout, size, pixels, group }
     }
 
-    /// Makes the buffer anew when `size` is another; then (true) whoever bound [`pixels`](Self::pixels) binds it again.
+    /// Makes the buffer anew when `size` is another; then (true) whoever bound
+    /// [`pixels`](Self::pixels) binds it again.
     pub fn fit(&mut self, size: [u32; 2]) -> bool {
         if size == self.size {
             return false;
@@ -70,7 +73,8 @@ impl CellsPass {
         true
     }
 
-    /// Records pass `gi.cells` for inputs of the size that was last given to [`new`](Self::new) or [`fit`](Self::fit).
+    /// Records pass `gi.cells` for inputs of the size that was last given to [`new`](Self::new) or
+    /// [`fit`](Self::fit).
     pub fn record(&self, recorder: &mut Recorder<'_>, inputs: &BoundInputs) {
         let [w, h] = cells_of(inputs.size);
         recorder.compute("gi.cells", |pass| {

@@ -1,5 +1,5 @@
-//! One exposure for the picture: the scalar that makes the network's inputs free of units and its answer linear in
-//! the light. A two-level reduction of fixed order over the low-resolution cells.
+//! One exposure for the picture: the scalar that makes the network's inputs free of units and its
+//! answer linear in the light. A two-level reduction of fixed order over the low-resolution cells.
 
 use super::inputs::{BoundInputs, InputGroup};
 use crate::gi::interface::GiError;
@@ -13,8 +13,8 @@ const MAX_GROUPS: u32 = 256;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Exposure {
-    /// Mean over all cells of the luminance of direct light (E/π) and emission, background counting as 0, plus the
-    /// environment's luminance; W/(m²·sr). Exactly 0 at or below 1e-20.
+    /// Mean over all cells of the luminance of direct light (E/π) and emission, background counting
+    /// as 0, plus the environment's luminance; W/(m²·sr). Exactly 0 at or below 1e-20.
     pub s: f32,
     /// 1/s, or 0 where s is 0.
     pub inv_s: f32,
@@ -22,10 +22,11 @@ pub struct Exposure {
     pub ln_m: f32,
     /// Share of cells whose sample hit something.
     pub hit_fraction: f32,
-    /// Cells whose sample had NaN or infinity in depth, normal, direct light or emission (all read as 0).
+    /// Cells whose sample had NaN or infinity in depth, normal, direct light or emission (all read
+    /// as 0).
     pub nonfinite: u32,
-    /// Mean over all cells of the radiance that surfaces send on at once, albedo · direct light + emission, background
-    /// counting as 0; W/(m²·sr).
+    /// Mean over all cells of the radiance that surfaces send on at once, albedo · direct light +
+    /// emission, background counting as 0; W/(m²·sr).
     pub outgoing: [f32; 3],
 }
 

@@ -1,7 +1,9 @@
-//! The bind group that every stage of `gi/` shares (group 0): camera parameters and the five input textures.
+//! The bind group that every stage of `gi/` shares (group 0): camera parameters and the five input
+//! textures.
 //!
-//! Parameters go into a ring of uniform slots, one slot a recording, so that a host may record several views into one
-//! submission; up to [`SLOTS`] recordings between two submissions keep their own parameters.
+//! Parameters go into a ring of uniform slots, one slot a recording, so that a host may record
+//! several views into one submission; up to [`SLOTS`] recordings between two submissions keep their
+//! own parameters.
 
 use super::formats;
 pub(crate) use super::formats::{check, check_output};
@@ -99,7 +101,8 @@ impl InputGroup {
         &self.layout
     }
 
-    /// Checks `inputs`, writes their parameters into the next slot and finds or makes their bind group.
+    /// Checks `inputs`, writes their parameters into the next slot and finds or makes their bind
+    /// group.
     ///
     /// # Errors
     /// [`GiError::Size`], [`GiError::Camera`], [`GiError::Conventions`], [`GiError::Texture`] or

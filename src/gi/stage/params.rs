@@ -31,7 +31,8 @@ pub fn cells_of(size: [u32; 2]) -> [u32; 2] {
     size.map(|n| n.div_ceil(CELL))
 }
 
-/// The pixel that stands for a cell of a picture of `size` pixels: `sample_pixel` of `shaders/gi/inputs.wgsl`.
+/// The pixel that stands for a cell of a picture of `size` pixels: `sample_pixel` of
+/// `shaders/gi/inputs.wgsl`.
 pub fn sample_pixel(cell: [u32; 2], size: [u32; 2]) -> [u32; 2] {
     std::array::from_fn(|i| (CELL * cell[i] + CELL / 2).min(size[i] - 1))
 }

@@ -1,8 +1,8 @@
-//! Bind groups remembered by the identity of the texture views in them, so that a host that hands over the same views
-//! every frame (or alternates between a few sets) makes each group once.
+//! Bind groups remembered by the identity of the texture views in them, so that a host that hands
+//! over the same views every frame (or alternates between a few sets) makes each group once.
 
-/// A few bind groups; the oldest goes when a new one comes. Holding a view keeps its texture alive, so `clear` is
-/// called whenever the size changes.
+/// A few bind groups; the oldest goes when a new one comes. Holding a view keeps its texture alive,
+/// so `clear` is called whenever the size changes.
 pub(crate) struct ViewCache<const N: usize> {
     entries: Vec<([wgpu::TextureView; N], wgpu::BindGroup)>,
     next: usize,

@@ -1,7 +1,8 @@
 //! By what a cell's light counts at a pixel: that it lies in the pixel's plane and faces its way.
 
-/// Distance from the pixel's plane, relative to the view distance, at which a tap's weight has fallen to a quarter.
-/// About half a cell's footprint at 1024×512 and 60°: nothing closer can be told apart at this resolution anyway.
+/// Distance from the pixel's plane, relative to the view distance, at which a tap's weight has
+/// fallen to a quarter. About half a cell's footprint at 1024×512 and 60°: nothing closer can be
+/// told apart at this resolution anyway.
 pub const PLANE_TOLERANCE: f32 = 0.004;
 /// Power of the cosine between normals: 10° keeps 78 %, 30° keeps 10 %, 60° nothing.
 pub const NORMAL_POWER: f32 = 16.0;

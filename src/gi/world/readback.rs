@@ -36,9 +36,9 @@ pub enum BufferIndices<'a> {
     },
 }
 
-/// A triangle mesh in buffers of the host's, in its own space. Attributes may lie in one buffer, each
-/// vertex's together or not, and other meshes may lie there, too. Without pictures: those are in
-/// [`MeshSource`].
+/// A triangle mesh in buffers of the host's, in its own space. Attributes may lie in one buffer,
+/// each vertex's together or not, and other meshes may lie there, too. Without pictures: those are
+/// in [`MeshSource`].
 #[derive(Debug, Clone, Copy)]
 pub struct BufferMesh<'a> {
     /// Positions, metres.
@@ -98,12 +98,13 @@ struct Span<'a> {
 }
 
 impl MeshReadback {
-    /// Records the copy out of the host's buffers. Nothing is submitted or waited for: the host submits the
-    /// encoder, and polls its device, or submits again, until [`is_ready`](Self::is_ready).
+    /// Records the copy out of the host's buffers. Nothing is submitted or waited for: the host
+    /// submits the encoder, and polls its device, or submits again, until
+    /// [`is_ready`](Self::is_ready).
     ///
     /// # Errors
-    /// [`GiError::Mesh`] for a range beyond its buffer, a buffer without COPY_SRC and the like; then nothing
-    /// was recorded.
+    /// [`GiError::Mesh`] for a range beyond its buffer, a buffer without COPY_SRC and the like;
+    /// then nothing was recorded.
     pub fn record(
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
@@ -176,8 +177,8 @@ impl MeshReadback {
         })
     }
 
-    /// Whether [`build`](Self::build) has something to build from, or the copy has failed. Never of a copy
-    /// that was not submitted.
+    /// Whether [`build`](Self::build) has something to build from, or the copy has failed. Never of
+    /// a copy that was not submitted.
     pub fn is_ready(&self) -> bool {
         self.mapped.get().is_some()
     }
@@ -185,7 +186,8 @@ impl MeshReadback {
     /// Builds the tree, on this thread.
     ///
     /// # Errors
-    /// [`GiError::Mesh`] for a mesh that disagrees in itself, a lost device, and before [`is_ready`](Self::is_ready).
+    /// [`GiError::Mesh`] for a mesh that disagrees in itself, a lost device, and before
+    /// [`is_ready`](Self::is_ready).
     pub fn build(self) -> Result<PreparedMesh, GiError> {
         match self.mapped.get() {
             Some(Ok(())) => {}

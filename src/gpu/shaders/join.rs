@@ -77,7 +77,8 @@ impl Joined {
         Some((file, line - first + 1))
     }
 
-    /// A compiler's `message` about the text, with `wgsl:LINE:` as the file and line that it speaks of.
+    /// A compiler's `message` about the text, with `wgsl:LINE:` as the file and line that it speaks
+    /// of.
     pub fn located(&self, message: &str) -> String {
         const MARK: &str = "wgsl:";
         let mut parts = message.split(MARK);

@@ -136,7 +136,8 @@ impl NetKernel {
         format!("net.{}{words}", self.family.name())
     }
 
-    /// The files that it is made of, in order. It needs a prelude; `net::gpu::example_preludes` gives one of each kind.
+    /// The files that it is made of, in order. It needs a prelude; `net::gpu::example_preludes`
+    /// gives one of each kind.
     pub(super) fn files(self) -> Vec<String> {
         let half = |full: &'static str, half: &'static str| if self.half { half } else { full };
         let mut files = vec!["common", half("arena_full", "arena_half"), half("load_full", "load_half")];

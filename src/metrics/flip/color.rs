@@ -1,4 +1,5 @@
-//! Colour as FLIP sees it: opponent channels for filtering, then Hunt-adjusted L*a*b* for distances.
+//! Colour as FLIP sees it: opponent channels for filtering, then Hunt-adjusted L*a*b* for
+//! distances.
 
 /// Linear Rec.709 to XYZ, each row divided by its sum: XYZ relative to the white point (D65).
 const XYZ_FROM_RGB: [[f32; 3]; 3] = [
@@ -37,7 +38,8 @@ pub fn linear_from_opponent([y, cx, cz]: [f32; 3]) -> [f32; 3] {
     product(&RGB_FROM_XYZ, [y + cx / 500.0, y, y - cz / 200.0])
 }
 
-/// L*a*b* of linear Rec.709 in [0, 1], a* and b* scaled by lightness: colours differ more where it is bright (Hunt).
+/// L*a*b* of linear Rec.709 in [0, 1], a* and b* scaled by lightness: colours differ more where it
+/// is bright (Hunt).
 pub fn hunt_lab(rgb: [f32; 3]) -> [f32; 3] {
     const KNEE: f32 = 6.0 / 29.0;
     let root = |v: f32| if v > KNEE * KNEE * KNEE { v.cbrt() } else { v / (3.0 * KNEE * KNEE) + 4.0 / 29.0 };
@@ -69,7 +71,8 @@ impl Distance {
     }
 }
 
-/// HyAB distance (city blocks in lightness, straight in colour; right for large distances), compressed.
+/// HyAB distance (city blocks in lightness, straight in colour; right for large distances),
+/// compressed.
 fn compressed(a: [f32; 3], b: [f32; 3]) -> f32 {
     let d = [0, 1, 2].map(|i| a[i] - b[i]);
     (d[0].abs() + (d[1] * d[1] + d[2] * d[2]).sqrt()).powf(COMPRESSION)

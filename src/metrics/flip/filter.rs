@@ -1,24 +1,28 @@
-//! The filters of FLIP and their separable convolution; a picture goes on beyond its border as its outermost pixels.
+//! The filters of FLIP and their separable convolution; a picture goes on beyond its border as its
+//! outermost pixels.
 
 use std::f64::consts::PI;
 
 /// Weights around a middle one; always an odd number of them.
 pub struct Kernel(Vec<f32>);
 
-/// What the eye resolves in each channel: Gaussians fitted to its contrast sensitivity (FLIP 2020, table 1).
+/// What the eye resolves in each channel: Gaussians fitted to its contrast sensitivity (FLIP 2020,
+/// table 1).
 pub struct SpatialKernels {
     /// Achromatic.
     pub y: Kernel,
     /// Red against green.
     pub cx: Kernel,
-    /// Yellow against blue: the filter is the sum of two Gaussians, so the results of these two are added.
+    /// Yellow against blue: the filter is the sum of two Gaussians, so the results of these two are
+    /// added.
     pub cz: [Kernel; 2],
 }
 
 impl SpatialKernels {
     /// For a display that shows `ppd` pixels in a degree of the field of view.
     pub fn new(ppd: f32) -> Self {
-        // Weight and width of each Gaussian, weight · √(π/width) · exp(−π² x²/width) with x in degrees.
+        // Weight and width of each Gaussian, weight · √(π/width) · exp(−π² x²/width) with x in
+        // degrees.
         let (y, cx) = ((1.0, 0.0047), (1.0, 0.0053));
         let cz: [(f64, f64); 2] = [(34.1, 0.04), (13.5, 0.025)];
         let ppd = f64::from(ppd);
@@ -78,7 +82,8 @@ impl Kernel {
     fn balanced(weights: &[f64]) -> Self {
         let side = |sign: f64| weights.iter().map(|w| (w * sign).max(0.0)).sum::<f64>();
         let (positive, negative) = (side(1.0), side(-1.0));
-        // Where a degree has hardly a pixel, every weight beside the middle underflows to 0; it then stays 0.
+        // Where a degree has hardly a pixel, every weight beside the middle underflows to 0; it
+        // then stays 0.
         let share = |w: &f64| match *w {
             w if w > 0.0 => w / positive,
             w if w < 0.0 => w / negative,

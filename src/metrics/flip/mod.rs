@@ -1,4 +1,5 @@
-//! FLIP: how much two pictures differ to an eye that switches between them, pixel by pixel in [0, 1].
+//! FLIP: how much two pictures differ to an eye that switches between them, pixel by pixel in [0,
+//! 1].
 //!
 //! [`flip`] is for display values (Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and
 //! Fairchild, HPG 2020): pictures are blurred as the eye would at a viewing distance, colours
@@ -15,8 +16,8 @@ use color::Distance;
 use filter::{FeatureKernels, SpatialKernels};
 use serde::Serialize;
 
-/// Pixels in a degree of the field of view of somebody who sits 0.7 m from a display that is 3840 pixels and 0.7 m
-/// wide: FLIP's own default.
+/// Pixels in a degree of the field of view of somebody who sits 0.7 m from a display that is 3840
+/// pixels and 0.7 m wide: FLIP's own default.
 pub const PIXELS_PER_DEGREE: f32 = 67.020_645;
 
 /// Most pixels per degree that are taken; the eye resolves about 60, and filters grow with them.
@@ -62,7 +63,8 @@ pub fn flip(a: Picture<'_>, b: Picture<'_>, pixels_per_degree: f32) -> Result<Fl
     Ok(FlipMap { values: eye.difference(&eye.see(a.pixels(), linear), &eye.see(b.pixels(), linear)) })
 }
 
-/// HDR-FLIP of linear Rec.709 radiance; negative values count as 0. Not symmetric: `b` chooses the exposures.
+/// HDR-FLIP of linear Rec.709 radiance; negative values count as 0. Not symmetric: `b` chooses the
+/// exposures.
 ///
 /// # Errors
 /// As [`flip`].
@@ -80,7 +82,8 @@ pub fn hdr_flip(a: Picture<'_>, b: Picture<'_>, pixels_per_degree: f32) -> Resul
     Ok((FlipMap { values }, exposures))
 }
 
-/// Numerator and denominator, in falling powers, of the ACES curve (Narkowicz 2015) without its pre-exposure of 0.6.
+/// Numerator and denominator, in falling powers, of the ACES curve (Narkowicz 2015) without its
+/// pre-exposure of 0.6.
 const ACES: [[f32; 3]; 2] = [[0.6 * 0.6 * 2.51, 0.6 * 0.03, 0.0], [0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14]];
 
 /// Linear display value in [0, 1] of exposed radiance.

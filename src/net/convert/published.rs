@@ -93,7 +93,8 @@ impl Builder {
         let (mut from, mut channels) = (INPUT.to_string(), INPUTS);
         for i in 1..=8 {
             let (name, out) = (format!("conv{i}"), width.saturating_mul(multiple(i)));
-            // The published code's leaky ReLU works in place, so skips carry its result; ReLU after it is ReLU alone.
+            // The published code's leaky ReLU works in place, so skips carry its result; ReLU after
+            // it is ReLU alone.
             let last = format!("encoder{i}");
             match i {
                 1 => self.ops.push(conv(&name, &from, &last, [channels, out], 2, true, LEAKY)),

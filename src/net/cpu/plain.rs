@@ -15,7 +15,8 @@ fn from_fn(shape: Shape, mut value: impl FnMut(usize, usize, usize) -> f32) -> T
     out
 }
 
-/// `shape.width`×`shape.height` pixels from the left top corner; beyond the edges the last column and row are repeated.
+/// `shape.width`×`shape.height` pixels from the left top corner; beyond the edges the last column
+/// and row are repeated.
 pub(super) fn window(input: &Tensor, shape: Shape) -> Tensor {
     if input.shape == shape {
         return input.clone();

@@ -42,7 +42,8 @@ pub(crate) struct StepUniform {
     pub group_inputs: u32,
 }
 
-/// Distance of uniforms in their buffer, and alignment of weights: WebGPU's default alignment of bindings.
+/// Distance of uniforms in their buffer, and alignment of weights: WebGPU's default alignment of
+/// bindings.
 const SLOT: u64 = 256;
 
 /// One step ready to record.
@@ -58,7 +59,8 @@ pub(super) struct Layer {
     pub sum: Option<(wgpu::ComputePipeline, wgpu::BindGroup)>,
 }
 
-/// Room for the trained numbers of all parts of a kernel, at [`Layer::offsets`]; nothing where it has none.
+/// Room for the trained numbers of all parts of a kernel, at [`Layer::offsets`]; nothing where it
+/// has none.
 fn trained(device: &wgpu::Device, label: &str, kernel: &Kernel) -> Option<wgpu::Buffer> {
     let place = match kernel.bound {
         Bound::None => return None,

@@ -1,4 +1,5 @@
-//! How a convolution runs: as taps, phases and blocks of output channels, in one of several permutations. Pure.
+//! How a convolution runs: as taps, phases and blocks of output channels, in one of several
+//! permutations. Pure.
 //!
 //! A transposed convolution of stride s, and a convolution of a picture enlarged s times, are s²
 //! ordinary ones of the picture itself, each of which makes every s-th output pixel in both

@@ -2,7 +2,8 @@
 
 use crate::gpu::shaders::{NetFamily::*, NetKernel};
 
-/// One prelude of each kind with the shader it belongs to, so that a test can validate every permutation without a GPU.
+/// One prelude of each kind with the shader it belongs to, so that a test can validate every
+/// permutation without a GPU.
 pub fn example_preludes() -> Vec<(String, String)> {
     let mut examples = Vec::new();
     let lines =

@@ -1,4 +1,5 @@
-//! A kernel of a step: which shader with which numbers, what it binds and how many workgroups it takes. Pure.
+//! A kernel of a step: which shader with which numbers, what it binds and how many workgroups it
+//! takes. Pure.
 
 use super::layer::{Filter, Layer};
 use super::permutation::{Facts, MATRIX, MAX_UNIFORM, Permutation, Tuned, Variant};
@@ -80,7 +81,8 @@ pub struct Kernel {
     pub filter: Option<Filter>,
     /// For convolutions.
     pub layer: Option<Layer>,
-    /// For convolutions of an enlarged input whose taps are merged: the factor and the padding before.
+    /// For convolutions of an enlarged input whose taps are merged: the factor and the padding
+    /// before.
     pub enlarged: Option<(u32, [i32; 2])>,
     /// For blocked convolutions.
     pub permutation: Option<Permutation>,
@@ -114,8 +116,8 @@ impl Kernel {
         let matrices = self.filter.map_or(0, |f| f.matrices(self.vectors)) * u64::from(self.blocks_per_part);
         match self.bound {
             Bound::None => 0,
-            // As long whatever the layer has of them: an array's length is part of a shader's text, and each text is
-            // compiled.
+            // As long whatever the layer has of them: an array's length is part of a shader's text,
+            // and each text is compiled.
             Bound::Uniform => MAX_UNIFORM,
             Bound::Storage => matrices * MATRIX,
             Bound::Half => matrices * MATRIX / 2,

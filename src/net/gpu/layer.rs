@@ -35,7 +35,8 @@ impl Filter {
     }
 }
 
-/// Everything that the speed of one convolution depends on, and the key under which a tuner remembers it.
+/// Everything that the speed of one convolution depends on, and the key under which a tuner
+/// remembers it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Layer {
     /// The kernel's view of it.
@@ -69,7 +70,8 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// For `vectors` vectors a thread: as few columns as cover the output channels, and no more pixels than there are.
+    /// For `vectors` vectors a thread: as few columns as cover the output channels, and no more
+    /// pixels than there are.
     pub fn of(layer: &Layer, vectors: u32) -> Self {
         let columns = layer.out_vectors.div_ceil(vectors).next_power_of_two().min(8);
         let rows = THREADS / columns;

@@ -109,7 +109,8 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// The weight that takes input channel `i` under tap (ky, kx) of a phase's kernel to output channel `o`.
+    /// The weight that takes input channel `i` under tap (ky, kx) of a phase's kernel to output
+    /// channel `o`.
     fn at(&self, phase: [u32; 2], o: usize, i: usize, ky: usize, kx: usize) -> f32 {
         let [kh, kw] = self.kernel;
         if o >= self.bias.len() || i >= self.in_channels {
@@ -175,7 +176,8 @@ impl<'a> Layer<'a> {
             // The first channel that the block reads, as in make.wgsl.
             let own = first / self.group[1].max(1) * self.group[0] / 4;
             let begin = 4 * own.min(self.in_channels.div_ceil(4) - self.filter.in_vectors as usize);
-            // One tap of one input vector. Column-major: column k takes input channel k to the four outputs.
+            // One tap of one input vector. Column-major: column k takes input channel k to the four
+            // outputs.
             let mut matrices = |c: usize, tap: usize| {
                 let (ky, kx) = (tap / self.filter.taps[1] as usize, tap % self.filter.taps[1] as usize);
                 for k in 0..16 * vectors {

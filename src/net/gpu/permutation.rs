@@ -114,9 +114,9 @@ impl Facts {
 pub type Tuned = HashMap<String, Permutation>;
 
 impl Layer {
-    /// Every permutation worth timing here, the guess first. On processors a workgroup's memory is no
-    /// faster than any other, 16-bit arithmetic is converted, and a few workgroups are enough: all that
-    /// is left out there.
+    /// Every permutation worth timing here, the guess first. On processors a workgroup's memory is
+    /// no faster than any other, 16-bit arithmetic is converted, and a few workgroups are enough:
+    /// all that is left out there.
     pub fn candidates(&self, plan: &Plan, facts: Facts) -> Vec<Permutation> {
         let mut vectors: Vec<u32> = (1..=self.out_vectors.min(4)).collect();
         vectors.sort_by_key(|v| self.rounds(*v));

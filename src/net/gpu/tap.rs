@@ -1,4 +1,5 @@
-//! What a layer has made of a picture, read back: for tools that look into a network, not for frames.
+//! What a layer has made of a picture, read back: for tools that look into a network, not for
+//! frames.
 
 use super::Network;
 use crate::gpu::readback::{self, ReadbackError};
@@ -28,12 +29,14 @@ impl Network {
             .collect()
     }
 
-    /// Records the steps up to and with `step`, so that its result is not yet overwritten: layers share memory.
+    /// Records the steps up to and with `step`, so that its result is not yet overwritten: layers
+    /// share memory.
     pub fn record_until(&self, step: usize, recorder: &mut Recorder<'_>) {
         (0..self.layers.len().min(step + 1)).for_each(|i| self.record_step(i, recorder));
     }
 
-    /// Reads the result of `step`, after [`Network::record_until`] was submitted. Waits for the GPU.
+    /// Reads the result of `step`, after [`Network::record_until`] was submitted. Waits for the
+    /// GPU.
     ///
     /// # Errors
     /// Reading back failed.

@@ -58,7 +58,8 @@ pub struct Stride {
 pub type Gradients = BTreeMap<String, Vec<f32>>;
 
 impl Learner {
-    /// Takes the numbers of `weights` up, to be learnt from pictures of `cells` (width, height). Compiles the kernels.
+    /// Takes the numbers of `weights` up, to be learnt from pictures of `cells` (width, height).
+    /// Compiles the kernels.
     ///
     /// # Errors
     /// An operator without a way back, and what does not fit the device. A network whose answer has
@@ -89,7 +90,8 @@ impl Learner {
             let usage = usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
             device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
         };
-        // The network's own, and the loss's two and the step's two, which are written anew for each step.
+        // The network's own, and the loss's two and the step's two, which are written anew for each
+        // step.
         let slots = (tape.forward.len() + tape.backward.len() + 4) as u64;
         let learner = Self {
             pipelines: pipelines(device, &layout),
@@ -200,8 +202,8 @@ impl Learner {
     }
 
     /// Relative error of the light in these pictures, as [`Stride::error`], by the network that
-    /// [`Self::weights`] returns. Learns nothing: the same for pictures that are never learnt from tells when
-    /// to stop.
+    /// [`Self::weights`] returns. Learns nothing: the same for pictures that are never learnt from
+    /// tells when to stop.
     ///
     /// # Errors
     /// A meaning without a loss; the device was lost.
@@ -228,8 +230,8 @@ impl Learner {
         Ok(self.read(self.section(SECTIONS), RESULTS)?[4].sqrt())
     }
 
-    /// The slope of Σ `output_slopes` · output in each learnt number, for one input; both channel by channel.
-    /// Learns nothing.
+    /// The slope of Σ `output_slopes` · output in each learnt number, for one input; both channel
+    /// by channel. Learns nothing.
     ///
     /// # Errors
     /// Lists of other lengths; the device was lost.

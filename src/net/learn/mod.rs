@@ -18,8 +18,9 @@ use thiserror::Error;
 
 /// Meaning of an answer whose loss is known here.
 pub const MEANING: &str = "gain_and_rest_on_guess";
-/// Largest gain (as a logarithm) and rest (in units of the exposure) while they are learnt; frames keep them closer
-/// (`gi::reconstruct`), but a number at its limit has no slope. As in `training/bouncelight_training/features.py`.
+/// Largest gain (as a logarithm) and rest (in units of the exposure) while they are learnt; frames
+/// keep them closer (`gi::reconstruct`), but a number at its limit has no slope. As in
+/// `training/bouncelight_training/features.py`.
 const MOST_GAIN: f32 = 2.0;
 const MOST_REST: f32 = 1.0;
 /// Light below this share of the exposure is no divisor of an error; and the loss of a picture that
@@ -99,7 +100,8 @@ pub enum LearnError {
     Readback(#[from] ReadbackError),
 }
 
-/// What is learnt from: one picture, at the network's resolution. Planes are `[channel][row][column]`.
+/// What is learnt from: one picture, at the network's resolution. Planes are
+/// `[channel][row][column]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Example {
     /// The network's input.

@@ -37,7 +37,8 @@ pub(super) enum Work {
     Unshuffle(u32),
 }
 
-/// One or more operators that run together: work, then skip and activation as `add_at` says, then dropout.
+/// One or more operators that run together: work, then skip and activation as `add_at` says, then
+/// dropout.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Node {
     /// Position in the graph of the operator that does the work.
@@ -160,7 +161,8 @@ impl Net<'_> {
         }
     }
 
-    /// Removes node `at`, whose result only convolutions read, after `change` has been done to their work.
+    /// Removes node `at`, whose result only convolutions read, after `change` has been done to
+    /// their work.
     fn push_into_convolutions(&mut self, at: usize, change: impl Fn(&mut Work) -> bool) -> bool {
         let gone = self.nodes[at].clone();
         if !gone.bare() || gone.output == self.output {
@@ -226,7 +228,8 @@ impl Net<'_> {
         }
     }
 
-    /// Merges node `at` with the one that makes its input (or one of its summands), if one epilogue can do for both.
+    /// Merges node `at` with the one that makes its input (or one of its summands), if one epilogue
+    /// can do for both.
     fn merge(&mut self, at: usize) -> bool {
         let node = self.nodes[at].clone();
         let sides: &[(usize, usize)] = if node.skip.is_some() { &[(0, 1), (1, 0)] } else { &[(0, 0)] };

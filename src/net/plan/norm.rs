@@ -1,4 +1,5 @@
-//! What a norm needs to know of the picture that it scales: mean and variance of each group of channels.
+//! What a norm needs to know of the picture that it scales: mean and variance of each group of
+//! channels.
 
 use super::fuse::Node;
 use super::{Builder, Kind, Step, TILE};

@@ -1,5 +1,5 @@
-//! Where tensors live in the arena: which share memory because one overwrites the other in place or is a slice of its
-//! channels, and the offsets of all that do not.
+//! Where tensors live in the arena: which share memory because one overwrites the other in place or
+//! is a slice of its channels, and the offsets of all that do not.
 
 use super::{ALIGN, Kind, Plan};
 use std::cmp::Reverse;
@@ -11,8 +11,8 @@ pub(super) struct Inside {
     pub slice: u32,
 }
 
-/// Lets steps overwrite what they read for the last time, where each thread reads just the element that it then writes.
-/// The older tensor moves into the younger.
+/// Lets steps overwrite what they read for the last time, where each thread reads just the element
+/// that it then writes. The older tensor moves into the younger.
 pub(super) fn overwrite(plan: &Plan, inside: &mut [Option<Inside>]) {
     for (i, step) in plan.steps.iter().enumerate() {
         let mut candidates = Vec::new();

@@ -8,7 +8,8 @@ pub enum Precision {
     /// 32 bits.
     #[default]
     F32,
-    /// Weights and the tensors between the operators in 16 bits; input, output and the norms' statistics in 32.
+    /// Weights and the tensors between the operators in 16 bits; input, output and the norms'
+    /// statistics in 32.
     F16,
 }
 
@@ -31,7 +32,8 @@ impl Default for Options {
     }
 }
 
-/// A tensor's place and life. Step `i` happens at time `i + 1`; the input exists from time 0, the output to the end.
+/// A tensor's place and life. Step `i` happens at time `i + 1`; the input exists from time 0, the
+/// output to the end.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tensor {
     /// Name in the graph, or `OPERATOR.moments` and the like for what steps need between them.
@@ -42,7 +44,8 @@ pub struct Tensor {
     pub full: bool,
     /// Byte offset of its first value in the arena.
     pub offset: u64,
-    /// Distance of pixels in vectors: more than its own when the tensor is a slice of a concatenation.
+    /// Distance of pixels in vectors: more than its own when the tensor is a slice of a
+    /// concatenation.
     pub pitch: u32,
     /// Index of the tensor whose memory it shares, or its own.
     pub root: usize,
@@ -110,7 +113,8 @@ pub enum Kind {
     },
     /// The input itself.
     Copy,
-    /// Number, mean and sum of squared deviations of each channel's values in tiles of [`TILE`] pixels; no epilogue.
+    /// Number, mean and sum of squared deviations of each channel's values in tiles of [`TILE`]
+    /// pixels; no epilogue.
     Moments,
     /// From those to scale and shift of each channel; no epilogue.
     Merge {
@@ -119,7 +123,8 @@ pub enum Kind {
         /// Added to the variance.
         eps: f32,
     },
-    /// Scale and shift of each channel, from the step before or, for a batch norm, from the weights.
+    /// Scale and shift of each channel, from the step before or, for a batch norm, from the
+    /// weights.
     Scale {
         /// From the weights.
         fixed: bool,

@@ -1,7 +1,8 @@
-//! Everything that shines, with alias tables (Walker 1977; Vose 1991) from which light samples choose.
+//! Everything that shines, with alias tables (Walker 1977; Vose 1991) from which light samples
+//! choose.
 //!
-//! Chances follow power with a share for everybody: what lights a closed room may be a weak lamp beside a strong sun
-//! outside. Wrong chances cost noise, never correctness.
+//! Chances follow power with a share for everybody: what lights a closed room may be a weak lamp
+//! beside a strong sun outside. Wrong chances cost noise, never correctness.
 
 use super::sky;
 use super::triangles::Flat;
@@ -76,7 +77,8 @@ pub(super) fn pack(scene: &Scene, flat: &Flat) -> Lights {
     let mut vectors: Vec<[f32; 4]> = Vec::new();
     for (id, light) in (0u32..).zip(&scene.lights) {
         let mut gpu = LightGpu::new(light);
-        // Rays that hit a light want to know how it would have been sampled; 0 tells that it is not there in truth.
+        // Rays that hit a light want to know how it would have been sampled; 0 tells that it is not
+        // there in truth.
         gpu.chance = truth.iter().find(|t| t.0 == id).map_or(0.0, |t| t.1 as f32);
         vectors.extend_from_slice(bytemuck::cast_slice(bytemuck::bytes_of(&gpu)));
     }

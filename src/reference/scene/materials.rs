@@ -56,7 +56,8 @@ pub struct RefMaterial {
     pub emissive_use: ImageUse,
 }
 
-/// The scene's materials, and the texels of all images that they use (RGBA, 8 bits each, red lowest).
+/// The scene's materials, and the texels of all images that they use (RGBA, 8 bits each, red
+/// lowest).
 pub(super) fn pack(scene: &Scene, limits: &Limits) -> Result<(Vec<RefMaterial>, Vec<u32>), PackError> {
     let mut first = vec![None; scene.images.len()];
     for use_ in scene.materials.iter().flat_map(uses).flatten() {
@@ -123,7 +124,8 @@ pub(super) fn pack(scene: &Scene, limits: &Limits) -> Result<(Vec<RefMaterial>, 
     Ok((items.collect(), texels))
 }
 
-/// The images, those that some material uses halved, the largest first, until all have no more than `limit` texels.
+/// The images, those that some material uses halved, the largest first, until all have no more than
+/// `limit` texels.
 fn fitting<'a>(scene: &'a Scene, used: &[Option<u64>], limit: u64) -> Result<Vec<Level<'a>>, PackError> {
     let level = |i: &'a Image| Level { width: i.width, height: i.height, rgba: Cow::Borrowed(i.rgba.as_slice()) };
     let mut levels: Vec<_> = scene.images.iter().map(level).collect();

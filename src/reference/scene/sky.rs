@@ -2,11 +2,13 @@
 
 use crate::scene::environment::EnvironmentImage;
 
-/// Cells of the table at most; finer pictures are chosen from in blocks, which costs noise and no correctness.
+/// Cells of the table at most; finer pictures are chosen from in blocks, which costs noise and no
+/// correctness.
 const MOST: [usize; 2] = [512, 256];
 
-/// Cells (columns, rows) of `image`'s table and the chance of each, row by row: the mean luminance of the cell and of
-/// the texels that bilinear interpolation lets shine into it, times its solid angle. `None` for a black picture.
+/// Cells (columns, rows) of `image`'s table and the chance of each, row by row: the mean luminance
+/// of the cell and of the texels that bilinear interpolation lets shine into it, times its solid
+/// angle. `None` for a black picture.
 pub(super) fn cells(image: &EnvironmentImage) -> Option<([u32; 2], Vec<f64>)> {
     let (width, height) = (image.width as usize, image.height as usize);
     let [columns, rows] = [width.min(MOST[0]), height.min(MOST[1])];

@@ -1,4 +1,5 @@
-//! Tables that do not depend on the scene: the energy that single-scattering GGX keeps, and the pixel filter's inverse.
+//! Tables that do not depend on the scene: the energy that single-scattering GGX keeps, and the
+//! pixel filter's inverse.
 
 use super::materials::RefMaterial;
 use crate::render::sampling;
@@ -46,8 +47,9 @@ fn unit(i: usize, count: usize) -> f64 {
     i as f64 / (count - 1) as f64
 }
 
-/// Share of the light from direction cosine `mu` that one scattering off GGX of width `alpha` with perfect reflection
-/// sends out: the mean of G2/G1 over visible normals (Heitz 2018), on a grid of points of the unit square.
+/// Share of the light from direction cosine `mu` that one scattering off GGX of width `alpha` with
+/// perfect reflection sends out: the mean of G2/G1 over visible normals (Heitz 2018), on a grid of
+/// points of the unit square.
 fn kept(alpha: f64, mu: f64) -> f64 {
     const N: usize = 24;
     let lambda = |z: f64| {

@@ -7,7 +7,8 @@ use glam::{Mat4, Vec3};
 use half::f16;
 use std::collections::HashMap;
 
-/// Vectors of a triangle's record: three corners with their normals, then material, attributes, density, instance.
+/// Vectors of a triangle's record: three corners with their normals, then material, attributes,
+/// density, instance.
 const RECORD: usize = 4;
 /// Vectors of the attributes of a triangle that has texture coordinates, tangents or colours.
 const EXTRA: usize = 6;
@@ -16,18 +17,21 @@ const NONE: u32 = u32::MAX;
 
 /// All triangles of a scene.
 pub(super) struct Flat {
-    /// World-space corners, counter-clockwise seen from the front (mirrored instances are turned round).
+    /// World-space corners, counter-clockwise seen from the front (mirrored instances are turned
+    /// round).
     pub positions: Vec<[[f32; 3]; 3]>,
     /// Index into the scene's materials, one a triangle.
     pub materials: Vec<u32>,
     normals: Vec<[u32; 3]>,
-    /// First vector of each triangle's attributes, counted from the end of the records; `NONE` without.
+    /// First vector of each triangle's attributes, counted from the end of the records; `NONE`
+    /// without.
     extras: Vec<u32>,
     data: Vec<[u32; 4]>,
 }
 
 impl Flat {
-    /// The buffer that `surface.wgsl` reads. `densities`: chance per area with which a glowing triangle is sampled.
+    /// The buffer that `surface.wgsl` reads. `densities`: chance per area with which a glowing
+    /// triangle is sampled.
     pub fn records(&self, densities: &HashMap<u32, f32>) -> Vec<[u32; 4]> {
         let first = (RECORD * self.positions.len()) as u32;
         let mut out = Vec::with_capacity(first as usize + self.data.len());
@@ -84,7 +88,8 @@ fn has_attributes(mesh: &Mesh) -> bool {
 
 fn add(flat: &mut Flat, mesh: &Mesh, world: Mat4) {
     let [a, b, c] = [0, 1, 2].map(|i| world.col(i).truncate());
-    // The cofactor matrix is the inverse transpose times the determinant: right for normals, never singular.
+    // The cofactor matrix is the inverse transpose times the determinant: right for normals, never
+    // singular.
     let (ca, cb, cc) = (b.cross(c), c.cross(a), a.cross(b));
     let mirrored = a.dot(ca) < 0.0;
     let sign = if mirrored { -1.0 } else { 1.0 };

@@ -1,4 +1,5 @@
-//! Boxes, quads and balls with normals and texture coordinates, collected into one mesh per material.
+//! Boxes, quads and balls with normals and texture coordinates, collected into one mesh per
+//! material.
 
 use glam::{Affine3A, Vec2, Vec3};
 
@@ -34,7 +35,8 @@ impl Builder {
         TextureRef { image: self.scene.images.len() - 1, sampler: Sampler::default(), uv_set: 0, transform }
     }
 
-    /// Adds one mesh of `material`, filled by `fill`. `density` is how often textures repeat per metre.
+    /// Adds one mesh of `material`, filled by `fill`. `density` is how often textures repeat per
+    /// metre.
     pub(super) fn part(&mut self, name: &str, material: usize, density: f32, fill: impl FnOnce(&mut Part)) {
         let mesh = Mesh { name: name.to_owned(), material, ..Mesh::default() };
         let mut part = Part { mesh, density };
@@ -49,8 +51,8 @@ impl Builder {
 }
 
 impl Part {
-    /// A parallelogram from `origin` along `u` and `v`; its front is where `u` × `v` points. Texture coordinates
-    /// measure metres along `u` and `v`, times the density, from `origin`.
+    /// A parallelogram from `origin` along `u` and `v`; its front is where `u` × `v` points.
+    /// Texture coordinates measure metres along `u` and `v`, times the density, from `origin`.
     pub(super) fn quad(&mut self, origin: Vec3, u: Vec3, v: Vec3) {
         let normal = u.cross(v).normalize();
         let size = Vec2::new(u.length(), v.length()) * self.density;
@@ -76,8 +78,9 @@ impl Part {
         }
     }
 
-    /// A body of revolution about the vertical through `base`: `profile` lists (radius, height) from the bottom up.
-    /// Normals are smooth along the profile except at repeated points, where there is an edge.
+    /// A body of revolution about the vertical through `base`: `profile` lists (radius, height)
+    /// from the bottom up. Normals are smooth along the profile except at repeated points, where
+    /// there is an edge.
     pub(super) fn lathe(&mut self, base: Vec3, profile: &[[f32; 2]], segments: u32) {
         let runs = profile.cut_at_edges();
         for run in runs {
@@ -122,7 +125,8 @@ impl Part {
         self.lathe(center, &profile, segments);
     }
 
-    /// A quad between two corners of a plane whose texture covers it exactly once, whatever the density.
+    /// A quad between two corners of a plane whose texture covers it exactly once, whatever the
+    /// density.
     pub(super) fn picture(&mut self, origin: Vec3, u: Vec3, v: Vec3) {
         let first = self.mesh.uv0.len();
         self.quad(origin, u, v);

@@ -1,7 +1,9 @@
-//! A box after the Cornell box: white, red and green walls, two blocks, a glowing panel under the ceiling.
+//! A box after the Cornell box: white, red and green walls, two blocks, a glowing panel under the
+//! ceiling.
 //!
-//! Direct light is computed for analytic lights, so a spot light in the panel's place stands for it. glTF's ramp from
-//! the axis to 90° is the cosine squared; 1.5 times the panel's intensity makes its flux that of the panel.
+//! Direct light is computed for analytic lights, so a spot light in the panel's place stands for
+//! it. glTF's ramp from the axis to 90° is the cosine squared; 1.5 times the panel's intensity
+//! makes its flux that of the panel.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 

@@ -1,8 +1,8 @@
-//! A small furnished room: the sun falls through a window onto a wooden floor, a lamp hangs over the table, and the
-//! strongly coloured walls, rug and sofa bleed into everything white.
+//! A small furnished room: the sun falls through a window onto a wooden floor, a lamp hangs over
+//! the table, and the strongly coloured walls, rug and sofa bleed into everything white.
 //!
-//! The room is 5 m wide (x), 4.6 m deep (z) and 2.7 m high, closed on all sides; walls are slabs, so that nothing
-//! leaks in a shadow map. The camera stands inside, near the +Z wall.
+//! The room is 5 m wide (x), 4.6 m deep (z) and 2.7 m high, closed on all sides; walls are slabs,
+//! so that nothing leaks in a shadow map. The camera stands inside, near the +Z wall.
 
 use glam::{Affine3A, Quat, Vec3, vec3};
 

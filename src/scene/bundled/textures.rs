@@ -1,4 +1,5 @@
-//! Textures made by code: planks, plaster, a rug, a painting. Deterministic: an integer hash is the only randomness.
+//! Textures made by code: planks, plaster, a rug, a painting. Deterministic: an integer hash is the
+//! only randomness.
 
 use crate::scene::{ColorSpace, Image};
 

@@ -97,7 +97,8 @@ impl Reader<'_> {
         Ok(out)
     }
 
-    /// Vectors of N floats. A `fill` lets shorter vectors through (RGB for RGBA), its value in the missing components.
+    /// Vectors of N floats. A `fill` lets shorter vectors through (RGB for RGBA), its value in the
+    /// missing components.
     pub(super) fn floats<const N: usize>(
         &self,
         accessor: &gltf::Accessor,

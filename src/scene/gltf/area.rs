@@ -1,5 +1,5 @@
-//! EXT_lights_area (a draft of Khronos; Babylon.js reads and writes it): flat lights, as surfaces that glow on
-//! one side.
+//! EXT_lights_area (a draft of Khronos; Babylon.js reads and writes it): flat lights, as surfaces
+//! that glow on one side.
 
 use super::Loader;
 use super::instancing::Copy;
@@ -44,8 +44,8 @@ impl Default for Rect {
 }
 
 impl Loader<'_> {
-    /// Adds the area light of a node, if it has one: a surface that glows along the node's −Z, with a light that stands
-    /// in for it where surfaces light nothing.
+    /// Adds the area light of a node, if it has one: a surface that glows along the node's −Z, with
+    /// a light that stands in for it where surfaces light nothing.
     pub(super) fn area_light(&mut self, node: &gltf::Node<'_>, name: &str, place: &str, world: Mat4) {
         let root = self.document.as_json();
         let own = root.nodes[node.index()].extensions.as_ref().and_then(|e| e.others.get(NAME));

@@ -1,4 +1,5 @@
-//! Cameras. An orthographic one becomes a long lens from afar, since all passes after this know perspectives only.
+//! Cameras. An orthographic one becomes a long lens from afar, since all passes after this know
+//! perspectives only.
 
 use super::Loader;
 use crate::scene::Camera;
@@ -7,8 +8,9 @@ use crate::scene::rig::RigNode;
 use glam::{Mat4, Vec3};
 use gltf::camera::Projection;
 
-/// Vertical field of view of the lens that stands for an orthographic camera, radians. At 1° what is as far before or
-/// behind the middle as the picture is high is shown 1.7 % too large or too small.
+/// Vertical field of view of the lens that stands for an orthographic camera, radians. At 1° what
+/// is as far before or behind the middle as the picture is high is shown 1.7 % too large or too
+/// small.
 const LENS: f32 = std::f32::consts::PI / 180.0;
 
 /// No length of a camera's is larger, metres.
@@ -67,8 +69,9 @@ impl Loader<'_> {
         self.scene.cameras.push(camera);
     }
 
-    /// Moves the eyes of orthographic cameras back as far as makes the lens show 2 · `ymag` at the reference plane: in
-    /// the middle of what there is between the camera's planes, and at its near plane where there is nothing.
+    /// Moves the eyes of orthographic cameras back as far as makes the lens show 2 · `ymag` at the
+    /// reference plane: in the middle of what there is between the camera's planes, and at its near
+    /// plane where there is nothing.
     pub(super) fn move_back(&mut self) {
         if self.orthographic.is_empty() {
             return;
@@ -86,15 +89,16 @@ impl Loader<'_> {
             });
             let first = nearest.max(flat.znear);
             let last = farthest.min(flat.zfar).max(first);
-            // Where the eye would stand within a deep scene, its front has the say: nothing may lie behind the eye, nor
-            // be shown at more than twice its size.
+            // Where the eye would stand within a deep scene, its front has the say: nothing may lie
+            // behind the eye, nor be shown at more than twice its size.
             let distance = flat.ymag / (0.5 * LENS).tan();
             let reference = (0.5 * (first + last)).min(first + 0.5 * distance);
             let reference = if reference.abs() < MOST { reference } else { flat.znear };
             flat.back = distance - reference;
             let at = eye - forward * flat.back;
             [camera.transform[3][0], camera.transform[3][1], camera.transform[3][2]] = at.into();
-            // Nothing lies before `first`, which is half of `distance` away at least; so this cuts as the file says.
+            // Nothing lies before `first`, which is half of `distance` away at least; so this cuts
+            // as the file says.
             camera.near = (flat.znear + flat.back).max(0.01 * distance);
             camera.far = flat.zfar + flat.back;
         }

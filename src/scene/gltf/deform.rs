@@ -1,5 +1,5 @@
-//! Skins and morph targets. None is worth refusing a file: what is broken is left out with a warning, and the mesh
-//! stands as it was modelled.
+//! Skins and morph targets. None is worth refusing a file: what is broken is left out with a
+//! warning, and the mesh stands as it was modelled.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
@@ -15,8 +15,9 @@ use crate::scene::deform::{self, Deform, Delta, Joint, Shape};
 use crate::scene::rig::{self, RigDeform, Skin};
 use crate::scene::{Mesh, SceneError};
 
-/// Vertices of all the meshes that are copied because nodes deform them apart, and what all morph targets of a file may
-/// add to vertices: more than people have, and what keeps a small file from asking for all memory.
+/// Vertices of all the meshes that are copied because nodes deform them apart, and what all morph
+/// targets of a file may add to vertices: more than people have, and what keeps a small file from
+/// asking for all memory.
 const MOST_COPIED: usize = 1 << 22;
 const MOST_DELTAS: usize = 1 << 22;
 /// Elements of morph targets that are read at all, most of which add nothing.
@@ -106,7 +107,8 @@ impl Draft {
         shape
     }
 
-    /// The deltas with what targets do to the normals of flat triangles, which follows from where they put the corners.
+    /// The deltas with what targets do to the normals of flat triangles, which follows from where
+    /// they put the corners.
     fn turned(&self, mesh: &Mesh) -> Vec<(u32, Delta)> {
         let mut all: BTreeMap<(u32, u32), Delta> = self.deltas.iter().map(|d| ((d.0, d.1.target), d.1)).collect();
         for t in mesh.indices.chunks_exact(3) {
@@ -230,7 +232,8 @@ impl<'a> Loader<'a> {
         Ok(())
     }
 
-    /// Keeps what deforms scene mesh `mesh`, whose `indices` were these before its vertices were finished.
+    /// Keeps what deforms scene mesh `mesh`, whose `indices` were these before its vertices were
+    /// finished.
     pub(super) fn keep(&mut self, mesh: usize, mut draft: Draft, before: (&[u32], usize)) {
         let made = &self.scene.meshes[mesh];
         if made.positions.len() != before.1 || made.indices != before.0 {
@@ -239,7 +242,8 @@ impl<'a> Loader<'a> {
         self.deforming.drafts.insert(mesh, draft);
     }
 
-    /// The scene mesh that a node places where the file has `mesh`: one of its own if it deforms there.
+    /// The scene mesh that a node places where the file has `mesh`: one of its own if it deforms
+    /// there.
     pub(super) fn own(&mut self, node: &gltf::Node<'a>, place: &str, mesh: usize) -> usize {
         let skin = self.document.as_json().nodes[node.index()].skin.map(|s| s.value());
         let facts = self.deforming.drafts.get(&mesh).map(|d| (d.sets > 0, d.targets > 0));
@@ -300,8 +304,8 @@ impl<'a> Loader<'a> {
         }
     }
 
-    /// Finds what all that deforms hangs on. `nodes`: place of each glTF node in the scene's list, with its world
-    /// transform at rest.
+    /// Finds what all that deforms hangs on. `nodes`: place of each glTF node in the scene's list,
+    /// with its world transform at rest.
     pub(super) fn resolve(&mut self, nodes: &HashMap<usize, (usize, Mat4)>) -> (Vec<Skin>, Vec<RigDeform>) {
         let (mut skins, mut deforms) = (Vec::new(), Vec::new());
         let worlds: HashMap<usize, Mat4> = nodes.values().copied().collect();

@@ -1,6 +1,8 @@
-//! KHR_draco_mesh_compression: indices and attributes of a primitive, compressed together in one buffer view.
+//! KHR_draco_mesh_compression: indices and attributes of a primitive, compressed together in one
+//! buffer view.
 //!
-//! The `draco-core` crate reads the stream; this file says which of its numbers are which of the primitive's.
+//! The `draco-core` crate reads the stream; this file says which of its numbers are which of the
+//! primitive's.
 
 use std::collections::HashMap;
 
@@ -57,8 +59,8 @@ impl Unpacked {
         self.mesh.faces().iter().flatten().map(|point| point.0).collect()
     }
 
-    /// Vectors of N floats; `None` where the stream does not have the attribute. Integers are as `integers` and the
-    /// accessor's flag `normalized` say; a `fill` lets shorter vectors through.
+    /// Vectors of N floats; `None` where the stream does not have the attribute. Integers are as
+    /// `integers` and the accessor's flag `normalized` say; a `fill` lets shorter vectors through.
     ///
     /// # Errors
     /// A sentence when the stream's attribute is not what its name promises.

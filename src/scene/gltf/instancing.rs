@@ -49,7 +49,8 @@ impl<'a> Loader<'a> {
             [translations.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len)];
         let mut given = counts.into_iter().flatten();
         let Some(count) = given.next() else {
-            // Only attributes of a program's own: they place nothing, and how many there are is theirs to know.
+            // Only attributes of a program's own: they place nothing, and how many there are is
+            // theirs to know.
             self.warn(&place, "has no TRANSLATION, ROTATION or SCALE; the mesh stands once");
             return Ok(vec![Copy::SELF]);
         };

@@ -1,11 +1,11 @@
 //! What lies over a surface or is seen through it: KHR_materials_sheen, KHR_materials_clearcoat,
 //! KHR_materials_transmission with KHR_materials_volume.
 //!
-//! A [`Material`] is one opaque layer with coverage. So the light that fibres throw back becomes part of the surface's
-//! colour, a coat becomes part of its own reflectance, and what
-//! is transmitted goes straight on where the surface does not cover: nothing is refracted or scattered on its way, and
-//! its colour counts by the mean over red, green and blue. Rasteriser and path tracer draw the same surface. Textures
-//! count by their mean, with a warning.
+//! A [`Material`] is one opaque layer with coverage. So the light that fibres throw back becomes
+//! part of the surface's colour, a coat becomes part of its own reflectance, and what is
+//! transmitted goes straight on where the surface does not cover: nothing is refracted or scattered
+//! on its way, and its colour counts by the mean over red, green and blue. Rasteriser and path
+//! tracer draw the same surface. Textures count by their mean, with a warning.
 
 use super::Loader;
 use crate::scene::texture::{self, Use};
@@ -15,9 +15,9 @@ use serde_json::{Map, Value};
 type Extensions = Map<String, Value>;
 
 impl Loader<'_> {
-    /// KHR_materials_clearcoat: a dielectric layer of index 1.5 over the surface. At normal incidence it reflects its
-    /// share and lets the rest of the light to the surface below; one lobe of the mean roughness, weighted by
-    /// reflectance, stands for both.
+    /// KHR_materials_clearcoat: a dielectric layer of index 1.5 over the surface. At normal
+    /// incidence it reflects its share and lets the rest of the light to the surface below; one
+    /// lobe of the mean roughness, weighted by reflectance, stands for both.
     pub(super) fn clearcoat(&mut self, place: &str, extensions: &Extensions, out: &mut Material) {
         let Some(coat) = extensions.get("KHR_materials_clearcoat") else { return };
         let weight = self.factor(place, coat, "clearcoat", 0);
@@ -36,9 +36,9 @@ impl Loader<'_> {
         out.roughness = (coat * coat_roughness + below * out.roughness) / (coat + below);
     }
 
-    /// KHR_materials_sheen: fibres over the surface. What they throw back, in the mean over all directions, is
-    /// scattered like the surface's own diffuse light, which gets what they leave; that cloth is brightest at
-    /// its rims is lost.
+    /// KHR_materials_sheen: fibres over the surface. What they throw back, in the mean over all
+    /// directions, is scattered like the surface's own diffuse light, which gets what they leave;
+    /// that cloth is brightest at its rims is lost.
     pub(super) fn sheen(&mut self, place: &str, extensions: &Extensions, out: &mut Material) {
         let Some(sheen) = extensions.get("KHR_materials_sheen") else { return };
         let channel = |c: usize| sheen["sheenColorFactor"].get(c).and_then(Value::as_f64).map_or(0.0, |v| v as f32);
@@ -75,9 +75,10 @@ impl Loader<'_> {
 
     /// KHR_materials_transmission, and the colour that KHR_materials_volume gives to what passes.
     ///
-    /// Of the light that a dielectric does not reflect, the share t goes on instead of being scattered, coloured by the
-    /// base colour. The surface covers what does not: 1 − t (1 − F0) c. There it has the diffuse and the specular
-    /// light of the whole, so both are divided by the coverage.
+    /// Of the light that a dielectric does not reflect, the share t goes on instead of being
+    /// scattered, coloured by the base colour. The surface covers what does not: 1 − t (1 − F0) c.
+    /// There it has the diffuse and the specular light of the whole, so both are divided by the
+    /// coverage.
     pub(super) fn transmission(&mut self, place: &str, extensions: &Extensions, out: &mut Material) {
         let Some(through) = extensions.get("KHR_materials_transmission") else { return };
         let share = self.factor(place, through, "transmission", 0) * (1.0 - self.metalness(out));
@@ -108,7 +109,8 @@ impl Loader<'_> {
         out.f0 = (out.f0 / covered).min(1.0);
     }
 
-    /// Mean of what is metal of a surface: many files leave the factor at 1 and say in the texture that nothing is.
+    /// Mean of what is metal of a surface: many files leave the factor at 1 and say in the texture
+    /// that nothing is.
     fn metalness(&self, material: &Material) -> f32 {
         let image = material.metallic_roughness_texture.map(|t| &self.scene.images[t.image]);
         material.metallic * image.map_or(1.0, |image| texture::mean(image)[2])
@@ -128,7 +130,8 @@ impl Loader<'_> {
         factor * mean.map_or(1.0, |mean| mean[channel])
     }
 
-    /// Mean of the texture called `slot`, with a warning that it is all that counts; `None` where there is none.
+    /// Mean of the texture called `slot`, with a warning that it is all that counts; `None` where
+    /// there is none.
     fn mean_of(&mut self, place: &str, extension: &Value, slot: &str, kind: Use) -> Option<[f32; 4]> {
         let index = extension.get(slot)?.get("index")?;
         let known = index.as_u64().filter(|&i| (i as usize) < self.document.as_json().textures.len());
@@ -147,9 +150,9 @@ fn number(extension: &Value, name: &str) -> Option<f32> {
     extension.get(name).and_then(Value::as_f64).map(|v| v as f32)
 }
 
-/// Share of light from a direction that fibres of a roughness throw back, in the mean over a hemisphere by the
-/// cosine: the "Charlie" lobe of KHR_materials_sheen with the shadowing of Estevez and Kulla (2017), integrated
-/// in steps of 0.1; the curve is off by 0.002 at most.
+/// Share of light from a direction that fibres of a roughness throw back, in the mean over a
+/// hemisphere by the cosine: the "Charlie" lobe of KHR_materials_sheen with the shadowing of
+/// Estevez and Kulla (2017), integrated in steps of 0.1; the curve is off by 0.002 at most.
 fn fibres(roughness: f32) -> f32 {
     0.0152 + roughness * (0.0171 + roughness * (0.6970 - 0.4283 * roughness))
 }
@@ -164,7 +167,8 @@ fn summed(image: &Image, change: impl Fn(usize, f32) -> f32) -> Image {
     out
 }
 
-/// Share of light that is left on its way through a body once, by Beer's law; all where it is thin or clear.
+/// Share of light that is left on its way through a body once, by Beer's law; all where it is thin
+/// or clear.
 fn absorbed(volume: &Value) -> f32 {
     let thickness = number(volume, "thicknessFactor").unwrap_or(0.0);
     let distance = number(volume, "attenuationDistance").unwrap_or(f32::INFINITY);

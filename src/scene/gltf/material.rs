@@ -63,7 +63,8 @@ impl<'a> Loader<'a> {
         out.emissive_texture =
             material.emissive_texture().and_then(|t| self.texture(&place, "emissiveTexture", plain(&t), Use::Color));
 
-        // For these two the crate types no KHR_texture_transform, so it is read from what it keeps as JSON.
+        // For these two the crate types no KHR_texture_transform, so it is read from what it keeps
+        // as JSON.
         if let Some(normal) = material.normal_texture() {
             let others = json.normal_texture.as_ref().and_then(|t| t.extensions.as_ref()).map(|e| &e.others);
             let reference = special(normal.texture().index(), normal.tex_coord(), others);

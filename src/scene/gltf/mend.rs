@@ -7,7 +7,8 @@ use gltf::json::{Index, Root};
 /// Place and problem of a warning.
 pub(super) type Warning = (String, String);
 
-/// Mends what a strict reader would refuse and reads extensions that only redirect; tells what was left out.
+/// Mends what a strict reader would refuse and reads extensions that only redirect; tells what was
+/// left out.
 pub(super) fn mend(root: &mut Root) -> Vec<Warning> {
     let mut warnings = unknown_lights(root);
     warnings.extend(other_images(root));

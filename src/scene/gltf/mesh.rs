@@ -155,7 +155,8 @@ impl<'a> Loader<'a> {
         }
     }
 
-    /// Normals and tangents where they are missing; texture coordinates that a material wants and the mesh lacks.
+    /// Normals and tangents where they are missing; texture coordinates that a material wants and
+    /// the mesh lacks.
     fn finish(&mut self, place: &str, mesh: &mut Mesh) {
         if mesh.normals.is_empty() {
             geometry::make_flat_normals(mesh);

@@ -1,9 +1,9 @@
 //! glTF 2.0: `.gltf` with external or embedded buffers, and `.glb`.
 //!
-//! The `gltf` crate parses the JSON and types it; container, buffers and accessors are read here, because the
-//! crate's readers panic or give up wholesale on the broken files that people have. What cannot be used for a
-//! reason that leaves a picture (a missing texture, a line primitive, a broken skin) becomes a warning; the
-//! rest is a [`SceneError`].
+//! The `gltf` crate parses the JSON and types it; container, buffers and accessors are read here,
+//! because the crate's readers panic or give up wholesale on the broken files that people have.
+//! What cannot be used for a reason that leaves a picture (a missing texture, a line primitive, a
+//! broken skin) becomes a warning; the rest is a [`SceneError`].
 
 mod accessor;
 mod area;
@@ -35,8 +35,8 @@ use super::files::{self, LoadOptions};
 use super::{Environment, Instance, Scene, SceneError, defaults, error, sound};
 use source::Source;
 
-/// Loads the file's default scene (else its first, else every root node) and fills in what is missing, as
-/// [`super::defaults`] says. What was mended or left out stands in [`Scene::warnings`].
+/// Loads the file's default scene (else its first, else every root node) and fills in what is
+/// missing, as [`super::defaults`] says. What was mended or left out stands in [`Scene::warnings`].
 ///
 /// # Errors
 /// [`SceneError`] naming the file and the place in it, never a panic.
@@ -75,7 +75,8 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError>
     Ok(scene)
 }
 
-/// Runs the crate's own validation, which later code relies on not to panic, but forgives what this loader can handle.
+/// Runs the crate's own validation, which later code relies on not to panic, but forgives what this
+/// loader can handle.
 fn validate(path: &Path, root: &gltf::json::Root) -> Result<(), SceneError> {
     // The crate's validation looks at the accessor of POSITION before it asks whether there is one.
     for (m, mesh) in root.meshes.iter().enumerate() {
@@ -134,7 +135,8 @@ pub(super) struct Loader<'a> {
     materials: HashMap<Option<usize>, usize>,
     /// glTF image index and use → scene image.
     images: HashMap<(usize, super::texture::Use), usize>,
-    /// Specular-glossiness textures with their factors → scene images of base colour and surface, mean of the texture.
+    /// Specular-glossiness textures with their factors → scene images of base colour and surface,
+    /// mean of the texture.
     converted: HashMap<String, (usize, usize, [f32; 4])>,
     /// How each instance stands to its node.
     placed: Vec<instancing::Copy>,
@@ -194,8 +196,8 @@ impl<'a> Loader<'a> {
         let mut seen = vec![false; document.nodes().len()];
         let mut stack: Vec<(gltf::Node, Mat4, Option<usize>, bool)> =
             roots.into_iter().rev().map(|n| (n, Mat4::IDENTITY, None, true)).collect();
-        // For animations: nodes in the order of this walk, and which of them each instance, camera and light
-        // belongs to.
+        // For animations: nodes in the order of this walk, and which of them each instance, camera
+        // and light belongs to.
         let (mut walked, mut carried, mut places) = (Vec::new(), motion::Carried::default(), HashMap::new());
         while let Some((node, parent, above, visible)) = stack.pop() {
             if std::mem::replace(&mut seen[node.index()], true) {

@@ -28,8 +28,8 @@ impl Carried {
 }
 
 impl<'a> Loader<'a> {
-    /// Reads all animations of nodes; `nodes` are those of the scene, parents first: glTF node, position of its parent.
-    /// `places`: where in that list each glTF node is.
+    /// Reads all animations of nodes; `nodes` are those of the scene, parents first: glTF node,
+    /// position of its parent. `places`: where in that list each glTF node is.
     pub(super) fn animations(
         &mut self,
         nodes: &[(gltf::Node<'a>, Option<usize>)],
@@ -122,7 +122,8 @@ impl<'a> Loader<'a> {
         mesh.and_then(|m| m.primitives.first()?.targets.as_ref()).map_or(0, Vec::len)
     }
 
-    /// Names of the variants, and the materials that the primitives have in them (KHR_materials_variants).
+    /// Names of the variants, and the materials that the primitives have in them
+    /// (KHR_materials_variants).
     pub(super) fn variants(&mut self, json: &[u8]) {
         let Ok(file) = serde_json::from_slice::<File>(json) else { return };
         let Some(names) = file.extensions.and_then(|e| e.variants) else { return };
@@ -130,7 +131,8 @@ impl<'a> Loader<'a> {
         let count = self.scene.variants.len();
         let read: Vec<(usize, Vec<usize>)> = self.meshes.iter().map(|(mesh, made)| (*mesh, made.clone())).collect();
         for (mesh, made) in read {
-            // Primitives that were left out make the numbers disagree; then the file's materials stay.
+            // Primitives that were left out make the numbers disagree; then the file's materials
+            // stay.
             let primitives = file.meshes.get(mesh).map(|m| m.primitives.as_slice()).unwrap_or_default();
             if primitives.len() != made.len() {
                 if primitives.iter().any(|p| p.extensions.is_some()) {

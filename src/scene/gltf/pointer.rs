@@ -6,9 +6,9 @@ use serde_json::{Value, json};
 /// The extension's name.
 const NAME: &str = "KHR_animation_pointer";
 
-/// Rewrites channels that point to a node's own properties into ordinary ones and takes the others out, which a
-/// plain reader would refuse: they have no node. `None` where there is nothing to do; else the new JSON, and
-/// place and problem of a warning for each channel that is left out.
+/// Rewrites channels that point to a node's own properties into ordinary ones and takes the others
+/// out, which a plain reader would refuse: they have no node. `None` where there is nothing to do;
+/// else the new JSON, and place and problem of a warning for each channel that is left out.
 pub(super) fn rewrite(json: &[u8]) -> Option<(Vec<u8>, Vec<Warning>)> {
     if !json.windows(NAME.len()).any(|w| w == NAME.as_bytes()) {
         return None;

@@ -64,8 +64,8 @@ pub(super) struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// Reads every buffer that is needed, each of which must have at least its declared length, and unpacks
-    /// compressed views.
+    /// Reads every buffer that is needed, each of which must have at least its declared length, and
+    /// unpacks compressed views.
     pub(super) fn open(
         path: &'a Path,
         document: &gltf::Document,
@@ -78,7 +78,8 @@ impl<'a> Source<'a> {
             let read = Packed::of(view).map_err(|e| SceneError::broken(path, format!("bufferViews[{i}]"), e))?;
             packed.extend(read.map(|p| (i, p)));
         }
-        // A buffer to which only compressed views refer is there for loaders that cannot unpack them, if at all.
+        // A buffer to which only compressed views refer is there for loaders that cannot unpack
+        // them, if at all.
         let mut needed = vec![true; root.buffers.len()];
         let mut mark = |buffer: usize, value: bool| needed.get_mut(buffer).into_iter().for_each(|n| *n = value);
         packed.iter().for_each(|(i, _)| mark(root.buffer_views[*i].buffer.value(), false));

@@ -1,9 +1,11 @@
-//! Reflectance of dielectrics: KHR_materials_ior with KHR_materials_specular, and KHR_materials_pbrSpecularGlossiness.
+//! Reflectance of dielectrics: KHR_materials_ior with KHR_materials_specular, and
+//! KHR_materials_pbrSpecularGlossiness.
 //!
-//! A [`Material`] has one coloured reflectance without texture. So the extensions' factors are kept as they are, but
-//! textures of KHR_materials_specular count by their mean (with a warning), its weight scales the reflectance at normal
-//! incidence only (at grazing angles every surface with any is a mirror), and a specular-glossiness texture becomes
-//! base colour, metallic and roughness, texel by texel.
+//! A [`Material`] has one coloured reflectance without texture. So the extensions' factors are kept
+//! as they are, but textures of KHR_materials_specular count by their mean (with a warning), its
+//! weight scales the reflectance at normal incidence only (at grazing angles every surface with any
+//! is a mirror), and a specular-glossiness texture becomes base colour, metallic and roughness,
+//! texel by texel.
 
 use super::Loader;
 use super::texture::plain;
@@ -35,7 +37,8 @@ impl<'a> Loader<'a> {
         set_reflectance(out, color.map(|c| (plain_f0 * c).min(1.0) * weight));
     }
 
-    /// KHR_materials_pbrSpecularGlossiness, which wins over the metallic-roughness values beside it.
+    /// KHR_materials_pbrSpecularGlossiness, which wins over the metallic-roughness values beside
+    /// it.
     pub(super) fn glossiness(
         &mut self,
         place: &str,
@@ -77,7 +80,8 @@ impl<'a> Loader<'a> {
             out.base_color = [1.0, 1.0, 1.0, diffuse[3]];
             out.base_color_texture = Some(TextureRef { image: base, ..placed });
         } else {
-            // Two placements cannot be joined into one: then the reflectance is one colour, roughness stays a picture.
+            // Two placements cannot be joined into one: then the reflectance is one colour,
+            // roughness stays a picture.
             out.metallic = 0.0;
             set_reflectance(out, [0, 1, 2].map(|c| specular[c] * mean[c]));
             self.warn(place, "its two textures are placed differently, so its specular colour counts by its mean");
@@ -97,8 +101,9 @@ pub(super) fn set_reflectance(out: &mut Material, f0: [f32; 3]) {
     out.specular_tint = if most > 0.0 && most.is_finite() { f0.map(|c| c / most) } else { [1.0; 3] };
 }
 
-/// Base colour (sRGB) and metallic-roughness images of a specular-glossiness texture and the diffuse one beside it, at
-/// the larger of their sizes, all factors multiplied in but that of alpha.
+/// Base colour (sRGB) and metallic-roughness images of a specular-glossiness texture and the
+/// diffuse one beside it, at the larger of their sizes, all factors multiplied in but that of
+/// alpha.
 fn converted(
     colors: Option<&Image>,
     gloss: &Image,
@@ -146,7 +151,8 @@ fn metallic_of(diffuse: [f32; 3], specular: [f32; 3]) -> ([f32; 3], f32) {
     let diffuse = diffuse.map(|d| d.clamp(0.0, 1.0) * left / (1.0 - F));
     let mean = |c: [f32; 3]| (c[0] + c[1] + c[2]) / 3.0;
     let (d, s) = (mean(diffuse), mean(specular));
-    // f k² − (D + S) k + D = 0 with k = 1 − m; written so that D = 0 (pure metal) and D = S = 0 give what they should.
+    // f k² − (D + S) k + D = 0 with k = 1 − m; written so that D = 0 (pure metal) and D = S = 0
+    // give what they should.
     let root = ((d + s).powi(2) - 4.0 * F * d).max(0.0).sqrt();
     let k = if s <= F { 1.0 } else { (2.0 * d / (d + s + root).max(1e-6)).clamp(0.0, 1.0) };
     let m = 1.0 - k;

@@ -51,7 +51,8 @@ impl Loader<'_> {
         })
     }
 
-    /// Index in the scene of a texture's image, decoded on first use; a broken one is named and replaced.
+    /// Index in the scene of a texture's image, decoded on first use; a broken one is named and
+    /// replaced.
     fn image(&mut self, place: &str, texture: usize, usage: Use) -> usize {
         let source = self.document.as_json().textures[texture].source.value();
         if let Some(&known) = self.images.get(&(source, usage)) {
@@ -130,8 +131,8 @@ pub(super) fn special(
     }
 }
 
-/// KHR_texture_transform: scale, then rotation, then offset. A positive rotation turns coordinates counter-clockwise as
-/// seen with v pointing down, which is how every viewer reads the extension.
+/// KHR_texture_transform: scale, then rotation, then offset. A positive rotation turns coordinates
+/// counter-clockwise as seen with v pointing down, which is how every viewer reads the extension.
 fn affine(offset: [f32; 2], rotation: f32, scale: [f32; 2]) -> [[f32; 3]; 2] {
     let (sin, cos) = rotation.sin_cos();
     let rows = [[cos * scale[0], sin * scale[1], offset[0]], [-sin * scale[0], cos * scale[1], offset[1]]];

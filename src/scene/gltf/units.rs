@@ -3,8 +3,8 @@
 use crate::scene::units::Units;
 use gltf::json::{Index, Node, Root, scene::UnitQuaternion};
 
-/// Puts the scene that is shown below one more node, and measures what no node's scale reaches: planes of cameras and
-/// ranges of lights.
+/// Puts the scene that is shown below one more node, and measures what no node's scale reaches:
+/// planes of cameras and ranges of lights.
 pub(super) fn apply(root: &mut Root, units: Units) {
     if units == Units::default() {
         return;

@@ -1,4 +1,5 @@
-//! What scenes are put together from: numbers, colours, and one mesh a shape and material that its instances share.
+//! What scenes are put together from: numbers, colours, and one mesh a shape and material that its
+//! instances share.
 
 use crate::numbers::SplitMix;
 use crate::scene::shapes::{self, Shape};
@@ -197,7 +198,8 @@ impl Builder {
     }
 }
 
-/// Parts in the coordinates of a thing: x to its right, y up from the floor, z from its back to its front, metres.
+/// Parts in the coordinates of a thing: x to its right, y up from the floor, z from its back to its
+/// front, metres.
 pub(super) struct Piece<'a> {
     pub builder: &'a mut Builder,
     pose: Mat4,

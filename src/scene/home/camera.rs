@@ -19,7 +19,8 @@ pub(super) struct Proposal {
     pub depth: f32,
 }
 
-/// The first of the proposals that keeps clear and sees far enough, or the best of all. Fields of view are 45° to 75°.
+/// The first of the proposals that keeps clear and sees far enough, or the best of all. Fields of
+/// view are 45° to 75°.
 pub(super) fn choose(b: &mut Builder, name: &str, mut propose: impl FnMut(&mut Builder) -> Proposal) {
     let mut best: Option<(f32, Camera)> = None;
     for _ in 0..TRIES {

@@ -1,4 +1,5 @@
-//! Which furniture a room gets, and where: at walls or in the middle, out of the way of doors, windows and each other.
+//! Which furniture a room gets, and where: at walls or in the middle, out of the way of doors,
+//! windows and each other.
 
 use super::builder::{Builder, Piece, Solid};
 use super::furniture as make;
@@ -29,7 +30,8 @@ pub(super) struct Furnisher<'a> {
 }
 
 impl Furnisher<'_> {
-    /// A pose with its back at a wall, `size` (width, depth, height) free, and somewhat more in front.
+    /// A pose with its back at a wall, `size` (width, depth, height) free, and somewhat more in
+    /// front.
     pub fn at_wall(&mut self, size: [f32; 3]) -> Option<Mat4> {
         for _ in 0..TRIES {
             let side = self.b.below(4);

@@ -1,5 +1,5 @@
-//! Things with legs, boards and doors, each in its own coordinates: x to its right, y up, z from its back (0) to its
-//! front, metres.
+//! Things with legs, boards and doors, each in its own coordinates: x to its right, y up, z from
+//! its back (0) to its front, metres.
 
 use super::builder::{Form, Piece};
 use super::look::Look;

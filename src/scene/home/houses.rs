@@ -55,8 +55,8 @@ impl Parts {
     }
 }
 
-/// A house whose front is at z = `front`, looking towards the street at z = 0, from `from` to `to` along x. Adds where
-/// one can stand on its balconies.
+/// A house whose front is at z = `front`, looking towards the street at z = 0, from `from` to `to`
+/// along x. Adds where one can stand on its balconies.
 pub(super) fn house(b: &mut Builder, parts: &Parts, [from, to]: [f32; 2], front: f32, stands: &mut Vec<Vec3>) {
     let paint = b.paint();
     let plaster = b.material("house", paint, 0.9);

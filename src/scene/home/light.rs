@@ -1,7 +1,8 @@
 //! Day: a sky and perhaps a sun through the windows. Night: lamps in some of the rooms.
 //!
-//! Strengths follow from what they light: the light E/π that a room's walls would have if they were grey is drawn, and
-//! the strength is what gives it in a room of that surface. So pictures come out well at exposure 0.
+//! Strengths follow from what they light: the light E/π that a room's walls would have if they were
+//! grey is drawn, and the strength is what gives it in a room of that surface. So pictures come out
+//! well at exposure 0.
 
 use super::builder::{Builder, Form, Piece, Solid};
 use super::furnish::Furnisher;

@@ -1,5 +1,6 @@
-//! The materials of a home: reflectances of real things. Flat colours only: the light that a network learns, E/π, has
-//! the surface's own colour divided out, so a texture would change nothing of it but the little that it reflects.
+//! The materials of a home: reflectances of real things. Flat colours only: the light that a
+//! network learns, E/π, has the surface's own colour divided out, so a texture would change nothing
+//! of it but the little that it reflects.
 
 use super::builder::Builder;
 use super::plan::Kind;

@@ -1,9 +1,10 @@
-//! Rooms that people live in and streets between houses, made by code: what a network learns from that is to filter the
-//! light of flats, hotels, offices and streets.
+//! Rooms that people live in and streets between houses, made by code: what a network learns from
+//! that is to filter the light of flats, hotels, offices and streets.
 //!
-//! Five of six are flats of one to five rooms with doors, windows and furniture, the sixth is a street. By day (55 %)
-//! the sky and perhaps a sun shine in; by night lamps do, in some of the rooms, so that light comes round corners.
-//! Strengths are such that pictures come out well at exposure 0.
+//! Five of six are flats of one to five rooms with doors, windows and furniture, the sixth is a
+//! street. By day (55 %) the sky and perhaps a sun shine in; by night lamps do, in some of the
+//! rooms, so that light comes round corners. Strengths are such that pictures come out well at
+//! exposure 0.
 
 mod builder;
 mod camera;
@@ -35,8 +36,8 @@ const CLOSED: f32 = 0.3;
 /// Cameras of a scene.
 pub const CAMERAS: usize = 3;
 
-/// Scene `index` of this stream; the same index gives the same scene. It has three cameras at places where a person
-/// would stand, and 500 to 60,000 triangles.
+/// Scene `index` of this stream; the same index gives the same scene. It has three cameras at
+/// places where a person would stand, and 500 to 60,000 triangles.
 pub fn scene(index: u32) -> Scene {
     let mut b = Builder::new(index);
     let night = b.chance(NIGHTS);

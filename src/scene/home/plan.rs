@@ -84,7 +84,8 @@ impl Room {
         windows.map(|o| (o.to - o.from) * (o.high - o.low)).sum()
     }
 
-    /// A box at the wall: along it, upwards, and away from it into the room (or, negative, into the wall).
+    /// A box at the wall: along it, upwards, and away from it into the room (or, negative, into the
+    /// wall).
     pub fn at_wall(&self, side: usize, along: [f32; 2], up: [f32; 2], out: [f32; 2]) -> Solid {
         let ((run, across), (face, inwards)) = (axes(side), self.face(side));
         let corner = |i: usize| {
@@ -229,7 +230,8 @@ fn outer_sides(air: Solid, inside: Solid) -> [bool; 4] {
     [air.low.x <= inside.low.x, air.high.x >= inside.high.x, air.low.z <= inside.low.z, air.high.z >= inside.high.z]
 }
 
-/// Cuts `air` into `count` rooms, or fewer where they would be too small, with walls of `thick` between them.
+/// Cuts `air` into `count` rooms, or fewer where they would be too small, with walls of `thick`
+/// between them.
 fn split(b: &mut Builder, air: Solid, count: usize, thick: f32, out: &mut Vec<Solid>) {
     let size = air.high - air.low;
     let axis = if size.x > size.z { 0 } else { 2 };

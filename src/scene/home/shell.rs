@@ -1,4 +1,5 @@
-//! Walls, floors, ceilings, doors, windows and curtains of a flat, and what can be seen out of its windows.
+//! Walls, floors, ceilings, doors, windows and curtains of a flat, and what can be seen out of its
+//! windows.
 
 use super::builder::{Builder, Form, Solid};
 use super::look::Look;
@@ -9,7 +10,8 @@ use std::f32::consts::FRAC_PI_2;
 /// Thickness of floor boards and of plaster on outer walls, metres.
 const SKIN: f32 = 0.02;
 
-/// A wall of boxes around its openings. It fills `solid`; openings run along x or z, whichever `along` (0 or 2) says.
+/// A wall of boxes around its openings. It fills `solid`; openings run along x or z, whichever
+/// `along` (0 or 2) says.
 pub(super) fn wall(b: &mut Builder, name: &str, material: usize, solid: Solid, along: usize, openings: &[Opening]) {
     let mut openings = openings.to_vec();
     openings.sort_by(|a, b| a.from.total_cmp(&b.from));
@@ -57,7 +59,8 @@ pub(super) fn build(b: &mut Builder, plan: &mut Plan, look: &Look) {
     }
 }
 
-/// A closed box around the flat but for the windows: four walls that overlap at the corners, between two slabs.
+/// A closed box around the flat but for the windows: four walls that overlap at the corners,
+/// between two slabs.
 fn outside_walls(b: &mut Builder, plan: &Plan) {
     let (low, high, out) = (plan.inside.low, plan.inside.high, plan.outer);
     let (paint, white) = (b.paint(), b.between(0.7, 0.86));

@@ -1,10 +1,11 @@
-//! What of a scene is worth being framed: nearly all of it, but not one thing that lies far away, a ground plane that
-//! reaches to the horizon, or a dome for the sky.
+//! What of a scene is worth being framed: nearly all of it, but not one thing that lies far away, a
+//! ground plane that reaches to the horizon, or a dome for the sky.
 
 use crate::scene::{Scene, bounds::world_bounds, triangles};
 use glam::Vec3;
 
-/// Share of the triangles that is near enough to each other; what lies apart from them is left out …
+/// Share of the triangles that is near enough to each other; what lies apart from them is left out
+/// …
 const MOST: f32 = 0.75;
 /// … if it is so many times as far from their middle as they reach.
 const APART: f32 = 4.0;
@@ -22,7 +23,8 @@ pub struct Extent {
 impl Extent {
     /// `None` where nothing is placed.
     ///
-    /// Distances are measured from the median of the triangles, per axis, to each triangle's farthest corner.
+    /// Distances are measured from the median of the triangles, per axis, to each triangle's
+    /// farthest corner.
     pub fn of(scene: &Scene) -> Option<Self> {
         let (low, high) = world_bounds(scene)?;
         let all = Self { low: low.into(), high: high.into() };

@@ -1,5 +1,6 @@
-//! A scene as a coarse grid of cells that know whether a surface passes through them, which way it faces and what it
-//! belongs to: enough to ask where walls are, and quick for millions of triangles.
+//! A scene as a coarse grid of cells that know whether a surface passes through them, which way it
+//! faces and what it belongs to: enough to ask where walls are, and quick for millions of
+//! triangles.
 
 use crate::scene::{AlphaMode, Scene, triangles};
 use glam::{IVec3, Vec3};
@@ -58,8 +59,8 @@ impl Grid {
         grid
     }
 
-    /// Marks the cells of points spread over a triangle, at most half a cell apart: rows along its longest
-    /// edge, so that a sliver takes no more of them than a line.
+    /// Marks the cells of points spread over a triangle, at most half a cell apart: rows along its
+    /// longest edge, so that a sliver takes no more of them than a line.
     fn add(&mut self, corners: [Vec3; 3], instance: u32) {
         let length = |i: usize| corners[i].distance(corners[(i + 1) % 3]);
         let first = (0..3).max_by(|&i, &j| length(i).total_cmp(&length(j))).unwrap_or(0);
@@ -114,8 +115,8 @@ impl Grid {
         !around.clone().any(|x| around.clone().any(|y| around.clone().any(|z| self.is_filled(p + IVec3::new(x, y, z)))))
     }
 
-    /// The first surface from `from` along a unit vector; `None` where the ray leaves the grid. The cell where it
-    /// begins does not count.
+    /// The first surface from `from` along a unit vector; `None` where the ray leaves the grid. The
+    /// cell where it begins does not count.
     pub fn ray(&self, from: Vec3, direction: Vec3) -> Option<Hit> {
         let mut place = self.place(from);
         let step = IVec3::new(sign(direction.x), sign(direction.y), sign(direction.z));

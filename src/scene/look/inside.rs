@@ -126,8 +126,8 @@ pub fn daylight(grid: &Grid, eye: Vec3, stands: &[Stand]) -> Daylight {
     Daylight::Lamp { position: eye + Vec3::Y * up, height: EYE * height + up }
 }
 
-/// How good the picture is that one takes at `eye` along `forward` (level): deep, with many things in it, nothing close
-/// before the lens and little of the void.
+/// How good the picture is that one takes at `eye` along `forward` (level): deep, with many things
+/// in it, nothing close before the lens and little of the void.
 fn score(grid: &Grid, eye: Vec3, forward: Vec3, room: f32) -> f32 {
     let (right, up) = (forward.cross(Vec3::Y).normalize_or(Vec3::X), Vec3::Y);
     let slope = (0.5 * YFOV).tan();
@@ -156,7 +156,8 @@ fn score(grid: &Grid, eye: Vec3, forward: Vec3, room: f32) -> f32 {
     depth / rays + rich - 1.5 * close / rays - 0.7 * (lost / rays - 0.25f32).max(0.0)
 }
 
-/// The best camera in the room: at one of `stands`, towards `wish` if somebody wishes for a direction.
+/// The best camera in the room: at one of `stands`, towards `wish` if somebody wishes for a
+/// direction.
 pub fn camera(grid: &Grid, stands: &[Stand], wish: Option<Vec3>) -> Option<Camera> {
     let room = {
         // How far one sees in the mean of all places: the size of a room rather than of a house.

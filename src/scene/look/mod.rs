@@ -1,8 +1,10 @@
-//! The first look: from where a scene is seen for which nobody says it, and what kind of place it is.
+//! The first look: from where a scene is seen for which nobody says it, and what kind of place it
+//! is.
 //!
-//! A scene is an **interior** if most places in it where one can stand have walls and a ceiling around them,
-//! and no side of it is open enough to look in. There the camera stands in the room; everything else is seen
-//! whole, from a three-quarter view a little above, or from the side that lets one look deepest.
+//! A scene is an **interior** if most places in it where one can stand have walls and a ceiling
+//! around them, and no side of it is open enough to look in. There the camera stands in the room;
+//! everything else is seen whole, from a three-quarter view a little above, or from the side that
+//! lets one look deepest.
 
 mod extent;
 mod grid;
@@ -19,7 +21,8 @@ use outside::Shape;
 /// Vertical field of view of the camera that looks at a scene from outside, radians.
 pub const FRAMING_YFOV: f32 = outside::YFOV;
 
-/// Share of all directions in which a wall stands around who is in a room: windows and doors are open.
+/// Share of all directions in which a wall stands around who is in a room: windows and doors are
+/// open.
 const ENCLOSED: f32 = 0.8;
 /// Of those, at most, in which one would see a wall from behind.
 const BEHIND: f32 = 0.1;
@@ -35,8 +38,8 @@ const OPEN: f32 = 0.45;
 pub enum Daylight {
     /// From above: the camera stands in the open.
     Outdoors,
-    /// Through windows and doors of the room where the camera stands; most of a sun's comes in from this direction (a
-    /// unit vector towards it), if any does.
+    /// Through windows and doors of the room where the camera stands; most of a sun's comes in from
+    /// this direction (a unit vector towards it), if any does.
     Openings(Option<Vec3>),
     /// Not at all: the room is closed. A lamp could hang here, so high above the floor.
     Lamp {
@@ -47,7 +50,8 @@ pub enum Daylight {
     },
 }
 
-/// Share of the places that have walls but no ceiling, from which on one looks into the rooms from above.
+/// Share of the places that have walls but no ceiling, from which on one looks into the rooms from
+/// above.
 const ROOFLESS: f32 = 0.3;
 
 /// What a scene looks like from anywhere, so far as framing it goes.
@@ -104,13 +108,14 @@ impl<'a> Look<'a> {
         inside.unwrap_or_else(|| self.outside(self.back, FRAMING_YFOV, 1.0))
     }
 
-    /// The same for pictures `aspect` times as wide as high, which show more of a scene that is seen from outside.
+    /// The same for pictures `aspect` times as wide as high, which show more of a scene that is
+    /// seen from outside.
     pub fn camera_for(&self, aspect: f32) -> Camera {
         if self.interior { self.camera() } else { self.outside(self.back, FRAMING_YFOV, aspect) }
     }
 
-    /// A camera that looks along −`back` (a unit vector) and sees all of it, or as much as one sees inside. `yfov` in
-    /// radians, `aspect` is the picture's width by its height.
+    /// A camera that looks along −`back` (a unit vector) and sees all of it, or as much as one sees
+    /// inside. `yfov` in radians, `aspect` is the picture's width by its height.
     pub fn from(&self, back: Vec3, yfov: f32, aspect: f32) -> Camera {
         let level = back.with_y(0.0).length() > 0.3;
         let inside = if self.interior && level { inside::camera(&self.grid, &self.stands, Some(-back)) } else { None };
@@ -131,8 +136,8 @@ impl<'a> Look<'a> {
         outside::camera(self.scene, &self.core, back, yfov, aspect)
     }
 
-    /// How far away that is what one would turn around who looks through `camera`: the middle of what is
-    /// framed, or where one looks in a room.
+    /// How far away that is what one would turn around who looks through `camera`: the middle of
+    /// what is framed, or where one looks in a room.
     pub fn distance(&self, camera: &Camera) -> f32 {
         let (eye, forward) = (Vec3::from(camera.eye()), Vec3::from(camera.forward()));
         let size = self.core.size();
@@ -152,8 +157,8 @@ impl<'a> Look<'a> {
 /// Name of the camera that looks at a scene from outside for want of one in the file.
 pub const FRAMING: &str = "framing";
 
-/// The camera of a scene that brings none; `look` is its, if anything is placed in it. It shows everything in
-/// any picture at least as wide as high.
+/// The camera of a scene that brings none; `look` is its, if anything is placed in it. It shows
+/// everything in any picture at least as wide as high.
 pub fn first_camera(look: Option<&Look<'_>>) -> Camera {
     match look {
         Some(look) => look.camera(),

@@ -1,4 +1,5 @@
-//! A camera that looks at all of the scene from outside, at an angle from which one sees much of it.
+//! A camera that looks at all of the scene from outside, at an angle from which one sees much of
+//! it.
 
 use super::Extent;
 use crate::scene::{AlphaMode, Camera, Scene, triangles};
@@ -25,9 +26,9 @@ pub enum Shape {
     Roofless,
 }
 
-/// Directions from the scene to the eye, and how much each is liked before anything is known of the scene:
-/// three-quarter views from a little above, the front first. Straight ones, which look into boxes, and steep ones,
-/// which look over walls, have to be clearly deeper.
+/// Directions from the scene to the eye, and how much each is liked before anything is known of the
+/// scene: three-quarter views from a little above, the front first. Straight ones, which look into
+/// boxes, and steep ones, which look over walls, have to be clearly deeper.
 fn proposals(shape: Shape) -> Vec<(Vec3, f32)> {
     // Into rooms without ceilings one looks from above, steeply enough to see their floors.
     let steep = if shape == Shape::Roofless { 1.6 } else { 0.72 };
@@ -45,8 +46,8 @@ fn proposals(shape: Shape) -> Vec<(Vec3, f32)> {
     all
 }
 
-/// The direction to the eye that is liked most, given how deep one sees into the scene from there and how many of its
-/// things, and that depth as a share of the scene's.
+/// The direction to the eye that is liked most, given how deep one sees into the scene from there
+/// and how many of its things, and that depth as a share of the scene's.
 pub fn direction(scene: &Scene, core: &Extent, shape: Shape) -> (Vec3, f32) {
     let views: Vec<_> =
         proposals(shape).into_iter().map(|(back, liking)| (back, liking, seen(scene, core, back))).collect();
@@ -57,12 +58,14 @@ pub fn direction(scene: &Scene, core: &Extent, shape: Shape) -> (Vec3, f32) {
     best.map_or((Vec3::Z, 0.0), |(back, _, seen)| (back, seen.depth))
 }
 
-/// The nearest eye that sees all of `core` when it looks along −`back`, in a picture `aspect` times as wide as high;
+/// The nearest eye that sees all of `core` when it looks along −`back`, in a picture `aspect` times
+/// as wide as high;
 pub fn camera(scene: &Scene, core: &Extent, back: Vec3, yfov: f32, aspect: f32) -> Camera {
     let (right, up) = axes(back);
     let slope = (0.5 * yfov).tan() / MARGIN;
     let sides = [(right, slope * aspect.clamp(0.05, 20.0)), (up, slope)];
-    // A point is seen where |x − offset| ≤ slope · (distance − z): each side of the picture asks for one largest sum.
+    // A point is seen where |x − offset| ≤ slope · (distance − z): each side of the picture asks
+    // for one largest sum.
     let mut sums = [[f32::NEG_INFINITY; 2]; 2];
     let mut nearest = f32::NEG_INFINITY;
     let mut take = |p: Vec3| {
@@ -130,7 +133,8 @@ fn seen(scene: &Scene, core: &Extent, back: Vec3) -> Seen {
 /// What one sees from a side.
 #[derive(Debug, Clone, Copy)]
 struct Seen {
-    /// Mean depth behind the near side of the bounding box, as a share of the box's extent along the view.
+    /// Mean depth behind the near side of the bounding box, as a share of the box's extent along
+    /// the view.
     depth: f32,
     /// How many instances.
     things: usize,

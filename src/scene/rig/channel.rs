@@ -13,8 +13,8 @@ pub struct Channel {
     pub interpolation: Interpolation,
     /// Seconds, rising, at least one.
     pub times: Vec<f32>,
-    /// As many for each time as the property has numbers, or for [`Interpolation::Cubic`] three times as many:
-    /// in-tangents, values, out-tangents.
+    /// As many for each time as the property has numbers, or for [`Interpolation::Cubic`] three
+    /// times as many: in-tangents, values, out-tangents.
     pub values: Vec<f32>,
 }
 

@@ -1,6 +1,6 @@
-//! Textures in blocks of 4×4 texels (BC7, one byte a texel instead of four), encoded by Intel's kernels as the
-//! crate `block_compression` has them: as shaders on a card, on all cores where the device is one itself, whose
-//! driver takes two minutes and a half to compile them.
+//! Textures in blocks of 4×4 texels (BC7, one byte a texel instead of four), encoded by Intel's
+//! kernels as the crate `block_compression` has them: as shaders on a card, on all cores where the
+//! device is one itself, whose driver takes two minutes and a half to compile them.
 
 use crate::scene::mips::Level;
 #[cfg(feature = "io")]
@@ -128,8 +128,8 @@ fn variant() -> CompressionVariant {
     CompressionVariant::BC7(BC7Settings::alpha_fast())
 }
 
-/// Blocks of a level, row by row, and the bytes of a row of them; what lacks to whole blocks repeats the last
-/// column and row.
+/// Blocks of a level, row by row, and the bytes of a row of them; what lacks to whole blocks
+/// repeats the last column and row.
 #[cfg(feature = "io")]
 fn blocks(level: &Level<'_>) -> (Vec<u8>, u32) {
     let variant = variant();

@@ -24,7 +24,8 @@ pub struct DeformGpu {
     pub pad: u32,
 }
 
-/// Spacing of [`DeformGpu`] in their buffer: the largest alignment of dynamic offsets that a device may ask for.
+/// Spacing of [`DeformGpu`] in their buffer: the largest alignment of dynamic offsets that a device
+/// may ask for.
 pub(crate) const STRIDE: u64 = 256;
 
 /// Deforming meshes on the GPU. Their vertices are the first of the scene's.

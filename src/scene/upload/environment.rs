@@ -28,8 +28,8 @@ fn texels(image: &EnvironmentImage, rest: Option<&EnvironmentImage>) -> Vec<[f32
     .collect()
 }
 
-/// `Rgba32Float`, without mip levels: nothing filters it but `shaders/lib/environment.wgsl`. Pictures larger than the
-/// device allows are halved until they fit, with a warning.
+/// `Rgba32Float`, without mip levels: nothing filters it but `shaders/lib/environment.wgsl`.
+/// Pictures larger than the device allows are halved until they fit, with a warning.
 pub(super) fn upload(
     device: &wgpu::Device,
     queue: &wgpu::Queue,

@@ -39,7 +39,8 @@ pub const CANDIDATES: usize = 8;
 /// may be all the light of a room.
 const EVEN: f64 = 0.3;
 
-/// A spot whose half angle is above this gets a cube of shadow maps: one map would waste its texels on the rim.
+/// A spot whose half angle is above this gets a cube of shadow maps: one map would waste its texels
+/// on the rim.
 const WIDEST_SPOT: f32 = 60.0 * std::f32::consts::PI / 180.0;
 
 /// True for lights whose cone fits into one shadow map.

@@ -34,7 +34,8 @@ pub struct MaterialGpu {
     pub normal_scale: f32,
     /// Strength of the occlusion map.
     pub occlusion_strength: f32,
-    /// 0 opaque, the mask's cutoff, 2 for stochastic coverage, 3 for a veil, which may be blended instead.
+    /// 0 opaque, the mask's cutoff, 2 for stochastic coverage, 3 for a veil, which may be blended
+    /// instead.
     pub alpha_cutoff: f32,
     /// Reflectance of a dielectric at normal incidence.
     pub f0: f32,
@@ -139,8 +140,9 @@ fn uniform(m: &Material, veil: bool) -> MaterialGpu {
     }
 }
 
-/// Layout of the materials' bind groups (group 1 of the geometry passes): uniform, five textures, five samplers.
-/// wgpu holds layouts with equal entries for the same, so pipelines can be made before any scene is there.
+/// Layout of the materials' bind groups (group 1 of the geometry passes): uniform, five textures,
+/// five samplers. wgpu holds layouts with equal entries for the same, so pipelines can be made
+/// before any scene is there.
 pub fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let stages = wgpu::ShaderStages::FRAGMENT;
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: stages, ty, count: None };

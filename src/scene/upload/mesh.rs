@@ -1,4 +1,5 @@
-//! Meshes and instances: compact vertices, one set of buffers for the whole scene, draws grouped by material.
+//! Meshes and instances: compact vertices, one set of buffers for the whole scene, draws grouped by
+//! material.
 
 use super::closed::is_closed;
 use super::{UploadError, filled, is_covered};
@@ -38,7 +39,8 @@ pub type Bounds = ([f32; 3], [f32; 3]);
 pub struct Slot {
     /// World-space bounds, which hold whatever of it is drawn.
     pub bounds: Bounds,
-    /// Number of what is there: another one whenever it is another instance, elsewhere or of another shape.
+    /// Number of what is there: another one whenever it is another instance, elsewhere or of
+    /// another shape.
     pub version: u64,
 }
 
@@ -61,7 +63,8 @@ pub struct Draw {
     pub closed: bool,
     /// Masked or blended: needs the permutation that discards.
     pub covered: bool,
-    /// Covers a share of each place by lot (`BLEND`), so that another frame's shadow of it is another.
+    /// Covers a share of each place by lot (`BLEND`), so that another frame's shadow of it is
+    /// another.
     pub by_lot: bool,
     /// A veil, to be blended with what is behind: one instance, so that draws can be put in order.
     pub veil: bool,
@@ -91,14 +94,15 @@ pub fn position_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 2] {
     [layout(12, wgpu::VertexStepMode::Vertex, &POSITION), layout(48, wgpu::VertexStepMode::Instance, &ROWS)]
 }
 
-/// Vertex buffers of passes that read everything: positions, instances, attributes in slots 0, 1, 2.
+/// Vertex buffers of passes that read everything: positions, instances, attributes in slots 0,
+/// 1, 2.
 pub fn attribute_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 3] {
     let [positions, instances] = position_layouts();
     [positions, instances, layout(36, wgpu::VertexStepMode::Vertex, &ATTRIBUTES)]
 }
 
-/// As [`attribute_layouts`], for passes that write motion vectors: slots 3 and 4 have instances and positions as they
-/// were in the frame before.
+/// As [`attribute_layouts`], for passes that write motion vectors: slots 3 and 4 have instances and
+/// positions as they were in the frame before.
 pub fn motion_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 5] {
     let [positions, instances, attributes] = attribute_layouts();
     let before = layout(48, wgpu::VertexStepMode::Instance, &BEFORE);
@@ -184,7 +188,8 @@ fn deforming(scene: &Scene) -> Vec<bool> {
     deforms
 }
 
-/// Meshes in the order of the shared buffers: first those that deform, in the order of [`Scene::deforms`].
+/// Meshes in the order of the shared buffers: first those that deform, in the order of
+/// [`Scene::deforms`].
 fn order(scene: &Scene) -> Vec<usize> {
     let deforms = deforming(scene);
     scene.deforms.iter().map(|d| d.mesh).chain((0..scene.meshes.len()).filter(|m| !deforms[*m])).collect()
@@ -208,9 +213,9 @@ pub(super) struct Placements {
     pub draws: Vec<Draw>,
 }
 
-/// Places a scene whose instances name meshes that exist; which of these are `closed` is known, which materials are
-/// `veils`, and how instances were placed `before`: what has not moved since need not be measured again.
-/// `deformed`: what deforms does so otherwise than before.
+/// Places a scene whose instances name meshes that exist; which of these are `closed` is known,
+/// which materials are `veils`, and how instances were placed `before`: what has not moved since
+/// need not be measured again. `deformed`: what deforms does so otherwise than before.
 pub(super) fn placements(
     scene: &Scene,
     closed: &[bool],

@@ -14,13 +14,14 @@ pub enum TextureMemory {
     Auto,
     /// As they are, four bytes a texel.
     Full,
-    /// In blocks (BC7), a byte a texel, where the device has them and an image is a whole number of them; normal maps
-    /// stay as they are.
+    /// In blocks (BC7), a byte a texel, where the device has them and an image is a whole number of
+    /// them; normal maps stay as they are.
     Compressed,
 }
 
 impl TextureMemory {
-    /// Bytes of all textures of a scene from which on `Auto` takes blocks: an eighth of a card of 4 GB.
+    /// Bytes of all textures of a scene from which on `Auto` takes blocks: an eighth of a card of 4
+    /// GB.
     pub const MOST: u64 = 512 << 20;
 }
 
@@ -109,7 +110,8 @@ pub(super) fn upload(
     Ok(Textures { views, white, flat, bytes: TextureBytes { full, kept } })
 }
 
-/// Bytes of an image with its mip levels at four bytes a texel, its sides halved until none exceeds `limit`.
+/// Bytes of an image with its mip levels at four bytes a texel, its sides halved until none exceeds
+/// `limit`.
 fn full_bytes(image: &Image, limit: u32) -> u64 {
     let (mut width, mut height) = (image.width.max(1), image.height.max(1));
     while width > limit || height > limit {
@@ -127,7 +129,8 @@ enum Kind {
     Normals,
 }
 
-/// Whether materials take normals from this image, and nothing else: another use may want its alpha.
+/// Whether materials take normals from this image, and nothing else: another use may want its
+/// alpha.
 fn is_normal_map(scene: &Scene, image: usize) -> bool {
     let of = |r: Option<crate::scene::TextureRef>| r.is_some_and(|r| r.image == image);
     let others = |m: &crate::scene::Material| {

@@ -1,7 +1,8 @@
-//! Which blended materials are veils (panes, smoke, beams of light), and which are cut out of a sheet (leaves).
+//! Which blended materials are veils (panes, smoke, beams of light), and which are cut out of a
+//! sheet (leaves).
 //!
-//! glTF has one word for both. A veil has to be blended with what is behind; where a cut-out is drawn so, its triangles
-//! come in a wrong order and its rims get the light of what is behind.
+//! glTF has one word for both. A veil has to be blended with what is behind; where a cut-out is
+//! drawn so, its triangles come in a wrong order and its rims get the light of what is behind.
 
 use crate::scene::{AlphaMode, Material, Scene};
 
@@ -9,8 +10,8 @@ use crate::scene::{AlphaMode, Material, Scene};
 /// `shaders/render/surface.wgsl`.
 const SOLID: f32 = 0.995;
 
-/// Of each material, whether it is blended and most of what it covers is covered in part only. Colours of vertices are
-/// taken to be opaque.
+/// Of each material, whether it is blended and most of what it covers is covered in part only.
+/// Colours of vertices are taken to be opaque.
 pub(super) fn veils(scene: &Scene) -> Vec<bool> {
     scene.materials.iter().map(|material| is_veil(material, scene)).collect()
 }

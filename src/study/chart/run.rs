@@ -41,7 +41,8 @@ pub struct Hooks<'a> {
 /// scene, numbers) are not done again.
 ///
 /// # Errors
-/// [`ChartError::Stopped`] (what was done has been saved by then); folders of references that cannot be read; saving.
+/// [`ChartError::Stopped`] (what was done has been saved by then); folders of references that
+/// cannot be read; saving.
 pub fn run(
     gpu: &Gpu,
     plan: &Plan,

@@ -97,7 +97,8 @@ pub struct Point {
     pub wall_ms: Spread,
     /// GPU memory, bytes.
     pub bytes: u64,
-    /// Frames timed: as many as were asked for, or as the limit of time allows; 0 in records of older programs.
+    /// Frames timed: as many as were asked for, or as the limit of time allows; 0 in records of
+    /// older programs.
     #[serde(default)]
     pub frames: u32,
 }

@@ -2,9 +2,10 @@
 //! from.
 //!
 //! Half of the time at most goes into pictures (`lessons`), the rest into steps (`net::learn`), as
-//! training takes them. What has been learnt is judged as every candidate is, and stays only if it beats
-//! `gather`, the network it began as, and what was chosen before, by more than the noise of the
-//! references explains. What is judged is the state that is best on views held out from the steps.
+//! training takes them. What has been learnt is judged as every candidate is, and stays only if it
+//! beats `gather`, the network it began as, and what was chosen before, by more than the noise of
+//! the references explains. What is judged is the state that is best on views held out from the
+//! steps.
 
 use super::lessons::{self, Lessons};
 use super::{Candidate, Fit, FitError, FitOptions, Network, Search};

@@ -5,8 +5,8 @@
 //! what is dearer is not tried. Free numbers: the light of `ambient` and `ssgi` is linear in two of
 //! them, so where the usual ones miss the target, the scene's own follow from three pictures a
 //! view. Of `gather` the usual ones are tried first: where they are good enough, cheaper ones are
-//! sought by bisection, where not, finer ones are candidates of their own. At last, for methods that
-//! settle, the fewest frames that still meet the target are sought by bisection, too. Both
+//! sought by bisection, where not, finer ones are candidates of their own. At last, for methods
+//! that settle, the fewest frames that still meet the target are sought by bisection, too. Both
 //! bisections take it that error falls as cost rises; what they return has been measured to meet
 //! the target in any case.
 
@@ -147,8 +147,8 @@ struct Search<'a, 'b> {
 }
 
 impl Search<'_, '_> {
-    /// Steps that there will be if nothing ends the search early: a reference or a candidate in one view
-    /// each.
+    /// Steps that there will be if nothing ends the search early: a reference or a candidate in one
+    /// view each.
     fn guess(&self, views: usize) -> u32 {
         (views * (1 + 4 + FINER.len() + self.options.networks.len())) as u32
     }
@@ -210,8 +210,8 @@ impl Search<'_, '_> {
         Ok(None)
     }
 
-    /// A candidate whose light is linear in two numbers, with those that suit these views best; `None`
-    /// for the others.
+    /// A candidate whose light is linear in two numbers, with those that suit these views best;
+    /// `None` for the others.
     fn own_numbers(&mut self, row: Option<usize>) -> Result<Option<Candidate>, FitError> {
         let Some(candidate) = row.map(|row| self.rows[row].candidate.clone()) else { return Ok(None) };
         let mut problem = unseen::Problem::default();
@@ -289,8 +289,8 @@ impl Search<'_, '_> {
         tried.min_by(|a, b| self.options.yardstick.order(a.1.worst, b.1.worst)).map(|(i, _)| i)
     }
 
-    /// Tries a candidate in every view and adds its row; `None` where it is too dear or cannot draw the
-    /// scene.
+    /// Tries a candidate in every view and adds its row; `None` where it is too dear or cannot draw
+    /// the scene.
     fn attempt(&mut self, candidate: Candidate, frames: u32) -> Result<Option<usize>, FitError> {
         let cost_ms = match self.cost(&candidate)? {
             Some(cost) => cost,

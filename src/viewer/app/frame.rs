@@ -1,4 +1,5 @@
-//! One picture of the window: hands, scene, overlay, in this order, so that what hands did is seen at once.
+//! One picture of the window: hands, scene, overlay, in this order, so that what hands did is seen
+//! at once.
 
 use super::App;
 use crate::gpu::{readback, timing::Recorder};
@@ -213,8 +214,8 @@ impl App {
         drawn
     }
 
-    /// Measures the exposure, if that is wished: in the first frame of a scene, and again at rest whenever
-    /// something else than the camera has changed meanwhile.
+    /// Measures the exposure, if that is wished: in the first frame of a scene, and again at rest
+    /// whenever something else than the camera has changed meanwhile.
     fn expose(&mut self) {
         let (Some(stage), Some(shown)) = (&self.stage, &self.state.shown) else { return };
         let first = self.state.measured.is_none() && stage.still() > 0;

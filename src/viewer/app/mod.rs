@@ -286,7 +286,8 @@ impl ApplicationHandler<Event> for App {
                 self.state.settings.window = [points.width.max(160), points.height.max(160)];
                 self.redraw = true;
             }
-            // What egui moves on every event of a window that is only being looked at is no reason to draw.
+            // What egui moves on every event of a window that is only being looked at is no reason
+            // to draw.
             WindowEvent::CursorMoved { .. } if self.script.is_some() => {}
             _ => self.again |= response.repaint,
         }

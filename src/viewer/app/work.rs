@@ -95,7 +95,8 @@ impl App {
         }
     }
 
-    /// Asks for a file by the system's dialog, which stays open beside the window. Scripts have no hands for it.
+    /// Asks for a file by the system's dialog, which stays open beside the window. Scripts have no
+    /// hands for it.
     fn browse(&mut self, surroundings: bool) {
         let Some(window) = self.screen.as_ref().map(|s| s.window.clone()).filter(|_| self.script.is_none()) else {
             return;

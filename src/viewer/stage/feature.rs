@@ -1,4 +1,5 @@
-//! What the network is given and what its layers make of it, as pictures. Read back, on demand only.
+//! What the network is given and what its layers make of it, as pictures. Read back, on demand
+//! only.
 
 use super::Stage;
 use crate::gi::pack::NetworkInputs;
@@ -20,7 +21,8 @@ pub(super) struct Feature {
 }
 
 impl Stage {
-    /// Computes and uploads what is wanted of the network, if it is not there already. Waits for the GPU.
+    /// Computes and uploads what is wanted of the network, if it is not there already. Waits for
+    /// the GPU.
     ///
     /// # Errors
     /// What the pass says.

@@ -330,7 +330,8 @@ impl Stage {
         rows
     }
 
-    /// What the flicker meter says of the frame that was just submitted; `None` where the view is new.
+    /// What the flicker meter says of the frame that was just submitted; `None` where the view is
+    /// new.
     ///
     /// # Errors
     /// Reading back failed.

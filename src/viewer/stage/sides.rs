@@ -101,8 +101,8 @@ impl Stage {
         self.read(slot).map(Some)
     }
 
-    /// Linear RGB of what the left renderer has drawn so far, read back; `None` before its first frame. Waits for the
-    /// GPU.
+    /// Linear RGB of what the left renderer has drawn so far, read back; `None` before its first
+    /// frame. Waits for the GPU.
     ///
     /// # Errors
     /// Reading back failed.

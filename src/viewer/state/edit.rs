@@ -1,4 +1,5 @@
-//! Changes of the scene by hand: lights, objects, surroundings. They are kept so that the command line can repeat them.
+//! Changes of the scene by hand: lights, objects, surroundings. They are kept so that the command
+//! line can repeat them.
 
 use super::{Request, Stale, State};
 use crate::scene::{
@@ -38,8 +39,8 @@ impl State {
         self.take_sky(turned);
     }
 
-    /// Adds a light: a sun from behind the shoulder, others between the eye and what it looks at, as bright there as
-    /// 1 W/m².
+    /// Adds a light: a sun from behind the shoulder, others between the eye and what it looks at,
+    /// as bright there as 1 W/m².
     pub(super) fn add_light(&mut self, kind: NewLight) {
         let Some(light) = self.shown.as_ref().map(|s| s.scene.lights.len()) else { return };
         let n = &self.navigator;
@@ -170,8 +171,8 @@ impl State {
         self.version += 1;
     }
 
-    /// Writes the vertices of what deforms, for whoever looks at meshes: clicks, the path tracer, files. Not
-    /// done in each frame of an animation, which the GPU moves by itself.
+    /// Writes the vertices of what deforms, for whoever looks at meshes: clicks, the path tracer,
+    /// files. Not done in each frame of an animation, which the GPU moves by itself.
     pub fn settle(&mut self) {
         if let Some(shown) = self.shown.as_mut().filter(|shown| shown.unsettled) {
             Arc::make_mut(&mut shown.scene).move_vertices();
@@ -196,8 +197,8 @@ impl State {
         animations.get(shown.pose.map_or(0, |p| p.0)).map(|a| a.end)
     }
 
-    /// Plays the animation that was chosen last from where it stands, from its beginning if it is at its end;
-    /// or stops it.
+    /// Plays the animation that was chosen last from where it stands, from its beginning if it is
+    /// at its end; or stops it.
     pub(super) fn animate(&mut self, now: Instant) {
         let Some(end) = self.animation_end() else { return self.tell("this scene has no animation", false) };
         if self.animated.take().is_some() {
@@ -306,7 +307,8 @@ mod tests {
         assert_eq!(shown.scene.instances[3].transform, shown.original.instances[3].transform);
     }
 
-    /// The room with an animation of 2 s that lifts its object 0 by 1 m and carries its light 0 along.
+    /// The room with an animation of 2 s that lifts its object 0 by 1 m and carries its light 0
+    /// along.
     fn lively() -> crate::viewer::state::State {
         use crate::scene::rig::{Animation, Channel, Interpolation, Property, Rig, RigNode};
         let mut scene = crate::scene::paper_room::scene(3);

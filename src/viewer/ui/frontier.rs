@@ -6,7 +6,8 @@ use crate::viewer::choice::{Side, Source};
 use crate::viewer::state::{Action, State};
 use egui::{Align2, FontId, Pos2, Rect, RichText, Sense, Stroke, Ui, Vec2};
 
-/// Where a name of `size` stands beside the dot at `p`: the first of four places that nothing else has.
+/// Where a name of `size` stands beside the dot at `p`: the first of four places that nothing else
+/// has.
 fn free_place(p: Pos2, size: Vec2, taken: &[Rect], within: Rect) -> Rect {
     let sides = [
         (Align2::CENTER_BOTTOM, Vec2::new(0.0, -7.0)),
@@ -28,12 +29,14 @@ struct Dot {
     at: Pos2,
 }
 
-/// The dot that a hand at `p` means: reaches overlap where methods take the same time, and the nearest dot counts.
+/// The dot that a hand at `p` means: reaches overlap where methods take the same time, and the
+/// nearest dot counts.
 fn meant(dots: &[Dot], p: Pos2) -> Option<&Dot> {
     dots.iter().min_by(|a, b| a.at.distance_sq(p).total_cmp(&b.at.distance_sq(p)))
 }
 
-/// Error against time: what was measured here across, what docs/accuracy.md has up. A dot chooses its method.
+/// Error against time: what was measured here across, what docs/accuracy.md has up. A dot chooses
+/// its method.
 pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 150.0), Sense::hover());
     let visuals = ui.visuals().clone();

@@ -289,7 +289,8 @@ mod tests {
         for _ in 0..60 {
             run_in(&context, &mut state, vec![vec![press(egui::Key::Tab)]]);
             let Some(id) = context.memory(|m| m.focused()) else { continue };
-            // The first time a control has the focus it is pressed; what that changes is changed back.
+            // The first time a control has the focus it is pressed; what that changes is changed
+            // back.
             if seen.insert(id) {
                 let (split, help) = (state.settings.split, state.help);
                 run_in(&context, &mut state, vec![vec![press(egui::Key::Space)], vec![]]);

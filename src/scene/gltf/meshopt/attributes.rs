@@ -5,7 +5,8 @@ use super::Stream;
 /// Elements whose bytes are packed together.
 const GROUP: usize = 16;
 
-/// How the groups of one byte place are stored, by their two header bits: bits a difference, 8 for plain bytes.
+/// How the groups of one byte place are stored, by their two header bits: bits a difference, 8 for
+/// plain bytes.
 const VERSION_0: [u32; 4] = [0, 2, 4, 8];
 const CONTROLS: [[u32; 4]; 2] = [[0, 1, 2, 4], [1, 2, 4, 8]];
 

@@ -1,4 +1,5 @@
-//! Filters of unpacked attributes. Values that no encoder writes give some number, never a panic: conversions saturate.
+//! Filters of unpacked attributes. Values that no encoder writes give some number, never a panic:
+//! conversions saturate.
 
 /// Signed components of 1 or 2 bytes.
 fn component(bytes: &[u8]) -> i32 {
@@ -14,7 +15,8 @@ fn store(bytes: &mut [u8], value: i32) {
     bytes.copy_from_slice(&value.to_le_bytes()[..width]);
 }
 
-/// Unit vectors in octahedral form, elements of 4 or 8 bytes; the third component says what 1 is, the fourth stays.
+/// Unit vectors in octahedral form, elements of 4 or 8 bytes; the third component says what 1 is,
+/// the fourth stays.
 pub(super) fn octahedral(data: &mut [u8], stride: usize) {
     let width = stride / 4;
     let scale = if width == 1 { 127.0 } else { 32_767.0 };

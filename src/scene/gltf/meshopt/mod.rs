@@ -1,8 +1,9 @@
-//! EXT_meshopt_compression and KHR_meshopt_compression: buffer views whose bytes are packed for transport.
+//! EXT_meshopt_compression and KHR_meshopt_compression: buffer views whose bytes are packed for
+//! transport.
 //!
-//! Written from the extensions' specification (github.com/KhronosGroup/glTF, appendices A and B). Output grows as
-//! input is read and never by more than a fixed factor, so a short file cannot ask for much memory; every read is
-//! checked, so broken streams are errors.
+//! Written from the extensions' specification (github.com/KhronosGroup/glTF, appendices A and B).
+//! Output grows as input is read and never by more than a fixed factor, so a short file cannot ask
+//! for much memory; every read is checked, so broken streams are errors.
 
 mod attributes;
 mod filters;

@@ -62,7 +62,8 @@ fn everything_unpacks_as_meshoptimizer_does() {
 fn broken_streams_are_refused_and_never_panic() {
     let (mut refused, mut changed) = (0, 0);
     for case in &cases() {
-        // The tail's padding makes a cut attribute stream another stream, so only its length can tell.
+        // The tail's padding makes a cut attribute stream another stream, so only its length can
+        // tell.
         for cut in [0, 1, case.bytes.len() / 2, case.bytes.len() - 1] {
             let result = case.packed.unpack(&case.bytes[..cut]);
             assert!(result.is_err() || worst(case, &result.unwrap()) > 0, "{}: cut to {cut} bytes", case.name);

@@ -76,7 +76,8 @@ pub static SWEEP: Test = Test {
         },
     ],
     control: Fault::Late(0.93),
-    // All light is the mean of as many rays as there are cells: at 96×64 `gather` has 2.3 % of noise (docs/log).
+    // All light is the mean of as many rays as there are cells: at 96×64 `gather` has 2.3 % of
+    // noise (docs/log).
     size: [192, 128],
     paths: 16,
     pictures: false,

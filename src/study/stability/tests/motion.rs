@@ -182,8 +182,8 @@ pub static DISOCCLUSION: Test = Test {
     },
 };
 
-/// FLIP and the change of light near what is uncovered between the first look and the second, the second against the
-/// third.
+/// FLIP and the change of light near what is uncovered between the first look and the second, the
+/// second against the third.
 fn after_uncovering(looks: &[Look]) -> Result<[f64; 2], StabilityError> {
     let ring = measures::uncovered(&looks[0], &looks[1], 8);
     let gain = 0.2 / (looks[2].rgb.iter().sum::<f32>() / looks[2].rgb.len() as f32).max(1e-9);
