@@ -20,6 +20,8 @@ Rows that are no methods: with --constant, that one ambient light (E/pi; python 
 training rooms), the floor that everything else has to pass (0.0508761, the sky's radiance, is the raster picture that the paper's network starts from); `best constant` is fitted to each picture itself, by least absolute error
 before the view transform: nobody can know it, it is there for scale.
 
+A scene whose reference is black is left out, with a line that says so.
+
 `light` is the error of the diffuse light that direct lighting misses: mean |difference| / mean after 4x4 pooling, on pixels with
 a surface, against Cycles' DiffInd + DiffDir - our DiffDir (Cycles counts the sky into DiffDir). With 64 samples a pixel Cycles' own
 noise is about 0.02 of it. Pixels where Cycles has less than 2 % of its median light are left out: coincident faces, which it shows black.
@@ -43,6 +45,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from bouncelight_training.pix2pix.pairs import PICTURES, inputs_of  # noqa: E402
 from bouncelight_training.stream import indices  # noqa: E402
 
+# Radiance, W/(m² sr), below which nothing of a picture is seen: 8 bits at 16 times the exposure.
+BLACK = 1 / 255 / 16
 METRICS = ["l1", "l2", "paper-ssim", "fid", "psnr", "ssim", "flip", "relmse", "light"]
 
 
@@ -232,6 +236,9 @@ def main():
 
     for group, name, scene, reference in found:
         truth, drawn = layers(reference), {}
+        if rgb(truth, "Combined").max() < BLACK:
+            print(f"{name}: left out, its reference is black; the camera may stand inside something", file=sys.stderr, flush=True)
+            continue
         height, width = truth["Combined.R"].shape
         for method in ["direct"] + [m for m in a.methods if m != "direct"]:
             kind, _, weights = method.partition(":")
