@@ -67,6 +67,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 
     let mut pictures = Vec::new();
     for method in shown {
+        progress.compiles();
         let options = CaptureOptions { samples: SAMPLES, warmup: frames(&method) - SAMPLES, ..Default::default() };
         let options_of = RendererOptions { method, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, SIZE, options_of)?;

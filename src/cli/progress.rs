@@ -20,8 +20,8 @@ pub struct Progress {
     /// them, since shaders are compiled and files read in them.
     first_done: Option<(Instant, f64)>,
     last_line: Instant,
-    /// Says what the program does until the first step is done; ends when this is dropped.
-    first: Option<Sender<()>>,
+    /// Says that shaders are compiled until the next step is done; ends when this is dropped.
+    compiling: Option<Sender<()>>,
 }
 
 /// What there is to say before the first step: a driver without a shader cache compiles for half a
@@ -59,22 +59,27 @@ impl Progress {
             ProgressStyle::with_template(template).expect("the template is a constant").progress_chars("█▌ "),
         );
         bar.set_message(what);
-        Self { what: what.into(), kind, bar, first_done: None, last_line: Instant::now(), first: None }
+        Self { what: what.into(), kind, bar, first_done: None, last_line: Instant::now(), compiling: None }
     }
 
     /// As [`new`](Self::new) before anything is compiled; until the first step it says that this
     /// goes on.
     pub fn compiling(global: &Global, what: &'static str, total: u64) -> Self {
         let mut progress = Self::new(global, what, total);
-        match progress.kind {
-            ProgressKind::Plain => progress.first = Some(say_compiling()),
+        progress.compiles();
+        progress
+    }
+
+    /// More is compiled now; until the next step it says that this goes on.
+    pub fn compiles(&mut self) {
+        match self.kind {
+            ProgressKind::Plain => self.compiling = Some(say_compiling()),
             ProgressKind::Bar => {
-                progress.bar.set_message("compiling shaders");
-                progress.bar.enable_steady_tick(PLAIN_INTERVAL);
+                self.bar.set_message("compiling shaders");
+                self.bar.enable_steady_tick(PLAIN_INTERVAL);
             }
             _ => (),
         }
-        progress
     }
 
     /// There are `total` steps, as is known by now.
@@ -96,10 +101,8 @@ impl Progress {
 
     /// `done` of `total` steps are done; the total may have become another.
     pub fn at(&mut self, done: f64, total: u64) {
-        if self.bar.position() == 0 {
-            self.first = None;
-            self.bar.set_message(self.what.clone());
-        }
+        self.compiling = None;
+        self.bar.set_message(self.what.clone());
         self.bar.set_length(total);
         self.bar.set_position(done as u64);
         let waited = self.last_line.elapsed() >= PLAIN_INTERVAL;
