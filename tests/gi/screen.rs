@@ -1,8 +1,10 @@
 //! Occlusion and light of the screen against rays: cosine-weighted rays into the very geometry that
 //! the picture shows.
 
+use crate::gather::{go_on, uploaded};
 use crate::shot::{Hit, Random, Shot, output, view};
-use crate::{common, read_light};
+use crate::{common, read_light, world};
+use bouncelight::gi::Method;
 use bouncelight::gi::bitmask::March;
 use bouncelight::gi::inputs::InputGroup;
 use bouncelight::gi::occlusion::OcclusionPass;
@@ -250,5 +252,26 @@ fn screen_light_is_linear_and_none_gives_none() {
         assert!(crate::stages::largest_excess(&two, &doubled) < 1e-3, "{size:?}");
         assert!(screen_light(&gpu, &shot.scaled(0.0), SsgiOptions::default()).iter().flatten().all(|x| *x == 0.0));
         assert!(size == [1, 1] || one.iter().flatten().any(|x| *x > 0.01), "negative control: there was light");
+    }
+}
+
+#[test]
+fn what_a_light_stands_in_for_lights_once() {
+    let Some(gpu) = common::gpu() else { return };
+    let light = |method: Method, glows: bool, stands_in: bool| {
+        let mut scene = bouncelight::scene::load("cornell").expect("it is bundled");
+        scene.lights.iter_mut().for_each(|l| l.stands_in = stands_in);
+        if !glows {
+            scene.materials.iter_mut().for_each(|m| m.emissive = [0.0; 3]);
+        }
+        let mut renderer = world::renderer(&gpu, [96, 96], method);
+        go_on(&gpu, &mut renderer, &uploaded(&gpu, &scene), &scene.cameras[0], 1)
+    };
+    for method in [|| Method::Ambient, || Method::Ssgi] {
+        let dark = light(method(), false, true);
+        assert!(dark.iter().any(|v| *v > 0.0));
+        assert!(light(method(), true, true) == dark, "the panel's light is the light's");
+        // The control: a panel beside a light that is another one.
+        assert!(light(method(), true, false) != dark);
     }
 }

@@ -115,7 +115,10 @@ impl InputGroup {
             _ => Ok(view.unwrap_or(&self.absent).clone()),
         };
         let (albedo, direct) = (needed(inputs.albedo, "albedo")?, needed(inputs.direct, "direct")?);
-        let views = [inputs.depth, inputs.normal, &albedo, inputs.emissive.unwrap_or(&self.absent), &direct];
+        // What glows lights the picture as a light already; found on the screen it would do so twice, and small and
+        // bright as it is, by few of a pixel's steps.
+        let glows = inputs.emissive.filter(|_| !inputs.lights.is_some_and(|l| l.stand_in));
+        let views = [inputs.depth, inputs.normal, &albedo, glows.unwrap_or(&self.absent), &direct];
         let group = self.cache.get(views, || {
             let view = |i: usize| wgpu::BindGroupEntry {
                 binding: i as u32 + 1,
