@@ -14,12 +14,12 @@ const GAP: f32 = 0.022;
 const TRIES: usize = 30;
 
 /// Turns z to the way into the room from a wall.
-fn turned_from(side: usize) -> Quat {
+pub(super) fn turned_from(side: usize) -> Quat {
     Quat::from_rotation_y([FRAC_PI_2, -FRAC_PI_2, 0.0, PI][side])
 }
 
 /// Box of a thing in its own coordinates.
-fn footprint([w, d, h]: [f32; 3]) -> Solid {
+pub(super) fn footprint([w, d, h]: [f32; 3]) -> Solid {
     Solid { low: vec3(-0.5 * w, 0.0, 0.0), high: vec3(0.5 * w, h, d) }
 }
 

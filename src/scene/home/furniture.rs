@@ -112,7 +112,7 @@ pub(super) fn shelf(p: &mut Piece<'_>, look: &Look, w: f32, h: f32) {
 }
 
 /// A row of books from `from` on, with gaps; the tallest has 0.28.
-fn books(p: &mut Piece<'_>, look: &Look, [from, to]: [f32; 2], y: f32, z: f32) {
+pub(super) fn books(p: &mut Piece<'_>, look: &Look, [from, to]: [f32; 2], y: f32, z: f32) {
     let mut at = from;
     while at < to - 0.16 {
         match p.builder.below(8) {

@@ -8,14 +8,18 @@
 
 mod builder;
 mod camera;
+mod clutter;
 mod furnish;
 mod furniture;
 mod houses;
 mod light;
 mod look;
+mod mouldings;
+mod pavement;
 mod plan;
 mod shell;
 mod street;
+mod things;
 
 use super::Scene;
 use builder::Builder;
@@ -63,6 +67,11 @@ fn flat(b: &mut Builder, night: bool) {
         light::day(b, &plan);
         (0..plan.rooms.len()).filter(|&i| plan.rooms[i].glass() > 0.0).collect()
     };
+    // Last, so that it finds the room that lamps leave.
+    let habits = clutter::Habits::draw(b);
+    for room in &mut plan.rooms {
+        Furnisher { b, room, look: &look }.clutter(&habits);
+    }
     // From rooms with light of their own, and from those behind their doors through the door.
     let doors = |i: usize| plan.rooms[i].neighbours.iter().zip(&plan.rooms[i].ways).map(move |(n, way)| (i, *n, way));
     let dark = (0..plan.rooms.len()).filter(|i| !lit.contains(i));

@@ -4,6 +4,7 @@ use super::builder::{Builder, Form, Solid};
 use super::camera::{self, Proposal};
 use super::houses::{Parts, house};
 use super::light;
+use super::pavement::litter;
 use crate::scene::{Environment, Light, LightKind};
 use glam::{Mat4, Quat, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -37,6 +38,7 @@ pub(super) fn build(b: &mut Builder, night: bool) {
     for side in [-1.0, 1.0] {
         things(b, &parts, &profile, side, night);
     }
+    litter(b, &parts, [profile.road, profile.front], KERB);
     if night {
         light::dark_sky(b);
     } else {
