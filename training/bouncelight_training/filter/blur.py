@@ -3,18 +3,21 @@ its direction, this the light along each cell's own normal: where surfaces are c
 import torch
 import torch.nn.functional as F
 
-LUMINANCE = torch.tensor([0.2126, 0.7152, 0.0722])
+LUMINANCE = (0.2126, 0.7152, 0.0722)
 # Of shaders/gi/gather/blur.wgsl, types.wgsl and smooth.wgsl.
 SETTLED, NARROW, WIDE, LOOKS, STRIDE = 9, 2, 4, 4, 4
 # Of past.wgsl and blur.wgsl: a nearness that is none; a plane that is another surface's; what is seen as a blotch, and how few rays are few.
 NO_NEARNESS, LEAST_COSINE_OF_PLANE, BLOTCH, FEW, MANY = 0.01, 0.5, 0.1, 4.0, 8.0
 # Of shaders/gi/gather/guided.wgsl: numbers of a cell (two are not read), frames up to which they count in full, and their limit.
-GUIDANCE, GUIDED_FRAMES, MOST_LOG = 12, 6.0, 4.0
+GUIDANCE, GUIDED_FRAMES, MOST_LOG = 12, 32.0, 4.0
+# Where they stand.
+PARTS = {"near": slice(0, 4), "far": slice(4, 8), "trust": slice(8, 9), "tolerance": slice(9, 10)}
 
 
 def luminance(rgb):
     """[n,3,h,w] to [n,h,w]."""
-    return (rgb * LUMINANCE.view(1, 3, 1, 1)).sum(1)
+    r, g, b = LUMINANCE
+    return r * rgb[:, 0] + g * rgb[:, 1] + b * rgb[:, 2]
 
 
 def around(x, radius, stride=1):
@@ -76,10 +79,10 @@ def as_near(batch, radius, stride):
 
 def without_rare(w, light, square, frames, total):
     """Share of each neighbour [n,k,h,w] that is kept: none of what few bright rays have brought, where it would be seen."""
-    bright = (light * LUMINANCE.view(1, 3, 1, 1, 1)).sum(1)
+    bright = luminance(light)
     rays = frames * bright * bright / square.clamp(min=1e-30)
-    most, place = torch.where(rays < MANY, w * bright, torch.zeros(())).max(1)
-    weight = torch.where(most > 0, w.gather(1, place.unsqueeze(1))[:, 0], torch.zeros(()))
+    most, place = torch.where(rays < MANY, w * bright, 0.0).max(1)
+    weight = torch.where(most > 0, w.gather(1, place.unsqueeze(1))[:, 0], 0.0)
     others = ((w * bright).sum(1) - most) / (total - weight).clamp(min=1e-30)
     seen = most - others * weight > BLOTCH * others * total
     brings = w * (bright - others.unsqueeze(1)) / (others * total).clamp(min=1e-30).unsqueeze(1)
@@ -90,11 +93,12 @@ def without_rare(w, light, square, frames, total):
 def blur(batch, near, trust):
     """Mean light [n,3,h,w] over neighbours, the variance [n,h,w] of its luminance, and which part of it [n,3,h,w] few rays have brought."""
     narrow = torch.maximum(batch["frames"], batch["age"].view(-1, 1, 1) - 1) >= SETTLED
-    radius = NARROW if narrow.all() else WIDE
+    # What is older than this everywhere need not be asked, which a GPU would have to be waited for.
+    radius = NARROW if batch.get("narrow") or narrow.all() else WIDE
     with torch.no_grad():
-        steps = torch.arange(-radius, radius + 1)
+        steps = torch.arange(-radius, radius + 1, device=narrow.device)
         reach = torch.maximum(steps.abs().view(-1, 1), steps.abs().view(1, -1)).reshape(1, -1, 1, 1)
-        own = torch.where(narrow, NARROW, WIDE).unsqueeze(1)
+        own = (WIDE - (WIDE - NARROW) * narrow.int()).unsqueeze(1)
         rows, columns = steps.abs().view(-1, 1).expand(-1, 2 * radius + 1).reshape(1, -1, 1, 1), steps.abs().repeat(2 * radius + 1).view(1, -1, 1, 1)
         rim = torch.where(rows == own, 0.5, 1.0) * torch.where(columns == own, 0.5, 1.0) * (reach <= own)
         frames = around(batch["frames"].unsqueeze(1), radius)[:, 0]
@@ -117,7 +121,7 @@ def blur(batch, near, trust):
 
 def smooth(batch, mean, variance, rare, far, tolerance):
     """One à-trous step over cells that differ by no more than noise; what few rays have brought over all of the surface."""
-    taps = torch.tensor([1 / 6, 2 / 3, 1, 2 / 3, 1 / 6])
+    taps = mean.new_tensor([1 / 6, 2 / 3, 1, 2 / 3, 1 / 6])
     weights = (taps.view(-1, 1) * taps.view(1, -1)).reshape(1, -1, 1, 1)
     mean, rare = (1 - rare) * mean, rare * mean
     bright = luminance(mean)
@@ -136,9 +140,9 @@ def smooth(batch, mean, variance, rare, far, tolerance):
 def filtered(batch, answer=None):
     """Light [n,3,h,w] that the filter shows, and the mean of its first step. `answer` [n,12,h,w]; None: zeros."""
     if answer is None:
-        answer = torch.zeros(len(batch["frames"]), GUIDANCE, *batch["frames"].shape[1:])
-    near, far = answer[:, :4], answer[:, 4:8]
-    trust, tolerance = (answer[:, c].clamp(-MOST_LOG, MOST_LOG) for c in (8, 9))
+        answer = batch["frames"].new_zeros(len(batch["frames"]), GUIDANCE, *batch["frames"].shape[1:])
+    near, far = answer[:, PARTS["near"]], answer[:, PARTS["far"]]
+    trust, tolerance = (answer[:, PARTS[part]][:, 0].clamp(-MOST_LOG, MOST_LOG) for part in ("trust", "tolerance"))
     mean, variance, rare = blur(batch, near, trust)
     # A difference of means squared over a variance of nothing has no slope worth having.
     least = 1e-8 * (luminance(mean) ** 2).detach()

@@ -14,7 +14,7 @@ from ..export import verify
 from ..model import parameter_count
 from ..weights import WeightsError, document, write
 from . import blur, lessons
-from .train import Config, network, read_checkpoint
+from .train import Config, kept_parts, network, read_checkpoint
 
 MEANING = "filter"
 
@@ -22,7 +22,7 @@ MEANING = "filter"
 def export(run, out, name=""):
     """Writes the file, half floats, and its provenance beside it; returns a summary."""
     state = read_checkpoint(os.path.join(run, "checkpoint.pt"))
-    config = Config(**{k: tuple(v) if isinstance(v, list) else v for k, v in state["config"].items()})
+    config = Config(**{k: tuple(v) if isinstance(v, list) else v for k, v in state["config"].items()} | {"device": "cpu"})
     error, average = state["best"]
     model = network(config)
     model.load_state_dict(average)
@@ -33,6 +33,10 @@ def export(run, out, name=""):
         for channel, feature in enumerate(names):
             if feature in config.without:
                 first.weight[:, channel] = 0
+        # Nor has what is no part of the answer.
+        last, kept = model.get_submodule(model.graph[-1]["name"]), kept_parts(config).cpu().view(-1)
+        last.weight *= kept.view(-1, 1, 1, 1)
+        last.bias *= kept
     model.eval()
     words = [f"--{k} {','.join(map(str, v)) if isinstance(v, tuple) else v}" for k, v in vars(config).items() if v != getattr(Config(), k) and k not in ("train", "validation")]
     folders = ",".join(os.path.basename(os.path.normpath(f)) for f in config.train.split(","))

@@ -1,5 +1,7 @@
 """What `bouncelight dataset --moments` writes: one safetensors file a view (src/study/moments.rs)."""
+import concurrent.futures
 import glob
+import multiprocessing
 import os
 
 import numpy as np
@@ -8,6 +10,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load_file
 
 from ..errors import TrainingError
+from .blur import SETTLED
 
 # Table `cells`, version 1 (src/gi/neural/memory.rs).
 TABLE = [("light", 1), ("chroma", 2), ("deviation", 1), ("frames", 1), ("lately", 1), ("nearness", 1), ("depth", 1), ("normal", 3), ("hit", 1), ("towards", 3)]
@@ -16,6 +19,9 @@ CHANNELS = sum(n for _, n in TABLE)
 SAME_NORMAL = 0.9
 # Root mean square error of a cell's target over the picture's mean above which the picture teaches nothing.
 MOST_NOISE = 2.0
+# Views from which on it is worth starting processes to read them.
+MANY = 64
+FIELDS = ("features", "light", "square", "x", "n", "frames", "strictness", "nearness", "shown", "target", "mask")
 
 
 def unpack_normals(bits):
@@ -30,7 +36,7 @@ def unpack_normals(bits):
 
 
 class Lesson:
-    """One moment of one view, as tensors of one picture: `features` [15,h,w], `light`, `x`, `n` [3,h,w], `frames`, `square`, `strictness`,
+    """One moment of one view, as arrays of one picture: `features` [15,h,w], `light`, `x`, `n` [3,h,w], `frames`, `square`, `strictness`,
     `nearness` [h,w]; what is to be learnt, `target` [3,h,w], and where (`mask` [h,w]); `shown` [3,h,w]: what `gather` itself shows."""
 
     def __init__(self, file, when, name):
@@ -53,38 +59,67 @@ class Lesson:
         same &= (unpack_normals(file["place"][3]) * n).sum(0) > SAME_NORMAL
         self.mask = (frames > 0) & np.isfinite(self.target).all(0) & same
         for field in ("features", "light", "square", "x", "n", "frames", "strictness", "nearness", "shown", "target"):
-            setattr(self, field, torch.from_numpy(np.ascontiguousarray(np.nan_to_num(getattr(self, field), posinf=0, neginf=0), np.float32)))
+            setattr(self, field, np.ascontiguousarray(np.nan_to_num(getattr(self, field), posinf=0, neginf=0), np.float32))
         self.x = self.x * (self.frames > 0)
-        self.mask = torch.from_numpy(self.mask)
         # `gather` lacks some of the light in its first frames, or has too much. A filter cannot mend that, and is not to
         # learn to count bright cells for more: what is learnt is where light is, not how much there is in all.
-        self.target = self.target * float((self.shown * self.mask).sum() / (self.target * self.mask).sum().clamp(min=1e-20))
-        self.mean = float((self.target * self.mask).sum() / (3 * self.mask.sum()).clamp(min=1))
+        self.target = self.target * np.float32((self.shown * self.mask).sum() / max((self.target * self.mask).sum(), 1e-20))
+        self.mean = float((self.target * self.mask).sum() / max(3 * self.mask.sum(), 1))
 
 
-def read(folder):
-    """All moments of all views of a folder; pictures without light, or with more noise than light, are left out."""
-    paths = sorted(glob.glob(os.path.join(folder, "*.safetensors")))
+def moments_of(path):
+    """The moments of a view that teach something: none of pictures without light, or with more noise than light."""
+    try:
+        file = load_file(path)
+        moments = [name.split(".")[1] for name in file if name.startswith("past.")]
+        made = [Lesson(file, when, os.path.basename(path).removesuffix(".safetensors")) for when in moments]
+    except (OSError, SafetensorError, KeyError) as error:
+        raise TrainingError(f"{path}: not a lesson of a filter: {error}; make it with bouncelight dataset --moments") from error
+    return [lesson for lesson in made if lesson.mean > 1e-6 and lesson.mask.mean() > 0.2 and lesson.noise < MOST_NOISE]
+
+
+def read(folder, every=1):
+    """All moments of the views of a folder, or of one view in so many. Many views are read by as many processes as there are cores."""
+    paths = sorted(glob.glob(os.path.join(folder, "*.safetensors")))[::every]
     if not paths:
         raise TrainingError(f"{folder}: no samples; make them with bouncelight dataset --moments")
-    lessons = []
-    for path in paths:
-        try:
-            file = load_file(path)
-            moments = [name.split(".")[1] for name in file if name.startswith("past.")]
-            made = [Lesson(file, when, os.path.basename(path).removesuffix(".safetensors")) for when in moments]
-        except (OSError, SafetensorError, KeyError) as error:
-            raise TrainingError(f"{path}: not a lesson of a filter: {error}; make it with bouncelight dataset --moments") from error
-        lessons += [lesson for lesson in made if lesson.mean > 1e-6 and lesson.mask.float().mean() > 0.2 and lesson.noise < MOST_NOISE]
-    return lessons
+    if len(paths) < MANY:
+        return [lesson for path in paths for lesson in moments_of(path)]
+    # Forked, which is quick, since nothing of torch has run yet that has threads.
+    with concurrent.futures.ProcessPoolExecutor(mp_context=multiprocessing.get_context("fork")) as pool:
+        return [lesson for lessons in pool.map(moments_of, paths, chunksize=4) for lesson in lessons]
 
 
-def stacked(lessons):
-    """A batch: one tensor of every field."""
-    fields = ("features", "light", "square", "x", "n", "frames", "strictness", "nearness", "target", "mask")
-    batch = {field: torch.stack([getattr(lesson, field) for lesson in lessons]) for field in fields}
-    batch["mean"] = torch.tensor([lesson.mean for lesson in lessons])
-    batch["age"] = torch.tensor([lesson.age for lesson in lessons])
-    batch["noise"] = torch.tensor([lesson.noise for lesson in lessons])
-    batch["base"] = torch.tensor([lesson.base for lesson in lessons])
-    return batch
+def stacked(lessons, device="cpu"):
+    """A batch: one tensor of every field; `narrow`: whether all of it is blurred narrowly."""
+    batch = {field: torch.from_numpy(np.stack([getattr(lesson, field) for lesson in lessons])).to(device) for field in FIELDS}
+    for number in ("mean", "age", "noise", "base"):
+        batch[number] = torch.tensor([getattr(lesson, number) for lesson in lessons], dtype=torch.float32, device=device)
+    return batch | {"narrow": all(is_narrow(lesson) for lesson in lessons)}
+
+
+def is_narrow(lesson):
+    """Whether all cells of a moment are blurred narrowly, whatever their own age."""
+    return lesson.age - 1 >= SETTLED
+
+
+class Pile:
+    """Moments of one size of pictures and one breadth of the blur, as tensors."""
+
+    def __init__(self, lessons, device="cpu"):
+        self.lessons, self.fields = lessons, stacked(lessons, device)
+
+    def taken(self, which, window=None):
+        """The moments of these numbers; `window`: of them rows and columns from a place on, (y, x, side), or what there is."""
+        index = torch.as_tensor(which, device=self.fields["mean"].device)
+        batch = {k: v if isinstance(v, bool) else v[index] for k, v in self.fields.items()}
+        if window:
+            y, x, side = window
+            batch = {k: v[..., y:y + side, x:x + side] if torch.is_tensor(v) and v.dim() > 1 else v for k, v in batch.items()}
+        return batch
+
+
+def piles(lessons, device="cpu"):
+    """All lessons, by size and breadth."""
+    kinds = sorted({(lesson.mask.shape, is_narrow(lesson)) for lesson in lessons})
+    return [Pile([v for v in lessons if (v.mask.shape, is_narrow(v)) == kind], device) for kind in kinds]

@@ -1,6 +1,6 @@
-"""Trains the network that guides `gather`'s filter, on the CPU.
+"""Trains the network that guides `gather`'s filter.
 
-    python -m bouncelight_training.filter.train --train FOLDER[,FOLDER] --validation FOLDER --run runs/NAME [--minutes 20]
+    python -m bouncelight_training.filter.train --train FOLDER[,FOLDER] --validation FOLDER --run runs/NAME [--minutes 20] [--device cuda]
 
 The same command goes on where a killed run stopped. The run's folder holds config.json, checkpoint.pt and log.csv; what is kept is the
 average of the weights over steps (EMA) that did best on the validation's views, the untrained network (`gather` itself) included.
@@ -44,6 +44,9 @@ class Config:
     widths: tuple = (12, 16, 24, 32)
     pointwise: int = 1  # levels with 1x1 kernels
     without: tuple = ()  # features of the table that are zeroed, for ablations
+    mute: tuple = ()  # parts of the answer that are zeroed, for ablations: near, far, trust, tolerance
+    pools: tuple = POOLS  # sides of the squares of cells that the loss compares
+    every: int = 1  # one view of so many, for ablations
     minutes: float = 20.0
     batch: int = 4
     crop: int = 48  # cells on a side of the windows that steps look at; 0: whole pictures
@@ -53,6 +56,7 @@ class Config:
     raw: float = 0.3  # share of the loss that looks at the first step alone
     seed: int = 1
     threads: int = 2
+    device: str = "cpu"
 
 
 def network(config):
@@ -75,17 +79,28 @@ def kept_channels(config):
     unknown = set(config.without) - {name for name, _ in lessons.TABLE}
     if unknown:
         raise TrainingError(f"no such feature: {sorted(unknown)[0]}")
-    return torch.tensor([float(name not in config.without) for name, n in lessons.TABLE for _ in range(n)]).view(1, -1, 1, 1)
+    return torch.tensor([float(name not in config.without) for name, n in lessons.TABLE for _ in range(n)], device=config.device).view(1, -1, 1, 1)
 
 
-def loss_of(shown, target, mask, mean, noise):
+def kept_parts(config):
+    """1 for numbers of an answer that count, else 0: [1,12,1,1]."""
+    unknown = set(config.mute) - set(blur.PARTS)
+    if unknown:
+        raise TrainingError(f"no such part of an answer: {sorted(unknown)[0]}")
+    kept = torch.zeros(1, blur.GUIDANCE, 1, 1, device=config.device)
+    for part, place in blur.PARTS.items():
+        kept[:, place] = float(part not in config.mute)
+    return kept
+
+
+def loss_of(shown, target, mask, mean, noise, pools=POOLS):
     """Square of the difference over light here and in the picture, of cells and of means over 2x2, 4x4 and 16x16 of them: without bias on targets
     that hold noise, and even to bright and dark: [n]. Each is weighed by its side, since noise goes with that and what is wrong in the mean does not:
     a filter that trusts dark cells more has less noise and too little light. And by how much of it the target's noise is; a place whose difference is
     beyond five times both lights counts by the root: a firefly. shown, target [n,3,h,w], mask [n,h,w], mean and noise [n]."""
     mean, weight = mean.view(-1, 1, 1, 1), mask.unsqueeze(1).to(shown.dtype)
     loss = 0.0
-    for size in POOLS:
+    for size in pools:
         share = F.avg_pool2d(weight, size)
         pooled = [F.avg_pool2d(x * weight, size) / share.clamp(min=1e-6) for x in (shown, target)]
         here = pooled[0].detach().clamp(min=0)
@@ -106,10 +121,10 @@ def held(answer):
 def augmented(batch, rng):
     """The batch, or its mirror image (left for right; the gravity frame's x with it), with its colours in another order."""
     names = [name for name, n in lessons.TABLE for _ in range(n)]
-    order = torch.from_numpy(rng.permutation(3))
+    order = torch.as_tensor(rng.permutation(3), device=batch["mask"].device)
     batch = batch | {k: batch[k][:, order] for k in ("light", "target")}
     if rng.random() < 0.5:
-        batch = {k: v.flip(-1) if v.dim() > 1 else v for k, v in batch.items()}
+        batch = {k: v.flip(-1) if torch.is_tensor(v) and v.dim() > 1 else v for k, v in batch.items()}
         features = batch["features"].clone()
         for name in ("normal", "towards"):
             features[:, names.index(name)] *= -1
@@ -122,27 +137,32 @@ def augmented(batch, rng):
     return batch | {"features": features}
 
 
-def cropped(batch, size, rng):
-    """A window of the batch, `size` cells on a side or what there is."""
-    if not size:
-        return batch
-    h, w = batch["mask"].shape[-2:]
-    y, x = (int(rng.integers(0, max(n - size, 0) + 1)) for n in (h, w))
-    return {k: v[..., y:y + size, x:x + size] if v.dim() > 1 else v for k, v in batch.items()}
+def window(pile, size, rng):
+    """Where a window of `size` cells on a side lies, or None for all."""
+    h, w = pile.fields["mask"].shape[-2:]
+    return (*(int(rng.integers(0, max(n - size, 0) + 1)) for n in (h, w)), size) if size else None
 
 
-def validate(model, views, channels):
+def in_parts(pile, size=16):
+    """All moments of a pile, so many at once: (their lessons, the batch)."""
+    for first in range(0, len(pile.lessons), size):
+        numbers = range(first, min(first + size, len(pile.lessons)))
+        yield [pile.lessons[i] for i in numbers], pile.taken(list(numbers))
+
+
+def validate(model, piles, channels, parts):
     """Pooled error of `gather`'s light and of the network's, by moment, and over all."""
     sums = {}
     with torch.no_grad():
-        for lesson in views:
-            batch = lessons.stacked([lesson])
-            for which, answer in (("gather", None), ("network", model(batch["features"] * channels))):
-                shown, _ = blur.filtered(batch, answer)
-                off, light = pooled_error(shown.clamp(min=0) / lesson.mean, batch["target"] / lesson.mean, batch["mask"])
-                for key in (lesson.when, "all"):
-                    a, b = sums.get((key, which), (0, 0))
-                    sums[key, which] = (a + off, b + light)
+        for some, batch in (part for pile in piles for part in in_parts(pile)):
+            mean = batch["mean"].view(-1, 1, 1, 1)
+            for which, answer in (("gather", None), ("network", model(batch["features"] * channels) * parts)):
+                shown = blur.filtered(batch, answer)[0].clamp(min=0) / mean
+                errors = [pooled_error(shown[i:i + 1], batch["target"][i:i + 1] / mean[i], batch["mask"][i:i + 1]) for i in range(len(some))]
+                for lesson, (off, light) in zip(some, errors):
+                    for key in (lesson.when, "all"):
+                        a, b = sums.get((key, which), (0, 0))
+                        sums[key, which] = (a + off, b + light)
     return {f"{key} {which}": off / max(light, 1e-20) for (key, which), (off, light) in sums.items()}
 
 
@@ -151,7 +171,7 @@ class Run:
 
     def __init__(self, config, folder):
         self.config, self.folder = config, folder
-        self.model, self.channels = network(config), kept_channels(config)
+        self.model, self.channels, self.parts = network(config).to(config.device), kept_channels(config), kept_parts(config)
         self.average = {k: v.detach().clone() for k, v in self.model.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step, self.seconds, self.rows, self.best = 0, 0.0, [], (float("inf"), None)
@@ -163,7 +183,7 @@ class Run:
     def save(self):
         state = {k: getattr(self, k) for k in ("average", "step", "seconds", "rows", "best")}
         state |= {"config": dataclasses.asdict(self.config), "model": self.model.state_dict(), "optimiser": self.optimiser.state_dict(),
-                  "commit": commit(), "machine": machine_of(torch.device("cpu"))}
+                  "commit": commit(), "machine": machine_of(torch.device(self.config.device))}
         torch.save(state, self.path + ".part")
         os.replace(self.path + ".part", self.path)
 
@@ -171,54 +191,51 @@ class Run:
         if not os.path.exists(self.path):
             return
         state = read_checkpoint(self.path)
-        differ = [k for k, v in dataclasses.asdict(self.config).items() if k not in ("minutes", "threads") and state["config"].get(k) != v]
+        differ = [k for k, v in dataclasses.asdict(self.config).items() if k not in ("minutes", "threads", "device") and state["config"].get(k) != v]
         if differ:
             raise TrainingError(f"{self.path} was made with another {differ[0]}; use another --run")
         self.model.load_state_dict(state["model"])
         self.optimiser.load_state_dict(state["optimiser"])
         for k in ("average", "step", "seconds", "rows", "best"):
             setattr(self, k, state[k])
+        self.average = {k: v.to(self.config.device) for k, v in self.average.items()}
 
     def averaged(self):
-        model = network(self.config)
+        model = network(self.config).to(self.config.device)
         model.load_state_dict(self.average)
         return model.eval()
 
-    def train_step(self, views, began):
+    def train_step(self, piles, began):
+        """One step on moments of one pile; its loss (a tensor, so that a GPU need not be waited for), the rate, and which part of the time is gone."""
         c = self.config
         rng = np.random.default_rng([c.seed, self.step])
         done = min((self.seconds + time.monotonic() - began) / (60 * c.minutes), 1)
         rate = c.learning_rate * min(1, (self.step + 1) / 50) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * done)))
         for group in self.optimiser.param_groups:
             group["lr"] = rate
-        chosen = [views[i] for i in rng.integers(0, len(views), c.batch)]
-        shapes = {lesson.mask.shape for lesson in chosen}
-        loss_sum = 0.0
+        counts = np.array([len(pile.lessons) for pile in piles])
+        pile = piles[rng.choice(len(piles), p=counts / counts.sum())]
+        batch = augmented(pile.taken(rng.integers(0, len(pile.lessons), c.batch), window(pile, c.crop, rng)), rng)
+        answer = self.model(batch["features"] * self.channels) * self.parts
+        shown, first = blur.filtered(batch, answer)
+        learnt = [batch[k] for k in ("target", "mask", "mean", "noise")]
+        loss = (1 - c.raw) * loss_of(shown, *learnt, c.pools) + c.raw * loss_of(first, *learnt, c.pools)
+        # Over that of `gather` alone: a late moment counts as much as an early one, a quiet picture as much as one of fireflies.
+        loss = loss / (batch["base"] + LEAST_BASE)
+        loss = (loss / (loss.detach() / LOUD).clamp(min=1)).mean() + held(answer)
         self.optimiser.zero_grad()
-        for shape in shapes:
-            own = [lesson for lesson in chosen if lesson.mask.shape == shape]
-            batch = augmented(cropped(lessons.stacked(own), c.crop, rng), rng)
-            answer = self.model(batch["features"] * self.channels)
-            shown, first = blur.filtered(batch, answer)
-            learnt = [batch[k] for k in ("target", "mask", "mean", "noise")]
-            loss = (1 - c.raw) * loss_of(shown, *learnt) + c.raw * loss_of(first, *learnt)
-            # Over that of `gather` alone: a late moment counts as much as an early one, a quiet picture as much as one of fireflies.
-            loss = loss / (batch["base"] + LEAST_BASE)
-            loss = (loss / (loss.detach() / LOUD).clamp(min=1)).mean() + held(answer)
-            (loss * len(own) / c.batch).backward()
-            loss_sum += loss.item() * len(own) / c.batch
+        loss.backward()
         nn.utils.clip_grad_norm_(self.model.parameters(), 0.5)
         self.optimiser.step()
         self.step += 1
         keep = min(c.ema, (self.step + 1) / (self.step + 10))
-        for k, v in self.model.state_dict().items():
-            self.average[k].lerp_(v, 1 - keep)
-        return loss_sum, rate, done
+        torch._foreach_lerp_(list(self.average.values()), list(self.model.state_dict().values()), 1 - keep)
+        return loss.detach(), rate, done
 
 
 def read_checkpoint(path):
     try:
-        return torch.load(path, weights_only=True)
+        return torch.load(path, weights_only=True, map_location="cpu")
     except (OSError, RuntimeError, ValueError, EOFError, KeyError) as error:
         raise TrainingError(f"{path}: not a readable checkpoint: {error}") from error
 
@@ -226,7 +243,7 @@ def read_checkpoint(path):
 def train(config, folder):
     """Runs to the end; returns the Run."""
     torch.set_num_threads(config.threads)
-    views = [lesson for name in config.train.split(",") for lesson in lessons.read(name)]
+    views = [lesson for name in config.train.split(",") for lesson in lessons.read(name, config.every)]
     held_out = lessons.read(config.validation)
     shared = {v.name for v in views} & {v.name for v in held_out}
     if shared:
@@ -236,22 +253,25 @@ def train(config, folder):
     run.load()
     with open(os.path.join(folder, "config.json"), "w") as file:
         json.dump(dataclasses.asdict(config), file, indent=1)
+    count, piles, held_out = len(views), lessons.piles(views, config.device), lessons.piles(held_out, config.device)
     with torch.no_grad():
-        for lesson in views:
-            batch = lessons.stacked([lesson])
-            lesson.base = loss_of(blur.filtered(batch)[0], *(batch[k] for k in ("target", "mask", "mean", "noise"))).item()
-    print(f"{parameter_count(run.model)} parameters, {flops(run.model, 128, 256) / 1e9:.3f} GFLOP at 256x128 cells; {len(views)} training and {len(held_out)} validation "
-          f"moments", file=sys.stderr, flush=True)
+        for pile in piles:
+            pile.fields["base"] = torch.cat([loss_of(blur.filtered(batch)[0], *(batch[k] for k in ("target", "mask", "mean", "noise")), config.pools)
+                                             for _, batch in in_parts(pile)])
+    print(f"{parameter_count(run.model)} parameters, {flops(run.model, 128, 256) / 1e9:.3f} GFLOP at 256x128 cells; {count} training and "
+          f"{sum(len(pile.lessons) for pile in held_out)} validation moments", file=sys.stderr, flush=True)
     began, sums, looked = time.monotonic(), [], time.monotonic()
     done = run.seconds / (60 * config.minutes)
     if run.step == 0:
         note(run, held_out, 0.0, 0.0)
     while done < 1:
-        loss, rate, done = run.train_step(views, began)
+        loss, rate, done = run.train_step(piles, began)
         sums.append(loss)
+        if run.step % 32 == 0:
+            loss.item()  # Waits for a GPU, so that the clock tells what is done.
         if time.monotonic() - looked > 90 or done >= 1:
             run.seconds, began = run.seconds + time.monotonic() - began, time.monotonic()
-            note(run, held_out, float(np.mean(sums)), rate)
+            note(run, held_out, torch.stack(sums).mean().item(), rate)
             sums, looked, began = [], time.monotonic(), time.monotonic()
             run.save()
     return run
@@ -259,7 +279,7 @@ def train(config, folder):
 
 def note(run, held_out, loss, rate):
     """Validates the averaged network, keeps it if it is the best, adds a row to the log."""
-    errors = validate(run.averaged(), held_out, run.channels)
+    errors = validate(run.averaged(), held_out, run.channels, run.parts)
     if errors["all network"] < run.best[0]:
         run.best = (errors["all network"], {k: v.clone() for k, v in run.average.items()})
     run.rows.append({"step": run.step, "samples": run.step * run.config.batch, "seconds": round(run.seconds, 1), "learning_rate": rate,
@@ -277,7 +297,8 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--run", required=True, help="folder of the run; continued if it has a checkpoint")
     for field in dataclasses.fields(Config):
-        kind = {"widths": lambda t: tuple(int(n) for n in t.split(",")), "without": lambda t: tuple(t.split(","))}.get(field.name, type(field.default))
+        numbers, words = lambda t: tuple(int(n) for n in t.split(",")), lambda t: tuple(t.split(","))
+        kind = {"widths": numbers, "pools": numbers, "without": words, "mute": words}.get(field.name, type(field.default))
         parser.add_argument("--" + field.name, type=kind, default=field.default, help=f"default {field.default}")
     a = vars(parser.parse_args(arguments))
     folder = a.pop("run")
