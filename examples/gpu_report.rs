@@ -126,7 +126,7 @@ fn pytorch(size: [u32; 2], left: Duration) -> Value {
     let [width, height] = size.map(|n| n.div_ceil(4));
     let output = Command::new("python3")
         .arg(root.join("training/torch_speed.py"))
-        .arg(root.join("assets/weights/small.safetensors"))
+        .arg(root.join("assets/weights/filter.safetensors"))
         .arg(format!("{width}x{height}"))
         .args(["--seconds", &left.as_secs().to_string()])
         .env("PYTHONPATH", root.join("weights-format/python"))

@@ -366,9 +366,9 @@ fn results_may_be_read_in_part_and_a_full_disk_is_said() {
 }
 
 #[test]
-fn the_shipped_network_has_a_name() {
-    for command in ["info", "verify"] {
-        let out = bouncelight(&["weights", command, "small"]);
+fn the_shipped_networks_have_names() {
+    for (command, name) in [("info", "small"), ("verify", "small"), ("verify", "filter")] {
+        let out = bouncelight(&["weights", command, name]);
         assert!(out.status.success(), "{command}: {}", String::from_utf8_lossy(&out.stderr));
     }
     fails(&["weights", "verify", "smal"], 4, &["smal"]);

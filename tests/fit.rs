@@ -237,7 +237,7 @@ fn a_network_learns_the_scene_and_stays_only_if_it_wins() {
     let draw = ["render", "paper-room:7", "-o", "a.png", "--size", "64x32", "--gi", "room.toml", "--gi-frames", "1"];
     ends(&run(&draw), 0, &["`neural`, as fitted"]);
     assert_eq!(drawn_by(&at("a.png")), "neural");
-    std::fs::write(at("room.safetensors"), Weights::shipped().unwrap().to_bytes()).unwrap();
+    std::fs::write(at("room.safetensors"), Weights::corrector().unwrap().to_bytes()).unwrap();
     ends(&run(&draw), 0, &["not obeyed", "changed"]);
 }
 

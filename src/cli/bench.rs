@@ -34,7 +34,7 @@ pub struct Args {
     method: Option<Methods>,
     #[command(flatten)]
     fitted: super::fitted::Flag,
-    /// Weights of `neural`; the shipped ones (`small`) when absent.
+    /// Weights of `neural`; the shipped ones (`filter`) when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
     /// Frames that count.

@@ -46,11 +46,11 @@ pub struct Args {
     /// Frames of a still camera up to the one that is judged, for methods that settle.
     #[arg(long, default_value_t = Method::SETTLED, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     gi_frames: u32,
-    /// A network to try beside the shipped one; may be repeated.
+    /// A network to try beside the shipped ones; may be repeated.
     #[arg(long, value_name = "W")]
     weights: Vec<PathBuf>,
-    /// Where nothing meets the target: fine-tune the network (the first of --weights, else the
-    /// shipped one) to the scene for so many minutes, on this device and on views of its own, and
+    /// Where nothing meets the target: fine-tune a network (the first of --weights, else `small`,
+    /// which is shipped) to the scene for so many minutes, on this device and on views of its own, and
     /// keep it beside the record if it wins where it is judged.
     #[arg(long, value_name = "MINUTES", value_parser = parse_minutes)]
     learn: Option<f64>,
@@ -187,7 +187,7 @@ fn check_learning(args: &Args, output: &Path) -> Result<()> {
     }
     image_io::check_writable(&path)?;
     let start = args.weights.first();
-    let weights = Weights::find(start.map(PathBuf::as_path))?;
+    let weights = start.map_or_else(Weights::corrector, |path| Weights::find(Some(path)))?;
     let named = || start.map_or("the shipped weights".into(), |path| path.display().to_string());
     learn::check(&weights, cells_of(args.scene.size)).with_context(named)
 }
@@ -203,8 +203,8 @@ fn learn(
     let scene =
         Path::new(&args.scene.scene).file_stem().map_or(args.scene.scene.clone().into(), |s| s.to_string_lossy());
     let command: Vec<String> = std::env::args().skip(1).collect();
-    // The shipped network comes first of `options`.
-    let start = usize::from(!args.weights.is_empty());
+    // `options` has the shipped networks first, the one that corrects before the one that filters.
+    let start = if args.weights.is_empty() { 0 } else { 2 };
     let learning =
         Learning { minutes, start, scene: scene.into_owned(), command: format!("bouncelight {}", command.join(" ")) };
     let mut progress = Progress::new(global, "seconds", 1);
@@ -238,7 +238,7 @@ fn typed(e: TrialError) -> anyhow::Error {
 }
 
 fn options(global: &Global, gpu: &Gpu, args: &Args) -> Result<FitOptions> {
-    let mut networks = vec![(PathBuf::from("small"), Weights::shipped()?)];
+    let mut networks = vec![("small".into(), Weights::corrector()?), ("filter".into(), Weights::shipped()?)];
     for path in &args.weights {
         // The record must still name them when somebody reads it in another folder.
         let whole = std::fs::canonicalize(path).with_context(|| format!("cannot read {}", path.display()))?;

@@ -45,7 +45,7 @@ pub struct Args {
     /// what `fit` found for the scene, else `gather`, `neural` with --weights.
     #[arg(long, value_parser = MethodParser)]
     method: Option<MethodName>,
-    /// Weights of `neural`; the shipped ones (`small`) when absent.
+    /// Weights of `neural`; the shipped ones (`filter`) when absent.
     #[arg(long)]
     weights: Option<PathBuf>,
     #[command(flatten)]

@@ -34,7 +34,7 @@ pub struct Args {
     /// its weights.
     #[arg(long, default_value = "all", value_name = "NAMES")]
     methods: String,
-    /// Weights of `neural`; the shipped ones (`small`) when absent.
+    /// Weights of `neural`; the shipped ones (`filter`) when absent.
     #[arg(long, value_name = "W")]
     weights: Option<PathBuf>,
     /// Weights of a network on pictures (the paper's recipe, as `weights convert` and training make

@@ -2,29 +2,38 @@
 
 use super::format::{Weights, WeightsError};
 
-static FILE: &[u8] = include_bytes!("../../assets/weights/small.safetensors");
-
-/// What `--weights` may call them.
-const NAME: &str = "small";
+/// What `--weights` may call them, and the files; the first is method `neural`'s own.
+static FILES: [(&str, &[u8]); 2] = [
+    ("filter", include_bytes!("../../assets/weights/filter.safetensors")),
+    ("small", include_bytes!("../../assets/weights/small.safetensors")),
+];
 
 impl Weights {
-    /// The shipped network. It corrects what method `gather` answers.
+    /// The shipped network of method `neural`, `filter`: it says which light `gather` averages.
     ///
     /// # Errors
     /// Never for an unmodified build; the file is checked as any other.
     pub fn shipped() -> Result<Self, WeightsError> {
-        Self::from_bytes(FILE)
+        Self::from_bytes(FILES[0].1)
     }
 
-    /// The weights in `path`; the shipped ones without a path, and for `small` where there is no
-    /// such file.
+    /// The shipped network that corrects what `gather` answers, `small`: what `fit --learn` begins
+    /// with.
+    ///
+    /// # Errors
+    /// As [`Weights::shipped`].
+    pub fn corrector() -> Result<Self, WeightsError> {
+        Self::from_bytes(FILES[1].1)
+    }
+
+    /// The weights in `path`, or the shipped ones of that name where there is no such file; without
+    /// a path [`Weights::shipped`].
     ///
     /// # Errors
     /// As [`Weights::load`].
     pub fn find(path: Option<&std::path::Path>) -> Result<Self, WeightsError> {
-        match path.filter(|path| path.to_str() != Some(NAME) || path.exists()) {
-            Some(path) => Self::load(path),
-            None => Self::shipped(),
-        }
+        let Some(path) = path else { return Self::shipped() };
+        let named = FILES.iter().find(|(name, _)| path.to_str() == Some(name) && !path.exists());
+        named.map_or_else(|| Self::load(path), |(_, file)| Self::from_bytes(file))
     }
 }

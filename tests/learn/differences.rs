@@ -122,7 +122,7 @@ fn what_has_no_way_back_is_refused_by_name() {
     let add = refused(&Weights::load(&path).unwrap(), [13, 9]);
     assert!(matches!(&add, LearnError::Operator { name, .. } if name == "c"), "{add}");
     assert!(add.to_string().contains("add"), "{add}");
-    let shipped = Weights::shipped().unwrap();
+    let shipped = Weights::corrector().unwrap();
     let wide = refused(&shipped, [16384, 16384]);
     assert!(matches!(wide, LearnError::Size { .. }), "{wide}");
     let learner = learner(&gpu, &shipped, [4, 4]);

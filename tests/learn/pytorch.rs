@@ -46,7 +46,7 @@ impl Fixture {
 
 /// Learner, and what each of `steps` steps told.
 fn learnt(gpu: &bouncelight::gpu::Gpu, examples: &[Example], steps: u32) -> (Learner, Vec<Stride>) {
-    let mut learner = learner(gpu, &Weights::shipped().unwrap(), CELLS);
+    let mut learner = learner(gpu, &Weights::corrector().unwrap(), CELLS);
     let loaded: Vec<_> = examples.iter().map(|e| learner.load(e).unwrap()).collect();
     let pictures: Vec<_> = loaded.iter().collect();
     let strides = (0..steps).map(|_| learner.step(&pictures, RATE).unwrap()).collect();
@@ -73,7 +73,7 @@ fn the_whole_networks_gradients_are_pytorchs() {
     let wanted = fixture.values("losses")[0];
     assert!((strides[0].loss / wanted - 1.0).abs() <= OF_LOSS, "{} against {wanted}", strides[0].loss);
     let mut found = learner.last_gradients().unwrap();
-    assert_eq!(found.len(), Weights::shipped().unwrap().tensors().len());
+    assert_eq!(found.len(), Weights::corrector().unwrap().tensors().len());
     let (values, norms) = gradients_off(&fixture, &found);
     println!("gradients {values:.1e}, norms {norms:.1e}");
     assert!(values <= OF_GRADIENTS && norms <= OF_GRADIENTS, "{values} {norms}");
@@ -94,7 +94,7 @@ fn five_steps_are_pytorchs() {
     let wanted = fixture.values("losses");
     println!("{losses:?} against {wanted:?}");
     assert!(error(&losses, &wanted) <= OF_LOSS);
-    let (learnt, start) = (learner.weights().unwrap(), Weights::shipped().unwrap());
+    let (learnt, start) = (learner.weights().unwrap(), Weights::corrector().unwrap());
     for name in ["enc0.a.weight", "up1.conv.weight", "head.weight", "head.bias"] {
         let wanted = fixture.values(&format!("average.{name}"));
         let off = error(&learnt.tensors()[name].data, &wanted);

@@ -19,7 +19,7 @@ fn example(name: &str, gain: f32) -> Example {
 
 /// Weights after `steps` steps, and the losses before each.
 fn learnt(gpu: &Gpu, examples: &[Example], steps: u32) -> (Weights, Vec<f32>) {
-    let mut learner = learner(gpu, &Weights::shipped().unwrap(), CELLS);
+    let mut learner = learner(gpu, &Weights::corrector().unwrap(), CELLS);
     let loaded: Vec<_> = examples.iter().map(|e| learner.load(e).unwrap()).collect();
     let pictures: Vec<_> = loaded.iter().collect();
     let losses = (0..steps).map(|_| learner.step(&pictures, 2e-3).unwrap().loss).collect();
@@ -29,7 +29,7 @@ fn learnt(gpu: &Gpu, examples: &[Example], steps: u32) -> (Weights, Vec<f32>) {
 #[test]
 fn without_a_step_the_file_is_the_same() {
     let Some(gpu) = common::gpu() else { return };
-    let start = Weights::shipped().unwrap();
+    let start = Weights::corrector().unwrap();
     let same = |weights: &Weights| weights.to_bytes() == start.to_bytes();
     assert!(same(&learnt(&gpu, &[example("a", 1.2)], 0).0));
     assert!(!same(&learnt(&gpu, &[example("a", 1.2)], 1).0), "a step changes it");
@@ -47,7 +47,7 @@ fn what_can_be_met_is_met_and_two_runs_are_the_same() {
     assert!(first > 0.01 && last < 0.02 * first, "{first} to {last}");
     assert_eq!(weights.to_bytes(), learnt(&gpu, &examples, 60).0.to_bytes(), "two runs are the same to the bit");
     // Asking what the error is on other pictures teaches nothing.
-    let mut asked = learner(&gpu, &Weights::shipped().unwrap(), CELLS);
+    let mut asked = learner(&gpu, &Weights::corrector().unwrap(), CELLS);
     let loaded: Vec<_> = examples.iter().map(|e| asked.load(e).unwrap()).collect();
     let before = asked.error(&loaded).unwrap();
     let steps = (0..60).map(|_| {
@@ -74,9 +74,9 @@ fn what_cannot_be_learnt_is_told() {
     assert!(matches!(error, LearnError::Meaning { .. }), "{error}");
     let mut learner = learner(&gpu, &other, CELLS);
     assert!(matches!(learner.step(&[], 1e-3), Err(LearnError::Meaning { .. })));
-    assert!(check(&Weights::shipped().unwrap(), CELLS).is_ok());
+    assert!(check(&Weights::corrector().unwrap(), CELLS).is_ok());
     // Numbers that run away are an error in the very step.
-    let mut learner = super::learner(&gpu, &Weights::shipped().unwrap(), CELLS);
+    let mut learner = super::learner(&gpu, &Weights::corrector().unwrap(), CELLS);
     let broken = Example { target: vec![f32::INFINITY; 3 * PIXELS], ..example("a", 1.0) };
     let loaded = learner.load(&broken).unwrap();
     assert!(matches!(learner.step(&[&loaded], 1e-3), Err(LearnError::Diverged { step: 1, .. })));

@@ -117,17 +117,19 @@ fn at_rim(step: vec2i, radius: i32) -> f32 {
 // How much a neighbour counts in the mean: that it is the same surface, and that as much is near to
 // it as to the cell, as far as their rays can tell. Light beside a thing that stands on a surface
 // is other than that of the surface around, whatever a few rays of it were.
-fn counts(here: Past, there: Past, neighbour: u32, own: Guidance, plane: Plane) -> f32 {
+fn counts(here: Past, there: Past, plane: Plane) -> f32 {
     let nearer = there.nearness - here.nearness;
     let chance = chance_of_nearness(here.nearness, here.frames) + chance_of_nearness(there.nearness, there.frames);
-    var w = alike(here, there, plane) * exp(-min(0.5 * nearer * nearer / chance, 60.0))
+    return alike(here, there, plane) * exp(-min(0.5 * nearer * nearer / chance, 60.0))
         * clamp(there.frames, f32(LOOKS), 16.0);
-    if (gather.flags & GATHER_GUIDED) != 0u {
-        let other = guidance_at(neighbour);
-        let share = guided_share(here.frames);
-        w *= kinship(own.near, other.near, share) * exp(share * other.trust);
-    }
-    return w;
+}
+
+// What a network makes of that.
+fn told(here: Past, neighbour: u32, own: Guidance) -> f32 {
+    if (gather.flags & GATHER_GUIDED) == 0u { return 1.0; }
+    let other = guidance_at(neighbour);
+    let share = guided_share(here.frames);
+    return kinship(own.near, other.near, share) * exp(share * other.trust);
 }
 
 // Of a neighbourhood: light times weight, weight, mean of squares and the like.
@@ -149,7 +151,7 @@ fn without_rare(id: vec2u, here: Past, own: Guidance, plane: Plane, radius: i32,
             let neighbour = cell_index(vec2u(at));
             let there = past_at(neighbour);
             if there.frames <= 0.0 { continue; }
-            let w = at_rim(vec2i(x, y), radius) * counts(here, there, neighbour, own, plane);
+            let w = at_rim(vec2i(x, y), radius) * counts(here, there, plane) * told(here, neighbour, own);
             let l = luminance(there.light);
             let rays = there.frames * l * l / max(there.square, 1e-30);
             let brings = w * (l - mean) / max(mean * total, 1e-30);
@@ -199,7 +201,10 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     var sum = vec3f(0.0);
     var vector = vec3f(0.0);
     var total = 0.0;
+    // Whether light has changed is not asked of a network: of all frames luminance times weight, and
+    // weight.
     var lately = vec3f(0.0);
+    var all = vec2f(0.0);
     var noise = 0.0;
     var most = 0.0;
     var squares = 0.0;
@@ -213,17 +218,19 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             let neighbour = cell_index(vec2u(at));
             let there = past_at(neighbour);
             if there.frames <= 0.0 { continue; }
-            let w = at_rim(vec2i(x, y), radius) * counts(here, there, neighbour, own, plane);
+            let alone = at_rim(vec2i(x, y), radius) * counts(here, there, plane);
+            let w = alone * told(here, neighbour, own);
             sum += w * there.light;
             // Across each one's own normal: what lies along normals that differ is no gradient of
             // light.
             vector += w * (there.vector - there.n * dot(there.vector, there.n));
             total += w;
-            lately += w * there.lately;
             let l = luminance(there.light);
+            lately += alone * there.lately;
+            all += alone * vec2f(l, 1.0);
             if w * l > brightest.x && there.frames * l * l < MANY * there.square { brightest = vec2f(w * l, w); }
-            noise += w * w * max(there.square - l * l, 0.0);
-            most = max(most, w * bright_ray(there));
+            noise += alone * alone * max(there.square - l * l, 0.0);
+            most = max(most, alone * bright_ray(there));
             squares += w * there.square;
             parts += w * w / there.frames;
         }
@@ -232,10 +239,11 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     // The mean of lately against that of all frames: its own noise, from that of single frames,
     // allows for so much.
     if here.frames > LEAST_KNOWN && (gather.flags & GATHER_EVEN) == 0u {
-        let now = lately / max(total, 1e-30);
-        let variance = noise * lately_noise() / max(total * total, 1e-30);
-        most *= lately_share() / max(total, 1e-30);
-        if region_differs || differs(luminance(mean), luminance(now), variance, most, LEAST_CHANGE) {
+        let weight = max(all.y, 1e-30);
+        let now = lately / weight;
+        let variance = noise * lately_noise() / max(all.y * all.y, 1e-30);
+        most *= lately_share() / weight;
+        if region_differs || differs(all.x / weight, luminance(now), variance, most, LEAST_CHANGE) {
             changes[cell] = vec4f(now, 1.0);
             mean = now;
         }

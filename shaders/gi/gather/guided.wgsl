@@ -10,9 +10,9 @@ struct Guidance {
     tolerance: f32,
 }
 
-// Frames up to which what a network says counts in full; from there on the blur is narrow, and
-// noise less. Later by so much less.
-const GUIDED_FRAMES = 6.0;
+// Frames up to which what a network says counts in full: it has learnt from moments up to the 20th.
+// Later by so much less, since what is known well needs no filter.
+const GUIDED_FRAMES = 32.0;
 const MOST_LOG = 4.0;
 
 fn limited(x: f32) -> f32 {

@@ -64,6 +64,17 @@ impl FilterGi {
             rebuilds: 0,
         })
     }
+
+    /// Makes the tensors anew for pictures of another size.
+    fn fit(&mut self, size: [u32; 2]) -> Result<(), GiError> {
+        if size != self.size {
+            self.network = network(&self.device, &self.queue, &self.neural, size)?;
+            self.size = size;
+            self.rebuilds += 1;
+            self.forget();
+        }
+        Ok(())
+    }
 }
 
 /// The tensors for pictures of `size` pixels.
@@ -110,12 +121,7 @@ impl Technique for FilterGi {
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
         stage::inputs::check_output(output, inputs.size)?;
-        if inputs.size != self.size {
-            self.network = network(&self.device, &self.queue, &self.neural, inputs.size)?;
-            self.size = inputs.size;
-            self.rebuilds += 1;
-            self.forget();
-        }
+        self.fit(inputs.size)?;
         let lit = self.inputs.bind(queue, inputs)?;
         let settled = self.gather.settle(recorder, queue, inputs, true)?;
         self.exposure.record(recorder, &lit);
@@ -124,6 +130,17 @@ impl Technique for FilterGi {
         self.network.record(recorder);
         self.gather.filter(recorder, &settled, Some(bound(self.network.output())), output);
         Ok(())
+    }
+
+    fn warm_up(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+    ) -> Result<bool, GiError> {
+        // What is remembered hangs on no network.
+        self.fit(inputs.size)?;
+        self.gather.warm_up(recorder, queue, inputs)
     }
 
     fn cut(&mut self) {

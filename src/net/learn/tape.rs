@@ -283,7 +283,7 @@ mod tests {
 
     #[test]
     fn the_shipped_network_has_a_way_back_from_every_operator() {
-        let weights = Weights::shipped().unwrap();
+        let weights = Weights::corrector().unwrap();
         let tape = Tape::new(&weights, [33, 17]).unwrap();
         let kinds = |kernel: Kernel| tape.backward.iter().filter(|c| c.kernel == kernel).count();
         let convolutions = weights.graph.ops.iter().filter(|op| matches!(op, Op::Conv2d(_))).count();
@@ -299,7 +299,7 @@ mod tests {
     #[test]
     fn what_cannot_be_learnt_is_named() {
         let with = |edit: &dyn Fn(&mut Vec<Op>)| {
-            let mut weights = Weights::shipped().unwrap();
+            let mut weights = Weights::corrector().unwrap();
             edit(&mut weights.graph.ops);
             Tape::new(&weights, [16, 16]).unwrap_err().to_string()
         };
