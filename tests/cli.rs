@@ -293,7 +293,7 @@ fn bench_prints_passes_and_writes_a_record_that_it_can_compare_with() {
     let out = bouncelight(&[&base[..], &["--json", &json]].concat());
     let text = String::from_utf8_lossy(&out.stdout);
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    for word in ["shadow", "gbuffer", "direct", "net.enc0.a", "gi.reconstruct", "wall clock", "MiB of GPU memory"] {
+    for word in ["shadow", "gbuffer", "direct", "net.enc0.a", "gi.features", "wall clock", "MiB of GPU memory"] {
         assert!(text.contains(word), "`{word}` is missing in: {text}");
     }
     let record: serde_json::Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();

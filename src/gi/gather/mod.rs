@@ -64,7 +64,7 @@ const HURRIED: f32 = 2.5;
 
 /// Rays of each entry in the first frame in which lights or objects change after a rest, and in
 /// further ones in which they do.
-const ROUNDS_RESTED: u32 = 8;
+const ROUNDS_RESTED: u32 = 16;
 const ROUNDS_CHANGED: u32 = 4;
 
 /// Constants of the shaders as WGSL.
