@@ -321,7 +321,7 @@ mod tests {
         let with = |hash: &str| Fitted {
             method: MethodName::Neural,
             gather: None,
-            weights: Some(FittedWeights { file: "small".into(), hash: hash.into() }),
+            weights: Some(FittedWeights { file: "filter".into(), hash: hash.into() }),
             ..fitted()
         };
         assert_eq!(with(&shipped).method().unwrap().name(), "neural");

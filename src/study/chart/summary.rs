@@ -42,7 +42,7 @@ impl Clock {
         let agrees = |unit: &Unit| match &unit.time {
             Some(time) => time
                 .gpu_ms
-                .is_some_and(|gpu| (time.wall_ms.median - gpu.median).abs() <= bench::AGREEMENT * time.wall_ms.median),
+                .is_some_and(|gpu| bench::disagreement(time.wall_ms.median, gpu.median).is_none()),
             None => true,
         };
         let drawn = |unit: &&Unit| record.kind(&unit.entry) == Some(Kind::Method);

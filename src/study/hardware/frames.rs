@@ -188,6 +188,9 @@ mod tests {
             drawn: Default::default(),
         };
         assert_eq!(own(&m, 3.0), (1.5, Timing::Timestamps));
+        // A frame is waited for, too.
+        m.wall_ms = at(5.4);
+        assert_eq!(own(&m, 3.0), (1.5, Timing::Timestamps));
         // Timestamps that do not add up to the clock are not believed.
         m.wall_ms = at(9.0);
         assert_eq!(own(&m, 3.0), (6.0, Timing::Clock));
