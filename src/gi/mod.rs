@@ -18,12 +18,12 @@
 //! in the world where it ends. It asks what stands between; what is left is noise, which frames and
 //! neighbours average away.
 //!
-//! [`pass`] is the neural method: features of every 4×4 cell ([`pack`]), what `gather` says among
-//! them, go through a U-Net, and its gain and rest are applied to `gather`'s answer at full
-//! resolution, guided by depth and normal ([`reconstruct`]). It learns where that answer errs:
-//! noise that is left, light that the cache of light blurs. It knows no more of the world than
-//! `gather` and the picture show, corrects nothing finer than a cell (4 pixels), and adds no
-//! specular light beyond what `composite` derives from E.
+//! The neural method is `gather` and a U-Net. Weights that filter are given what each
+//! cell remembers ([`memory`]) and say which cells' light is averaged. Weights that correct
+//! ([`pass`]) are given features of every cell ([`pack`]), what `gather` says among them, and their
+//! gain and rest are applied to that answer at full resolution, guided by depth and normal
+//! ([`reconstruct`]). Neither knows more of the world than `gather` and the picture show, is finer
+//! than a cell (4 pixels), or adds specular light beyond what `composite` derives from E.
 //!
 //! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when
 //! all light is off. `docs/gi.md` tells the same with a picture of the data flow and the table of

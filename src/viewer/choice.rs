@@ -14,10 +14,9 @@ impl Source {
     }
 
     /// Mean error of indirect light on the five judged rooms, %, as docs/accuracy.md has it
-    /// (`light`; of `neural` the shipped weights): measured once, on other scenes, not here; `None`
-    /// where nobody has.
+    /// (`light`): measured once, on other scenes, not here; `None` where nobody has.
     pub fn static_error(self) -> Option<f64> {
-        [Some(100.0), Some(28.8), Some(23.0), Some(5.9), Some(4.7), None][self as usize]
+        [Some(100.0), Some(28.8), Some(23.0), Some(5.9), None, None][self as usize]
     }
 }
 

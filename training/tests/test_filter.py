@@ -26,8 +26,9 @@ def draw(folder, rooms, *more):
 
 def off(lesson, answer):
     """How far torch's light is from the program's, over the mean light."""
-    shown, _ = blur.filtered(lessons.stacked([lesson]), answer)
-    return (((shown[0] - lesson.shown).abs() * lesson.mask).sum() / (lesson.shown * lesson.mask).sum()).item()
+    batch = lessons.stacked([lesson])
+    (shown, _), theirs, mask = blur.filtered(batch, answer), batch["shown"], batch["mask"]
+    return (((shown - theirs).abs() * mask).sum() / (theirs * mask).sum()).item()
 
 
 @unittest.skipUnless(PROGRAM, "SKIP: BOUNCELIGHT does not name the program")
@@ -53,7 +54,7 @@ class WithTheProgram(unittest.TestCase):
             model = run.averaged()
             for view in draw(os.path.join(folder, "b"), "1", "--weights", file):
                 with torch.no_grad():
-                    answer = model(view.features[None])
+                    answer = model(lessons.stacked([view])["features"])
                 near, control = off(view, answer), off(view, None)
                 self.assertLess(near, 2e-3, view.when)
                 self.assertGreater(control, 5 * near, view.when)
