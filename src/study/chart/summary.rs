@@ -40,9 +40,7 @@ impl Clock {
     /// the synchronised clock.
     pub fn of(record: &Record) -> Self {
         let agrees = |unit: &Unit| match &unit.time {
-            Some(time) => time
-                .gpu_ms
-                .is_some_and(|gpu| bench::disagreement(time.wall_ms.median, gpu.median).is_none()),
+            Some(time) => time.gpu_ms.is_some_and(|gpu| bench::disagreement(time.wall_ms.median, gpu.median).is_none()),
             None => true,
         };
         let drawn = |unit: &&Unit| record.kind(&unit.entry) == Some(Kind::Method);
