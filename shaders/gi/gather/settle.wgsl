@@ -5,10 +5,9 @@
 
 // Frames in which the light between surfaces settles.
 const YOUNG = 16.0;
-// Share of a frame in a mean, by its number, while light changes or the surface moves on the screen
-// (else all count alike). The first frames count for less, each for its number, since they know
-// least of the light as it is now; from YOUNG on all count the same. `more` is what the first one
-// counts for beyond that.
+// Share of a frame in a mean, by its number. The first frames count for less, each for its number,
+// since they know least of the light between surfaces; from YOUNG on all count the same. `more` is
+// what the first one counts for beyond that.
 fn share_of_frame(number: f32, more: f32) -> f32 {
     let weight = min(number, YOUNG);
     return weight / (0.5 * weight * (weight + 1.0) + more + YOUNG * (number - weight));
@@ -132,7 +131,7 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let more = f32(LOOKS - 1u);
     let early = select(2.0 / (frames + 1.0), 0.0, frames > f32(LOOKS));
     var share = max(max(share_of_frame(max(frames - more, 1.0), more), early), share_of_frame(most, 0.0));
-    if (gather.flags & GATHER_EVEN) != 0u || !changing { share = 1.0 / frames; }
+    if (gather.flags & GATHER_EVEN) != 0u { share = 1.0 / frames; }
     if fresh { share = 1.0; }
     let surface = textureLoad(specular_map, pixel, 0);
     let roughness = select(NO_LOBE, surface.a, any(surface.rgb > vec3f(0.0)));

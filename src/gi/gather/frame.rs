@@ -4,7 +4,7 @@ use super::bring::Brought;
 use super::params::{self, Params};
 use super::pass::Groups;
 use super::store::{self, Store};
-use super::{GatherGi, HURRIED, HURRY, ROUNDS_CHANGED, ROUNDS_RESTED, STIR, work};
+use super::{GatherGi, HURRIED, HURRY, ROUNDS_RESTED, ROUNDS_YOUNG, STIR, YOUNG, work};
 use crate::gi::interface::{GiError, Inputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -135,6 +135,10 @@ impl GatherGi {
             if changed {
                 (self.stir, self.changing) = (STIR, STIR);
             }
+            // Each frame is to see entries of its own, not the first one's.
+            if self.frame == 1 {
+                self.stir = STIR;
+            }
         }
         (self.lights_epoch, self.moves) = (epoch, moves);
         let mut params = self.params(inputs, rays, guided)?;
@@ -166,7 +170,8 @@ impl GatherGi {
         let rounds = match (self.frame, self.stir) {
             (0, _) => self.options.first_rounds.max(1),
             _ if rested => ROUNDS_RESTED,
-            _ if changed => ROUNDS_CHANGED,
+            (1..=YOUNG, _) => ROUNDS_YOUNG,
+            _ if changed => ROUNDS_YOUNG,
             (_, 0) => 1,
             _ => 2,
         };

@@ -55,17 +55,20 @@ const LIFT_STEPS: f32 = 4.0;
 /// evidence.
 const HURRY: u32 = 8;
 
-/// Frames after a change of the lights, or after an object has moved, for which entries get two rays
-/// each and remember no more than [`HURRIED`]. Light between surfaces of albedo ρ goes with
-/// exp(−t (1 − ρ) 2 / HURRIED) then, by frames: of white ones' (0.8) 2 % are left after so many.
-/// With one ray a frame and a memory of eight it would take 160.
+/// Frames after the first, after a change of the lights, or after an object has moved, for which
+/// entries get two rays each and remember no more than [`HURRIED`]. Light between surfaces of
+/// albedo ρ goes with exp(−t (1 − ρ) 2 / HURRIED) then, by frames: of white ones' (0.8) 2 % are
+/// left after so many. With one ray a frame and a memory of eight it would take 160.
 const STIR: u32 = 24;
 const HURRIED: f32 = 2.5;
 
-/// Rays of each entry in the first frame in which lights or objects change after a rest, and in
-/// further ones in which they do.
-const ROUNDS_RESTED: u32 = 16;
-const ROUNDS_CHANGED: u32 = 4;
+/// After the first frame entries get so many rays each for so many frames, and in a frame in which
+/// lights or objects change: what cells average is then of other rays in each frame.
+const YOUNG: u32 = 8;
+const ROUNDS_YOUNG: u32 = 4;
+
+/// Rays of each entry in the first frame in which lights or objects change after a rest.
+const ROUNDS_RESTED: u32 = 8;
 
 /// Constants of the shaders as WGSL.
 pub fn prelude() -> String {
