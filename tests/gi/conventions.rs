@@ -50,17 +50,17 @@ fn depth_and_normals_in_every_convention() {
     assert!(wrong > 0.1, "{wrong}");
 
     // Rays that start a little aside meet other entries of the cache: by noise, not by the format,
-    // about 1 % differs.
+    // 1 to 2 % differ.
     use {NormalEncoding as E, NormalRange as R, NormalSpace as S};
     for (encoding, range, format, most) in [
-        (E::Octahedral, R::Signed, F::Rg16Float, 0.02),
-        (E::Octahedral, R::Unsigned, F::Rgb10a2Unorm, 0.02),
-        (E::Xyz, R::Signed, F::Rgba16Float, 0.02),
-        (E::Xyz, R::Unsigned, F::Rgba16Float, 0.02),
-        (E::Xyz, R::Unsigned, F::Rgb10a2Unorm, 0.02),
-        (E::Xyz, R::Unsigned, F::Rgba8Unorm, 0.02),
-        (E::Xy, R::Signed, F::Rg16Float, 0.02),
-        (E::Xy, R::Unsigned, F::Rgba8Unorm, 0.02),
+        (E::Octahedral, R::Signed, F::Rg16Float, 0.03),
+        (E::Octahedral, R::Unsigned, F::Rgb10a2Unorm, 0.03),
+        (E::Xyz, R::Signed, F::Rgba16Float, 0.03),
+        (E::Xyz, R::Unsigned, F::Rgba16Float, 0.03),
+        (E::Xyz, R::Unsigned, F::Rgb10a2Unorm, 0.03),
+        (E::Xyz, R::Unsigned, F::Rgba8Unorm, 0.04),
+        (E::Xy, R::Signed, F::Rg16Float, 0.03),
+        (E::Xy, R::Unsigned, F::Rgba8Unorm, 0.04),
     ] {
         for space in [S::World, S::View] {
             if encoding == E::Xy && space == S::World {
@@ -76,8 +76,7 @@ fn depth_and_normals_in_every_convention() {
             if encoding != E::Xy && format == F::Rgba16Float {
                 let other = if space == S::View { S::World } else { S::View };
                 let wrong = still(&gpu, &how, &Conventions { normal_space: other, ..conventions });
-                let wrong = difference(&wrong, &plain);
-                assert!(wrong > 0.03, "{encoding:?} {range:?} read as {other:?}: {wrong}");
+                assert!(difference(&wrong, &plain) > 0.05, "{encoding:?} read as {other:?}");
             }
         }
     }
