@@ -107,13 +107,11 @@ fn finish(at: u32) {
     let found = found_by(at);
     var light = found.radiance;
     if found.slot != NONE { light += found.back * entry_light[even + found.slot].rgb; }
-    // Each of the first rays counts for a power of its number: the earlier ones met entries that
-    // knew nothing yet. Of the light between surfaces of albedo ρ n^(-k (1 - ρ)) is missing then
-    // after n rays that count for n^(k - 1), and noise is that of (2k - 1)/k² n of them. In a first
-    // frame nobody knows anything; later entries find others that do.
-    let k = select(4.0, 8.0, (gather.flags & GATHER_CUT) != 0u);
+    // Each of the first rays counts for the cube of its number: the earlier ones met entries that
+    // knew nothing yet. Of the light between surfaces of albedo ρ n^(-4 (1 - ρ)) is missing then
+    // after n rays, and noise is that of 7/16 n of them.
     let n_rays = min(before.a + 1.0, 4.0 * gather.entry_frames);
-    let share = max(k / (n_rays + k - 1.0), 1.0 / gather.entry_frames);
+    let share = max(4.0 / (n_rays + 3.0), 1.0 / gather.entry_frames);
     entry_light[odd + slot] = vec4f(mix(before.rgb, finite3(light), share), n_rays);
 }
 

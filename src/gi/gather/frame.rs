@@ -4,7 +4,7 @@ use super::bring::Brought;
 use super::params::{self, Params};
 use super::pass::Groups;
 use super::store::{self, Store};
-use super::{GatherGi, HURRIED, HURRY, ROUNDS_RESTED, ROUNDS_YOUNG, STIR, YOUNG, work};
+use super::{GatherGi, HURRIED, HURRY, ROUNDS_YOUNG, STIR, YOUNG, work};
 use crate::gi::interface::{GiError, Inputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -135,7 +135,7 @@ impl GatherGi {
             if changed {
                 (self.stir, self.changing) = (STIR, STIR);
             }
-            // Each frame is to see entries of its own, not the first one's.
+            // Entries have to come to know each other.
             if self.frame == 1 {
                 self.stir = STIR;
             }
@@ -169,7 +169,7 @@ impl GatherGi {
         self.rays.record(recorder, groups(offset), own, [work::of_cells(inputs.size), 1, 1]);
         let rounds = match (self.frame, self.stir) {
             (0, _) => self.options.first_rounds.max(1),
-            _ if rested => ROUNDS_RESTED,
+            _ if rested => self.options.first_rounds.max(ROUNDS_YOUNG),
             (1..=YOUNG, _) => ROUNDS_YOUNG,
             _ if changed => ROUNDS_YOUNG,
             (_, 0) => 1,

@@ -55,7 +55,7 @@ pub struct Params {
 const STRIDE: u64 = 256;
 /// Rounds between two submissions that keep their own parameters: as many views as `InputGroup`
 /// allows, with a few first frames among them.
-const SLOTS: u32 = 512;
+const SLOTS: u32 = 128;
 
 pub(super) struct ParamsRing {
     buffer: wgpu::Buffer,
