@@ -43,31 +43,48 @@ fn mean(light: &[f32], of: &[bool]) -> f64 {
     sum / of.iter().filter(|of| **of).count().max(1) as f64
 }
 
-/// Changes one scene into the other and back, and asks for nine tenths of the change within `soon`
-/// frames, for all but 2 % within thirty.
-fn follows(gpu: &Gpu, scenes: [&Scene; 2], soon: u32, change: impl Fn(&mut SceneGpu, &Scene)) {
+/// Shares of old light that are left, %, and how much there may be.
+struct Left {
+    soon: u32,
+    most_soon: f64,
+    /// Frames before the change. What is left after few frames is noise of few rays, too: another
+    /// number for each, so that the mean over several is asked.
+    rests: &'static [u32],
+}
+
+/// Changes one scene into the other and back, and asks how much of the change is missing after a
+/// few frames, and for all but 2 % within thirty.
+fn follows(gpu: &Gpu, scenes: [&Scene; 2], asked: &Left, change: impl Fn(&mut SceneGpu, &Scene)) {
     let (light, same) = states(gpu, scenes);
     let [there, gone] = light.map(|l| mean(&l, &same));
     // Else nothing would be asked.
     assert!((there / gone - 1.0).abs() > 0.2, "the light is {there} before and {gone} after");
-    let mut renderer = world::renderer(gpu, SIZE, world::gather());
-    let mut scene = uploaded(gpu, scenes[0]);
-    let mut after = |scene: &SceneGpu, frames| {
-        let light = mean(&go_on(gpu, &mut renderer, scene, &scenes[0].cameras[0], frames), &same);
-        100.0 * (light - gone) / (there - gone)
-    };
-    // Negative control: before the change all of it is there.
-    let before = after(&scene, 64);
-    assert!((before - 100.0).abs() < 10.0, "{before} %");
-    change(&mut scene, scenes[1]);
-    let away = [after(&scene, soon), after(&scene, 30 - soon)];
-    after(&scene, 34);
-    change(&mut scene, scenes[0]);
-    let back = [after(&scene, soon), after(&scene, 30 - soon)].map(|there| 100.0 - there);
-    for (left, words) in [(away, "away"), (back, "back")] {
-        println!("{words}: {:.1} % of the old light after {soon} frames, {:.2} % after 30", left[0], left[1]);
-        assert!(left[0].abs() < 10.0 && left[1].abs() < 2.0, "{words}: {left:?}");
+    let soon = asked.soon;
+    // After a few frames away and back, after thirty away and back.
+    let mut left = [0.0; 4];
+    for rest in asked.rests {
+        let mut renderer = world::renderer(gpu, SIZE, world::gather());
+        let mut scene = uploaded(gpu, scenes[0]);
+        let mut after = |scene: &SceneGpu, frames| {
+            let light = mean(&go_on(gpu, &mut renderer, scene, &scenes[0].cameras[0], frames), &same);
+            100.0 * (light - gone) / (there - gone)
+        };
+        // Negative control: before the change all of it is there.
+        let before = after(&scene, *rest);
+        assert!((before - 100.0).abs() < 10.0, "{before} %");
+        change(&mut scene, scenes[1]);
+        let away = [after(&scene, soon), after(&scene, 30 - soon)];
+        after(&scene, 34);
+        change(&mut scene, scenes[0]);
+        let back = [after(&scene, soon), after(&scene, 30 - soon)].map(|there| 100.0 - there);
+        println!("after {rest} frames: {away:.1?} % away, {back:.1?} % back");
+        for (sum, one) in left.iter_mut().zip([away[0], back[0], away[1], back[1]]) {
+            *sum += one / asked.rests.len() as f64;
+        }
     }
+    println!("in the mean: {:.1?} % of the old light after {soon} frames, {:.2?} % after 30", &left[..2], &left[2..]);
+    assert!(left[..2].iter().all(|l| l.abs() < asked.most_soon), "{left:?}");
+    assert!(left[2..].iter().all(|l| l.abs() < 2.0), "{left:?}");
 }
 
 #[test]
@@ -75,7 +92,8 @@ fn light_follows_the_lamps_of_a_flat() {
     let Some(gpu) = common::gpu() else { return };
     let Some(on) = real("apartment_night") else { return };
     let off = Scene { lights: Vec::new(), ..on.clone() };
-    follows(&gpu, [&on, &off], 6, |scene, to| scene.set_lights(&gpu.device, &gpu.queue, to));
+    let asked = Left { soon: 6, most_soon: 10.0, rests: &[64] };
+    follows(&gpu, [&on, &off], &asked, |scene, to| scene.set_lights(&gpu.device, &gpu.queue, to));
 }
 
 #[test]
@@ -87,5 +105,6 @@ fn light_follows_a_ceiling_that_slides_away() {
     ceiling.transform[3][1] += 40.0;
     // A host says of lamps that they are others, of objects only that they moved: after twelve
     // frames 14 % are left.
-    follows(&gpu, [&there, &gone], 6, |scene, to| scene.set_placements(&gpu.queue, to));
+    let asked = Left { soon: 6, most_soon: 12.0, rests: &[56, 59, 62, 65, 68] };
+    follows(&gpu, [&there, &gone], &asked, |scene, to| scene.set_placements(&gpu.queue, to));
 }

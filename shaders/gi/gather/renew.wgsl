@@ -7,12 +7,13 @@
 // One ray for each entry of the cache, whose find is mixed into the entry's mean. The finds' own
 // entries are read as they were after the round before, so the order of threads does not matter.
 
-// The round in which an entry was last asked for, from 1; 0 for never.
+// The round with which the frame ended in which an entry was last asked for, from 1; 0 for never.
 @group(2) @binding(3) var<storage, read_write> entry_asked: array<u32>;
 // Two halves, for even and odd rounds: irradiance over π, and rays in it.
 @group(2) @binding(4) var<storage, read_write> entry_light: array<vec4f>;
 
-// Rounds after which an entry that no ray has met leaves.
+// Rounds after which an entry that no ray has met leaves; those of a frame are no age, or a first
+// frame's entries would leave with the second.
 const ENTRY_AGE = 32u;
 
 // Before the rays of a frame, so that none of them looks up what is about to leave: two runs would
@@ -61,7 +62,7 @@ fn begins(slot: u32) -> bool {
     var asked = entry_asked[slot];
     if lot != NONE {
         begin = entry_queries[lot & ((1u << lot_bits()) - 1u)];
-        asked = gather.round + 1u;
+        asked = gather.last_round + 1u;
         atomicStore(&entry_lots[odd + slot], NONE);
     } else if asked == 0u {
         // Made in this very round.
@@ -107,11 +108,13 @@ fn finish(at: u32) {
     let found = found_by(at);
     var light = found.radiance;
     if found.slot != NONE { light += found.back * entry_light[even + found.slot].rgb; }
-    // Each of the first rays counts for the cube of its number: the earlier ones met entries that
-    // knew nothing yet. Of the light between surfaces of albedo ρ n^(-4 (1 - ρ)) is missing then
-    // after n rays, and noise is that of 7/16 n of them.
+    // Each of the first rays counts for a power of its number: the earlier ones met entries that
+    // knew nothing yet. Of the light between surfaces of albedo ρ n^(-k (1 - ρ)) is missing then
+    // after n rays that count for n^(k - 1), and noise is that of (2k - 1)/k² n of them. In a first
+    // frame nobody knows anything; later entries find others that do.
+    let k = select(4.0, 8.0, (gather.flags & GATHER_CUT) != 0u);
     let n_rays = min(before.a + 1.0, 4.0 * gather.entry_frames);
-    let share = max(4.0 / (n_rays + 3.0), 1.0 / gather.entry_frames);
+    let share = max(k / (n_rays + k - 1.0), 1.0 / gather.entry_frames);
     entry_light[odd + slot] = vec4f(mix(before.rgb, finite3(light), share), n_rays);
 }
 

@@ -34,6 +34,8 @@ struct Gather {
     rays: u32,
     // Frames since lights or objects changed, while GATHER_CHANGING.
     since: u32,
+    // The round with which the frame ends.
+    last_round: u32,
 }
 
 const GATHER_STANDS_IN = 1u;

@@ -4,7 +4,7 @@ use super::bring::Brought;
 use super::params::{self, Params};
 use super::pass::Groups;
 use super::store::{self, Store};
-use super::{GatherGi, HURRIED, HURRY, ROUNDS_YOUNG, STIR, YOUNG, work};
+use super::{GatherGi, HURRIED, HURRY, ROUNDS_RESTED, ROUNDS_YOUNG, STIR, YOUNG, work};
 use crate::gi::interface::{GiError, Inputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -37,7 +37,8 @@ impl Settled {
 }
 
 impl GatherGi {
-    fn params(&self, inputs: &Inputs<'_>, rays: &Rays<'_>, guided: bool) -> Result<Params, GiError> {
+    /// Those of the first of the frame's rounds.
+    fn params(&self, inputs: &Inputs<'_>, rays: &Rays<'_>, guided: bool, rounds: u32) -> Result<Params, GiError> {
         let counts = rays.scene.counts();
         let camera = stage::inputs::Params::of(inputs, None)?;
         let flags = [
@@ -62,7 +63,7 @@ impl GatherGi {
             entry_scale: self.options.entry_scale.min(widest(camera.tan_half_height())),
             round: self.round,
             cell_frames: self.options.cell_frames,
-            entry_frames: if self.stir > 0 {
+            entry_frames: if self.changing > 0 {
                 self.options.entry_frames.min(HURRIED)
             } else {
                 self.options.entry_frames
@@ -71,6 +72,8 @@ impl GatherGi {
             cells: cells::count(inputs.size) as u32,
             rays: (cells::count(inputs.size) + store::squares(inputs.size)) as u32,
             since: STIR - self.changing,
+            last_round: self.round + rounds - 1,
+            pad: [0; 3],
         })
     }
 
@@ -135,13 +138,21 @@ impl GatherGi {
             if changed {
                 (self.stir, self.changing) = (STIR, STIR);
             }
-            // Entries have to come to know each other.
+            // Each frame is to see entries of its own, not the first one's.
             if self.frame == 1 {
                 self.stir = STIR;
             }
         }
         (self.lights_epoch, self.moves) = (epoch, moves);
-        let mut params = self.params(inputs, rays, guided)?;
+        let rounds = match (self.frame, self.stir) {
+            (0, _) => self.options.first_rounds.max(1),
+            _ if rested => ROUNDS_RESTED,
+            (1..=YOUNG, _) => ROUNDS_YOUNG,
+            _ if changed => ROUNDS_YOUNG,
+            (_, 0) => 1,
+            _ => 2,
+        };
+        let mut params = self.params(inputs, rays, guided, rounds)?;
         if changed {
             params.flags |= params::CHANGED;
         }
@@ -167,14 +178,6 @@ impl GatherGi {
         self.evict.record(recorder, groups(offset), table(), slots);
         let own = [&keys, &lots, &queries, &pixels, &records, &specular].map(Clone::clone);
         self.rays.record(recorder, groups(offset), own, [work::of_cells(inputs.size), 1, 1]);
-        let rounds = match (self.frame, self.stir) {
-            (0, _) => self.options.first_rounds.max(1),
-            _ if rested => self.options.first_rounds.max(ROUNDS_YOUNG),
-            (1..=YOUNG, _) => ROUNDS_YOUNG,
-            _ if changed => ROUNDS_YOUNG,
-            (_, 0) => 1,
-            _ => 2,
-        };
         let of_slots = [work::of_slots(self.options.slots), 1, 1];
         for round in 0..rounds {
             if round > 0 {

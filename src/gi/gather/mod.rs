@@ -63,9 +63,12 @@ const STIR: u32 = 24;
 const HURRIED: f32 = 2.5;
 
 /// After the first frame entries get so many rays each for so many frames, and in a frame in which
-/// lights or objects change: light between surfaces has come round by then.
+/// lights or objects change: what cells average is then of other rays in each frame.
 const YOUNG: u32 = 8;
 const ROUNDS_YOUNG: u32 = 4;
+
+/// Rays of each entry in the first frame in which lights or objects change after a rest.
+const ROUNDS_RESTED: u32 = 8;
 
 /// Constants of the shaders as WGSL.
 pub fn prelude() -> String {

@@ -35,7 +35,7 @@ impl Default for Options {
             entry_frames: 8.0,
             slots: 1 << 15,
             entry_scale: 1.0 / 16.0,
-            first_rounds: 8,
+            first_rounds: 32,
             blur: true,
             even: false,
             caustics: true,

@@ -49,13 +49,15 @@ pub struct Params {
     pub cells: u32,
     pub rays: u32,
     pub since: u32,
+    pub last_round: u32,
+    pub pad: [u32; 3],
 }
 
 /// Uniform offsets are multiples of this under WebGPU's default limits.
 const STRIDE: u64 = 256;
 /// Rounds between two submissions that keep their own parameters: as many views as `InputGroup`
 /// allows, with a few first frames among them.
-const SLOTS: u32 = 128;
+const SLOTS: u32 = 512;
 
 pub(super) struct ParamsRing {
     buffer: wgpu::Buffer,
