@@ -29,12 +29,20 @@ struct Options {
 @group(0) @binding(11) var hdr: texture_2d<f32>;
 @group(1) @binding(0) var<uniform> options: Options;
 @group(1) @binding(1) var<storage, read_write> out: array<vec4f>;
+@group(2) @binding(0) var texture: texture_storage_2d<rgba16float, write>;
 
 @compute @workgroup_size(8, 8)
 fn layers(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.size.x || id.y >= options.rows { return; }
     let pixel = vec2u(id.x, id.y + options.first_row);
     out[id.y * frame.size.x + id.x] = decode(pixel);
+}
+
+// The same into a texture, for temporal anti-aliasing.
+@compute @workgroup_size(8, 8)
+fn layer_texture(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= frame.size) { return; }
+    textureStore(texture, id.xy, min(decode(id.xy), vec4f(65504.0)));
 }
 
 fn decode(pixel: vec2u) -> vec4f {

@@ -33,6 +33,9 @@ const HALF_MAX: f32 = 65504.0;
 // Frames in the mean: a half float counts to 2048; a moving picture loses sharpness with each
 // fetch.
 const MOST_STILL = 2000.0;
+// Frames of a still camera whose weight grows with their number, since methods that settle know
+// least of the light in the first; later ones count alike.
+const GROWING = 32.0;
 const MOST_MOVING = 10.0;
 // Width of the neighbourhood's box in standard deviations (Salvi 2016 has 1).
 const BOX = 1.25;
@@ -162,18 +165,21 @@ fn taa(@builtin(global_invocation_id) id: vec3u) {
     let here = around(centre);
     var mean = here.value;
     var count = 0.0;
+    var share = 1.0;
     if blend.mode.x == STILL {
         let old = textureLoad(history, pixel, 0);
         count = min(old.a, MOST_STILL);
         mean = old.rgb;
+        share = 1.0 / max(0.5 * (count + 2.0), count + 1.0 - 0.5 * (GROWING - 1.0));
     } else if blend.mode.x == MOVING {
         let there = before(pixel, centre);
         if all(there.place >= vec2f(0.0)) && all(there.place < vec2f(frame.size)) && was_seen(there) {
             count = min(textureLoad(history, vec2i(floor(there.place)), 0).a, MOST_MOVING);
             mean = held(here, fetch(there.place));
+            share = 1.0 / (count + 1.0);
         }
     }
-    mean = min(mix(mean, here.value, 1.0 / (count + 1.0)), vec3f(HALF_MAX));
+    mean = min(mix(mean, here.value, share), vec3f(HALF_MAX));
     let depth = textureLoad(depth_texture, centre, 0).x;
     var distance = 0.0;
     if depth > 0.0 { distance = linear_depth(frame, depth); }

@@ -55,7 +55,8 @@ pub struct Args {
     /// a cut (--gi-frames 1).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     samples: Option<u32>,
-    /// Real-time anti-aliasing over this many frames before the one that is written.
+    /// Real-time anti-aliasing over this many frames before the one that is written, or before the
+    /// first of a sequence, through which it goes on; layers of --aov are averaged as the picture is.
     #[arg(long, conflicts_with = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     taa: Option<u32>,
     /// Frames of a still camera up to the one that is written, for methods that settle (`gather`,
@@ -244,8 +245,8 @@ struct Raster<'a> {
     asked: &'static str,
     /// The method's answer settles over frames.
     settles: bool,
-    /// A frame of a sequence has been drawn: the next goes on from it, as in a viewer.
-    running: bool,
+    /// Frames of a sequence that have been drawn: the next goes on from them, as in a viewer.
+    drawn: u32,
 }
 
 impl<'a> Raster<'a> {
@@ -279,12 +280,12 @@ impl<'a> Raster<'a> {
         });
         let (scene, renderer) = (scene?, renderer?);
         let samples = args.samples();
-        Ok(Self { gpu, scene, renderer, layers, samples, weights, asked, settles, running: false })
+        Ok(Self { gpu, scene, renderer, layers, samples, weights, asked, settles, drawn: 0 })
     }
 
     /// Frames before the first sample: the method's and anti-aliasing's go on at once.
     fn warmup(&self, args: &Args) -> u32 {
-        if self.running {
+        if self.drawn > 0 {
             return 0;
         }
         let settle = if self.settles { args.gi_frames.unwrap_or(Method::SETTLED) - 1 } else { 0 };
@@ -301,7 +302,8 @@ impl<'a> Raster<'a> {
 
     fn picture(&mut self, args: &Args, camera: &Camera, step: &mut dyn FnMut()) -> Result<Drawn> {
         let warmup = self.warmup(args);
-        let options = CaptureOptions { samples: self.samples, seed: args.seed, layers: &self.layers, warmup };
+        let number = if args.taa.is_some() { self.drawn } else { 0 };
+        let options = CaptureOptions { samples: self.samples, seed: args.seed, layers: &self.layers, warmup, number };
         let frame = capture_with(self.gpu, &mut self.renderer, &self.scene, camera, options, &mut || {
             step();
             !interrupt::requested()
@@ -314,7 +316,7 @@ impl<'a> Raster<'a> {
         let layers = frame.layers.iter().map(layer).collect();
         let mut facts =
             vec![("Method".into(), self.renderer.drawn_by().into()), ("Weights".into(), self.weights.clone())];
-        if let Some(instead) = self.renderer.instead().filter(|_| !self.running) {
+        if let Some(instead) = self.renderer.instead().filter(|_| self.drawn == 0) {
             let why = self.scene.no_rays.as_deref().unwrap_or(instead.why);
             eprintln!("warning: `{}` cannot draw this, so `{}` did: {why}", self.asked, instead.method);
         }
@@ -345,7 +347,7 @@ fn film(
         let drawn = raster.picture(args, &camera, &mut || ())?;
         // The first frame's measure holds for all, so that a path does not flicker.
         stops = Some(showing.write(raster.gpu, &sequence::name(&args.output, number), &drawn, stops)?);
-        raster.running = true;
+        raster.drawn += 1;
         progress.step();
     }
     progress.finish();

@@ -11,11 +11,11 @@ use std::path::{Path, PathBuf};
 pub struct SequenceFlags {
     /// Camera path (JSON, as the viewer records it): draws a frame after the other; the output's
     /// name holds `{frame}` or `{frame:04}`.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "look_at", "camera", "reference", "taa"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "look_at", "camera", "reference"])]
     path: Option<PathBuf>,
     /// Which frames of the path or of --animation, from A to before B; all of a path when absent.
     /// The animation goes on from frame to frame.
-    #[arg(long, value_name = "A..B", conflicts_with_all = ["reference", "taa"], value_parser = parse_frames)]
+    #[arg(long, value_name = "A..B", conflicts_with = "reference", value_parser = parse_frames)]
     frames: Option<Range<u32>>,
     /// Seconds from one frame to the next, such as 1/24; 1/60 when absent.
     #[arg(long, value_name = "SECONDS", value_parser = parse_step)]

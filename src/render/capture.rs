@@ -1,9 +1,10 @@
 //! A finished picture in memory: N jittered frames averaged, with the layers that Blender's passes
 //! would hold.
 
+use super::decode::Decoder;
 use super::view::View;
-use super::{Purpose, RenderError, Renderer, sampling, tool};
-use crate::gpu::{Gpu, readback, timing::Recorder};
+use super::{Purpose, RenderError, Renderer, sampling};
+use crate::gpu::{Gpu, timing::Recorder};
 use crate::scene::Camera;
 use crate::scene::upload::SceneGpu;
 
@@ -96,7 +97,7 @@ impl Layer {
     /// The colour that is divided out after filtering, as Blender does it.
     fn divisor(self) -> Option<Sum> {
         match self {
-            Layer::DiffDir | Layer::DiffInd => Some(Sum { number: WEIGHT, ..Sum::of(Layer::DiffCol) }),
+            Layer::DiffDir | Layer::DiffInd => Some(Sum { number: WEIGHT, ..Sum::of(self) }),
             Layer::GlossDir | Layer::GlossInd => Some(Sum::of(Layer::GlossCol)),
             _ => None,
         }
@@ -131,11 +132,14 @@ pub struct CaptureOptions<'a> {
     pub layers: &'a [Layer],
     /// Frames drawn before the first sample, for temporal anti-aliasing and methods that settle.
     pub warmup: u32,
+    /// Number of the picture in a sequence under temporal anti-aliasing, whose frames' samples lie
+    /// at one place of the pixel after the other; 0 has its first through the pixels' centres.
+    pub number: u32,
 }
 
 impl Default for CaptureOptions<'_> {
     fn default() -> Self {
-        Self { samples: 1, seed: 0, layers: &[], warmup: 0 }
+        Self { samples: 1, seed: 0, layers: &[], warmup: 0, number: 0 }
     }
 }
 
@@ -177,7 +181,8 @@ impl CapturedFrame {
 }
 
 /// Draws `scene` as `camera` sees it at the renderer's size: sample 0 through the pixels' centres,
-/// the others spread by the filter, all with equal weight. Blocks until the picture is in memory.
+/// the others spread by the filter, all with equal weight. With temporal anti-aliasing filtered
+/// layers are means over frames as the picture is. Blocks until the picture is in memory.
 pub fn capture(
     gpu: &Gpu,
     renderer: &mut Renderer,
@@ -209,6 +214,7 @@ pub fn capture_with(
     let pixels = size[0] as usize * size[1] as usize;
     let mut beauty = vec![0.0; 4 * pixels];
     let mut sums: Vec<(Sum, Vec<f32>)> = needed.iter().map(|&s| (s, vec![0.0; s.channels * pixels])).collect();
+    renderer.average(needed.iter().filter(|s| s.filtered).map(|s| s.number));
     let decoder = Decoder::new(&gpu.device, renderer);
     let mut draw = |i: u32, offset: [f32; 2], purpose: Purpose| -> Result<(), RenderError> {
         let seed = options.seed.wrapping_mul(0x9e37_79b9).wrapping_add(i);
@@ -226,9 +232,13 @@ pub fn capture_with(
         }
     }
     for i in 0..options.samples {
-        let offset = sampling::offset_of(i, options.samples, options.seed);
+        let number = options.number + i;
+        let offset = match options.number {
+            0 => sampling::offset_of(i, options.samples, options.seed),
+            _ => sampling::offset(number, options.seed),
+        };
         let new = i == 0 && options.warmup == 0;
-        draw(i, offset, if new { Purpose::Picture } else { Purpose::FurtherSample })?;
+        draw(number, offset, if new { Purpose::Picture } else { Purpose::FurtherSample })?;
         decoder.add(gpu, size, 0, &mut beauty, 4)?;
         for (sum, data) in &mut sums {
             if i == 0 || sum.filtered {
@@ -267,88 +277,4 @@ fn checked(name: &str, picture: Picture) -> Result<Picture, RenderError> {
     let count = 1 + bad.count();
     let (x, y) = (first % picture.width, first / picture.width);
     Err(RenderError::NotFinite { layer: name.to_string(), count, x, y })
-}
-
-/// Largest band of rows that is decoded at once, bytes.
-const BAND: u64 = 64 << 20;
-
-/// Turns G-buffer texels into floats on the GPU and reads them back in bands of rows.
-struct Decoder {
-    pipeline: wgpu::ComputePipeline,
-    picture: wgpu::BindGroup,
-    output: wgpu::BindGroup,
-    options: wgpu::Buffer,
-    buffer: wgpu::Buffer,
-    rows: u32,
-}
-
-impl Decoder {
-    fn new(device: &wgpu::Device, renderer: &Renderer) -> Self {
-        use tool::*;
-        let t = renderer.targets();
-        let stage = wgpu::ShaderStages::COMPUTE;
-        let mut types = vec![UNIFORM, LOAD];
-        types.extend([LOAD; 10]);
-        let picture_layout = layout(device, "render.layers", stage, &types);
-        let output_layout = layout(device, "render.layers", stage, &[UNIFORM, READ_WRITE]);
-        let pipeline = compute(device, "render.layers", "layers", &[&picture_layout, &output_layout]);
-        let views = [
-            &t.depth,
-            &t.normal,
-            &t.albedo,
-            &t.specular,
-            &t.emissive,
-            &t.motion,
-            &t.direct_diffuse,
-            &t.direct_specular,
-            &t.indirect,
-            &t.indirect_specular,
-            &t.hdr,
-        ];
-        let mut resources = vec![renderer.frame().as_entire_binding()];
-        resources.extend(views.map(view));
-        let picture = group(device, "render.layers", &picture_layout, &resources);
-        let row = 16 * u64::from(t.size[0]);
-        let rows = (BAND / row).clamp(1, u64::from(t.size[1])) as u32;
-        let make = |size, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("render.layers"),
-                size,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
-        let options = make(16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
-        let buffer = make(row * u64::from(rows), wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
-        let resources = [options.as_entire_binding(), buffer.as_entire_binding()];
-        let output = group(device, "render.layers", &output_layout, &resources);
-        Self { pipeline, picture, output, options, buffer, rows }
-    }
-
-    /// Adds layer number `layer` of the frame just drawn to `sum`, which has `channels` values a
-    /// pixel.
-    fn add(&self, gpu: &Gpu, size: [u32; 2], layer: u32, sum: &mut [f32], channels: usize) -> Result<(), RenderError> {
-        let band = self.rows as usize * size[0] as usize * channels;
-        for (i, sum) in sum.chunks_mut(band).enumerate() {
-            let first = i as u32 * self.rows;
-            let rows = self.rows.min(size[1] - first);
-            gpu.queue.write_buffer(&self.options, 0, bytemuck::cast_slice(&[layer, first, rows, 0]));
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            Recorder::new(&mut encoder).compute("layers", |pass| {
-                pass.set_pipeline(&self.pipeline);
-                pass.set_bind_group(0, &self.picture, &[]);
-                pass.set_bind_group(1, &self.output, &[]);
-                tool::dispatch(pass, [size[0], rows]);
-            });
-            gpu.queue.submit([encoder.finish()]);
-            let bytes = u64::from(rows) * u64::from(size[0]) * 16;
-            let read = readback::buffer(&gpu.device, &gpu.queue, &self.buffer, 0, bytes)?;
-            for (sum, value) in sum.chunks_exact_mut(channels).zip(read.chunks_exact(16)) {
-                for (s, v) in sum.iter_mut().zip(value.chunks_exact(4)) {
-                    *s += f32::from_ne_bytes([v[0], v[1], v[2], v[3]]);
-                }
-            }
-        }
-        Ok(())
-    }
 }

@@ -16,7 +16,7 @@ use super::moved::Moved;
 use super::shadow::{ShadowMaps, ShadowOptions, ShadowPass};
 use super::shadow_maps::Audience;
 use super::taa::TaaPass;
-use super::targets::Targets;
+use super::targets::{Target, Targets};
 use super::view::{FrameUniform, View};
 use crate::gi::{
     self,
@@ -301,6 +301,19 @@ impl Renderer {
     /// Draw calls, triangles and shadow maps of the last frame.
     pub fn drawn(&self) -> DrawnCount {
         self.drawn
+    }
+
+    /// Layers of these numbers are averaged by temporal anti-aliasing from now on, where there is
+    /// any.
+    pub(super) fn average(&mut self, layers: impl Iterator<Item = u32>) {
+        if let Some(taa) = &mut self.taa {
+            taa.average(&self.device, &self.frame, &self.targets, layers);
+        }
+    }
+
+    /// Number and mean of each layer that is.
+    pub(super) fn averaged(&self) -> impl Iterator<Item = (u32, &Target)> {
+        self.taa.iter().flat_map(TaaPass::averaged)
     }
 
     /// The textures that [`Renderer::record`] fills.

@@ -4,6 +4,7 @@ pub mod blended;
 pub mod capture;
 pub mod composite;
 pub mod cull;
+mod decode;
 pub mod deform;
 pub mod direct;
 pub mod exposure;

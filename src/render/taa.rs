@@ -13,6 +13,7 @@
 //! the camera moves. What an object's distance was is guessed from where it is now, so one that
 //! comes or goes by more than a few percent of it in a frame starts anew.
 
+use super::decode::{LayerGroups, LayerWriter, PICTURE};
 use super::sampling;
 use super::targets::{Target, Targets};
 use super::tool;
@@ -65,6 +66,10 @@ pub struct TaaPass {
     layout: wgpu::BindGroupLayout,
     mode: wgpu::Buffer,
     textures: Option<Textures>,
+    /// What reads layers of the frame, where any are averaged.
+    writer: Option<LayerWriter>,
+    /// Numbers of these layers.
+    layers: Vec<u32>,
     last: Option<Last>,
     frames: u32,
 }
@@ -77,10 +82,20 @@ struct Last {
 }
 
 struct Textures {
-    /// The frame before anti-aliasing; composite writes it.
-    current: Target,
-    history: [Target; 2],
     distance: [Target; 2],
+    /// The picture's, then layers'.
+    means: Vec<Mean>,
+}
+
+/// Something that is averaged over frames.
+struct Mean {
+    /// [`PICTURE`], or a layer's number.
+    layer: u32,
+    /// The frame before anti-aliasing; composite writes the picture's.
+    current: Target,
+    /// The mean where it can be read, of a layer; the picture's is `hdr` of the targets.
+    shown: Option<(Target, LayerGroups)>,
+    history: [Target; 2],
     /// Group `i` reads history `i` and writes the other.
     groups: [wgpu::BindGroup; 2],
 }
@@ -103,29 +118,70 @@ impl TaaPass {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        Self { pipeline, layout, mode, textures: None, last: None, frames: 0 }
+        Self { pipeline, layout, mode, textures: None, writer: None, layers: Vec::new(), last: None, frames: 0 }
     }
 
     /// Makes the history's textures for `targets` and forgets what it held.
     pub fn fit(&mut self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets) {
-        use wgpu::TextureFormat::{R32Float, Rgba16Float};
         let stored = wgpu::TextureUsages::STORAGE_BINDING;
-        let make = |name, format| Target::new(device, name, targets.size, format, stored);
+        let make = |name| Target::new(device, name, targets.size, wgpu::TextureFormat::R32Float, stored);
+        let distance = ["taa.distance_a", "taa.distance_b"].map(make);
+        self.textures = Some(Textures { distance, means: Vec::new() });
+        self.add(device, frame, targets, PICTURE);
+        for layer in std::mem::take(&mut self.layers) {
+            self.add(device, frame, targets, layer);
+        }
+        self.cut();
+    }
+
+    /// From the next frame on the layers of these numbers are averaged as well, for
+    /// [`capture`](super::capture); those that already are go on.
+    pub(super) fn average(
+        &mut self,
+        device: &wgpu::Device,
+        frame: &wgpu::Buffer,
+        targets: &Targets,
+        layers: impl Iterator<Item = u32>,
+    ) {
+        for layer in layers {
+            if !self.layers.contains(&layer) {
+                self.add(device, frame, targets, layer);
+            }
+        }
+    }
+
+    fn add(&mut self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets, layer: u32) {
+        let Some(textures) = &mut self.textures else { return };
+        let (stored, half) = (wgpu::TextureUsages::STORAGE_BINDING, wgpu::TextureFormat::Rgba16Float);
+        let make = |name| Target::new(device, name, targets.size, half, stored);
+        // What blends is drawn into the picture.
         let drawn = stored | wgpu::TextureUsages::RENDER_ATTACHMENT;
-        let current = Target::new(device, "taa.current", targets.size, Rgba16Float, drawn);
-        let history = ["taa.history_a", "taa.history_b"].map(|name| make(name, Rgba16Float));
-        let distance = ["taa.distance_a", "taa.distance_b"].map(|name| make(name, R32Float));
+        let current = Target::new(device, "taa.current", targets.size, half, drawn);
+        // A new history is of no frames: its texels are 0.
+        let history = ["taa.history_a", "taa.history_b"].map(make);
+        let shown = (layer != PICTURE).then(|| {
+            self.layers.push(layer);
+            let writer = self.writer.get_or_insert_with(|| LayerWriter::new(device));
+            (make("taa.layer"), writer.bind(device, frame, targets, (layer, &current)))
+        });
+        let mean = shown.as_ref().map_or(&targets.hdr, |(mean, _)| mean);
+        let distance = &textures.distance;
         let groups = [0, 1].map(|i| {
             let read = [&targets.depth, &targets.motion, &current, &history[i], &distance[i]].map(tool::view);
-            let written = [&targets.hdr, &history[1 - i], &distance[1 - i]].map(tool::view);
+            let written = [mean, &history[1 - i], &distance[1 - i]].map(tool::view);
             let mut resources = vec![frame.as_entire_binding()];
             resources.extend(read);
             resources.push(self.mode.as_entire_binding());
             resources.extend(written);
             tool::group(device, "render.taa", &self.layout, &resources)
         });
-        self.textures = Some(Textures { current, history, distance, groups });
-        self.cut();
+        textures.means.push(Mean { layer, current, shown, history, groups });
+    }
+
+    /// Number and mean of each layer that is averaged.
+    pub(super) fn averaged(&self) -> impl Iterator<Item = (u32, &Target)> {
+        let means = self.textures.iter().flat_map(|t| &t.means);
+        means.filter_map(|m| m.shown.as_ref().map(|(mean, _)| (m.layer, mean)))
     }
 
     /// Where composite puts the frame before anti-aliasing.
@@ -133,7 +189,7 @@ impl TaaPass {
     /// # Panics
     /// Before [`fit`](Self::fit).
     pub fn current(&self) -> &Target {
-        &self.textures.as_ref().expect("fitted before it is bound").current
+        &self.textures.as_ref().expect("fitted before it is bound").means[0].current
     }
 
     /// The next frame has nothing to do with the last: a cut.
@@ -163,12 +219,16 @@ impl TaaPass {
             _ => Mode::Fresh,
         };
         queue.write_buffer(&self.mode, 0, bytemuck::bytes_of(&Blend::new(mode, view.jitter)));
-        let group = &textures.groups[self.frames as usize % 2];
-        recorder.compute("taa", |pass| {
-            pass.set_pipeline(&self.pipeline);
-            pass.set_bind_group(0, group, &[]);
-            tool::dispatch(pass, view.size);
-        });
+        for mean in &textures.means {
+            if let (Some((_, groups)), Some(writer)) = (&mean.shown, &self.writer) {
+                writer.record(recorder, groups, view.size);
+            }
+            recorder.compute("taa", |pass| {
+                pass.set_pipeline(&self.pipeline);
+                pass.set_bind_group(0, &mean.groups[self.frames as usize % 2], &[]);
+                tool::dispatch(pass, view.size);
+            });
+        }
         self.last = Some(Last { scene: scene.id, placement: scene.placement, view: *view });
         self.frames = self.frames.wrapping_add(1);
     }
@@ -176,6 +236,10 @@ impl TaaPass {
     /// Name and bytes of the history's textures.
     pub fn bytes(&self) -> Vec<(&'static str, u64)> {
         let Some(t) = &self.textures else { return Vec::new() };
-        [&t.current].into_iter().chain(&t.history).chain(&t.distance).map(|t| (t.name, t.bytes())).collect()
+        let means = t.means.iter().flat_map(|m| {
+            let shown = m.shown.iter().map(|(mean, _)| mean);
+            [&m.current].into_iter().chain(&m.history).chain(shown)
+        });
+        means.chain(&t.distance).map(|t| (t.name, t.bytes())).collect()
     }
 }

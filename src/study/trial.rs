@@ -330,7 +330,8 @@ impl<'a> Trial<'a> {
         warmup: u32,
         number: u32,
     ) -> Result<Shot, TrialError> {
-        let options = CaptureOptions { samples, seed: self.options.seed, layers: &self.options.layers, warmup };
+        let options =
+            CaptureOptions { samples, seed: self.options.seed, layers: &self.options.layers, warmup, number: 0 };
         let (mut done, all) = (0, f64::from(samples + warmup));
         let alone = all > 1.0;
         let frame = capture_with(self.gpu, renderer, &self.uploaded, camera, options, &mut || {
@@ -354,7 +355,7 @@ impl<'a> Trial<'a> {
     /// A frame whose layers nobody reads, but waited for: drivers let thousands of them pile up
     /// otherwise.
     fn draw(&self, renderer: &mut Renderer, camera: &Camera) -> Result<(), TrialError> {
-        let options = CaptureOptions { samples: 1, seed: self.options.seed, layers: &[], warmup: 0 };
+        let options = CaptureOptions { samples: 1, seed: self.options.seed, ..Default::default() };
         capture_with(self.gpu, renderer, &self.uploaded, camera, options, &mut || true)?;
         Ok(())
     }

@@ -99,7 +99,7 @@ impl<'a> Painter<'a> {
         uploaded.trace(device, queue, scene).expect("the fixture has rays");
         self.renderer.cut();
         let [warmup, samples] = self.effort.frames;
-        let options = CaptureOptions { samples, seed: 0, layers: &[], warmup };
+        let options = CaptureOptions { samples, warmup, ..Default::default() };
         let frame = capture(self.gpu, &mut self.renderer, &uploaded, &scene.cameras[0], options).expect("it draws");
         assert_eq!(self.renderer.drawn_by(), "gather");
         shown(&frame.beauty.data)

@@ -4,7 +4,7 @@
 use crate::{build, common, read_light};
 use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, timing::Recorder};
-use bouncelight::render::capture::{CaptureOptions, capture};
+use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::shadow::ShadowOptions;
 use bouncelight::render::{Renderer, RendererOptions, View, sampling};
 use bouncelight::scene::{self, Camera, Scene, upload::SceneGpu};
@@ -38,6 +38,14 @@ impl<'a> Stage<'a> {
         self.renderer.record(&mut recorder, &self.gpu.queue, &self.uploaded, &view).expect("the frame is drawn");
         self.gpu.queue.submit([encoder.finish()]);
         read_light(self.gpu, &self.renderer.targets().hdr.texture)
+    }
+
+    /// The layer of direct light through `camera`, as `options` say.
+    fn direct(&mut self, camera: &Camera, options: CaptureOptions<'_>) -> Rgb {
+        let options = CaptureOptions { layers: &[Layer::DiffDir], ..options };
+        let frame = capture(self.gpu, &mut self.renderer, &self.uploaded, camera, options).expect("drawn");
+        let layer = frame.layer(Layer::DiffDir).expect("asked for");
+        layer.data.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
     }
 
     /// The mean of many samples: what the picture should be.
@@ -155,6 +163,35 @@ fn a_slow_pan_beats_single_frames() {
     println!("error {:.5} against {:.5}; temporal {wobble:.5} against {wobble_without:.5}", with / 6.0, without / 6.0);
     assert!(count == 6 && with < 0.8 * without, "{with} {without}");
     assert!(wobble < 0.8 * wobble_without, "{wobble} {wobble_without}");
+}
+
+#[test]
+fn layers_are_averaged_as_the_picture_is() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, camera) = room();
+    let mut on = Stage::new(&gpu, &scene, Method::Direct, true);
+    let mut off = Stage::new(&gpu, &scene, Method::Direct, false);
+    let truth = off.direct(&camera, CaptureOptions { samples: 100, ..Default::default() });
+    let single = mean(&off.direct(&camera, CaptureOptions::default()), &truth);
+    let rest = mean(&on.direct(&camera, CaptureOptions { warmup: 99, ..Default::default() }), &truth);
+    println!("at rest {rest:.5} from the filtered layer; one frame {single:.5}");
+    // The control is the single frame.
+    assert!(rest < 0.25 * single, "{rest} {single}");
+
+    // A third of a pixel a frame, on from there.
+    let step = 0.33 * 2.0 * (camera.yfov * 0.5).tan() / SIZE[1] as f32;
+    let (mut with, mut without) = (0.0, 0.0);
+    for i in 1..21 {
+        let camera = turned(&camera, step * i as f32);
+        let moving = on.direct(&camera, CaptureOptions { number: i, ..Default::default() });
+        if i > 14 {
+            let truth = off.direct(&camera, CaptureOptions { samples: 12, ..Default::default() });
+            with += mean(&moving, &truth);
+            without += mean(&off.direct(&camera, CaptureOptions::default()), &truth);
+        }
+    }
+    println!("in a pan {:.5}; single frames {:.5}", with / 6.0, without / 6.0);
+    assert!(with < 0.8 * without, "{with} {without}");
 }
 
 #[test]
