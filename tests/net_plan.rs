@@ -390,3 +390,21 @@ proptest! {
         prop_assert_eq!(output.shape.channels, whole.channels);
     }
 }
+
+#[test]
+fn the_shipped_filter_is_projected_within_a_millisecond() {
+    use bouncelight::study::projection::{Cost, EFFICIENCY, GTX_1050, total_ms};
+    let weights = Weights::shipped().expect("it is whole");
+    let ms = |precision, packed_input| {
+        let options = Options { precision, packed_input, ..Options::default() };
+        let plan = Plan::with(&weights.graph, 256, 128, &options).expect("it fits");
+        let cost = |s: &Step| Cost::new(&s.name, s.flops as f64, s.traffic as f64);
+        total_ms(&plan.steps.iter().map(cost).collect::<Vec<_>>(), &GTX_1050, EFFICIENCY)
+    };
+    let [full, half, packed] = [(Precision::F32, false), (Precision::F16, false), (Precision::F16, true)]
+        .map(|(precision, packed)| ms(precision, packed));
+    println!("{full:.3} ms in 32 bits, {half:.3} in 16 with an input of 32, {packed:.3} with one of 16");
+    assert!(packed < 1.0, "{packed}");
+    // Negative control: what it takes as other networks run.
+    assert!(full > 1.1 && half > packed, "{full} {half}");
+}

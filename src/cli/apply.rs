@@ -92,7 +92,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> Result<Tensor> {
     let dropout = args.dropout;
     let slow = |reason: &dyn std::fmt::Display| {
-        if global.precision == PrecisionName::F16 {
+        if global.precision == Some(PrecisionName::F16) {
             return Err(usage(format!(
                 "{reason}; and without a GPU networks run in 32 bits only: leave --precision out"
             )));
@@ -108,7 +108,7 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
         Err(e) if global.adapter.is_some() => return Err(e),
         Err(e) => return slow(&e),
     };
-    let options = Options { dropout, precision: global.precision.precision(), ..Default::default() };
+    let options = Options { dropout, precision: global.precision().unwrap_or_default(), ..Default::default() };
     let size = [input.shape.width, input.shape.height];
     let tuned = super::tuned::of(&gpu.device, global.quiet);
     let setup = Setup { options, tuned, ..Setup::default() };

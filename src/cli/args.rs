@@ -5,7 +5,7 @@ pub use crate::gi::name::MethodName;
 use crate::{
     gi::{Method, pass::Neural},
     gpu::{Backend, Gpu, GpuOptions},
-    net::format::Weights,
+    net::{format::Weights, plan::Precision},
     scene::{
         LoadOptions,
         units::{Units, Up},
@@ -28,9 +28,10 @@ pub struct Global {
     /// Graphics API.
     #[arg(long, global = true, value_enum, default_value = "auto")]
     pub backend: BackendName,
-    /// How a network's numbers are stored on the GPU.
-    #[arg(long, global = true, value_enum, default_value = "f32")]
-    pub precision: PrecisionName,
+    /// How a network's numbers are stored on the GPU; when absent 16 bits for networks that filter
+    /// light, 32 for others.
+    #[arg(long, global = true, value_enum)]
+    pub precision: Option<PrecisionName>,
     /// Only errors.
     #[arg(short, long, global = true)]
     pub quiet: bool,
@@ -84,10 +85,10 @@ pub enum PrecisionName {
 
 impl PrecisionName {
     /// As the runtime knows it.
-    pub fn precision(self) -> crate::net::plan::Precision {
+    pub fn precision(self) -> Precision {
         match self {
-            PrecisionName::F32 => crate::net::plan::Precision::F32,
-            PrecisionName::F16 => crate::net::plan::Precision::F16,
+            PrecisionName::F32 => Precision::F32,
+            PrecisionName::F16 => Precision::F16,
         }
     }
 }
@@ -125,6 +126,11 @@ pub enum ProgressKind {
 }
 
 impl Global {
+    /// How networks store their numbers, where it is said.
+    pub fn precision(&self) -> Option<Precision> {
+        self.precision.map(PrecisionName::precision)
+    }
+
     /// What a scene file may do.
     pub fn load_options(&self) -> LoadOptions {
         let up = if self.up == UpName::Y { Up::Y } else { Up::Z };
@@ -205,8 +211,7 @@ impl MethodName {
         match (self.plain(), self) {
             (Some(method), _) => Ok(method),
             (None, MethodName::Neural) => {
-                let mut neural = Neural::from(load_weights(weights)?);
-                neural.network.precision = global.precision.precision();
+                let neural = Neural::from(load_weights(weights)?).stored(global.precision());
                 Ok(Method::Neural(Box::new(neural)))
             }
             (None, _) => Err(usage(format!("`{}` is no real-time method", self.name()))),

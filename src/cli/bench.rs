@@ -111,7 +111,7 @@ struct Record {
     software: bool,
     /// How the network's numbers are stored.
     #[serde(default)]
-    precision: PrecisionName,
+    precision: Option<PrecisionName>,
     frames: u32,
     warmup: u32,
     methods: Vec<Measurement>,
@@ -150,8 +150,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
             Some(fitted) => fitted.method()?,
             None => name.method(global, args.weights.as_ref())?,
         };
-        if let Method::Neural(neural) = &mut method {
-            neural.network.precision = global.precision.precision();
+        if let (Method::Neural(neural), Some(precision)) = (&mut method, global.precision()) {
+            neural.network.precision = precision;
         }
         methods.push(super::tuned::tuned(method, &gpu, global.quiet));
     }

@@ -246,8 +246,7 @@ fn options(global: &Global, gpu: &Gpu, args: &Args) -> Result<FitOptions> {
     }
     let tuned = super::tuned::of(&gpu.device, global.quiet);
     let network = |(file, weights): (PathBuf, Weights)| {
-        let mut neural = Neural::from(weights);
-        neural.network.precision = global.precision.precision();
+        let mut neural = Neural::from(weights).stored(global.precision());
         neural.tuned = tuned.clone();
         Network { file, neural }
     };

@@ -13,7 +13,7 @@ use anyhow::Result;
 /// Times the layers for a picture of `size`.
 pub fn measure(global: &Global, gpu: &Gpu, weights: &Weights, size: [u32; 2]) -> Result<Layers> {
     let tuned = super::tuned::of(&gpu.device, global.quiet);
-    let options = Options { precision: global.precision.precision(), ..Options::default() };
+    let options = Options { precision: global.precision().unwrap_or_default(), ..Options::default() };
     let peak = peak::measure(&gpu.device, &gpu.queue);
     Ok(layers::measure(gpu, weights, cells_of(size), options, tuned, peak)?)
 }

@@ -112,8 +112,8 @@ pub fn main() -> ExitCode {
         crate::gpu::shaders::read_from(Some(folder.clone()));
     }
     let done = match cli.command {
-        command if cli.global.precision != args::PrecisionName::F32 && !command.runs_network() => {
-            Err(args::usage("--precision f16 is for networks, and none runs here; leave it out".into()))
+        command if cli.global.precision.is_some() && !command.runs_network() => {
+            Err(args::usage("--precision is for networks, and none runs here; leave it out".into()))
         }
         #[cfg(feature = "viewer")]
         Command::View(a) => view::run(&cli.global, a),

@@ -56,7 +56,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         captures: args.captures,
         gpu: global.gpu_options(),
         textures: global.textures(),
-        precision: global.precision.precision(),
+        precision: global.precision(),
         tuned: Some(|device| super::tuned::of(device, true)),
     };
     Ok(viewer::run(options)?)

@@ -1,6 +1,7 @@
 //! What is written in front of shaders.
 
 use super::neural::features::FeatureSet;
+use crate::net::plan::Precision;
 
 /// Each shader of `gi/` that needs a prelude, with examples of it, for the validation of every
 /// permutation.
@@ -22,7 +23,8 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.mirror", super::gather::prelude()),
         ("gi.recall", super::gather::prelude()),
         ("gi.settle", super::gather::prelude()),
-        ("gi.features", super::gather::prelude()),
+        ("gi.features", super::neural::memory::prelude(Precision::F32)),
+        ("gi.features", super::neural::memory::prelude(Precision::F16)),
         ("gi.blur", super::gather::prelude()),
         ("gi.smooth", super::gather::prelude()),
         ("gi.check", super::world::prelude()),

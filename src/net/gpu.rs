@@ -58,8 +58,11 @@ pub enum NetError {
 pub struct Options {
     /// Convolution kernels.
     pub variant: Variant,
-    /// Storage of weights and tensors. With [`Precision::F16`] input and output stay in 32 bits.
+    /// Storage of weights and tensors. With [`Precision::F16`] the output stays in 32 bits and, unless
+    /// it is packed, the input.
     pub precision: Precision,
+    /// The caller writes the input in that precision, too: four halves a vector.
+    pub packed_input: bool,
     /// Seed of dropout; off without one.
     pub dropout: Option<u32>,
     /// Operators are fused; off for tests that compare.
@@ -68,7 +71,13 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { variant: Variant::default(), precision: Precision::default(), dropout: None, fuse: true }
+        Self {
+            variant: Variant::default(),
+            precision: Precision::default(),
+            packed_input: false,
+            dropout: None,
+            fuse: true,
+        }
     }
 }
 
@@ -89,7 +98,7 @@ impl From<Options> for Setup {
     }
 }
 
-/// One tensor on the GPU: NHWC f32, channels padded to a multiple of four.
+/// One tensor on the GPU: NHWC, channels padded to a multiple of four; f32 but for a packed input.
 #[derive(Debug, Clone, Copy)]
 pub struct Binding<'a> {
     /// The arena (usage STORAGE, COPY_SRC, COPY_DST).

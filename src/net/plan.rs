@@ -102,7 +102,7 @@ impl Plan {
         };
         let mut builder =
             Builder { graph, shapes: &shapes, plan, index: HashMap::new(), inside: Vec::new(), measure: options.fuse };
-        builder.begin();
+        builder.begin(options.packed_input);
         let nodes = fuse::nodes(graph, &shapes, options);
         for node in &nodes {
             builder.add(node, &nodes);
@@ -197,12 +197,12 @@ impl<'a> Builder<'a> {
     }
 
     /// The input, and the picture fitted to the size and the precision at which the graph runs.
-    fn begin(&mut self) {
+    fn begin(&mut self, packed: bool) {
         let Plan { width, height, inner, precision, .. } = self.plan;
         let shape = Shape { channels: self.graph.input_channels, width, height };
-        let mut at = self.tensor(INPUT, shape, true);
+        let mut at = self.tensor(INPUT, shape, !packed);
         (self.plan.tensors[at].first, self.plan.tensors[at].last) = (0, 0);
-        if inner != [width, height] || precision == Precision::F16 {
+        if inner != [width, height] || (precision == Precision::F16 && !packed) {
             let fitted = self.tensor("input.fitted", Shape { width: inner[0], height: inner[1], ..shape }, false);
             self.push(self.step("fit", None, WINDOW, at, fitted));
             at = fitted;
@@ -212,10 +212,10 @@ impl<'a> Builder<'a> {
 
     /// The output, cropped and in f32.
     fn end(&mut self) {
-        let Plan { width, height, inner, precision, .. } = self.plan;
+        let Plan { width, height, inner, .. } = self.plan;
         // `check` has seen that an operator writes the output, and fusion keeps it.
         let mut at = self.index[self.graph.output.as_str()];
-        if inner != [width, height] || precision == Precision::F16 {
+        if inner != [width, height] || !self.plan.tensors[at].full {
             let shape = self.plan.tensors[at].shape;
             let kept = Shape {
                 width: Graph::cropped(shape.width, width, inner[0]),
@@ -264,7 +264,12 @@ impl<'a> Builder<'a> {
             && node.output != self.graph.output
             && readers.next().is_some_and(|n| n.work == Work::Affine && n.skip.is_none())
             && readers.next().is_none();
-        let output = self.output(last, shape, unrounded);
+        // What is handed over in f32 as it is need not be copied into it.
+        let handed = node.is_conv()
+            && node.output == self.graph.output
+            && self.plan.inner == [self.plan.width, self.plan.height]
+            && !nodes.iter().any(|n| n.inputs.iter().chain(&n.skip).any(|t| *t == node.output));
+        let output = self.output(last, shape, unrounded || handed);
         let step = self.step(name, Some(node.op), kind, inputs[0], output);
         self.push(Step {
             second: measured,

@@ -17,6 +17,7 @@ use crate::{
         memory::{CHANNELS, FeaturesPass, PITCH},
     },
     gpu::{Gpu, bind::Bound, readback, timing::Recorder},
+    net::plan::Precision,
     numbers::SplitMix,
     render::{Purpose, Renderer, View},
     scene::{Camera, upload::SceneGpu},
@@ -205,7 +206,8 @@ impl Reader {
     /// Compiles the shaders.
     pub fn new(device: &wgpu::Device) -> Self {
         let inputs = InputGroup::new(device);
-        let (exposure, features) = (ExposurePass::new(device, &inputs), FeaturesPass::new(device, &inputs));
+        let (exposure, features) =
+            (ExposurePass::new(device, &inputs), FeaturesPass::new(device, &inputs, Precision::F32));
         Self { inputs, exposure, features }
     }
 

@@ -2,6 +2,7 @@
 
 use super::choice::Source;
 use super::state::State;
+use crate::net::plan::Precision;
 use crate::render::Backdrop;
 use crate::scene::{units::Up, upload::TextureMemory};
 
@@ -46,8 +47,8 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     if let (Source::Ambient | Source::Ssgi, Some(numbers)) = (s.left, &state.unseen) {
         flag("unseen", numbers.clone());
     }
-    if s.left == Source::Neural && state.half {
-        flag("precision", "f16".into());
+    if let (Source::Neural, Some(precision)) = (s.left, state.precision) {
+        flag("precision", if precision == Precision::F16 { "f16" } else { "f32" }.into());
     }
     if state.units.scale != 1.0 {
         flag("scale", state.units.scale.to_string());

@@ -204,7 +204,8 @@ pub fn rays(handles: &Handles, stamp: u64, scene: &Scene, progress: &Progress) -
 /// How networks are run, and rays.
 #[derive(Debug, Clone, Default)]
 pub struct Network {
-    pub precision: Precision,
+    /// How they store their numbers; `None`: each as it is best.
+    pub precision: Option<Precision>,
     pub tuned: Arc<Tuned>,
     /// Numbers of `gather` that were fitted to the scene.
     pub gather: gather::Options,
@@ -221,8 +222,7 @@ fn method(source: Source, weights: Option<&Path>, network: &Network) -> Result<M
         Source::Gather => Method::Gather(network.gather),
         Source::Neural => {
             let weights = Weights::find(weights).map_err(|e| e.to_string())?;
-            let mut neural = Neural::from(weights);
-            neural.network.precision = network.precision;
+            let mut neural = Neural::from(weights).stored(network.precision);
             neural.tuned = network.tuned.clone();
             Method::Neural(Box::new(neural))
         }

@@ -71,8 +71,8 @@ pub struct Options {
     pub gpu: GpuOptions,
     /// How textures lie in the device's memory.
     pub textures: crate::scene::upload::TextureMemory,
-    /// How networks store their numbers.
-    pub precision: Precision,
+    /// How networks store their numbers; `None`: each as it is best.
+    pub precision: Option<Precision>,
     /// What a tuner has found on a device, if somebody knows.
     pub tuned: Option<fn(&wgpu::Device) -> Arc<Tuned>>,
 }

@@ -71,7 +71,8 @@ fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usiz
     assert!(faults.is_empty(), "{options:?}\n{}", faults.join("\n"));
 }
 
-const FULL: Options = Options { variant: Variant::Auto, precision: Precision::F32, dropout: None, fuse: true };
+const FULL: Options =
+    Options { variant: Variant::Auto, precision: Precision::F32, packed_input: false, dropout: None, fuse: true };
 
 /// Each kind of weights with each width. Uniform weights do not exist in 16 bits: storage takes
 /// their place.

@@ -57,7 +57,8 @@ fn check_generators(ways: &[Options]) {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-const HALF: Options = Options { variant: Variant::Auto, precision: Precision::F16, dropout: None, fuse: true };
+const HALF: Options =
+    Options { variant: Variant::Auto, precision: Precision::F16, packed_input: false, dropout: None, fuse: true };
 
 #[test]
 fn the_generators_agree_with_pytorch() {

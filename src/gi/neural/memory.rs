@@ -6,6 +6,7 @@ use crate::gi::stage::inputs::{BoundInputs, InputGroup};
 use crate::gpu::bind::{self, Binder, Bound};
 use crate::gpu::binding::{READ, READ_WRITE};
 use crate::gpu::{shaders, timing::Recorder};
+use crate::net::plan::Precision;
 
 /// Table `cells` v1: (name, channels), in channel order. s and m (e^ln_m) are
 /// [`Exposure`](crate::gi::stage::exposure::Exposure)'s, L the luminance of the cell's mean light.
@@ -43,6 +44,12 @@ pub const CHANNELS: u32 = 15;
 /// Channels as they lie in the buffer: whole vectors.
 pub const PITCH: u32 = CHANNELS.next_multiple_of(4);
 
+/// Constants of the shader as WGSL.
+pub fn prelude(precision: Precision) -> String {
+    let half = precision == Precision::F16;
+    format!("{}const HALF_TABLE = {half};\n", crate::gi::gather::prelude())
+}
+
 /// The pass `gi.features`.
 pub struct FeaturesPass {
     pipeline: wgpu::ComputePipeline,
@@ -50,15 +57,16 @@ pub struct FeaturesPass {
 }
 
 impl FeaturesPass {
-    /// Compiles the shader; `inputs` gives the layout of group 0.
-    pub fn new(device: &wgpu::Device, inputs: &InputGroup) -> Self {
+    /// Compiles the shader; `inputs` gives the layout of group 0. The table is of numbers stored as
+    /// `precision` says.
+    pub fn new(device: &wgpu::Device, inputs: &InputGroup, precision: Precision) -> Self {
         let binder = Binder::new(device, "gi.features", &[READ, READ, READ_WRITE]);
-        let module = shaders::module_with(device, "gi.features", &crate::gi::gather::prelude());
+        let module = shaders::module_with(device, "gi.features", &prelude(precision));
         let layouts = [inputs.layout(), binder.layout()];
         Self { pipeline: bind::pipeline(device, "gi.features", &module, "features", &layouts), binder }
     }
 
-    /// Records the pass into `target` (f32, [`PITCH`] numbers a cell, row by row); `pasts` is what
+    /// Records the pass into `target` ([`PITCH`] numbers a cell, row by row); `pasts` is what
     /// cells remember, and the exposure must have been recorded before.
     pub fn record(
         &mut self,

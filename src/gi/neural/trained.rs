@@ -7,6 +7,7 @@ use crate::gi::interface::GiError;
 use crate::gi::stage::inputs::CELL;
 use crate::net::format::Weights;
 use crate::net::gpu::{self, Tuned};
+use crate::net::plan::Precision;
 use std::sync::Arc;
 
 /// What the output of a network that filters means, in weights files.
@@ -41,7 +42,18 @@ pub struct Neural {
 
 impl From<Weights> for Neural {
     fn from(weights: Weights) -> Self {
-        Self { weights, network: gpu::Options::default(), tuned: Arc::default(), gather: gather::Options::default() }
+        // What a filter's answer is worth ends long before halves do; its layers wait for memory.
+        let precision = if is_filter(&weights) { Precision::F16 } else { Precision::F32 };
+        let network = gpu::Options { precision, ..gpu::Options::default() };
+        Self { weights, network, tuned: Arc::default(), gather: gather::Options::default() }
+    }
+}
+
+impl Neural {
+    /// The same with its numbers stored as `precision` says, where it says something.
+    pub fn stored(mut self, precision: Option<Precision>) -> Self {
+        self.network.precision = precision.unwrap_or(self.network.precision);
+        self
     }
 }
 

@@ -97,6 +97,7 @@ pub(super) fn plan(device: &wgpu::Device, graph: &Graph, size: [u32; 2], options
     let limits = device.limits();
     let options = plan::Options {
         precision: options.precision,
+        packed_input: options.packed_input,
         dropout: options.dropout.is_some(),
         fuse: options.fuse,
         limit: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),

@@ -8,8 +8,8 @@ pub enum Precision {
     /// 32 bits.
     #[default]
     F32,
-    /// Weights and the tensors between the operators in 16 bits; input, output and the norms'
-    /// statistics in 32.
+    /// Weights and the tensors between the operators in 16 bits; output, the norms' statistics and,
+    /// unless it is packed, the input in 32.
     F16,
 }
 
@@ -18,6 +18,8 @@ pub enum Precision {
 pub struct Options {
     /// Storage.
     pub precision: Precision,
+    /// The caller writes the input in that precision, too.
+    pub packed_input: bool,
     /// Dropout is on.
     pub dropout: bool,
     /// Operators are fused and concatenations are slices of one tensor. Off for tests that compare.
@@ -28,7 +30,13 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { precision: Precision::default(), dropout: false, fuse: true, limit: super::MAX_ARENA }
+        Self {
+            precision: Precision::default(),
+            packed_input: false,
+            dropout: false,
+            fuse: true,
+            limit: super::MAX_ARENA,
+        }
     }
 }
 

@@ -54,7 +54,7 @@ impl App {
         let tuned = self.options.tuned.map(|of| of(&gpu.device)).unwrap_or_default();
         let precision = self.options.precision;
         self.network = jobs::Network { precision, tuned, ..self.network.clone() };
-        self.state.half = self.options.precision == crate::net::plan::Precision::F16;
+        self.state.precision = precision;
         self.state.lines(gpu.device.features().contains(wires::NEEDS));
         self.stage = Some(Stage::new(gpu, screen.format(), self.options.textures));
         self.screen = Some(screen);

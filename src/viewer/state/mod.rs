@@ -9,6 +9,7 @@ use super::choice::{Side, Source, View};
 use super::film::{self, Film, Recording};
 use super::navigate::{Navigator, Preset};
 use super::saved::Settings;
+use crate::net::plan::Precision;
 use crate::render::{Backdrop, tonemap_curve::Tonemap};
 use crate::scene::{Environment, Light, Scene, look::FRAMING, path::CameraPath, units::Units, upload::TextureMemory};
 pub use action::{Action, Request};
@@ -82,8 +83,8 @@ pub struct State {
     /// Width by height of the picture, pixels.
     pub size: [u32; 2],
     pub preset: Option<Preset>,
-    /// Networks store their numbers in 16 bits.
-    pub half: bool,
+    /// How networks store their numbers, where somebody has said.
+    pub precision: Option<Precision>,
     /// The device draws no lines, and so no wireframes.
     pub no_lines: bool,
     /// How textures lie in the device's memory.
