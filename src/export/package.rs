@@ -13,7 +13,7 @@ use std::path::Path;
 /// `camera` is what the view decides, the others are counters.
 const HOST: [(&str, &[&str]); 2] = [
     ("Params", &["unproject", "depth", "gravity_from_view", "gravity_from_world", "world_from_view", "eye"]),
-    ("Gather", &["eye", "frame", "round"]),
+    ("Gather", &["eye", "frame", "round", "last_round"]),
 ];
 
 /// Uniform offsets are multiples of this under WebGPU's default limits.
@@ -244,8 +244,10 @@ impl Packing<'_> {
                             return Err(ExportError::Recording { pass: name.to_owned(), reason });
                         }
                         "frame" => Value::Host("frame".to_owned()),
-                        "round" if round(bytes) == first => Value::Host("round".to_owned()),
-                        "round" => Value::Host(format!("round + {}", round(bytes) - first)),
+                        name @ ("round" | "last_round") => match number(bytes, layout, name) - first {
+                            0 => Value::Host("round".to_owned()),
+                            more => Value::Host(format!("round + {more}")),
+                        },
                         other if changing.contains(&other) => Value::Host(format!("camera.{other}")),
                         _ => value(&bytes[member.offset as usize..], &member.kind),
                     };
