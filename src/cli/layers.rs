@@ -2,10 +2,9 @@
 
 use super::args::Global;
 use super::stdout::say;
-use crate::gi::inputs::cells_of;
+use crate::gi::{inputs::cells_of, pass::Neural};
 use crate::gpu::Gpu;
 use crate::net::format::Weights;
-use crate::net::gpu::Options;
 use crate::net::peak;
 use crate::study::layers::{self, Layers};
 use anyhow::Result;
@@ -13,7 +12,8 @@ use anyhow::Result;
 /// Times the layers for a picture of `size`.
 pub fn measure(global: &Global, gpu: &Gpu, weights: &Weights, size: [u32; 2]) -> Result<Layers> {
     let tuned = super::tuned::of(&gpu.device, global.quiet);
-    let options = Options { precision: global.precision().unwrap_or_default(), ..Options::default() };
+    // As a frame runs it.
+    let options = Neural::from(weights.clone()).stored(global.precision()).network;
     let peak = peak::measure(&gpu.device, &gpu.queue);
     Ok(layers::measure(gpu, weights, cells_of(size), options, tuned, peak)?)
 }

@@ -2,11 +2,11 @@
 
 use super::args::Global;
 use super::stdout::say;
-use crate::gi::Method;
+use crate::gi::{Method, pass::Neural};
 use crate::gpu::Gpu;
 use crate::image_io;
 use crate::net::format::Weights;
-use crate::net::gpu::{Options, Tuned};
+use crate::net::gpu::Tuned;
 use crate::net::tune::{self, Cache, MAX_TEXT};
 use anyhow::{Context, Result};
 use std::io::Read;
@@ -66,15 +66,10 @@ pub fn tuned(mut method: Method, gpu: &Gpu, quiet: bool) -> Method {
 }
 
 /// `weights tune`.
-pub fn run(
-    global: &Global,
-    file: &Path,
-    size: [u32; 2],
-    options: Options,
-    cache: Option<PathBuf>,
-    again: bool,
-) -> Result<()> {
+pub fn run(global: &Global, file: &Path, size: [u32; 2], cache: Option<PathBuf>, again: bool) -> Result<()> {
     let weights = Weights::load(file)?;
+    // As a frame runs it.
+    let options = Neural::from(weights.clone()).stored(global.precision()).network;
     let path = cache.or_else(path).context("there is no cache folder here; name a file with --cache")?;
     let mut cache = load(&path, global.quiet);
     let gpu = global.open_gpu()?;

@@ -117,9 +117,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         Command::Info { file, size } => info(&Weights::find(Some(&file))?, size)?,
         Command::Convert(args) => convert_file(&args)?,
         Command::Tune { file, size, cache, again } => {
-            let options =
-                crate::net::gpu::Options { precision: global.precision().unwrap_or_default(), ..Default::default() };
-            super::tuned::run(global, &file, size, options, cache, again)?;
+            super::tuned::run(global, &file, size, cache, again)?;
         }
     }
     Ok(())

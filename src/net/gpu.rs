@@ -81,6 +81,13 @@ impl Default for Options {
     }
 }
 
+impl Options {
+    /// How the caller writes the input.
+    pub fn input_precision(&self) -> Precision {
+        if self.packed_input { self.precision } else { Precision::F32 }
+    }
+}
+
 /// What a network is built with.
 #[derive(Clone, Default)]
 pub struct Setup {

@@ -19,7 +19,7 @@ use crate::gi::stage::inputs::{InputGroup, cells_of};
 use crate::gpu::bind::Bound;
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
-use crate::net::gpu::{self, Binding, Network, Setup, Tap};
+use crate::net::gpu::{Binding, Network, Setup, Tap};
 use crate::net::plan::Plan;
 
 /// Numbers of a cell: two places in spaces of four dimensions; trust, tolerance, and two that are
@@ -53,7 +53,7 @@ impl FilterGi {
         let gather = GatherGi::new(device, size, neural.gather);
         Ok(Self {
             exposure: ExposurePass::new(device, &inputs),
-            features: FeaturesPass::new(device, &inputs, neural.network.precision),
+            features: FeaturesPass::new(device, &inputs, neural.network.input_precision()),
             network: network(device, queue, neural, size)?,
             device: device.clone(),
             queue: queue.clone(),
@@ -80,8 +80,7 @@ impl FilterGi {
 /// The tensors for pictures of `size` pixels.
 fn network(device: &wgpu::Device, queue: &wgpu::Queue, neural: &Neural, size: [u32; 2]) -> Result<Network, GiError> {
     let cells = cells_of(size);
-    let options = gpu::Options { packed_input: true, ..neural.network };
-    let setup = Setup { options, tuned: neural.tuned.clone(), ..Setup::default() };
+    let setup = Setup { options: neural.network, tuned: neural.tuned.clone(), ..Setup::default() };
     Network::new(device, queue, &neural.weights, cells, setup)
         .map_err(|e| GiError::Network { cells, source: Box::new(e) })
 }

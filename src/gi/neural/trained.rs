@@ -43,8 +43,9 @@ pub struct Neural {
 impl From<Weights> for Neural {
     fn from(weights: Weights) -> Self {
         // What a filter's answer is worth ends long before halves do; its layers wait for memory.
-        let precision = if is_filter(&weights) { Precision::F16 } else { Precision::F32 };
-        let network = gpu::Options { precision, ..gpu::Options::default() };
+        let packed_input = is_filter(&weights);
+        let precision = if packed_input { Precision::F16 } else { Precision::F32 };
+        let network = gpu::Options { precision, packed_input, ..gpu::Options::default() };
         Self { weights, network, tuned: Arc::default(), gather: gather::Options::default() }
     }
 }
