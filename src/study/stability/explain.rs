@@ -39,28 +39,9 @@ pub fn why(test: &str, subject: &str) -> Option<&'static str> {
              sharp, and the mirrored \
              wall is not (docs/gi.md: \"mirrors\" stands among what it cannot do)"
         }
-        ("red-wall", "neural") => {
-            "the network's rest is a share of the picture's exposure, and both change when the wall leaves the \
-             picture: with the rest \
-             set to 0 red over green changes by 1.4 %, with it by 4.7 %"
-        }
-        ("furnace", "neural") => {
-            "the network's gain moves what `gather` has right within 1 % (with its rest set to 0 the error is the \
-             same 4 and 7 %): it has \
-             learnt from rooms with lamps and sun, where no wall glows"
-        }
-        ("corner", "neural") => {
-            "the network takes away what `gather` has found in the dark end: it has learnt from rooms that a lamp or \
-             the sun reaches"
-        }
-        ("saturated", "neural") => {
-            "the network's rest is a share of the frame's exposure in each channel, whatever colour the light has: \
-             docs/gi.md, E/π = \
-             C·exp(g) + s·r; `gather` alone is exact"
-        }
-        ("sealed" | "thin-wall", "neural") => {
-            "the network's rest r is a share of the frame's exposure, which counts the sky outside: it lights rooms \
-             that have no light"
+        ("disocclusion", "gather" | "neural") => {
+            "what an object uncovers has four rays a cell in its first frame, averaged over 5×5 cells: their noise. More \
+             rays of entries there (8, 16, 32) change nothing"
         }
         ("repeat", "paper") => "dropout stays on as published: each frame draws another half of the channels",
         ("crop" | "red-wall", "paper") => {

@@ -168,12 +168,13 @@ pub static DISOCCLUSION: Test = Test {
         let mut moved = hall.instances[plate].transform;
         moved[3][0] += 1.2;
         let edits = Edits { placements: vec![(plate, moved)], ..Edits::default() };
-        // Which rays a first frame sends is a draw: the mean of four moments.
+        // Which rays a first frame sends is a draw: the mean of twelve moments. Of four it was
+        // 0.048 and 0.050 with the same light.
         let film = |wait: usize| {
             let script = Script::new().rest(&camera, LONG + wait).look(&camera).edit(edits.clone()).look(&camera);
             play.film(&hall, script.rest(&camera, LONG).look(&camera))
         };
-        let films = [0, 1, 2, 3].into_iter().map(film).collect::<Result<Vec<_>, _>>()?;
+        let films = (0..12).map(film).collect::<Result<Vec<_>, _>>()?;
         play.roll(&films[0]);
         let names = ["before", "first frame", "later"];
         films[0].iter().zip(names).for_each(|(look, name)| play.keep(name, look));
