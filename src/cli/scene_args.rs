@@ -10,6 +10,56 @@ use anyhow::{Context, Result};
 use clap::Args;
 use std::path::PathBuf;
 
+/// How a scene is lit where its file does not say.
+#[derive(Debug, Args)]
+pub struct Lit {
+    /// The surroundings: radiance as `R,G,B` or one number for grey, or a lat-long picture (.hdr,
+    /// .exr).
+    #[arg(long, value_parser = parse_surroundings, value_name = "R,G,B|FILE")]
+    pub environment: Option<Surroundings>,
+    /// Turns the picture of the surroundings about the vertical, the way from +X to +Z.
+    #[arg(long, value_name = "DEGREES", requires = "environment", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub environment_turn: f32,
+    /// Radius of point and spot lights, metres.
+    #[arg(long, value_name = "M")]
+    pub light_radius: Option<f32>,
+    /// Angular diameter of directional lights, radians.
+    #[arg(long, value_name = "RAD")]
+    pub sun_angle: Option<f32>,
+}
+
+impl Lit {
+    /// Whether any of it is.
+    pub fn is_given(&self) -> bool {
+        self.environment.is_some() || self.light_radius.is_some() || self.sun_angle.is_some()
+    }
+
+    /// Lights the scene so; what a picture of the surroundings lacks is among the scene's warnings.
+    pub fn apply(&self, scene: &mut Scene) -> Result<()> {
+        match &self.environment {
+            Some(Surroundings::Constant(radiance)) => scene.surround(Environment::constant(*radiance)),
+            Some(Surroundings::Picture(path)) => {
+                let (environment, mended) = Environment::load(path)?;
+                if !self.environment_turn.is_finite() {
+                    return Err(usage(format!("--environment-turn {} is no angle", self.environment_turn)));
+                }
+                scene.surround(environment.turned(self.environment_turn));
+                scene.warnings.extend(mended);
+            }
+            None => {}
+        }
+        for light in &mut scene.lights {
+            match &mut light.kind {
+                LightKind::Directional { angle, .. } => *angle = positive("--sun-angle", self.sun_angle, *angle)?,
+                LightKind::Point { radius, .. } | LightKind::Spot { radius, .. } => {
+                    *radius = positive("--light-radius", self.light_radius, *radius)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Which scene, how it is lit, and from where it is seen.
 #[derive(Debug, Args)]
 pub struct SceneArgs {
@@ -31,19 +81,8 @@ pub struct SceneArgs {
     /// Vertical field of view in degrees.
     #[arg(long, value_name = "D")]
     pub fov: Option<f32>,
-    /// The surroundings: radiance as `R,G,B` or one number for grey, or a lat-long picture (.hdr,
-    /// .exr).
-    #[arg(long, value_parser = parse_surroundings, value_name = "R,G,B|FILE")]
-    pub environment: Option<Surroundings>,
-    /// Turns the picture of the surroundings about the vertical, the way from +X to +Z.
-    #[arg(long, value_name = "DEGREES", requires = "environment", default_value_t = 0.0, allow_hyphen_values = true)]
-    pub environment_turn: f32,
-    /// Radius of point and spot lights, metres.
-    #[arg(long, value_name = "M")]
-    pub light_radius: Option<f32>,
-    /// Angular diameter of directional lights, radians.
-    #[arg(long, value_name = "RAD")]
-    pub sun_angle: Option<f32>,
+    #[command(flatten)]
+    pub lit: Lit,
     /// Variant of materials, by name or number from 0.
     #[arg(long, value_name = "NAME|N")]
     pub variant: Option<String>,
@@ -67,29 +106,10 @@ impl SceneArgs {
     /// Loads the scene, tells its warnings, and applies the flags about light.
     pub fn load(&self, global: &Global) -> Result<Scene> {
         let mut scene = scene::load_with(&self.scene, global.load_options())?;
-        match &self.environment {
-            Some(Surroundings::Constant(radiance)) => scene.surround(Environment::constant(*radiance)),
-            Some(Surroundings::Picture(path)) => {
-                let (environment, mended) = Environment::load(path)?;
-                if !self.environment_turn.is_finite() {
-                    return Err(usage(format!("--environment-turn {} is no angle", self.environment_turn)));
-                }
-                scene.surround(environment.turned(self.environment_turn));
-                scene.warnings.extend(mended);
-            }
-            None => {}
-        }
+        self.lit.apply(&mut scene)?;
         if !global.quiet {
             for warning in &scene.warnings {
                 eprintln!("warning: {warning}");
-            }
-        }
-        for light in &mut scene.lights {
-            match &mut light.kind {
-                LightKind::Directional { angle, .. } => *angle = positive("--sun-angle", self.sun_angle, *angle)?,
-                LightKind::Point { radius, .. } | LightKind::Spot { radius, .. } => {
-                    *radius = positive("--light-radius", self.light_radius, *radius)?;
-                }
             }
         }
         if let Some(name) = &self.variant {

@@ -11,7 +11,7 @@ import torch
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 from bouncelight_training.errors import TrainingError  # noqa: E402
-from bouncelight_training.filter import blur, export, lessons, train  # noqa: E402
+from bouncelight_training.filter import blur, export, lessons, scene, train  # noqa: E402
 
 PROGRAM = os.environ.get("BOUNCELIGHT")
 SIZE = ["--size", "96x64", "--spp", "4", "--moments", "1,8,pan", "-q"]
@@ -47,7 +47,7 @@ class WithTheProgram(unittest.TestCase):
             run = train.Run(config, folder)
             torch.nn.init.normal_(run.model.get_submodule("head").weight, std=0.5)
             run.average = {k: v.detach().half().float() for k, v in run.model.state_dict().items()}
-            run.best, run.rows = (1.0, run.average), [{"validation_error": 1.0}]
+            run.best, run.rows = (1.0, run.average), [{"validation_error": 1.0, "gather_error": 1.0}]
             run.save()
             file = os.path.join(folder, "random.safetensors")
             export.export(folder, file)
@@ -66,7 +66,7 @@ class WithTheProgram(unittest.TestCase):
             paths = ["--train", os.path.join(folder, "a"), "--validation", os.path.join(folder, "b"), "--run", os.path.join(folder, "run")]
             train.main([*paths, "--minutes", "0.05", "--widths", "4,8"])
             summary = export.export(os.path.join(folder, "run"), os.path.join(folder, "toy.safetensors"))
-            self.assertLessEqual(summary["value"], summary["untrained"])
+            self.assertLessEqual(summary["value"], summary["gather"])
             info = subprocess.run([PROGRAM, "weights", "verify", summary["file"]], capture_output=True, text=True)
             self.assertEqual(info.returncode, 0, info.stderr)
             with open(os.path.join(folder, "toy.json")) as file:
@@ -74,8 +74,35 @@ class WithTheProgram(unittest.TestCase):
             with self.assertRaisesRegex(TrainingError, "training and validation"):
                 train.train(train.Config(train=os.path.join(folder, "a"), validation=os.path.join(folder, "a")), os.path.join(folder, "other"))
 
+    def test_a_network_is_fitted_to_one_scene(self):
+        with tempfile.TemporaryDirectory() as folder:
+            out = os.path.join(folder, "mine.safetensors")
+            told = scene.fit(PROGRAM, "cornell", out, folder, views=2, spp=4, minutes=0.03, size="96x64", lit=["--environment", "0.2"])
+            self.assertEqual((told["views"], told["held_out_error"]["columns"]), (2, ["gather", "before", "after"]))
+            gather, before, after = told["held_out_error"]["all"]
+            # It began with the shipped network, which is not `gather`, and has learnt something.
+            self.assertNotEqual(gather, before)
+            self.assertNotEqual(before, after)
+            state = train.read_checkpoint(os.path.join(folder, "run", "checkpoint.pt"))
+            self.assertEqual(state["best"][0], min(row["validation_error"] for row in state["rows"]))
+            info = subprocess.run([PROGRAM, "weights", "verify", out], capture_output=True, text=True)
+            self.assertEqual(info.returncode, 0, info.stderr)
+
 
 class Alone(unittest.TestCase):
+    def test_what_cannot_be_begun_with_is_named(self):
+        corrects = os.path.join(os.path.dirname(scene.SHIPPED), "small.safetensors")
+        self.assertEqual(scene.shape_of(scene.SHIPPED), ((16, 24, 32, 48, 64), 1))
+        model = train.network(train.Config(widths=(4, 8)))
+        with self.assertRaisesRegex(TrainingError, "not one that filters"):
+            scene.shape_of(corrects)
+        with self.assertRaisesRegex(TrainingError, "cannot begin with it"):
+            scene.shape_of("none.safetensors")
+        with self.assertRaisesRegex(TrainingError, "does not filter"):
+            train.begin_with(model, corrects)
+        with self.assertRaisesRegex(TrainingError, "cannot begin with it"):
+            train.begin_with(model, scene.SHIPPED)
+
     def test_what_is_no_lesson_is_named(self):
         with tempfile.TemporaryDirectory() as folder:
             with self.assertRaisesRegex(TrainingError, "no samples"):

@@ -11,6 +11,7 @@ use super::{
     args::{Global, usage},
     interrupt,
     progress::Progress,
+    scene_args::Lit,
     stdout::say,
 };
 use crate::{
@@ -46,6 +47,8 @@ pub struct Args {
     /// A scene file or bundled scene (recipe scene).
     #[arg(long, required_if_eq("recipe", "scene"))]
     scene: Option<String>,
+    #[command(flatten)]
+    lit: Lit,
     /// Views of each room (directions into which the full turn is cut; of a home, its cameras) or
     /// of the scene (drawn around its own camera).
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
@@ -152,6 +155,9 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
             )));
         }
     }
+    if args.recipe != Recipe::Scene && args.lit.is_given() {
+        return Err(usage("--environment, --light-radius and --sun-angle go with recipe scene".into()));
+    }
     std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make the folder {}", args.out.display()))?;
     interrupt::install()?;
     let gpu = global.open_gpu()?;
@@ -242,7 +248,8 @@ fn many_rooms(global: &Global, writer: &mut Writer, Rooms(rooms): &Rooms, args: 
 const TOO_CLOSE: f32 = 0.03;
 
 fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> Result<()> {
-    let scene = scene::load_with(spec, global.load_options())?;
+    let mut scene = scene::load_with(spec, global.load_options())?;
+    args.lit.apply(&mut scene)?;
     let uploaded = writer.upload(&scene)?;
     let stem = Path::new(spec).file_stem().map_or(spec.into(), |s| s.to_string_lossy().into_owned());
     let [shard, of] = args.shard;

@@ -33,8 +33,7 @@ const BETA: [f32; 2] = [0.9, 0.999];
 const TINY: f32 = 1e-8;
 const DECAY: f32 = 1e-4;
 const CLIP: f32 = 1.0;
-/// What the average over steps keeps of itself in a step; less in the first ones. As
-/// `training/bouncelight_training/finetune.py`.
+/// What the average over steps keeps of itself in a step; less in the first ones.
 const KEEP: f32 = 0.99;
 
 /// The lines of `const` in front of shader `shader`.

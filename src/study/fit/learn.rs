@@ -21,7 +21,7 @@ use std::time::Instant;
 /// Share of the time after which no picture is begun any more.
 const DRAWING: f64 = 0.5;
 /// Pictures of a step; AdamW's rate at the beginning and at the end, and the steps over which it
-/// rises first. As in `training/bouncelight_training/finetune.py`.
+/// rises first.
 const BATCH: usize = 2;
 const RATE: [f32; 2] = [5e-4, 2e-5];
 const RISING: u32 = 20;

@@ -14,9 +14,7 @@ from ..export import verify
 from ..model import parameter_count
 from ..weights import WeightsError, document, write
 from . import blur, lessons
-from .train import Config, kept_parts, network, read_checkpoint
-
-MEANING = "filter"
+from .train import MEANING, Config, kept_parts, network, read_checkpoint
 
 
 def export(run, out, name=""):
@@ -44,7 +42,7 @@ def export(run, out, name=""):
         "command": f"python -m bouncelight_training.filter.train --train {folders} --validation {os.path.basename(os.path.normpath(config.validation))} {' '.join(words)}",
         "commit": state["commit"], "date": datetime.date.today().isoformat(), "device": state["machine"], "seed": config.seed,
         "samples_seen": state["step"] * config.batch, "training_minutes": round(state["seconds"] / 60, 1),
-        "validation_error": {"measure": "mean |dE| / mean E after pooling 4x4 cells, all moments", "value": round(error, 5), "untrained": round(state["rows"][0]["validation_error"], 5)},
+        "validation_error": {"measure": "mean |dE| / mean E after pooling 4x4 cells, all moments", "value": round(error, 5), "gather": round(state["rows"][0]["gather_error"], 5)},
     }
     tensors = {k: v.half().contiguous() for k, v in model.state_dict().items()}
     try:

@@ -3,7 +3,7 @@
     python -m bouncelight_training.filter.train --train FOLDER[,FOLDER] --validation FOLDER --run runs/NAME [--minutes 20] [--device cuda]
 
 The same command goes on where a killed run stopped. The run's folder holds config.json, checkpoint.pt and log.csv; what is kept is the
-average of the weights over steps (EMA) that did best on the validation's views, the untrained network (`gather` itself) included.
+average of the weights over steps (EMA) that did best on the validation's views, what training begins with (untrained: `gather` itself) included.
 """
 import argparse
 import csv
@@ -23,16 +23,18 @@ from ..errors import TrainingError, reported
 from ..losses import pooled_error
 from ..model import LEAK, flops, parameter_count
 from ..provenance import commit, machine_of
-from ..weights import GraphNet, unet
+from ..weights import GraphNet, WeightsError, read, unet
 from . import blur, lessons
 
+# What the answer of such a network means, in weights files.
+MEANING = "filter"
 # Of the loss of `gather`: a picture that is right already teaches nothing.
 LEAST_BASE = 0.01
 # Sides of the squares of cells over which light is compared.
 POOLS = (1, 2, 4, 16)
 # A picture that has become so much worse counts no more than this.
 LOUD = 2.0
-FIELDS = ["step", "samples", "seconds", "learning_rate", "loss", "validation_error"]
+FIELDS = ["step", "samples", "seconds", "learning_rate", "loss", "validation_error", "gather_error"]
 
 
 @dataclasses.dataclass
@@ -41,6 +43,7 @@ class Config:
 
     train: str = ""
     validation: str = ""
+    begin: str = ""  # weights file whose numbers training begins with; else the untrained network
     widths: tuple = (12, 16, 24, 32)
     pointwise: int = 1  # levels with 1x1 kernels
     without: tuple = ()  # features of the table that are zeroed, for ablations
@@ -72,6 +75,17 @@ def network(config):
     nn.init.normal_(layer.weight, std=0.01)
     nn.init.zeros_(layer.weight[8:])
     return model
+
+
+def begin_with(model, path):
+    """Gives the network the numbers of a weights file of the same shape."""
+    try:
+        tensors, doc = read(path)
+        if doc["output"]["meaning"] != MEANING:
+            raise TrainingError(f"{path}: a network of meaning {doc['output']['meaning']} does not filter")
+        model.load_state_dict({name: torch.from_numpy(np.asarray(values, np.float32)) for name, values in tensors.items()})
+    except (OSError, WeightsError, RuntimeError) as error:
+        raise TrainingError(f"{path}: cannot begin with it: {error}") from error
 
 
 def kept_channels(config):
@@ -172,6 +186,8 @@ class Run:
     def __init__(self, config, folder):
         self.config, self.folder = config, folder
         self.model, self.channels, self.parts = network(config).to(config.device), kept_channels(config), kept_parts(config)
+        if config.begin:
+            begin_with(self.model, config.begin)
         self.average = {k: v.detach().clone() for k, v in self.model.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step, self.seconds, self.rows, self.best = 0, 0.0, [], (float("inf"), None)
@@ -240,13 +256,13 @@ def read_checkpoint(path):
         raise TrainingError(f"{path}: not a readable checkpoint: {error}") from error
 
 
-def train(config, folder):
-    """Runs to the end; returns the Run."""
+def train(config, folder, same_names=False):
+    """Runs to the end; returns the Run. Views of the same name are the same view, unless `same_names` are meant to be allowed."""
     torch.set_num_threads(config.threads)
     views = [lesson for name in config.train.split(",") for lesson in lessons.read(name, config.every)]
     held_out = lessons.read(config.validation)
     shared = {v.name for v in views} & {v.name for v in held_out}
-    if shared:
+    if shared and not same_names:
         raise TrainingError(f"{sorted(shared)[0]} stands in training and validation")
     os.makedirs(folder, exist_ok=True)
     run = Run(config, folder)
@@ -283,7 +299,7 @@ def note(run, held_out, loss, rate):
     if errors["all network"] < run.best[0]:
         run.best = (errors["all network"], {k: v.clone() for k, v in run.average.items()})
     run.rows.append({"step": run.step, "samples": run.step * run.config.batch, "seconds": round(run.seconds, 1), "learning_rate": rate,
-                     "loss": loss, "validation_error": errors["all network"]})
+                     "loss": loss, "validation_error": errors["all network"], "gather_error": errors["all gather"]})
     with open(os.path.join(run.folder, "log.csv.part"), "w", newline="") as file:
         writer = csv.DictWriter(file, FIELDS)
         writer.writeheader()

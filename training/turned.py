@@ -1,0 +1,93 @@
+"""Whether light keeps still on its surfaces when the camera turns: a picture from a reference's camera and one turned by some degrees about
+the vertical, both settled, compared at the world points that both show.
+
+    python training/turned.py out/turned ../shared/reference/real [--methods gather,neural] [--degrees 15] [--frames 32] [--scenes hotel,study]
+
+Each pixel's place (Position) of the first picture is looked up in the second; a pair counts where the second's own place is nearer than half a
+pixel's width and its normal agrees. Light is all diffuse light that a method adds (DiffInd), as means over 4x4 pixels of the first picture; the
+number is mean |difference| / mean, its mean difference in brackets. `control`: the same with the pixels of the second picture four to the side.
+"""
+import argparse
+import os
+import subprocess
+import sys
+
+import numpy as np
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from judge import layers, pooled, references, rgb  # noqa: E402
+import json  # noqa: E402
+
+
+def camera_of(meta, degrees):
+    """Flags of the reference's camera, turned about the vertical; and the matrix that brings a world point to its pixels in [-1, 1]."""
+    eye, target = np.array(meta["eye"], float), np.array(meta["target"], float)
+    a = np.radians(degrees)
+    x, y, z = target - eye
+    to = np.array([np.cos(a) * x + np.sin(a) * z, y, -np.sin(a) * x + np.cos(a) * z])
+    forward = to / np.linalg.norm(to)
+    right = np.cross(forward, [0, 1, 0])
+    right /= np.linalg.norm(right)
+    words = lambda v: ",".join(f"{n:.6f}" for n in v)
+    flags = ["--eye", words(eye), "--look-at", words(eye + to), "--fov", str(meta["fov"])]
+    return flags, (eye, right, np.cross(right, forward), forward, np.tan(np.radians(meta["fov"]) / 2))
+
+
+def changed(first, second, camera, shift=0):
+    """mean |difference| / mean of the light at the points that both pictures show, the mean difference over that, and the share of such cells."""
+    place = lambda o: np.stack([o[f"Position.{c}"] for c in "XYZ"], -1)
+    normal = lambda o: np.stack([o[f"Normal.{c}"] for c in "XYZ"], -1)
+    eye, right, up, forward, tangent = camera
+    h, w = first["Depth.Z"].shape
+    at = place(first) - eye
+    z = at @ forward
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u, v = at @ right / (z * tangent * w / h), at @ up / (z * tangent)
+    inside = (first["Depth.Z"] < 1e9) & (z > 0) & (np.abs(u) < 1) & (np.abs(v) < 1)
+    px = np.where(inside, (u + 1) / 2 * w, 0).astype(int).clip(0, w - 1)
+    py = np.where(inside, (1 - v) / 2 * h, 0).astype(int).clip(0, h - 1)
+    wide = 2 * tangent / h * np.where(inside, z, 1)
+    same = inside & (np.linalg.norm(place(second)[py, px] - place(first), axis=-1) < wide) & ((normal(second)[py, px] * normal(first)).sum(-1) > 0.95)
+    px = (px + shift).clip(0, w - 1)
+    a, b = rgb(first, "DiffInd"), rgb(second, "DiffInd")[py, px]
+    weight = (same & (rgb(first, "DiffCol").min(-1) > 0.01)).astype(np.float32)
+    a, full = pooled(a, weight)
+    b, _ = pooled(b, weight)
+    d = (b - a)[full]
+    return np.abs(d).mean() / a[full].mean(), d.mean() / a[full].mean(), full.mean()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", help="folder for our pictures")
+    parser.add_argument("references", help="folder of references, one folder a scene with scene.glb and meta.json")
+    parser.add_argument("--methods", default="gather,neural", type=lambda t: t.split(","))
+    parser.add_argument("--scenes", type=lambda t: t.split(","))
+    parser.add_argument("--degrees", type=float, default=15)
+    parser.add_argument("--frames", type=int, default=32)
+    parser.add_argument("--samples", type=int, default=4)
+    parser.add_argument("--size", default="512x256")
+    parser.add_argument("--bouncelight", default="target/release/bouncelight")
+    a = parser.parse_args()
+    os.makedirs(a.out, exist_ok=True)
+    for _, name, scene, _ in references(a.references):
+        if a.scenes and name not in a.scenes:
+            continue
+        with open(os.path.join(os.path.dirname(scene[0]), "meta.json")) as file:
+            meta = json.load(file)
+        for method in a.methods:
+            drawn = []
+            for degrees in (0, a.degrees):
+                path = os.path.join(a.out, f"{name}_{method}_{degrees:g}.exr")
+                flags, camera = camera_of(meta, degrees)
+                if not os.path.exists(path):
+                    subprocess.run([a.bouncelight, "render", *scene, *flags, "--size", a.size, "--method", method, "--gi-frames", str(a.frames),
+                                    "--samples", str(a.samples), "--aov", "all", "-q", "-o", path], check=True)
+                drawn.append(layers(path))
+            change, bias, share = changed(*drawn, camera)
+            control = changed(*drawn, camera, shift=4)[0]
+            print(f"{name} {method}: {100 * change:.2f} % ({100 * bias:+.2f}), {100 * share:.0f} % of the picture; control {100 * control:.1f} %", flush=True)
+
+
+if __name__ == "__main__":
+    main()
