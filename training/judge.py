@@ -6,7 +6,8 @@
 
 A method `gather@N` is drawn after N frames of a still camera (1: the first after a cut), `gather@pan` after sixteen frames in which the
 camera, settled before, turned by 1 degree each; one without says nothing of frames and has the program's own default. `gather+caustics=0`
-(or another of its numbers) is drawn with `render --gather caustics=0`, for references made without Cycles' "Reflective Caustics". A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file. `apply:FILE` is a network on
+(or another of its numbers) is drawn with `render --gather caustics=0`, for references made without Cycles' "Reflective Caustics"; `gather+taa@pan` under temporal
+anti-aliasing (over the pan, or the frames) in place of --samples. A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file. `apply:FILE` is a network on
 pictures (the paper's, pix2pix/): `bouncelight apply` on the four pictures of the raster; `dropout:FILE` is the same with dropout on,
 as the authors ran theirs. Both give 8-bit pictures, so they have no relmse and no light.
 
@@ -133,13 +134,15 @@ def pooled(light, weight):
     return block(light * weight[..., None]) / np.maximum(total, 1), total[..., 0] > 8
 
 
-def light_error(ours, direct, reference):
+def light_error(ours, direct, reference, taa=False):
     """The error of the light itself, see above."""
     surface = (direct["Depth.Z"] < 1e9) & (rgb(direct, "DiffCol").min(-1) > 0.01)
     all_light = (rgb(reference, "DiffInd") + rgb(reference, "DiffDir")).mean(-1)
     weight = (surface & (all_light >= 0.02 * np.median(all_light[surface]))).astype(np.float32)
     truth, full = pooled(rgb(reference, "DiffInd") + rgb(reference, "DiffDir") - rgb(direct, "DiffDir"), weight)
-    guess, _ = pooled(rgb(ours, "DiffInd"), weight)
+    # Anti-aliased over frames its direct light is another than that of samples.
+    own = rgb(ours, "DiffDir") - rgb(direct, "DiffDir") if taa else 0
+    guess, _ = pooled(rgb(ours, "DiffInd") + own, weight)
     return float(np.abs(guess - truth)[full].mean() / truth[full].mean())
 
 
@@ -176,7 +179,9 @@ def draw(program, scene, row, path, size, samples, inputs):
         return
     kind, _, state = kind.partition("@")
     kind, *options = kind.split("+")
-    command = [program, "render", *scene, "--size", size, "--method", kind, "--samples", str(samples), "--aov", "all"]
+    taa = ["--taa", str(PAN_FRAMES if state == "pan" else max(int(state or 32) - 1, 1))] if "taa" in options else None
+    options = [o for o in options if o != "taa"]
+    command = [program, "render", *scene, "--size", size, "--method", kind, *(taa or ["--samples", str(samples)]), "--aov", "all"]
     command += ["--weights", weights] if weights else []
     command += ["--gather", ",".join(options)] if options else []
     if state == "pan":
@@ -251,7 +256,7 @@ def main():
                 stamps.put(path, stamp)
             drawn[method] = None if picture else layers(path)
             if method in a.methods:
-                compare(group, name, row, path, reference, float("nan") if picture else light_error(drawn[method], drawn["direct"], truth))
+                compare(group, name, row, path, reference, float("nan") if picture else light_error(drawn[method], drawn["direct"], truth, "+taa" in kind))
         extra = [("constant", with_constant(drawn["direct"], a.constant))] if a.constant else []
         extra += [("best constant", with_constant(drawn["direct"], best_constant(drawn["direct"], truth)))]
         for row, picture in extra:
