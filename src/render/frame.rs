@@ -2,18 +2,18 @@
 //! composite → blended (→ taa). A display adds `tonemap` after it.
 
 use super::RenderError;
-use super::blended::{BlendedInputs, BlendedPass, Blending};
-use super::composite::{Backdrop, CompositePass};
+use super::blended::{BlendedInputs, Blending};
+use super::composite::Backdrop;
 use super::cull::DrawnCount;
-use super::deform::DeformPass;
-use super::direct::{DirectInputs, DirectPass};
-use super::gbuffer::{GbufferInputs, GbufferPass};
-use super::glossy::{GlossyInputs, GlossyPass, GlossyPicture};
+use super::direct::DirectInputs;
+use super::gbuffer::GbufferInputs;
+use super::glossy::GlossyInputs;
 use super::handed::{clear, gi_inputs};
 use super::light_choice::LightOptions;
-use super::lights::{LightLists, LightsPass};
+use super::lights::LightLists;
 use super::moved::Moved;
-use super::shadow::{ShadowMaps, ShadowOptions, ShadowPass};
+use super::passes::{Passes, Picture};
+use super::shadow::{ShadowMaps, ShadowOptions};
 use super::shadow_maps::Audience;
 use super::taa::TaaPass;
 use super::targets::{Target, Targets};
@@ -46,15 +46,6 @@ pub struct RendererOptions {
     pub blending: Blending,
     /// What is seen beyond the scene.
     pub backdrop: Backdrop,
-}
-
-/// What is bound as long as the targets stay.
-struct Picture {
-    lights: wgpu::BindGroup,
-    direct: wgpu::BindGroup,
-    glossy: GlossyPicture,
-    composite: wgpu::BindGroup,
-    blended: Option<wgpu::BindGroup>,
 }
 
 /// What is bound as long as the scene stays.
@@ -99,56 +90,6 @@ pub struct Renderer {
     last: Option<View>,
     /// What the last frame drew.
     drawn: DrawnCount,
-}
-
-/// The passes that every method shares.
-struct Passes {
-    deform: DeformPass,
-    shadow: ShadowPass,
-    gbuffer: GbufferPass,
-    lights: LightsPass,
-    direct: DirectPass,
-    glossy: GlossyPass,
-    composite: CompositePass,
-    /// `None` where what blends is drawn by lot.
-    blended: Option<BlendedPass>,
-}
-
-impl Passes {
-    fn new(device: &wgpu::Device, frame: &wgpu::Buffer, options: &RendererOptions) -> Self {
-        let direct = DirectPass::new(device);
-        let blended = (options.blending == Blending::Sorted).then(|| BlendedPass::new(device, direct.light_layout()));
-        Self {
-            deform: DeformPass::new(device),
-            shadow: ShadowPass::new(device, options.shadow),
-            gbuffer: GbufferPass::new(device, frame, options.blending),
-            lights: LightsPass::new(device),
-            direct,
-            glossy: GlossyPass::new(device),
-            composite: CompositePass::new(device),
-            blended,
-        }
-    }
-
-    fn bind(
-        &self,
-        device: &wgpu::Device,
-        frame: &wgpu::Buffer,
-        targets: &Targets,
-        taa: &mut Option<TaaPass>,
-    ) -> Picture {
-        if let Some(taa) = taa {
-            taa.fit(device, frame, targets);
-        }
-        let picture = taa.as_ref().map_or(&targets.hdr, TaaPass::current);
-        Picture {
-            lights: self.lights.picture(device, frame, targets),
-            direct: self.direct.picture(device, frame, targets),
-            glossy: self.glossy.picture(device, frame, targets),
-            composite: self.composite.picture(device, frame, targets, picture),
-            blended: self.blended.as_ref().map(|b| b.picture(device, frame, targets)),
-        }
-    }
 }
 
 impl Renderer {

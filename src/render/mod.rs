@@ -15,6 +15,7 @@ mod handed;
 pub mod light_choice;
 pub mod lights;
 pub mod moved;
+mod passes;
 pub mod sampling;
 pub mod shadow;
 mod shadow_kept;
