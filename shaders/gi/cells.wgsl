@@ -8,8 +8,9 @@
 // A cell without any surface, in `cell_pixels`.
 const NO_PIXEL = 0xffffffffu;
 
-// Beside a pixel: nothing is remembered of the surface there.
+// Beside a pixel: nothing is remembered of the surface there, or its light holds no longer.
 const FRESH = 0x80000000u;
+const STALE = 0x8000u;
 
 // One cell's light, a vec4f a colour channel: E/π(n) = max(0, channel.w + dot(channel.xyz, n)), n a
 // world-space unit normal near the cell's own.
@@ -34,7 +35,7 @@ fn pack_pixel(pixel: vec2i) -> u32 {
 }
 
 fn unpack_pixel(packed: u32) -> vec2i {
-    return vec2i(i32(packed & 0xffffu), i32((packed >> 16u) & 0x7fffu));
+    return vec2i(i32(packed & 0x7fffu), i32((packed >> 16u) & 0x7fffu));
 }
 
 // Metres from the eye, along the world's axes; `distance` is distance_at(pixel).

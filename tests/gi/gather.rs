@@ -110,8 +110,8 @@ fn share_of_wall(p: [f32; 3], eye: [f32; 3], roughness: f32) -> f64 {
     on / all
 }
 
-/// What was not seen before has four rays a cell, what was has one: its light is half as far from
-/// the settled one, or less.
+/// What was not seen before has eight rays a cell, what was has one: its light is much nearer to the
+/// settled one (by √8 if rays were drawn by chance; they are far from each other).
 #[test]
 fn what_is_new_in_the_picture_has_more_rays() {
     let Some(gpu) = common::gpu() else { return };

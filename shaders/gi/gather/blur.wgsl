@@ -20,11 +20,10 @@
 // Of each cell, with GATHER_GUIDED.
 @group(2) @binding(4) var<storage, read> guidance: array<vec4f>;
 
-// Rays of a mean, four of them in the first frame, from which on the narrow blur is enough, and the
-// radii of both in cells: the first five frames after a cut are blurred widely. What comes into
-// view later has four rays a cell, and neighbours that know their light: the wide blur would drown
-// its own in theirs.
-const SETTLED = 9.0;
+// Frames after a cut that are blurred widely, and the radii of both blurs in cells. What comes into
+// view later has several rays a cell, and neighbours that know their light: the wide blur would
+// drown its own in theirs.
+const WIDE_FRAMES = 5u;
 const NARROW = 2;
 const WIDE = 4;
 
@@ -121,7 +120,7 @@ fn counts(here: Past, there: Past, plane: Plane) -> f32 {
     let nearer = there.nearness - here.nearness;
     let chance = chance_of_nearness(here.nearness, here.frames) + chance_of_nearness(there.nearness, there.frames);
     return alike(here, there, plane) * exp(-min(0.5 * nearer * nearer / chance, 60.0))
-        * clamp(there.frames, f32(LOOKS), 16.0);
+        * clamp(there.frames, f32(AGAIN), 16.0);
 }
 
 // What a network makes of that.
@@ -196,7 +195,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     }
     let plane = Plane(side_at(id.xy, here), strictness_at(here.x));
     let own = guidance_at(cell);
-    var radius = select(NARROW, WIDE, max(here.frames, f32(gather.frame)) < SETTLED);
+    let narrow_from = f32(gather.looks + WIDE_FRAMES);
+    var radius = select(NARROW, WIDE, max(here.frames, f32(gather.frame)) < narrow_from);
     if (gather.flags & GATHER_NO_BLUR) != 0u { radius = 0; }
     var sum = vec3f(0.0);
     var vector = vec3f(0.0);

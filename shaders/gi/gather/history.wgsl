@@ -8,7 +8,8 @@
 // What cells remembered after the frame before, and what rays have found: what `gi.recall` and
 // `gi.settle` are bound to.
 
-// The pixel of a cell, FRESH where `before` has nothing of its surface.
+// The pixel of a cell, FRESH where `before` has nothing of its surface, STALE where its light has
+// changed.
 @group(2) @binding(0) var<storage, read_write> cell_pixels: array<u32>;
 @group(2) @binding(1) var<storage, read_write> records: array<vec4f>;
 @group(2) @binding(2) var<storage, read> entry_light: array<vec4f>;

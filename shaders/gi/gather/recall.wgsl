@@ -1,6 +1,6 @@
 //#import gi/gather/history.wgsl
 
-// Before the rays: marks cells that are fresh, since nothing is remembered of them, or nothing that
+// Before the rays: marks cells that begin anew, since nothing is remembered of them, or nothing that
 // still holds.
 
 // The pixel of a cell that shows what the cell remembers, nearest to its middle; NO_PIXEL where
@@ -96,8 +96,8 @@ fn recall(@builtin(global_invocation_id) id: vec3u) {
         goes_on = packed | FRESH;
     } else if (gather.flags & GATHER_CHANGED) != 0u {
         let worth = frames_worth(past, vec2f(pixel) + motion);
-        // A fresh cell has as many rays at once.
-        if worth < f32(LOOKS) { goes_on |= FRESH; }
+        // As many rays at once are worth more.
+        if worth < f32(AGAIN) { goes_on |= STALE; }
         records[3u * cell_record(cell, 3u)].x = worth;
     }
     cell_pixels[cell] = goes_on;

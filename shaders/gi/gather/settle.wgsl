@@ -3,8 +3,8 @@
 // What a cell's ray found, with the light of its entry, mixed into the mean over the frames before,
 // which is looked up where the surface was then.
 
-// Frames in which the light between surfaces settles.
-const YOUNG = 16.0;
+// Frames in which the light between surfaces settles: entries send more than a ray in each.
+const YOUNG = 24.0;
 // Share of a frame in a mean, by its number. The first frames count for less, each for its number,
 // since they know least of the light between surfaces; from YOUNG on all count the same. `more` is
 // what the first one counts for beyond that.
@@ -89,16 +89,17 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let z = distance_at(pixel);
     let width = cell_foot(z);
     var arrived = arrived_by(cell, width);
-    let fresh = (packed & FRESH) != 0u;
+    let looks = looks_of(packed);
+    let fresh = looks > 1u;
     if fresh {
-        for (var look = 1u; look < LOOKS; look++) {
+        for (var look = 1u; look < looks; look++) {
             let more = arrived_by(cell_record(cell, look), width);
             arrived.light += more.light;
             arrived.vector += more.vector;
             arrived.square += more.square;
             arrived.nearness += more.nearness;
         }
-        let share = 1.0 / f32(LOOKS);
+        let share = 1.0 / f32(looks);
         arrived = Arrived(
             share * arrived.light, share * arrived.vector, share * arrived.square, share * arrived.nearness
         );
@@ -121,15 +122,15 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     if changing && (gather.flags & GATHER_EVEN) == 0u { most = min(most, BRIEF); }
     // A fresh cell's first frame counts for its several rays; not just after a change, when what
     // rays meet knows nothing of it yet.
-    let frames = min(past.frames + f32(select(1u, LOOKS, fresh && !changed)), most);
+    let frames = min(past.frames + f32(select(looks, 1u, changed)), most);
     if fresh && changed {
         // Of one frame in which several rays were sent.
         let l = luminance(arrived.light);
-        arrived.square = mix(arrived.square, l * l, 1.0 - 1.0 / f32(LOOKS));
+        arrived.square = mix(arrived.square, l * l, 1.0 - 1.0 / f32(looks));
     }
     // It is no older for them.
-    let more = f32(LOOKS - 1u);
-    let early = select(2.0 / (frames + 1.0), 0.0, frames > f32(LOOKS));
+    let more = f32(AGAIN - 1u);
+    let early = select(2.0 / (frames + 1.0), 0.0, frames > f32(AGAIN));
     var share = max(max(share_of_frame(max(frames - more, 1.0), more), early), share_of_frame(most, 0.0));
     if (gather.flags & GATHER_EVEN) != 0u { share = 1.0 / frames; }
     if fresh { share = 1.0; }

@@ -3,6 +3,7 @@
 //#import lib/lights.wgsl
 //#import lib/sampling.wgsl
 //#import accel/surface.wgsl
+//#import gi/cells.wgsl
 
 // What the passes of `gather` share: their parameters and the scene as rays meet it (group 1).
 
@@ -36,6 +37,8 @@ struct Gather {
     since: u32,
     // The round with which the frame ends.
     last_round: u32,
+    // Rays of a cell of which nothing is remembered.
+    looks: u32,
 }
 
 const GATHER_STANDS_IN = 1u;
@@ -67,8 +70,14 @@ const GATHER_ALL_ENTRIES = 1024u;
 @group(1) @binding(5) var environment_picture: texture_2d<f32>;
 @group(1) @binding(6) var corner_normals: texture_2d<u32>;
 
-// Rays of a cell of which nothing is remembered. The others have one.
-const LOOKS = 4u;
+// Rays of a cell whose remembered light holds no longer.
+const AGAIN = 4u;
+
+// Rays of a cell, of what stands in `cell_pixels`.
+fn looks_of(packed: u32) -> u32 {
+    if (packed & FRESH) != 0u { return gather.looks; }
+    return select(1u, AGAIN, (packed & STALE) != 0u);
+}
 
 // Where ray `look` of a cell stands among the records: the first rays of all cells and those into
 // lobes come first.

@@ -4,7 +4,7 @@ use super::bring::Brought;
 use super::params::{self, Params};
 use super::pass::Groups;
 use super::store::{self, Store};
-use super::{GatherGi, HURRIED, HURRY, ROUNDS_RESTED, ROUNDS_YOUNG, STIR, YOUNG, work};
+use super::{GatherGi, HURRIED, HURRY, ROUNDS_RESTED, ROUNDS_YOUNG, STIR, YOUNG, looks, work};
 use crate::gi::interface::{GiError, Inputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -73,7 +73,8 @@ impl GatherGi {
             rays: (cells::count(inputs.size) + store::squares(inputs.size)) as u32,
             since: STIR - self.changing,
             last_round: self.round + rounds - 1,
-            pad: [0; 3],
+            looks: looks(inputs.size),
+            pad: [0; 2],
         })
     }
 

@@ -82,8 +82,12 @@ const LOT_BITS: u32 = 22;
 /// Storage buffers that `gi.rays` and `gi.renew` bind: as many as every WebGPU device has.
 const STORAGE_BUFFERS: u32 = 8;
 
-/// Rays of a cell of which nothing is remembered; `LOOKS` of `types.wgsl`.
-const LOOKS: u64 = 4;
+/// Rays of a cell of which nothing is remembered: eight in pictures of up to two million pixels.
+/// Larger ones have more cells of the same surfaces, and at 3840×2160 records of eight would not fit
+/// into the 128 MiB that every WebGPU device binds.
+pub(super) fn looks(size: [u32; 2]) -> u32 {
+    if size.map(u64::from).iter().product::<u64>() <= 1 << 21 { 8 } else { 4 }
+}
 
 /// Bytes that a workgroup remembers of its rays: of 256, nine vectors each (`WALKS` of
 /// `queue.wgsl`, `PARTS` of `look.wgsl`).

@@ -50,7 +50,8 @@ pub struct Params {
     pub rays: u32,
     pub since: u32,
     pub last_round: u32,
-    pub pad: [u32; 3],
+    pub looks: u32,
+    pub pad: [u32; 2],
 }
 
 /// Uniform offsets are multiples of this under WebGPU's default limits.

@@ -1,6 +1,6 @@
 //! What `gather` keeps from frame to frame, and between the passes of one.
 
-use super::{LOOKS, PAST, RECORD, WAYS, work};
+use super::{PAST, RECORD, WAYS, looks, work};
 use crate::gi::stage::{cells, inputs::cells_of};
 
 /// Squares of 2×2 cells, each of which sends one ray a frame into a lobe.
@@ -51,7 +51,7 @@ impl Store {
     pub fn new(device: &wgpu::Device, size: [u32; 2], slots: u32) -> Self {
         let cells = cells::count(size).max(1);
         let rays = cells + squares(size);
-        let records = rays + (LOOKS - 1) * cells;
+        let records = rays + u64::from(looks(size) - 1) * cells;
         let slots = u64::from(slots);
         let buffer = |label, size| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -95,7 +95,7 @@ impl Store {
     pub fn largest(size: [u32; 2], slots: u32) -> u64 {
         let (cells, slots) = (cells::count(size).max(1), u64::from(slots));
         let rays = cells + squares(size);
-        let records = rays + (LOOKS - 1) * cells;
+        let records = rays + u64::from(looks(size) - 1) * cells;
         let [light, pasts, records] = [32 * slots, PAST * cells, RECORD * records];
         [queries(size, slots), light, pasts, records, cells::light_bytes(size), mirrored(size)]
             .into_iter()

@@ -1,6 +1,6 @@
 //! How the rays of a pass are shared out among workgroups (`look.wgsl`).
 
-use super::LOOKS;
+use super::looks;
 use crate::gi::stage::inputs::cells_of;
 
 /// Jobs that a workgroup has at once: `JOBS` of `look.wgsl`. Of cells or squares they are 32×32
@@ -19,7 +19,7 @@ fn blocks(grid: [u32; 2]) -> u32 {
 /// Workgroups of `gi.rays`: a layer of blocks for rays of cells, one for rays into lobes, the
 /// others for further rays of fresh cells.
 pub fn of_cells(size: [u32; 2]) -> u32 {
-    blocks(cells_of(size)).saturating_mul(1 + LOOKS as u32).clamp(1, GROUPS)
+    blocks(cells_of(size)).saturating_mul(1 + looks(size)).clamp(1, GROUPS)
 }
 
 /// Workgroups of `gi.gradient`, for squares of 2×2 cells.
@@ -39,8 +39,8 @@ pub fn of_slots(slots: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{LOOKS, WAYS};
-    use super::{BLOCK, JOBS};
+    use super::super::{GatherGi, Options, RECORD, WAYS, looks};
+    use super::{BLOCK, JOBS, cells_of};
 
     /// A constant of a shader.
     fn constant(source: &str, name: &str) -> u64 {
@@ -53,11 +53,19 @@ mod tests {
     fn buffers_and_groups_are_what_shaders_fill() {
         let look = include_str!("../../../shaders/gi/gather/look.wgsl");
         let queue = include_str!("../../../shaders/gi/gather/queue.wgsl");
-        let types = include_str!("../../../shaders/gi/gather/types.wgsl");
         assert_eq!(constant(look, "JOBS"), u64::from(JOBS));
         assert_eq!(16 * constant(queue, "WALKS") * constant(look, "PARTS"), WAYS);
-        assert_eq!(constant(types, "LOOKS"), LOOKS);
         let blocks = format!("return (grid + {}u) / {BLOCK}u;", BLOCK - 1);
         assert!(look.contains(&blocks), "{blocks}");
+    }
+
+    #[test]
+    fn a_picture_of_4k_fits_every_device() {
+        let (limits, size) = (wgpu::Limits::default(), [3840, 2160]);
+        GatherGi::check(&limits, size, &Options::default()).expect("it fits");
+        // Eight rays for each cell that nothing is remembered of would not.
+        let cells: u64 = cells_of(size).map(u64::from).iter().product();
+        assert!(8 * RECORD * cells > limits.max_storage_buffer_binding_size);
+        assert_eq!((looks(size), looks([1920, 1080])), (4, 8));
     }
 }

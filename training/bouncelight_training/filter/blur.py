@@ -4,8 +4,8 @@ import torch
 import torch.nn.functional as F
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
-# Of shaders/gi/gather/blur.wgsl, types.wgsl and smooth.wgsl.
-SETTLED, NARROW, WIDE, LOOKS, STRIDE = 9, 2, 4, 4, 4
+# Of shaders/gi/gather/blur.wgsl (from eight rays in a first frame on), types.wgsl and smooth.wgsl.
+NARROW_FROM, NARROW, WIDE, AGAIN, STRIDE = 13, 2, 4, 4, 4
 # Of past.wgsl and blur.wgsl: a nearness that is none; a plane that is another surface's; what is seen as a blotch, and how few rays are few.
 NO_NEARNESS, LEAST_COSINE_OF_PLANE, BLOTCH, FEW, MANY = 0.01, 0.5, 0.1, 4.0, 8.0
 # Of shaders/gi/gather/guided.wgsl: numbers of a cell (two are not read), frames up to which they count in full, and their limit.
@@ -92,7 +92,7 @@ def without_rare(w, light, square, frames, total):
 
 def blur(batch, near, trust):
     """Mean light [n,3,h,w] over neighbours, the variance [n,h,w] of its luminance, and which part of it [n,3,h,w] few rays have brought."""
-    narrow = torch.maximum(batch["frames"], batch["age"].view(-1, 1, 1) - 1) >= SETTLED
+    narrow = torch.maximum(batch["frames"], batch["age"].view(-1, 1, 1) - 1) >= NARROW_FROM
     # What is older than this everywhere need not be asked, which a GPU would have to be waited for.
     radius = NARROW if batch.get("narrow") or narrow.all() else WIDE
     with torch.no_grad():
@@ -102,7 +102,7 @@ def blur(batch, near, trust):
         rows, columns = steps.abs().view(-1, 1).expand(-1, 2 * radius + 1).reshape(1, -1, 1, 1), steps.abs().repeat(2 * radius + 1).view(1, -1, 1, 1)
         rim = torch.where(rows == own, 0.5, 1.0) * torch.where(columns == own, 0.5, 1.0) * (reach <= own)
         frames = around(batch["frames"].unsqueeze(1), radius)[:, 0]
-        fixed = rim * same_surface(batch, radius, 1) * as_near(batch, radius, 1) * frames.clamp(LOOKS, 16)
+        fixed = rim * same_surface(batch, radius, 1) * as_near(batch, radius, 1) * frames.clamp(AGAIN, 16)
         light, square = around(batch["light"], radius), around(batch["square"].unsqueeze(1), radius)[:, 0]
     share = guided_share(batch)
     w = fixed * kinship(near, share, radius, 1) * torch.exp(share.unsqueeze(1) * around(trust.unsqueeze(1), radius)[:, 0])

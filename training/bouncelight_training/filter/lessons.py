@@ -10,7 +10,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load_file
 
 from ..errors import TrainingError
-from .blur import SETTLED
+from .blur import NARROW_FROM
 
 # Table `cells`, version 1 (src/gi/neural/memory.rs).
 TABLE = [("light", 1), ("chroma", 2), ("deviation", 1), ("frames", 1), ("lately", 1), ("nearness", 1), ("depth", 1), ("normal", 3), ("hit", 1), ("towards", 3)]
@@ -100,7 +100,7 @@ def stacked(lessons, device="cpu"):
 
 def is_narrow(lesson):
     """Whether all cells of a moment are blurred narrowly, whatever their own age."""
-    return lesson.age - 1 >= SETTLED
+    return lesson.age - 1 >= NARROW_FROM
 
 
 class Pile:
