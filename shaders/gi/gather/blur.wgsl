@@ -195,8 +195,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     }
     let plane = Plane(side_at(id.xy, here), strictness_at(here.x));
     let own = guidance_at(cell);
-    let narrow_from = f32(gather.looks + WIDE_FRAMES);
-    var radius = select(NARROW, WIDE, max(here.frames, f32(gather.frame)) < narrow_from);
+    var radius = select(NARROW, WIDE, gather.frame < WIDE_FRAMES);
     if (gather.flags & GATHER_NO_BLUR) != 0u { radius = 0; }
     var sum = vec3f(0.0);
     var vector = vec3f(0.0);

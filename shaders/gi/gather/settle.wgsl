@@ -114,8 +114,10 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
         past.frames = 0.0;
         past.gloss.a = min(past.gloss.a, GLOSS_HURRIED);
     } else if changed {
-        // As recall.wgsl left it there.
-        past.frames = min(past.frames, records[3u * cell_record(cell, 3u)].x);
+        // As recall.wgsl left it there. And no mean is older than the cut: a first frame's many rays
+        // hold no change up.
+        let worth = records[3u * cell_record(cell, 3u)].x;
+        past.frames = min(past.frames, min(worth, f32(gather.frame)));
     }
     var most = gather.cell_frames;
     let changing = (gather.flags & GATHER_CHANGING) != 0u || !rests(motion);

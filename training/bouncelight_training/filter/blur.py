@@ -4,8 +4,8 @@ import torch
 import torch.nn.functional as F
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
-# Of shaders/gi/gather/blur.wgsl (from eight rays in a first frame on), types.wgsl and smooth.wgsl.
-NARROW_FROM, NARROW, WIDE, AGAIN, STRIDE = 13, 2, 4, 4, 4
+# Of shaders/gi/gather/blur.wgsl, types.wgsl and smooth.wgsl.
+WIDE_FRAMES, NARROW, WIDE, AGAIN, STRIDE = 5, 2, 4, 4, 4
 # Of past.wgsl and blur.wgsl: a nearness that is none; a plane that is another surface's; what is seen as a blotch, and how few rays are few.
 NO_NEARNESS, LEAST_COSINE_OF_PLANE, BLOTCH, FEW, MANY = 0.01, 0.5, 0.1, 4.0, 8.0
 # Of shaders/gi/gather/guided.wgsl: numbers of a cell (two are not read), frames up to which they count in full, and their limit.
@@ -92,7 +92,7 @@ def without_rare(w, light, square, frames, total):
 
 def blur(batch, near, trust):
     """Mean light [n,3,h,w] over neighbours, the variance [n,h,w] of its luminance, and which part of it [n,3,h,w] few rays have brought."""
-    narrow = torch.maximum(batch["frames"], batch["age"].view(-1, 1, 1) - 1) >= NARROW_FROM
+    narrow = (batch["age"].view(-1, 1, 1) > WIDE_FRAMES).expand_as(batch["frames"])
     # What is older than this everywhere need not be asked, which a GPU would have to be waited for.
     radius = NARROW if batch.get("narrow") or narrow.all() else WIDE
     with torch.no_grad():

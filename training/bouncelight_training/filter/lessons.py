@@ -10,7 +10,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load_file
 
 from ..errors import TrainingError
-from .blur import NARROW_FROM
+from .blur import WIDE_FRAMES
 
 # Table `cells`, version 1 (src/gi/neural/memory.rs).
 TABLE = [("light", 1), ("chroma", 2), ("deviation", 1), ("frames", 1), ("lately", 1), ("nearness", 1), ("depth", 1), ("normal", 3), ("hit", 1), ("towards", 3)]
@@ -99,8 +99,8 @@ def stacked(lessons, device="cpu"):
 
 
 def is_narrow(lesson):
-    """Whether all cells of a moment are blurred narrowly, whatever their own age."""
-    return lesson.age - 1 >= NARROW_FROM
+    """Whether the cells of a moment are blurred narrowly."""
+    return lesson.age > WIDE_FRAMES
 
 
 class Pile:
