@@ -77,7 +77,7 @@ class WithTheProgram(unittest.TestCase):
     def test_a_network_is_fitted_to_one_scene(self):
         with tempfile.TemporaryDirectory() as folder:
             out = os.path.join(folder, "mine.safetensors")
-            told = scene.fit(PROGRAM, "cornell", out, folder, views=2, spp=4, minutes=0.03, size="96x64", lit=["--environment", "0.2"])
+            told = scene.fit(PROGRAM, "cornell", out, folder, views=2, spp=4, minutes=0.1, size="96x64", lit=["--environment", "0.2"])
             self.assertEqual((told["views"], told["held_out_error"]["columns"]), (2, ["gather", "before", "after"]))
             gather, before, after = told["held_out_error"]["all"]
             # It began with the shipped network, which is not `gather`, and has learnt something.

@@ -40,7 +40,7 @@ pub fn why(test: &str, subject: &str) -> Option<&'static str> {
              wall is not (docs/gi.md: \"mirrors\" stands among what it cannot do)"
         }
         ("disocclusion", "gather" | "neural") => {
-            "what an object uncovers has four rays a cell in its first frame, averaged over 5×5 cells: their noise. \
+            "what an object uncovers has eight rays a cell in its first frame, averaged over 5×5 cells: their noise. \
              More rays of entries there (8, 16, 32) change nothing"
         }
         ("repeat", "paper") => "dropout stays on as published: each frame draws another half of the channels",
