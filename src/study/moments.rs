@@ -30,15 +30,31 @@ use safetensors::{Dtype, tensor::TensorView};
 pub enum When {
     /// After so many frames of a still camera, the first of which follows a cut.
     Frames(u32),
-    /// At the end of [`PAN`] frames of a camera that turns and moves, which stood still for four
-    /// before.
+    /// At the end of [`PAN`] frames of a camera that turns and moves, which count as frames since
+    /// the cut. Before a pan that comes first the camera stands still for four.
     Pan,
 }
 
-/// Frames of a pan, and of rest before it: by then the blur is narrow, and what comes into view is
-/// younger than the rest.
+/// Frames of a pan, and of rest before one that comes first: by then the blur is narrow, and what
+/// comes into view is younger than the rest.
 pub const PAN: u32 = 6;
 const STILL: u32 = 4;
+
+/// Frames since the cut at each of these moments, which one run of frames passes in this order:
+/// 1, 8, pan, 20 are 1, 8, 14, 20. `None` where a moment lies no later than the one before it.
+pub fn ages(moments: &[When]) -> Option<Vec<u32>> {
+    let mut drawn = 0;
+    let age = |when: &When| {
+        let age = match *when {
+            When::Frames(frames) => frames,
+            When::Pan => drawn.max(STILL) + PAN,
+        };
+        let later = age > drawn;
+        drawn = age;
+        later.then_some(age)
+    };
+    moments.iter().map(age).collect()
+}
 
 /// Planes that a moment takes: features, memory, light.
 pub const PLANES: u64 = CHANNELS as u64 + PAST / 4 + 12;
@@ -79,7 +95,7 @@ pub struct Lesson {
 }
 
 /// Draws one view. `renderer`'s method gathers, and so does `teacher`'s, plainly, for `frames`
-/// frames; `seed` decides the pan.
+/// frames; `seed` decides the pan, `moments` are in order ([`ages`]).
 ///
 /// # Errors
 /// What drawing and reading back report; `None` where `go_on` said no.
@@ -95,40 +111,41 @@ pub fn lesson(
     let environment = raster.environment.radiance;
     let mut read = Vec::new();
     renderer.cut();
-    let (mut drawn, mut fresh) = (0, true);
-    for &when in moments {
+    let (mut drawn, mut first) = (0, true);
+    let ages = ages(moments).unwrap_or_default();
+    for (&when, age) in moments.iter().zip(ages) {
         let views: Vec<Camera> = match when {
-            When::Frames(frames) => (drawn..frames).map(|_| camera.clone()).collect(),
-            When::Pan => {
-                renderer.cut();
-                pan(camera, seed)
-            }
+            When::Frames(_) => (drawn..age).map(|_| camera.clone()).collect(),
+            When::Pan => pan(camera, seed, age - drawn),
         };
-        drawn = match when {
-            When::Frames(frames) => frames,
-            // What follows a pan would not be still.
-            When::Pan => u32::MAX,
-        };
-        for camera in &views {
+        drawn = age;
+        let last = views.len() - 1;
+        for (i, camera) in views.iter().enumerate() {
             if !go_on() {
                 return Ok(None);
             }
-            // Nothing but the camera moves: one frame's shadow maps do for all.
-            draw(gpu, renderer, raster, camera, if fresh { Purpose::Picture } else { Purpose::FurtherSample })?;
-            fresh = false;
+            // What the filter shows is read at the moment itself only. Nothing but the camera
+            // moves: one frame's shadow maps do for all.
+            let purpose = match i {
+                _ if i < last => Purpose::WarmUp { first },
+                _ if first => Purpose::Picture,
+                _ => Purpose::FurtherSample,
+            };
+            draw(gpu, renderer, raster, camera, purpose)?;
+            first = false;
         }
         let view = View::new(camera, size, [0.0; 2]);
-        read.push(reader.read(gpu, renderer, &view, environment, when)?);
+        read.push(reader.read(gpu, renderer, &view, environment, (when, age))?);
     }
     teacher.cut();
     for frame in 0..frames {
         if !go_on() {
             return Ok(None);
         }
-        draw(gpu, teacher, raster, camera, if frame == 0 { Purpose::Picture } else { Purpose::FurtherSample })?;
+        draw(gpu, teacher, raster, camera, Purpose::WarmUp { first: frame == 0 })?;
     }
     let view = View::new(camera, size, [0.0; 2]);
-    let taught = reader.read(gpu, teacher, &view, environment, When::Frames(frames))?.past;
+    let taught = reader.read(gpu, teacher, &view, environment, (When::Frames(frames), frames))?.past;
     let cells = cells_of(size);
     let count = cells[0] as usize * cells[1] as usize;
     let place = Mat4::from_cols_array_2d(&camera.transform);
@@ -158,10 +175,10 @@ fn noise_of(past: &[f32], count: usize) -> f32 {
     if sum > 0.0 { ((error / cells).sqrt() / (sum / cells)) as f32 } else { f32::INFINITY }
 }
 
-/// The cameras of a pan that ends at `camera`, those of the rest before it first: 0.2 to 2 degrees
-/// a frame about its vertical, up to 0.3 about its horizontal, and up to 0.04 metres of way, a
-/// frame.
-fn pan(camera: &Camera, seed: u32) -> Vec<Camera> {
+/// The cameras of a pan that ends at `camera`, so many `frames` with those of the rest before it:
+/// 0.2 to 2 degrees a frame about its vertical, up to 0.3 about its horizontal, and up to 0.04
+/// metres of way, a frame.
+fn pan(camera: &Camera, seed: u32, frames: u32) -> Vec<Camera> {
     let mut numbers = SplitMix::new(0x9a70_0000_0000 | u64::from(seed));
     let mut between = |low: f32, high: f32| low + (high - low) * numbers.next();
     let side = if between(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 };
@@ -169,7 +186,7 @@ fn pan(camera: &Camera, seed: u32) -> Vec<Camera> {
     let nod = between(-0.3, 0.3).to_radians();
     let step = Vec3::new(between(-0.02, 0.02), between(-0.01, 0.01), between(-0.03, 0.03));
     let own = Mat4::from_cols_array_2d(&camera.transform);
-    (0..STILL + PAN)
+    (0..frames)
         .rev()
         .map(|before| before.min(PAN))
         .map(|before| {
@@ -218,7 +235,7 @@ impl Reader {
         renderer: &Renderer,
         view: &View,
         environment: [f32; 3],
-        when: When,
+        (when, age): (When, u32),
     ) -> Result<Moment, DatasetError> {
         let (device, queue) = (&gpu.device, &gpu.queue);
         let Some(memory) = renderer.memory() else { return Err(crate::gi::GiError::Rays.into()) };
@@ -243,10 +260,7 @@ impl Reader {
         let past = PAST as usize / 4;
         Ok(Moment {
             when,
-            age: match when {
-                When::Frames(frames) => frames,
-                When::Pan => STILL + PAN,
-            },
+            age,
             features: planes(&target, PITCH as usize, CHANNELS as usize)?,
             past: planes(memory.pasts, past, past)?,
             shown: planes(memory.light, 12, 12)?,
@@ -297,5 +311,20 @@ impl Lesson {
             .collect::<Result<Vec<_>, _>>()
             .map_err(failed)?;
         safetensors::serialize(views, None).map_err(failed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{When::*, ages};
+
+    #[test]
+    fn moments_pass_in_order() {
+        assert_eq!(ages(&[Frames(1), Frames(2), Pan, Frames(20)]), Some(vec![1, 2, 10, 20]));
+        assert_eq!(ages(&[Pan]), Some(vec![10]));
+        assert_eq!(ages(&[Frames(8), Pan]), Some(vec![8, 14]));
+        for late in [&[Frames(4), Frames(4)][..], &[Frames(8), Frames(2)], &[Frames(8), Pan, Frames(14)]] {
+            assert_eq!(ages(late), None);
+        }
     }
 }

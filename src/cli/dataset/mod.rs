@@ -75,8 +75,8 @@ pub struct Args {
     #[arg(long)]
     out: PathBuf,
     /// What a network that filters learns from, instead: moments at which what cells remember is
-    /// kept, frames after a cut or `pan` (at the end of six frames of a moving camera), such as
-    /// 1,2,8,pan. The light to be learnt is the mean of --spp of the same rays.
+    /// kept, in order: frames after a cut, or `pan` (at the end of six frames of a moving camera,
+    /// which count), such as 1,2,8,pan,20. The light to be learnt is the mean of --spp of the same rays.
     #[arg(long, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST",
         conflicts_with_all = ["motion", "guides"])]
     moments: Vec<When>,
@@ -163,6 +163,9 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let gpu = global.open_gpu()?;
     if !args.moments.is_empty() && args.spp == 0 {
         return Err(usage("--moments need the light to be learnt: --spp N".into()));
+    }
+    if moments::ages(&args.moments).is_none() {
+        return Err(usage("--moments are frames of one run, each later than the one before; a pan takes six".into()));
     }
     let mut writer = Writer::open(gpu, &args)?;
     match (args.recipe, &args.rooms, &args.scene) {
