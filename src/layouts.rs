@@ -74,7 +74,7 @@ fn rows() -> Vec<(&'static str, Layout)> {
         row!("Exposure", Exposure => s, inv_s, ln_m, hit_fraction, nonfinite, outgoing as "red"),
         row!("Gather", gather::Params =>
             eye, frame, light_count, emitter_count, inverse_power, mask, entry_scale, round, cell_frames, entry_frames,
-            flags, cells, rays, since, last_round, looks,
+            flags, cells, rays, since, last_round, looks, shift,
         ),
         row!("Sample", Sample => depth, normal, plane, offset, mirrored, motion, color, broken),
         row!("Step", StepUniform =>

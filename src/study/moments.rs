@@ -26,7 +26,7 @@ use glam::{Mat4, Quat, Vec3};
 use safetensors::{Dtype, tensor::TensorView};
 
 /// When a memory is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum When {
     /// After so many frames of a still camera, the first of which follows a cut.
     Frames(u32),

@@ -207,6 +207,34 @@ fn a_glowing_room_is_the_series_of_its_albedo() {
     }
 }
 
+/// What a filter's network learns must not share noise with what it learns from.
+#[test]
+fn another_seed_is_other_noise_of_the_same_light() {
+    let Some(gpu) = common::gpu() else { return };
+    let room = hall(GREY, &[sun(world::BACKWARDS, 2.0)], 0.3, 1.0);
+    let at = |seed, frames| {
+        light(&gpu, Method::Gather(Options { seed, first_rounds: 64, ..Options::PLAIN }), [96, 64], &room, frames)
+    };
+    let truth = at(3, 1024);
+    let noise = |light: Vec<f32>| -> Vec<f64> {
+        let off: Vec<f64> = light.iter().zip(&truth).map(|(a, b)| f64::from(a - b)).collect();
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        off.iter().map(|v| v - mean).collect()
+    };
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let correlation = |a: &[f64], b: &[f64]| product(a, b) / (product(a, a) * product(b, b)).sqrt();
+    let (own, mean_of_truth) = (at(0, 16), mean(&truth));
+    let brighter = mean(&own) / mean_of_truth - 1.0;
+    let own = noise(own);
+    let (other, same) = (correlation(&own, &noise(at(1, 64))), correlation(&own, &noise(at(0, 64))));
+    println!("noise of 16 frames goes with that of 64 by {other:.2}, of the same seed by {same:.2}; {brighter:+.3}");
+    // What is left is of entries, whose places and rays are the same.
+    assert!(other.abs() < 0.3, "{other}");
+    assert!(brighter.abs() < 0.02, "{brighter}");
+    // Negative control: sixteen of the same seed's 64 frames are the very same.
+    assert!(same > 0.5, "{same}");
+}
+
 /// A lamp in one of two closed rooms under one roof leaves the other dark.
 #[test]
 fn no_light_goes_through_an_inner_wall() {

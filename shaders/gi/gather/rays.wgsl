@@ -34,7 +34,7 @@ fn numbers(cell: vec2u, look: u32, turn: u32) -> vec2f {
     let place = ORDER[(cell.y & 3u) * 4u + (cell.x & 3u)];
     var shift = vec2u(0x80000000u);
     if gather.frame == 0u { shift = pcg3(vec3u(cell >> vec2u(2u), 77u)).xy; }
-    return lattice(((place - turn * look) & 15u) + 16u * (gather.frame - look), shift);
+    return lattice(((place - turn * look) & 15u) + 16u * (gather.frame - look), shift + gather.shift);
 }
 
 // The two numbers of a ray into a lobe. Each square has a lattice of its own: lobes are narrower

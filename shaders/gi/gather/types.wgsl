@@ -39,6 +39,8 @@ struct Gather {
     last_round: u32,
     // Rays of a cell of which nothing is remembered.
     looks: u32,
+    // Turns the lattice of cells' rays: other noise of the same light.
+    shift: vec2u,
 }
 
 const GATHER_STANDS_IN = 1u;

@@ -44,7 +44,7 @@ pub(super) struct Writer {
 
 /// What lessons of a filter are made with.
 pub(super) struct Lessons {
-    /// Those of a still camera in the order in which they come, the pan last.
+    /// In the order in which they come.
     moments: Vec<When>,
     reader: moments::Reader,
     /// Gathers the light that is to be learnt.
@@ -53,13 +53,12 @@ pub(super) struct Lessons {
 
 impl Lessons {
     fn new(gpu: &Gpu, args: &Args) -> Result<Self> {
-        let mut moments = args.moments.clone();
-        moments.sort();
-        moments.dedup();
-        let method = Method::Gather(gather::Options::PLAIN);
+        // Of its own seed: the noise of what is to be learnt must not be that of what it is learnt
+        // from, or a cell's own few rays would seem to know more than its neighbours'.
+        let method = Method::Gather(gather::Options { seed: 1, ..gather::Options::PLAIN });
         let options = RendererOptions { method, blending: Blending::Stochastic, ..Default::default() };
         let teacher = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
-        Ok(Self { moments, reader: moments::Reader::new(&gpu.device), teacher })
+        Ok(Self { moments: args.moments.clone(), reader: moments::Reader::new(&gpu.device), teacher })
     }
 }
 

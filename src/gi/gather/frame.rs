@@ -74,7 +74,7 @@ impl GatherGi {
             since: STIR - self.changing,
             last_round: self.round + rounds - 1,
             looks: looks(inputs.size),
-            pad: [0; 2],
+            shift: self.options.shift(),
         })
     }
 

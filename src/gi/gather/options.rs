@@ -1,5 +1,6 @@
 //! The free numbers of `gather`.
 
+use crate::numbers::SplitMix;
 use std::str::FromStr;
 use thiserror::Error;
 
@@ -26,6 +27,8 @@ pub struct Options {
     /// Whether surfaces that rays meet show their gloss. Pictures made by Cycles without
     /// "Reflective Caustics" are compared with those made without it; light is missing then.
     pub caustics: bool,
+    /// Pictures of another seed have other noise of cells' rays, and the same light.
+    pub seed: u32,
 }
 
 impl Default for Options {
@@ -39,6 +42,7 @@ impl Default for Options {
             blur: true,
             even: false,
             caustics: true,
+            seed: 0,
         }
     }
 }
@@ -56,6 +60,7 @@ impl Options {
         blur: false,
         even: true,
         caustics: true,
+        seed: 0,
     };
 }
 
@@ -74,11 +79,18 @@ impl Options {
                 ("blur", flag(o.blur)),
                 ("even", flag(o.even)),
                 ("caustics", flag(o.caustics)),
+                ("seed", o.seed as f32),
             ]
         };
         let other = numbers(self).into_iter().zip(numbers(&own)).filter(|(ours, own)| ours != own);
         let words: Vec<String> = other.map(|((name, value), _)| format!("{name}={value}")).collect();
         (!words.is_empty()).then(|| words.join(","))
+    }
+
+    /// What the seed turns the lattice of cells' rays by, in 2⁻³² of a turn.
+    pub(super) fn shift(&self) -> [u32; 2] {
+        let mut numbers = SplitMix::new(self.seed.into());
+        [(); 2].map(|()| if self.seed == 0 { 0 } else { (numbers.next() * (1 << 24) as f32) as u32 * 256 })
     }
 }
 
@@ -87,7 +99,7 @@ impl Options {
 pub enum OptionsError {
     /// No such number.
     #[error(
-        "`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, blur=0|1, even=0|1, caustics=0|1"
+        "`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, blur=0|1, even=0|1, caustics=0|1, seed=N"
     )]
     Unknown(String),
     /// A value that cannot be.
@@ -123,6 +135,9 @@ impl FromStr for Options {
                 "blur" => options.blur = number != 0.0,
                 "even" => options.even = number != 0.0,
                 "caustics" => options.caustics = number != 0.0,
+                // What a float counts exactly.
+                "seed" if (0.0..=16_777_216.0).contains(&number) => options.seed = number as u32,
+                "seed" => return Err(wrong("must be a whole number up to 16777216")),
                 _ => return Err(OptionsError::Unknown(word.into())),
             }
         }
@@ -138,11 +153,14 @@ mod tests {
     fn words_are_read_and_wrong_ones_named() {
         let read: Options = "plain,blur=1,slots=4096".parse().unwrap();
         assert_eq!(read, Options { blur: true, slots: 4096, ..Options::PLAIN });
-        for options in [read, Options::PLAIN, Options { caustics: false, entry_scale: 0.1, ..Default::default() }] {
+        for options in
+            [read, Options::PLAIN, Options { caustics: false, entry_scale: 0.1, seed: 7, ..Default::default() }]
+        {
             assert_eq!(options.words().unwrap().parse(), Ok(options));
         }
         assert_eq!(Options::default().words(), None);
-        for bad in ["", "rays=3", "slots=1000", "cell_frames=0", "cell_frames=nan", "entry_scale=-1", "blur"] {
+        for bad in ["", "rays=3", "slots=1000", "cell_frames=0", "cell_frames=nan", "entry_scale=-1", "blur", "seed=-1"]
+        {
             let error = bad.parse::<Options>().unwrap_err().to_string();
             assert!(error.contains(bad), "{error}");
         }

@@ -51,7 +51,7 @@ pub struct Params {
     pub since: u32,
     pub last_round: u32,
     pub looks: u32,
-    pub pad: [u32; 2],
+    pub shift: [u32; 2],
 }
 
 /// Uniform offsets are multiples of this under WebGPU's default limits.

@@ -20,7 +20,7 @@ from ..model import LEAK
 from . import blur, export, lessons, train
 
 SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "..", "assets", "weights", "filter.safetensors")
-MOMENTS = "1,2,4,8,20,pan"
+MOMENTS = "1,2,4,8,pan,20"
 # Views that choose and views that are held out, against those that are learnt.
 CHOOSING, HELD_OUT = 1 / 6, 1 / 4
 
