@@ -39,9 +39,9 @@ def picture_difference(prediction, target, mask, albedo, direct):
     return (difference * weight).sum() / (3 * weight.sum()).clamp(min=1)
 
 
-def pooled_error(prediction, target, mask):
-    """(sum |dE|, sum E) over blocks of 4x4 cells: their ratio is the error that the project quotes. Units of the arguments."""
-    p, kept = pooled(prediction, mask)
-    t, _ = pooled(target, mask)
+def pooled_error(prediction, target, mask, size=POOL):
+    """(sum |dE|, sum E) over blocks of size x size cells: their ratio is the error that the project quotes. Units of the arguments."""
+    p, kept = pooled(prediction, mask, size)
+    t, _ = pooled(target, mask, size)
     kept = kept.unsqueeze(1)
     return ((p - t).abs() * kept).sum().item(), (t * kept).sum().item()

@@ -42,7 +42,7 @@ def export(run, out, name=""):
         "command": f"python -m bouncelight_training.filter.train --train {folders} --validation {os.path.basename(os.path.normpath(config.validation))} {' '.join(words)}",
         "commit": state["commit"], "date": datetime.date.today().isoformat(), "device": state["machine"], "seed": config.seed,
         "samples_seen": state["step"] * config.batch, "training_minutes": round(state["seconds"] / 60, 1),
-        "validation_error": {"measure": "mean |dE| / mean E after pooling 4x4 cells, all moments", "value": round(error, 5), "gather": round(state["rows"][0]["gather_error"], 5)},
+        "validation_error": {"measure": "mean |dE| / mean E of cells, all moments, the targets' noise included", "value": round(error, 5), "gather": round(state["rows"][0]["gather_error"], 5)},
     }
     tensors = {k: v.half().contiguous() for k, v in model.state_dict().items()}
     try:

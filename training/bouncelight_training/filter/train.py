@@ -165,14 +165,15 @@ def in_parts(pile, size=16):
 
 
 def validate(model, piles, channels, parts):
-    """Pooled error of `gather`'s light and of the network's, by moment, and over all."""
+    """Error of `gather`'s light and of the network's, by moment, and over all: of each cell, as finished pictures are judged by blocks of 4x4 pixels.
+    It holds the target's noise."""
     sums = {}
     with torch.no_grad():
         for some, batch in (part for pile in piles for part in in_parts(pile)):
             mean = batch["mean"].view(-1, 1, 1, 1)
             for which, answer in (("gather", None), ("network", model(batch["features"] * channels) * parts)):
                 shown = blur.filtered(batch, answer)[0].clamp(min=0) / mean
-                errors = [pooled_error(shown[i:i + 1], batch["target"][i:i + 1] / mean[i], batch["mask"][i:i + 1]) for i in range(len(some))]
+                errors = [pooled_error(shown[i:i + 1], batch["target"][i:i + 1] / mean[i], batch["mask"][i:i + 1], 1) for i in range(len(some))]
                 for lesson, (off, light) in zip(some, errors):
                     for key in (lesson.when, "all"):
                         a, b = sums.get((key, which), (0, 0))
@@ -241,7 +242,8 @@ class Run:
         loss = (loss / (loss.detach() / LOUD).clamp(min=1)).mean() + held(answer)
         self.optimiser.zero_grad()
         loss.backward()
-        nn.utils.clip_grad_norm_(self.model.parameters(), 0.5)
+        if not torch.isfinite(nn.utils.clip_grad_norm_(self.model.parameters(), 0.5)):
+            raise TrainingError(f"step {self.step}: the gradient is not a number; what did best so far is in {self.path}")
         self.optimiser.step()
         self.step += 1
         keep = min(c.ema, (self.step + 1) / (self.step + 10))
