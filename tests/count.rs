@@ -56,7 +56,7 @@ fn passes_that_find_no_light_are_counted_and_those_that_cannot_draw_are_not() {
 #[test]
 fn rays_are_those_that_a_frame_at_rest_sends() {
     let Some(gpu) = common::gpu() else { return };
-    let costs = counted(&gpu, Method::Gather(gather::Options::default()), [128, 64], 12);
+    let costs = counted(&gpu, Method::Gather(gather::Options::default()), [128, 64], 48);
     // A look a cell and one for each 2×2: the nearest hit, a line to a light, a line to where an
     // entry's rays begin.
     let looks = 32.0 * 16.0 * 1.25;
@@ -65,7 +65,11 @@ fn rays_are_those_that_a_frame_at_rest_sends() {
     for cost in costs.iter().filter(|c| c.pass.starts_with("gi.")) {
         assert!(cost.flops > 0.0 && cost.bytes >= 0.0, "{cost:?}");
     }
-    // A first frame sends four rays a cell, and more for entries.
+    // A young cell sends a ray more than one at rest.
+    let young = counted(&gpu, Method::Gather(gather::Options::default()), [128, 64], 16);
+    let more = of(&young, "gi.rays").rays / rays;
+    assert!((1.5..2.2).contains(&more), "{more}");
+    // A first frame sends eight rays a cell, and more for entries.
     let first = counted(&gpu, Method::Gather(gather::Options::default()), [128, 64], 1);
     assert!(of(&first, "gi.rays").rays > 2.5 * rays, "{first:?}");
 }

@@ -8,9 +8,16 @@
 // A cell without any surface, in `cell_pixels`.
 const NO_PIXEL = 0xffffffffu;
 
-// Beside a pixel: nothing is remembered of the surface there, or its light holds no longer.
+// Beside a pixel: nothing is remembered of the surface there, or its light holds no longer, or it
+// has been remembered for a short while.
 const FRESH = 0x80000000u;
 const STALE = 0x8000u;
+const YOUNG = 0x80008000u;
+
+// One of the three, or 0.
+fn age_of(packed: u32) -> u32 {
+    return packed & YOUNG;
+}
 
 // One cell's light, a vec4f a colour channel: E/π(n) = max(0, channel.w + dot(channel.xyz, n)), n a
 // world-space unit normal near the cell's own.

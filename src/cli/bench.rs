@@ -190,7 +190,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     if args.count {
         for (method, measured) in methods.iter().zip(&mut measured) {
             let still = count::Still { scene: &scene, camera: &camera, size: args.scene.size };
-            measured.costs = count::frame(&gpu, still, with(method), method.frames_to_settle())?;
+            measured.costs = count::frame(&gpu, still, with(method), method.frames_to_rest())?;
         }
     }
     let network = if args.layers && names.contains(&MethodName::Neural) {

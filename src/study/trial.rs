@@ -295,13 +295,13 @@ impl<'a> Trial<'a> {
     }
 
     /// What the passes that find and add indirect light do in a frame of a still camera, settled
-    /// over [`Method::SETTLED`] frames where the method does.
+    /// over [`Method::frames_to_rest`].
     ///
     /// # Errors
     /// [`TrialError::Count`].
     pub fn count(&self, method: &Method, camera: &Camera) -> Result<Vec<Cost>, TrialError> {
         let still = count::Still { scene: &self.scene, camera, size: self.size };
-        let mut costs = count::frame(self.gpu, still, self.renderer_options(method), method.frames_to_settle())?;
+        let mut costs = count::frame(self.gpu, still, self.renderer_options(method), method.frames_to_rest())?;
         costs.retain(|c| projection::is_indirect(&c.pass));
         Ok(costs)
     }

@@ -110,8 +110,8 @@ fn share_of_wall(p: [f32; 3], eye: [f32; 3], roughness: f32) -> f64 {
     on / all
 }
 
-/// What was not seen before has eight rays a cell, what was has one: its light is much nearer to the
-/// settled one (by √8 if rays were drawn by chance; they are far from each other).
+/// What was not seen before has eight rays a cell, what was lately two, the rest one: its light is
+/// much nearer to the settled one (by √8 if rays were drawn by chance; they are far from each other).
 #[test]
 fn what_is_new_in_the_picture_has_more_rays() {
     let Some(gpu) = common::gpu() else { return };
@@ -122,22 +122,29 @@ fn what_is_new_in_the_picture_has_more_rays() {
         |angle: f32| Camera::look_at([0.0, 9.0, -55.0], [6.0 * angle.sin(), 0.0, -55.0 + 6.0 * angle.cos()], 0.8);
     let floor = scene(&blocks, &[], 1.0, look(0.0));
     let uploaded = uploaded(&gpu, &floor);
-    // Each frame shows its own rays.
-    let alone = Method::Gather(Options { cell_frames: 1.0, blur: false, ..Default::default() });
-    let mut renderer = world::renderer(&gpu, [96, 64], alone);
+    // Each frame shows its own rays; where all frames are even no cell is young.
+    let alone = |even| {
+        let method = Method::Gather(Options { cell_frames: 1.0, blur: false, even, ..Default::default() });
+        world::renderer(&gpu, [96, 64], method)
+    };
+    let mut renderer = alone(true);
     let mut settled = world::renderer(&gpu, [96, 64], method());
-    let mut off = |camera: &Camera, frames: u32, columns: std::ops::Range<usize>| {
+    let mut from_settled = |renderer: &mut Renderer, camera: &Camera, frames: u32, columns: std::ops::Range<usize>| {
         let truth = go_on(&gpu, &mut settled, &uploaded, camera, 64);
-        let found = go_on(&gpu, &mut renderer, &uploaded, camera, frames);
+        let found = go_on(&gpu, renderer, &uploaded, camera, frames);
         let kept = |light: &[f32]| -> Vec<f32> {
             let pixels = light.chunks_exact(3).enumerate();
             pixels.filter(|(i, _)| columns.contains(&(i % 96))).map(|(_, p)| p[1]).collect()
         };
         difference(&kept(&found), &kept(&truth))
     };
+    let young = from_settled(&mut alone(false), &look(0.0), 4, 0..96);
+    let mut off = |camera: &Camera, frames, columns| from_settled(&mut renderer, camera, frames, columns);
     let (first, later) = (off(&look(0.0), 1, 0..96), off(&look(0.0), 3, 0..96));
     println!("a frame's light is {:.1} % off where it is the first, {:.1} % later", 100.0 * first, 100.0 * later);
     assert!(first < 0.25 * later && later > 0.2);
+    println!("and {:.1} % while cells are young", 100.0 * young);
+    assert!(young < 0.8 * later, "{young} {later}");
     // After a turn by 20 degrees the same holds of what has come in from the side, and no more in
     // the frame after.
     let (new, old) = (off(&look(0.35), 1, 0..16), off(&look(0.35), 1, 0..16));

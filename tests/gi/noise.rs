@@ -39,18 +39,30 @@ fn lamp_at_a_shade() -> Scene {
 #[test]
 fn what_one_bright_ray_brings_is_no_blotch_and_is_not_lost() {
     let Some(gpu) = common::gpu() else { return };
-    let drawn = |blur: bool| {
-        let method = Method::Gather(Options { blur, ..Default::default() });
+    let drawn = |blur: bool, seed: u32| {
+        let method = Method::Gather(Options { blur, seed, ..Default::default() });
         of_cells(&lit(&gpu, &mut world::renderer(&gpu, SIZE, method), &lamp_at_a_shade(), 16).0.data)
     };
     let mean = |cells: &[f64]| cells.iter().sum::<f64>() / cells.len() as f64;
     let brightest = |cells: &[f64]| cells.iter().copied().fold(0.0, f64::max) / mean(cells);
-    let (shown, rays) = (drawn(true), drawn(false));
-    println!("brightest {:.2} {:.2}, mean {:.5} {:.5}", brightest(&shown), brightest(&rays), mean(&shown), mean(&rays));
-    assert!(brightest(&shown) < 3.5, "{} times the mean", brightest(&shown));
-    assert!((mean(&shown) / mean(&rays) - 1.0).abs() < 0.15, "{} of {}", mean(&shown), mean(&rays));
-    // Control: the rays themselves.
-    assert!(brightest(&rays) > 20.0, "{}", brightest(&rays));
+    // A handful of rays meets the shade: what one seed's few bring hangs on how many neighbours they have.
+    let (mut in_all, mut brought) = (0.0, 0.0);
+    for seed in 0..8 {
+        let (shown, rays) = (drawn(true, seed), drawn(false, seed));
+        println!(
+            "brightest {:.2} {:.2}, mean {:.5} {:.5}",
+            brightest(&shown),
+            brightest(&rays),
+            mean(&shown),
+            mean(&rays)
+        );
+        assert!(brightest(&shown) < 3.5, "{} times the mean", brightest(&shown));
+        // Control: the rays themselves.
+        assert!(brightest(&rays) > 20.0, "{}", brightest(&rays));
+        in_all += mean(&shown);
+        brought += mean(&rays);
+    }
+    assert!((in_all / brought - 1.0).abs() < 0.15, "{in_all} of {brought}");
 }
 
 /// How much cells differ from those beside them, root mean square over the mean, away from the

@@ -30,11 +30,15 @@ const TURN_AGAIN = 3u;
 // The two numbers of a cell's ray. Sixteen cells share one lattice, which goes on from frame to
 // frame, so a blur over them sees an even hemisphere. In a first frame each square turns it by
 // itself: no pattern then repeats over the picture.
-fn numbers(cell: vec2u, look: u32, turn: u32) -> vec2f {
+fn numbers(cell: vec2u, look: u32, age: u32) -> vec2f {
     let place = ORDER[(cell.y & 3u) * 4u + (cell.x & 3u)];
     var shift = vec2u(0x80000000u);
     if gather.frame == 0u { shift = pcg3(vec3u(cell >> vec2u(2u), 77u)).xy; }
-    return lattice(((place - turn * look) & 15u) + 16u * (gather.frame - look), shift + gather.shift);
+    shift += gather.shift;
+    // The further rays of a young cell are those of a lattice half a turn away.
+    if age == YOUNG { return lattice(place + 16u * gather.frame, shift + (look << 31u)); }
+    let turn = select(TURN_AGAIN, TURN, age == FRESH);
+    return lattice(((place - turn * look) & 15u) + 16u * (gather.frame - look), shift);
 }
 
 // The two numbers of a ray into a lobe. Each square has a lattice of its own: lobes are narrower
@@ -75,8 +79,7 @@ fn cell_ray(at: u32, at_cell: vec2u, look_number: u32) {
     let ray = cell_record(cell, look_number);
     let packed = cell_pixels[cell];
     let start = start_at(unpack_pixel(packed));
-    let turn = select(TURN_AGAIN, TURN, (packed & FRESH) != 0u);
-    let d = cosine_direction(start.n, numbers(at_cell, look_number, turn));
+    let d = cosine_direction(start.n, numbers(at_cell, look_number, age_of(packed)));
     send(at, start.x, start.n, d, select(NONE, cell, ray == cell), ray, ray);
 }
 

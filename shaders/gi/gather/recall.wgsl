@@ -35,6 +35,8 @@ const ASKED = 2;
 const LEAST_ASKED = 4.0;
 // Cells that the narrow blur averages.
 const AVERAGED = 16.0;
+// A cell is young for so many frames.
+const YOUNG_FRAMES = 40.0;
 // Less than this share of the light is no change.
 const NO_CHANGE = 0.01;
 
@@ -99,6 +101,8 @@ fn recall(@builtin(global_invocation_id) id: vec3u) {
         // As many rays at once are worth more.
         if worth < f32(AGAIN) { goes_on |= STALE; }
         records[3u * cell_record(cell, 3u)].x = worth;
+    } else if past.frames < YOUNG_FRAMES && (gather.flags & GATHER_EVEN) == 0u {
+        goes_on |= YOUNG;
     }
     cell_pixels[cell] = goes_on;
 }

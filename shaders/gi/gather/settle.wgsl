@@ -4,13 +4,13 @@
 // which is looked up where the surface was then.
 
 // Frames in which the light between surfaces settles: entries send more than a ray in each.
-const YOUNG = 24.0;
+const SETTLED = 24.0;
 // Share of a frame in a mean, by its number. The first frames count for less, each for its number,
-// since they know least of the light between surfaces; from YOUNG on all count the same. `more` is
+// since they know least of the light between surfaces; from SETTLED on all count the same. `more` is
 // what the first one counts for beyond that.
 fn share_of_frame(number: f32, more: f32) -> f32 {
-    let weight = min(number, YOUNG);
-    return weight / (0.5 * weight * (weight + 1.0) + more + YOUNG * (number - weight));
+    let weight = min(number, SETTLED);
+    return weight / (0.5 * weight * (weight + 1.0) + more + SETTLED * (number - weight));
 }
 
 // Frames that a mean remembers where its surface moves on the screen, or light may be changing.
@@ -90,8 +90,9 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let width = cell_foot(z);
     var arrived = arrived_by(cell, width);
     let looks = looks_of(packed);
-    let fresh = looks > 1u;
-    if fresh {
+    let young = age_of(packed) == YOUNG;
+    let fresh = looks > 1u && !young;
+    if looks > 1u {
         for (var look = 1u; look < looks; look++) {
             let more = arrived_by(cell_record(cell, look), width);
             arrived.light += more.light;
@@ -124,11 +125,11 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     if changing && (gather.flags & GATHER_EVEN) == 0u { most = min(most, BRIEF); }
     // A fresh cell's first frame counts for its several rays; not just after a change, when what
     // rays meet knows nothing of it yet.
-    let frames = min(past.frames + f32(select(looks, 1u, changed)), most);
-    if fresh && changed {
-        // Of one frame in which several rays were sent.
+    let frames = min(past.frames + f32(select(1u, looks, fresh && !changed)), most);
+    if young || (fresh && changed) {
+        // Of one frame in which several rays were sent: one number among others, or the only one.
         let l = luminance(arrived.light);
-        arrived.square = mix(arrived.square, l * l, 1.0 - 1.0 / f32(looks));
+        arrived.square = mix(arrived.square, l * l, select(1.0 - 1.0 / f32(looks), 1.0, young));
     }
     // It is no older for them.
     let more = f32(AGAIN - 1u);
@@ -141,7 +142,7 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     let lately = mix(past.lately, arrived.light, select(max(lately_share(), 1.0 / frames), 1.0, fresh));
     // At rest a bright ray comes into the mean over some frames, all of it in the end, and not as a
     // spark.
-    let whole = changing || frames <= YOUNG || (gather.flags & GATHER_EVEN) != 0u;
+    let whole = changing || frames <= SETTLED || (gather.flags & GATHER_EVEN) != 0u;
     let mean = mix(past.light, select(lately, arrived.light, whole), share);
     let now = Past(
         mean, frames, mix(past.vector, arrived.vector, share), mix(past.square, arrived.square, share), x, n,

@@ -75,10 +75,17 @@ const GATHER_ALL_ENTRIES = 1024u;
 // Rays of a cell whose remembered light holds no longer.
 const AGAIN = 4u;
 
+// Rays of a young cell.
+const MORE = 2u;
+
 // Rays of a cell, of what stands in `cell_pixels`.
 fn looks_of(packed: u32) -> u32 {
-    if (packed & FRESH) != 0u { return gather.looks; }
-    return select(1u, AGAIN, (packed & STALE) != 0u);
+    switch age_of(packed) {
+        case FRESH: { return gather.looks; }
+        case STALE: { return AGAIN; }
+        case YOUNG: { return MORE; }
+        default: { return 1u; }
+    }
 }
 
 // Where ray `look` of a cell stands among the records: the first rays of all cells and those into

@@ -45,6 +45,12 @@ impl Method {
         if self.has_history() { Self::SETTLED } else { 1 }
     }
 
+    /// Frames of a still camera after which a frame does no more than all later ones: what it costs
+    /// is counted then. (Cells of `gather` that are young send more rays.)
+    pub fn frames_to_rest(&self) -> u32 {
+        if self.has_history() { Self::SETTLED + 16 } else { 1 }
+    }
+
     /// The method's name on the command line.
     pub fn name(&self) -> &'static str {
         match self {

@@ -106,9 +106,9 @@ fn rows(
         let seconds = SHARE * run.left();
         let measured = one(gpu, with.clone(), &uploaded, camera, size, seconds);
         let Some((mut measured, frames)) = run.kept(&what, measured) else { continue };
-        let settling = with.frames_to_settle();
+        let frames_to_rest = with.frames_to_rest();
         let options = RendererOptions { method: with, ..Default::default() };
-        let counted = count::frame(gpu, count::Still { scene, camera, size }, options, settling);
+        let counted = count::frame(gpu, count::Still { scene, camera, size }, options, frames_to_rest);
         measured.costs = run.kept(&format!("{what}, counts"), counted).unwrap_or_default();
         measured.costs.retain(|c| is_indirect(&c.pass));
         let direct = rows.first().map_or(measured.wall_ms.median, |r| r.measured.wall_ms.median);
