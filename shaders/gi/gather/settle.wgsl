@@ -4,7 +4,7 @@
 // which is looked up where the surface was then.
 
 // Frames in which the light between surfaces settles: entries send more than a ray in each.
-const SETTLED = 24.0;
+const SETTLED = 28.0;
 // Share of a frame in a mean, by its number. The first frames count for less, each for its number,
 // since they know least of the light between surfaces; from SETTLED on all count the same. `more` is
 // what the first one counts for beyond that.
