@@ -12,9 +12,13 @@ use bouncelight::gpu::Gpu;
 use half::f16;
 use wgpu::TextureFormat as F;
 
+/// A step of the camera's way from which normals read in the wrong space show other light by more
+/// than at its beginning (5.6 and 8.4 %).
+const STEP: u32 = 12;
+
 /// Light of eight frames at rest, written one way and read another.
 fn still(gpu: &Gpu, how: &Written, read: &Conventions) -> Vec<f32> {
-    let shot = shot(0, [0.0; 2]);
+    let shot = shot(STEP, [0.0; 2]);
     let targets = written(gpu, &shot, how, &shot.camera);
     let (world, mut view) = (world(gpu), gather(gpu));
     let mut last = Vec::new();
@@ -77,7 +81,8 @@ fn depth_and_normals_in_every_convention() {
                 let other = if space == S::View { S::World } else { S::View };
                 let wrong = still(&gpu, &how, &Conventions { normal_space: other, ..conventions });
                 let control = difference(&wrong, &plain);
-                assert!(control > 0.04, "{encoding:?} read as {other:?}: {control}");
+                println!("{encoding:?} read as {other:?}: {:.1} %", 100.0 * control);
+                assert!(control > 0.05, "{encoding:?} read as {other:?}: {control}");
             }
         }
     }

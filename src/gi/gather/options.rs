@@ -99,7 +99,8 @@ impl Options {
 pub enum OptionsError {
     /// No such number.
     #[error(
-        "`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, blur=0|1, even=0|1, caustics=0|1, seed=N"
+        "`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, \
+         blur=0|1, even=0|1, caustics=0|1, seed=N"
     )]
     Unknown(String),
     /// A value that cannot be.
