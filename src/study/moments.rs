@@ -1,6 +1,5 @@
 //! What a network that filters learns from: what `gather` remembers of a view's cells at several
-//! moments of its settling, and the light that they are to show: what the same rays find in the
-//! end.
+//! moments of its settling, and the light that they are to show: what such rays find in the end.
 //!
 //! The light is `gather`'s own ([`Options::PLAIN`](crate::gi::gather::Options::PLAIN): nothing
 //! blurred, all frames alike) and not the path tracer's. A filter can take away noise and nothing

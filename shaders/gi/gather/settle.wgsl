@@ -3,11 +3,11 @@
 // What a cell's ray found, with the light of its entry, mixed into the mean over the frames before,
 // which is looked up where the surface was then.
 
-// Frames in which the light between surfaces settles: entries send more than a ray in each.
+// Frames until the light between surfaces has settled.
 const SETTLED = 28.0;
 // Share of a frame in a mean, by its number. The first frames count for less, each for its number,
-// since they know least of the light between surfaces; from SETTLED on all count the same. `more` is
-// what the first one counts for beyond that.
+// since they know least of the light between surfaces; from SETTLED on all count the same. `more`
+// is what the first one counts for beyond that.
 fn share_of_frame(number: f32, more: f32) -> f32 {
     let weight = min(number, SETTLED);
     return weight / (0.5 * weight * (weight + 1.0) + more + SETTLED * (number - weight));

@@ -76,7 +76,8 @@ pub struct Args {
     out: PathBuf,
     /// What a network that filters learns from, instead: moments at which what cells remember is
     /// kept, in order: frames after a cut, or `pan` (at the end of six frames of a moving camera,
-    /// which count), such as 1,2,8,pan,20. The light to be learnt is the mean of --spp of the same rays.
+    /// which count), such as 1,2,8,pan,20. The light to be learnt is the mean of --spp rays of
+    /// another seed.
     #[arg(long, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST",
         conflicts_with_all = ["motion", "guides"])]
     moments: Vec<When>,
