@@ -80,11 +80,14 @@ class WithTheProgram(unittest.TestCase):
             told = scene.fit(PROGRAM, "cornell", out, folder, views=2, spp=4, minutes=0.1, size="96x64", lit=["--environment", "0.2"])
             self.assertEqual((told["views"], told["held_out_error"]["columns"]), (2, ["gather", "before", "after"]))
             gather, before, after = told["held_out_error"]["all"]
-            # It began with the shipped network, which is not `gather`, and has learnt something.
+            # It began with the shipped network, which is not `gather`, took steps, and kept what did best on the views for choosing. Whether
+            # six seconds lead to something better is not asked: on a slow machine they do not, and then the network is the one begun with.
             self.assertNotEqual(gather, before)
-            self.assertNotEqual(before, after)
             state = train.read_checkpoint(os.path.join(folder, "run", "checkpoint.pt"))
-            self.assertEqual(state["best"][0], min(row["validation_error"] for row in state["rows"]))
+            errors = [row["validation_error"] for row in state["rows"]]
+            self.assertEqual(state["best"][0], min(errors))
+            self.assertNotEqual(errors[-1], errors[0])
+            self.assertEqual(before == after, errors.index(min(errors)) == 0)
             info = subprocess.run([PROGRAM, "weights", "verify", out], capture_output=True, text=True)
             self.assertEqual(info.returncode, 0, info.stderr)
 
@@ -111,6 +114,23 @@ class Alone(unittest.TestCase):
                 file.write(b"nothing")
             with self.assertRaisesRegex(TrainingError, "a.safetensors: not a lesson"):
                 lessons.read(folder)
+
+    def test_slopes_are_numbers_in_the_dark(self):
+        # Beside one bright cell its neighbours have next to nothing: what one brings over the others' light is beyond numbers.
+        h, w = 8, 16
+        x = torch.stack([torch.arange(w).float().expand(h, w), torch.arange(h).float().view(-1, 1).expand(h, w), torch.zeros(h, w)])
+        light = 10.0 ** (-30 * torch.rand(1, 1, h, w, generator=torch.Generator().manual_seed(1))).expand(1, 3, h, w)
+        batch = {"x": x[None], "n": torch.tensor([0.0, 0, 1]).view(1, 3, 1, 1).expand(1, 3, h, w), "light": light, "square": light[:, 0] ** 2,
+                 "frames": torch.full((1, h, w), 4.0), "age": torch.tensor([4.0]), "strictness": torch.full((1, h, w), 2.0),
+                 "nearness": torch.zeros(1, h, w)}
+        answer = (3 * torch.randn(1, blur.GUIDANCE, h, w, generator=torch.Generator().manual_seed(2))).requires_grad_()
+        blur.filtered(batch, answer)[0].sum().backward()
+        self.assertTrue(torch.isfinite(answer.grad).all())
+        self.assertGreater(answer.grad.abs().max().item(), 0)
+        # A ratio that is cut after it was taken is not.
+        a, b = torch.tensor(1.0), torch.tensor(1e-25, requires_grad=True)
+        (a / b).clamp(max=60).backward()
+        self.assertFalse(torch.isfinite(b.grad))
 
     def test_places_apart_keep_light_apart_and_trust_counts(self):
         # A plane, its left half bright and its right half dark.

@@ -228,7 +228,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             lately += alone * there.lately;
             all += alone * vec2f(l, 1.0);
             if w * l > brightest.x && there.frames * l * l < MANY * there.square { brightest = vec2f(w * l, w); }
-            noise += alone * alone * max(there.square - l * l, 0.0);
+            noise += alone * alone * max(square_lately(there) - l * l, 0.0);
             most = max(most, alone * bright_ray(there));
             squares += w * there.square;
             parts += w * w / there.frames;

@@ -20,14 +20,14 @@ const KNOWN = 2u;
 fn tells(here: Past) -> vec4f {
     if here.frames <= LEAST_KNOWN { return vec4f(0.0); }
     let l = luminance(here.light);
-    let variance = max(here.square - l * l, 0.0) * lately_noise();
+    let variance = max(square_lately(here) - l * l, 0.0) * lately_noise();
     return vec4f(l, luminance(here.lately), variance, lately_share() * bright_ray(here));
 }
 
 // Luminance of the rays that bring a cell's light: of rays that find either nothing or one
 // brightness, that brightness.
 fn bright_ray(here: Past) -> f32 {
-    return here.square / max(luminance(here.light), 1e-20);
+    return square_lately(here) / max(luminance(here.light), 1e-20);
 }
 
 // Whether the mean of lately differs from that of all frames by more than its noise, by Bernstein's

@@ -58,6 +58,20 @@ fn strictness_at(x: vec3f) -> f32 {
     return 1.0 / (BLUR_PLANE * cell_foot(max(z, 1e-9)));
 }
 
+// Mean square of the luminance of frames of one ray. Those in which the cell was young are means of
+// several.
+fn square_of_one(past: Past) -> f32 {
+    let l = luminance(past.light);
+    let young = select(min(YOUNG_FRAMES / max(past.frames, 1.0), 1.0), 0.0, (gather.flags & GATHER_EVEN) != 0u);
+    return l * l + max(past.square - l * l, 0.0) / (1.0 - young * (1.0 - 1.0 / f32(MORE)));
+}
+
+// The same of frames as they have been lately.
+fn square_lately(past: Past) -> f32 {
+    if past.frames <= YOUNG_FRAMES { return past.square; }
+    return square_of_one(past);
+}
+
 // The side that a surface's plane shows, from the places of the cells beside one: shading normals
 // of coarse meshes and of bumps lean away from it. The nearer one of each two is on the same
 // surface if any is. Where what comes out is far from the shading normal neither is, and that has

@@ -35,8 +35,6 @@ const ASKED = 2;
 const LEAST_ASKED = 4.0;
 // Cells that the narrow blur averages.
 const AVERAGED = 16.0;
-// A cell is young for so many frames.
-const YOUNG_FRAMES = 40.0;
 // Less than this share of the light is no change.
 const NO_CHANGE = 0.01;
 
@@ -70,7 +68,7 @@ fn frames_worth(past: Past, then: vec2f) -> f32 {
     let square = (asked.x * asked.x - asked.y) / max(asked.z * (asked.z - 1.0), 1.0);
     let l = luminance(past.light);
     if square <= NO_CHANGE * NO_CHANGE * l * l { return past.frames; }
-    return max(past.square - l * l, 0.0) / (AVERAGED * square);
+    return max(square_of_one(past) - l * l, 0.0) / (AVERAGED * square);
 }
 
 // At rest a cell goes on with the surface that it remembers as long as one of its pixels shows it:

@@ -75,7 +75,8 @@ const GATHER_ALL_ENTRIES = 1024u;
 // Rays of a cell whose remembered light holds no longer.
 const AGAIN = 4u;
 
-// Rays of a young cell.
+// A cell is young for so many frames, and sends so many rays in each.
+const YOUNG_FRAMES = 40.0;
 const MORE = 2u;
 
 // Rays of a cell, of what stands in `cell_pixels`.

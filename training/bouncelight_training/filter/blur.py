@@ -20,6 +20,11 @@ def luminance(rgb):
     return r * rgb[:, 0] + g * rgb[:, 1] + b * rgb[:, 2]
 
 
+def bounded_ratio(a, b, most):
+    """a / b of b >= 0, no more than `most`, with finite slopes however small b is: those of a quotient that is cut afterwards are 0 times infinity."""
+    return a / torch.maximum(b, a / most).clamp(min=1e-30)
+
+
 def around(x, radius, stride=1):
     """[n,c,h,w] to [n,c,k,h,w]: the k cells of the square around each, 0 outside."""
     n, c, h, w = x.shape
@@ -85,7 +90,7 @@ def without_rare(w, light, square, frames, total):
     weight = torch.where(most > 0, w.gather(1, place.unsqueeze(1))[:, 0], 0.0)
     others = ((w * bright).sum(1) - most) / (total - weight).clamp(min=1e-30)
     seen = most - others * weight > BLOTCH * others * total
-    brings = w * (bright - others.unsqueeze(1)) / (others * total).clamp(min=1e-30).unsqueeze(1)
+    brings = bounded_ratio(w * (bright - others.unsqueeze(1)), (others * total).unsqueeze(1), 4 * BLOTCH)
     rare = (brings / BLOTCH - 1).clamp(0, 1) * ((MANY - rays) / (MANY - FEW)).clamp(0, 1)
     return 1 - rare * seen.unsqueeze(1)
 
@@ -132,7 +137,7 @@ def smooth(batch, mean, variance, rare, far, tolerance):
         surface = same_surface(batch, 2, STRIDE)
         surface[:, 12] = 0
         same = weights * surface * as_near(batch, 2, STRIDE)
-    w = same * torch.exp(-(apart * apart / noise.clamp(min=1e-30)).clamp(max=60)) * kinship(far, share, 2, STRIDE)
+    w = same * torch.exp(-bounded_ratio(apart * apart, noise, 60)) * kinship(far, share, 2, STRIDE)
     spread = (rare + (surface.unsqueeze(1) * around(rare, 2, STRIDE)).sum(2)) / (1 + surface.sum(1)).unsqueeze(1)
     return spread + (mean + (w.unsqueeze(1) * around(mean, 2, STRIDE)).sum(2)) / (1 + w.sum(1)).unsqueeze(1)
 
