@@ -14,6 +14,7 @@ pub(crate) mod alias;
 mod build;
 mod caster;
 mod cpu;
+mod cutout;
 mod emitters;
 mod gpu;
 pub(crate) mod hash;

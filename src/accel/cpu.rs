@@ -2,7 +2,7 @@
 
 use glam::{Mat3, Vec3};
 
-use super::trees::{SceneTrees, apart};
+use super::trees::{How, SceneTrees, apart};
 use super::wide::{Block, INSTANCE, NODE};
 use super::{Accel, AccelError, scene};
 use crate::scene::Scene;
@@ -196,7 +196,7 @@ impl SceneBlocks {
     /// [`AccelError::TooManyTriangles`].
     pub fn new(scene: &Scene) -> Result<Self, AccelError> {
         Accel::check_count(scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum())?;
-        let trees = SceneTrees::build(scene, &|_, _| true, false)?;
+        let trees = SceneTrees::build(scene, &|_, _| true, How { alone: false, pieces: true })?;
         let mut blocks = Self { trees, instances: Vec::new() };
         blocks.place(scene);
         Ok(blocks)
@@ -206,7 +206,7 @@ impl SceneBlocks {
     /// [`SceneRays::place`](super::SceneRays::place) does.
     pub fn place(&mut self, scene: &Scene) {
         if apart(&self.trees.meshes, &scene.instances)
-            && let Ok(alone) = SceneTrees::build(scene, &|_, _| true, true)
+            && let Ok(alone) = SceneTrees::build(scene, &|_, _| true, How { alone: true, pieces: true })
         {
             self.trees = alone;
         }

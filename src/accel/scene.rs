@@ -5,7 +5,7 @@
 
 use super::emitters::{self, EmitterGpu};
 use super::gpu::{self, ROW};
-use super::trees::{MeshPart, MeshTree, SceneTrees, apart};
+use super::trees::{How, MeshPart, MeshTree, SceneTrees, apart};
 use super::wide::{Block, INSTANCE, WORDS};
 use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, surfaces};
 use crate::scene::Scene;
@@ -19,7 +19,8 @@ static NEXT: AtomicU64 = AtomicU64::new(1);
 /// What [`SceneRays`] holds, for overlays and tests.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RayCounts {
-    /// Triangles of the meshes, each mesh once.
+    /// Triangles of the meshes, each mesh once; of those that pictures cut holes into the pieces that
+    /// stop rays.
     pub triangles: usize,
     /// Instances that rays can meet.
     pub instances: usize,
@@ -73,7 +74,7 @@ impl SceneRays {
     ) -> Result<Self, AccelError> {
         // What cannot fit is not built first.
         check(device, scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum())?;
-        let mut rays = Self::of_trees(device, queue, SceneTrees::build(scene, progress, false)?)?;
+        let mut rays = Self::of_scene(device, queue, scene, progress, false)?;
         rays.place(queue, scene);
         Ok(rays)
     }
@@ -90,6 +91,25 @@ impl SceneRays {
     ) -> Result<Self, AccelError> {
         check(device, parts.iter().map(|p| p.triangles() as u64).sum())?;
         Self::of_trees(device, queue, SceneTrees::join(parts, instances))
+    }
+
+    /// With what pictures cut holes into in pieces, or whole where those are too many for the device.
+    fn of_scene(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        scene: &Scene,
+        progress: &(dyn Fn(usize, usize) -> bool + Sync),
+        alone: bool,
+    ) -> Result<Self, AccelError> {
+        let made = |pieces| {
+            let trees = SceneTrees::build(scene, progress, How { alone, pieces })?;
+            check(device, trees.surfaces.len() as u64)?;
+            Self::of_trees(device, queue, trees)
+        };
+        match made(true) {
+            Err(e) if !matches!(e, AccelError::Stopped) => made(false),
+            made => made,
+        }
     }
 
     fn of_trees(device: &wgpu::Device, queue: &wgpu::Queue, trees: SceneTrees) -> Result<Self, AccelError> {
@@ -128,8 +148,7 @@ impl SceneRays {
         let mut anew = false;
         if apart(&self.meshes, &scene.instances) {
             // Who moves one part may move others.
-            let trees = SceneTrees::build(scene, &|_, _| true, true);
-            match trees.and_then(|trees| Self::of_trees(&self.device, queue, trees)) {
+            match Self::of_scene(&self.device, queue, scene, &|_, _| true, true) {
                 Ok(mut made) => {
                     made.succeed(self);
                     *self = made;
@@ -201,7 +220,7 @@ impl SceneRays {
         &self.accel
     }
 
-    /// One `surfaces::Packed` for each triangle of each mesh.
+    /// One `surfaces::Packed` for each triangle of each mesh, or piece of one.
     pub fn surfaces(&self) -> &wgpu::Buffer {
         &self.surfaces
     }

@@ -6,7 +6,7 @@ use super::gpu::ROW;
 use super::image::Reductions;
 use super::refit::Refit;
 use super::wide::{Block, NODE, WORDS};
-use super::{Accel, AccelError, build, surfaces, threads};
+use super::{Accel, AccelError, build, cutout, surfaces, threads};
 use crate::scene::deform::{Deform, Joint, Vertices};
 use crate::scene::{Instance, Material, Mesh, Scene, octahedral::octahedral_word};
 use glam::Vec3;
@@ -61,6 +61,15 @@ fn normals(triangles: impl Iterator<Item = [u32; 3]>, of: &[[f32; 3]]) -> Vec<[u
     triangles.map(|t| [normal(t[0]), normal(t[1]), normal(t[2]), 0]).collect()
 }
 
+/// What trees are made of.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct How {
+    /// A tree for each mesh.
+    pub alone: bool,
+    /// What pictures cut holes into is met in pieces ([`cutout`]).
+    pub pieces: bool,
+}
+
 /// All that is uploaded once.
 pub(super) struct SceneTrees {
     /// Room for the tree over the instances, then the meshes' trees.
@@ -94,12 +103,14 @@ pub(crate) struct MeshPart {
 }
 
 impl MeshPart {
-    /// Of a mesh of `scene`, and of how it deforms, if it does. One that disagrees in itself is not
-    /// met: the upload of the picture's part refuses it.
-    pub fn new(scene: &Scene, mesh: &Mesh, reductions: &Reductions, deform: Option<&Deform>) -> Self {
+    /// Of a mesh of `scene`, and of how it deforms, if it does; `halvings` of its sides where a
+    /// picture cuts holes into it. One that disagrees in itself is not met: the upload of the
+    /// picture's part refuses it.
+    pub fn new(scene: &Scene, mesh: &Mesh, reductions: &Reductions, deform: Option<&Deform>, halvings: u32) -> Self {
         if mesh.check(scene.materials.len()).is_err() {
             return Self::default();
         }
+        let mesh = &*cutout::in_pieces(scene, mesh, reductions, halvings);
         let corners = corners(mesh);
         let part = Self::without_tree(scene, mesh, reductions, &corners);
         let triangles = || mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);
@@ -123,11 +134,17 @@ impl MeshPart {
 
     /// Of meshes that are in one place, with one tree, which the first of them has. `done` hears of
     /// each.
-    fn of_all(scene: &Scene, meshes: &[usize], reductions: &Reductions, done: impl Fn()) -> Vec<Self> {
+    fn of_all(
+        scene: &Scene,
+        meshes: &[usize],
+        reductions: &Reductions,
+        halvings: &[u32],
+        done: impl Fn(),
+    ) -> Vec<Self> {
         let mut all = Vec::new();
         let mut parts: Vec<Self> = Vec::with_capacity(meshes.len());
         for &i in meshes {
-            let mesh = &scene.meshes[i];
+            let mesh = &*cutout::in_pieces(scene, &scene.meshes[i], reductions, halvings[i]);
             let own = corners(mesh);
             parts.push(Self::without_tree(scene, mesh, reductions, &own));
             all.extend(own);
@@ -207,31 +224,32 @@ fn can_be_met(mesh: &Mesh) -> bool {
 
 impl SceneTrees {
     /// Builds them on all of the machine's threads. `progress` as in
-    /// [`SceneRays::with_progress`](super::SceneRays::with_progress); `alone`: a tree for each
-    /// mesh.
+    /// [`SceneRays::with_progress`](super::SceneRays::with_progress).
     pub fn build(
         scene: &Scene,
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
-        alone: bool,
+        how: How,
     ) -> Result<Self, AccelError> {
         let reductions = Reductions::new(scene);
+        let halvings = if how.pieces { cutout::halvings(scene) } else { vec![0; scene.meshes.len()] };
         let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(!progress(0, scene.meshes.len())));
         let one_done = || {
             if !progress(done.fetch_add(1, Ordering::Relaxed) + 1, scene.meshes.len()) {
                 stopped.store(true, Ordering::Relaxed);
             }
         };
-        let groups = shared(scene, alone);
+        let groups = shared(scene, how.alone);
         let make = |group: &Vec<usize>| {
             if stopped.load(Ordering::Relaxed) {
                 return Vec::new();
             }
             if let [mesh] = group[..] {
-                let part = MeshPart::new(scene, &scene.meshes[mesh], &reductions, scene.deform_of(mesh));
+                let deform = scene.deform_of(mesh);
+                let part = MeshPart::new(scene, &scene.meshes[mesh], &reductions, deform, halvings[mesh]);
                 one_done();
                 return vec![part];
             }
-            MeshPart::of_all(scene, group, &reductions, one_done)
+            MeshPart::of_all(scene, group, &reductions, &halvings, one_done)
         };
         let size = |group: &Vec<usize>| group.iter().map(|&m| scene.meshes[m].indices.len()).sum();
         let made = threads::map(&groups, size, make);

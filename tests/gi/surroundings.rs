@@ -1,11 +1,11 @@
 //! What `gather` makes of surroundings other than walls under lamps: pictures of the sky, holes cut
 //! by alpha, surfaces that shine.
 
-use crate::common;
 use crate::world::{Block, GREY, difference, gather, hall, light, mean, renderer, scene};
+use crate::{build, common};
 use bouncelight::gi::Method;
 use bouncelight::scene::environment::EnvironmentImage;
-use bouncelight::scene::{AlphaMode, Camera, Scene};
+use bouncelight::scene::{AlphaMode, Camera, ColorSpace, Image, Instance, Material, Mesh, Sampler, Scene, TextureRef};
 use std::sync::Arc;
 
 /// A room with a roof, the camera inside; material 4 is the wall behind it, 5 the roof.
@@ -67,6 +67,52 @@ fn the_sky_comes_in_where_alpha_cuts_a_hole() {
     assert!(mean(&none) > 0.1 && difference(&hole, &none) < 1e-6, "{}", difference(&hole, &none));
     // Negative control: above the cutoff the roof is there.
     assert_eq!(mean(&roofed(Some(0.6))), 0.0);
+}
+
+/// Six black cards under the sky instead of a roof, close above each other, whose picture of 64×64
+/// texels stops rays where `solid` says so.
+fn under_cards(solid: impl Fn(usize, usize) -> bool) -> Scene {
+    let mut scene = room(1.0);
+    scene.instances.pop();
+    let rgba = (0..64 * 64).flat_map(|i| [0, 0, 0, if solid(i % 64, i / 64) { 255 } else { 0 }]).collect();
+    let (name, color_space) = (String::new(), ColorSpace::Srgb);
+    scene.images.push(Image { name, width: 64, height: 64, rgba, color_space });
+    let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let texture = TextureRef { image: 0, sampler: Sampler::default(), uv_set: 0, transform };
+    let material = scene.materials.len();
+    scene.materials.push(Material {
+        base_color_texture: Some(texture),
+        alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+        f0: 0.0,
+        double_sided: true,
+        ..Default::default()
+    });
+    for i in 0..6 {
+        let card = build::quad([-3.2, 3.0 + 0.01 * i as f32, 3.2], [6.4, 0.0, 0.0], [0.0, 0.0, -6.4]);
+        let (mesh, transform) = (scene.meshes.len(), build::IDENTITY);
+        scene.meshes.push(Mesh { material, ..card });
+        scene.instances.push(Instance { name: format!("card{i}"), mesh, transform });
+    }
+    scene
+}
+
+#[test]
+fn light_comes_in_where_holes_lie_over_each_other() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut renderer = renderer(&gpu, [48, 32], gather());
+    let mut lit = |scene: &Scene| light(&gpu, &mut renderer, scene);
+    // Half of each card is open, on the same side; or a roof covers that half, black and as thick.
+    let cards = lit(&under_cards(|x, _| x >= 32));
+    let mut half = room(1.0);
+    half.materials[5].base_color = [0.0, 0.0, 0.0, 1.0];
+    let roof = half.instances.last_mut().expect("it has a roof");
+    (roof.transform[0][0], roof.transform[1][1], roof.transform[3]) = (1.6, 0.025, [1.6, 3.025, 0.0, 1.0]);
+    let half = lit(&half);
+    // Negative control: as many texels are open, but there is no piece of a card that is.
+    let fog = lit(&under_cards(|x, y| (x as u32 + 64 * y as u32).wrapping_mul(0x9e37_79b1) >> 16 & 1 == 0));
+    println!("E/π under cards {:.3}, half a roof {:.3}, fog {:.3}", mean(&cards), mean(&half), mean(&fog));
+    assert!(difference(&cards, &half) < 0.05, "{}", difference(&cards, &half));
+    assert!(mean(&fog) < 0.3 * mean(&half), "{} {}", mean(&fog), mean(&half));
 }
 
 #[test]

@@ -316,7 +316,7 @@ impl PreparedMesh {
     /// [`GiError::Mesh`] for what disagrees in itself.
     pub fn new(source: &MeshSource<'_>) -> Result<Self, GiError> {
         let (scene, mesh) = source.scene().map_err(GiError::Mesh)?;
-        let part = MeshPart::new(&scene, &mesh, &Reductions::new(&scene), None);
+        let part = MeshPart::new(&scene, &mesh, &Reductions::new(&scene), None, 0);
         Ok(Self { part, corners: accel::corners(&mesh) })
     }
 
