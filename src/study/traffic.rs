@@ -58,8 +58,6 @@ struct Place {
 struct Rays<'a> {
     scene: &'a Scene,
     blocks: SceneBlocks,
-    /// Number of each mesh's first triangle among those of all meshes.
-    first: Vec<usize>,
     eye: Vec3,
     random: Random,
     read: [usize; 3],
@@ -72,11 +70,8 @@ impl Rays<'_> {
         let ray = (x.to_array(), d.to_array());
         let (hit, instance) = self.blocks.walk(ray.0, ray.1, (f32::INFINITY, false), seed, &mut |b| list.push(b))?;
         let instance = &self.scene.instances[instance as usize];
-        let mesh = &self.scene.meshes[instance.mesh];
-        let triangle = &mesh.indices[3 * (hit.triangle as usize - self.first[instance.mesh])..][..3];
-        let world = Mat4::from_cols_array_2d(&instance.transform);
-        let [a, b, c] = [0, 1, 2].map(|k| world.transform_point3(mesh.positions[triangle[k] as usize].into()));
-        let n = (b - a).cross(c - a).normalize_or(-d);
+        let across = Mat4::from_cols_array_2d(&instance.transform).inverse().transpose();
+        let n = across.transform_vector3(self.blocks.normal(&hit)).normalize_or(-d);
         let n = if n.dot(d) > 0.0 { -n } else { n };
         let x = x + d * hit.t;
         Some(Place { x: x + n * (3e-5 * x.distance(self.eye)), n })
@@ -124,10 +119,8 @@ impl Rays<'_> {
 /// [`AccelError`] where the scene has too many triangles.
 pub fn count(scene: &Scene, camera: &Camera, size: [u32; 2]) -> Result<Traffic, AccelError> {
     let blocks = SceneBlocks::new(scene)?;
-    let counts = scene.meshes.iter().map(|m| m.indices.len() / 3);
-    let first = counts.scan(0, |sum, n| Some(std::mem::replace(sum, *sum + n))).collect();
     let eye = Vec3::from(camera.eye());
-    let mut rays = Rays { scene, first, eye, random: Random(1), read: [0; 3], blocks };
+    let mut rays = Rays { scene, eye, random: Random(1), read: [0; 3], blocks };
     let world = Mat4::from_cols_array_2d(&camera.transform);
     let [columns, rows] = cells_of(size);
     let half = (0.5 * camera.yfov).tan();
@@ -251,6 +244,27 @@ mod tests {
         assert_eq!(found(&twice(2 * FAR)), [4 * FAR, 4 * FAR, 4 * FAR * WARP]);
         // Threads of a warp that ask for the same are one request, and wait for the slowest.
         assert_eq!(found(&[vec![1, 2, 4], vec![1, 3]]), [4, 4, 3 * WARP]);
+    }
+
+    #[test]
+    fn what_is_met_in_pieces_is_counted() {
+        use crate::scene::{AlphaMode, ColorSpace, Image, Sampler, TextureRef};
+        let mut scene = crate::scene::load("cornell").unwrap();
+        let whole = count(&scene, &scene.cameras[0], [64, 64]).unwrap();
+        let rgba = (0..64 * 64).flat_map(|i| [255, 255, 255, if i % 64 < 20 { 0 } else { 255 }]).collect();
+        let (name, color_space) = (String::new(), ColorSpace::Srgb);
+        scene.images.push(Image { name, width: 64, height: 64, rgba, color_space });
+        let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let image = scene.images.len() - 1;
+        for material in &mut scene.materials {
+            material.base_color_texture = Some(TextureRef { image, sampler: Sampler::default(), uv_set: 0, transform });
+            material.alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
+        }
+        for mesh in &mut scene.meshes {
+            mesh.uv0 = mesh.positions.iter().map(|p| [p[0] + p[2], p[1] + p[2]]).collect();
+        }
+        let pieces = count(&scene, &scene.cameras[0], [64, 64]).unwrap();
+        assert!(pieces.blocks > whole.blocks + 100 && pieces.looks > 0, "{pieces:?} {whole:?}");
     }
 
     #[test]
