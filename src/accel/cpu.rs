@@ -245,8 +245,8 @@ impl SceneBlocks {
 
     /// The nearest hit (any hit where `any`) with 0 < t < `t_max`, and the number of its instance;
     /// `triangle` counts those of all meshes, one after the other, or pieces of what pictures cut
-    /// holes into. Triangles that let rays through
-    /// do so by `seed`. `seen` hears of each block that is read, in the GPU's order.
+    /// holes into. Triangles that let rays through do so by `seed`. `seen` hears of each block that
+    /// is read, in the GPU's order.
     pub fn walk(
         &self,
         origin: [f32; 3],

@@ -7,7 +7,7 @@ use super::emitters::{self, EmitterGpu};
 use super::gpu::{self, ROW};
 use super::trees::{How, MeshPart, MeshTree, SceneTrees, apart};
 use super::wide::{Block, INSTANCE, WORDS};
-use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, surfaces};
+use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, cutout, surfaces};
 use crate::scene::Scene;
 use glam::{Mat4, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -107,7 +107,9 @@ impl SceneRays {
             Self::of_trees(device, queue, trees)
         };
         match made(true) {
-            Err(e) if !matches!(e, AccelError::Stopped) => made(false),
+            Err(e) if !matches!(e, AccelError::Stopped) && cutout::halvings(scene).iter().any(|n| *n > 0) => {
+                made(false)
+            }
             made => made,
         }
     }
