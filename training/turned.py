@@ -3,9 +3,10 @@ the vertical, both settled, compared at the world points that both show.
 
     python training/turned.py out/turned ../shared/reference/real [--methods gather,neural] [--degrees 15] [--frames 32] [--scenes hotel,study]
 
-Each pixel's place (Position) of the first picture is looked up in the second; a pair counts where the second's own place is nearer than half a
-pixel's width and its normal agrees. Light is all diffuse light that a method adds (DiffInd), as means over 4x4 pixels of the first picture; the
-number is mean |difference| / mean, its mean difference in brackets. `control`: the same with the pixels of the second picture four to the side.
+Each pixel's place (Position) of the first picture is looked up in the second, between the four pixels around it, all of which must show the
+same surface: on the first's plane to a pixel's width, with its normal (cosine 0.95) and its albedo (to a quarter). Light is all diffuse light
+that a method adds (DiffInd), as means over 4x4 pixels of the first picture; the number is mean |difference| / mean, its mean difference in
+brackets. `control`: light of the second four pixels to the side. `--degrees 0.7` tells what noise and places of cells have of it.
 """
 import argparse
 import os
@@ -33,26 +34,38 @@ def camera_of(meta, degrees):
     return flags, (eye, right, np.cross(right, forward), forward, np.tan(np.radians(meta["fov"]) / 2))
 
 
+def around(x, y, wide, high):
+    """The four pixels around places in units of pixels, pixel centres at whole numbers: (rows, columns, weights)."""
+    left, top = np.floor(x).astype(int), np.floor(y).astype(int)
+    for down in (0, 1):
+        for right in (0, 1):
+            weight = np.abs(1 - right - (x - left)) * np.abs(1 - down - (y - top))
+            yield (top + down).clip(0, high - 1), (left + right).clip(0, wide - 1), weight
+
+
 def changed(first, second, camera, shift=0):
     """mean |difference| / mean of the light at the points that both pictures show, the mean difference over that, and the share of such cells."""
-    place = lambda o: np.stack([o[f"Position.{c}"] for c in "XYZ"], -1)
-    normal = lambda o: np.stack([o[f"Normal.{c}"] for c in "XYZ"], -1)
+    vector = lambda o, name: np.stack([o[f"{name}.{c}"] for c in "XYZ"], -1)
+    place, normal, albedo = vector(first, "Position"), vector(first, "Normal"), rgb(first, "DiffCol")
     eye, right, up, forward, tangent = camera
     h, w = first["Depth.Z"].shape
-    at = place(first) - eye
+    at = place - eye
     z = at @ forward
     with np.errstate(divide="ignore", invalid="ignore"):
         u, v = at @ right / (z * tangent * w / h), at @ up / (z * tangent)
-    inside = (first["Depth.Z"] < 1e9) & (z > 0) & (np.abs(u) < 1) & (np.abs(v) < 1)
-    px = np.where(inside, (u + 1) / 2 * w, 0).astype(int).clip(0, w - 1)
-    py = np.where(inside, (1 - v) / 2 * h, 0).astype(int).clip(0, h - 1)
-    wide = 2 * tangent / h * np.where(inside, z, 1)
-    same = inside & (np.linalg.norm(place(second)[py, px] - place(first), axis=-1) < wide) & ((normal(second)[py, px] * normal(first)).sum(-1) > 0.95)
-    px = (px + shift).clip(0, w - 1)
-    a, b = rgb(first, "DiffInd"), rgb(second, "DiffInd")[py, px]
-    weight = (same & (rgb(first, "DiffCol").min(-1) > 0.01)).astype(np.float32)
-    a, full = pooled(a, weight)
-    b, _ = pooled(b, weight)
+    same = (first["Depth.Z"] < 1e9) & (z > 0) & (np.abs(u) < 1) & (np.abs(v) < 1) & (albedo.min(-1) > 0.01)
+    x, y = np.where(same, (u + 1) / 2 * w - 0.5, 0), np.where(same, (1 - v) / 2 * h - 0.5, 0)
+    pixel = 2 * tangent / h * np.where(same, z, 1)
+    places, normals, albedos, lights = vector(second, "Position"), vector(second, "Normal"), rgb(second, "DiffCol"), rgb(second, "DiffInd")
+    light = np.zeros_like(albedo)
+    for row, column, weight in around(x, y, w, h):
+        alike = np.abs(((places[row, column] - place) * normal).sum(-1)) < pixel
+        alike &= (normals[row, column] * normal).sum(-1) > 0.95
+        alike &= np.abs(albedos[row, column] - albedo).max(-1) < 0.25 * albedo.max(-1)
+        same &= alike | (weight < 1e-3)
+        light += weight[..., None] * lights[row, (column + shift).clip(0, w - 1)]
+    a, full = pooled(rgb(first, "DiffInd"), same.astype(np.float32))
+    b, _ = pooled(light, same.astype(np.float32))
     d = (b - a)[full]
     return np.abs(d).mean() / a[full].mean(), d.mean() / a[full].mean(), full.mean()
 

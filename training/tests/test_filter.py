@@ -11,7 +11,7 @@ import torch
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 from bouncelight_training.errors import TrainingError  # noqa: E402
-from bouncelight_training.filter import blur, export, lessons, scene, train  # noqa: E402
+from bouncelight_training.filter import ablation, blur, export, lessons, scene, train  # noqa: E402
 
 PROGRAM = os.environ.get("BOUNCELIGHT")
 SIZE = ["--size", "96x64", "--spp", "4", "--moments", "1,8,pan", "-q"]
@@ -108,6 +108,24 @@ class Alone(unittest.TestCase):
             train.begin_with(model, corrects)
         with self.assertRaisesRegex(TrainingError, "cannot begin with it"):
             train.begin_with(model, scene.SHIPPED)
+
+    def test_each_part_is_left_out_once(self):
+        base = train.Config(train="a", validation="b")
+        runs = dict(ablation.variants(base))
+        for name, _ in lessons.TABLE:
+            kept = train.kept_channels(runs[f"no {name}"]).flatten()
+            missing = [other for other, n in lessons.TABLE for _ in range(n)]
+            self.assertEqual({m for m, k in zip(missing, kept) if not k}, {name})
+        for part, place in blur.PARTS.items():
+            kept = train.kept_parts(runs[f"answer without {part}"])
+            self.assertEqual(kept[:, place].abs().sum().item(), 0)
+            self.assertEqual(kept.sum().item(), sum(p.stop - p.start for p in blur.PARTS.values()) - (place.stop - place.start))
+        self.assertEqual({p for p in base.pools for name, c in runs.items() if name == f"loss without {p}x{p} cells" and p not in c.pools}, set(base.pools))
+        # All parts, but for chance: the seeds differ, and what is worth nothing is told from what is worth something by that.
+        alike = [c for name, c in runs.items() if name.startswith("all")]
+        self.assertEqual((len({c.seed for c in alike}), {c.without for c in alike}), (ablation.SEEDS, {()}))
+        rows = [(name, 0.1, 0.05) for name in ("all, seed 1", "all, seed 2", "all, seed 3")] + [("no light", 0.1, 0.06)]
+        self.assertIn("| no light | 10.000 | 6.000 | +1.000 |", ablation.table(rows))
 
     def test_what_is_no_lesson_is_named(self):
         with tempfile.TemporaryDirectory() as folder:

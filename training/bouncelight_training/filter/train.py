@@ -51,6 +51,7 @@ class Config:
     pools: tuple = POOLS  # sides of the squares of cells that the loss compares
     every: int = 1  # one view of so many, for ablations
     minutes: float = 20.0
+    steps: int = 0  # so many in place of minutes, so that runs on a busy machine are alike
     batch: int = 4
     crop: int = 48  # cells on a side of the windows that steps look at; 0: whole pictures
     learning_rate: float = 1e-3
@@ -208,7 +209,7 @@ class Run:
         if not os.path.exists(self.path):
             return
         state = read_checkpoint(self.path)
-        differ = [k for k, v in dataclasses.asdict(self.config).items() if k not in ("minutes", "threads", "device") and state["config"].get(k) != v]
+        differ = [k for k, v in dataclasses.asdict(self.config).items() if k not in ("minutes", "steps", "threads", "device") and state["config"].get(k, v) != v]
         if differ:
             raise TrainingError(f"{self.path} was made with another {differ[0]}; use another --run")
         self.model.load_state_dict(state["model"])
@@ -222,11 +223,15 @@ class Run:
         model.load_state_dict(self.average)
         return model.eval()
 
+    def done(self, lately=0.0):
+        """Which part of the run is gone, `lately` being seconds since the clock was looked at."""
+        return min(self.step / self.config.steps if self.config.steps else (self.seconds + lately) / (60 * self.config.minutes), 1)
+
     def train_step(self, piles, began):
-        """One step on moments of one pile; its loss (a tensor, so that a GPU need not be waited for), the rate, and which part of the time is gone."""
+        """One step on moments of one pile; its loss (a tensor, so that a GPU need not be waited for) and the rate."""
         c = self.config
         rng = np.random.default_rng([c.seed, self.step])
-        done = min((self.seconds + time.monotonic() - began) / (60 * c.minutes), 1)
+        done = self.done(time.monotonic() - began)
         rate = c.learning_rate * min(1, (self.step + 1) / 50) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * done)))
         for group in self.optimiser.param_groups:
             group["lr"] = rate
@@ -248,7 +253,7 @@ class Run:
         self.step += 1
         keep = min(c.ema, (self.step + 1) / (self.step + 10))
         torch._foreach_lerp_(list(self.average.values()), list(self.model.state_dict().values()), 1 - keep)
-        return loss.detach(), rate, done
+        return loss.detach(), rate
 
 
 def read_checkpoint(path):
@@ -279,19 +284,19 @@ def train(config, folder, same_names=False):
     print(f"{parameter_count(run.model)} parameters, {flops(run.model, 128, 256) / 1e9:.3f} GFLOP at 256x128 cells; {count} training and "
           f"{sum(len(pile.lessons) for pile in held_out)} validation moments", file=sys.stderr, flush=True)
     began, sums, looked = time.monotonic(), [], time.monotonic()
-    done = run.seconds / (60 * config.minutes)
     if run.step == 0:
         note(run, held_out, 0.0, 0.0)
-    while done < 1:
-        loss, rate, done = run.train_step(piles, began)
+    while run.done() < 1:
+        loss, rate = run.train_step(piles, began)
+        done = run.done(time.monotonic() - began)
         sums.append(loss)
         if run.step % 32 == 0:
             loss.item()  # Waits for a GPU, so that the clock tells what is done.
         if time.monotonic() - looked > 90 or done >= 1:
             run.seconds, began = run.seconds + time.monotonic() - began, time.monotonic()
             note(run, held_out, torch.stack(sums).mean().item(), rate)
-            sums, looked, began = [], time.monotonic(), time.monotonic()
             run.save()
+            sums, looked, began = [], time.monotonic(), time.monotonic()
     return run
 
 
@@ -310,9 +315,9 @@ def note(run, held_out, loss, rate):
     print(f"step {run.step} {run.seconds:.0f} s loss {loss:.4f} " + " ".join(f"{k} {v:.2%}" for k, v in errors.items()), file=sys.stderr, flush=True)
 
 
-@reported
-def main(arguments=None):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def asked(description, arguments):
+    """What a command line asks for: (Config, folder of the run)."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--run", required=True, help="folder of the run; continued if it has a checkpoint")
     for field in dataclasses.fields(Config):
         numbers, words = lambda t: tuple(int(n) for n in t.split(",")), lambda t: tuple(t.split(","))
@@ -324,7 +329,12 @@ def main(arguments=None):
     for name in ("train", "validation"):
         if not getattr(config, name):
             raise TrainingError(f"--{name} is missing: a folder that bouncelight dataset --moments has written")
-    train(config, folder)
+    return config, folder
+
+
+@reported
+def main(arguments=None):
+    train(*asked(__doc__, arguments))
 
 
 if __name__ == "__main__":
