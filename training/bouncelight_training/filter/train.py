@@ -34,6 +34,8 @@ LEAST_BASE = 0.01
 POOLS = (1, 2, 4, 16)
 # A picture that has become so much worse counts no more than this.
 LOUD = 2.0
+# Share of steps that may be lost to gradients that are not numbers.
+MOST_LOST = 0.01
 FIELDS = ["step", "samples", "seconds", "learning_rate", "loss", "validation_error", "gather_error"]
 
 
@@ -193,6 +195,7 @@ class Run:
         self.average = {k: v.detach().clone() for k, v in self.model.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step, self.seconds, self.rows, self.best = 0, 0.0, [], (float("inf"), None)
+        self.lost = 0  # steps whose gradient was not a number
 
     @property
     def path(self):
@@ -228,7 +231,8 @@ class Run:
         return min(self.step / self.config.steps if self.config.steps else (self.seconds + lately) / (60 * self.config.minutes), 1)
 
     def train_step(self, piles, began):
-        """One step on moments of one pile; its loss (a tensor, so that a GPU need not be waited for) and the rate."""
+        """One step on moments of one pile; its loss (a tensor, so that a GPU need not be waited for; None where its gradient was not a number, and
+        nothing was learnt) and the rate."""
         c = self.config
         rng = np.random.default_rng([c.seed, self.step])
         done = self.done(time.monotonic() - began)
@@ -247,10 +251,13 @@ class Run:
         loss = (loss / (loss.detach() / LOUD).clamp(min=1)).mean() + held(answer)
         self.optimiser.zero_grad()
         loss.backward()
-        if not torch.isfinite(nn.utils.clip_grad_norm_(self.model.parameters(), 0.5)):
-            raise TrainingError(f"step {self.step}: the gradient is not a number; what did best so far is in {self.path}")
-        self.optimiser.step()
         self.step += 1
+        if not torch.isfinite(nn.utils.clip_grad_norm_(self.model.parameters(), 0.5)):
+            self.lost += 1
+            if self.lost > MOST_LOST * self.step + 1:
+                raise TrainingError(f"step {self.step}: the gradient is not a number, {self.lost} times now; what did best so far is in {self.path}")
+            return None, rate
+        self.optimiser.step()
         keep = min(c.ema, (self.step + 1) / (self.step + 10))
         torch._foreach_lerp_(list(self.average.values()), list(self.model.state_dict().values()), 1 - keep)
         return loss.detach(), rate
@@ -289,12 +296,13 @@ def train(config, folder, same_names=False):
     while run.done() < 1:
         loss, rate = run.train_step(piles, began)
         done = run.done(time.monotonic() - began)
-        sums.append(loss)
-        if run.step % 32 == 0:
-            loss.item()  # Waits for a GPU, so that the clock tells what is done.
+        if loss is not None:
+            sums.append(loss)
+            if run.step % 32 == 0:
+                loss.item()  # Waits for a GPU, so that the clock tells what is done.
         if time.monotonic() - looked > 90 or done >= 1:
             run.seconds, began = run.seconds + time.monotonic() - began, time.monotonic()
-            note(run, held_out, torch.stack(sums).mean().item(), rate)
+            note(run, held_out, torch.stack(sums).mean().item() if sums else math.nan, rate)
             run.save()
             sums, looked, began = [], time.monotonic(), time.monotonic()
     return run
