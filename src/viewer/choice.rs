@@ -16,7 +16,7 @@ impl Source {
     /// Mean error of indirect light on the five judged rooms, %, as docs/accuracy.md has it
     /// (`light`): measured once, on other scenes, not here; `None` where nobody has.
     pub fn static_error(self) -> Option<f64> {
-        [Some(100.0), Some(28.8), Some(23.0), Some(5.9), None, None][self as usize]
+        [Some(100.0), Some(28.8), Some(23.0), Some(5.8), Some(5.8), None][self as usize]
     }
 }
 
