@@ -13,7 +13,7 @@ const MODULES: [(&str, u32); 6] = [
     ("tests.test_distributed", 4),
     ("tests.test_judge", 1),
     ("tests.test_motion", 6),
-    ("tests.test_filter", 8),
+    ("tests.test_filter", 11),
 ];
 
 #[test]

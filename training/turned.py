@@ -45,6 +45,16 @@ def around(x, y, wide, high):
 
 def changed(first, second, camera, shift=0):
     """mean |difference| / mean of the light at the points that both pictures show, the mean difference over that, and the share of such cells."""
+    a, b, same = at_both(first, second, camera, lambda picture: rgb(picture, "DiffInd"), shift)
+    # Of black surfaces nobody sees the light.
+    same &= rgb(first, "DiffCol").min(-1) > 0.01
+    (a, full), (b, _) = (pooled(light, same.astype(np.float32)) for light in (a, b))
+    d = (b - a)[full]
+    return np.abs(d).mean() / a[full].mean(), d.mean() / a[full].mean(), full.mean()
+
+
+def at_both(first, second, camera, light_of, shift=0):
+    """What `light_of` takes from either picture at the first's pixels ([h,w,3] each), and which of them show points that both do [h,w]."""
     vector = lambda o, name: np.stack([o[f"{name}.{c}"] for c in "XYZ"], -1)
     place, normal, albedo = vector(first, "Position"), vector(first, "Normal"), rgb(first, "DiffCol")
     eye, right, up, forward, tangent = camera
@@ -53,21 +63,18 @@ def changed(first, second, camera, shift=0):
     z = at @ forward
     with np.errstate(divide="ignore", invalid="ignore"):
         u, v = at @ right / (z * tangent * w / h), at @ up / (z * tangent)
-    same = (first["Depth.Z"] < 1e9) & (z > 0) & (np.abs(u) < 1) & (np.abs(v) < 1) & (albedo.min(-1) > 0.01)
+    same = (first["Depth.Z"] < 1e9) & (z > 0) & (np.abs(u) < 1) & (np.abs(v) < 1)
     x, y = np.where(same, (u + 1) / 2 * w - 0.5, 0), np.where(same, (1 - v) / 2 * h - 0.5, 0)
     pixel = 2 * tangent / h * np.where(same, z, 1)
-    places, normals, albedos, lights = vector(second, "Position"), vector(second, "Normal"), rgb(second, "DiffCol"), rgb(second, "DiffInd")
+    places, normals, albedos, lights = vector(second, "Position"), vector(second, "Normal"), rgb(second, "DiffCol"), light_of(second)
     light = np.zeros_like(albedo)
     for row, column, weight in around(x, y, w, h):
         alike = np.abs(((places[row, column] - place) * normal).sum(-1)) < pixel
         alike &= (normals[row, column] * normal).sum(-1) > 0.95
-        alike &= np.abs(albedos[row, column] - albedo).max(-1) < 0.25 * albedo.max(-1)
+        alike &= np.abs(albedos[row, column] - albedo).max(-1) <= np.maximum(0.25 * albedo.max(-1), 0.01)
         same &= alike | (weight < 1e-3)
         light += weight[..., None] * lights[row, (column + shift).clip(0, w - 1)]
-    a, full = pooled(rgb(first, "DiffInd"), same.astype(np.float32))
-    b, _ = pooled(light, same.astype(np.float32))
-    d = (b - a)[full]
-    return np.abs(d).mean() / a[full].mean(), d.mean() / a[full].mean(), full.mean()
+    return light_of(first), light, same
 
 
 def main():

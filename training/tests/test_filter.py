@@ -5,8 +5,10 @@ import os
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 
+import numpy as np
 import torch
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
@@ -126,6 +128,68 @@ class Alone(unittest.TestCase):
         self.assertEqual((len({c.seed for c in alike}), {c.without for c in alike}), (ablation.SEEDS, {()}))
         rows = [(name, 0.1, 0.05) for name in ("all, seed 1", "all, seed 2", "all, seed 3")] + [("no light", 0.1, 0.06)]
         self.assertIn("| no light | 10.000 | 6.000 | +1.000 |", ablation.table(rows))
+
+    def made_up(self, moments):
+        """Lessons of a plane, 24x24 cells: (name, when, age, light [3,h,w] and target)."""
+        h = w = 24
+        ones = np.ones((h, w), np.float32)
+        x = np.stack([np.tile(np.arange(w), (h, 1)), np.tile(np.arange(h)[:, None], (1, w)), np.zeros((h, w))]).astype(np.float32)
+        made = []
+        for name, when, age, light, target in moments:
+            features = np.random.default_rng(1).normal(size=(lessons.CHANNELS, h, w)).astype(np.float32)
+            made.append(types.SimpleNamespace(
+                name=name, when=when, age=float(age), features=features, light=light, square=2 * light[0] ** 2, x=x, n=np.stack([0 * ones, 0 * ones, ones]),
+                frames=age * ones, strictness=ones, nearness=0 * ones, shown=light, target=target, mask=ones > 0, mean=float(light.mean()), noise=0.1, base=0.0))
+        return lessons.piles(made)
+
+    def test_the_next_frame_of_a_moment_is_found(self):
+        flat = np.ones((3, 24, 24), np.float32)
+        kinds = [("a", "4", 4), ("a", "5", 5), ("b", "5", 5), ("a", "pan", 3), ("b", "1", 1), ("c", "2", 2)]
+        pile, = self.made_up([(*kind, flat, flat) for kind in kinds])
+        self.assertEqual(pile.later.tolist(), [1, -1, -1, -1, -1, -1])
+
+    def test_what_changes_from_frame_to_frame_counts(self):
+        flat = np.ones((3, 24, 24), np.float32)
+        noisy = [(flat * np.random.default_rng(seed).gamma(2, 0.5, (1, 24, 24))).astype(np.float32) for seed in (1, 2)]
+        still, = self.made_up([("a", "4", 4, noisy[0], flat), ("a", "5", 5, noisy[0], flat)])
+        restless, = self.made_up([("a", "4", 4, noisy[0], flat), ("a", "5", 5, noisy[1], flat)])
+        model = train.network(train.Config(widths=(4, 8)))
+        one = lambda pile: train.changes(model, [pile], 1, torch.ones(1, blur.GUIDANCE, 1, 1))["change gather"]
+        # The frame before counts for less than the one after, whose age is greater: nothing else differs.
+        self.assertLess(one(still), 0.01)
+        self.assertGreater(one(restless), 0.05)
+        for pile in (still, restless):
+            train.based([pile], train.POOLS)
+        self.assertGreater(restless.fields["change"][0], 30 * still.fields["change"][0])
+        self.assertEqual(restless.fields["change"][1], 0)
+
+        # A step towards a network that flickers less: the term is what turns it that way.
+        def slope(flicker):
+            run = train.Run(train.Config(widths=(4, 8), batch=4, crop=0, flicker=flicker, learning_rate=0.0), "")
+            run.train_step([restless], 0.0)
+            return torch.cat([p.grad.flatten() for p in run.model.parameters()])
+
+        self.assertGreater((slope(10.0) - slope(0.0)).abs().max(), 1e-3)
+        quiet = self.made_up([("a", "4", 4, noisy[0], flat), ("b", "5", 5, noisy[1], flat)])
+        self.assertEqual(train.changes(model, quiet, 1, 1), {})
+
+    def test_a_step_without_a_gradient_teaches_nothing_and_many_end_the_run(self):
+        flat = np.ones((3, 24, 24), np.float32)
+        broken = self.made_up([("a", "4", 4, flat, np.nan * flat)])
+        train.based(broken, train.POOLS)
+        run = train.Run(train.Config(widths=(4, 8), batch=2), "")
+        before = [p.detach().clone() for p in run.model.parameters()]
+        loss, _ = run.train_step(broken, 0.0)
+        self.assertIsNone(loss)
+        self.assertTrue(all(torch.equal(a, b) for a, b in zip(before, run.model.parameters())))
+        with self.assertRaisesRegex(TrainingError, "not a number, 2 times"):
+            run.train_step(broken, 0.0)
+        # What has one does teach.
+        good = self.made_up([("a", "4", 4, flat * np.random.default_rng(1).gamma(2, 0.5, (1, 24, 24)).astype(np.float32), flat)])
+        train.based(good, train.POOLS)
+        run = train.Run(train.Config(widths=(4, 8), batch=2), "")
+        self.assertIsNotNone(run.train_step(good, 0.0)[0])
+        self.assertFalse(all(torch.equal(a, b) for a, b in zip(before, run.model.parameters())))
 
     def test_what_is_no_lesson_is_named(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -25,6 +25,7 @@ def variants(config):
     for part in blur.PARTS:
         yield f"answer without {part}", change(mute=(part,))
     yield "loss without the first step alone", change(raw=0.0)
+    yield "loss without flicker", change(flicker=0.0)
     for pool in config.pools:
         yield f"loss without {pool}x{pool} cells", change(pools=tuple(p for p in config.pools if p != pool))
 
@@ -40,9 +41,9 @@ def table(rows):
 @reported
 def main(arguments=None):
     config, folder = train.asked(__doc__, arguments)
-    rows = []
+    rows, read = [], train.piles_of(config)
     for name, one in variants(config):
-        run = train.train(one, os.path.join(folder, name.replace(" ", "_").replace(",", "")))
+        run = train.train(one, os.path.join(folder, name.replace(" ", "_").replace(",", "")), read=read)
         rows.append((name, run.rows[0]["validation_error"], run.rows[-1]["validation_error"]))
         print(f"{name}: {100 * rows[-1][1]:.3f} -> {100 * rows[-1][2]:.3f} %; `gather` {100 * run.rows[0]['gather_error']:.3f} %", flush=True)
     print("\n" + table(rows))

@@ -108,6 +108,10 @@ class Pile:
 
     def __init__(self, lessons, device="cpu"):
         self.lessons, self.fields = lessons, stacked(lessons, device)
+        self.based_on = None  # squares of cells over which the losses of `gather` are that it holds
+        # Of each the moment that is its next frame by a still camera, -1 where there is none.
+        places = {(lesson.name, lesson.age): i for i, lesson in enumerate(lessons) if lesson.when != "pan"}
+        self.later = np.array([places.get((lesson.name, lesson.age + 1), -1) if lesson.when != "pan" else -1 for lesson in lessons])
 
     def taken(self, which, window=None):
         """The moments of these numbers; `window`: of them rows and columns from a place on, (y, x, side), or what there is."""

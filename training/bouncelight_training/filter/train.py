@@ -30,6 +30,8 @@ from . import blur, lessons
 MEANING = "filter"
 # Of the loss of `gather`: a picture that is right already teaches nothing.
 LEAST_BASE = 0.01
+# The same of what changes from one frame to the next.
+LEAST_CHANGE = 1e-4
 # Sides of the squares of cells over which light is compared.
 POOLS = (1, 2, 4, 16)
 # A picture that has become so much worse counts no more than this.
@@ -60,6 +62,7 @@ class Config:
     weight_decay: float = 1e-2
     ema: float = 0.998
     raw: float = 0.3  # share of the loss that looks at the first step alone
+    flicker: float = 0.1  # what a change between two frames of a still camera counts against the rest, where lessons have both
     seed: int = 1
     threads: int = 2
     device: str = "cpu"
@@ -129,6 +132,11 @@ def loss_of(shown, target, mask, mean, noise, pools=POOLS):
     return loss
 
 
+def change_of(shown, later, batch, pools=POOLS):
+    """`loss_of` of the next frame's light against this one's, which should be the same: [n]."""
+    return loss_of(later, shown, batch["mask"], batch["mean"], torch.zeros_like(batch["mean"]), pools)
+
+
 def held(answer):
     """What keeps an answer [n,12,h,w] small where nothing speaks for it, and within its limits."""
     beyond = (answer[:, 8:10].abs() - blur.MOST_LOG).clamp(min=0)
@@ -182,6 +190,21 @@ def validate(model, piles, channels, parts):
                         a, b = sums.get((key, which), (0, 0))
                         sums[key, which] = (a + off, b + light)
     return {f"{key} {which}": off / max(light, 1e-20) for (key, which), (off, light) in sums.items()}
+
+
+def changes(model, piles, channels, parts):
+    """Mean |change| of the light from one frame of a still camera to the next over mean light, of `gather` and of the network; empty without such frames."""
+    sums = {}
+    with torch.no_grad():
+        for pile in piles:
+            for i in np.flatnonzero(pile.later >= 0):
+                batch = pile.taken([i, pile.later[i]])
+                mask = batch["mask"][:1].unsqueeze(1)
+                for which, answer in (("gather", None), ("network", model(batch["features"] * channels) * parts)):
+                    shown = blur.filtered(batch, answer)[0].clamp(min=0)
+                    a, b = sums.get(which, (0, 0))
+                    sums[which] = (a + ((shown[1:] - shown[:1]).abs() * mask).sum().item(), b + (shown[:1] * mask).sum().item())
+    return {f"change {which}": a / max(b, 1e-20) for which, (a, b) in sums.items()}
 
 
 class Run:
@@ -241,13 +264,20 @@ class Run:
             group["lr"] = rate
         counts = np.array([len(pile.lessons) for pile in piles])
         pile = piles[rng.choice(len(piles), p=counts / counts.sum())]
-        batch = augmented(pile.taken(rng.integers(0, len(pile.lessons), c.batch), window(pile, c.crop, rng)), rng)
+        chosen = rng.integers(0, len(pile.lessons), c.batch)
+        # Beside each its next frame, if there is one.
+        followed = np.flatnonzero(pile.later[chosen] >= 0) if c.flicker else []
+        batch = augmented(pile.taken(np.concatenate([chosen, pile.later[chosen[followed]]]), window(pile, c.crop, rng)), rng)
         answer = self.model(batch["features"] * self.channels) * self.parts
         shown, first = blur.filtered(batch, answer)
         learnt = [batch[k] for k in ("target", "mask", "mean", "noise")]
         loss = (1 - c.raw) * loss_of(shown, *learnt, c.pools) + c.raw * loss_of(first, *learnt, c.pools)
         # Over that of `gather` alone: a late moment counts as much as an early one, a quiet picture as much as one of fireflies.
         loss = loss / (batch["base"] + LEAST_BASE)
+        if len(followed):
+            change = change_of(shown[followed], shown[c.batch:], {k: batch[k][followed] for k in ("mask", "mean")}, c.pools)
+            change = c.flicker * change / (batch["change"][followed] + LEAST_CHANGE)
+            loss = loss.index_add(0, torch.as_tensor(followed, device=loss.device), change)
         loss = (loss / (loss.detach() / LOUD).clamp(min=1)).mean() + held(answer)
         self.optimiser.zero_grad()
         loss.backward()
@@ -270,24 +300,47 @@ def read_checkpoint(path):
         raise TrainingError(f"{path}: not a readable checkpoint: {error}") from error
 
 
-def train(config, folder, same_names=False):
-    """Runs to the end; returns the Run. Views of the same name are the same view, unless `same_names` are meant to be allowed."""
+def piles_of(config, same_names=False):
+    """What is learnt and what is held out. Views of the same name are the same view, unless `same_names` are meant to be allowed."""
     torch.set_num_threads(config.threads)
     views = [lesson for name in config.train.split(",") for lesson in lessons.read(name, config.every)]
     held_out = lessons.read(config.validation)
     shared = {v.name for v in views} & {v.name for v in held_out}
     if shared and not same_names:
         raise TrainingError(f"{sorted(shared)[0]} stands in training and validation")
+    return lessons.piles(views, config.device), lessons.piles(held_out, config.device)
+
+
+def based(piles, pools):
+    """Gives piles the loss of `gather` alone, and that of its changes from one frame to the next."""
+    with torch.no_grad():
+        for pile in piles:
+            # A minute for a thousand moments: runs that share piles do so once.
+            if pile.based_on == pools:
+                continue
+            pile.based_on = pools
+            shown, losses = [], []
+            for _, batch in in_parts(pile):
+                shown.append(blur.filtered(batch)[0])
+                losses.append(loss_of(shown[-1], *(batch[k] for k in ("target", "mask", "mean", "noise")), pools))
+            pile.fields["base"], shown = torch.cat(losses), torch.cat(shown)
+            pile.fields["change"] = torch.zeros_like(pile.fields["base"])
+            followed = np.flatnonzero(pile.later >= 0)
+            if len(followed):
+                batch = {k: pile.fields[k][followed] for k in ("mask", "mean")}
+                pile.fields["change"][followed] = change_of(shown[followed], shown[pile.later[followed]], batch, pools)
+
+
+def train(config, folder, same_names=False, read=None):
+    """Runs to the end; returns the Run. `read`: what `piles_of` has read already."""
+    piles, held_out = read or piles_of(config, same_names)
     os.makedirs(folder, exist_ok=True)
     run = Run(config, folder)
     run.load()
     with open(os.path.join(folder, "config.json"), "w") as file:
         json.dump(dataclasses.asdict(config), file, indent=1)
-    count, piles, held_out = len(views), lessons.piles(views, config.device), lessons.piles(held_out, config.device)
-    with torch.no_grad():
-        for pile in piles:
-            pile.fields["base"] = torch.cat([loss_of(blur.filtered(batch)[0], *(batch[k] for k in ("target", "mask", "mean", "noise")), config.pools)
-                                             for _, batch in in_parts(pile)])
+    based(piles, config.pools)
+    count = sum(len(pile.lessons) for pile in piles)
     print(f"{parameter_count(run.model)} parameters, {flops(run.model, 128, 256) / 1e9:.3f} GFLOP at 256x128 cells; {count} training and "
           f"{sum(len(pile.lessons) for pile in held_out)} validation moments", file=sys.stderr, flush=True)
     began, sums, looked = time.monotonic(), [], time.monotonic()
@@ -310,7 +363,7 @@ def train(config, folder, same_names=False):
 
 def note(run, held_out, loss, rate):
     """Validates the averaged network, keeps it if it is the best, adds a row to the log."""
-    errors = validate(run.averaged(), held_out, run.channels, run.parts)
+    errors = validate(run.averaged(), held_out, run.channels, run.parts) | changes(run.averaged(), held_out, run.channels, run.parts)
     if errors["all network"] < run.best[0]:
         run.best = (errors["all network"], {k: v.clone() for k, v in run.average.items()})
     run.rows.append({"step": run.step, "samples": run.step * run.config.batch, "seconds": round(run.seconds, 1), "learning_rate": rate,
