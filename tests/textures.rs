@@ -72,6 +72,37 @@ fn normal_maps_tilt_along_tangent_and_bitangent() {
 }
 
 #[test]
+fn bumps_cast_no_shadow_on_their_own_plane() {
+    let Some(gpu) = common::gpu() else { return };
+    // A sun that grazes the board by 20°, and a map that turns its normals by 30° towards it: where
+    // shadow maps are compared with the plane of such normals, it stands in its own light.
+    let (sine, cosine) = 20f32.to_radians().sin_cos();
+    let mut s = board();
+    s.lights = vec![sun([cosine, 0.0, -sine], 1.0, 0.005)];
+    s.meshes[0].tangents = vec![[1.0, 0.0, 0.0, 1.0]; 4];
+    let range = |s: &Scene| {
+        let f = render(&gpu, s, &camera(), [64, 64], 1);
+        let light = f.layer(Layer::DiffDir).unwrap();
+        // Within the rim, where the pixels around are known.
+        let pixels = (4..60).flat_map(|y| (4..60).map(move |x| (x, y))).map(|(x, y)| light.at(x, y)[0]);
+        pixels.fold((f32::INFINITY, 0f32), |(least, most), v| (least.min(v), most.max(v)))
+    };
+    let (flat, flat_most) = range(&s);
+    assert!(flat > 0.99 * flat_most, "{flat} to {flat_most}");
+    // (−0.5, 0, 0.866).
+    s.images = vec![image(&[[64, 128, 238, 255]], 1, ColorSpace::Linear)];
+    s.materials[0].normal_texture = Some(reference(0));
+    let (least, most) = range(&s);
+    let wanted = flat * (0.5 * cosine + 0.866 * sine) / sine;
+    assert!(least > 0.97 * wanted && most < 1.03 * wanted, "{least} to {most}, {wanted} is right");
+    // Control: what stands before it does cast one.
+    s.meshes.push(quad([-0.3, -0.3, 0.2], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0]));
+    s.instances.push(bouncelight::scene::Instance { mesh: 1, ..s.instances[0].clone() });
+    let (least, _) = range(&s);
+    assert!(least < 0.1 * wanted, "{least}");
+}
+
+#[test]
 fn the_display_pass_is_the_curve_on_the_cpu() {
     let Some(gpu) = common::gpu() else { return };
     let mut s = board();

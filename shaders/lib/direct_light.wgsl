@@ -31,10 +31,10 @@ fn pattern_of(pixel: vec2u) -> Pattern {
     return Pattern(6.2831853 * hash01(pixel.x, pixel.y, frame.seed, 1u), hash01(pixel.x, pixel.y, frame.seed, 2u));
 }
 
-// At p, which faces n, to an eye at v; `surface`: F0 and roughness. `before`: p lies before what
-// the G-buffer shows.
+// At p with normal n on a surface that faces `face`, to an eye at v; `surface`: F0 and roughness.
+// `before`: p lies before what the G-buffer shows.
 fn direct_light(
-    p: vec3f, n: vec3f, v: vec3f, surface: vec4f, pixel: vec2u, before: bool,
+    p: vec3f, n: vec3f, face: vec3f, v: vec3f, surface: vec4f, pixel: vec2u, before: bool,
 ) -> DirectLight {
     var sum = DirectLight();
     let pattern = pattern_of(pixel);
@@ -50,7 +50,7 @@ fn direct_light(
         while bits != 0u {
             let i = 32u * word + firstTrailingBit(bits);
             bits &= bits - 1u;
-            add_light(&sum, i, p, n, v, surface, pattern);
+            add_light(&sum, i, p, n, face, v, surface, pattern);
         }
     }
     if any(sum.specular > vec3f(0.0)) { sum.specular *= lobe_gain(surface.rgb, surface.a, dot(n, v)); }
@@ -58,7 +58,7 @@ fn direct_light(
 }
 
 fn add_light(
-    sum: ptr<function, DirectLight>, i: u32, p: vec3f, n: vec3f, v: vec3f, surface: vec4f, pattern: Pattern,
+    sum: ptr<function, DirectLight>, i: u32, p: vec3f, n: vec3f, face: vec3f, v: vec3f, surface: vec4f, pattern: Pattern,
 ) {
     let light = lights[i];
     let shadow = light_shadows[i];
@@ -70,9 +70,9 @@ fn add_light(
     var seen = 1.0;
     if shadow.count > 0u {
         if light.kind == LIGHT_SUN {
-            seen = sun_visibility(shadow.first, shadow.count, p, n, s.l, light.radius, pattern);
+            seen = sun_visibility(shadow.first, shadow.count, p, face, s.l, light.radius, pattern);
         } else {
-            seen = local_visibility(shadow.first, shadow.count, p, n, light.position, light.radius, pattern);
+            seen = local_visibility(shadow.first, shadow.count, p, face, light.position, light.radius, pattern);
         }
     }
     if seen <= 0.0 { return; }

@@ -30,7 +30,7 @@ fn fragment(in: Varying, @builtin(front_facing) facing: bool) -> @location(0) ve
     if s.alpha >= SOLID || s.alpha <= 0.0 { discard; }
     let pixel = vec2u(in.position.xy);
     let v = to_eye(frame, pixel);
-    let direct = direct_light(in.world, s.normal, v, s.specular, pixel, true);
+    let direct = direct_light(in.world, s.normal, s.normal, v, s.specular, pixel, true);
     // Light from all around is taken to be that of what is behind, or the sky's: no cell looks out
     // from here.
     let open = textureLoad(emitted, pixel, 0).a <= 0.0;
