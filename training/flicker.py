@@ -8,7 +8,6 @@ what mirrors show, so that a picture without a fault has some. Frames are drawn 
 with temporal anti-aliasing, `METHOD+taa`. The path tracer's noise is no change: each frame is traced twice, with --spp paths a pixel and other seeds,
 and the changes of the one are multiplied with those of the other. `control`: each frame as the first after a cut, without any history.
 """
-import argparse
 import json
 import os
 import shutil
@@ -19,8 +18,8 @@ import tempfile
 import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from judge import PAN_FRAMES, layers, pan_to, references  # noqa: E402
-from turned import at_both, camera_of  # noqa: E402
+from judge import PAN_FRAMES, layers, pan_to  # noqa: E402
+from turned import arguments, at_both, camera_of, scenes_of  # noqa: E402
 
 
 def picture(layers_of):
@@ -42,24 +41,17 @@ def size(change, other=None):
     return np.sqrt(max(np.nanmean(change * (change if other is None else other)), 0))
 
 
+def beside(ours, own):
+    """What is said of our change beside the path tracer's own."""
+    return f"{ours / own:.2f} of the path tracer's" if own > 0 else "the path tracer's own is below what its noise lets be told"
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", help="folder for our pictures")
-    parser.add_argument("references", help="folder of references, one folder a scene with scene.glb and meta.json")
-    parser.add_argument("--methods", default="gather,neural,neural+taa", type=lambda t: t.split(","))
-    parser.add_argument("--scenes", type=lambda t: t.split(","))
-    parser.add_argument("--samples", type=int, default=16)
+    parser = arguments(__doc__, "gather,neural,neural+taa", 16, "256x128")
     parser.add_argument("--spp", type=int, default=256)
-    parser.add_argument("--size", default="256x128")
-    parser.add_argument("--bouncelight", default="target/release/bouncelight")
     a = parser.parse_args()
     os.makedirs(a.out, exist_ok=True)
-    for _, name, scene, _ in references(a.references):
-        if a.scenes and name not in a.scenes:
-            continue
-        path_of_meta = os.path.join(os.path.dirname(scene[0]), "meta.json")
-        with open(path_of_meta) as file:
-            meta = json.load(file)
+    for name, scene, path_of_meta, meta in scenes_of(a):
         cameras = [camera_of(meta, degrees) for degrees in (1, 0)]
 
         def render(path, *more):
@@ -92,10 +84,10 @@ def main():
                     for number, path in zip((PAN_FRAMES - 1, PAN_FRAMES), frames):
                         shutil.move(os.path.join(folder, f"{number}.exr"), path)
             ours = size(change(*map(layers, frames), cameras[1][1])) / mean
-            print(f"{name} {row}: {100 * ours:.2f} %, {ours / own:.2f} of the path tracer's", flush=True)
+            print(f"{name} {row}: {100 * ours:.2f} %, {beside(ours, own)}", flush=True)
         cut = [alone("cut", i, "--method", "gather", "--gi-frames", "1", "--samples", str(a.samples), "--gather", f"seed={i}") for i in (0, 1)]
         ours = size(change(*cut, cameras[1][1])) / mean
-        print(f"{name} control: {100 * ours:.2f} %, {ours / own:.2f}", flush=True)
+        print(f"{name} control: {100 * ours:.2f} %, {beside(ours, own)}", flush=True)
 
 
 if __name__ == "__main__":

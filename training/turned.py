@@ -77,24 +77,35 @@ def at_both(first, second, camera, light_of, shift=0):
     return light_of(first), light, same
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def arguments(description, methods, samples, size):
+    """The command line that such comparisons share, with these defaults; a command adds its own to it."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", help="folder for our pictures")
     parser.add_argument("references", help="folder of references, one folder a scene with scene.glb and meta.json")
-    parser.add_argument("--methods", default="gather,neural", type=lambda t: t.split(","))
+    parser.add_argument("--methods", default=methods, type=lambda t: t.split(","))
     parser.add_argument("--scenes", type=lambda t: t.split(","))
+    parser.add_argument("--samples", type=int, default=samples)
+    parser.add_argument("--size", default=size)
+    parser.add_argument("--bouncelight", default="target/release/bouncelight")
+    return parser
+
+
+def scenes_of(a):
+    """(name, scene arguments, path of meta.json, what it says) of each scene that is asked for."""
+    for _, name, scene, _ in references(a.references):
+        if not a.scenes or name in a.scenes:
+            path = os.path.join(os.path.dirname(scene[0]), "meta.json")
+            with open(path) as file:
+                yield name, scene, path, json.load(file)
+
+
+def main():
+    parser = arguments(__doc__, "gather,neural", 4, "512x256")
     parser.add_argument("--degrees", type=float, default=15)
     parser.add_argument("--frames", type=int, default=32)
-    parser.add_argument("--samples", type=int, default=4)
-    parser.add_argument("--size", default="512x256")
-    parser.add_argument("--bouncelight", default="target/release/bouncelight")
     a = parser.parse_args()
     os.makedirs(a.out, exist_ok=True)
-    for _, name, scene, _ in references(a.references):
-        if a.scenes and name not in a.scenes:
-            continue
-        with open(os.path.join(os.path.dirname(scene[0]), "meta.json")) as file:
-            meta = json.load(file)
+    for name, scene, _, meta in scenes_of(a):
         for method in a.methods:
             drawn = []
             for degrees in (0, a.degrees):

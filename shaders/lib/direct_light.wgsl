@@ -58,7 +58,8 @@ fn direct_light(
 }
 
 fn add_light(
-    sum: ptr<function, DirectLight>, i: u32, p: vec3f, n: vec3f, face: vec3f, v: vec3f, surface: vec4f, pattern: Pattern,
+    sum: ptr<function, DirectLight>, i: u32, p: vec3f, n: vec3f, face: vec3f, v: vec3f, surface: vec4f,
+    pattern: Pattern,
 ) {
     let light = lights[i];
     let shadow = light_shadows[i];
