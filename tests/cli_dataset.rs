@@ -103,3 +103,37 @@ fn samples_hold_a_second_frame_guides_and_the_room_on_request() {
     assert!((sky[0].as_f64().unwrap() as f32 - own.environment.radiance[0]).abs() < 1e-6);
     assert!(!plain.join("varied0007.glb").exists());
 }
+
+#[test]
+fn lessons_show_light_that_has_changed_and_end_with_the_scene() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let make = |moments: &str| {
+        let out = dir.path().join(moments);
+        let room = ["dataset", "--recipe", "home", "--rooms", "2", "--views", "1", "--size", "64x32", "--spp", "2"];
+        let done = bouncelight(&[&room[..], &["--moments", moments, "--out", out.to_str().expect("text")]].concat());
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        std::fs::read(out.join("home0002_view0.safetensors")).unwrap()
+    };
+    let (still, changing) = (make("22,36"), make("8,lamp,thing"));
+    let still = safetensors::SafeTensors::deserialize(&still).unwrap();
+    let changing = safetensors::SafeTensors::deserialize(&changing).unwrap();
+    let values = |file: &safetensors::SafeTensors<'_>, name: &str| -> Vec<f32> {
+        bytemuck::pod_collect_to_vec(file.tensor(name).expect(name).data())
+    };
+    let ages = ["8", "lamp", "thing"].map(|when| values(&changing, &format!("age.{when}"))[0]);
+    assert_eq!(ages, [8.0, 22.0, 36.0]);
+    assert_eq!(changing.tensor("changed.lamp").unwrap().shape(), [1, 8, 16]);
+    // What is to be learnt is the light of the scene itself, found after all has come to its place.
+    assert_eq!(values(&still, "light"), values(&changing, "light"));
+    // Cells remember fewer frames after a change than at rest.
+    let frames = |file: &safetensors::SafeTensors<'_>, when: &str| -> f32 {
+        let past = values(file, &format!("past.{when}"));
+        past[3 * 128..4 * 128].iter().sum()
+    };
+    let (rest, lamp, thing) = (frames(&still, "22"), frames(&changing, "lamp"), frames(&changing, "thing"));
+    assert!(lamp < 0.9 * rest, "{lamp} {rest}");
+    assert!(thing < 0.9 * frames(&still, "36"), "{thing}");
+}

@@ -13,6 +13,9 @@ pub enum DatasetError {
     /// The GPU did not give the data.
     #[error(transparent)]
     Readback(#[from] readback::ReadbackError),
+    /// What changes in a scene could not be uploaded.
+    #[error(transparent)]
+    Upload(#[from] crate::scene::upload::UploadError),
     /// The GI pass did not give its inputs.
     #[error(transparent)]
     Gi(#[from] crate::gi::GiError),

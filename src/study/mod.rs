@@ -1,6 +1,8 @@
 //! What is measured over methods and scenes.
 
 pub mod bench;
+#[cfg(all(feature = "io", feature = "reference"))]
+mod changes;
 #[cfg(feature = "chart")]
 pub mod chart;
 #[cfg(feature = "reference")]

@@ -6,7 +6,7 @@
 //! else, so what `gather` is wrong about in the mean must not be learnt from the scenes that happen
 //! to be shown; and a ray that ends in the cache has a tenth of the noise of a path.
 
-use super::error::DatasetError;
+use super::{changes::Change, error::DatasetError};
 use crate::{
     accel::luminance,
     gi::{
@@ -19,7 +19,7 @@ use crate::{
     net::plan::Precision,
     numbers::SplitMix,
     render::{Purpose, Renderer, View},
-    scene::{Camera, upload::SceneGpu},
+    scene::{Camera, Scene, upload::SceneGpu},
 };
 use glam::{Mat4, Quat, Vec3};
 use safetensors::{Dtype, tensor::TensorView};
@@ -32,12 +32,22 @@ pub enum When {
     /// At the end of [`PAN`] frames of a camera that turns and moves, which count as frames since
     /// the cut. Before a pan that comes first the camera stands still for four.
     Pan,
+    /// After six frames in which a lamp (the sky, where there is none) came to what it is in the
+    /// scene, and eight in which it was what it came from. Left out where nothing shines but
+    /// surfaces.
+    Lamp,
+    /// The same of a thing, which moves through the picture to where it stands. Left out where none
+    /// is in view.
+    Thing,
 }
 
 /// Frames of a pan, and of rest before one that comes first: by then the blur is narrow, and what
 /// comes into view is younger than the rest.
 pub const PAN: u32 = 6;
 const STILL: u32 = 4;
+/// Frames of a change, and of rest before it.
+const CHANGE: u32 = 6;
+const BEFORE: u32 = 8;
 
 /// Frames since the cut at each of these moments, which one run of frames passes in this order:
 /// 1, 8, pan, 20 are 1, 8, 14, 20. `None` where a moment lies no later than the one before it.
@@ -47,6 +57,7 @@ pub fn ages(moments: &[When]) -> Option<Vec<u32>> {
         let age = match *when {
             When::Frames(frames) => frames,
             When::Pan => drawn.max(STILL) + PAN,
+            When::Lamp | When::Thing => drawn + BEFORE + CHANGE,
         };
         let later = age > drawn;
         drawn = age;
@@ -55,8 +66,8 @@ pub fn ages(moments: &[When]) -> Option<Vec<u32>> {
     moments.iter().map(age).collect()
 }
 
-/// Planes that a moment takes: features, memory, light.
-pub const PLANES: u64 = CHANNELS as u64 + PAST / 4 + 12;
+/// Planes that a moment takes: features, memory, light, changes.
+pub const PLANES: u64 = CHANNELS as u64 + PAST / 4 + 13;
 
 /// The memory of all cells at one moment; planes of rows.
 #[derive(Debug, Clone)]
@@ -72,6 +83,8 @@ pub struct Moment {
     pub past: Vec<f32>,
     /// The light that `gather` shows of each cell: three vectors, 12 planes.
     pub shown: Vec<f32>,
+    /// One plane: 1 where light has changed, so that the filter shows that of lately, else 0.
+    pub changed: Vec<f32>,
 }
 
 /// One view.
@@ -94,47 +107,61 @@ pub struct Lesson {
 }
 
 /// Draws one view. `renderer`'s method gathers, and so does `teacher`'s, plainly, for `frames`
-/// frames; `seed` decides the pan, `moments` are in order ([`ages`]).
+/// frames; `seed` decides the pan and what changes, `moments` are in order ([`ages`]). `raster` is
+/// made of `scene` and shows it at the end.
 ///
 /// # Errors
 /// What drawing and reading back report; `None` where `go_on` said no.
 pub fn lesson(
     gpu: &Gpu,
     (renderer, teacher, reader): (&mut Renderer, &mut Renderer, &mut Reader),
-    raster: &SceneGpu,
+    (scene, raster): (&Scene, &mut SceneGpu),
     camera: &Camera,
     (moments, frames, seed): (&[When], u32, u32),
     mut go_on: impl FnMut() -> bool,
 ) -> Result<Option<Lesson>, DatasetError> {
     let size = renderer.size();
-    let environment = raster.environment.radiance;
     let mut read = Vec::new();
     renderer.cut();
     let (mut drawn, mut first) = (0, true);
     let ages = ages(moments).unwrap_or_default();
     for (&when, age) in moments.iter().zip(ages) {
+        let aspect = size[0] as f32 / size[1] as f32;
+        let change = match when {
+            When::Frames(_) | When::Pan => None,
+            When::Lamp => Change::of_lamp(scene, camera, seed),
+            When::Thing => Change::of_thing(scene, camera, aspect, seed),
+        };
+        if matches!(when, When::Lamp | When::Thing) && change.is_none() {
+            continue;
+        }
+        let frames = age - drawn;
         let views: Vec<Camera> = match when {
-            When::Frames(_) => (drawn..age).map(|_| camera.clone()).collect(),
-            When::Pan => pan(camera, seed, age - drawn),
+            When::Pan => pan(camera, seed, frames),
+            _ => vec![camera.clone(); frames as usize],
         };
         drawn = age;
-        let last = views.len() - 1;
-        for (i, camera) in views.iter().enumerate() {
+        for (i, camera) in (1..).zip(&views) {
             if !go_on() {
                 return Ok(None);
             }
-            // What the filter shows is read at the moment itself only. Nothing but the camera
-            // moves: one frame's shadow maps do for all.
-            let purpose = match i {
-                _ if i < last => Purpose::WarmUp { first },
-                _ if first => Purpose::Picture,
-                _ => Purpose::FurtherSample,
+            if let Some(change) = &change {
+                change.upload(gpu, raster, scene, (frames - i).min(CHANGE) as f32 / CHANGE as f32)?;
+            }
+            // What the filter shows is read at the moment itself only. Where nothing but the camera
+            // moves one frame's shadow maps do for all.
+            let new = first || change.is_some();
+            let purpose = match i == frames {
+                false => Purpose::WarmUp { first: new },
+                true if new => Purpose::Picture,
+                true => Purpose::FurtherSample,
             };
             draw(gpu, renderer, raster, camera, purpose)?;
-            first = false;
+            // After a change things rest, which motion vectors have to learn.
+            first = change.is_some();
         }
         let view = View::new(camera, size, [0.0; 2]);
-        read.push(reader.read(gpu, renderer, &view, environment, (when, age))?);
+        read.push(reader.read(gpu, renderer, &view, raster.environment.radiance, (when, age))?);
     }
     teacher.cut();
     for frame in 0..frames {
@@ -144,7 +171,7 @@ pub fn lesson(
         draw(gpu, teacher, raster, camera, Purpose::WarmUp { first: frame == 0 })?;
     }
     let view = View::new(camera, size, [0.0; 2]);
-    let taught = reader.read(gpu, teacher, &view, environment, (When::Frames(frames), frames))?.past;
+    let taught = reader.read(gpu, teacher, &view, raster.environment.radiance, (When::Frames(frames), frames))?.past;
     let cells = cells_of(size);
     let count = cells[0] as usize * cells[1] as usize;
     let place = Mat4::from_cols_array_2d(&camera.transform);
@@ -263,24 +290,27 @@ impl Reader {
             features: planes(&target, PITCH as usize, CHANNELS as usize)?,
             past: planes(memory.pasts, past, past)?,
             shown: planes(memory.light, 12, 12)?,
+            changed: planes(memory.changes, 4, 4)?.split_off(3 * count as usize),
         })
     }
 }
 
 impl When {
-    /// `3` or `pan`: part of tensors' names.
+    /// `3`, `pan`, `lamp` or `thing`: part of tensors' names.
     pub fn name(&self) -> String {
         match self {
             When::Frames(frames) => frames.to_string(),
             When::Pan => "pan".into(),
+            When::Lamp => "lamp".into(),
+            When::Thing => "thing".into(),
         }
     }
 }
 
 impl Lesson {
     /// The lesson as a safetensors file, all f32: `features.WHEN` [15, h, w], `past.WHEN` [20, h,
-    /// w], `shown.WHEN` [12, h, w], `age.WHEN` (one number) of each moment (WHEN: frames, or
-    /// `pan`); `light` [3, h, w], `noise` (one number), `place` [4, h, w], `view` (seven).
+    /// w], `shown.WHEN` [12, h, w], `changed.WHEN` [1, h, w], `age.WHEN` (one number) of each moment (WHEN: frames,
+    /// `pan`, `lamp` or `thing`); `light` [3, h, w], `noise` (one number), `place` [4, h, w], `view` (seven).
     ///
     /// # Errors
     /// [`DatasetError::Serialize`].
@@ -296,7 +326,8 @@ impl Lesson {
         for (moment, age) in self.moments.iter().zip(&ages) {
             let name = moment.when.name();
             tensors.push((format!("age.{name}"), vec![1], std::slice::from_ref(age)));
-            for (what, values) in [("features", &moment.features), ("past", &moment.past), ("shown", &moment.shown)] {
+            let Moment { features, past, shown, changed, .. } = moment;
+            for (what, values) in [("features", features), ("past", past), ("shown", shown), ("changed", changed)] {
                 tensors.push((format!("{what}.{name}"), vec![values.len() / (w * h), h, w], values));
             }
         }
@@ -322,6 +353,7 @@ mod tests {
         assert_eq!(ages(&[Frames(1), Frames(2), Pan, Frames(20)]), Some(vec![1, 2, 10, 20]));
         assert_eq!(ages(&[Pan]), Some(vec![10]));
         assert_eq!(ages(&[Frames(8), Pan]), Some(vec![8, 14]));
+        assert_eq!(ages(&[Lamp, Frames(20), Thing]), Some(vec![14, 20, 34]));
         for late in [&[Frames(4), Frames(4)][..], &[Frames(8), Frames(2)], &[Frames(8), Pan, Frames(14)]] {
             assert_eq!(ages(late), None);
         }

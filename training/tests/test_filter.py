@@ -16,7 +16,7 @@ from bouncelight_training.errors import TrainingError  # noqa: E402
 from bouncelight_training.filter import ablation, blur, export, lessons, scene, train  # noqa: E402
 
 PROGRAM = os.environ.get("BOUNCELIGHT")
-SIZE = ["--size", "96x64", "--spp", "4", "--moments", "1,8,pan", "-q"]
+SIZE = ["--size", "96x64", "--spp", "4", "--moments", "1,8,pan,lamp,thing", "-q"]
 
 
 def draw(folder, rooms, *more):
@@ -38,7 +38,7 @@ class WithTheProgram(unittest.TestCase):
     def test_torch_filters_as_the_shaders_do(self):
         with tempfile.TemporaryDirectory() as folder:
             views = draw(os.path.join(folder, "a"), "1")
-            self.assertEqual(sorted(v.when for v in views), ["1", "8", "pan"])
+            self.assertEqual(sorted(v.when for v in views), ["1", "8", "lamp", "pan", "thing"])
             for view in views:
                 # Where surfaces are curved the shaders average light with its direction, torch without: a thousandth.
                 near, control = off(view, None), off(view, torch.randn(1, blur.GUIDANCE, *view.mask.shape, generator=torch.Generator().manual_seed(1)))

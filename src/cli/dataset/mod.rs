@@ -75,9 +75,10 @@ pub struct Args {
     #[arg(long)]
     out: PathBuf,
     /// What a network that filters learns from, instead: moments at which what cells remember is
-    /// kept, in order: frames after a cut, or `pan` (at the end of six frames of a moving camera,
-    /// which count), such as 1,2,8,pan,20. The light to be learnt is the mean of --spp rays of
-    /// another seed.
+    /// kept, in order: frames after a cut, `pan` (at the end of six frames of a moving camera, which
+    /// count), `lamp` or `thing` (eight frames with a lamp or a thing elsewhere and six in which it
+    /// comes to its place; left out where a view has none), such as 1,2,8,pan,20,lamp,thing. The
+    /// light to be learnt is the mean of --spp rays of another seed.
     #[arg(long, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST",
         conflicts_with_all = ["motion", "guides"])]
     moments: Vec<When>,
@@ -135,8 +136,10 @@ fn parse_rooms(text: &str) -> Result<Rooms, String> {
 fn parse_moment(text: &str) -> Result<When, String> {
     match text.parse() {
         Ok(frames) if frames > 0 => Ok(When::Frames(frames)),
-        _ if text == "pan" => Ok(When::Pan),
-        _ => Err(format!("{text} is neither a number of frames nor `pan`")),
+        _ => [When::Pan, When::Lamp, When::Thing]
+            .into_iter()
+            .find(|when| when.name() == text)
+            .ok_or_else(|| format!("{text} is neither a number of frames nor `pan`, `lamp` or `thing`")),
     }
 }
 
@@ -166,7 +169,10 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         return Err(usage("--moments need the light to be learnt: --spp N".into()));
     }
     if moments::ages(&args.moments).is_none() {
-        return Err(usage("--moments are frames of one run, each later than the one before; a pan takes six".into()));
+        return Err(usage(
+            "--moments are frames of one run, each later than the one before; a pan takes six, a change fourteen"
+                .into(),
+        ));
     }
     let mut writer = Writer::open(gpu, &args)?;
     match (args.recipe, &args.rooms, &args.scene) {
@@ -235,11 +241,11 @@ fn many_rooms(global: &Global, writer: &mut Writer, Rooms(rooms): &Rooms, args: 
             continue;
         }
         let scene = build(room);
-        let uploaded = writer.upload(&scene)?;
+        let mut uploaded = writer.upload(&scene)?;
         let cameras = views_of(&scene);
         for view in missing {
             let camera = &cameras[view as usize];
-            writer.write(&stem(view), &uploaded, camera, room.wrapping_mul(10_007).wrapping_add(view))?;
+            writer.write(&stem(view), &mut uploaded, camera, room.wrapping_mul(10_007).wrapping_add(view))?;
             progress.step();
         }
     }
@@ -254,7 +260,7 @@ const TOO_CLOSE: f32 = 0.03;
 fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> Result<()> {
     let mut scene = scene::load_with(spec, global.load_options())?;
     args.lit.apply(&mut scene)?;
-    let uploaded = writer.upload(&scene)?;
+    let mut uploaded = writer.upload(&scene)?;
     let stem = Path::new(spec).file_stem().map_or(spec.into(), |s| s.to_string_lossy().into_owned());
     let [shard, of] = args.shard;
     announce(global, args, (args.views.saturating_sub(shard)).div_ceil(of) as usize);
@@ -272,7 +278,7 @@ fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> R
         }
         let name = format!("{stem}_view{view}");
         if view % of == shard && !writer.has(&name)? {
-            writer.write_drawn(&name, &uploaded, &camera, view, sample)?;
+            writer.write_drawn(&name, &mut uploaded, &camera, view, sample)?;
         }
         cameras.push(camera);
         progress.step();

@@ -63,7 +63,8 @@ impl Lessons {
 }
 
 /// A scene as both renderers want it.
-pub(super) struct Uploaded {
+pub(super) struct Uploaded<'a> {
+    scene: &'a Scene,
     pub(super) raster: SceneGpu,
     traced: Option<ReferenceScene>,
 }
@@ -89,11 +90,11 @@ impl Writer {
         Ok(writer)
     }
 
-    pub(super) fn upload(&self, scene: &Scene) -> Result<Uploaded> {
+    pub(super) fn upload<'a>(&self, scene: &'a Scene) -> Result<Uploaded<'a>> {
         let mut raster = SceneGpu::new(&self.gpu.device, &self.gpu.queue, scene)?;
         raster.trace(&self.gpu.device, &self.gpu.queue, scene)?;
         let trace = |_| ReferenceScene::new(&self.gpu.device, &self.gpu.queue, scene);
-        Ok(Uploaded { raster, traced: self.kernel.as_ref().map(trace).transpose()? })
+        Ok(Uploaded { scene, raster, traced: self.kernel.as_ref().map(trace).transpose()? })
     }
 
     /// Width and height of the pictures.
@@ -106,7 +107,7 @@ impl Writer {
     }
 
     /// Draws, traces and writes the sample `stem`; `seed` is the path tracer's.
-    pub(super) fn write(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32) -> Result<()> {
+    pub(super) fn write(&mut self, stem: &str, scene: &mut Uploaded<'_>, camera: &Camera, seed: u32) -> Result<()> {
         if self.lessons.is_some() {
             return self.write_lesson(stem, scene, camera, seed);
         }
@@ -118,7 +119,7 @@ impl Writer {
     pub(super) fn write_drawn(
         &mut self,
         stem: &str,
-        scene: &Uploaded,
+        scene: &mut Uploaded<'_>,
         camera: &Camera,
         seed: u32,
         sample: Sample,
@@ -130,7 +131,14 @@ impl Writer {
     }
 
     /// Completes the sample that was drawn last, by what else of it is wanted, and writes it.
-    fn complete(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32, mut sample: Sample) -> Result<()> {
+    fn complete(
+        &mut self,
+        stem: &str,
+        scene: &Uploaded<'_>,
+        camera: &Camera,
+        seed: u32,
+        mut sample: Sample,
+    ) -> Result<()> {
         if self.guides {
             sample.guides = Some(Guides::read(&self.gpu, self.renderer.targets(), camera.near)?);
         }
@@ -152,12 +160,13 @@ impl Writer {
         self.save(stem, sample.to_bytes()?)
     }
 
-    fn write_lesson(&mut self, stem: &str, scene: &Uploaded, camera: &Camera, seed: u32) -> Result<()> {
+    fn write_lesson(&mut self, stem: &str, scene: &mut Uploaded<'_>, camera: &Camera, seed: u32) -> Result<()> {
         let Some(Lessons { moments, reader, teacher }) = &mut self.lessons else { return Ok(()) };
+        let shown = (scene.scene, &mut scene.raster);
         let drawn_by = (&mut self.renderer, teacher, reader);
         let asked = (moments.as_slice(), self.spp, seed);
         let go_on = || !interrupt::requested();
-        let lesson = moments::lesson(&self.gpu, drawn_by, &scene.raster, camera, asked, go_on)?;
+        let lesson = moments::lesson(&self.gpu, drawn_by, shown, camera, asked, go_on)?;
         interrupt::check()?;
         lesson.map_or(Ok(()), |lesson| self.save(stem, lesson.to_bytes()?))
     }

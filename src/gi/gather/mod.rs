@@ -286,7 +286,8 @@ impl Technique for GatherGi {
 
     fn memory(&self) -> Option<Memory<'_>> {
         let pasts = &self.store.pasts[(self.frame & 1) as usize];
-        Some(Memory { pasts, pixels: self.cells.pixels(), light: &self.store.cell_light })
+        let Store { cell_light, changes, .. } = &self.store;
+        Some(Memory { pasts, pixels: self.cells.pixels(), light: cell_light, changes })
     }
 
     fn knows_scene(&self, rays: bool) -> bool {

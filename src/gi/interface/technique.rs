@@ -23,6 +23,9 @@ pub struct Memory<'a> {
     pub pixels: &'a wgpu::Buffer,
     /// The light that the frame shows, 48 bytes each.
     pub light: &'a wgpu::Buffer,
+    /// Where light has changed, 16 bytes each: what it is now, shown without a network's say, and 1;
+    /// else 0.
+    pub changes: &'a wgpu::Buffer,
 }
 
 /// A method at work: G-buffer in, indirect diffuse light (E/π) out. Allocates only when size or

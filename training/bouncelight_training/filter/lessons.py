@@ -10,7 +10,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load_file
 
 from ..errors import TrainingError
-from .blur import WIDE_FRAMES
+from .blur import STRIDE, WIDE_FRAMES
 
 # Table `cells`, version 1 (src/gi/neural/memory.rs).
 TABLE = [("light", 1), ("chroma", 2), ("deviation", 1), ("frames", 1), ("lately", 1), ("nearness", 1), ("depth", 1), ("normal", 3), ("hit", 1), ("towards", 3)]
@@ -35,6 +35,13 @@ def unpack_normals(bits):
     return n / np.maximum(np.linalg.norm(n, axis=0), 1e-20)
 
 
+def within_reach(cells):
+    """Of cells [h,w] all whose filter's last step asks one of them, 5x5 in strides."""
+    h, w = cells.shape
+    around = np.pad(cells, 2 * STRIDE)
+    return np.any([around[y:y + h, x:x + w] for y in range(0, 4 * STRIDE + 1, STRIDE) for x in range(0, 4 * STRIDE + 1, STRIDE)], axis=0)
+
+
 class Lesson:
     """One moment of one view, as arrays of one picture: `features` [15,h,w], `light`, `x`, `n` [3,h,w], `frames`, `square`, `strictness`,
     `nearness` [h,w]; what is to be learnt, `target` [3,h,w], and where (`mask` [h,w]); `shown` [3,h,w]: what `gather` itself shows."""
@@ -54,10 +61,11 @@ class Lesson:
         # Halves of a word: roughness, nearness.
         self.nearness = (np.ascontiguousarray(file[f"past.{when}"][15]).view(np.uint32) >> 16).astype(np.uint16).view(np.float16)
         self.age = float(file[f"age.{when}"][0])
+        # Where light has changed the filter shows that of lately, and asks no network.
         # After a pan another pixel may stand for a cell than in the still pictures that the light is of.
         same = np.abs(((file["place"][:3] - past[8:11]) * n).sum(0)) * self.strictness < 1
         same &= (unpack_normals(file["place"][3]) * n).sum(0) > SAME_NORMAL
-        self.mask = (frames > 0) & np.isfinite(self.target).all(0) & same
+        self.mask = (frames > 0) & np.isfinite(self.target).all(0) & same & ~within_reach(file[f"changed.{when}"][0] > 0)
         for field in ("features", "light", "square", "x", "n", "frames", "strictness", "nearness", "shown", "target"):
             setattr(self, field, np.ascontiguousarray(np.nan_to_num(getattr(self, field), posinf=0, neginf=0), np.float32))
         self.x = self.x * (self.frames > 0)
@@ -110,8 +118,8 @@ class Pile:
         self.lessons, self.fields = lessons, stacked(lessons, device)
         self.based_on = None  # squares of cells over which the losses of `gather` are that it holds
         # Of each the moment that is its next frame by a still camera, -1 where there is none.
-        places = {(lesson.name, lesson.age): i for i, lesson in enumerate(lessons) if lesson.when != "pan"}
-        self.later = np.array([places.get((lesson.name, lesson.age + 1), -1) if lesson.when != "pan" else -1 for lesson in lessons])
+        places = {(lesson.name, lesson.age): i for i, lesson in enumerate(lessons) if lesson.when.isdigit()}
+        self.later = np.array([places.get((lesson.name, lesson.age + 1), -1) if lesson.when.isdigit() else -1 for lesson in lessons])
 
     def taken(self, which, window=None):
         """The moments of these numbers; `window`: of them rows and columns from a place on, (y, x, side), or what there is."""
