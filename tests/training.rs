@@ -12,7 +12,7 @@ const MODULES: [(&str, u32); 7] = [
     ("tests.test_pix2pix", 10),
     ("tests.test_distributed", 4),
     ("tests.test_judge", 1),
-    ("tests.test_turned", 3),
+    ("tests.test_turned", 4),
     ("tests.test_motion", 6),
     ("tests.test_filter", 11),
 ];

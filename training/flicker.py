@@ -6,7 +6,8 @@ frame), compared at the world points that both show.
 The number is the root mean square of the change, over means of 4x4 pixels, over the mean of the picture. Everything counts: shadows, textures, light and
 what mirrors show, so that a picture without a fault has some. Frames are drawn with --samples a pixel and the pixel filter that the path tracer has, or
 with temporal anti-aliasing, `METHOD+taa`. The path tracer's noise is no change: each frame is traced twice, with --spp paths a pixel and other seeds,
-and the changes of the one are multiplied with those of the other. `control`: each frame as the first after a cut, without any history.
+and the changes of the one are multiplied with those of the other. What blends is drawn as it is seen, over the picture (--blending sorted), not by lot as for layers.
+`control`: each frame as the first after a cut, without any history.
 """
 import json
 import os
@@ -21,15 +22,18 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from judge import PAN_FRAMES, layers, pan_to  # noqa: E402
 from turned import arguments, at_both, camera_of, scenes_of  # noqa: E402
 
+# How a viewer draws what blends.
+SEEN = ["--blending", "sorted"]
+
 
 def picture(layers_of):
     """The finished picture, linear: [h,w,3]."""
     return np.stack([layers_of[c] for c in "RGB"], -1)
 
 
-def change(first, second, camera):
+def change(first, second, cameras):
     """[h/4,w/4,3]: change of means over those of 4x4 pixels that both pictures show; NaN where they are less than half."""
-    a, b, same = at_both(first, second, camera, picture)
+    a, b, same = at_both(first, second, cameras, picture)
     h, w = (n // 4 for n in same.shape)
     pooled = lambda x: x[:4 * h, :4 * w].reshape(h, 4, w, 4, -1).sum((1, 3))
     count = pooled(same.astype(np.float32))
@@ -52,7 +56,7 @@ def main():
     a = parser.parse_args()
     os.makedirs(a.out, exist_ok=True)
     for name, scene, path_of_meta, meta in scenes_of(a):
-        cameras = [camera_of(meta, degrees) for degrees in (1, 0)]
+        flags, cameras = zip(*(camera_of(meta, degrees) for degrees in (1, 0)))
 
         def render(path, *more):
             subprocess.run([a.bouncelight, "render", *scene, "--size", a.size, "--aov", "all", "-q", "-o", path, *more], check=True)
@@ -61,13 +65,13 @@ def main():
             """A frame by itself."""
             path = os.path.join(a.out, f"{name}_{what}_{number}.exr")
             if not os.path.exists(path):
-                render(path, *cameras[number][0], *more)
+                render(path, *flags[number], *more)
             return layers(path)
 
         traced, means = [], []
         for seed in (1, 2):
             frames = [alone(f"paths{seed}", i, "--method", "reference", "--spp", str(a.spp), "--seed", str(2 * seed + i)) for i in (0, 1)]
-            traced.append(change(*frames, cameras[1][1]))
+            traced.append(change(*frames, cameras))
             means.append(picture(frames[0]).mean())
         mean = np.mean(means)
         own = size(*traced) / mean
@@ -80,13 +84,13 @@ def main():
                     with open(os.path.join(folder, "pan.json"), "w") as file:
                         json.dump(pan_to(path_of_meta), file)
                     fine = ["--taa", str(PAN_FRAMES)] if taa else ["--samples", str(a.samples)]
-                    render(os.path.join(folder, "{frame}.exr"), "--method", method, *fine, "--path", os.path.join(folder, "pan.json"))
+                    render(os.path.join(folder, "{frame}.exr"), "--method", method, *SEEN, *fine, "--path", os.path.join(folder, "pan.json"))
                     for number, path in zip((PAN_FRAMES - 1, PAN_FRAMES), frames):
                         shutil.move(os.path.join(folder, f"{number}.exr"), path)
-            ours = size(change(*map(layers, frames), cameras[1][1])) / mean
+            ours = size(change(*map(layers, frames), cameras)) / mean
             print(f"{name} {row}: {100 * ours:.2f} %, {beside(ours, own)}", flush=True)
-        cut = [alone("cut", i, "--method", "gather", "--gi-frames", "1", "--samples", str(a.samples), "--gather", f"seed={i}") for i in (0, 1)]
-        ours = size(change(*cut, cameras[1][1])) / mean
+        cut = [alone("cut", i, "--method", "gather", *SEEN, "--gi-frames", "1", "--samples", str(a.samples), "--gather", f"seed={i}") for i in (0, 1)]
+        ours = size(change(*cut, cameras)) / mean
         print(f"{name} control: {100 * ours:.2f} %, {beside(ours, own)}", flush=True)
 
 

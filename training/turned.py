@@ -3,7 +3,7 @@ the vertical, both settled, compared at the world points that both show.
 
     python training/turned.py out/turned ../shared/reference/real [--methods gather,neural] [--degrees 15] [--frames 32] [--scenes hotel,study]
 
-Each pixel's place (Position) of the first picture is looked up in the second, between the four pixels around it, all of which must show the
+Each pixel's place (Position, at the pixel's centre) of the first picture is looked up in the second, between the four pixels around it, all of which must show the
 same surface: on the first's plane to a pixel's width, with its normal (cosine 0.95) and its albedo (to a quarter). Light is all diffuse light
 that a method adds (DiffInd), as means over 4x4 pixels of the first picture; the number is mean |difference| / mean, its mean difference in
 brackets. `control`: light of the second four pixels to the side. `--degrees 0.7` tells what noise and places of cells have of it.
@@ -43,9 +43,9 @@ def around(x, y, wide, high):
             yield (top + down).clip(0, high - 1), (left + right).clip(0, wide - 1), weight
 
 
-def changed(first, second, camera, shift=0):
+def changed(first, second, cameras, shift=0):
     """mean |difference| / mean of the light at the points that both pictures show, the mean difference over that, and the share of such cells."""
-    a, b, same = at_both(first, second, camera, lambda picture: rgb(picture, "DiffInd"), shift)
+    a, b, same = at_both(first, second, cameras, lambda picture: rgb(picture, "DiffInd"), shift)
     # Of black surfaces nobody sees the light.
     same &= rgb(first, "DiffCol").min(-1) > 0.01
     (a, full), (b, _) = (pooled(light, same.astype(np.float32)) for light in (a, b))
@@ -53,11 +53,26 @@ def changed(first, second, camera, shift=0):
     return np.abs(d).mean() / a[full].mean(), d.mean() / a[full].mean(), full.mean()
 
 
-def at_both(first, second, camera, light_of, shift=0):
+def centred(place, normal, camera):
+    """Places of pixels' centres, which is where filtered light is: a sample's, which a layer holds, lies up to half a pixel aside. The rays through the
+    centres meet the planes of what the pixels show there; where that is farther away than two pixels it is no plane."""
+    eye, right, up, forward, tangent = camera
+    h, w = place.shape[:2]
+    v, u = np.meshgrid(1 - (2 * np.arange(h) + 1) / h, (2 * np.arange(w) + 1) / w - 1, indexing="ij")
+    ray = forward + u[..., None] * tangent * w / h * right + v[..., None] * tangent * up
+    facing = (ray * normal).sum(-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        centre = eye + ray * (((place - eye) * normal).sum(-1) / facing)[..., None]
+        near = np.linalg.norm(centre - place, axis=-1) < 4 * tangent / h * np.abs((place - eye) @ forward)
+    return np.where((near & np.isfinite(centre).all(-1))[..., None], centre, place)
+
+
+def at_both(first, second, cameras, light_of, shift=0):
     """What `light_of` takes from either picture at the first's pixels ([h,w,3] each), and which of them show points that both do [h,w]."""
     vector = lambda o, name: np.stack([o[f"{name}.{c}"] for c in "XYZ"], -1)
-    place, normal, albedo = vector(first, "Position"), vector(first, "Normal"), rgb(first, "DiffCol")
-    eye, right, up, forward, tangent = camera
+    normal, albedo = vector(first, "Normal"), rgb(first, "DiffCol")
+    place = centred(vector(first, "Position"), normal, cameras[0])
+    eye, right, up, forward, tangent = cameras[1]
     h, w = first["Depth.Z"].shape
     at = place - eye
     z = at @ forward
@@ -107,7 +122,7 @@ def main():
     os.makedirs(a.out, exist_ok=True)
     for name, scene, _, meta in scenes_of(a):
         for method in a.methods:
-            drawn = []
+            drawn, cameras = [], []
             for degrees in (0, a.degrees):
                 path = os.path.join(a.out, f"{name}_{method}_{degrees:g}.exr")
                 flags, camera = camera_of(meta, degrees)
@@ -115,8 +130,9 @@ def main():
                     subprocess.run([a.bouncelight, "render", *scene, *flags, "--size", a.size, "--method", method, "--gi-frames", str(a.frames),
                                     "--samples", str(a.samples), "--aov", "all", "-q", "-o", path], check=True)
                 drawn.append(layers(path))
-            change, bias, share = changed(*drawn, camera)
-            control = changed(*drawn, camera, shift=4)[0]
+                cameras.append(camera)
+            change, bias, share = changed(*drawn, cameras)
+            control = changed(*drawn, cameras, shift=4)[0]
             print(f"{name} {method}: {100 * change:.2f} % ({100 * bias:+.2f}), {100 * share:.0f} % of the picture; control {100 * control:.1f} %", flush=True)
 
 
