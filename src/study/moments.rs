@@ -145,8 +145,10 @@ pub fn lesson(
             if !go_on() {
                 return Ok(None);
             }
-            if let Some(change) = &change {
-                change.upload(gpu, raster, scene, (frames - i).min(CHANGE) as f32 / CHANGE as f32)?;
+            // Taken over where it is another than before only: a sky counts as changed by that.
+            let left = (frames - i).min(CHANGE);
+            if let Some(change) = change.as_ref().filter(|_| i == 1 || left < CHANGE) {
+                change.upload(gpu, raster, scene, left as f32 / CHANGE as f32)?;
             }
             // What the filter shows is read at the moment itself only. Where nothing but the camera
             // moves one frame's shadow maps do for all.
