@@ -1,13 +1,22 @@
-//! Which cells begin anew when an object moves: those whose light is another, and no others.
+//! What is remembered after a change: which cells begin anew when an object moves, those whose light is another and no
+//! others; and that light follows a lamp by what the same rays find, without the noise of new ones.
 
 use crate::common;
 use crate::gather::{go_on, uploaded};
-use crate::world::{self, GREY};
+use crate::world::{self, GREY, difference};
 use bouncelight::gi::gather::PAST;
 use bouncelight::gpu::{Gpu, readback};
-use bouncelight::scene::{Camera, Scene};
+use bouncelight::render::Renderer;
+use bouncelight::scene::{Camera, LightKind, Scene};
 
 const SIZE: [u32; 2] = [96, 64];
+
+/// What cells remember: light of three channels and frames.
+fn remembered(gpu: &Gpu, renderer: &Renderer) -> Vec<[f32; 4]> {
+    let pasts = renderer.memory().expect("it remembers").pasts;
+    let bytes = readback::buffer(&gpu.device, &gpu.queue, pasts, 0, pasts.size()).expect("reading back works");
+    bytes.chunks_exact(PAST as usize).map(|p| bytemuck::pod_read_unaligned(&p[..16])).collect()
+}
 
 /// The share of cells that remember no more than this frame's rays after 30 frames at rest and one
 /// after instance `moved` went up by 40 m.
@@ -21,11 +30,8 @@ fn begun_anew(gpu: &Gpu, scene: &Scene, moved: Option<usize>) -> f64 {
         drawn.set_placements(&gpu.queue, &other);
     }
     go_on(gpu, &mut renderer, &drawn, &scene.cameras[0], 1);
-    let pasts = renderer.memory().expect("it remembers").pasts;
-    let bytes = readback::buffer(&gpu.device, &gpu.queue, pasts, 0, pasts.size()).expect("reading back works");
-    let frames: Vec<f32> =
-        bytes.chunks_exact(PAST as usize).map(|p| bytemuck::pod_read_unaligned(&p[12..16])).collect();
-    frames.iter().filter(|f| (0.5..4.5).contains(*f)).count() as f64 / frames.len() as f64
+    let cells = remembered(gpu, &renderer);
+    cells.iter().filter(|cell| (0.5..4.5).contains(&cell[3])).count() as f64 / cells.len() as f64
 }
 
 #[test]
@@ -52,4 +58,48 @@ fn cells_whose_light_is_another_begin_anew_and_no_others() {
     );
     assert!(ceiling > 0.6, "{ceiling}");
     assert!(behind < 0.01 && none < 0.01, "{behind}, {none}");
+}
+
+/// Where walls send next to nothing on, all indirect light is the lamp's first bounce, and a dimmed
+/// lamp's is there in the frame itself.
+#[test]
+fn light_follows_a_dimmed_lamp_without_new_noise() {
+    let Some(gpu) = common::gpu() else { return };
+    const DARK: [f32; 3] = [0.05; 3];
+    let blocks = [
+        ([-3.0, -0.2, -3.0], [3.0, 0.0, 3.0], DARK),
+        ([-3.2, 0.0, -3.0], [-3.0, 3.0, 3.0], DARK),
+        ([3.0, 0.0, -3.0], [3.2, 3.0, 3.0], DARK),
+        ([-3.0, 0.0, -3.2], [3.0, 3.0, -3.0], DARK),
+        ([-3.0, 0.0, 3.0], [3.0, 3.0, 3.2], DARK),
+        ([-3.2, 3.0, -3.2], [3.2, 3.2, 3.2], DARK),
+    ];
+    let camera = Camera::look_at([0.0, 1.6, 2.5], [0.0, 1.0, -3.0], 1.0);
+    let lamp =
+        |intensity: f32| LightKind::Point { position: [1.5, 2.0, 0.5], intensity, radius: 0.05, range: None }.into();
+    let mut scene = world::scene(&blocks, &[], 0.0, camera);
+    scene.lights = vec![lamp(20.0)];
+    let mut renderer = world::renderer(&gpu, SIZE, world::gather());
+    let mut drawn = uploaded(&gpu, &scene);
+    let mut light_after = |drawn: &_, frames| -> Vec<f32> {
+        go_on(&gpu, &mut renderer, drawn, &scene.cameras[0], frames);
+        remembered(&gpu, &renderer).iter().flat_map(|cell| [cell[0], cell[1], cell[2]]).collect()
+    };
+    let first = light_after(&drawn, 1);
+    let bright = light_after(&drawn, 63);
+    for share in [0.7, 0.5, 2.0] {
+        let before = light_after(&drawn, 1);
+        let dimmed = Scene { lights: vec![lamp(20.0 * share)], ..scene.clone() };
+        drawn.set_lights(&gpu.device, &gpu.queue, &dimmed);
+        let now = light_after(&drawn, 1);
+        let expected: Vec<f32> = before.iter().map(|l| l * share).collect();
+        println!("{share} of the lamp: {:.1} % off", 100.0 * difference(&now, &expected));
+        // The walls send 5 % on, which follows later, and the frame's own ray has noise.
+        assert!(difference(&now, &expected) < 0.1, "{}", difference(&now, &expected));
+        drawn.set_lights(&gpu.device, &gpu.queue, &scene);
+        light_after(&drawn, 64);
+    }
+    // Negative control: rays of a frame of their own know it less well.
+    println!("after a cut {:.1} %", 100.0 * difference(&first, &bright));
+    assert!(difference(&first, &bright) > 0.15);
 }

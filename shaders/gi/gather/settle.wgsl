@@ -76,6 +76,18 @@ fn arrived_by(ray: u32, width: f32) -> Arrived {
     return Arrived(found + glow.rgb, vector, l * l, nearness);
 }
 
+// What is remembered where light has become `gain` times what it was, and `rest` more.
+fn followed(past: Past, gain: f32, rest: vec3f) -> Past {
+    var now = past;
+    now.light = max(gain * past.light + rest, vec3f(0.0));
+    now.lately = max(gain * past.lately + rest, vec3f(0.0));
+    let l = luminance(past.light);
+    let ratio = select(1.0, luminance(now.light) / l, l > 0.0);
+    now.vector *= ratio;
+    now.square *= ratio * ratio;
+    return now;
+}
+
 @compute @workgroup_size(8, 8)
 fn settle(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= cell_grid()) { return; }
@@ -117,8 +129,10 @@ fn settle(@builtin(global_invocation_id) id: vec3u) {
     } else if changed {
         // As recall.wgsl left it there. And no mean is older than the cut: a first frame's many rays
         // hold no change up.
-        let worth = records[3u * cell_record(cell, 3u)].x;
-        past.frames = min(past.frames, min(worth, f32(gather.frame)));
+        let place = 3u * cell_record(cell, 3u);
+        let next = records[place];
+        past = followed(past, records[place + 1u].x, next.rgb);
+        past.frames = min(past.frames, min(next.a, f32(gather.frame)));
     }
     var most = gather.cell_frames;
     let changing = (gather.flags & GATHER_CHANGING) != 0u || !rests(motion);
