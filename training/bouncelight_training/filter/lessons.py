@@ -75,15 +75,19 @@ class Lesson:
         self.mean = float((self.target * self.mask).sum() / max(3 * self.mask.sum(), 1))
 
 
-def moments_of(path):
-    """The moments of a view that teach something: none of pictures without light, or with more noise than light."""
+def all_of(path):
+    """Every moment of a view."""
     try:
         file = load_file(path)
         moments = [name.split(".")[1] for name in file if name.startswith("past.")]
-        made = [Lesson(file, when, os.path.basename(path).removesuffix(".safetensors")) for when in moments]
+        return [Lesson(file, when, os.path.basename(path).removesuffix(".safetensors")) for when in moments]
     except (OSError, SafetensorError, KeyError) as error:
         raise TrainingError(f"{path}: not a lesson of a filter: {error}; make it with bouncelight dataset --moments") from error
-    return [lesson for lesson in made if lesson.mean > 1e-6 and lesson.mask.mean() > 0.2 and lesson.noise < MOST_NOISE]
+
+
+def moments_of(path):
+    """The moments of a view that teach something: none of pictures without light, or with more noise than light."""
+    return [lesson for lesson in all_of(path) if lesson.mean > 1e-6 and lesson.mask.mean() > 0.2 and lesson.noise < MOST_NOISE]
 
 
 def read(folder, every=1):
