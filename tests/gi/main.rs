@@ -32,6 +32,7 @@ mod noise;
 #[cfg(feature = "io")]
 mod readback;
 mod real;
+mod repeat;
 mod screen;
 mod shot;
 mod sky_sun;

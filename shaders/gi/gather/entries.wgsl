@@ -14,7 +14,8 @@
 // 0 for a free slot, LEFT for one whose entry has left while others that were put further on for it
 // are still there.
 @group(2) @binding(0) var<storage, read_write> entry_keys: array<atomic<u32>>;
-// Two halves, for even and odd rounds: the winner's lot. Its low bits are an index into
+// Two halves, for even and odd rounds: the winner's lot. From the top: whether entries' rays alone
+// have met the entry; the number that was drawn; whether one ray alone has drawn it; an index into
 // `entry_queries`.
 @group(2) @binding(1) var<storage, read_write> entry_lots: array<atomic<u32>>;
 // Where rays met a cell: position, and the packed normal of the side that they met. First those of
@@ -23,14 +24,16 @@
 // remember of their rays (look.wgsl).
 @group(2) @binding(2) var<storage, read_write> entry_queries: array<vec4u>;
 
-// Slots that are looked at before a place goes without an entry.
-const ENTRY_PROBES = 12u;
+// Slots that are looked at before a place goes without an entry. Which one does in a full stretch of
+// the table is a matter of who comes first, so none is to be as long: up to half the slots in use
+// one entry in a million is, with two thirds one in two thousand.
+const ENTRY_PROBES = 32u;
 // Of the lot of an entry that no ray of the picture's cells has met, entries' rays alone.
 const BY_ENTRIES = 0x80000000u;
 // No entry's key, which are all odd.
 const LEFT = 2u;
 
-// Bits of a lot that are the query's index: no more than needed, since the rest of the bits decide.
+// Bits of a lot that are the query's index: no more than needed, since the bits above decide.
 fn lot_bits() -> u32 {
     return 32u - countLeadingZeros(gather.rays + 4u * (gather.mask + 1u));
 }
@@ -108,10 +111,13 @@ fn entry_room(x: vec3f, n: vec3f, room: u32) -> EntryLine {
 fn claim_entry(slot: u32, x: vec3f, n: vec3f, query: u32, name: u32, round: u32) {
     if query == NONE { return; }
     entry_queries[query] = vec4u(bitcast<vec3u>(x), pack_normal(n));
-    var lot = (pcg3(vec3u(name, round, 0x2545f491u)).x << (lot_bits() + 1u)) >> 1u;
-    lot |= query;
+    let alone = 1u << lot_bits();
+    var drawn = (pcg3(vec3u(name, round, 0x2545f491u)).x << (lot_bits() + 2u)) >> 1u;
     // The picture's own rays come before those of entries, which tell what the light between
     // surfaces is.
-    if query >= gather.rays { lot |= BY_ENTRIES; }
-    atomicMin(&entry_lots[(round & 1u) * (gather.mask + 1u) + slot], lot);
+    if query >= gather.rays { drawn |= BY_ENTRIES; }
+    let i = (round & 1u) * (gather.mask + 1u) + slot;
+    let lowest = atomicMin(&entry_lots[i], drawn | alone | query);
+    // Of two that draw the same neither wins: their indices are slots, which go to who comes first.
+    if lowest != NONE && (lowest & ~(2u * alone - 1u)) == drawn { atomicMin(&entry_lots[i], drawn); }
 }

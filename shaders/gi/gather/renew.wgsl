@@ -61,13 +61,13 @@ fn begins(slot: u32) -> bool {
     var begin = entry_queries[places + slots - odd];
     var asked = entry_asked[slot];
     if lot != NONE {
-        begin = entry_queries[lot & ((1u << lot_bits()) - 1u)];
+        let alone = 1u << lot_bits();
+        if (lot & alone) != 0u { begin = entry_queries[lot & (alone - 1u)]; }
         asked = gather.last_round + 1u;
         atomicStore(&entry_lots[odd + slot], NONE);
-    } else if asked == 0u {
-        // Made in this very round.
-        return false;
     }
+    // Made in this very round, or nobody has won yet.
+    if begin.w == 0u { return false; }
     entry_asked[slot] = asked;
     entry_queries[places + odd] = begin;
     let far = lot >= BY_ENTRIES && (gather.flags & GATHER_ALL_ENTRIES) == 0u;

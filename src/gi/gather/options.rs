@@ -36,7 +36,7 @@ impl Default for Options {
         Self {
             cell_frames: 1024.0,
             entry_frames: 8.0,
-            slots: 1 << 15,
+            slots: 1 << 16,
             entry_scale: 1.0 / 16.0,
             first_rounds: 32,
             blur: true,
