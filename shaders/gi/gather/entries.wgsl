@@ -60,15 +60,19 @@ fn entry_cell(x: vec3f, n: vec3f) -> EntryCell {
 // The slot with this hash; a new one where there is none yet. NONE where the table is full around
 // there.
 fn entry_slot(hash: vec2u) -> u32 {
-    for (var i = 0u; i < ENTRY_PROBES; i++) {
-        let slot = (hash.x + i) & gather.mask;
-        for (var again = 0u; again < 4u; again++) {
-            let key = atomicLoad(&entry_keys[slot]);
-            if key == hash.y { return slot; }
-            if key != 0u { break; }
-            let taken = atomicCompareExchangeWeak(&entry_keys[slot], 0u, hash.y);
-            if taken.exchanged || taken.old_value == hash.y { return slot; }
+    var probe = 0u;
+    loop {
+        if probe == ENTRY_PROBES { return NONE; }
+        let slot = (hash.x + probe) & gather.mask;
+        let key = atomicLoad(&entry_keys[slot]);
+        if key == hash.y { return slot; }
+        if key != 0u {
+            probe++;
+            continue;
         }
+        // It may fail for no reason; then the slot is asked again.
+        let taken = atomicCompareExchangeWeak(&entry_keys[slot], 0u, hash.y);
+        if taken.exchanged || taken.old_value == hash.y { return slot; }
     }
     return NONE;
 }
