@@ -27,8 +27,7 @@ def draw(folder, rooms, *more, moments="1,8,pan"):
 
 
 def moments_of(folder):
-    """Every moment of one view. In which cells a lamp counts as changing light is not the same in each run (threads enter light into the
-    world's hash table in any order), and where it does in many `lessons.read` leaves the moment out."""
+    """Every moment of one view, also where a lamp changes light in so many cells that `lessons.read` leaves the moment out."""
     (path,) = glob.glob(os.path.join(folder, "*.safetensors"))
     return lessons.all_of(path)
 

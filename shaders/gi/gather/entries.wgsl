@@ -25,8 +25,8 @@
 @group(2) @binding(2) var<storage, read_write> entry_queries: array<vec4u>;
 
 // Slots that are looked at before a place goes without an entry. Which one does in a full stretch of
-// the table is a matter of who comes first, so none is to be as long: up to half the slots in use
-// one entry in a million is, with two thirds one in two thousand.
+// the table is a matter of who comes first, so none is to be as long: with half the slots in use
+// none of 100,000 entries comes to one (simulated), with two thirds one in two thousand.
 const ENTRY_PROBES = 32u;
 // Of the lot of an entry that no ray of the picture's cells has met, entries' rays alone.
 const BY_ENTRIES = 0x80000000u;
