@@ -22,6 +22,7 @@ mod image;
 mod pairs;
 mod refit;
 mod scene;
+mod split;
 mod surfaces;
 mod threads;
 mod trees;
@@ -138,7 +139,7 @@ impl Accel {
         self.blocks.len()
     }
 
-    /// Leaves that hold a triangle or two.
+    /// Leaves that hold a triangle or two; what fills its box badly stands in several.
     pub fn leaf_count(&self) -> usize {
         self.blocks.iter().filter(|b| b[3] & wide::NODE == 0 && b.iter().any(|w| *w != 0)).count()
     }

@@ -220,9 +220,16 @@ fn visits_grow_like_a_logarithm() {
 /// Nearly every triangle of a mesh finds a partner to share a leaf with; strewn ones find none.
 #[test]
 fn neighbours_share_leaves() {
-    let (mesh, strewn) = (Accel::build(&sphere(48)).unwrap(), Accel::build(&soup(1000, 0.1, 1)).unwrap());
-    assert!(mesh.leaf_count() * 100 < mesh.triangle_count() * 53, "{} leaves", mesh.leaf_count());
-    assert_eq!(strewn.leaf_count(), 1000);
+    let (mut mesh, mut strewn) = (Accel::build(&sphere(48)).unwrap(), Accel::build(&soup(1000, 0.1, 1)).unwrap());
+    // What fills its box badly stands in several leaves.
+    let kinds = |accel: &mut Accel| {
+        let leaves = accel.words_mut().chunks(16).filter(|b| b[3] == 0 && b.iter().any(|w| *w != 0));
+        leaves.collect::<std::collections::HashSet<_>>().len()
+    };
+    let leaves = kinds(&mut mesh);
+    assert!(leaves * 100 < mesh.triangle_count() * 53, "{leaves} leaves");
+    assert_eq!(kinds(&mut strewn), 1000);
+    assert!(strewn.leaf_count() <= 1200, "{} leaves", strewn.leaf_count());
 }
 
 #[test]
