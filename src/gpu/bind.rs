@@ -76,6 +76,13 @@ impl Binder {
     }
 }
 
+/// How shaders of frames are compiled: they write what a workgroup shares before they read it. naga would
+/// else set it to zero, in GLSL by constructors with as many arguments as arrays have elements, which
+/// takes Mesa minutes.
+pub(crate) fn compilation() -> wgpu::PipelineCompilationOptions<'static> {
+    wgpu::PipelineCompilationOptions { zero_initialize_workgroup_memory: false, ..Default::default() }
+}
+
 /// A compute pipeline of a shader module with these groups.
 pub fn pipeline(
     device: &wgpu::Device,
@@ -91,7 +98,7 @@ pub fn pipeline(
         layout: Some(&layout),
         module,
         entry_point: Some(entry),
-        compilation_options: Default::default(),
+        compilation_options: compilation(),
         cache: None,
     };
     tape::compute_pipeline(device, &descriptor)

@@ -61,7 +61,7 @@ pub(crate) fn compute_with(
         layout: Some(&layout),
         module: &module,
         entry_point: Some(entry),
-        compilation_options: Default::default(),
+        compilation_options: crate::gpu::bind::compilation(),
         cache: None,
     };
     tape::compute_pipeline(device, &descriptor)

@@ -35,6 +35,9 @@ fn stage(index: u32, first: vec2i) {
     }
     let cell = first + vec2i(i32(index) % STAGED, i32(index) / STAGED);
     points[index] = vec4f(0.0);
+    normals[index] = vec3f(0.0);
+    lights[index] = CellLight();
+    gleams[index] = vec4f(0.0);
     if any(cell < vec2i(0)) || any(cell >= vec2i(cell_grid())) {
         return;
     }
@@ -163,6 +166,7 @@ fn bring(
 ) {
     let first = vec2i(group.xy) * (8 / CELL_SIDE) - 2;
     stage(index, first);
+    if index == 0u { atomicStore(&further_count, 0u); }
     workgroupBarrier();
     if all(id.xy < params.size) {
         let pixel = vec2i(id.xy);

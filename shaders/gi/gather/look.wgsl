@@ -79,6 +79,7 @@ const JOBS = 1024u;
 var<workgroup> jobs: array<atomic<u32>, JOBS / 2u>;
 var<workgroup> jobs_noted: atomic<u32>;
 var<workgroup> jobs_taken: atomic<u32>;
+var<workgroup> jobs_counted: u32;
 // Ways that look for an entry, and ways at their end.
 var<workgroup> asking: array<u32, WALKS>;
 var<workgroup> asking_count: atomic<u32>;
@@ -135,6 +136,9 @@ fn no_jobs(thread: u32) {
     if thread == 0u {
         atomicStore(&jobs_noted, 0u);
         atomicStore(&jobs_taken, 0u);
+        atomicStore(&asking_count, 0u);
+        atomicStore(&ended_count, 0u);
+        no_rays();
     }
     workgroupBarrier();
 }
@@ -142,6 +146,13 @@ fn no_jobs(thread: u32) {
 fn note_job(job: u32) {
     let i = atomicAdd(&jobs_noted, 1u);
     atomicOr(&jobs[i / 2u], job << (16u * (i & 1u)));
+}
+
+// Whether more than `most` jobs are noted. All threads call this.
+fn jobs_exceed(thread: u32, most: u32) -> bool {
+    workgroupBarrier();
+    if thread == 0u { jobs_counted = atomicLoad(&jobs_noted); }
+    return workgroupUniformLoad(&jobs_counted) > most;
 }
 
 // Does the jobs, a way each; as soon as a way is at its end another sets out in its place, so that

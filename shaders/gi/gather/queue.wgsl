@@ -21,6 +21,13 @@ var<workgroup> half: u32;
 var<workgroup> sent_nearest: u32;
 var<workgroup> sent_all: u32;
 
+// Before the first of them is put, by one thread.
+fn no_rays() {
+    atomicStore(&waiting_nearest, 0u);
+    atomicStore(&waiting_any, 0u);
+    half = 0u;
+}
+
 // A ray, number `at`, for the next `walk_all`.
 fn put(at: u32, origin: vec3f, direction: vec3f, reach: f32, any: bool, seed: u32) {
     walks[2u * at] = vec4u(bitcast<vec3u>(origin), bitcast<u32>(select(reach, -reach, any)));

@@ -78,7 +78,13 @@ fn begins(slot: u32) -> bool {
     return true;
 }
 
-// First of the slots that the workgroup looks after, as many at once as it can have jobs.
+// Slots that a workgroup looks after. Few of a table's are in use, and of those few send a ray, so it
+// asks more of them than it can have jobs.
+const SPAN = 2u * JOBS;
+// Slots after which it sees whether there is room for the jobs of as many.
+const PART = JOBS / 4u;
+
+// The first of them.
 var<private> first_slot: u32;
 
 // The ray of an entry.
@@ -118,7 +124,7 @@ fn finish(at: u32) {
     entry_light[odd + slot] = vec4f(mix(before.rgb, finite3(light), share), n_rays);
 }
 
-// Of eight slots about one is in use, so first it is noted which.
+// First it is noted who sends a ray.
 @compute @workgroup_size(WALKERS)
 fn renew(
     @builtin(workgroup_id) id: vec3u,
@@ -126,12 +132,16 @@ fn renew(
     @builtin(local_invocation_index) thread: u32,
 ) {
     group = id.x;
-    for (var i = id.x; i * JOBS <= gather.mask; i += groups.x) {
-        first_slot = i * JOBS;
+    for (var i = id.x; i * SPAN <= gather.mask; i += groups.x) {
+        first_slot = i * SPAN;
         no_jobs(thread);
-        for (var job = thread; job < JOBS; job += WALKERS) {
-            if begins(first_slot + job) { note_job(job); }
+        for (var part = PART; part <= SPAN; part += PART) {
+            for (var job = part - PART + thread; job < part; job += WALKERS) {
+                if begins(first_slot + job) { note_job(job); }
+            }
+            if part < SPAN && !jobs_exceed(thread, JOBS - PART) { continue; }
+            look(thread, gather.round + 1u, true);
+            no_jobs(thread);
         }
-        look(thread, gather.round + 1u, true);
     }
 }

@@ -32,15 +32,19 @@ pub fn of_pixels(size: [u32; 2]) -> u32 {
     blocks(size.map(|n| n.div_ceil(2))).clamp(1, GROUPS)
 }
 
+/// Slots that a workgroup of `gi.renew` looks after: `SPAN` of `renew.wgsl`. The table of 65,536 has
+/// 32 workgroups then, about as many as fill the memory of a GTX 1050.
+const SPAN: u32 = 2 * JOBS;
+
 /// Workgroups of `gi.renew`.
 pub fn of_slots(slots: u32) -> u32 {
-    slots.div_ceil(JOBS).clamp(1, GROUPS)
+    slots.div_ceil(SPAN).clamp(1, GROUPS)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::{GatherGi, Options, RECORD, WAYS, looks};
-    use super::{BLOCK, JOBS, cells_of};
+    use super::{BLOCK, JOBS, SPAN, cells_of};
 
     /// A constant of a shader.
     fn constant(source: &str, name: &str) -> u64 {
@@ -54,6 +58,8 @@ mod tests {
         let look = include_str!("../../../shaders/gi/gather/look.wgsl");
         let queue = include_str!("../../../shaders/gi/gather/queue.wgsl");
         assert_eq!(constant(look, "JOBS"), u64::from(JOBS));
+        let renew = include_str!("../../../shaders/gi/gather/renew.wgsl");
+        assert!(renew.contains(&format!("const SPAN = {}u * JOBS;", SPAN / JOBS)));
         assert_eq!(16 * constant(queue, "WALKS") * constant(look, "PARTS"), WAYS);
         let blocks = format!("return (grid + {}u) / {BLOCK}u;", BLOCK - 1);
         assert!(look.contains(&blocks), "{blocks}");
