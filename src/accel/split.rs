@@ -2,6 +2,9 @@
 //! large as the room, and every ray comes by. Each part of such a box becomes a leaf of its own
 //! with the same pair in it (early split clipping, Ernst and Greiner 2007), those first that save
 //! most.
+//!
+//! Counts of blocks below are those that a nearest hit reads (`examples/rays --traffic`), each
+//! number varied beside the others as they stood when it was chosen.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
