@@ -76,9 +76,9 @@ impl Binder {
     }
 }
 
-/// How shaders of frames are compiled: they write what a workgroup shares before they read it. naga would
-/// else set it to zero, in GLSL by constructors with as many arguments as arrays have elements, which
-/// takes Mesa minutes.
+/// How shaders of frames are compiled: they write what a workgroup shares before they read it. naga
+/// would else set it to zero, in GLSL by constructors with as many arguments as arrays have
+/// elements, which takes Mesa minutes.
 pub(crate) fn compilation() -> wgpu::PipelineCompilationOptions<'static> {
     wgpu::PipelineCompilationOptions { zero_initialize_workgroup_memory: false, ..Default::default() }
 }

@@ -78,8 +78,8 @@ fn begins(slot: u32) -> bool {
     return true;
 }
 
-// Slots that a workgroup looks after. Few of a table's are in use, and of those few send a ray, so it
-// asks more of them than it can have jobs.
+// Slots that a workgroup looks after. Few of a table's are in use, and of those few send a ray, so
+// it asks more of them than it can have jobs.
 const SPAN = 2u * JOBS;
 // Slots after which it sees whether there is room for the jobs of as many.
 const PART = JOBS / 4u;

@@ -32,8 +32,8 @@ pub fn of_pixels(size: [u32; 2]) -> u32 {
     blocks(size.map(|n| n.div_ceil(2))).clamp(1, GROUPS)
 }
 
-/// Slots that a workgroup of `gi.renew` looks after: `SPAN` of `renew.wgsl`. The table of 65,536 has
-/// 32 workgroups then, about as many as fill the memory of a GTX 1050.
+/// Slots that a workgroup of `gi.renew` looks after: `SPAN` of `renew.wgsl`. The table of 65,536
+/// has 32 workgroups then, about as many as fill the memory of a GTX 1050.
 const SPAN: u32 = 2 * JOBS;
 
 /// Workgroups of `gi.renew`.
