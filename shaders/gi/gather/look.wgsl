@@ -6,7 +6,7 @@
 //#import gi/gather/types.wgsl
 //#import gi/gather/light.wgsl
 //#import gi/gather/entries.wgsl
-//#import gi/gather/queue.wgsl
+//#import gi/gather/jobs.wgsl
 
 // What a ray finds: the sky, or a surface with the light of lamps and of what glows that it sends
 // back, and the entry that knows the rest of its light.
@@ -73,13 +73,6 @@ const NAMES = 8u;
 // Number of the workgroup.
 var<private> group: u32;
 
-// What the workgroup has to do, and how much of it is done or being done.
-const JOBS = 1024u;
-// Sixteen bits each.
-var<workgroup> jobs: array<atomic<u32>, JOBS / 2u>;
-var<workgroup> jobs_noted: atomic<u32>;
-var<workgroup> jobs_taken: atomic<u32>;
-var<workgroup> jobs_counted: u32;
 // Ways that look for an entry, and ways at their end.
 var<workgroup> asking: array<u32, WALKS>;
 var<workgroup> asking_count: atomic<u32>;
@@ -129,32 +122,6 @@ fn job_of(at: u32) -> u32 {
     return part_of(at, LIGHT).w;
 }
 
-// Before the workgroup notes its jobs, numbers below 65,536. All threads call this, and `look`.
-fn no_jobs(thread: u32) {
-    workgroupBarrier();
-    for (var i = thread; i < JOBS / 2u; i += WALKERS) { atomicStore(&jobs[i], 0u); }
-    if thread == 0u {
-        atomicStore(&jobs_noted, 0u);
-        atomicStore(&jobs_taken, 0u);
-        atomicStore(&asking_count, 0u);
-        atomicStore(&ended_count, 0u);
-        no_rays();
-    }
-    workgroupBarrier();
-}
-
-fn note_job(job: u32) {
-    let i = atomicAdd(&jobs_noted, 1u);
-    atomicOr(&jobs[i / 2u], job << (16u * (i & 1u)));
-}
-
-// Whether more than `most` jobs are noted. All threads call this.
-fn jobs_exceed(thread: u32, most: u32) -> bool {
-    workgroupBarrier();
-    if thread == 0u { jobs_counted = atomicLoad(&jobs_noted); }
-    return workgroupUniformLoad(&jobs_counted) > most;
-}
-
 // Does the jobs, a way each; as soon as a way is at its end another sets out in its place, so that
 // there are rays enough for all threads. The shader that imports this file says what a job is:
 // `begin(at, job) -> bool` sends way `at` on it (false: it is at its end at once), `finish(at)`
@@ -162,6 +129,10 @@ fn jobs_exceed(thread: u32, most: u32) -> bool {
 // glows counts where rays from the beginning meet it.
 fn look(thread: u32, round: u32, glows: bool) {
     workgroupBarrier();
+    if thread == 0u {
+        atomicStore(&asking_count, 0u);
+        atomicStore(&ended_count, 0u);
+    }
     for (var at = thread; at < WALKS; at += WALKERS) { take_job(at); }
     loop {
         if !walk_all(thread) { break; }
@@ -179,16 +150,6 @@ fn look(thread: u32, round: u32, glows: bool) {
             atomicStore(&asking_count, 0u);
             atomicStore(&ended_count, 0u);
         }
-    }
-}
-
-// The next job that there is for way `at`.
-fn take_job(at: u32) {
-    loop {
-        let i = atomicAdd(&jobs_taken, 1u);
-        if i >= atomicLoad(&jobs_noted) { return; }
-        let job = (atomicLoad(&jobs[i / 2u]) >> (16u * (i & 1u))) & 0xffffu;
-        if begin(at, job) { return; }
     }
 }
 
@@ -343,14 +304,4 @@ fn ask(at: u32, round: u32) {
     keep(at, COURSE, along, bitcast<u32>(max(dot(n, along), 1e-4)));
     keep(at, PLACE, x, (segment << 8u) | NEAREST);
     put(at, x, along, FAR, false, seed.x);
-}
-
-// Blocks of 32×32 places that a grid is cut into.
-fn blocks_of(grid: vec2u) -> vec2u {
-    return (grid + 31u) / 32u;
-}
-
-// Place of job `i` in such a block; 64 jobs that follow each other are a square.
-fn place_of(block: vec2u, i: u32) -> vec2u {
-    return 32u * block + vec2u((i & 7u) | ((i >> 3u) & 24u), ((i >> 3u) & 7u) | ((i >> 5u) & 24u));
 }

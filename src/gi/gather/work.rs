@@ -1,9 +1,9 @@
-//! How the rays of a pass are shared out among workgroups (`look.wgsl`).
+//! How the rays of a pass are shared out among workgroups (`jobs.wgsl`).
 
 use super::looks;
 use crate::gi::stage::inputs::cells_of;
 
-/// Jobs that a workgroup has at once: `JOBS` of `look.wgsl`. Of cells or squares they are 32×32
+/// Jobs that a workgroup has at once: `JOBS` of `jobs.wgsl`. Of cells or squares they are 32×32
 /// beside each other.
 const JOBS: u32 = BLOCK * BLOCK;
 const BLOCK: u32 = 32;
@@ -56,13 +56,14 @@ mod tests {
     #[test]
     fn buffers_and_groups_are_what_shaders_fill() {
         let look = include_str!("../../../shaders/gi/gather/look.wgsl");
+        let jobs = include_str!("../../../shaders/gi/gather/jobs.wgsl");
         let queue = include_str!("../../../shaders/gi/gather/queue.wgsl");
-        assert_eq!(constant(look, "JOBS"), u64::from(JOBS));
+        assert_eq!(constant(jobs, "JOBS"), u64::from(JOBS));
         let renew = include_str!("../../../shaders/gi/gather/renew.wgsl");
         assert!(renew.contains(&format!("const SPAN = {}u * JOBS;", SPAN / JOBS)));
         assert_eq!(16 * constant(queue, "WALKS") * constant(look, "PARTS"), WAYS);
         let blocks = format!("return (grid + {}u) / {BLOCK}u;", BLOCK - 1);
-        assert!(look.contains(&blocks), "{blocks}");
+        assert!(jobs.contains(&blocks), "{blocks}");
     }
 
     #[test]
