@@ -100,15 +100,20 @@ impl Tape {
     }
 }
 
+/// Whether one runs on this thread.
+pub(crate) fn runs() -> bool {
+    RUNS.get()
+}
+
 fn write(note: impl FnOnce(&mut Tape)) {
-    if RUNS.get() {
+    if runs() {
         TAPE.with_borrow_mut(note);
     }
 }
 
 /// Compiles WGSL.
 pub(crate) fn shader_module(device: &wgpu::Device, name: &str, text: String) -> wgpu::ShaderModule {
-    let kept = RUNS.get().then(|| text.clone());
+    let kept = runs().then(|| text.clone());
     let source = wgpu::ShaderSource::Wgsl(text.into());
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source });
     if let Some(text) = kept {

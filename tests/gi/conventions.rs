@@ -16,14 +16,15 @@ use wgpu::TextureFormat as F;
 /// than at its beginning (5.6 and 8.4 %).
 const STEP: u32 = 12;
 
-/// Light of eight frames at rest, written one way and read another.
-fn still(gpu: &Gpu, how: &Written, read: &Conventions) -> Vec<f32> {
+/// Light of eight frames at rest, written one way and read another. Another world's light is
+/// nobody's past, so `lit` begins anew.
+fn still(gpu: &Gpu, lit: &mut View, how: &Written, read: &Conventions) -> Vec<f32> {
     let shot = shot(STEP, [0.0; 2]);
     let targets = written(gpu, &shot, how, &shot.camera);
-    let (world, mut view) = (world(gpu), gather(gpu));
+    let world = world(gpu);
     let mut last = Vec::new();
     for _ in 0..8 {
-        last = draw(gpu, &mut view, Some(&world), &targets.inputs(*read)).expect("it draws");
+        last = draw(gpu, lit, Some(&world), &targets.inputs(*read)).expect("it draws");
     }
     last
 }
@@ -31,7 +32,8 @@ fn still(gpu: &Gpu, how: &Written, read: &Conventions) -> Vec<f32> {
 #[test]
 fn depth_and_normals_in_every_convention() {
     let Some(gpu) = common::gpu() else { return };
-    let plain = still(&gpu, &Written::default(), &Conventions::default());
+    let mut lit = gather(&gpu);
+    let plain = still(&gpu, &mut lit, &Written::default(), &Conventions::default());
     assert!(mean(&plain) > 0.02 && plain.iter().all(|v| v.is_finite()));
     let own = Conventions::default();
     for (depth, finite) in [
@@ -43,14 +45,14 @@ fn depth_and_normals_in_every_convention() {
     ] {
         let conventions = Conventions { depth, ..own };
         let how = Written { conventions, finite, ..Default::default() };
-        let off = difference(&still(&gpu, &how, &conventions), &plain);
+        let off = difference(&still(&gpu, &mut lit, &how, &conventions), &plain);
         println!("depth {depth:?}, finite {finite}: {:.3} %", 100.0 * off);
         assert!(off < 0.01, "{depth:?} {finite}: {off}");
     }
     // Negative control: the other clip space.
     let [gl, forward] = [Depth::ForwardGl, Depth::Forward].map(|depth| Conventions { depth, ..own });
     let how = Written { conventions: gl, finite: true, ..Default::default() };
-    let wrong = difference(&still(&gpu, &how, &forward), &plain);
+    let wrong = difference(&still(&gpu, &mut lit, &how, &forward), &plain);
     assert!(wrong > 0.1, "{wrong}");
 
     // Rays that start a little aside meet other entries of the cache: by noise, not by the format,
@@ -73,13 +75,13 @@ fn depth_and_normals_in_every_convention() {
             let conventions =
                 Conventions { normal_encoding: encoding, normal_range: range, normal_space: space, ..own };
             let how = Written { conventions, normal: format, ..Default::default() };
-            let off = difference(&still(&gpu, &how, &conventions), &plain);
+            let off = difference(&still(&gpu, &mut lit, &how, &conventions), &plain);
             println!("normals {encoding:?} {range:?} {space:?} in {format:?}: {:.3} %", 100.0 * off);
             assert!(off < most, "{encoding:?} {range:?} {space:?}: {off}");
             // Negative control: the other space.
             if encoding != E::Xy && format == F::Rgba16Float {
                 let other = if space == S::View { S::World } else { S::View };
-                let wrong = still(&gpu, &how, &Conventions { normal_space: other, ..conventions });
+                let wrong = still(&gpu, &mut lit, &how, &Conventions { normal_space: other, ..conventions });
                 let control = difference(&wrong, &plain);
                 println!("{encoding:?} read as {other:?}: {:.1} %", 100.0 * control);
                 assert!(control > 0.05, "{encoding:?} read as {other:?}: {control}");
@@ -92,9 +94,10 @@ fn depth_and_normals_in_every_convention() {
 fn cameras_that_look_down_plus_z() {
     let Some(gpu) = common::gpu() else { return };
     let own = Conventions::default();
-    let plain = still(&gpu, &Written::default(), &own);
+    let mut lit = gather(&gpu);
+    let plain = still(&gpu, &mut lit, &Written::default(), &own);
     let ahead = Conventions { forward: Forward::PositiveZ, ..own };
-    let off = difference(&still(&gpu, &Written { conventions: ahead, ..Default::default() }, &ahead), &plain);
+    let off = difference(&still(&gpu, &mut lit, &Written { conventions: ahead, ..Default::default() }, &ahead), &plain);
     println!("down +Z: {:.4} %", 100.0 * off);
     assert!(off < 1e-4, "{off}");
     // Depth 0 near and 1 far, and normals along the camera's axes in each encoding.
@@ -112,7 +115,7 @@ fn cameras_that_look_down_plus_z() {
             ..ahead
         };
         let how = Written { conventions, finite: true, normal: format };
-        let off = difference(&still(&gpu, &how, &conventions), &plain);
+        let off = difference(&still(&gpu, &mut lit, &how, &conventions), &plain);
         println!("normals {encoding:?} {range:?} down +Z: {:.3} %", 100.0 * off);
         assert!(off < 0.03, "{encoding:?}: {off}");
     }
@@ -122,13 +125,13 @@ fn cameras_that_look_down_plus_z() {
     let how = Written { conventions: view, normal: F::Rgba16Float, ..Default::default() };
     let shot = shot(0, [0.0; 2]);
     let mut targets = written(&gpu, &shot, &how, &shot.camera);
-    let (world, mut wrong) = (world(&gpu), gather(&gpu));
-    assert!(draw(&gpu, &mut wrong, Some(&world), &targets.inputs(ahead)).is_err(), "it looks down -Z");
+    let world = world(&gpu);
+    assert!(draw(&gpu, &mut lit, Some(&world), &targets.inputs(ahead)).is_err(), "it looks down -Z");
     targets.camera = turned(targets.camera);
     let turned = Conventions { forward: Forward::PositiveZ, ..view };
     let mut last = Vec::new();
     for _ in 0..8 {
-        last = draw(&gpu, &mut wrong, Some(&world), &targets.inputs(turned)).expect("it draws");
+        last = draw(&gpu, &mut lit, Some(&world), &targets.inputs(turned)).expect("it draws");
     }
     assert!(difference(&last, &plain) > 0.05, "{}", difference(&last, &plain));
 }
@@ -147,9 +150,9 @@ fn worlds_that_are_left_handed() {
     let own = Conventions::default();
     let shot = shot(0, [0.0; 2]);
     // Other rays are sent in a mirrored world, so it takes frames.
-    let light = |world: &World, targets: &Targets, read: Conventions| {
-        let mut view = gather(&gpu);
-        let mut draw = || draw(&gpu, &mut view, Some(world), &targets.inputs(read)).expect("it draws");
+    let mut lit = gather(&gpu);
+    let mut light = |world: &World, targets: &Targets, read: Conventions| {
+        let mut draw = || draw(&gpu, &mut lit, Some(world), &targets.inputs(read)).expect("it draws");
         std::iter::repeat_with(&mut draw).take(48).last().expect("a frame")
     };
     let plain = light(&foreign::world(&gpu), &written(&gpu, &shot, &Written::default(), &shot.camera), own);
@@ -175,8 +178,8 @@ fn worlds_that_are_left_handed() {
 }
 
 /// Light of the last of some frames of a camera that moves, with a jitter each.
-fn moving(gpu: &Gpu, how: &Written, read: impl Fn(usize) -> Conventions, bare: bool) -> Vec<f32> {
-    let (world, mut view) = (world(gpu), gather(gpu));
+fn moving(gpu: &Gpu, lit: &mut View, how: &Written, read: impl Fn(usize) -> Conventions, bare: bool) -> Vec<f32> {
+    let world = world(gpu);
     let mut before = None;
     let mut last = Vec::new();
     for step in 0..10 {
@@ -187,7 +190,7 @@ fn moving(gpu: &Gpu, how: &Written, read: impl Fn(usize) -> Conventions, bare: b
             // The jitter is said apart.
             (targets.camera.clip_from_view[2][0], targets.camera.clip_from_view[2][1]) = (0.0, 0.0);
         }
-        last = draw(gpu, &mut view, Some(&world), &targets.inputs(read(step as usize))).expect("it draws");
+        last = draw(gpu, lit, Some(&world), &targets.inputs(read(step as usize))).expect("it draws");
     }
     last
 }
@@ -198,13 +201,14 @@ const JITTER: [[f32; 2]; 4] = [[0.25, -0.25], [-0.25, 0.25], [0.4, 0.1], [-0.1, 
 fn motion_in_every_convention() {
     let Some(gpu) = common::gpu() else { return };
     let own = Conventions::default();
-    let plain = moving(&gpu, &Written::default(), |_| own, false);
+    let mut lit = gather(&gpu);
+    let plain = moving(&gpu, &mut lit, &Written::default(), |_| own, false);
     for motion_units in [MotionUnits::Uv, MotionUnits::Pixels, MotionUnits::Ndc] {
         for motion_sense in [MotionSense::ToPast, MotionSense::FromPast] {
             for motion_jitter in [MotionJitter::Free, MotionJitter::Included] {
                 let conventions = Conventions { motion_units, motion_sense, motion_jitter, ..own };
                 let how = Written { conventions, ..Default::default() };
-                let off = difference(&moving(&gpu, &how, |_| conventions, false), &plain);
+                let off = difference(&moving(&gpu, &mut lit, &how, |_| conventions, false), &plain);
                 println!("{motion_units:?} {motion_sense:?} {motion_jitter:?}: {:.3} %", 100.0 * off);
                 assert!(off < 0.001, "{motion_units:?} {motion_sense:?} {motion_jitter:?}: {off}");
             }
@@ -212,11 +216,12 @@ fn motion_in_every_convention() {
     }
     // The jitter said apart is the same jitter.
     let apart = |step: usize| Conventions { jitter: Jitter::Pixels(JITTER[step % 4]), ..own };
-    let off = difference(&moving(&gpu, &Written::default(), apart, true), &plain);
+    let off = difference(&moving(&gpu, &mut lit, &Written::default(), apart, true), &plain);
     assert!(off < 0.005, "{off}");
     // Negative controls: read the other way round, and no jitter said.
     let wrong = Conventions { motion_sense: MotionSense::FromPast, ..own };
-    let [wrong, bare] = [(wrong, false), (own, true)].map(|(c, bare)| moving(&gpu, &Written::default(), |_| c, bare));
+    let [wrong, bare] =
+        [(wrong, false), (own, true)].map(|(c, bare)| moving(&gpu, &mut lit, &Written::default(), |_| c, bare));
     println!(
         "wrong sense {:.2} %, no jitter {:.2} %",
         100.0 * difference(&wrong, &plain),
@@ -231,14 +236,14 @@ fn light_and_albedo_in_every_convention() {
     let shot = shot(0, [0.0; 2]);
     let targets = written(&gpu, &shot, &Written::default(), &shot.camera);
     let encode = |v: f32| if v <= 0.0031308 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-    let screen = |exposure: f32, srgb: bool, read: Conventions| {
+    let mut ssgi = View::new(&gpu.device, &gpu.queue, SIZE, &Method::Ssgi).expect("made");
+    let mut screen = |exposure: f32, srgb: bool, read: Conventions| {
         let byte = |v: f32| ((if srgb { encode(v) } else { v }) * 255.0).round() as u8;
         let albedo: Vec<u8> = shot.buffers.albedo.iter().flat_map(|a| a.map(byte)).collect();
         let half = |v: f32| f16::from_f32(v * exposure);
         let direct: Vec<f16> = shot.buffers.direct.iter().flat_map(|d| [d[0], d[1], d[2], 0.0].map(half)).collect();
         let make = |format, bytes: &[u8]| view(&texture_with(&gpu.device, &gpu.queue, SIZE, format, bytes));
         let (albedo, direct) = (make(F::Rgba8Unorm, &albedo), make(F::Rgba16Float, bytemuck::cast_slice(&direct)));
-        let mut ssgi = View::new(&gpu.device, &gpu.queue, SIZE, &Method::Ssgi).expect("made");
         let inputs = Inputs { albedo: Some(&albedo), direct: Some(&direct), ..targets.inputs(read) };
         draw(&gpu, &mut ssgi, None, &inputs).expect("it draws")
     };

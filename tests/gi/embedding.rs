@@ -27,7 +27,7 @@ fn device_bytes(gpu: &Gpu) -> Option<u64> {
 }
 
 #[test]
-fn ten_thousand_frames_and_nothing_grows() {
+fn thousands_of_frames_and_nothing_grows() {
     let Some(gpu) = common::gpu() else { return };
     let size = [8, 8];
     let options = bouncelight::gi::gather::Options { slots: 64, ..Default::default() };
@@ -54,7 +54,7 @@ fn ten_thousand_frames_and_nothing_grows() {
         (lit.allocations(), lit.bytes(), world.allocations(), world.bytes(), device_bytes(&gpu))
     };
     let first = (0..20).map(|i| frame(&mut world, i)).last();
-    let last = (20..10_000).map(|i| frame(&mut world, i)).last();
+    let last = (20..3_000).map(|i| frame(&mut world, i)).last();
     assert_eq!(first, last);
     // Negative control: a thousand objects more show.
     for key in 100..1100 {

@@ -29,7 +29,8 @@ fn light_from_places_that_no_entry_knows_is_not_lost() {
     let kernel = Kernel::new(&gpu.device);
     // Indirect light on the floor: by rays and by paths.
     let light = |scene: &Scene| {
-        let mut renderer = world::renderer(&gpu, size, Method::Gather(Options::PLAIN));
+        let mut renderer =
+            world::renderer(&gpu, size, Method::Gather(Options { slots: world::FEW_SLOTS, ..Options::PLAIN }));
         let (rays, places) = lit(&gpu, &mut renderer, scene, 160);
         let packed = ReferenceScene::new(&gpu.device, &gpu.queue, scene).expect("it fits");
         let subject = Subject { camera: &scene.cameras[0], size, points: None };

@@ -10,10 +10,10 @@ use bouncelight::render::{Renderer, View};
 use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{Camera, LightKind, Scene};
 
-const PLAIN: Method = Method::Gather(Options::PLAIN);
+const PLAIN: Method = Method::Gather(Options { slots: world::FEW_SLOTS, ..Options::PLAIN });
 
 fn method() -> Method {
-    Method::Gather(Options::default())
+    Method::Gather(Options { slots: world::FEW_SLOTS, ..Default::default() })
 }
 
 pub(crate) fn uploaded(gpu: &Gpu, scene: &Scene) -> SceneGpu {
@@ -220,7 +220,13 @@ fn another_seed_is_other_noise_of_the_same_light() {
     let Some(gpu) = common::gpu() else { return };
     let room = hall(GREY, &[sun(world::BACKWARDS, 2.0)], 0.3, 1.0);
     let at = |seed, frames| {
-        light(&gpu, Method::Gather(Options { seed, first_rounds: 64, ..Options::PLAIN }), [96, 64], &room, frames)
+        light(
+            &gpu,
+            Method::Gather(Options { seed, slots: world::FEW_SLOTS, ..Options::PLAIN }),
+            [96, 64],
+            &room,
+            frames,
+        )
     };
     let truth = at(3, 1024);
     let noise = |light: Vec<f32>| -> Vec<f64> {

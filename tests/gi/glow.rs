@@ -7,10 +7,11 @@ use crate::gather::uploaded;
 use crate::world::{self, difference, mean};
 use bouncelight::gi::{Method, gather::Options};
 use bouncelight::gpu::Gpu;
+use bouncelight::render::Renderer;
 use bouncelight::render::capture::{CaptureOptions, CapturedFrame, Layer, capture};
 use bouncelight::scene::{AlphaMode, Camera, Material, Mesh, Scene, defaults, upload::SceneGpu};
 
-const PLAIN: Method = Method::Gather(Options::PLAIN);
+const PLAIN: Method = Method::Gather(Options { slots: world::FEW_SLOTS, ..Options::PLAIN });
 
 fn matte(albedo: f32) -> Material {
     Material { f0: 0.0, roughness: 1.0, double_sided: false, ..material([albedo; 3]) }
@@ -30,15 +31,15 @@ fn of_parts(parts: Vec<(Mesh, Material)>, camera: Camera) -> Scene {
     scene
 }
 
-fn frame(gpu: &Gpu, method: Method, scene: &Scene, uploaded: &SceneGpu, frames: u32) -> CapturedFrame {
-    sized(gpu, [32, 24], method, scene, uploaded, frames)
+fn renderer(gpu: &Gpu, size: [u32; 2]) -> Renderer {
+    world::renderer(gpu, size, PLAIN)
 }
 
-fn sized(gpu: &Gpu, size: [u32; 2], method: Method, scene: &Scene, uploaded: &SceneGpu, frames: u32) -> CapturedFrame {
+/// The last of some frames of a scene that `renderer` has not drawn before.
+fn frame(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, uploaded: &SceneGpu, frames: u32) -> CapturedFrame {
     let layers = &[Layer::DiffDir, Layer::DiffInd, Layer::Position];
     let options = CaptureOptions { layers, warmup: frames - 1, ..Default::default() };
-    let mut renderer = world::renderer(gpu, size, method);
-    capture(gpu, &mut renderer, uploaded, &scene.cameras[0], options).expect("the frame is drawn")
+    capture(gpu, renderer, uploaded, &scene.cameras[0], options).expect("the frame is drawn")
 }
 
 fn layer(frame: &CapturedFrame, layer: Layer) -> &[f32] {
@@ -59,9 +60,10 @@ fn a_sheet_with_holes_sends_what_its_coverage_says() {
         of_parts(vec![(floor, matte(0.02)), (down, sheet)], look_at([0.0, 0.8, 2.6], [0.0, 0.0, -0.2], 0.8))
     };
     // Mean over what is in view of the light, over that by arithmetic for a sheet without holes.
-    let share = |coverage: f32| {
+    let mut renderer = renderer(&gpu, [96, 72]);
+    let mut share = |coverage: f32| {
         let scene = build(coverage);
-        let frame = sized(&gpu, [96, 72], PLAIN, &scene, &uploaded(&gpu, &scene), 100);
+        let frame = frame(&gpu, &mut renderer, &scene, &uploaded(&gpu, &scene), 100);
         let (mut found, mut expected) = (0.0, 0.0);
         for (e, p) in layer(&frame, Layer::DiffInd).chunks_exact(3).zip(layer(&frame, Layer::Position).chunks_exact(3))
         {
@@ -117,7 +119,8 @@ fn six_panels_light_a_room_once_each() {
     let Some(gpu) = common::gpu() else { return };
     let scene = six_panels();
     let sum = |f: &CapturedFrame| mean(layer(f, Layer::DiffDir)) + mean(layer(f, Layer::DiffInd));
-    let gathered = frame(&gpu, PLAIN, &scene, &uploaded(&gpu, &scene), 600);
+    let mut renderer = renderer(&gpu, [32, 24]);
+    let gathered = frame(&gpu, &mut renderer, &scene, &uploaded(&gpu, &scene), 600);
     let packed = ReferenceScene::new(&gpu.device, &gpu.queue, &scene).expect("it fits");
     let kernel = Kernel::new(&gpu.device);
     let subject = Subject { camera: &scene.cameras[0], size: [32, 24], points: None };
@@ -132,10 +135,10 @@ fn six_panels_light_a_room_once_each() {
     // Negative control: lamps that are lamps shine beside the panels.
     let mut both = scene.clone();
     both.lights.iter_mut().for_each(|l| l.stands_in = false);
-    assert!(sum(&frame(&gpu, PLAIN, &both, &uploaded(&gpu, &both), 60)) > 1.3 * truth);
+    assert!(sum(&frame(&gpu, &mut renderer, &both, &uploaded(&gpu, &both), 60)) > 1.3 * truth);
     // Where there are no rays, the lamps stand in.
     let plain = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("it fits");
-    assert!(mean(layer(&frame(&gpu, PLAIN, &scene, &plain, 1), Layer::DiffDir)) > 0.2 * truth);
+    assert!(mean(layer(&frame(&gpu, &mut renderer, &scene, &plain, 1), Layer::DiffDir)) > 0.2 * truth);
 }
 
 /// A glowing wedge as `turn` changes its corners, as geometry or by its instance's transform.
@@ -160,7 +163,9 @@ fn wedge(turn: [f32; 3], by_instance: bool, reversed: bool) -> Scene {
 #[test]
 fn a_mirrored_instance_lights_as_its_mirrored_geometry() {
     let Some(gpu) = common::gpu() else { return };
-    let light = |scene: &Scene| layer(&frame(&gpu, PLAIN, scene, &uploaded(&gpu, scene), 60), Layer::DiffInd).to_vec();
+    let mut renderer = renderer(&gpu, [32, 24]);
+    let mut light =
+        |scene: &Scene| layer(&frame(&gpu, &mut renderer, scene, &uploaded(&gpu, scene), 60), Layer::DiffInd).to_vec();
     for turn in [[-1.0, 1.0, 1.0], [-1.0, 1.0, -0.7], [1.0, 1.0, -1.3]] {
         let mirrored = turn.iter().product::<f32>() < 0.0;
         let (instance, geometry) = (light(&wedge(turn, true, false)), light(&wedge(turn, false, mirrored)));
@@ -191,10 +196,11 @@ fn triangles_that_cannot_be_are_not_there() {
     }
     // The picture's part may clip what is far out in its own way, so both are drawn with the good
     // one's.
-    let light = |rays_of: &Scene| {
+    let mut renderer = renderer(&gpu, [32, 24]);
+    let mut light = |rays_of: &Scene| {
         let mut scene = uploaded(&gpu, &good);
         scene.trace(&gpu.device, &gpu.queue, rays_of).expect("the rest fits");
-        let frame = frame(&gpu, PLAIN, &good, &scene, 40);
+        let frame = frame(&gpu, &mut renderer, &good, &scene, 40);
         (layer(&frame, Layer::DiffInd).to_vec(), scene.rays.as_ref().expect("it was made").counts())
     };
     let ((clean, _), (light, counts)) = (light(&good), light(&bad));

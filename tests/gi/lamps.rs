@@ -38,7 +38,7 @@ fn lights(count: usize) -> Vec<LightKind> {
 fn means(gpu: &Gpu, scene: &Scene, whole: bool, frames: u32) -> [f64; 2] {
     // Small maps: direct light is not what is asked about.
     let shadow = ShadowOptions { sun_size: 64, cascades: 1, local_size: 64 };
-    let method = Method::Gather(Options { slots: 4096, first_rounds: 16, ..Options::PLAIN });
+    let method = Method::Gather(Options { slots: world::FEW_SLOTS, first_rounds: 16, ..Options::PLAIN });
     let options = RendererOptions { method, shadow, ..Default::default() };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, [64, 48], options).expect("the size fits");
     let gpu_scene = uploaded(gpu, scene);
@@ -77,7 +77,7 @@ fn lists_of_lights_may_change_between_frames() {
     let Some(gpu) = common::gpu() else { return };
     let all = lights(60);
     let scene = |lights: &[LightKind]| hall(GREY, lights, 0.01, 1.0);
-    let method = || Method::Gather(Options::default());
+    let method = || Method::Gather(Options { slots: world::FEW_SLOTS, ..Default::default() });
     let settled = |s: &Scene| {
         mean(&go_on(&gpu, &mut world::renderer(&gpu, [48, 32], method()), &uploaded(&gpu, s), &s.cameras[0], 96))
     };

@@ -71,6 +71,10 @@ pub(crate) fn difference(a: &[f32], b: &[f32]) -> f64 {
     a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / b.len() as f64 / mean(b).max(1e-12)
 }
 
+/// Slots of the table that are enough for rooms of a few boxes. A driver on the CPU looks at each of
+/// them in every frame, which for small pictures takes longer than all of the rest.
+pub(crate) const FEW_SLOTS: u32 = 1 << 12;
+
 /// The method that these tests are about.
 pub(crate) fn gather() -> Method {
     Method::Gather(Default::default())

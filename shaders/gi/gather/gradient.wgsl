@@ -14,7 +14,10 @@
 @group(2) @binding(3) var<storage, read> before: array<vec4f>;
 @group(2) @binding(4) var<storage, read_write> records: array<vec4f>;
 
-var<private> block: vec2u;
+fn block_of(unit: u32) -> vec3u {
+    let across = blocks_of(gloss_grid()).x;
+    return vec3u(unit % across, unit / across, 0u);
+}
 
 // Whether the square's cell has sent a ray whose surface is remembered.
 fn has_ray(square: vec2u) -> bool {
@@ -26,8 +29,12 @@ fn has_ray(square: vec2u) -> bool {
     return before[5u * cell].a > 0.0;
 }
 
+fn wants(block: vec3u, i: u32) -> bool {
+    return has_ray(place_of(block.xy, i));
+}
+
 fn begin(at: u32, job: u32) -> bool {
-    let cell = cell_index(gloss_cell(place_of(block, job)));
+    let cell = cell_index(gloss_cell(place_of(block_of(unit_of(job)).xy, place_in_unit(job))));
     let then = cell_record(cell, 1u);
     let place = before[5u * cell + 2u];
     let n = unpack_normal(bitcast<u32>(place.w));
@@ -52,12 +59,6 @@ fn gradient(
 ) {
     group = id.x;
     let blocks = blocks_of(gloss_grid());
-    for (var i = id.x; i < blocks.x * blocks.y; i += groups.x) {
-        block = vec2u(i % blocks.x, i / blocks.x);
-        no_jobs(thread);
-        for (var job = thread; job < JOBS; job += WALKERS) {
-            if has_ray(place_of(block, job)) { note_job(job); }
-        }
-        look(thread, gather.round, (gather.flags & GATHER_STANDS_IN) == 0u);
-    }
+    let share = share_of(id.x, groups.x, blocks.x * blocks.y);
+    look(thread, share, gather.round, (gather.flags & GATHER_STANDS_IN) == 0u);
 }

@@ -122,12 +122,22 @@ fn job_of(at: u32) -> u32 {
     return part_of(at, LIGHT).w;
 }
 
-// Does the jobs, a way each; as soon as a way is at its end another sets out in its place, so that
-// there are rays enough for all threads. The shader that imports this file says what a job is:
-// `begin(at, job) -> bool` sends way `at` on it (false: it is at its end at once), `finish(at)`
-// takes down what it found. `round` is that which will update the entries, `glows`: whether what
-// glows counts where rays from the beginning meet it.
-fn look(thread: u32, round: u32, glows: bool) {
+// Does all jobs of a share. The shader that imports this file says what a job is: `begin(at, job)
+// -> bool` sends way `at` on it (false: it is at its end at once), `finish(at)` takes down what it
+// found. `round` is that which will update the entries, `glows`: whether what glows counts where
+// rays from the beginning meet it.
+fn look(thread: u32, share: Share, round: u32, glows: bool) {
+    var part = 0u;
+    loop {
+        part = note_jobs(thread, share, part);
+        do_jobs(thread, round, glows);
+        if part == share.parts { break; }
+    }
+}
+
+// Does the jobs that are noted, a way each; as soon as a way is at its end another sets out in its
+// place, so that there are rays enough for all threads.
+fn do_jobs(thread: u32, round: u32, glows: bool) {
     workgroupBarrier();
     if thread == 0u {
         atomicStore(&asking_count, 0u);

@@ -48,11 +48,27 @@ fn turn_of(first: vec2u) -> vec2u {
     return own;
 }
 
-var<private> block: vec2u;
+fn blocks() -> vec2u {
+    return blocks_of((params.size + 1u) / 2u);
+}
+
+fn block_of(unit: u32) -> vec3u {
+    let across = blocks().x;
+    return vec3u(unit % across, unit / across, 0u);
+}
+
+fn wants(block: vec3u, i: u32) -> bool {
+    return any(turn_of(2u * place_of(block.xy, i)) < params.size);
+}
+
+// The first pixel of a job's square.
+fn first_of(job: u32) -> vec2u {
+    return 2u * place_of(block_of(unit_of(job)).xy, place_in_unit(job));
+}
 
 // Into the lobe of a square's next pixel, in one direction.
 fn begin(at: u32, job: u32) -> bool {
-    let pixel = turn_of(2u * place_of(block, job));
+    let pixel = turn_of(first_of(job));
     let start = start_at(vec2i(pixel));
     let shift = pcg3(vec3u(pixel, 0x6a09e667u)).xy;
     let lobe = lobe_ray(start, surface_at(pixel), lattice(gather.frame >> 2u, shift));
@@ -63,7 +79,7 @@ fn begin(at: u32, job: u32) -> bool {
 
 // What the square shows then.
 fn finish(at: u32) {
-    let first = 2u * place_of(block, job_of(at));
+    let first = first_of(job_of(at));
     let own = turn_of(first);
     let by_ray = found_by(at);
     var radiance = by_ray.radiance;
@@ -99,13 +115,6 @@ fn mirror(
     @builtin(local_invocation_index) thread: u32,
 ) {
     group = id.x;
-    let blocks = blocks_of((params.size + 1u) / 2u);
-    for (var i = id.x; i < blocks.x * blocks.y; i += groups.x) {
-        block = vec2u(i % blocks.x, i / blocks.x);
-        no_jobs(thread);
-        for (var job = thread; job < JOBS; job += WALKERS) {
-            if any(turn_of(2u * place_of(block, job)) < params.size) { note_job(job); }
-        }
-        look(thread, gather.round, (gather.flags & GATHER_STANDS_IN) == 0u);
-    }
+    let share = share_of(id.x, groups.x, blocks().x * blocks().y);
+    look(thread, share, gather.round, (gather.flags & GATHER_STANDS_IN) == 0u);
 }

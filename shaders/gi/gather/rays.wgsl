@@ -83,17 +83,30 @@ fn cell_ray(at: u32, at_cell: vec2u, look_number: u32) {
     send(at, start.x, start.n, d, select(NONE, cell, ray == cell), ray, ray);
 }
 
-// A layer of blocks each: first rays of cells, rays into lobes, further rays of fresh cells.
-var<private> block: vec3u;
+// Units by block, of each of which there are layers: first rays of its cells, then rays into lobes,
+// then further rays of cells that are fresh.
+fn block_of(unit: u32) -> vec3u {
+    let layers = 1u + gather.looks;
+    let block = unit / layers;
+    let across = blocks_of(cell_grid()).x;
+    return vec3u(block % across, block / across, unit % layers);
+}
 
-fn look_number() -> u32 {
+fn look_number(block: vec3u) -> u32 {
     return max(block.z, 1u) - 1u;
 }
 
+fn wants(block: vec3u, i: u32) -> bool {
+    let place = place_of(block.xy, i);
+    if block.z == 1u { return has_gloss(place); }
+    return has_ray(place, look_number(block));
+}
+
 fn begin(at: u32, job: u32) -> bool {
-    let place = place_of(block.xy, job);
+    let block = block_of(unit_of(job));
+    let place = place_of(block.xy, place_in_unit(job));
     if block.z == 1u { return gloss_ray(at, place); }
-    cell_ray(at, place, look_number());
+    cell_ray(at, place, look_number(block));
     return true;
 }
 
@@ -109,16 +122,6 @@ fn rays(
 ) {
     group = id.x;
     let blocks = blocks_of(cell_grid());
-    let layer = blocks.x * blocks.y;
-    for (var i = id.x; i < (1u + gather.looks) * layer; i += groups.x) {
-        block = vec3u(i % blocks.x, (i / blocks.x) % blocks.y, i / layer);
-        no_jobs(thread);
-        for (var job = thread; job < JOBS; job += WALKERS) {
-            let place = place_of(block.xy, job);
-            var wanted = false;
-            if block.z == 1u { wanted = has_gloss(place); } else { wanted = has_ray(place, look_number()); }
-            if wanted { note_job(job); }
-        }
-        look(thread, gather.round, (gather.flags & GATHER_STANDS_IN) == 0u);
-    }
+    let share = share_of(id.x, groups.x, (1u + gather.looks) * blocks.x * blocks.y);
+    look(thread, share, gather.round, (gather.flags & GATHER_STANDS_IN) == 0u);
 }

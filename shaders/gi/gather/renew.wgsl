@@ -78,18 +78,22 @@ fn begins(slot: u32) -> bool {
     return true;
 }
 
-// Slots that a workgroup looks after. Few of a table's are in use, and of those few send a ray, so
-// it asks more of them than it can have jobs.
-const SPAN = 2u * JOBS;
-// Slots after which it sees whether there is room for the jobs of as many.
-const PART = JOBS / 4u;
+// Slots in their order; few of a table's are in use, and of those few send a ray.
+fn block_of(unit: u32) -> vec3u {
+    return vec3u(UNIT * unit, 0u, 0u);
+}
 
-// The first of them.
-var<private> first_slot: u32;
+fn wants(block: vec3u, i: u32) -> bool {
+    return begins(block.x + i);
+}
+
+fn slot_of(job: u32) -> u32 {
+    return UNIT * first_unit + job;
+}
 
 // The ray of an entry.
 fn begin(at: u32, job: u32) -> bool {
-    let slot = first_slot + job;
+    let slot = slot_of(job);
     let slots = gather.mask + 1u;
     let odd = (gather.round & 1u) * slots;
     let even = slots - odd;
@@ -106,7 +110,7 @@ fn begin(at: u32, job: u32) -> bool {
 
 // What it has found goes into the mean.
 fn finish(at: u32) {
-    let slot = first_slot + job_of(at);
+    let slot = slot_of(job_of(at));
     let slots = gather.mask + 1u;
     let odd = (gather.round & 1u) * slots;
     let even = slots - odd;
@@ -124,7 +128,6 @@ fn finish(at: u32) {
     entry_light[odd + slot] = vec4f(mix(before.rgb, finite3(light), share), n_rays);
 }
 
-// First it is noted who sends a ray.
 @compute @workgroup_size(WALKERS)
 fn renew(
     @builtin(workgroup_id) id: vec3u,
@@ -132,16 +135,5 @@ fn renew(
     @builtin(local_invocation_index) thread: u32,
 ) {
     group = id.x;
-    for (var i = id.x; i * SPAN <= gather.mask; i += groups.x) {
-        first_slot = i * SPAN;
-        no_jobs(thread);
-        for (var part = PART; part <= SPAN; part += PART) {
-            for (var job = part - PART + thread; job < part; job += WALKERS) {
-                if begins(first_slot + job) { note_job(job); }
-            }
-            if part < SPAN && !jobs_exceed(thread, JOBS - PART) { continue; }
-            look(thread, gather.round + 1u, true);
-            no_jobs(thread);
-        }
-    }
+    look(thread, share_of(id.x, groups.x, (gather.mask + UNIT) / UNIT), gather.round + 1u, true);
 }

@@ -4,7 +4,7 @@ use super::bring::Brought;
 use super::params::{self, Params};
 use super::pass::Groups;
 use super::store::{self, Store};
-use super::{GatherGi, HURRIED, HURRY, ROUNDS_RESTED, ROUNDS_YOUNG, STIR, YOUNG, looks, work};
+use super::{GatherGi, HURRIED, HURRY, ROUNDS_RESTED, ROUNDS_YOUNG, STIR, YOUNG, looks};
 use crate::gi::interface::{GiError, Inputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -157,6 +157,7 @@ impl GatherGi {
         if changed {
             params.flags |= params::CHANGED;
         }
+        let workgroups = self.workgroups;
         let [w, h] = cells_of(inputs.size).map(|n| n.div_ceil(8));
         let mut offset = self.params.write(queue, &params);
         let frame_params = self.frame_params.group([self.params.bound()]);
@@ -171,15 +172,15 @@ impl GatherGi {
             // By the random numbers of the frame before.
             let offset = self.params.write(queue, &Params { round: self.sent, ..params });
             let own = [&keys, &lots, &queries, &before, &records].map(Clone::clone);
-            self.gradient.record(recorder, groups(offset), own, [work::of_squares(inputs.size), 1, 1]);
+            self.gradient.record(recorder, groups(offset), own, [workgroups.for_squares(inputs.size), 1, 1]);
         }
         self.sent = params.round;
         self.recall.record(recorder, alone(offset), history(), [w, h, 1]);
         let slots = [self.options.slots.div_ceil(64), 1, 1];
         self.evict.record(recorder, groups(offset), table(), slots);
         let own = [&keys, &lots, &queries, &pixels, &records, &specular].map(Clone::clone);
-        self.rays.record(recorder, groups(offset), own, [work::of_cells(inputs.size), 1, 1]);
-        let of_slots = [work::of_slots(self.options.slots), 1, 1];
+        self.rays.record(recorder, groups(offset), own, [workgroups.for_cells(inputs.size), 1, 1]);
+        let of_slots = [workgroups.for_slots(self.options.slots), 1, 1];
         for round in 0..rounds {
             if round > 0 {
                 params.round += 1;
@@ -189,7 +190,7 @@ impl GatherGi {
         }
         if inputs.specular.is_some() {
             let own = [&keys, &lots, &queries, &entry_light, &Bound::from(&store.mirrored), &specular, &motion];
-            let of_pixels = [work::of_pixels(inputs.size), 1, 1];
+            let of_pixels = [workgroups.for_pixels(inputs.size), 1, 1];
             self.mirror.record(recorder, groups(offset), own.map(Clone::clone), of_pixels);
         }
         self.mean.record(recorder, alone(offset), history(), [w, h, 1]);

@@ -127,6 +127,7 @@ pub struct GatherGi {
     smooth: Pass,
     bring: BringPass,
     store: Store,
+    workgroups: work::Groups,
     /// Size of pictures that the device is known to have room for.
     checked: [u32; 2],
     /// Bound where the host names no lights or no motion.
@@ -218,6 +219,7 @@ impl GatherGi {
             smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), &[READ, READ, rw, READ, READ, rw]),
             bring: BringPass::new(device, &inputs),
             store: Store::new(device, size, options.slots),
+            workgroups: work::Groups::of(device),
             checked: size,
             no_lights: unused("gi.no_lights", size_of::<crate::scene::upload::LightGpu>() as u64),
             no_guidance: unused("gi.no_guidance", GUIDANCE),

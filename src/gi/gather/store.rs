@@ -43,7 +43,8 @@ fn mirrored(size: [u32; 2]) -> u64 {
 /// Bytes of `queries`.
 fn queries(size: [u32; 2], slots: u64) -> u64 {
     let rays = cells::count(size).max(1) + squares(size);
-    let groups = work::of_pixels(size).max(work::of_cells(size)).max(work::of_slots(slots as u32));
+    let most = work::Groups::GPU;
+    let groups = most.for_pixels(size).max(most.for_cells(size)).max(most.for_slots(slots as u32));
     16 * (rays + 4 * slots) + u64::from(groups) * WAYS
 }
 
