@@ -5,6 +5,10 @@
 // cell's light says about a direction. A gather joins this file behind gi/inputs.wgsl; the prelude
 // (`gi::stage::cells::prelude`) holds CELL_SIDE, the pixels on a side of a cell.
 
+// A cell beside one, or a plane, that looks elsewhere by more than this (60°) is none of its
+// surface.
+const LEAST_COSINE_OF_PLANE = 0.5;
+
 // A cell without any surface, in `cell_pixels`.
 const NO_PIXEL = 0xffffffffu;
 

@@ -46,9 +46,6 @@ fn lately_noise() -> f32 {
     return min(LATELY / (2.0 - LATELY), lately_share());
 }
 
-// A cell beside one, or a plane, that looks elsewhere by more than this (60°) is none of its
-// surface.
-const LEAST_COSINE_OF_PLANE = 0.5;
 // Distance from the plane, in cells, that counts as nothing.
 const BLUR_PLANE = 0.5;
 
