@@ -41,6 +41,15 @@ fn cell_index(cell: vec2u) -> u32 {
     return cell.y * cell_grid().x + cell.x;
 }
 
+// For loops over cells beside one, which ask `cell_grid` once.
+fn is_beyond(grid: vec2i, cell: vec2i) -> bool {
+    return any(cell < vec2i(0)) || any(cell >= grid);
+}
+
+fn index_in(grid: vec2i, cell: vec2i) -> u32 {
+    return u32(cell.y * grid.x + cell.x);
+}
+
 fn pack_pixel(pixel: vec2i) -> u32 {
     return u32(pixel.x) | (u32(pixel.y) << 16u);
 }

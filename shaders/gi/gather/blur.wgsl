@@ -54,9 +54,9 @@ struct Plane {
 }
 
 // Step to a cell beside one; 0 where it shows nothing, or what looks elsewhere.
-fn step_to(here: Past, at: vec2i) -> vec3f {
-    if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { return vec3f(0.0); }
-    let i = 5u * cell_index(vec2u(at));
+fn step_to(here: Past, grid: vec2i, at: vec2i) -> vec3f {
+    if is_beyond(grid, at) { return vec3f(0.0); }
+    let i = 5u * index_in(grid, at);
     let place = pasts[i + 2u];
     if pasts[i].a <= 0.0 || dot(unpack_normal(bitcast<u32>(place.w)), here.n) <= LEAST_COSINE_OF_PLANE {
         return vec3f(0.0);
@@ -66,9 +66,10 @@ fn step_to(here: Past, at: vec2i) -> vec3f {
 
 fn side_at(id: vec2u, here: Past) -> vec3f {
     let at = vec2i(id);
+    let grid = vec2i(cell_grid());
     return plane_normal(
-        step_to(here, at - vec2i(1, 0)), step_to(here, at + vec2i(1, 0)),
-        step_to(here, at - vec2i(0, 1)), step_to(here, at + vec2i(0, 1)), here.n
+        step_to(here, grid, at - vec2i(1, 0)), step_to(here, grid, at + vec2i(1, 0)),
+        step_to(here, grid, at - vec2i(0, 1)), step_to(here, grid, at + vec2i(0, 1)), here.n
     );
 }
 
@@ -87,12 +88,13 @@ fn gloss_around(id: vec2u, here: Past, plane: Plane) -> vec4f {
     let aside = exp(-min(f32(stride * stride) * 0.5 / max(breadth * breadth, 1e-3), 60.0));
     let outer = aside * aside * aside * aside;
     let falls = array<f32, 3>(1.0, aside, select(outer, balanced(aside, outer), stride == 1));
+    let grid = vec2i(cell_grid());
     var sum = vec4f(0.0);
     for (var i = 0; i < 25; i++) {
         let tap = vec2i(i % 5 - 2, i / 5 - 2);
         let at = vec2i(id) + stride * tap;
-        if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
-        let there = past_at(cell_index(vec2u(at)));
+        if is_beyond(grid, at) { continue; }
+        let there = past_at(index_in(grid, at));
         if there.frames <= 0.0 { continue; }
         let w = alike(here, there, plane) * as_rough(here, there.roughness) * falls[abs(tap.x)] * falls[abs(tap.y)];
         sum += w * there.gloss.a * vec4f(there.gloss.rgb, 1.0);
@@ -142,12 +144,13 @@ struct Usual {
 // The neighbourhood without cells whose few bright rays would be seen as a blotch. `mean`:
 // luminance without the brightest; `total`: weight of all.
 fn without_rare(id: vec2u, here: Past, own: Guidance, plane: Plane, radius: i32, mean: f32, total: f32) -> Usual {
+    let grid = vec2i(cell_grid());
     var sum = Usual();
     for (var y = -radius; y <= radius; y++) {
         for (var x = -radius; x <= radius; x++) {
             let at = vec2i(id) + vec2i(x, y);
-            if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
-            let neighbour = cell_index(vec2u(at));
+            if is_beyond(grid, at) { continue; }
+            let neighbour = index_in(grid, at);
             let there = past_at(neighbour);
             if there.frames <= 0.0 { continue; }
             let w = at_rim(vec2i(x, y), radius) * counts(here, there, plane) * told(here, neighbour, own);
@@ -195,6 +198,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     }
     let plane = Plane(side_at(id.xy, here), strictness_at(here.x));
     let own = guidance_at(cell);
+    let grid = vec2i(cell_grid());
     var radius = select(NARROW, WIDE, gather.frame < WIDE_FRAMES);
     if (gather.flags & GATHER_NO_BLUR) != 0u { radius = 0; }
     var sum = vec3f(0.0);
@@ -213,8 +217,8 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     for (var y = -radius; y <= radius; y++) {
         for (var x = -radius; x <= radius; x++) {
             let at = vec2i(id.xy) + vec2i(x, y);
-            if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
-            let neighbour = cell_index(vec2u(at));
+            if is_beyond(grid, at) { continue; }
+            let neighbour = index_in(grid, at);
             let there = past_at(neighbour);
             if there.frames <= 0.0 { continue; }
             let alone = at_rim(vec2i(x, y), radius) * counts(here, there, plane);

@@ -79,24 +79,25 @@ fn tilting(channel: vec3f, n: vec3f) -> vec4f {
 fn gloss_of(id: vec2u, here: Past, side: vec3f) -> vec4f {
     if lobe_stride(here.roughness) == 1 { return glosses[cell_index(id)]; }
     let strictness = strictness_at(here.x);
+    let grid = vec2i(cell_grid());
     var sum = vec4f(0.0);
     for (var i = 0; i < 9; i++) {
         let step = vec2i(i % 3 - 1, i / 3 - 1);
         let at = vec2i(id) + step;
-        if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { continue; }
-        let there = past_at(cell_index(vec2u(at)));
+        if is_beyond(grid, at) { continue; }
+        let there = past_at(index_in(grid, at));
         if there.frames <= 0.0 { continue; }
         let same = same_surface(there.x - here.x, side, here.n, there.n, strictness) * as_rough(here, there.roughness);
-        sum += same / f32((1 + abs(step.x)) * (1 + abs(step.y))) * glosses[cell_index(vec2u(at))];
+        sum += same / f32((1 + abs(step.x)) * (1 + abs(step.y))) * glosses[index_in(grid, at)];
     }
     return sum;
 }
 
 // Cell that tap `i` of 25 asks, NO_CELL outside the picture.
-fn tap_at(id: vec2u, i: i32) -> u32 {
+fn tap_at(grid: vec2i, id: vec2u, i: i32) -> u32 {
     let at = vec2i(id) + SMOOTH_STRIDE * vec2i(i % 5 - 2, i / 5 - 2);
-    if any(at < vec2i(0)) || any(at >= vec2i(cell_grid())) { return NO_CELL; }
-    return cell_index(vec2u(at));
+    if is_beyond(grid, at) { return NO_CELL; }
+    return index_in(grid, at);
 }
 
 const NO_CELL = 0xffffffffu;
@@ -104,10 +105,11 @@ const NO_CELL = 0xffffffffu;
 // What few rays have brought, averaged over all of the surface that the taps reach.
 fn rare_around(id: vec2u, here: Past, side: vec3f) -> mat3x3f {
     let strictness = strictness_at(here.x);
+    let grid = vec2i(cell_grid());
     var sum = mat3x3f();
     var total = 0.0;
     for (var i = 0; i < 25; i++) {
-        let other = tap_at(id, i);
+        let other = tap_at(grid, id, i);
         if other == NO_CELL || pasts[5u * other].a <= 0.0 { continue; }
         let place = pasts[5u * other + 2u];
         let w = same_surface(place.xyz - here.x, side, here.n, unpack_normal(bitcast<u32>(place.w)), strictness);
@@ -133,10 +135,11 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     let side = unpack_normal(bitcast<u32>(blurred[3u * cell + 2u].a));
     if here.frames > 0.0 && (gather.flags & GATHER_NO_BLUR) == 0u {
         let strictness = strictness_at(here.x);
+        let grid = vec2i(cell_grid());
         let taps = array<f32, 3>(1.0, 2.0 / 3.0, 1.0 / 6.0);
         var total = 1.0;
         for (var i = 0; i < 25; i++) {
-            let other = tap_at(id.xy, i);
+            let other = tap_at(grid, id.xy, i);
             if i == 12 || other == NO_CELL { continue; }
             let there = blurred_at(other);
             if there.frames <= 0.0 { continue; }
