@@ -145,7 +145,7 @@ fn leaning_normals_leave_no_rows() {
     };
     let (straight, leaning) = (wall(Vec3::Z), wall(lean));
     // Another light in each fourth column of cells.
-    let column = |pixel: usize| even(if (pixel as u32 % SIZE[0] / CELL) % 4 == 0 { 2.0 } else { 1.0 });
+    let column = |pixel: usize| even(if (pixel as u32 % SIZE[0] / CELL).is_multiple_of(4) { 2.0 } else { 1.0 });
     let [straight_light, light] = [&straight, &leaning].map(|shot| bring(&gpu, shot, column));
     let worst = |light: &[[f32; 3]]| {
         let inside = |i: &usize| [i % SIZE[0] as usize, i / SIZE[0] as usize].iter().all(|k| (8..100).contains(k));
