@@ -32,68 +32,11 @@ const ALONE = 1e12;
 // (docs/log/2026-11-25-lists.md).
 const SEGMENTS = 4u;
 
-// A ray with all that follows from what it meets is a way. A workgroup has as many as rays that it
-// sends at once; any of its threads takes each a stage further, so that those that do the same
-// stand side by side.
-
-// What a way waits for: what its ray meets; whether the light chosen there is seen; whether the
-// place where an entry's rays began is; whether a point that glows is seen from where it sets out.
-const NEAREST = 0u;
-const SHADOW = 1u;
-const ENTRY = 2u;
-const GLOW = 3u;
-
-// What is remembered of a way: nine vectors behind the places of all entries in `entry_queries`.
-const PARTS = 9u;
-// Where its ray begins, from the first hit on the last place that it has met; stage, segments
-// behind it and rooms of the place's cell that were asked, a byte each.
-const PLACE = 0u;
-// Direction; cosine by which shadow rays to what glows were weighted where it begins, ALONE where
-// none were sent.
-const COURSE = 1u;
-// The side that the place shows; slot of the entry that is being asked, at the end of that which
-// knows the rest.
-const SIDE = 2u;
-// What its chances are drawn by; no surface whose plane the beginning lies nearer to than this can
-// be met but the one that it begins on, by a ray that a shading normal sends below it: such light
-// is lost.
-const CHANCES = 3u;
-// Radiance found; distance of the first hit.
-const RADIANCE = 4u;
-// What the rest is multiplied by; direction in which it set out.
-const BACK = 5u;
-// What the chosen light sends if it is seen; what the shader that sent it calls it.
-const LIGHT = 6u;
-// What glows, by a shadow ray from where it set out, and its direction.
-const GLOWS = 7u;
-// The ray's number among all of the frame, NONE if it claims no entry; what its random numbers are
-// drawn by, which slots of the table must not decide, since they go to who comes first.
-const NAMES = 8u;
-
-// Number of the workgroup.
-var<private> group: u32;
-
 // Ways that look for an entry, and ways at their end.
 var<workgroup> asking: array<u32, WALKS>;
 var<workgroup> asking_count: atomic<u32>;
 var<workgroup> ended: array<u32, WALKS>;
 var<workgroup> ended_count: atomic<u32>;
-
-fn part_at(at: u32, part: u32) -> u32 {
-    return gather.rays + 4u * (gather.mask + 1u) + (group * WALKS + at) * PARTS + part;
-}
-
-fn part_of(at: u32, part: u32) -> vec4u {
-    return entry_queries[part_at(at, part)];
-}
-
-fn keep(at: u32, part: u32, v: vec3f, w: u32) {
-    keep_bits(at, part, vec4u(bitcast<vec3u>(v), w));
-}
-
-fn keep_bits(at: u32, part: u32, bits: vec4u) {
-    entry_queries[part_at(at, part)] = bits;
-}
 
 // Way `at` from o along d. `n_d` is its cosine, `height` the height of COURSE and CHANCES; what it
 // finds is weighted by `weight`, and taken down as that of `job`. Its ray is still to be put.
@@ -147,7 +90,9 @@ fn do_jobs(thread: u32, round: u32, glows: bool) {
     loop {
         if !walk_all(thread) { break; }
         for (var i = thread; i < sent_nearest; i += WALKERS) { arrive(sent(i), glows); }
-        for (var i = sent_nearest + thread; i < sent_all; i += WALKERS) { see(sent(i), round); }
+        for (var i = sent_nearest + thread; i < sent_all; i += WALKERS) {
+            if sent(i) < LINE { see(sent(i), round); }
+        }
         meet();
         for (var i = thread; i < atomicLoad(&asking_count); i += WALKERS) { ask(asking[i], round); }
         meet();
@@ -221,42 +166,54 @@ fn arrive(at: u32, glows: bool) {
     let chosen = choose_light(here, true, pcg3(chances.xyz));
     keep(at, SIDE, n, NONE);
     keep(at, BACK, weight * back, back_part.w);
-    // The rooms of another cell.
-    keep(at, PLACE, x, (place.w & 0xff00u) | SHADOW);
+    var stage = ENTRY;
     if chosen.reach > 0.0 {
         keep(at, LIGHT, weight * chosen.radiance, job_of(at));
-        put(at, x, chosen.l, chosen.reach, true, chances.y);
-    } else {
-        ask_next(at);
+        put(LINE + at, x, chosen.l, chosen.reach, true, chances.y);
+        stage |= LIT;
     }
+    // The rooms of another cell.
+    keep(at, PLACE, x, (place.w & 0xff00u) | stage);
+    ask_next(at);
 }
 
-// The line of way `at` is free, or not.
-fn see(at: u32, round: u32) {
-    let free = walked(at).triangle == NO_TRIANGLE;
-    let place = part_of(at, PLACE);
-    let stage = place.w & 255u;
-    if stage == GLOW {
-        if !free { keep(at, GLOWS, vec3f(0.0), 0u); }
-        keep(at, PLACE, bitcast<vec3f>(place.xyz), NEAREST);
-        send_on(at);
-        return;
-    }
-    if stage == SHADOW {
-        if free {
-            let light = bitcast<vec3f>(part_of(at, LIGHT).xyz);
+// The line of way `at` to a light is free, or not: where it begins, beside its first ray, one to a
+// point that glows, later to the chosen light.
+fn line_ended(at: u32, direction: vec3f, free: bool) {
+    let waits = part_of(at, PLACE).w;
+    if free {
+        let light = bitcast<vec3f>(part_of(at, LIGHT).xyz);
+        if (waits & 0xffffu) == NEAREST {
+            keep(at, GLOWS, light, pack_normal(direction));
+        } else {
             let so_far = part_of(at, RADIANCE);
             keep(at, RADIANCE, bitcast<vec3f>(so_far.xyz) + light, so_far.w);
         }
-    } else if free {
+    }
+    if (waits & 127u) == LAST_LINE { end(at); }
+}
+
+// The line of way `at` to where an entry's rays began is free, or not.
+fn see(at: u32, round: u32) {
+    let place = part_of(at, PLACE);
+    if walked(at).triangle == NO_TRIANGLE {
         let side = part_of(at, SIDE);
         claim(at, side.w, bitcast<vec3f>(place.xyz), bitcast<vec3f>(side.xyz), round);
         end(at);
         return;
-    } else {
-        keep(at, PLACE, bitcast<vec3f>(place.xyz), place.w + 0x10000u);
     }
+    // By now its line to a light has ended, too.
+    keep(at, PLACE, bitcast<vec3f>(place.xyz), (place.w & ~LIT) + 0x10000u);
     ask_next(at);
+}
+
+// Way `at` is at its end but for a line to a light that is under way.
+fn end_with_line(at: u32, place: vec4u) {
+    if (place.w & LIT) == 0u {
+        end(at);
+        return;
+    }
+    keep(at, PLACE, bitcast<vec3f>(place.xyz), (place.w & 0xff00u) | LAST_LINE);
 }
 
 fn claim(at: u32, slot: u32, x: vec3f, n: vec3f, round: u32) {
@@ -292,11 +249,10 @@ fn ask(at: u32, round: u32) {
         if line.slot != NONE {
             keep(at, SIDE, n, line.slot);
             if any(line.to != vec3f(0.0)) {
-                keep(at, PLACE, x, (place.w & 0xffff00u) | ENTRY);
                 put(at, line.start, line.to, 1.0, true, 0u);
             } else {
                 claim(at, line.slot, x, n, round);
-                end(at);
+                end_with_line(at, place);
             }
             return;
         }
@@ -304,7 +260,7 @@ fn ask(at: u32, round: u32) {
     keep(at, SIDE, n, NONE);
     let segment = ((place.w >> 8u) & 255u) + 1u;
     if segment == SEGMENTS {
-        end(at);
+        end_with_line(at, place);
         return;
     }
     let chances = part_of(at, CHANCES);

@@ -1,25 +1,25 @@
 //#import accel/traverse.wgsl
+//#import gi/gather/ways.wgsl
 
 // Rays that a workgroup sends together. Rays differ much in length, and threads side by side wait
-// for the longest of theirs. So all share one list of rays, several for each thread: whose ray is
-// through the trees goes on with the next.
+// for the longest of theirs. So all share one list of rays: whose ray is through the trees goes on
+// with the next that nobody has taken. A way has two at most: its ray, or its line to an entry,
+// and beside it a line to a light.
 
-// Threads of a workgroup, and rays that it sends at once.
-const WALKERS = 64u;
-const WALKS = 256u;
-
-// Rays by number, then what each has met: origin and reach (negative: any hit will do), direction
-// and seed; t, triangle and weights, instance and leaf.
-var<workgroup> walks: array<vec4u, 2u * WALKS>;
-// Numbers of those to be sent, and in the other half of those that were sent last: from the front
+// Names of those to be sent, and in the other half of those that were sent last: from the front
 // those that ask for the nearest hit, from the back those that any will do for, so that threads
 // side by side have as many of either.
-var<workgroup> lists: array<u32, 2u * WALKS>;
+const LIST = 2u * WALKS;
+var<workgroup> lists: array<u32, 2u * LIST>;
 var<workgroup> waiting_nearest: atomic<u32>;
 var<workgroup> waiting_any: atomic<u32>;
 var<workgroup> half: u32;
 var<workgroup> sent_nearest: u32;
 var<workgroup> sent_all: u32;
+var<workgroup> taken: atomic<u32>;
+
+// A ray's name: its way, and this for the line to a light.
+const LINE = WALKS;
 
 // Before the first of them is put, by one thread.
 fn no_rays() {
@@ -28,20 +28,27 @@ fn no_rays() {
     half = 0u;
 }
 
-// A ray, number `at`, for the next `walk_all`.
-fn put(at: u32, origin: vec3f, direction: vec3f, reach: f32, any: bool, seed: u32) {
-    walks[2u * at] = vec4u(bitcast<vec3u>(origin), bitcast<u32>(select(reach, -reach, any)));
-    walks[2u * at + 1u] = vec4u(bitcast<vec3u>(direction), seed);
+// First of a ray's two vectors: origin and reach (negative: any hit will do), direction and seed;
+// of ways' own rays then t, triangle and weights, instance and leaf.
+fn ray_part(name: u32) -> u32 {
+    return RAY + select(0u, 2u, name >= LINE);
+}
+
+fn put(name: u32, origin: vec3f, direction: vec3f, reach: f32, any: bool, seed: u32) {
+    let at = name % LINE;
+    let part = ray_part(name);
+    keep(at, part, origin, bitcast<u32>(select(reach, -reach, any)));
+    keep(at, part + 1u, direction, seed);
     if any {
-        lists[half + WALKS - 1u - atomicAdd(&waiting_any, 1u)] = at;
+        lists[half + LIST - 1u - atomicAdd(&waiting_any, 1u)] = name;
     } else {
-        lists[half + atomicAdd(&waiting_nearest, 1u)] = at;
+        lists[half + atomicAdd(&waiting_nearest, 1u)] = name;
     }
 }
 
 // Number i of the rays that were sent last, those for the nearest hit first.
 fn sent(i: u32) -> u32 {
-    return lists[WALKS - half + select(WALKS - 1u + sent_nearest - i, i, i < sent_nearest)];
+    return lists[LIST - half + select(LIST - 1u + sent_nearest - i, i, i < sent_nearest)];
 }
 
 // All that threads have written is there for the others of the workgroup.
@@ -50,44 +57,59 @@ fn meet() {
     workgroupBarrier();
 }
 
+// Number of the next ray that nobody has taken; on a device whose threads run one after the other,
+// the first of which would take all, the thread's own next (`src/gpu/instrument.rs` knows this
+// function).
+fn take_next(own: u32) -> u32 {
+    return select(atomicAdd(&taken, 1u), own, (gather.flags & GATHER_IN_TURN) != 0u);
+}
+
 // Sends all rays that were put; false where there are none. All threads of the workgroup call it.
+// Of lines to lights that are through, the shader that imports this file hears by `line_ended(at,
+// direction, free)`.
 fn walk_all(thread: u32) -> bool {
-    workgroupBarrier();
+    meet();
     if thread == 0u {
         sent_nearest = atomicLoad(&waiting_nearest);
         sent_all = sent_nearest + atomicLoad(&waiting_any);
         atomicStore(&waiting_nearest, 0u);
         atomicStore(&waiting_any, 0u);
-        half = WALKS - half;
+        half = LIST - half;
+        atomicStore(&taken, 0u);
     }
     let count = workgroupUniformLoad(&sent_all);
-    var next = thread;
-    var at = NO_TRIANGLE;
+    var own = thread;
+    var name = NO_TRIANGLE;
     var walk: Walk;
     loop {
-        if at == NO_TRIANGLE {
+        if name == NO_TRIANGLE {
+            let next = take_next(own);
+            own += WALKERS;
             if next >= count { break; }
-            at = sent(next);
-            next += WALKERS;
-            let begin = walks[2u * at];
-            let along = walks[2u * at + 1u];
+            name = sent(next);
+            let begin = part_of(name % LINE, ray_part(name));
+            let along = part_of(name % LINE, ray_part(name) + 1u);
             let reach = bitcast<f32>(begin.w);
             walk_begin(&walk, bitcast<vec3f>(begin.xyz), bitcast<vec3f>(along.xyz), abs(reach), reach < 0.0, along.w);
         }
         if !walk_step(&walk) {
             let hit = walk_hit(&walk);
-            walks[2u * at] = vec4u(bitcast<u32>(hit.t), hit.triangle, bitcast<vec2u>(hit.uv));
-            walks[2u * at + 1u] = vec4u(hit.instance, hit.leaf, 0u, 0u);
-            at = NO_TRIANGLE;
+            if name >= LINE {
+                line_ended(name - LINE, walk.direction, hit.triangle == NO_TRIANGLE);
+            } else {
+                keep_bits(name, RAY, vec4u(bitcast<u32>(hit.t), hit.triangle, bitcast<vec2u>(hit.uv)));
+                keep_bits(name, RAY + 1u, vec4u(hit.instance, hit.leaf, 0u, 0u));
+            }
+            name = NO_TRIANGLE;
         }
     }
     meet();
     return count > 0u;
 }
 
-// What the last ray of this number has met.
+// What the last ray of a way has met.
 fn walked(at: u32) -> Hit {
-    let a = walks[2u * at];
-    let b = walks[2u * at + 1u];
+    let a = part_of(at, RAY);
+    let b = part_of(at, RAY + 1u);
     return Hit(bitcast<f32>(a.x), a.y, bitcast<vec2f>(a.zw), b.x, b.y);
 }

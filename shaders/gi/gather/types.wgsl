@@ -63,6 +63,8 @@ const GATHER_CHANGED = 512u;
 // Every entry sends a ray in each round, whoever met it: light has changed lately, or all frames
 // are to be alike.
 const GATHER_ALL_ENTRIES = 1024u;
+// The device runs the threads of a workgroup one after the other.
+const GATHER_IN_TURN = 2048u;
 
 @group(1) @binding(0) var<uniform> gather: Gather;
 @group(1) @binding(1) var accel_blocks: texture_2d<u32>;

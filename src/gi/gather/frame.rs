@@ -52,6 +52,7 @@ impl GatherGi {
             (self.changing > 0, params::CHANGING),
             (guided, params::GUIDED),
             (self.frame == 0 || self.stir > 0 || self.options.even, params::ALL_ENTRIES),
+            (self.workgroups.in_turn(), params::IN_TURN),
         ];
         Ok(Params {
             eye: camera.eye_position(),

@@ -89,9 +89,9 @@ pub(super) fn looks(size: [u32; 2]) -> u32 {
     if size.map(u64::from).iter().product::<u64>() <= 1 << 21 { 8 } else { 4 }
 }
 
-/// Bytes that a workgroup remembers of its rays: of 256, nine vectors each (`WALKS` of
-/// `queue.wgsl`, `PARTS` of `look.wgsl`).
-const WAYS: u64 = 256 * 9 * 16;
+/// Bytes that a workgroup remembers of its rays: of 256 ways, thirteen vectors each (`WALKS`
+/// and `PARTS` of `ways.wgsl`).
+const WAYS: u64 = 256 * 13 * 16;
 
 /// Bytes of what a cell's ray found.
 const RECORD: u64 = 48;

@@ -29,6 +29,8 @@ pub(super) const GUIDED: u32 = 256;
 pub(super) const CHANGED: u32 = 512;
 /// Every entry sends a ray in each round, whoever met it.
 pub(super) const ALL_ENTRIES: u32 = 1024;
+/// The device runs the threads of a workgroup one after the other.
+pub(super) const IN_TURN: u32 = 2048;
 
 /// `Gather` of `shaders/gi/gather/types.wgsl`, which documents the fields.
 #[repr(C)]

@@ -41,10 +41,9 @@ fn mirrored(size: [u32; 2]) -> u64 {
 }
 
 /// Bytes of `queries`.
-fn queries(size: [u32; 2], slots: u64) -> u64 {
+fn queries(size: [u32; 2], slots: u64, groups: work::Groups) -> u64 {
     let rays = cells::count(size).max(1) + squares(size);
-    let most = work::Groups::GPU;
-    let groups = most.for_pixels(size).max(most.for_cells(size)).max(most.for_slots(slots as u32));
+    let groups = groups.for_pixels(size).max(groups.for_cells(size)).max(groups.for_slots(slots as u32));
     16 * (rays + 4 * slots) + u64::from(groups) * WAYS
 }
 
@@ -77,7 +76,7 @@ impl Store {
         Self {
             keys: buffer("gi.entry_keys", 4 * slots),
             lots,
-            queries: buffer("gi.entry_queries", queries(size, slots)),
+            queries: buffer("gi.entry_queries", queries(size, slots, work::Groups::of(device))),
             asked: buffer("gi.entry_asked", 4 * slots),
             light: buffer("gi.entry_light", 32 * slots),
             records: buffer("gi.records", RECORD * records),
@@ -92,16 +91,14 @@ impl Store {
         }
     }
 
-    /// Bytes of the largest buffer.
+    /// Bytes of the largest buffer, on whatever device.
     pub fn largest(size: [u32; 2], slots: u32) -> u64 {
         let (cells, slots) = (cells::count(size).max(1), u64::from(slots));
         let rays = cells + squares(size);
         let records = rays + u64::from(looks(size) - 1) * cells;
         let [light, pasts, records] = [32 * slots, PAST * cells, RECORD * records];
-        [queries(size, slots), light, pasts, records, cells::light_bytes(size), mirrored(size)]
-            .into_iter()
-            .max()
-            .unwrap_or(0)
+        let queries = queries(size, slots, work::Groups::CPU).max(queries(size, slots, work::Groups::GPU));
+        [queries, light, pasts, records, cells::light_bytes(size), mirrored(size)].into_iter().max().unwrap_or(0)
     }
 
     pub fn bytes(&self) -> u64 {

@@ -8,33 +8,46 @@ use crate::gpu::tape;
 const UNIT: u32 = BLOCK * BLOCK;
 const BLOCK: u32 = 32;
 
-/// Units of a workgroup's share at most, since sixteen bits name a job.
-const SHARE: u32 = 65_536 / UNIT;
-
-/// How many workgroups a device does well with.
+/// How many workgroups a device does well with, and how it runs them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Groups {
-    /// Of a pass at most.
+    /// Of a pass at most, if their shares are no larger for it than `share` units.
     most: u32,
+    share: u32,
+    /// Threads of a workgroup run one after the other.
+    in_turn: bool,
 }
 
 impl Groups {
-    /// Of each of a GTX 1050's five multiprocessors six fill the memory.
-    pub const GPU: Self = Self { most: 256 };
+    /// Of each of a GTX 1050's five multiprocessors six fill the memory. Sixteen bits name a job.
+    pub const GPU: Self = Self { most: 256, share: 65_536 / UNIT, in_turn: false };
 
-    /// Of a driver that draws on the CPU two a processor: vectors of threads go through a whole
-    /// shader once, whether one of them has something to do or not. What is written down of
-    /// dispatches, to be counted or exported, is as GPUs have it.
+    /// For a processor alone: each vector of threads goes through a whole shader once, whether one
+    /// of them has something to do or not. But Mesa's driver ends all loops of a thread after
+    /// 65,535 rounds in all, without a word: of a city's first frame, eight rays a cell, shares of
+    /// 60 units come to that.
+    pub const CPU: Self = Self { most: 2, share: 4, in_turn: true };
+
+    /// For a driver that draws on the CPU two a processor; but what is written down of dispatches,
+    /// to be counted or exported, is as GPUs have it.
     pub fn of(device: &wgpu::Device) -> Self {
-        if device.adapter_info().device_type != wgpu::DeviceType::Cpu || tape::runs() {
+        if device.adapter_info().device_type != wgpu::DeviceType::Cpu {
             return Self::GPU;
         }
+        if tape::runs() {
+            return Self { in_turn: true, ..Self::GPU };
+        }
         let processors = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
-        Self { most: processors.saturating_mul(2).min(Self::GPU.most) }
+        Self { most: processors.saturating_mul(Self::CPU.most).min(Self::GPU.most), ..Self::CPU }
+    }
+
+    /// Whether threads of a workgroup run one after the other.
+    pub fn in_turn(self) -> bool {
+        self.in_turn
     }
 
     fn for_units(self, units: u32) -> u32 {
-        units.clamp(1, self.most).max(units.div_ceil(SHARE))
+        units.clamp(1, self.most).max(units.div_ceil(self.share))
     }
 
     /// Workgroups of `gi.rays`: layers of blocks for rays of cells, for rays into lobes, and for
@@ -68,7 +81,7 @@ fn blocks(grid: [u32; 2]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::super::{GatherGi, Options, RECORD, WAYS, looks};
-    use super::{BLOCK, Groups, SHARE, UNIT, cells_of};
+    use super::{BLOCK, Groups, UNIT, cells_of};
 
     /// A constant of a shader.
     fn constant(source: &str, name: &str) -> u64 {
@@ -79,35 +92,34 @@ mod tests {
 
     #[test]
     fn buffers_and_groups_are_what_shaders_fill() {
-        let look = include_str!("../../../shaders/gi/gather/look.wgsl");
+        let ways = include_str!("../../../shaders/gi/gather/ways.wgsl");
         let jobs = include_str!("../../../shaders/gi/gather/jobs.wgsl");
-        let queue = include_str!("../../../shaders/gi/gather/queue.wgsl");
         assert_eq!(constant(jobs, "UNIT"), u64::from(UNIT));
-        assert_eq!(16 * constant(queue, "WALKS") * constant(look, "PARTS"), WAYS);
+        assert_eq!(16 * constant(ways, "WALKS") * constant(ways, "PARTS"), WAYS);
+        assert_eq!(u64::from(Groups::GPU.share) * constant(jobs, "UNIT"), 1 << 16, "sixteen bits name a job");
         let blocks = format!("return (grid + {}u) / {BLOCK}u;", BLOCK - 1);
         assert!(jobs.contains(&blocks), "{blocks}");
     }
 
     #[test]
     fn every_workgroup_has_a_share_that_sixteen_bits_name() {
-        for most in [1, 4, 256] {
-            let groups = Groups { most };
+        for groups in [Groups::CPU, Groups { most: 4, ..Groups::CPU }, Groups::GPU] {
             for units in [1, 2, 9, 63, 288, 2040, 16_384] {
                 let of = |group: u32, all: u32| group * units / all;
                 let all = groups.for_units(units);
-                assert!(all <= units, "{most}, {units}");
+                assert!(all <= units, "{groups:?}, {units}");
                 for group in 0..all {
                     let share = of(group + 1, all) - of(group, all);
-                    assert!((1..=SHARE).contains(&share), "{most}, {units}: {share}");
+                    assert!((1..=groups.share).contains(&share), "{groups:?}, {units}: {share}");
                 }
             }
             assert!([64_u32, 1024, 1 << 16, 1 << 20].iter().all(|&slots| {
                 let units = slots.div_ceil(UNIT);
-                (units.div_ceil(SHARE)..=units).contains(&groups.for_slots(slots))
+                (units.div_ceil(groups.share)..=units).contains(&groups.for_slots(slots))
             }));
         }
         // Negative control: one workgroup could not name all of a large picture's places.
-        assert!(16_384 > SHARE && Groups { most: 1 }.for_units(16_384) > 1);
+        assert!(16_384 > Groups::GPU.share && Groups { most: 1, ..Groups::GPU }.for_units(16_384) > 1);
     }
 
     #[test]
