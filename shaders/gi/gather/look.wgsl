@@ -48,9 +48,8 @@ fn set_out(at: u32, o: vec3f, d: vec3f, n_d: f32, height: f32, query: u32, name:
     keep_bits(at, CHANCES, vec4u(seed, bitcast<u32>(height)));
     keep(at, RADIANCE, vec3f(0.0), bitcast<u32>(FAR));
     keep(at, BACK, weight, pack_normal(d));
-    keep(at, LIGHT, vec3f(0.0), job);
     keep(at, GLOWS, vec3f(0.0), 0u);
-    keep_bits(at, NAMES, vec4u(query, name, 0u, 0u));
+    keep_bits(at, NAMES, vec4u(query, name, job, 0u));
 }
 
 // What way `at` has found, at its end.
@@ -62,7 +61,7 @@ fn found_by(at: u32) -> Found {
 }
 
 fn job_of(at: u32) -> u32 {
-    return part_of(at, LIGHT).w;
+    return part_of(at, NAMES).z;
 }
 
 // Does all jobs of a share. The shader that imports this file says what a job is: `begin(at, job)
@@ -168,8 +167,8 @@ fn arrive(at: u32, glows: bool) {
     keep(at, BACK, weight * back, back_part.w);
     var stage = ENTRY;
     if chosen.reach > 0.0 {
-        keep(at, LIGHT, weight * chosen.radiance, job_of(at));
-        put(LINE + at, x, chosen.l, chosen.reach, true, chances.y);
+        keep(at, LIGHT, weight * chosen.radiance, 0u);
+        put_line(LINE + at, x, chosen.l, chosen.reach, chances.y);
         stage |= LIT;
     }
     // The rooms of another cell.
@@ -196,7 +195,7 @@ fn line_ended(at: u32, direction: vec3f, free: bool) {
 // The line of way `at` to where an entry's rays began is free, or not.
 fn see(at: u32, round: u32) {
     let place = part_of(at, PLACE);
-    if walked(at).triangle == NO_TRIANGLE {
+    if is_free(at) {
         let side = part_of(at, SIDE);
         claim(at, side.w, bitcast<vec3f>(place.xyz), bitcast<vec3f>(side.xyz), round);
         end(at);
@@ -221,17 +220,11 @@ fn claim(at: u32, slot: u32, x: vec3f, n: vec3f, round: u32) {
     claim_entry(slot, x, n, names.x, names.y, round);
 }
 
-// The next ray of way `at`.
-fn send_on(at: u32) {
-    let place = part_of(at, PLACE);
-    put(at, bitcast<vec3f>(place.xyz), bitcast<vec3f>(part_of(at, COURSE).xyz), FAR, false, part_of(at, CHANCES).x);
-}
-
 // Sends the ray of way `at`, which has just set out, if what it finds counts; else the way is at
 // its end.
 fn goes(at: u32, weight: vec3f) -> bool {
     if any(weight > vec3f(0.0)) {
-        send_on(at);
+        put_ray(at);
         return true;
     }
     finish(at);
@@ -249,7 +242,7 @@ fn ask(at: u32, round: u32) {
         if line.slot != NONE {
             keep(at, SIDE, n, line.slot);
             if any(line.to != vec3f(0.0)) {
-                put(at, line.start, line.to, 1.0, true, 0u);
+                put_line(at, line.start, line.to, 1.0, 0u);
             } else {
                 claim(at, line.slot, x, n, round);
                 end_with_line(at, place);
@@ -269,5 +262,5 @@ fn ask(at: u32, round: u32) {
     keep_bits(at, CHANCES, vec4u(seed, chances.w));
     keep(at, COURSE, along, bitcast<u32>(max(dot(n, along), 1e-4)));
     keep(at, PLACE, x, (segment << 8u) | NEAREST);
-    put(at, x, along, FAR, false, seed.x);
+    put_ray(at);
 }

@@ -28,22 +28,21 @@ fn no_rays() {
     half = 0u;
 }
 
-// First of a ray's two vectors: origin and reach (negative: any hit will do), direction and seed;
-// of ways' own rays then t, triangle and weights, instance and leaf.
-fn ray_part(name: u32) -> u32 {
-    return RAY + select(0u, 2u, name >= LINE);
+// Asks what the ray of way `at` meets, from its place on its course.
+fn put_ray(at: u32) {
+    lists[half + atomicAdd(&waiting_nearest, 1u)] = at;
 }
 
-fn put(name: u32, origin: vec3f, direction: vec3f, reach: f32, any: bool, seed: u32) {
-    let at = name % LINE;
-    let part = ray_part(name);
-    keep(at, part, origin, bitcast<u32>(select(reach, -reach, any)));
-    keep(at, part + 1u, direction, seed);
-    if any {
-        lists[half + LIST - 1u - atomicAdd(&waiting_any, 1u)] = name;
-    } else {
-        lists[half + atomicAdd(&waiting_nearest, 1u)] = name;
-    }
+// Asks whether a line is free: origin and reach, direction and seed are kept.
+fn put_line(name: u32, origin: vec3f, direction: vec3f, reach: f32, seed: u32) {
+    let part = line_part(name);
+    keep(name % LINE, part, origin, bitcast<u32>(reach));
+    keep(name % LINE, part + 1u, direction, seed);
+    lists[half + LIST - 1u - atomicAdd(&waiting_any, 1u)] = name;
+}
+
+fn line_part(name: u32) -> u32 {
+    return select(HIT, LIT_LINE, name >= LINE);
 }
 
 // Number i of the rays that were sent last, those for the nearest hit first.
@@ -87,18 +86,25 @@ fn walk_all(thread: u32) -> bool {
             own += WALKERS;
             if next >= count { break; }
             name = sent(next);
-            let begin = part_of(name % LINE, ray_part(name));
-            let along = part_of(name % LINE, ray_part(name) + 1u);
-            let reach = bitcast<f32>(begin.w);
-            walk_begin(&walk, bitcast<vec3f>(begin.xyz), bitcast<vec3f>(along.xyz), abs(reach), reach < 0.0, along.w);
+            let any = next >= sent_nearest;
+            let part = line_part(name);
+            let begin = part_of(name % LINE, select(PLACE, part, any));
+            let along = part_of(name % LINE, select(COURSE, part + 1u, any));
+            var reach = bitcast<f32>(begin.w);
+            var seed = along.w;
+            if !any {
+                reach = FAR;
+                seed = part_of(name, CHANCES).x;
+            }
+            walk_begin(&walk, bitcast<vec3f>(begin.xyz), bitcast<vec3f>(along.xyz), reach, any, seed);
         }
         if !walk_step(&walk) {
             let hit = walk_hit(&walk);
             if name >= LINE {
                 line_ended(name - LINE, walk.direction, hit.triangle == NO_TRIANGLE);
             } else {
-                keep_bits(name, RAY, vec4u(bitcast<u32>(hit.t), hit.triangle, bitcast<vec2u>(hit.uv)));
-                keep_bits(name, RAY + 1u, vec4u(hit.instance, hit.leaf, 0u, 0u));
+                keep_bits(name, HIT, vec4u(bitcast<u32>(hit.t), hit.triangle, bitcast<vec2u>(hit.uv)));
+                if !walk.any { keep_bits(name, HIT + 1u, vec4u(hit.instance, hit.leaf, 0u, 0u)); }
             }
             name = NO_TRIANGLE;
         }
@@ -107,9 +113,14 @@ fn walk_all(thread: u32) -> bool {
     return count > 0u;
 }
 
+// Whether the last line of a way to an entry is free.
+fn is_free(at: u32) -> bool {
+    return part_of(at, HIT).y == NO_TRIANGLE;
+}
+
 // What the last ray of a way has met.
 fn walked(at: u32) -> Hit {
-    let a = part_of(at, RAY);
-    let b = part_of(at, RAY + 1u);
+    let a = part_of(at, HIT);
+    let b = part_of(at, HIT + 1u);
     return Hit(bitcast<f32>(a.x), a.y, bitcast<vec2f>(a.zw), b.x, b.y);
 }

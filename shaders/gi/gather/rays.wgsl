@@ -83,8 +83,9 @@ fn cell_ray(at: u32, at_cell: vec2u, look_number: u32) {
     send(at, start.x, start.n, d, select(NONE, cell, ray == cell), ray, ray);
 }
 
-// Units by block, of each of which there are layers: first rays of its cells, then rays into lobes,
-// then further rays of cells that are fresh.
+// Units by block, of each of which there are layers: first rays of its cells, further rays of cells
+// that are fresh, and amid these rays into lobes. So those that have jobs in every frame are not
+// one workgroup's.
 fn block_of(unit: u32) -> vec3u {
     let layers = 1u + gather.looks;
     let block = unit / layers;
@@ -92,20 +93,24 @@ fn block_of(unit: u32) -> vec3u {
     return vec3u(block % across, block / across, unit % layers);
 }
 
+fn has_lobes(block: vec3u) -> bool {
+    return block.z == gather.looks / 2u;
+}
+
 fn look_number(block: vec3u) -> u32 {
-    return max(block.z, 1u) - 1u;
+    return block.z - select(0u, 1u, block.z > gather.looks / 2u);
 }
 
 fn wants(block: vec3u, i: u32) -> bool {
     let place = place_of(block.xy, i);
-    if block.z == 1u { return has_gloss(place); }
+    if has_lobes(block) { return has_gloss(place); }
     return has_ray(place, look_number(block));
 }
 
 fn begin(at: u32, job: u32) -> bool {
     let block = block_of(unit_of(job));
     let place = place_of(block.xy, place_in_unit(job));
-    if block.z == 1u { return gloss_ray(at, place); }
+    if has_lobes(block) { return gloss_ray(at, place); }
     cell_ray(at, place, look_number(block));
     return true;
 }

@@ -104,7 +104,7 @@ fn begin(at: u32, job: u32) -> bool {
     let d = cosine_direction(n, lattice(gather.round, shift.xy));
     let query = gather.rays + even + slot;
     set_out(at, bitcast<vec3f>(place.xyz), d, max(dot(n, d), 1e-4), 0.0, query, key, vec3f(1.0), job);
-    send_on(at);
+    put_ray(at);
     return true;
 }
 

@@ -35,9 +35,9 @@ fn send(at: u32, x: vec3f, n: vec3f, d: vec3f, query: u32, ray: u32, to: u32) {
         // Of an even white surface without gloss.
         let chosen = choose_light(Place(x, n, n, vec3f(1.0), vec3f(0.0), 1.0), false, seed);
         if chosen.reach > 0.0 {
-            keep(at, LIGHT, chosen.even, to);
-            put(LINE + at, x, chosen.l, chosen.reach, true, seed.z);
+            keep(at, LIGHT, chosen.even, 0u);
+            put_line(LINE + at, x, chosen.l, chosen.reach, seed.z);
         }
     }
-    send_on(at);
+    put_ray(at);
 }

@@ -36,15 +36,18 @@ const CHANCES = 3u;
 const RADIANCE = 4u;
 // What the rest is multiplied by; direction in which it set out.
 const BACK = 5u;
-// What the chosen light sends if it is seen; what the shader that sent it calls it.
+// What the chosen light sends if it is seen.
 const LIGHT = 6u;
 // What glows, by a shadow ray from where it set out, and its direction.
 const GLOWS = 7u;
 // The ray's number among all of the frame, NONE if it claims no entry; what its random numbers are
-// drawn by, which slots of the table must not decide, since they go to who comes first.
+// drawn by, which slots of the table must not decide, since they go to who comes first; what the
+// shader that sent it calls it.
 const NAMES = 8u;
-// Its ray or its line to an entry, and its line to a light, two vectors each (`queue.wgsl`).
-const RAY = 9u;
+// Two vectors each: its line to an entry, and then what that or its ray has met; its line to a light
+// (`queue.wgsl`).
+const HIT = 9u;
+const LIT_LINE = 11u;
 
 // Number of the workgroup.
 var<private> group: u32;

@@ -11,22 +11,23 @@ const BLOCK: u32 = 32;
 /// How many workgroups a device does well with, and how it runs them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Groups {
-    /// Of a pass at most, if their shares are no larger for it than `share` units.
+    /// Of a pass at most, with `least` units each if there are as many, and `share` at most.
     most: u32,
+    least: u32,
     share: u32,
     /// Threads of a workgroup run one after the other.
     in_turn: bool,
 }
 
 impl Groups {
-    /// Of each of a GTX 1050's five multiprocessors six fill the memory. Sixteen bits name a job.
-    pub const GPU: Self = Self { most: 256, share: 65_536 / UNIT, in_turn: false };
+    /// A GTX 1050 runs 60 at a time; each holds 53 kB of memory. Sixteen bits name a job.
+    pub const GPU: Self = Self { most: 512, least: 2, share: 65_536 / UNIT, in_turn: false };
 
     /// For a processor alone: each vector of threads goes through a whole shader once, whether one
     /// of them has something to do or not. But Mesa's driver ends all loops of a thread after
     /// 65,535 rounds in all, without a word: of a city's first frame, eight rays a cell, shares of
     /// 60 units come to that.
-    pub const CPU: Self = Self { most: 2, share: 4, in_turn: true };
+    pub const CPU: Self = Self { most: 2, least: 1, share: 4, in_turn: true };
 
     /// For a driver that draws on the CPU two a processor; but what is written down of dispatches,
     /// to be counted or exported, is as GPUs have it.
@@ -47,7 +48,7 @@ impl Groups {
     }
 
     fn for_units(self, units: u32) -> u32 {
-        units.clamp(1, self.most).max(units.div_ceil(self.share))
+        units.div_ceil(self.least).clamp(1, self.most).max(units.div_ceil(self.share))
     }
 
     /// Workgroups of `gi.rays`: layers of blocks for rays of cells, for rays into lobes, and for
@@ -66,11 +67,9 @@ impl Groups {
         self.for_units(blocks(size.map(|n| n.div_ceil(2))))
     }
 
-    /// Workgroups of `gi.renew`, two units each, since few slots of a table are in use, and of those
-    /// few send a ray. The table of 65,536 has 32 workgroups then, about as many as fill the memory
-    /// of a GTX 1050.
+    /// Workgroups of `gi.renew`.
     pub fn for_slots(self, slots: u32) -> u32 {
-        self.for_units(slots.div_ceil(UNIT)).min(slots.div_ceil(2 * UNIT))
+        self.for_units(slots.div_ceil(UNIT))
     }
 }
 
