@@ -212,6 +212,44 @@ fn the_same_command_gives_the_same_picture_and_all_layers() {
     }
 }
 
+/// Rays of a workgroup go to whoever is free; on the CPU's driver, to each thread in turn.
+#[test]
+fn whoever_takes_a_ray_the_picture_is_the_same() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let drawn = |from: &str, to: &str| {
+        let folder = path(&dir, "shaders");
+        let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+        let mut folders = vec![own.clone()];
+        while let Some(of) = folders.pop() {
+            let there = Path::new(&folder).join(of.strip_prefix(&own).unwrap());
+            std::fs::create_dir_all(&there).unwrap();
+            for entry in std::fs::read_dir(of).unwrap().map(Result::unwrap) {
+                if entry.path().is_dir() {
+                    folders.push(entry.path());
+                } else {
+                    let text = std::fs::read_to_string(entry.path()).unwrap();
+                    std::fs::write(there.join(entry.file_name()), text.replace(from, to)).unwrap();
+                }
+            }
+        }
+        let file = path(&dir, "x.exr");
+        let args = ["render", "cornell", "--size", "64x48", "--method", "gather", "--gi-frames", "3", "-o", &file];
+        let out = bouncelight(&[&args[..], &["--shaders", &folder]].concat());
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        bouncelight::image_io::read_exr(Path::new(&file)).unwrap().image("Combined").unwrap().to_rgb()
+    };
+    let taken = "select(atomicAdd(&taken, 1u), own, (gather.flags & GATHER_IN_TURN) != 0u)";
+    let queue = include_str!("../shaders/gi/gather/queue.wgsl");
+    assert!(queue.contains(taken));
+    let in_turn = drawn(taken, "own");
+    assert_eq!(drawn(taken, "atomicAdd(&taken, 1u)"), in_turn);
+    // Negative control: every second ray is taken by nobody.
+    assert_ne!(drawn(taken, "2u * own"), in_turn);
+}
+
 #[test]
 fn layers_add_up_to_the_picture_as_blenders_do() {
     if common::gpu().is_none() {

@@ -167,21 +167,25 @@ impl Gpu {
     /// Nothing here needs the larger buffers but larger problems: wide networks on large pictures,
     /// scenes of many millions of triangles.
     pub fn from_adapter(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
-        Self::with_more(adapter, 0)
+        let limits = wgpu::Limits::default().or_worse_values_from(&adapter.limits());
+        Self::with(adapter, limits)
     }
 
-    /// Another device on the same adapter, with room for a storage buffer more a stage.
+    /// Another device on the same adapter, with room for a storage buffer more a stage and for what
+    /// workgroups count.
     #[cfg(feature = "reference")]
     pub(crate) fn for_counting(&self) -> Result<Self, GpuError> {
-        Self::with_more(self.adapter.clone(), 1)
+        let granted = self.adapter.limits();
+        let mut limits = wgpu::Limits::default().or_worse_values_from(&granted);
+        limits.max_storage_buffers_per_shader_stage += 1;
+        limits.max_compute_workgroup_storage_size = granted.max_compute_workgroup_storage_size;
+        Self::with(self.adapter.clone(), limits)
     }
 
-    /// As [`from_adapter`](Self::from_adapter), with so many storage buffers a stage more.
-    fn with_more(adapter: wgpu::Adapter, buffers: u32) -> Result<Self, GpuError> {
+    /// With these limits but for those of buffers' sizes.
+    fn with(adapter: wgpu::Adapter, mut limits: wgpu::Limits) -> Result<Self, GpuError> {
         let info = adapter.get_info();
         let granted = adapter.limits();
-        let mut limits = wgpu::Limits::default().or_worse_values_from(&granted);
-        limits.max_storage_buffers_per_shader_stage += buffers;
         limits.max_buffer_size = granted.max_buffer_size;
         limits.max_storage_buffer_binding_size = granted.max_storage_buffer_binding_size;
         let descriptor = wgpu::DeviceDescriptor {

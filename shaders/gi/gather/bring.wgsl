@@ -5,7 +5,7 @@
 // Directional light of the cells, and what their lobes show, brought to every pixel: bilinear where
 // the surface goes on, and only from cells of the pixel's own surface where it does not, the light
 // evaluated for the pixel's own normal. All of it in f32. A workgroup reads the cells around its
-// 8x8 pixels once. The prelude holds CELL_SIDE and the tolerances (gi::gather::bring documents
+// 16x8 pixels once. The prelude holds CELL_SIDE and the tolerances (gi::gather::bring documents
 // them).
 
 @group(1) @binding(0) var<storage, read> cell_pixels: array<u32>;
@@ -17,33 +17,39 @@
 // F0 and roughness; and of smooth pixels what mirror.wgsl has found.
 @group(1) @binding(5) var specular_map: texture_2d<f32>;
 @group(1) @binding(6) var<storage, read> mirrored: array<vec2u>;
-// Cells on a side of what a workgroup reads: its own 8 / CELL_SIDE and two on each side.
-const STAGED = 8 / CELL_SIDE + 4;
+// Pixels of a workgroup.
+const WIDE = 16;
+const HIGH = 8;
+const PIXELS = WIDE * HIGH;
+// Cells that a workgroup reads, across and in all: its own and two on each side.
+const ACROSS = WIDE / CELL_SIDE + 4;
+const STAGED = ACROSS * (HIGH / CELL_SIDE + 4);
 
 // A cell's surface point (a: 1, or 0 where there is none), normal, how the normal leans, light and
-// gloss. 36 cells of 112 bytes at most.
-var<workgroup> points: array<vec4f, STAGED * STAGED>;
-var<workgroup> normals: array<vec3f, STAGED * STAGED>;
-var<workgroup> leans: array<vec3f, STAGED * STAGED>;
-var<workgroup> lights: array<CellLight, STAGED * STAGED>;
-var<workgroup> gleams: array<vec4f, STAGED * STAGED>;
+// gloss. 48 cells of 112 bytes.
+var<workgroup> points: array<vec4f, STAGED>;
+var<workgroup> normals: array<vec3f, STAGED>;
+var<workgroup> leans: array<vec3f, STAGED>;
+var<workgroup> lights: array<CellLight, STAGED>;
+var<workgroup> gleams: array<vec4f, STAGED>;
 
-// Thread `index` brings one cell of the square that begins at cell `first`. Cells beyond the
+// Thread `index` brings one cell of those that begin at cell `first`. Cells beyond the
 // picture count as empty.
 fn stage(index: u32, first: vec2i) {
-    if index >= u32(STAGED * STAGED) {
+    if index >= u32(STAGED) {
         return;
     }
-    let cell = first + vec2i(i32(index) % STAGED, i32(index) / STAGED);
+    let cell = first + vec2i(i32(index) % ACROSS, i32(index) / ACROSS);
     points[index] = vec4f(0.0);
     normals[index] = vec3f(0.0);
     leans[index] = vec3f(0.0);
     lights[index] = CellLight();
     gleams[index] = vec4f(0.0);
-    if any(cell < vec2i(0)) || any(cell >= vec2i(cell_grid())) {
+    let grid = vec2i(cell_grid());
+    if is_beyond(grid, cell) {
         return;
     }
-    let row = cell_index(vec2u(cell));
+    let row = index_in(grid, cell);
     let packed = cell_pixels[row];
     if packed == NO_PIXEL {
         return;
@@ -79,11 +85,11 @@ const LEAST_SLOPE = 0.5;
 
 // Thread `index` finds how the normal of a cell leans that has cells on all sides.
 fn stage_lean(index: u32) {
-    const INNER = STAGED - 2;
-    if index >= u32(INNER * INNER) { return; }
-    let at = (i32(index) / INNER + 1) * STAGED + i32(index) % INNER + 1;
+    const INNER = ACROSS - 2;
+    if index >= u32(INNER * (STAGED / ACROSS - 2)) { return; }
+    let at = (i32(index) / INNER + 1) * ACROSS + i32(index) % INNER + 1;
     leans[at] = lean_along(normals[at], step_to(at, at - 1), step_to(at, at + 1))
-        + lean_along(normals[at], step_to(at, at - STAGED), step_to(at, at + STAGED));
+        + lean_along(normals[at], step_to(at, at - ACROSS), step_to(at, at + ACROSS));
 }
 
 fn finite4(v: vec4f) -> vec4f {
@@ -129,20 +135,20 @@ fn tap(here: Surface, at: i32, spatial: f32, least_cosine: f32) -> Sum {
     return Sum(vec4f(arrives, 1.0) * weight, vec4f(gleams[at].rgb, 1.0) * (gleams[at].a * weight));
 }
 
-// Tent-weighted sum over the 2r x 2r cells around `place` (in cells, from the first staged one), r
-// being 1 or 2.
-fn gather(here: Surface, place: vec2f, radius: i32, least_cosine: f32) -> Sum {
-    let base = vec2i(floor(place)) - (radius - 1);
-    let slope = 1.0 / f32(radius);
+// Tent-weighted sum, of `slope`, over the 2 x 2 cells from `base` on for a pixel at `place` (in
+// cells, from the first staged one).
+fn gather(here: Surface, place: vec2f, base: vec2i, slope: f32, least_cosine: f32) -> Sum {
     var sum = Sum();
-    for (var i = 0; i < 4 * radius * radius; i++) {
-        let cell = base + vec2i(i & (2 * radius - 1), i >> u32(radius));
+    for (var i = 0; i < 4; i++) {
+        let cell = base + vec2i(i & 1, i >> 1u);
         let tent = 1.0 - abs(vec2f(cell) - place) * slope;
-        let one = tap(here, cell.y * STAGED + cell.x, tent.x * tent.y, least_cosine);
-        sum.light += one.light;
-        sum.gloss += one.gloss;
+        sum = both(sum, tap(here, cell.y * ACROSS + cell.x, tent.x * tent.y, least_cosine));
     }
     return sum;
+}
+
+fn both(a: Sum, b: Sum) -> Sum {
+    return Sum(a.light + b.light, a.gloss + b.gloss);
 }
 
 // Of a pixel.
@@ -159,10 +165,34 @@ fn mean(sum: Sum) -> Brought {
 }
 
 // Pixels of the workgroup whose four cells lie on other surfaces, and what these say: such pixels
-// look further out. In a list, since threads side by side would all wait for each of them.
-var<workgroup> further: array<u32, 64>;
-var<workgroup> further_count: atomic<u32>;
-var<workgroup> nearby: array<Sum, 64>;
+// look further out, at 4 x 4 cells. In a list, since threads side by side would all wait for each
+// of them, and by four threads each, since few pixels would leave most threads without one.
+var<workgroup> further: array<u32, PIXELS>;
+var<workgroup> further_noted: atomic<u32>;
+var<workgroup> further_count: u32;
+var<workgroup> nearby: array<Sum, PIXELS>;
+var<workgroup> quarters: array<Sum, PIXELS>;
+
+// A quarter of what a pixel of the list finds further out.
+fn quarter(at: u32, part: u32, corner: vec2i, first: vec2i) -> Sum {
+    let pixel = pixel_of(further[at], corner);
+    let place = place_of(pixel, first);
+    let base = vec2i(floor(place)) - 1 + 2 * vec2i(i32(part & 1u), i32(part >> 1u));
+    return gather(surface_of(pixel, distance_at(pixel)), place, base, 0.5, LEAST_COSINE);
+}
+
+// Near and far blended so that no seam shows.
+fn answer_further(at: u32, corner: vec2i, i: u32) {
+    let near = nearby[further[at]];
+    let far = mean(both(both(quarters[i], quarters[i + 1u]), both(quarters[i + 2u], quarters[i + 3u])));
+    let close = mean(near);
+    let share = near.light.a / TRUST;
+    answer(pixel_of(further[at], corner), Brought(mix(far.light, close.light, share), mix(far.gloss, close.gloss, share)));
+}
+
+fn pixel_of(index: u32, corner: vec2i) -> vec2i {
+    return corner + vec2i(i32(index) % WIDE, i32(index) / WIDE);
+}
 
 // Where a pixel lies in cells, from the first staged one. A cell counts as lying at its middle,
 // whichever pixel stands for it.
@@ -186,15 +216,16 @@ fn answer(pixel: vec2i, brought: Brought) {
     textureStore(gloss_output, pixel, vec4f(min(gloss, vec3f(LARGEST)), 1.0));
 }
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(WIDE, HIGH)
 fn bring(
     @builtin(global_invocation_id) id: vec3u,
     @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_index) index: u32,
 ) {
-    let first = vec2i(group.xy) * (8 / CELL_SIDE) - 2;
+    let corner = vec2i(group.xy) * vec2i(WIDE, HIGH);
+    let first = corner / CELL_SIDE - 2;
     stage(index, first);
-    if index == 0u { atomicStore(&further_count, 0u); }
+    if index == 0u { atomicStore(&further_noted, 0u); }
     workgroupBarrier();
     stage_lean(index);
     workgroupBarrier();
@@ -202,12 +233,13 @@ fn bring(
         let pixel = vec2i(id.xy);
         let z = distance_at(pixel);
         if z > 0.0 {
-            let near = gather(surface_of(pixel, z), place_of(pixel, first), 1, 0.0);
+            let place = place_of(pixel, first);
+            let near = gather(surface_of(pixel, z), place, vec2i(floor(place)), 1.0, 0.0);
             if near.light.a >= TRUST {
                 answer(pixel, mean(near));
             } else {
                 nearby[index] = near;
-                further[atomicAdd(&further_count, 1u)] = index;
+                further[atomicAdd(&further_noted, 1u)] = index;
             }
         } else {
             textureStore(output, pixel, vec4f(vec3f(0.0), 1.0));
@@ -215,13 +247,13 @@ fn bring(
         }
     }
     workgroupBarrier();
-    if index >= atomicLoad(&further_count) { return; }
-    let at = further[index];
-    let pixel = 8 * vec2i(group.xy) + vec2i(i32(at & 7u), i32(at >> 3u));
-    let near = nearby[at];
-    // Blended so that no seam shows.
-    let far = mean(gather(surface_of(pixel, distance_at(pixel)), place_of(pixel, first), 2, LEAST_COSINE));
-    let close = mean(near);
-    let share = near.light.a / TRUST;
-    answer(pixel, Brought(mix(far.light, close.light, share), mix(far.gloss, close.gloss, share)));
+    if index == 0u { further_count = atomicLoad(&further_noted); }
+    let count = workgroupUniformLoad(&further_count);
+    for (var done = 0u; done < count; done += u32(PIXELS) / 4u) {
+        let at = done + index / 4u;
+        if at < count { quarters[index] = quarter(at, index & 3u, corner, first); }
+        workgroupBarrier();
+        if index < u32(PIXELS) / 4u && done + index < count { answer_further(done + index, corner, 4u * index); }
+        workgroupBarrier();
+    }
 }

@@ -5,7 +5,7 @@
 //! pixel's own surface: distance from the pixel's plane relative to the pixel's depth, and
 //! agreement of normals (the tolerances are [`reconstruct`](crate::gi::reconstruct)'s). Where those
 //! four mostly disagree the 4×4 cells around are blended in. Background pixels get 0. A workgroup
-//! reads each cell around its 8×8 pixels once, into its shared memory.
+//! reads each cell around its 16×8 pixels once, into its shared memory.
 
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
@@ -13,6 +13,10 @@ use crate::gi::stage::weights::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEI
 use crate::gpu::bind::{self, Binder, Bound};
 use crate::gpu::binding::{LOAD, READ, STORE_HALF};
 use crate::gpu::{shaders, timing::Recorder};
+
+/// Pixels of a workgroup: `WIDE` and `HIGH` of the shader.
+const WIDE: u32 = 16;
+const HIGH: u32 = 8;
 
 /// Sum of the four weights below which the 4×4 cells around are blended in.
 const TRUST: f32 = 0.3;
@@ -84,7 +88,7 @@ impl BringPass {
             inputs.set(pass);
             pass.set_bind_group(1, &group, &[]);
             pass.set_pipeline(&self.pipeline);
-            pass.dispatch_workgroups(inputs.size[0].div_ceil(8), inputs.size[1].div_ceil(8), 1);
+            pass.dispatch_workgroups(inputs.size[0].div_ceil(WIDE), inputs.size[1].div_ceil(HIGH), 1);
         });
     }
 
