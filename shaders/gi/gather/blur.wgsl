@@ -3,8 +3,7 @@
 //#import gi/gather/types.wgsl
 //#import gi/gather/gleam.wgsl
 //#import gi/gather/changed.wgsl
-//#import gi/gather/past.wgsl
-//#import gi/gather/guided.wgsl
+//#import gi/gather/beside.wgsl
 
 // Means of cells blurred over neighbours on the same surface, as directional light (`CellLight`).
 
@@ -20,11 +19,10 @@
 // Of each cell, with GATHER_GUIDED.
 @group(2) @binding(4) var<storage, read> guidance: array<vec4f>;
 
-// Frames after a cut that are blurred widely, and the radii of both blurs in cells. What comes into
-// view later has several rays a cell, and neighbours that know their light: the wide blur would
-// drown its own in theirs.
-const WIDE_FRAMES = 5u;
-const NARROW = 2;
+// Radii in cells. The first WIDE_FRAMES frames after a cut are blurred widely (`gi::gather`). What
+// comes into view later has several rays a cell, and neighbours that know their light: the wide blur
+// would drown its own in theirs.
+const NARROW = AROUND;
 const WIDE = 4;
 
 // A cell whose few bright rays bring more than this share of the mean over its neighbourhood is
@@ -35,23 +33,10 @@ const BLOTCH = 0.1;
 const FEW = 4.0;
 const MANY = 8.0;
 
-fn guidance_at(cell: u32) -> Guidance {
-    if (gather.flags & GATHER_GUIDED) == 0u { return Guidance(); }
-    let i = 3u * cell;
-    return guidance_from(guidance[i], guidance[i + 1u], guidance[i + 2u]);
-}
-
 // Of the cells of a workgroup: luminance of all frames, of lately, its noise, and the most that one
 // ray has in it.
 var<workgroup> of_cells: array<vec4f, 64>;
 var<workgroup> region: vec4f;
-
-// The plane in which neighbours have to lie: its side, and one over the distance that counts as
-// little, 1/m.
-struct Plane {
-    side: vec3f,
-    strictness: f32,
-}
 
 // Step to a cell beside one; 0 where it shows nothing, or what looks elsewhere.
 fn step_to(here: Past, grid: vec2i, at: vec2i) -> vec3f {
@@ -73,11 +58,6 @@ fn side_at(id: vec2u, here: Past) -> vec3f {
     );
 }
 
-// How much of a neighbour counts: that it lies in the same plane and faces the same way.
-fn alike(here: Past, there: Past, plane: Plane) -> f32 {
-    return same_surface(there.x - here.x, plane.side, here.n, there.n, plane.strictness);
-}
-
 // What rays into lobes around have found, times weight (a). Over a wide lobe's breadth every second
 // cell is asked, all of which have the same turn (`gloss_cell`); smooth.wgsl brings the four turns
 // together.
@@ -96,7 +76,8 @@ fn gloss_around(id: vec2u, here: Past, plane: Plane) -> vec4f {
         if is_beyond(grid, at) { continue; }
         let there = past_at(index_in(grid, at));
         if there.frames <= 0.0 { continue; }
-        let w = alike(here, there, plane) * as_rough(here, there.roughness) * falls[abs(tap.x)] * falls[abs(tap.y)];
+        let same = same_surface(there.x - here.x, plane.side, here.n, there.n, plane.strictness);
+        let w = same * as_rough(here, there.roughness) * falls[abs(tap.x)] * falls[abs(tap.y)];
         sum += w * there.gloss.a * vec4f(there.gloss.rgb, 1.0);
     }
     return sum;
@@ -109,30 +90,6 @@ fn balanced(aside: f32, outer: f32) -> f32 {
     return clamp(aside - 0.5, 0.0, outer);
 }
 
-// Half at the rim: then each of the sixteen places of the rays' lattice counts the same.
-fn at_rim(step: vec2i, radius: i32) -> f32 {
-    let outermost = (abs(step) == vec2i(radius)) & vec2<bool>(radius > 0);
-    return select(1.0, 0.5, outermost.x) * select(1.0, 0.5, outermost.y);
-}
-
-// How much a neighbour counts in the mean: that it is the same surface, and that as much is near to
-// it as to the cell, as far as their rays can tell. Light beside a thing that stands on a surface
-// is other than that of the surface around, whatever a few rays of it were.
-fn counts(here: Past, there: Past, plane: Plane) -> f32 {
-    let nearer = there.nearness - here.nearness;
-    let chance = chance_of_nearness(here.nearness, here.frames) + chance_of_nearness(there.nearness, there.frames);
-    return alike(here, there, plane) * exp(-min(0.5 * nearer * nearer / chance, 60.0))
-        * clamp(there.frames, f32(AGAIN), 16.0);
-}
-
-// What a network makes of that.
-fn told(here: Past, neighbour: u32, own: Guidance) -> f32 {
-    if (gather.flags & GATHER_GUIDED) == 0u { return 1.0; }
-    let other = guidance_at(neighbour);
-    let share = guided_share(here.frames);
-    return kinship(own.near, other.near, share) * exp(share * other.trust);
-}
-
 // Of a neighbourhood: light times weight, weight, mean of squares and the like.
 struct Usual {
     light: vec3f,
@@ -143,17 +100,15 @@ struct Usual {
 
 // The neighbourhood without cells whose few bright rays would be seen as a blotch. `mean`:
 // luminance without the brightest; `total`: weight of all.
-fn without_rare(id: vec2u, here: Past, own: Guidance, plane: Plane, radius: i32, mean: f32, total: f32) -> Usual {
-    let grid = vec2i(cell_grid());
+fn without_rare(centre: Centre, mean: f32, total: f32) -> Usual {
+    let radius = centre.radius;
     var sum = Usual();
     for (var y = -radius; y <= radius; y++) {
         for (var x = -radius; x <= radius; x++) {
-            let at = vec2i(id) + vec2i(x, y);
-            if is_beyond(grid, at) { continue; }
-            let neighbour = index_in(grid, at);
-            let there = past_at(neighbour);
+            let found = tap(centre, vec2i(x, y));
+            let there = found.there;
             if there.frames <= 0.0 { continue; }
-            let w = at_rim(vec2i(x, y), radius) * counts(here, there, plane) * told(here, neighbour, own);
+            let w = found.weight;
             let l = luminance(there.light);
             let rays = there.frames * l * l / max(there.square, 1e-30);
             let brings = w * (l - mean) / max(mean * total, 1e-30);
@@ -170,6 +125,16 @@ fn without_rare(id: vec2u, here: Past, own: Guidance, plane: Plane, radius: i32,
 
 @compute @workgroup_size(8, 8)
 fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) index: u32) {
+    stage(vec2i(id.xy / 8u * 8u), index);
+    blur_cell(id, index, false);
+}
+
+@compute @workgroup_size(8, 8)
+fn blur_wide(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) index: u32) {
+    blur_cell(id, index, true);
+}
+
+fn blur_cell(id: vec3u, index: u32, wide: bool) {
     let inside = all(id.xy < cell_grid());
     var cell = 0u;
     if inside { cell = cell_index(id.xy); }
@@ -197,10 +162,12 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
         return;
     }
     let plane = Plane(side_at(id.xy, here), strictness_at(here.x));
-    let own = guidance_at(cell);
-    let grid = vec2i(cell_grid());
-    var radius = select(NARROW, WIDE, gather.frame < WIDE_FRAMES);
+    var radius = select(NARROW, WIDE, wide);
     if (gather.flags & GATHER_NO_BLUR) != 0u { radius = 0; }
+    let centre = Centre(
+        beside_from(here), told_at(cell), guided_share(here.frames), plane, vec2i(id.xy), vec2i(id.xy & vec2u(7u)),
+        vec2i(cell_grid()), radius, wide
+    );
     var sum = vec3f(0.0);
     var vector = vec3f(0.0);
     var total = 0.0;
@@ -216,24 +183,20 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     var brightest = vec2f(0.0);
     for (var y = -radius; y <= radius; y++) {
         for (var x = -radius; x <= radius; x++) {
-            let at = vec2i(id.xy) + vec2i(x, y);
-            if is_beyond(grid, at) { continue; }
-            let neighbour = index_in(grid, at);
-            let there = past_at(neighbour);
+            let found = tap(centre, vec2i(x, y));
+            let there = found.there;
             if there.frames <= 0.0 { continue; }
-            let alone = at_rim(vec2i(x, y), radius) * counts(here, there, plane);
-            let w = alone * told(here, neighbour, own);
+            let alone = found.alone;
+            let w = found.weight;
             sum += w * there.light;
-            // Across each one's own normal: what lies along normals that differ is no gradient of
-            // light.
-            vector += w * (there.vector - there.n * dot(there.vector, there.n));
+            vector += w * there.across;
             total += w;
             let l = luminance(there.light);
             lately += alone * there.lately;
             all += alone * vec2f(l, 1.0);
             if w * l > brightest.x && there.frames * l * l < MANY * there.square { brightest = vec2f(w * l, w); }
-            noise += alone * alone * max(square_lately(there) - l * l, 0.0);
-            most = max(most, alone * bright_ray(there));
+            noise += alone * alone * max(there.square_lately - l * l, 0.0);
+            most = max(most, alone * (there.square_lately / max(l, 1e-20)));
             squares += w * there.square;
             parts += w * w / there.frames;
         }
@@ -256,7 +219,7 @@ fn blur(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     var rare = vec3f(0.0);
     let others = (luminance(sum) - brightest.x) / max(total - brightest.y, 1e-30);
     if radius > 0 && changes[cell].a == 0.0 && brightest.x - others * brightest.y > BLOTCH * others * total {
-        usual = without_rare(id.xy, here, own, plane, radius, others, total);
+        usual = without_rare(centre, others, total);
         rare = saturate(1.0 - usual.light / max(usual.total * mean, vec3f(1e-30)));
     }
     // Variance of the mean: that of single rays here and around, over how many they are.

@@ -4,7 +4,7 @@ use super::bring::Brought;
 use super::params::{self, Params};
 use super::pass::Groups;
 use super::store::{self, Store};
-use super::{GatherGi, HURRIED, HURRY, ROUNDS_RESTED, ROUNDS_YOUNG, STIR, YOUNG, looks};
+use super::{GatherGi, HURRIED, HURRY, ROUNDS_RESTED, ROUNDS_YOUNG, STIR, WIDE_FRAMES, YOUNG, looks};
 use crate::gi::interface::{GiError, Inputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -22,6 +22,8 @@ pub struct Settled {
     /// Group 1, and where the frame's parameters lie in it.
     params: wgpu::BindGroup,
     offset: u32,
+    /// Whether it is blurred widely.
+    wide: bool,
 }
 
 impl Settled {
@@ -202,7 +204,8 @@ impl GatherGi {
         self.changing = self.changing.saturating_sub(1);
         let pasts = self.store.pasts[(self.frame & 1) as usize].clone();
         let specular = inputs.specular.unwrap_or(&self.no_specular).clone();
-        Ok(Settled { inputs: bound, specular, pasts, params: frame_params, offset })
+        let wide = params.frame < WIDE_FRAMES;
+        Ok(Settled { inputs: bound, specular, pasts, params: frame_params, offset, wide })
     }
 
     /// Averages means over neighbours and finds where light has changed, which the next frame asks.
@@ -211,7 +214,8 @@ impl GatherGi {
         let [pasts, blurred, changes, glosses] =
             [&settled.pasts, &store.blurred, &store.changes, &store.glosses].map(Bound::from);
         let own = [pasts, blurred, changes, glosses, guidance];
-        self.blur.record(recorder, settled.groups(), own, settled.workgroups());
+        let blur = if settled.wide { &mut self.blur_wide } else { &mut self.blur };
+        blur.record(recorder, settled.groups(), own, settled.workgroups());
     }
 
     /// Records the rest of the frame: means averaged over neighbours, brought to full size.

@@ -89,6 +89,9 @@ pub(super) fn looks(size: [u32; 2]) -> u32 {
     if size.map(u64::from).iter().product::<u64>() <= 1 << 21 { 8 } else { 4 }
 }
 
+/// Frames after a cut that are blurred widely.
+const WIDE_FRAMES: u32 = 5;
+
 /// Bytes that a workgroup remembers of its rays: of 256 ways, thirteen vectors each (`WALKS`
 /// and `PARTS` of `ways.wgsl`).
 const WAYS: u64 = 256 * 13 * 16;
@@ -124,6 +127,7 @@ pub struct GatherGi {
     mirror: Pass,
     mean: Pass,
     blur: Pass,
+    blur_wide: Pass,
     smooth: Pass,
     bring: BringPass,
     store: Store,
@@ -216,6 +220,7 @@ impl GatherGi {
             recall: new(alone, ("gi.recall", "gi.recall", "recall"), &history),
             mean: new(alone, ("gi.settle", "gi.settle", "settle"), &history),
             blur: new(alone, ("gi.blur", "gi.blur", "blur"), &[READ, rw, rw, rw, READ]),
+            blur_wide: new(alone, ("gi.blur", "gi.blur", "blur_wide"), &[READ, rw, rw, rw, READ]),
             smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), &[READ, READ, rw, READ, READ, rw]),
             bring: BringPass::new(device, &inputs),
             store: Store::new(device, size, options.slots),
@@ -251,7 +256,7 @@ impl GatherGi {
     /// Bind groups made since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
         let rays = [&self.gradient, &self.recall, &self.evict, &self.rays, &self.renew, &self.mirror];
-        let made = rays.into_iter().chain([&self.mean, &self.blur, &self.smooth]).map(Pass::made);
+        let made = rays.into_iter().chain([&self.mean, &self.blur, &self.blur_wide, &self.smooth]).map(Pass::made);
         self.inputs.made() + self.scene.made() + self.frame_params.made() + self.bring.made() + made.sum::<u64>()
     }
 }
