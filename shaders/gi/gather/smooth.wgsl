@@ -30,10 +30,10 @@ struct Blurred {
     // 0 frames: shows nothing.
     frames: f32,
     n: vec3f,
-    // Without what few rays have brought: a column a colour.
-    light: mat3x3f,
     // Of `light`.
     luminance: f32,
+    // Without what few rays have brought: a column a colour.
+    light: mat3x3f,
     variance: f32,
     nearness: f32,
     chance: f32,
@@ -61,7 +61,7 @@ fn blurred_at(cell: u32) -> Blurred {
     // The light along the normal.
     let l = luminance(n * light);
     return Blurred(
-        place.xyz, frames, n, light, l, blurred[3u * cell].a, nearness, chance_of_nearness(nearness, frames),
+        place.xyz, frames, n, l, light, blurred[3u * cell].a, nearness, chance_of_nearness(nearness, frames),
         is_rare(blurred[3u * cell + 1u].a)
     );
 }
@@ -93,6 +93,29 @@ fn gloss_of(id: vec2u, here: Past, side: vec3f) -> vec4f {
     return sum;
 }
 
+// A workgroup has 8×8 cells that are SMOOTH_STRIDE apart, so that their taps are each other's: with
+// two around they are read once.
+const OWN = 8;
+const STAGED = OWN + 4;
+// Cells on a side of what as many workgroups as there are ways to begin share.
+const SHARED = OWN * SMOOTH_STRIDE;
+
+var<workgroup> staged: array<Blurred, STAGED * STAGED>;
+// Where a network places them.
+var<workgroup> staged_far: array<vec4f, STAGED * STAGED>;
+
+fn stage(first: vec2i, thread: u32) {
+    let grid = vec2i(cell_grid());
+    for (var i = i32(thread); i < STAGED * STAGED; i += OWN * OWN) {
+        let at = first + SMOOTH_STRIDE * (vec2i(i % STAGED, i / STAGED) - 2);
+        staged[i] = Blurred();
+        if is_beyond(grid, at) { continue; }
+        let cell = index_in(grid, at);
+        staged[i] = blurred_at(cell);
+        if (gather.flags & GATHER_GUIDED) != 0u { staged_far[i] = finite4(guidance[3u * cell + 1u]); }
+    }
+}
+
 // Cell that tap `i` of 25 asks, NO_CELL outside the picture.
 fn tap_at(grid: vec2i, id: vec2u, i: i32) -> u32 {
     let at = vec2i(id) + SMOOTH_STRIDE * vec2i(i % 5 - 2, i / 5 - 2);
@@ -119,11 +142,20 @@ fn rare_around(id: vec2u, here: Past, side: vec3f) -> mat3x3f {
     return sum * (1.0 / max(total, 1e-30));
 }
 
-@compute @workgroup_size(8, 8)
-fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= cell_grid()) { return; }
-    let cell = cell_index(id.xy);
-    let here = blurred_at(cell);
+@compute @workgroup_size(OWN, OWN)
+fn smooth_light(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_id) local: vec3u,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let first = vec2i(group.xy) / SMOOTH_STRIDE * SHARED + vec2i(group.xy) % SMOOTH_STRIDE;
+    stage(first, thread);
+    workgroupBarrier();
+    let id = vec2u(first + SMOOTH_STRIDE * vec2i(local.xy));
+    if any(id >= cell_grid()) { return; }
+    let cell = cell_index(id);
+    let middle = (i32(local.y) + 2) * STAGED + i32(local.x) + 2;
+    let here = staged[middle];
     var own = Guidance();
     let share = guided_share(here.frames);
     if (gather.flags & GATHER_GUIDED) != 0u {
@@ -135,14 +167,12 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     let side = unpack_normal(bitcast<u32>(blurred[3u * cell + 2u].a));
     if here.frames > 0.0 && (gather.flags & GATHER_NO_BLUR) == 0u {
         let strictness = strictness_at(here.x);
-        let grid = vec2i(cell_grid());
         let taps = array<f32, 3>(1.0, 2.0 / 3.0, 1.0 / 6.0);
         var total = 1.0;
         for (var i = 0; i < 25; i++) {
-            let other = tap_at(grid, id.xy, i);
-            if i == 12 || other == NO_CELL { continue; }
-            let there = blurred_at(other);
-            if there.frames <= 0.0 { continue; }
+            let other = middle + (i / 5 - 2) * STAGED + i % 5 - 2;
+            let there = staged[other];
+            if i == 12 || there.frames <= 0.0 { continue; }
             any_rare = any_rare || there.rare;
             let apart = there.luminance - here.luminance;
             // Two means of the same light differ by their two variances.
@@ -153,18 +183,18 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
             var w = taps[abs(i % 5 - 2)] * taps[abs(i / 5 - 2)] * exp(-min(unlike, 60.0));
             w *= same_surface(there.x - here.x, side, here.n, there.n, strictness);
             if (gather.flags & GATHER_GUIDED) != 0u {
-                w *= kinship(own.far, finite4(guidance[3u * other + 1u]), share);
+                w *= kinship(own.far, staged_far[other], share);
             }
             light_here += w * there.light;
             total += w;
         }
         light_here *= 1.0 / total;
     }
-    if any_rare { light_here += rare_around(id.xy, past, side); }
+    if any_rare { light_here += rare_around(id, past, side); }
     let mean = here.n * light_here;
     let vector = light_here * vec3f(0.2126, 0.7152, 0.0722);
     let across = vector / max(luminance(mean), 1e-30) - here.n;
-    gleams[cell] = shown(past, mean, across, gloss_of(id.xy, past, side));
+    gleams[cell] = shown(past, mean, across, gloss_of(id, past, side));
     light[3u * cell] = tilting(light_here[0], here.n);
     light[3u * cell + 1u] = tilting(light_here[1], here.n);
     light[3u * cell + 2u] = tilting(light_here[2], here.n);

@@ -233,7 +233,9 @@ impl GatherGi {
         let [pasts, blurred, light, glosses, gleams] =
             [&settled.pasts, &store.blurred, &store.cell_light, &store.glosses, &store.gleams].map(Bound::from);
         let own = [pasts, blurred, light, guidance, glosses, gleams];
-        self.smooth.record(recorder, settled.groups(), own, settled.workgroups());
+        // Of 32×32 cells each of sixteen workgroups has those that are four apart.
+        let [w, h] = settled.inputs.cells.map(|n| 4 * n.div_ceil(32));
+        self.smooth.record(recorder, settled.groups(), own, [w, h, 1]);
         let brought = Brought {
             light: &store.cell_light,
             glosses: &store.gleams,
