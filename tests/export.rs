@@ -279,9 +279,9 @@ fn rays_are_shared_out_as_for_a_gpu() {
     let Some(gpu) = common::gpu() else { return };
     let m = exported(&gpu, &methods()[0], Target::Wgsl).manifest;
     let workgroups = |label: &str| m.dispatches.iter().find(|d| d.label == label).map(|d| d.workgroups);
-    // Two units of 1,024 of the table's 65,536 slots each; of one block of cells nine layers.
+    // Two units each: of 1,024 of the table's 65,536 slots; of nine layers of one block of cells.
     assert_eq!(workgroups("gi.renew"), Some([32, 1, 1]));
-    assert_eq!(workgroups("gi.rays"), Some([9, 1, 1]));
+    assert_eq!(workgroups("gi.rays"), Some([5, 1, 1]));
 }
 
 #[test]

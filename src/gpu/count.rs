@@ -52,7 +52,7 @@ pub(crate) struct Count {
 impl Count {
     /// From here on it is remembered of what pipelines are made.
     pub fn start() -> Self {
-        Self { tape: tape::Running::start(), counter: None }
+        Self { tape: tape::Running::to_count(), counter: None }
     }
 
     /// Dispatches count from here on. The device needs room for a storage buffer more a stage than

@@ -7,6 +7,7 @@ use std::cell::{Cell, RefCell};
 
 thread_local! {
     static RUNS: Cell<bool> = const { Cell::new(false) };
+    static COUNTS: Cell<bool> = const { Cell::new(false) };
     static TAPE: RefCell<Tape> = RefCell::default();
 }
 
@@ -74,6 +75,13 @@ impl Running {
         Self(())
     }
 
+    /// Starts, for dispatches that will be counted.
+    #[cfg(feature = "reference")]
+    pub(super) fn to_count() -> Self {
+        COUNTS.set(true);
+        Self::start()
+    }
+
     /// From here on `listener` hears of dispatches, or nobody does.
     #[cfg(feature = "reference")]
     pub(super) fn listen(&mut self, listener: Option<std::rc::Rc<RefCell<dyn Listener>>>) {
@@ -90,6 +98,7 @@ impl Running {
 impl Drop for Running {
     fn drop(&mut self) {
         RUNS.set(false);
+        COUNTS.set(false);
         TAPE.take();
     }
 }
@@ -103,6 +112,11 @@ impl Tape {
 /// Whether one runs on this thread.
 pub(crate) fn runs() -> bool {
     RUNS.get()
+}
+
+/// Whether dispatches of this thread will be counted on this device.
+pub(crate) fn counts() -> bool {
+    COUNTS.get()
 }
 
 fn write(note: impl FnOnce(&mut Tape)) {

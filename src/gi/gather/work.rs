@@ -30,13 +30,13 @@ impl Groups {
     pub const CPU: Self = Self { most: 2, least: 1, share: 4, in_turn: true };
 
     /// For a driver that draws on the CPU two a processor; but what is written down of dispatches,
-    /// to be counted or exported, is as GPUs have it.
+    /// to be counted or exported, is as GPUs have it, and what is exported is for them.
     pub fn of(device: &wgpu::Device) -> Self {
         if device.adapter_info().device_type != wgpu::DeviceType::Cpu {
             return Self::GPU;
         }
         if tape::runs() {
-            return Self { in_turn: true, ..Self::GPU };
+            return Self { in_turn: tape::counts(), ..Self::GPU };
         }
         let processors = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
         Self { most: processors.saturating_mul(Self::CPU.most).min(Self::GPU.most), ..Self::CPU }
