@@ -187,7 +187,8 @@ fn answer_further(at: u32, corner: vec2i, i: u32) {
     let far = mean(both(both(quarters[i], quarters[i + 1u]), both(quarters[i + 2u], quarters[i + 3u])));
     let close = mean(near);
     let share = near.light.a / TRUST;
-    answer(pixel_of(further[at], corner), Brought(mix(far.light, close.light, share), mix(far.gloss, close.gloss, share)));
+    let blended = Brought(mix(far.light, close.light, share), mix(far.gloss, close.gloss, share));
+    answer(pixel_of(further[at], corner), blended);
 }
 
 fn pixel_of(index: u32, corner: vec2i) -> vec2i {

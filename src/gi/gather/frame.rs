@@ -106,7 +106,7 @@ impl GatherGi {
         let another = rays.scene.id() != self.scene_id;
         self.scene_id = rays.scene.id();
         if self.cells.fit(inputs.size) || another {
-            self.store = Store::new(&self.device, inputs.size, self.options.slots);
+            self.store = Store::new(&self.device, inputs.size, self.options.slots, self.workgroups);
             // The same scene gets the same rays, whatever was drawn before.
             self.round = 0;
             self.bring.forget();

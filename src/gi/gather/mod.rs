@@ -3,7 +3,8 @@
 //! blurred over neighbours, brought to full resolution.
 //!
 //! ```text
-//! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.smooth ─► gi.bring ─► E/π, gloss
+//! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.smooth ─► gi.bring ─►
+//! E/π, gloss
 //!                          │  ▲ who was met       ▲   mean of the frames before
 //!                          ▼  │                   │
 //!        gi.evict ─► table of entries ─► gi.renew ┘   one ray an entry, several rounds in a first frame
@@ -210,6 +211,7 @@ impl GatherGi {
         let rw = READ_WRITE;
         let table = [rw, rw, rw, rw, rw];
         let history = [rw, rw, READ, READ, rw, READ, LOAD, LOAD];
+        let workgroups = work::Groups::of(device);
         Self {
             cells: CellsPass::new(device, &inputs, size),
             evict: new(shared, ("gi.evict", "gi.renew", "evict"), &table),
@@ -223,8 +225,8 @@ impl GatherGi {
             blur_wide: new(alone, ("gi.blur", "gi.blur", "blur_wide"), &[READ, rw, rw, rw, READ]),
             smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), &[READ, READ, rw, READ, READ, rw]),
             bring: BringPass::new(device, &inputs),
-            store: Store::new(device, size, options.slots),
-            workgroups: work::Groups::of(device),
+            store: Store::new(device, size, options.slots, workgroups),
+            workgroups,
             checked: size,
             no_lights: unused("gi.no_lights", size_of::<crate::scene::upload::LightGpu>() as u64),
             no_guidance: unused("gi.no_guidance", GUIDANCE),

@@ -48,7 +48,7 @@ fn queries(size: [u32; 2], slots: u64, groups: work::Groups) -> u64 {
 }
 
 impl Store {
-    pub fn new(device: &wgpu::Device, size: [u32; 2], slots: u32) -> Self {
+    pub fn new(device: &wgpu::Device, size: [u32; 2], slots: u32, groups: work::Groups) -> Self {
         let cells = cells::count(size).max(1);
         let rays = cells + squares(size);
         let records = rays + u64::from(looks(size) - 1) * cells;
@@ -76,7 +76,7 @@ impl Store {
         Self {
             keys: buffer("gi.entry_keys", 4 * slots),
             lots,
-            queries: buffer("gi.entry_queries", queries(size, slots, work::Groups::of(device))),
+            queries: buffer("gi.entry_queries", queries(size, slots, groups)),
             asked: buffer("gi.entry_asked", 4 * slots),
             light: buffer("gi.entry_light", 32 * slots),
             records: buffer("gi.records", RECORD * records),
