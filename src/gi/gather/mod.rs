@@ -3,8 +3,7 @@
 //! blurred over neighbours, brought to full resolution.
 //!
 //! ```text
-//! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.smooth ─► gi.bring ─►
-//! E/π, gloss
+//! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.smooth ─► gi.bring ─► E/π, gloss
 //!                          │  ▲ who was met       ▲   mean of the frames before
 //!                          ▼  │                   │
 //!        gi.evict ─► table of entries ─► gi.renew ┘   one ray an entry, several rounds in a first frame
