@@ -241,7 +241,9 @@ fn recorded(gpu: &Gpu, method: &Method, frames: usize) -> Vec<Vec<String>> {
     let mut all = Vec::new();
     for _ in 0..frames {
         let mut encoder = device.create_command_encoder(&Default::default());
-        technique.record(&mut Recorder::timed(&mut encoder, &profiler), queue, &inputs, &output).expect("it records");
+        technique
+            .record(&mut Recorder::timed(&mut encoder, &profiler), queue, &inputs, (&output).into())
+            .expect("it records");
         profiler.resolve_queries(&mut encoder);
         queue.submit([encoder.finish()]);
         profiler.end_frame().expect("all queries are closed");

@@ -77,9 +77,9 @@ class Pass:
         return self.textures["output"]
 
     @property
-    def gloss(self):
-        """Radiance that specular lobes show, over their directional albedo; rows from the top."""
-        return self.textures["gloss_output"]
+    def specular(self):
+        """Radiance that specular lobes reflect of surroundings and bounces; rows from the top."""
+        return self.textures["specular_output"]
 
     @property
     def sky(self):

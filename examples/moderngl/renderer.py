@@ -120,8 +120,8 @@ void main() {
 
 COMPOSITE = """
 #version 430
-uniform sampler2D albedo, emissive, direct, indirect, gloss, normals, places, speculars;
-uniform vec3 eye, sky;
+uniform sampler2D albedo, emissive, direct, indirect, specular, places;
+uniform vec3 sky;
 uniform bool with_direct, with_indirect;
 out vec4 color;
 void main() {
@@ -129,10 +129,7 @@ void main() {
     vec3 light = (with_direct ? texelFetch(direct, pixel, 0).rgb : vec3(0.0))
         + (with_indirect ? texelFetch(indirect, pixel, 0).rgb : vec3(0.0));
     vec3 hdr = texelFetch(albedo, pixel, 0).rgb * light + texelFetch(emissive, pixel, 0).rgb;
-    vec3 n = decoded(texelFetch(normals, pixel, 0).xy);
-    vec4 surface = texelFetch(speculars, pixel, 0);
-    float n_v = dot(n, normalize(eye - texelFetch(places, pixel, 0).xyz));
-    if (with_indirect) { hdr += texelFetch(gloss, pixel, 0).rgb * lobe(surface.rgb, surface.a, max(n_v, 0.0)); }
+    if (with_indirect) { hdr += texelFetch(specular, pixel, 0).rgb; }
     hdr = texelFetch(places, pixel, 0).w > 0.0 ? hdr : sky;
     vec3 v = clamp(hdr, 0.0, 1.0);
     color = vec4(mix(12.92 * v, 1.055 * pow(v, vec3(1.0 / 2.4)) - 0.055, greaterThan(v, vec3(0.0031308))), 1.0);
@@ -292,8 +289,8 @@ class Renderer:
         self.shown.use()
         t = self.targets
         pictures = {"albedo": t["albedo"], "emissive": t["emissive"], "direct": self.direct, "indirect": gi.output,
-                    "gloss": gi.gloss, "normals": t["normal"], "places": t["place"], "speculars": t["specular"]}
-        self._set(self.composite, eye=self.eye, sky=gi.sky)
+                    "specular": gi.specular, "places": t["place"]}
+        self._set(self.composite, sky=gi.sky)
         for slot, (name, texture) in enumerate(pictures.items()):
             texture.use(slot)
             self.composite[name] = slot

@@ -100,7 +100,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             ..Inputs::new(drawn.size, depth, normal, matrices)
         };
         let mut encoder = device.create_command_encoder(&Default::default());
-        technique.record(&mut Recorder::new(&mut encoder), queue, &inputs, &output_view)?;
+        technique.record(&mut Recorder::new(&mut encoder), queue, &inputs, (&output_view).into())?;
         if let Some(instead) = technique.instead() {
             return Err(format!("drawn by {}: {}", instead.method, instead.why).into());
         }

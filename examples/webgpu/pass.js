@@ -94,9 +94,9 @@ export class Pass {
     });
   }
 
-  // Light that direct lighting misses, E/π, and what lobes show over their directional albedo.
+  // Light that direct lighting misses, E/π, and radiance that lobes reflect.
   get output() { return this.views.output; }
-  get gloss() { return this.views.gloss_output; }
+  get specular() { return this.views.specular_output; }
   // Radiance of the surroundings.
   get sky() { return this.manifest.frames[0].writes.find((w) => w.type === "Params").values.environment.slice(0, 3); }
 

@@ -61,11 +61,9 @@ struct Fields {
 const COMPOSITE = SHARED + /* wgsl */ `
 @group(1) @binding(0) var albedo: texture_2d<f32>;
 @group(1) @binding(1) var emissive: texture_2d<f32>;
-@group(1) @binding(2) var specular: texture_2d<f32>;
-@group(1) @binding(3) var normal: texture_2d<f32>;
-@group(1) @binding(4) var depth: texture_2d<f32>;
-@group(1) @binding(5) var indirect: texture_2d<f32>;
-@group(1) @binding(6) var gloss: texture_2d<f32>;
+@group(1) @binding(2) var depth: texture_2d<f32>;
+@group(1) @binding(3) var indirect: texture_2d<f32>;
+@group(1) @binding(4) var specular: texture_2d<f32>;
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
     return vec4f(select(-1.0, 3.0, i == 1u), select(-1.0, 3.0, i == 2u), 0.0, 1.0);
 }
@@ -77,16 +75,8 @@ const COMPOSITE = SHARED + /* wgsl */ `
         hdr = textureLoad(emissive, pixel, 0).rgb;
         // Right of the split: with what the pass found.
         if place.x >= view.shown.x {
-            let surface = textureLoad(specular, pixel, 0);
-            let e = textureLoad(normal, pixel, 0).xy;
-            var n = vec3f(e, 1.0 - abs(e.x) - abs(e.y));
-            let t = max(-n.z, 0.0);
-            n = normalize(vec3f(n.xy - select(vec2f(-t), vec2f(t), n.xy >= vec2f(0.0)), n.z));
-            // Here \`before\` turns rays of the picture into the world.
-            let ndc = place.xy / view.shown.yz * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
-            let v = -normalize((view.before * vec4f(ndc, -1.0, 0.0)).xyz);
             hdr += textureLoad(albedo, pixel, 0).rgb * textureLoad(indirect, pixel, 0).rgb
-                + textureLoad(gloss, pixel, 0).rgb * lobe(surface.rgb, surface.a, max(dot(n, v), 0.0));
+                + textureLoad(specular, pixel, 0).rgb;
         }
     }
     let c = saturate(hdr);
@@ -176,21 +166,17 @@ export class Renderer {
       pass.drawIndexed(count);
     }
     pass.end();
-    // World from view-space rays: columns scaled by the slopes of the picture's edges.
-    const [x, y, z] = rotation;
-    const slope = [1 / p[0][0], 1 / p[1][1]];
-    this.rays = [...x.map((n) => n * slope[0]), 0, ...y.map((n) => n * slope[1]), 0, ...z, 0, 0, 0, 0, 1];
     this.eye = eye;
   }
 
   // Records the picture into `target`; left of pixel `split` without the pass's light.
   show(encoder, target, pass, split) {
-    const shown = [...this.before, ...this.rays, ...this.eye, 0, ...pass.sky, 0, split, ...this.size, 0];
+    const shown = [...this.before, ...this.before, ...this.eye, 0, ...pass.sky, 0, split, ...this.size, 0];
     this.device.queue.writeBuffer(this.shown, 0, new Float32Array(shown));
-    const { albedo, emissive, specular, normal } = this.targets;
+    const { albedo, emissive } = this.targets;
     this.groups ??= new Map();
     if (!this.groups.has(pass)) {
-      const bound = [albedo, emissive, specular, normal, this.depth, pass.output, pass.gloss];
+      const bound = [albedo, emissive, this.depth, pass.output, pass.specular];
       this.groups.set(pass, this.group(this.composite, 1, bound));
     }
     const screen = encoder.beginRenderPass({

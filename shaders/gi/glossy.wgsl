@@ -2,19 +2,15 @@
 //#import lib/environment.wgsl
 //#import gi/outgoing.wgsl
 
-// Specular light of sky and bounces: the split sum's share of what rays into the lobe have found,
-// where the method sends some; smooth surfaces then ask the screen, too, which is sharper. Without
-// such rays: of what one ray along the mirrored direction finds on the screen, blurred by the
-// lobe's width there, and where it finds nothing of the light that the surface's own side receives,
-// mixed with the picture's colour where the ray leaves it, or the surroundings where only they are
-// there.
+// Specular light of sky and bounces for methods that send no rays into lobes: the split sum's share
+// of what one ray along the mirrored direction finds on the screen, blurred by the lobe's width
+// there, and where it finds nothing of the light that the surface's own side receives, mixed with
+// the picture's colour where the ray leaves it, or the surroundings where only they are there.
 
 @group(1) @binding(0) var lit_picture: texture_2d<f32>;
 @group(1) @binding(1) var blurred: sampler;
 @group(1) @binding(2) var indirect_specular: texture_storage_2d<rgba16float, write>;
 @group(2) @binding(0) var environment_picture: texture_2d<f32>;
-// What rays into lobes have found (`Technique::gloss`); one texel where the method sends none.
-@group(2) @binding(1) var found_gloss: texture_2d<f32>;
 
 // The largest finite half: brighter light is held there instead of becoming infinite.
 const HALF_MAX: f32 = 65504.0;
@@ -32,10 +28,6 @@ const NEXT_PIXEL = 1.5;
 const FAR = 1e9;
 // Level of the lit picture (pixels: 2^(level + 1)) that guesses what lies beyond its border.
 const BORDER_LEVEL = 4.0;
-// Roughness up to which the screen is asked where rays have found something, and from which on it
-// is not: their cells are too coarse for a mirror, and one ray along one direction is not a lobe.
-const SHARP = 0.1;
-const BLUNT = 0.3;
 
 // A ray on the screen: pixel position and 1/distance are linear between its ends.
 struct Track {
@@ -164,13 +156,6 @@ fn reflected(pixel: vec2u, depth: f32, n: vec3f, roughness: f32) -> vec3f {
     let p = world_position(frame, pixel, depth);
     let r = reflect(-to_eye(frame, pixel), n);
     let z = linear_depth(frame, depth);
-    if all(textureDimensions(found_gloss) == frame.size) {
-        let lobe = textureLoad(found_gloss, pixel, 0).rgb;
-        let sharp = 1.0 - smoothstep(SHARP, BLUNT, roughness);
-        if sharp <= 0.0 { return lobe; }
-        let hit = on_picture(p, n, r, z, roughness);
-        return mix(lobe, hit.radiance, sharp * hit.trust);
-    }
     let around = textureLoad(indirect, pixel, 0).rgb;
     // A lobe that fills the hemisphere shows what the surface's own side receives, and no ray tells
     // it better.

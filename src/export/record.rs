@@ -2,7 +2,7 @@
 
 use super::ExportError;
 use super::Target;
-use crate::gi::{CameraMatrices, Inputs, Lights, Method, Rays, method};
+use crate::gi::{CameraMatrices, Inputs, Lights, Method, Outputs, Rays, method};
 use crate::gpu::bind::Bound;
 use crate::gpu::tape::{Dispatch, Running};
 use crate::gpu::{readback, timing::Recorder};
@@ -13,7 +13,7 @@ use crate::scene::{Scene, upload::SceneGpu};
 pub(super) const FRAMES: usize = 64;
 
 /// Name, format and role of each texture of the host's.
-const HOST: [(&str, wgpu::TextureFormat, &str); 8] = [
+const HOST: [(&str, wgpu::TextureFormat, &str); 9] = [
     ("depth", wgpu::TextureFormat::R32Float, "input"),
     ("normal", wgpu::TextureFormat::Rg16Float, "input"),
     ("albedo", wgpu::TextureFormat::Rgba8UnormSrgb, "input"),
@@ -22,6 +22,7 @@ const HOST: [(&str, wgpu::TextureFormat, &str); 8] = [
     ("motion", wgpu::TextureFormat::Rg16Float, "input"),
     ("specular", wgpu::TextureFormat::Rgba8Unorm, "input"),
     ("output", wgpu::TextureFormat::Rgba16Float, "output"),
+    ("specular_output", wgpu::TextureFormat::Rgba16Float, "output"),
 ];
 
 /// A dispatch, and of each uniform that it binds what the frame wrote there.
@@ -59,7 +60,8 @@ pub(super) fn record(
     };
     let textures = HOST.map(|(_, format, _)| host_texture(device, size, format));
     let views = textures.each_ref().map(|t| t.create_view(&Default::default()));
-    let [depth, normal, albedo, emissive, direct, motion, specular, output] = &views;
+    let [depth, normal, albedo, emissive, direct, motion, specular, output, specular_output] = &views;
+    let outputs = Outputs { light: output, specular: Some(specular_output) };
     let inputs = Inputs {
         albedo: Some(albedo),
         emissive: Some(emissive),
@@ -81,7 +83,7 @@ pub(super) fn record(
     for _ in 0..FRAMES {
         // What is recorded is never submitted, so that resources stay as they begin.
         let mut encoder = device.create_command_encoder(&Default::default());
-        technique.record(&mut Recorder::new(&mut encoder), queue, &inputs, output)?;
+        technique.record(&mut Recorder::new(&mut encoder), queue, &inputs, outputs)?;
         if let Some(instead) = technique.instead() {
             return Err(ExportError::Instead { method: method.name(), why: instead.why.to_owned() });
         }

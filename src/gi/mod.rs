@@ -45,7 +45,7 @@ pub(crate) mod world;
 
 pub use interface::{
     AlbedoEncoding, CameraMatrices, Conventions, Depth, Forward, GiError, Inputs, Jitter, LightScale, Lights,
-    MotionJitter, MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Rays, technique,
+    MotionJitter, MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Outputs, Rays, technique,
 };
 pub use method::{Method, fitted, name};
 pub use neural::{cpu, features, memory, pack, pass, reconstruct};

@@ -7,7 +7,7 @@ use super::composite::Backdrop;
 use super::cull::DrawnCount;
 use super::direct::DirectInputs;
 use super::gbuffer::GbufferInputs;
-use super::glossy::GlossyInputs;
+use super::glossy::{GlossyInputs, GlossyPass, GlossyPicture};
 use super::handed::{clear, gi_inputs};
 use super::light_choice::LightOptions;
 use super::lights::LightLists;
@@ -19,7 +19,7 @@ use super::taa::TaaPass;
 use super::targets::{Target, Targets};
 use super::view::{FrameUniform, View};
 use crate::gi::{
-    self,
+    self, Outputs,
     features::FeatureSet,
     method, pack,
     technique::{self, Technique},
@@ -272,7 +272,7 @@ impl Renderer {
         let mut rows = self.targets.bytes();
         rows.extend(self.lighting.iter().flat_map(|l| l.maps.bytes()));
         rows.extend(self.lighting.iter().map(|l| ("lights", l.lists.buffer.size())));
-        rows.push(("gi.lit", self.picture.glossy.bytes()));
+        rows.push(("gi.lit", self.picture.glossy.as_ref().map_or(0, GlossyPicture::bytes)));
         rows.push(("moved", self.moved.bytes()));
         rows.push(("deform", self.passes.deform.bytes()));
         rows.extend(self.taa.iter().flat_map(TaaPass::bytes));
@@ -356,13 +356,15 @@ impl Renderer {
         }
         match &mut self.indirect {
             Some(indirect) => {
-                indirect.record(recorder, queue, &inputs, &self.targets.indirect.view)?;
-                let lit = GlossyInputs {
-                    picture: &self.picture.glossy,
-                    sky: &scene.environment_view,
-                    found: indirect.gloss(),
-                };
-                self.passes.glossy.record(recorder, lit, size);
+                let Targets { indirect: light, indirect_specular: specular, .. } = &self.targets;
+                let outputs = Outputs { light: &light.view, specular: Some(&specular.view) };
+                indirect.record(recorder, queue, &inputs, outputs)?;
+                if !indirect.shows_lobes() {
+                    let glossy = self.passes.glossy.get_or_insert_with(|| GlossyPass::new(&self.device));
+                    let made = || glossy.picture(&self.device, &self.frame, &self.targets);
+                    let picture = self.picture.glossy.get_or_insert_with(made);
+                    glossy.record(recorder, GlossyInputs { picture, sky: &scene.environment_view }, size);
+                }
             }
             None => clear(recorder, &self.targets),
         }

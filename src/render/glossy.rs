@@ -1,9 +1,7 @@
-//! Specular light of sky and bounces: the split sum's share of what one ray along the mirrored
-//! direction finds on the screen, blurred by the lobe's width.
-//!
-//! Where the method has sent rays into lobes
-//! ([`Technique::gloss`](crate::gi::technique::Technique::gloss)), what they found is shown, and
-//! the screen is asked by smooth surfaces only, for sharpness.
+//! Specular light of sky and bounces where the method sends no rays into lobes
+//! ([`Technique::shows_lobes`](crate::gi::technique::Technique::shows_lobes)): the split sum's
+//! share of what one ray along the mirrored direction finds on the screen, blurred by the lobe's
+//! width.
 //!
 //! `gi.lit` makes a half-size picture of the light that all surfaces send out, and blurs it in
 //! steps of two; `gi.glossy` marches one ray a pixel through the depth texture (16 steps, 48 for
@@ -32,8 +30,6 @@ pub struct GlossyPass {
     trace: wgpu::BindGroupLayout,
     sky: Binder,
     sampler: wgpu::Sampler,
-    /// One texel: bound where the method has sent no rays into lobes.
-    nothing: wgpu::TextureView,
 }
 
 /// The lit picture and all bindings of one set of targets.
@@ -54,8 +50,6 @@ pub struct GlossyInputs<'a> {
     pub picture: &'a GlossyPicture,
     /// Radiance of the surroundings, for rays that leave the picture.
     pub sky: &'a wgpu::TextureView,
-    /// [`Technique::gloss`](crate::gi::technique::Technique::gloss).
-    pub found: Option<&'a wgpu::TextureView>,
 }
 
 impl GlossyPicture {
@@ -74,7 +68,7 @@ impl GlossyPass {
         let surfaces = layout(&[UNIFORM, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD]);
         let level = layout(&[LOAD, STORE_HALF]);
         let trace = layout(&[SAMPLE, SAMPLER, STORE_HALF]);
-        let sky = Binder::new(device, "gi.glossy", &[LOAD, LOAD]);
+        let sky = Binder::new(device, "gi.glossy", &[LOAD]);
         Self {
             lit: tool::compute(device, "gi.lit", "lit", &[&surfaces, &level]),
             halve: tool::compute(device, "gi.lit", "halve", &[&surfaces, &level]),
@@ -83,18 +77,6 @@ impl GlossyPass {
             level,
             trace,
             sky,
-            nothing: device
-                .create_texture(&wgpu::TextureDescriptor {
-                    label: Some("gi.nothing"),
-                    size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
-                    mip_level_count: 1,
-                    sample_count: 1,
-                    dimension: wgpu::TextureDimension::D2,
-                    format: wgpu::TextureFormat::Rgba16Float,
-                    usage: wgpu::TextureUsages::TEXTURE_BINDING,
-                    view_formats: &[],
-                })
-                .create_view(&Default::default()),
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("gi.glossy"),
                 mag_filter: wgpu::FilterMode::Linear,
@@ -150,7 +132,7 @@ impl GlossyPass {
     /// Records passes `gi.lit` and `gi.glossy` for targets of `size` pixels.
     pub fn record(&mut self, recorder: &mut Recorder<'_>, inputs: GlossyInputs<'_>, size: [u32; 2]) {
         let picture = inputs.picture;
-        let sky = self.sky.group([inputs.sky.into(), inputs.found.unwrap_or(&self.nothing).into()]);
+        let sky = self.sky.group([inputs.sky.into()]);
         recorder.compute("gi.lit", |pass| {
             pass.set_bind_group(0, &picture.surfaces, &[]);
             for (i, (group, level)) in picture.levels.iter().enumerate() {

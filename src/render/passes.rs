@@ -17,7 +17,8 @@ use super::targets::Targets;
 pub(super) struct Picture {
     pub lights: wgpu::BindGroup,
     pub direct: wgpu::BindGroup,
-    pub glossy: GlossyPicture,
+    /// Once a method draws that shows no lobes.
+    pub glossy: Option<GlossyPicture>,
     pub composite: wgpu::BindGroup,
     pub blended: Option<wgpu::BindGroup>,
 }
@@ -29,7 +30,8 @@ pub(super) struct Passes {
     pub gbuffer: GbufferPass,
     pub lights: LightsPass,
     pub direct: DirectPass,
-    pub glossy: GlossyPass,
+    /// The same.
+    pub glossy: Option<GlossyPass>,
     pub composite: CompositePass,
     /// `None` where what blends is drawn by lot.
     pub blended: Option<BlendedPass>,
@@ -45,7 +47,7 @@ impl Passes {
             gbuffer: GbufferPass::new(device, frame, options.blending),
             lights: LightsPass::new(device),
             direct,
-            glossy: GlossyPass::new(device),
+            glossy: None,
             composite: CompositePass::new(device),
             blended,
         }
@@ -65,7 +67,7 @@ impl Passes {
         Picture {
             lights: self.lights.picture(device, frame, targets),
             direct: self.direct.picture(device, frame, targets),
-            glossy: self.glossy.picture(device, frame, targets),
+            glossy: None,
             composite: self.composite.picture(device, frame, targets, picture),
             blended: self.blended.as_ref().map(|b| b.picture(device, frame, targets)),
         }

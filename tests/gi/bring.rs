@@ -3,6 +3,7 @@
 
 use crate::common;
 use crate::edges::{FLOOR, LIGHT, PLATE, POLE, SIZE, WALL, bleeding, room};
+use crate::glossy::metal;
 use crate::shot::{Hit, Shot, output, texture_with, view};
 use bouncelight::gi::cells::{self, CellsPass, NO_PIXEL};
 use bouncelight::gi::cpu::oct_decode;
@@ -35,15 +36,20 @@ fn choose(gpu: &Gpu, shot: &Shot) -> Vec<Option<usize>> {
 
 /// Chooses cells, asks `light` for the light of each (by its pixel) and brings it back.
 fn bring(gpu: &Gpu, shot: &Shot, light: impl Fn(usize) -> [Channel; 3]) -> Vec<[f32; 3]> {
-    bring_both(gpu, shot, light, |_| [0.0; 4]).0
+    bring_both(gpu, shot, light, |_| [0.0; 4], [0; 4]).0
 }
 
-/// As [`bring`], with what lobes show (rgb; a: 1, or 0 without a lobe).
+/// A metal that reflects everything, of roughness 0.9; `env_brdf` of it is 1 from everywhere.
+const WHITE_METAL: [u8; 4] = [255, 255, 255, 230];
+
+/// As [`bring`], with what lobes show (rgb; a: 1, or 0 without a lobe) and what surfaces reflect
+/// (F0 and roughness), all the same.
 fn bring_both(
     gpu: &Gpu,
     shot: &Shot,
     light: impl Fn(usize) -> [Channel; 3],
     gloss: impl Fn(usize) -> Channel,
+    surface: [u8; 4],
 ) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
     let (device, queue) = (&gpu.device, &gpu.queue);
     let chosen = choose(gpu, shot);
@@ -57,7 +63,7 @@ fn bring_both(
     let (rows, lobes) = (buffer(bytemuck::cast_slice(&rows)), buffer(bytemuck::cast_slice(&lobes)));
     assert_eq!(rows.size(), cells::light_bytes(shot.size));
     let targets = [output(device, shot.size), output(device, shot.size)];
-    let [light, gloss] = [view(&targets[0]), view(&targets[1])];
+    let [light, reflected] = [view(&targets[0]), view(&targets[1])];
     let mut group = InputGroup::new(device);
     let cells = CellsPass::new(device, &group, shot.size);
     let mut pass = BringPass::new(device, &group);
@@ -67,14 +73,15 @@ fn bring_both(
     cells.record(&mut recorder, &bound);
     // Nothing is smooth.
     let mirrored = buffer(&vec![0; 8 * (shot.size[0] * shot.size[1]) as usize]);
-    let specular = view(&texture_with(device, queue, [1, 1], wgpu::TextureFormat::Rgba8Unorm, &[0; 4]));
+    let texels = surface.repeat((shot.size[0] * shot.size[1]) as usize);
+    let specular = view(&texture_with(device, queue, shot.size, wgpu::TextureFormat::Rgba8Unorm, &texels));
     let brought = Brought {
         light: &rows,
         glosses: &lobes,
         specular: &specular,
         mirrored: &mirrored,
         output: &light,
-        gloss: &gloss,
+        specular_output: &reflected,
     };
     pass.record(&mut recorder, &bound, &cells, brought);
     queue.submit([encoder.finish()]);
@@ -240,7 +247,7 @@ fn what_lobes_show_stays_on_surfaces_with_lobes() {
     let (shot, surfaces) = the_room();
     let shows = |surface: usize| 1.0 + surface as f32;
     let lobe = |pixel: usize| if surfaces[pixel] == WALL { [0.0; 4] } else { [shows(surfaces[pixel]), 0.0, 0.0, 1.0] };
-    let (_, gloss) = bring_both(&gpu, &shot, |_| even(0.25), lobe);
+    let (_, gloss) = bring_both(&gpu, &shot, |_| even(0.25), lobe, WHITE_METAL);
     let off = |expected: &dyn Fn(usize) -> f32| {
         let wrong = (0..gloss.len()).filter(|i| [FLOOR, PLATE].contains(&surfaces[*i]));
         let wrong = wrong.map(|i| (gloss[i][0] - expected(surfaces[i])).abs() > 0.05);
@@ -252,6 +259,19 @@ fn what_lobes_show_stays_on_surfaces_with_lobes() {
     // Negative control: one lobe for all.
     assert!(off(&|_| shows(PLATE)) > 0.5);
     // Far from any lobe the light of the surface's own side stands in.
-    let (_, gloss) = bring_both(&gpu, &shot, |_| even(0.25), |_| [0.0; 4]);
+    let (_, gloss) = bring_both(&gpu, &shot, |_| even(0.25), |_| [0.0; 4], WHITE_METAL);
     assert!((0..gloss.len()).filter(|i| surfaces[*i] == WALL).all(|i| (gloss[i][0] - 0.25).abs() < 1e-3));
+    // Of half the reflectance as much as an integral over visible normals says from anywhere;
+    // without reflectance nothing.
+    let (_, grey) = bring_both(&gpu, &shot, |_| even(0.25), lobe, [128, 128, 128, 230]);
+    let shares: Vec<f32> =
+        (0..grey.len()).filter(|i| surfaces[*i] == FLOOR).map(|i| grey[i][0] / shows(FLOOR)).collect();
+    let [least, most] = [shares.iter().copied().fold(1.0, f32::min), shares.iter().copied().fold(0.0, f32::max)];
+    let known: Vec<f32> =
+        (1..=20).map(|c| metal(128.0 / 255.0, 230.0 / 255.0, f64::from(c) / 20.0, true) as f32).collect();
+    let [lowest, highest] = [known.iter().copied().fold(1.0, f32::min), known.iter().copied().fold(0.0, f32::max)];
+    assert!(least > lowest - 0.02 && most < highest + 0.02, "{least} to {most}, not {lowest} to {highest}");
+    assert!(highest < 0.9, "the white metal would do as well");
+    let (_, black) = bring_both(&gpu, &shot, |_| even(0.25), lobe, [0, 0, 0, 230]);
+    assert!(black.iter().all(|c| *c == [0.0; 3]));
 }

@@ -47,7 +47,7 @@ fn shine(
     let mut recorder = Recorder::new(&mut encoder);
     renderer.record(&mut recorder, queue, &uploaded, &View::new(camera, size, [0.0; 2])).expect("draws");
     give(gpu, &mut recorder, &given, &renderer.targets().indirect.view);
-    let inputs = GlossyInputs { picture: &picture, sky: &uploaded.environment_view, found: None };
+    let inputs = GlossyInputs { picture: &picture, sky: &uploaded.environment_view };
     pass.record(&mut recorder, inputs, size);
     queue.submit([encoder.finish()]);
     (read_light(gpu, &renderer.targets().indirect_specular.texture), color)
@@ -96,7 +96,7 @@ fn even_light_gives_exactly_the_split_sum() {
 /// What a GGX metal of reflectance `f0` shows of even light at the cosine `c`, the light that
 /// single scattering loses given back (Kulla and Conty 2017) or not: numerical integrals over
 /// visible normals (Dupuy and Benyoub 2023), height-correlated Smith.
-fn metal(f0: f64, roughness: f64, c: f64, again: bool) -> f64 {
+pub fn metal(f0: f64, roughness: f64, c: f64, again: bool) -> f64 {
     let single = |c: f64| {
         let (alpha, steps) = (roughness * roughness, 48);
         let a2 = alpha * alpha;

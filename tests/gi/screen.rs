@@ -114,7 +114,8 @@ fn screen_light(gpu: &Gpu, shot: &Shot, options: SsgiOptions) -> Vec<[f32; 3]> {
     let target = output(&gpu.device, shot.size);
     let mut gi = SsgiGi::new(&gpu.device, options);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    gi.record(&mut Recorder::new(&mut encoder), &gpu.queue, &textures.inputs(shot), &view(&target)).expect("records");
+    gi.record(&mut Recorder::new(&mut encoder), &gpu.queue, &textures.inputs(shot), (&view(&target)).into())
+        .expect("records");
     gpu.queue.submit([encoder.finish()]);
     read_light(gpu, &target)
 }

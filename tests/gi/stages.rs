@@ -22,7 +22,8 @@ pub fn ambient(gpu: &Gpu, shot: &Shot) -> (Exposure, Vec<[f32; 3]>) {
     let target = output(&gpu.device, shot.size);
     let mut gi = AmbientGi::new(&gpu.device);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    gi.record(&mut Recorder::new(&mut encoder), &gpu.queue, &textures.inputs(shot), &view(&target)).expect("records");
+    gi.record(&mut Recorder::new(&mut encoder), &gpu.queue, &textures.inputs(shot), (&view(&target)).into())
+        .expect("records");
     gpu.queue.submit([encoder.finish()]);
     let exposure = exposure::read(&gpu.device, &gpu.queue, gi.exposure_buffer()).expect("readable");
     (exposure, read_light(gpu, &target))

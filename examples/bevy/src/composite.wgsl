@@ -14,8 +14,8 @@ struct Camera {
 @group(0) @binding(0) var gbuffer: texture_2d<u32>;
 // E/π, W/(m²·sr).
 @group(0) @binding(1) var light: texture_2d<f32>;
-// What lobes show, W/(m²·sr).
-@group(0) @binding(2) var gloss: texture_2d<f32>;
+// What lobes reflect, W/(m²·sr).
+@group(0) @binding(2) var reflected: texture_2d<f32>;
 @group(0) @binding(3) var normals: texture_2d<f32>;
 @group(0) @binding(4) var<uniform> camera: Camera;
 
@@ -57,6 +57,5 @@ fn composite(@builtin(position) at: vec4f) -> @location(0) vec4f {
     // What the lobe reflects, the diffuse part lacks.
     let known = camera.back.w;
     let diffuse = s.base * (1.0 - s.metallic) * (1.0 - known * diffuse_loss(s.f0, s.roughness, n_v));
-    let lobe = known * env_brdf(mix(vec3f(s.f0), s.base, s.metallic), s.roughness, n_v);
-    return vec4f(diffuse * textureLoad(light, pixel, 0).rgb + lobe * textureLoad(gloss, pixel, 0).rgb, 0.0);
+    return vec4f(diffuse * textureLoad(light, pixel, 0).rgb + known * textureLoad(reflected, pixel, 0).rgb, 0.0);
 }

@@ -10,7 +10,8 @@ use bevy::render::camera::{ExtractedCamera, TemporalJitter};
 use bevy::render::renderer::{RenderContext, RenderDevice, RenderQueue, ViewQuery};
 use bevy::render::view::{ExtractedView, ViewTarget};
 use bouncelight::gi::{
-    CameraMatrices, Conventions, Inputs, Method, MotionSense, NormalEncoding, NormalRange, View, World, WorldOptions,
+    CameraMatrices, Conventions, Inputs, Method, MotionSense, NormalEncoding, NormalRange, Outputs, View, World,
+    WorldOptions,
 };
 use bouncelight::wgpu;
 use std::sync::{Mutex, PoisonError};
@@ -36,8 +37,9 @@ struct Camera {
     size: [u32; 2],
     /// Nothing where it could not be made.
     pass: Option<Mutex<Pass>>,
-    /// E/π.
+    /// E/π, and what lobes reflect.
     light: wgpu::TextureView,
+    reflected: wgpu::TextureView,
     /// F0 and roughness.
     specular: wgpu::TextureView,
     /// `Camera` of `composite.wgsl`.
@@ -119,8 +121,8 @@ pub(crate) fn prepare(
             });
             texture.create_view(&Default::default())
         };
-        let light =
-            texture("bouncelight.light", wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::STORAGE_BINDING);
+        let [light, reflected] = ["bouncelight.light", "bouncelight.reflected"]
+            .map(|label| texture(label, wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::STORAGE_BINDING));
         let specular = texture("bouncelight.specular", SPECULAR, wgpu::TextureUsages::RENDER_ATTACHMENT);
         let matrices = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("bouncelight.camera"),
@@ -139,7 +141,7 @@ pub(crate) fn prepare(
                 }
             },
         };
-        views.cameras.insert(entity, Camera { size, pass: made, light, specular, matrices, checked: false });
+        views.cameras.insert(entity, Camera { size, pass: made, light, reflected, specular, matrices, checked: false });
     }
 }
 
@@ -212,16 +214,17 @@ pub(crate) fn light(
     };
     let encoder = context.command_encoder();
     draw(encoder, first, &group(first, &[texture(gbuffer)]), to_specular, 0.0);
-    if let Err(e) = pass.view.record(encoder, &lit.world, &inputs, &camera.light) {
+    let outputs = Outputs { light: &camera.light, specular: Some(&camera.reflected) };
+    if let Err(e) = pass.view.record(encoder, &lit.world, &inputs, outputs) {
         error_once!("{e}");
         return;
     }
-    let gloss = pass.view.gloss();
-    queue.write_buffer(&camera.matrices, 0, bytemuck::cast_slice(&matrices(&inputs.camera, gloss.is_some())));
+    let known = matrices(&inputs.camera, pass.view.shows_lobes());
+    queue.write_buffer(&camera.matrices, 0, bytemuck::cast_slice(&known));
     let bound = [
         texture(gbuffer),
         texture(&camera.light),
-        texture(gloss.unwrap_or(&camera.light)),
+        texture(&camera.reflected),
         texture(inputs.normal),
         camera.matrices.as_entire_binding(),
     ];
@@ -253,10 +256,10 @@ fn draw(
 }
 
 /// `Camera` of `composite.wgsl`.
-fn matrices(camera: &CameraMatrices, gloss: bool) -> [[f32; 4]; 3] {
+fn matrices(camera: &CameraMatrices, shows_lobes: bool) -> [[f32; 4]; 3] {
     let (view, p) = (Mat4::from_cols_array_2d(&camera.view_from_world), camera.clip_from_view);
     let axis = |row: usize, over: f32, with: f32| (view.row(row).truncate() / over).extend(with).to_array();
-    [axis(0, p[0][0], p[2][0]), axis(1, p[1][1], p[2][1]), axis(2, 1.0, f32::from(u8::from(gloss)))]
+    [axis(0, p[0][0], p[2][0]), axis(1, p[1][1], p[2][1]), axis(2, 1.0, f32::from(u8::from(shows_lobes)))]
 }
 
 const SPECULAR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

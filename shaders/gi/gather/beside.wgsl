@@ -80,8 +80,9 @@ struct Plane {
 
 // Half at the rim: then each of the sixteen places of the rays' lattice counts the same.
 fn at_rim(step: vec2i, radius: i32) -> f32 {
-    let outermost = (abs(step) == vec2i(radius)) & vec2<bool>(radius > 0);
-    return select(1.0, 0.5, outermost.x) * select(1.0, 0.5, outermost.y);
+    if radius == 0 { return 1.0; }
+    let shares = select(vec2f(1.0), vec2f(0.5), abs(step) == vec2i(radius));
+    return shares.x * shares.y;
 }
 
 // How much a neighbour counts in the mean: that it is the same surface, and that as much is near to

@@ -70,15 +70,16 @@ fn gloss_around(id: vec2u, here: Past, plane: Plane) -> vec4f {
     let falls = array<f32, 3>(1.0, aside, select(outer, balanced(aside, outer), stride == 1));
     let grid = vec2i(cell_grid());
     var sum = vec4f(0.0);
-    for (var i = 0; i < 25; i++) {
-        let tap = vec2i(i % 5 - 2, i / 5 - 2);
-        let at = vec2i(id) + stride * tap;
-        if is_beyond(grid, at) { continue; }
-        let there = past_at(index_in(grid, at));
-        if there.frames <= 0.0 { continue; }
-        let same = same_surface(there.x - here.x, plane.side, here.n, there.n, plane.strictness);
-        let w = same * as_rough(here, there.roughness) * falls[abs(tap.x)] * falls[abs(tap.y)];
-        sum += w * there.gloss.a * vec4f(there.gloss.rgb, 1.0);
+    for (var y = -2; y <= 2; y++) {
+        for (var x = -2; x <= 2; x++) {
+            let at = vec2i(id) + stride * vec2i(x, y);
+            if is_beyond(grid, at) { continue; }
+            let there = past_at(index_in(grid, at));
+            if there.frames <= 0.0 || there.gloss.a <= 0.0 { continue; }
+            let same = same_surface(there.x - here.x, plane.side, here.n, there.n, plane.strictness);
+            let w = same * as_rough(here, there.roughness) * falls[abs(x)] * falls[abs(y)] * there.gloss.a;
+            sum += w * vec4f(there.gloss.rgb, 1.0);
+        }
     }
     return sum;
 }

@@ -1,10 +1,11 @@
 //#import gi/inputs.wgsl
 //#import gi/cells.wgsl
+//#import lib/brdf.wgsl
 //#import gi/gather/lobe.wgsl
 
 // Directional light of the cells, and what their lobes show, brought to every pixel: bilinear where
 // the surface goes on, and only from cells of the pixel's own surface where it does not, the light
-// evaluated for the pixel's own normal. All of it in f32. A workgroup reads the cells around its
+// evaluated for the pixel's own normal, what lobes show reflected by the pixel's own lobe. All of it in f32. A workgroup reads the cells around its
 // 16x8 pixels once. The prelude holds CELL_SIDE and the tolerances (gi::gather::bring documents
 // them).
 
@@ -13,7 +14,7 @@
 // What lobes show over `env_brdf`; a: 1, or 0 without a lobe.
 @group(1) @binding(2) var<storage, read> glosses: array<vec4f>;
 @group(1) @binding(3) var output: texture_storage_2d<rgba16float, write>;
-@group(1) @binding(4) var gloss_output: texture_storage_2d<rgba16float, write>;
+@group(1) @binding(4) var specular_output: texture_storage_2d<rgba16float, write>;
 // F0 and roughness; and of smooth pixels what mirror.wgsl has found.
 @group(1) @binding(5) var specular_map: texture_2d<f32>;
 @group(1) @binding(6) var<storage, read> mirrored: array<vec2u>;
@@ -114,6 +115,14 @@ struct Sum {
     gloss: vec4f,
 }
 
+// NORMAL_POWER of `gi::stage::weights`.
+fn sixteenth_power(x: f32) -> f32 {
+    let x2 = x * x;
+    let x4 = x2 * x2;
+    let x8 = x4 * x4;
+    return x8 * x8;
+}
+
 // What one staged cell adds. A point of the same surface weighs 1: of the pixel's plane, less what
 // the cell's normal leans away from its own. The tails are heavy on purpose:
 // where nothing agrees the least bad cell wins by ratio, without a branch and without a division by
@@ -127,7 +136,7 @@ fn tap(here: Surface, at: i32, spatial: f32, least_cosine: f32) -> Sum {
     let off_plane = dot(here.normal - leans[at], found.xyz - here.position) * here.strictness;
     let lorentz = 1.0 + min(off_plane * off_plane, 1e12);
     let cosine = dot(here.normal, normals[at]);
-    let facing = max(pow(max(cosine, 0.0), NORMAL_POWER), NORMAL_FLOOR);
+    let facing = max(sixteenth_power(max(cosine, 0.0)), NORMAL_FLOOR);
     let weight = found.w * spatial * max(facing / (lorentz * lorentz), WEIGHT_FLOOR);
     var direction = here.normal;
     if least_cosine > 0.0 { direction += max(least_cosine - cosine, 0.0) * normals[at]; }
@@ -135,16 +144,17 @@ fn tap(here: Surface, at: i32, spatial: f32, least_cosine: f32) -> Sum {
     return Sum(vec4f(arrives, 1.0) * weight, vec4f(gleams[at].rgb, 1.0) * (gleams[at].a * weight));
 }
 
-// Tent-weighted sum, of `slope`, over the 2 x 2 cells from `base` on for a pixel at `place` (in
-// cells, from the first staged one).
-fn gather(here: Surface, place: vec2f, base: vec2i, slope: f32, least_cosine: f32) -> Sum {
-    var sum = Sum();
-    for (var i = 0; i < 4; i++) {
-        let cell = base + vec2i(i & 1, i >> 1u);
-        let tent = 1.0 - abs(vec2f(cell) - place) * slope;
-        sum = both(sum, tap(here, cell.y * ACROSS + cell.x, tent.x * tent.y, least_cosine));
-    }
-    return sum;
+// Sum over 2 x 2 cells, `at` being the first; x and y: how much columns count and rows.
+fn gather(here: Surface, at: i32, first: vec2f, second: vec2f, least_cosine: f32) -> Sum {
+    let above = both(
+        tap(here, at, first.x * first.y, least_cosine),
+        tap(here, at + 1, second.x * first.y, least_cosine)
+    );
+    let below = both(
+        tap(here, at + ACROSS, first.x * second.y, least_cosine),
+        tap(here, at + ACROSS + 1, second.x * second.y, least_cosine)
+    );
+    return both(above, below);
 }
 
 fn both(a: Sum, b: Sum) -> Sum {
@@ -159,9 +169,9 @@ struct Brought {
 
 // Where no cell has a lobe but the pixel may, it shows the light of its side.
 fn mean(sum: Sum) -> Brought {
-    let e = sum.light.rgb / max(sum.light.a, 1e-30);
+    let e = sum.light.rgb * (1.0 / max(sum.light.a, 1e-30));
     if sum.gloss.a <= 1e-3 * sum.light.a { return Brought(e, e); }
-    return Brought(e, sum.gloss.rgb / sum.gloss.a);
+    return Brought(e, sum.gloss.rgb * (1.0 / sum.gloss.a));
 }
 
 // Pixels of the workgroup whose four cells lie on other surfaces, and what these say: such pixels
@@ -178,7 +188,11 @@ fn quarter(at: u32, part: u32, corner: vec2i, first: vec2i) -> Sum {
     let pixel = pixel_of(further[at], corner);
     let place = place_of(pixel, first);
     let base = vec2i(floor(place)) - 1 + 2 * vec2i(i32(part & 1u), i32(part >> 1u));
-    return gather(surface_of(pixel, distance_at(pixel)), place, base, 0.5, LEAST_COSINE);
+    // A tent twice as wide as that of bilinear weights.
+    let left = 1.0 - 0.5 * abs(place - vec2f(base));
+    let right = 1.0 - 0.5 * abs(place - vec2f(base + 1));
+    let here = surface_of(pixel, distance_at(pixel));
+    return gather(here, base.y * ACROSS + base.x, left, right, LEAST_COSINE);
 }
 
 // Near and far blended so that no seam shows.
@@ -188,7 +202,8 @@ fn answer_further(at: u32, corner: vec2i, i: u32) {
     let close = mean(near);
     let share = near.light.a / TRUST;
     let blended = Brought(mix(far.light, close.light, share), mix(far.gloss, close.gloss, share));
-    answer(pixel_of(further[at], corner), blended);
+    let pixel = pixel_of(further[at], corner);
+    answer(pixel, surface_of(pixel, distance_at(pixel)), blended);
 }
 
 fn pixel_of(index: u32, corner: vec2i) -> vec2i {
@@ -198,7 +213,7 @@ fn pixel_of(index: u32, corner: vec2i) -> vec2i {
 // Where a pixel lies in cells, from the first staged one. A cell counts as lying at its middle,
 // whichever pixel stands for it.
 fn place_of(pixel: vec2i, first: vec2i) -> vec2f {
-    return (vec2f(pixel) - f32(CELL_SIDE / 2)) / f32(CELL_SIDE) - vec2f(first);
+    return (vec2f(pixel) - f32(CELL_SIDE / 2)) * (1.0 / f32(CELL_SIDE)) - vec2f(first);
 }
 
 // What cells say that a lobe shows, and for the share `own` what the pixel's rays do, if there are
@@ -209,12 +224,15 @@ fn sharper(gloss: vec3f, pixel: u32, own: f32) -> vec3f {
     return mix(gloss, found.rgb, select(0.0, own, found.a > 0.0));
 }
 
-fn answer(pixel: vec2i, brought: Brought) {
+fn answer(pixel: vec2i, here: Surface, brought: Brought) {
     var gloss = brought.gloss;
-    let own = mirrors(textureLoad(specular_map, pixel, 0));
+    let surface = textureLoad(specular_map, pixel, 0);
+    let own = mirrors(surface);
     if own > 0.0 { gloss = sharper(gloss, u32(pixel.y) * params.size.x + u32(pixel.x), own); }
+    let cosine = -dot(here.normal, here.position) * inverseSqrt(dot(here.position, here.position));
+    let reflected = env_brdf(surface.rgb, surface.a, cosine) * gloss;
     textureStore(output, pixel, vec4f(min(brought.light, vec3f(LARGEST)), 1.0));
-    textureStore(gloss_output, pixel, vec4f(min(gloss, vec3f(LARGEST)), 1.0));
+    textureStore(specular_output, pixel, vec4f(min(reflected, vec3f(LARGEST)), 1.0));
 }
 
 @compute @workgroup_size(WIDE, HIGH)
@@ -235,16 +253,19 @@ fn bring(
         let z = distance_at(pixel);
         if z > 0.0 {
             let place = place_of(pixel, first);
-            let near = gather(surface_of(pixel, z), place, vec2i(floor(place)), 1.0, 0.0);
+            let here = surface_of(pixel, z);
+            let base = floor(place);
+            let right = place - base;
+            let near = gather(here, i32(base.y) * ACROSS + i32(base.x), 1.0 - right, right, 0.0);
             if near.light.a >= TRUST {
-                answer(pixel, mean(near));
+                answer(pixel, here, mean(near));
             } else {
                 nearby[index] = near;
                 further[atomicAdd(&further_noted, 1u)] = index;
             }
         } else {
             textureStore(output, pixel, vec4f(vec3f(0.0), 1.0));
-            textureStore(gloss_output, pixel, vec4f(vec3f(0.0), 1.0));
+            textureStore(specular_output, pixel, vec4f(vec3f(0.0), 1.0));
         }
     }
     workgroupBarrier();

@@ -14,5 +14,8 @@ fn has_lobe(surface: vec4f) -> bool {
 // Of a surface (F0, roughness), how much of what its lobe shows is asked for pixel by pixel: all
 // where the lobe changes within a cell, nothing where cells tell it.
 fn mirrors(surface: vec4f) -> f32 {
-    return select(0.0, 1.0 - smoothstep(0.5, 2.0, lobe_cells(surface.a)), has_lobe(surface));
+    if !has_lobe(surface) { return 0.0; }
+    let across = lobe_cells(surface.a);
+    if across >= 2.0 { return 0.0; }
+    return 1.0 - smoothstep(0.5, 2.0, across);
 }

@@ -80,15 +80,18 @@ fn gloss_of(id: vec2u, here: Past, side: vec3f) -> vec4f {
     if lobe_stride(here.roughness) == 1 { return glosses[cell_index(id)]; }
     let strictness = strictness_at(here.x);
     let grid = vec2i(cell_grid());
+    let first = max(vec2i(id) - 1, vec2i(0));
+    let last = min(vec2i(id) + 1, grid - 1);
     var sum = vec4f(0.0);
-    for (var i = 0; i < 9; i++) {
-        let step = vec2i(i % 3 - 1, i / 3 - 1);
-        let at = vec2i(id) + step;
-        if is_beyond(grid, at) { continue; }
-        let there = past_at(index_in(grid, at));
-        if there.frames <= 0.0 { continue; }
-        let same = same_surface(there.x - here.x, side, here.n, there.n, strictness) * as_rough(here, there.roughness);
-        sum += same / f32((1 + abs(step.x)) * (1 + abs(step.y))) * glosses[index_in(grid, at)];
+    for (var y = first.y; y <= last.y; y++) {
+        let row = select(0.5, 1.0, y == i32(id.y));
+        for (var x = first.x; x <= last.x; x++) {
+            let at = index_in(grid, vec2i(x, y));
+            let there = past_at(at);
+            if there.frames <= 0.0 { continue; }
+            let same = same_surface(there.x - here.x, side, here.n, there.n, strictness);
+            sum += same * as_rough(here, there.roughness) * select(0.5, 1.0, x == i32(id.x)) * row * glosses[at];
+        }
     }
     return sum;
 }
@@ -116,28 +119,23 @@ fn stage(first: vec2i, thread: u32) {
     }
 }
 
-// Cell that tap `i` of 25 asks, NO_CELL outside the picture.
-fn tap_at(grid: vec2i, id: vec2u, i: i32) -> u32 {
-    let at = vec2i(id) + SMOOTH_STRIDE * vec2i(i % 5 - 2, i / 5 - 2);
-    if is_beyond(grid, at) { return NO_CELL; }
-    return index_in(grid, at);
-}
-
-const NO_CELL = 0xffffffffu;
-
 // What few rays have brought, averaged over all of the surface that the taps reach.
 fn rare_around(id: vec2u, here: Past, side: vec3f) -> mat3x3f {
     let strictness = strictness_at(here.x);
     let grid = vec2i(cell_grid());
     var sum = mat3x3f();
     var total = 0.0;
-    for (var i = 0; i < 25; i++) {
-        let other = tap_at(grid, id, i);
-        if other == NO_CELL || pasts[5u * other].a <= 0.0 { continue; }
-        let place = pasts[5u * other + 2u];
-        let w = same_surface(place.xyz - here.x, side, here.n, unpack_normal(bitcast<u32>(place.w)), strictness);
-        sum += w * part_of(other, true);
-        total += w;
+    for (var y = -2; y <= 2; y++) {
+        for (var x = -2; x <= 2; x++) {
+            let at = vec2i(id) + SMOOTH_STRIDE * vec2i(x, y);
+            if is_beyond(grid, at) { continue; }
+            let other = index_in(grid, at);
+            if pasts[5u * other].a <= 0.0 { continue; }
+            let place = pasts[5u * other + 2u];
+            let w = same_surface(place.xyz - here.x, side, here.n, unpack_normal(bitcast<u32>(place.w)), strictness);
+            sum += w * part_of(other, true);
+            total += w;
+        }
     }
     return sum * (1.0 / max(total, 1e-30));
 }
@@ -169,24 +167,28 @@ fn smooth_light(
         let strictness = strictness_at(here.x);
         let taps = array<f32, 3>(1.0, 2.0 / 3.0, 1.0 / 6.0);
         var total = 1.0;
-        for (var i = 0; i < 25; i++) {
-            let other = middle + (i / 5 - 2) * STAGED + i % 5 - 2;
-            let there = staged[other];
-            if i == 12 || there.frames <= 0.0 { continue; }
-            any_rare = any_rare || there.rare;
-            let apart = there.luminance - here.luminance;
-            // Two means of the same light differ by their two variances.
-            let noise = 2.0 * exp(share * own.tolerance) * (here.variance + there.variance);
-            let nearer = there.nearness - here.nearness;
-            let unlike = apart * apart / max(noise, 1e-30)
-                + 0.5 * nearer * nearer / (here.chance + there.chance);
-            var w = taps[abs(i % 5 - 2)] * taps[abs(i / 5 - 2)] * exp(-min(unlike, 60.0));
-            w *= same_surface(there.x - here.x, side, here.n, there.n, strictness);
-            if (gather.flags & GATHER_GUIDED) != 0u {
-                w *= kinship(own.far, staged_far[other], share);
+        let allowed = 2.0 * exp(share * own.tolerance);
+        for (var y = -2; y <= 2; y++) {
+            let row = taps[abs(y)];
+            for (var x = -2; x <= 2; x++) {
+                let other = middle + y * STAGED + x;
+                let there = staged[other];
+                if other == middle || there.frames <= 0.0 { continue; }
+                any_rare = any_rare || there.rare;
+                let apart = there.luminance - here.luminance;
+                // Two means of the same light differ by their two variances.
+                let noise = allowed * (here.variance + there.variance);
+                let nearer = there.nearness - here.nearness;
+                let unlike = apart * apart / max(noise, 1e-30)
+                    + 0.5 * nearer * nearer / (here.chance + there.chance);
+                var w = row * taps[abs(x)] * exp(-min(unlike, 60.0));
+                w *= same_surface(there.x - here.x, side, here.n, there.n, strictness);
+                if (gather.flags & GATHER_GUIDED) != 0u {
+                    w *= kinship(own.far, staged_far[other], share);
+                }
+                light_here += w * there.light;
+                total += w;
             }
-            light_here += w * there.light;
-            total += w;
         }
         light_here *= 1.0 / total;
     }

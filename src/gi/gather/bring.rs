@@ -1,5 +1,5 @@
 //! From light of cells to light at every pixel: a joint bilateral filter that evaluates each cell's
-//! light for the pixel's own normal, and takes what lobes show along.
+//! light for the pixel's own normal, and takes what lobes show along, by the split sum.
 //!
 //! The four cells around a pixel are weighted bilinearly times how much their sample lies on the
 //! pixel's own surface: distance from the pixel's plane relative to the pixel's depth, and
@@ -9,7 +9,7 @@
 
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
-use crate::gi::stage::weights::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
+use crate::gi::stage::weights::{NORMAL_FLOOR, PLANE_TOLERANCE, WEIGHT_FLOOR};
 use crate::gpu::bind::{self, Binder, Bound};
 use crate::gpu::binding::{LOAD, READ, STORE_HALF};
 use crate::gpu::{shaders, timing::Recorder};
@@ -30,7 +30,6 @@ pub fn prelude() -> String {
     let mut text = cells::prelude();
     for (name, value) in [
         ("PLANE_TOLERANCE", PLANE_TOLERANCE),
-        ("NORMAL_POWER", NORMAL_POWER),
         ("NORMAL_FLOOR", NORMAL_FLOOR),
         ("WEIGHT_FLOOR", WEIGHT_FLOOR),
         ("TRUST", TRUST),
@@ -59,8 +58,8 @@ pub struct Brought<'a> {
     pub mirrored: &'a wgpu::Buffer,
     /// `Rgba16Float`, storage, full size: E/π.
     pub output: &'a wgpu::TextureView,
-    /// The same: what lobes show over their directional albedo.
-    pub gloss: &'a wgpu::TextureView,
+    /// The same: light that lobes reflect, W/(m²·sr); a smaller texture where nobody asks.
+    pub specular_output: &'a wgpu::TextureView,
 }
 
 impl BringPass {
@@ -80,10 +79,10 @@ impl BringPass {
         cells: &CellsPass,
         brought: Brought<'_>,
     ) {
-        let Brought { light, glosses, specular, mirrored, output, gloss } = brought;
+        let Brought { light, glosses, specular, mirrored, output, specular_output } = brought;
         let [pixels, light, glosses, mirrored] = [cells.pixels(), light, glosses, mirrored].map(Bound::from);
-        let [output, gloss, specular] = [output, gloss, specular].map(Bound::from);
-        let group = self.binder.group([pixels, light, glosses, output, gloss, specular, mirrored]);
+        let [output, reflected, specular] = [output, specular_output, specular].map(Bound::from);
+        let group = self.binder.group([pixels, light, glosses, output, reflected, specular, mirrored]);
         recorder.compute("gi.bring", |pass| {
             inputs.set(pass);
             pass.set_bind_group(1, &group, &[]);

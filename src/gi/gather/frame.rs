@@ -5,7 +5,7 @@ use super::params::{self, Params};
 use super::pass::Groups;
 use super::store::{self, Store};
 use super::{GatherGi, HURRIED, HURRY, ROUNDS_RESTED, ROUNDS_YOUNG, STIR, WIDE_FRAMES, YOUNG, looks};
-use crate::gi::interface::{GiError, Inputs, Rays};
+use crate::gi::interface::{GiError, Inputs, Outputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
 use crate::gi::stage::inputs::{BoundInputs, cells_of};
@@ -225,7 +225,7 @@ impl GatherGi {
         recorder: &mut Recorder<'_>,
         settled: &Settled,
         guidance: Option<Bound>,
-        output: &wgpu::TextureView,
+        outputs: Outputs<'_>,
     ) {
         let guidance = guidance.unwrap_or_else(|| Bound::from(&self.no_guidance));
         self.blur(recorder, settled, guidance.clone());
@@ -241,8 +241,8 @@ impl GatherGi {
             glosses: &store.gleams,
             specular: &settled.specular,
             mirrored: &store.mirrored,
-            output,
-            gloss: &store.gloss,
+            output: outputs.light,
+            specular_output: outputs.specular.unwrap_or(&self.nowhere),
         };
         self.bring.record(recorder, &settled.inputs, &self.cells, brought);
     }

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Of each 2×2 cells one in turn sends a second ray, into its surface's lobe: what lobes show goes
-//! the same way beside the light ([`Technique::gloss`]). Lobes narrower than cells get rays of
+//! the same way beside the light ([`Outputs::specular`]). Lobes narrower than cells get rays of
 //! their own, one a frame of each 2×2 pixels (`gi.mirror`).
 //!
 //! It asks what stands between, so it needs no constant for that. What it knows of a surface that a
@@ -31,7 +31,7 @@ pub use options::{Options, OptionsError};
 pub use params::Params;
 
 use crate::gi::interface::technique::{Memory, Technique};
-use crate::gi::interface::{GiError, Inputs};
+use crate::gi::interface::{GiError, Inputs, Outputs};
 use crate::gi::stage;
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::InputGroup;
@@ -141,6 +141,8 @@ pub struct GatherGi {
     no_motion: wgpu::TextureView,
     /// Bound where the host names no specular reflectance: there is none.
     no_specular: wgpu::TextureView,
+    /// Where what lobes reflect goes if the host does not ask for it: one texel.
+    nowhere: wgpu::TextureView,
     /// Frames since the last cut, rounds since the beginning, and the round of the last frame's
     /// rays.
     frame: u32,
@@ -231,6 +233,7 @@ impl GatherGi {
             no_guidance: unused("gi.no_guidance", GUIDANCE),
             no_motion: stage::absent(device, "gi.no_motion", wgpu::TextureFormat::Rg16Float),
             no_specular: stage::absent(device, "gi.no_specular", wgpu::TextureFormat::Rgba8Unorm),
+            nowhere: stage::nowhere(device, "gi.nowhere"),
             device: device.clone(),
             options,
             inputs,
@@ -268,11 +271,11 @@ impl Technique for GatherGi {
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,
         inputs: &Inputs<'_>,
-        output: &wgpu::TextureView,
+        outputs: Outputs<'_>,
     ) -> Result<(), GiError> {
-        stage::inputs::check_output(output, inputs.size)?;
+        stage::inputs::check_outputs(outputs, inputs.size)?;
         let settled = self.settle(recorder, queue, inputs, false)?;
-        self.filter(recorder, &settled, None, output);
+        self.filter(recorder, &settled, None, outputs);
         Ok(())
     }
 
@@ -288,8 +291,8 @@ impl Technique for GatherGi {
         Ok(true)
     }
 
-    fn gloss(&self) -> Option<&wgpu::TextureView> {
-        Some(&self.store.gloss)
+    fn shows_lobes(&self) -> bool {
+        true
     }
 
     fn memory(&self) -> Option<Memory<'_>> {

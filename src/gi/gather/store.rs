@@ -26,11 +26,9 @@ pub(super) struct Store {
     pub blurred: wgpu::Buffer,
     /// Of cells: what light has changed to.
     pub changes: wgpu::Buffer,
-    /// What rays into lobes of cells found, over neighbours; what lobes show, of cells and of
-    /// pixels.
+    /// What rays into lobes of cells found, over neighbours; what lobes show.
     pub glosses: wgpu::Buffer,
     pub gleams: wgpu::Buffer,
-    pub gloss: wgpu::TextureView,
     /// What rays of smooth pixels have found, four halves a pixel: `mirrored` of `mirror.wgsl`.
     pub mirrored: wgpu::Buffer,
 }
@@ -86,7 +84,6 @@ impl Store {
             changes: buffer("gi.changes", 16 * cells),
             glosses: buffer("gi.glosses", 16 * cells),
             gleams: buffer("gi.gleams", 16 * cells),
-            gloss: gloss(device, size),
             mirrored: buffer("gi.mirrored", mirrored(size)),
         }
     }
@@ -115,30 +112,10 @@ impl Store {
             changes,
             glosses,
             gleams,
-            gloss,
             mirrored,
         } = self;
-        let texels = u64::from(gloss.texture().width()) * u64::from(gloss.texture().height());
         let table = [keys, lots, queries, asked, light];
         let buffers = table.into_iter().chain([records, a, b, cell_light, blurred, changes, glosses, gleams, mirrored]);
-        8 * texels + buffers.map(|b| b.size()).sum::<u64>()
+        buffers.map(|b| b.size()).sum::<u64>()
     }
-}
-
-fn gloss(device: &wgpu::Device, size: [u32; 2]) -> wgpu::TextureView {
-    let [width, height] = size.map(|n| n.max(1));
-    device
-        .create_texture(&wgpu::TextureDescriptor {
-            label: Some("gi.gloss"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba16Float,
-            usage: wgpu::TextureUsages::STORAGE_BINDING
-                | wgpu::TextureUsages::TEXTURE_BINDING
-                | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        })
-        .create_view(&Default::default())
 }

@@ -70,7 +70,7 @@ pub struct Inputs<'a> {
     /// moves on the screen starts anew where plane or normal differ, and drags its light where not.
     pub motion: Option<&'a wgpu::TextureView>,
     /// `Rgba8Unorm(Srgb)`: F0 and perceptual roughness, for methods that find what lobes show
-    /// ([`Technique::gloss`](technique::Technique::gloss)). `None`: no lobes.
+    /// ([`Outputs::specular`]). `None`: no lobes.
     pub specular: Option<&'a wgpu::TextureView>,
     /// The picture has nothing to do with the one before (a cut): what is remembered of pixels is
     /// forgotten first.
@@ -102,6 +102,24 @@ impl<'a> Inputs<'a> {
             specular: None,
             reset: false,
         }
+    }
+}
+
+/// Where a method writes: `Rgba16Float`, usage STORAGE_BINDING, the inputs' size.
+#[derive(Debug, Clone, Copy)]
+pub struct Outputs<'a> {
+    /// Becomes the light that direct lighting misses, as E/π; 0 on the background.
+    pub light: &'a wgpu::TextureView,
+    /// Becomes what specular lobes reflect of surroundings and bounces, W/(m²·sr), to be added to
+    /// the picture; 0 on the background. Of methods that send rays into lobes, with
+    /// [`Inputs::specular`]; others leave it as it was
+    /// ([`Technique::shows_lobes`](technique::Technique::shows_lobes)).
+    pub specular: Option<&'a wgpu::TextureView>,
+}
+
+impl<'a> From<&'a wgpu::TextureView> for Outputs<'a> {
+    fn from(light: &'a wgpu::TextureView) -> Self {
+        Self { light, specular: None }
     }
 }
 

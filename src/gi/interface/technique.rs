@@ -1,6 +1,6 @@
 //! What all methods share: the trait that a frame drives them by.
 
-use super::{GiError, Inputs};
+use super::{GiError, Inputs, Outputs};
 use crate::gpu::timing::Recorder;
 use crate::net::gpu::Tap;
 use crate::net::plan::Plan;
@@ -28,25 +28,23 @@ pub struct Memory<'a> {
     pub changes: &'a wgpu::Buffer,
 }
 
-/// A method at work: G-buffer in, indirect diffuse light (E/π) out. Allocates only when size or
-/// views are new. `Send`, so that a viewer can build one on another thread.
+/// A method at work: G-buffer in, indirect light out. Allocates only when size or views are new. `Send`, so that a viewer can build one on another thread.
 pub trait Technique: Send {
-    /// Records all of the method's passes: `output` (`Rgba16Float`, usage STORAGE_BINDING, the
-    /// inputs' size) becomes the light that direct lighting misses; 0 on the background.
+    /// Records all of the method's passes.
     ///
     /// # Errors
-    /// [`GiError`] when inputs or output do not fit; then nothing was recorded.
+    /// [`GiError`] when inputs or outputs do not fit; then nothing was recorded.
     fn record(
         &mut self,
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,
         inputs: &Inputs<'_>,
-        output: &wgpu::TextureView,
+        outputs: Outputs<'_>,
     ) -> Result<(), GiError>;
 
-    /// Records what later frames remember of this one and nothing that only this one shows: output
-    /// and [`gloss`](Technique::gloss) stay as they were, direct light is not read. True when it
-    /// did; a method that needs whole frames says false, and nothing was recorded.
+    /// Records what later frames remember of this one and nothing that only this one shows: outputs
+    /// stay as they were, direct light is not read. True when it did; a method that needs whole
+    /// frames says false, and nothing was recorded.
     ///
     /// # Errors
     /// As [`Technique::record`].
@@ -84,11 +82,9 @@ pub trait Technique: Send {
         None
     }
 
-    /// What the specular lobe of each pixel's surface shows, divided by its directional albedo
-    /// (`env_brdf`): radiance, W/(m²·sr), where the method knows it. `Rgba16Float` of the picture's
-    /// size; another view after a change of size.
-    fn gloss(&self) -> Option<&wgpu::TextureView> {
-        None
+    /// Whether the last recording has written [`Outputs::specular`], if it was given.
+    fn shows_lobes(&self) -> bool {
+        false
     }
 
     /// What cells remember after the last recording, where the method gathers.

@@ -2,7 +2,7 @@
 //! are built, in a scene or on a device that is too large or too small for them.
 
 use crate::gi::interface::technique::{Instead, Memory, Technique};
-use crate::gi::interface::{GiError, Inputs};
+use crate::gi::interface::{GiError, Inputs, Outputs};
 use crate::gi::screen::ssgi::{SsgiGi, SsgiOptions};
 use crate::gpu::timing::Recorder;
 use crate::net::gpu::Tap;
@@ -42,10 +42,10 @@ impl Technique for OrBelow {
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,
         inputs: &Inputs<'_>,
-        output: &wgpu::TextureView,
+        outputs: Outputs<'_>,
     ) -> Result<(), GiError> {
         if let Ok(above) = &mut self.above {
-            match above.record(recorder, queue, inputs, output) {
+            match above.record(recorder, queue, inputs, outputs) {
                 // Nothing was recorded.
                 Err(lacks @ (GiError::Rays | GiError::Device(_))) => {
                     above.cut();
@@ -59,7 +59,7 @@ impl Technique for OrBelow {
             }
         }
         let below = self.below.get_or_insert_with(|| SsgiGi::new(&self.device, SsgiOptions::default()));
-        below.record(recorder, queue, inputs, output)
+        below.record(recorder, queue, inputs, outputs)
     }
 
     fn warm_up(
@@ -83,8 +83,8 @@ impl Technique for OrBelow {
         Some(Instead { method: "ssgi", why: self.why.as_deref()? })
     }
 
-    fn gloss(&self) -> Option<&wgpu::TextureView> {
-        self.drew()?.gloss()
+    fn shows_lobes(&self) -> bool {
+        self.drew().is_some_and(|drew| drew.shows_lobes())
     }
 
     fn memory(&self) -> Option<Memory<'_>> {

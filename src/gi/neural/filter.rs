@@ -12,7 +12,7 @@ use super::memory::{self, FeaturesPass};
 use super::trained::{FILTER, Neural};
 use crate::gi::gather::{GUIDANCE, GatherGi};
 use crate::gi::interface::technique::{Memory, Technique};
-use crate::gi::interface::{GiError, Inputs};
+use crate::gi::interface::{GiError, Inputs, Outputs};
 use crate::gi::stage;
 use crate::gi::stage::exposure::ExposurePass;
 use crate::gi::stage::inputs::{InputGroup, cells_of};
@@ -118,9 +118,9 @@ impl Technique for FilterGi {
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,
         inputs: &Inputs<'_>,
-        output: &wgpu::TextureView,
+        outputs: Outputs<'_>,
     ) -> Result<(), GiError> {
-        stage::inputs::check_output(output, inputs.size)?;
+        stage::inputs::check_outputs(outputs, inputs.size)?;
         self.fit(inputs.size)?;
         let lit = self.inputs.bind(queue, inputs)?;
         let settled = self.gather.settle(recorder, queue, inputs, true)?;
@@ -128,7 +128,7 @@ impl Technique for FilterGi {
         let known = (&settled.pasts, &self.exposure);
         self.features.record(recorder, &lit, known, bound(self.network.input()));
         self.network.record(recorder);
-        self.gather.filter(recorder, &settled, Some(bound(self.network.output())), output);
+        self.gather.filter(recorder, &settled, Some(bound(self.network.output())), outputs);
         Ok(())
     }
 
@@ -155,8 +155,8 @@ impl Technique for FilterGi {
         self.gather.knows_scene(rays)
     }
 
-    fn gloss(&self) -> Option<&wgpu::TextureView> {
-        self.gather.gloss()
+    fn shows_lobes(&self) -> bool {
+        self.gather.shows_lobes()
     }
 
     fn memory(&self) -> Option<Memory<'_>> {

@@ -25,7 +25,7 @@ use super::trained::check_weights;
 pub use super::trained::{Neural, needs_guess};
 use crate::gi::gather::GatherGi;
 use crate::gi::interface::technique::Technique;
-use crate::gi::interface::{GiError, Inputs};
+use crate::gi::interface::{GiError, Inputs, Outputs};
 use crate::gi::stage::exposure::ExposurePass;
 use crate::gi::stage::inputs::InputGroup;
 use crate::gpu::timing::Recorder;
@@ -127,7 +127,7 @@ impl NeuralGi {
         inputs: &Inputs<'_>,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
-        self.record_stages(&mut Recorder::new(encoder), inputs, output)
+        self.record_stages(&mut Recorder::new(encoder), inputs, output.into())
     }
 
     /// Like [`record`](Self::record), for a frame that times each stage: `gi.exposure`, `gi.pack`,
@@ -139,21 +139,21 @@ impl NeuralGi {
         &mut self,
         recorder: &mut Recorder<'_>,
         inputs: &Inputs<'_>,
-        output: &wgpu::TextureView,
+        outputs: Outputs<'_>,
     ) -> Result<(), GiError> {
-        crate::gi::stage::inputs::check_output(output, inputs.size)?;
+        crate::gi::stage::inputs::check_outputs(outputs, inputs.size)?;
         if inputs.size != self.rebuilt.size {
             self.resize(inputs.size)?;
         }
         let bound = self.inputs.bind(&self.queue, inputs)?;
         let Rebuilt { network, pack, guess, .. } = &self.rebuilt;
         if let Some(gather) = &mut self.gather {
-            gather.record(recorder, &self.queue, inputs, guess)?;
+            gather.record(recorder, &self.queue, inputs, Outputs { light: guess, ..outputs })?;
         }
         self.exposure.record(recorder, &bound);
         pack.record(recorder, &bound);
         network.record(recorder);
-        self.reconstruct.record(recorder, &bound, &self.exposure, network.output().resource(), guess, output)
+        self.reconstruct.record(recorder, &bound, &self.exposure, network.output().resource(), guess, outputs.light)
     }
 
     fn resize(&mut self, size: [u32; 2]) -> Result<(), GiError> {
@@ -262,9 +262,9 @@ impl Technique for NeuralGi {
         recorder: &mut Recorder<'_>,
         _queue: &wgpu::Queue,
         inputs: &Inputs<'_>,
-        output: &wgpu::TextureView,
+        outputs: Outputs<'_>,
     ) -> Result<(), GiError> {
-        self.record_stages(recorder, inputs, output)
+        self.record_stages(recorder, inputs, outputs)
     }
 
     fn warm_up(
@@ -291,8 +291,8 @@ impl Technique for NeuralGi {
         self.gather.as_ref().is_some_and(|gather| gather.knows_scene(rays))
     }
 
-    fn gloss(&self) -> Option<&wgpu::TextureView> {
-        self.gather.as_ref().and_then(|gather| gather.gloss())
+    fn shows_lobes(&self) -> bool {
+        self.gather.as_ref().is_some_and(|gather| gather.shows_lobes())
     }
 
     fn guess(&self) -> Option<&wgpu::TextureView> {

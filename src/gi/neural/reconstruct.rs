@@ -131,7 +131,7 @@ impl ReconstructPass {
         guess: &wgpu::TextureView,
         output: &wgpu::TextureView,
     ) -> Result<(), GiError> {
-        crate::gi::stage::inputs::check_output(output, inputs.size)?;
+        crate::gi::stage::inputs::check_outputs(output.into(), inputs.size)?;
         let group = self.outputs.get([output], || {
             Ok::<_, GiError>(tape::bind_group(
                 &self.device,

@@ -6,10 +6,10 @@
 use super::bitmask::{March, bind};
 use super::occlusion::OcclusionPass;
 use crate::gi::interface::technique::Technique;
-use crate::gi::interface::{GiError, Inputs};
+use crate::gi::interface::{GiError, Inputs, Outputs};
 use crate::gi::stage::ViewCache;
 use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry};
-use crate::gi::stage::inputs::{InputGroup, check_output, texture_entry};
+use crate::gi::stage::inputs::{InputGroup, check_outputs, texture_entry};
 use crate::gpu::timing::Recorder;
 use crate::gpu::{shaders, tape};
 use std::str::FromStr;
@@ -142,9 +142,9 @@ impl Technique for AmbientGi {
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,
         inputs: &Inputs<'_>,
-        output: &wgpu::TextureView,
+        outputs: Outputs<'_>,
     ) -> Result<(), GiError> {
-        check_output(output, inputs.size)?;
+        check_outputs(outputs, inputs.size)?;
         if inputs.size != self.size {
             self.forget();
             self.size = inputs.size;
@@ -153,11 +153,11 @@ impl Technique for AmbientGi {
         if self.occlusion.fit(inputs.size) {
             self.outputs.clear();
         }
-        let group = self.outputs.get([output], || {
+        let group = self.outputs.get([outputs.light], || {
             let entries = [
                 wgpu::BindGroupEntry { binding: 0, resource: self.exposure.buffer().as_entire_binding() },
                 wgpu::BindGroupEntry { binding: 1, resource: bind(self.occlusion.visibility()) },
-                wgpu::BindGroupEntry { binding: 2, resource: bind(output) },
+                wgpu::BindGroupEntry { binding: 2, resource: bind(outputs.light) },
             ];
             let label = Some("gi.ambient");
             let descriptor = wgpu::BindGroupDescriptor { label, layout: &self.layout, entries: &entries };

@@ -10,7 +10,7 @@
 use super::ambient;
 use super::bitmask::{Kernel, March, Pattern, Stage, bind, half_of, pattern_entry, write_entry};
 use crate::gi::interface::technique::Technique;
-use crate::gi::interface::{GiError, Inputs};
+use crate::gi::interface::{GiError, Inputs, Outputs};
 use crate::gi::stage::ViewCache;
 use crate::gi::stage::exposure::{ExposurePass, output_entry, storage_entry};
 use crate::gi::stage::inputs::{InputGroup, texture_entry};
@@ -111,13 +111,13 @@ impl Technique for SsgiGi {
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,
         inputs: &Inputs<'_>,
-        output: &wgpu::TextureView,
+        outputs: Outputs<'_>,
     ) -> Result<(), GiError> {
-        crate::gi::stage::inputs::check_output(output, inputs.size)?;
+        crate::gi::stage::inputs::check_outputs(outputs, inputs.size)?;
         let bound = self.inputs.bind(queue, inputs)?;
         self.fit(inputs.size);
-        let full = self.outputs.get([output], || {
-            Ok::<_, GiError>(self.full.group(&self.device, &[bind(self.half.get()), bind(output)]))
+        let full = self.outputs.get([outputs.light], || {
+            Ok::<_, GiError>(self.full.group(&self.device, &[bind(self.half.get()), bind(outputs.light)]))
         })?;
         let Some([radiance, gather]) = &self.groups else { return Ok(()) };
         let half = half_of(inputs.size);

@@ -1,6 +1,6 @@
 //! Which formats a host's textures may have, in the conventions that it names.
 
-use crate::gi::interface::{GiError, Inputs, NormalEncoding, NormalRange};
+use crate::gi::interface::{GiError, Inputs, NormalEncoding, NormalRange, Outputs};
 use wgpu::TextureFormat as F;
 
 const DEPTH: &[F] =
@@ -86,6 +86,10 @@ fn check_any(
 }
 
 /// The output of every method.
-pub(crate) fn check_output(output: &wgpu::TextureView, size: [u32; 2]) -> Result<(), GiError> {
-    check("output", output, size, wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::STORAGE_BINDING)
+pub(crate) fn check_outputs(outputs: Outputs<'_>, size: [u32; 2]) -> Result<(), GiError> {
+    let one = |name, view: &wgpu::TextureView| {
+        check(name, view, size, wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::STORAGE_BINDING)
+    };
+    one("output", outputs.light)?;
+    outputs.specular.map_or(Ok(()), |view| one("output of specular light", view))
 }

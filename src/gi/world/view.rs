@@ -3,7 +3,7 @@
 use super::check::{Complaint, Evidence};
 use super::{World, sample};
 use crate::gi::interface::technique::{Instead, Technique};
-use crate::gi::interface::{GiError, Inputs};
+use crate::gi::interface::{GiError, Inputs, Outputs};
 use crate::gi::method::{self, Method};
 use crate::gi::pass::NeuralGi;
 use crate::gi::stage::inputs::Params;
@@ -63,8 +63,7 @@ impl View {
         Ok(Self { queue: queue.clone(), technique, size, seen: [None; 2] })
     }
 
-    /// Records all of the method's passes: `output` (`Rgba16Float`, usage STORAGE_BINDING, the
-    /// inputs' size) becomes the light that direct lighting misses, as E/π; 0 on the background.
+    /// Records all of the method's passes. `outputs`: one view for the diffuse light, or [`Outputs`].
     /// Lights, sky and rays are those of `world`, whatever `inputs` say. Allocates only when the
     /// size or the texture views are new. Never submits and never waits.
     ///
@@ -72,14 +71,14 @@ impl View {
     /// [`View::instead`] says so, and albedo and direct light must be there.
     ///
     /// # Errors
-    /// [`GiError`] when inputs or output do not fit, or the world has changed since
+    /// [`GiError`] when inputs or outputs do not fit, or the world has changed since
     /// [`World::prepare`]; then nothing was recorded.
     pub fn record<'a>(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         world: impl Into<Option<&'a World>>,
         inputs: &Inputs<'_>,
-        output: &wgpu::TextureView,
+        outputs: impl Into<Outputs<'a>>,
     ) -> Result<(), GiError> {
         let inputs = match world.into() {
             Some(world) => world.complete(inputs)?,
@@ -89,7 +88,7 @@ impl View {
             self.technique.forget();
             self.size = inputs.size;
         }
-        self.technique.record(&mut Recorder::new(encoder), &self.queue, &inputs, output)?;
+        self.technique.record(&mut Recorder::new(encoder), &self.queue, &inputs, outputs.into())?;
         let before = self.seen[0].filter(|p| !inputs.reset && p.size == inputs.size);
         self.seen = [Some(Params::of(&inputs, None)?), before];
         Ok(())
@@ -131,10 +130,10 @@ impl View {
         self.technique.instead()
     }
 
-    /// What the specular lobe of each pixel's surface shows, see [`Technique::gloss`]; with
-    /// [`Inputs::specular`] only.
-    pub fn gloss(&self) -> Option<&wgpu::TextureView> {
-        self.technique.gloss()
+    /// Whether the last frame wrote [`Outputs::specular`], if it was given: the method sends rays
+    /// into lobes, or another drew in its place that does not.
+    pub fn shows_lobes(&self) -> bool {
+        self.technique.shows_lobes()
     }
 
     /// Frames that the answer has settled over since the last reset; `None` where it does not
