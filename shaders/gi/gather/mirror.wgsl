@@ -31,6 +31,12 @@ fn surface_at(pixel: vec2u) -> vec4f {
     return textureLoad(specular_map, pixel, 0);
 }
 
+// Whether pixels of a square count each other's rays: lobes as wide as a pixel show both the same.
+fn shares(a: vec2u, b: vec2u) -> bool {
+    let roughness = surface_at(a).a;
+    return lobe_cells(roughness) * f32(CELL_SIDE) > 1.0 && abs(roughness - surface_at(b).a) < 0.02;
+}
+
 fn is_smooth(pixel: vec2u) -> bool {
     return all(pixel < params.size) && mirrors(surface_at(pixel)) > 0.0 && distance_at(vec2i(pixel)) > 0.0;
 }
@@ -97,7 +103,8 @@ fn finish(at: u32) {
         let i_pixel = pixel.y * params.size.x + pixel.x;
         let packed = select(vec2u(0u), mirrored[i_pixel], kept & rests(motion_of(vec2i(pixel))));
         var here = vec4f(unpack2x16float(packed.x), unpack2x16float(packed.y));
-        if all(pixel == own) {
+        let near = all(pixel == own) || (shares(pixel, own) && dot(world_normal_at(vec2i(pixel)), n) > SAME_SIDE);
+        if near {
             // Each ray counts for its number, since entries come to know more.
             let rays = min(floor(here.a) + 1.0, most);
             here = vec4f(mix(here.rgb, found, 2.0 / (rays + 1.0)), rays);
