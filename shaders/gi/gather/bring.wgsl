@@ -4,10 +4,9 @@
 //#import gi/gather/lobe.wgsl
 
 // Directional light of the cells, and what their lobes show, brought to every pixel: bilinear where
-// the surface goes on, and only from cells of the pixel's own surface where it does not, the light
-// evaluated for the pixel's own normal, what lobes show reflected by the pixel's own lobe. All of it in f32. A workgroup reads the cells around its
-// 16x8 pixels once. The prelude holds CELL_SIDE and the tolerances (gi::gather::bring documents
-// them).
+// the surface goes on, only from cells of the pixel's own surface where it does not. Light is that on
+// the pixel's own normal, what lobes show is reflected by its own lobe. In f32; a workgroup reads the
+// cells around its 16x8 pixels once. The prelude holds CELL_SIDE and the tolerances (gi::gather::bring).
 
 @group(1) @binding(0) var<storage, read> cell_pixels: array<u32>;
 @group(1) @binding(1) var<storage, read> light: array<vec4f>;

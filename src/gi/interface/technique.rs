@@ -28,7 +28,8 @@ pub struct Memory<'a> {
     pub changes: &'a wgpu::Buffer,
 }
 
-/// A method at work: G-buffer in, indirect light out. Allocates only when size or views are new. `Send`, so that a viewer can build one on another thread.
+/// A method at work: G-buffer in, indirect light out. Allocates only when size or views are new.
+/// `Send`, so that a viewer can build one on another thread.
 pub trait Technique: Send {
     /// Records all of the method's passes.
     ///
