@@ -34,8 +34,14 @@ struct Options {
 @compute @workgroup_size(8, 8)
 fn layers(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.size.x || id.y >= options.rows { return; }
-    let pixel = vec2u(id.x, id.y + options.first_row);
+    var pixel = vec2u(id.x, id.y + options.first_row);
+    if options.layer >= 9u && options.layer <= 11u { pixel = nearest(pixel); }
     out[id.y * frame.size.x + id.x] = decode(pixel);
+}
+
+// The pixel whose sample lies nearest to this one's centre: a jitter may be wider than a pixel.
+fn nearest(pixel: vec2u) -> vec2u {
+    return vec2u(clamp(vec2i(pixel) - vec2i(round(frame.jitter)), vec2i(0), vec2i(frame.size) - 1));
 }
 
 // The same into a texture, for temporal anti-aliasing.

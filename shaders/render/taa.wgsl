@@ -55,8 +55,8 @@ fn inside(pixel: vec2i) -> vec2i {
 }
 
 // Mean over frames at `place` (pixels, centres at a half), by Catmull-Rom: bilinear fetches would
-// blur a little each frame.
-fn fetch(place: vec2f) -> vec3f {
+// blur a little each frame. It does not overshoot below `least`.
+fn fetch(place: vec2f, least: vec3f) -> vec3f {
     let base = floor(place - 0.5);
     let t = place - 0.5 - base;
     var wx: array<f32, 4>;
@@ -69,7 +69,7 @@ fn fetch(place: vec2f) -> vec3f {
         let y = i >> 2u;
         sum += wx[x] * wy[y] * textureLoad(history, inside(vec2i(base) + vec2i(x, y) - 1), 0).rgb;
     }
-    return max(sum, vec3f(0.0));
+    return max(sum, least);
 }
 
 fn weights(t: f32, w: ptr<function, array<f32, 4>>) {
@@ -85,28 +85,31 @@ struct Around {
     value: vec3f,      // through the pixel filter
     middle: vec3f,     // mean, in YCoCg
     size: vec3f,       // standard deviation, in YCoCg
+    least: vec3f,      // of each channel, and 0: only layers that have a sign have less than none
 }
 
 fn around(centre: vec2i) -> Around {
     var value = vec3f(0.0);
     var first = vec3f(0.0);
     var second = vec3f(0.0);
+    var least = vec3f(0.0);
     for (var i = 0; i < 9; i++) {
         let color = textureLoad(current, inside(centre + vec2i(i % 3, i / 3) - 1), 0).rgb;
         value += blend.wx[i % 3] * blend.wy[i / 3] * color;
+        least = min(least, color);
         let c = to_ycocg(color);
         first += c / 9.0;
         second += c * c / 9.0;
     }
-    return Around(value, first, sqrt(max(second - first * first, vec3f(0.0))));
+    return Around(value, first, sqrt(max(second - first * first, vec3f(0.0))), least);
 }
 
 // `value` moved towards the middle of the 3x3 samples' colours until it lies in their box.
 fn held(here: Around, value: vec3f) -> vec3f {
     let off = to_ycocg(value) - here.middle;
-    let beyond = abs(off) / max(BOX * here.size + 1e-6 * here.middle.x, vec3f(1e-12));
+    let beyond = abs(off) / max(BOX * here.size + 1e-6 * abs(here.middle.x), vec3f(1e-12));
     let most = max(max(beyond.x, beyond.y), beyond.z);
-    return max(from_ycocg(here.middle + off / max(most, 1.0)), vec3f(0.0));
+    return max(from_ycocg(here.middle + off / max(most, 1.0)), here.least);
 }
 
 // The nearest of the 3x3 pixels: edges move with what is in front.
@@ -175,7 +178,7 @@ fn taa(@builtin(global_invocation_id) id: vec3u) {
         let there = before(pixel, centre);
         if all(there.place >= vec2f(0.0)) && all(there.place < vec2f(frame.size)) && was_seen(there) {
             count = min(textureLoad(history, vec2i(floor(there.place)), 0).a, MOST_MOVING);
-            mean = held(here, fetch(there.place));
+            mean = held(here, fetch(there.place, here.least));
             share = 1.0 / (count + 1.0);
         }
     }

@@ -40,12 +40,15 @@ impl<'a> Stage<'a> {
         read_light(self.gpu, &self.renderer.targets().hdr.texture)
     }
 
-    /// The layer of direct light through `camera`, as `options` say.
-    fn direct(&mut self, camera: &Camera, options: CaptureOptions<'_>) -> Rgb {
-        let options = CaptureOptions { layers: &[Layer::DiffDir], ..options };
+    /// The layers of direct light, normals and places through `camera`, as `options` say.
+    fn layers(&mut self, camera: &Camera, options: CaptureOptions<'_>) -> [Rgb; 3] {
+        let layers = [Layer::DiffDir, Layer::Normal, Layer::Position];
+        let options = CaptureOptions { layers: &layers, ..options };
         let frame = capture(self.gpu, &mut self.renderer, &self.uploaded, camera, options).expect("drawn");
-        let layer = frame.layer(Layer::DiffDir).expect("asked for");
-        layer.data.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
+        layers.map(|l| {
+            let data = &frame.layer(l).expect("asked for").data;
+            data.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
+        })
     }
 
     /// The mean of many samples: what the picture should be.
@@ -165,33 +168,63 @@ fn a_slow_pan_beats_single_frames() {
     assert!(wobble < 0.8 * wobble_without, "{wobble} {wobble_without}");
 }
 
+/// How far places lie from their pixels' centres along an axis at most, pixels.
+fn off_centre(camera: &Camera, places: &Rgb) -> f32 {
+    let clip_from_world = Mat4::from_cols_array_2d(&View::new(camera, SIZE, [0.0; 2]).clip_from_world_unjittered);
+    let off = |(i, place): (usize, &[f32; 3])| {
+        let ndc = clip_from_world.project_point3((*place).into());
+        let at = [(0.5 + 0.5 * ndc.x) * SIZE[0] as f32, (0.5 - 0.5 * ndc.y) * SIZE[1] as f32];
+        let centre = [i % SIZE[0] as usize, i / SIZE[0] as usize].map(|n| n as f32 + 0.5);
+        (at[0] - centre[0]).abs().max((at[1] - centre[1]).abs())
+    };
+    // The picture's rim has no sample beyond it, and the background no place.
+    let inner = |i: usize| {
+        let (x, y) = (i as u32 % SIZE[0], i as u32 / SIZE[0]);
+        x > 1 && y > 1 && x + 2 < SIZE[0] && y + 2 < SIZE[1]
+    };
+    places.iter().enumerate().filter(|(i, p)| inner(*i) && **p != [0.0; 3]).map(off).fold(0.0, f32::max)
+}
+
 #[test]
 fn layers_are_averaged_as_the_picture_is() {
     let Some(gpu) = common::gpu() else { return };
     let (scene, camera) = room();
     let mut on = Stage::new(&gpu, &scene, Method::Direct, true);
     let mut off = Stage::new(&gpu, &scene, Method::Direct, false);
-    let truth = off.direct(&camera, CaptureOptions { samples: 100, ..Default::default() });
-    let single = mean(&off.direct(&camera, CaptureOptions::default()), &truth);
-    let rest = mean(&on.direct(&camera, CaptureOptions { warmup: 99, ..Default::default() }), &truth);
-    println!("at rest {rest:.5} from the filtered layer; one frame {single:.5}");
-    // The control is the single frame.
-    assert!(rest < 0.25 * single, "{rest} {single}");
+    let truth = off.layers(&camera, CaptureOptions { samples: 100, ..Default::default() });
+    let single = off.layers(&camera, CaptureOptions::default());
+    let rest = on.layers(&camera, CaptureOptions { warmup: 99, ..Default::default() });
+    for (i, name) in ["direct light", "normals"].iter().enumerate() {
+        let (rest, single) = (mean(&rest[i], &truth[i]), mean(&single[i], &truth[i]));
+        println!("{name} at rest {rest:.5} from the filtered layer; one frame {single:.5}");
+        // The control is the single frame.
+        assert!(rest < 0.25 * single, "{name}: {rest} {single}");
+    }
 
     // A third of a pixel a frame, on from there.
     let step = 0.33 * 2.0 * (camera.yfov * 0.5).tan() / SIZE[1] as f32;
-    let (mut with, mut without) = (0.0, 0.0);
+    let (mut with, mut without) = ([0.0; 2], [0.0; 2]);
+    let mut widest = 0.0f32;
     for i in 1..21 {
         let camera = turned(&camera, step * i as f32);
-        let moving = on.direct(&camera, CaptureOptions { number: i, ..Default::default() });
+        let moving = on.layers(&camera, CaptureOptions { number: i, ..Default::default() });
+        // What is not averaged is of the sample nearest to the pixel's centre.
+        let aside = off_centre(&camera, &moving[2]);
+        assert!(aside < 0.51, "frame {i}: a place {aside} pixels off its pixel's centre");
+        widest = sampling::offset(i, 0).iter().fold(widest, |a, x| a.max(x.abs()));
         if i > 14 {
-            let truth = off.direct(&camera, CaptureOptions { samples: 12, ..Default::default() });
-            with += mean(&moving, &truth);
-            without += mean(&off.direct(&camera, CaptureOptions::default()), &truth);
+            let truth = off.layers(&camera, CaptureOptions { samples: 12, ..Default::default() });
+            let single = off.layers(&camera, CaptureOptions::default());
+            for layer in 0..2 {
+                with[layer] += mean(&moving[layer], &truth[layer]);
+                without[layer] += mean(&single[layer], &truth[layer]);
+            }
         }
     }
-    println!("in a pan {:.5}; single frames {:.5}", with / 6.0, without / 6.0);
-    assert!(with < 0.8 * without, "{with} {without}");
+    println!("direct light and normals in a pan {with:?}; single frames {without:?}; samples up to {widest} off");
+    assert!(with[0] < 0.8 * without[0] && with[1] < 0.8 * without[1], "{with:?} {without:?}");
+    // Negative control: some pixels' own samples lie farther off.
+    assert!(widest > 0.6, "{widest}");
 }
 
 #[test]
