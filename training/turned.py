@@ -55,7 +55,8 @@ def changed(first, second, cameras, shift=0):
 
 def centred(place, normal, camera):
     """Places of pixels' centres, which is where filtered light is: a sample's, which a layer holds, lies up to half a pixel aside. The rays through the
-    centres meet the planes of what the pixels show there; where that is farther away than two pixels it is no plane."""
+    centres meet the planes of what the pixels show there; where that is farther away than two pixels, which on a surface seen along itself are
+    longer, it is no plane."""
     eye, right, up, forward, tangent = camera
     h, w = place.shape[:2]
     v, u = np.meshgrid(1 - (2 * np.arange(h) + 1) / h, (2 * np.arange(w) + 1) / w - 1, indexing="ij")
@@ -63,7 +64,8 @@ def centred(place, normal, camera):
     facing = (ray * normal).sum(-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         centre = eye + ray * (((place - eye) * normal).sum(-1) / facing)[..., None]
-        near = np.linalg.norm(centre - place, axis=-1) < 4 * tangent / h * np.abs((place - eye) @ forward)
+        along = np.abs(facing) / np.linalg.norm(ray, axis=-1)
+        near = np.linalg.norm(centre - place, axis=-1) * along < 4 * tangent / h * np.abs((place - eye) @ forward)
     return np.where((near & np.isfinite(centre).all(-1))[..., None], centre, place)
 
 
