@@ -71,6 +71,14 @@ fn world_position_at(pixel: vec2i, distance: f32) -> vec3f {
     return offset_at(pixel, distance) + params.eye.xyz;
 }
 
+// The pixel in which x lies, outside of the picture where it does not; (-1, -1) behind the eye.
+fn pixel_where(x: vec3f) -> vec2i {
+    let v = (x - params.eye.xyz) * params.world_from_view;
+    let ndc = v.xy / (-v.z * params.unproject.xy) - params.unproject.zw;
+    let uv = vec2f(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y);
+    return select(vec2i(-1), vec2i(floor(clamp(uv, vec2f(-1.0), vec2f(2.0)) * vec2f(params.size))), v.z < 0.0);
+}
+
 // E/π on a surface with unit normal `n` (world space).
 fn light_towards(light: CellLight, n: vec3f) -> vec3f {
     let direction = vec4f(n, 1.0);

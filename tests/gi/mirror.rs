@@ -1,4 +1,5 @@
-//! Mirrors show what is off the screen pixel by pixel, at once and while the camera turns.
+//! Mirrors show what is off the screen pixel by pixel, at once and while the camera turns, and
+//! pictures on surfaces that the screen shows.
 
 use crate::build::{floor, look_at, material, quad, scene};
 use crate::gather::uploaded;
@@ -7,7 +8,7 @@ use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{Renderer, View};
-use bouncelight::scene::{Camera, Environment, Scene};
+use bouncelight::scene::{Camera, ColorSpace, Environment, Image, Sampler, Scene, TextureRef};
 use glam::{Mat4, Vec3};
 
 const SIZE: [u32; 2] = [96, 64];
@@ -33,10 +34,21 @@ fn camera(turn: f32) -> Camera {
 /// Light that pixels show by their lobes over the lobes' albedo: the last of several frames, in
 /// each of which the camera turns.
 fn shown(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, frames: u32, turn: f32) -> Vec<f32> {
+    shown_to(gpu, renderer, scene, frames, |left| camera(turn * left as f32))
+}
+
+/// The same of cameras that are told how many frames are left.
+fn shown_to(
+    gpu: &Gpu,
+    renderer: &mut Renderer,
+    scene: &Scene,
+    frames: u32,
+    camera: impl Fn(u32) -> Camera,
+) -> Vec<f32> {
     let gpu_scene = uploaded(gpu, scene);
     for i in 0..frames {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let camera = camera(turn * (frames - 1 - i) as f32);
+        let camera = camera(frames - 1 - i);
         let view = View::new(&camera, SIZE, [0.0; 2]).with_seed(i);
         renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, &gpu_scene, &view).expect("the frame is drawn");
         gpu.queue.submit([encoder.finish()]);
@@ -44,16 +56,15 @@ fn shown(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, frames: u32, turn: f
     let light = read_light(gpu, &renderer.targets().indirect_specular.texture);
     let mut direct = world::renderer(gpu, SIZE, Method::Direct);
     let layers = CaptureOptions { layers: &[Layer::GlossCol], ..Default::default() };
-    let frame = capture(gpu, &mut direct, &gpu_scene, &camera(0.0), layers).expect("draws");
+    let frame = capture(gpu, &mut direct, &gpu_scene, &camera(0), layers).expect("draws");
     let share = &frame.layer(Layer::GlossCol).expect("asked for").data;
     light.iter().zip(share.chunks_exact(3)).map(|(l, s)| l[0] / s[0].max(1e-6)).collect()
 }
 
-/// How far each pixel's mirrored place lies inside the glowing square (metres; negative outside),
-/// None off the floor.
-fn inside() -> Vec<Option<f32>> {
-    let camera = camera(0.0);
-    let m = View::new(&camera, SIZE, [0.0; 2]).matrices();
+/// Where each pixel's ray, mirrored by the floor, meets the plane of a wall at `z`: x and y; None off
+/// the floor, and where the wall hides it.
+fn on_wall(camera: &Camera, z: f32) -> Vec<Option<[f32; 2]>> {
+    let m = View::new(camera, SIZE, [0.0; 2]).matrices();
     let back = (Mat4::from_cols_array_2d(&m.clip_from_view) * Mat4::from_cols_array_2d(&m.view_from_world)).inverse();
     let eye = Vec3::new(0.0, 1.5, 3.0);
     let of = |i: u32| {
@@ -61,14 +72,20 @@ fn inside() -> Vec<Option<f32>> {
         let ndc = Vec3::new(2.0 * x / SIZE[0] as f32 - 1.0, 1.0 - 2.0 * y / SIZE[1] as f32, 0.5);
         let d = (back.project_point3(ndc) - eye).normalize();
         let floor = eye + d * (eye.y / -d.y);
-        if d.y >= 0.0 || floor.x.abs() > 7.9 || floor.z < -3.9 {
+        if d.y >= 0.0 || floor.x.abs() > 7.9 || floor.z < z + 0.1 {
             return None;
         }
-        let t = (floor.z + 4.0) / -d.z;
-        let (x, y) = (floor.x + t * d.x, -t * d.y);
-        Some((1.0 - x.abs()).min(y - 1.5).min(3.5 - y))
+        let t = (floor.z - z) / -d.z;
+        Some([floor.x + t * d.x, -t * d.y])
     };
     (0..SIZE[0] * SIZE[1]).map(of).collect()
+}
+
+/// How far each pixel's mirrored place lies inside the glowing square (metres; negative outside),
+/// None off the floor.
+fn inside() -> Vec<Option<f32>> {
+    let of = |place: Option<[f32; 2]>| place.map(|[x, y]| (1.0 - x.abs()).min(y - 1.5).min(3.5 - y));
+    on_wall(&camera(0.0), -4.0).into_iter().map(of).collect()
 }
 
 /// Share of the pixels, away from the square's rim by `margin` metres, that show what they mirror
@@ -101,4 +118,64 @@ fn a_mirror_is_sharp_where_the_screen_knows_nothing() {
     // Control: what cells know is not sharp enough, and a rough floor is none.
     let rough = right(&shown(&gpu, &mut new(), &room(0.4), 8, 0.0), 0.06);
     assert!(rough < 0.9, "a rough floor passes for a mirror: {rough}");
+}
+
+/// A metal floor before a wall of four stripes, every second of which sends back nothing, or glows
+/// and the others do not.
+fn striped(glows: bool) -> Scene {
+    let wall = quad([-2.0, 0.0, -1.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]);
+    let mut s = scene(vec![floor(8.0, 0.0), wall], vec![]);
+    s.materials = vec![material([1.0; 3]), material([1.0; 3])];
+    (s.materials[0].metallic, s.materials[0].roughness) = (1.0, 0.02);
+    let rgba = (0..64 * 64).flat_map(|i| [if (i % 64) & 16 == 0 { 255 } else { 0 }; 4]).collect();
+    let (name, color_space) = (String::new(), ColorSpace::Srgb);
+    s.images.push(Image { name, width: 64, height: 64, rgba, color_space });
+    let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let stripes = Some(TextureRef { image: 0, sampler: Sampler::default(), uv_set: 0, transform });
+    if glows {
+        (s.materials[1].base_color, s.materials[1].f0) = ([0.0, 0.0, 0.0, 1.0], 0.0);
+        (s.materials[1].emissive, s.materials[1].emissive_texture) = ([GLOW; 3], stripes);
+    } else {
+        s.materials[1].f0 = 0.0;
+        s.materials[1].base_color_texture = stripes;
+    }
+    s.meshes[1].material = 1;
+    s.environment = Environment::constant([if glows { 0.0 } else { 1.0 }; 3]);
+    s
+}
+
+/// Means of what the floor mirrors of the bright stripes and of the dark ones, off their rims.
+fn of_stripes(light: &[f32], camera: &Camera) -> [f64; 2] {
+    let mut sums = [[0.0; 2]; 2];
+    for (l, place) in light.iter().zip(on_wall(camera, -1.0)) {
+        let seen = |[x, y]: &[f32; 2]| x.abs() < 1.9 && (0.2..1.4).contains(y) && (x - x.round()).abs() > 0.1;
+        let Some([x, _]) = place.filter(seen) else { continue };
+        let dark = (x + 2.0) as usize % 2;
+        sums[dark][0] += f64::from(*l);
+        sums[dark][1] += 1.0;
+    }
+    assert!(sums.iter().all(|s| s[1] > 100.0), "{sums:?}");
+    sums.map(|s| s[0] / s[1])
+}
+
+#[test]
+fn a_mirror_shows_the_pictures_that_the_screen_shows() {
+    let Some(gpu) = common::gpu() else { return };
+    let method = || Method::Gather(Default::default());
+    // The wall is in the picture; turned down so far that only its picture in the floor is.
+    let towards = |y: f32| look_at([0.0, 1.5, 3.0], [0.0, y, 0.0], 1.2);
+    for glows in [false, true] {
+        let [[bright, dark], [bright_off, dark_off]] = [0.5, -3.0].map(|y| {
+            let camera = towards(y);
+            of_stripes(
+                &shown_to(&gpu, &mut world::renderer(&gpu, SIZE, method()), &striped(glows), 8, |_| camera.clone()),
+                &camera,
+            )
+        });
+        println!("glowing {glows}: {bright} and {dark}; off the screen {bright_off} and {dark_off}");
+        assert!(bright > 20.0 * dark, "{bright} of bright stripes, {dark} of dark ones");
+        assert!(!glows || (bright - f64::from(GLOW)).abs() < 0.02 * f64::from(GLOW), "{bright}");
+        // Negative control: of a wall that is not in the picture a mirror knows the mean.
+        assert!(bright_off < 2.0 * dark_off, "{bright_off} and {dark_off}");
+    }
 }

@@ -9,7 +9,8 @@
 //#import gi/gather/jobs.wgsl
 
 // What a ray finds: the sky, or a surface with the light of lamps and of what glows that it sends
-// back, and the entry that knows the rest of its light.
+// back, and the entry that knows the rest of its light. The shader that imports this file says by
+// `colours(hit, x, side) -> Met` what a way's first ray has met at x, on the side that faces `side`.
 
 struct Found {
     // Radiance that is known at once.
@@ -133,8 +134,6 @@ fn arrive(at: u32, glows: bool) {
     }
     let first = ((place.w >> 8u) & 255u) == 0u;
     let distance = select(so_far.w, bitcast<u32>(hit.t), first);
-    var surface = met(hit.triangle);
-    if (gather.flags & GATHER_NO_CAUSTICS) != 0u { surface.f0 = vec3f(0.0); }
     let front = trace_normal(hit);
     let facing = -dot(front, along);
     let chances = part_of(at, CHANCES);
@@ -145,6 +144,10 @@ fn arrive(at: u32, glows: bool) {
     }
     let side = select(-front, front, facing > 0.0);
     let n = met_normal(hit, side);
+    let on_it = bitcast<vec3f>(place.xyz) + along * hit.t;
+    var surface: Met;
+    if first { surface = colours(hit, on_it, side); } else { surface = met(hit.triangle); }
+    if (gather.flags & GATHER_NO_CAUSTICS) != 0u { surface.f0 = vec3f(0.0); }
     let counts = (glows || !first) && (facing > 0.0 || (surface.flags & MET_DOUBLE_SIDED) != 0u);
     if counts && any(surface.emission > vec3f(0.0)) {
         let density = surface.by_area * gather.inverse_power * hit.t * hit.t / max(abs(facing), 1e-6);
@@ -160,7 +163,7 @@ fn arrive(at: u32, glows: bool) {
         end(at);
         return;
     }
-    let x = off(bitcast<vec3f>(place.xyz) + along * hit.t, side, hit.t);
+    let x = off(on_it, side, hit.t);
     let here = Place(x, n, -along, diffuse, surface.f0, max(surface.roughness, LEAST_ROUGHNESS));
     let chosen = choose_light(here, true, pcg3(chances.xyz));
     keep(at, SIDE, n, NONE);

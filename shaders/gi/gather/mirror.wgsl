@@ -83,6 +83,25 @@ fn begin(at: u32, job: u32) -> bool {
     return goes(at, lobe.weight);
 }
 
+// Rays know of a triangle its mean colours. Where the picture shows the place that was met, it knows
+// them better: a mirror shows textures.
+fn colours(hit: Hit, x: vec3f, side: vec3f) -> Met {
+    var surface = met(hit.triangle);
+    let pixel = pixel_where(x);
+    if any(pixel < vec2i(0)) || any(pixel >= vec2i(params.size)) { return surface; }
+    let z = distance_at(pixel);
+    // What is thin has another picture on its other side.
+    let facing = dot(world_normal_at(pixel), side) > 0.0;
+    if z > 0.0 && facing && abs(dot(world_position_at(pixel, z) - x, side)) < above(x) {
+        let specular = surface_at(vec2u(pixel));
+        surface.diffuse = albedo_at(pixel);
+        surface.f0 = specular.rgb;
+        surface.roughness = specular.a;
+        surface.emission = emissive_at(pixel);
+    }
+    return surface;
+}
+
 // What the square shows then.
 fn finish(at: u32) {
     let first = first_of(job_of(at));

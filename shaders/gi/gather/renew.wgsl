@@ -91,6 +91,10 @@ fn slot_of(job: u32) -> u32 {
     return UNIT * first_unit + job;
 }
 
+fn colours(hit: Hit, x: vec3f, side: vec3f) -> Met {
+    return met(hit.triangle);
+}
+
 // The ray of an entry.
 fn begin(at: u32, job: u32) -> bool {
     let slot = slot_of(job);

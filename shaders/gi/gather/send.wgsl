@@ -14,6 +14,10 @@ fn shared_exponent(c: vec3f) -> u32 {
     return code.x | (code.y << 9u) | (code.z << 18u) | (exponent << 27u);
 }
 
+fn colours(hit: Hit, x: vec3f, side: vec3f) -> Met {
+    return met(hit.triangle);
+}
+
 // What way `at` has found becomes its record.
 fn record(at: u32) {
     let found = found_by(at);
