@@ -47,9 +47,13 @@ struct Material {
 // True in the permutation for masked and blended materials; the opaque one keeps early depth tests.
 override ALPHA: bool = false;
 
+// Where a fragment reads a picture. Fragments side by side are a picture apart at most, which its
+// coarsest level tells as well as any more: beside a triangle that passes behind the eye they would
+// be thousands apart, and Mesa's CPU driver asks all texels in between, for minutes.
 fn coordinates(use_: TextureUse, uv: vec4f) -> vec2f {
     let p = vec3f(select(uv.xy, uv.zw, use_.row0.w > 0.5), 1.0);
-    return vec2f(dot(use_.row0.xyz, p), dot(use_.row1.xyz, p));
+    let at = vec2f(dot(use_.row0.xyz, p), dot(use_.row1.xyz, p));
+    return at / max(max(abs(dpdxCoarse(at)), abs(dpdyCoarse(at))), vec2f(1.0));
 }
 
 fn is_veil() -> bool {
