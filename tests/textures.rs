@@ -197,6 +197,45 @@ fn textures_are_filtered_once() {
     }
 }
 
+/// A plain to the horizon: fragments beside it, that a square of four has besides those on it, lie behind the eye.
+#[test]
+fn a_plain_to_the_horizon_has_its_textures_mean_there_and_takes_no_minutes() {
+    let Some(gpu) = common::gpu() else { return };
+    let half = 2e3;
+    let mut s =
+        scene(vec![quad([-half, -0.3 * half, half], [2.0 * half, 0.6 * half, 0.0], [0.0, 0.0, -2.0 * half])], vec![]);
+    let checker: Vec<[u8; 4]> =
+        (0..64 * 64).map(|i| if (i % 64 / 32) ^ (i / 2048) == 0 { [0, 0, 0, 255] } else { [255; 4] }).collect();
+    s.images = vec![image(&checker, 64, ColorSpace::Linear)];
+    let transform = [[2.0 * half, 0.0, 0.0], [0.0, 2.0 * half, 0.0]];
+    let texture = TextureRef { sampler: Sampler::default(), transform, ..reference(0) };
+    s.materials[0].base_color_texture = Some(texture);
+    let (done, waits) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        for i in 0..12 {
+            let camera = look_at([0.0, 1.5, 0.0], [0.1 * i as f32, 1.5 - 0.01 * i as f32, -3.0], 0.8);
+            let f = render(&gpu, &s, &camera, [64, 48], 1);
+            let (color, depth) = (f.layer(Layer::DiffCol).unwrap(), f.layer(Layer::Depth).unwrap());
+            let far: Vec<f32> = (0..64 * 48)
+                .map(|i| (i % 64, i / 64))
+                .filter(|&(x, y)| (60.0..1e9).contains(&depth.at(x, y)[0]))
+                .map(|(x, y)| color.at(x, y)[0])
+                .collect();
+            done.send(far).expect("the test waits");
+        }
+    });
+    let mut all = Vec::new();
+    for i in 0..12 {
+        all.extend(
+            waits.recv_timeout(std::time::Duration::from_secs(30)).unwrap_or_else(|e| panic!("picture {i}: {e}")),
+        );
+    }
+    let mean = all.iter().sum::<f32>() / all.len() as f32;
+    // Half of the texels, less a fifth that gloss takes along the plain.
+    println!("{} pixels far away, {mean} in the mean", all.len());
+    assert!(all.len() > 500 && (mean - 0.385).abs() < 0.03, "{mean} of {}", all.len());
+}
+
 /// Stripes that run away from the eye stay apart where a pixel's footprint is long and narrow.
 #[test]
 fn textures_stay_sharp_at_grazing_angles() {
