@@ -89,7 +89,7 @@ impl Layer {
     }
 
     /// Averages over an edge would name points and depths that are nowhere, so these take the
-    /// centre's sample.
+    /// sample at the pixel's centre, or in a frame of a sequence that nearest to it.
     fn is_unfiltered(self) -> bool {
         matches!(self, Layer::Depth | Layer::Position | Layer::Motion)
     }
