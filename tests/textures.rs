@@ -197,7 +197,8 @@ fn textures_are_filtered_once() {
     }
 }
 
-/// A plain to the horizon: fragments beside it, that a square of four has besides those on it, lie behind the eye.
+/// A plain to the horizon: of a square of four fragments those that it does not cover lie behind
+/// the eye.
 #[test]
 fn a_plain_to_the_horizon_has_its_textures_mean_there_and_takes_no_minutes() {
     let Some(gpu) = common::gpu() else { return };

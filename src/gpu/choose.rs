@@ -281,8 +281,8 @@ fn enumerate(
     }
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = mask;
-    // Programs built for development would have line numbers in every shader, which naga and drivers take an eighth
-    // longer over; WGPU_DEBUG=1 asks for them.
+    // Programs built for development would have line numbers in every shader, over which naga and
+    // drivers take an eighth longer; WGPU_DEBUG=1 asks for them.
     descriptor.flags.remove(wgpu::InstanceFlags::DEBUG);
     descriptor.flags = descriptor.flags.with_env();
     descriptor.display = display;
