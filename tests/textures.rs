@@ -228,7 +228,7 @@ fn a_plain_to_the_horizon_has_its_textures_mean_there_and_takes_no_minutes() {
     let mut all = Vec::new();
     for i in 0..12 {
         all.extend(
-            waits.recv_timeout(std::time::Duration::from_secs(30)).unwrap_or_else(|e| panic!("picture {i}: {e}")),
+            waits.recv_timeout(std::time::Duration::from_secs(120)).unwrap_or_else(|e| panic!("picture {i}: {e}")),
         );
     }
     let mean = all.iter().sum::<f32>() / all.len() as f32;
