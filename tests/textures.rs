@@ -232,7 +232,8 @@ fn a_plain_to_the_horizon_has_its_textures_mean_there_and_takes_no_minutes() {
         );
     }
     let mean = all.iter().sum::<f32>() / all.len() as f32;
-    // Half of the texels, less a fifth that gloss takes along the plain.
+    // What was drawn before places were bounded, too (0.389, as far as it came): a check that they
+    // are not moved, not an independent answer.
     println!("{} pixels far away, {mean} in the mean", all.len());
     assert!(all.len() > 500 && (mean - 0.385).abs() < 0.03, "{mean} of {}", all.len());
 }
