@@ -36,7 +36,7 @@ fn dimmed(scene: &Scene, factor: f32) -> Scene {
 
 #[test]
 fn a_paper_room_with_the_network_stays_below_200_mb_and_steady_frames_allocate_nothing() {
-    let Some(gpu) = common::gpu() else { return };
+    let Some(gpu) = common::own_gpu() else { return };
     let scene = scene::load("paper-room:2").expect("the room is made by code");
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("the scene fits");
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, [1024, 512], neural()).expect("the size fits");

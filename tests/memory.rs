@@ -24,7 +24,7 @@ fn resident() -> u64 {
 
 #[test]
 fn frames_take_no_memory() {
-    let Some(gpu) = common::gpu() else { return };
+    let Some(gpu) = common::own_gpu() else { return };
     let scene = scene::load("paper-room:60").expect("the room is made by code");
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("the scene fits");
     let network = Weights::shipped().expect("the shipped file is sound");

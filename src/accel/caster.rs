@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use wgpu::util::DeviceExt;
 
 use super::AccelGpu;
-use crate::gpu::{readback, shaders};
+use crate::gpu::{readback, shaders, shared, tape};
 
 /// A ray as `rays.wgsl` reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -67,23 +67,25 @@ impl RayCaster {
             },
             count: None,
         };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("accel.rays"),
-            entries: &[storage(0, true), AccelGpu::layout_entry(), storage(3, false)],
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("accel.rays"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("accel.rays"),
-            layout: Some(&pipeline_layout),
-            module: &shaders::module(device, "accel.rays"),
-            entry_point: Some("main"),
-            compilation_options: Default::default(),
-            cache: None,
-        });
+        let layout = shared::bind_group_layout(
+            device,
+            &wgpu::BindGroupLayoutDescriptor {
+                label: Some("accel.rays"),
+                entries: &[storage(0, true), AccelGpu::layout_entry(), storage(3, false)],
+            },
+        );
+        let pipeline_layout = tape::pipeline_layout(device, "accel.rays", &[Some(&layout)]);
+        let pipeline = tape::compute_pipeline(
+            device,
+            &wgpu::ComputePipelineDescriptor {
+                label: Some("accel.rays"),
+                layout: Some(&pipeline_layout),
+                module: &shaders::module(device, "accel.rays"),
+                entry_point: Some("main"),
+                compilation_options: Default::default(),
+                cache: None,
+            },
+        );
         Self { pipeline, layout }
     }
 

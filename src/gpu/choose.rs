@@ -4,6 +4,7 @@
 //! `WGPU_BACKEND` and `WGPU_ADAPTER_NAME` are obeyed; explicit options win over them. Every request
 //! is answered by an adapter or by a [`GpuError`] that lists what was found and how to get one.
 
+use super::shared::Shared;
 use thiserror::Error;
 
 /// Backends by the names of the command line.
@@ -93,8 +94,10 @@ pub fn fix() -> &'static str {
     }
 }
 
-/// A device with what is known about it. Hosts that embed the passes bring their own device and
+/// A device with what is known about it, and what has been compiled on it so far: renderers that are
+/// made one after another share that. Clones are handles to the same. Hosts that embed the passes bring their own device and
 /// never need this.
+#[derive(Clone)]
 pub struct Gpu {
     /// The adapter.
     pub adapter: wgpu::Adapter,
@@ -104,6 +107,7 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// Name, driver, backend, kind.
     pub info: wgpu::AdapterInfo,
+    _shared: Shared,
 }
 
 impl Gpu {
@@ -196,7 +200,13 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| GpuError::Device { adapter: info.name.clone(), message: e.to_string() })?;
-        Ok(Self { adapter, device, queue, info })
+        Ok(Self::of(adapter, device, queue))
+    }
+
+    /// A device that was opened on `adapter`, and its queue.
+    pub fn of(adapter: wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let (info, _shared) = (adapter.get_info(), Shared::of(&device));
+        Self { adapter, device, queue, info, _shared }
     }
 
     /// True for an adapter that runs on the CPU.

@@ -11,6 +11,7 @@ pub(crate) mod count;
 mod instrument;
 pub mod readback;
 pub mod shaders;
+pub(crate) mod shared;
 pub(crate) mod tape;
 pub mod timing;
 

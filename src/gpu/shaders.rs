@@ -98,6 +98,11 @@ pub fn module(device: &wgpu::Device, name: &str) -> wgpu::ShaderModule {
 /// Shaders that this process has compiled.
 static COMPILED: AtomicU32 = AtomicU32::new(0);
 
+/// One is about to be.
+pub(super) fn compiles() {
+    COMPILED.fetch_add(1, Ordering::Relaxed);
+}
+
 /// How many shaders this process has compiled so far, for saying so while it takes long.
 pub fn compiled() -> u32 {
     COMPILED.load(Ordering::Relaxed)
@@ -118,7 +123,6 @@ pub fn located(message: &str) -> String {
 
 /// Compiles shader `name` behind a generated prelude of `const` lines.
 pub fn module_with(device: &wgpu::Device, name: &str, prelude: &str) -> wgpu::ShaderModule {
-    COMPILED.fetch_add(1, Ordering::Relaxed);
     let joined = joined(name, prelude);
     let text = joined.text.clone();
     if folder().is_some() {

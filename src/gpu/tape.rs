@@ -1,8 +1,9 @@
 //! A tape of what compute passes are: while one runs on this thread, shaders, pipelines, bind
 //! groups and dispatches are written down as they are made, for `export` and for whoever listens.
-//! Without one, each function here is wgpu's own and a look at a flag.
+//! Without one, what is compiled is [`shared`].
 
 use super::bound::Bound;
+use super::shared;
 use std::cell::{Cell, RefCell};
 
 thread_local! {
@@ -127,12 +128,16 @@ fn write(note: impl FnOnce(&mut Tape)) {
 
 /// Compiles WGSL.
 pub(crate) fn shader_module(device: &wgpu::Device, name: &str, text: String) -> wgpu::ShaderModule {
-    let kept = runs().then(|| text.clone());
-    let source = wgpu::ShaderSource::Wgsl(text.into());
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source });
-    if let Some(text) = kept {
-        write(|tape| tape.sources.push((module.clone(), Source { name: name.to_owned(), text })));
+    let make = || {
+        super::shaders::compiles();
+        let source = wgpu::ShaderSource::Wgsl(text.as_str().into());
+        device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source })
+    };
+    if !runs() {
+        return shared::shader_module(device, name, &text, make);
     }
+    let module = make();
+    write(|tape| tape.sources.push((module.clone(), Source { name: name.to_owned(), text })));
     module
 }
 
@@ -144,6 +149,9 @@ pub(crate) fn pipeline_layout(
 ) -> wgpu::PipelineLayout {
     let descriptor =
         wgpu::PipelineLayoutDescriptor { label: Some(label), bind_group_layouts: groups, immediate_size: 0 };
+    if !runs() {
+        return shared::pipeline_layout(device, &descriptor);
+    }
     let layout = device.create_pipeline_layout(&descriptor);
     write(|tape| tape.layouts.push((layout.clone(), groups.iter().map(|g| g.cloned()).collect())));
     layout
@@ -154,6 +162,9 @@ pub(crate) fn compute_pipeline(
     device: &wgpu::Device,
     descriptor: &wgpu::ComputePipelineDescriptor<'_>,
 ) -> wgpu::ComputePipeline {
+    if !runs() {
+        return shared::compute_pipeline(device, descriptor);
+    }
     let pipeline = device.create_compute_pipeline(descriptor);
     write(|tape| {
         let source = tape.sources.iter().find(|(module, _)| module == descriptor.module).map(|s| s.1.clone());

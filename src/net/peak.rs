@@ -36,14 +36,17 @@ pub fn measure(device: &wgpu::Device, queue: &wgpu::Queue) -> Peak {
         })
     };
     let [from, to] = ["peak.from", "peak.to"].map(buffer);
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some("net.peak"),
-        layout: None,
-        module: &shaders::module(device, "net.peak"),
-        entry_point: Some("main"),
-        compilation_options: Default::default(),
-        cache: None,
-    });
+    let pipeline = crate::gpu::tape::compute_pipeline(
+        device,
+        &wgpu::ComputePipelineDescriptor {
+            label: Some("net.peak"),
+            layout: None,
+            module: &shaders::module(device, "net.peak"),
+            entry_point: Some("main"),
+            compilation_options: Default::default(),
+            cache: None,
+        },
+    );
     let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("net.peak"),
         layout: &pipeline.get_bind_group_layout(0),

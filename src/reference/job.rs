@@ -1,6 +1,7 @@
 //! What one dispatch of the path tracer is asked to do: the uniform at group 1, binding 0 of
 //! `reference.path` and `reference.first_hit`.
 
+use crate::gpu::shared;
 use crate::render::View;
 use crate::scene::Camera;
 use bytemuck::{Pod, Zeroable};
@@ -109,10 +110,13 @@ pub fn film_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         count: None,
     };
     let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("reference.film"),
-        entries: &[entry(0, wgpu::BufferBindingType::Uniform), entry(1, storage(true)), entry(2, storage(false))],
-    })
+    shared::bind_group_layout(
+        device,
+        &wgpu::BindGroupLayoutDescriptor {
+            label: Some("reference.film"),
+            entries: &[entry(0, wgpu::BufferBindingType::Uniform), entry(1, storage(true)), entry(2, storage(false))],
+        },
+    )
 }
 
 /// Points that one workgroup of either kernel advances.

@@ -1,7 +1,7 @@
 //! The two compiled kernels of the path tracer and one dispatch of them.
 
 use super::{ReferenceScene, TracerError, job};
-use crate::gpu::shaders;
+use crate::gpu::{shaders, tape};
 
 /// The compiled kernels. Make one for a device and share it: compiling takes far longer than a
 /// small picture. Clones are handles to the same kernels.
@@ -30,23 +30,19 @@ impl Kernel {
     pub fn from_wgsl(device: &wgpu::Device, path: &str, first_hit: &str) -> Self {
         let layout = job::film_layout(device);
         let scene = ReferenceScene::layout(device);
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("reference"),
-            bind_group_layouts: &[Some(&scene), Some(&layout)],
-            immediate_size: 0,
-        });
+        let pipeline_layout = tape::pipeline_layout(device, "reference", &[Some(&scene), Some(&layout)]);
         let pipeline = |label, text: &str, entry| {
-            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(label),
-                layout: Some(&pipeline_layout),
-                module: &device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            tape::compute_pipeline(
+                device,
+                &wgpu::ComputePipelineDescriptor {
                     label: Some(label),
-                    source: wgpu::ShaderSource::Wgsl(text.into()),
-                }),
-                entry_point: Some(entry),
-                compilation_options: Default::default(),
-                cache: None,
-            })
+                    layout: Some(&pipeline_layout),
+                    module: &tape::shader_module(device, label, text.to_owned()),
+                    entry_point: Some(entry),
+                    compilation_options: Default::default(),
+                    cache: None,
+                },
+            )
         };
         Self {
             path: pipeline("reference.path", path, "path"),

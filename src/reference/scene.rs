@@ -19,6 +19,7 @@ mod triangles;
 pub use materials::{ImageUse, RefMaterial};
 
 use crate::accel::{self, Accel, AccelGpu};
+use crate::gpu::shared;
 use crate::scene::Scene;
 use bytemuck::{Pod, Zeroable};
 use thiserror::Error;
@@ -174,17 +175,20 @@ impl ReferenceScene {
         };
         let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
         let read = buffer(wgpu::BufferBindingType::Storage { read_only: true });
-        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("reference.scene"),
-            entries: &[
-                entry(0, buffer(wgpu::BufferBindingType::Uniform)),
-                AccelGpu::layout_entry(),
-                entry(3, read),
-                entry(4, read),
-                entry(5, read),
-                entry(6, read),
-            ],
-        })
+        shared::bind_group_layout(
+            device,
+            &wgpu::BindGroupLayoutDescriptor {
+                label: Some("reference.scene"),
+                entries: &[
+                    entry(0, buffer(wgpu::BufferBindingType::Uniform)),
+                    AccelGpu::layout_entry(),
+                    entry(3, read),
+                    entry(4, read),
+                    entry(5, read),
+                    entry(6, read),
+                ],
+            },
+        )
     }
 
     /// Group 0 for a pipeline made with [`ReferenceScene::layout`].

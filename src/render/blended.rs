@@ -4,7 +4,7 @@ use super::cull::{Count, Volume};
 use super::targets::Targets;
 use super::tool;
 use super::view::View;
-use crate::gpu::{shaders, timing::Recorder};
+use crate::gpu::{shaders, tape, timing::Recorder};
 use crate::scene::upload::{Draw, SceneGpu, attribute_layouts, material_layout};
 use glam::Vec3;
 
@@ -63,11 +63,11 @@ impl BlendedPass {
     pub fn new(device: &wgpu::Device, lights: &wgpu::BindGroupLayout) -> Self {
         let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
         let layout = tool::layout(device, "render.blended", stages, &[tool::UNIFORM, tool::LOAD, tool::LOAD]);
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("render.blended"),
-            bind_group_layouts: &[Some(&layout), Some(&material_layout(device)), Some(lights)],
-            immediate_size: 0,
-        });
+        let pipeline_layout = tape::pipeline_layout(
+            device,
+            "render.blended",
+            &[Some(&layout), Some(&material_layout(device)), Some(lights)],
+        );
         let module = shaders::module(device, "render.blended");
         let target = wgpu::ColorTargetState {
             format: wgpu::TextureFormat::Rgba16Float,

@@ -24,6 +24,7 @@ use crate::gi::{
     method, pack,
     technique::{self, Technique},
 };
+use crate::gpu::shared::Shared;
 use crate::gpu::timing::Recorder;
 use crate::net::gpu::Tap;
 use crate::net::plan::Plan;
@@ -73,6 +74,7 @@ pub(crate) enum Purpose {
 /// GPU.
 pub struct Renderer {
     device: wgpu::Device,
+    _shared: Shared,
     frame: wgpu::Buffer,
     targets: Targets,
     picture: Picture,
@@ -101,6 +103,7 @@ impl Renderer {
         options: RendererOptions,
     ) -> Result<Self, RenderError> {
         let targets = Targets::new(device, size)?;
+        let shared = Shared::of(device);
         let frame = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("render.frame"),
             size: size_of::<FrameUniform>() as u64,
@@ -117,6 +120,7 @@ impl Renderer {
         let (lights, last, backdrop) = (options.lights, None, options.backdrop);
         Ok(Self {
             device,
+            _shared: shared,
             frame,
             targets,
             picture,

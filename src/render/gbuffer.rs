@@ -31,7 +31,7 @@ use super::cull::{Count, Volume};
 use super::targets::Targets;
 use super::tool;
 use super::view::View;
-use crate::gpu::{shaders, timing::Recorder};
+use crate::gpu::{shaders, tape, timing::Recorder};
 use crate::scene::upload::{Draw, SceneGpu, material_layout, motion_layouts};
 use glam::{Vec3, Vec4};
 
@@ -62,11 +62,8 @@ impl GbufferPass {
         let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
         let layout = tool::layout(device, "render.gbuffer", stages, &[tool::UNIFORM]);
         let frame = tool::group(device, "render.gbuffer", &layout, &[frame.as_entire_binding()]);
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("render.gbuffer"),
-            bind_group_layouts: &[Some(&layout), Some(&material_layout(device))],
-            immediate_size: 0,
-        });
+        let pipeline_layout =
+            tape::pipeline_layout(device, "render.gbuffer", &[Some(&layout), Some(&material_layout(device))]);
         let module = shaders::module(device, "render.gbuffer");
         let pipelines = (0..6).map(|i| pipeline(device, (&pipeline_layout, &module), i, blending)).collect();
         Self { pipelines, frame }

@@ -14,7 +14,7 @@ use super::shadow_maps::{Audience, CAMERA_STRIDE};
 pub use super::shadow_maps::{MAX_LOCAL_LAYERS, MAX_SUNS, ShadowMaps, ShadowOptions};
 pub use super::shadow_view::ShadowViewGpu;
 use super::tool;
-use crate::gpu::{shaders, timing::Recorder};
+use crate::gpu::{shaders, shared, tape, timing::Recorder};
 use crate::scene::upload::{SceneGpu, attribute_layouts, material_layout, position_layouts};
 
 /// Draws depth from the lights.
@@ -41,40 +41,39 @@ impl ShadowPass {
         let pipeline = |covered: bool| {
             let material = covered.then(|| material_layout(device));
             let groups = [Some(&layout), material.as_ref()];
-            let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some("render.shadow"),
-                bind_group_layouts: &groups[..1 + usize::from(covered)],
-                immediate_size: 0,
-            });
+            let pipeline_layout = tape::pipeline_layout(device, "render.shadow", &groups[..1 + usize::from(covered)]);
             let (positions, all) = (position_layouts(), attribute_layouts());
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some("render.shadow"),
-                layout: Some(&pipeline_layout),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some(if covered { "covered" } else { "opaque" }),
-                    compilation_options: Default::default(),
-                    buffers: if covered { &all } else { &positions },
+            shared::render_pipeline(
+                device,
+                &wgpu::RenderPipelineDescriptor {
+                    label: Some("render.shadow"),
+                    layout: Some(&pipeline_layout),
+                    vertex: wgpu::VertexState {
+                        module: &module,
+                        entry_point: Some(if covered { "covered" } else { "opaque" }),
+                        compilation_options: Default::default(),
+                        buffers: if covered { &all } else { &positions },
+                    },
+                    // Both faces cast: single-sided walls must not let light through from behind.
+                    primitive: Default::default(),
+                    depth_stencil: Some(wgpu::DepthStencilState {
+                        format: wgpu::TextureFormat::Depth32Float,
+                        depth_write_enabled: Some(true),
+                        depth_compare: Some(wgpu::CompareFunction::Greater),
+                        stencil: Default::default(),
+                        bias: Default::default(),
+                    }),
+                    multisample: Default::default(),
+                    fragment: covered.then(|| wgpu::FragmentState {
+                        module: &module,
+                        entry_point: Some("coverage"),
+                        compilation_options: Default::default(),
+                        targets: &[],
+                    }),
+                    multiview_mask: None,
+                    cache: None,
                 },
-                // Both faces cast: single-sided walls must not let light through from behind.
-                primitive: Default::default(),
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: wgpu::TextureFormat::Depth32Float,
-                    depth_write_enabled: Some(true),
-                    depth_compare: Some(wgpu::CompareFunction::Greater),
-                    stencil: Default::default(),
-                    bias: Default::default(),
-                }),
-                multisample: Default::default(),
-                fragment: covered.then(|| wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some("coverage"),
-                    compilation_options: Default::default(),
-                    targets: &[],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
+            )
         };
         let (opaque, covered) = (pipeline(false), pipeline(true));
         Self { layout, opaque, covered, options }

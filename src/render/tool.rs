@@ -1,7 +1,7 @@
 //! Short forms for what every pass says to wgpu.
 
 pub(crate) use crate::gpu::binding::*;
-use crate::gpu::tape;
+use crate::gpu::{shared, tape};
 
 /// A bind group layout entry for one stage set, numbered by the list it stands in.
 pub(crate) fn layout(
@@ -14,7 +14,7 @@ pub(crate) fn layout(
         .zip(types)
         .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None })
         .collect();
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+    shared::bind_group_layout(device, &wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
 }
 
 /// A bind group whose bindings are numbered by the list.
@@ -81,32 +81,31 @@ pub(crate) fn screen(
     layout: &wgpu::BindGroupLayout,
 ) -> wgpu::RenderPipeline {
     let module = crate::gpu::shaders::module(device, name);
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(name),
-        bind_group_layouts: &[Some(layout)],
-        immediate_size: 0,
-    });
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(name),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers: &[],
+    let layout = tape::pipeline_layout(device, name, &[Some(layout)]);
+    shared::render_pipeline(
+        device,
+        &wgpu::RenderPipelineDescriptor {
+            label: Some(name),
+            layout: Some(&layout),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("vertex"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: None,
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("fragment"),
+                compilation_options: Default::default(),
+                targets: &[Some(format.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
         },
-        primitive: Default::default(),
-        depth_stencil: None,
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fragment"),
-            compilation_options: Default::default(),
-            targets: &[Some(format.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+    )
 }
 
 /// How [`mesh`] draws.
@@ -128,33 +127,39 @@ pub(crate) fn mesh(
     (layout, module): (&wgpu::PipelineLayout, &wgpu::ShaderModule),
     drawn: Drawn<'_>,
 ) -> wgpu::RenderPipeline {
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(label),
-        layout: Some(layout),
-        vertex: wgpu::VertexState {
-            module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers: drawn.buffers,
+    shared::render_pipeline(
+        device,
+        &wgpu::RenderPipelineDescriptor {
+            label: Some(label),
+            layout: Some(layout),
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: Some("vertex"),
+                compilation_options: Default::default(),
+                buffers: drawn.buffers,
+            },
+            primitive: wgpu::PrimitiveState { cull_mode: drawn.cull, ..Default::default() },
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: wgpu::TextureFormat::Depth32Float,
+                depth_write_enabled: Some(drawn.writes_depth),
+                depth_compare: Some(wgpu::CompareFunction::Greater),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module,
+                entry_point: Some("fragment"),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: drawn.constants,
+                    ..Default::default()
+                },
+                targets: drawn.targets,
+            }),
+            multiview_mask: None,
+            cache: None,
         },
-        primitive: wgpu::PrimitiveState { cull_mode: drawn.cull, ..Default::default() },
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: wgpu::TextureFormat::Depth32Float,
-            depth_write_enabled: Some(drawn.writes_depth),
-            depth_compare: Some(wgpu::CompareFunction::Greater),
-            stencil: Default::default(),
-            bias: Default::default(),
-        }),
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module,
-            entry_point: Some("fragment"),
-            compilation_options: wgpu::PipelineCompilationOptions { constants: drawn.constants, ..Default::default() },
-            targets: drawn.targets,
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+    )
 }
 
 /// A uniform buffer of `size` bytes that the queue writes.

@@ -1,6 +1,6 @@
 //! The pass `wires`: edges of all triangles that are seen, a pixel wide, for the view `wireframe`.
 
-use crate::gpu::{shaders, timing::Recorder};
+use crate::gpu::{shaders, shared, tape, timing::Recorder};
 use crate::render::cull::{Count, Volume};
 use crate::render::{Renderer, View, gbuffer, targets::Target, tool};
 use crate::scene::upload::{SceneGpu, position_layouts};
@@ -82,40 +82,39 @@ impl WiresPass {
 
 fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, cull: Option<wgpu::Face>) -> wgpu::RenderPipeline {
     let module = shaders::module(device, "viewer.wires");
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("viewer.wires"),
-        bind_group_layouts: &[Some(layout)],
-        immediate_size: 0,
-    });
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("viewer.wires"),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vertex"),
-            compilation_options: Default::default(),
-            buffers: &position_layouts(),
+    let layout = tape::pipeline_layout(device, "viewer.wires", &[Some(layout)]);
+    shared::render_pipeline(
+        device,
+        &wgpu::RenderPipelineDescriptor {
+            label: Some("viewer.wires"),
+            layout: Some(&layout),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("vertex"),
+                compilation_options: Default::default(),
+                buffers: &position_layouts(),
+            },
+            primitive: wgpu::PrimitiveState {
+                cull_mode: cull,
+                polygon_mode: wgpu::PolygonMode::Line,
+                ..Default::default()
+            },
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: wgpu::TextureFormat::Depth32Float,
+                depth_write_enabled: Some(false),
+                depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
+                stencil: Default::default(),
+                bias: wgpu::DepthBiasState { constant: NEARER.0, slope_scale: NEARER.1, clamp: 0.0 },
+            }),
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("fragment"),
+                compilation_options: Default::default(),
+                targets: &[Some(wgpu::TextureFormat::R8Unorm.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
         },
-        primitive: wgpu::PrimitiveState {
-            cull_mode: cull,
-            polygon_mode: wgpu::PolygonMode::Line,
-            ..Default::default()
-        },
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: wgpu::TextureFormat::Depth32Float,
-            depth_write_enabled: Some(false),
-            depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
-            stencil: Default::default(),
-            bias: wgpu::DepthBiasState { constant: NEARER.0, slope_scale: NEARER.1, clamp: 0.0 },
-        }),
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fragment"),
-            compilation_options: Default::default(),
-            targets: &[Some(wgpu::TextureFormat::R8Unorm.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+    )
 }

@@ -77,8 +77,19 @@ pub fn skip(need: Need, reason: impl Display) {
     }
 }
 
-/// A device whose validation errors fail the test, or `None` after a [`skip`].
+/// A device whose validation errors fail the test, or `None` after a [`skip`]. All tests of a program
+/// share it, and what is compiled on it.
 pub fn gpu() -> Option<Gpu> {
+    static GPU: std::sync::Mutex<Option<Gpu>> = std::sync::Mutex::new(None);
+    let mut gpu = GPU.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    if gpu.is_none() {
+        *gpu = own_gpu();
+    }
+    gpu.clone()
+}
+
+/// As [`gpu`], a device of the test's own: for tests that measure what a device holds.
+pub fn own_gpu() -> Option<Gpu> {
     match Gpu::open(&GpuOptions::default()) {
         Ok(gpu) => {
             gpu.device.on_uncaptured_error(std::sync::Arc::new(|e| panic!("wgpu: {e}")));

@@ -25,7 +25,7 @@ fn small(gpu: &Gpu, change: impl FnOnce(&mut wgpu::Limits)) -> Gpu {
     let descriptor = wgpu::DeviceDescriptor { label: Some("small"), required_limits, ..Default::default() };
     let (device, queue) = pollster::block_on(gpu.adapter.request_device(&descriptor)).expect("less is granted");
     device.on_uncaptured_error(std::sync::Arc::new(|e| panic!("wgpu: {e}")));
-    Gpu { adapter: gpu.adapter.clone(), device, queue, info: gpu.info.clone() }
+    Gpu::of(gpu.adapter.clone(), device, queue)
 }
 
 #[test]

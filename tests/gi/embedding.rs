@@ -28,7 +28,7 @@ fn device_bytes(gpu: &Gpu) -> Option<u64> {
 
 #[test]
 fn thousands_of_frames_and_nothing_grows() {
-    let Some(gpu) = common::gpu() else { return };
+    let Some(gpu) = common::own_gpu() else { return };
     let size = [8, 8];
     let options = bouncelight::gi::gather::Options { slots: 64, ..Default::default() };
     let mut lit = View::new(&gpu.device, &gpu.queue, size, &Method::Gather(options)).expect("made");
@@ -94,8 +94,8 @@ fn two_views_of_one_device_do_not_know_of_each_other() {
 
 #[test]
 fn two_devices_and_any_order_of_dropping() {
-    let Some(first) = common::gpu() else { return };
-    let Some(second) = common::gpu() else { return };
+    let Some(first) = common::own_gpu() else { return };
+    let Some(second) = common::own_gpu() else { return };
     let light = |gpu: &Gpu| {
         let shot = shot(0, [0.0; 2]);
         let targets = written(gpu, &shot, &Written::default(), &shot.camera);
@@ -142,7 +142,7 @@ fn a_lost_device_is_no_panic() {
     let (device, queue) =
         pollster::block_on(gpu.adapter.request_device(&Default::default())).expect("a device to be lost");
     device.on_uncaptured_error(Arc::new(|_| {}));
-    let lost = Gpu { adapter: gpu.adapter.clone(), device, queue, info: gpu.info.clone() };
+    let lost = Gpu::of(gpu.adapter, device, queue);
     let shot = shot(0, [0.0; 2]);
     let targets = written(&lost, &shot, &Written::default(), &shot.camera);
     let (mut world, mut lit) = (world(&lost), gather(&lost));

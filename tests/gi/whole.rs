@@ -188,7 +188,7 @@ fn two_views_in_one_submission_keep_their_own_cameras() {
 
 #[test]
 fn steady_frames_allocate_nothing() {
-    let Some(gpu) = common::gpu() else { return };
+    let Some(gpu) = common::own_gpu() else { return };
     let (device, queue) = (&gpu.device, &gpu.queue);
     let mut gi = NeuralGi::new(device, queue, &weights::weights(), Options { size: [64, 48] }).expect("made");
     let shot = Shot::random([64, 48], 10);

@@ -245,7 +245,7 @@ fn odd_sizes_are_lit() {
 
 #[test]
 fn steady_frames_allocate_nothing() {
-    let Some(gpu) = common::gpu() else { return };
+    let Some(gpu) = common::own_gpu() else { return };
     let build = hall(GREY, &[sun(BACKWARDS, 1.0)], 0.1, 1.0);
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &build).expect("the scene fits");
     uploaded.trace(&gpu.device, &gpu.queue, &build).expect("its rays fit");

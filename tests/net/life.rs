@@ -118,7 +118,7 @@ fn held(gpu: &Gpu) -> Option<u64> {
 
 #[test]
 fn a_thousand_changes_leak_nothing() {
-    let Some(gpu) = common::gpu() else { return };
+    let Some(gpu) = common::own_gpu() else { return };
     let graph = graph(4, json!([conv("a", "input", 4, 4, 1, 1), conv("b", "a", 4, 4, 1, 1)]));
     let weights = hashed::network(&graph);
     let mut bytes = hashed::file(&graph, 4);

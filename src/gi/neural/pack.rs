@@ -5,7 +5,7 @@ use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::exposure::{ExposurePass, pipeline, storage_entry};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup, cells_of, check, texture_entry};
 use crate::gpu::timing::Recorder;
-use crate::gpu::{readback, shaders, tape};
+use crate::gpu::{readback, shaders, shared, tape};
 
 /// The pack stage, bound to one input buffer.
 pub struct PackPass {
@@ -25,10 +25,13 @@ impl PackPass {
         target: wgpu::BindingResource<'_>,
         guess: &wgpu::TextureView,
     ) -> Self {
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("gi.pack"),
-            entries: &[storage_entry(0, true), storage_entry(1, false), texture_entry(2)],
-        });
+        let layout = shared::bind_group_layout(
+            device,
+            &wgpu::BindGroupLayoutDescriptor {
+                label: Some("gi.pack"),
+                entries: &[storage_entry(0, true), storage_entry(1, false), texture_entry(2)],
+            },
+        );
         let module = shaders::module_with(device, "gi.pack", &features.prelude());
         let group = tape::bind_group(
             device,

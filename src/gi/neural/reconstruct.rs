@@ -13,7 +13,7 @@ use crate::gi::stage::exposure::{ExposurePass, output_entry, pipeline, storage_e
 use crate::gi::stage::inputs::{BoundInputs, InputGroup, texture_entry};
 use crate::gi::stage::weights::{NORMAL_FLOOR, NORMAL_POWER, PLANE_TOLERANCE, WEIGHT_FLOOR};
 use crate::gpu::timing::Recorder;
-use crate::gpu::{shaders, tape};
+use crate::gpu::{shaders, shared, tape};
 
 /// Sum of the four weights below which more cells are asked.
 pub const TRUST: f32 = 0.1;
@@ -106,10 +106,13 @@ pub struct ReconstructPass {
 impl ReconstructPass {
     /// Compiles the shader.
     pub fn new(device: &wgpu::Device, inputs: &InputGroup, answer: Answer) -> Self {
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("gi.reconstruct"),
-            entries: &[storage_entry(0, true), storage_entry(1, true), output_entry(2), texture_entry(3)],
-        });
+        let layout = shared::bind_group_layout(
+            device,
+            &wgpu::BindGroupLayoutDescriptor {
+                label: Some("gi.reconstruct"),
+                entries: &[storage_entry(0, true), storage_entry(1, true), output_entry(2), texture_entry(3)],
+            },
+        );
         let module = shaders::module_with(device, "gi.reconstruct", &prelude(answer));
         let pipeline = pipeline(device, "gi.reconstruct", &module, "reconstruct", inputs, &layout);
         Self { device: device.clone(), pipeline, layout, outputs: ViewCache::new() }

@@ -11,7 +11,7 @@ use crate::gi::stage::ViewCache;
 use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry};
 use crate::gi::stage::inputs::{InputGroup, check_outputs, texture_entry};
 use crate::gpu::timing::Recorder;
-use crate::gpu::{shaders, tape};
+use crate::gpu::{shaders, shared, tape};
 use std::str::FromStr;
 
 /// Light where a network's cells cannot answer (E/π, linear Rec.709), as a multiple of the exposure
@@ -102,10 +102,13 @@ impl AmbientGi {
         let inputs = InputGroup::new(device);
         let exposure = ExposurePass::new(device, &inputs);
         let occlusion = OcclusionPass::new(device, &inputs, March::NEAR);
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("gi.ambient"),
-            entries: &[storage_entry(0, true), texture_entry(1), output_entry(2)],
-        });
+        let layout = shared::bind_group_layout(
+            device,
+            &wgpu::BindGroupLayoutDescriptor {
+                label: Some("gi.ambient"),
+                entries: &[storage_entry(0, true), texture_entry(1), output_entry(2)],
+            },
+        );
         let module = shaders::module_with(device, "gi.ambient", &unseen_prelude(unseen.sky, unseen.bounce));
         let pipeline = exposure::pipeline(device, "gi.ambient", &module, "ambient", &inputs, &layout);
         Self {

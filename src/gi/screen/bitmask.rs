@@ -9,7 +9,7 @@
 use crate::gi::stage::exposure;
 use crate::gi::stage::exposure::storage_entry;
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
-use crate::gpu::{shaders, tape};
+use crate::gpu::{shaders, shared, tape};
 
 /// How far, how densely and how thickly the depth buffer is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -153,7 +153,8 @@ impl Kernel {
         prelude: &str,
         entries: &[wgpu::BindGroupLayoutEntry],
     ) -> Self {
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries });
+        let layout =
+            shared::bind_group_layout(device, &wgpu::BindGroupLayoutDescriptor { label: Some(label), entries });
         let module = shaders::module_with(device, label, prelude);
         let entry = label.trim_start_matches("gi.");
         let pipeline = exposure::pipeline(device, label, &module, entry, inputs, &layout);

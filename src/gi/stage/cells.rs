@@ -17,7 +17,7 @@
 use super::exposure::{pipeline, storage_entry};
 use super::inputs::{BoundInputs, CELL, InputGroup, cells_of};
 use crate::gpu::timing::Recorder;
-use crate::gpu::{shaders, tape};
+use crate::gpu::{shaders, shared, tape};
 
 /// What `cell_pixels` holds for a cell that shows the background only; `NO_PIXEL` in
 /// `shaders/gi/cells.wgsl`.
@@ -52,10 +52,10 @@ pub struct CellsPass {
 impl CellsPass {
     /// Compiles the shader and makes the buffer for pictures of `size` pixels.
     pub fn new(device: &wgpu::Device, inputs: &InputGroup, size: [u32; 2]) -> Self {
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("gi.cells"),
-            entries: &[storage_entry(0, false)],
-        });
+        let layout = shared::bind_group_layout(
+            device,
+            &wgpu::BindGroupLayoutDescriptor { label: Some("gi.cells"), entries: &[storage_entry(0, false)] },
+        );
         let module = shaders::module_with(device, "gi.cells", &prelude());
         let pipeline = pipeline(device, "gi.cells", &module, "choose", inputs, &layout);
         let (pixels, group) = buffer(device, &layout, size);

@@ -4,7 +4,7 @@
 use super::inputs::{BoundInputs, InputGroup};
 use crate::gi::interface::GiError;
 use crate::gpu::timing::Recorder;
-use crate::gpu::{bind, readback, shaders, tape};
+use crate::gpu::{bind, readback, shaders, shared, tape};
 
 /// Most workgroups of the first level; `MAX_GROUPS` in the shader.
 const MAX_GROUPS: u32 = 256;
@@ -52,10 +52,13 @@ impl ExposurePass {
         };
         let partials = buffer("gi.exposure.partials", u64::from(MAX_GROUPS) * 32, wgpu::BufferUsages::COPY_SRC);
         let result = buffer("gi.exposure", size_of::<Exposure>() as u64, wgpu::BufferUsages::COPY_SRC);
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("gi.exposure"),
-            entries: &[storage_entry(0, false), storage_entry(1, false)],
-        });
+        let layout = shared::bind_group_layout(
+            device,
+            &wgpu::BindGroupLayoutDescriptor {
+                label: Some("gi.exposure"),
+                entries: &[storage_entry(0, false), storage_entry(1, false)],
+            },
+        );
         let group = tape::bind_group(
             device,
             &wgpu::BindGroupDescriptor {

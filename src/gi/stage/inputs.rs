@@ -10,8 +10,8 @@ pub(crate) use super::formats::{check, check_outputs};
 pub use super::params::{CELL, Params, cells_of, sample_pixel};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::ViewCache;
-use crate::gpu::tape;
 use crate::gpu::timing::Pass;
+use crate::gpu::{shared, tape};
 
 /// Recordings between two submissions that keep their own parameters.
 pub const SLOTS: u32 = 64;
@@ -74,17 +74,20 @@ impl InputGroup {
             },
             count: None,
         };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("gi.inputs"),
-            entries: &[
-                uniform,
-                texture_entry(1),
-                texture_entry(2),
-                texture_entry(3),
-                texture_entry(4),
-                texture_entry(5),
-            ],
-        });
+        let layout = shared::bind_group_layout(
+            device,
+            &wgpu::BindGroupLayoutDescriptor {
+                label: Some("gi.inputs"),
+                entries: &[
+                    uniform,
+                    texture_entry(1),
+                    texture_entry(2),
+                    texture_entry(3),
+                    texture_entry(4),
+                    texture_entry(5),
+                ],
+            },
+        );
         let ring = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("gi.params"),
             size: STRIDE * u64::from(SLOTS),

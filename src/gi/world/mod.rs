@@ -20,6 +20,7 @@ pub use view::View;
 
 use super::interface::{GiError, Inputs, Lights, Rays};
 use crate::accel::{MeshPart, RayCounts, SceneRays};
+use crate::gpu::shared::Shared;
 use crate::scene::upload::{self, LightGpu};
 use crate::scene::{Environment, Light};
 use std::collections::BTreeMap;
@@ -90,6 +91,8 @@ struct Placed {
 /// ```
 pub struct World {
     device: wgpu::Device,
+    /// What its views compile is there for views to come.
+    _shared: Shared,
     options: WorldOptions,
     meshes: BTreeMap<u64, PreparedMesh>,
     instances: BTreeMap<u64, Placed>,
@@ -131,6 +134,7 @@ impl World {
     pub fn new(device: &wgpu::Device, options: WorldOptions) -> Self {
         Self {
             device: device.clone(),
+            _shared: Shared::of(device),
             options,
             meshes: BTreeMap::new(),
             instances: BTreeMap::new(),

@@ -7,6 +7,7 @@ use crate::gi::interface::{GiError, Inputs, Outputs};
 use crate::gi::method::{self, Method};
 use crate::gi::pass::NeuralGi;
 use crate::gi::stage::inputs::Params;
+use crate::gpu::shared::Shared;
 use crate::gpu::timing::Recorder;
 
 /// What a method remembers of one camera's picture, and its passes. Make one for each camera; any
@@ -39,6 +40,7 @@ pub struct View {
     size: [u32; 2],
     /// The last frame's camera, and that of the frame before if the last one followed it.
     seen: [Option<Params>; 2],
+    _shared: Shared,
 }
 
 impl View {
@@ -52,15 +54,17 @@ impl View {
         NeuralGi::required_limits()
     }
 
-    /// Compiles `method`'s pipelines and makes its buffers for pictures of `size` pixels. Keeps
-    /// clones of device and queue (handles).
+    /// Compiles those of `method`'s pipelines that neither another view nor a [`World`] of this
+    /// device has, and makes its buffers for pictures of `size` pixels. Keeps clones of device and
+    /// queue (handles).
     ///
     /// # Errors
     /// [`GiError::NoMethod`] for [`Method::Direct`], which adds no light; [`GiError`] where a
     /// network does not fit.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, size: [u32; 2], method: &Method) -> Result<Self, GiError> {
+        let _shared = Shared::of(device);
         let technique = method::build(device, queue, size, method)?.ok_or(GiError::NoMethod(method.name()))?;
-        Ok(Self { queue: queue.clone(), technique, size, seen: [None; 2] })
+        Ok(Self { queue: queue.clone(), technique, size, seen: [None; 2], _shared })
     }
 
     /// Records all of the method's passes. `outputs`: one view for the diffuse light, or [`Outputs`].

@@ -2,6 +2,7 @@
 
 use super::texture::Textures;
 use super::{UploadError, filled};
+use crate::gpu::shared;
 use crate::scene::{AlphaMode, Material, Sampler, Scene, TextureRef, Wrap};
 use bytemuck::{Pod, Zeroable};
 use std::collections::HashMap;
@@ -166,8 +167,10 @@ pub fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         entries.push(entry(6 + i, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)));
     }
     entries.sort_by_key(|e| e.binding);
-    device
-        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("scene.material"), entries: &entries })
+    shared::bind_group_layout(
+        device,
+        &wgpu::BindGroupLayoutDescriptor { label: Some("scene.material"), entries: &entries },
+    )
 }
 
 fn sampler(device: &wgpu::Device, s: Sampler) -> wgpu::Sampler {
