@@ -67,12 +67,8 @@ fn is_same(one: &wgpu::Device, other: &wgpu::Device) -> bool {
     let unheard = other.push_error_scope(wgpu::ErrorFilter::Validation);
     let heard = one.push_error_scope(wgpu::ErrorFilter::Validation);
     let usage = wgpu::BufferUsages::empty();
-    other.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("a mistake"),
-        size: 4,
-        usage,
-        mapped_at_creation: false,
-    });
+    let label = Some("a mistake");
+    let _ = other.create_buffer(&wgpu::BufferDescriptor { label, size: 4, usage, mapped_at_creation: false });
     let heard = pollster::block_on(heard.pop()).is_some();
     pollster::block_on(unheard.pop());
     heard
