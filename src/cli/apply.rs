@@ -111,7 +111,7 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
     let options = Options { dropout, precision: global.precision().unwrap_or_default(), ..Default::default() };
     let size = [input.shape.width, input.shape.height];
     let tuned = super::tuned::of(&gpu.device, global.quiet);
-    let setup = Setup { options, tuned, ..Setup::default() };
+    let setup = Setup { options, tuned };
     let network = match Network::new(&gpu.device, &gpu.queue, weights, size, setup) {
         Ok(network) => network,
         Err(e @ (NetError::Plan(PlanError::TooLarge { .. }) | NetError::Limit { .. })) => return slow(&e),

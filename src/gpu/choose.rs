@@ -95,8 +95,8 @@ pub fn fix() -> &'static str {
 }
 
 /// A device with what is known about it, and what has been compiled on it so far: renderers that are
-/// made one after another share that. Clones are handles to the same. Hosts that embed the passes bring their own device and
-/// never need this.
+/// made one after another share that. Clones are handles to the same. Hosts that embed the passes
+/// bring their own device and never need this.
 #[derive(Clone)]
 pub struct Gpu {
     /// The adapter.

@@ -13,19 +13,17 @@ mod kernels;
 pub mod layer;
 mod pack;
 pub mod permutation;
-mod pipelines;
 mod tap;
 
 use super::format::Weights;
 use super::graph::Graph;
 use super::plan::{Plan, PlanError, Precision};
-use crate::gpu::timing::Recorder;
+use crate::gpu::{shared::Shared, timing::Recorder};
 use build::{Layer, Memory};
 pub use examples::example_preludes;
 pub use kernel::{Bound, Choice, Kernel, Numbers, Part, Sum};
 pub use layer::Filter;
 pub use permutation::{Facts, Permutation, Source, Tuned, Variant};
-pub use pipelines::Pipelines;
 use std::sync::Arc;
 pub use tap::Tap;
 use thiserror::Error;
@@ -95,8 +93,6 @@ pub struct Setup {
     pub options: Options,
     /// What a tuner has found on this device.
     pub tuned: Arc<Tuned>,
-    /// Compiled kernels that other networks of this device use too.
-    pub pipelines: Pipelines,
 }
 
 impl From<Options> for Setup {
@@ -131,12 +127,12 @@ pub struct Network {
     options: Options,
     memory: Memory,
     layers: Vec<Layer>,
-    pipelines: Pipelines,
+    _shared: Shared,
     tuned: Arc<Tuned>,
 }
 
 impl Network {
-    /// Builds pipelines, uploads weights, allocates the arena for an input of `size` (width,
+    /// Compiles those kernels that nobody has yet on this device, uploads weights, allocates the arena for an input of `size` (width,
     /// height). `setup`: [`Options`] alone, or a whole [`Setup`].
     ///
     /// # Errors
@@ -148,23 +144,23 @@ impl Network {
         size: [u32; 2],
         setup: impl Into<Setup>,
     ) -> Result<Self, NetError> {
-        let Setup { options, tuned, pipelines } = setup.into();
+        let Setup { options, tuned } = setup.into();
+        let _shared = Shared::of(device);
         let plan = build::plan(device, &weights.graph, size, options)?;
         let choice = Choice { variant: options.variant, tuned: &tuned, facts: Facts::of(device) };
         let kernels: Vec<Kernel> = plan.steps.iter().map(|s| Kernel::choose(&plan, s, &choice)).collect();
         build::check_limits(device, &plan, &kernels)?;
-        pipelines.keep(&kernels);
         let memory = Memory::new(device, &plan, &kernels);
         queue.write_buffer(&memory.steps, 0, &build::uniforms(&plan, &kernels, options.dropout));
-        let layers = build::layers(device, &plan, kernels, &pipelines, &memory);
+        let layers = build::layers(device, &plan, kernels, &memory);
         let graph = weights.graph.clone();
-        let network = Self { graph, plan, options, memory, layers, pipelines, tuned };
+        let network = Self { graph, plan, options, memory, layers, _shared, tuned };
         network.upload(queue, weights);
         Ok(network)
     }
 
-    /// The same network for another size and other weights, whose graph may be another. Pipelines
-    /// that serve again are kept.
+    /// The same network for another size and other weights, whose graph may be another. Nothing
+    /// that was compiled for it is compiled again.
     ///
     /// # Errors
     /// As [`Network::new`]; then the old network is gone.
@@ -175,12 +171,12 @@ impl Network {
         weights: &Weights,
         size: [u32; 2],
     ) -> Result<Self, NetError> {
-        let Self { options, pipelines, tuned, .. } = self;
-        Self::new(device, queue, weights, size, Setup { options, tuned, pipelines })
+        let Self { options, tuned, _shared, .. } = self;
+        Self::new(device, queue, weights, size, Setup { options, tuned })
     }
 
-    /// The same network with what a tuner has found in the meantime. Pipelines that serve again are
-    /// kept.
+    /// The same network with what a tuner has found in the meantime. Nothing that was compiled for
+    /// it is compiled again.
     ///
     /// # Errors
     /// As [`Network::new`]; then the old network is gone.
@@ -190,8 +186,8 @@ impl Network {
         weights: &Weights,
         tuned: Arc<Tuned>,
     ) -> Result<Self, NetError> {
-        let Self { options, pipelines, plan, .. } = self;
-        Self::new(device, queue, weights, [plan.width, plan.height], Setup { options, tuned, pipelines })
+        let Self { options, plan, _shared, .. } = self;
+        Self::new(device, queue, weights, [plan.width, plan.height], Setup { options, tuned })
     }
 
     /// Replaces the trained numbers from the queue's next submission on. Allocates nothing on the

@@ -8,7 +8,7 @@
 use super::format::Weights;
 use super::gpu::layer::Layer;
 use super::gpu::permutation::MAX_PARTS;
-use super::gpu::{Facts, NetError, Network, Options, Permutation, Pipelines, Setup, Tuned};
+use super::gpu::{Facts, NetError, Network, Options, Permutation, Setup, Tuned};
 use crate::gpu::timing::Recorder;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -152,12 +152,8 @@ pub fn tune(
 ) -> Result<Vec<Report>, NetError> {
     let (info, facts) = (device.adapter_info(), Facts::of(device));
     let known = if again { Tuned::new() } else { cache.tuned(&info) };
-    // What both rivals share is compiled once.
-    let pipelines = Pipelines::default();
-    let build = |tuned: &Tuned| {
-        let (tuned, pipelines) = (Arc::new(tuned.clone()), pipelines.clone());
-        Network::new(device, queue, weights, size, Setup { options, tuned, pipelines })
-    };
+    let build =
+        |tuned: &Tuned| Network::new(device, queue, weights, size, Setup { options, tuned: Arc::new(tuned.clone()) });
     let mut champion = build(&known)?;
     // Steps of one shape share what is found.
     let mut rivals: BTreeMap<String, (usize, Layer, Vec<Permutation>)> = BTreeMap::new();

@@ -57,7 +57,7 @@ pub fn measure(
     tuned: Arc<Tuned>,
     peak: Peak,
 ) -> Result<Layers, NetError> {
-    let setup = Setup { options, tuned, ..Setup::default() };
+    let setup = Setup { options, tuned };
     let network = Network::new(&gpu.device, &gpu.queue, weights, cells, setup)?;
     let times = tune::layers((&gpu.device, &gpu.queue), &network, TURNS);
     let layer = |((row, kernel), ms): ((crate::net::plan::Row, &Kernel), f64)| {

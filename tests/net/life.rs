@@ -10,7 +10,7 @@ use bouncelight::net::arch;
 use bouncelight::net::convert::{Arch, Norm};
 use bouncelight::net::cpu::{self, Tensor};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{NetError, Network, Options, Permutation, Pipelines, Setup, Source, Variant};
+use bouncelight::net::gpu::{NetError, Network, Options, Permutation, Source, Variant};
 use bouncelight::net::graph::{Graph, Shape};
 use bouncelight::net::plan::Precision;
 use serde_json::{Value, json};
@@ -201,7 +201,6 @@ fn dropout_drops_the_same_values_everywhere() {
 #[test]
 fn wide_layers_agree_with_the_cpu_reference() {
     let Some(gpu) = common::gpu() else { return };
-    let pipelines = Pipelines::default();
     let norm = |c: u32| {
         json!([{"op": "group_norm", "name": "y", "input": "input", "output": "y", "channels": c,
         "groups": 2}])
@@ -236,14 +235,7 @@ fn wide_layers_agree_with_the_cpu_reference() {
             Options { variant: staged(1, 7, false), ..half },
             Options { variant: staged(2, 4, true), ..half },
         ] {
-            let network = Network::new(
-                &gpu.device,
-                &gpu.queue,
-                &weights,
-                size,
-                Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
-            )
-            .unwrap();
+            let network = Network::new(&gpu.device, &gpu.queue, &weights, size, options).unwrap();
             let e = error(&run_network(&gpu, &network, &input).data, &by_cpu.data);
             let ways: Vec<_> = network.kernels().filter_map(|k| k.permutation).map(|p| p.to_string()).collect();
             println!("{name}, {}: {e:.1e}", ways.join(", "));

@@ -120,8 +120,7 @@ fn every_kernel_agrees_with_pytorch_and_with_the_cpu_reference() {
         let mut worst = 0f32;
         for name in NAMES {
             let weights = Weights::load(&fixture(&format!("{name}.safetensors"))).unwrap();
-            // Every network compiles its own pipelines; the other variants need the whole net at
-            // one size only.
+            // The other variants need the whole net at one size only.
             let few = name == "unet" && variant != Variant::Auto;
             for (input, reference) in cases(name).into_iter().take(if few { 1 } else { usize::MAX }) {
                 let found = run_gpu(&gpu, &weights, &input, Options { variant, ..Options::default() });

@@ -7,7 +7,7 @@ use crate::{common, fixed, run_gpu, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::cpu::{self, Tensor};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Setup, Source, Variant};
+use bouncelight::net::gpu::{Network, Options, Permutation, Source, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::Precision;
 use serde_json::{Value, json};
@@ -30,16 +30,9 @@ fn up(i: u32, o: u32, kernel: u32, stride: u32) -> Value {
            "kernel": [kernel, kernel], "stride": stride})
 }
 
-fn run(gpu: &Gpu, pipelines: &Pipelines, weights: &Weights, input: &Tensor, options: Options) -> (Tensor, usize) {
+fn run(gpu: &Gpu, weights: &Weights, input: &Tensor, options: Options) -> (Tensor, usize) {
     let size = [input.shape.width, input.shape.height];
-    let network = Network::new(
-        &gpu.device,
-        &gpu.queue,
-        weights,
-        size,
-        Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
-    )
-    .unwrap();
+    let network = Network::new(&gpu.device, &gpu.queue, weights, size, options).unwrap();
     let measured = network.plan().steps.iter().filter(|s| s.moments.is_some()).count();
     (run_network(gpu, &network, input), measured)
 }
@@ -49,7 +42,6 @@ fn run(gpu: &Gpu, pipelines: &Pipelines, weights: &Weights, input: &Tensor, opti
 #[test]
 fn what_a_convolution_measures_is_what_a_step_of_its_own_does() {
     let Some(gpu) = common::gpu() else { return };
-    let pipelines = Pipelines::default();
     let cases = [
         (6, json!([conv(6, 12, 3, 1), norm("c", 12, 2)])),
         (8, json!([conv(8, 18, 3, 1), norm("c", 18, 3)])),
@@ -75,11 +67,11 @@ fn what_a_convolution_measures_is_what_a_step_of_its_own_does() {
         for (size, options) in [[37, 29], [1, 3], [70, 2]].into_iter().flat_map(|s| ways.clone().map(move |w| (s, w))) {
             let input = hashed::input("x", channels, size);
             let by_cpu = cpu::run(&weights, &input).unwrap();
-            let (found, measured) = run(&gpu, &pipelines, &weights, &input, options);
+            let (found, measured) = run(&gpu, &weights, &input, options);
             assert_eq!(measured, 1);
             let mut e = error(&found.data, &by_cpu.data);
             if options.variant == Variant::Auto {
-                let (apart, measured) = run(&gpu, &pipelines, &weights, &input, Options { fuse: false, ..options });
+                let (apart, measured) = run(&gpu, &weights, &input, Options { fuse: false, ..options });
                 assert_eq!(measured, 0);
                 e = e.max(error(&found.data, &apart.data));
             }
@@ -89,7 +81,7 @@ fn what_a_convolution_measures_is_what_a_step_of_its_own_does() {
             worst[usize::from(in_half)] = worst[usize::from(in_half)].max(e);
         }
     }
-    println!("worst {worst:?}, {} kernels", pipelines.len());
+    println!("worst {worst:?}");
     // Negative control: moments of other groups, as a wrong tile would make them.
     let [two, three] = [2, 3].map(|n| hashed::network(&graph(6, json!([conv(6, 12, 3, 1), norm("c", 12, n)]))));
     let input = hashed::input("x", 6, [37, 29]);
@@ -138,8 +130,7 @@ fn norms_of_large_means_are_sound() {
         let by_cpu = cpu::run(&far, &near).unwrap();
         let parts = Variant::Fixed(Permutation { parts: 2, ..Permutation::new(Source::Staged, 2) });
         for variant in [Variant::Auto, fixed(Source::Uniform, 2), parts] {
-            let (found, measured) =
-                run(&gpu, &Pipelines::default(), &far, &near, Options { variant, ..Options::default() });
+            let (found, measured) = run(&gpu, &far, &near, Options { variant, ..Options::default() });
             let e = error(&found.data, &by_cpu.data);
             println!("{groups} groups after a convolution, {variant:?}: {e:.1e}");
             assert!(measured == 1 && e <= 2e-3, "{groups} groups, {variant:?}: {e}");
@@ -168,7 +159,7 @@ fn what_is_measured_once_serves_two_norms() {
     let input = hashed::input("x", 6, [41, 23]);
     let by_cpu = cpu::run_with(&weights, &input, Some(5)).unwrap();
     let options = Options { dropout: Some(5), ..Options::default() };
-    let (found, measured) = run(&gpu, &Pipelines::default(), &weights, &input, options);
+    let (found, measured) = run(&gpu, &weights, &input, options);
     assert_eq!(measured, 1);
     assert!(error(&found.data, &by_cpu.data) <= TOLERANCE);
     // Negative control: another seed is other moments.

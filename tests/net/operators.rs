@@ -4,7 +4,7 @@ use crate::hashed::{self, cases, graphs};
 use crate::{common, fixed, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{Network, Options, Permutation, Pipelines, Setup, Source, Variant};
+use bouncelight::net::gpu::{Network, Options, Permutation, Source, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::op::Op;
 use bouncelight::net::op_facts::KINDS;
@@ -37,7 +37,7 @@ fn the_cpu_reference_agrees_with_pytorch_on_every_operator() {
 
 /// Runs the graphs that `wanted` picks at up to `sizes` sizes in the way that `options` say, with
 /// compiled kernels shared.
-fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usize, wanted: impl Fn(&Graph) -> bool) {
+fn check_kernels(gpu: &Gpu, options: Options, sizes: usize, wanted: impl Fn(&Graph) -> bool) {
     let (cases, metadata) = cases("operators.safetensors");
     let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
     let start = std::time::Instant::now();
@@ -49,13 +49,7 @@ fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usiz
         for case in cases[name].iter().rev().take(sizes) {
             let input = hashed::input(name, graph.input_channels, case.size);
             let next = match network.take() {
-                None => Network::new(
-                    &gpu.device,
-                    &gpu.queue,
-                    &weights,
-                    case.size,
-                    Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
-                ),
+                None => Network::new(&gpu.device, &gpu.queue, &weights, case.size, options),
                 Some(last) => last.rebuilt(&gpu.device, &gpu.queue, &weights, case.size),
             };
             let found = run_network(gpu, network.insert(next.unwrap()), &input);
@@ -67,7 +61,7 @@ fn check_kernels(gpu: &Gpu, pipelines: &Pipelines, options: Options, sizes: usiz
             worst = if e > worst.0 { (e, name.clone()) } else { worst };
         }
     }
-    println!("{options:?}: worst {worst:?}, {} kernels, {:.1} s", pipelines.len(), start.elapsed().as_secs_f64());
+    println!("{options:?}: worst {worst:?}, {:.1} s", start.elapsed().as_secs_f64());
     assert!(faults.is_empty(), "{options:?}\n{}", faults.join("\n"));
 }
 
@@ -105,11 +99,10 @@ fn shapes(graph: &Graph) -> BTreeSet<String> {
 /// Kernels of the same text are compiled once for all of them.
 fn check_permutations(precision: Precision) {
     let Some(gpu) = common::gpu() else { return };
-    let pipelines = Pipelines::default();
     for variant in [Variant::Auto, Variant::Plain] {
         let options = Options { variant, precision, ..FULL };
-        check_kernels(&gpu, &pipelines, options, usize::MAX, |_| true);
-        check_kernels(&gpu, &pipelines, Options { fuse: false, ..options }, usize::MAX, |_| true);
+        check_kernels(&gpu, options, usize::MAX, |_| true);
+        check_kernels(&gpu, Options { fuse: false, ..options }, usize::MAX, |_| true);
     }
     for variant in permutations() {
         let seen = RefCell::new(BTreeSet::new());
@@ -119,7 +112,7 @@ fn check_permutations(precision: Precision) {
             seen.extend(shapes);
             seen.len() > before
         };
-        check_kernels(&gpu, &pipelines, Options { variant, precision, ..FULL }, usize::MAX, new);
+        check_kernels(&gpu, Options { variant, precision, ..FULL }, usize::MAX, new);
     }
 }
 
@@ -137,12 +130,11 @@ fn the_kernels_agree_on_every_operator_in_16_bits() {
 #[ignore = "half an hour: every graph in every way; run it after a change of kernels"]
 fn the_kernels_agree_in_every_way() {
     let Some(gpu) = common::gpu() else { return };
-    let pipelines = Pipelines::default();
     for variant in permutations() {
         for precision in [Precision::F32, Precision::F16] {
             let options = Options { variant, precision, ..FULL };
-            check_kernels(&gpu, &pipelines, options, usize::MAX, |_| true);
-            check_kernels(&gpu, &pipelines, Options { fuse: false, ..options }, usize::MAX, |_| true);
+            check_kernels(&gpu, options, usize::MAX, |_| true);
+            check_kernels(&gpu, Options { fuse: false, ..options }, usize::MAX, |_| true);
         }
     }
 }
@@ -152,7 +144,6 @@ fn the_kernels_agree_in_every_way() {
 #[test]
 fn groups_read_their_own() {
     let Some(gpu) = common::gpu() else { return };
-    let pipelines = Pipelines::default();
     // Input and output channels, groups, kernel, stride; vectors that an output reads, and whether
     // groups are whole vectors.
     for ([inputs, outputs, groups, kernel, stride], read, whole) in [
@@ -184,14 +175,7 @@ fn groups_read_their_own() {
             Variant::Plain,
         ] {
             let options = Options { variant, ..FULL };
-            let network = Network::new(
-                &gpu.device,
-                &gpu.queue,
-                &weights,
-                [7, 9],
-                Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
-            )
-            .unwrap();
+            let network = Network::new(&gpu.device, &gpu.queue, &weights, [7, 9], options).unwrap();
             let kernel = network.kernels().find(|k| k.filter.is_some()).unwrap();
             let filter = kernel.filter.unwrap();
             let dense = variant == Variant::Plain;

@@ -6,9 +6,7 @@ use crate::{common, fixed, run_network};
 use bouncelight::net::arch;
 use bouncelight::net::convert::{Arch, Norm};
 use bouncelight::net::cpu;
-use bouncelight::net::gpu::{
-    Choice, Facts, Kernel, Network, Options, Permutation, Pipelines, Setup, Source, Tuned, Variant,
-};
+use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Source, Tuned, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::{self, Plan, Precision};
 
@@ -24,7 +22,7 @@ fn generator(name: &str, width: u32) -> Graph {
 /// Each generator on the CPU; on the GPU in `ways`.
 fn check_generators(ways: &[Options]) {
     let gpu = common::gpu();
-    let (pipelines, mut faults) = (Pipelines::default(), Vec::new());
+    let mut faults = Vec::new();
     let (cases, _) = cases("networks.safetensors");
     for (name, cases) in cases {
         let weights = hashed::network(&generator(&name, 4));
@@ -37,14 +35,7 @@ fn check_generators(ways: &[Options]) {
             let Some(gpu) = &gpu else { continue };
             for &options in ways {
                 let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
-                let network = Network::new(
-                    &gpu.device,
-                    &gpu.queue,
-                    &weights,
-                    case.size,
-                    Setup { options, pipelines: pipelines.clone(), ..Setup::default() },
-                )
-                .unwrap();
+                let network = Network::new(&gpu.device, &gpu.queue, &weights, case.size, options).unwrap();
                 let found = run_network(gpu, &network, &input);
                 let e = case.error(&found).max(hashed::error(&found.data, &by_cpu.data));
                 println!("{name} {:?}: {options:?} {e:.2e}", case.size);

@@ -80,7 +80,7 @@ impl FilterGi {
 /// The tensors for pictures of `size` pixels.
 fn network(device: &wgpu::Device, queue: &wgpu::Queue, neural: &Neural, size: [u32; 2]) -> Result<Network, GiError> {
     let cells = cells_of(size);
-    let setup = Setup { options: neural.network, tuned: neural.tuned.clone(), ..Setup::default() };
+    let setup = Setup { options: neural.network, tuned: neural.tuned.clone() };
     Network::new(device, queue, &neural.weights, cells, setup)
         .map_err(|e| GiError::Network { cells, source: Box::new(e) })
 }

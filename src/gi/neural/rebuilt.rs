@@ -31,7 +31,7 @@ impl Rebuilt {
         pack::feature_bytes(device, features, size)?;
         let cells = cells_of(size);
         let Neural { weights, network, tuned, .. } = neural;
-        let setup = Setup { options: *network, tuned: tuned.clone(), ..Setup::default() };
+        let setup = Setup { options: *network, tuned: tuned.clone() };
         let network = Network::new(device, queue, weights, cells, setup)
             .map_err(|e| GiError::Network { cells, source: Box::new(e) })?;
         let guess = guess_texture(device, if needs_guess(weights) { size } else { [1, 1] });

@@ -1,12 +1,13 @@
 //! Buffers, pipelines and bind groups of a network.
 
 use super::kernel::{Bound, Kernel, Numbers, Part};
-use super::pipelines::Pipelines;
 use super::{NetError, Options};
+use crate::gpu::shaders::{self, NetKernel};
 use crate::gpu::tape;
 use crate::net::dropout;
 use crate::net::graph::Graph;
 use crate::net::plan::{self, Kind, Plan, Precision, Step};
+use std::collections::HashMap;
 
 /// The uniform that a kernel reads; `Step` in `shaders/net/common.wgsl`.
 #[repr(C)]
@@ -231,18 +232,18 @@ impl Memory {
 }
 
 /// Pipelines, bind groups and buffers for weights (not yet filled) of every step.
-pub(super) fn layers(
-    device: &wgpu::Device,
-    plan: &Plan,
-    kernels: Vec<Kernel>,
-    pipelines: &Pipelines,
-    memory: &Memory,
-) -> Vec<Layer> {
+pub(super) fn layers(device: &wgpu::Device, plan: &Plan, kernels: Vec<Kernel>, memory: &Memory) -> Vec<Layer> {
     let mut slot = 0;
+    // Steps of one text share a pipeline.
+    let mut compiled = HashMap::new();
+    let mut compiled_of = |shader: NetKernel, prelude: &str| {
+        let make = || compile(device, shader, prelude);
+        compiled.entry((shader, prelude.to_owned())).or_insert_with(make).clone()
+    };
     let layer = |(step, kernel): (&Step, Kernel)| {
         let label = format!("net.{}", step.name);
         let weights = trained(device, &label, &kernel);
-        let (pipeline, layout) = pipelines.get(device, kernel.shader, &kernel.prelude);
+        let (pipeline, layout) = compiled_of(kernel.shader, &kernel.prelude);
         let first_slot = slot;
         let whole = |buffer, offset, size| {
             let size = wgpu::BufferSize::new(size);
@@ -270,7 +271,7 @@ pub(super) fn layers(
         };
         let bind_groups = offsets(&kernel).map(bind_group).collect();
         let sum = kernel.sum.as_ref().map(|sum| {
-            let (pipeline, layout) = pipelines.get(device, sum.shader, &sum.prelude);
+            let (pipeline, layout) = compiled_of(sum.shader, &sum.prelude);
             let mut resources = shared(first_slot);
             resources.extend(partial.clone());
             (pipeline, group(&layout, resources))
@@ -278,4 +279,20 @@ pub(super) fn layers(
         Layer { label, kernel, pipeline, weights, bind_groups, sum }
     };
     plan.steps.iter().zip(kernels).map(layer).collect()
+}
+
+/// The pipeline of a shader behind its `const` lines, and the layout of its bind group.
+fn compile(device: &wgpu::Device, shader: NetKernel, prelude: &str) -> (wgpu::ComputePipeline, wgpu::BindGroupLayout) {
+    let name = shader.name();
+    let descriptor = wgpu::ComputePipelineDescriptor {
+        label: Some(&name),
+        layout: None,
+        module: &shaders::module_with(device, &name, prelude),
+        entry_point: Some("main"),
+        compilation_options: Default::default(),
+        cache: None,
+    };
+    let pipeline = tape::compute_pipeline(device, &descriptor);
+    let layout = pipeline.get_bind_group_layout(0);
+    (pipeline, layout)
 }
