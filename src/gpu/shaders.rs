@@ -10,7 +10,6 @@ pub use join::{Joined, folder, read_from};
 pub use net::{NetFamily, NetKernel};
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Name (`room.stage`, also the wgpu label) and file of each shader but those that run the network.
 const FILES: &[(&str, &str)] = &[
@@ -95,17 +94,9 @@ pub fn module(device: &wgpu::Device, name: &str) -> wgpu::ShaderModule {
     module_with(device, name, "")
 }
 
-/// Shaders that this process has compiled.
-static COMPILED: AtomicU32 = AtomicU32::new(0);
-
-/// One is about to be.
-pub(super) fn compiles() {
-    COMPILED.fetch_add(1, Ordering::Relaxed);
-}
-
 /// How many shaders this process has compiled so far, for saying so while it takes long.
 pub fn compiled() -> u32 {
-    COMPILED.load(Ordering::Relaxed)
+    super::tape::compiled()
 }
 
 /// Shaders compiled while files were read from a folder, by name: whoever edits them wants to know

@@ -7,6 +7,7 @@
 
 use std::collections::HashMap;
 use std::hash::Hash;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 /// As long as there is one for a device, or a clone of it, what is compiled on that device stays.
@@ -27,6 +28,14 @@ struct Shelves {
 
 /// Of all devices of this process.
 static ALL: Mutex<Vec<Weak<Shelves>>> = Mutex::new(Vec::new());
+
+/// Whether anything is kept.
+static KEEPS: AtomicBool = AtomicBool::new(true);
+
+/// From here on, what is made is kept, or is not.
+pub(super) fn keeps(keeps: bool) {
+    KEEPS.store(keeps, Ordering::Relaxed);
+}
 
 /// What a call may be told of.
 const MISTAKES: [wgpu::ErrorFilter; 3] =
@@ -86,7 +95,8 @@ fn get<K: Eq + Hash, V: Clone>(
     key: impl FnOnce() -> K,
     make: impl Fn() -> V,
 ) -> V {
-    let Some(shelves) = find(&lock(&ALL), device) else { return make() };
+    let shelves = KEEPS.load(Ordering::Relaxed).then(|| find(&lock(&ALL), device)).flatten();
+    let Some(shelves) = shelves else { return make() };
     let place = lock(shelf(&shelves)).entry(key()).or_default().clone();
     let mut place = lock(&place);
     if let Some(there) = &*place {
@@ -110,10 +120,6 @@ pub(super) fn shader_module(
     text: &str,
     make: impl Fn() -> wgpu::ShaderModule,
 ) -> wgpu::ShaderModule {
-    // Files that are being edited have another text each time.
-    if super::shaders::folder().is_some() {
-        return make();
-    }
     get(device, |s| &s.modules, || (name.to_owned(), text.to_owned()), make)
 }
 
@@ -213,7 +219,7 @@ impl Drawing {
 mod tests {
     use super::*;
     use crate::gpu::{Gpu, GpuOptions, bind, binding, tape};
-    use std::sync::atomic::{AtomicU32, Ordering};
+    use std::sync::atomic::AtomicU32;
 
     fn gpu() -> Option<Gpu> {
         Gpu::open(&GpuOptions::default())

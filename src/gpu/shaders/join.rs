@@ -1,6 +1,7 @@
 //! One WGSL text out of many files: the line `//#import lib/frame.wgsl` brings that file in, once
 //! and before the file that says so.
 
+use crate::gpu::shared;
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};
 use std::sync::RwLock;
@@ -18,6 +19,8 @@ static FOLDER: RwLock<Option<PathBuf>> = RwLock::new(None);
 /// program runs. `None` goes back to what was compiled in.
 pub fn read_from(folder: Option<PathBuf>) {
     if let Ok(mut place) = FOLDER.write() {
+        // What is edited has another text each time, and nobody asks for the one before.
+        shared::keeps(folder.is_none());
         *place = folder;
     }
 }
