@@ -8,11 +8,13 @@ use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{Renderer, View};
-use bouncelight::scene::{Camera, ColorSpace, Environment, Image, Sampler, Scene, TextureRef};
+use bouncelight::scene::{Camera, ColorSpace, Environment, Image, Mesh, Sampler, Scene, TextureRef};
 use glam::{Mat4, Vec3};
+use std::f32::consts::PI;
 
 const SIZE: [u32; 2] = [96, 64];
 const GLOW: f32 = 2.0;
+const EYE: Vec3 = Vec3::new(0.0, 1.5, 3.0);
 
 /// A metal floor before a glowing square that no picture here shows.
 fn room(roughness: f32) -> Scene {
@@ -28,7 +30,7 @@ fn room(roughness: f32) -> Scene {
 
 /// Above the floor, looking down; turned by so many radians.
 fn camera(turn: f32) -> Camera {
-    look_at([0.0, 1.5, 3.0], [3.5 * turn.sin(), 0.0, 3.0 - 3.5 * turn.cos()], 0.6)
+    look_at(EYE.to_array(), [3.5 * turn.sin(), 0.0, 3.0 - 3.5 * turn.cos()], 0.6)
 }
 
 /// Light that pixels show by their lobes over the lobes' albedo: the last of several frames, in
@@ -61,24 +63,30 @@ fn shown_to(
     light.iter().zip(share.chunks_exact(3)).map(|(l, s)| l[0] / s[0].max(1e-6)).collect()
 }
 
-/// Where each pixel's ray, mirrored by the floor, meets the plane of a wall at `z`: x and y; None off
-/// the floor, and where the wall hides it.
-fn on_wall(camera: &Camera, z: f32) -> Vec<Option<[f32; 2]>> {
+/// The ways that pixels look.
+fn looks(camera: &Camera) -> Vec<Vec3> {
     let m = View::new(camera, SIZE, [0.0; 2]).matrices();
     let back = (Mat4::from_cols_array_2d(&m.clip_from_view) * Mat4::from_cols_array_2d(&m.view_from_world)).inverse();
-    let eye = Vec3::new(0.0, 1.5, 3.0);
     let of = |i: u32| {
         let (x, y) = ((i % SIZE[0]) as f32 + 0.5, (i / SIZE[0]) as f32 + 0.5);
         let ndc = Vec3::new(2.0 * x / SIZE[0] as f32 - 1.0, 1.0 - 2.0 * y / SIZE[1] as f32, 0.5);
-        let d = (back.project_point3(ndc) - eye).normalize();
-        let floor = eye + d * (eye.y / -d.y);
+        (back.project_point3(ndc) - EYE).normalize()
+    };
+    (0..SIZE[0] * SIZE[1]).map(of).collect()
+}
+
+/// Where each pixel's ray, mirrored by the floor, meets the plane of a wall at `z`: x and y; None off
+/// the floor, and where the wall hides it.
+fn on_wall(camera: &Camera, z: f32) -> Vec<Option<[f32; 2]>> {
+    let of = |d: Vec3| {
+        let floor = EYE + d * (EYE.y / -d.y);
         if d.y >= 0.0 || floor.x.abs() > 7.9 || floor.z < z + 0.1 {
             return None;
         }
         let t = (floor.z - z) / -d.z;
         Some([floor.x + t * d.x, -t * d.y])
     };
-    (0..SIZE[0] * SIZE[1]).map(of).collect()
+    looks(camera).into_iter().map(of).collect()
 }
 
 /// How far each pixel's mirrored place lies inside the glowing square (metres; negative outside),
@@ -163,7 +171,7 @@ fn a_mirror_shows_the_pictures_that_the_screen_shows() {
     let Some(gpu) = common::gpu() else { return };
     let method = || Method::Gather(Default::default());
     // The wall is in the picture; turned down so far that only its picture in the floor is.
-    let towards = |y: f32| look_at([0.0, 1.5, 3.0], [0.0, y, 0.0], 1.2);
+    let towards = |y: f32| look_at(EYE.to_array(), [0.0, y, 0.0], 1.2);
     for glows in [false, true] {
         let [[bright, dark], [bright_off, dark_off]] = [0.5, -3.0].map(|y| {
             let camera = towards(y);
@@ -178,4 +186,71 @@ fn a_mirror_shows_the_pictures_that_the_screen_shows() {
         // Negative control: of a wall that is not in the picture a mirror knows the mean.
         assert!(bright_off < 2.0 * dark_off, "{bright_off} and {dark_off}");
     }
+}
+
+const BALL: Vec3 = Vec3::new(0.0, 1.5, 0.0);
+const RADIUS: f32 = 0.25;
+
+/// A metal ball under a glowing ceiling without end, above nothing.
+fn ball(roughness: f32) -> Scene {
+    const STEPS: u32 = 64;
+    let at = |i: u32| {
+        let (down, around) = ((i / (STEPS + 1)) as f32 / STEPS as f32, (i % (STEPS + 1)) as f32 / STEPS as f32);
+        let ((sin, cos), turn) = ((PI * down).sin_cos(), 2.0 * PI * around);
+        Vec3::new(sin * turn.cos(), cos, -sin * turn.sin())
+    };
+    let normals: Vec<Vec3> = (0..(STEPS + 1) * (STEPS + 1)).map(at).collect();
+    let squares = (0..STEPS * STEPS).map(|i| i / STEPS * (STEPS + 1) + i % STEPS);
+    let mesh = Mesh {
+        positions: normals.iter().map(|n| (BALL + RADIUS * n).to_array()).collect(),
+        normals: normals.iter().map(Vec3::to_array).collect(),
+        indices: squares.flat_map(|i| [i, i + STEPS + 1, i + STEPS + 2, i, i + STEPS + 2, i + 1]).collect(),
+        ..Default::default()
+    };
+    let ceiling = quad([-400.0, 8.0, -400.0], [800.0, 0.0, 0.0], [0.0, 0.0, 800.0]);
+    let mut s = scene(vec![mesh, ceiling], vec![]);
+    s.materials = vec![material([1.0; 3]), material([0.0; 3])];
+    (s.materials[0].metallic, s.materials[0].roughness) = (1.0, roughness);
+    (s.materials[1].f0, s.materials[1].emissive) = (0.0, [GLOW; 3]);
+    s.meshes[1].material = 1;
+    s.environment = Environment::constant([0.0; 3]);
+    s
+}
+
+/// Share of the ball's pixels that show what they mirror within a tenth, but for those whose mirrored
+/// direction is nearer than `margin` (sine) to the horizon.
+fn right_on_ball(light: &[f32], camera: &Camera, margin: f32) -> f64 {
+    let (mut right, mut all) = (0, 0);
+    for (l, d) in light.iter().zip(looks(camera)) {
+        // |EYE + t d - BALL| = RADIUS.
+        let (from, aside) = ((EYE - BALL).dot(d), (EYE - BALL).length_squared() - RADIUS * RADIUS);
+        // Not the rim, of which pixels show a part.
+        let Some(root) = Some(from * from - aside).filter(|v| *v > 0.01).map(f32::sqrt) else { continue };
+        let n = (EYE + d * (-from - root) - BALL) / RADIUS;
+        let up = (d - 2.0 * d.dot(n) * n).y;
+        if up.abs() > margin {
+            all += 1;
+            right += u32::from((l - if up > 0.0 { GLOW } else { 0.0 }).abs() < 0.1 * GLOW);
+        }
+    }
+    assert!(all > 500, "{all} pixels");
+    f64::from(right) / f64::from(all)
+}
+
+/// What a lobe shows changes from pixel to pixel where a surface bends, wide as it may be for a plane.
+#[test]
+fn a_ball_mirrors_what_its_lobe_is_narrow_enough_for() {
+    let Some(gpu) = common::gpu() else { return };
+    let camera = look_at(EYE.to_array(), BALL.to_array(), 0.2);
+    let method = || Method::Gather(Default::default());
+    let light = |roughness: f32| {
+        shown_to(&gpu, &mut world::renderer(&gpu, SIZE, method()), &ball(roughness), 32, |_| camera.clone())
+    };
+    // On a plane its lobe changes little over two and a half cells. From cell to cell of the ball the
+    // mirrored direction turns by 0.3, five times the lobe's α.
+    let smooth = right_on_ball(&light(0.25), &camera, 0.2);
+    // Negative control: the lobe of a rougher ball is no narrower than that.
+    let rough = right_on_ball(&light(0.7), &camera, 0.2);
+    println!("{smooth} of the ball's pixels are right, {rough} of a rough ball's");
+    assert!(smooth > 0.97 && rough < 0.8, "{smooth} {rough}");
 }

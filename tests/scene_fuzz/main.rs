@@ -26,6 +26,7 @@ use serde_json::{Value, json};
 use spoil::{Random, TOKENS, spoil_text, spoil_value};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 #[global_allocator]
@@ -206,8 +207,37 @@ impl Tally {
     }
 }
 
+/// The program runs itself once a processor, since its allocator counts for all of its threads: such
+/// a run is told here which part of the cases is its own.
+const PART: &str = "SCENE_FUZZ_PART";
+
 #[test]
 fn hostile_files() {
+    let parts = std::thread::available_parallelism().map_or(1, usize::from) as u64;
+    match std::env::var(PART) {
+        Ok(part) => read_part(part.parse().expect("a whole number"), parts),
+        Err(_) => read_in_parts(parts),
+    }
+}
+
+fn read_in_parts(parts: u64) {
+    let program = std::env::current_exe().expect("the test's own program");
+    let begin = |part: u64| {
+        let mut command = Command::new(&program);
+        command.args(["--exact", "hostile_files", "--nocapture"]).env(PART, part.to_string());
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it can be started")
+    };
+    let runs: Vec<_> = (0..parts).map(begin).collect();
+    let ended = runs.into_iter().map(|run| run.wait_with_output().expect("it ends")).collect::<Vec<_>>();
+    for output in &ended {
+        print!("{}", String::from_utf8_lossy(&output.stdout));
+        eprint!("{}", String::from_utf8_lossy(&output.stderr));
+    }
+    assert!(ended.iter().all(|output| output.status.success()), "a part failed; its message is above");
+}
+
+/// Cases `part`, `part + parts` and so on.
+fn read_part(part: u64, parts: u64) {
     let (cases, seed) = (setting("SCENE_FUZZ_CASES", CASES), setting("SCENE_FUZZ_SEED", SEED));
     let files = corpus();
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -216,7 +246,7 @@ fn hostile_files() {
     files.iter().for_each(|file| tally.read(&path, &file.bytes()));
     assert_eq!(tally.accepted as usize, files.len(), "the originals are sound");
     let started = Instant::now();
-    for case_number in 0..cases {
+    for case_number in (part..cases).step_by(parts as usize) {
         let bytes = case(&files, &mut Random::new(seed, case_number));
         let path = folder.path().join(if bytes.first() == Some(&b'{') { "case.gltf" } else { "case.glb" });
         let run = catch_unwind(AssertUnwindSafe(|| tally.read(&path, &bytes)));
@@ -226,9 +256,10 @@ fn hostile_files() {
             panic!("case {case_number} of seed {seed} failed; the message is above, the file in {}", kept.display());
         }
     }
-    println!("seed {seed}: {cases} cases in {:.1} s", started.elapsed().as_secs_f64());
+    let read = tally.accepted + tally.refused - files.len() as u64;
+    println!("seed {seed}, part {part}: {read} cases in {:.1} s", started.elapsed().as_secs_f64());
     println!("{} accepted, {} refused, slowest {:?}", tally.accepted, tally.refused, tally.slowest);
     println!("{} MiB of memory at most", tally.most >> 20);
     // Some mutations are harmless and many are not; without both the test would ask nothing.
-    assert!(tally.accepted > cases / 10 && tally.refused > cases / 10);
+    assert!(tally.accepted > read / 10 && tally.refused > read / 10);
 }

@@ -14,7 +14,7 @@
 // Where light has changed: what it is now (rgb; a: 1), else 0.
 @group(2) @binding(2) var<storage, read_write> changes: array<vec4f>;
 
-// What rays into lobes have found, times weight (a).
+// What rays into lobes have found, times weight (a; negative: see `gloss_around`).
 @group(2) @binding(3) var<storage, read_write> glosses: array<vec4f>;
 // Of each cell, with GATHER_GUIDED.
 @group(2) @binding(4) var<storage, read> guidance: array<vec4f>;
@@ -38,36 +38,56 @@ const MANY = 8.0;
 var<workgroup> of_cells: array<vec4f, 64>;
 var<workgroup> region: vec4f;
 
-// Step to a cell beside one; 0 where it shows nothing, or what looks elsewhere.
-fn step_to(here: Past, grid: vec2i, at: vec2i) -> vec3f {
-    if is_beyond(grid, at) { return vec3f(0.0); }
-    let i = 5u * index_in(grid, at);
-    let place = pasts[i + 2u];
-    if pasts[i].a <= 0.0 || dot(unpack_normal(bitcast<u32>(place.w)), here.n) <= LEAST_COSINE_OF_PLANE {
-        return vec3f(0.0);
-    }
-    return place.xyz - here.x;
+// A cell beside one: the step to it, 0 where it shows nothing, or what looks elsewhere; and by how
+// much its normal differs, much where it shows nothing.
+struct Next {
+    step: vec3f,
+    turn: f32,
 }
 
-fn side_at(id: vec2u, here: Past) -> vec3f {
-    let at = vec2i(id);
-    let grid = vec2i(cell_grid());
-    return plane_normal(
-        step_to(here, grid, at - vec2i(1, 0)), step_to(here, grid, at + vec2i(1, 0)),
-        step_to(here, grid, at - vec2i(0, 1)), step_to(here, grid, at + vec2i(0, 1)), here.n
+fn next_to(here: Past, grid: vec2i, at: vec2i) -> Next {
+    if is_beyond(grid, at) { return Next(vec3f(0.0), 2.0); }
+    let i = 5u * index_in(grid, at);
+    if pasts[i].a <= 0.0 { return Next(vec3f(0.0), 2.0); }
+    let place = pasts[i + 2u];
+    let n = unpack_normal(bitcast<u32>(place.w));
+    return Next(
+        select(vec3f(0.0), place.xyz - here.x, dot(n, here.n) > LEAST_COSINE_OF_PLANE), distance(n, here.n)
     );
 }
 
+// The side of a cell's plane, and how much its surface bends: by how much the normal turns to the
+// next cell across and down, on the side on which it does less, since the other may be behind an edge.
+struct Bend {
+    side: vec3f,
+    turn: vec2f,
+}
+
+fn bend_at(id: vec2u, here: Past) -> Bend {
+    let at = vec2i(id);
+    let grid = vec2i(cell_grid());
+    let left = next_to(here, grid, at - vec2i(1, 0));
+    let right = next_to(here, grid, at + vec2i(1, 0));
+    let above = next_to(here, grid, at - vec2i(0, 1));
+    let below = next_to(here, grid, at + vec2i(0, 1));
+    return Bend(
+        plane_normal(left.step, right.step, above.step, below.step, here.n),
+        vec2f(min(left.turn, right.turn), min(above.turn, below.turn))
+    );
+}
+
+// Breadth of a lobe, in cells, from which on every second cell is asked.
+const BROAD = 4.0;
+
 // What rays into lobes around have found, times weight (a). Over a wide lobe's breadth every second
 // cell is asked, all of which have the same turn (`gloss_cell`); smooth.wgsl brings the four turns
-// together.
-fn gloss_around(id: vec2u, here: Past, plane: Plane) -> vec4f {
+// together of cells whose weight is negative therefore, -1 and less.
+fn gloss_around(id: vec2u, here: Past, plane: Plane, turn: vec2f) -> vec4f {
     if here.roughness >= ROUGHEST { return vec4f(0.0); }
-    let breadth = lobe_cells(here.roughness);
-    let stride = lobe_stride(here.roughness);
-    let aside = exp(-min(f32(stride * stride) * 0.5 / max(breadth * breadth, 1e-3), 60.0));
-    let outer = aside * aside * aside * aside;
-    let falls = array<f32, 3>(1.0, aside, select(outer, balanced(aside, outer), stride == 1));
+    let breadth = lobe_over(here.roughness, turn);
+    let stride = select(1, 2, all(breadth >= vec2f(BROAD)));
+    let across = falls_over(breadth.x, stride);
+    let down = falls_over(breadth.y, stride);
     let grid = vec2i(cell_grid());
     var sum = vec4f(0.0);
     for (var y = -2; y <= 2; y++) {
@@ -77,11 +97,18 @@ fn gloss_around(id: vec2u, here: Past, plane: Plane) -> vec4f {
             let there = past_at(index_in(grid, at));
             if there.frames <= 0.0 || there.gloss.a <= 0.0 { continue; }
             let same = same_surface(there.x - here.x, plane.side, here.n, there.n, plane.strictness);
-            let w = same * as_rough(here, there.roughness) * falls[abs(x)] * falls[abs(y)] * there.gloss.a;
+            let w = same * as_rough(here, there.roughness) * across[abs(x)] * down[abs(y)] * there.gloss.a;
             sum += w * vec4f(there.gloss.rgb, 1.0);
         }
     }
-    return sum;
+    return vec4f(sum.rgb, select(sum.a, -1.0 - sum.a, stride == 2));
+}
+
+// What cells of a row of five, or a column, count by how far they are from the middle.
+fn falls_over(breadth: f32, stride: i32) -> vec3f {
+    let aside = exp(-min(f32(stride * stride) * 0.5 / max(breadth * breadth, 1e-3), 60.0));
+    let outer = aside * aside * aside * aside;
+    return vec3f(1.0, aside, select(outer, balanced(aside, outer), stride == 1));
 }
 
 // What the outer two of a row of five count so that they and the middle one together count as much
@@ -162,7 +189,8 @@ fn blur_cell(id: vec3u, index: u32, wide: bool) {
         glosses[cell] = vec4f(0.0);
         return;
     }
-    let plane = Plane(side_at(id.xy, here), strictness_at(here.x));
+    let bend = bend_at(id.xy, here);
+    let plane = Plane(bend.side, strictness_at(here.x));
     var radius = select(NARROW, WIDE, wide);
     if (gather.flags & GATHER_NO_BLUR) != 0u { radius = 0; }
     let centre = Centre(
@@ -237,7 +265,7 @@ fn blur_cell(id: vec3u, index: u32, wide: bool) {
     let known = saturate(1.0 - chance / max(dot(beside, beside), 1e-30));
     let across = (8.0 / 3.0) * known * beside / max(luminance(mean), 1e-30);
     let whole = here.n + across;
-    glosses[cell] = gloss_around(id.xy, here, plane);
+    glosses[cell] = gloss_around(id.xy, here, plane, bend.turn);
     light[3u * cell] = vec4f(mean.r * whole, variance);
     light[3u * cell + 1u] = vec4f(mean.g * whole, pack_rare(rare));
     light[3u * cell + 2u] = vec4f(mean.b * whole, bitcast<f32>(pack_normal(plane.side)));

@@ -14,8 +14,6 @@ const LEAST_TILT = 0.3;
 const MOST_TILT = 2.0;
 // From here to ROUGHEST the light's gradient takes over from rays.
 const ROUGH = 0.7;
-// Breadth of a lobe, in cells, from which on every second cell is asked.
-const BROAD = 4.0;
 
 // What a cell remembers.
 fn past_at(cell: u32) -> Past {
@@ -25,11 +23,6 @@ fn past_at(cell: u32) -> Past {
 
 fn as_rough(here: Past, roughness: f32) -> f32 {
     return saturate(1.0 - ALIKE * abs(roughness - here.roughness));
-}
-
-// Cells between those that are asked what they found.
-fn lobe_stride(roughness: f32) -> i32 {
-    return select(1, 2, lobe_cells(roughness) >= BROAD);
 }
 
 // What the cell's lobe shows over `env_brdf` (a: 1), 0 without one: what rays have found (`gloss`,

@@ -11,11 +11,56 @@ fn has_lobe(surface: vec4f) -> bool {
     return surface.a < ROUGHEST && any(surface.rgb > vec3f(0.0));
 }
 
-// Of a surface (F0, roughness), how much of what its lobe shows is asked for pixel by pixel: all
-// where the lobe changes within a cell, nothing where cells tell it.
-fn mirrors(surface: vec4f) -> f32 {
-    if !has_lobe(surface) { return 0.0; }
-    let across = lobe_cells(surface.a);
-    if across >= 2.0 { return 0.0; }
-    return 1.0 - smoothstep(0.5, 2.0, across);
+// Lobes of this roughness and more are not filled by the few rays that a pixel has.
+const SPARKS = 0.3;
+
+// Cells, across and down, over which what a lobe shows changes little: `lobe_cells` on a surface that
+// bends. To the next cell the mirrored direction turns by twice as much as the normal (`turn`), too,
+// beside which there are the eye's own turn and the step aside, as much again.
+fn lobe_over(roughness: f32, turn: vec2f) -> vec2f {
+    return 0.5 * roughness * roughness / (cell_foot(1.0) + turn);
+}
+
+// By how much the normal differs from those as far aside as a cell is wide, across and down: on the
+// side on which it does less, since the other may be behind an edge.
+fn turn_at(pixel: vec2i) -> vec2f {
+    let n = world_normal_at(pixel);
+    let right = vec2i(CELL_SIDE, 0);
+    let down = vec2i(0, CELL_SIDE);
+    return vec2f(
+        min(turn_to(n, pixel - right), turn_to(n, pixel + right)),
+        min(turn_to(n, pixel - down), turn_to(n, pixel + down))
+    );
+}
+
+fn turn_to(n: vec3f, pixel: vec2i) -> f32 {
+    if any(pixel < vec2i(0)) || any(pixel >= vec2i(params.size)) { return 2.0; }
+    return distance(n, world_normal_at(pixel));
+}
+
+// Where what a lobe shows changes little over so many cells (`lobe_of`) cells tell it; where it changes
+// within a cell, pixels' own rays do.
+const BY_CELLS = 2.0;
+const BY_PIXELS = 0.5;
+
+// Cells over which what a pixel's lobe (F0, roughness) shows changes little; many without one.
+fn lobe_of(surface: vec4f, pixel: vec2i) -> f32 {
+    if !has_lobe(surface) { return 2.0 * BY_CELLS; }
+    let flat = lobe_cells(surface.a);
+    if surface.a > SPARKS || flat <= BY_PIXELS { return flat; }
+    let bent = lobe_over(surface.a, turn_at(pixel));
+    return min(bent.x, bent.y);
+}
+
+// Pixels over which what a lobe shows changes little on a plane: from one on they have rays of their
+// own in common.
+fn lobe_pixels(roughness: f32) -> f32 {
+    return lobe_cells(roughness) * f32(CELL_SIDE);
+}
+
+// Cosine between normals up to which pixels show the same, and whether lobes are as wide.
+const SAME_SIDE = 0.9;
+
+fn is_alike(roughness: f32, there: f32) -> bool {
+    return abs(roughness - there) < 0.02;
 }

@@ -24,8 +24,6 @@ const A_NEIGHBOUR = 0.5;
 // Most rays that are remembered: at rest, and while lights or objects change.
 const MOST_RAYS = 32.0;
 const MOST_CHANGING = 4.0;
-// Cosine between normals up to which pixels of a square show the same.
-const SAME_SIDE = 0.9;
 
 fn surface_at(pixel: vec2u) -> vec4f {
     return textureLoad(specular_map, pixel, 0);
@@ -34,11 +32,12 @@ fn surface_at(pixel: vec2u) -> vec4f {
 // Whether pixels of a square count each other's rays: lobes as wide as a pixel show both the same.
 fn shares(a: vec2u, b: vec2u) -> bool {
     let roughness = surface_at(a).a;
-    return lobe_cells(roughness) * f32(CELL_SIDE) > 1.0 && abs(roughness - surface_at(b).a) < 0.02;
+    return lobe_pixels(roughness) > 1.0 && is_alike(roughness, surface_at(b).a);
 }
 
 fn is_smooth(pixel: vec2u) -> bool {
-    return all(pixel < params.size) && mirrors(surface_at(pixel)) > 0.0 && distance_at(vec2i(pixel)) > 0.0;
+    return all(pixel < params.size) && lobe_of(surface_at(pixel), vec2i(pixel)) < BY_CELLS
+        && distance_at(vec2i(pixel)) > 0.0;
 }
 
 // Pixels of a square of 2×2, in the order in which they have their turns.

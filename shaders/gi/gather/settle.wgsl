@@ -19,10 +19,8 @@ const BRIEF = 128.0;
 const GLOSS_RAYS = 32.0;
 const GLOSS_HURRIED = 4.0;
 
-// A ray into a lobe that is wider than this (roughness) counts no more than so many times the light
-// on the surface or the mean of the rays before: few rays fill such a lobe, and one spark would
-// stay for seconds.
-const SPARKS = 0.3;
+// A ray into a lobe that is wider than `SPARKS` counts no more than so many times the light on the
+// surface or the mean of the rays before: one spark would stay for seconds.
 const BRIGHTEST = 12.0;
 
 // The mean of what rays into the cell's lobe have found, with this frame's, if it is the cell's

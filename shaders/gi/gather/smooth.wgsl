@@ -16,8 +16,8 @@
 @group(2) @binding(2) var<storage, read_write> light: array<vec4f>;
 // Of each cell, with GATHER_GUIDED.
 @group(2) @binding(3) var<storage, read> guidance: array<vec4f>;
-// What rays into lobes have found, times weight (a), and what lobes show over `env_brdf` (a: 1), 0
-// on surfaces without.
+// What rays into lobes have found, times weight (a; -1 less that where every second cell was asked),
+// and what lobes show over `env_brdf` (a: 1), 0 on surfaces without.
 @group(2) @binding(4) var<storage, read> glosses: array<vec4f>;
 @group(2) @binding(5) var<storage, read_write> gleams: array<vec4f>;
 
@@ -77,7 +77,8 @@ fn tilting(channel: vec3f, n: vec3f) -> vec4f {
 // What rays into lobes have found, times weight (a). Where every second cell was asked, neighbours
 // of all four turns count alike, the cell's own in the middle.
 fn gloss_of(id: vec2u, here: Past, side: vec3f) -> vec4f {
-    if lobe_stride(here.roughness) == 1 { return glosses[cell_index(id)]; }
+    let own = glosses[cell_index(id)];
+    if own.a >= 0.0 { return own; }
     let strictness = strictness_at(here.x);
     let grid = vec2i(cell_grid());
     let first = max(vec2i(id) - 1, vec2i(0));
@@ -90,7 +91,9 @@ fn gloss_of(id: vec2u, here: Past, side: vec3f) -> vec4f {
             let there = past_at(at);
             if there.frames <= 0.0 { continue; }
             let same = same_surface(there.x - here.x, side, here.n, there.n, strictness);
-            sum += same * as_rough(here, there.roughness) * select(0.5, 1.0, x == i32(id.x)) * row * glosses[at];
+            let gloss = glosses[at];
+            let found = vec4f(gloss.rgb, select(gloss.a, -1.0 - gloss.a, gloss.a < 0.0));
+            sum += same * as_rough(here, there.roughness) * select(0.5, 1.0, x == i32(id.x)) * row * found;
         }
     }
     return sum;
