@@ -220,10 +220,14 @@ fn found_by_pixel(pixel: vec2i) -> vec4f {
     return vec4f(unpack2x16float(packed.x), unpack2x16float(packed.y));
 }
 
+// Rays of which there is a mean.
+const FEW = 8.0;
+
 // What rays of a pixel and of those around that look the same way have found, times how many: of the
 // squares beside, as much as lobes have in common whose mirrored directions are so far apart; where
-// that is nothing, since what a lobe shows changes within a pixel (`fine`), of the pixels beside.
-fn found_around(pixel: vec2i, n: vec3f, roughness: f32, fine: bool) -> vec4f {
+// that is nothing, since what a lobe shows changes within a pixel (`fine`), of the pixels beside. Few
+// rays are no brighter than as many times what cells say, or one in the sun would be a spark.
+fn found_around(pixel: vec2i, n: vec3f, roughness: f32, fine: bool, cells: f32) -> vec4f {
     var sum = vec4f(0.0);
     let alpha = roughness * roughness;
     let step = select(2, 1, fine);
@@ -239,7 +243,8 @@ fn found_around(pixel: vec2i, n: vec3f, roughness: f32, fine: bool) -> vec4f {
             let in_common = exp(-min(2.0 * dot(turned, turned) / (alpha * alpha), 60.0));
             let tent = select(0.5, 1.0, x == 0) * select(0.5, 1.0, y == 0);
             let w = found.a * select(in_common, tent, fine);
-            sum += w * vec4f(found.rgb, 1.0);
+            let most = select((found.a + 1.0) * cells, LARGEST, found.a >= FEW);
+            sum += w * vec4f(found.rgb * min(1.0, most / max(luminance(found.rgb), 1e-20)), 1.0);
         }
     }
     return sum;
@@ -250,7 +255,7 @@ fn found_around(pixel: vec2i, n: vec3f, roughness: f32, fine: bool) -> vec4f {
 fn sharper(gloss: vec3f, pixel: vec2i, n: vec3f, roughness: f32, across: f32) -> vec3f {
     let own = 1.0 - smoothstep(BY_PIXELS, BY_CELLS, across);
     if lobe_pixels(roughness) > 1.0 {
-        let found = found_around(pixel, n, roughness, across * f32(CELL_SIDE) < 1.0);
+        let found = found_around(pixel, n, roughness, across * f32(CELL_SIDE) < 1.0, luminance(gloss));
         return mix(gloss, (found.rgb + gloss) / (found.a + 1.0), own);
     }
     let found = found_by_pixel(pixel);
