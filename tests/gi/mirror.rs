@@ -217,8 +217,8 @@ fn ball(roughness: f32) -> Scene {
     s
 }
 
-/// Share of the ball's pixels that show what they mirror within a tenth, but for those whose mirrored
-/// direction is nearer than `margin` (sine) to the horizon.
+/// Share of the ball's pixels that show what they mirror within a tenth, but for those whose
+/// mirrored direction is nearer than `margin` (sine) to the horizon.
 fn right_on_ball(light: &[f32], camera: &Camera, margin: f32) -> f64 {
     let (mut right, mut all) = (0, 0);
     for (l, d) in light.iter().zip(looks(camera)) {
@@ -237,7 +237,8 @@ fn right_on_ball(light: &[f32], camera: &Camera, margin: f32) -> f64 {
     f64::from(right) / f64::from(all)
 }
 
-/// What a lobe shows changes from pixel to pixel where a surface bends, wide as it may be for a plane.
+/// What a lobe shows changes from pixel to pixel where a surface bends, wide as it may be for a
+/// plane.
 #[test]
 fn a_ball_mirrors_what_its_lobe_is_narrow_enough_for() {
     let Some(gpu) = common::gpu() else { return };
@@ -246,8 +247,8 @@ fn a_ball_mirrors_what_its_lobe_is_narrow_enough_for() {
     let light = |roughness: f32| {
         shown_to(&gpu, &mut world::renderer(&gpu, SIZE, method()), &ball(roughness), 32, |_| camera.clone())
     };
-    // On a plane its lobe changes little over two and a half cells. From cell to cell of the ball the
-    // mirrored direction turns by 0.3, five times the lobe's α.
+    // On a plane its lobe changes little over two and a half cells. From cell to cell of the ball
+    // the mirrored direction turns by 0.3, five times the lobe's α.
     let smooth = right_on_ball(&light(0.25), &camera, 0.2);
     // Negative control: the lobe of a rougher ball is no narrower than that.
     let rough = right_on_ball(&light(0.7), &camera, 0.2);

@@ -207,8 +207,8 @@ impl Tally {
     }
 }
 
-/// The program runs itself once a processor, since its allocator counts for all of its threads: such
-/// a run is told here which part of the cases is its own.
+/// The program runs itself once a processor, since its allocator counts for all of its threads:
+/// such a run is told here which part of the cases is its own.
 const PART: &str = "SCENE_FUZZ_PART";
 
 #[test]

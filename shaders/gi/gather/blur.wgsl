@@ -57,7 +57,8 @@ fn next_to(here: Past, grid: vec2i, at: vec2i) -> Next {
 }
 
 // The side of a cell's plane, and how much its surface bends: by how much the normal turns to the
-// next cell across and down, on the side on which it does less, since the other may be behind an edge.
+// next cell across and down, on the side on which it does less, since the other may be behind an
+// edge.
 struct Bend {
     side: vec3f,
     turn: vec2f,

@@ -223,10 +223,11 @@ fn found_by_pixel(pixel: vec2i) -> vec4f {
 // Rays of which there is a mean.
 const FEW = 8.0;
 
-// What rays of a pixel and of those around that look the same way have found, times how many: of the
-// squares beside, as much as lobes have in common whose mirrored directions are so far apart; where
-// that is nothing, since what a lobe shows changes within a pixel (`fine`), of the pixels beside. Few
-// rays are no brighter than as many times what cells say, or one in the sun would be a spark.
+// What rays of a pixel and of those around that look the same way have found, times how many: of
+// the squares beside, as much as lobes have in common whose mirrored directions are so far apart;
+// where that is nothing, since what a lobe shows changes within a pixel (`fine`), of the pixels
+// beside. Few rays are no brighter than as many times what cells say, or one in the sun would be a
+// spark.
 fn found_around(pixel: vec2i, n: vec3f, roughness: f32, fine: bool, cells: f32) -> vec4f {
     var sum = vec4f(0.0);
     let alpha = roughness * roughness;
@@ -250,8 +251,9 @@ fn found_around(pixel: vec2i, n: vec3f, roughness: f32, fine: bool, cells: f32) 
     return sum;
 }
 
-// What cells say that a lobe shows and, the more the less it changes little `across` cells, what the
-// pixel's rays do, if there are any. Beside few rays what cells say counts as one more.
+// What cells say that a lobe shows, or what the pixel's rays do, if there are any: these the more,
+// the fewer cells it changes little over (`across`). Beside few rays what cells say counts as one
+// more.
 fn sharper(gloss: vec3f, pixel: vec2i, n: vec3f, roughness: f32, across: f32) -> vec3f {
     let own = 1.0 - smoothstep(BY_PIXELS, BY_CELLS, across);
     if lobe_pixels(roughness) > 1.0 {

@@ -14,9 +14,9 @@ fn has_lobe(surface: vec4f) -> bool {
 // Lobes of this roughness and more are not filled by the few rays that a pixel has.
 const SPARKS = 0.3;
 
-// Cells, across and down, over which what a lobe shows changes little: `lobe_cells` on a surface that
-// bends. To the next cell the mirrored direction turns by twice as much as the normal (`turn`), too,
-// beside which there are the eye's own turn and the step aside, as much again.
+// Cells, across and down, over which what a lobe shows changes little: `lobe_cells` on a surface
+// that bends. To the next cell the mirrored direction turns by twice as much as the normal
+// (`turn`), too, beside which there are the eye's own turn and the step aside, as much again.
 fn lobe_over(roughness: f32, turn: vec2f) -> vec2f {
     return 0.5 * roughness * roughness / (cell_foot(1.0) + turn);
 }
@@ -38,8 +38,8 @@ fn turn_to(n: vec3f, pixel: vec2i) -> f32 {
     return distance(n, world_normal_at(pixel));
 }
 
-// Where what a lobe shows changes little over so many cells (`lobe_of`) cells tell it; where it changes
-// within a cell, pixels' own rays do.
+// Where what a lobe shows changes little over so many cells (`lobe_of`) cells tell it; where it
+// changes within a cell, pixels' own rays do.
 const BY_CELLS = 2.0;
 const BY_PIXELS = 0.5;
 
@@ -52,8 +52,8 @@ fn lobe_of(surface: vec4f, pixel: vec2i) -> f32 {
     return min(bent.x, bent.y);
 }
 
-// Pixels over which what a lobe shows changes little on a plane: from one on they have rays of their
-// own in common.
+// Pixels over which what a lobe shows changes little on a plane: from one on they have rays of
+// their own in common.
 fn lobe_pixels(roughness: f32) -> f32 {
     return lobe_cells(roughness) * f32(CELL_SIDE);
 }

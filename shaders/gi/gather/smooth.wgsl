@@ -16,8 +16,8 @@
 @group(2) @binding(2) var<storage, read_write> light: array<vec4f>;
 // Of each cell, with GATHER_GUIDED.
 @group(2) @binding(3) var<storage, read> guidance: array<vec4f>;
-// What rays into lobes have found, times weight (a; -1 less that where every second cell was asked),
-// and what lobes show over `env_brdf` (a: 1), 0 on surfaces without.
+// What rays into lobes have found, times weight (a; -1 less that where every second cell was
+// asked), and what lobes show over `env_brdf` (a: 1), 0 on surfaces without.
 @group(2) @binding(4) var<storage, read> glosses: array<vec4f>;
 @group(2) @binding(5) var<storage, read_write> gleams: array<vec4f>;
 
