@@ -4,6 +4,8 @@
 //! Every command first makes sure of a wgpu adapter: it asks `bouncelight doctor`, and on Debian or
 //! Ubuntu without any adapter it installs Mesa's CPU driver, saying so before it does.
 
+mod tests;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -64,7 +66,7 @@ fn demo() -> Result<(), String> {
 fn test() -> Result<(), String> {
     // The program as tests have it: `cargo build` would take other features of dependencies, and
     // compile them twice.
-    cargo(&["test", "--workspace", "--no-run"])?;
+    let programs = tests::build()?;
     make_sure_of_adapter(&built("debug")?)?;
     make_sure_of_display()?;
     // Tests append what they skip to this file: `tests/common`.
@@ -72,7 +74,7 @@ fn test() -> Result<(), String> {
     if skips.exists() {
         std::fs::remove_file(&skips).map_err(|e| format!("{}: {e}", skips.display()))?;
     }
-    let tested = run(command("cargo", &["test", "--workspace"]).env("SKIP_LOG", &skips));
+    let tested = tests::run_all(programs, &skips);
     print_skips(&std::fs::read_to_string(&skips).unwrap_or_default());
     tested
 }
