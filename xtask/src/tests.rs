@@ -1,4 +1,5 @@
-//! Every test program of the workspace, two and two: one alone leaves a fifth of two cores idle, waiting for its slowest test.
+//! Every test program of the workspace, two and two: one alone leaves a fifth of two cores idle,
+//! waiting for its slowest test.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -8,7 +9,8 @@ use std::time::Instant;
 
 use crate::{command, run};
 
-/// Programs that run at once. Each has as many threads for its tests as there are processors, so more would only take memory.
+/// Programs that run at once. Each has as many threads for its tests as there are processors, so
+/// more would only take memory.
 const AT_ONCE: usize = 2;
 
 /// A test program as cargo has built it.
@@ -48,7 +50,8 @@ fn program(line: &str) -> Result<Option<Program>, String> {
     Ok(Some(Program { name, file: file.into(), folder }))
 }
 
-/// Runs all `programs`, then the examples in comments. What one prints comes in one piece, when it has ended.
+/// Runs all `programs`, then the examples in comments. What one prints comes in one piece, when it
+/// has ended.
 ///
 /// # Errors
 /// Names those that failed, when all have run.
