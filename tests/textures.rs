@@ -10,7 +10,7 @@ use bouncelight::render::tonemap::{TonemapOptions, TonemapPass};
 use bouncelight::render::tonemap_curve::Tonemap;
 use bouncelight::render::{Renderer, View};
 use bouncelight::scene::upload::SceneGpu;
-use bouncelight::scene::{ColorSpace, Image, Sampler, Scene, TextureRef};
+use bouncelight::scene::{AlphaMode, ColorSpace, Image, Sampler, Scene, TextureRef};
 use bouncelight::wgpu;
 use build::*;
 
@@ -195,6 +195,44 @@ fn textures_are_filtered_once() {
         println!("{width} pixels: {right:.4}, against a filter 1.4 times as wide {wide:.4}");
         assert!(right < 0.02 && wide > 2.0 * right, "{width}: {right} {wide}");
     }
+}
+
+/// Models whose faces each have one place of a small picture, as low-poly artists paint them: a pixel's
+/// footprint is then a point, by whose size no filter may divide.
+#[test]
+fn palettes_have_their_colours() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut s = board();
+    let (red, blue) = ([255, 0, 0, 255], [0, 0, 255, 0]);
+    s.images = vec![image(&[[red; 4], [red; 4], [blue; 4], [blue; 4]].concat(), 4, ColorSpace::Linear)];
+    let texture = Some(TextureRef { sampler: Sampler::default(), ..reference(0) });
+    let m = &mut s.materials[0];
+    (m.base_color_texture, m.emissive_texture, m.metallic_roughness_texture) = (texture, texture, texture);
+    m.emissive = [1.0; 3];
+    // On a texel's middle, on a corner between four of one colour, and far outside, where it repeats.
+    for (at, color) in [([0.375, 0.125], 0), ([0.5, 0.25], 0), ([0.625, 0.875], 2), ([-99.5, 40.75], 2)] {
+        s.meshes[0].uv0 = vec![at; 4];
+        let f = render(&gpu, &s, &camera(), [16, 16], 1);
+        let layers = [Layer::DiffCol, Layer::Emit].map(|layer| f.layer(layer).unwrap());
+        let seen = layers.map(|l| <[f32; 3]>::try_from(l.at(8, 8)).unwrap());
+        assert!(layers.iter().all(|l| l.data.iter().all(|v| v.is_finite())), "{at:?}: {seen:?}");
+        let emitted = seen[1];
+        assert!((0..3).all(|i| (emitted[i] - f32::from(u8::from(i == color))).abs() < 1e-3), "{at:?}: {emitted:?}");
+    }
+    // As casters: the transparent colour throws no shadow, the other does.
+    let mut s = scene(vec![floor(4.0, 0.0), floor(1.0, 1.0)], vec![sun([0.0, -1.0, 0.0], 1.0, 0.0)]);
+    s.materials.push(s.materials[0].clone());
+    s.images = vec![image(&[red, blue], 2, ColorSpace::Linear)];
+    s.materials[1].base_color_texture = texture;
+    s.materials[1].alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
+    s.meshes[1].material = 1;
+    let mut lit = |at: [f32; 2]| {
+        s.meshes[1].uv0 = vec![at; 4];
+        let f = render(&gpu, &s, &look_at([0.0, 0.6, 3.0], [0.0; 3], 0.5), [32, 32], 1);
+        f.layer(Layer::DiffDir).unwrap().at(16, 16)[0]
+    };
+    let (transparent, solid) = (lit([0.75, 0.5]), lit([0.25, 0.5]));
+    assert!(transparent > 0.25 && solid < 1e-3, "{transparent} {solid}");
 }
 
 /// A plain to the horizon: of a square of four fragments those that it does not cover lie behind

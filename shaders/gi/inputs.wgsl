@@ -132,25 +132,27 @@ fn stored_normal(pixel: vec2i) -> vec3f {
     return select(n, vec3f(n.xy, -n.z), turned);
 }
 
+// Chosen, not branched: normals are read at many places, and each branch there costs compilers more
+// than it saves threads.
 fn stored_vector(pixel: vec2i) -> vec3f {
-    var texel = finite3(textureLoad(normal_map, pixel, 0).rgb);
-    if (params.flags & STORED_UNSIGNED) != 0u { texel = 2.0 * texel - 1.0; }
-    if (params.flags & (STORED_XYZ | STORED_XY)) == 0u { return oct_decode(texel.xy); }
-    if (params.flags & STORED_XY) != 0u { texel.z = sqrt(max(1.0 - dot(texel.xy, texel.xy), 0.0)); }
-    let length = length(texel);
-    return select(vec3f(0.0, 0.0, 1.0), texel / length, length > 1e-6);
+    let texel = finite3(textureLoad(normal_map, pixel, 0).rgb);
+    let v = select(texel, 2.0 * texel - 1.0, (params.flags & STORED_UNSIGNED) != 0u);
+    let z = select(v.z, sqrt(max(1.0 - dot(v.xy, v.xy), 0.0)), (params.flags & STORED_XY) != 0u);
+    let whole = vec3f(v.xy, z);
+    let length = length(whole);
+    let unit = select(vec3f(0.0, 0.0, 1.0), whole / length, length > 1e-6);
+    return select(unit, oct_decode(v.xy), (params.flags & (STORED_XYZ | STORED_XY)) == 0u);
 }
 
 // Unit normal in the gravity frame.
 fn normal_at(pixel: vec2i) -> vec3f {
     let n = stored_normal(pixel);
-    if (params.flags & STORED_IN_VIEW) != 0u { return params.gravity_from_view * n; }
-    return params.gravity_from_world * n;
+    let in_view = (params.flags & STORED_IN_VIEW) != 0u;
+    return select(params.gravity_from_world * n, params.gravity_from_view * n, in_view);
 }
 
 // Unit normal in the world.
 fn world_normal_at(pixel: vec2i) -> vec3f {
     let n = stored_normal(pixel);
-    if (params.flags & STORED_IN_VIEW) != 0u { return params.world_from_view * n; }
-    return n;
+    return select(n, params.world_from_view * n, (params.flags & STORED_IN_VIEW) != 0u);
 }

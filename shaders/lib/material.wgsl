@@ -47,13 +47,21 @@ struct Material {
 // True in the permutation for masked and blended materials; the opaque one keeps early depth tests.
 override ALPHA: bool = false;
 
+// Least step between fragments, of the coordinate: four roundings of a float, far below a texel.
+const LEAST_STEP = 4.7683716e-7;
+
 // Where a fragment reads a picture. Fragments side by side are a picture apart at most, which its
 // coarsest level tells as well as any more: beside a triangle that passes behind the eye they would
 // be thousands apart, and Mesa's CPU driver asks all texels in between, for minutes.
-fn coordinates(use_: TextureUse, uv: vec4f) -> vec2f {
+//
+// Fragments side by side never read the very same place: where a face has one place for all of it
+// (a palette's colour), the footprint would be a point, by whose length some drivers' anisotropic
+// filter divides (NaN on Mesa 25's CPU driver). `pixel` is the fragment's position.
+fn coordinates(use_: TextureUse, uv: vec4f, pixel: vec2f) -> vec2f {
     let p = vec3f(select(uv.xy, uv.zw, use_.row0.w > 0.5), 1.0);
     let at = vec2f(dot(use_.row0.xyz, p), dot(use_.row1.xyz, p));
-    return at / max(max(abs(dpdxCoarse(at)), abs(dpdyCoarse(at))), vec2f(1.0));
+    let within = at / max(max(abs(dpdxCoarse(at)), abs(dpdyCoarse(at))), vec2f(1.0));
+    return within + vec2f(vec2u(pixel) & vec2u(1u)) * max(abs(within), vec2f(1.0)) * LEAST_STEP;
 }
 
 fn is_veil() -> bool {

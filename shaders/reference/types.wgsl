@@ -113,7 +113,9 @@ struct MaterialStore {
     items: array<RefMaterial>,
 }
 
-@group(0) @binding(0) var<uniform> scene: SceneInfo;
+// Neither this nor `job` is a uniform, though all threads read the same: where a uniform decides a
+// branch, Mesa's CPU driver before 23 compiles the path tracer anew for each dispatch, and keeps all.
+@group(0) @binding(0) var<storage, read> scene: SceneInfo;
 @group(0) @binding(1) var accel_blocks: texture_2d<u32>;
 // Four vectors a triangle, then six for each triangle that has texture coordinates or colours;
 // `surface.wgsl` reads them.
@@ -122,7 +124,7 @@ struct MaterialStore {
 @group(0) @binding(5) var<storage, read> lights: array<vec4u>;
 @group(0) @binding(6) var<storage, read> texels: array<u32>;
 
-@group(1) @binding(0) var<uniform> job: Job;
+@group(1) @binding(0) var<storage, read> job: Job;
 @group(1) @binding(1) var<storage, read> points: array<vec2f>;
 
 const NONE: u32 = 0xffffffffu;

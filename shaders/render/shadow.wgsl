@@ -51,7 +51,7 @@ fn covered(v: Vertex) -> Varying {
 @fragment
 fn coverage(in: Varying) {
     let alpha = material.base_color.a * in.alpha
-        * textureSample(base_texture, base_sampler, coordinates(material.base_use, in.uv)).a;
+        * textureSample(base_texture, base_sampler, coordinates(material.base_use, in.uv, in.position.xy)).a;
     let q = vec2u(in.position.xy);
     if alpha < cutoff(hash01(q.x, q.y, camera.seed.x, bitcast<u32>(in.position.z))) {
         discard;

@@ -24,14 +24,17 @@ const SOLID = 0.995;
 
 fn surface_at(in: Varying, facing: bool) -> Surface {
     let bias = frame.texture_bias;
+    let pixel = in.position.xy;
     let base = material.base_color * in.color
-        * textureSampleBias(base_texture, base_sampler, coordinates(material.base_use, in.uv), bias);
-    let rough_metal = textureSampleBias(rough_texture, rough_sampler, coordinates(material.rough_use, in.uv), bias);
-    let bump = textureSampleBias(normal_texture, normal_sampler, coordinates(material.normal_use, in.uv), bias);
-    let shade =
-        textureSampleBias(occlusion_texture, occlusion_sampler, coordinates(material.occlusion_use, in.uv), bias).r;
-    let glow =
-        textureSampleBias(emissive_texture, emissive_sampler, coordinates(material.emissive_use, in.uv), bias).rgb;
+        * textureSampleBias(base_texture, base_sampler, coordinates(material.base_use, in.uv, pixel), bias);
+    let rough_at = coordinates(material.rough_use, in.uv, pixel);
+    let rough_metal = textureSampleBias(rough_texture, rough_sampler, rough_at, bias);
+    let bump_at = coordinates(material.normal_use, in.uv, pixel);
+    let bump = textureSampleBias(normal_texture, normal_sampler, bump_at, bias);
+    let shade_at = coordinates(material.occlusion_use, in.uv, pixel);
+    let shade = textureSampleBias(occlusion_texture, occlusion_sampler, shade_at, bias).r;
+    let glow_at = coordinates(material.emissive_use, in.uv, pixel);
+    let glow = textureSampleBias(emissive_texture, emissive_sampler, glow_at, bias).rgb;
 
     let front = facing == (in.mirror > 0.0);
     var n = normalize(in.normal);

@@ -2,6 +2,7 @@
 
 use super::args::Global;
 use super::stdout::say;
+use crate::gpu::probe::driver_faults;
 use crate::gpu::{self, Gpu};
 use crate::scene::upload::TextureMemory;
 use anyhow::Result;
@@ -39,12 +40,14 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let (have, need) = (limits(&gpu.device.limits()), limits(&wgpu::Limits::default()));
     let short: Vec<_> = have.iter().zip(need).filter(|(h, n)| h.1 < n.1).map(|(h, _)| h.0).collect();
     let names = |f: wgpu::Features| f.iter_names().map(|(n, _)| n.to_lowercase()).collect::<Vec<_>>();
+    let faults = driver_faults(&gpu)?;
     if args.json {
         let record = json!({
             "schema": 1, "adapter": gpu.info.name, "backend": format!("{:?}", gpu.info.backend).to_lowercase(),
             "driver": gpu.info.driver, "driver_info": gpu.info.driver_info, "software": gpu.is_software(),
             "limits": have.into_iter().collect::<std::collections::BTreeMap<_, _>>(), "limits_below_default": short,
             "features_used": names(used), "features_missing": names(missing), "adapters": found,
+            "driver_faults": faults.iter().map(|f| f.name()).collect::<Vec<_>>(),
         });
         say!("{record:#}");
         return Ok(());
@@ -61,6 +64,9 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         say!("textures  in blocks of a byte a texel (BC7) where a scene's take more than {most} MiB whole; --textures");
     } else {
         say!("textures  whole, four bytes a texel: this device has no blocks (BC7)");
+    }
+    for fault in faults {
+        say!("driver    {}", fault.sentence());
     }
     if missing.contains(wgpu::Features::TIMESTAMP_QUERY) {
         say!("note      without timestamp_query, bench shows synchronised wall-clock time only");

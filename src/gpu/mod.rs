@@ -9,6 +9,7 @@ mod choose;
 pub(crate) mod count;
 #[cfg(feature = "reference")]
 mod instrument;
+pub mod probe;
 pub mod readback;
 pub mod shaders;
 pub(crate) mod shared;

@@ -54,6 +54,8 @@ const FILES: &[(&str, &str)] = &[
     ("learn.adam", "net/learn/adam.wgsl"),
     ("reference.path", "reference/path.wgsl"),
     ("reference.first_hit", "reference/first_hit.wgsl"),
+    ("probe.branch", "probe/branch.wgsl"),
+    ("probe.still", "probe/still.wgsl"),
     ("viewer.sum", "viewer/sum.wgsl"),
     ("viewer.flicker", "viewer/flicker.wgsl"),
     ("viewer.show", "viewer/show.wgsl"),

@@ -1,4 +1,4 @@
-//! What one dispatch of the path tracer is asked to do: the uniform at group 1, binding 0 of
+//! What one dispatch of the path tracer is asked to do: group 1, binding 0 of
 //! `reference.path` and `reference.first_hit`.
 
 use crate::gpu::shared;
@@ -114,7 +114,7 @@ pub fn film_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         device,
         &wgpu::BindGroupLayoutDescriptor {
             label: Some("reference.film"),
-            entries: &[entry(0, wgpu::BufferBindingType::Uniform), entry(1, storage(true)), entry(2, storage(false))],
+            entries: &[entry(0, storage(true)), entry(1, storage(true)), entry(2, storage(false))],
         },
     )
 }

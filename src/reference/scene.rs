@@ -139,7 +139,7 @@ impl ReferenceScene {
         let usage = wgpu::BufferUsages::STORAGE;
         let make = |label, usage, data: &[u8]| filled(device, queue, label, usage, data);
         let buffers = [
-            make("reference.scene", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&info)),
+            make("reference.scene", usage, bytemuck::bytes_of(&info)),
             make("reference.triangles", usage, bytemuck::cast_slice(&records)),
             make("reference.materials", usage, bytemuck::cast_slice(&store)),
             make("reference.lights", usage, bytemuck::cast_slice(&lights.vectors)),
@@ -173,14 +173,14 @@ impl ReferenceScene {
             ty,
             count: None,
         };
-        let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
-        let read = buffer(wgpu::BufferBindingType::Storage { read_only: true });
+        let ty = wgpu::BufferBindingType::Storage { read_only: true };
+        let read = wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
         shared::bind_group_layout(
             device,
             &wgpu::BindGroupLayoutDescriptor {
                 label: Some("reference.scene"),
                 entries: &[
-                    entry(0, buffer(wgpu::BufferBindingType::Uniform)),
+                    entry(0, read),
                     AccelGpu::layout_entry(),
                     entry(3, read),
                     entry(4, read),
@@ -263,8 +263,7 @@ fn filled(
     data: &[u8],
 ) -> wgpu::Buffer {
     let least = (tables::HEADER_BYTES + size_of::<RefMaterial>()) as u64;
-    let size =
-        if usage.contains(wgpu::BufferUsages::UNIFORM) { data.len() as u64 } else { (data.len() as u64).max(least) };
+    let size = (data.len() as u64).max(least);
     let usage = usage | wgpu::BufferUsages::COPY_DST;
     let buffer =
         device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });

@@ -103,7 +103,7 @@ pub struct Tracer {
     points: u32,
     film: Film,
     groups: [wgpu::BindGroup; 2],
-    uniform: wgpu::Buffer,
+    job_buffer: wgpu::Buffer,
     job: Job,
     /// First point of the film and how many it holds.
     band: (u32, u32),
@@ -157,13 +157,13 @@ impl Tracer {
             let usage = usage | wgpu::BufferUsages::COPY_DST;
             device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
         };
-        let uniform = make("reference.job", size_of::<Job>() as u64, wgpu::BufferUsages::UNIFORM);
+        let job_buffer = make("reference.job", size_of::<Job>() as u64, wgpu::BufferUsages::STORAGE);
         let list: &[u8] = bytemuck::cast_slice(subject.points.unwrap_or(&[]));
         let point_list = make("reference.points", (list.len() as u64).max(16), wgpu::BufferUsages::STORAGE);
         if !list.is_empty() {
             queue.write_buffer(&point_list, 0, list);
         }
-        let groups = film.halves.each_ref().map(|half| kernel.group(device, &uniform, &point_list, half));
+        let groups = film.halves.each_ref().map(|half| kernel.group(device, &job_buffer, &point_list, half));
         let mut tracer = Self {
             device: device.clone(),
             queue: queue.clone(),
@@ -172,7 +172,7 @@ impl Tracer {
             points,
             film,
             groups,
-            uniform,
+            job_buffer,
             job,
             band: (0, most),
             most,
@@ -344,7 +344,7 @@ impl Tracer {
     }
 
     fn dispatch(&self, entry: Entry, job: &Job) -> Result<(), TracerError> {
-        self.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(job));
+        self.queue.write_buffer(&self.job_buffer, 0, bytemuck::bytes_of(job));
         let groups = [&self.scene, &self.groups[job.half as usize]];
         self.kernel.run(&self.device, &self.queue, entry, groups, job.point_count)
     }

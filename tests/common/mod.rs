@@ -77,6 +77,11 @@ pub fn skip(need: Need, reason: impl Display) {
     }
 }
 
+/// Whether heavy tests run whole (`TESTS=all`), not at a tenth.
+pub fn whole() -> bool {
+    std::env::var("TESTS").is_ok_and(|v| v == "all")
+}
+
 /// A device whose validation errors fail the test, or `None` after a [`skip`]. All tests of a program
 /// share it, and what is compiled on it.
 pub fn gpu() -> Option<Gpu> {

@@ -1,11 +1,12 @@
 //! `cargo xtask demo | test | hosts | gpu-report | conformance | ci`: set-up and checks; no product
 //! code.
 //!
-//! Every command first makes sure of a wgpu adapter: it asks `bouncelight doctor`, and on Debian or
-//! Ubuntu without any adapter it installs Mesa's CPU driver, saying so before it does.
+//! Every command first makes sure of a wgpu adapter (`driver.rs`).
 
+mod driver;
 mod tests;
 
+use driver::{apt, make_sure_of_adapter};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -25,10 +26,16 @@ usage: cargo xtask COMMAND
          (--dev builds without release's optimisation: for rehearsals)
   conformance
          docs/conformance.md: glTF feature by feature, the rasteriser beside the path tracer
-  ci     what continuous integration runs (.ci/run)";
+  ci     what continuous integration runs (.ci/run)
 
-/// Exit code with which `bouncelight doctor` says that there is no usable adapter.
-const NO_ADAPTER: i32 = 3;
+Where no GPU answers, Debian and Ubuntu get Mesa's CPU driver (on Debian 12 that of its backports, whose frames take a
+third of the time); what is installed is said first. --no-install refuses.";
+
+/// Whether nothing may be installed.
+fn no_install() -> bool {
+    std::env::args().any(|word| word == "--no-install")
+}
+
 /// Exit code with which `bouncelight render` says that a picture differs from its reference.
 const ABOVE_THRESHOLD: i32 = 5;
 
@@ -38,7 +45,7 @@ fn main() -> ExitCode {
         "demo" => demo(),
         "test" => test(),
         "hosts" => hosts(),
-        "gpu-report" => gpu_report(std::env::args().skip(2).collect()),
+        "gpu-report" => gpu_report(std::env::args().skip(2).filter(|word| word != "--no-install").collect()),
         "conformance" => conformance(),
         "ci" => ci(),
         _ => {
@@ -215,37 +222,6 @@ fn built(profile: &str) -> Result<PathBuf, String> {
     Ok(target.join(profile).join(format!("bouncelight{}", std::env::consts::EXE_SUFFIX)))
 }
 
-/// Makes sure that an adapter answers; installs Mesa's CPU driver for Vulkan where that is a matter
-/// of one package. It is preferred to OpenGL's, which compiles the same shaders in minutes instead
-/// of seconds.
-fn make_sure_of_adapter(program: &Path) -> Result<(), String> {
-    let found = doctor(program)?;
-    if found == Adapter::Good {
-        return Ok(());
-    }
-    let debian = std::path::Path::new("/etc/debian_version").exists();
-    if !debian && found == Adapter::None {
-        return Err("no usable GPU adapter; `bouncelight doctor` says what to install".into());
-    }
-    let why = if found == Adapter::None { "no GPU adapter answers" } else { "only OpenGL on the CPU answers, slowly" };
-    if !debian {
-        eprintln!("xtask: {why}; Mesa's CPU driver for Vulkan would be ten times as fast to begin");
-        return Ok(());
-    }
-    eprintln!("xtask: {why}; installing mesa-vulkan-drivers (Vulkan on the CPU) with apt-get");
-    let installed = apt(&["update", "-q"])
-        .and_then(|()| apt(&["install", "-y", "-q", "--no-install-recommends", "mesa-vulkan-drivers"]));
-    match (installed, found) {
-        (Err(e), Adapter::SlowGl) => eprintln!("xtask: {e}; going on with OpenGL"),
-        (Err(e), _) => return Err(e),
-        (Ok(()), _) if doctor(program)? == Adapter::None => {
-            return Err("still no adapter after installing mesa-vulkan-drivers".into());
-        }
-        (Ok(()), _) => {}
-    }
-    Ok(())
-}
-
 /// The viewer's tests need an X server without a screen, and what a window under X loads at run
 /// time.
 fn make_sure_of_display() -> Result<(), String> {
@@ -257,41 +233,6 @@ fn make_sure_of_display() -> Result<(), String> {
     apt(&["update", "-q"])?;
     let libraries = ["libx11-6", "libx11-xcb1", "libxcursor1", "libxi6", "libxrandr2", "libxkbcommon-x11-0"];
     apt(&[["install", "-y", "-q", "--no-install-recommends", "xvfb"].as_slice(), &libraries].concat())
-}
-
-/// What `bouncelight doctor` finds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Adapter {
-    Good,
-    /// OpenGL in software and nothing else.
-    SlowGl,
-    None,
-}
-
-fn doctor(program: &Path) -> Result<Adapter, String> {
-    let program = program.to_string_lossy();
-    let found = command(&program, &["doctor"])
-        .stderr(std::process::Stdio::inherit())
-        .output()
-        .map_err(|e| format!("{program}: {e}"))?;
-    let text = String::from_utf8_lossy(&found.stdout);
-    print!("{text}");
-    match found.status.code() {
-        // The sentence about the adapter: its name, its backend, and that it is software when it
-        // is.
-        Some(0) if text.contains(" (Gl, ") && text.contains("software rendering") => Ok(Adapter::SlowGl),
-        Some(0) => Ok(Adapter::Good),
-        Some(NO_ADAPTER) => Ok(Adapter::None),
-        code => Err(format!("`bouncelight doctor` ended with {code:?}")),
-    }
-}
-
-fn apt(args: &[&str]) -> Result<(), String> {
-    // Containers run as root and often have no sudo.
-    let root = Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout.trim_ascii() == b"0");
-    let (program, prefix): (&str, &[&str]) = if root { ("apt-get", &[]) } else { ("sudo", &["apt-get"]) };
-    let all: Vec<&str> = prefix.iter().chain(args).copied().collect();
-    run(command(program, &all).env("DEBIAN_FRONTEND", "noninteractive"))
 }
 
 fn cargo(args: &[&str]) -> Result<(), String> {

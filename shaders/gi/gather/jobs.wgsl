@@ -4,7 +4,7 @@
 // has a share of the units; it notes the jobs of as many as it has room for and does them
 // (`look.wgsl`), and then those of the next. The shader says what they are: `block_of(unit) ->
 // vec3u` finds a unit, `wants(block, i) -> bool` is asked once whether place `i` of it has a job,
-// and `begin(at, job)` sends way `at` on it.
+// and `begin(at, job) -> bool` sends way `at` on it (false: it is at its end at once).
 
 const UNIT = 1024u;
 // Places after which a workgroup sees whether there is room for the jobs of as many.
@@ -80,13 +80,17 @@ fn jobs_so_far(thread: u32) -> u32 {
     return workgroupUniformLoad(&jobs_counted);
 }
 
-// The next job that there is for way `at`.
-fn take_job(at: u32) {
+// The next job that there is for way `at`; what it found for the one before, if there was one, is
+// taken down first.
+fn next_job(at: u32, had_one: bool) {
+    var is_done = had_one;
     loop {
+        if is_done { finish(at); }
         let i = atomicAdd(&jobs_taken, 1u);
         if i >= atomicLoad(&jobs_noted) { return; }
         let job = (atomicLoad(&jobs[i / 2u]) >> (16u * (i & 1u))) & 0xffffu;
         if begin(at, job) { return; }
+        is_done = true;
     }
 }
 

@@ -25,17 +25,20 @@ fn lobe_over(roughness: f32, turn: vec2f) -> vec2f {
 // side on which it does less, since the other may be behind an edge.
 fn turn_at(pixel: vec2i) -> vec2f {
     let n = world_normal_at(pixel);
-    let right = vec2i(CELL_SIDE, 0);
-    let down = vec2i(0, CELL_SIDE);
-    return vec2f(
-        min(turn_to(n, pixel - right), turn_to(n, pixel + right)),
-        min(turn_to(n, pixel - down), turn_to(n, pixel + down))
-    );
+    var least = vec2f(2.0);
+    for (var i = 0; i < 4; i++) {
+        // Left, right, up, down.
+        let step = (2 * (i & 1) - 1) * vec2i(CELL_SIDE);
+        let turn = turn_to(n, pixel + select(step * vec2i(0, 1), step * vec2i(1, 0), i < 2));
+        least = select(vec2f(least.x, min(least.y, turn)), vec2f(min(least.x, turn), least.y), i < 2);
+    }
+    return least;
 }
 
+// 2 beside the picture.
 fn turn_to(n: vec3f, pixel: vec2i) -> f32 {
-    if any(pixel < vec2i(0)) || any(pixel >= vec2i(params.size)) { return 2.0; }
-    return distance(n, world_normal_at(pixel));
+    let inside = all(pixel >= vec2i(0)) && all(pixel < vec2i(params.size));
+    return select(2.0, distance(n, world_normal_at(pixel)), inside);
 }
 
 // Where what a lobe shows changes little over so many cells (`lobe_of`) cells tell it; where it

@@ -79,15 +79,20 @@ fn look(thread: u32, share: Share, round: u32, glows: bool) {
 }
 
 // Does the jobs that are noted, a way each; as soon as a way is at its end another sets out in its
-// place, so that there are rays enough for all threads.
+// place, so that there are rays enough for all threads. At first all ways are at an end.
 fn do_jobs(thread: u32, round: u32, glows: bool) {
-    workgroupBarrier();
-    if thread == 0u {
-        atomicStore(&asking_count, 0u);
-        atomicStore(&ended_count, 0u);
-    }
-    for (var at = thread; at < WALKS; at += WALKERS) { take_job(at); }
+    for (var at = thread; at < WALKS; at += WALKERS) { ended[at] = at; }
+    if thread == 0u { atomicStore(&ended_count, WALKS); }
+    var begun = false;
     loop {
+        meet();
+        for (var i = thread; i < atomicLoad(&ended_count); i += WALKERS) { next_job(ended[i], begun); }
+        begun = true;
+        workgroupBarrier();
+        if thread == 0u {
+            atomicStore(&asking_count, 0u);
+            atomicStore(&ended_count, 0u);
+        }
         if !walk_all(thread) { break; }
         for (var i = thread; i < sent_nearest; i += WALKERS) { arrive(sent(i), glows); }
         for (var i = sent_nearest + thread; i < sent_all; i += WALKERS) {
@@ -95,16 +100,6 @@ fn do_jobs(thread: u32, round: u32, glows: bool) {
         }
         meet();
         for (var i = thread; i < atomicLoad(&asking_count); i += WALKERS) { ask(asking[i], round); }
-        meet();
-        for (var i = thread; i < atomicLoad(&ended_count); i += WALKERS) {
-            finish(ended[i]);
-            take_job(ended[i]);
-        }
-        workgroupBarrier();
-        if thread == 0u {
-            atomicStore(&asking_count, 0u);
-            atomicStore(&ended_count, 0u);
-        }
     }
 }
 
@@ -226,12 +221,9 @@ fn claim(at: u32, slot: u32, x: vec3f, n: vec3f, round: u32) {
 // Sends the ray of way `at`, which has just set out, if what it finds counts; else the way is at
 // its end.
 fn goes(at: u32, weight: vec3f) -> bool {
-    if any(weight > vec3f(0.0)) {
-        put_ray(at);
-        return true;
-    }
-    finish(at);
-    return false;
+    if !any(weight > vec3f(0.0)) { return false; }
+    put_ray(at);
+    return true;
 }
 
 // Way `at` asks the next room of its place's cell.

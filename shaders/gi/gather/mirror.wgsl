@@ -71,13 +71,24 @@ fn first_of(job: u32) -> vec2u {
     return 2u * place_of(block_of(unit_of(job)).xy, place_in_unit(job));
 }
 
+// What a pixel's random numbers are drawn by: its number, after those of other rays.
+fn name_of(pixel: vec2u) -> u32 {
+    return gather.rays + pixel.y * params.size.x + pixel.x;
+}
+
+// The pixel of that name.
+fn named(name: u32) -> vec2u {
+    let number = name - gather.rays;
+    return vec2u(number % params.size.x, number / params.size.x);
+}
+
 // Into the lobe of a square's next pixel, in one direction.
 fn begin(at: u32, job: u32) -> bool {
     let pixel = turn_of(first_of(job));
     let start = start_at(vec2i(pixel));
     let shift = pcg3(vec3u(pixel, 0x6a09e667u)).xy;
     let lobe = lobe_ray(start, surface_at(pixel), lattice(gather.frame >> 2u, shift));
-    let name = gather.rays + pixel.y * params.size.x + pixel.x;
+    let name = name_of(pixel);
     set_out(at, start.x, lobe.d, ALONE, 0.0, NONE, name, lobe.weight, job);
     return goes(at, lobe.weight);
 }
@@ -104,7 +115,7 @@ fn colours(hit: Hit, x: vec3f, side: vec3f) -> Met {
 // What the square shows then.
 fn finish(at: u32) {
     let first = first_of(job_of(at));
-    let own = turn_of(first);
+    let own = named(part_of(at, NAMES).y);
     let by_ray = found_by(at);
     var radiance = by_ray.radiance;
     if by_ray.slot != NONE {

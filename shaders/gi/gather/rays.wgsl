@@ -32,9 +32,10 @@ const TURN_AGAIN = 3u;
 // itself: no pattern then repeats over the picture.
 fn numbers(cell: vec2u, look: u32, age: u32) -> vec2f {
     let place = ORDER[(cell.y & 3u) * 4u + (cell.x & 3u)];
-    var shift = vec2u(0x80000000u);
-    if gather.frame == 0u { shift = pcg3(vec3u(cell >> vec2u(2u), 77u)).xy; }
-    shift += gather.shift;
+    let half = vec2u(0x80000000u);
+    // Chosen, not branched: Mesa's CPU driver compiles what uniforms alone branch on anew for each
+    // value, here in each frame.
+    let shift = select(half, pcg3(vec3u(cell >> vec2u(2u), 77u)).xy, gather.frame == 0u) + gather.shift;
     // The further rays of a young cell are those of a lattice half a turn away.
     if age == YOUNG { return lattice(place + 16u * gather.frame, shift + (look << 31u)); }
     let turn = select(TURN_AGAIN, TURN, age == FRESH);

@@ -24,6 +24,13 @@
 // Cells between taps: those of the blur before are used up.
 const SMOOTH_STRIDE = 4;
 
+// Taps of five rows, one loop over all: compilers unroll loops of five, which they take long over.
+const TAPS = 25;
+
+fn step_of(tap: i32) -> vec2i {
+    return vec2i(tap % 5, tap / 5) - 2;
+}
+
 // Of a cell as it is blurred.
 struct Blurred {
     x: vec3f,
@@ -128,17 +135,15 @@ fn rare_around(id: vec2u, here: Past, side: vec3f) -> mat3x3f {
     let grid = vec2i(cell_grid());
     var sum = mat3x3f();
     var total = 0.0;
-    for (var y = -2; y <= 2; y++) {
-        for (var x = -2; x <= 2; x++) {
-            let at = vec2i(id) + SMOOTH_STRIDE * vec2i(x, y);
-            if is_beyond(grid, at) { continue; }
-            let other = index_in(grid, at);
-            if pasts[5u * other].a <= 0.0 { continue; }
-            let place = pasts[5u * other + 2u];
-            let w = same_surface(place.xyz - here.x, side, here.n, unpack_normal(bitcast<u32>(place.w)), strictness);
-            sum += w * part_of(other, true);
-            total += w;
-        }
+    for (var tap = 0; tap < TAPS; tap++) {
+        let at = vec2i(id) + SMOOTH_STRIDE * step_of(tap);
+        if is_beyond(grid, at) { continue; }
+        let other = index_in(grid, at);
+        if pasts[5u * other].a <= 0.0 { continue; }
+        let place = pasts[5u * other + 2u];
+        let w = same_surface(place.xyz - here.x, side, here.n, unpack_normal(bitcast<u32>(place.w)), strictness);
+        sum += w * part_of(other, true);
+        total += w;
     }
     return sum * (1.0 / max(total, 1e-30));
 }
@@ -171,27 +176,25 @@ fn smooth_light(
         let taps = array<f32, 3>(1.0, 2.0 / 3.0, 1.0 / 6.0);
         var total = 1.0;
         let allowed = 2.0 * exp(share * own.tolerance);
-        for (var y = -2; y <= 2; y++) {
-            let row = taps[abs(y)];
-            for (var x = -2; x <= 2; x++) {
-                let other = middle + y * STAGED + x;
-                let there = staged[other];
-                if other == middle || there.frames <= 0.0 { continue; }
-                any_rare = any_rare || there.rare;
-                let apart = there.luminance - here.luminance;
-                // Two means of the same light differ by their two variances.
-                let noise = allowed * (here.variance + there.variance);
-                let nearer = there.nearness - here.nearness;
-                let unlike = apart * apart / max(noise, 1e-30)
-                    + 0.5 * nearer * nearer / (here.chance + there.chance);
-                var w = row * taps[abs(x)] * exp(-min(unlike, 60.0));
-                w *= same_surface(there.x - here.x, side, here.n, there.n, strictness);
-                if (gather.flags & GATHER_GUIDED) != 0u {
-                    w *= kinship(own.far, staged_far[other], share);
-                }
-                light_here += w * there.light;
-                total += w;
+        for (var tap = 0; tap < TAPS; tap++) {
+            let step = step_of(tap);
+            let other = middle + step.y * STAGED + step.x;
+            let there = staged[other];
+            if other == middle || there.frames <= 0.0 { continue; }
+            any_rare = any_rare || there.rare;
+            let apart = there.luminance - here.luminance;
+            // Two means of the same light differ by their two variances.
+            let noise = allowed * (here.variance + there.variance);
+            let nearer = there.nearness - here.nearness;
+            let unlike = apart * apart / max(noise, 1e-30)
+                + 0.5 * nearer * nearer / (here.chance + there.chance);
+            var w = taps[abs(step.y)] * taps[abs(step.x)] * exp(-min(unlike, 60.0));
+            w *= same_surface(there.x - here.x, side, here.n, there.n, strictness);
+            if (gather.flags & GATHER_GUIDED) != 0u {
+                w *= kinship(own.far, staged_far[other], share);
             }
+            light_here += w * there.light;
+            total += w;
         }
         light_here *= 1.0 / total;
     }

@@ -73,7 +73,8 @@ pub(super) fn upload(
             samplers.entry(use_.sampler).or_insert_with(|| sampler(device, use_.sampler));
         }
     }
-    let plain = sampler(device, Sampler::default());
+    // One texel for all: any filter would find the same.
+    let plain = device.create_sampler(&wgpu::SamplerDescriptor { label: Some("scene.plain"), ..Default::default() });
     let mut groups = Vec::with_capacity(scene.materials.len());
     for (i, material) in scene.materials.iter().enumerate() {
         let size = wgpu::BufferSize::new(size_of::<MaterialGpu>() as u64);
