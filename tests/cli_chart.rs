@@ -103,8 +103,8 @@ fn a_folder_with_a_reference_is_judged_by_it() {
     bouncelight::scene::export::write_glb(&scene, &room.join("scene.glb")).expect("written");
     std::fs::write(room.join("meta.json"), r#"{"world": 0.1, "light": "sun", "spp": 64}"#).expect("written");
     let mut traced = Command::cargo_bin("bouncelight").expect("it was built");
-    traced.current_dir(&room).args(["render", "scene.glb", "--environment", "0.1", "--size", "48x24", "-q"]);
-    let layers = ["--method", "reference", "--spp", "64", "--no-caustics", "--aov", "all", "-o", "frame0000.exr"];
+    traced.current_dir(&room).args(["trace", "scene.glb", "--environment", "0.1", "--size", "48x24", "-q"]);
+    let layers = ["--spp", "64", "--no-caustics", "--aov", "all", "-o", "frame0000.exr"];
     traced.args(layers).assert().success();
     let refs = folder.path().join("refs");
     chart(&out, &["--scenes", refs.to_str().expect("plain"), "--no-caustics"]).success();

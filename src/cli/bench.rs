@@ -29,7 +29,7 @@ pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
     /// Real-time method to measure, or `all` of them; what `fit` found for the scene when absent,
-    /// else all. (`render --method reference` tells its own samples per second.)
+    /// else all. (`bouncelight trace` tells its own samples per second.)
     #[arg(long, value_parser = parse_methods)]
     method: Option<Methods>,
     #[command(flatten)]
@@ -78,7 +78,7 @@ fn parse_methods(text: &str) -> Result<Methods, String> {
     match text {
         "all" => Ok(Methods(MethodName::REAL_TIME.to_vec())),
         "reference" => {
-            Err("bench measures frames of real-time methods; `render --method reference` tells its speed".into())
+            Err("bench measures frames of real-time methods; `bouncelight trace` tells its speed".into())
         }
         one if replaced(one).is_some() => Err(replaced(one).unwrap_or_default()),
         one => <MethodName as clap::ValueEnum>::from_str(one, false).map(|m| Methods(vec![m])),
