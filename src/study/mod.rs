@@ -3,7 +3,7 @@
 pub mod bench;
 #[cfg(all(feature = "io", feature = "reference"))]
 mod changes;
-#[cfg(feature = "chart")]
+#[cfg(all(feature = "io", feature = "reference"))]
 pub mod chart;
 #[cfg(feature = "reference")]
 pub mod count;
