@@ -191,11 +191,7 @@ fn odd_scenes_and_sizes() {
     );
     let broken = file("broken.gltf", &text);
     let gone = dir.path().join("gone.exr");
-    fails(
-        &["trace", &broken, "-o", gone.to_str().unwrap()],
-        4,
-        &["broken.gltf", "not a finite"],
-    );
+    fails(&["trace", &broken, "-o", gone.to_str().unwrap()], 4, &["broken.gltf", "not a finite"]);
     assert!(!gone.exists());
 }
 

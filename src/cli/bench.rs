@@ -67,9 +67,7 @@ struct Methods(Vec<MethodName>);
 fn parse_methods(text: &str) -> Result<Methods, String> {
     match text {
         "all" => Ok(Methods(MethodName::REAL_TIME.to_vec())),
-        "reference" => {
-            Err("bench measures frames of real-time methods; `bouncelight trace` tells its speed".into())
-        }
+        "reference" => Err("bench measures frames of real-time methods; `bouncelight trace` tells its speed".into()),
         one if replaced(one).is_some() => Err(replaced(one).unwrap_or_default()),
         one => <MethodName as clap::ValueEnum>::from_str(one, false).map(|m| Methods(vec![m])),
     }
@@ -276,8 +274,8 @@ fn rows(m: &Measurement, layers: bool) -> Vec<(String, f64, f64)> {
 
 fn read_base(path: &PathBuf) -> Result<Record> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let base: Record = serde_json::from_str(&text)
-        .with_context(|| format!("{} is no record of `bench --json`", path.display()))?;
+    let base: Record =
+        serde_json::from_str(&text).with_context(|| format!("{} is no record of `bench --json`", path.display()))?;
     if base.schema != 1 {
         return Err(usage(format!("{}: schema {} is not known", path.display(), base.schema)));
     }

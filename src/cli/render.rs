@@ -92,7 +92,8 @@ impl Args {
 
     /// Frames that are averaged.
     fn samples(&self) -> u32 {
-        let raw = self.picture.aov.is_some() || self.taa.is_some() || self.gi_frames == Some(1) || self.sequence.is_given();
+        let raw =
+            self.picture.aov.is_some() || self.taa.is_some() || self.gi_frames == Some(1) || self.sequence.is_given();
         self.samples.unwrap_or(if raw { 1 } else { PICTURE_SAMPLES })
     }
 

@@ -108,7 +108,14 @@ impl Args {
         // Combined is the picture itself, which every file has.
         let known = &Layer::ALL[1..];
         let mut layers = vec![Layer::Combined];
-        layers.extend(self.picture.aov.as_deref().map(|text| parse_layers(text, known, Layer::name)).transpose()?.unwrap_or_default());
+        layers.extend(
+            self.picture
+                .aov
+                .as_deref()
+                .map(|text| parse_layers(text, known, Layer::name))
+                .transpose()?
+                .unwrap_or_default(),
+        );
         let asked = layers.len();
         if self.denoise {
             layers.extend(preview::READ.into_iter().filter(|l| !layers.contains(l)).collect::<Vec<_>>());

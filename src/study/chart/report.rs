@@ -186,13 +186,15 @@ fn how(record: &Record, metric: Metric) -> String {
         Metric::Flip => "Error: FLIP of the finished picture through Filmic, in 8 bits.",
         Metric::L1 => "Error: the paper's L1 (each channel stretched on its own), scaled to the pixels of 1024×512.",
     };
+    // Records of older programs have no waiting in their counts.
+    let waits = record.units.iter().flat_map(|u| &u.costs).any(|c| c.waited > 0.0);
+    let waiting = if waits { ", with what threads wait for each other in the last of the settled frames" } else { "" };
     format!(
         "{what} Means over {} scenes, in brackets best and worst. Settled pictures are of the 32nd frame of a still \
          camera on, {} samples \
          a pixel; the first frame has one. Time: a whole frame, rasteriser included, median of {frames} frames after \
          {warmup}; {}. \
-         Counted (GFLOP, MB, rays) and projected, with what threads wait for each other: only the passes that find and \
-         add indirect light, in the last of the settled frames. \
+         Counted (GFLOP, MB, rays) and projected{waiting}: only the passes that find and add indirect light. \
          \"Against paths\": how many times as long our path tracer takes to come as near on this device.{}\n",
         record.sound_scenes(),
         record.samples,
