@@ -54,7 +54,7 @@ enum Command {
     View(view::Args),
     /// Draw a scene into a PNG or multi-layer EXR.
     Render(render::Args),
-    /// Draw it by paths, until the light is right: what everything else is measured against.
+    /// Draw a scene by paths, until the light is right: what everything else is measured against.
     Trace(trace::Args),
     /// Measure GPU time per pass, wall-clock time per frame and memory.
     Bench(bench::Args),
