@@ -8,19 +8,24 @@ use bouncelight::net::convert::{Arch, Norm, published};
 use bouncelight::net::format::Weights;
 use bouncelight::net::plan::Plan;
 use bouncelight::scene::{self, Scene};
-use bouncelight::study::chart::sweep;
 use divan::{Bencher, black_box};
 
 fn main() {
     divan::main();
 }
 
-/// The triangles of a made floor.
+/// Triangles of a field with waves, about `count`.
 fn triangles(count: u32) -> Vec<[[f32; 3]; 3]> {
-    let scene = sweep::floor(count);
-    let mesh = &scene.meshes[0];
-    let corners = |t: &[u32]| [0, 1, 2].map(|i| mesh.positions[t[i] as usize]);
-    mesh.indices.chunks_exact(3).map(corners).collect()
+    let side = (f64::from(count) / 2.0).sqrt().round() as u32;
+    let at = |i: u32, j: u32| {
+        let (x, z) = (20.0 * i as f32 / side as f32 - 10.0, 20.0 * j as f32 / side as f32 - 10.0);
+        [x, 0.4 * (1.3 * x).sin() * (1.7 * z).cos(), z]
+    };
+    let square = |(i, j): (u32, u32)| {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
+        [[a, c, b], [b, c, d]]
+    };
+    (0..side).flat_map(|j| (0..side).map(move |i| (i, j))).flat_map(square).collect()
 }
 
 #[divan::bench(args = [1_000, 30_000, 300_000], max_time = 10)]

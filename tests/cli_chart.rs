@@ -5,6 +5,7 @@
 mod common;
 
 use assert_cmd::Command;
+use bouncelight::study::chart::{Metric, Record, report};
 use std::path::Path;
 
 fn chart(out: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
@@ -66,10 +67,6 @@ fn a_small_chart_is_made_and_taken_up_again() {
     let columns = csv.lines().next().expect("a head").split(',').count();
     assert_eq!(csv.lines().count(), 9);
     assert!(csv.lines().all(|l| l.split(',').count() >= columns), "{csv}");
-    let svg = std::fs::read_to_string(out.join("chart.svg")).expect("written");
-    assert!(svg.contains("PROJECTED, NOT MEASURED") && svg.contains("<desc>") && svg.contains("ambient"));
-    let png = bouncelight::image_io::read_png(&out.join("chart.png")).expect("a picture");
-    assert!(png.width == 2560 && png.pixels.iter().any(|v| *v < 0.5));
     let words = std::fs::read_to_string(&page).expect("written");
     assert!(words.contains("(out/chart.svg)") && words.contains("Frontier as measured here"), "{words}");
     // Again: everything is kept, times too, but for the last bit, which JSON's reader may miss.
@@ -93,6 +90,22 @@ fn a_small_chart_is_made_and_taken_up_again() {
     assert_eq!(json(&out)["scenes"].as_array().map(Vec::len), Some(3));
 }
 
+/// The page in docs is what its record gives; `RENEW=1` writes it anew.
+#[test]
+fn the_page_of_results_is_made_of_its_record() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let record = std::fs::read_to_string(docs.join("results/chart.json")).expect("it is in the repository");
+    let record: Record = serde_json::from_str(&record).expect("a record");
+    let made = report::page(&record, Metric::Light, "results/chart.svg");
+    let page = docs.join("results.md");
+    if std::env::var_os("RENEW").is_some() {
+        std::fs::write(&page, &made).expect("writable");
+    }
+    assert!(std::fs::read_to_string(&page).expect("it is there") == made, "changed by hand: RENEW=1 makes it anew");
+    let other = Record { samples: record.samples + 1, ..record };
+    assert!(report::page(&other, Metric::Light, "results/chart.svg") != made, "negative control");
+}
+
 /// A folder as other programs' references stand in: its own size, its samples, its sky.
 #[test]
 fn a_folder_with_a_reference_is_judged_by_it() {
@@ -103,8 +116,8 @@ fn a_folder_with_a_reference_is_judged_by_it() {
     bouncelight::scene::export::write_glb(&scene, &room.join("scene.glb")).expect("written");
     std::fs::write(room.join("meta.json"), r#"{"world": 0.1, "light": "sun", "spp": 64}"#).expect("written");
     let mut traced = Command::cargo_bin("bouncelight").expect("it was built");
-    traced.current_dir(&room).args(["render", "scene.glb", "--environment", "0.1", "--size", "48x24", "-q"]);
-    let layers = ["--method", "reference", "--spp", "64", "--no-caustics", "--aov", "all", "-o", "frame0000.exr"];
+    traced.current_dir(&room).args(["trace", "scene.glb", "--environment", "0.1", "--size", "48x24", "-q"]);
+    let layers = ["--spp", "64", "--no-caustics", "--aov", "all", "-o", "frame0000.exr"];
     traced.args(layers).assert().success();
     let refs = folder.path().join("refs");
     chart(&out, &["--scenes", refs.to_str().expect("plain"), "--no-caustics"]).success();

@@ -39,7 +39,7 @@ fn scenes_of_nothing_exit_with_4() {
     fails(&["render", &noise, "-o", &out], 4, &["noise.obj", "nothing to draw"]);
     let empty = path(&dir, "empty.gltf");
     std::fs::write(&empty, r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[]}]}"#).unwrap();
-    fails(&["render", &empty, "-o", &out, "--method", "reference"], 4, &["empty.gltf", "nothing to draw"]);
+    fails(&["trace", &empty, "-o", &out], 4, &["empty.gltf", "nothing to draw"]);
     assert!(!Path::new(&out).exists());
 }
 

@@ -63,7 +63,7 @@ fn rays_are_those_that_a_frame_at_rest_sends() {
     let rays = of(&costs, "gi.rays").rays;
     assert!(rays > looks && rays <= 3.0 * looks, "{rays} rays for {looks} looks");
     for cost in costs.iter().filter(|c| c.pass.starts_with("gi.")) {
-        assert!(cost.flops > 0.0 && cost.bytes >= 0.0, "{cost:?}");
+        assert!(cost.flops > 0.0, "{cost:?}");
     }
     // A young cell sends a ray more than one at rest.
     let young = counted(&gpu, Method::Gather(gather::Options::default()), [128, 64], 16);

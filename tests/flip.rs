@@ -264,19 +264,3 @@ fn heat_map_shows_the_place() {
     assert!((hottest % 40).abs_diff(20) < 2 && (hottest / 40).abs_diff(20) < 2, "{hottest}");
     assert!(heat[3 * hottest] > heat[0]);
 }
-
-/// `cargo test --release --test flip speed -- --ignored --nocapture`
-#[test]
-#[ignore = "a timing, for an idle machine"]
-fn speed() {
-    let (a, b) = (noise(1024 * 512 * 3, 8), noise(1024 * 512 * 3, 9));
-    let start = std::time::Instant::now();
-    ldr(&a, &b, 1024);
-    let low = start.elapsed();
-    let light = |p: &[f32]| p.iter().map(|v| (12.0 * v - 4.0).exp2()).collect::<Vec<_>>();
-    let (a, b) = (light(&a), light(&b));
-    let start = std::time::Instant::now();
-    hdr(&a, &b, 1024);
-    println!("1024x512: FLIP {low:?}, HDR-FLIP {:?} for {:?}", start.elapsed(), exposures(picture(&b, 1024)));
-    assert!(low.as_secs_f32() < 2.0);
-}

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// Test modules, and how many tests each has: an empty run must not pass.
-const MODULES: [(&str, u32); 7] = [
+const MODULES: [(&str, u32); 8] = [
     ("tests.test_toy", 15),
     ("tests.test_pix2pix", 10),
     ("tests.test_distributed", 4),
@@ -15,6 +15,7 @@ const MODULES: [(&str, u32); 7] = [
     ("tests.test_turned", 4),
     ("tests.test_motion", 6),
     ("tests.test_filter", 11),
+    ("tests.test_chart", 2),
 ];
 
 #[test]

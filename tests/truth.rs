@@ -9,8 +9,8 @@
 
 mod common;
 
+use bouncelight::gi::Method;
 use bouncelight::gi::inputs::{cells_of, sample_pixel};
-use bouncelight::gi::{Method, gather};
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::net::format::Weights;
@@ -97,32 +97,21 @@ fn make_the_truth() {
 
 /// rgb of each point as `method` answers after [`FRAMES`].
 fn answer(gpu: &Gpu, method: &Method, scene: &Scene) -> Vec<f32> {
-    let frames = if method.has_history() { FRAMES } else { 1 };
-    answers(gpu, method, scene, &[frames]).pop().expect("one was asked for")
-}
-
-/// The same after each number of `frames`, which rise.
-fn answers(gpu: &Gpu, method: &Method, scene: &Scene, frames: &[u32]) -> Vec<Vec<f32>> {
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the scene fits");
     uploaded.trace(&gpu.device, &gpu.queue, scene).expect("its rays fit");
     let options = RendererOptions { method: method.clone(), ..Default::default() };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, SIZE, options).expect("the size fits");
-    let mut answers = Vec::new();
-    for i in 0..*frames.last().expect("a number of frames") {
+    for i in 0..if method.has_history() { FRAMES } else { 1 } {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let view = View::new(&scene.cameras[0], SIZE, [0.0; 2]).with_seed(i);
         renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, &uploaded, &view).expect("the frame is drawn");
         gpu.queue.submit([encoder.finish()]);
-        if !frames.contains(&(i + 1)) {
-            continue;
-        }
-        let texture = &renderer.targets().indirect.texture;
-        let bytes = bouncelight::gpu::readback::texture(&gpu.device, &gpu.queue, texture).expect("readable");
-        let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
-        let at = |[x, y]: [u32; 2]| 4 * (y * SIZE[0] + x) as usize;
-        answers.push(points().into_iter().flat_map(|p| [0, 1, 2].map(|c| f32::from(halves[at(p) + c]))).collect());
     }
-    answers
+    let texture = &renderer.targets().indirect.texture;
+    let bytes = bouncelight::gpu::readback::texture(&gpu.device, &gpu.queue, texture).expect("readable");
+    let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
+    let at = |[x, y]: [u32; 2]| 4 * (y * SIZE[0] + x) as usize;
+    points().into_iter().flat_map(|p| [0, 1, 2].map(|c| f32::from(halves[at(p) + c]))).collect()
 }
 
 /// Means over blocks of 4×4 points, in which the truth has 65,536 paths: its own noise is 0.4 % of
@@ -190,26 +179,4 @@ fn methods_are_as_near_to_the_truth_as_they_were() {
         }
     }
     assert!(missed.is_empty(), "{missed:?}");
-}
-
-/// What `gather` converges to: history without end and no filter, so that each cell has as many
-/// rays as there were frames.
-#[test]
-#[ignore = "prints a table: a quarter of an hour on two cores"]
-fn what_gather_converges_to() {
-    let Some(gpu) = common::gpu() else { return };
-    let frames = [32, 128, 512, 1024];
-    for (name, scene) in rooms() {
-        let truth = truth(name);
-        for (options, words) in [(gather::Options::PLAIN, "plain"), (Default::default(), "default")] {
-            for (found, n) in answers(&gpu, &Method::Gather(options), &scene, &frames).iter().zip(frames) {
-                let all = |light: &[f32]| light.iter().sum::<f32>();
-                let off = 100.0 * (all(found) / all(&truth) - 1.0);
-                println!(
-                    "{name}, {words}, {n} frames: {:.2} % off, all of the light {off:+.2} %",
-                    100.0 * error(found, &truth)
-                );
-            }
-        }
-    }
 }

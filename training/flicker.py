@@ -58,19 +58,19 @@ def main():
     for name, scene, path_of_meta, meta in scenes_of(a):
         flags, cameras = zip(*(camera_of(meta, degrees) for degrees in (1, 0)))
 
-        def render(path, *more):
-            subprocess.run([a.bouncelight, "render", *scene, "--size", a.size, "--aov", "all", "-q", "-o", path, *more], check=True)
+        def draw(command, path, *more):
+            subprocess.run([a.bouncelight, command, *scene, "--size", a.size, "--aov", "all", "-q", "-o", path, *more], check=True)
 
-        def alone(what, number, *more):
+        def alone(what, number, command, *more):
             """A frame by itself."""
             path = os.path.join(a.out, f"{name}_{what}_{number}.exr")
             if not os.path.exists(path):
-                render(path, *flags[number], *more)
+                draw(command, path, *flags[number], *more)
             return layers(path)
 
         traced, means = [], []
         for seed in (1, 2):
-            frames = [alone(f"paths{seed}", i, "--method", "reference", "--spp", str(a.spp), "--seed", str(2 * seed + i)) for i in (0, 1)]
+            frames = [alone(f"paths{seed}", i, "trace", "--spp", str(a.spp), "--seed", str(2 * seed + i)) for i in (0, 1)]
             traced.append(change(*frames, cameras))
             means.append(picture(frames[0]).mean())
         mean = np.mean(means)
@@ -84,12 +84,12 @@ def main():
                     with open(os.path.join(folder, "pan.json"), "w") as file:
                         json.dump(pan_to(path_of_meta), file)
                     fine = ["--taa", str(PAN_FRAMES)] if taa else ["--samples", str(a.samples)]
-                    render(os.path.join(folder, "{frame}.exr"), "--method", method, *SEEN, *fine, "--path", os.path.join(folder, "pan.json"))
+                    draw("render", os.path.join(folder, "{frame}.exr"), "--method", method, *SEEN, *fine, "--path", os.path.join(folder, "pan.json"))
                     for number, path in zip((PAN_FRAMES - 1, PAN_FRAMES), frames):
                         shutil.move(os.path.join(folder, f"{number}.exr"), path)
             ours = size(change(*map(layers, frames), cameras)) / mean
             print(f"{name} {row}: {100 * ours:.2f} %, {beside(ours, own)}", flush=True)
-        cut = [alone("cut", i, "--method", "gather", *SEEN, "--gi-frames", "1", "--samples", str(a.samples), "--gather", f"seed={i}") for i in (0, 1)]
+        cut = [alone("cut", i, "render", "--method", "gather", *SEEN, "--gi-frames", "1", "--samples", str(a.samples), "--gather", f"seed={i}") for i in (0, 1)]
         ours = size(change(*cut, cameras)) / mean
         print(f"{name} control: {100 * ours:.2f} %, {beside(ours, own)}", flush=True)
 

@@ -73,9 +73,9 @@ def main():
     os.makedirs(a.out, exist_ok=True)
     description, rest = read_glb(a.scene)
 
-    def render(scene, path, method, *more):
+    def draw(scene, path, command, *more):
         if not os.path.exists(path):
-            command = [a.bouncelight, "render", scene, "-o", path, "--method", method, "--size", a.size, "--aov", "all"]
+            command = [a.bouncelight, command, scene, "-o", path, "--size", a.size, "--aov", "all"]
             subprocess.run([*command, "--environment", a.environment, "-q", *more], check=True)
         return layers(path)
 
@@ -85,9 +85,9 @@ def main():
             base = os.path.join(a.out, f"{'metal' if metals else 'dielectric'}_{roughness:g}")
             scene = base + ".glb"
             write_glb(scene, with_roughness(description, metals, roughness), rest)
-            direct = render(scene, base + "_direct.exr", "direct", "--samples", "4")
+            direct = draw(scene, base + "_direct.exr", "render", "--method", "direct", "--samples", "4")
             reference, second = (
-                render(scene, f"{base}_reference{seed}.exr", "reference", "--spp", str(a.spp), "--seed", str(seed)) for seed in (1, 2)
+                draw(scene, f"{base}_reference{seed}.exr", "trace", "--spp", str(a.spp), "--seed", str(seed)) for seed in (1, 2)
             )
             surface = direct["Depth.Z"] < 1e9
             mask = surface & ((rgb(direct, "DiffCol").max(-1) < 0.01) == metals)
@@ -98,7 +98,7 @@ def main():
             whole = (rgb(reference, "") + rgb(second, "")) / 2
             write(base + "_truth.exr", whole)
             for method in a.methods:
-                ours = direct if method == "direct" else render(scene, f"{base}_{method}.exr", method, "--samples", "4")
+                ours = direct if method == "direct" else draw(scene, f"{base}_{method}.exr", "render", "--method", method, "--samples", "4")
                 guess = pooled(reflected(ours, direct), mask)
                 patched = base + f"_{method}_patched.exr"
                 write(patched, np.where(mask[..., None], rgb(ours, ""), whole))

@@ -6,7 +6,6 @@ use super::trees::{How, SceneTrees, apart};
 use super::wide::{Block, INSTANCE, NODE};
 use super::{Accel, AccelError, scene};
 use crate::scene::Scene;
-use crate::scene::octahedral::from_octahedral_word;
 
 /// Where a ray meets a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -229,18 +228,6 @@ impl SceneBlocks {
         for (number, instance) in (0..).zip(&scene.instances).filter(|(_, i)| shares(i.mesh)) {
             self.instances[instance.mesh] = Some(number);
         }
-    }
-
-    /// Blocks in all.
-    pub fn count(&self) -> usize {
-        self.trees.blocks.len()
-    }
-
-    /// Where the mesh's normals point at a hit that [`SceneBlocks::walk`] found, in the mesh's space.
-    pub(crate) fn normal(&self, hit: &AccelHit) -> Vec3 {
-        let corners = &self.trees.normals[hit.triangle as usize];
-        let [a, b, c] = [0, 1, 2].map(|k| Vec3::from(from_octahedral_word(corners[k])));
-        a + hit.uv[0] * (b - a) + hit.uv[1] * (c - a)
     }
 
     /// The nearest hit (any hit where `any`) with 0 < t < `t_max`, and the number of its instance;

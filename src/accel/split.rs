@@ -3,7 +3,7 @@
 //! with the same pair in it (early split clipping, Ernst and Greiner 2007), those first that save
 //! most.
 //!
-//! Counts of blocks below are those that a nearest hit reads (`examples/rays --traffic`), each
+//! Counts of blocks below are those that a nearest hit reads (docs/log/2026-11-28-trees.md), each
 //! number varied beside the others as they stood when it was chosen.
 
 use std::cmp::Ordering;

@@ -13,7 +13,7 @@ use crate::{
     },
 };
 use anyhow::Result;
-use clap::builder::{EnumValueParser, PossibleValue, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Arg, Args, Command, ValueEnum};
 use serde::{Deserialize, Serialize};
@@ -185,22 +185,33 @@ pub fn replaced(text: &str) -> Option<String> {
     REPLACED.contains(&text).then(|| format!("method `{text}` was replaced by `gather`"))
 }
 
-/// Parses a method's name, as clap does it but for the names of methods that there were.
+/// What is said to who asks for paths where frames are drawn.
+pub const TRACED: &str = "paths are traced by `bouncelight trace`, a command of its own";
+
+/// Parses a method's name, one of those given, and says where to look for others that there are or
+/// were.
 #[derive(Debug, Clone)]
-pub struct MethodParser;
+pub struct MethodParser(pub &'static [MethodName]);
 
 impl TypedValueParser for MethodParser {
     type Value = MethodName;
 
     fn parse_ref(&self, cmd: &Command, arg: Option<&Arg>, value: &OsStr) -> Result<MethodName, clap::Error> {
-        if let Some(reason) = value.to_str().and_then(replaced) {
-            return Err(clap::Error::raw(ErrorKind::InvalidValue, reason).with_cmd(cmd));
+        let error = |reason: String| clap::Error::raw(ErrorKind::InvalidValue, reason).with_cmd(cmd);
+        let asked = value.to_str().unwrap_or_default();
+        if let Some(reason) = replaced(asked) {
+            return Err(error(reason));
         }
-        EnumValueParser::new().parse_ref(cmd, arg, value)
+        if asked == MethodName::Reference.name() && !self.0.contains(&MethodName::Reference) {
+            return Err(error(TRACED.into()));
+        }
+        let names = PossibleValuesParser::new(self.possible_values().into_iter().flatten());
+        let name = names.parse_ref(cmd, arg, value)?;
+        MethodName::from_name(&name).ok_or_else(|| error(format!("`{name}` is no method")))
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
-        Some(Box::new(MethodName::value_variants().iter().filter_map(ValueEnum::to_possible_value)))
+        Some(Box::new(self.0.iter().filter_map(ValueEnum::to_possible_value)))
     }
 }
 

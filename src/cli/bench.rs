@@ -17,7 +17,6 @@ use crate::{
         count,
         layers::Layers,
         projection::{self, Cost, EFFICIENCY, GTX_1050},
-        ratios::{self, Ratios},
     },
 };
 use anyhow::{Context, Result};
@@ -29,7 +28,7 @@ pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
     /// Real-time method to measure, or `all` of them; what `fit` found for the scene when absent,
-    /// else all. (`render --method reference` tells its own samples per second.)
+    /// else all. (`bouncelight trace` tells its own samples per second.)
     #[arg(long, value_parser = parse_methods)]
     method: Option<Methods>,
     #[command(flatten)]
@@ -53,20 +52,11 @@ pub struct Args {
     /// Write the record to this file.
     #[arg(long, value_name = "F")]
     json: Option<PathBuf>,
-    /// Take turns: every method so many times, which makes ratios of times that hold on a busy
-    /// machine.
-    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
-    rounds: u32,
-    /// Write the ratios of method to method and pass to pass to this file, a base for --compare on
-    /// other machines.
-    #[arg(long, value_name = "F")]
-    ratios: Option<PathBuf>,
-    /// A record written earlier, on this device, to compare with; or ratios, on a device of that
-    /// kind. Takes --fail-over, too.
+    /// A record written earlier, on this device, to compare with. Takes --fail-over, too.
     #[arg(long, value_name = "BASE", requires = "fail_over")]
     compare: Option<PathBuf>,
     /// With --compare: how much slower than the base is still allowed, such as 5%; above it the
-    /// exit code is 6. (Ratios state what they vary by, and are allowed that at least.)
+    /// exit code is 6.
     #[arg(long, value_parser = parse_percent, value_name = "P%")]
     fail_over: Option<f64>,
 }
@@ -77,9 +67,7 @@ struct Methods(Vec<MethodName>);
 fn parse_methods(text: &str) -> Result<Methods, String> {
     match text {
         "all" => Ok(Methods(MethodName::REAL_TIME.to_vec())),
-        "reference" => {
-            Err("bench measures frames of real-time methods; `render --method reference` tells its speed".into())
-        }
+        "reference" => Err("bench measures frames of real-time methods; `bouncelight trace` tells its speed".into()),
         one if replaced(one).is_some() => Err(replaced(one).unwrap_or_default()),
         one => <MethodName as clap::ValueEnum>::from_str(one, false).map(|m| Methods(vec![m])),
     }
@@ -88,14 +76,6 @@ fn parse_methods(text: &str) -> Result<Methods, String> {
 fn parse_percent(text: &str) -> Result<f64, String> {
     let number = text.trim_end_matches('%').parse::<f64>().map_err(|e| format!("{text}: {e}"))?;
     if number.is_finite() && number >= 0.0 { Ok(number / 100.0) } else { Err(format!("{text} is not a percentage")) }
-}
-
-/// What `--compare` reads.
-#[derive(Debug, Deserialize)]
-#[serde(untagged)]
-enum Base {
-    Ratios(Ratios),
-    Times(Box<Record>),
 }
 
 /// What `--json` writes and `--compare` reads.
@@ -129,7 +109,7 @@ impl Args {
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
     let base = args.compare.as_ref().map(read_base).transpose()?;
-    for path in args.json.iter().chain(&args.ratios) {
+    if let Some(path) = &args.json {
         crate::image_io::check_writable(path)?;
     }
     let scene = args.scene.load(global)?;
@@ -170,23 +150,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let with = |method: &Method| RendererOptions { method: method.clone(), ..Default::default() };
     let make = |method| Renderer::new(&gpu.device, &gpu.queue, args.scene.size, with(method));
     let mut renderers = methods.iter().map(make).collect::<Result<Vec<_>, _>>()?;
-    let mut rounds = Vec::new();
-    for _ in 0..args.rounds {
-        let turn = |renderer| measure(&gpu, renderer, &uploaded, &camera, options);
-        rounds.push(renderers.iter_mut().map(turn).collect::<Result<Vec<Measurement>, _>>()?);
-    }
-    let ratios = Ratios {
-        schema: 1,
-        command: format!("bouncelight {}", std::env::args().skip(1).collect::<Vec<_>>().join(" ")),
-        scene: args.scene.scene.clone(),
-        size: args.scene.size,
-        adapter: gpu.info.name.clone(),
-        software: gpu.is_software(),
-        rounds: args.rounds,
-        frames: args.frames,
-        ratios: ratios::of(&rounds),
-    };
-    let mut measured = rounds.pop().unwrap_or_default();
+    let turn = |renderer| measure(&gpu, renderer, &uploaded, &camera, options);
+    let mut measured = renderers.iter_mut().map(turn).collect::<Result<Vec<Measurement>, _>>()?;
     if args.count {
         for (method, measured) in methods.iter().zip(&mut measured) {
             let still = count::Still { scene: &scene, camera: &camera, size: args.scene.size };
@@ -222,36 +187,10 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     if let Some(path) = &args.json {
         crate::image_io::write_whole(path, format!("{}\n", serde_json::to_string_pretty(&record)?).as_bytes())?;
     }
-    if args.rounds > 1 {
-        say!("\nratios, of the fastest of {} rounds:", args.rounds);
-        ratios
-            .ratios
-            .iter()
-            .for_each(|r| say!("  {:<44}{:>9.3}  may grow by {:.0} %", r.of, r.value, 100.0 * r.allowed));
-    }
-    if let Some(path) = &args.ratios {
-        crate::image_io::write_whole(path, format!("{}\n", serde_json::to_string_pretty(&ratios)?).as_bytes())?;
-    }
     match (base, args.fail_over) {
-        (Some(Base::Times(base)), Some(allowed)) => compare(&base, &record, allowed),
-        (Some(Base::Ratios(base)), Some(allowed)) => compare_ratios(&base, &ratios, allowed),
+        (Some(base), Some(allowed)) => compare(&base, &record, allowed),
         _ => Ok(()),
     }
-}
-
-fn compare_ratios(base: &Ratios, now: &Ratios, allowed: f64) -> Result<()> {
-    if (&base.scene, base.size) != (&now.scene, now.size) {
-        let [w, h] = base.size;
-        return Err(usage(format!("the base's ratios are of {} at {w}x{h}: measure the same", base.scene)));
-    }
-    if base.software != now.software || (!base.software && base.adapter != now.adapter) {
-        return Err(usage(format!("the base's ratios are of {}; they say nothing of {}", base.adapter, now.adapter)));
-    }
-    let (slower, faster) = ratios::compare(&base.ratios, &now.ratios, allowed);
-    for words in &faster {
-        eprintln!("note: {words}: faster than the base by more than it varies; make the base anew to keep that");
-    }
-    if slower.is_empty() { Ok(()) } else { Err(CliError::TooSlow(slower.join("; ")).into()) }
 }
 
 fn print(record: &Record, gpu: &Gpu, layers: bool) {
@@ -333,16 +272,12 @@ fn rows(m: &Measurement, layers: bool) -> Vec<(String, f64, f64)> {
     rows
 }
 
-fn read_base(path: &PathBuf) -> Result<Base> {
+fn read_base(path: &PathBuf) -> Result<Record> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let base: Base = serde_json::from_str(&text)
-        .with_context(|| format!("{} is no record of `bench --json` or `--ratios`", path.display()))?;
-    let schema = match &base {
-        Base::Ratios(ratios) => ratios.schema,
-        Base::Times(record) => record.schema,
-    };
-    if schema != 1 {
-        return Err(usage(format!("{}: schema {schema} is not known", path.display())));
+    let base: Record =
+        serde_json::from_str(&text).with_context(|| format!("{} is no record of `bench --json`", path.display()))?;
+    if base.schema != 1 {
+        return Err(usage(format!("{}: schema {} is not known", path.display(), base.schema)));
     }
     Ok(base)
 }

@@ -1,4 +1,4 @@
-//! `bouncelight chart`: speed against accuracy, as a chart, a table, a page and records.
+//! `bouncelight chart`: speed against accuracy, as a table, a page and records.
 
 use super::{
     args::{Global, MethodName, parse_size, usage},
@@ -17,10 +17,9 @@ use crate::{
             ChartError, Metric, Provenance, Record,
             entries::{Entry, path_counts},
             plan::Plan,
-            plot, report,
+            report,
             run::{self, Hooks},
             scenes::{self, sources},
-            sweep::Axis,
         },
     },
 };
@@ -51,8 +50,8 @@ pub struct Args {
     /// records.
     #[arg(long, value_enum, default_value = "light")]
     metric: MetricName,
-    /// Folder for chart.svg, chart.png, chart.csv, chart.json. What is in chart.json already is not
-    /// done again.
+    /// Folder for chart.csv and chart.json, of which `training/chart.py` draws a picture. What is in
+    /// chart.json already is not done again.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Where the page goes, such as docs/results.md; DIR/results.md when absent.
@@ -79,13 +78,6 @@ pub struct Args {
     /// Most paths a pixel on the curve of paths; 0 leaves it out.
     #[arg(long, default_value_t = 1024, value_name = "N")]
     paths: u32,
-    /// Costs as these grow: resolution, triangles, lights; all or none.
-    #[arg(long, value_delimiter = ',', default_value = "none", value_name = "AXIS,...", value_parser = parse_axis)]
-    sweeps: Vec<Axes>,
-    /// Seconds for the frames of a step of a sweep: fewer are timed where all would take longer,
-    /// and the sweep ends where two would.
-    #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
-    sweep_seconds: f64,
     /// Leave out what gloss throws on after a diffuse bounce, in our references, paths, `gather`
     /// and `neural` alike: for folders of references that were rendered so (Cycles without
     /// "Reflective Caustics").
@@ -108,20 +100,6 @@ enum MetricName {
     Light,
     Flip,
     L1,
-}
-
-#[derive(Debug, Clone)]
-struct Axes(Vec<Axis>);
-
-fn parse_axis(text: &str) -> Result<Axes, String> {
-    match text {
-        "all" => Ok(Axes(Axis::ALL.into())),
-        "none" => Ok(Axes(Vec::new())),
-        one => {
-            let found = Axis::ALL.into_iter().find(|a| a.name() == one);
-            found.map(|a| Axes(vec![a])).ok_or_else(|| "there are resolution, triangles, lights, all and none".into())
-        }
-    }
 }
 
 /// `None` for all.
@@ -177,8 +155,6 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         reference: (args.error, args.most_samples),
         kept: args.references.clone().unwrap_or_else(|| place("references")),
         generator: !args.no_generator,
-        sweeps: args.sweeps.iter().flat_map(|a| a.0.clone()).collect(),
-        sweep_seconds: args.sweep_seconds,
         no_caustics: args.no_caustics,
     };
     let provenance = provenance(args.keep.then_some(&before).and_then(|b| b.as_ref()));
@@ -324,11 +300,10 @@ fn write(args: &Args, record: &Record, metric: Metric) -> Result<()> {
     let place = |name: &str| args.out.join(name);
     image_io::write_whole(&place("chart.json"), json(record)?.as_bytes())?;
     image_io::write_whole(&place("chart.csv"), report::csv(record).as_bytes())?;
-    let drawn = plot::write(record, metric, &place("chart.svg"), &place("chart.png"));
     let page = args.page.clone().unwrap_or_else(|| place("results.md"));
     let picture = relative(&page, &place("chart.svg"));
     image_io::write_whole(&page, report::page(record, metric, &picture).as_bytes())?;
-    Ok(drawn?)
+    Ok(())
 }
 
 /// `file` as a page in the folder of `page` names it; as it is where they share no beginning.
@@ -346,10 +321,7 @@ fn print(args: &Args, record: &Record, metric: Metric) {
         let ms = g.wall_ms.map_or("not run".to_owned(), |s| format!("{:.1} ms here", s.median));
         say!("the paper's generator: {ms}, {:.1} GFLOP, projected {:.1} ms", g.gflop(), g.projected_ms());
     }
-    for sweep in &record.sweeps {
-        say!("{:<12}{:<24}{}", sweep.axis.name(), sweep.entry, report::slope(sweep));
-    }
-    say!("{}", args.out.join("chart.svg").display());
+    say!("{}; `python training/chart.py {}` draws it", args.out.join("chart.json").display(), args.out.display());
 }
 
 #[cfg(test)]
@@ -358,8 +330,6 @@ mod tests {
 
     #[test]
     fn words_are_understood() {
-        assert_eq!(parse_axis("all").unwrap().0.len(), 3);
-        assert!(parse_axis("none").unwrap().0.is_empty() && parse_axis("size").is_err());
         assert_eq!(parse_method("all"), Ok(None));
         assert_eq!(parse_method("gather"), Ok(Some(MethodName::Gather)));
         assert!(["reference", "rsm", "magic"].iter().all(|m| parse_method(m).is_err()));

@@ -13,8 +13,8 @@ use std::path::PathBuf;
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// `gather` or `neural`.
-    #[arg(long, value_parser = MethodParser, default_value = "gather", value_name = "METHOD")]
+    /// How indirect light is found.
+    #[arg(long, value_parser = MethodParser(&[MethodName::Gather, MethodName::Neural]), default_value = "gather", value_name = "METHOD")]
     method: MethodName,
     /// A network's weights; the shipped ones without.
     #[arg(long, value_name = "FILE")]
@@ -46,9 +46,6 @@ impl TargetName {
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
-    if !matches!(args.method, MethodName::Gather | MethodName::Neural) {
-        return Err(usage(format!("--method {}: `gather` and `neural` can be exported", args.method.name())));
-    }
     if args.weights.is_some() && args.method != MethodName::Neural {
         return Err(usage("--weights is for --method neural".into()));
     }

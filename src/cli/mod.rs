@@ -18,20 +18,22 @@ mod fitted;
 mod interrupt;
 mod layers;
 mod log;
+mod picture;
 mod progress;
-mod reference;
 mod render;
 mod scene_args;
 mod sequence;
 mod showing;
 mod stability;
 mod stdout;
+mod trace;
 mod tuned;
 #[cfg(feature = "viewer")]
 mod view;
 mod weights;
 
-use clap::{Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// A deferred rasteriser whose G-buffers feed a small in-GPU U-Net that adds global illumination.
@@ -52,6 +54,8 @@ enum Command {
     View(view::Args),
     /// Draw a scene into a PNG or multi-layer EXR.
     Render(render::Args),
+    /// Draw a scene by paths, until the light is right: what everything else is measured against.
+    Trace(trace::Args),
     /// Measure GPU time per pass, wall-clock time per frame and memory.
     Bench(bench::Args),
     /// Chart speed against accuracy: every method over a set of scenes, measured and judged.
@@ -91,7 +95,9 @@ impl Command {
             Command::Stability(a) => a.runs_network(),
             Command::Chart(a) => a.runs_network(),
             Command::Weights(a) => a.runs_network(),
-            Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) | Command::Export(_) => false,
+            Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) | Command::Export(_) | Command::Trace(_) => {
+                false
+            }
         }
     }
 }
@@ -104,6 +110,9 @@ pub fn main() -> ExitCode {
             // Help and version are results; everything else is a usage error, which clap also exits
             // with 2 for.
             let _ = e.print();
+            if let Some(flag) = only_of_trace(&e) {
+                eprintln!("{flag} is a flag of `bouncelight trace`");
+            }
             return ExitCode::from(if e.use_stderr() { error::USAGE } else { 0 });
         }
     };
@@ -118,6 +127,7 @@ pub fn main() -> ExitCode {
         #[cfg(feature = "viewer")]
         Command::View(a) => view::run(&cli.global, a),
         Command::Render(a) => render::run(&cli.global, a),
+        Command::Trace(a) => trace::run(&cli.global, a),
         Command::Bench(a) => bench::run(&cli.global, a),
         Command::Chart(a) => chart::run(&cli.global, a),
         Command::Compare(a) => compare::run(a),
@@ -137,6 +147,17 @@ pub fn main() -> ExitCode {
             ExitCode::from(error::exit_code(&e))
         }
     }
+}
+
+/// The flag that a command does not know, where it is one of paths and of no frame.
+fn only_of_trace(e: &clap::Error) -> Option<&str> {
+    let Some(ContextValue::String(flag)) = e.get(ContextKind::InvalidArg) else { return None };
+    let cli = Cli::command();
+    let knows = |name: &str| {
+        let command = cli.find_subcommand(name)?;
+        command.get_arguments().find(|a| a.get_long() == flag.strip_prefix("--"))
+    };
+    (e.kind() == ErrorKind::UnknownArgument && knows("trace").is_some() && knows("render").is_none()).then_some(flag)
 }
 
 fn init_logging(global: &args::Global) {

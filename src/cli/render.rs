@@ -3,12 +3,11 @@
 
 use super::{
     args::{Global, MethodName, MethodParser, usage},
-    compare::{Heat, Shown},
-    drawn::{Drawn, Format, parse_layers},
+    drawn::{Drawn, parse_layers},
     error::CliError,
     interrupt,
+    picture::PictureArgs,
     progress::Progress,
-    reference,
     scene_args::SceneArgs,
     sequence,
     showing::Showing,
@@ -16,11 +15,10 @@ use super::{
 use crate::{
     gi::{Method, gather, pass::Neural},
     gpu::Gpu,
-    image_io, metrics,
+    image_io,
     render::{
-        Backdrop, Blending, Exposure, Renderer, RendererOptions,
+        Backdrop, Blending, Renderer, RendererOptions,
         capture::{CaptureOptions, Layer, Picture, capture_with},
-        tonemap_curve::Tonemap,
     },
     scene::{
         Camera, Scene,
@@ -38,12 +36,11 @@ const PICTURE_SAMPLES: u32 = 8;
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Where the picture goes: .png, .exr, or `-` for a PNG on standard output.
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
-    /// How indirect light is found; `reference` traces paths until the light is right. When absent:
-    /// what `fit` found for the scene, else `gather`, `neural` with --weights.
-    #[arg(long, value_parser = MethodParser)]
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// How indirect light is found. When absent: what `fit` found for the scene, else `gather`,
+    /// `neural` with --weights.
+    #[arg(long, value_parser = MethodParser(&MethodName::REAL_TIME))]
     method: Option<MethodName>,
     /// Weights of `neural`; the shipped ones (`filter`) when absent.
     #[arg(long)]
@@ -71,9 +68,6 @@ pub struct Args {
     /// of its surfaces' light.
     #[arg(long, value_name = "sky=X,bounce=Y")]
     unseen: Option<crate::gi::ambient::Unseen>,
-    /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
-    #[arg(long, value_name = "LAYERS")]
-    aov: Option<String>,
     /// Surfaces that blend with what is behind: `sorted` are drawn over the picture without grain,
     /// `stochastic` by lot, as paths meet them, for layers and many samples. When absent:
     /// `stochastic` with --aov, else `sorted`.
@@ -83,35 +77,11 @@ pub struct Args {
     /// or `hidden`.
     #[arg(long, default_value = "shown", value_name = "HOW")]
     backdrop: Backdrop,
-    /// Stops by which a PNG is brighter, or `auto`: as many as make the mean of what is seen middle
-    /// grey. When absent: `auto` for a file without any light, 0 for others and with --reference.
-    #[arg(long, allow_hyphen_values = true, value_name = "EV|auto")]
-    exposure: Option<Exposure>,
-    /// View transform of a PNG.
-    #[arg(long, default_value = "filmic")]
-    tonemap: Tonemap,
-    /// Seed of jitter and soft-shadow patterns, or of the paths.
+    /// Seed of jitter and soft-shadow patterns.
     #[arg(long, default_value_t = 0)]
     seed: u32,
-    /// A picture to compare with: EXR (both go through the view transform and --exposure) or PNG.
-    #[arg(long, value_name = "FILE")]
-    reference: Option<PathBuf>,
-    /// Metric of the comparison.
-    #[arg(long, default_value = "mae", requires = "reference", value_parser = metrics::NAMES.map(|(n, _)| n))]
-    metric: String,
-    /// On the wrong side of it (above; below for psnr and the ssims; bias by its size) the exit
-    /// code is 5.
-    #[arg(long, requires = "reference", value_name = "T")]
-    threshold: Option<f64>,
-    /// Picture of where they differ: FLIP's map for flip and hdrflip, else the mean difference up
-    /// to a quarter.
-    #[arg(long, requires = "reference", value_name = "PNG")]
-    diff: Option<PathBuf>,
     #[command(flatten)]
     sequence: sequence::SequenceFlags,
-    // Last, since its heading would go on to what follows.
-    #[command(flatten)]
-    tracing: reference::Flags,
 }
 
 impl Args {
@@ -122,18 +92,14 @@ impl Args {
 
     /// Frames that are averaged.
     fn samples(&self) -> u32 {
-        let raw = self.aov.is_some() || self.taa.is_some() || self.gi_frames == Some(1) || self.sequence.is_given();
+        let raw =
+            self.picture.aov.is_some() || self.taa.is_some() || self.gi_frames == Some(1) || self.sequence.is_given();
         self.samples.unwrap_or(if raw { 1 } else { PICTURE_SAMPLES })
-    }
-
-    /// Stops of a picture that is compared.
-    fn stops(&self) -> f32 {
-        if let Some(Exposure::Stops(stops)) = self.exposure { stops } else { 0.0 }
     }
 
     /// How what blends is drawn.
     fn blending(&self) -> Blending {
-        self.blending.unwrap_or(if self.aov.is_some() { Blending::Stochastic } else { Blending::Sorted })
+        self.blending.unwrap_or(if self.picture.aov.is_some() { Blending::Stochastic } else { Blending::Sorted })
     }
 
     /// It may run a network on a device: what was fitted is not known yet.
@@ -175,61 +141,36 @@ fn gathering(method: Method, options: Option<gather::Options>) -> Method {
 
 pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let loaded = args.obey(global)?;
-    let format = check(&args)?;
-    let task = match args.method() {
-        MethodName::Reference => Task::Trace(args.tracing.task(args.scene.size, args.seed, args.aov.as_deref())?),
-        name => {
-            let layers = args.aov.as_deref().map(|text| parse_layers(text, &Layer::ALL, Layer::name)).transpose()?;
-            let method = match name {
-                MethodName::Gather => Method::Gather(args.gather.unwrap_or_default()),
-                MethodName::Ambient => args.unseen.map_or(Method::Ambient, Method::AmbientWith),
-                MethodName::Ssgi => args.unseen.map_or(Method::Ssgi, Method::SsgiWith),
-                _ => gathering(name.method(global, args.weights.as_ref())?, args.gather),
-            };
-            Task::Rasterise(method, layers.unwrap_or_default())
-        }
+    check(&args)?;
+    let format = args.picture.check()?;
+    let layers = args.picture.aov.as_deref().map(|text| parse_layers(text, &Layer::ALL, Layer::name)).transpose()?;
+    let method = match args.method() {
+        MethodName::Gather => Method::Gather(args.gather.unwrap_or_default()),
+        MethodName::Ambient => args.unseen.map_or(Method::Ambient, Method::AmbientWith),
+        MethodName::Ssgi => args.unseen.map_or(Method::Ssgi, Method::SsgiWith),
+        name => gathering(name.method(global, args.weights.as_ref())?, args.gather),
     };
-    if let Task::Trace(task) = &task {
-        // From here on the size is that of the picture that is written.
-        args.scene.size = task.size();
-    }
-    let ev = args.stops();
-    let judged = |path| Shown::reference(path, args.tonemap, ev, args.scene.size, &args.metric);
-    let reference = args.reference.as_deref().map(judged).transpose()?;
-    let sequence = args.sequence.sequence(&args.output, args.scene.animation.is_some())?;
+    let reference = args.picture.reference(args.scene.size)?;
+    let sequence = args.sequence.sequence(&args.picture.output, args.scene.animation.is_some())?;
     let scene = loaded.map_or_else(|| args.scene.load(global), Ok)?;
-    let showing = Showing::new(args.exposure, args.reference.is_some(), format, &scene, global.quiet);
+    let showing = args.picture.showing(format, &scene, global.quiet);
     let camera = match sequence.as_ref().and_then(|s| s.frames().next()) {
         Some((_, _, Some(camera))) => camera,
         _ => args.scene.camera(&scene)?,
     };
     interrupt::install()?;
     let gpu = global.open_gpu()?;
-    let drawn = match task {
-        Task::Trace(task) => task.run(global, &gpu, &scene, &camera)?,
-        Task::Rasterise(method, layers) => {
-            let method = super::tuned::tuned(method, &gpu, global.quiet);
-            // Says from here on what the program does: without a shader cache nothing is drawn for
-            // half a minute.
-            let progress = Progress::compiling(global, if sequence.is_some() { "frames" } else { "samples" }, 1);
-            let mut raster = Raster::new(&args, (&gpu, global.textures()), &scene, method, layers)?;
-            if let Some(sequence) = sequence {
-                return film(progress, &args, showing, raster, (&sequence, scene));
-            }
-            raster.draw(progress, &args, &camera)?
-        }
-    };
-    showing.write(&gpu, &args.output, &drawn, None)?;
-    match reference {
-        Some(reference) => judge(&args, &drawn, &reference, ev),
-        None => Ok(()),
+    let method = super::tuned::tuned(method, &gpu, global.quiet);
+    // Says from here on what the program does: without a shader cache nothing is drawn for half a
+    // minute.
+    let progress = Progress::compiling(global, if sequence.is_some() { "frames" } else { "samples" }, 1);
+    let mut raster = Raster::new(&args, (&gpu, global.textures()), &scene, method, layers.unwrap_or_default())?;
+    if let Some(sequence) = sequence {
+        return film(progress, &args, showing, raster, (&sequence, scene));
     }
-}
-
-/// What is to be done, with everything that only flags decide.
-enum Task {
-    Rasterise(Method, Vec<Layer>),
-    Trace(reference::Task),
+    let drawn = raster.draw(progress, &args, &camera)?;
+    showing.write(&gpu, &args.picture.output, &drawn, None)?;
+    args.picture.judge(&drawn, reference.as_ref())
 }
 
 /// The rasteriser, ready to draw.
@@ -346,7 +287,7 @@ fn film(
         let camera = camera.map_or_else(|| args.scene.camera(&scene), Ok)?;
         let drawn = raster.picture(args, &camera, &mut || ())?;
         // The first frame's measure holds for all, so that a path does not flicker.
-        stops = Some(showing.write(raster.gpu, &sequence::name(&args.output, number), &drawn, stops)?);
+        stops = Some(showing.write(raster.gpu, &sequence::name(&args.picture.output, number), &drawn, stops)?);
         raster.drawn += 1;
         progress.step();
     }
@@ -354,40 +295,9 @@ fn film(
     Ok(())
 }
 
-/// Faults that can be found before anything is drawn.
-fn check(args: &Args) -> Result<Format> {
-    let path = &args.output;
-    let format = Format::of(path, args.tonemap)?;
-    if args.aov.is_some() && format != Format::Exr {
-        return Err(usage("--aov needs an .exr: a PNG holds one picture".into()));
-    }
-    if args.exposure == Some(Exposure::Auto) && args.reference.is_some() {
-        return Err(usage(
-            "--exposure auto measures this picture; with --reference both need a number of stops".into(),
-        ));
-    }
+/// Flags that do not belong to the method.
+fn check(args: &Args) -> Result<()> {
     let name = args.method().name();
-    if args.method() == MethodName::Reference {
-        if args.samples.is_some() {
-            return Err(usage("--samples averages frames of the rasteriser; --method reference takes --spp".into()));
-        }
-        if args.taa.is_some() {
-            return Err(usage("--taa averages frames of the rasteriser; --method reference takes --spp".into()));
-        }
-        if args.sequence.is_given() {
-            return Err(usage(
-                "--path and --frames draw with the rasteriser; trace single pictures with --eye or --time".into(),
-            ));
-        }
-        if args.backdrop != Backdrop::Shown {
-            return Err(usage("--backdrop is the rasteriser's; --method reference shows the surroundings".into()));
-        }
-        if args.weights.is_some() {
-            return Err(usage("--weights are a network's; --method reference traces paths and has none".into()));
-        }
-    } else if let Some(flag) = args.tracing.given() {
-        return Err(usage(format!("{flag} belongs to --method reference; `{name}` traces no paths")));
-    }
     let settles = [MethodName::Gather, MethodName::Neural].contains(&args.method());
     if args.gi_frames.is_some() && !settles {
         return Err(usage(format!(
@@ -400,34 +310,5 @@ fn check(args: &Args) -> Result<Format> {
     if args.unseen.is_some() && ![MethodName::Ambient, MethodName::Ssgi].contains(&args.method()) {
         return Err(usage(format!("--unseen belongs to methods ambient and ssgi, not to `{name}`")));
     }
-    image_io::check_writable(path)?;
-    if let Some(diff) = &args.diff {
-        image_io::check_writable(diff)?;
-    }
-    Ok(format)
-}
-
-/// Prints the metric and fails when it is on the wrong side of the threshold.
-fn judge(args: &Args, drawn: &Drawn, reference: &Shown, ev: f32) -> Result<()> {
-    let name = args.output.display().to_string();
-    let ours = Shown::linear(name, args.scene.size.map(|n| n as usize), drawn.rgb(), ev, args.tonemap);
-    let heat = Heat::of_metric(&args.metric);
-    let options =
-        metrics::Options { flip: heat == Heat::Flip, hdr_flip: heat == Heat::Hdrflip, ..metrics::Options::default() };
-    let (comparison, maps) = ours.against(reference, options)?;
-    let Some(value) = comparison.value(&args.metric) else {
-        return Err(usage(format!("{} needs a linear reference (EXR)", args.metric)));
-    };
-    if let (Some(path), Some(rgb)) = (&args.diff, ours.heat_map(reference, heat, &maps)?) {
-        let [width, height] = args.scene.size;
-        image_io::write_png(path, width, height, &rgb, &[])?;
-    }
-    // The picture itself may be on standard output.
-    eprintln!("{} {value:.6}", args.metric);
-    match args.threshold {
-        Some(threshold) if comparison.passes(&args.metric, threshold) == Some(false) => {
-            Err(CliError::AboveThreshold { metric: args.metric.clone(), value, threshold }.into())
-        }
-        _ => Ok(()),
-    }
+    Ok(())
 }

@@ -14,7 +14,7 @@ pub struct Args {
     #[arg(long, value_name = "W")]
     weights: Option<PathBuf>,
     /// How indirect light is found at first.
-    #[arg(long, value_parser = MethodParser)]
+    #[arg(long, value_parser = MethodParser(&MethodName::ALL))]
     method: Option<MethodName>,
     /// Load scene and weights again when their files change; in a checkout, shaders, too.
     #[arg(long)]

@@ -21,11 +21,3 @@ pub(crate) fn octahedral_word(v: [f32; 3]) -> u32 {
     let [x, y] = octahedral(v).map(|c| u32::from(c as u16));
     x | y << 16
 }
-
-/// The direction of a word of [`octahedral_word`], to within its 16 bits.
-pub(crate) fn from_octahedral_word(word: u32) -> [f32; 3] {
-    let [x, y] = [word as u16, (word >> 16) as u16].map(|c| f32::from(c as i16) / f32::from(i16::MAX));
-    let z = 1.0 - x.abs() - y.abs();
-    let (x, y) = if z < 0.0 { ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)) } else { (x, y) };
-    glam::Vec3::new(x, y, z).normalize().to_array()
-}

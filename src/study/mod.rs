@@ -3,7 +3,7 @@
 pub mod bench;
 #[cfg(all(feature = "io", feature = "reference"))]
 mod changes;
-#[cfg(feature = "chart")]
+#[cfg(all(feature = "io", feature = "reference"))]
 pub mod chart;
 #[cfg(feature = "reference")]
 pub mod count;
@@ -24,13 +24,11 @@ pub mod moments;
 #[cfg(feature = "io")]
 pub mod motion;
 pub mod projection;
-pub mod ratios;
 pub mod rays;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod stability;
 #[cfg(feature = "reference")]
 pub mod target;
-pub mod traffic;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod trial;
 #[cfg(all(feature = "io", feature = "reference"))]

@@ -14,21 +14,17 @@ use std::time::Instant;
 /// Rays of each kind along a side of the picture.
 const SIDE: usize = 384;
 
-/// The kinds of rays: from the eye; from what the eye sees towards a light, any hit; from there all
-/// around, nearest hit.
-pub const KINDS: [&str; 3] = ["primary", "shadow", "diffuse"];
-
 /// Numbers without any claim to quality: only places to aim at hang on them.
-pub(super) struct Random(pub(super) u64);
+struct Random(u64);
 
 impl Random {
-    pub(super) fn unit(&mut self) -> f32 {
+    fn unit(&mut self) -> f32 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f32 / 16_777_216.0
     }
 
     /// A direction.
-    pub(super) fn sphere(&mut self) -> Vec3 {
+    fn sphere(&mut self) -> Vec3 {
         let (z, phi) = (2.0 * self.unit() - 1.0, self.unit() * TAU);
         ((1.0 - z * z).sqrt() * Vec3::new(phi.cos(), phi.sin(), 0.0)).with_z(z)
     }
@@ -110,7 +106,8 @@ impl RayScene {
         Self { empty: true, ..Self::spheres(1000) }
     }
 
-    /// The three kinds of rays, pixel by pixel.
+    /// Primary rays; from what they meet shadow rays towards a light, any hit, and diffuse rays all
+    /// around, nearest hit: pixel by pixel.
     fn rays(&self, accel: &Accel) -> [Vec<RayGpu>; 3] {
         let view = &self.view;
         let ray = |o: Vec3, d: Vec3, t_max, any| RayGpu { origin: o.into(), direction: d.into(), t_max, any };

@@ -1,4 +1,5 @@
-//! "Copy as command": the `bouncelight render` line whose picture is the one on show, bit for bit.
+//! "Copy as command": the `bouncelight render` or `trace` line whose picture is the one on show, bit
+//! for bit.
 
 use super::choice::Source;
 use super::state::State;
@@ -18,7 +19,8 @@ pub fn line(state: &State, output: Option<&str>) -> String {
 pub fn words(state: &State, output: &str) -> Vec<String> {
     let Some(shown) = &state.shown else { return vec!["doctor".into()] };
     let s = &state.settings;
-    let mut words: Vec<String> = vec!["render".into(), shown.spec.clone(), "-o".into(), output.into()];
+    let command = if s.left == Source::Reference { "trace" } else { "render" };
+    let mut words: Vec<String> = vec![command.into(), shown.spec.clone(), "-o".into(), output.into()];
     let mut flag = |name: &str, value: String| {
         // As one word, since values may begin with a minus.
         words.push(format!("--{name}={value}"));
@@ -33,10 +35,12 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
             flag("fov", n.fov.to_string());
         }
     }
-    flag("method", s.left.name().into());
     match s.left {
         Source::Reference => flag("spp", s.spp.to_string()),
-        _ => flag("samples", s.samples.to_string()),
+        method => {
+            flag("method", method.name().into());
+            flag("samples", s.samples.to_string());
+        }
     }
     if let (Source::Neural, Some(weights)) = (s.left, &s.weights) {
         flag("weights", weights.display().to_string());
@@ -130,5 +134,9 @@ mod tests {
         assert!(line(&state, None).contains("--gather=entry_scale=0.25"));
         state.apply(Action::Undo);
         assert!(!line(&state, None).contains("--object"));
+        state.settings.left = Source::Reference;
+        let text = line(&state, None);
+        assert!(text.starts_with("bouncelight trace ") && text.contains("--spp="), "{text}");
+        assert!(!["--method", "--samples", "--gather"].iter().any(|flag| text.contains(flag)), "{text}");
     }
 }

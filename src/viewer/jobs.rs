@@ -252,7 +252,7 @@ pub fn renderer(handles: &Handles, plan: Plan, progress: &Progress) -> Result<Pr
     Ok(Product::Renderer { side: plan.side, key: plan.key, renderer })
 }
 
-/// What is captured: the arguments of `bouncelight render` that draw the same.
+/// What is captured: the arguments of `bouncelight render`, or `trace`, that draw the same.
 pub struct Shot {
     pub output: PathBuf,
     pub source: Source,

@@ -68,7 +68,7 @@ def cycles(scene, spp, folder):
 
 
 def ours(a, spp, folder):
-    command = [a.program, "-q", "render", a.scene, "-o", os.path.join(folder, "ours.exr"), "--method", "reference",
+    command = [a.program, "-q", "trace", a.scene, "-o", os.path.join(folder, "ours.exr"),
                "--spp", str(spp), "--size", f"{a.size[0]}x{a.size[1]}", "--environment", ",".join([str(a.world)] * 3),
                "--light-radius", str(a.light_radius), *a.limits.split(), *(["--aov", a.aov] if a.aov else [])]
     start = time.perf_counter()

@@ -2,19 +2,18 @@
 //! paths that would do the same.
 //!
 //! [`run`] fills a [`Record`], piece by piece, so that what was done is kept; [`summary`] makes
-//! means, spreads and the Pareto frontier of it; [`plot`] draws, [`report`] writes.
+//! means, spreads and the Pareto frontier of it; [`report`] writes, and `training/chart.py` draws
+//! what was written.
 
 pub mod entries;
 mod on_pictures;
 pub mod plan;
-pub mod plot;
 pub mod published;
 pub mod report;
 pub mod run;
 pub mod scenes;
 mod stage;
 pub mod summary;
-pub mod sweep;
 
 use super::{
     bench::{BenchError, Spread},
@@ -250,8 +249,6 @@ pub struct Record {
     pub units: Vec<Unit>,
     /// The paper's generator, run here.
     pub generator: Option<published::Generator>,
-    /// Costs against sizes.
-    pub sweeps: Vec<sweep::Sweep>,
 }
 
 /// Why a chart could not be made.
@@ -297,9 +294,6 @@ pub enum ChartError {
     /// The record cannot be turned into text.
     #[error("the record cannot be written: {0}")]
     Json(#[from] serde_json::Error),
-    /// The picture cannot be drawn.
-    #[error("the chart cannot be drawn: {0}")]
-    Plot(String),
     /// The driver refused a command.
     #[error("the GPU driver refused a command: {0}")]
     Driver(String),

@@ -1,6 +1,6 @@
 //! What is charted, and how much work that is.
 
-use super::{entries::Entry, scenes::Source, sweep::Axis};
+use super::{entries::Entry, scenes::Source};
 use crate::{
     reference::{TracerOptions, job},
     scene::LoadOptions,
@@ -29,10 +29,6 @@ pub struct Plan {
     pub kept: PathBuf,
     /// Run the paper's generator, too.
     pub generator: bool,
-    /// Costs against sizes, of every method.
-    pub sweeps: Vec<Axis>,
-    /// Seconds a step of a sweep.
-    pub sweep_seconds: f64,
     /// Light that gloss throws on after a diffuse bounce is left out of paths, ours and the
     /// references'. Methods have numbers of their own for that.
     pub no_caustics: bool,
@@ -63,12 +59,6 @@ impl Plan {
         let entries: f64 = self.entries.iter().map(|e| self.parts(e)).sum();
         let scenes: f64 = self.sources.iter().map(|s| self.reference_parts(s) + entries).sum();
         let frames = f64::from(self.bench.frames + self.bench.warmup);
-        scenes
-            + self.sweep_methods().count() as f64 * self.sweeps.len() as f64 * 6.0 * frames
-            + if self.generator { 4.0 * frames } else { 0.0 }
-    }
-
-    pub(super) fn sweep_methods(&self) -> impl Iterator<Item = &Entry> {
-        self.entries.iter().filter(|e| matches!(e, Entry::Method { .. }))
+        scenes + if self.generator { 4.0 * frames } else { 0.0 }
     }
 }

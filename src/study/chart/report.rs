@@ -5,7 +5,6 @@ use super::{
     published::{PRINTED_L1, PRINTED_MS},
     run::missing,
     summary::{Bars, Clock, Row, rows},
-    sweep::Sweep,
 };
 use crate::study::{
     bench::AGREEMENT,
@@ -140,7 +139,7 @@ pub fn page(record: &Record, metric: Metric, picture: &str) -> String {
         text.push('\n');
     };
     add(&mut text, "# Results\n");
-    add(&mut text, "Made by one command, not by hand; changes are lost:\n");
+    add(&mut text, "Made by one command, not by hand; changes are lost. `training/chart.py` draws the picture.\n");
     add(&mut text, &format!("    {}\n", p.command));
     add(
         &mut text,
@@ -164,10 +163,6 @@ pub fn page(record: &Record, metric: Metric, picture: &str) -> String {
     add(&mut text, &by_scene(record, metric));
     add(&mut text, "## References\n");
     add(&mut text, &references(record));
-    if !record.sweeps.is_empty() {
-        add(&mut text, "## What a frame costs as things grow\n");
-        add(&mut text, &sweeps(record));
-    }
     let missing = missing(record, metric);
     if !missing.is_empty() {
         add(&mut text, "## What is missing\n");
@@ -191,13 +186,15 @@ fn how(record: &Record, metric: Metric) -> String {
         Metric::Flip => "Error: FLIP of the finished picture through Filmic, in 8 bits.",
         Metric::L1 => "Error: the paper's L1 (each channel stretched on its own), scaled to the pixels of 1024×512.",
     };
+    // Records of older programs have no waiting in their counts.
+    let waits = record.units.iter().flat_map(|u| &u.costs).any(|c| c.waited > 0.0);
+    let waiting = if waits { ", with what threads wait for each other in the last of the settled frames" } else { "" };
     format!(
         "{what} Means over {} scenes, in brackets best and worst. Settled pictures are of the 32nd frame of a still \
          camera on, {} samples \
          a pixel; the first frame has one. Time: a whole frame, rasteriser included, median of {frames} frames after \
          {warmup}; {}. \
-         Counted (GFLOP, MB, rays) and projected, with what threads wait for each other: only the passes that find and \
-         add indirect light, in the last of the settled frames. \
+         Counted (GFLOP, MB, rays) and projected{waiting}: only the passes that find and add indirect light. \
          \"Against paths\": how many times as long our path tracer takes to come as near on this device.{}\n",
         record.sound_scenes(),
         record.samples,
@@ -338,44 +335,5 @@ fn references(record: &Record) -> String {
          Below their own noise no error can be measured.",
         100.0 * error
     );
-    text
-}
-
-/// Slopes as they are printed.
-pub fn slope(sweep: &Sweep) -> String {
-    let (what, _, unit) = sweep.axis.unit();
-    match sweep.slope() {
-        Some((slope, exponent)) => format!("{slope:.3} {unit}; grows with {what} to the power {exponent:.2}"),
-        None => "too few steps for a slope".into(),
-    }
-}
-
-fn sweeps(record: &Record) -> String {
-    let mut text = String::from(
-        "Milliseconds of a whole frame by the synchronised clock; in brackets the frames of the median where time \
-         allowed fewer than above. \
-         Resolution: paper room 2; triangles: an uneven floor under sun and sky; lights: point \
-         lamps in a closed room (shadow maps are shared by the first 8; the others shine without).\n\n",
-    );
-    for axis in super::sweep::Axis::ALL {
-        let of: Vec<&Sweep> = record.sweeps.iter().filter(|s| s.axis == axis).collect();
-        let Some(longest) = of.iter().max_by_key(|s| s.points.len()) else { continue };
-        let head = |p: &super::sweep::Point| match axis {
-            super::sweep::Axis::Resolution => format!("{}×{}", p.size[0], p.size[1]),
-            _ => p.x.to_string(),
-        };
-        let heads: Vec<String> = longest.points.iter().map(head).collect();
-        let _ =
-            writeln!(text, "| {} | {} | slope |\n|{}", axis.name(), heads.join(" | "), "---|".repeat(heads.len() + 2));
-        for sweep in &of {
-            let frames = |n: u32| if (1..record.frames[0]).contains(&n) { format!(" ({n})") } else { String::new() };
-            let cell = |p: &super::sweep::Point| format!("{:.1}{}", p.wall_ms.median, frames(p.frames));
-            let cell = |i: usize| sweep.points.get(i).map_or("—".into(), cell);
-            let cells: Vec<String> = (0..heads.len()).map(cell).collect();
-            let ended = sweep.ended.as_ref().map_or(String::new(), |why| format!(" (ends here: {why})"));
-            let _ = writeln!(text, "| {} | {} | {}{ended} |", sweep.entry, cells.join(" | "), slope(sweep));
-        }
-        text.push('\n');
-    }
     text
 }

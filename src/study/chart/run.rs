@@ -7,7 +7,6 @@ use super::{
     published,
     scenes::{self, Source},
     stage::Stage,
-    sweep::{self, Limits},
 };
 use crate::{
     gpu::Gpu,
@@ -72,7 +71,6 @@ pub fn run(
     if plan.generator {
         work.generator()?;
     }
-    work.sweeps()?;
     Ok(work.record)
 }
 
@@ -133,8 +131,6 @@ impl<'a> Work<'a> {
         let missing = |u: &&Unit| !self.record.units.iter().any(|n| n.key == u.key);
         kept.units.extend(self.before.units.iter().filter(missing).cloned());
         kept.generator = kept.generator.or_else(|| self.before.generator.clone());
-        let missing = |s: &&sweep::Sweep| !self.record.sweeps.iter().any(|n| n.key == s.key);
-        kept.sweeps.extend(self.before.sweeps.iter().filter(missing).cloned());
         (self.hooks.save)(&kept)
     }
 
@@ -296,32 +292,6 @@ impl<'a> Work<'a> {
         }
         self.record.generator = Some(found);
         self.end(4.0 * f64::from(bench.frames + bench.warmup))
-    }
-
-    fn sweeps(&mut self) -> Result<(), ChartError> {
-        let limits = Limits { bench: self.plan.bench, seconds: self.plan.sweep_seconds };
-        let parts = 6.0 * f64::from(limits.bench.frames + limits.bench.warmup);
-        for axis in &self.plan.sweeps {
-            for entry in self.plan.sweep_methods() {
-                let Entry::Method { name, method } = entry else { continue };
-                self.begin(&format!("sweep of {}: {name}", axis.name()))?;
-                let size = self.plan.size;
-                let key = self.key(&(entry.key(), axis, size, limits.seconds));
-                let known = self.before.sweeps.iter().find(|s| s.key == key).cloned();
-                let found = match known {
-                    Some(found) => Ok(found),
-                    None => self
-                        .guarded(|| sweep::sweep(self.gpu, (name, method), *axis, size, limits, key, self.hooks.go_on)),
-                };
-                match found {
-                    Err(ChartError::Stopped) => return Err(ChartError::Stopped),
-                    Err(e) => (self.hooks.warn)(&format!("sweep of {} by {name}: {e}", axis.name())),
-                    Ok(found) => self.record.sweeps.push(found),
-                }
-                self.end(parts)?;
-            }
-        }
-        Ok(())
     }
 }
 

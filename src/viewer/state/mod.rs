@@ -291,7 +291,7 @@ impl State {
             }
             A::CopyCommand => {
                 self.requests.push(Request::CopyCommand);
-                self.tell("copied: the `bouncelight render` line of this view", false);
+                self.tell("copied: the command line of this view", false);
             }
             A::Open(path) => self.open(&path),
             A::Weights(path) => self.requests.push(Request::Weights(path)),

@@ -1,4 +1,4 @@
-//! `render --method reference` as a user meets it: flags, metadata, exit codes, files that appear
+//! `bouncelight trace` as a user meets it: flags, metadata, exit codes, files that appear
 //! or do not.
 
 mod common;
@@ -9,12 +9,12 @@ use bouncelight::image_io::{Layers, read_exr};
 use program::{bouncelight, fails};
 use std::path::Path;
 
-/// Renders the Cornell box with `flags` into `name`; gives the file and what was said.
+/// Traces the Cornell box with `flags` into `name`; gives the file and what was said.
 #[track_caller]
-fn render(dir: &Path, name: &str, flags: &[&str]) -> (Layers, String) {
+fn trace(dir: &Path, name: &str, flags: &[&str]) -> (Layers, String) {
     let path = dir.join(name);
     let out = path.to_str().expect("a temporary path is text");
-    let args = [&["render", "cornell", "--method", "reference", "-o", out], flags].concat();
+    let args = [&["trace", "cornell", "-o", out], flags].concat();
     let done = bouncelight(&args);
     let text = String::from_utf8_lossy(&done.stderr).into_owned();
     assert_eq!(done.status.code(), Some(0), "{args:?}: {text}");
@@ -32,7 +32,7 @@ fn flags_that_make_no_sense_exit_with_2() {
     let path = dir.path().join("x.exr");
     let out = path.to_str().unwrap();
     let traced = |flags: &[&str], words: &[&str]| {
-        fails(&[&["render", "cornell", "--method", "reference", "-o", out], flags].concat(), 2, words);
+        fails(&[&["trace", "cornell", "-o", out], flags].concat(), 2, words);
     };
     traced(&["--spp", "0"], &["--spp"]);
     for bound in ["0", "-1", "nan", "inf"] {
@@ -40,18 +40,25 @@ fn flags_that_make_no_sense_exit_with_2() {
     }
     traced(&["--clamp", "nan"], &["--clamp", "or above"]);
     traced(&["--cells", "0"], &["--cells"]);
-    traced(&["--samples", "4"], &["--samples", "--spp"]);
     traced(&["--cells", "4", "--denoise"], &["--cells", "--denoise"]);
-    traced(&["--weights", "w.safetensors"], &["--weights", "network"]);
     traced(&["--aov", "Motion"], &["Motion", "Gi, Analytic"]);
     traced(&["--aov", "Depth,Depth"], &["twice"]);
-    for (flag, value) in
-        [("--spp", "4"), ("--until-error", "0.1"), ("--clamp", "1"), ("--bounces", "3"), ("--cells", "4")]
-    {
-        fails(&["render", "cornell", "--method", "direct", "-o", out, flag, value], 2, &[flag, "--method reference"]);
+    // What belongs to frames is no flag of paths, and the other way round.
+    for flag in ["--method", "--samples", "--taa", "--frames", "--backdrop", "--weights", "--gather", "--gi-frames"] {
+        traced(&[flag, "1"], &[flag]);
     }
+    for flag in ["--spp", "--until-error", "--clamp", "--bounces", "--cells"] {
+        fails(&["render", "cornell", "-o", out, flag, "4"], 2, &[flag, "bouncelight trace"]);
+    }
+    for (command, output) in [("render", "-o"), ("export", "--output")] {
+        let more: &[&str] = if command == "export" { &["--target", "wgsl"] } else { &["--spp", "4"] };
+        let args = [&[command, "cornell", output, out, "--method", "reference"], more].concat();
+        fails(&args, 2, &["bouncelight trace"]);
+    }
+    fails(&["render", "cornell", "-o", out, "--spp", "4", "--method", "reference"], 2, &["bouncelight trace"]);
+    fails(&["render", "cornell", "-o", out, "--method", "magic"], 2, &["magic", "direct", "gather"]);
     fails(&["render", "cornell", "--method", "direct", "-o", out, "--aov", "Gi"], 2, &["Gi", "Motion"]);
-    fails(&["bench", "cornell", "--method", "reference"], 2, &["real-time"]);
+    fails(&["bench", "cornell", "--method", "reference"], 2, &["real-time", "bouncelight trace"]);
     assert!(std::fs::read_dir(dir.path()).unwrap().next().is_none(), "a usage error leaves nothing behind");
 }
 
@@ -63,7 +70,7 @@ fn pictures_tell_their_noise_and_how_they_were_made() {
     let dir = tempfile::tempdir().unwrap();
     let flags = ["--size", "20x12", "--spp", "5", "--aov", "all", "--seed", "3"];
     let limits = ["--bounces", "12", "--diffuse-bounces", "4", "--glossy-bounces", "4", "--clamp", "10"];
-    let (a, said) = render(dir.path(), "a.exr", &[&flags[..], &limits].concat());
+    let (a, said) = trace(dir.path(), "a.exr", &[&flags[..], &limits].concat());
     assert_eq!((a.width, a.height), (20, 12));
     for layer in
         "DiffDir DiffInd DiffCol GlossDir GlossInd GlossCol Emit Env Gi Analytic Normal Depth Position".split(' ')
@@ -88,9 +95,9 @@ fn pictures_tell_their_noise_and_how_they_were_made() {
     }
     assert!(key(&a, "ReferenceSamplesPerSecond").parse::<f64>().unwrap() > 0.0);
     // The same seed gives the same picture, another seed another one.
-    let (again, _) = render(dir.path(), "again.exr", &[&flags[..], &limits].concat());
+    let (again, _) = trace(dir.path(), "again.exr", &[&flags[..], &limits].concat());
     assert_eq!(again.layers, a.layers);
-    let (other, _) = render(dir.path(), "other.exr", &["--size", "20x12", "--spp", "5", "--aov", "all", "--quiet"]);
+    let (other, _) = trace(dir.path(), "other.exr", &["--size", "20x12", "--spp", "5", "--aov", "all", "--quiet"]);
     assert_ne!(other.layer("").unwrap(), a.layer("").unwrap());
     assert_eq!(key(&other, "ReferenceBounces"), "unlimited unlimited unlimited");
 }
@@ -104,7 +111,7 @@ fn a_preview_is_nearer_to_the_truth_and_says_what_it_is() {
     }
     let dir = tempfile::tempdir().unwrap();
     let of = |name: &str, spp: &str, more: &[&str]| {
-        render(dir.path(), name, &[&["--size", "64x64", "--spp", spp, "--aov", "Gi,Normal"], more].concat())
+        trace(dir.path(), name, &[&["--size", "64x64", "--spp", spp, "--aov", "Gi,Normal"], more].concat())
     };
     let (truth, _) = of("truth.exr", "1024", &["--seed", "7"]);
     let (noisy, said) = of("noisy.exr", "16", &[]);
@@ -137,14 +144,14 @@ fn cells_and_error_bounds() {
     }
     let dir = tempfile::tempdir().unwrap();
     let (cells, _) =
-        render(dir.path(), "cells.exr", &["--size", "65x33", "--cells", "4", "--until-error", "0.5", "--aov", "Gi"]);
+        trace(dir.path(), "cells.exr", &["--size", "65x33", "--cells", "4", "--until-error", "0.5", "--aov", "Gi"]);
     assert_eq!((cells.width, cells.height, key(&cells, "ReferenceCells").as_str()), (17, 9, "4"));
     assert!(key(&cells, "ReferenceNoiseGi").parse::<f64>().unwrap() <= 0.5);
     assert!(key(&cells, "ReferenceSamples").parse::<u32>().unwrap() >= 16);
     // A picture of cells can be judged, and the exit code tells.
     let (own, out) = (dir.path().join("cells.exr"), dir.path().join("one.png"));
     let (own, out) = (own.to_str().unwrap(), out.to_str().unwrap());
-    let start = ["render", "cornell", "--method", "reference", "--size", "65x33", "--cells", "4", "--spp", "1"];
+    let start = ["trace", "cornell", "--size", "65x33", "--cells", "4", "--spp", "1"];
     let judged = |threshold| [&start[..], &["-o", out, "--reference", own, "--threshold", threshold]].concat();
     assert_eq!(bouncelight(&judged("0.9")).status.code(), Some(0));
     fails(&judged("0.000001"), 5, &["mae"]);
@@ -164,7 +171,7 @@ fn odd_scenes_and_sizes() {
     let out = dir.path().join("out.exr");
     let out = out.to_str().unwrap();
     let ok = |scene: &str, flags: &[&str]| {
-        let args = [&["render", scene, "--method", "reference", "--spp", "2", "-o", out], flags].concat();
+        let args = [&["trace", scene, "--spp", "2", "-o", out], flags].concat();
         let done = bouncelight(&args);
         assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
         read_exr(Path::new(out)).unwrap().check_finite("").unwrap();
@@ -184,11 +191,7 @@ fn odd_scenes_and_sizes() {
     );
     let broken = file("broken.gltf", &text);
     let gone = dir.path().join("gone.exr");
-    fails(
-        &["render", &broken, "--method", "reference", "-o", gone.to_str().unwrap()],
-        4,
-        &["broken.gltf", "not a finite"],
-    );
+    fails(&["trace", &broken, "-o", gone.to_str().unwrap()], 4, &["broken.gltf", "not a finite"]);
     assert!(!gone.exists());
 }
 
@@ -228,7 +231,7 @@ fn more_than_the_device_holds_exits_with_4_before_memory_is_taken() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("copies.gltf");
     let out = dir.path().join("x.png").display().to_string();
-    let args = ["render", path.to_str().unwrap(), "--method", "reference", "--spp", "1", "--size", "8x8", "-o", &out];
+    let args = ["trace", path.to_str().unwrap(), "--spp", "1", "--size", "8x8", "-o", &out];
     // A hundred million triangles are too many for any device's bindings or for the tree.
     write_copies(&path, 10_000, 10_000);
     fails(&args, 4, &["copies", "100000000"]);
@@ -245,7 +248,7 @@ fn an_interrupted_run_exits_with_130_and_leaves_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("long.exr");
     let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_bouncelight"))
-        .args(["render", "cornell", "--method", "reference", "--size", "64x64", "--spp", "1000000"])
+        .args(["trace", "cornell", "--size", "64x64", "--spp", "1000000"])
         .args(["--progress", "plain", "-o", out.to_str().unwrap()])
         .stderr(std::process::Stdio::piped())
         .spawn()

@@ -1,12 +1,14 @@
-//! `--method reference` of `bouncelight render`: flags, the tracing itself with progress, and what
-//! is told of the noise.
+//! `bouncelight trace`: one picture of a scene by paths, as PNG or EXR: flags, the tracing itself
+//! with progress, and what is told of the noise.
 
 use super::{
     args::{Global, usage},
     drawn::{Drawn, parse_layers},
     error::CliError,
     interrupt,
+    picture::PictureArgs,
     progress::Progress,
+    scene_args::SceneArgs,
 };
 use crate::{
     gpu::Gpu,
@@ -24,8 +26,14 @@ use anyhow::Result;
 const DEFAULT_SPP: u32 = 64;
 
 #[derive(Debug, clap::Args)]
-#[command(next_help_heading = "With --method reference")]
-pub struct Flags {
+pub struct Args {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// Seed of the paths.
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
     /// Samples a pixel, 64 when absent; with --until-error the most there may be, 65536 when
     /// absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -80,31 +88,34 @@ fn parse_limit(text: &str) -> Result<f32, String> {
     if clamp.is_finite() && clamp >= 0.0 { Ok(clamp) } else { Err("it must be 0 (none) or above".into()) }
 }
 
-impl Flags {
-    /// The first of these flags that was given.
-    pub fn given(&self) -> Option<&'static str> {
-        [
-            ("--spp", self.spp.is_some()),
-            ("--until-error", self.until_error.is_some()),
-            ("--clamp", self.clamp.is_some()),
-            ("--bounces", self.bounces.is_some()),
-            ("--diffuse-bounces", self.diffuse_bounces.is_some()),
-            ("--glossy-bounces", self.glossy_bounces.is_some()),
-            ("--filter-glossy", self.filter_glossy.is_some()),
-            ("--no-caustics", self.no_caustics),
-            ("--cells", self.cells.is_some()),
-            ("--denoise", self.denoise),
-        ]
-        .into_iter()
-        .find_map(|(name, given)| given.then_some(name))
-    }
+pub fn run(global: &Global, args: Args) -> Result<()> {
+    let format = args.picture.check()?;
+    let task = args.task()?;
+    let reference = args.picture.reference(task.size())?;
+    let scene = args.scene.load(global)?;
+    let showing = args.picture.showing(format, &scene, global.quiet);
+    let camera = args.scene.camera(&scene)?;
+    interrupt::install()?;
+    let gpu = global.open_gpu()?;
+    let drawn = task.run(global, &gpu, &scene, &camera)?;
+    showing.write(&gpu, &args.picture.output, &drawn, None)?;
+    args.picture.judge(&drawn, reference.as_ref())
+}
 
-    /// What the flags ask for on a frame of `size` pixels with the layers `aov`.
-    pub fn task(&self, size: [u32; 2], seed: u32, aov: Option<&str>) -> Result<Task> {
+impl Args {
+    /// What the flags ask for.
+    fn task(&self) -> Result<Task> {
         // Combined is the picture itself, which every file has.
         let known = &Layer::ALL[1..];
         let mut layers = vec![Layer::Combined];
-        layers.extend(aov.map(|text| parse_layers(text, known, Layer::name)).transpose()?.unwrap_or_default());
+        layers.extend(
+            self.picture
+                .aov
+                .as_deref()
+                .map(|text| parse_layers(text, known, Layer::name))
+                .transpose()?
+                .unwrap_or_default(),
+        );
         let asked = layers.len();
         if self.denoise {
             layers.extend(preview::READ.into_iter().filter(|l| !layers.contains(l)).collect::<Vec<_>>());
@@ -114,7 +125,7 @@ impl Flags {
         let options = TracerOptions {
             samples: self.spp.unwrap_or(samples),
             until_error: self.until_error.map(|bound| (judged, bound)),
-            seed,
+            seed: self.seed,
             bounces: self.bounces.unwrap_or(job::UNLIMITED),
             diffuse_bounces: self.diffuse_bounces.unwrap_or(job::UNLIMITED),
             glossy_bounces: self.glossy_bounces.unwrap_or(job::UNLIMITED),
@@ -124,12 +135,12 @@ impl Flags {
             layers,
             ..Default::default()
         };
-        Ok(Task { frame: size, cells: self.cells, asked, denoise: self.denoise, options })
+        Ok(Task { frame: self.scene.size, cells: self.cells, asked, denoise: self.denoise, options })
     }
 }
 
 /// A picture to trace.
-pub struct Task {
+struct Task {
     /// Size of the frame, pixels.
     frame: [u32; 2],
     cells: Option<u32>,
@@ -141,7 +152,7 @@ pub struct Task {
 
 impl Task {
     /// Size of the picture that comes out.
-    pub fn size(&self) -> [u32; 2] {
+    fn size(&self) -> [u32; 2] {
         self.frame.map(|n| n.div_ceil(self.cells.unwrap_or(1)))
     }
 
@@ -157,7 +168,7 @@ impl Task {
     }
 
     /// Traces, shows progress, tells the noise.
-    pub fn run(self, global: &Global, gpu: &Gpu, scene: &Scene, camera: &Camera) -> Result<Drawn> {
+    fn run(self, global: &Global, gpu: &Gpu, scene: &Scene, camera: &Camera) -> Result<Drawn> {
         let packed = ReferenceScene::new(&gpu.device, &gpu.queue, scene)?;
         let kernel = Kernel::new(&gpu.device);
         let points = self.points();
