@@ -7,8 +7,7 @@ use bouncelight::gpu::shaders;
 /// numbers from outside have one.
 fn permutations() -> Vec<(String, String)> {
     let gi = bouncelight::gi::example_preludes().into_iter().map(|(name, prelude)| (name.to_owned(), prelude));
-    let learnt = ["learn.loss", "learn.adam"].map(|name| (name.to_owned(), bouncelight::net::learn::prelude(name)));
-    let mut all: Vec<_> = gi.chain(bouncelight::net::gpu::example_preludes()).chain(learnt).collect();
+    let mut all: Vec<_> = gi.chain(bouncelight::net::gpu::example_preludes()).collect();
     let plain = shaders::names().filter(|name| !all.iter().any(|(n, _)| n == name)).collect::<Vec<_>>();
     all.extend(plain.into_iter().map(|name| (name, String::new())));
     all
@@ -53,7 +52,7 @@ fn every_shader_validates_in_every_permutation() {
     let seen: std::collections::BTreeSet<_> = permutations.iter().map(|p| p.0.clone()).collect();
     assert_eq!(seen, shaders::names().collect(), "every shader was seen");
     assert_eq!(shaders::NetKernel::all().count(), 48);
-    assert_eq!(permutations.len(), 566);
+    assert_eq!(permutations.len(), 561);
 }
 
 /// Negative control: a shader that uses what it does not have is refused.

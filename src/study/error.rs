@@ -51,9 +51,6 @@ pub enum TrialError {
     /// Nothing could be counted.
     #[error(transparent)]
     Count(#[from] super::count::CountError),
-    /// What a network learns from could not be made.
-    #[error(transparent)]
-    Sample(#[from] DatasetError),
     /// A file could not be written.
     #[error(transparent)]
     Image(#[from] crate::image_io::ImageError),
