@@ -71,7 +71,7 @@ fn rows() -> Vec<(&'static str, Layout)> {
             size, cells, unproject, depth, environment, gravity_from_view, gravity_from_world, world_from_view, eye,
             motion, flags, light_scale,
         ),
-        row!("Exposure", Exposure => s, inv_s, ln_m, hit_fraction, nonfinite, outgoing as "red"),
+        row!("Exposure", Exposure => s, ln_m, hit_fraction, nonfinite, outgoing as "red"),
         row!("Gather", gather::Params =>
             eye, frame, light_count, emitter_count, inverse_power, mask, entry_scale, round, cell_frames, entry_frames,
             flags, cells, rays, since, last_round, looks, shift,

@@ -58,7 +58,7 @@ fn every_shader_validates_in_every_permutation() {
 /// Negative control: a shader that uses what it does not have is refused.
 #[test]
 fn a_shader_without_its_numbers_is_refused() {
-    assert!(naga::front::wgsl::parse_str(&shaders::source("gi.pack", "")).is_err());
+    assert!(naga::front::wgsl::parse_str(&shaders::source("gi.features", "")).is_err());
     let half = naga::front::wgsl::parse_str("enable f16;\n@compute @workgroup_size(1) fn main() { _ = 1.0h; }");
     assert!(half.is_err() || validate(&half.unwrap()).is_err(), "16-bit arithmetic needs a feature");
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times one network in PyTorch, ONNX Runtime and bouncelight on the processor, in one run, interleaved.
 
-    PYTHONPATH=weights-format/python python3 training/compare_runtimes.py assets/weights/small.safetensors 256x128 \\
+    PYTHONPATH=weights-format/python python3 training/compare_runtimes.py assets/weights/filter.safetensors 256x128 \\
         --bouncelight "target/release/examples/network" --threads 2
 
 The graph of the weights file becomes a PyTorch module (`bouncelight_weights.torch_graph`), which is exported to ONNX; the same

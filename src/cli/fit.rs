@@ -10,7 +10,7 @@ use super::{
     stdout::say,
 };
 use crate::{
-    gi::{Method, fitted::Fitted, pass::Neural},
+    gi::{Method, Neural, fitted::Fitted},
     gpu::Gpu,
     image_io,
     net::format::Weights,

@@ -30,7 +30,7 @@ use super::{
     truth::Reference,
 };
 use crate::{
-    gi::{gather, pass::Neural},
+    gi::{Neural, gather},
     render::capture::Layer,
     scene::Camera,
 };
@@ -297,7 +297,7 @@ impl Search<'_, '_> {
             self.rows.push(row);
             return Ok(None);
         }
-        let frames = if candidate.settles(&self.options.networks) { frames } else { 1 };
+        let frames = if candidate.settles() { frames } else { 1 };
         let Some((errors, shots)) = self.errors(&candidate, frames)? else {
             let row = Row::blank(candidate, Verdict::Cannot);
             self.rows.push(row);

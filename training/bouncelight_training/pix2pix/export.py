@@ -14,8 +14,8 @@ import os
 import numpy as np
 import torch
 
+from ..checkpoint import read_checkpoint
 from ..errors import TrainingError, reported
-from ..train import read_checkpoint
 from ..weights import GraphNet, WeightsError, document, read, write
 from .model import PICTURES, generator
 from .pairs import Pairs
