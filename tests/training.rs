@@ -7,12 +7,8 @@ use std::path::Path;
 use std::process::Command;
 
 /// Test modules, and how many tests each has: an empty run must not pass.
-const MODULES: [(&str, u32); 4] = [
-    ("tests.test_pix2pix", 10),
-    ("tests.test_judge", 1),
-    ("tests.test_turned", 4),
-    ("tests.test_filter", 11),
-];
+const MODULES: [(&str, u32); 4] =
+    [("tests.test_pix2pix", 10), ("tests.test_judge", 1), ("tests.test_turned", 4), ("tests.test_filter", 11)];
 
 #[test]
 fn training_runs_end_to_end_at_toy_scale() {

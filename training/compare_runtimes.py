@@ -137,7 +137,7 @@ def pix2pix(path, width):
     torch.manual_seed(1)
     module = GraphNet(graph, "y")
     inputs = [(name, 3) for name in ("depth", "direct", "diffuse", "normal")]
-    write(path, module.state_dict(), document(graph, "y", inputs=inputs, table=("images", 1), cell=1, meaning="display_signed",
+    write(path, module.state_dict(), document(graph, "y", inputs=inputs, table=("images", 1), cell=1, meaning="display_signed", output_channels=3,
                                               licence="CC0-1.0", name="pix2pix"))
 
 
