@@ -41,7 +41,7 @@ const WITHIN: [&str; 6] = ["green", "blue", "rough_use", "normal_use", "occlusio
 fn rows() -> Vec<(&'static str, Layout)> {
     use crate::accel::{EmitterGpu, HitGpu, RayGpu};
     use crate::gi::{exposure::Exposure, gather, inputs::Params, world::sample::Sample};
-    use crate::net::{gpu::build::StepUniform, learn::tape::Job as LearnJob};
+    use crate::net::gpu::build::StepUniform;
     use crate::reference::Job;
     use crate::reference::scene::{ImageUse, RefMaterial, SceneInfo};
     use crate::render::{light_choice::LightShadowGpu, shadow::ShadowViewGpu, taa::Blend, tonemap, view::FrameUniform};
@@ -71,7 +71,7 @@ fn rows() -> Vec<(&'static str, Layout)> {
             size, cells, unproject, depth, environment, gravity_from_view, gravity_from_world, world_from_view, eye,
             motion, flags, light_scale,
         ),
-        row!("Exposure", Exposure => s, inv_s, ln_m, hit_fraction, nonfinite, outgoing as "red"),
+        row!("Exposure", Exposure => s, ln_m, hit_fraction, nonfinite, outgoing as "red"),
         row!("Gather", gather::Params =>
             eye, frame, light_count, emitter_count, inverse_power, mask, entry_scale, round, cell_frames, entry_frames,
             flags, cells, rays, since, last_round, looks, shift,
@@ -81,10 +81,6 @@ fn rows() -> Vec<(&'static str, Layout)> {
             in_size, out_size, input, output, skip, second, pad, base, first_block, blocks, parts, in_channels,
             in_vectors, in_pitch, out_channels, out_vectors, out_pitch, skip_pitch, group, stream, threshold, keep,
             slope, epsilon, channel, tiles, moments, group_inputs,
-        ),
-        row!("Job", LearnJob =>
-            in_size, out_size, kernel, corner, in_channels, out_channels, stride, input, other, output, weight, bias,
-            total, slope, share, rate, unbias, keep,
         ),
         // The Rust struct ends with padding to the alignment of uniform offsets.
         row!("Material", MaterialGpu, size std::mem::offset_of!(MaterialGpu, tail) =>
@@ -152,9 +148,8 @@ fn same(rust: &Layout, shader: &Layout) -> bool {
 fn structs_of_shaders_lie_in_memory_as_those_of_rust() {
     let rows = rows();
     let gi = crate::gi::example_preludes().into_iter().map(|(name, prelude)| (name.to_owned(), prelude));
-    let learnt = ["learn.loss", "learn.adam"].map(|name| (name.to_owned(), crate::net::learn::prelude(name)));
     // One permutation of each shader: their numbers change no struct.
-    let preludes: BTreeMap<_, _> = gi.chain(crate::net::gpu::example_preludes()).chain(learnt).collect();
+    let preludes: BTreeMap<_, _> = gi.chain(crate::net::gpu::example_preludes()).collect();
     let (mut used, mut without) = (BTreeSet::new(), BTreeSet::new());
     for shader in shaders::names() {
         let module = parse(&shader, preludes.get(&shader).map_or("", |p| p));

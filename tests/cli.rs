@@ -38,8 +38,10 @@ fn usage_errors_exit_with_2() {
         fails(&["render", "interior", "-o", &out, "--method", method], 2, &[method, "replaced by `gather`"]);
         fails(&["bench", "interior", "--method", method], 2, &[method, "replaced by `gather`"]);
     }
-    fails(&["dataset", "--rooms", "5-47", "--out", &path(&dir, "d")], 2, &["judging", "47"]);
-    fails(&["dataset", "--rooms", "5", "--shard", "4/4", "--out", &path(&dir, "d")], 2, &["4/4", "n-1"]);
+    let lessons = ["dataset", "--spp", "2", "--moments", "1", "--out", &path(&dir, "d"), "--rooms"];
+    fails(&[&lessons[..], &["5-47"]].concat(), 2, &["judging", "47"]);
+    fails(&[&lessons[..], &["5", "--shard", "4/4"]].concat(), 2, &["4/4", "n-1"]);
+    fails(&["dataset", "--rooms", "5", "--spp", "2", "--out", &path(&dir, "d")], 2, &["--moments"]);
     assert!(is_empty(dir.path()), "a usage error leaves nothing behind");
 }
 
@@ -100,7 +102,7 @@ fn invalid_weights_exit_with_4_and_name_the_tensor() {
     let dir = tempfile::tempdir().unwrap();
     let out = path(&dir, "out.png");
     let shipped =
-        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/weights/small.safetensors")).unwrap();
+        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/weights/filter.safetensors")).unwrap();
     let text = path(&dir, "text.safetensors");
     std::fs::write(&text, b"these are no weights").unwrap();
     fails(&["render", "interior", "-o", &out, "--weights", &text], 4, &["text.safetensors"]);
@@ -121,7 +123,7 @@ fn invalid_weights_exit_with_4_and_name_the_tensor() {
     fails(&["weights", "verify", &missing], 4, &["head.weight"]);
     // Another shape with as many bytes.
     let misshaped = path(&dir, "misshaped.safetensors");
-    std::fs::write(&misshaped, replaced(&shipped, b"[6,16,1,1]", b"[6,1,16,1]")).unwrap();
+    std::fs::write(&misshaped, replaced(&shipped, b"[12,16,1,1]", b"[12,1,16,1]")).unwrap();
     fails(&["render", "interior", "-o", &out, "--weights", &misshaped], 4, &["head.weight"]);
     fails(&["weights", "info", dir.path().to_str().unwrap()], 4, &["not a file"]);
     assert!(!Path::new(&out).exists());
@@ -389,7 +391,7 @@ fn gl_draws_the_same_picture_as_vulkan() {
 fn results_may_be_read_in_part_and_a_full_disk_is_said() {
     let run = |more: &str| {
         let shell =
-            format!("{} weights info assets/weights/small.safetensors {more}", env!("CARGO_BIN_EXE_bouncelight"));
+            format!("{} weights info assets/weights/filter.safetensors {more}", env!("CARGO_BIN_EXE_bouncelight"));
         std::process::Command::new("bash")
             .args(["-c", &format!("set -o pipefail; {shell}")])
             .output()
@@ -404,12 +406,33 @@ fn results_may_be_read_in_part_and_a_full_disk_is_said() {
 }
 
 #[test]
-fn the_shipped_networks_have_names() {
-    for (command, name) in [("info", "small"), ("verify", "small"), ("verify", "filter")] {
-        let out = bouncelight(&["weights", command, name]);
+fn the_shipped_network_has_a_name() {
+    for command in ["info", "verify"] {
+        let out = bouncelight(&["weights", command, "filter"]);
         assert!(out.status.success(), "{command}: {}", String::from_utf8_lossy(&out.stderr));
     }
-    fails(&["weights", "verify", "smal"], 4, &["smal"]);
+    fails(&["weights", "verify", "filt"], 4, &["filt"]);
+}
+
+/// Networks that correct, and operators that nobody uses, have left: files that have them are
+/// refused by name.
+#[test]
+fn what_has_left_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = path(&dir, "out.png");
+    for command in [&["weights", "verify", "small"][..], &["render", "cornell", "-o", &out, "--weights", "small"]] {
+        fails(command, 4, &["`small` has left", "`filter`"]);
+    }
+    let bad = |name: &str| format!("{}/weights-format/fixtures/bad/{name}.safetensors", env!("CARGO_MANIFEST_DIR"));
+    for (name, words) in [
+        ("operator_left", &["`n`", "`pixel_shuffle` has left"]),
+        ("meaning_left", &["`gain_and_rest_on_guess` has left", "`neural`"]),
+        ("table_left", &["`screen` has left", "`neural`"]),
+    ] {
+        fails(&["weights", "verify", &bad(name)], 4, words);
+        fails(&["render", "cornell", "-o", &out, "--weights", &bad(name)], 4, words);
+    }
+    assert!(is_empty(dir.path()));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! `dataset` as a user meets it: shards, checksums, what a sample's file holds.
+//! `dataset` as a user meets it: shards, checksums, what a lesson's file holds.
 
 mod common;
 #[path = "common/program.rs"]
@@ -7,101 +7,74 @@ mod program;
 use program::bouncelight;
 use std::path::Path;
 
+/// A dataset of the tests' size into `out`.
+fn make(out: &Path, more: &[&str]) -> String {
+    let args = ["dataset", "--size", "32x16", "--spp", "2", "--moments", "1", "--views", "1"];
+    let done = bouncelight(&[&args[..], more, &["--out", out.to_str().expect("a temporary path is text")]].concat());
+    let told = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.success(), "{told}");
+    told
+}
+
 #[test]
 fn a_dataset_is_made_in_shards_with_its_light_and_checksums() {
     if common::gpu().is_none() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let out = dir.path().join("samples").to_str().expect("a temporary path is text").to_string();
-    let make = |shard: &str| {
-        let args = [
-            "dataset",
-            "--recipe",
-            "paper-room-varied",
-            "--rooms",
-            "7-8",
-            "--views",
-            "1",
-            "--size",
-            "32x16",
-            "--spp",
-            "2",
-        ];
-        let done = bouncelight(&[&args[..], &["--shard", shard, "--out", &out]].concat());
-        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-        String::from_utf8_lossy(&done.stderr).into_owned()
-    };
-    assert!(make("0/2").contains("1 samples, 0.0 MB"));
-    let first = std::fs::read(Path::new(&out).join("varied0007_view0.safetensors")).unwrap();
-    assert!(!Path::new(&out).join("varied0008_view0.safetensors").exists(), "that is the other shard's");
-    // What a kill leaves: a sample without its line in the list, another not begun.
-    std::fs::remove_file(Path::new(&out).join("SHA256SUMS")).unwrap();
+    let out = dir.path().join("lessons");
+    let make = |shard: &str| make(&out, &["--recipe", "paper-room-varied", "--rooms", "7-8", "--shard", shard]);
+    assert!(make("0/2").contains("1 lessons, 0.0 MB"));
+    assert!(!out.join("varied0007.glb").exists(), "not asked for");
+    let first = std::fs::read(out.join("varied0007_view0.safetensors")).unwrap();
+    assert!(!out.join("varied0008_view0.safetensors").exists(), "that is the other shard's");
+    // What a kill leaves: a lesson without its line in the list, another not begun.
+    std::fs::remove_file(out.join("SHA256SUMS")).unwrap();
     make("0/2");
     make("1/2");
-    assert_eq!(first, std::fs::read(Path::new(&out).join("varied0007_view0.safetensors")).unwrap(), "it was kept");
-    let list = std::fs::read_to_string(Path::new(&out).join("SHA256SUMS")).unwrap();
+    assert_eq!(first, std::fs::read(out.join("varied0007_view0.safetensors")).unwrap(), "it was kept");
+    let list = std::fs::read_to_string(out.join("SHA256SUMS")).unwrap();
     let named: Vec<_> = list.lines().map(|l| l.split_once("  ").expect("sum and name").1).collect();
     assert_eq!(named, ["varied0007_view0.safetensors", "varied0008_view0.safetensors"]);
     let file = safetensors::SafeTensors::deserialize(&first).unwrap();
     let values = |name: &str| -> Vec<f32> { bytemuck::pod_collect_to_vec(file.tensor(name).unwrap().data()) };
-    assert_eq!((file.tensor("features").unwrap().shape(), values("noise").len()), (&[24, 4, 8][..], 1));
+    assert_eq!((file.tensor("features.1").unwrap().shape(), values("noise").len()), (&[15, 4, 8][..], 1));
     assert_eq!(values("light").len(), 3 * 32);
     assert!(values("light").iter().all(|x| x.is_finite()) && values("light").iter().any(|x| *x > 0.0));
 }
 
 #[test]
-fn samples_hold_a_second_frame_guides_and_the_room_on_request() {
+fn rooms_are_exported_on_request() {
     if common::gpu().is_none() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let make = |name: &str, more: &[&str]| {
-        let out = dir.path().join(name);
-        let args = ["dataset", "--recipe", "paper-room-varied", "--rooms", "7", "--size", "64x32"];
-        let folder = ["--out", out.to_str().expect("a temporary path is text")];
-        let done = bouncelight(&[&args[..], more, &folder].concat());
-        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-        out
-    };
-    let (plain, whole) =
-        (make("plain", &["--views", "1"]), make("whole", &["--views", "1", "--motion", "--guides", "--export"]));
-    let read = |folder: &Path| std::fs::read(folder.join("varied0007_view0.safetensors")).unwrap();
-    let (few, all) = (read(&plain), read(&whole));
-    let few = safetensors::SafeTensors::deserialize(&few).unwrap();
-    let all = safetensors::SafeTensors::deserialize(&all).unwrap();
-    assert!(few.tensor("flow").is_err() && few.tensor("guide_depth").is_err(), "not asked for");
-    assert_eq!(few.tensor("features").unwrap().data(), all.tensor("features").unwrap().data());
-    for (name, shape) in [
-        ("next_features", &[24, 8, 16][..]),
-        ("next_scale", &[1]),
-        ("flow", &[2, 8, 16]),
-        ("guide_depth", &[32, 64]),
-        ("guide_normal", &[3, 32, 64]),
-        ("guide_albedo", &[4, 32, 64]),
-        ("guide_direct", &[3, 32, 64]),
-        ("guide_guess", &[3, 32, 64]),
-        ("guide_rest", &[3, 32, 64]),
-    ] {
-        assert_eq!(all.tensor(name).unwrap().shape(), shape, "{name}");
-    }
-    assert_ne!(all.tensor("next_features").unwrap().data(), all.tensor("features").unwrap().data(), "it has moved");
+    let whole = dir.path().join("whole");
+    make(&whole, &["--recipe", "paper-room-varied", "--rooms", "7", "--export"]);
     // The exported room is the room, and the record says where it is looked at from.
     let exported = bouncelight::scene::load(whole.join("varied0007.glb").to_str().unwrap()).unwrap();
     let own = bouncelight::study::varied::scene(7);
     assert_eq!(exported.instances.len(), own.instances.len());
-    let record = || -> serde_json::Value {
-        let text = std::fs::read_to_string(whole.join("varied0007_views.json")).unwrap();
-        serde_json::from_str(&text).unwrap()
-    };
-    let views = |r: serde_json::Value| r["views"].as_array().map(Vec::len);
-    assert_eq!(views(record()), Some(1));
-    make("whole", &["--views", "2", "--export"]);
-    assert_eq!(views(record()), Some(2), "more views were asked for");
-    let record = record();
+    let text = std::fs::read_to_string(whole.join("varied0007_views.json")).unwrap();
+    let record: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(record["views"].as_array().map(Vec::len), Some(1));
     let sky = record["environment"].as_array().unwrap();
     assert!((sky[0].as_f64().unwrap() as f32 - own.environment.radiance[0]).abs() < 1e-6);
-    assert!(!plain.join("varied0007.glb").exists());
+}
+
+/// Views through a scene are chosen by what they show: none stands before a wall.
+#[test]
+fn views_of_a_scene_are_chosen_and_written_down() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("scene");
+    make(&out, &["--recipe", "scene", "--scene", "cornell"]);
+    assert!(out.join("cornell_view0.safetensors").exists());
+    let text = std::fs::read_to_string(out.join("cornell_views.json")).unwrap();
+    let record: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(record["views"].as_array().map(Vec::len), Some(1));
 }
 
 #[test]

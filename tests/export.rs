@@ -7,7 +7,7 @@ mod program;
 
 use bouncelight::export::manifest::{Binding, Manifest};
 use bouncelight::export::{self, Package, Target};
-use bouncelight::gi::{CameraMatrices, Inputs, Lights, Method, Rays, method, pass::Neural};
+use bouncelight::gi::{CameraMatrices, Inputs, Lights, Method, Neural, Rays, method};
 use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::net::format::Weights;
 use bouncelight::scene::{self, upload::SceneGpu};

@@ -243,7 +243,7 @@ fn random_graph(choices: &[(u8, u8, u8)], [width, height]: [u32; 2]) -> Graph {
             Op::parse(op.as_str().unwrap(), fields).unwrap().unwrap()
         };
         let even = channels % 2 == 0;
-        let op = match (kind % 16, partner, beside) {
+        let op = match (kind % 15, partner, beside) {
             (0 | 1, ..) => conv(&name, &from, &name, [channels, 1 + u32::from(*b) % 12], 3, 1),
             (2, ..) => conv(&name, &from, &name, [channels, channels], 3, 2),
             (3, ..) => up(&name, &from, &made[*b as usize % made.len()].0),
@@ -266,7 +266,6 @@ fn random_graph(choices: &[(u8, u8, u8)], [width, height]: [u32; 2]) -> Graph {
                 json(serde_json::json!({"op": "conv_transpose2d", "in_channels": channels, "out_channels": 8,
                     "kernel": [4, 4], "stride": 2, "padding": 1, "bias": false}))
             }
-            (15, ..) if channels % 4 == 0 => json(serde_json::json!({"op": "pixel_shuffle", "factor": 2})),
             _ => conv(&name, &from, &name, [channels, 5], 1, 1),
         };
         graph.ops.push(op);

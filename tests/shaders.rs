@@ -7,8 +7,7 @@ use bouncelight::gpu::shaders;
 /// numbers from outside have one.
 fn permutations() -> Vec<(String, String)> {
     let gi = bouncelight::gi::example_preludes().into_iter().map(|(name, prelude)| (name.to_owned(), prelude));
-    let learnt = ["learn.loss", "learn.adam"].map(|name| (name.to_owned(), bouncelight::net::learn::prelude(name)));
-    let mut all: Vec<_> = gi.chain(bouncelight::net::gpu::example_preludes()).chain(learnt).collect();
+    let mut all: Vec<_> = gi.chain(bouncelight::net::gpu::example_preludes()).collect();
     let plain = shaders::names().filter(|name| !all.iter().any(|(n, _)| n == name)).collect::<Vec<_>>();
     all.extend(plain.into_iter().map(|name| (name, String::new())));
     all
@@ -52,14 +51,14 @@ fn every_shader_validates_in_every_permutation() {
     }
     let seen: std::collections::BTreeSet<_> = permutations.iter().map(|p| p.0.clone()).collect();
     assert_eq!(seen, shaders::names().collect(), "every shader was seen");
-    assert_eq!(shaders::NetKernel::all().count(), 48);
-    assert_eq!(permutations.len(), 566);
+    assert_eq!(shaders::NetKernel::all().count(), 46);
+    assert_eq!(permutations.len(), 549);
 }
 
 /// Negative control: a shader that uses what it does not have is refused.
 #[test]
 fn a_shader_without_its_numbers_is_refused() {
-    assert!(naga::front::wgsl::parse_str(&shaders::source("gi.pack", "")).is_err());
+    assert!(naga::front::wgsl::parse_str(&shaders::source("gi.features", "")).is_err());
     let half = naga::front::wgsl::parse_str("enable f16;\n@compute @workgroup_size(1) fn main() { _ = 1.0h; }");
     assert!(half.is_err() || validate(&half.unwrap()).is_err(), "16-bit arithmetic needs a feature");
 }

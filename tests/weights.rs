@@ -12,9 +12,9 @@ fn fixture(name: &str) -> PathBuf {
 /// A small network to spoil: two convolutions.
 fn sound_document() -> Value {
     json!({
-        "version": 1, "licence": "CC0-1.0", "table": {"name": "screen", "version": 1}, "cell": 4,
-        "inputs": [{"name": "direct", "channels": 3}, {"name": "hit", "channels": 1}],
-        "output": {"tensor": "y", "meaning": "log_irradiance_over_exposure", "channels": 3},
+        "version": 1, "licence": "CC0-1.0", "table": {"name": "cells", "version": 1}, "cell": 4,
+        "inputs": [{"name": "normal", "channels": 3}, {"name": "hit", "channels": 1}],
+        "output": {"tensor": "y", "meaning": "plain", "channels": 3},
         "graph": [
             {"op": "conv2d", "name": "a", "input": "input", "output": "h", "in_channels": 4, "out_channels": 4,
              "kernel": [3, 3], "stride": 1, "padding": 1, "activation": "relu"},
@@ -160,13 +160,19 @@ fn documents() {
     let set =
         |pointer: &'static str, value: Value| move |f: &mut File| *f.document.pointer_mut(pointer).unwrap() = value;
     one(&["version 3", "up to version 2"], set("/version", json!(3)));
-    one(&["table `screen`", "version 7"], set("/table/version", json!(7)));
+    one(&["table `cells`", "version 7"], set("/table/version", json!(7)));
     one(&["table `probe` is unknown"], set("/table/name", json!("probe")));
-    one(&["`cache`", "`gather` has replaced", "anew"], set("/inputs/0/name", json!("cache")));
-    one(&["gain_and_rest_on_cache", "`gather` has replaced"], set("/output/meaning", json!("gain_and_rest_on_cache")));
+    // What has left says so.
+    one(&["table `screen` has left", "`neural`", "guide a filter"], set("/table/name", json!("screen")));
+    for meaning in ["log_irradiance_over_exposure", "gain_and_rest_on_guess", "gain_and_rest_on_cache"] {
+        one(&[meaning, "has left", "guide a filter"], move |f| f.document["output"]["meaning"] = json!(meaning));
+    }
+    for kind in ["pixel_shuffle", "pixel_unshuffle"] {
+        one(&["`b`", kind, "has left"], move |f| f.document["graph"][1]["op"] = json!(kind));
+    }
     one(&["`glow`", "no such feature"], set("/inputs/0/name", json!("glow")));
-    one(&["`direct`", "3 channels"], |f| {
-        f.document["inputs"] = json!([{"name": "direct", "channels": 4}]);
+    one(&["`normal`", "3 channels"], |f| {
+        f.document["inputs"] = json!([{"name": "normal", "channels": 4}]);
     });
     one(&["order"], |f| f.document["inputs"].as_array_mut().unwrap().reverse());
     one(&["meaning `loudness`"], set("/output/meaning", json!("loudness")));
@@ -203,7 +209,7 @@ fn version_2_writes_its_encodings() {
         move |f: &mut File| {
             f.document["version"] = json!(2);
             f.document["inputs"] = json!([
-                {"name": "direct", "channels": 3, "encoding": "log1p_over_exposure"},
+                {"name": "normal", "channels": 3, "encoding": "gravity_frame"},
                 {"name": "hit", "channels": 1, "encoding": "flag"}
             ]);
             spoil(&mut f.document);
@@ -216,7 +222,7 @@ fn version_2_writes_its_encodings() {
     assert_eq!(weights.inputs, Weights::from_bytes(&File::sound().bytes()).unwrap().inputs);
     one(&["`hit`", "missing"], second(|d| drop(d["inputs"][1].as_object_mut().unwrap().remove("encoding"))));
     one(&["`hit`", "encoding `signed`", "known: flag"], second(|d| d["inputs"][1]["encoding"] = json!("signed")));
-    one(&["`direct`", "came with version 2"], |f| f.document["inputs"][0]["encoding"] = json!("log1p_over_exposure"));
+    one(&["`normal`", "came with version 2"], |f| f.document["inputs"][0]["encoding"] = json!("gravity_frame"));
     one(&["licence is empty"], second(|d| d["licence"] = json!(" ")));
 }
 

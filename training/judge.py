@@ -17,8 +17,7 @@ one without a reference is an error that gives the command which renders it. Our
 if the same program drew it with the same weights and samples (stamps.json beside it; --keep: whoever drew it), and its comparison if
 neither it nor the reference is newer, so a killed run goes on where it stopped.
 
-Rows that are no methods: with --constant, that one ambient light (E/pi; python -m bouncelight_training.baseline fits it to the
-training rooms), the floor that everything else has to pass (0.0508761, the sky's radiance, is the raster picture that the paper's network starts from); `best constant` is fitted to each picture itself, by least absolute error
+Rows that are no methods: with --constant, that one ambient light (E/pi), the floor that everything else has to pass (0.0508761, the sky's radiance, is the raster picture that the paper's network starts from); `best constant` is fitted to each picture itself, by least absolute error
 before the view transform: nobody can know it, it is there for scale.
 
 A scene whose reference is black is left out, with a line that says so.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times one network in PyTorch on the best device that it has, for `cargo xtask gpu-report`; prints a JSON record.
 
-    PYTHONPATH=weights-format/python python3 training/torch_speed.py assets/weights/small.safetensors 256x128
+    PYTHONPATH=weights-format/python python3 training/torch_speed.py assets/weights/filter.safetensors 256x128
 
 The graph of the weights file becomes a PyTorch module, in channels-last layout, 32 bits, eager and compiled; each time is the fastest of
 several runs that are waited for. The package that is needed is torch; where it is missing, the last line of the error says so.

@@ -5,7 +5,7 @@
 //! FOLDER holds `inputs.json` and for each frame K the textures' bytes as `K.NAME`; the light of
 //! the last frame is written there as `rust.output` (`Rgba16Float`, rows from the top).
 
-use bouncelight::gi::pass::Neural;
+use bouncelight::gi::Neural;
 use bouncelight::gi::{CameraMatrices, Conventions, Depth, Inputs, Lights, Method, Rays, method};
 use bouncelight::gpu::{Gpu, GpuOptions, readback, timing::Recorder};
 use bouncelight::net::format::Weights;

@@ -86,16 +86,13 @@ fn finish(@builtin(local_invocation_index) index: u32) {
     if index == 0u {
         let cells = f32(cell_count());
         var s = total.light / cells + luminance(params.environment.rgb);
-        var inv_s = 0.0;
         // Below this nothing a half float holds could come out; exactly zero keeps "lights off"
         // exact.
         if s <= 1e-20 {
             s = 0.0;
-        } else {
-            inv_s = 1.0 / s;
         }
         let ln_m = select(0.0, total.ln_z / f32(max(total.hits, 1u)), total.hits > 0u);
         let mean = total.outgoing / cells;
-        result = Exposure(s, inv_s, ln_m, f32(total.hits) / cells, total.nonfinite, mean.r, mean.g, mean.b);
+        result = Exposure(s, ln_m, f32(total.hits) / cells, total.nonfinite, mean.r, mean.g, mean.b);
     }
 }

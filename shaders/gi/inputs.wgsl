@@ -37,7 +37,6 @@ const STORED_AHEAD = 64u;
 // `gi::exposure::Exposure` is the Rust side and documents the fields.
 struct Exposure {
     s: f32,
-    inv_s: f32,
     ln_m: f32,
     hit_fraction: f32,
     nonfinite: u32,

@@ -3,7 +3,7 @@
 use super::error::CliError;
 pub use crate::gi::name::MethodName;
 use crate::{
-    gi::{Method, pass::Neural},
+    gi::{Method, Neural},
     gpu::{Backend, Gpu, GpuOptions},
     net::{format::Weights, plan::Precision},
     scene::{

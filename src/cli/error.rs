@@ -5,7 +5,7 @@ use crate::{
     export::ExportError,
     gi::{GiError, fitted::FittedError},
     gpu::GpuError,
-    net::{convert::ConvertError, format::WeightsError, learn::LearnError, pictures::PicturesError},
+    net::{convert::ConvertError, format::WeightsError, pictures::PicturesError},
     reference::PackError,
     render::RenderError,
     scene::{SceneError, environment::EnvironmentError, upload::UploadError},
@@ -106,11 +106,6 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
             _ => None,
         };
         if let Some(GiError::Feature { .. } | GiError::Output(_)) = cause.downcast_ref::<GiError>().or(wrapped) {
-            return INVALID_INPUT;
-        }
-        if let Some(LearnError::Operator { .. } | LearnError::Meaning { .. } | LearnError::Graph(_)) =
-            cause.downcast_ref()
-        {
             return INVALID_INPUT;
         }
         if let Some(ConvertError::NoSuchVariant) = cause.downcast_ref::<ConvertError>() {

@@ -1,5 +1,4 @@
-//! `bouncelight fit`: the cheapest method that is good enough for a scene, kept beside it, and a
-//! network that has learned the scene.
+//! `bouncelight fit`: the cheapest method that is good enough for a scene, kept beside it.
 
 use super::{
     args::{Global, usage},
@@ -11,13 +10,13 @@ use super::{
     stdout::say,
 };
 use crate::{
-    gi::{Method, fitted::Fitted, inputs::cells_of, pass::Neural},
+    gi::{Method, Neural, fitted::Fitted},
     gpu::Gpu,
     image_io,
-    net::{format::Weights, learn},
+    net::format::Weights,
     render::tonemap_curve::Tonemap,
     study::{
-        fit::{self, Fit, FitError, FitOptions, Learning, Network, Yardstick},
+        fit::{self, Fit, FitError, FitOptions, Network, Yardstick},
         trial::{Trial, TrialError, TrialOptions},
     },
 };
@@ -49,11 +48,9 @@ pub struct Args {
     /// A network to try beside the shipped ones; may be repeated.
     #[arg(long, value_name = "W")]
     weights: Vec<PathBuf>,
-    /// Where nothing meets the target: fine-tune a network (the first of --weights, else `small`,
-    /// which is shipped) to the scene for so many minutes, on this device and on views of its own, and
-    /// keep it beside the record if it wins where it is judged.
-    #[arg(long, value_name = "MINUTES", value_parser = parse_minutes)]
-    learn: Option<f64>,
+    /// Has left; whoever asks for it is told what there is instead.
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "", value_parser = learning_has_left)]
+    learn: Option<String>,
     /// Most samples a pixel of a reference.
     #[arg(long, default_value_t = 1024, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
     spp: u32,
@@ -85,18 +82,16 @@ fn parse_budget(text: &str) -> Result<f64, String> {
     if ms.is_finite() && ms >= 0.0 { Ok(ms) } else { Err("a budget is 0 or more milliseconds".into()) }
 }
 
-fn parse_minutes(text: &str) -> Result<f64, String> {
-    let minutes: f64 = text.parse().map_err(|e| format!("{e}"))?;
-    if minutes.is_finite() && minutes > 0.0 { Ok(minutes) } else { Err("learning takes more than 0 minutes".into()) }
+fn learning_has_left(_: &str) -> Result<String, String> {
+    Err("`fit` no longer learns on the device; `python -m bouncelight_training.filter.scene` fine-tunes the shipped \
+         network to a scene (training/README.md), and `fit --weights FILE` tries what comes of it"
+        .into())
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
     let output = args.output.clone().unwrap_or_else(|| Fitted::path(&args.scene.scene));
     if output != Path::new("-") {
         image_io::check_writable(&output)?;
-    }
-    if args.learn.is_some() {
-        check_learning(&args, &output)?;
     }
     let scene = args.scene.load(global)?;
     let fixed = match args.scene.eye {
@@ -105,7 +100,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     };
     interrupt::install()?;
     let gpu = global.open_gpu()?;
-    let mut options = options(global, &gpu, &args)?;
+    let options = options(global, &gpu, &args)?;
     let kept = TrialOptions { kept: args.references.clone(), ..TrialOptions::default() };
     let mut trial = Trial::new(&gpu, scene, args.scene.size, kept).map_err(typed)?.watched(|_| !interrupt::requested());
     let views = match fixed.is_empty() {
@@ -118,19 +113,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         progress.at(f64::from(done), all.into());
     });
     progress.finish();
-    let mut found = fitted.map_err(named)?;
-    let weights = match args.learn {
-        Some(minutes) if !found.reached => learn(global, &args, minutes, &mut trial, &mut found, &mut options)?,
-        _ => None,
-    };
-    if let Some(weights) = weights {
-        let path = weights_path(&output);
-        image_io::write_whole(&path, &weights)?;
-        // As other weights: the record must still name them when somebody reads it in another
-        // folder.
-        let whole = std::fs::canonicalize(&path).with_context(|| format!("cannot read {}", path.display()))?;
-        options.networks.last_mut().expect("it was learnt").file = whole;
-    }
+    let found = fitted.map_err(named)?;
     let hash = trial.hash().to_owned();
     let fitted = found.fitted(&options, hash, args.scene.size, gpu.info.name.clone());
     let heading = format!(
@@ -142,9 +125,6 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         options.yardstick.show(options.yardstick.target)
     );
     say!("{heading}\n\n{}\n{}", found.table(&options), found.why(&options));
-    if args.learn.is_some() && found.learned.is_none() {
-        say!("{}", not_learned(&found));
-    }
     if let Some(folder) = &args.report {
         report(folder, &heading, &found, &options, &fitted)?;
     }
@@ -165,64 +145,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 fn named(e: FitError) -> anyhow::Error {
     match e {
         FitError::Trial(e) => typed(e),
-        FitError::Learn(e) => e.into(),
-        FitError::Weights(e) => e.into(),
         e => usage(e.to_string()),
-    }
-}
-
-/// Where what was learnt is kept: beside the record.
-fn weights_path(record: &Path) -> PathBuf {
-    record.with_extension("safetensors")
-}
-
-/// What can be known to be wrong before minutes are spent.
-fn check_learning(args: &Args, output: &Path) -> Result<()> {
-    if output == Path::new("-") {
-        return Err(usage("--learn keeps weights beside the record; name a file with -o".into()));
-    }
-    let path = weights_path(output);
-    if path == output {
-        return Err(usage(format!("{}: the weights of --learn would lie there; name another -o", output.display())));
-    }
-    image_io::check_writable(&path)?;
-    let start = args.weights.first();
-    let weights = start.map_or_else(Weights::corrector, |path| Weights::find(Some(path)))?;
-    let named = || start.map_or("the shipped weights".into(), |path| path.display().to_string());
-    learn::check(&weights, cells_of(args.scene.size)).with_context(named)
-}
-
-fn learn(
-    global: &Global,
-    args: &Args,
-    minutes: f64,
-    trial: &mut Trial<'_>,
-    found: &mut Fit,
-    options: &mut FitOptions,
-) -> Result<Option<Vec<u8>>> {
-    let scene =
-        Path::new(&args.scene.scene).file_stem().map_or(args.scene.scene.clone().into(), |s| s.to_string_lossy());
-    let command: Vec<String> = std::env::args().skip(1).collect();
-    // `options` has the shipped networks first, the one that corrects before the one that filters.
-    let start = if args.weights.is_empty() { 0 } else { 2 };
-    let learning =
-        Learning { minutes, start, scene: scene.into_owned(), command: format!("bouncelight {}", command.join(" ")) };
-    let mut progress = Progress::new(global, "seconds", 1);
-    let seconds = (60.0 * minutes).ceil();
-    let learned = fit::learn(trial, found, options, &learning, &mut |what, gone| {
-        progress.tell(what);
-        progress.at(gone.min(seconds), seconds as u64);
-    });
-    progress.finish();
-    learned.map_err(named)
-}
-
-/// Why nothing was learnt.
-fn not_learned(found: &Fit) -> &'static str {
-    if found.reached {
-        "The target is met: nothing needs to be learned."
-    } else {
-        "Nothing was learned: `gather` or the network to begin with is over the budget or cannot draw this scene here."
     }
 }
 
@@ -238,7 +161,7 @@ fn typed(e: TrialError) -> anyhow::Error {
 }
 
 fn options(global: &Global, gpu: &Gpu, args: &Args) -> Result<FitOptions> {
-    let mut networks = vec![("small".into(), Weights::corrector()?), ("filter".into(), Weights::shipped()?)];
+    let mut networks = vec![("filter".into(), Weights::shipped()?)];
     for path in &args.weights {
         // The record must still name them when somebody reads it in another folder.
         let whole = std::fs::canonicalize(path).with_context(|| format!("cannot read {}", path.display()))?;

@@ -2,7 +2,7 @@
 
 use super::args::Global;
 use super::stdout::say;
-use crate::gi::{inputs::cells_of, pass::Neural};
+use crate::gi::{Neural, inputs::cells_of};
 use crate::gpu::Gpu;
 use crate::net::format::Weights;
 use crate::net::peak;

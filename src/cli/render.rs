@@ -13,7 +13,7 @@ use super::{
     showing::Showing,
 };
 use crate::{
-    gi::{Method, gather, pass::Neural},
+    gi::{Method, Neural, gather},
     gpu::Gpu,
     image_io,
     render::{

@@ -2,7 +2,7 @@
 
 use super::args::Global;
 use super::stdout::say;
-use crate::gi::{Method, pass::Neural};
+use crate::gi::{Method, Neural};
 use crate::gpu::Gpu;
 use crate::image_io;
 use crate::net::format::Weights;

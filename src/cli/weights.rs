@@ -24,7 +24,7 @@ pub struct Args {
 enum Command {
     /// Layers with shapes, FLOPs, bytes and places in memory, for a picture of a given size.
     Info {
-        /// A weights file, or `filter` or `small`, which are shipped.
+        /// A weights file, or `filter`, which is shipped.
         file: PathBuf,
         /// Width and height of the picture in pixels.
         #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true,
@@ -33,7 +33,7 @@ enum Command {
     },
     /// Check everything a reader can check; says `ok` or lists every fault.
     Verify {
-        /// A weights file, or `filter` or `small`, which are shipped.
+        /// A weights file, or `filter`, which is shipped.
         file: PathBuf,
     },
     /// Time the ways in which each convolution can run on this device, and remember the fastest for

@@ -18,12 +18,9 @@
 //! in the world where it ends. It asks what stands between; what is left is noise, which frames and
 //! neighbours average away.
 //!
-//! The neural method is `gather` and a U-Net. Weights that filter are given what each
-//! cell remembers ([`memory`]) and say which cells' light is averaged. Weights that correct
-//! ([`pass`]) are given features of every cell ([`pack`]), what `gather` says among them, and their
-//! gain and rest are applied to that answer at full resolution, guided by depth and normal
-//! ([`reconstruct`]). Neither knows more of the world than `gather` and the picture show, is finer
-//! than a cell (4 pixels), or adds specular light beyond what `composite` derives from E.
+//! The neural method is `gather` and a U-Net, which is given what each cell remembers ([`memory`])
+//! and says which cells' light is averaged. It does not know more of the world than `gather`, and is
+//! not finer than a cell (4 pixels).
 //!
 //! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when
 //! all light is off. `docs/gi.md` tells the same with a picture of the data flow and the table of
@@ -34,6 +31,7 @@
 //! `interface` ← `stage` ← `screen`, `gather` ← `neural` ← `method` ← `world`: each imports only
 //! what stands before it, and nothing here imports `render`.
 
+pub mod cpu;
 pub mod gather;
 pub mod interface;
 pub mod method;
@@ -48,7 +46,7 @@ pub use interface::{
     MotionJitter, MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Outputs, Rays, technique,
 };
 pub use method::{Method, fitted, name};
-pub use neural::{cpu, features, memory, pack, pass, reconstruct};
+pub use neural::{Neural, memory};
 pub use preludes::example_preludes;
 pub use screen::{ambient, bitmask, occlusion, ssgi};
 pub use stage::{cells, exposure, exposure::ExposurePass, inputs};

@@ -1,21 +1,15 @@
 //! What is written in front of shaders.
 
-use super::neural::features::FeatureSet;
 use crate::net::plan::Precision;
 
 /// Each shader of `gi/` that needs a prelude, with examples of it, for the validation of every
 /// permutation.
 pub fn example_preludes() -> Vec<(&'static str, String)> {
-    let few = FeatureSet::new([("direct", 3), ("depth", 1), ("hit", 1)]).expect("rows of the table in order");
     vec![
         ("gi.ambient", super::screen::ambient::unseen_prelude(1.0, 0.5)),
         ("gi.occlusion", super::screen::bitmask::March::NEAR.prelude()),
         ("gi.radiance", super::screen::ssgi::SsgiOptions::default().prelude()),
         ("gi.ssgi", super::screen::ssgi::SsgiOptions::default().prelude()),
-        ("gi.pack", FeatureSet::all().prelude()),
-        ("gi.pack", few.prelude()),
-        ("gi.reconstruct", super::neural::reconstruct::prelude(super::neural::reconstruct::Answer::Light)),
-        ("gi.reconstruct", super::neural::reconstruct::prelude(super::neural::reconstruct::Answer::Gain)),
         ("gi.cells", super::stage::cells::prelude()),
         ("gi.rays", super::gather::prelude()),
         ("gi.renew", super::gather::prelude()),

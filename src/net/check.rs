@@ -66,7 +66,6 @@ pub(super) fn fields(op: &Op, errors: &mut Vec<GraphError>) {
             activation(errors, name, o.activation);
         }
         Op::Activation(o) => activation(errors, name, o.activation),
-        Op::PixelShuffle(o) | Op::PixelUnshuffle(o) => range(errors, name, "factor", o.factor, 1, MAX_SCALE),
         Op::Dropout(o) => number(errors, name, "p", o.p, (0.0..1.0).contains(&o.p), "0 or more, less than 1"),
     }
 }
@@ -114,20 +113,10 @@ pub(super) fn channels(op: &Op, of: impl Fn(&str) -> Option<u32>, errors: &mut V
             Some(o.channels)
         }
         Op::Activation(o) => of(&o.input),
-        Op::PixelShuffle(o) => {
-            let square = o.factor.saturating_mul(o.factor).max(1);
-            let found = of(&o.input);
-            if let Some(value) = found.filter(|n| n % square != 0) {
-                errors.push(GraphError::Divide { op: name.into(), what: "channels", value, by: square });
-            }
-            found.map(|n| n / square)
-        }
-        Op::PixelUnshuffle(o) => of(&o.input).map(|n| n.saturating_mul(o.factor.saturating_mul(o.factor))),
         Op::Dropout(o) => of(&o.input),
     };
-    // Only these two make channels out of thin air; the others' are judged as fields or are an
-    // input's.
-    if let (Op::Concat(_) | Op::PixelUnshuffle(_), Some(n)) = (op, out) {
+    // The others' are judged as fields or are an input's.
+    if let (Op::Concat(_), Some(n)) = (op, out) {
         range(errors, name, "channels", n, 1, MAX_CHANNELS);
     }
     out

@@ -139,8 +139,6 @@ fn apply(weights: &Weights, op: &Op, tensors: &HashMap<&str, Tensor>, shape: Sha
             activated(plain::group_norm(weights, &o.name, read(&o.input), o.groups, o.eps), o.activation)
         }
         Op::Activation(o) => activated(read(&o.input).clone(), o.activation),
-        Op::PixelShuffle(o) => plain::shuffle(read(&o.input), o.factor, shape),
-        Op::PixelUnshuffle(o) => plain::unshuffle(read(&o.input), o.factor, shape),
         Op::Dropout(o) => match stream {
             Some(stream) => plain::dropout(read(&o.input), stream, o.p),
             None => read(&o.input).clone(),

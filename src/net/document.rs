@@ -3,8 +3,9 @@
 
 use super::graph::{Graph, GraphError};
 use super::op::Op;
-use super::problem::Problem;
-use super::spec::{KEY, KNOWN_VERSIONS, MAX_OPS, MEANINGS, TABLES, VERSION};
+use super::op_facts::LEFT;
+use super::problem::{CORRECTS, Problem};
+use super::spec::{KEY, KNOWN_VERSIONS, LEFT_MEANINGS, LEFT_TABLE, MAX_OPS, MEANINGS, TABLES, VERSION};
 use serde::de::{Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
@@ -31,7 +32,7 @@ pub struct Feature {
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
-    /// `screen`, `images`, or `free` for a network outside the renderer.
+    /// `cells`, `images`, or `free` for a network outside the renderer.
     pub name: String,
     /// Version of the table.
     pub version: u64,
@@ -149,14 +150,11 @@ pub(super) fn parse<'a>(
     sized.then_some((document, graph))
 }
 
-/// What is said of networks that correct a method which is gone.
-const REPLACED: &str = "it builds on method `cache`, which `gather` has replaced; a network has to be trained anew";
-
 fn check_fields(document: &Document<'_>, problems: &mut Vec<Problem>) {
     let mut fault = |text: String| problems.push(Problem::Document(text));
     let meaning = &document.output.meaning;
-    if meaning == "gain_and_rest_on_cache" {
-        fault(format!("output meaning `{meaning}`: {REPLACED} with meaning `gain_and_rest_on_guess`"));
+    if LEFT_MEANINGS.contains(&meaning.as_str()) {
+        fault(format!("output meaning `{meaning}` has left: {CORRECTS}"));
     } else if !MEANINGS.contains(&meaning.as_str()) {
         fault(format!("output meaning `{meaning}` is unknown; known: {}", MEANINGS.join(", ")));
     }
@@ -177,7 +175,10 @@ fn check_inputs(document: &mut Document<'_>, problems: &mut Vec<Problem>) {
     }
     let Some(table) = TABLES.iter().find(|t| t.name == name) else {
         let known: Vec<_> = TABLES.iter().map(|t| t.name).collect();
-        problems.push(Problem::Document(format!("feature table `{name}` is unknown; known: {}", known.join(", "))));
+        problems.push(Problem::Document(match name.as_str() {
+            LEFT_TABLE => format!("feature table `{name}` has left: {CORRECTS}"),
+            _ => format!("feature table `{name}` is unknown; known: {}", known.join(", ")),
+        }));
         return;
     };
     if document.inputs.is_empty() {
@@ -204,10 +205,7 @@ fn check_inputs(document: &mut Document<'_>, problems: &mut Vec<Problem>) {
             continue;
         }
         let Some(at) = table.features.iter().position(|f| f.name == name.as_str()) else {
-            fault(match (table.name, name.as_str()) {
-                ("screen", "cache") => format!("{REPLACED} with feature `guess`"),
-                (table, _) => format!("table `{table}` version 1 has no such feature"),
-            });
+            fault(format!("table `{}` version 1 has no such feature", table.name));
             continue;
         };
         let row = &table.features[at];
@@ -313,7 +311,11 @@ fn operator(index: usize, text: &str, problems: &mut Vec<Problem>) -> Option<Op>
         Some(Ok(op)) => Some(op),
         Some(Err(e)) => fault(plain(&e)),
         None => {
-            problems.push(Problem::UnknownOperator { index, name, op: kind });
+            let left = LEFT.contains(&kind.as_str());
+            problems.push(match left {
+                true => Problem::OperatorLeft { index, name, op: kind },
+                false => Problem::UnknownOperator { index, name, op: kind },
+            });
             None
         }
     }

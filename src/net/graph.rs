@@ -8,7 +8,7 @@ use super::check;
 pub use super::graph_error::GraphError;
 pub use super::op::{
     Activate, Activation, Add, AddAt, BatchNorm, Concat, Conv2d, ConvTranspose2d, Dropout, GroupNorm, InstanceNorm, Op,
-    Pad, Padding, PixelShuffle, Upsample,
+    Pad, Padding, Upsample,
 };
 pub use super::tensor::{MAX_CHANNELS, MAX_EDGE, MAX_JOINED, MAX_KERNEL, MAX_PAD, MAX_SCALE, MAX_STRIDE, Shape};
 use std::collections::{HashMap, HashSet};

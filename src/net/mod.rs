@@ -9,9 +9,8 @@
 //! - [`cpu`]: the slow, obvious CPU reference; every kernel is tested against it and against
 //!   PyTorch.
 //! - [`gpu`]: the WGSL kernels' host side.
-//! - [`learn`]: the way back through the shipped network's operators, for fitting it to a scene.
 //!
-//! Only [`gpu`] and [`learn`] know wgpu.
+//! Only [`gpu`] knows wgpu.
 
 pub mod activation;
 mod check;
@@ -24,7 +23,6 @@ pub mod gpu;
 pub mod graph;
 mod graph_error;
 mod header;
-pub mod learn;
 pub mod op;
 pub mod op_facts;
 pub mod peak;

@@ -249,15 +249,6 @@ operators! {
         activation: Activation,
     }
 
-    /// `pixel_shuffle`: channels become pixels, [c·f², h, w] → [c, h·f, w·f]; `pixel_unshuffle`:
-    /// the inverse. Orders as PyTorch's.
-    PixelShuffle {
-        /// Tensor read.
-        input: String,
-        /// The factor f.
-        factor: u32,
-    }
-
     /// Dropout. The identity unless the run is given a seed; then a value becomes 0 with
     /// probability `p` and is divided by 1 − p otherwise, as in PyTorch's training mode. See
     /// [`super::dropout`] for the random numbers.
@@ -310,10 +301,6 @@ pub enum Op {
     GroupNorm(GroupNorm),
     /// `activation`
     Activation(Activate),
-    /// `pixel_shuffle`
-    PixelShuffle(PixelShuffle),
-    /// `pixel_unshuffle`
-    PixelUnshuffle(PixelShuffle),
     /// `dropout`
     Dropout(Dropout),
 }
@@ -332,7 +319,6 @@ macro_rules! each {
             Op::InstanceNorm($o) => $body,
             Op::GroupNorm($o) => $body,
             Op::Activation($o) => $body,
-            Op::PixelShuffle($o) | Op::PixelUnshuffle($o) => $body,
             Op::Dropout($o) => $body,
         }
     };

@@ -5,7 +5,7 @@ use super::graph::Shape;
 use super::op::{Activation, Op};
 
 /// Every operator, as the file spells it.
-pub const KINDS: [&str; 14] = [
+pub const KINDS: [&str; 12] = [
     "conv2d",
     "conv_transpose2d",
     "upsample_nearest",
@@ -17,10 +17,11 @@ pub const KINDS: [&str; 14] = [
     "instance_norm",
     "group_norm",
     "activation",
-    "pixel_shuffle",
-    "pixel_unshuffle",
     "dropout",
 ];
+
+/// Operators that have left, as files spelt them: no shipped and no published network has one.
+pub const LEFT: [&str; 2] = ["pixel_shuffle", "pixel_unshuffle"];
 
 impl Op {
     /// The operator `kind` from its fields (without `op`); `None` for a kind that is not in
@@ -39,8 +40,6 @@ impl Op {
             "instance_norm" => read(fields).map(Op::InstanceNorm),
             "group_norm" => read(fields).map(Op::GroupNorm),
             "activation" => read(fields).map(Op::Activation),
-            "pixel_shuffle" => read(fields).map(Op::PixelShuffle),
-            "pixel_unshuffle" => read(fields).map(Op::PixelUnshuffle),
             "dropout" => read(fields).map(Op::Dropout),
             _ => return None,
         })
@@ -60,8 +59,6 @@ impl Op {
             Op::InstanceNorm(_) => "instance_norm",
             Op::GroupNorm(_) => "group_norm",
             Op::Activation(_) => "activation",
-            Op::PixelShuffle(_) => "pixel_shuffle",
-            Op::PixelUnshuffle(_) => "pixel_unshuffle",
             Op::Dropout(_) => "dropout",
         }
     }
@@ -79,7 +76,6 @@ impl Op {
             Op::InstanceNorm(o) => vec![&o.input],
             Op::GroupNorm(o) => vec![&o.input],
             Op::Activation(o) => vec![&o.input],
-            Op::PixelShuffle(o) | Op::PixelUnshuffle(o) => vec![&o.input],
             Op::Dropout(o) => vec![&o.input],
         }
     }
@@ -146,12 +142,7 @@ impl Op {
             }
             Op::BatchNorm(_) => 2 * values(output),
             Op::InstanceNorm(_) | Op::GroupNorm(_) => 8 * values(output),
-            Op::UpsampleNearest(_)
-            | Op::Pad(_)
-            | Op::Concat(_)
-            | Op::Dropout(_)
-            | Op::PixelShuffle(_)
-            | Op::PixelUnshuffle(_) => 0,
+            Op::UpsampleNearest(_) | Op::Pad(_) | Op::Concat(_) | Op::Dropout(_) => 0,
         }
     }
 }

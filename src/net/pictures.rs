@@ -65,12 +65,7 @@ pub fn check(weights: &Weights) -> Result<(), PicturesError> {
     match weights.table.name.as_str() {
         "images" if weights.cell == 1 => {}
         "images" => return inputs("they are cells of several pixels, and which pixel stands for a cell is not said"),
-        "screen" => {
-            return inputs(
-                "they are radiance relative to the frame's exposure, metres and normals in the camera's frame, and \
-                 pictures have been through a view transform and know neither metres nor the camera; use `render`",
-            );
-        }
+        "cells" => return inputs("they are what `gather` remembers of cells; use `render`"),
         _ => return inputs("nothing says what they are"),
     }
     let (meaning, channels) = (weights.output.meaning.clone(), weights.output.channels);

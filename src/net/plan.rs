@@ -248,8 +248,6 @@ impl<'a> Builder<'a> {
             Work::Pad(p) => Kind::Window { left: p.left, top: p.top, clamp: false, channel: 0 },
             Work::Copy => Kind::Copy,
             Work::Affine => Kind::Scale { fixed: true },
-            Work::Shuffle(f) => Kind::Shuffle(f),
-            Work::Unshuffle(f) => Kind::Unshuffle(f),
             Work::Concat => return self.concat(node, &inputs, shape),
             Work::Norm { .. } => Kind::Scale { fixed: false },
         };

@@ -62,21 +62,6 @@ pub(super) fn infer(op: &Op, of: impl Fn(&str) -> Shape) -> Result<Shape, GraphE
         Op::GroupNorm(o) => of(&o.input),
         Op::Activation(o) => of(&o.input),
         Op::Dropout(o) => of(&o.input),
-        Op::PixelShuffle(o) => {
-            let Shape { channels, height, width } = of(&o.input);
-            let f = o.factor;
-            Shape { channels: channels / (f * f), height: height * f, width: width * f }
-        }
-        Op::PixelUnshuffle(o) => {
-            let Shape { channels, height, width } = of(&o.input);
-            let f = o.factor;
-            for (what, value) in [("height", height), ("width", width)] {
-                if value % f != 0 {
-                    return Err(GraphError::Divide { op: name.into(), what, value, by: f });
-                }
-            }
-            Shape { channels: channels * f * f, height: height / f, width: width / f }
-        }
     };
     let edge = shape.width.max(shape.height);
     if edge > MAX_EDGE {

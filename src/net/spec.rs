@@ -18,8 +18,11 @@ pub const SCALE_SUFFIX: &str = "_scale";
 /// Largest scale: the largest byte times it is still a finite f32.
 pub const MAX_SCALE: f32 = f32::MAX / 128.0;
 /// Meanings of the output that exist. `plain` is for tests: numbers without a unit.
-pub const MEANINGS: &[&str] =
-    &["log_irradiance_over_exposure", "gain_and_rest_on_guess", "filter", "display_signed", "plain"];
+pub const MEANINGS: &[&str] = &["filter", "display_signed", "plain"];
+/// Meanings, and a table, of networks that correct, which have left.
+pub(super) const LEFT_MEANINGS: &[&str] =
+    &["log_irradiance_over_exposure", "gain_and_rest_on_guess", "gain_and_rest_on_cache"];
+pub(super) const LEFT_TABLE: &str = "screen";
 
 /// One row of a feature table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,21 +50,6 @@ const fn row(name: &'static str, channels: u32, encodings: &'static [&'static st
     FeatureRow { name, channels, encodings }
 }
 
-/// Table `screen`, version 1: one real pixel for each cell of the picture; `gi::features` says what
-/// the encodings are.
-pub const SCREEN_V1: &[FeatureRow] = &[
-    row("direct", 3, &["log1p_over_exposure"]),
-    row("outgoing", 3, &["log1p_over_exposure"]),
-    row("albedo", 3, &["linear"]),
-    row("normal", 3, &["gravity_frame"]),
-    row("position", 3, &["gravity_frame_squashed"]),
-    row("depth", 1, &["log_over_mean"]),
-    row("spread", 1, &["log_ratio"]),
-    row("hit", 1, &["flag"]),
-    row("sky", 3, &["log1p_over_exposure"]),
-    row("guess", 3, &["log1p_over_exposure"]),
-];
-
 /// Table `cells`, version 1: what `gather` remembers of each cell; `gi::neural::memory` says what
 /// the encodings are.
 pub const CELLS_V1: &[FeatureRow] = &[
@@ -88,7 +76,6 @@ pub const IMAGES_V1: &[FeatureRow] =
 
 /// Every feature table.
 pub const TABLES: &[FeatureTable] = &[
-    FeatureTable { name: "screen", features: SCREEN_V1, ordered: true },
     FeatureTable { name: "cells", features: CELLS_V1, ordered: true },
     FeatureTable { name: "images", features: IMAGES_V1, ordered: false },
     FeatureTable { name: "free", features: &[], ordered: false },

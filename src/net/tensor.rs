@@ -10,7 +10,7 @@ pub const MAX_STRIDE: u32 = 4;
 pub const MAX_EDGE: u32 = 16384;
 /// Largest padding of `pad` on one side.
 pub const MAX_PAD: u32 = 64;
-/// Largest factor of resampling and pixel shuffle.
+/// Largest factor of resampling.
 pub const MAX_SCALE: u32 = 8;
 /// Most tensors that one `concat` joins.
 pub const MAX_JOINED: u32 = 16;

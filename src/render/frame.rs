@@ -19,9 +19,7 @@ use super::taa::TaaPass;
 use super::targets::{Target, Targets};
 use super::view::{FrameUniform, View};
 use crate::gi::{
-    self, Outputs,
-    features::FeatureSet,
-    method, pack,
+    self, Outputs, method,
     technique::{self, Technique},
 };
 use crate::gpu::shared::Shared;
@@ -204,23 +202,14 @@ impl Renderer {
         gi_inputs(&self.targets, view, environment, None)
     }
 
-    /// All that a network can be given of the last frame, which `view` drew, read back: the
-    /// G-buffer's features and, where the method has computed it, what `gather` answers. Waits for
-    /// the GPU.
+    /// What the network was given for the last frame, which `view` drew; `None` without a network.
+    /// Waits for the GPU.
     ///
     /// # Errors
-    /// As [`pack::read_features`].
-    pub fn read_features(
-        &self,
-        queue: &wgpu::Queue,
-        view: &View,
-        environment: [f32; 3],
-    ) -> Result<pack::NetworkInputs, gi::GiError> {
-        let own = (self.method == "gather").then_some(&self.targets.indirect.view);
-        let guess = self.indirect.as_ref().and_then(|i| i.guess()).or(own);
-        let set = if guess.is_some() { FeatureSet::all() } else { FeatureSet::screen() };
-        let inputs = self.gi_inputs(view, environment);
-        pack::read_features(&self.device, queue, &set, &inputs, guess.unwrap_or(&self.targets.indirect.view))
+    /// As [`Technique::read_input`].
+    pub fn read_network_input(&mut self, view: &View, environment: [f32; 3]) -> Result<Option<Tap>, gi::GiError> {
+        let Some(indirect) = &mut self.indirect else { return Ok(None) };
+        indirect.read_input(&gi_inputs(&self.targets, view, environment, None))
     }
 
     /// What cells remember after the last frame, where the method gathers.
@@ -237,7 +226,7 @@ impl Renderer {
     /// no such layer. Runs the network again and waits for the GPU.
     ///
     /// # Errors
-    /// As [`NeuralGi::read_layer`](gi::pass::NeuralGi::read_layer).
+    /// As [`Technique::read_layer`].
     pub fn read_layer(&mut self, view: &View, environment: [f32; 3], layer: usize) -> Result<Option<Tap>, gi::GiError> {
         let Some(indirect) = &mut self.indirect else { return Ok(None) };
         indirect.read_layer(&gi_inputs(&self.targets, view, environment, None), layer)

@@ -4,7 +4,7 @@ use crate::gpu::readback;
 use crate::render::RenderError;
 use thiserror::Error;
 
-/// Why a sample could not be made.
+/// Why a lesson could not be made.
 #[derive(Debug, Error)]
 pub enum DatasetError {
     /// The frame could not be drawn.
@@ -19,12 +19,8 @@ pub enum DatasetError {
     /// The GI pass did not give its inputs.
     #[error(transparent)]
     Gi(#[from] crate::gi::GiError),
-    /// The path tracer failed.
-    #[cfg(feature = "reference")]
-    #[error(transparent)]
-    Tracer(#[from] crate::reference::TracerError),
     /// Serialisation failed.
-    #[error("cannot serialise the sample: {0}")]
+    #[error("cannot serialise the lesson: {0}")]
     Serialize(String),
 }
 
@@ -51,9 +47,6 @@ pub enum TrialError {
     /// Nothing could be counted.
     #[error(transparent)]
     Count(#[from] super::count::CountError),
-    /// What a network learns from could not be made.
-    #[error(transparent)]
-    Sample(#[from] DatasetError),
     /// A file could not be written.
     #[error(transparent)]
     Image(#[from] crate::image_io::ImageError),

@@ -23,11 +23,6 @@ pub struct LightError {
     /// What `error` would be of the reference's own noise, were ours perfect; an estimate from its
     /// two halves.
     pub floor: f64,
-    /// Standard deviation that the reference's noise gives the difference of two pictures' errors,
-    /// at most. A block's noise moves its |ours − reference| by no more than itself, so it moves
-    /// the difference by no more than twice that; over N independent blocks: 2 σ / √N, whatever
-    /// share of the noise each of them has.
-    pub doubt: f64,
 }
 
 /// Compares `light` (rgb a pixel, E/π: [`Shot::added`](super::trial::Shot::added), or another
@@ -40,7 +35,7 @@ pub fn light_error(light: &[f32], reference: &Reference) -> Option<LightError> {
     assert_eq!(light.len(), wanted.len(), "the picture has the reference's size");
     let weight = weights(reference)?;
     let (blocks_x, blocks_y) = (width / BLOCK, height / BLOCK);
-    let (mut apart, mut signed, mut all, mut blocks) = (0.0, 0.0, 0.0, 0u32);
+    let (mut apart, mut signed, mut all) = (0.0, 0.0, 0.0);
     for block in 0..blocks_x * blocks_y {
         let (x0, y0) = (block % blocks_x * BLOCK, block / blocks_x * BLOCK);
         let pixels = (0..BLOCK * BLOCK).map(|i| (y0 + i / BLOCK) * width + x0 + i % BLOCK);
@@ -54,7 +49,6 @@ pub fn light_error(light: &[f32], reference: &Reference) -> Option<LightError> {
         }
         // Half a block at least: the rim of an object is no place to judge light at.
         if count > (BLOCK * BLOCK / 2) as f64 {
-            blocks += 1;
             for (ours, theirs) in sums[0].iter().zip(sums[1]).map(|(ours, theirs)| (ours / count, theirs / count)) {
                 apart += (ours - theirs).abs();
                 signed += ours - theirs;
@@ -64,8 +58,8 @@ pub fn light_error(light: &[f32], reference: &Reference) -> Option<LightError> {
     }
     // Of a Gaussian the mean |Δ| is √(2/π) of the root mean square.
     let noise = reference.light_noise() / BLOCK as f64;
-    let (floor, doubt) = (noise * std::f64::consts::FRAC_2_PI.sqrt(), 2.0 * noise / f64::from(blocks).sqrt());
-    (all > 0.0).then(|| LightError { error: apart / all, bias: signed / all, floor, doubt })
+    let floor = noise * std::f64::consts::FRAC_2_PI.sqrt();
+    (all > 0.0).then(|| LightError { error: apart / all, bias: signed / all, floor })
 }
 
 /// Which pixels count.
@@ -150,8 +144,6 @@ mod tests {
         let same = light_error(&[2.0; 192], &truth).unwrap();
         assert_eq!((same.error, same.bias), (0.0, 0.0));
         assert!((same.floor - 0.01 * 0.797_88).abs() < 1e-6);
-        // Four blocks of 1 % each.
-        assert!((same.doubt - 0.01).abs() < 1e-9, "{}", same.doubt);
         let dark = light_error(&[1.0; 192], &truth).unwrap();
         assert!((dark.error - 0.5).abs() < 1e-9 && (dark.bias + 0.5).abs() < 1e-9);
         // Noise that differs from pixel to pixel is gone in blocks, a wrong block is not.

@@ -7,11 +7,9 @@ mod changes;
 pub mod chart;
 #[cfg(feature = "reference")]
 pub mod count;
-pub mod dataset;
 mod error;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod fit;
-pub mod guides;
 #[cfg(feature = "reference")]
 pub mod hardware;
 #[cfg(feature = "io")]
@@ -21,14 +19,10 @@ pub mod judge;
 pub mod layers;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod moments;
-#[cfg(feature = "io")]
-pub mod motion;
 pub mod projection;
 pub mod rays;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod stability;
-#[cfg(feature = "reference")]
-pub mod target;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod trial;
 #[cfg(all(feature = "io", feature = "reference"))]

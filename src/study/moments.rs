@@ -6,7 +6,8 @@
 //! else, so what `gather` is wrong about in the mean must not be learnt from the scenes that happen
 //! to be shown; and a ray that ends in the cache has a tenth of the noise of a path.
 
-use super::{changes::Change, error::DatasetError};
+use super::changes::Change;
+pub use super::error::DatasetError;
 use crate::{
     accel::luminance,
     gi::{

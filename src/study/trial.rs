@@ -1,7 +1,6 @@
 //! One scene, any method: pictures with their layers in linear light, sequences that keep their
 //! history, what it costs, and the path-traced picture beside it. The one place where studies draw.
 
-mod samples;
 mod shot;
 
 pub use super::error::TrialError;

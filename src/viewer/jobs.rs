@@ -5,7 +5,7 @@ use super::choice::Source;
 use super::command;
 use super::state::State;
 use crate::accel::{AccelError, SceneRays};
-use crate::gi::{Method, ambient::Unseen, fitted::Fitted, gather, pass::Neural};
+use crate::gi::{Method, Neural, ambient::Unseen, fitted::Fitted, gather};
 use crate::image_io;
 use crate::net::{format::Weights, gpu::Tuned, plan::Precision};
 use crate::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};

@@ -33,9 +33,8 @@ impl Random {
 /// What replaces a number, a text, a list: the borders of every type, and what sound files hold.
 fn palette(random: &mut Random) -> Value {
     let numbers = [0, 1, 2, 3, 4, 5, 7, 8, 16, 17, 64, 255, 4096, 4097, 16_384, u64::from(u32::MAX), 1 << 32, u64::MAX];
-    let words = [
-        "", "input", "y", "a", "conv2d", "concat", "relu", "F32", "I8", "screen", "free", "images", "\u{0}", "ä𝄞", "x",
-    ];
+    let words =
+        ["", "input", "y", "a", "conv2d", "concat", "relu", "F32", "I8", "cells", "free", "images", "\u{0}", "ä𝄞", "x"];
     match random.below(12) {
         0..=4 => json!(*random.pick(&numbers)),
         5 => json!(*random.pick(&[-1.0, 0.5, 1e-300, 1e38, 1e39, 1e300, f64::MIN_POSITIVE])),

@@ -2,12 +2,15 @@
 //! chance makes of a cell.
 
 use crate::common;
-use crate::weights::{constant_filter, linear_bytes, random_filter};
+use crate::linear::linear_bytes;
+use crate::weights::{constant_filter, random_filter};
 use crate::world::{BACKWARDS, difference, gather, hall, light, mean, renderer, sun};
-use bouncelight::gi::{GiError, Method};
+use bouncelight::gi::{GiError, Method, Neural};
 use bouncelight::gpu::Gpu;
-use bouncelight::net::format::{CELLS_V1, FeatureRow, SCREEN_V1, Weights};
-use bouncelight::render::{RenderError, Renderer, RendererOptions};
+use bouncelight::net::format::{CELLS_V1, FeatureRow, IMAGES_V1, Weights};
+use bouncelight::net::gpu::Tap;
+use bouncelight::net::{cpu, plan::Precision};
+use bouncelight::render::{RenderError, Renderer, RendererOptions, View};
 use bouncelight::scene::Scene;
 
 const SIZE: [u32; 2] = [96, 64];
@@ -72,17 +75,65 @@ fn weights_of_something_else_are_refused_by_name() {
             Ok(_) => String::new(),
         }
     };
-    let of = |table: &str, rows: &[FeatureRow], outputs: usize| {
+    let of = |table: &str, rows: &[FeatureRow], meaning: &str, outputs: usize| {
         let channels: u32 = rows.iter().map(|r| r.channels).sum();
-        linear_bytes(table, rows, "filter", &vec![0.0; outputs * channels as usize], &vec![0.0; outputs])
+        linear_bytes(table, rows, meaning, &vec![0.0; outputs * channels as usize], &vec![0.0; outputs])
     };
-    assert_eq!(refusal(of("cells", CELLS_V1, 12)), "");
+    assert_eq!(refusal(of("cells", CELLS_V1, "filter", 12)), "");
     for (bytes, named) in [
-        (of("screen", SCREEN_V1, 12), "screen"),
-        (of("cells", &CELLS_V1[..9], 12), "the whole table"),
-        (of("cells", CELLS_V1, 8), "8 channels"),
+        (of("images", IMAGES_V1, "filter", 12), "images"),
+        (of("cells", &CELLS_V1[..9], "filter", 12), "the whole table"),
+        (of("cells", CELLS_V1, "filter", 8), "8 channels"),
+        (of("cells", CELLS_V1, "plain", 12), "`plain`"),
     ] {
         let error = refusal(bytes);
         assert!(error.contains(named), "{named}: {error}");
     }
+}
+
+/// What the shipped network is given and makes of it, read back after frames in which its layers
+/// overwrote each other.
+#[test]
+fn the_network_is_seen_at_work() {
+    let Some(gpu) = common::gpu() else { return };
+    let weights = Weights::shipped().expect("they are read");
+    // Of 32 bits, as the CPU reference.
+    let neural = Neural::from(weights.clone()).stored(Some(Precision::F32));
+    let mut drawn = renderer(&gpu, SIZE, Method::Neural(Box::new(neural)));
+    let scene = room(1.0);
+    light(&gpu, &mut drawn, &scene);
+    let (view, sky) = (View::new(&scene.cameras[0], SIZE, [0.0; 2]), scene.environment.radiance);
+    let given = drawn.read_network_input(&view, sky).expect("it is read").expect("there is a network");
+    assert_eq!([given.shape.channels, given.shape.width, given.shape.height], [15, 24, 16]);
+    let hits = &given.values[11 * 384..12 * 384];
+    assert!(hits.iter().all(|x| *x == 0.0 || *x == 1.0) && hits.contains(&1.0), "channel 11 is `hit`");
+    let input = cpu::Tensor { shape: given.shape, data: given.values.clone() };
+    let answer = cpu::run(&weights, &input).expect("it runs").data;
+    let last = drawn.layers().len() - 1;
+    let mut layer = |i| drawn.read_layer(&view, sky, i).expect("it is read").expect("there is one");
+    let off = |tap: &Tap| tap.values.iter().zip(&answer).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    let largest = answer.iter().fold(0.0f32, |most, x| most.max(x.abs()));
+    let (first, again) = (layer(last), layer(last));
+    assert!(off(&first) < 1e-3 * largest && largest > 0.1, "{} of {largest}", off(&first));
+    assert_eq!(first, again, "reading changes nothing");
+    // Negative control: an answer to other features is another one.
+    let other = cpu::Tensor { data: input.data.iter().map(|x| 0.9 * x).collect(), ..input };
+    let other = cpu::run(&weights, &other).expect("it runs").data;
+    assert!(other.iter().zip(&answer).any(|(a, b)| (a - b).abs() > 1e-3 * largest));
+    // A method without a network has nothing to show.
+    let mut plain = renderer(&gpu, SIZE, gather());
+    light(&gpu, &mut plain, &scene);
+    assert_eq!(plain.read_network_input(&view, sky).expect("no error"), None);
+}
+
+#[test]
+fn numbers_are_stored_as_asked() {
+    let Some(gpu) = common::gpu() else { return };
+    let of = |precision| {
+        let neural = Neural::from(random_filter(2.0)).stored(Some(precision));
+        light(&gpu, &mut renderer(&gpu, SIZE, Method::Neural(Box::new(neural))), &room(1.0))
+    };
+    let (half, full) = (of(Precision::F16), of(Precision::F32));
+    let off = difference(&half, &full);
+    assert!(half != full && off < 0.01, "16 bits differ, but little: {off}");
 }

@@ -10,9 +10,6 @@ mod bumps;
 mod common;
 mod contract;
 mod conventions;
-mod corrected;
-#[cfg(feature = "io")]
-mod dataset;
 mod edges;
 #[cfg(feature = "io")]
 mod embed;
@@ -27,6 +24,8 @@ mod glow;
 mod gradient;
 mod in_flight;
 mod lamps;
+#[path = "../common/linear.rs"]
+mod linear;
 mod mirror;
 mod noise;
 #[cfg(feature = "io")]
@@ -41,7 +40,6 @@ mod surroundings;
 mod taa;
 mod warm_up;
 mod weights;
-mod whole;
 mod world;
 
 use bouncelight::gpu::Gpu;

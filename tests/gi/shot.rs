@@ -2,7 +2,7 @@
 //! upload.
 
 use bouncelight::gi::cpu::{GBuffer, Picture, oct_encode};
-use bouncelight::gi::inputs::{Params, cells_of};
+use bouncelight::gi::inputs::Params;
 use bouncelight::gi::{CameraMatrices, Inputs};
 use glam::{Mat4, Vec3};
 use half::f16;
@@ -73,7 +73,6 @@ impl Shot {
             albedo: vec![[0.0; 4]; n],
             emissive: vec![[0.0; 3]; n],
             direct: vec![[0.0; 3]; n],
-            guess: vec![[0.0; 3]; n],
         };
         Self { size, camera: camera(size, Vec3::ZERO, Vec3::NEG_Z, [0.0; 2]), environment: [0.0; 3], buffers }
     }
@@ -96,7 +95,6 @@ impl Shot {
             let n = Vec3::new(r.unit() - 0.5, r.unit() - 0.5, r.unit() - 0.5).normalize_or(Vec3::Y);
             shot.buffers.normal[i] = oct_encode(n.to_array()).map(half);
             shot.buffers.direct[i] = [r.unit(), r.unit(), 0.1 * r.unit()].map(half);
-            shot.buffers.guess[i] = [0.5 * r.unit(), 0.2 * r.unit(), r.unit()].map(half);
             shot.buffers.emissive[i] = if r.unit() > 0.9 { [2.0, r.unit(), 0.5].map(half) } else { [0.0; 3] };
             let rgb = [r.unit(), r.unit(), r.unit()];
             shot.set_albedo(i, rgb, r.unit());
@@ -142,14 +140,10 @@ impl Shot {
         Picture::new(&self.buffers, self.params())
     }
 
-    pub fn cells(&self) -> [u32; 2] {
-        cells_of(self.size)
-    }
-
     /// All light times `k` (a power of two keeps half floats exact).
     pub fn scaled(&self, k: f32) -> Self {
         let mut shot = self.clone();
-        let light = shot.buffers.direct.iter_mut().chain(&mut shot.buffers.emissive).chain(&mut shot.buffers.guess);
+        let light = shot.buffers.direct.iter_mut().chain(&mut shot.buffers.emissive);
         light.for_each(|c| *c = c.map(|x| x * k));
         shot.environment = shot.environment.map(|x| x * k);
         shot
@@ -180,7 +174,6 @@ impl Shot {
             albedo: view(&make(F::Rgba8Unorm, &albedo)),
             emissive: view(&make(F::Rgba16Float, bytemuck::cast_slice(&wide(&b.emissive)))),
             direct: view(&make(F::Rgba16Float, bytemuck::cast_slice(&wide(&b.direct)))),
-            guess: view(&make(F::Rgba16Float, bytemuck::cast_slice(&wide(&b.guess)))),
         }
     }
 }
@@ -192,8 +185,6 @@ pub struct Textures {
     albedo: wgpu::TextureView,
     emissive: wgpu::TextureView,
     direct: wgpu::TextureView,
-    /// What method `gather` would answer.
-    pub guess: wgpu::TextureView,
 }
 
 impl Textures {

@@ -168,13 +168,13 @@ fn what_cannot_be_applied() {
     encoder.write_header().unwrap().write_image_data(&[100; 1200]).unwrap();
     check("--depth", &path("deep.png"), 2, &["deep.png", "16 bits"]);
     check("-o", &path("out.exr"), 2, &["out.exr", ".png"]);
-    let screen = root("weights-format/fixtures/unet.safetensors");
-    check("--weights", screen.to_str().unwrap(), 4, &["albedo", "screen", "four pictures", "exposure"]);
+    let filter = root("assets/weights/filter.safetensors");
+    check("--weights", filter.to_str().unwrap(), 4, &["light", "cells", "four pictures"]);
     let free = root("weights-format/fixtures/add.safetensors");
     check("--weights", free.to_str().unwrap(), 4, &["free", "nothing says what they are"]);
     if common::gpu().is_some() {
         let (net, out) = (path("net.safetensors"), path("out.png"));
-        fails(&["render", "interior", "--size", "16x8", "--weights", &net, "-o", &out], 4, &["images", "screen"]);
+        fails(&["render", "interior", "--size", "16x8", "--weights", &net, "-o", &out], 4, &["images", "cells"]);
     }
     // A faulty state is refused as a whole.
     let mut faulty = state("pix2pix", "batch", 1);

@@ -160,7 +160,7 @@ fn widths_that_cannot_be() {
     let only: State = [("down1.model.0.weight".to_string(), ("F32", vec![1 << 40, 0, 4, 4], vec![]))].into();
     assert!(faults(&only, Arch::Pix2pix, Norm::Group).iter().any(|f| f.contains("channels")));
     let weights =
-        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/weights/small.safetensors")).unwrap();
+        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/weights/filter.safetensors")).unwrap();
     let recipe = Recipe {
         arch: Arch::Pix2pix,
         norm: Norm::Group,

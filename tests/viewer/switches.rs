@@ -2,17 +2,21 @@
 
 use super::common;
 use super::display::Display;
+use super::linear::linear_bytes;
 use super::session::{mean, printed, session, session_with, succeeds};
+use bouncelight::net::format::CELLS_V1;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
 fn shipped() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/weights/small.safetensors")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/weights/filter.safetensors")
 }
 
-/// A network that answers light itself, from the G-buffer alone.
-fn other() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("weights-format/fixtures/unet.safetensors")
+/// A network of one layer, which answers zeros.
+fn other(folder: &Path) -> PathBuf {
+    let path = folder.join("one_layer.safetensors");
+    std::fs::write(&path, linear_bytes("cells", CELLS_V1, "filter", &[0.0; 12 * 15], &[0.0; 12])).unwrap();
+    path
 }
 
 /// A sky of one colour as Radiance .hdr without run lengths: 8×4 pixels of (mantissa, exponent).
@@ -51,15 +55,15 @@ fn methods_weights_and_views_switch_at_run_time() {
             "/messages": { "contains": "bad.safetensors" } } },
         { "key": "Escape" }, { "wait": 2 },
         { "drop": shipped() }, { "wait": "idle" },
-        { "expect": { "/left": "neural", "/drawn/left": "neural", "/weights": { "contains": "small" }, "/errors": 0 } },
+        { "expect": { "/left": "neural", "/drawn/left": "neural", "/weights": { "contains": "filter" }, "/errors": 0 } },
         { "save": { "passes": "/passes" } },
-        // What goes in, what `gather` makes of it, and what layers make of that.
-        { "key": "0" }, { "wait": "idle" }, { "expect": { "/feature": { "contains": "of 24" } } },
+        // What goes in, and what layers make of it.
+        { "key": "0" }, { "wait": "idle" }, { "expect": { "/feature": { "contains": "`light` (1 of 15)" } } },
         { "key": "L" }, { "wait": "idle" }, { "expect": { "/view": "layer",
             "/feature": { "contains": "layer 1 of" } } },
         { "key": "L" }, { "wait": "idle" }, { "expect": { "/feature": { "contains": "layer 2 of" } } },
         { "screenshot": "layer.png" }, { "key": "1" },
-        { "drop": other() }, { "wait": "idle" }, { "expect": { "/weights": { "contains": "unet" } } },
+        { "drop": other(dir.path()) }, { "wait": "idle" }, { "expect": { "/weights": { "contains": "one_layer" } } },
         { "expect_not_saved": { "passes": "/passes" } }
     ]);
     let out = session(&display, dir.path(), script, &["cornell", "--method", "ambient", "--size", "640x620"]);
@@ -121,7 +125,7 @@ fn watched_files_are_loaded_again_and_broken_ones_told() {
     std::fs::write(at("two.obj"), quad(0.0) + "o more\n" + &quad(-1.0).replace("1 2 3", "4 5 6")).unwrap();
     std::fs::write(at("bad.obj"), "v 0 0 0\nf 1 2 99\n").unwrap();
     std::fs::copy(shipped(), at("net.safetensors")).unwrap();
-    std::fs::copy(other(), at("other.safetensors")).unwrap();
+    std::fs::rename(other(dir.path()), at("other.safetensors")).unwrap();
     std::fs::write(at("junk"), "junk").unwrap();
     let gi = at("shaders").join("gi");
     std::fs::create_dir_all(&gi).unwrap();

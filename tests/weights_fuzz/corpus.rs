@@ -57,13 +57,13 @@ fn tensor(name: &str, dtype: &str, shape: &[u64]) -> Tensor {
     (name.into(), dtype.into(), shape.into(), each.repeat(values as usize))
 }
 
-/// Two small networks: one of plain convolutions on the screen's features, one with every operator
+/// Two small networks: one of plain convolutions on what cells remember, one with every operator
 /// and number type.
 pub fn weights() -> Vec<File> {
     let small = json!({
-        "version": 1, "licence": "CC0-1.0", "table": {"name": "screen", "version": 1}, "cell": 4,
-        "inputs": [{"name": "direct", "channels": 3}, {"name": "hit", "channels": 1}],
-        "output": {"tensor": "y", "meaning": "log_irradiance_over_exposure", "channels": 3},
+        "version": 1, "licence": "CC0-1.0", "table": {"name": "cells", "version": 1}, "cell": 4,
+        "inputs": [{"name": "normal", "channels": 3}, {"name": "hit", "channels": 1}],
+        "output": {"tensor": "y", "meaning": "plain", "channels": 3},
         "graph": [
             {"op": "conv2d", "name": "a", "input": "input", "output": "h", "in_channels": 4, "out_channels": 4,
              "kernel": [3, 3], "stride": 1, "padding": 1, "activation": "relu", "add": "input",
@@ -101,9 +101,7 @@ fn every_operator() -> File {
             {"op": "concat", "name": "cat", "inputs": ["u", "g"], "output": "c"},
             {"op": "batch_norm", "name": "n", "input": "c", "output": "n", "channels": 16, "activation": "sigmoid"},
             {"op": "instance_norm", "name": "i", "input": "n", "output": "i", "channels": 16},
-            {"op": "pixel_unshuffle", "name": "pu", "input": "i", "output": "pu", "factor": 2},
-            {"op": "pixel_shuffle", "name": "ps", "input": "pu", "output": "ps", "factor": 2},
-            {"op": "pad", "name": "p", "input": "ps", "output": "p", "padding": [1, 1, 0, 0]},
+            {"op": "pad", "name": "p", "input": "i", "output": "p", "padding": [1, 1, 0, 0]},
             {"op": "upsample_nearest", "name": "un", "input": "p", "output": "un", "scale": 2},
             {"op": "upsample_bilinear", "name": "ub", "input": "un", "output": "ub", "size_as": "input"},
             {"op": "conv2d", "name": "o", "input": "ub", "output": "o", "in_channels": 16, "out_channels": 6,

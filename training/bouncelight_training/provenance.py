@@ -1,22 +1,9 @@
-"""What a run writes down about itself: its command, its machine, the commit."""
-import dataclasses
+"""What a run writes down about itself: its machine, the commit."""
 import os
 import platform
 import subprocess
 
 import torch
-
-
-def command_of(config, folder, processes=1):
-    """The command that makes this run; of paths the last part only."""
-    start = "python" if processes == 1 else f"torchrun --standalone --nproc_per_node={processes}"
-    words = [f"{start} -m bouncelight_training.train", "--run" if processes == 1 else "--folder", os.path.basename(os.path.normpath(folder))]
-    for field in dataclasses.fields(config):
-        value = getattr(config, field.name)
-        if value != field.default:
-            text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
-            words += ["--" + field.name.replace("_", "-"), os.path.basename(text)]
-    return " ".join(words)
 
 
 def machine_of(device):

@@ -108,15 +108,15 @@ class WithTheProgram(unittest.TestCase):
 
 class Alone(unittest.TestCase):
     def test_what_cannot_be_begun_with_is_named(self):
-        corrects = os.path.join(os.path.dirname(scene.SHIPPED), "small.safetensors")
+        other = os.path.join(os.path.dirname(scene.SHIPPED), "..", "..", "weights-format", "fixtures", "add.safetensors")
         self.assertEqual(scene.shape_of(scene.SHIPPED), ((16, 24, 32, 48, 64), 1))
         model = train.network(train.Config(widths=(4, 8)))
         with self.assertRaisesRegex(TrainingError, "not one that filters"):
-            scene.shape_of(corrects)
+            scene.shape_of(other)
         with self.assertRaisesRegex(TrainingError, "cannot begin with it"):
             scene.shape_of("none.safetensors")
         with self.assertRaisesRegex(TrainingError, "does not filter"):
-            train.begin_with(model, corrects)
+            train.begin_with(model, other)
         with self.assertRaisesRegex(TrainingError, "cannot begin with it"):
             train.begin_with(model, scene.SHIPPED)
 

@@ -115,7 +115,7 @@ struct Sum {
     gloss: vec4f,
 }
 
-// NORMAL_POWER of `gi::stage::weights`.
+// Of the cosine between normals: 10° keeps 78 %, 30° keeps 10 %, 60° nothing.
 fn sixteenth_power(x: f32) -> f32 {
     let x2 = x * x;
     let x4 = x2 * x2;

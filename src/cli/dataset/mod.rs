@@ -1,9 +1,6 @@
-//! `bouncelight dataset`: network inputs of views around the paper's rooms, through rooms of their
-//! kind or through a scene, one safetensors file a view (training/README.md has the format).
-//!
-//! The light to be learnt is path-traced here (`--spp`), or rendered by Cycles under the same file
-//! stems: `training/cycles/paper_rooms.py` draws the same rooms from the same stream,
-//! `training/cycles/scene_file.py` reads the `views.json` written here.
+//! `bouncelight dataset`: what a network that filters learns from, in views around the paper's rooms,
+//! through rooms of their kind, homes or a scene, one safetensors file a view (training/README.md has
+//! the format). `training/cycles/scene_file.py` reads the `views.json` written here.
 
 mod writer;
 
@@ -15,11 +12,10 @@ use super::{
     stdout::say,
 };
 use crate::{
-    gi::{features::FeatureSet, inputs::cells_of},
+    gi::inputs::cells_of,
     image_io::write_whole,
     scene::{self, Camera, LightKind, Scene, home, paper_room},
     study::{
-        guides::Guides,
         moments::{self, When},
         varied,
         views::{around, turned},
@@ -56,44 +52,29 @@ pub struct Args {
     /// Seed of the views of recipe scene.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Width and height of the rasterised picture; the inputs have a quarter of it.
+    /// Width and height of the rasterised picture; lessons have a quarter of it.
     #[arg(long, default_value = "1024x512", value_parser = super::args::parse_size, value_name = "WxH")]
     size: [u32; 2],
-    /// Path-trace the light to be learnt with so many samples for each cell (with --moments: gather
-    /// it with so many rays); 0 leaves it out, for targets from Cycles.
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=65_536), value_name = "N")]
+    /// Rays a cell of the light to be learnt, which are of another seed.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=65_536), value_name = "N")]
     spp: u32,
-    /// Frames of a still camera that method `gather`, the first guess, settles over before it is
-    /// read: 1 is the first after a cut.
-    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=65_536), value_name = "N")]
-    gi_frames: u32,
     /// Only every n-th room (or view of a scene), beginning with the i-th: 0/4, 1/4 … for four
     /// machines that share the work.
     #[arg(long, default_value = "0/1", value_parser = parse_shard, value_name = "I/N")]
     shard: [u32; 2],
-    /// Folder for the samples; those that exist are kept, so a stopped run goes on where it was.
+    /// Folder for the lessons; those that exist are kept, so a stopped run goes on where it was.
     #[arg(long)]
     out: PathBuf,
-    /// What a network that filters learns from, instead: moments at which what cells remember is
-    /// kept, in order: frames after a cut, `pan` (at the end of six frames of a moving camera, which
-    /// count), `lamp` or `thing` (eight frames with a lamp or a thing elsewhere and six in which it
-    /// comes to its place; left out where a view has none), such as 1,2,8,pan,20,lamp,thing. The
-    /// light to be learnt is the mean of --spp rays of another seed.
-    #[arg(long, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST",
-        conflicts_with_all = ["motion", "guides"])]
+    /// Moments at which what cells remember is kept, in order: frames after a cut, `pan` (at the end
+    /// of six frames of a moving camera, which count), `lamp` or `thing` (eight frames with a lamp or
+    /// a thing elsewhere and six in which it comes to its place; left out where a view has none),
+    /// such as 1,2,8,pan,20,lamp,thing.
+    #[arg(long, required = true, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST")]
     moments: Vec<When>,
-    /// Weights of a network that filters, whose light is kept beside what cells remember
-    /// (with --moments): what it makes of them in the program.
-    #[arg(long, requires = "moments", value_name = "FILE")]
+    /// Weights of a network that filters, whose light is kept beside what cells remember: what it
+    /// makes of them in the program.
+    #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// Also draw a second frame of each view from a camera that has moved a little, for training's
-    /// temporal term.
-    #[arg(long)]
-    motion: bool,
-    /// Also keep the picture at full resolution: guides for the way back from cells to pixels, and
-    /// what puts the picture together again (32 bytes a pixel).
-    #[arg(long)]
-    guides: bool,
     /// Also write each room as a `.glb` with a `_views.json` beside it, for targets from Cycles
     /// (recipes paper-room and paper-room-varied; recipe scene always writes the views, and the
     /// scene is there).
@@ -165,9 +146,6 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make the folder {}", args.out.display()))?;
     interrupt::install()?;
     let gpu = global.open_gpu()?;
-    if !args.moments.is_empty() && args.spp == 0 {
-        return Err(usage("--moments need the light to be learnt: --spp N".into()));
-    }
     if moments::ages(&args.moments).is_none() {
         return Err(usage(
             "--moments are frames of one run, each later than the one before; a pan takes six, a change fourteen"
@@ -186,19 +164,13 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 }
 
 /// Says before the work begins what it will take up.
-fn announce(global: &Global, args: &Args, samples: usize) {
+fn announce(global: &Global, args: &Args, lessons: usize) {
     let [w, h] = cells_of(args.size).map(u64::from);
-    // Features, direct light, albedo, normal, depth, and the light to be learnt; about 1 KB of
-    // header.
-    let features = u64::from(FeatureSet::all().channels());
-    let mut planes = features + 10 + if args.spp > 0 { 3 } else { 0 } + if args.motion { features + 2 } else { 0 };
-    if !args.moments.is_empty() {
-        planes = 7 + args.moments.len() as u64 * moments::PLANES;
-    }
-    let guides = if args.guides { Guides::bytes(args.size) } else { 0 };
-    let bytes = samples as u64 * (w * h * planes * 4 + guides + 1024);
+    // The light to be learnt, its place, and each moment; about 1 KB of header.
+    let planes = 7 + args.moments.len() as u64 * moments::PLANES;
+    let bytes = lessons as u64 * (w * h * planes * 4 + 1024);
     if !global.quiet {
-        eprintln!("{samples} samples, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
+        eprintln!("{lessons} lessons, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
     }
 }
 
@@ -272,13 +244,12 @@ fn one_scene(global: &Global, writer: &mut Writer, spec: &str, args: &Args) -> R
             break;
         }
         // Which views are fit is found out by drawing them, the same ones by every shard.
-        let sample = writer.sample(&uploaded.raster, &camera)?;
-        if sample.closer_than(TOO_CLOSE * scene_size(&scene)) > 0.1 {
+        if writer.closer_than(&uploaded.raster, &camera, TOO_CLOSE * scene_size(&scene))? > 0.1 {
             continue;
         }
         let name = format!("{stem}_view{view}");
         if view % of == shard && !writer.has(&name)? {
-            writer.write_drawn(&name, &mut uploaded, &camera, view, sample)?;
+            writer.write(&name, &mut uploaded, &camera, view)?;
         }
         cameras.push(camera);
         progress.step();

@@ -1,72 +1,46 @@
-//! Draws samples and writes them, each whole or not at all, beside the list of their checksums.
+//! Draws lessons and writes them, each whole or not at all, beside the list of their checksums.
 
 use super::{
     super::{args::load_weights, interrupt},
     Args,
 };
 use crate::{
-    gi::{Method, gather},
-    gpu::Gpu,
-    image_io::write_whole,
-    reference::{Kernel, ReferenceScene},
-    render::{Blending, Renderer, RendererOptions},
-    scene::{Camera, Scene, upload::SceneGpu},
-    study::{
-        dataset::{Next, Sample, frame, sample},
-        guides::Guides,
-        moments::{self, When},
-        motion, target,
+    gi::{
+        Method, gather,
+        inputs::{cells_of, sample_pixel},
     },
+    gpu::{Gpu, readback, timing::Recorder},
+    image_io::write_whole,
+    render::{Blending, Renderer, RendererOptions, View},
+    scene::{Camera, Scene, upload::SceneGpu},
+    study::moments::{self, When},
 };
 use anyhow::{Context, Result};
 use sha2::{Digest, Sha256};
 use std::{collections::HashSet, io::Write, path::PathBuf};
 
-/// File with the SHA-256 of every sample, as `sha256sum -c` reads it.
+/// File with the SHA-256 of every lesson, as `sha256sum -c` reads it.
 const LIST: &str = "SHA256SUMS";
 
-/// Draws samples and writes them; a file that exists is kept.
+/// Draws lessons and writes them; a file that exists is kept.
 pub(super) struct Writer {
     gpu: Gpu,
     renderer: Renderer,
-    /// The path tracer, if it makes the targets.
-    kernel: Option<Kernel>,
     spp: u32,
-    motion: bool,
-    guides: bool,
-    gi_frames: u32,
-    /// What cells remember is written instead.
-    lessons: Option<Lessons>,
-    pub(super) out: PathBuf,
-    /// Names in the list of checksums.
-    listed: HashSet<String>,
-}
-
-/// What lessons of a filter are made with.
-pub(super) struct Lessons {
     /// In the order in which they come.
     moments: Vec<When>,
     reader: moments::Reader,
     /// Gathers the light that is to be learnt.
     teacher: Renderer,
+    pub(super) out: PathBuf,
+    /// Names in the list of checksums.
+    listed: HashSet<String>,
 }
 
-impl Lessons {
-    fn new(gpu: &Gpu, args: &Args) -> Result<Self> {
-        // Of its own seed: the noise of what is to be learnt must not be that of what it is learnt
-        // from, or a cell's own few rays would seem to know more than its neighbours'.
-        let method = Method::Gather(gather::Options { seed: 1, ..gather::Options::PLAIN });
-        let options = RendererOptions { method, blending: Blending::Stochastic, ..Default::default() };
-        let teacher = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
-        Ok(Self { moments: args.moments.clone(), reader: moments::Reader::new(&gpu.device), teacher })
-    }
-}
-
-/// A scene as both renderers want it.
+/// A scene and what the device has of it.
 pub(super) struct Uploaded<'a> {
     scene: &'a Scene,
     pub(super) raster: SceneGpu,
-    traced: Option<ReferenceScene>,
 }
 
 impl Writer {
@@ -76,16 +50,16 @@ impl Writer {
             Some(path) => Method::Neural(Box::new(load_weights(Some(path))?.into())),
             None => Method::Gather(gather::Options::default()),
         };
-        let options = RendererOptions { method, blending: Blending::Stochastic, ..Default::default() };
-        let renderer = Renderer::new(&gpu.device, &gpu.queue, args.size, options)?;
-        let lessons = match args.moments.is_empty() {
-            true => None,
-            false => Some(Lessons::new(&gpu, args)?),
+        // Of its own seed: the noise of what is to be learnt must not be that of what it is learnt
+        // from, or a cell's own few rays would seem to know more than its neighbours'.
+        let plain = Method::Gather(gather::Options { seed: 1, ..gather::Options::PLAIN });
+        let of = |method| {
+            let options = RendererOptions { method, blending: Blending::Stochastic, ..Default::default() };
+            Renderer::new(&gpu.device, &gpu.queue, args.size, options)
         };
-        let kernel = (args.spp > 0 && lessons.is_none()).then(|| Kernel::new(&gpu.device));
-        let Args { spp, motion, guides, gi_frames, .. } = *args;
-        let (out, listed) = (args.out.clone(), HashSet::new());
-        let mut writer = Self { gpu, renderer, kernel, spp, motion, guides, gi_frames, lessons, out, listed };
+        let (renderer, teacher, reader) = (of(method)?, of(plain)?, moments::Reader::new(&gpu.device));
+        let (spp, moments, out, listed) = (args.spp, args.moments.clone(), args.out.clone(), HashSet::new());
+        let mut writer = Self { gpu, renderer, spp, moments, reader, teacher, out, listed };
         writer.open_list()?;
         Ok(writer)
     }
@@ -93,8 +67,7 @@ impl Writer {
     pub(super) fn upload<'a>(&self, scene: &'a Scene) -> Result<Uploaded<'a>> {
         let mut raster = SceneGpu::new(&self.gpu.device, &self.gpu.queue, scene)?;
         raster.trace(&self.gpu.device, &self.gpu.queue, scene)?;
-        let trace = |_| ReferenceScene::new(&self.gpu.device, &self.gpu.queue, scene);
-        Ok(Uploaded { scene, raster, traced: self.kernel.as_ref().map(trace).transpose()? })
+        Ok(Uploaded { scene, raster })
     }
 
     /// Width and height of the pictures.
@@ -106,65 +79,11 @@ impl Writer {
         self.out.join(format!("{stem}.safetensors"))
     }
 
-    /// Draws, traces and writes the sample `stem`; `seed` is the path tracer's.
+    /// Draws and writes the lesson `stem`; `seed` decides the pan and what changes.
     pub(super) fn write(&mut self, stem: &str, scene: &mut Uploaded<'_>, camera: &Camera, seed: u32) -> Result<()> {
-        if self.lessons.is_some() {
-            return self.write_lesson(stem, scene, camera, seed);
-        }
-        let sample = self.sample(&scene.raster, camera)?;
-        self.complete(stem, scene, camera, seed, sample)
-    }
-
-    /// As [`write`](Self::write) for a view whose sample was drawn last.
-    pub(super) fn write_drawn(
-        &mut self,
-        stem: &str,
-        scene: &mut Uploaded<'_>,
-        camera: &Camera,
-        seed: u32,
-        sample: Sample,
-    ) -> Result<()> {
-        match self.lessons {
-            Some(_) => self.write_lesson(stem, scene, camera, seed),
-            None => self.complete(stem, scene, camera, seed, sample),
-        }
-    }
-
-    /// Completes the sample that was drawn last, by what else of it is wanted, and writes it.
-    fn complete(
-        &mut self,
-        stem: &str,
-        scene: &Uploaded<'_>,
-        camera: &Camera,
-        seed: u32,
-        mut sample: Sample,
-    ) -> Result<()> {
-        if self.guides {
-            sample.guides = Some(Guides::read(&self.gpu, self.renderer.targets(), camera.near)?);
-        }
-        if self.motion {
-            let size = self.renderer.size();
-            let moved = motion::stepped(camera, size, motion::median_distance(&sample), u64::from(seed));
-            // The guess goes on, as it does when a camera moves.
-            interrupt::check()?;
-            let next = frame(&self.gpu, &mut self.renderer, &scene.raster, &moved, 1)?;
-            let flow = motion::flow((&sample, camera), (&next, &moved), size);
-            sample.next = Some(Next { inputs: next.inputs, flow });
-        }
-        if let (Some(kernel), Some(traced)) = (&self.kernel, &scene.traced) {
-            let options = target::options(self.spp, seed);
-            let go_on = || !interrupt::requested();
-            sample.target = target::target(&self.gpu, kernel, traced, camera, self.renderer.size(), options, go_on)?;
-            interrupt::check()?;
-        }
-        self.save(stem, sample.to_bytes()?)
-    }
-
-    fn write_lesson(&mut self, stem: &str, scene: &mut Uploaded<'_>, camera: &Camera, seed: u32) -> Result<()> {
-        let Some(Lessons { moments, reader, teacher }) = &mut self.lessons else { return Ok(()) };
         let shown = (scene.scene, &mut scene.raster);
-        let drawn_by = (&mut self.renderer, teacher, reader);
-        let asked = (moments.as_slice(), self.spp, seed);
+        let drawn_by = (&mut self.renderer, &mut self.teacher, &mut self.reader);
+        let asked = (self.moments.as_slice(), self.spp, seed);
         let go_on = || !interrupt::requested();
         let lesson = moments::lesson(&self.gpu, drawn_by, shown, camera, asked, go_on)?;
         interrupt::check()?;
@@ -176,9 +95,22 @@ impl Writer {
         self.list(stem, &bytes)
     }
 
-    pub(super) fn sample(&mut self, scene: &SceneGpu, camera: &Camera) -> Result<Sample> {
+    /// Share of the cells whose surface is nearer than `distance`, metres.
+    pub(super) fn closer_than(&mut self, scene: &SceneGpu, camera: &Camera, distance: f32) -> Result<f32> {
         interrupt::check()?;
-        Ok(sample(&self.gpu, &mut self.renderer, scene, camera, self.gi_frames)?)
+        let (device, queue, size) = (&self.gpu.device, &self.gpu.queue, self.renderer.size());
+        let view = View::new(camera, size, [0.0; 2]);
+        self.renderer.cut();
+        let mut encoder = device.create_command_encoder(&Default::default());
+        self.renderer.record(&mut Recorder::new(&mut encoder), queue, scene, &view)?;
+        queue.submit([encoder.finish()]);
+        let texels = readback::texture(device, queue, &self.renderer.targets().depth.texture)?;
+        let depth: Vec<f32> = bytemuck::pod_collect_to_vec(&texels);
+        let [w, h] = cells_of(size);
+        let cells = (0..h).flat_map(|y| (0..w).map(move |x| sample_pixel([x, y], size)));
+        // Reversed: the near plane is at 1, nothing at 0.
+        let near = cells.filter(|[x, y]| depth[(y * size[0] + x) as usize] > camera.near / distance);
+        Ok(near.count() as f32 / (w * h) as f32)
     }
 
     fn open_list(&mut self) -> Result<()> {
@@ -187,7 +119,7 @@ impl Writer {
         Ok(())
     }
 
-    /// Adds a sample to the list of checksums. One write, so that several shards may share a
+    /// Adds a lesson to the list of checksums. One write, so that several shards may share a
     /// folder.
     fn list(&mut self, stem: &str, bytes: &[u8]) -> Result<()> {
         let name = format!("{stem}.safetensors");
@@ -201,7 +133,7 @@ impl Writer {
         Ok(())
     }
 
-    /// Whether the sample is there; one that a kill left without its checksum gets it now.
+    /// Whether the lesson is there; one that a kill left without its checksum gets it now.
     pub(super) fn has(&mut self, stem: &str) -> Result<bool> {
         let path = self.path(stem);
         if !path.exists() {

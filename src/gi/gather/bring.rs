@@ -3,13 +3,12 @@
 //!
 //! The four cells around a pixel are weighted bilinearly times how much their sample lies on the
 //! pixel's own surface: distance from the pixel's plane relative to the pixel's depth, and
-//! agreement of normals (the tolerances are [`reconstruct`](crate::gi::reconstruct)'s). Where those
-//! four mostly disagree the 4×4 cells around are blended in. Background pixels get 0. A workgroup
-//! reads each cell around its 16×8 pixels once, into its shared memory.
+//! agreement of normals. Where those four mostly disagree the 4×4 cells around are blended in.
+//! Background pixels get 0. A workgroup reads each cell around its 16×8 pixels once, into its shared
+//! memory.
 
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
-use crate::gi::stage::weights::{NORMAL_FLOOR, PLANE_TOLERANCE, WEIGHT_FLOOR};
 use crate::gpu::bind::{self, Binder, Bound};
 use crate::gpu::binding::{LOAD, READ, STORE_HALF};
 use crate::gpu::{shaders, timing::Recorder};
@@ -17,6 +16,15 @@ use crate::gpu::{shaders, timing::Recorder};
 /// Pixels of a workgroup: `WIDE` and `HIGH` of the shader.
 const WIDE: u32 = 16;
 const HIGH: u32 = 8;
+
+/// Distance from the pixel's plane, relative to the view distance, at which a tap's weight has
+/// fallen to a quarter. About half a cell's footprint at 1024×512 and 60°: nothing closer can be
+/// told apart at this resolution anyway.
+const PLANE_TOLERANCE: f32 = 0.004;
+/// Least factor by normals, so that a wrong normal in the right plane still beats a wrong plane.
+const NORMAL_FLOOR: f32 = 1e-5;
+/// Least weight, so that no sum over hit cells is 0.
+const WEIGHT_FLOOR: f32 = 1e-15;
 
 /// Sum of the four weights below which the 4×4 cells around are blended in.
 const TRUST: f32 = 0.3;

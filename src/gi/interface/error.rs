@@ -81,8 +81,8 @@ pub enum GiError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The weights' output is no light and no gain on a first guess.
-    #[error("the weights' output is {0}; this program needs 3 channels of light, or 6 of gain and rest")]
+    /// The weights' output is not how a filter averages.
+    #[error("the weights' output is {0}; method `neural` needs 12 channels of `filter`")]
     Output(String),
     /// The network could not be built.
     #[error("the network could not be built for {}x{} cells: {source}", cells[0], cells[1])]

@@ -93,11 +93,6 @@ pub trait Technique: Send {
         None
     }
 
-    /// What method `gather` answered in the last recording, where this one builds on it.
-    fn guess(&self) -> Option<&wgpu::TextureView> {
-        None
-    }
-
     /// Names of the network's layers; none without a network.
     fn layers(&self) -> Vec<&str> {
         Vec::new()
@@ -106,6 +101,15 @@ pub trait Technique: Send {
     /// What the network does, step by step, where one runs.
     fn plan(&self) -> Option<&Plan> {
         None
+    }
+
+    /// What the network is given for `inputs`, which must be those of the last recording; `None`
+    /// without a network.
+    ///
+    /// # Errors
+    /// As [`Technique::read_layer`].
+    fn read_input(&mut self, _inputs: &Inputs<'_>) -> Result<Option<Tap>, GiError> {
+        Ok(None)
     }
 
     /// What a layer of the network makes of `inputs`, which must be those of the last recording;

@@ -91,8 +91,8 @@ impl Technique for OrBelow {
         self.drew()?.memory()
     }
 
-    fn guess(&self) -> Option<&wgpu::TextureView> {
-        self.above.as_ref().ok()?.guess()
+    fn read_input(&mut self, inputs: &Inputs<'_>) -> Result<Option<Tap>, GiError> {
+        self.above.as_mut().map_or(Ok(None), |above| above.read_input(inputs))
     }
 
     fn layers(&self) -> Vec<&str> {

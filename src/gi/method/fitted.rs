@@ -2,7 +2,7 @@
 //! method that it names.
 
 use super::{Method, name::MethodName};
-use crate::gi::{ambient::Unseen, gather, pass::Neural};
+use crate::gi::{Neural, ambient::Unseen, gather};
 use crate::net::format::{Weights, WeightsError};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;

@@ -6,9 +6,8 @@ pub mod name;
 
 use super::gather::{self, GatherGi};
 use super::interface::{GiError, technique::Technique};
+use super::neural::Neural;
 use super::neural::filter::FilterGi;
-use super::neural::is_filter;
-use super::neural::pass::{self, NeuralGi, Options};
 use super::screen::{
     ambient::{AmbientGi, Unseen},
     ssgi::{SsgiGi, SsgiOptions},
@@ -31,8 +30,9 @@ pub enum Method {
     SsgiWith(Unseen),
     /// Rays into the scene's triangles and a cache of light in the world, see [`gather`].
     Gather(gather::Options),
-    /// A network, see [`pass`]; `weights.into()` runs it with defaults.
-    Neural(Box<pass::Neural>),
+    /// `gather`, whose filter a network guides, see [`neural`](super::neural); `weights.into()`
+    /// runs it with defaults.
+    Neural(Box<Neural>),
 }
 
 impl Method {
@@ -64,11 +64,7 @@ impl Method {
 
     /// Whether the method asks rays ([`Inputs::rays`](super::Inputs::rays)).
     pub fn needs_rays(&self) -> bool {
-        match self {
-            Method::Gather(_) => true,
-            Method::Neural(neural) => pass::needs_guess(&neural.weights),
-            _ => false,
-        }
+        matches!(self, Method::Gather(_) | Method::Neural(_))
     }
 
     /// Whether the method's answer settles over frames.
@@ -102,16 +98,12 @@ pub fn build(
             let above = above.map(|()| Box::new(GatherGi::new(device, size, *options)) as Box<dyn Technique>);
             Some(Box::new(OrBelow::new(device, above.map_err(|e| e.to_string()))))
         }
-        Method::Neural(neural) if method.needs_rays() => {
+        Method::Neural(neural) => {
             let above = match GatherGi::check(&device.limits(), size, &Default::default()) {
-                Ok(()) if is_filter(&neural.weights) => {
-                    Ok(Box::new(FilterGi::new(device, queue, neural, size)?) as Box<dyn Technique>)
-                }
-                Ok(()) => Ok(Box::new(NeuralGi::with(device, queue, neural, Options { size })?) as Box<dyn Technique>),
+                Ok(()) => Ok(Box::new(FilterGi::new(device, queue, neural, size)?) as Box<dyn Technique>),
                 Err(lacks) => Err(lacks.to_string()),
             };
             Some(Box::new(OrBelow::new(device, above)))
         }
-        Method::Neural(neural) => Some(Box::new(NeuralGi::with(device, queue, neural, Options { size })?)),
     })
 }

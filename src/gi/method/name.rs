@@ -61,7 +61,7 @@ impl MethodName {
 
     /// Whether it asks rays ([`Method::needs_rays`]).
     pub fn needs_rays(self) -> bool {
-        self == M::Gather
+        matches!(self, M::Gather | M::Neural)
     }
 
     /// The one called `name`.

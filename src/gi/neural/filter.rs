@@ -9,7 +9,7 @@
 //! the light is twice the answer, and an answer of zeros is `gather` itself.
 
 use super::memory::{self, FeaturesPass};
-use super::trained::{FILTER, Neural};
+use super::trained::Neural;
 use crate::gi::gather::{GUIDANCE, GatherGi};
 use crate::gi::interface::technique::{Memory, Technique};
 use crate::gi::interface::{GiError, Inputs, Outputs};
@@ -25,6 +25,9 @@ use crate::net::plan::Plan;
 /// Numbers of a cell: two places in spaces of four dimensions; trust, tolerance, and two that are
 /// not read.
 pub const CHANNELS: u32 = GUIDANCE as u32 / 4;
+
+/// What the output of a network that filters means, in weights files.
+const FILTER: &str = "filter";
 
 /// The method at work.
 pub struct FilterGi {
@@ -77,6 +80,25 @@ impl FilterGi {
     }
 }
 
+impl FilterGi {
+    /// Makes the features of the last recording again, of which `inputs` are, and runs the network up
+    /// to and with `step`: its layers share memory, the input's included. False where nothing was
+    /// recorded yet. Submits.
+    fn run_again(&mut self, inputs: &Inputs<'_>, step: Option<usize>) -> Result<bool, GiError> {
+        let Some(memory) = self.gather.memory().filter(|_| inputs.size == self.size) else { return Ok(false) };
+        let lit = self.inputs.bind(&self.queue, inputs)?;
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        let mut recorder = Recorder::new(&mut encoder);
+        let known = (memory.pasts, &self.exposure);
+        self.features.record(&mut recorder, &lit, known, bound(self.network.input()));
+        if let Some(step) = step {
+            self.network.record_until(step, &mut recorder);
+        }
+        self.queue.submit([encoder.finish()]);
+        Ok(true)
+    }
+}
+
 /// The tensors for pictures of `size` pixels.
 fn network(device: &wgpu::Device, queue: &wgpu::Queue, neural: &Neural, size: [u32; 2]) -> Result<Network, GiError> {
     let cells = cells_of(size);
@@ -102,8 +124,9 @@ fn check(weights: &Weights) -> Result<(), GiError> {
         let found: Vec<_> = named().map(|(name, _)| name).collect();
         return wrong("(all)", format!("list is {}; a filter is given the whole table", found.join(", ")));
     }
-    if weights.output.channels != CHANNELS {
-        return Err(GiError::Output(format!("{} channels of `{FILTER}`", weights.output.channels)));
+    let output = &weights.output;
+    if (output.meaning.as_str(), output.channels) != (FILTER, CHANNELS) {
+        return Err(GiError::Output(format!("{} channels of `{}`", output.channels, output.meaning)));
     }
     Ok(())
 }
@@ -167,13 +190,19 @@ impl Technique for FilterGi {
         self.network.taps().into_iter().map(|(_, name)| name).collect()
     }
 
+    fn read_input(&mut self, inputs: &Inputs<'_>) -> Result<Option<Tap>, GiError> {
+        if !self.run_again(inputs, None)? {
+            return Ok(None);
+        }
+        Ok(Some(self.network.read_input(&self.device, &self.queue)?))
+    }
+
     fn read_layer(&mut self, inputs: &Inputs<'_>, layer: usize) -> Result<Option<Tap>, GiError> {
         let taps = self.network.taps();
-        let Some(&(step, _)) = taps.get(layer).filter(|_| inputs.size == self.size) else { return Ok(None) };
-        // The features of the last recording lie where the network reads them.
-        let mut encoder = self.device.create_command_encoder(&Default::default());
-        self.network.record_until(step, &mut Recorder::new(&mut encoder));
-        self.queue.submit([encoder.finish()]);
+        let Some(&(step, _)) = taps.get(layer) else { return Ok(None) };
+        if !self.run_again(inputs, Some(step))? {
+            return Ok(None);
+        }
         Ok(Some(self.network.read_tap(&self.device, &self.queue, step)?))
     }
 

@@ -1,13 +1,7 @@
-//! The network's method: features of cells, a U-Net, its answer applied to what `gather` says.
+//! The network's method: what cells remember, a U-Net, and a filter that it guides.
 
-pub mod cpu;
-pub mod features;
 pub mod filter;
 pub mod memory;
-pub mod pack;
-pub mod pass;
-mod rebuilt;
-pub mod reconstruct;
 mod trained;
 
-pub(crate) use trained::is_filter;
+pub use trained::Neural;

@@ -14,13 +14,6 @@ use crate::gpu::timing::Recorder;
 use crate::gpu::{shaders, shared, tape};
 use std::str::FromStr;
 
-/// Light where a network's cells cannot answer (E/π, linear Rec.709), as a multiple of the exposure
-/// `s`: what `reconstruct` falls back to. It was the whole of this method once. Fitted to 400 views
-/// of the 50 training rooms: grey, least absolute error of albedo · (direct + light) under Filmic's
-/// logarithmic encoding (`python -m bouncelight_training.baseline`, "grey least absolute of the
-/// picture").
-pub const AMBIENT: [f32; 3] = [0.3985, 0.3985, 0.3985];
-
 /// The environment's share in what the screen does not show. Fitted with [`BOUNCE`] to paper rooms
 /// 2, 3, 6, 7, 60 and 61: least mean of Σ|ΔE| / ΣE after 4×4 pooling, for this method and
 /// [`ssgi`](super::ssgi) together. The rooms are open above; a room with a roof gets too much sky.

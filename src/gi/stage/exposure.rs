@@ -16,8 +16,6 @@ pub struct Exposure {
     /// Mean over all cells of the luminance of direct light (E/π) and emission, background counting
     /// as 0, plus the environment's luminance; W/(m²·sr). Exactly 0 at or below 1e-20.
     pub s: f32,
-    /// 1/s, or 0 where s is 0.
-    pub inv_s: f32,
     /// Mean over hit cells of ln(view distance in metres); 0 when nothing is hit.
     pub ln_m: f32,
     /// Share of cells whose sample hit something.

@@ -6,7 +6,7 @@
 //! own parameters.
 
 use super::formats;
-pub(crate) use super::formats::{check, check_outputs};
+pub(crate) use super::formats::check_outputs;
 pub use super::params::{CELL, Params, cells_of, sample_pixel};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::ViewCache;

@@ -1,5 +1,5 @@
 //! What passes share: the G-buffer as shaders read it, cells, the mean light of a picture, groups
-//! kept by view, weights by which cells light pixels.
+//! kept by view.
 
 pub mod cells;
 pub mod exposure;
@@ -7,7 +7,6 @@ mod formats;
 pub mod inputs;
 mod params;
 mod view_cache;
-pub mod weights;
 
 pub(crate) use view_cache::ViewCache;
 

@@ -5,7 +5,6 @@ use super::{World, sample};
 use crate::gi::interface::technique::{Instead, Technique};
 use crate::gi::interface::{GiError, Inputs, Outputs};
 use crate::gi::method::{self, Method};
-use crate::gi::pass::NeuralGi;
 use crate::gi::stage::inputs::Params;
 use crate::gpu::shared::Shared;
 use crate::gpu::timing::Recorder;
@@ -44,14 +43,15 @@ pub struct View {
 }
 
 impl View {
-    /// Features that would be used where the adapter has them. None is needed.
+    /// Features that would be used where the adapter has them: timestamps, by hosts that time
+    /// passes, and what some of the network's kernels use. None is needed.
     pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
-        NeuralGi::optional_features(adapter)
+        adapter.features() & crate::gpu::wanted_features()
     }
 
     /// Limits that the device must have: WebGPU's defaults.
     pub fn required_limits() -> wgpu::Limits {
-        NeuralGi::required_limits()
+        wgpu::Limits::default()
     }
 
     /// Compiles those of `method`'s pipelines that neither another view nor a [`World`] of this

@@ -31,15 +31,12 @@ pub enum NetFamily {
     BatchNorm,
     /// Operations a second that a device can do.
     Peak,
-    /// Channels to pixels, or back.
-    Shuffle,
 }
 
 use NetFamily::*;
 
-const FAMILIES: [NetFamily; 15] = [
-    ConvPlain, Conv3x3, ConvAny, ConvStaged, Sum, Upsample, Nearest, Add, Window, Moments, Merge, Norm, BatchNorm,
-    Peak, Shuffle,
+const FAMILIES: [NetFamily; 14] = [
+    ConvPlain, Conv3x3, ConvAny, ConvStaged, Sum, Upsample, Nearest, Add, Window, Moments, Merge, Norm, BatchNorm, Peak,
 ];
 
 impl NetFamily {
@@ -59,7 +56,6 @@ impl NetFamily {
             Norm => "norm",
             BatchNorm => "batch_norm",
             Peak => "peak",
-            Shuffle => "shuffle",
         }
     }
 

@@ -97,18 +97,6 @@ pub(super) fn group_norm(weights: &Weights, name: &str, input: &Tensor, groups: 
     normalised(weights, name, input, eps, |c| moments[c / channels])
 }
 
-/// out[c, y·f + i, x·f + j] = in[c·f² + i·f + j, y, x].
-pub(super) fn shuffle(input: &Tensor, factor: u32, shape: Shape) -> Tensor {
-    let (f, in_w) = (factor as usize, input.shape.width as usize);
-    from_fn(shape, |c, y, x| input.plane((c * f + y % f) * f + x % f)[y / f * in_w + x / f])
-}
-
-/// out[c·f² + i·f + j, y, x] = in[c, y·f + i, x·f + j].
-pub(super) fn unshuffle(input: &Tensor, factor: u32, shape: Shape) -> Tensor {
-    let (f, in_w) = (factor as usize, input.shape.width as usize);
-    from_fn(shape, |c, y, x| input.plane(c / (f * f))[(y * f + c / f % f) * in_w + x * f + c % f])
-}
-
 /// Values dropped as [`random`] says.
 pub(super) fn dropout(input: &Tensor, stream: u32, p: f32) -> Tensor {
     let (threshold, scale) = (random::threshold(p), 1.0 / (1.0 - p));

@@ -43,7 +43,6 @@ pub fn example_preludes() -> Vec<(String, String)> {
                 Norm | BatchNorm => [0, 1].map(|full| lines(&[("IN_FULL", full)])).to_vec(),
                 Sum => vec![lines(&[("MADE", 1)])],
                 Upsample => [0, 1].map(|double| lines(&[("DOUBLE", double)])).to_vec(),
-                Shuffle => [0, 1].map(|down| lines(&[("FACTOR", 2), ("DOWN", down)])).to_vec(),
                 Nearest | Add | Moments | Merge | Peak => vec![String::new()],
             };
             let feature = if shader.arithmetic { "enable f16;\n" } else { "" };

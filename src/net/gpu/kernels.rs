@@ -105,11 +105,6 @@ impl Kernel {
                 kernel.bound = Bound::Vectors(3 * out.vectors());
                 NetFamily::BatchNorm
             }
-            Kind::Shuffle(factor) | Kind::Unshuffle(factor) => {
-                prelude.add("FACTOR", factor);
-                prelude.add("DOWN", matches!(step.kind, Kind::Unshuffle(_)).into());
-                NetFamily::Shuffle
-            }
         };
         if matches!(step.kind, Kind::Scale { .. }) {
             prelude.add("IN_FULL", (half && input.full).into());

@@ -44,7 +44,25 @@ impl Network {
     /// # Panics
     /// If the plan has no such step.
     pub fn read_tap(&self, device: &wgpu::Device, queue: &wgpu::Queue, step: usize) -> Result<Tap, ReadbackError> {
-        let tensor = &self.plan.tensors[self.plan.steps[step].output];
+        let name = self.plan.steps[step].name.clone();
+        self.read_tensor(device, queue, (self.plan.steps[step].output, name))
+    }
+
+    /// Reads the input that the caller has put there. Waits for the GPU.
+    ///
+    /// # Errors
+    /// Reading back failed.
+    pub fn read_input(&self, device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Tap, ReadbackError> {
+        self.read_tensor(device, queue, (0, "input".into()))
+    }
+
+    fn read_tensor(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        (tensor, name): (usize, String),
+    ) -> Result<Tap, ReadbackError> {
+        let tensor = &self.plan.tensors[tensor];
         let (shape, vector) = (tensor.shape, tensor.vector_bytes());
         let pitch = u64::from(tensor.pitch);
         let bytes = ((shape.pixels() - 1) * pitch + u64::from(shape.vectors())) * vector;
@@ -57,6 +75,6 @@ impl Network {
         let stride = 4 * pitch as usize;
         let channel = |c: usize| numbers.iter().skip(c).step_by(stride).take(shape.pixels() as usize).copied();
         let values = (0..shape.channels as usize).flat_map(channel).collect();
-        Ok(Tap { name: self.plan.steps[step].name.clone(), shape, values })
+        Ok(Tap { name, shape, values })
     }
 }

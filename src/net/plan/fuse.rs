@@ -33,8 +33,6 @@ pub(super) enum Work {
         groups: u32,
         eps: f32,
     },
-    Shuffle(u32),
-    Unshuffle(u32),
 }
 
 /// One or more operators that run together: work, then skip and activation as `add_at` says, then
@@ -109,8 +107,6 @@ fn node(i: usize, op: &Op, options: &Options) -> Node {
         Op::InstanceNorm(o) => (Work::Norm { groups: o.channels, eps: o.eps }, o.activation),
         Op::GroupNorm(o) => (Work::Norm { groups: o.groups, eps: o.eps }, o.activation),
         Op::Activation(o) => (Work::Copy, o.activation),
-        Op::PixelShuffle(o) => (Work::Shuffle(o.factor), Activation::None),
-        Op::PixelUnshuffle(o) => (Work::Unshuffle(o.factor), Activation::None),
         Op::Dropout(o) => {
             node.dropout = options.dropout.then_some((i, o.p));
             (Work::Copy, Activation::None)

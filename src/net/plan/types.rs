@@ -137,10 +137,6 @@ pub enum Kind {
         /// From the weights.
         fixed: bool,
     },
-    /// Pixel shuffle by a factor.
-    Shuffle(u32),
-    /// Its inverse.
-    Unshuffle(u32),
 }
 
 /// Pixels of a tile of [`Kind::Moments`].
@@ -228,8 +224,6 @@ impl Row {
             Kind::Moments => "moments".into(),
             Kind::Merge { .. } => "statistics".into(),
             Kind::Scale { .. } => "norm".into(),
-            Kind::Shuffle(f) => format!("shuffle ×{f}"),
-            Kind::Unshuffle(f) => format!("unshuffle /{f}"),
         };
         if step.fold.is_some() {
             kind.push_str(" + norm");

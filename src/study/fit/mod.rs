@@ -11,8 +11,6 @@
 //! the target in any case.
 
 mod error;
-mod learn;
-mod lessons;
 mod report;
 mod rows;
 mod unseen;
@@ -20,7 +18,6 @@ mod views;
 mod yardstick;
 
 pub use error::FitError;
-pub use learn::{Learned, Learning, learn};
 pub use report::{Record, RecordRow};
 pub use rows::{Candidate, Row, Verdict};
 pub use views::covering;
@@ -33,7 +30,7 @@ use super::{
     truth::Reference,
 };
 use crate::{
-    gi::{gather, pass::Neural},
+    gi::{Neural, gather},
     render::capture::Layer,
     scene::Camera,
 };
@@ -76,9 +73,6 @@ pub struct Seen {
     pub reference: Reference,
     /// What the metric would say of the reference's own noise; 0 for metrics that cannot tell.
     pub floor: f64,
-    /// Standard deviation that this noise may give the difference of two pictures' metric; 0 for
-    /// metrics that cannot tell.
-    pub doubt: f64,
 }
 
 /// What was found.
@@ -91,8 +85,6 @@ pub struct Fit {
     pub reached: bool,
     /// The views.
     pub views: Vec<Seen>,
-    /// What came of learning, where a network was fine-tuned to the scene.
-    pub learned: Option<Learned>,
 }
 
 impl Fit {
@@ -128,7 +120,7 @@ pub fn fit(
         None => (search.nearest().expect("`direct` draws every scene and costs nothing"), false),
     };
     search.settle(chosen, reached)?;
-    Ok(Fit { rows: search.rows, chosen, reached, views: search.views, learned: None })
+    Ok(Fit { rows: search.rows, chosen, reached, views: search.views })
 }
 
 /// The metric in each view, and the pictures.
@@ -164,9 +156,9 @@ impl Search<'_, '_> {
         for (view, camera) in cameras.iter().enumerate() {
             self.tell(&format!("reference of view {view}"));
             let reference = self.trial.reference(camera, &options)?;
-            let noise = self.options.yardstick.noise(&reference);
-            let [floor, doubt] = noise.map_err(|reason| FitError::Blind { view, reason })?;
-            self.views.push(Seen { camera: camera.clone(), reference, floor, doubt });
+            let floor = self.options.yardstick.noise(&reference);
+            let floor = floor.map_err(|reason| FitError::Blind { view, reason })?;
+            self.views.push(Seen { camera: camera.clone(), reference, floor });
         }
         if self.views.is_empty() { Err(FitError::NoViews) } else { Ok(()) }
     }
@@ -305,7 +297,7 @@ impl Search<'_, '_> {
             self.rows.push(row);
             return Ok(None);
         }
-        let frames = if candidate.settles(&self.options.networks) { frames } else { 1 };
+        let frames = if candidate.settles() { frames } else { 1 };
         let Some((errors, shots)) = self.errors(&candidate, frames)? else {
             let row = Row::blank(candidate, Verdict::Cannot);
             self.rows.push(row);

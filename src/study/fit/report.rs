@@ -1,6 +1,6 @@
 //! What a fit explains itself by: a record, and a table in Markdown.
 
-use super::{Fit, FitOptions, Learned, Verdict, Yardstick};
+use super::{Fit, FitOptions, Verdict};
 use crate::gi::fitted::{Fitted, FittedWeights, Measured, SCHEMA, Target};
 use serde::Serialize;
 use std::fmt::Write;
@@ -16,9 +16,6 @@ pub struct Record {
     pub references: Vec<([u32; 2], f64)>,
     /// What was tried, and what was not.
     pub rows: Vec<RecordRow>,
-    /// What came of learning, where a network was fine-tuned to the scene.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub learned: Option<Learned>,
 }
 
 /// One candidate.
@@ -92,7 +89,7 @@ impl Fit {
         };
         let references = self.views.iter().map(|v| (v.reference.samples, v.reference.seconds)).collect();
         let rows = self.rows.iter().map(row).collect();
-        Record { schema: 1, fitted, references, rows, learned: self.learned.clone() }
+        Record { schema: 1, fitted, references, rows }
     }
 
     /// The table: a row for each candidate, a column for each view.
@@ -158,9 +155,6 @@ impl Fit {
         if !row.settling.is_empty() {
             let _ = write!(text, " It does so from frame {} after a cut on.", row.frames);
         }
-        if let Some(learned) = &self.learned {
-            let _ = write!(text, " {}", learned.sentences(y));
-        }
         if self.floor() > 0.0 {
             let _ = write!(text, " The reference's own noise makes up to {} of each number.", y.show(self.floor()));
         }
@@ -171,38 +165,5 @@ impl Fit {
                      trust this.";
         }
         text
-    }
-}
-
-impl Learned {
-    /// What was learnt from what, and whether it is kept, in sentences.
-    fn sentences(&self, yardstick: &Yardstick) -> String {
-        let Self { started_from, views, pictures, drawing_seconds, step_seconds, steps, error, worst, mean, .. } = self;
-        let held_out = self.best.map_or(String::new(), |b| {
-            format!(
-                " Of {} pictures that it did not learn from, the state after {} steps is nearest: {:.1} %, before \
-                 {:.1} %.",
-                self.held_out,
-                b.step,
-                100.0 * b.error,
-                100.0 * b.before
-            )
-        });
-        let [by_worst, by_mean] = self.margin.map(|m| yardstick.difference(m));
-        let shown = |errors: &[f64; 3]| errors.map(|e| yardstick.show(e));
-        let [gather, before, after] = shown(worst);
-        let [gather_mean, before_mean, after_mean] = shown(mean);
-        let end = if self.kept { "It is kept." } else { "It does not win, so it is not kept." };
-        format!(
-            "`{started_from}` has learned the scene from {pictures} pictures of {views} other views \
-             ({drawing_seconds:.0} s) in {steps} steps \
-             ({step_seconds:.0} s, {:.1} a second); its error there {:.1} % at first, {:.1} % at last.{held_out} \
-             Where it is judged, worst view (mean): `gather` \
-             {gather} ({gather_mean}), `{started_from}` {before} ({before_mean}), learned {after} ({after_mean}); the \
-             references' noise explains differences of {by_worst} ({by_mean}). {end}",
-            f64::from(*steps) / step_seconds.max(1e-9),
-            100.0 * error[0],
-            100.0 * error[1],
-        )
     }
 }

@@ -1,7 +1,7 @@
 //! What is tried, and what comes of it.
 
 use super::Network;
-use crate::gi::{Method, ambient::Unseen, gather, name::MethodName, pass};
+use crate::gi::{Method, ambient::Unseen, gather, name::MethodName};
 
 /// Something to try: a method with its numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,12 +78,8 @@ impl Candidate {
     }
 
     /// Whether its answer settles over frames.
-    pub fn settles(&self, networks: &[Network]) -> bool {
-        match self {
-            Candidate::Gather(_) => true,
-            Candidate::Neural(index) => pass::needs_guess(&networks[*index].neural.weights),
-            _ => false,
-        }
+    pub fn settles(&self) -> bool {
+        matches!(self, Candidate::Gather(_) | Candidate::Neural(_))
     }
 }
 

@@ -117,20 +117,14 @@ impl Yardstick {
         if self.metric == Metric::Light { 1 } else { SHOWN_SAMPLES }
     }
 
-    /// What the metric would say of the reference's own noise, and how much that may move the
-    /// difference of two pictures (one standard deviation); 0 where that is unknown.
-    pub(super) fn noise(&self, reference: &truth::Reference) -> Result<[f64; 2], String> {
+    /// What the metric would say of the reference's own noise; 0 where that is unknown.
+    pub(super) fn noise(&self, reference: &truth::Reference) -> Result<f64, String> {
         match self.metric {
             Metric::Light => judge::light_error(reference.layer(Layer::Gi), reference)
-                .map(|l| [l.floor, l.doubt])
+                .map(|l| l.floor)
                 .ok_or_else(|| "its reference has no light that a method could add".into()),
-            Metric::Shown(_) => Ok([0.0; 2]),
+            Metric::Shown(_) => Ok(0.0),
         }
-    }
-
-    /// Whether `value` is better than `other` by more than `margin`.
-    pub(super) fn beats(&self, value: f64, other: f64, margin: f64) -> bool {
-        self.order(value, other).is_lt() && (value - other).abs() > margin
     }
 
     /// What the metric says of one picture.
@@ -146,14 +140,6 @@ impl Yardstick {
                 let compared = judge::compare(&shot.rgb(), reference, flip).map_err(|e| e.to_string())?;
                 compared.value(name).ok_or_else(|| format!("`{name}` cannot be computed here"))
             }
-        }
-    }
-
-    /// A difference of values for people.
-    pub(super) fn difference(&self, value: f64) -> String {
-        match self.metric {
-            Metric::Light => format!("{:.2} %", value * 100.0),
-            Metric::Shown(_) => self.show(value),
         }
     }
 

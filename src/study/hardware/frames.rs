@@ -2,7 +2,7 @@
 
 use super::{Projected, Run};
 use crate::{
-    gi::{Method, name::MethodName, pass::Neural},
+    gi::{Method, Neural, name::MethodName},
     gpu::Gpu,
     net::plan::Precision,
     render::{Renderer, RendererOptions},
@@ -87,7 +87,7 @@ fn rows(
     let traced = uploaded.trace(&gpu.device, &gpu.queue, scene);
     let rays = run.kept(&format!("{what}, methods that send rays"), traced).is_some();
     let mut rows: Vec<FrameRow> = Vec::new();
-    for &method in methods.iter().filter(|m| rays || !(m.needs_rays() || **m == MethodName::Neural)) {
+    for &method in methods.iter().filter(|m| rays || !m.needs_rays()) {
         let what = format!("{what}, {}, {}", method.name(), label(precision));
         // Whatever came before is a fair guess for what comes next; the methods are listed cheapest
         // first.

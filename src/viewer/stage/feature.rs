@@ -2,7 +2,6 @@
 //! only.
 
 use super::Stage;
-use crate::gi::pack::NetworkInputs;
 use crate::net::gpu::Tap;
 use crate::render::{View as Eye, targets::Target};
 use crate::scene::Camera;
@@ -54,10 +53,13 @@ impl Stage {
             let tap = slot.renderer.read_layer(&view, sky, layer).map_err(|e| e.to_string())?;
             tap.map(|tap| tiles(&tap, layer, count, state.size))
         } else {
-            let read = slot.renderer.read_features(&self.gpu.queue, &view, sky).map_err(|e| e.to_string())?;
-            Some(channel(&read, wanted.1))
+            let read = slot.renderer.read_network_input(&view, sky).map_err(|e| e.to_string())?;
+            read.map(|tap| channel(&tap, wanted.1))
         };
-        let Some(Tiles { size, texels, range, name }) = tiles else { return Ok(()) };
+        let Some(Tiles { size, texels, range, name }) = tiles else {
+            self.feature = None;
+            return Ok(());
+        };
         let texture = picture(&self.gpu.device, "viewer.feature", size);
         self.fill(&texture, &texels);
         self.show.forget();
@@ -85,14 +87,14 @@ struct Tiles {
 }
 
 /// A channel of the network's inputs.
-fn channel(read: &NetworkInputs, wanted: u32) -> Tiles {
-    let channel = wanted % read.channels;
-    let [w, h] = read.cells;
-    let plane = (w * h) as usize;
-    let values = &read.features[channel as usize * plane..][..plane];
+fn channel(read: &Tap, wanted: u32) -> Tiles {
+    let (channels, size) = (read.shape.channels, [read.shape.width, read.shape.height]);
+    let channel = wanted % channels;
+    let plane = (size[0] * size[1]) as usize;
+    let values = &read.values[channel as usize * plane..][..plane];
     let texels = values.iter().flat_map(|&v| [v, 1.0, 0.0, 1.0]).collect();
-    let name = format!("network input `{}` ({} of {})", channel_name(channel), channel + 1, read.channels);
-    Tiles { size: read.cells, texels, range: range(values), name }
+    let name = format!("network input `{}` ({} of {channels})", channel_name(channel), channel + 1);
+    Tiles { size, texels, range: range(values), name }
 }
 
 /// All channels of a layer beside each other, as large as `window` allows.
@@ -131,12 +133,12 @@ fn range(values: &[f32]) -> [f32; 2] {
 /// Name of a channel of the network's inputs, such as `normal.1`.
 fn channel_name(channel: u32) -> String {
     let mut first = 0;
-    for feature in crate::gi::features::FEATURES {
-        if channel < first + feature.channels {
+    for (name, channels) in crate::gi::memory::FEATURES {
+        if channel < first + channels {
             let which = channel - first;
-            return if feature.channels == 1 { feature.name.into() } else { format!("{}.{which}", feature.name) };
+            return if channels == 1 { name.into() } else { format!("{name}.{which}") };
         }
-        first += feature.channels;
+        first += channels;
     }
     channel.to_string()
 }
@@ -148,9 +150,9 @@ mod tests {
 
     #[test]
     fn channels_have_the_names_of_the_table() {
-        let names: Vec<_> = (0..24).map(channel_name).collect();
-        let some = [0, 5, 15, 20, 23].map(|i: usize| names[i].as_str());
-        assert_eq!(some, ["direct.0", "outgoing.2", "depth", "sky.2", "guess.2"]);
+        let names: Vec<_> = (0..16).map(channel_name).collect();
+        let some = [0, 2, 7, 11, 14, 15].map(|i: usize| names[i].as_str());
+        assert_eq!(some, ["light", "chroma.1", "depth", "hit", "towards.2", "15"]);
     }
 
     #[test]

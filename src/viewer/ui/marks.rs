@@ -30,7 +30,7 @@ pub(super) fn marks(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect) {
             (View::Wireframe, _) => format!("wireframe over {}", s.left.name()),
             (View::Feature, Some((name, [low, high]))) => format!("{name}: {low:.3} to {high:.3}"),
             (View::Layer, Some((name, [low, high]))) => format!("{name}; all {low:.3} to {high:.3}"),
-            (View::Layer, None) => "only `neural` has layers".into(),
+            (View::Feature | View::Layer, None) => "only `neural` has a network".into(),
             (View::Error, _) => format!("error: {} against {}, bright at 0.25", s.left.name(), s.right.name()),
             (view, _) => view.doc().to_string(),
         };

@@ -10,9 +10,8 @@ import os
 import torch
 
 from ..errors import TrainingError, reported
-from ..export import verify
 from ..model import parameter_count
-from ..weights import WeightsError, document, write
+from ..weights import WeightsError, document, verify, write
 from . import blur, lessons
 from .train import MEANING, Config, kept_parts, network, read_checkpoint
 
@@ -50,7 +49,7 @@ def export(run, out, name=""):
                                      name=name or os.path.basename(os.path.normpath(run)), provenance=about))
     except (WeightsError, OSError) as problem:
         raise TrainingError(str(problem)) from problem
-    worst, _ = verify(out, model, 2e-2)
+    worst = verify(out, model, 2e-2)
     with open(os.path.splitext(out)[0] + ".json", "w") as file:
         json.dump(about, file, indent=1)
         file.write("\n")

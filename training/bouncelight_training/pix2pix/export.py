@@ -14,8 +14,8 @@ import os
 import numpy as np
 import torch
 
+from ..checkpoint import read_checkpoint
 from ..errors import TrainingError, reported
-from ..train import read_checkpoint
 from ..weights import GraphNet, WeightsError, document, read, write
 from .model import PICTURES, generator
 from .pairs import Pairs
@@ -81,7 +81,7 @@ def export(run, out, pairs=None, half=False, targets=TARGETS, state_path=None):
         if state_path:
             from safetensors.torch import save_file
             save_file({name: values.contiguous() for name, values in model.state_dict().items()}, state_path)
-        write(out, tensors, document(model.graph, model.output, inputs=[(name, 3) for name in PICTURES], table=("images", 1), cell=1, meaning="display_signed",
+        write(out, tensors, document(model.graph, model.output, inputs=[(name, 3) for name in PICTURES], table=("images", 1), cell=1, meaning="display_signed", output_channels=3,
                                      name=f"pix2pix, width {config.width}", provenance=about))
     except (WeightsError, OSError) as problem:
         raise TrainingError(str(problem)) from problem

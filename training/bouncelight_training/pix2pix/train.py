@@ -25,9 +25,9 @@ import numpy as np
 import torch
 from torch import nn
 
+from ..checkpoint import Stop, read_checkpoint
 from ..errors import TrainingError, reported
 from ..provenance import commit, machine_of
-from ..train import Stop, read_checkpoint
 from . import curves
 from .model import NORMS, Discriminator, first_numbers, generator
 from .pairs import Pairs

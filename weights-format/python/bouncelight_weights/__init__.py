@@ -4,7 +4,7 @@ The specification is ../../README.md. `torch_graph` in this package (optional, n
 describes, so that the topology stands in one place: the list of operators.
 
     from bouncelight_weights import write, read, verify, unet
-    graph, output = unet(in_channels=24)
+    graph, output = unet()
     write("net.safetensors", state_dict, document(graph, output, provenance={...}))
 """
 
@@ -15,13 +15,13 @@ import tempfile
 import numpy as np
 
 from . import container
-from .document import IMAGES_V1, KEY, MEANINGS, SCALE_SUFFIX, SCREEN_V1, TABLES, VERSION, check_tensors, schema
+from .document import CELLS_V1, IMAGES_V1, KEY, MEANINGS, SCALE_SUFFIX, TABLES, VERSION, check_tensors, schema
 from .document import check as check_document
 from .graph import complete
 from .operators import OPERATORS, scaled_axis, tensors
 from .problems import NotReadable, Problem, WeightsError
 
-__all__ = ["IMAGES_V1", "KEY", "OPERATORS", "SCREEN_V1", "VERSION", "Problem", "WeightsError", "check", "conv2d", "document",
+__all__ = ["CELLS_V1", "IMAGES_V1", "KEY", "OPERATORS", "VERSION", "Problem", "WeightsError", "check", "conv2d", "document",
            "quantised", "read", "schema", "unet", "verify", "write"]
 
 
@@ -32,7 +32,7 @@ def conv2d(name, input, output, in_channels, out_channels, kernel=3, stride=1, p
             "padding": kernel // 2 if padding is None else padding, "activation": activation, **rest}
 
 
-def unet(in_channels=24, widths=(16, 24, 32, 48), out_channels=3, pointwise=0, activation="relu"):
+def unet(in_channels=15, widths=(16, 24, 32, 48), out_channels=12, pointwise=0, activation="relu"):
     """The compact U-Net: (graph, output tensor's name). Additive skips, 1x1 before each upsampling, no normalisation. The first
     `pointwise` levels look at single places only (1x1 kernels, one before the way down and one after the way up), which
     is a fifth of the arithmetic: for answers that are smooth along surfaces, and change from one to the next."""
@@ -64,7 +64,7 @@ def unet(in_channels=24, widths=(16, 24, 32, 48), out_channels=3, pointwise=0, a
     return graph, "y"
 
 
-def document(graph, output_tensor, *, inputs=None, table=("screen", 1), cell=4, meaning=MEANINGS[0], output_channels=3,
+def document(graph, output_tensor, *, inputs=None, table=("cells", 1), cell=4, meaning=MEANINGS[0], output_channels=12,
              licence="MIT OR Apache-2.0", name="", provenance=None):
     """The JSON document of a file. `inputs`: (feature, channels) or (feature, channels, encoding), by default the whole table in its
     order; without an encoding it is the table's first, `plain` in table `free`."""

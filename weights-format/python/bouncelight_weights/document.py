@@ -3,24 +3,19 @@
 import numpy as np
 
 from . import graph as graphs
-from .operators import OPERATORS, U32, operator_schemas, scaled_axis, tensors
+from .operators import LEFT, OPERATORS, U32, operator_schemas, scaled_axis, tensors
 from .problems import Problem
 
 VERSION = 2
 KNOWN_VERSIONS = (1, 2)
 KEY = "bouncelight"
 MAX_OPS = 1024
-MEANINGS = ("log_irradiance_over_exposure", "gain_and_rest_on_guess", "filter", "display_signed", "plain")
-# What is said of networks that correct a method which is gone.
-REPLACED = "it builds on method `cache`, which `gather` has replaced; a network has to be trained anew"
+MEANINGS = ("filter", "display_signed", "plain")
+# Meanings, and a table, of networks that correct, which have left, and what is said of them.
+LEFT_MEANINGS, LEFT_TABLE = ("log_irradiance_over_exposure", "gain_and_rest_on_guess", "gain_and_rest_on_cache"), "screen"
+CORRECTS = "nothing runs networks that answer light; method `neural` runs those that guide a filter (table `cells`)"
 _PICTURE = ("signed", "signed_stretched", "unit")
 # Feature: (channels, encodings); files of version 1 mean the first encoding.
-SCREEN_V1 = {
-    "direct": (3, ("log1p_over_exposure",)), "outgoing": (3, ("log1p_over_exposure",)), "albedo": (3, ("linear",)),
-    "normal": (3, ("gravity_frame",)), "position": (3, ("gravity_frame_squashed",)), "depth": (1, ("log_over_mean",)),
-    "spread": (1, ("log_ratio",)), "hit": (1, ("flag",)), "sky": (3, ("log1p_over_exposure",)),
-    "guess": (3, ("log1p_over_exposure",)),
-}
 CELLS_V1 = {
     "light": (1, ("over_sum_with_exposure",)), "chroma": (2, ("differences_over_sum",)), "deviation": (1, ("log1p_over_light",)),
     "frames": (1, ("inverse_root",)), "lately": (1, ("difference_over_sum",)), "nearness": (1, ("twice_width_over_length",)),
@@ -28,7 +23,7 @@ CELLS_V1 = {
 }
 IMAGES_V1 = {name: (3, _PICTURE) for name in ("depth", "direct", "diffuse", "normal")}
 # Table: (features, whether a network uses them in the table's order).
-TABLES = {"screen": (SCREEN_V1, True), "cells": (CELLS_V1, True), "images": (IMAGES_V1, False), "free": ({}, False)}
+TABLES = {"cells": (CELLS_V1, True), "images": (IMAGES_V1, False), "free": ({}, False)}
 SCALE_SUFFIX = "_scale"
 MAX_SCALE = float(np.finfo(np.float32).max) / 128
 
@@ -76,8 +71,8 @@ def check(doc):
     def fault(sentence):
         problems.append(Problem("document", "", f"metadata `{KEY}`: {sentence}"))
 
-    if doc["output"]["meaning"] == "gain_and_rest_on_cache":
-        fault(f"output meaning `gain_and_rest_on_cache`: {REPLACED} with meaning `gain_and_rest_on_guess`")
+    if doc["output"]["meaning"] in LEFT_MEANINGS:
+        fault(f"output meaning `{doc['output']['meaning']}` has left: {CORRECTS}")
     elif doc["output"]["meaning"] not in MEANINGS:
         fault(f"output meaning `{doc['output']['meaning']}` is unknown; known: {', '.join(MEANINGS)}")
     if not 1 <= doc["cell"] <= 64:
@@ -113,6 +108,8 @@ def _operator(index, op):
     name = op["name"] if isinstance(op, dict) and _text(op.get("name")) else "?"
     if not isinstance(op, dict) or not _text(op.get("op")):
         return [Problem("operator", name, f"graph[{index}] `{name}`: field `op` is missing or no string, or a field stands twice")]
+    if op["op"] in LEFT:
+        return [Problem("unknown-operator", name, f"graph[{index}] `{name}`: operator `{op['op']}` has left, since no shipped and no published network has it")]
     if op["op"] not in OPERATORS:
         return [Problem("unknown-operator", name, f"graph[{index}] `{name}`: operator `{op['op']}` is unknown; a newer program may run it")]
     wrong = graphs.field_fault(op)
@@ -125,7 +122,8 @@ def _inputs(doc):
     if version != 1:
         return [Problem("version", f"feature table `{name}`", f"feature table `{name}` has version {version}; known: 1")]
     if name not in TABLES:
-        return [Problem("document", "", f"metadata `{KEY}`: feature table `{name}` is unknown; known: {', '.join(TABLES)}")]
+        why = f"has left: {CORRECTS}" if name == LEFT_TABLE else f"is unknown; known: {', '.join(TABLES)}"
+        return [Problem("document", "", f"metadata `{KEY}`: feature table `{name}` {why}")]
     problems = [] if doc["inputs"] else [Problem("document", "", f"metadata `{KEY}`: there is no input feature")]
     rows, ordered = TABLES[name]
     order, following, seen = list(rows), 0, set()
@@ -146,7 +144,7 @@ def _inputs(doc):
         if not rows:
             continue
         if own not in rows:
-            fault(f"{REPLACED} with feature `guess`" if (name, own) == ("screen", "cache") else f"table `{name}` version 1 has no such feature")
+            fault(f"table `{name}` version 1 has no such feature")
             continue
         channels, encodings = rows[own]
         if feature["channels"] != channels:
@@ -220,7 +218,7 @@ def schema():
     part = lambda required, properties: {"type": "object", "additionalProperties": False, "required": required, "properties": properties}  # noqa: E731
     feature = part(["name", "channels"], {
         "name": {"type": "string"}, "channels": integer,
-        "encoding": {"type": "string", "minLength": 1, "description": f"required from version 2 on; in tables screen and images one of {', '.join(encodings)}"}})
+        "encoding": {"type": "string", "minLength": 1, "description": f"required from version 2 on; in tables cells and images one of {', '.join(encodings)}"}})
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"bouncelight weights document, versions {KNOWN_VERSIONS[0]} to {VERSION}",

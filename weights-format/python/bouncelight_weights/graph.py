@@ -105,16 +105,7 @@ def _channels(op, known):
         out = None if None in parts else min(sum(parts), U32 - 1)
     else:
         out = known.get(op["input"])
-        square = min(op.get("factor", 1) ** 2, U32 - 1)
-        if kind == "pixel_shuffle" and out is not None:
-            square = max(square, 1)
-            if out % square:
-                faults.append(f"channels {out} is no multiple of {square}")
-                bad_size = True
-            out //= square
-        elif kind == "pixel_unshuffle" and out is not None:
-            out = min(out * square, U32 - 1)
-    if kind in ("concat", "pixel_unshuffle") and out is not None and not 1 <= out <= MAX_CHANNELS:
+    if kind == "concat" and out is not None and not 1 <= out <= MAX_CHANNELS:
         faults.append(f"channels is {out}, allowed are 1 to {MAX_CHANNELS}")
         bad_size = True
     return out, faults, bad_size
@@ -173,12 +164,6 @@ def _shape(op, known):
         return sum(other[0] for other in inputs), h, w
     if kind == "add" and inputs[0] != inputs[1]:
         raise SizeError(name, f"{inputs} do not fit together")
-    if kind == "pixel_shuffle":
-        return c // op["factor"] ** 2, h * op["factor"], w * op["factor"]
-    if kind == "pixel_unshuffle":
-        if h % op["factor"] or w % op["factor"]:
-            raise SizeError(name, f"{w}×{h} is no multiple of {op['factor']}")
-        return c * op["factor"] ** 2, h // op["factor"], w // op["factor"]
     return c, h, w
 
 

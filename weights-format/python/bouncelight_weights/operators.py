@@ -110,7 +110,6 @@ _WEIGHTS = {**_ONE, "in_channels": (CHANNELS, REQUIRED), "out_channels": (CHANNE
             "stride": (STRIDE, 1), "bias": (FLAG, True), "activation": (ACTIVATION, "none")}
 _UPSAMPLE = {**_ONE, "size_as": (MAYBE_TEXT, None), "scale": (_maybe(Natural(1, MAX_SCALE)), None)}
 _NORM = {**_ONE, "channels": (CHANNELS, REQUIRED), "eps": (EPS, 1e-5), "affine": (FLAG, True), "activation": (ACTIVATION, "none")}
-_SHUFFLE = {**_ONE, "factor": (Natural(1, MAX_SCALE), REQUIRED)}
 
 # Operator: field: (kind, default).
 OPERATORS = {
@@ -126,10 +125,10 @@ OPERATORS = {
     "instance_norm": {**_NORM, "affine": (FLAG, False)},
     "group_norm": {**_NORM, "groups": (CHANNELS, REQUIRED)},
     "activation": {**_ONE, "activation": (ACTIVATION, REQUIRED)},
-    "pixel_shuffle": _SHUFFLE,
-    "pixel_unshuffle": _SHUFFLE,
     "dropout": {**_ONE, "p": (Fraction(0, 1, open_high=True), REQUIRED)},
 }
+# Operators that have left.
+LEFT = ("pixel_shuffle", "pixel_unshuffle")
 NORMS = ("batch_norm", "instance_norm", "group_norm")
 
 

@@ -105,10 +105,6 @@ class GraphNet(nn.Module):
             return act(t[op["inputs"][0]] + t[op["inputs"][1]])
         if kind == "activation":
             return act(x)
-        if kind == "pixel_shuffle":
-            return F.pixel_shuffle(x, op["factor"])
-        if kind == "pixel_unshuffle":
-            return F.pixel_unshuffle(x, op["factor"])
         if kind == "dropout":
             return F.dropout(x, op["p"], self.training)
         raise ValueError(f"operator `{kind}` is unknown")
