@@ -2,12 +2,16 @@
 //! bundled scenes, round trips.
 #![cfg(feature = "io")]
 
+#[path = "common/build.rs"]
+mod build;
 mod common;
 
 #[path = "scene/area.rs"]
 mod area;
 #[path = "scene/bad_input.rs"]
 mod bad_input;
+#[path = "scene/bumps.rs"]
+mod bumps;
 #[path = "scene/bundled.rs"]
 mod bundled;
 #[path = "scene/cameras.rs"]

@@ -129,3 +129,29 @@ pub(crate) fn make_tangents(mesh: &mut Mesh, uv_set: u8, transform: [[f32; 3]; 2
     unshare(mesh);
     mesh.tangents = tangents;
 }
+
+/// Makes tangents anew, as [`make_tangents`] does, at vertices whose own span no plane with the
+/// normal: without a length, along it, or without a side. Returns how many vertices had such.
+pub(crate) fn mend_tangents(mesh: &mut Mesh, uv_set: u8, transform: [[f32; 3]; 2]) -> usize {
+    let spans = |t: &[f32; 4], n: &[f32; 3]| {
+        let along = Vec3::new(t[0], t[1], t[2]).try_normalize();
+        t[3] != 0.0 && along.is_some_and(|t| t.cross(Vec3::from(*n)).length_squared() > 1e-5)
+    };
+    let sound: Vec<bool> = mesh.tangents.iter().zip(&mesh.normals).map(|(t, n)| spans(t, n)).collect();
+    let bad = sound.iter().filter(|s| !**s).count();
+    if bad > 0 {
+        let given = std::mem::take(&mut mesh.tangents);
+        let before = mesh.indices.clone();
+        make_tangents(mesh, uv_set, transform);
+        if mesh.tangents.is_empty() {
+            let beside = |n: &[f32; 3]| Vec3::from(*n).any_orthonormal_vector().extend(1.0).into();
+            let own = given.iter().zip(&mesh.normals).zip(&sound);
+            mesh.tangents = own.map(|((t, n), sound)| if *sound { *t } else { beside(n) }).collect();
+        } else {
+            let own = mesh.tangents.iter_mut().zip(before.iter().map(|i| *i as usize));
+            own.filter(|(_, i)| sound[*i]).for_each(|(t, i)| *t = given[i]);
+        }
+    }
+    mesh.tangents.iter_mut().for_each(|t| t[3] = if t[3] < 0.0 { -1.0 } else { 1.0 });
+    bad
+}

@@ -65,6 +65,9 @@ pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<(Image, Opt
     }
     let color_space = usage.color_space();
     let kept = |[from_width, from_height]: [u32; 2], mut level: Level<'_>| {
+        if usage == Use::Normal {
+            mend_normals(level.rgba.to_mut());
+        }
         while level.width.max(level.height) > KEPT_SIDE {
             level = level.halved(color_space);
         }
@@ -103,6 +106,24 @@ pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<(Image, Opt
         Level { width, height, rgba: Cow::Owned(decoded.into_rgba8().into_raw()) }
     };
     Ok(kept([width, height], level))
+}
+
+/// Texels that point into the surface, which no normal map can mean, or nowhere. Maps of two channels
+/// leave out blue, which follows from the others; what else there is, black for one, becomes flat.
+fn mend_normals(rgba: &mut [u8]) {
+    for p in rgba.chunks_exact_mut(4) {
+        let nowhere = p[..3].iter().all(|c| c.abs_diff(128) <= 4);
+        if p[2] >= 127 && !nowhere {
+            continue;
+        }
+        let [x, y] = [p[0], p[1]].map(|c| f32::from(c) / 127.5 - 1.0);
+        let rest = 1.0 - x * x - y * y;
+        if rest < -0.05 {
+            (p[0], p[1], p[2]) = (128, 128, 255);
+        } else {
+            p[2] = (127.5 + 127.5 * rest.max(0.0).sqrt()).round() as u8;
+        }
+    }
 }
 
 /// Half of a large picture, two rows at a time, so that it never lies in memory twice.

@@ -186,7 +186,12 @@ impl<'a> Loader<'a> {
         }
         match normal_map {
             Some(map) if mesh.tangents.is_empty() => geometry::make_tangents(mesh, map.uv_set, map.transform),
-            Some(_) => {}
+            Some(map) => {
+                let bad = geometry::mend_tangents(mesh, map.uv_set, map.transform);
+                if bad > 0 {
+                    self.warn(place, &format!("{bad} tangents span no plane with their normals and were made anew"));
+                }
+            }
             None => mesh.tangents.clear(),
         }
     }
