@@ -46,6 +46,8 @@ mod paper_room;
 mod real_files;
 #[path = "scene/shared.rs"]
 mod shared;
+#[path = "scene/skies.rs"]
+mod skies;
 #[path = "scene/specular.rs"]
 mod specular;
 #[path = "scene/units.rs"]

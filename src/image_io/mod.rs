@@ -8,6 +8,7 @@
 mod error;
 mod exr;
 mod png;
+pub(crate) mod radiance;
 mod whole;
 
 pub use error::ImageError;

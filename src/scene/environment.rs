@@ -10,6 +10,8 @@ mod sun;
 
 pub use sun::SkySun;
 
+#[cfg(feature = "io")]
+use crate::image_io::radiance;
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 use thiserror::Error;
@@ -92,11 +94,8 @@ impl Environment {
             return Err(file("is a folder; name an .hdr or .exr picture".into()));
         }
         let bytes = crate::image_io::read_regular(path).map_err(|e| file(format!("cannot be read: {e}")))?;
-        let (width, height, rgb) = if bytes.starts_with(b"#?") {
-            let reader = image::ImageReader::with_format(std::io::Cursor::new(&bytes), image::ImageFormat::Hdr);
-            let picture = reader.decode().map_err(|e| file(format!("damaged or truncated HDR picture: {e}")))?;
-            let picture = picture.into_rgb32f();
-            (picture.width(), picture.height(), picture.into_raw())
+        let (width, height, rgb) = if bytes.starts_with(radiance::MAGIC) {
+            radiance::decode(&bytes).map_err(|e| file(format!("damaged or truncated HDR picture: {e}")))?
         } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
             let layers = crate::image_io::read_exr(path).map_err(|e| EnvironmentError::File {
                 path: shown.clone(),
