@@ -32,6 +32,8 @@ mod home;
 mod layers;
 #[path = "scene/limits.rs"]
 mod limits;
+#[path = "scene/mended.rs"]
+mod mended;
 #[path = "scene/meshopt.rs"]
 mod meshopt;
 #[path = "scene/nothing.rs"]

@@ -79,9 +79,9 @@ pub struct Args {
     /// `stochastic` with --aov, else `sorted`.
     #[arg(long, value_name = "HOW")]
     blending: Option<Blending>,
-    /// What is seen beyond the scene, which the surroundings light in any case: `shown`, `blurred`
-    /// or `hidden`.
-    #[arg(long, default_value = "shown", value_name = "HOW")]
+    /// What is seen beyond the scene, which the surroundings light in any case: `shown`, `blurred`,
+    /// `hidden` or `transparent`, which makes alpha of a PNG and an EXR what surfaces cover.
+    #[arg(long, visible_alias = "background", default_value = "shown", value_name = "HOW")]
     backdrop: Backdrop,
     /// Stops by which a PNG is brighter, or `auto`: as many as make the mean of what is seen middle
     /// grey. When absent: `auto` for a file without any light, 0 for others and with --reference.
@@ -365,6 +365,9 @@ fn check(args: &Args) -> Result<Format> {
         return Err(usage(
             "--exposure auto measures this picture; with --reference both need a number of stops".into(),
         ));
+    }
+    if args.backdrop == Backdrop::Transparent && args.taa.is_some() {
+        return Err(usage("--taa remembers colours without alpha; a transparent backdrop takes --samples".into()));
     }
     let name = args.method().name();
     if args.method() == MethodName::Reference {

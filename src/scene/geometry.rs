@@ -1,7 +1,7 @@
 //! Mending of meshes that files leave incomplete: flat normals, tangents, strips and fans.
 
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::Mesh;
 
@@ -58,13 +58,27 @@ pub(crate) fn make_flat_normals(mesh: &mut Mesh) {
     }
 }
 
-/// Brings normals to unit length; those that have none become +Y. Returns how many had none.
-pub(crate) fn normalize_normals(normals: &mut [[f32; 3]]) -> usize {
-    let mut bad = 0;
-    for normal in normals {
-        *normal = Vec3::from(*normal).try_normalize().unwrap_or_else(|| (bad += 1, Vec3::Y).1).into();
+/// Brings normals to unit length; those that have none get that of their triangles, or +Y where
+/// these have no area. Returns how many had none.
+pub(crate) fn normalize_normals(mesh: &mut Mesh) -> usize {
+    let mut bad = Vec::new();
+    for (v, normal) in mesh.normals.iter_mut().enumerate() {
+        *normal = Vec3::from(*normal).try_normalize().unwrap_or_else(|| (bad.push(v), Vec3::Y).1).into();
     }
-    bad
+    if bad.is_empty() {
+        return 0;
+    }
+    // Twice the area of each triangle, along its normal.
+    let mut sums = vec![DVec3::ZERO; mesh.normals.len()];
+    for t in mesh.indices.chunks_exact(3) {
+        let [a, b, c] = [0, 1, 2].map(|k| Vec3::from(mesh.positions[t[k] as usize]).as_dvec3());
+        let normal = (b - a).cross(c - a);
+        t.iter().for_each(|&v| sums[v as usize] += normal);
+    }
+    for &v in &bad {
+        mesh.normals[v] = sums[v].try_normalize().map_or(Vec3::Y, |n| n.as_vec3()).to_array();
+    }
+    bad.len()
 }
 
 /// The triangles as MikkTSpace sees them: no vertex is shared.

@@ -47,6 +47,7 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError>
         numbers: HashMap::new(),
         libraries: Vec::new(),
         warnings: Vec::new(),
+        origin: None,
         lines: 0,
         curves: 0,
     };
@@ -71,6 +72,8 @@ struct Reading<'a> {
     numbers: HashMap<String, usize>,
     libraries: Vec<mtl::Entry>,
     warnings: Vec<String>,
+    /// Where the scene has its origin: at the first vertex, where that is far from the file's.
+    origin: Option<[f64; 3]>,
     lines: usize,
     curves: usize,
 }
@@ -79,16 +82,18 @@ impl Reading<'_> {
     fn statement(&mut self, s: &Statement<'_>) -> Result<(), String> {
         match s.key {
             "v" => {
-                let (n, count) = numbers::<8>(s.plain(), 3)?;
-                let color = (count >= 6).then_some([n[3], n[4], n[5]]).filter(|c| c.iter().all(|v| v.is_finite()));
-                self.faces.place([n[0], n[1], n[2]], color);
+                let (n, count) = numbers::<f64, 8>(s.plain(), 3)?;
+                let origin = self.origin.get_or_insert_with(|| origin([n[0], n[1], n[2]]));
+                let color = [n[3], n[4], n[5]].map(|v| v as f32);
+                let color = (count >= 6).then_some(color).filter(|c| c.iter().all(|v| v.is_finite()));
+                self.faces.place([0, 1, 2].map(|c| (n[c] - origin[c]) as f32), color);
             }
             "vt" => {
-                let (n, count) = numbers::<2>(s.plain(), 1)?;
+                let (n, count) = numbers::<f32, 2>(s.plain(), 1)?;
                 let v = if count > 1 && n[1].is_finite() { n[1] } else { 0.0 };
                 self.faces.uv([n[0], v]);
             }
-            "vn" => self.faces.normal(numbers::<3>(s.plain(), 3)?.0),
+            "vn" => self.faces.normal(numbers::<f32, 3>(s.plain(), 3)?.0),
             "f" => self.faces.face(s.plain())?,
             "l" | "p" => self.lines += 1,
             "curv" | "curv2" | "surf" => self.curves += 1,
@@ -171,6 +176,17 @@ impl Reading<'_> {
     fn into_scene(mut self, scene: &mut Scene, path: &Path, placed: [[f32; 4]; 4]) {
         self.faces.end();
         let mut warnings = std::mem::take(&mut self.warnings);
+        if self.origin.is_some_and(|origin| origin != [0.0; 3])
+            && self.faces.reach_back(self.origin.unwrap_or_default())
+        {
+            self.origin = None;
+        }
+        if let Some([x, y, z]) = self.origin.filter(|o| *o != [0.0; 3]) {
+            warnings.push(format!(
+                "everything is far from the file's origin, where numbers are coarse; places count from ({x}, {y}, {z}) \
+                 instead"
+            ));
+        }
         let told = [
             (self.lines, "lines and points are left out; only surfaces are drawn"),
             (self.curves, "free-form curves and surfaces are left out; only polygons are drawn"),
@@ -222,14 +238,44 @@ impl Reading<'_> {
     }
 }
 
+/// Where a file whose first vertex is `first` has its origin: its own, or whole units beside that
+/// vertex where it is so far away that 32-bit floats are coarse there, as in coordinates of maps.
+fn origin(first: [f64; 3]) -> [f64; 3] {
+    first.map(|v| if v.abs() > 1e5 { v.round() } else { 0.0 })
+}
+
+/// A number as files write it; NaN for what is none, or none of 32 bits.
+trait Word: Copy {
+    fn read(word: &str) -> Self;
+    fn is_sound(self) -> bool;
+}
+
+impl Word for f32 {
+    fn read(word: &str) -> Self {
+        word.parse().unwrap_or(f32::NAN)
+    }
+    fn is_sound(self) -> bool {
+        self.is_finite()
+    }
+}
+
+impl Word for f64 {
+    fn read(word: &str) -> Self {
+        word.parse().unwrap_or(f64::NAN)
+    }
+    fn is_sound(self) -> bool {
+        (self as f32).is_finite()
+    }
+}
+
 /// Up to N numbers, NaN for those that are none behind the `needed`, and how many words there are of
 /// those N.
-fn numbers<const N: usize>(words: &str, needed: usize) -> Result<([f32; N], usize), String> {
-    let mut out = [f32::NAN; N];
+fn numbers<T: Word, const N: usize>(words: &str, needed: usize) -> Result<([T; N], usize), String> {
+    let mut out = [T::read(""); N];
     let mut count = 0;
     for (out, word) in out.iter_mut().zip(words.split_ascii_whitespace()) {
-        *out = word.parse().unwrap_or(f32::NAN);
-        if count < needed && !out.is_finite() {
+        *out = T::read(word);
+        if count < needed && !out.is_sound() {
             return Err(format!("'{word}' is not a finite number"));
         }
         count += 1;

@@ -299,3 +299,24 @@ fn maps_have_options_and_names_with_spaces() {
     // Negative control: a name that is none is told.
     assert!(warned(&load(&head, "newmtl m\nmap_Kd -s 2 2 1 c.png\n"), &["'c.png'", "checker"]));
 }
+
+#[test]
+fn map_coordinates_keep_their_digits() {
+    let square = |x: f64, y: f64| {
+        let corner = |dx: f64, dy: f64| format!("v {} {} 12.5\n", x + dx, y + dy);
+        [corner(0.0, 0.0), corner(0.125, 0.0), corner(0.125, 0.125), corner(0.0, 0.125), "f 1 2 3 4\n".into()].concat()
+    };
+    let sides = |scene: &Scene| {
+        let c = corners(scene);
+        [(c[1][0] - c[0][0]), (c[2][1] - c[1][1])]
+    };
+    let far = load(&square(500_123.4375, 4_649_776.0625), "");
+    assert_eq!(sides(&far), [0.125; 2]);
+    assert!(warned(&far, &["far from the file's origin", "(500123, 4649776, 0)"]), "{:?}", far.warnings);
+    // Negative controls: near ones stay, and so does what reaches as far as it is away.
+    let near = load(&square(99.0, -12.0), "");
+    assert_eq!((corners(&near)[0], sides(&near)), ([99.0, -12.0, 12.5], [0.125; 2]));
+    let large = load("v 120000 0 0\nv -120000 0 0\nv 0 90000 0\nf 1 2 3\n", "");
+    assert_eq!(corners(&large)[0], [120_000.0, 0.0, 0.0]);
+    assert!(!warned(&large, &["far from"]));
+}

@@ -118,3 +118,72 @@ fn radiance_pictures_that_are_not_whole_or_none() {
     refused(HEADER, &[9, 9, 9, 9, 1, 1, 1, 200], &["longer than its scanline"]);
     refused(HEADER, &[2, 2, 0, 17], &["length other than 16"]);
 }
+
+/// Channels of an EXR: its layer's names, where its pixels lie, and the picture that it shows.
+fn exr_with(
+    names: &[&str],
+    first: [i32; 2],
+    size: [usize; 2],
+    of: impl Fn(usize, usize) -> [f32; 3],
+) -> Result<EnvironmentImage, String> {
+    use exr::prelude::*;
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("sky.exr");
+    let channel = |(c, name): (usize, &&str)| {
+        let values = (0..size[0] * size[1]).map(|i| of(i % size[0], i / size[0])[c.min(2)]).collect();
+        AnyChannel::new(Text::from(*name), FlatSamples::F32(values))
+    };
+    let channels = AnyChannels::sort(names.iter().enumerate().map(channel).collect());
+    let attributes = LayerAttributes { layer_position: Vec2(first[0], first[1]), ..LayerAttributes::default() };
+    let layer = exr::prelude::Layer::new(Vec2(size[0], size[1]), attributes, Encoding::UNCOMPRESSED, channels);
+    let shown = IntegerBounds::from_dimensions(Vec2(WIDTH, HEIGHT));
+    let image = exr::prelude::Image::empty(ImageAttributes::new(shown)).with_layer(layer);
+    image.write().to_file(&path).expect("it is written");
+    let (environment, _) = Environment::load(&path).map_err(|e| e.to_string())?;
+    Ok(EnvironmentImage::clone(environment.image.as_ref().expect("a picture")))
+}
+
+#[test]
+fn exr_pictures_of_every_kind() {
+    let ramp = |x: usize, y: usize| [x as f32, y as f32, 0.5];
+    let whole = [WIDTH, HEIGHT];
+    let plain = exr_with(&["R", "G", "B"], [0, 0], whole, ramp).expect("it loads");
+    assert_eq!((plain.width, plain.height, &plain.rgb[3 * 17..3 * 18]), (16, 8, &[1.0, 1.0, 0.5][..]));
+    for names in [
+        ["r", "g", "b"],
+        ["sky.R", "sky.G", "sky.B"],
+        ["sky.r", "sky.g", "sky.b"],
+        ["ViewLayer.Combined.R", "ViewLayer.Combined.G", "ViewLayer.Combined.B"],
+    ] {
+        assert!(exr_with(&names, [0, 0], whole, ramp).expect("it loads").rgb == plain.rgb, "{names:?}");
+    }
+    // Luminance, alone and with alpha: grey.
+    let grey = |x: usize, y: usize| [(x + y) as f32, 1.0, 1.0];
+    for names in [&["Y"][..], &["Y", "A"], &["y", "a"]] {
+        let picture = exr_with(names, [0, 0], whole, grey).expect("it loads");
+        assert!(picture.rgb.chunks_exact(3).enumerate().all(|(i, p)| p == [(i % 16 + i / 16) as f32; 3]), "{names:?}");
+    }
+    // Pixels that are a part of what is shown, or more than it.
+    let moved =
+        |dx: i64, dy: i64| move |x: usize, y: usize| [(x as i64 + dx + 100) as f32, (y as i64 + dy + 100) as f32, 0.5];
+    let placed = exr_with(&["R", "G", "B"], [0, 0], whole, moved(0, 0)).expect("it loads");
+    let cropped = exr_with(&["R", "G", "B"], [3, 2], [8, 4], moved(3, 2)).expect("it loads");
+    for (i, (have, full)) in cropped.rgb.chunks_exact(3).zip(placed.rgb.chunks_exact(3)).enumerate() {
+        let inside = (3..11).contains(&(i % 16)) && (2..6).contains(&(i / 16));
+        assert_eq!(have, if inside { full } else { &[0.0; 3] }, "{i}");
+    }
+    assert_eq!((cropped.width, cropped.height), (16, 8));
+    let overscan = exr_with(&["R", "G", "B"], [-4, -3], [30, 20], moved(-4, -3)).expect("it loads");
+    assert!(overscan.rgb == placed.rgb && (overscan.width, overscan.height) == (16, 8));
+    let beside = exr_with(&["R", "G", "B"], [40, -30], [4, 4], ramp).expect("it loads");
+    assert!(beside.rgb.iter().all(|v| *v == 0.0));
+    // A few bytes do not claim a great window.
+    let claimed = exr_with(&["R", "G", "B"], [0, 0], [1 << 12, 1], ramp).expect("it loads");
+    assert_eq!((claimed.width, claimed.height), (16, 8));
+    // Negative controls: no picture of light, and two of them.
+    for names in [&["Depth.Z"][..], &["Normal.X", "Normal.Y", "Normal.Z"], &["a.R", "a.G", "a.B", "b.R", "b.G", "b.B"]]
+    {
+        let told = exr_with(names, [0, 0], whole, ramp).map(drop).expect_err("it is refused");
+        assert!(told.contains("sky.exr") && told.contains(names[0].split('.').next().expect("a name")), "{told}");
+    }
+}

@@ -121,6 +121,20 @@ impl Faces {
         self.begin(String::new(), None);
     }
 
+    /// Moves everything back to the file's own `origin` where it reaches about as far as it is away,
+    /// as a large model in a small unit does. True if it does.
+    pub(super) fn reach_back(&mut self, origin: [f64; 3]) -> bool {
+        let places = self.made.iter().flat_map(|m| &m.mesh.positions).flatten();
+        let reach = places.fold(0.0f64, |most, c| most.max(f64::from(c.abs())));
+        let back = origin.iter().all(|o| o.abs() <= 2.0 * reach);
+        if back {
+            for place in self.made.iter_mut().flat_map(|m| &mut m.mesh.positions) {
+                *place = [0, 1, 2].map(|c| (f64::from(place[c]) + origin[c]) as f32);
+            }
+        }
+        back
+    }
+
     /// A face by its corners' words.
     ///
     /// # Errors
@@ -212,7 +226,7 @@ impl Faces {
         if normals < vertices.len() {
             give_flat(&mut mesh, |i| vertices[i].normal == NONE);
         }
-        geometry::normalize_normals(&mut mesh.normals);
+        geometry::normalize_normals(&mut mesh);
         Made { mesh, material }
     }
 }
