@@ -11,6 +11,16 @@ pub fn encode(linear: f32) -> f32 {
     if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
 }
 
+/// CIE XYZ as linear Rec.709; the white of both is D65.
+#[cfg(feature = "io")]
+pub(crate) fn from_xyz([x, y, z]: [f32; 3]) -> [f32; 3] {
+    [
+        3.240_454_2 * x - 1.537_138_5 * y - 0.498_531_4 * z,
+        -0.969_266 * x + 1.876_010_8 * y + 0.041_556 * z,
+        0.055_643_4 * x - 0.204_025_9 * y + 1.057_225_2 * z,
+    ]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,7 @@
 //! Scenes as the command line meets them: what they may name, scenes of nothing, surroundings that
 //! replace default light.
 
+mod common;
 #[path = "common/program.rs"]
 mod program;
 
@@ -81,4 +82,42 @@ fn given_surroundings_replace_the_default_sun() {
     let layer = bouncelight::image_io::Layer::new("", "RGB", &rgb);
     bouncelight::image_io::write_exr(Path::new(&sky), 16, 8, &[layer], &[]).unwrap();
     fails(&["render", &scene, "-o", "never.png", "--environment", &sky], 4, &["sky.exr", "finite"]);
+}
+
+#[test]
+fn a_picture_without_a_background_has_alpha() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let scene = path(&dir, "half.obj");
+    std::fs::write(path(&dir, "m.mtl"), "newmtl wall\nKd 0.5 0.5 0.5\nnewmtl pane\nKd 0.5 0.5 0.5\nd 0.5\n").unwrap();
+    let wall = "v -1 -0.5 0\nv 0 -0.5 0\nv 0 0.5 0\nv -1 0.5 0\nv 1 -0.5 0\nv 1 0.5 0\n";
+    std::fs::write(&scene, format!("mtllib m.mtl\n{wall}usemtl wall\nf 1 2 3 4\nusemtl pane\nf 2 5 6 3\n")).unwrap();
+    let drawn = |name: &str, more: &[&str]| {
+        let out = path(&dir, name);
+        let seen = ["--size", "32x32", "--method", "direct", "--eye", "0,0,5", "--look-at", "0,0,0", "--fov", "34"];
+        let run = bouncelight(&[&["render", &scene, "-o", &out], &seen[..], more].concat());
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        out
+    };
+    let places = [(16 + 2 * 32, 0.0), (11 + 16 * 32, 1.0), (20 + 16 * 32, 0.5)];
+    for flag in ["--backdrop", "--background"] {
+        let png = bouncelight::image_io::read_png(Path::new(&drawn("a.png", &[flag, "transparent"]))).unwrap();
+        assert_eq!(png.channels, 4);
+        let exr = bouncelight::image_io::read_exr(Path::new(&drawn("a.exr", &[flag, "transparent"]))).unwrap();
+        let alpha = exr.layer("").unwrap().channel("A").unwrap().to_vec();
+        for (i, wanted) in places {
+            assert!((png.pixels[4 * i + 3] - wanted).abs() < 0.01, "{i}: {}", png.pixels[4 * i + 3]);
+            assert!((alpha[i] - wanted).abs() < 0.01, "{i}: {}", alpha[i]);
+        }
+        // Colours of the PNG are not multiplied: pane and wall are lit the same.
+        let [wall, pane] = [11 + 16 * 32, 20 + 16 * 32].map(|i| png.pixels[4 * i]);
+        assert!((wall - pane).abs() < 0.03 && wall > 0.2, "{wall} {pane}");
+    }
+    // Negative control: with a background there is no alpha.
+    assert_eq!(bouncelight::image_io::read_png(Path::new(&drawn("b.png", &[]))).unwrap().channels, 3);
+    let never = path(&dir, "never.png");
+    let taa = ["--backdrop", "transparent", "--taa", "4"];
+    fails(&[&["render", &scene, "-o", &never], &taa[..]].concat(), 2, &["--taa", "alpha"]);
 }

@@ -2,12 +2,16 @@
 //! bundled scenes, round trips.
 #![cfg(feature = "io")]
 
+#[path = "common/build.rs"]
+mod build;
 mod common;
 
 #[path = "scene/area.rs"]
 mod area;
 #[path = "scene/bad_input.rs"]
 mod bad_input;
+#[path = "scene/bumps.rs"]
+mod bumps;
 #[path = "scene/bundled.rs"]
 mod bundled;
 #[path = "scene/cameras.rs"]
@@ -28,6 +32,8 @@ mod home;
 mod layers;
 #[path = "scene/limits.rs"]
 mod limits;
+#[path = "scene/mended.rs"]
+mod mended;
 #[path = "scene/meshopt.rs"]
 mod meshopt;
 #[path = "scene/nothing.rs"]
@@ -42,6 +48,8 @@ mod paper_room;
 mod real_files;
 #[path = "scene/shared.rs"]
 mod shared;
+#[path = "scene/skies.rs"]
+mod skies;
 #[path = "scene/specular.rs"]
 mod specular;
 #[path = "scene/units.rs"]

@@ -8,7 +8,7 @@ mod common;
 use bouncelight::gi::Method;
 use bouncelight::gpu::Gpu;
 use bouncelight::render::capture::{CaptureOptions, Picture, capture};
-use bouncelight::render::{Blending, Renderer, RendererOptions};
+use bouncelight::render::{Backdrop, Blending, Renderer, RendererOptions};
 use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{AlphaMode, Camera, Material, Scene};
 use build::{center, look_at, material, quad, scene, sun};
@@ -134,4 +134,45 @@ fn anti_aliasing_keeps_veils() {
     let options = RendererOptions { taa: true, ..sorted() };
     let camera = look_at([0.0, 0.0, 5.0], [0.0, 0.0, 0.0], 0.6);
     near(middle(&drawn(&gpu, &panes(&[(1.0, [1.0, 0.0, 0.0], 0.25)]), &camera, options, 1)), [0.25, 0.0, 0.75]);
+}
+
+#[test]
+fn alpha_of_vertices_is_that_of_a_pane() {
+    let Some(gpu) = common::gpu() else { return };
+    let camera = look_at([0.0, 0.0, 5.0], [0.0; 3], 0.6);
+    let mut coloured = panes(&[(1.0, [1.0, 0.0, 0.0], 1.0)]);
+    coloured.meshes[1].colors = vec![[1.0, 1.0, 1.0, 0.25]; 4];
+    near(middle(&drawn(&gpu, &coloured, &camera, sorted(), 1)), [0.25, 0.0, 0.75]);
+    // Negative control: opaque vertices cover all.
+    coloured.meshes[1].colors = vec![[1.0; 4]; 4];
+    near(middle(&drawn(&gpu, &coloured, &camera, sorted(), 1)), [1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn a_transparent_backdrop_has_alpha_where_surfaces_are() {
+    let Some(gpu) = common::gpu() else { return };
+    // A wall at the left, a pane at the right, nothing above and below.
+    let side = |x: f32| quad([x, -0.5, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
+    let mut s = scene(vec![side(-1.0), side(0.0)], Vec::new());
+    s.environment = build::environment(0.7);
+    s.materials[0] = Material { unlit: true, ..material([0.0, 0.0, 1.0]) };
+    let (base_color, alpha_mode) = ([1.0, 0.0, 0.0, 0.5], AlphaMode::Blend);
+    s.materials.push(Material { base_color, alpha_mode, unlit: true, ..material([0.0; 3]) });
+    s.meshes[1].material = 1;
+    let camera = look_at([0.0, 0.0, 5.0], [0.0; 3], 0.6);
+    let with = |backdrop, blending, samples| {
+        drawn(&gpu, &s, &camera, RendererOptions { backdrop, blending, ..sorted() }, samples)
+    };
+    for (blending, samples, slack) in [(Blending::Sorted, 1, 2e-3), (Blending::Stochastic, 64, 0.05)] {
+        let p = with(Backdrop::Transparent, blending, samples);
+        for (x, y, wanted) in [(16, 2, [0.0; 4]), (11, 16, [0.0, 0.0, 1.0, 1.0]), (20, 16, [0.5, 0.0, 0.0, 0.5])] {
+            let close = p.at(x, y).iter().zip(wanted).all(|(a, b)| (a - b).abs() <= slack);
+            assert!(close, "{blending:?} at {x}, {y}: {:?} instead of {wanted:?}", p.at(x, y));
+        }
+        // Negative control: other backdrops are opaque, exactly.
+        for backdrop in [Backdrop::Shown, Backdrop::Hidden] {
+            let opaque = with(backdrop, blending, samples);
+            assert!(opaque.data.chunks_exact(4).all(|p| p[3] == 1.0), "{backdrop:?}");
+        }
+    }
 }

@@ -114,7 +114,9 @@ fn fresnel_of(f0: vec3f, c: f32) -> vec3f {
 // GGX, single scattering: D * V * F, in 1/sr; multiply by n.l and the light, and for metals by
 // `lobe_gain`.
 fn ggx(n: vec3f, v: vec3f, l: vec3f, f0: vec3f, roughness: f32) -> vec3f {
-    let h = normalize(v + l);
+    // Light that passes straight through has no half-way direction.
+    let sum = v + l;
+    let h = sum * inverseSqrt(max(dot(sum, sum), 1e-12));
     let n_l = saturate(dot(n, l));
     let n_v = max(dot(n, v), 1e-4);
     let n_h = saturate(dot(n, h));

@@ -48,7 +48,8 @@ struct Lobe {
 // The lobe towards l, which lies above the shading normal's horizon.
 fn gloss_lobe(s: Surface, l: vec3f) -> Lobe {
     let sum = s.v + l;
-    let h = normalize(sum);
+    // Light that passes straight through has no half-way direction.
+    let h = sum * inverseSqrt(max(dot(sum, sum), 1e-12));
     let n_l = saturate(dot(s.n, l));
     let n_h = saturate(dot(s.n, h));
     let alpha = s.alpha;

@@ -1,6 +1,7 @@
 //#import accel/traverse.wgsl
 //#import lib/octahedral.wgsl
 //#import lib/brdf.wgsl
+//#import lib/bump.wgsl
 //#import reference/types.wgsl
 
 // What is at a hit: geometry, textures, material. Follows `gbuffer.wgsl` in every step.
@@ -150,9 +151,7 @@ fn energy_mean(roughness: f32) -> f32 {
 
 // Unit normal of the front side; zero for a triangle without area.
 fn front_normal(c: Corners) -> vec3f {
-    let n = cross(c.b - c.a, c.c - c.a);
-    let l = length(n);
-    return select(vec3f(0.0), n / l, l > 0.0);
+    return unit_or(cross(c.b - c.a, c.c - c.a), vec3f(0.0));
 }
 
 fn surface_at(hit: Hit, direction: vec3f) -> Surface {
@@ -171,16 +170,16 @@ fn surface_at(hit: Hit, direction: vec3f) -> Surface {
     let i = 4u * hit.triangle;
     var n = oct_decode(unpack2x16snorm(triangles[i].w)) * w.x + oct_decode(unpack2x16snorm(triangles[i + 1u].w)) * w.y
         + oct_decode(unpack2x16snorm(triangles[i + 2u].w)) * w.z;
-    n = select(front_n, normalize(n), dot(n, n) > 1e-12);
+    n = unit_or(n, front_n);
     if materials.items[m].normal_use.texel != NONE && extra != NONE {
         let t = triangles[extra + 3u];
         if (t.w & 8u) != 0u {
             let along = oct_decode(unpack2x16snorm(t.x)) * w.x + oct_decode(unpack2x16snorm(t.y)) * w.y
                 + oct_decode(unpack2x16snorm(t.z)) * w.z;
-            let across = cross(n, along) * select(1.0, -1.0, (t.w & 1u) != 0u);
+            let handed = select(1.0, -1.0, (t.w & 1u) != 0u);
             let bump = image_at(materials.items[m].normal_use, uv, vec4f(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0;
             let scale = materials.items[m].normal_scale;
-            n = normalize(normalize(along) * bump.x * scale + normalize(across) * bump.y * scale + n * bump.z);
+            n = bent_normal(n, along, handed, bump * vec3f(scale, scale, 1.0));
         }
     }
     s.n = select(-n, n, front);

@@ -49,6 +49,8 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let depth = textureLoad(depth_texture, id.xy, 0).x;
     var radiance = vec3f(0.0);
+    // Where there is no surface a transparent backdrop has neither light nor alpha.
+    let alpha = select(0.0, 1.0, depth > 0.0 || frame.backdrop != 3u);
     if depth > 0.0 {
         let albedo = textureLoad(albedo_texture, id.xy, 0);
         // Occlusion maps darken what comes from all around, not the analytic lights (glTF 2.0,
@@ -58,8 +60,8 @@ fn composite(@builtin(global_invocation_id) id: vec3u) {
             + textureLoad(direct_specular, id.xy, 0).rgb
             + textureLoad(indirect_specular, id.xy, 0).rgb * albedo.a
             + textureLoad(emissive_texture, id.xy, 0).rgb;
-    } else {
+    } else if alpha > 0.0 {
         radiance = backdrop(-to_eye(frame, id.xy), id.xy);
     }
-    textureStore(hdr, id.xy, vec4f(min(radiance, vec3f(HALF_MAX)), 1.0));
+    textureStore(hdr, id.xy, vec4f(min(radiance, vec3f(HALF_MAX)), alpha));
 }

@@ -53,7 +53,9 @@ fn layer_texture(@builtin(global_invocation_id) id: vec3u) {
 
 fn decode(pixel: vec2u) -> vec4f {
     if options.layer == 0u {
-        return vec4f(textureLoad(hdr, pixel, 0).rgb, 1.0);
+        let color = textureLoad(hdr, pixel, 0);
+        // Exactly 1 where there is a backdrop, whatever blending leaves of it.
+        return vec4f(color.rgb, select(1.0, color.a, frame.backdrop == 3u));
     }
     let depth = textureLoad(depth_texture, pixel, 0).x;
     if depth <= 0.0 {

@@ -1,4 +1,5 @@
 //#import lib/octahedral.wgsl
+//#import lib/bump.wgsl
 
 // The vertex stage of everything that draws surfaces with their materials: gbuffer.wgsl and
 // atlas.wgsl.
@@ -46,7 +47,7 @@ fn placed(v: Vertex, clip_from_world: mat4x4f) -> Varying {
     let t = select(vec3f(0.0), oct_decode(v.tangent.xy), v.tangent.z != 0.0);
     var out: Varying;
     out.position = clip_from_world * vec4f(world, 1.0);
-    out.normal = normalize(vec3f(dot(c0, n), dot(c1, n), dot(c2, n))) * mirror;
+    out.normal = unit_or(vec3f(dot(c0, n), dot(c1, n), dot(c2, n)), vec3f(0.0)) * mirror;
     out.tangent = vec4f(dot(v.row0.xyz, t), dot(v.row1.xyz, t), dot(v.row2.xyz, t), v.tangent.z * mirror);
     out.uv = vec4f(v.uv0, v.uv1);
     out.color = v.color;

@@ -1,5 +1,6 @@
 //#import lib/frame.wgsl
 //#import lib/brdf.wgsl
+//#import lib/bump.wgsl
 //#import lib/material.wgsl
 //#import render/mesh.wgsl
 
@@ -37,13 +38,13 @@ fn surface_at(in: Varying, facing: bool) -> Surface {
     let glow = textureSampleBias(emissive_texture, emissive_sampler, glow_at, bias).rgb;
 
     let front = facing == (in.mirror > 0.0);
-    var n = normalize(in.normal);
+    let v = -(frame.world_from_view * vec4f(view_ray_at(in.position.xy), 0.0)).xyz;
+    // Towards the eye where corners' normals have no mean.
+    var n = unit_or(in.normal, select(-1.0, 1.0, front) * normalize(v));
     var spread = 0.0;
     if in.tangent.w != 0.0 && material.normal_use.row1.w > 0.5 {
-        let t = in.tangent.xyz;
-        let b = cross(n, t) * in.tangent.w;
         let m = (bump.xyz * 2.0 - 1.0) * vec3f(material.normal_scale, material.normal_scale, 1.0);
-        n = normalize(normalize(t) * m.x + normalize(b) * m.y + n * m.z);
+        n = bent_normal(n, in.tangent.xyz, sign(in.tangent.w), m);
         spread = slope_variance(bump.a) * material.normal_scale * material.normal_scale;
     }
     n = select(-n, n, front);
@@ -51,7 +52,6 @@ fn surface_at(in: Varying, facing: bool) -> Surface {
     let metallic = saturate(material.metallic * rough_metal.b);
     let roughness = rougher(saturate(material.roughness * rough_metal.g), spread);
     let color = saturate(base.rgb);
-    let v = -(frame.world_from_view * vec4f(view_ray_at(in.position.xy), 0.0)).xyz;
     let n_v = dot(n, normalize(v));
     let share = diffuse_loss(material.f0, roughness, max(n_v, 0.0));
     let darkened = select(0.0, material.occlusion_strength, frame.picture_only != 0u);

@@ -39,6 +39,9 @@ pub struct Global {
     /// names them.
     #[arg(long, global = true)]
     pub allow_outside: bool,
+    /// A glTF file that says something wrong is refused instead of mended with a warning.
+    #[arg(long, global = true)]
+    pub strict: bool,
     /// Metres of a scene file's unit of length: 0.001 for one that counts in millimetres.
     #[arg(long, global = true, default_value_t = 1.0, allow_hyphen_values = true, value_parser = parse_scale, value_name = "M")]
     pub scale: f32,
@@ -134,7 +137,7 @@ impl Global {
     /// What a scene file may do.
     pub fn load_options(&self) -> LoadOptions {
         let up = if self.up == UpName::Y { Up::Y } else { Up::Z };
-        LoadOptions { allow_outside: self.allow_outside, units: Units { scale: self.scale, up } }
+        LoadOptions { allow_outside: self.allow_outside, strict: self.strict, units: Units { scale: self.scale, up } }
     }
 
     /// How textures are uploaded.

@@ -73,9 +73,9 @@ pub struct Args {
     /// `stochastic` with --aov, else `sorted`.
     #[arg(long, value_name = "HOW")]
     blending: Option<Blending>,
-    /// What is seen beyond the scene, which the surroundings light in any case: `shown`, `blurred`
-    /// or `hidden`.
-    #[arg(long, default_value = "shown", value_name = "HOW")]
+    /// What is seen beyond the scene, which the surroundings light in any case: `shown`, `blurred`,
+    /// `hidden` or `transparent`, which makes alpha of a PNG and an EXR what surfaces cover.
+    #[arg(long, visible_alias = "background", default_value = "shown", value_name = "HOW")]
     backdrop: Backdrop,
     /// Seed of jitter and soft-shadow patterns.
     #[arg(long, default_value_t = 0)]
@@ -297,6 +297,9 @@ fn film(
 
 /// Flags that do not belong to the method.
 fn check(args: &Args) -> Result<()> {
+    if args.backdrop == Backdrop::Transparent && args.taa.is_some() {
+        return Err(usage("--taa remembers colours without alpha; a transparent backdrop takes --samples".into()));
+    }
     let name = args.method().name();
     let settles = [MethodName::Gather, MethodName::Neural].contains(&args.method());
     if args.gi_frames.is_some() && !settles {

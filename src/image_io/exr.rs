@@ -83,6 +83,19 @@ pub fn write_exr(
 /// Missing, empty, truncated or foreign file; too many pixels; deep data, subsampled channels,
 /// parts of different sizes or an unknown compression.
 pub fn read_exr(path: &Path) -> Result<Layers, ImageError> {
+    read_with_windows(path).map(|(layers, _)| layers)
+}
+
+/// Where the pixels that a file has lie in the picture that it shows.
+pub(crate) struct Windows {
+    /// Column and row of the first pixel, counted from the picture's.
+    pub first: [i64; 2],
+    /// Columns and rows of the picture.
+    pub shown: [u64; 2],
+}
+
+/// As [`read_exr`], with what of the picture the layers are.
+pub(crate) fn read_with_windows(path: &Path) -> Result<(Layers, Windows), ImageError> {
     let bytes = read_all(path)?;
     if !bytes.starts_with(&MAGIC) {
         return Err(ImageError::NotThisFormat { path: path.into(), expected: "an EXR" });
@@ -102,6 +115,11 @@ pub fn read_exr(path: &Path) -> Result<Layers, ImageError> {
         .all_attributes()
         .from_buffered(Cursor::new(&bytes))
         .map_err(failed)?;
+
+    let IntegerBounds { position: Vec2(x, y), size: Vec2(columns, rows) } = image.attributes.display_window;
+    let Vec2(left, top) = image.layer_data.first().map_or(Vec2(x, y), |part| part.attributes.layer_position);
+    let first = [i64::from(left) - i64::from(x), i64::from(top) - i64::from(y)];
+    let windows = Windows { first, shown: [columns as u64, rows as u64] };
 
     let mut layers: Vec<Layer> = Vec::new();
     let mut metadata = std::collections::BTreeMap::new();
@@ -129,7 +147,8 @@ pub fn read_exr(path: &Path) -> Result<Layers, ImageError> {
     for layer in &mut layers {
         layer.channels.sort_by_key(|(name, _)| "RGBAXYZW".find(name.as_str()).unwrap_or(8));
     }
-    Ok(Layers { path: path.into(), width, height, layers, metadata: metadata.into_iter().collect() })
+    let metadata = metadata.into_iter().collect();
+    Ok((Layers { path: path.into(), width, height, layers, metadata }, windows))
 }
 
 /// What is known before pixels are decoded: size, and whether all parts have the same one.

@@ -8,9 +8,11 @@
 mod error;
 mod exr;
 mod png;
+pub(crate) mod radiance;
 mod whole;
 
 pub use error::ImageError;
+pub(crate) use exr::{Windows, read_with_windows};
 pub use exr::{read_exr, write_exr};
 pub use png::{decode_png, read_png, read_png_with_metadata, write_apng, write_png};
 pub use whole::{check_writable, write_whole};
@@ -168,6 +170,33 @@ impl Layers {
             }
         }
         Ok(())
+    }
+
+    /// The layer that is a picture of light, as three values a pixel: the beauty, else the only one
+    /// with red, green and blue or with a luminance, in letters of any case.
+    ///
+    /// # Errors
+    /// [`ImageError::NoLayer`].
+    pub(crate) fn light(&self) -> Result<Vec<f32>, ImageError> {
+        let channel = |l: &'_ Layer, name: &str| l.channels.iter().position(|(n, _)| n.eq_ignore_ascii_case(name));
+        let light = |l: &Layer| match ["R", "G", "B"].map(|name| channel(l, name)) {
+            [Some(r), Some(g), Some(b)] => Some([r, g, b]),
+            _ => channel(l, "Y").filter(|_| channel(l, "X").is_none()).map(|y| [y; 3]),
+        };
+        let beauty = self.layer("").ok().and_then(|l| Some((l, light(l)?)));
+        let mut others = self.layers.iter().filter_map(|l| Some((l, light(l)?)));
+        let root = || self.layers.iter().find(|l| l.name.is_empty()).and_then(|l| Some((l, light(l)?)));
+        let only = match (others.next(), others.next()) {
+            (only, None) => only,
+            _ => None,
+        };
+        let (layer, [r, g, b]) = beauty.or_else(root).or(only).ok_or_else(|| ImageError::NoLayer {
+            path: self.path.clone(),
+            wanted: "Combined".into(),
+            found: self.names(),
+        })?;
+        let [r, g, b] = [r, g, b].map(|i| &layer.channels[i].1);
+        Ok(r.iter().zip(g).zip(b).flat_map(|((r, g), b)| [*r, *g, *b]).collect())
     }
 
     fn names(&self) -> String {

@@ -7,8 +7,8 @@ use std::path::Path;
 
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// Writes display-encoded sRGB bytes (`3 · width · height`, rows from the top) with `metadata` as
-/// tEXt chunks, or iTXt where a text is not Latin-1. `-` is standard output. The file appears whole
+/// Writes display-encoded sRGB bytes (`3 · width · height`, or `4 · width · height` with alpha, by which
+/// colours are not multiplied; rows from the top) with `metadata` as tEXt chunks, or iTXt where a text is not Latin-1. `-` is standard output. The file appears whole
 /// or not at all.
 ///
 /// # Errors
@@ -18,20 +18,22 @@ pub fn write_png(
     path: &Path,
     width: u32,
     height: u32,
-    rgb: &[u8],
+    pixels: &[u8],
     metadata: &[(String, String)],
 ) -> Result<(), ImageError> {
-    if width == 0 || height == 0 || rgb.len() as u64 != 3 * u64::from(width) * u64::from(height) {
-        return Err(ImageError::shape(path, format!("{} bytes are not {width}×{height} RGB pixels", rgb.len())));
+    let (bytes, count) = (pixels.len() as u64, u64::from(width) * u64::from(height));
+    if count == 0 || (bytes != 3 * count && bytes != 4 * count) {
+        return Err(ImageError::shape(path, format!("{bytes} bytes are not {width}×{height} RGB or RGBA pixels")));
     }
-    write_whole(path, &encode(path, width, height, rgb, metadata)?)
+    write_whole(path, &encode(path, width, height, pixels, metadata)?)
 }
 
-fn encode(path: &Path, w: u32, h: u32, rgb: &[u8], metadata: &[(String, String)]) -> Result<Vec<u8>, ImageError> {
+fn encode(path: &Path, w: u32, h: u32, pixels: &[u8], metadata: &[(String, String)]) -> Result<Vec<u8>, ImageError> {
     let failed = |e: png::EncodingError| ImageError::shape(path, e.to_string());
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, w, h);
-    encoder.set_color(ColorType::Rgb);
+    let opaque = pixels.len() as u64 == 3 * u64::from(w) * u64::from(h);
+    encoder.set_color(if opaque { ColorType::Rgb } else { ColorType::Rgba });
     encoder.set_depth(BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     for (key, text) in metadata {
@@ -44,7 +46,7 @@ fn encode(path: &Path, w: u32, h: u32, rgb: &[u8], metadata: &[(String, String)]
         }
     }
     let mut writer = encoder.write_header().map_err(failed)?;
-    writer.write_image_data(rgb).map_err(failed)?;
+    writer.write_image_data(pixels).map_err(failed)?;
     writer.finish().map_err(failed)?;
     Ok(bytes)
 }

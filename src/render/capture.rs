@@ -167,7 +167,8 @@ impl Picture {
 /// What [`capture`] returns.
 #[derive(Debug, Clone)]
 pub struct CapturedFrame {
-    /// Scene-linear radiance, RGBA; alpha is 1.
+    /// Scene-linear radiance, RGBA; alpha is 1, or before a transparent backdrop the share that
+    /// surfaces cover, by which the radiance is multiplied.
     pub beauty: Picture,
     /// The layers asked for, in that order.
     pub layers: Vec<(Layer, Picture)>,

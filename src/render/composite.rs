@@ -16,15 +16,17 @@ pub enum Backdrop {
     Blurred,
     /// A dark grey.
     Hidden,
+    /// Nothing: alpha is the share of the picture that surfaces cover.
+    Transparent,
 }
 
 impl Backdrop {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Shown, Self::Blurred, Self::Hidden];
+    pub const ALL: [Self; 4] = [Self::Shown, Self::Blurred, Self::Hidden, Self::Transparent];
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
-        ["shown", "blurred", "hidden"][self as usize]
+        ["shown", "blurred", "hidden", "transparent"][self as usize]
     }
 }
 
@@ -33,7 +35,7 @@ impl std::str::FromStr for Backdrop {
 
     fn from_str(name: &str) -> Result<Self, String> {
         let found = Self::ALL.into_iter().find(|b| b.name() == name);
-        found.ok_or_else(|| format!("`{name}` is none of: shown, blurred, hidden"))
+        found.ok_or_else(|| format!("`{name}` is none of: shown, blurred, hidden, transparent"))
     }
 }
 

@@ -210,6 +210,15 @@ impl Deform {
         rows
     }
 
+    /// Whether its joints turn all of it over, so that front faces wind the other way round.
+    pub(crate) fn turns_over(&self) -> bool {
+        let turns = |rows: &Joint| {
+            let [a, b, c] = rows.map(|row| Vec4::from(row).truncate());
+            a.dot(b.cross(c)) < 0.0
+        };
+        self.shape.sets > 0 && !self.joints.is_empty() && self.joints.iter().all(turns)
+    }
+
     /// A box around all vertices, larger where joints blend or targets pull: it asks joints, not
     /// vertices. `None` without vertices.
     pub fn bounds(&self) -> Option<([f32; 3], [f32; 3])> {

@@ -15,6 +15,8 @@ pub struct LoadOptions {
     /// Buffers, textures and material libraries may lie outside the folder of the file that names
     /// them.
     pub allow_outside: bool,
+    /// What a glTF file says wrongly refuses it, where it would be mended or left out with a warning.
+    pub strict: bool,
     /// Its unit of length and its vertical.
     pub units: Units,
 }

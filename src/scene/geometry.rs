@@ -1,7 +1,7 @@
 //! Mending of meshes that files leave incomplete: flat normals, tangents, strips and fans.
 
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::Mesh;
 
@@ -58,13 +58,27 @@ pub(crate) fn make_flat_normals(mesh: &mut Mesh) {
     }
 }
 
-/// Brings normals to unit length; those that have none become +Y. Returns how many had none.
-pub(crate) fn normalize_normals(normals: &mut [[f32; 3]]) -> usize {
-    let mut bad = 0;
-    for normal in normals {
-        *normal = Vec3::from(*normal).try_normalize().unwrap_or_else(|| (bad += 1, Vec3::Y).1).into();
+/// Brings normals to unit length; those that have none get that of their triangles, or +Y where
+/// these have no area. Returns how many had none.
+pub(crate) fn normalize_normals(mesh: &mut Mesh) -> usize {
+    let mut bad = Vec::new();
+    for (v, normal) in mesh.normals.iter_mut().enumerate() {
+        *normal = Vec3::from(*normal).try_normalize().unwrap_or_else(|| (bad.push(v), Vec3::Y).1).into();
     }
-    bad
+    if bad.is_empty() {
+        return 0;
+    }
+    // Twice the area of each triangle, along its normal.
+    let mut sums = vec![DVec3::ZERO; mesh.normals.len()];
+    for t in mesh.indices.chunks_exact(3) {
+        let [a, b, c] = [0, 1, 2].map(|k| Vec3::from(mesh.positions[t[k] as usize]).as_dvec3());
+        let normal = (b - a).cross(c - a);
+        t.iter().for_each(|&v| sums[v as usize] += normal);
+    }
+    for &v in &bad {
+        mesh.normals[v] = sums[v].try_normalize().map_or(Vec3::Y, |n| n.as_vec3()).to_array();
+    }
+    bad.len()
 }
 
 /// The triangles as MikkTSpace sees them: no vertex is shared.
@@ -128,4 +142,30 @@ pub(crate) fn make_tangents(mesh: &mut Mesh, uv_set: u8, transform: [[f32; 3]; 2
     mesh.tangents.clear();
     unshare(mesh);
     mesh.tangents = tangents;
+}
+
+/// Makes tangents anew, as [`make_tangents`] does, at vertices whose own span no plane with the
+/// normal: without a length, along it, or without a side. Returns how many vertices had such.
+pub(crate) fn mend_tangents(mesh: &mut Mesh, uv_set: u8, transform: [[f32; 3]; 2]) -> usize {
+    let spans = |t: &[f32; 4], n: &[f32; 3]| {
+        let along = Vec3::new(t[0], t[1], t[2]).try_normalize();
+        t[3] != 0.0 && along.is_some_and(|t| t.cross(Vec3::from(*n)).length_squared() > 1e-5)
+    };
+    let sound: Vec<bool> = mesh.tangents.iter().zip(&mesh.normals).map(|(t, n)| spans(t, n)).collect();
+    let bad = sound.iter().filter(|s| !**s).count();
+    if bad > 0 {
+        let given = std::mem::take(&mut mesh.tangents);
+        let before = mesh.indices.clone();
+        make_tangents(mesh, uv_set, transform);
+        if mesh.tangents.is_empty() {
+            let beside = |n: &[f32; 3]| Vec3::from(*n).any_orthonormal_vector().extend(1.0).into();
+            let own = given.iter().zip(&mesh.normals).zip(&sound);
+            mesh.tangents = own.map(|((t, n), sound)| if *sound { *t } else { beside(n) }).collect();
+        } else {
+            let own = mesh.tangents.iter_mut().zip(before.iter().map(|i| *i as usize));
+            own.filter(|(_, i)| sound[*i]).for_each(|(t, i)| *t = given[i]);
+        }
+    }
+    mesh.tangents.iter_mut().for_each(|t| t[3] = if t[3] < 0.0 { -1.0 } else { 1.0 });
+    bad
 }

@@ -12,8 +12,12 @@ pub mod bounds;
 #[cfg(feature = "io")]
 pub mod bundled;
 mod camera;
+#[cfg(feature = "io")]
+mod cut_off;
 pub mod defaults;
 pub mod deform;
+#[cfg(feature = "io")]
+mod dome;
 pub mod edit;
 pub mod environment;
 #[cfg(feature = "io")]

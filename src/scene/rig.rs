@@ -5,13 +5,15 @@ mod channel;
 
 use super::deform::Joint;
 use super::{Camera, LightKind, Scene};
-use glam::{DMat4, Mat4, Quat, Vec3};
+use glam::{DMat4, DVec3, Mat4, Quat, Vec3};
 
 pub use channel::{Channel, Interpolation, Property};
 
 /// The tree of nodes behind a scene's instances, and how they move.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Rig {
+    /// Where the scene has its origin, in the space of nodes without a parent, metres.
+    pub origin: [f64; 3],
     /// Parents before their children.
     pub nodes: Vec<RigNode>,
     /// Node of each of [`Scene::instances`].
@@ -88,10 +90,10 @@ pub struct Pose {
 
 /// Matrices of a skin's joints in the space of its mesh's node, as glTF defines them: the node's
 /// own place cancels out. `joints`: world transform and inverse bind matrix of each. True beside
-/// them where the node has no inverse; then the vertices are in the world, and the mesh has to
-/// stand at its origin.
+/// them where the node has no inverse, or turns things over, which would turn front faces to the
+/// back; then the vertices are in the world, and the mesh has to stand at its origin.
 pub fn joints<'a>(node: Mat4, joints: impl Iterator<Item = (Mat4, &'a [[f32; 4]; 4])>) -> (Vec<Joint>, bool) {
-    let inverse = Some(node.as_dmat4().inverse()).filter(|m| m.is_finite() && node.determinant() != 0.0);
+    let inverse = Some(node.as_dmat4().inverse()).filter(|m| m.is_finite() && node.determinant() > 0.0);
     let from_world = inverse.unwrap_or(DMat4::IDENTITY);
     let rows = |(joint, bind): (Mat4, &[[f32; 4]; 4])| {
         let matrix = (from_world * joint.as_dmat4() * Mat4::from_cols_array_2d(bind).as_dmat4()).as_mat4();
@@ -121,12 +123,15 @@ impl Rig {
                 _ => {}
             }
         }
-        let mut world: Vec<Mat4> = Vec::with_capacity(nodes.len());
+        // With 64 bits: what is far from the file's origin may hang on nodes that are not.
+        let root = DMat4::from_translation(-DVec3::from(self.origin));
+        let mut exact: Vec<DMat4> = Vec::with_capacity(nodes.len());
         for node in &nodes {
             let [scale, translation] = [node.scale, node.translation].map(Vec3::from);
             let own = Mat4::from_scale_rotation_translation(scale, Quat::from_array(node.rotation), translation);
-            world.push(node.parent.map_or(own, |p| world[p] * own));
+            exact.push(node.parent.map_or(root, |p| exact[p]) * own.as_dmat4());
         }
+        let world: Vec<Mat4> = exact.iter().map(DMat4::as_mat4).collect();
         let placed = |nodes: &[usize]| nodes.iter().map(|&n| world[n].to_cols_array_2d()).collect();
         let deform = |(d, weights): (&RigDeform, Vec<f32>)| {
             let skin = d.skin.and_then(|s| self.skins.get(s));

@@ -2,7 +2,8 @@
 
 use std::io::Cursor;
 
-use super::{ColorSpace, Image, ktx2, mips::Level};
+use super::{ColorSpace, Image, cut_off, ktx2, mips::Level};
+use crate::image_io::radiance;
 use image::DynamicImage;
 use std::borrow::Cow;
 
@@ -65,6 +66,9 @@ pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<(Image, Opt
     }
     let color_space = usage.color_space();
     let kept = |[from_width, from_height]: [u32; 2], mut level: Level<'_>| {
+        if usage == Use::Normal {
+            mend_normals(level.rgba.to_mut());
+        }
         while level.width.max(level.height) > KEPT_SIDE {
             level = level.halved(color_space);
         }
@@ -80,6 +84,11 @@ pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<(Image, Opt
         let (size, width, height, rgba) = ktx2::decode(bytes, MAX_SIDE, KEPT_SIDE, MAX_TRANSCODED)?;
         return Ok(kept(size, Level { width, height, rgba: Cow::Owned(rgba) }));
     }
+    if bytes.starts_with(radiance::MAGIC) {
+        let (width, height, rgb) = radiance::decode(bytes).map_err(|e| format!("cannot be decoded: {e}"))?;
+        let rgba = rgb.chunks_exact(3).flat_map(|p| [byte(p[0]), byte(p[1]), byte(p[2]), 255]).collect();
+        return Ok(kept([width, height], Level { width, height, rgba: Cow::Owned(rgba) }));
+    }
     let mut reader = image::ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|e| format!("cannot be read: {e}"))?;
@@ -92,7 +101,11 @@ pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<(Image, Opt
     (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
     limits.max_alloc = Some(MAX_DECODED);
     reader.limits(limits);
-    let decoded = reader.decode().map_err(|e| format!("cannot be decoded: {e}"))?;
+    let rows = |e: image::ImageError| {
+        cut_off::png(bytes, MAX_SIDE, MAX_DECODED).ok_or_else(|| format!("cannot be decoded: {e}"))
+    };
+    let decoded = reader.decode().or_else(rows)?;
+    let cut_off = cut_off::is_cut_off(bytes).then(|| "is cut off; what there is of it is shown".to_owned());
     let (width, height) = (decoded.width(), decoded.height());
     if width == 0 || height == 0 {
         return Err(format!("has no pixels ({width}x{height})"));
@@ -102,7 +115,31 @@ pub(crate) fn decode(name: &str, bytes: &[u8], usage: Use) -> Result<(Image, Opt
     } else {
         Level { width, height, rgba: Cow::Owned(decoded.into_rgba8().into_raw()) }
     };
-    Ok(kept([width, height], level))
+    let (image, told) = kept([width, height], level);
+    Ok((image, cut_off.or(told)))
+}
+
+/// Texels that point into the surface, which no normal map can mean, or nowhere. Maps of two channels
+/// leave out blue, which follows from the others; what else there is, black for one, becomes flat.
+fn mend_normals(rgba: &mut [u8]) {
+    for p in rgba.chunks_exact_mut(4) {
+        let nowhere = p[..3].iter().all(|c| c.abs_diff(128) <= 4);
+        if p[2] >= 127 && !nowhere {
+            continue;
+        }
+        let [x, y] = [p[0], p[1]].map(|c| f32::from(c) / 127.5 - 1.0);
+        let rest = 1.0 - x * x - y * y;
+        if rest < -0.05 {
+            (p[0], p[1], p[2]) = (128, 128, 255);
+        } else {
+            p[2] = (127.5 + 127.5 * rest.max(0.0).sqrt()).round() as u8;
+        }
+    }
+}
+
+/// A value in [0, 1] in eight bits.
+fn byte(v: f32) -> u8 {
+    (v.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
 /// Half of a large picture, two rows at a time, so that it never lies in memory twice.

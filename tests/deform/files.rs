@@ -102,6 +102,27 @@ fn a_skin_at_rest_follows_its_nodes() {
     assert!((world(&load(&glb), 0).last().expect("a vertex").0 - Vec3::new(0.1, 3.0, 0.0)).length() < 1e-5);
 }
 
+/// The place of a skinned mesh's own node counts for nothing, nor does it turn faces over; joints
+/// that mirror do.
+#[test]
+fn the_sign_of_a_skinned_meshs_node_does_not_count() {
+    let posed = |node: usize, scale: [f32; 3]| {
+        let mut glb = strip(4, Coded::Floats);
+        bends(&mut glb, 2, 1.2);
+        glb.json["nodes"][node]["scale"] = json!(scale);
+        let mut scene = load(&glb);
+        scene.pose(0, 1.0);
+        scene
+    };
+    let expected = bent(4, Quat::from_array(turn(2, 1.2)));
+    for scale in [[-1.0, 1.0, 1.0], [2.0, -3.0, 1.0], [-1.0, -1.0, -1.0], [-1.0, -1.0, 1.0]] {
+        let scene = posed(0, scale);
+        assert!(world(&scene, 0).iter().zip(&expected).all(|(a, b)| a.0.distance(b.0) < 1e-5), "{scale:?}");
+        let instance = glam::Mat4::from_cols_array_2d(&scene.instances[0].transform);
+        assert!(instance.determinant() > 0.0, "{scale:?} would show the other sides");
+    }
+}
+
 /// One mesh under two nodes with other skins stands in two poses, and in a third where a node has
 /// none.
 #[test]

@@ -1,8 +1,9 @@
-//! Hostile glTF files, plain and compressed (meshopt, Draco, Basis Universal): no panic, no hang,
-//! bounded memory.
+//! Hostile files: glTF, plain and compressed (meshopt, Draco, Basis Universal), OBJ with its library,
+//! pictures of the surroundings. No panic, no hang, bounded memory.
 //!
-//! `SCENE_FUZZ_CASES` and `SCENE_FUZZ_SEED` make a longer run; `docs/log/2026-11-24-compressed.md`
-//! records one. The allocator counts for the whole program, so this binary has one test.
+//! `SCENE_FUZZ_CASES` (of each of the three kinds) and `SCENE_FUZZ_SEED` make a longer run;
+//! `docs/log/2026-11-24-compressed.md` records one. The allocator counts for the whole program, so this
+//! binary has one test.
 #![cfg(feature = "io")]
 
 #[path = "../deform/figures.rs"]
@@ -18,8 +19,9 @@ mod packed;
 mod shared;
 #[path = "../common/spoil.rs"]
 mod spoil;
+mod texts;
 
-use bouncelight::scene::{self, export};
+use bouncelight::scene::{self, Environment, export};
 use glb::Glb;
 use peak_alloc::PeakAlloc;
 use serde_json::{Value, json};
@@ -32,8 +34,8 @@ use std::time::{Duration, Instant};
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// Cases of an ordinary test run.
-const CASES: u64 = 100_000;
+/// Cases of each kind in an ordinary test run: a tenth of what a change to a loader is tried with.
+const CASES: u64 = 10_000;
 const SEED: u64 = 20_261_124;
 /// Longest that one file may take. The honest ones take less than a millisecond; a loaded machine
 /// may stop any of them for a while, and a picture of the largest size that is allowed takes its
@@ -199,28 +201,48 @@ struct Tally {
 }
 
 impl Tally {
-    fn read(&mut self, path: &Path, bytes: &[u8]) {
+    fn scene(&mut self, path: &Path, bytes: &[u8]) {
         std::fs::write(path, bytes).expect("a temporary file");
+        let read = self.read(bytes.len(), || scene::load(path.to_str().expect("a readable path")));
+        let Some(mut scene) = read else { return };
+        shared::assert_sound(&scene);
+        // Any numbers may come of it, but no panic.
+        if scene.pose(0, 0.7) {
+            assert!(scene.deforms.iter().all(|d| d.bounds().is_none_or(|b| b.0[0] <= b.1[0])));
+        }
+    }
+
+    fn model(&mut self, path: &Path, [obj, mtl]: &[Vec<u8>; 2]) {
+        std::fs::write(path.with_extension("mtl"), mtl).expect("a temporary file");
+        self.scene(path, obj);
+    }
+
+    fn sky(&mut self, path: &Path, bytes: &[u8]) {
+        std::fs::write(path, bytes).expect("a temporary file");
+        if let Some((sky, _)) = self.read(bytes.len(), || Environment::load(path)) {
+            assert!(sky.radiance.iter().all(|v| v.is_finite() && *v >= 0.0));
+        }
+    }
+
+    /// What `load` makes of a file of so many bytes.
+    fn read<T, E: std::fmt::Display>(&mut self, bytes: usize, load: impl FnOnce() -> Result<T, E>) -> Option<T> {
         let (before, started) = (MEMORY.current_usage(), Instant::now());
         MEMORY.reset_peak_usage();
-        let read = scene::load(path.to_str().expect("a readable path"));
+        let read = load();
         let (taken, time) = (MEMORY.peak_usage().saturating_sub(before), started.elapsed());
         assert!(time < SLOWEST, "took {time:?}");
-        assert!(taken <= MOST_MEMORY, "took {taken} bytes of memory for a file of {}", bytes.len());
+        assert!(taken <= MOST_MEMORY, "took {taken} bytes of memory for a file of {bytes}");
         (self.slowest, self.most) = (self.slowest.max(time), self.most.max(taken));
         match read {
-            Ok(mut scene) => {
+            Ok(read) => {
                 self.accepted += 1;
-                shared::assert_sound(&scene);
-                // Any numbers may come of it, but no panic.
-                if scene.pose(0, 0.7) {
-                    assert!(scene.deforms.iter().all(|d| d.bounds().is_none_or(|b| b.0[0] <= b.1[0])));
-                }
+                Some(read)
             }
             Err(error) => {
                 self.refused += 1;
                 let told = error.to_string();
                 assert!(told.contains("case."), "names no file: {told}");
+                None
             }
         }
     }
@@ -258,27 +280,65 @@ fn read_in_parts(parts: u64) {
 /// Cases `part`, `part + parts` and so on.
 fn read_part(part: u64, parts: u64) {
     let (cases, seed) = (setting("SCENE_FUZZ_CASES", CASES), setting("SCENE_FUZZ_SEED", SEED));
-    let files = corpus();
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join("case.glb");
+    let at = |name: &str| folder.path().join(name);
+    let numbers = || (part..cases).step_by(parts as usize).map(|n| (n, Random::new(seed, n)));
+
+    let files = corpus();
     let mut tally = Tally::default();
-    files.iter().for_each(|file| tally.read(&path, &file.bytes()));
-    assert_eq!(tally.accepted as usize, files.len(), "the originals are sound");
-    let started = Instant::now();
-    for case_number in (part..cases).step_by(parts as usize) {
-        let bytes = case(&files, &mut Random::new(seed, case_number));
-        let path = folder.path().join(if bytes.first() == Some(&b'{') { "case.gltf" } else { "case.glb" });
-        let run = catch_unwind(AssertUnwindSafe(|| tally.read(&path, &bytes)));
-        if run.is_err() {
-            let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("case-{seed}-{case_number}.glb"));
-            std::fs::write(&kept, &bytes).expect("the file can be kept");
-            panic!("case {case_number} of seed {seed} failed; the message is above, the file in {}", kept.display());
+    files.iter().for_each(|file| tally.scene(&at("case.glb"), &file.bytes()));
+    tally.begins_sound(files.len());
+    for (number, mut random) in numbers() {
+        let bytes = case(&files, &mut random);
+        let name = if bytes.first() == Some(&b'{') { "case.gltf" } else { "case.glb" };
+        tally.try_one((seed, number), name, &[&bytes], |tally| tally.scene(&at(name), &bytes));
+    }
+    tally.tell("glTF", files.len());
+
+    let files = texts::models();
+    std::fs::write(at("t.png"), glb::png([200, 100, 50, 255], 2, 2)).expect("a temporary file");
+    let mut tally = Tally::default();
+    files.iter().for_each(|file| tally.model(&at("case.obj"), &file.clone().map(String::into_bytes)));
+    tally.begins_sound(files.len());
+    for (number, mut random) in numbers() {
+        let both = texts::model(&files, &mut random);
+        tally.try_one((seed, number), "case.obj", &[&both[0], &both[1]], |tally| tally.model(&at("case.obj"), &both));
+    }
+    tally.tell("OBJ", files.len());
+
+    let files = texts::skies();
+    let mut tally = Tally::default();
+    files.iter().for_each(|file| tally.sky(&at("case.sky"), file));
+    tally.begins_sound(files.len());
+    for (number, mut random) in numbers() {
+        let mut bytes = random.pick(&files).clone();
+        texts::spoil_bytes(&mut bytes, &mut random);
+        tally.try_one((seed, number), "case.sky", &[&bytes], |tally| tally.sky(&at("case.sky"), &bytes));
+    }
+    tally.tell("skies", files.len());
+}
+
+impl Tally {
+    fn begins_sound(&self, originals: usize) {
+        assert_eq!(self.accepted as usize, originals, "the originals are sound");
+    }
+
+    /// Keeps the files of a case that fails.
+    fn try_one(&mut self, id: (u64, u64), name: &str, files: &[&Vec<u8>], run: impl FnOnce(&mut Self)) {
+        if catch_unwind(AssertUnwindSafe(|| run(self))).is_err() {
+            let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}-{}-{name}", id.0, id.1));
+            for (k, bytes) in files.iter().enumerate() {
+                std::fs::write(kept.with_added_extension(k.to_string()), bytes).expect("the file can be kept");
+            }
+            panic!("case {} of seed {} failed; the message is above, the files in {}.*", id.1, id.0, kept.display());
         }
     }
-    let read = tally.accepted + tally.refused - files.len() as u64;
-    println!("seed {seed}, part {part}: {read} cases in {:.1} s", started.elapsed().as_secs_f64());
-    println!("{} accepted, {} refused, slowest {:?}", tally.accepted, tally.refused, tally.slowest);
-    println!("{} MiB of memory at most", tally.most >> 20);
-    // Some mutations are harmless and many are not; without both the test would ask nothing.
-    assert!(tally.accepted > read / 10 && tally.refused > read / 10);
+
+    fn tell(&self, kind: &str, originals: usize) {
+        let read = self.accepted + self.refused - originals as u64;
+        println!("{kind}: {read} cases, {} accepted, {} refused", self.accepted, self.refused);
+        println!("  slowest {:?}, {} MiB of memory at most", self.slowest, self.most >> 20);
+        // Some mutations are harmless and many are not; without both the test would ask nothing.
+        assert!(self.accepted > read / 20 && self.refused > read / 20);
+    }
 }

@@ -4,6 +4,8 @@ use super::Loader;
 use super::texture::{plain, special};
 use crate::scene::texture::Use;
 use crate::scene::{AlphaMode, Material};
+use serde_json::Value;
+use std::collections::BTreeSet;
 
 impl<'a> Loader<'a> {
     /// Index in the scene of a glTF material, made on first use.
@@ -18,10 +20,30 @@ impl<'a> Loader<'a> {
         index
     }
 
+    /// The two sets of texture coordinates that a mesh keeps for a material: 0 and 1, or else the
+    /// first two that it reads.
+    pub(super) fn sets_of(&mut self, material: &gltf::Material<'a>) -> [u32; 2] {
+        if let Some(&known) = self.sets.get(&material.index()) {
+            return known;
+        }
+        let json = material.index().and_then(|i| serde_json::to_value(&self.document.as_json().materials[i]).ok());
+        let mut read = BTreeSet::new();
+        json.iter().for_each(|json| find_sets(json, &mut read));
+        let mut sets = read.into_iter();
+        let kept = match (sets.next(), sets.next()) {
+            (Some(first), Some(second)) if second > 1 => [first, second],
+            (Some(only), None) if only > 1 => [only, 0],
+            _ => [0, 1],
+        };
+        self.sets.insert(material.index(), kept);
+        kept
+    }
+
     fn build(&mut self, material: &gltf::Material<'a>) -> Material {
         let Some(index) = material.index() else {
             return Material { name: "glTF default".to_owned(), ..Material::default() };
         };
+        self.kept_sets = self.sets_of(material);
         let name = material.name().map_or_else(|| format!("materials[{index}]"), str::to_owned);
         let place = format!("materials[{index}] '{name}'");
         let pbr = material.pbr_metallic_roughness();
@@ -102,4 +124,16 @@ impl<'a> Loader<'a> {
             self.warn(place, "has factors out of range, which were clamped");
         }
     }
+}
+
+/// Sets of texture coordinates that texture references in a material's JSON name.
+fn find_sets(json: &Value, sets: &mut BTreeSet<u32>) {
+    let Some(map) = json.as_object() else { return };
+    if map.get("index").is_some_and(Value::is_u64) {
+        let other = json.pointer("/extensions/KHR_texture_transform/texCoord");
+        let set = other.or(map.get("texCoord")).and_then(Value::as_u64).unwrap_or(0);
+        sets.insert(u32::try_from(set).unwrap_or(u32::MAX));
+        return;
+    }
+    map.values().for_each(|value| find_sets(value, sets));
 }

@@ -82,22 +82,24 @@ impl<'a> Loader<'a> {
         let read =
             Vertices { reader: Reader { path: self.path, source: self.source }, primitive, packed, place: &place };
         let flagged = Integers::AsFlagged;
+        let sets = self.sets_of(&primitive.material());
         let mut out = Mesh {
             name,
             positions: read.floats(Semantic::Positions, flagged, None)?,
             normals: read.floats(Semantic::Normals, flagged, None)?,
             tangents: read.floats(Semantic::Tangents, flagged, None)?,
-            uv0: read.floats(Semantic::TexCoords(0), flagged, None)?,
-            uv1: read.floats(Semantic::TexCoords(1), flagged, None)?,
+            uv0: read.floats(Semantic::TexCoords(sets[0]), flagged, None)?,
+            uv1: read.floats(Semantic::TexCoords(sets[1]), flagged, None)?,
             colors: read.floats(Semantic::Colors(0), Integers::Normalized, Some(1.0))?,
             ..Mesh::default()
         };
         let count = out.positions.len();
+        let uv = sets.map(|set| format!("TEXCOORD_{set}"));
         for (attribute, length) in [
             ("NORMAL", out.normals.len()),
             ("TANGENT", out.tangents.len()),
-            ("TEXCOORD_0", out.uv0.len()),
-            ("TEXCOORD_1", out.uv1.len()),
+            (&*uv[0], out.uv0.len()),
+            (&*uv[1], out.uv1.len()),
             ("COLOR_0", out.colors.len()),
         ] {
             if length != 0 && length != count {
@@ -110,8 +112,8 @@ impl<'a> Loader<'a> {
         if let Some(bad) = indices.iter().find(|&&i| i as usize >= count) {
             return Err(self.broken(place, format!("index {bad} is not below the {count} vertices")));
         }
-        self.check_finite(&place, &out)?;
         out.indices = geometry::triangle_list(&indices, topology);
+        self.mend_numbers(&place, &uv, &mut out)?;
         if out.indices.is_empty() {
             self.warn(&place, "has no triangle and is left out");
             return Ok(false);
@@ -119,7 +121,7 @@ impl<'a> Loader<'a> {
         let draft = self.draft(&place, &read, count, out.normals.is_empty());
         out.material = self.material(&primitive.material());
         let before = out.indices.clone();
-        self.finish(&place, &mut out);
+        self.finish(&place, sets, &mut out);
         self.scene.meshes.push(out);
         if let Some(draft) = draft {
             self.keep(self.scene.meshes.len() - 1, draft, (&before, count));
@@ -137,33 +139,55 @@ impl<'a> Loader<'a> {
         packed.unpack(self.source.view(&view)?).map(Some).map_err(broken)
     }
 
-    fn check_finite(&self, place: &str, mesh: &Mesh) -> Result<(), SceneError> {
-        fn first_bad<const N: usize>(values: &[[f32; N]]) -> Option<usize> {
-            values.iter().position(|v| v.iter().any(|c| !c.is_finite()))
+    /// Numbers that are none: a triangle without a place is left out, every other attribute gets
+    /// what a mesh without it has.
+    fn mend_numbers(&mut self, place: &str, uv: &[String; 2], mesh: &mut Mesh) -> Result<(), SceneError> {
+        fn mend<const N: usize>(values: &mut [[f32; N]], by: [f32; N]) -> Vec<usize> {
+            let bad = |v: &[f32; N]| v.iter().any(|c| !c.is_finite());
+            let mut found = Vec::new();
+            for (i, v) in values.iter_mut().enumerate().filter(|(_, v)| bad(v)) {
+                *v = by;
+                found.push(i);
+            }
+            found
         }
+        let lost = mend(&mut mesh.positions, [0.0; 3]);
         let found = [
-            ("POSITION", first_bad(&mesh.positions)),
-            ("NORMAL", first_bad(&mesh.normals)),
-            ("TANGENT", first_bad(&mesh.tangents)),
-            ("TEXCOORD_0", first_bad(&mesh.uv0)),
-            ("TEXCOORD_1", first_bad(&mesh.uv1)),
-            ("COLOR_0", first_bad(&mesh.colors)),
+            ("POSITION", lost.clone(), "their triangles are left out"),
+            ("NORMAL", mend(&mut mesh.normals, [0.0; 3]), "their triangles' are used"),
+            ("TANGENT", mend(&mut mesh.tangents, [0.0; 4]), "they are made anew where a map needs them"),
+            (&*uv[0], mend(&mut mesh.uv0, [0.0; 2]), "(0, 0) is used"),
+            (&*uv[1], mend(&mut mesh.uv1, [0.0; 2]), "(0, 0) is used"),
+            ("COLOR_0", mend(&mut mesh.colors, [1.0; 4]), "they are white"),
         ];
-        match found.iter().find_map(|(name, at)| at.map(|at| (name, at))) {
-            Some((name, at)) => Err(self.broken(place, format!("{name} of vertex {at} is not a finite number"))),
-            None => Ok(()),
+        for (name, at, remedy) in found.iter().filter(|f| !f.1.is_empty()) {
+            if self.strict {
+                return Err(self.broken(place, format!("{name} of vertex {} is not a finite number", at[0])));
+            }
+            let what = format!("{name} is not a finite number at {} vertices, the first {}", at.len(), at[0]);
+            self.warn(place, &format!("{what}; {remedy}"));
         }
+        if lost.is_empty() {
+            return Ok(());
+        }
+        let is_lost = |i: &u32| lost.binary_search(&(*i as usize)).is_ok();
+        let kept = mesh.indices.chunks_exact(3).filter(|t| !t.iter().any(is_lost));
+        mesh.indices = kept.flatten().copied().collect();
+        // Where something is that is drawn, so that the mesh reaches no farther for them.
+        let somewhere = mesh.indices.first().map_or([0.0; 3], |&i| mesh.positions[i as usize]);
+        lost.iter().for_each(|&i| mesh.positions[i] = somewhere);
+        Ok(())
     }
 
     /// Normals and tangents where they are missing; texture coordinates that a material wants and
     /// the mesh lacks.
-    fn finish(&mut self, place: &str, mesh: &mut Mesh) {
+    fn finish(&mut self, place: &str, sets: [u32; 2], mesh: &mut Mesh) {
         if mesh.normals.is_empty() {
             geometry::make_flat_normals(mesh);
         } else {
-            let bad = geometry::normalize_normals(&mut mesh.normals);
+            let bad = geometry::normalize_normals(mesh);
             if bad > 0 {
-                self.warn(place, &format!("{bad} normals have no length and were replaced by +Y"));
+                self.warn(place, &format!("{bad} normals have no length and were replaced by their triangles'"));
             }
         }
         let material = &self.scene.materials[mesh.material];
@@ -182,11 +206,17 @@ impl<'a> Loader<'a> {
             .map(|p| p.0)
             .collect();
         for set in missing {
+            let set = sets[usize::from(set)];
             self.warn(place, &format!("its material reads TEXCOORD_{set}, which it lacks; (0, 0) is used"));
         }
         match normal_map {
             Some(map) if mesh.tangents.is_empty() => geometry::make_tangents(mesh, map.uv_set, map.transform),
-            Some(_) => {}
+            Some(map) => {
+                let bad = geometry::mend_tangents(mesh, map.uv_set, map.transform);
+                if bad > 0 {
+                    self.warn(place, &format!("{bad} tangents span no plane with their normals and were made anew"));
+                }
+            }
             None => mesh.tangents.clear(),
         }
     }

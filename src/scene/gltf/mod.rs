@@ -11,9 +11,11 @@ mod camera;
 mod deform;
 mod draco;
 mod extensions;
+mod far;
 mod instancing;
 mod layers;
 mod light;
+mod loosen;
 mod material;
 mod mend;
 mod mesh;
@@ -24,15 +26,16 @@ mod source;
 mod specular;
 mod texture;
 mod units;
+mod words;
 
 use std::collections::HashMap;
 use std::path::Path;
 
-use glam::Mat4;
+use glam::{DMat4, DVec3, Mat4};
 use gltf::json::validation::{Error as Invalid, Validate};
 
 use super::files::{self, LoadOptions};
-use super::{Environment, Instance, Scene, SceneError, defaults, error, sound};
+use super::{Environment, Instance, Scene, SceneError, defaults, dome, error, sound};
 use source::Source;
 
 /// Loads the file's default scene (else its first, else every root node) and fills in what is
@@ -51,17 +54,29 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError> {
     let bytes = error::read_file(path)?;
     let (json, blob) = source::split(path, &bytes)?;
-    let pointed = pointer::rewrite(files::without_mark(json));
-    let json = pointed.as_ref().map_or(files::without_mark(json), |p| &p.0);
-    let mut root: gltf::json::Root =
-        gltf::json::deserialize::from_slice(json).map_err(|e| SceneError::broken(path, "JSON", e.to_string()))?;
+    // Some writers fill a chunk up with zeros.
+    let json = files::without_mark(json);
+    let json = &json[..json.iter().rposition(|b| *b != 0).map_or(0, |last| last + 1)];
+    let pointed = pointer::rewrite(json);
+    let json = pointed.as_ref().map_or(json, |p| &p.0);
+    let read = if options.strict {
+        gltf::json::deserialize::from_slice(json).map(|root| (root, None))
+    } else {
+        loosen::read(json)
+    };
+    let (mut root, loosened) = read.map_err(|e| SceneError::broken(path, "JSON", e.to_string()))?;
+    let json = loosened.as_ref().map_or(json, |l| &l.0);
     extensions::check_required(path, &root)?;
-    let mended = mend::mend(&mut root);
+    let mut mended = mend::mend(&mut root);
+    if !options.strict {
+        mended.extend(words::mend(&mut root));
+    }
+    mended.extend(loosened.iter().flat_map(|l| l.1.iter().cloned()));
     units::apply(&mut root, options.units);
     validate(path, &root)?;
     let document = gltf::Document::from_json_without_validation(root);
     let source = Source::open(path, &document, blob, options)?;
-    let mut loader = Loader::new(path, &source, &document);
+    let mut loader = Loader::new(path, &source, &document, options.strict);
     mended.iter().chain(pointed.iter().flat_map(|p| &p.1)).for_each(|(place, what)| loader.warn(place, what));
     for extension in document.extensions_used().filter(|e| !extensions::is_known(e)) {
         loader.warn("extensionsUsed", &format!("{extension} is not supported; the file is shown without it"));
@@ -71,7 +86,10 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError>
     loader.settle_deforms();
     let mut scene = loader.scene;
     sound::settle(&mut scene, path)?;
+    let sky = dome::take(&mut scene);
     defaults::complete(&mut scene);
+    // It stands in for what was added, and leaves a sun that was.
+    scene.environment = sky.unwrap_or(scene.environment);
     Ok(scene)
 }
 
@@ -129,6 +147,12 @@ pub(super) struct Loader<'a> {
     source: &'a Source<'a>,
     document: &'a gltf::Document,
     scene: Scene,
+    /// Numbers that are none refuse the file.
+    strict: bool,
+    /// Sets of texture coordinates that the material which is read keeps.
+    kept_sets: [u32; 2],
+    /// Those sets of each glTF material.
+    sets: HashMap<Option<usize>, [u32; 2]>,
     /// glTF mesh index → scene meshes of its primitives.
     meshes: HashMap<usize, Vec<usize>>,
     /// glTF material index (`None` is the default material) → scene material.
@@ -147,7 +171,7 @@ pub(super) struct Loader<'a> {
 }
 
 impl<'a> Loader<'a> {
-    fn new(path: &'a Path, source: &'a Source<'a>, document: &'a gltf::Document) -> Self {
+    fn new(path: &'a Path, source: &'a Source<'a>, document: &'a gltf::Document, strict: bool) -> Self {
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let scene = Scene { name, ..Scene::default() };
         Self {
@@ -155,6 +179,9 @@ impl<'a> Loader<'a> {
             source,
             document,
             scene,
+            strict,
+            kept_sets: [0, 1],
+            sets: HashMap::new(),
             meshes: HashMap::new(),
             materials: HashMap::new(),
             images: HashMap::new(),
@@ -194,8 +221,13 @@ impl<'a> Loader<'a> {
             }
         };
         let mut seen = vec![false; document.nodes().len()];
-        let mut stack: Vec<(gltf::Node, Mat4, Option<usize>, bool)> =
-            roots.into_iter().rev().map(|n| (n, Mat4::IDENTITY, None, true)).collect();
+        let origin = far::origin(&roots, document.nodes().len());
+        if origin != DVec3::ZERO {
+            self.warn("scene", &far::told(origin));
+        }
+        let root = DMat4::from_translation(-origin);
+        let mut stack: Vec<(gltf::Node, DMat4, Option<usize>, bool)> =
+            roots.into_iter().rev().map(|n| (n, root, None, true)).collect();
         // For animations: nodes in the order of this walk, and which of them each instance, camera
         // and light belongs to.
         let (mut walked, mut carried, mut places) = (Vec::new(), motion::Carried::default(), HashMap::new());
@@ -204,21 +236,30 @@ impl<'a> Loader<'a> {
                 let place = format!("nodes[{}]", node.index());
                 return Err(self.broken(place, "is reached twice; nodes must form trees, not cycles"));
             }
-            let world = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
+            let exact = parent * Mat4::from_cols_array_2d(&node.transform().matrix()).as_dmat4();
+            let world = exact.as_mat4();
             if !world.is_finite() {
-                return Err(self.broken(format!("nodes[{}]", node.index()), "has a transform that is not finite"));
+                let place = format!("nodes[{}]", node.index());
+                if self.strict {
+                    return Err(self.broken(place, "has a transform that is not finite"));
+                }
+                self.warn(&place, "has a transform that is not finite and is left out with all below it");
+                continue;
             }
             let visible = visible && self.is_visible(&node);
             self.node(&node, world, visible)?;
             carried.follow(&self.scene, walked.len());
             places.insert(node.index(), (walked.len(), world));
-            let children: Vec<_> = node.children().map(|child| (child, world, Some(walked.len()), visible)).collect();
+            let children: Vec<_> = node.children().map(|child| (child, exact, Some(walked.len()), visible)).collect();
             walked.push((node, above));
             stack.extend(children.into_iter().rev());
         }
         let deforms = self.resolve(&places);
         self.move_back();
         self.animations(&walked, &places, carried, deforms);
+        if let Some(rig) = &mut self.scene.rig {
+            rig.origin = origin.to_array();
+        }
         Ok(())
     }
 

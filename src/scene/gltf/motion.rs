@@ -65,7 +65,7 @@ impl<'a> Loader<'a> {
         let mut nodes = nodes.iter().map(rest).collect();
         let instances = self.with_copies(&mut nodes, instances);
         let cameras = self.with_eyes(&mut nodes, cameras);
-        self.scene.rig = Some(Rig { nodes, instances, cameras, lights, deforms, skins, animations });
+        self.scene.rig = Some(Rig { nodes, instances, cameras, lights, deforms, skins, animations, ..Rig::default() });
     }
 
     /// A channel; nothing for a node of another scene.
@@ -107,7 +107,8 @@ impl<'a> Loader<'a> {
         if width == 0 {
             return Err("moves the weights of a node without morph targets".into());
         }
-        let rising = times.windows(2).all(|w| w[0] < w[1]);
+        // Two keys at one time are a jump.
+        let rising = times.windows(2).all(|w| w[0] <= w[1]);
         let finite = times.iter().chain(&values).all(|v| v.is_finite());
         if times.is_empty() || values.len() != width * interpolation.parts() * times.len() || !rising || !finite {
             return Err("has keys that do not rise, are no numbers or do not match their values".into());

@@ -157,11 +157,16 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// Bytes behind a URI: `data:` in base64, or a file relative to the glTF file.
+    /// Bytes behind a URI: `data:` in base64 or percent escapes, or a file relative to the glTF file.
     pub(super) fn fetch<'b>(&self, uri: &str) -> Result<Cow<'b, [u8]>, String> {
-        if let Some(data) = uri.strip_prefix("data:") {
-            let (_, text) = data.split_once(";base64,").ok_or("is a data URI without base64")?;
-            return decode_base64(text).map(Cow::Owned);
+        if let Some((_, data)) = uri.split_at_checked(5).filter(|(scheme, _)| scheme.eq_ignore_ascii_case("data:")) {
+            let (kind, text) = data.split_once(',').ok_or("is a data URI without a comma")?;
+            let base64 = kind.rsplit(';').next().is_some_and(|word| word.trim().eq_ignore_ascii_case("base64"));
+            if !base64 {
+                return Ok(Cow::Owned(unescaped(text)));
+            }
+            let escaped = text.contains('%').then(|| decode_percent(text));
+            return decode_base64(escaped.as_deref().unwrap_or(text)).map(Cow::Owned);
         }
         let name = match uri.split_once(':') {
             // As RFC 8089 has them, with no host or this one.
@@ -180,7 +185,14 @@ impl<'a> Source<'a> {
             }
             _ => uri,
         };
-        self.folder.read(&decode_percent(name)).map(Cow::Owned)
+        let decoded = decode_percent(name);
+        let bytes = self.folder.read(&decoded).or_else(|problem| {
+            // Written without escapes, or as Windows has it.
+            let plain = if decoded == name { None } else { self.folder.read(name).ok() };
+            let turned = |name: &str| self.folder.read(&name.replace('\\', "/")).ok();
+            plain.or_else(|| decoded.contains('\\').then(|| turned(&decoded)).flatten()).ok_or(problem)
+        });
+        bytes.map(Cow::Owned)
     }
 }
 
@@ -200,7 +212,7 @@ pub(super) fn decode_base64(text: &str) -> Result<Vec<u8>, String> {
             b'0'..=b'9' => c - b'0' + 52,
             b'+' | b'-' => 62,
             b'/' | b'_' => 63,
-            b'=' | b'\n' | b'\r' => continue,
+            b'=' | b'\n' | b'\r' | b' ' | b'\t' => continue,
             _ => return Err(format!("its base64 has an invalid character at {at}")),
         };
         bits = bits << 6 | u32::from(value);
@@ -213,8 +225,13 @@ pub(super) fn decode_base64(text: &str) -> Result<Vec<u8>, String> {
     Ok(out)
 }
 
-/// RFC 3986 percent escapes; what is not a valid escape stays as it is.
+/// As [`unescaped`], as text.
 fn decode_percent(uri: &str) -> String {
+    String::from_utf8_lossy(&unescaped(uri)).into_owned()
+}
+
+/// RFC 3986 percent escapes; what is not a valid escape stays as it is.
+fn unescaped(uri: &str) -> Vec<u8> {
     let bytes = uri.as_bytes();
     let mut out = Vec::with_capacity(bytes.len());
     let mut at = 0;
@@ -226,5 +243,5 @@ fn decode_percent(uri: &str) -> String {
         out.push(escape.unwrap_or(bytes[at]));
         at += if escape.is_some() { 3 } else { 1 };
     }
-    String::from_utf8_lossy(&out).into_owned()
+    out
 }

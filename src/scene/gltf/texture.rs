@@ -27,10 +27,12 @@ impl Loader<'_> {
 
     /// Sampler and placement of a texture, without its image.
     pub(super) fn placed(&mut self, place: &str, reference: Reference) -> Option<TextureRef> {
-        if reference.uv_set > 1 {
-            self.warn(place, &format!("reads TEXCOORD_{}; only 0 and 1 are kept, so it is left out", reference.uv_set));
+        let Some(uv_set) = self.kept_sets.iter().position(|set| *set == reference.uv_set) else {
+            let [a, b] = self.kept_sets;
+            let what = format!("reads TEXCOORD_{}; of its material's, only {a} and {b} are kept", reference.uv_set);
+            self.warn(place, &format!("{what}, so it is left out"));
             return None;
-        }
+        };
         let texture = self.document.textures().nth(reference.texture)?;
         let sampler = texture.sampler();
         let wrap = |mode| match mode {
@@ -46,7 +48,7 @@ impl Loader<'_> {
                 min_linear: !sampler.min_filter().is_some_and(|f| nearest.contains(&f)),
                 wrap: [wrap(sampler.wrap_s()), wrap(sampler.wrap_t())],
             },
-            uv_set: reference.uv_set as u8,
+            uv_set: uv_set as u8,
             transform: reference.transform,
         })
     }
@@ -72,7 +74,11 @@ impl Loader<'_> {
         let (label, decoded) = match root.images.get(source) {
             None => (place.to_owned(), Err("its texture has no image".to_owned())),
             Some(image) => {
-                let named = image.uri.as_deref().filter(|u| !u.starts_with("data:")).or(image.name.as_deref());
+                let named = image
+                    .uri
+                    .as_deref()
+                    .filter(|u| !u.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")))
+                    .or(image.name.as_deref());
                 let label = named.map_or_else(|| format!("images[{source}]"), shorten);
                 let bytes = match (&image.uri, &image.buffer_view) {
                     (Some(uri), _) => self.source.fetch(uri),

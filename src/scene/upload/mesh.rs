@@ -236,12 +236,17 @@ pub(super) fn placements(
         index += indices;
     }
 
+    let mut turned = vec![false; scene.meshes.len()];
+    for deform in scene.deforms.iter().filter(|d| d.turns_over()) {
+        turned.get_mut(deform.mesh).into_iter().for_each(|t| *t = true);
+    }
     // Grouped by material, then by mesh and winding, so that instances of one mesh become one draw.
     let mut sorted = Vec::with_capacity(scene.instances.len());
     for (i, instance) in scene.instances.iter().enumerate() {
         let Some(mesh) = scene.meshes.get(instance.mesh).filter(|m| !m.indices.is_empty()) else { continue };
         let transform = Mat4::from_cols_array_2d(&instance.transform);
-        sorted.push((mesh.material, instance.mesh, transform.determinant() < 0.0, i as u32, transform));
+        let mirrored = (transform.determinant() < 0.0) != turned[instance.mesh];
+        sorted.push((mesh.material, instance.mesh, mirrored, i as u32, transform));
     }
     sorted.sort_by_key(|o| (o.0, o.1, o.2));
     let mut placed = Vec::with_capacity(sorted.len());

@@ -11,29 +11,50 @@ use crate::scene::{AlphaMode, Material, Scene};
 const SOLID: f32 = 0.995;
 
 /// Of each material, whether it is blended and most of what it covers is covered in part only.
-/// Colours of vertices are taken to be opaque.
 pub(super) fn veils(scene: &Scene) -> Vec<bool> {
-    scene.materials.iter().map(|material| is_veil(material, scene)).collect()
+    scene.materials.iter().enumerate().map(|(i, material)| is_veil(i, material, scene)).collect()
 }
 
-fn is_veil(material: &Material, scene: &Scene) -> bool {
+/// How often each alpha of 8 bits is there.
+type Counts = [u64; 256];
+
+fn is_veil(index: usize, material: &Material, scene: &Scene) -> bool {
     if material.alpha_mode != AlphaMode::Blend {
         return false;
     }
     let factor = material.base_color[3];
-    let Some(image) = material.base_color_texture.and_then(|t| scene.images.get(t.image)) else {
+    let image = material.base_color_texture.and_then(|t| scene.images.get(t.image));
+    let texels = image.map(|i| counted(i.rgba.chunks_exact(4).map(|texel| texel[3])));
+    let vertices = of_vertices(index, scene);
+    if texels.is_none() && vertices.is_none() {
         return factor < SOLID;
-    };
-    // Texels by their alpha.
-    let mut counts = [0u64; 256];
-    image.rgba.chunks_exact(4).for_each(|texel| counts[usize::from(texel[3])] += 1);
+    }
+    let whole = counted(std::iter::once(255));
+    let (texels, vertices) = (texels.unwrap_or(whole), vertices.unwrap_or(whole));
+    let there = |counts: Counts| counts.into_iter().enumerate().filter(|(_, count)| *count > 0);
     let (mut solid, mut all) = (0.0, 0.0);
-    for (alpha, count) in counts.into_iter().enumerate() {
-        let coverage = factor * alpha as f32 / 255.0;
-        all += f64::from(coverage) * count as f64;
-        solid += if coverage >= SOLID { f64::from(coverage) * count as f64 } else { 0.0 };
+    for (a, m) in there(texels) {
+        for (b, n) in there(vertices) {
+            let coverage = factor * (a as f32 / 255.0) * (b as f32 / 255.0);
+            let covered = f64::from(coverage) * m as f64 * n as f64;
+            all += covered;
+            solid += if coverage >= SOLID { covered } else { 0.0 };
+        }
     }
     solid < 0.5 * all
+}
+
+/// Alpha of the vertices of all meshes with that material; `None` where no vertex has a colour.
+fn of_vertices(material: usize, scene: &Scene) -> Option<Counts> {
+    let coloured = || scene.meshes.iter().filter(|m| m.material == material && !m.colors.is_empty());
+    coloured().next()?;
+    Some(counted(coloured().flat_map(|m| &m.colors).map(|c| (c[3].clamp(0.0, 1.0) * 255.0).round() as u8)))
+}
+
+fn counted(alphas: impl Iterator<Item = u8>) -> Counts {
+    let mut counts = [0; 256];
+    alphas.for_each(|alpha| counts[usize::from(alpha)] += 1);
+    counts
 }
 
 #[cfg(test)]
@@ -67,6 +88,15 @@ mod tests {
         assert!(veil(&[0, 0, 0, 0, 0, 60, 200, 255, 255, 255], 0.5));
         assert!(veil(&[0, 10, 40, 80, 120, 160], 1.0));
         assert!(!veil(&[0, 0], 1.0), "what covers nothing needs no order");
+        // Alpha of vertices counts as any other, alone and beside a picture's.
+        let coloured = |alphas: &[u8], of_vertices: [f32; 4]| {
+            let mut scene = scene(alphas, 1.0, AlphaMode::Blend);
+            let colors = of_vertices.map(|a| [1.0, 1.0, 1.0, a]).to_vec();
+            scene.meshes = vec![crate::scene::Mesh { colors, ..Default::default() }];
+            veils(&scene)[0]
+        };
+        assert!(coloured(&[], [0.25; 4]) && coloured(&[255], [0.5; 4]) && coloured(&[], [0.0, 0.1, 0.5, 1.0]));
+        assert!(!coloured(&[], [1.0; 4]) && !coloured(&[], [1.0, 1.0, 1.0, 0.0]));
         // Masks are cut-outs whatever they hold.
         assert!(!veils(&scene(&[100, 120], 0.5, AlphaMode::Mask { cutoff: 0.2 }))[0]);
     }

@@ -1,0 +1,115 @@
+//! JSON as files have it that a strict reader refuses: whole numbers written as `4.0`, places that are
+//! null, animations that move nothing.
+
+use super::mend::Warning;
+use serde_json::{Number, Value};
+
+/// Reads a file's JSON; what a strict reader refuses is mended first, if it can be, and told. The
+/// mended text comes back for whoever reads it again.
+///
+/// # Errors
+/// What the strict reader said.
+pub(super) fn read(json: &[u8]) -> Result<(gltf::json::Root, Option<(Vec<u8>, Vec<Warning>)>), serde_json::Error> {
+    let refused = match gltf::json::deserialize::from_slice(json) {
+        Ok(root) => return Ok((root, None)),
+        Err(refused) => refused,
+    };
+    let Ok(mut root) = serde_json::from_slice::<Value>(json) else { return Err(refused) };
+    let mut mended = Mended::default();
+    mended.value(&mut root);
+    let mut warnings = channels_without_target(&mut root);
+    if mended.numbers > 0 {
+        warnings.push(("JSON".into(), format!("{} whole numbers are written as fractions", mended.numbers)));
+    }
+    if mended.large > 0 {
+        warnings.push(("JSON".into(), format!("{} numbers are larger than 32 bits hold", mended.large)));
+    }
+    if mended.nulls > 0 {
+        warnings.push(("JSON".into(), format!("{} places are null and were left out", mended.nulls)));
+    }
+    let read = |root: &Value| {
+        let text = serde_json::to_vec(root).ok()?;
+        Some((gltf::json::deserialize::from_slice(&text).ok()?, text))
+    };
+    if let Some((document, text)) = read(&root) {
+        return Ok((document, Some((text, warnings))));
+    }
+    // No picture needs them.
+    if root.as_object_mut().and_then(|r| r.remove("animations")).is_some()
+        && let Some((document, text)) = read(&root)
+    {
+        warnings.push(("animations".into(), format!("are left out: {refused}")));
+        return Ok((document, Some((text, warnings))));
+    }
+    Err(refused)
+}
+
+#[derive(Default)]
+struct Mended {
+    numbers: usize,
+    large: usize,
+    nulls: usize,
+}
+
+/// The largest number of 32 bits: places there are left out later on.
+const MOST: f64 = f32::MAX as f64;
+
+impl Mended {
+    fn value(&mut self, value: &mut Value) {
+        match value {
+            Value::Number(n) if n.is_f64() => {
+                if let Some(whole) = whole(n) {
+                    *n = whole;
+                    self.numbers += 1;
+                } else if let Some(most) =
+                    n.as_f64().filter(|v| v.abs() > MOST).and_then(|v| Number::from_f64(MOST.copysign(v)))
+                {
+                    *n = most;
+                    self.large += 1;
+                }
+            }
+            Value::Array(list) => {
+                while list.last().is_some_and(Value::is_null) {
+                    list.pop();
+                    self.nulls += 1;
+                }
+                list.iter_mut().for_each(|v| self.value(v));
+            }
+            Value::Object(map) => {
+                let before = map.len();
+                map.retain(|_, v| !v.is_null());
+                self.nulls += before - map.len();
+                map.iter_mut().for_each(|(_, v)| self.value(v));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The number as an integer, if it is one that a float holds exactly.
+fn whole(n: &Number) -> Option<Number> {
+    let v = n.as_f64()?;
+    if v.fract() != 0.0 || v.abs() > 9e15 || v == 0.0 && v.is_sign_negative() {
+        return None;
+    }
+    Some(if v < 0.0 { (v as i64).into() } else { (v as u64).into() })
+}
+
+/// Takes out channels of animations that have no node to move.
+fn channels_without_target(root: &mut Value) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let animations = root.get_mut("animations").and_then(Value::as_array_mut).into_iter().flatten();
+    for (a, animation) in animations.enumerate() {
+        let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) else { continue };
+        let mut c = 0;
+        channels.retain(|channel| {
+            let kept = channel.pointer("/target/node").is_some_and(Value::is_u64);
+            if !kept {
+                warnings.push((format!("animations[{a}].channels[{c}]"), "has no node to move and is left out".into()));
+            }
+            c += 1;
+            kept
+        });
+    }
+    warnings
+}
