@@ -117,7 +117,7 @@ import numpy as np
 import bouncelight_weights as bw
 from bouncelight_weights.graph import complete
 from bouncelight_weights.operators import tensors
-graph, output = bw.unet(24, widths=(4, 6))
+graph, output = bw.unet(widths=(4, 6))
 rng = np.random.default_rng(3)
 arrays = {n: rng.normal(0, 1, s).astype(np.float32) for op in complete(graph) for n, s in tensors(op).items()}
 half = {n: a.astype(np.float16) for n, a in arrays.items()}
