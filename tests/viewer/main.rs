@@ -6,9 +6,11 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod display;
+mod faults;
 mod rays;
 mod session;
 mod switches;
+mod timing;
 mod wires;
 
 use display::Display;
