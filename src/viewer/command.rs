@@ -40,7 +40,7 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     }
     // A single frame is one of a history that has not settled.
     if s.samples == 1 && matches!(s.left, Source::Gather | Source::Neural) {
-        flag("accumulate", "1".into());
+        flag("gi-frames", "1".into());
     }
     if let (Source::Neural, Some(weights)) = (s.left, &s.weights) {
         flag("weights", weights.display().to_string());

@@ -43,6 +43,42 @@ impl Group {
     }
 }
 
+/// What a pass does, for those who see its name only; nothing where the name says it.
+pub fn doc(label: &str) -> &'static str {
+    match label {
+        "deform" => "moves the vertices of skins and morph targets",
+        "gbuffer" => "draws depth, normals, albedo, specular and emission",
+        "shadow" => "draws shadow maps that have changed",
+        "lights" => "sorts lights into tiles of the picture",
+        "direct" => "light of all lamps and suns, with their shadows",
+        "indirect" => "reflections and indirect light of surfaces that blend",
+        "composite" => "albedo times light, reflections and emission: the picture",
+        "blended" => "surfaces that blend, over the picture",
+        "taa" => "temporal anti-aliasing",
+        "gi.ambient" | "gi.occlusion" | "gi.occlusion_full" => "even light times ambient occlusion",
+        "gi.ssgi" | "gi.ssgi_full" => "one bounce of light found on the screen",
+        "gi.radiance" => "what surfaces send on, at lower resolutions",
+        "gi.lit" => "the lit picture at lower resolutions, for reflections",
+        "gi.glossy" => "reflections found on the screen",
+        "gi.exposure" => "mean light of the picture, to which methods relate",
+        "gi.cells" => "which pixel stands for each cell",
+        "gi.recall" => "finds what cells knew in the frame before (reprojection)",
+        "gi.rays" => "rays into the scene's triangles",
+        "gi.mirror" => "rays into lobes of smooth surfaces",
+        "gi.gradient" => "asks old rays again where light has changed (temporal gradient)",
+        "gi.settle" => "adds what rays have found to each cell's history",
+        "gi.blur" | "gi.smooth" => "blurs cells over neighbours on the same surface",
+        "gi.bring" => "brings the light of cells to every pixel",
+        "gi.renew" => "brings the cache of light in the world up to date",
+        "gi.features" | "gi.pack" => "what the network is given",
+        "gi.reconstruct" => "brings the network's answer to every pixel",
+        "viewer.show" => "draws the picture into the window",
+        "viewer.sum" => "accumulates frames of a still view",
+        "viewer.overlay" => "draws panel and overlay",
+        _ => "",
+    }
+}
+
 /// A layer of the network; there are dozens of them.
 pub fn is_layer(label: &str) -> bool {
     label.starts_with("net.")

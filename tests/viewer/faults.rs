@@ -36,7 +36,7 @@ fn neural_is_drawn_by_neural() {
 }
 
 /// Two triangles, one of which rises for 2 s, and a spot that shines straight down.
-fn lively(folder: &std::path::Path) {
+pub fn lively(folder: &std::path::Path) {
     let numbers: [f32; 17] = [-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.5, 0.0];
     let bytes: Vec<u8> = numbers.iter().flat_map(|v| v.to_le_bytes()).collect();
     std::fs::write(folder.join("scene.bin"), bytes).unwrap();

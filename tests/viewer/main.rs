@@ -11,6 +11,7 @@ mod rays;
 mod session;
 mod switches;
 mod timing;
+mod tour;
 mod wires;
 
 use display::Display;

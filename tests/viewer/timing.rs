@@ -12,6 +12,8 @@ fn the_timing_overlay_by_hand() {
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
         { "wait": "loaded" }, { "wait": "idle" },
+        // Scripts see the picture alone unless they ask for more.
+        { "key": "F3" }, { "wait": 4 },
         { "expect": { "/timing/shown": true, "/timing/expanded": false, "/panel": true } },
         { "expect": { "/places/timing/0": { "min": 1.0 } } },
         // All of it; the panel's going leaves it where it is.

@@ -109,7 +109,8 @@ impl App {
     pub(super) fn mark_run(&mut self) {
         let (Some(stage), Some(shown)) = (&self.stage, &self.state.shown) else { return };
         let sides = if self.state.sources().len() == 2 { &[Side::Left, Side::Right][..] } else { &[Side::Left] };
-        let names = sides.iter().filter_map(|side| stage.drawn_by(&self.state, *side)).map(|by| by.source.title());
+        let names =
+            sides.iter().filter_map(|side| stage.drawn_by(&self.state, *side)).map(|by| self.state.title(by.source));
         let method = names.collect::<Vec<_>>().join(" | ");
         let size = stage.drawn_size(&self.state);
         self.meter.times.begin(Run { method, scene: shown.spec.clone(), size });

@@ -120,6 +120,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
     // A script sees whole pictures unless it asks for others.
     settings.coarse &= !scripted;
     settings.greeted |= scripted;
+    settings.timing.shown &= !scripted || options.settings.is_some();
     if let Some(method) = options.method {
         settings.left = method;
     } else if options.weights.is_some() {

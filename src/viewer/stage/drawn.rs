@@ -43,7 +43,7 @@ impl Stage {
             None => slot.key.0,
         };
         let why = match why.map(|(_, why)| why) {
-            _ if slot.key.0 != asked => Some(format!("building {}", asked.title())),
+            _ if slot.key.0 != asked => Some(format!("building {}", state.title(asked))),
             why => why,
         };
         Some(DrawnBy { source, why })

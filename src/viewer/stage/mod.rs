@@ -70,9 +70,9 @@ pub struct Stage {
     still: u32,
     /// Pixels that a texel of the renderers covers.
     texel: u32,
-    /// The camera has moved so shortly ago that nothing is averaged yet.
+    /// Something has moved so shortly ago that nothing is averaged yet.
     moving: bool,
-    /// When the camera moved last.
+    /// When the camera or the scene moved last.
     moved: Option<Instant>,
 }
 
@@ -224,7 +224,9 @@ impl Stage {
         again: bool,
     ) -> Result<bool, RenderError> {
         let Some(scene) = &self.scene else { return Ok(false) };
-        let moves = |old: &Sight| (old.transform, old.yfov) != (camera.transform, camera.yfov);
+        // What a hand or an animation moves is seen to move, too.
+        let now = (camera.transform, camera.yfov, state.version);
+        let moves = |old: &Sight| (old.transform, old.yfov, old.version) != now;
         if self.sight.as_ref().is_some_and(moves) {
             self.moved = Some(Instant::now());
         }

@@ -5,11 +5,12 @@
 mod action;
 mod edit;
 mod floor;
+mod roll;
 mod sky;
 mod undo;
 
 use super::choice::{Side, Source, View};
-use super::film::{self, Film, Recording};
+use super::film::Film;
 use super::navigate::{Navigator, Preset};
 use super::saved::Settings;
 use crate::net::plan::Precision;
@@ -226,6 +227,15 @@ impl State {
         self.size[0] as f32 / self.size[1].max(1) as f32
     }
 
+    /// What the window calls a source: networks of other files are not known to filter anything.
+    pub fn title(&self, source: Source) -> String {
+        let file = self.settings.weights.as_ref().filter(|_| source == Source::Neural);
+        match file.and_then(|path| path.file_stem()) {
+            Some(stem) => format!("Neural, {}", stem.to_string_lossy()),
+            None => source.title().into(),
+        }
+    }
+
     /// The sources that are on show.
     pub fn sources(&self) -> Vec<Source> {
         let s = &self.settings;
@@ -382,48 +392,6 @@ impl State {
             }
             A::Quit => self.requests.push(Request::Quit),
         }
-    }
-
-    fn record(&mut self) {
-        let now = Instant::now();
-        match std::mem::take(&mut self.film) {
-            Film::Records(recording) => {
-                self.path = Some(recording.finish(&self.navigator, now));
-                self.requests.push(Request::SavePath);
-            }
-            _ => {
-                self.film = Film::Records(Recording::new(&self.navigator, now));
-                self.tell("the camera is recorded until R is pressed again", false);
-            }
-        }
-    }
-
-    fn play(&mut self) {
-        match (&self.film, &self.path) {
-            (Film::Plays { .. }, _) => self.film = Film::Rests,
-            (_, Some(_)) => self.film = Film::Plays { since: Instant::now() },
-            (_, None) => self.tell("there is no camera path yet: record one (R) or drop its file", false),
-        }
-    }
-
-    /// Camera path and animation go on; true while they move something by themselves.
-    pub fn roll(&mut self, now: Instant) -> bool {
-        self.animation(now) | self.camera_path(now)
-    }
-
-    fn camera_path(&mut self, now: Instant) -> bool {
-        let rolls = match (&mut self.film, &self.path) {
-            (Film::Records(recording), _) => {
-                recording.look(&self.navigator, now);
-                return false;
-            }
-            (Film::Plays { since }, Some(path)) => film::play(path, *since, now, &mut self.navigator),
-            _ => return false,
-        };
-        if !rolls {
-            self.film = Film::Rests;
-        }
-        rolls
     }
 
     fn with_scene(&mut self, act: impl FnOnce(&mut Navigator, &Scene)) {

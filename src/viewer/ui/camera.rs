@@ -49,7 +49,8 @@ pub(super) fn picture(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
         ui.end_row();
         ui.label("Accumulate");
         let mut samples = state.settings.samples;
-        let field = drag(&mut samples, 1..=4096).suffix(" frames when still");
+        let words = if samples == 1 { " frame when still" } else { " frames when still" };
+        let field = drag(&mut samples, 1..=4096).suffix(words);
         let told = "Frames averaged while nothing moves: smooth edges, soft shadows. A method with a history settles \
             for 31 frames before.";
         if ui.add(field).on_hover_text(told).changed() {

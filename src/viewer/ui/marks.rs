@@ -20,10 +20,10 @@ pub(super) fn name(state: &State, facts: &Facts<'_>, side: Side) -> String {
         (Source::Reference, Some(r)) if r.samples > 0 => format!("{}, {} samples", asked.title(), r.samples),
         (Source::Reference, Some(r)) => format!("{} ({})", asked.title(), r.stage),
         (Source::Reference, None) => format!("{} (waits until the view rests)", asked.title()),
-        _ => match by.map(|by| (by.source.title(), &by.why)) {
+        _ => match by.map(|by| (state.title(by.source), &by.why)) {
             Some((title, Some(why))) => format!("{title} ({why})"),
-            Some((title, None)) => title.into(),
-            None => format!("building {}", asked.title()),
+            Some((title, None)) => title,
+            None => format!("building {}", state.title(asked)),
         },
     }
 }

@@ -174,7 +174,8 @@ fn side(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) 
     egui::Panel::right("panel").resizable(false).exact_size(width).show(ui, |ui| {
         let inner = ui.available_width();
         egui::ScrollArea::vertical().max_height(height).auto_shrink([false; 2]).show(ui, |ui| {
-            ui.set_max_width(inner - ui.spacing().scroll.allocated_width());
+            // The scroll bar lies over what it scrolls.
+            ui.set_max_width(inner - 10.0);
             panel::show(ui, state, memory, facts);
         });
     });
@@ -212,20 +213,21 @@ fn banner(ui: &mut Ui, facts: &Facts<'_>) {
 
 fn status(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
     ui.horizontal(|ui| {
-        let ms = |track: &Track| track.median().map_or("–".into(), |v| format!("{v:.2}"));
-        let times = &facts.times.now;
-        let gpu = if facts.timestamps {
-            format!("GPU {} ms", ms(&times.gpu))
-        } else {
-            format!("frame {} ms (no GPU timestamps; waited for)", ms(&times.wall))
-        };
-        // Most frames draw the overlay as it was, so its median says little.
-        let overlay = facts.times.overlay.spread().map_or("–".into(), |s| format!("{:.2} ms on average", s.mean));
-        let mut text =
-            format!("{}×{}  ·  {gpu}  ·  CPU {} ms, overlay {overlay}", state.size[0], state.size[1], ms(&times.cpu),);
+        let [w, h] = state.size;
+        let mut text = format!("{w}×{h}");
+        // The overlay tells more of it.
+        if !state.settings.timing.shown {
+            let ms = |track: &Track| track.median().map_or("–".into(), |v| format!("{v:.2}"));
+            let times = &facts.times.now;
+            let (name, main) = if facts.timestamps { ("GPU", &times.gpu) } else { ("frame, waited for,", &times.wall) };
+            text += &format!("  ·  {name} {} ms  ·  CPU {} ms", ms(main), ms(&times.cpu));
+        }
         let [still, all] = facts.still;
-        text +=
-            &if still < all { format!("  ·  Accumulating {still} of {all}") } else { format!("  ·  {all} frames") };
+        text += &match all {
+            _ if still < all => format!("  ·  Accumulating {still} of {all}"),
+            1 => "  ·  1 frame".into(),
+            _ => format!("  ·  {all} frames accumulated"),
+        };
         if let Some(r) = facts.reference {
             text += &format!("  ·  Reference: {} of {} samples", r.samples, state.settings.spp);
         }
@@ -251,120 +253,4 @@ fn source_box(ui: &mut Ui, id: &str, state: &mut State, side: Side) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use egui::{PointerButton, Vec2};
-    use std::sync::Arc;
-
-    /// Runs the overlay without any window, one frame for each list of events.
-    fn run(state: &mut State, frames: Vec<Vec<egui::Event>>) -> Rect {
-        run_in(&egui::Context::default(), state, frames)
-    }
-
-    fn run_in(context: &egui::Context, state: &mut State, frames: Vec<Vec<egui::Event>>) -> Rect {
-        let mut memory = Memory::default();
-        let (times, measured) = (Times::default(), BTreeMap::new());
-        let mut place = Rect::NOTHING;
-        for events in frames {
-            let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 500.0)));
-            let input = egui::RawInput { screen_rect, events, focused: true, ..Default::default() };
-            let facts = Facts::bare(&times, &measured);
-            let mut output = context.run_ui(input, |ui| place = show(ui, state, &mut memory, &facts));
-            output.textures_delta.clear();
-        }
-        place
-    }
-
-    fn state() -> State {
-        let mut state = State::new(Default::default());
-        state.show("cornell".into(), Arc::new(crate::scene::bundled::scene("cornell").expect("bundled")));
-        state
-    }
-
-    fn press(key: egui::Key) -> egui::Event {
-        egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Default::default() }
-    }
-
-    fn button(pos: Pos2, pressed: bool) -> egui::Event {
-        egui::Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Default::default() }
-    }
-
-    #[test]
-    fn the_panel_leaves_the_rest_to_the_picture() {
-        let mut state = state();
-        let place = run(&mut state, vec![vec![], vec![]]);
-        assert_eq!((place.left(), place.right()), (0.0, 500.0));
-        assert!(place.top() > 10.0 && place.bottom() < 490.0, "banner and status: {place}");
-        state.apply(Action::Panel);
-        assert_eq!(run(&mut state, vec![vec![], vec![]]), Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 500.0)));
-    }
-
-    #[test]
-    fn hands_over_the_picture_move_the_camera_and_over_the_panel_they_do_not() {
-        let drag = |from: Pos2| {
-            let to = from + Vec2::new(30.0, 0.0);
-            vec![
-                vec![egui::Event::PointerMoved(from)],
-                vec![button(from, true)],
-                vec![egui::Event::PointerMoved(to)],
-                vec![button(to, false)],
-            ]
-        };
-        let mut state = state();
-        let eye = state.navigator.eye;
-        run(&mut state, drag(Pos2::new(700.0, 420.0)));
-        assert_eq!(state.navigator.eye, eye, "the panel is no picture");
-        run(&mut state, drag(Pos2::new(200.0, 200.0)));
-        assert_ne!(state.navigator.eye, eye);
-        // The line is nearer than the camera to a hand that grabs it.
-        state.settings.split = true;
-        let (eye, line) = (state.navigator.eye, state.settings.line);
-        run(&mut state, drag(Pos2::new(250.0, 200.0)));
-        assert_eq!(state.navigator.eye, eye);
-        assert!((state.settings.line - line - 30.0 / 500.0).abs() < 1e-3, "{}", state.settings.line);
-    }
-
-    #[test]
-    fn keys_reach_the_state_but_not_while_somebody_types() {
-        let mut state = state();
-        run(&mut state, vec![vec![press(egui::Key::Num4)], vec![press(egui::Key::H)]]);
-        assert_eq!((state.settings.view, state.help), (View::Depth, true));
-        state.apply(Action::Escape);
-        // Tab goes to the first control; from then on letters are its own.
-        let mut tabbed = vec![vec![]];
-        tabbed.extend((0..3).map(|_| vec![press(egui::Key::Tab)]));
-        tabbed.push(vec![press(egui::Key::Num1)]);
-        run(&mut state, tabbed);
-        assert_eq!(state.settings.view, View::Depth);
-    }
-
-    #[test]
-    fn tab_reaches_every_control_and_space_presses_it() {
-        let (mut state, context) = (state(), egui::Context::default());
-        let mut seen = std::collections::HashSet::new();
-        for _ in 0..60 {
-            run_in(&context, &mut state, vec![vec![press(egui::Key::Tab)]]);
-            let Some(id) = context.memory(|m| m.focused()) else { continue };
-            // The first time a control has the focus it is pressed; what that changes is changed
-            // back.
-            if seen.insert(id) {
-                let (split, help) = (state.settings.split, state.help);
-                run_in(&context, &mut state, vec![vec![press(egui::Key::Space)], vec![]]);
-                if state.settings.split != split {
-                    seen.insert(egui::Id::unique("split was pressed"));
-                    state.apply(Action::Split);
-                }
-                if state.help != help {
-                    seen.insert(egui::Id::unique("help was pressed"));
-                    state.apply(Action::Help);
-                }
-                run_in(&context, &mut state, vec![vec![press(egui::Key::Space)], vec![]]);
-                (state.help, state.settings.split) = (help, split);
-            }
-        }
-        let pressed = ["split was pressed", "help was pressed"].map(|name| seen.contains(&egui::Id::unique(name)));
-        assert_eq!(pressed, [true, true]);
-        // Ten rooms, the status line, and what the four open ones hold.
-        assert!(seen.len() >= 24, "{} controls", seen.len());
-    }
-}
+mod tests;

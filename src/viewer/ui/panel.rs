@@ -83,7 +83,7 @@ fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
             state.apply(Action::Browse(false));
         }
         let hint = "file, interior, home:7";
-        let room = (ui.available_width() - 44.0).max(40.0);
+        let room = (ui.available_width() - 56.0).max(40.0);
         let field = ui.add(egui::TextEdit::singleline(&mut memory.path).hint_text(hint).desired_width(room));
         let enter = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
         let told = "Load what the field names: a file, a bundled scene or home:N";
@@ -134,12 +134,12 @@ fn variants(ui: &mut Ui, state: &mut State, names: &[String], now: Option<usize>
 
 /// A place for what is told and goes again, always as high, so that nothing below it moves.
 pub(super) fn notice(ui: &mut Ui, text: Option<(String, egui::Color32)>) {
-    let height = 2.0 * ui.text_style_height(&egui::TextStyle::Body) + 2.0;
+    let height = 2.0 * ui.text_style_height(&egui::TextStyle::Small) + 2.0;
     let size = Vec2::new(ui.available_width(), height);
     let (rect, response) = ui.allocate_exact_size(size, egui::Sense::hover());
     let Some((text, colour)) = text else { return };
     let mut job =
-        egui::text::LayoutJob::simple(text.clone(), egui::TextStyle::Body.resolve(ui.style()), colour, size.x);
+        egui::text::LayoutJob::simple(text.clone(), egui::TextStyle::Small.resolve(ui.style()), colour, size.x);
     job.wrap.max_rows = 2;
     let galley = ui.painter().layout_job(job);
     ui.painter().galley(rect.min, galley, colour);
@@ -213,7 +213,8 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
 /// How far apart both sides are; as high as ever while nobody knows.
 fn verdict(ui: &mut Ui, state: &State, facts: &Facts<'_>) {
     let v = facts.verdict.as_ref();
-    let [left, right] = v.map_or([state.settings.left, state.settings.right], |v| v.by).map(Source::title);
+    let [left, right] =
+        v.map_or([state.settings.left, state.settings.right], |v| v.by).map(|source| state.title(source));
     ui.add(egui::Label::new(RichText::new(format!("{left} against {right}")).strong()).truncate());
     let noise = facts.reference.and_then(|r| r.noise).unwrap_or(0.0);
     let noisy = v.is_some_and(|v| v.is_noise(noise));

@@ -81,7 +81,9 @@ pub fn history(ui: &mut Ui, memory: &mut Memory, facts: &Facts<'_>) {
         cpu.push(Pos2::new(left(i) + 0.5 * width, rect.bottom() - height(frame.cpu)));
     }
     painter.add(Shape::mesh(mesh));
-    painter.extend(Shape::dashed_line(&cpu, Stroke::new(1.2, TEXT), 3.0, 3.0));
+    if cpu.len() > 1 {
+        painter.line(cpu, Stroke::new(1.2, TEXT));
+    }
     let font = FontId::proportional(10.0);
     let mut note = |at: Pos2, align: Align2, text: &str, colour: Color32| {
         let galley = painter.layout_no_wrap(text.into(), font.clone(), colour);
@@ -90,18 +92,19 @@ pub fn history(ui: &mut Ui, memory: &mut Memory, facts: &Facts<'_>) {
         painter.galley(place.min, galley, colour);
     };
     for (aim, name) in AIMS {
-        if aim < 0.97 * top {
+        // On the ground it would be no line.
+        if aim < 0.97 * top && aim > 0.03 * top {
             let y = rect.bottom() - height(aim);
             let line = [Pos2::new(rect.left(), y), Pos2::new(rect.right(), y)];
             painter.extend(Shape::dashed_line(&line, Stroke::new(1.0, Color32::from_white_alpha(150)), 6.0, 4.0));
-            // Beside each other where the scale is large.
-            if aim > 0.12 * top {
+            // Each has room for its name.
+            if aim > 0.1 * top {
                 note(Pos2::new(rect.right() - 3.0, y), Align2::RIGHT_CENTER, name, TEXT);
             }
         }
     }
     note(rect.left_top() + Vec2::new(4.0, 3.0), Align2::LEFT_TOP, &format!("{} ms", ms(top.into())), WEAK);
-    note(rect.left_bottom() + Vec2::new(4.0, -3.0), Align2::LEFT_BOTTOM, "CPU – –", TEXT);
+    note(rect.left_bottom() + Vec2::new(4.0, -3.0), Align2::LEFT_BOTTOM, "CPU: the line", TEXT);
     marks(&painter, rect, facts, &left, &mut note);
     let hovered = response.hover_pos().map(|p| ((p.x - rect.left()) / width) as usize);
     let Some((i, frame)) = hovered.and_then(|c| c.checked_sub(first)).and_then(|i| Some((i, frames.get(i)?))) else {

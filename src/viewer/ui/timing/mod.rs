@@ -35,7 +35,7 @@ pub struct Look {
 
 /// Draws it over the picture at `rect`.
 pub fn show(ui: &Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>, rect: Rect) {
-    if !state.settings.timing.shown || rect.width() < 60.0 || rect.height() < 24.0 {
+    if !state.settings.timing.shown || rect.width() < 120.0 || rect.height() < 60.0 {
         return;
     }
     let at = state.settings.timing.at;
@@ -113,9 +113,12 @@ fn rate(ui: &mut Ui, facts: &Facts<'_>) {
 
 fn sums(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>, rect: Rect) {
     ui.horizontal(|ui| {
-        rate(ui, facts);
-        pair(ui, facts);
-        if rect.width() > 420.0 {
+        // What has no room goes, the least worth first.
+        if rect.width() > 260.0 {
+            rate(ui, facts);
+        }
+        pair(ui, facts, rect.width() > 340.0);
+        if rect.width() > 440.0 {
             graph::sparkline(ui, facts);
         }
         buttons(ui, state, memory);
@@ -123,7 +126,7 @@ fn sums(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>, 
 }
 
 /// GPU and CPU time.
-fn pair(ui: &mut Ui, facts: &Facts<'_>) {
+fn pair(ui: &mut Ui, facts: &Facts<'_>, both: bool) {
     let (name, numbers, spread) = main(facts);
     let told = match spread {
         Some(s) => format!("the renderer's passes, without the viewer's own; median of {} frames", s.count),
@@ -132,9 +135,12 @@ fn pair(ui: &mut Ui, facts: &Facts<'_>) {
     text(ui, name, 12.0, WEAK).on_hover_text(&told);
     text(ui, spread.map_or("–".into(), |s| ms(s.median)), 17.0, if facts.software { WARN } else { TEXT })
         .on_hover_text(&told);
+    text(ui, if both { "ms · CPU" } else { "ms" }, 12.0, WEAK);
+    if !both {
+        return;
+    }
     let cpu = numbers.cpu.spread();
     let told = "from recording to submission, the overlay's own share included";
-    text(ui, "ms · CPU", 12.0, WEAK).on_hover_text(told);
     text(ui, cpu.map_or("–".into(), |s| ms(s.median)), 17.0, TEXT).on_hover_text(told);
     text(ui, "ms", 12.0, WEAK);
 }
@@ -167,7 +173,7 @@ fn buttons(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
 fn whole(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>, rect: Rect) {
     ui.horizontal(|ui| {
         rate(ui, facts);
-        pair(ui, facts);
+        pair(ui, facts, rect.width() > 360.0);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             // From the right: the cross is the last of both.

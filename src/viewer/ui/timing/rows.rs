@@ -1,7 +1,7 @@
 //! Passes in their groups, with a bar and a share each.
 
 use super::{COLOURS, TEXT, WARN, WEAK, ms, right};
-use crate::viewer::frames::{Group, Row, is_layer};
+use crate::viewer::frames::{Group, Row, doc, is_layer};
 use crate::viewer::state::State;
 use crate::viewer::stats::Spread;
 use crate::viewer::ui::{Facts, Memory};
@@ -35,6 +35,9 @@ pub fn rows(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
     let all = now.gpu.spread();
     let share = |s: Option<Spread>| Some(s?.median / all?.median.max(1e-9));
     let slowest = facts.times.slowest();
+    let (name, whole) =
+        if facts.timestamps { ("GPU, all passes", all) } else { ("Frame, waited for", now.wall.spread()) };
+    paint(ui, &sum(name, whole), Sense::hover());
     for group in Group::ALL {
         let passes: Vec<&Row> = now.passes.iter().filter(|row| row.group == group).collect();
         if passes.is_empty() {
@@ -84,26 +87,25 @@ pub fn rows(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
             paint(ui, &line, Sense::hover());
         }
     }
-    let sum = |name, spread| Line {
+    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 3.0), Sense::hover());
+    ui.painter().hline(rect.x_range(), rect.center().y, Stroke::new(0.5, WEAK));
+    paint(ui, &sum("CPU", now.cpu.spread()), Sense::hover());
+    paint(ui, &sum("Frame to frame", now.interval.spread()), Sense::hover());
+}
+
+/// A line of no group.
+fn sum(name: &str, spread: Option<Spread>) -> Line<'_> {
+    Line {
         name,
         note: String::new(),
         spread,
         share: None,
         colour: Color32::TRANSPARENT,
         strong: true,
-        indent: 0.0,
+        indent: 12.0,
         open: None,
         slowest: false,
-    };
-    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 3.0), Sense::hover());
-    ui.painter().hline(rect.x_range(), rect.center().y, Stroke::new(0.5, WEAK));
-    if facts.timestamps {
-        paint(ui, &sum("GPU, the renderer's passes", all), Sense::hover());
-    } else {
-        paint(ui, &sum("frame, waited for", now.wall.spread()), Sense::hover());
     }
-    paint(ui, &sum("CPU", now.cpu.spread()), Sense::hover());
-    paint(ui, &sum("from frame to frame", now.interval.spread()), Sense::hover());
 }
 
 fn head(ui: &mut Ui) {
@@ -116,6 +118,12 @@ fn head(ui: &mut Ui) {
         "median and 95th percentile over the last two seconds, or the last 32 frames where these are slow; \
         no percentile stands on fewer than 20 frames; share of the renderer's sum",
     );
+}
+
+/// A share, with a digit behind the point where it is small.
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    if percent < 9.95 { format!("{percent:.1} %") } else { format!("{percent:.0} %") }
 }
 
 fn paint(ui: &mut Ui, line: &Line<'_>, sense: Sense) -> egui::Response {
@@ -140,7 +148,7 @@ fn paint(ui: &mut Ui, line: &Line<'_>, sense: Sense) -> egui::Response {
         x += 12.0;
     }
     // Names end where bars begin, and these where numbers do.
-    let (bar_left, bar_right) = (rect.left() + 0.42 * rect.width(), rect.right() - EDGES[0] - 56.0);
+    let (bar_left, bar_right) = (rect.left() + 0.4 * rect.width(), rect.right() - EDGES[0] - 56.0);
     let colour = if line.strong { TEXT } else { Color32::from_gray(0xd4) };
     let names = painter.with_clip_rect(Rect::from_x_y_ranges(rect.left()..=bar_left - 4.0, rect.y_range()));
     let size = if line.strong { 12.5 } else { 12.0 };
@@ -158,7 +166,7 @@ fn paint(ui: &mut Ui, line: &Line<'_>, sense: Sense) -> egui::Response {
         if line.slowest {
             painter.rect_stroke(bar, 1.5, Stroke::new(1.0, WARN), egui::StrokeKind::Outside);
         }
-        right(ui, Pos2::new(rect.right(), y), &format!("{:.0} %", 100.0 * share), 11.5, colour);
+        right(ui, Pos2::new(rect.right(), y), &percent(share), 11.5, colour);
     }
     let number = |v: Option<f64>| v.map_or("–".into(), |v| if v < 10.0 { format!("{v:.3}") } else { ms(v) });
     let (median, p95) = (number(line.spread.map(|s| s.median)), number(line.spread.and_then(|s| s.p95)));
@@ -166,7 +174,10 @@ fn paint(ui: &mut Ui, line: &Line<'_>, sense: Sense) -> egui::Response {
     right(ui, Pos2::new(rect.right() - EDGES[1], y), &p95, 11.5, WEAK);
     match line.spread {
         Some(s) if response.hovered() => {
-            response.on_hover_text(format!("{}: {:.3} ms, median of {} frames", line.name, s.median, s.count))
+            let what = doc(line.name);
+            let stop = if what.is_empty() { "" } else { "\n" };
+            response
+                .on_hover_text(format!("{what}{stop}{}: {:.3} ms, median of {} frames", line.name, s.median, s.count))
         }
         _ => response,
     }
