@@ -6,6 +6,12 @@ use serde::{Deserialize, Serialize};
 pub use crate::gi::name::MethodName as Source;
 
 impl Source {
+    /// What the window calls it.
+    pub fn title(self) -> &'static str {
+        ["Direct only", "Ambient + AO", "SSGI", "Ray-traced gather", "Gather + neural filter", "Path-traced reference"]
+            [self as usize]
+    }
+
     /// The one `by` places further, among those that are drawn in real time.
     pub fn next(self, by: isize) -> Self {
         let n = Self::REAL_TIME.len() as isize;
@@ -73,6 +79,25 @@ impl View {
             "emission",
             "layer",
             "wireframe",
+        ][self as usize]
+    }
+
+    /// What the window's lists call it.
+    pub fn title(self) -> &'static str {
+        [
+            "Picture",
+            "Albedo",
+            "Normals",
+            "Depth",
+            "Direct light",
+            "Indirect light",
+            "Reflections",
+            "Roughness",
+            "Error",
+            "Network input",
+            "Emission",
+            "Network layer",
+            "Wireframe",
         ][self as usize]
     }
 

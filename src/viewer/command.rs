@@ -42,6 +42,10 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
             flag("samples", s.samples.to_string());
         }
     }
+    // A single frame is one of a history that has not settled.
+    if s.samples == 1 && matches!(s.left, Source::Gather | Source::Neural) {
+        flag("gi-frames", "1".into());
+    }
     if let (Source::Neural, Some(weights)) = (s.left, &s.weights) {
         flag("weights", weights.display().to_string());
     }
@@ -132,7 +136,7 @@ mod tests {
         }
         (state.settings.left, state.gather) = (Source::Gather, Some("entry_scale=0.25".into()));
         assert!(line(&state, None).contains("--gather=entry_scale=0.25"));
-        state.apply(Action::Undo);
+        state.apply(Action::Reset);
         assert!(!line(&state, None).contains("--object"));
         state.settings.left = Source::Reference;
         let text = line(&state, None);

@@ -109,8 +109,11 @@ pub enum Product {
         side: usize,
         key: Key,
         renderer: Box<Renderer>,
+        /// Whether its method asks rays.
+        rays: bool,
     },
-    Captured(PathBuf),
+    /// A file, and what drew it in the place of the method that was asked for.
+    Captured(PathBuf, Option<String>),
 }
 
 /// A job's end.
@@ -191,7 +194,7 @@ fn fitted(spec: &str, scene: &Scene) -> Option<Result<Box<Fitted>, String>> {
 /// Builds the trees that rays need, while the method below draws.
 pub fn rays(handles: &Handles, stamp: u64, scene: &Scene, progress: &Progress) -> Result<Product, String> {
     let told = |done: usize, all: usize| {
-        progress.stage(&format!("rays: {done} of {all} meshes"));
+        progress.stage(&format!("building BVH: {done} of {all} meshes"));
         progress.at(done as f64 / all.max(1) as f64)
     };
     let rays = match SceneRays::with_progress(&handles.device, &handles.queue, scene, &told) {
@@ -242,6 +245,7 @@ pub struct Plan {
 pub fn renderer(handles: &Handles, plan: Plan, progress: &Progress) -> Result<Product, String> {
     let method = method(plan.key.0, plan.weights.as_deref(), &plan.network)?;
     progress.stage(&format!("building {}", plan.key.0.name()));
+    let rays = method.needs_rays();
     let scope = handles.device.push_error_scope(wgpu::ErrorFilter::Validation);
     let options = RendererOptions { method, ..Default::default() };
     let built = Renderer::new(&handles.device, &handles.queue, plan.size, options);
@@ -249,7 +253,7 @@ pub fn renderer(handles: &Handles, plan: Plan, progress: &Progress) -> Result<Pr
         return Err(crate::gpu::shaders::located(&e.to_string()));
     }
     let renderer = Box::new(built.map_err(|e| e.to_string())?);
-    Ok(Product::Renderer { side: plan.side, key: plan.key, renderer })
+    Ok(Product::Renderer { side: plan.side, key: plan.key, renderer, rays })
 }
 
 /// What is captured: the arguments of `bouncelight render`, or `trace`, that draw the same.
@@ -303,6 +307,7 @@ impl Shot {
 /// Draws the picture anew, away from the window, just as the command line would, and writes it.
 pub fn capture(gpu: &crate::gpu::Gpu, shot: &Shot, progress: &Progress) -> Result<Product, String> {
     let cancelled = || Err("cancelled".to_string());
+    let mut instead = None;
     let (beauty, layers) = if shot.source == Source::Reference {
         let Some(traced) = trace(gpu, shot, progress)? else { return cancelled() };
         traced
@@ -312,11 +317,11 @@ pub fn capture(gpu: &crate::gpu::Gpu, shot: &Shot, progress: &Progress) -> Resul
             SceneGpu::with_textures(&gpu.device, &gpu.queue, &shot.scene, shot.textures).map_err(|e| e.to_string())?;
         if method.needs_rays() {
             progress.stage("building trees for rays");
-            // Where they cannot be had, the method below draws.
+            // Where they cannot be had, the method below draws, and the file says so.
             let _ = scene.trace(&gpu.device, &gpu.queue, &shot.scene);
         }
         progress.stage("capturing");
-        let warmup = method.frames_to_settle() - 1;
+        let warmup = if shot.samples > 1 { method.frames_to_settle() - 1 } else { 0 };
         let options = RendererOptions { method, backdrop: shot.backdrop, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, shot.size, options).map_err(|e| e.to_string())?;
         let layers: &[Layer] = if shot.is_exr() { &Layer::ALL } else { &[] };
@@ -327,23 +332,26 @@ pub fn capture(gpu: &crate::gpu::Gpu, shot: &Shot, progress: &Progress) -> Resul
             progress.at(f64::from(done) / f64::from(shot.samples + warmup))
         });
         let Some(frame) = frame.map_err(|e| e.to_string())? else { return cancelled() };
+        instead = renderer.instead().map(|i| format!("{} ({})", i.method, i.why));
         let layer = |(layer, picture): &(Layer, crate::render::capture::Picture)| {
             image_io::Layer::new(layer.name(), &layer.channels().concat(), &picture.data)
         };
         (frame.beauty.data, frame.layers.iter().map(layer).collect())
     };
     let [width, height] = shot.size;
+    let mut metadata = shot.metadata.clone();
+    metadata.extend(instead.clone().map(|by| ("DrawnBy".to_string(), by)));
     let written = if shot.is_exr() {
         let mut all = vec![image_io::Layer::new("", "RGBA", &beauty)];
         all.extend(layers);
-        image_io::write_exr(&shot.output, width, height, &all, &shot.metadata)
+        image_io::write_exr(&shot.output, width, height, &all, &metadata)
     } else {
         let gain = shot.ev.exp2();
         let rgb: Vec<f32> = beauty.chunks_exact(4).flat_map(|p| [p[0] * gain, p[1] * gain, p[2] * gain]).collect();
-        image_io::write_png(&shot.output, width, height, &shot.tonemap.apply_to_bytes(&rgb), &shot.metadata)
+        image_io::write_png(&shot.output, width, height, &shot.tonemap.apply_to_bytes(&rgb), &metadata)
     };
     written.map_err(|e| e.to_string())?;
-    Ok(Product::Captured(shot.output.clone()))
+    Ok(Product::Captured(shot.output.clone(), instead))
 }
 
 /// The path tracer's picture and layers; `None` when cancelled.

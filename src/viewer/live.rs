@@ -2,7 +2,7 @@
 //! has found so far.
 
 use super::jobs::Handles;
-use crate::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions};
+use crate::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions, preview};
 use crate::scene::{Camera, Scene};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -11,6 +11,11 @@ use std::time::{Duration, Instant};
 /// Most points that are traced live: 256 bytes for each in two buffers, read back for every
 /// picture.
 const MOST_POINTS: u64 = 1 << 19;
+/// Pixels on a side of what is traced as one in the first picture, which takes a sixteenth of a
+/// sample's time.
+const COARSE: u32 = 4;
+/// Smaller pictures are there at once.
+const LEAST: u32 = 160;
 /// Least time between two pictures.
 const PICTURES: Duration = Duration::from_millis(500);
 
@@ -23,6 +28,8 @@ pub struct Subjects {
     pub yfov: f32,
     pub size: [u32; 2],
     pub samples: u32,
+    /// For a look, noise is averaged away.
+    pub denoise: bool,
 }
 
 impl Subjects {
@@ -51,8 +58,11 @@ pub struct Found {
     pub texel: u32,
     /// RGBA, scene-linear radiance.
     pub radiance: Vec<f32>,
+    /// The same with its noise averaged away: to look at, never to compare with.
+    pub denoised: Option<Vec<f32>>,
     /// RGB, what a method must add, E/π.
     pub indirect: Vec<f32>,
+    /// None while it is a coarse one to begin with.
     pub samples: u32,
     /// Noise of a pixel of the picture, as a share of the mean.
     pub noise: f64,
@@ -151,15 +161,24 @@ impl Work {
         drop(scene);
         let texel = self.subject.texel();
         let size = self.subject.size.map(|n| n.div_ceil(texel));
+        let mut layers = vec![Layer::Combined, Layer::Gi];
+        if self.subject.denoise {
+            layers.extend(preview::READ.into_iter().filter(|l| *l != Layer::Combined));
+        }
         let options = TracerOptions {
             samples: self.subject.samples,
-            layers: vec![Layer::Combined, Layer::Gi],
+            layers,
             // Between two of the window's pictures; on a CPU both take long.
             dispatch: Duration::from_millis(if self.software { 100 } else { 12 }),
             ..Default::default()
         };
         if stopped() {
             return Ok(());
+        }
+        if size[0].min(size[1]) >= LEAST
+            && let Some(found) = self.coarse(&kernel, &packed, &options)?
+        {
+            send(Report::Picture(Box::new(found)));
         }
         let subject = Subject { camera: &self.camera, size, points: None };
         let mut tracer = Tracer::new(device, queue, &kernel, &packed, subject, options).map_err(|e| e.to_string())?;
@@ -189,6 +208,7 @@ impl Work {
                     size,
                     texel,
                     radiance: layer(Layer::Combined),
+                    denoised: if self.subject.denoise { preview::denoise(traced, &self.camera) } else { None },
                     indirect: layer(Layer::Gi),
                     samples,
                     noise: traced.noise[0].pixel,
@@ -200,6 +220,39 @@ impl Work {
             }
         }
     }
+
+    /// One sample of every fourth pixel of every fourth row: something to look at while the first
+    /// whole pass is traced. `None` when nobody waits for it any more.
+    fn coarse(
+        &self,
+        kernel: &Kernel,
+        packed: &ReferenceScene,
+        options: &TracerOptions,
+    ) -> Result<Option<Found>, String> {
+        let texel = COARSE * self.subject.texel();
+        let size = self.subject.size.map(|n| n.div_ceil(texel));
+        let subject = Subject { camera: &self.camera, size, points: None };
+        let options = TracerOptions { samples: 1, ..options.clone() };
+        let Handles { device, queue, .. } = &self.handles;
+        let mut tracer = Tracer::new(device, queue, kernel, packed, subject, options).map_err(|e| e.to_string())?;
+        while tracer.step().map_err(|e| e.to_string())? {
+            if self.stop.load(Ordering::Relaxed) || self.pause.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+        }
+        let traced = tracer.resolve().map_err(|e| e.to_string())?;
+        let layer = |l| traced.layer(l).map(<[f32]>::to_vec).unwrap_or_default();
+        Ok(Some(Found {
+            size,
+            texel,
+            radiance: layer(Layer::Combined),
+            denoised: if self.subject.denoise { preview::denoise(traced, &self.camera) } else { None },
+            indirect: layer(Layer::Gi),
+            samples: 0,
+            noise: f64::NAN,
+            finished: false,
+        }))
+    }
 }
 
 #[cfg(test)]
@@ -208,7 +261,9 @@ mod tests {
 
     #[test]
     fn large_windows_are_traced_coarser() {
-        let of = |size| Subjects { version: 0, transform: [[0.0; 4]; 4], yfov: 1.0, size, samples: 1 }.texel();
+        let of = |size| {
+            Subjects { version: 0, transform: [[0.0; 4]; 4], yfov: 1.0, size, samples: 1, denoise: false }.texel()
+        };
         assert_eq!((of([640, 360]), of([1024, 512]), of([1920, 1080]), of([7680, 4320])), (1, 1, 2, 8));
     }
 }

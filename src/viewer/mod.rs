@@ -17,12 +17,14 @@ mod choice;
 mod command;
 mod film;
 mod flicker;
+mod frames;
 mod jobs;
 mod judge;
 mod keys;
 mod live;
 mod navigate;
 mod pick;
+mod records;
 #[cfg(feature = "script")]
 mod report;
 mod saved;

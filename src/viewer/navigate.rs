@@ -27,9 +27,9 @@ impl Preset {
     pub const ALL: [Preset; 6] =
         [Preset::Front, Preset::Right, Preset::Back, Preset::Left, Preset::Top, Preset::Corner];
 
-    /// Name in the window and in scripts.
-    pub fn name(self) -> &'static str {
-        ["front", "right", "back", "left", "top", "corner"][self as usize]
+    /// What the window calls it.
+    pub fn title(self) -> &'static str {
+        ["Front", "Right", "Back", "Left", "Top", "3/4 view"][self as usize]
     }
 
     /// From the scene towards the eye.

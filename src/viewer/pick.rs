@@ -14,8 +14,16 @@ pub fn ray(view: &View, pixel: [f32; 2]) -> (Vec3, Vec3) {
 
 /// The nearest instance that the ray hits, and how far away, metres.
 pub fn pick(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<(usize, f32)> {
+    pick_without(scene, None, origin, direction)
+}
+
+/// The same as if instance `left_out` were not there.
+pub fn pick_without(scene: &Scene, left_out: Option<usize>, origin: Vec3, direction: Vec3) -> Option<(usize, f32)> {
     let mut nearest: Option<(usize, f32)> = None;
     for (i, instance) in scene.instances.iter().enumerate() {
+        if left_out == Some(i) {
+            continue;
+        }
         let Some(mesh) = scene.meshes.get(instance.mesh) else { continue };
         let Some((low, high)) = instance_bounds(instance, mesh) else { continue };
         if !hits_box(origin, direction, low.into(), high.into()) {

@@ -34,7 +34,15 @@ pub struct Settings {
     pub coarse: bool,
     /// Samples a pixel that the live reference stops at.
     pub spp: u32,
+    /// The live reference is shown without its noise; numbers are taken with it.
+    pub denoise: bool,
     pub panel: bool,
+    /// Width of the panel, points.
+    pub panel_width: f32,
+    /// The timing overlay.
+    pub timing: Timing,
+    /// The line for those who are new has been seen.
+    pub greeted: bool,
     /// The flicker meter is on.
     pub flicker: bool,
     pub dark: bool,
@@ -63,7 +71,11 @@ impl Default for Settings {
             backdrop: Backdrop::Shown,
             coarse: true,
             spp: 256,
+            denoise: false,
             panel: true,
+            panel_width: 300.0,
+            timing: Timing::default(),
+            greeted: false,
             flicker: false,
             dark: true,
             zoom: 1.0,
@@ -71,6 +83,26 @@ impl Default for Settings {
             recent: Vec::new(),
             window: [1280, 720],
         }
+    }
+}
+
+/// Where the timing overlay is, and how much it tells.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Timing {
+    pub shown: bool,
+    /// With passes and the graph, or the sums alone.
+    pub expanded: bool,
+    /// From the picture's left and top edge, points; negative from the right and bottom one.
+    pub at: [f32; 2],
+    /// Which groups of passes are unfolded, by their numbers.
+    pub unfolded: [bool; 6],
+}
+
+impl Default for Timing {
+    fn default() -> Self {
+        // A network has dozens of layers.
+        Self { shown: true, expanded: false, at: [-8.0, 8.0], unfolded: [true, true, true, false, true, true] }
     }
 }
 
@@ -102,6 +134,8 @@ impl Settings {
         self.line = within(self.line, 0.0, 1.0, 0.5);
         self.exposure = within(self.exposure, -20.0, 20.0, 0.0);
         self.zoom = within(self.zoom, 0.5, 4.0, 1.0);
+        self.panel_width = within(self.panel_width, 200.0, 800.0, 300.0);
+        self.timing.at = self.timing.at.map(|v| within(v, -16_384.0, 16_384.0, 8.0));
         self.samples = self.samples.clamp(1, 4096);
         self.spp = self.spp.clamp(1, 1 << 20);
         self.window = self.window.map(|n| n.clamp(160, 16_384));

@@ -6,6 +6,9 @@ use crate::gpu::timing::Recorder;
 use crate::render::{Renderer, targets::Target, tonemap_curve::Tonemap, tool};
 use bytemuck::{Pod, Zeroable};
 
+/// Difference of display values that the error view shows brightest.
+pub const FULL_ERROR: f32 = 0.25;
+
 /// `Show` of `shaders/viewer/show.wgsl`, field by field.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -138,7 +141,7 @@ impl ShowPass {
             scale: [left.scale, right.scale],
             texel: [left.texel, right.texel],
             metres: inputs.metres,
-            full_error: 0.25,
+            full_error: FULL_ERROR,
             low: range[0],
             high: range[1],
         };

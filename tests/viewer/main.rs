@@ -6,11 +6,14 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod display;
+mod faults;
 #[path = "../common/linear.rs"]
 mod linear;
 mod rays;
 mod session;
 mod switches;
+mod timing;
+mod tour;
 mod wires;
 
 use display::Display;

@@ -59,7 +59,7 @@ impl MethodName {
         })
     }
 
-    /// Whether it asks rays ([`Method::needs_rays`]).
+    /// Whether it asks rays in any case. Of `neural` only [`Method::needs_rays`] can tell: its weights decide.
     pub fn needs_rays(self) -> bool {
         matches!(self, M::Gather | M::Neural)
     }

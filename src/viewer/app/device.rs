@@ -27,9 +27,11 @@ impl App {
         let fresh =
             self.options.settings.is_none() && (self.script.is_some() || saved::path().is_none_or(|p| !p.exists()));
         if fresh && self.stage.as_ref().is_some_and(|s| s.gpu.is_software()) {
-            // A frame takes as long as sixteen on the slowest card.
-            self.state.settings.samples = 1;
             self.state.settings.spp = if self.script.is_some() { 4 } else { 32 };
+            // Scripts ask for more where they want to see it.
+            if self.script.is_some() {
+                self.state.settings.samples = 1;
+            }
         }
         let spec = self.options.scene.clone().unwrap_or_else(|| "interior".into());
         self.start(Request::Load(spec));
@@ -75,8 +77,7 @@ impl App {
         self.tracing.kept = Kept::default();
         self.building = [None; 2];
         self.rays_of = None;
-        self.meter.timed_frames = 0;
-        self.meter.discard = 0;
+        self.meter.lose();
         self.requested = false;
         self.stage = None;
         let Some(screen) = self.screen.take() else { return };

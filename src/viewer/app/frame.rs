@@ -4,6 +4,7 @@
 use super::App;
 use crate::gpu::{readback, timing::Recorder};
 use crate::viewer::command;
+use crate::viewer::records;
 use crate::viewer::screen::Acquired;
 use crate::viewer::state::Request;
 use std::path::Path;
@@ -121,13 +122,18 @@ impl App {
         }
         buffers.push(encoder.finish());
         queue.submit(buffers);
+        let mut timed = false;
         if drawn && let Some(profiler) = &mut screen.profiler {
             match profiler.end_frame() {
-                Ok(()) => self.meter.timed_frames += 1,
+                Ok(()) => timed = true,
                 Err(e) => tracing::debug!("a frame was not timed: {e}"),
             }
         }
         cpu += finishing.elapsed();
+        let cpu = cpu.as_secs_f64() * 1e3;
+        if timed {
+            self.meter.timed(cpu);
+        }
         if let Some(texture) = kept {
             screen.window.pre_present_notify();
             queue.present(texture);
@@ -139,7 +145,7 @@ impl App {
             // Without timestamps the clock has to do.
             if device.poll(wgpu::PollType::wait_indefinitely()).is_ok() {
                 if self.meter.settling < 2 {
-                    self.meter.times.wall.add(Instant::now(), recording.elapsed().as_secs_f64() * 1e3);
+                    self.meter.times.waited(Instant::now(), recording.elapsed().as_secs_f64() * 1e3, cpu);
                 }
                 self.learn();
             }
@@ -151,12 +157,14 @@ impl App {
         }
         if drawn && self.meter.settling > 0 {
             self.meter.settling -= 1;
-            self.meter.discard += u32::from(self.meter.settling == 1);
         }
         self.frames += 1;
-        self.meter.times.cpu.add(Instant::now(), cpu.as_secs_f64() * 1e3);
+        if drawn {
+            self.meter.times.now.cpu.add(Instant::now(), cpu);
+        }
         self.meter.times.overlay.add(Instant::now(), overlay.as_secs_f64() * 1e3);
         self.collect_times();
+        self.tour();
         self.schedule(drawn);
     }
 
@@ -170,9 +178,9 @@ impl App {
         }
         let camera = self.state.navigator.camera(&shown.scene);
         let track = if self.screen.as_ref().is_some_and(|s| s.profiler.is_some()) {
-            &self.meter.times.gpu
+            &self.meter.times.now.gpu
         } else {
-            &self.meter.times.wall
+            &self.meter.times.now.wall
         };
         // Frames of half the resolution take a quarter.
         let most = if self.state.slow { SLOW / 4.0 } else { SLOW };
@@ -210,6 +218,9 @@ impl App {
         if let Err(e) = stage.update_feature(&self.state, &camera) {
             self.state.tell(e, true);
         }
+        if drawn {
+            self.mark_run();
+        }
         self.expose();
         drawn
     }
@@ -226,7 +237,7 @@ impl App {
         }
         let sky = &shown.scene.environment;
         let background = sky.image.is_none().then_some(sky.radiance);
-        match stage.read_left() {
+        match stage.read_left(&self.state) {
             Ok(Some(rgb)) => {
                 if rests {
                     self.meter.exposed = Some(now);
@@ -247,10 +258,22 @@ impl App {
         }
         let converging = self.stage.as_ref().is_some_and(|s| s.is_converging(&self.state));
         let measuring = self.state.measure && self.stage.as_ref().is_some_and(|s| s.has_scene());
-        self.again |= converging || measuring || self.meter.settling == 1;
+        let follows = converging || measuring || self.meter.settling == 1 || self.again;
+        self.again = follows;
+        if drawn {
+            self.meter.follow(Instant::now(), follows);
+        }
         if self.redraw || self.again {
             self.request_redraw();
         }
+    }
+
+    fn copy(&mut self, text: String) {
+        self.overlay.egui.copy_text(text.clone());
+        if let Some(screen) = self.screen.as_mut().filter(|_| self.script.is_none()) {
+            screen.input.set_clipboard_text(text.clone());
+        }
+        self.copied = Some(text);
     }
 
     /// Does what the state asks of the world outside.
@@ -259,12 +282,12 @@ impl App {
             match request {
                 Request::Quit => self.quit(event_loop),
                 Request::CopyCommand => {
-                    let text = command::line(&self.state, None);
-                    self.overlay.egui.copy_text(text.clone());
-                    if let Some(screen) = self.screen.as_mut().filter(|_| self.script.is_none()) {
-                        screen.input.set_clipboard_text(text.clone());
+                    self.copy(command::line(&self.state, None));
+                }
+                Request::CopyTimes => {
+                    if let Some(about) = self.about() {
+                        self.copy(records::table(&self.meter.times, &about));
                     }
-                    self.copied = Some(text);
                 }
                 Request::FullScreen(full) => {
                     if let Some(screen) = &self.screen {

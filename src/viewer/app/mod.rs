@@ -9,6 +9,7 @@ mod reference;
 mod sides;
 #[cfg(feature = "script")]
 mod steps;
+mod tour;
 mod work;
 
 use super::choice::Source;
@@ -71,6 +72,7 @@ pub struct App {
     network: jobs::Network,
     pub tracing: Tracing,
     pub meter: Meter,
+    tour: Option<tour::Tour>,
     pub script: Option<Script>,
     pub scripted: Vec<egui::Event>,
     pub screenshot: Option<PathBuf>,
@@ -117,6 +119,8 @@ pub fn run(options: Options) -> Result<(), ViewError> {
     }
     // A script sees whole pictures unless it asks for others.
     settings.coarse &= !scripted;
+    settings.greeted |= scripted;
+    settings.timing.shown &= !scripted || options.settings.is_some();
     if let Some(method) = options.method {
         settings.left = method;
     } else if options.weights.is_some() {
@@ -149,6 +153,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
         network: jobs::Network::default(),
         tracing: Tracing::default(),
         meter: Meter::default(),
+        tour: None,
         script,
         scripted: Vec::new(),
         screenshot: None,
@@ -207,6 +212,7 @@ impl App {
             && self.tracing.failed.is_none();
         let building = self.building.iter().any(Option::is_some);
         !(converging
+            || self.tour.is_some()
             || self.meter.settling == 1
             || tracing
             || self.tracing.is_judging()
@@ -327,7 +333,7 @@ impl ApplicationHandler<Event> for App {
             self.wake_at,
             self.tracing.judge_at,
             self.overlay.due().filter(|_| !self.again),
-            (self.meter.timed_frames > 0).then(|| now + POLL),
+            self.meter.waits().then(|| now + POLL),
             self.options.watch.then_some(self.next_look),
             #[cfg(feature = "script")]
             self.script.is_some().then(|| now + super::script::STEP),

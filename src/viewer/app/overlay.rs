@@ -3,8 +3,12 @@
 //! reads numbers that change more than four times a second.
 
 use super::App;
+use crate::viewer::choice::Side;
+use crate::viewer::film::Film;
+use crate::viewer::jobs::Kind;
+use crate::viewer::stage::{DrawnBy, Stage};
 use crate::viewer::state::State;
-use crate::viewer::ui::{self, hands, marks};
+use crate::viewer::ui::{self, gizmo, hands, marks};
 use egui::{ClippedPrimitive, Event, Rect, epaint::ClippedShape};
 use std::time::{Duration, Instant};
 
@@ -109,7 +113,12 @@ impl Overlay {
 
     /// Draws the selected object's box where it is now.
     fn outline(&mut self, state: &State) {
-        let shapes = marks::outline(state, self.place, self.density);
+        let mut shapes = marks::outline(state, self.place, self.density);
+        let text = |at, align, text: &str, colour| {
+            let font = egui::FontId::proportional(12.0);
+            self.egui.fonts_mut(|fonts| egui::Shape::text(fonts, at, align, text, font, colour))
+        };
+        shapes.extend(gizmo::shapes(state, self.place, self.density, &text));
         if self.outline == 0 && shapes.is_empty() {
             return;
         }
@@ -189,6 +198,7 @@ impl App {
             // Ctrl and + or −, which egui hears itself.
             self.state.settings.zoom = egui.zoom_factor();
         }
+        self.meter.ask_memory(Instant::now());
         let mut place = Rect::NOTHING;
         let mut output = egui.run_ui(raw, |ui| place = self.show(ui));
         let textures = std::mem::take(&mut output.textures_delta.set);
@@ -219,7 +229,11 @@ impl App {
     /// The overlay's layout, with what it tells.
     fn show(&mut self, ui: &mut egui::Ui) -> Rect {
         let Some(stage) = &self.stage else { return Rect::NOTHING };
-        let instead = stage.instead();
+        // Other scenes and sizes take other times.
+        let run = &self.meter.times.run;
+        let here = self.meter.measured.iter().filter(|(_, m)| (&m.run.scene, m.run.size) == (&run.scene, run.size));
+        let measured = here.map(|(source, m)| (*source, m.ms)).collect();
+        let by = [Side::Left, Side::Right].map(|side| self.drawn_by(stage, side));
         let facts = ui::Facts {
             adapter: &stage.gpu.info.name,
             software: stage.gpu.is_software(),
@@ -228,16 +242,39 @@ impl App {
             memory: &self.meter.memory,
             jobs: &self.jobs,
             reference: self.tracing.facts,
-            verdict: self.tracing.verdict,
-            measured: &self.meter.measured,
-            still: stage.still(),
+            verdict: self.tracing.verdict.clone(),
+            measured: &measured,
+            still: [stage.still(), stage.frames(&self.state)],
             feature: stage.feature(),
             layers: &stage.layers(),
             flicker: self.meter.flicker,
-            instead: instead.as_ref(),
+            by,
             drawn: stage.drawn(),
+            live: self.is_live(),
+            touring: self.touring(),
+            resident: self.meter.resident,
         };
         ui::show(ui, &mut self.state, &mut self.overlay.memory, &facts)
+    }
+
+    /// True while frames follow each other without any hand.
+    fn is_live(&self) -> bool {
+        let converging = self.stage.as_ref().is_some_and(|s| s.is_converging(&self.state));
+        let moves = self.state.animated.is_some() || matches!(self.state.film, Film::Plays { .. });
+        converging || moves || self.state.measure || self.overlay.flew.is_some()
+    }
+
+    /// What a side shows, and how far the work is that its method waits for.
+    fn drawn_by(&self, stage: &Stage, side: Side) -> Option<DrawnBy> {
+        let mut by = stage.drawn_by(&self.state, side)?;
+        let job = self.jobs.iter().find(|j| j.kind == Kind::Rays);
+        if let (Some(why), Some(job)) = (&mut by.why, job)
+            && why.starts_with("building BVH")
+            && let Some((_, count)) = job.progress.read().0.split_once(": ")
+        {
+            *why += &format!(", {count}");
+        }
+        Some(by)
     }
 
     /// Held keys fly, as long as frames are drawn one after the other.

@@ -49,6 +49,8 @@ impl App {
         if !self.state.wants_reference() {
             self.tracing.live = None;
             self.tracing.resting = None;
+            self.tracing.facts = None;
+            stage.forget_reference();
             return;
         }
         let camera = self.state.navigator.camera(&shown.scene);
@@ -58,6 +60,7 @@ impl App {
             yfov: camera.yfov,
             size: self.state.size,
             samples: self.state.settings.spp,
+            denoise: self.state.settings.denoise,
         };
         let now = Instant::now();
         if self.tracing.resting.as_ref().is_none_or(|(s, _)| *s != subject) {
@@ -108,18 +111,22 @@ impl App {
                 self.tracing.facts = Some(ReferenceFacts { stage, samples, share, ..before });
             }
             Report::Picture(found) => {
+                let found_samples = found.samples;
                 self.tracing.facts = Some(ReferenceFacts {
                     stage: "tracing",
                     samples: found.samples,
                     share: f64::from(found.samples) / f64::from(subject.samples.max(1)),
-                    noise: Some(found.noise),
+                    noise: Some(found.noise).filter(|_| found.samples > 0),
                     texel,
                     finished: found.finished,
                 });
                 if let Some(stage) = &mut self.stage {
                     stage.set_reference(*found);
                 }
-                self.tracing.judge_at = Some(Instant::now());
+                let whole = found_samples > 0;
+                if whole {
+                    self.tracing.judge_at = Some(Instant::now());
+                }
             }
             Report::Failed(text) => {
                 self.state.tell(format!("reference: {text}"), true);
@@ -139,7 +146,16 @@ impl App {
         let read = |side| stage.read_side(&self.state, side).unwrap_or_default();
         let (Some(left), Some(right)) = (read(Side::Left), read(Side::Right)) else { return };
         let s = &self.state.settings;
-        let pair = Pair { size: self.state.size, left, right, ev: self.state.stops(), tonemap: s.tonemap };
+        let by = |side| stage.drawn_by(&self.state, side).map(|d| d.source);
+        let (Some(first), Some(second)) = (by(Side::Left), by(Side::Right)) else { return };
+        let pair = Pair {
+            by: [first, second],
+            size: self.state.size,
+            left,
+            right,
+            ev: self.state.stops(),
+            tonemap: s.tonemap,
+        };
         self.tracing.judged += 1;
         let (number, proxy) = (self.tracing.judged, self.proxy.clone());
         self.tracing.judging = Some(number);

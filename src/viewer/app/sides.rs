@@ -41,7 +41,8 @@ impl App {
             self.building[1] = None;
         }
         let wanted = [Some(left), two.then_some(s.right)];
-        if wanted.into_iter().flatten().any(Source::needs_rays) && stage.wants_rays() {
+        let by_name = wanted.into_iter().flatten().any(Source::needs_rays) && stage.wants_rays();
+        if by_name || stage.lacks_rays() {
             self.reconcile_rays();
         }
         for (side, source) in wanted.into_iter().enumerate() {
@@ -73,7 +74,8 @@ impl App {
     pub(super) fn will_build_rays(&self) -> bool {
         let Some(stage) = &self.stage else { return false };
         let sources = self.state.sources();
-        sources.iter().any(|s| s.needs_rays()) && stage.wants_rays() && self.rays_of != Some(self.uploads)
+        let wanted = (sources.iter().any(|s| s.needs_rays()) && stage.wants_rays()) || stage.lacks_rays();
+        wanted && self.rays_of != Some(self.uploads)
     }
 
     /// Begins to build the trees of the scene on show, unless somebody is at it.
@@ -85,7 +87,7 @@ impl App {
         }
         self.rays_of = Some(stamp);
         let (handles, scene) = (stage.handles(), shown.scene.clone());
-        self.spawn("trees for rays".into(), Kind::Rays, move |p| jobs::rays(&handles, stamp, &scene, p));
+        self.spawn("building BVH".into(), Kind::Rays, move |p| jobs::rays(&handles, stamp, &scene, p));
     }
 
     /// A source that cannot be had: the side keeps what it has.

@@ -7,7 +7,6 @@ use crate::scene::path::CameraPath;
 use crate::viewer::choice::Source;
 use crate::viewer::jobs::{self, Done, Kind, Product, Shot};
 use crate::viewer::state::{Action, Request, Stale};
-use crate::viewer::stats::Track;
 use crate::viewer::watch::Changed;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -51,6 +50,7 @@ impl App {
                 self.spawn(name, Kind::Capture, move |p| jobs::capture(&gpu, &shot, p));
             }
             Request::Cancel => {
+                self.end_tour();
                 for job in std::mem::take(&mut self.jobs) {
                     job.progress.cancel();
                     self.state.tell(format!("cancelled: {}", job.name), false);
@@ -91,7 +91,9 @@ impl App {
                 self.state.tell(told.0, told.1);
             }
             Request::Browse(surroundings) => self.browse(surroundings),
-            Request::CopyCommand | Request::Quit | Request::FullScreen(_) => {}
+            Request::SaveTimes => self.save_times(),
+            Request::MeasureAll => self.measure_all(),
+            Request::CopyCommand | Request::CopyTimes | Request::Quit | Request::FullScreen(_) => {}
         }
     }
 
@@ -182,9 +184,10 @@ impl App {
                 let shown = self.state.shown.as_ref().filter(|_| stamp == self.uploads);
                 let Some(scene) = shown.map(|s| s.scene.clone()) else { return };
                 if let Err(why) = &rays {
-                    self.state.tell(format!("`gather` cannot draw this, so `ssgi` does: {why}"), true);
+                    self.state.tell(format!("there are no rays into this scene, so `ssgi` draws: {why}"), true);
                 }
                 stage.set_rays(&scene, rays.map(|r| *r));
+                self.meter.begin();
             }
             Ok(Product::Surroundings { path, environment }) => self.state.surround(&path, environment),
             Ok(Product::Weights(path)) => {
@@ -194,20 +197,18 @@ impl App {
                     self.state.settings.left = Source::Neural;
                 }
             }
-            Ok(Product::Renderer { side, key, renderer }) => {
+            Ok(Product::Renderer { side, key, renderer, rays }) => {
                 if self.building[side] == Some(key) {
                     self.building[side] = None;
                     self.built += 1;
-                    stage.set_renderer(side, key, *renderer);
-                    self.meter.settling = 2;
-                    self.meter.times.gpu = Track::default();
-                    self.meter.times.wall = Track::default();
-                    self.meter.times.passes.clear();
+                    stage.set_renderer(side, key, *renderer, rays);
+                    self.meter.begin();
                 }
             }
-            Ok(Product::Captured(path)) => {
+            Ok(Product::Captured(path, instead)) => {
                 self.captured = Some(path.display().to_string());
-                self.state.tell(format!("written: {}", path.display()), false);
+                let by = instead.map_or(String::new(), |by| format!(", drawn by {by}"));
+                self.state.tell(format!("written: {}{by}", path.display()), false);
             }
             Err(text) => {
                 self.state.tell(format!("{}: {text}", job.name), true);

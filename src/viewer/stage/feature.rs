@@ -38,10 +38,16 @@ impl Stage {
         if self.feature.as_ref().is_some_and(|f| f.which == wanted) {
             return Ok(());
         }
-        let (Some(slot), Some(scene)) = (&mut self.slots[0], &self.scene) else { return Ok(()) };
+        let (Some(slot), Some(_)) = (&self.slots[0], &self.scene) else { return Ok(()) };
         if self.still == 0 || slot.renderer.size() != state.size {
             return Ok(());
         }
+        if self.instead().is_some() && !self.is_known(wanted) {
+            self.feature = None;
+            return Ok(());
+        }
+        let Some(slot) = &mut self.slots[0] else { return Ok(()) };
+        let Some(scene) = &self.scene else { return Ok(()) };
         let view = Eye::new(camera, state.size, [0.0; 2]);
         let sky = scene.environment.radiance;
         let tiles = if s.view == View::Layer {
@@ -65,6 +71,14 @@ impl Stage {
         self.show.forget();
         self.feature = Some(Feature { texture, range, which: wanted, name });
         Ok(())
+    }
+
+    /// What is known of the network before it has run: its inputs, but for those that it draws itself.
+    fn is_known(&self, (view, number): (View, u32)) -> bool {
+        use crate::gi::features::FEATURES;
+        let all: u32 = FEATURES.iter().map(|f| f.channels).sum();
+        let own: u32 = FEATURES.iter().filter(|f| f.name == "guess").map(|f| f.channels).sum();
+        view == View::Feature && number % all < all - own
     }
 
     /// What of the network is on show, and its range.

@@ -1,6 +1,7 @@
 //! The GPU's side of the viewer: the uploaded scene, a renderer for each side of the line, the live
 //! reference's picture, and what a frame of the window records. Nothing here knows winit or egui.
 
+mod drawn;
 mod feature;
 mod sides;
 
@@ -12,12 +13,14 @@ use super::show::{ShowInputs, ShowPass, SumPass, Sums};
 use super::state::{Stale, State};
 use super::wires::WiresPass;
 use crate::accel::SceneRays;
+use crate::gi::Method;
 use crate::gpu::{Gpu, readback, timing::Recorder};
 use crate::render::{Backdrop, DrawnCount, Purpose, RenderError, Renderer, View as Eye, sampling};
 use crate::scene::{
     Camera, Scene,
     upload::{SceneGpu, TextureMemory},
 };
+pub use drawn::DrawnBy;
 use feature::Feature;
 use sides::Reference;
 use std::sync::Arc;
@@ -28,6 +31,8 @@ struct Slot {
     key: Key,
     renderer: Renderer,
     sums: Option<Sums>,
+    /// Its method asks rays.
+    rays: bool,
 }
 
 /// What decides how the picture looks; when it changes, averaging begins anew.
@@ -42,6 +47,7 @@ struct Sight {
     samples: u32,
     backdrop: Backdrop,
     texel: u32,
+    moving: bool,
 }
 
 /// Everything on the GPU.
@@ -64,7 +70,9 @@ pub struct Stage {
     still: u32,
     /// Pixels that a texel of the renderers covers.
     texel: u32,
-    /// When the camera moved last.
+    /// Something has moved so shortly ago that nothing is averaged yet.
+    moving: bool,
+    /// When the camera or the scene moved last.
     moved: Option<Instant>,
 }
 
@@ -93,6 +101,7 @@ impl Stage {
             sight: None,
             still: 0,
             texel: 1,
+            moving: false,
             moved: None,
         }
     }
@@ -122,16 +131,9 @@ impl Stage {
         self.scene.as_ref().is_some_and(|s| s.rays.is_none() && s.no_rays.is_none())
     }
 
-    /// What draws in the place of the method of the left side, and why.
-    pub fn instead(&self) -> Option<(&'static str, String)> {
-        let instead = self.slots[0].as_ref()?.renderer.instead()?;
-        let scene = self.scene.as_ref()?;
-        let why = match &scene.no_rays {
-            Some(why) => why.clone(),
-            None if scene.rays.is_none() => "until there are rays".into(),
-            None => instead.why.into(),
-        };
-        Some((instead.method, why))
+    /// True while a renderer waits for rays of which nobody has said whether there can be any.
+    pub fn lacks_rays(&self) -> bool {
+        self.wants_rays() && self.slots.iter().flatten().any(|s| s.rays)
     }
 
     /// What the left side's last frame drew.
@@ -145,8 +147,8 @@ impl Stage {
     }
 
     /// A side's new renderer.
-    pub fn set_renderer(&mut self, side: usize, key: Key, renderer: Renderer) {
-        self.slots[side] = Some(Slot { key, renderer, sums: None });
+    pub fn set_renderer(&mut self, side: usize, key: Key, renderer: Renderer, rays: bool) {
+        self.slots[side] = Some(Slot { key, renderer, sums: None, rays });
         self.show.forget();
         self.feature = None;
         self.sight = None;
@@ -185,10 +187,26 @@ impl Stage {
 
     /// True while another frame would change the picture.
     pub fn is_converging(&self, state: &State) -> bool {
-        self.scene.is_some() && self.slots[0].is_some() && (self.still < state.settings.samples || self.texel > 1)
+        self.scene.is_some() && self.slots[0].is_some() && (self.still < self.frames(state) || self.moving)
     }
 
-    /// Frames averaged so far.
+    /// Frames of a still view until its picture is what a capture draws: in the first of them the method's history
+    /// settles, the others are averaged.
+    pub fn frames(&self, state: &State) -> u32 {
+        self.settling(state) + state.settings.samples
+    }
+
+    fn settling(&self, state: &State) -> u32 {
+        let history = self.slots.iter().flatten().any(|s| s.rays);
+        if history && state.settings.samples > 1 { Method::SETTLED - 1 } else { 0 }
+    }
+
+    /// As many frames are in the average.
+    fn averaged(&self, state: &State) -> u32 {
+        self.still.saturating_sub(self.settling(state)).max(1)
+    }
+
+    /// Frames drawn of this still view so far.
     pub fn still(&self) -> u32 {
         self.still
     }
@@ -206,11 +224,15 @@ impl Stage {
         again: bool,
     ) -> Result<bool, RenderError> {
         let Some(scene) = &self.scene else { return Ok(false) };
-        let moves = |old: &Sight| (old.transform, old.yfov) != (camera.transform, camera.yfov);
+        // What a hand or an animation moves is seen to move, too.
+        let now = (camera.transform, camera.yfov, state.version);
+        let moves = |old: &Sight| (old.transform, old.yfov, old.version) != now;
         if self.sight.as_ref().is_some_and(moves) {
             self.moved = Some(Instant::now());
         }
         let moving = self.moved.is_some_and(|at| at.elapsed() < REST);
+        self.moving = moving;
+        let (settling, most) = (self.settling(state), self.frames(state));
         let texel = if moving && state.is_coarse() { 2 } else { 1 };
         let sight = Sight {
             version: state.version,
@@ -222,13 +244,16 @@ impl Stage {
             samples: state.settings.samples,
             backdrop: state.settings.backdrop,
             texel,
+            moving,
         };
         if self.sight.as_ref() != Some(&sight) {
             self.sight = Some(sight);
             self.still = 0;
             self.feature = None;
-        } else if self.still >= state.settings.samples {
-            if !again && texel == 1 {
+        } else if moving && self.still > 0 && !again {
+            return Ok(false);
+        } else if moving || self.still >= most {
+            if !again {
                 return Ok(false);
             }
             self.still = 0;
@@ -239,9 +264,16 @@ impl Stage {
         for slot in self.slots.iter_mut().flatten() {
             slot.renderer.resize(size)?;
             slot.renderer.set_backdrop(state.settings.backdrop);
-            // Sample by sample as a capture takes them.
-            let offset = sampling::offset_of(self.still, state.settings.samples, 0);
-            let view = Eye::new(camera, size, offset).with_seed(self.still);
+            // Frame by frame as a capture draws them.
+            let samples = if moving { 1 } else { state.settings.samples };
+            let (number, offset) = match settling.checked_sub(self.still) {
+                Some(left) if left > 0 && !moving => (left, sampling::offset(left, 0)),
+                _ => {
+                    let number = self.still.saturating_sub(settling);
+                    (number, sampling::offset_of(number, samples, 0))
+                }
+            };
+            let view = Eye::new(camera, size, offset).with_seed(number).with_samples(samples);
             let purpose = if self.still == 0 { Purpose::Picture } else { Purpose::FurtherSample };
             slot.renderer.record_frame(recorder, &self.gpu.queue, scene, &view, purpose)?;
             if state.settings.samples > 1 {
@@ -250,7 +282,7 @@ impl Stage {
                     Some(sums) => slot.sums.insert(sums),
                     None => slot.sums.insert(self.sum.sums(&self.gpu.device, hdr)),
                 };
-                self.sum.record(recorder, sums, self.still == 0);
+                self.sum.record(recorder, sums, self.still <= settling);
             } else {
                 slot.sums = None;
             }
@@ -294,7 +326,8 @@ impl Stage {
             sides,
             size: state.size,
             feature,
-            view: s.view,
+            // There is no error against nothing.
+            view: if s.view == View::Error && self.waits_for_reference(state) { View::Picture } else { s.view },
             split: s.split.then_some(s.line),
             ev: state.stops(),
             tonemap: s.tonemap,

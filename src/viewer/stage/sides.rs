@@ -8,6 +8,9 @@ use crate::viewer::live::Found;
 use crate::viewer::show::{SideView, picture};
 use crate::viewer::state::State;
 
+/// By this much the raster is dimmed where the path tracer has nothing yet.
+const WAITING: f32 = 0.25;
+
 /// The live reference as textures.
 pub(super) struct Reference {
     pub radiance: Target,
@@ -24,7 +27,7 @@ impl Stage {
         let make = |name| picture(&self.gpu.device, name, found.size);
         let (radiance, indirect) =
             known.map_or_else(|| (make("viewer.reference"), make("viewer.reference_gi")), |r| (r.radiance, r.indirect));
-        self.fill(&radiance, &found.radiance);
+        self.fill(&radiance, found.denoised.as_ref().unwrap_or(&found.radiance));
         let rgba: Vec<f32> = found.indirect.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 1.0]).collect();
         self.fill(&indirect, &rgba);
         self.reference = Some(Reference { radiance, indirect, texel: found.texel, found });
@@ -52,28 +55,31 @@ impl Stage {
     pub(super) fn side(&self, state: &State, side: Side) -> SideView {
         let s = &state.settings;
         let source = if side == Side::Left { s.left } else { s.right };
-        if source == Source::Reference {
-            return match &self.reference {
-                Some(r) => SideView {
+        let (slot, dim) = match (&self.reference, source) {
+            (Some(r), Source::Reference) => {
+                return SideView {
                     radiance: r.radiance.view.clone(),
                     indirect: r.indirect.view.clone(),
                     scale: 1.0,
                     texel: r.texel,
-                },
-                None => self.show.blank(),
-            };
-        }
-        let slot = match side {
-            Side::Right if s.right != s.left => self.slots[1].as_ref(),
-            _ => self.slots[0].as_ref(),
+                };
+            }
+            // Until there is a first sample: where things are, but plainly not the truth.
+            (None, Source::Reference) => (self.slots[0].as_ref(), WAITING),
+            _ => (self.slot(state, side), 1.0),
         };
         let Some(slot) = slot else { return self.show.blank() };
         let t = slot.renderer.targets();
         let (radiance, scale) = match &slot.sums {
-            Some(sums) => (sums.current().view.clone(), 1.0 / self.still.max(1) as f32),
+            Some(sums) => (sums.current().view.clone(), 1.0 / self.averaged(state) as f32),
             None => (t.hdr.view.clone(), 1.0),
         };
-        SideView { radiance, indirect: t.indirect.view.clone(), scale, texel: self.texel }
+        SideView { radiance, indirect: t.indirect.view.clone(), scale: dim * scale, texel: self.texel }
+    }
+
+    /// True where the path tracer's picture is wanted and has no sample yet.
+    pub fn waits_for_reference(&self, state: &State) -> bool {
+        state.wants_reference() && self.reference.as_ref().is_none_or(|r| r.found.samples == 0)
     }
 
     /// The last report of the path tracer.
@@ -90,15 +96,14 @@ impl Stage {
         let s = &state.settings;
         let source = if side == Side::Left { s.left } else { s.right };
         if source == Source::Reference {
-            let whole = self.reference.as_ref().filter(|r| r.texel == 1 && r.found.size == state.size);
+            let whole =
+                self.reference.as_ref().filter(|r| r.found.samples > 0 && r.texel == 1 && r.found.size == state.size);
             return Ok(whole.map(|r| r.found.radiance.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()));
         }
-        let slot = match side {
-            Side::Right if s.right != s.left => self.slots[1].as_ref(),
-            _ => self.slots[0].as_ref(),
+        let Some(slot) = self.slot(state, side).filter(|_| !self.is_converging(state)) else {
+            return Ok(None);
         };
-        let Some(slot) = slot.filter(|_| self.still >= s.samples && self.texel == 1) else { return Ok(None) };
-        self.read(slot).map(Some)
+        self.read(state, slot).map(Some)
     }
 
     /// Linear RGB of what the left renderer has drawn so far, read back; `None` before its first
@@ -106,16 +111,16 @@ impl Stage {
     ///
     /// # Errors
     /// Reading back failed.
-    pub fn read_left(&self) -> Result<Option<Vec<f32>>, readback::ReadbackError> {
-        self.slots[0].as_ref().filter(|_| self.still > 0).map(|slot| self.read(slot)).transpose()
+    pub fn read_left(&self, state: &State) -> Result<Option<Vec<f32>>, readback::ReadbackError> {
+        self.slots[0].as_ref().filter(|_| self.still > 0).map(|slot| self.read(state, slot)).transpose()
     }
 
-    fn read(&self, slot: &Slot) -> Result<Vec<f32>, readback::ReadbackError> {
+    fn read(&self, state: &State, slot: &Slot) -> Result<Vec<f32>, readback::ReadbackError> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         Ok(match &slot.sums {
             Some(sums) => {
                 let bytes = readback::texture(device, queue, &sums.current().texture)?;
-                let scale = 1.0 / self.still.max(1) as f32;
+                let scale = 1.0 / self.averaged(state) as f32;
                 let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
                 texels.iter().flat_map(|p| [p[0] * scale, p[1] * scale, p[2] * scale]).collect()
             }

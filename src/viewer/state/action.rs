@@ -31,6 +31,16 @@ pub enum Action {
     Help,
     Panel,
     Measure,
+    /// Shows or hides the timing overlay.
+    Timing,
+    /// Shows all that the timing overlay knows, or the sums alone.
+    ExpandTiming,
+    /// Copies the timing overlay's numbers.
+    CopyTimes,
+    /// Writes the timing overlay's numbers.
+    SaveTimes,
+    /// Lets every method draw this view for a while.
+    MeasureAll,
     Fit,
     Preset(Preset),
     NextPreset,
@@ -61,7 +71,12 @@ pub enum Action {
     },
     Select(Option<usize>),
     Move(Vec3),
+    /// Sets the selected object down on what lies below it.
+    Floor,
+    /// Lights, objects and surroundings as the file has them.
+    Reset,
     Undo,
+    Redo,
     Escape,
     /// Begins or ends recording the camera's path.
     Record,
@@ -99,6 +114,9 @@ pub enum Request {
     SavePath,
     /// Copies the command line of this view.
     CopyCommand,
+    CopyTimes,
+    SaveTimes,
+    MeasureAll,
     /// Shows the system's file dialog.
     Browse(bool),
     FullScreen(bool),

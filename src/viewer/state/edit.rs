@@ -15,13 +15,14 @@ impl State {
     pub fn surround(&mut self, path: &std::path::Path, environment: Environment) {
         let Some(shown) = &mut self.shown else { return };
         self.messages.retain(|m| !m.error);
+        shown.sky_added = false;
         shown.environment = Some(path.display().to_string());
         shown.sky = Some((environment.clone(), 0.0));
         self.take_sky(environment);
     }
 
     /// Takes surroundings; lights that were added stay, even where a default one goes.
-    fn take_sky(&mut self, environment: Environment) {
+    pub(super) fn take_sky(&mut self, environment: Environment) {
         let Some(shown) = &mut self.shown else { return };
         let scene = Arc::make_mut(&mut shown.scene);
         let own = scene.lights.split_off(scene.lights.len().saturating_sub(shown.added));
@@ -89,6 +90,7 @@ impl State {
         let Some(shown) = &mut self.shown else { return };
         let radiance = radiance.clamp(0.0, 1e4);
         (shown.environment, shown.sky) = (Some(radiance.to_string()), None);
+        shown.sky_added = false;
         self.take_sky(Environment::constant([radiance; 3]));
     }
 
@@ -134,7 +136,7 @@ impl State {
 
     /// Places all objects: at rest or as the animation has them, then moved by hand. Always from
     /// the file's places, so that the command line can repeat it bit for bit.
-    fn place(&mut self) {
+    pub(super) fn place(&mut self) {
         let edits = self.light_edits();
         let Some(shown) = &mut self.shown else { return };
         let (scene, original) = (Arc::make_mut(&mut shown.scene), &shown.original);
@@ -241,7 +243,7 @@ impl State {
     }
 
     /// Lights, objects and surroundings as the file has them.
-    pub(super) fn undo(&mut self) {
+    pub(super) fn reset(&mut self) {
         let Some(shown) = &mut self.shown else { return };
         if shown.variant.take().is_some() {
             self.requests.push(Request::Upload);
@@ -253,6 +255,7 @@ impl State {
         shown.unsettled = false;
         shown.moved.clear();
         (shown.environment, shown.sky, shown.added) = (None, None, 0);
+        shown.sky_added = false;
         self.stale = Stale { lights: true, placements: true, environment: true };
         self.version += 1;
     }
@@ -302,7 +305,7 @@ mod tests {
         ObjectEdit { object: 3, by: shown.moved[&3] }.apply(&mut again).unwrap();
         assert_eq!(again.instances[3].transform, shown.scene.instances[3].transform, "bit for bit");
         assert!(state.stale.placements && !state.stale.lights);
-        state.apply(Action::Undo);
+        state.apply(Action::Reset);
         let shown = state.shown.as_ref().unwrap();
         assert_eq!(shown.scene.instances[3].transform, shown.original.instances[3].transform);
     }
@@ -383,7 +386,7 @@ mod tests {
         // What the animation does is no change by hand.
         assert_eq!(state.light_edits(), [edit]);
         assert!(state.stale.lights && state.stale.placements);
-        state.apply(Action::Undo);
+        state.apply(Action::Reset);
         assert_eq!(state.light_edits(), []);
     }
 
@@ -408,7 +411,7 @@ mod tests {
         // Surroundings keep what was added.
         state.apply(Action::Sky(0.3));
         assert_eq!(state.shown.as_ref().unwrap().added, 2);
-        state.apply(Action::Undo);
+        state.apply(Action::Reset);
         assert_eq!(kinds(&state.shown.as_ref().unwrap().scene.lights), kinds(&before));
         assert_eq!(state.light_edits(), []);
     }
@@ -422,7 +425,7 @@ mod tests {
         assert_eq!(state.light_edits().len(), 1);
         assert_eq!(state.light_edits()[0].light, sun);
         assert!(state.stale.lights);
-        state.apply(Action::Undo);
+        state.apply(Action::Reset);
         assert_eq!(state.light_edits(), []);
         assert_eq!(state.shown.as_ref().unwrap().scene.lights[sun].kind, before[sun].kind);
         let back = from_angles(angles([0.3, -0.8, 0.1]));

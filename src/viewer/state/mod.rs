@@ -4,14 +4,21 @@
 
 mod action;
 mod edit;
+mod floor;
+mod roll;
+mod sky;
+mod undo;
 
 use super::choice::{Side, Source, View};
-use super::film::{self, Film, Recording};
+use super::film::Film;
 use super::navigate::{Navigator, Preset};
 use super::saved::Settings;
 use crate::net::plan::Precision;
 use crate::render::{Backdrop, tonemap_curve::Tonemap};
-use crate::scene::{Environment, Light, Scene, look::FRAMING, path::CameraPath, units::Units, upload::TextureMemory};
+use crate::scene::{
+    Environment, Light, Scene, bounds::world_bounds, look::FRAMING, path::CameraPath, units::Units,
+    upload::TextureMemory,
+};
 pub use action::{Action, Request};
 pub use edit::{angles, from_angles};
 use std::collections::BTreeMap;
@@ -59,6 +66,11 @@ pub struct Shown {
     pub sky: Option<(Environment, f32)>,
     /// How many of the lights were added by hand; they are the last.
     pub added: usize,
+    /// Width, height and depth of all of it, metres.
+    pub extent: Option<[f32; 3]>,
+    /// The file has lights and no surroundings, and got some of grey; nobody has said yet whether
+    /// they may stay.
+    pub sky_added: bool,
 }
 
 /// All that the viewer knows of itself.
@@ -106,6 +118,10 @@ pub struct State {
     /// When the animation went on last, if it plays.
     pub animated: Option<Instant>,
     pub playback: Playback,
+    /// Lamps are marked in the picture.
+    pub lamps: bool,
+    /// What can be taken back.
+    pub history: undo::History,
 }
 
 /// Why there are no wireframes.
@@ -160,7 +176,10 @@ impl State {
         let same = self.shown.as_ref().is_some_and(|s| s.spec == spec);
         // What did not load before is no news any more.
         self.messages.retain(|m| !m.error);
-        for warning in &scene.warnings {
+        let extent = world_bounds(&scene).map(|(low, high)| std::array::from_fn(|i| high[i] - low[i]));
+        // How large it is stands in the panel, and the camera is as far away in any case.
+        let told = scene.warnings.iter().filter(|w| !w.contains("across; if its unit is"));
+        for warning in told {
             self.tell(warning.clone(), false);
         }
         if !same {
@@ -189,9 +208,13 @@ impl State {
             environment: None,
             sky: None,
             added: 0,
+            extent,
+            sky_added: false,
         });
+        self.history.clear();
         self.stale = Stale::default();
         self.version += 1;
+        self.add_sky();
     }
 
     /// Stops by which the picture is brighter.
@@ -202,6 +225,15 @@ impl State {
     /// Width by height.
     fn aspect(&self) -> f32 {
         self.size[0] as f32 / self.size[1].max(1) as f32
+    }
+
+    /// What the window calls a source: networks of other files are not known to filter anything.
+    pub fn title(&self, source: Source) -> String {
+        let file = self.settings.weights.as_ref().filter(|_| source == Source::Neural);
+        match file.and_then(|path| path.file_stem()) {
+            Some(stem) => format!("Neural, {}", stem.to_string_lossy()),
+            None => source.title().into(),
+        }
     }
 
     /// The sources that are on show.
@@ -219,7 +251,8 @@ impl State {
     pub fn apply(&mut self, action: Action) {
         use Action as A;
         let aspect = self.aspect();
-        let scene = self.shown.as_ref().map(|s| s.scene.clone());
+        self.remember(&action, Instant::now());
+        let cameras = self.shown.as_ref().map_or(0, |s| s.scene.cameras.len());
         match action {
             A::View(View::Wireframe) if self.no_lines => self.tell(NO_LINES, true),
             A::View(view) => {
@@ -269,6 +302,18 @@ impl State {
             A::Help => self.help = !self.help,
             A::Panel => self.settings.panel = !self.settings.panel,
             A::Measure => self.measure = !self.measure,
+            A::Timing => self.settings.timing.shown = !self.settings.timing.shown,
+            A::ExpandTiming => {
+                let timing = &mut self.settings.timing;
+                timing.expanded = !(timing.shown && timing.expanded);
+                timing.shown = true;
+            }
+            A::CopyTimes => {
+                self.requests.push(Request::CopyTimes);
+                self.tell("copied: the times of this view", false);
+            }
+            A::SaveTimes => self.requests.push(Request::SaveTimes),
+            A::MeasureAll => self.requests.push(Request::MeasureAll),
             A::Fit => self.with_scene(|n, scene| n.fit(scene, aspect)),
             A::Preset(preset) => {
                 self.preset = Some(preset);
@@ -280,8 +325,7 @@ impl State {
             }
             A::Camera(n) => self.with_scene(|navigator, scene| navigator.take(scene, n)),
             A::NextCamera => {
-                let count = scene.as_ref().map_or(0, |s| s.cameras.len()).max(1);
-                let next = self.navigator.file_camera.map_or(0, |n| (n + 1) % count);
+                let next = self.navigator.file_camera.map_or(0, |n| (n + 1) % cameras.max(1));
                 self.apply(A::Camera(next));
             }
             A::Fly => self.navigator.fly = !self.navigator.fly,
@@ -315,7 +359,10 @@ impl State {
             A::TurnSun { dx, dy } => self.turn_sun(dx, dy),
             A::Select(object) => self.selected = object,
             A::Move(by) => self.move_selected(by),
-            A::Undo => self.undo(),
+            A::Floor => self.set_down(),
+            A::Reset => self.reset(),
+            A::Undo => self.step(true),
+            A::Redo => self.step(false),
             A::Escape => {
                 if self.help {
                     self.help = false;
@@ -345,48 +392,6 @@ impl State {
             }
             A::Quit => self.requests.push(Request::Quit),
         }
-    }
-
-    fn record(&mut self) {
-        let now = Instant::now();
-        match std::mem::take(&mut self.film) {
-            Film::Records(recording) => {
-                self.path = Some(recording.finish(&self.navigator, now));
-                self.requests.push(Request::SavePath);
-            }
-            _ => {
-                self.film = Film::Records(Recording::new(&self.navigator, now));
-                self.tell("the camera is recorded until R is pressed again", false);
-            }
-        }
-    }
-
-    fn play(&mut self) {
-        match (&self.film, &self.path) {
-            (Film::Plays { .. }, _) => self.film = Film::Rests,
-            (_, Some(_)) => self.film = Film::Plays { since: Instant::now() },
-            (_, None) => self.tell("there is no camera path yet: record one (R) or drop its file", false),
-        }
-    }
-
-    /// Camera path and animation go on; true while they move something by themselves.
-    pub fn roll(&mut self, now: Instant) -> bool {
-        self.animation(now) | self.camera_path(now)
-    }
-
-    fn camera_path(&mut self, now: Instant) -> bool {
-        let rolls = match (&mut self.film, &self.path) {
-            (Film::Records(recording), _) => {
-                recording.look(&self.navigator, now);
-                return false;
-            }
-            (Film::Plays { since }, Some(path)) => film::play(path, *since, now, &mut self.navigator),
-            _ => return false,
-        };
-        if !rolls {
-            self.film = Film::Rests;
-        }
-        rolls
     }
 
     fn with_scene(&mut self, act: impl FnOnce(&mut Navigator, &Scene)) {

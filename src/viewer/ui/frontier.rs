@@ -99,7 +99,7 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
             ui.painter().circle_stroke(p, 8.0, Stroke::new(1.5, visuals.text_color()));
         }
         let text = if now { visuals.strong_text_color() } else { visuals.text_color() };
-        let galley = ui.painter().layout_no_wrap(source.name().into(), font.clone(), text);
+        let galley = ui.painter().layout_no_wrap(source.title().into(), font.clone(), text);
         let name = free_place(p, galley.size(), &taken, rect);
         taken.push(name);
         ui.painter().rect_filled(name, 2.0, visuals.extreme_bg_color);
@@ -107,36 +107,41 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
         let clicked = response.interact_pointer_pos().and_then(|p| meant(&dots, p)).map_or(source, |d| d.source);
         let told = dots.iter().find(|d| hovered == Some(d.source));
         let text =
-            told.map_or(String::new(), |d| format!("{}: {:.2} ms here, {} % there", d.source.name(), d.ms, d.error));
+            told.map_or(String::new(), |d| format!("{}: {:.2} ms here, {} % there", d.source.title(), d.ms, d.error));
         if response.on_hover_text(text).clicked() {
             state.apply(Action::Source(Side::Left, clicked));
         }
     }
+    ui.horizontal(|ui| {
+        let text = match facts.touring {
+            Some(source) => format!("Stop ({} …)", source.title()),
+            None => "Measure all".into(),
+        };
+        let told = "Every method draws this view for 32 frames, one after the other";
+        let response = ui.button(text).on_hover_text(told);
+        memory.place("measure all", &response);
+        if response.clicked() {
+            state.apply(Action::MeasureAll);
+        }
+        let missing = Source::ALL.iter().filter(|s| s.static_error().is_some());
+        let missing = missing.filter(|s| !facts.measured.contains_key(&(**s as usize))).count();
+        ui.label(
+            RichText::new(if missing > 0 { format!("{missing} not measured here yet") } else { String::new() }).weak(),
+        );
+    });
     ui.label(
         RichText::new(
-            "across: GPU ms measured in this window; up: mean error of indirect light on five \
-        judged rooms (docs/accuracy.md), not measured here",
+            "Across: GPU ms measured in this window, of this scene and size, at least 8 frames. Up: mean error of \
+            indirect light on five judged rooms (docs/accuracy.md), not measured here.",
         )
         .small(),
     );
-    let is_missing = |s: &Source| s.static_error().is_some() && !facts.measured.contains_key(&(*s as usize));
-    let missing: Vec<Source> = Source::ALL.into_iter().filter(is_missing).collect();
-    if !missing.is_empty() {
-        ui.horizontal_wrapped(|ui| {
-            ui.label(RichText::new("not measured yet:").weak());
-            for source in missing {
-                if ui.small_button(source.name()).clicked() {
-                    state.apply(Action::Source(Side::Left, source));
-                }
-            }
-        });
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::viewer::stats::Times;
+    use crate::viewer::frames::Times;
     use egui::{Event, PointerButton};
     use std::collections::BTreeMap;
 

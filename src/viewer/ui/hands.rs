@@ -1,6 +1,6 @@
 //! What hands do over the picture, and keys.
 
-use super::Memory;
+use super::{Memory, gizmo};
 use crate::render::View as Eye;
 use crate::scene::bounds::posed_bounds;
 use crate::viewer::navigate::Navigator;
@@ -23,6 +23,8 @@ enum Grip {
     Line,
     Sun,
     Object,
+    /// An arrow of the selected object.
+    Axis(usize),
 }
 
 /// A drag over the picture that has got as far as `at`.
@@ -90,6 +92,7 @@ pub fn drag(state: &mut State, memory: &mut Memory, to: Pos2, rect: Rect) {
         Grip::Line => state.apply(Action::MoveSplit(d.x / rect.width().max(1.0))),
         Grip::Sun => state.apply(Action::TurnSun { dx: d.x, dy: d.y }),
         Grip::Object => drag_object(state, d, rect),
+        Grip::Axis(axis) => gizmo::drag(state, axis, d, rect, state.size[1] as f32 / rect.height().max(1.0)),
         Grip::Slide => state.navigator.pan(d.x, d.y, rect.height()),
         Grip::View if state.navigator.fly => state.navigator.look(-d.x, -d.y),
         Grip::View => state.navigator.orbit(d.x, d.y),
@@ -108,9 +111,12 @@ pub(super) fn hands(ui: &Ui, state: &mut State, memory: &mut Memory, response: &
     }
     if response.drag_started() {
         response.surrender_focus();
+        state.settings.greeted = true;
         let origin = ui.input(|i| i.pointer.press_origin()).unwrap_or(rect.center());
+        let (primary, density) = (response.dragged_by(PointerButton::Primary), ui.ctx().pixels_per_point());
         let grip = match () {
             () if on_line(origin) => Grip::Line,
+            () if primary && let Some(axis) = gizmo::grabbed(state, origin, rect, density) => Grip::Axis(axis),
             () if modifiers.ctrl || modifiers.command => Grip::Sun,
             () if modifiers.shift => {
                 if state.selected.is_none() {
@@ -137,27 +143,38 @@ pub(super) fn hands(ui: &Ui, state: &mut State, memory: &mut Memory, response: &
             state.apply(Action::Select(object_at(ui, state, p, rect)));
         }
     }
-    if response.hovered() {
-        let notches = ui.input(|i| wheel(&i.events));
-        if notches != 0.0 && state.navigator.fly {
+    let notches = wheel(ui, memory, rect);
+    if notches != 0.0 {
+        if state.navigator.fly {
             state.navigator.faster(notches);
             let text = format!("speed {:.2} m/s", state.navigator.speed);
             state.messages.retain(|m| !m.text.starts_with("speed "));
             state.tell(text, false);
-        } else if notches != 0.0 {
+        } else {
             state.navigator.dolly(notches);
         }
     }
 }
 
-/// Notches that a wheel was turned; a touchpad's points count a fiftieth.
-fn wheel(events: &[egui::Event]) -> f32 {
-    let notches = events.iter().map(|e| match e {
-        egui::Event::MouseWheel { unit: egui::MouseWheelUnit::Point, delta, .. } => delta.y / 50.0,
-        egui::Event::MouseWheel { delta, .. } => delta.y,
-        _ => 0.0,
-    });
-    notches.sum()
+/// Notches that a wheel was turned over the picture; a touchpad's points count a fiftieth. Each
+/// counts where the pointer was when it was turned: a slow frame hears of many places.
+fn wheel(ui: &Ui, memory: &mut Memory, rect: Rect) -> f32 {
+    let events = ui.input(|i| i.events.clone());
+    let mut notches = 0.0;
+    for event in &events {
+        match event {
+            egui::Event::PointerMoved(p) => memory.pointer = Some(*p),
+            egui::Event::PointerGone => memory.pointer = None,
+            egui::Event::MouseWheel { unit, delta, .. } => {
+                let own = |p: &Pos2| rect.contains(*p) && ui.ctx().layer_id_at(*p) == Some(ui.layer_id());
+                if memory.pointer.as_ref().is_some_and(own) {
+                    notches += if *unit == egui::MouseWheelUnit::Point { delta.y / 50.0 } else { delta.y };
+                }
+            }
+            _ => {}
+        }
+    }
+    notches
 }
 
 /// The object under a place of the window.

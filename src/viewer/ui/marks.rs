@@ -3,7 +3,7 @@
 use super::{Facts, ORANGE};
 use crate::render::View as Eye;
 use crate::scene::bounds::posed_bounds;
-use crate::viewer::choice::{Source, View};
+use crate::viewer::choice::{Side, Source, View};
 use crate::viewer::state::{Request, State};
 use egui::{Align2, Color32, FontId, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 use glam::Vec3;
@@ -11,27 +11,52 @@ use glam::Vec3;
 /// How long a message stays.
 const MESSAGE_SECONDS: u64 = 12;
 
+/// What a side shows, and where it is not what was chosen, why.
+pub(super) fn name(state: &State, facts: &Facts<'_>, side: Side) -> String {
+    let s = &state.settings;
+    let asked = if side == Side::Left { s.left } else { s.right };
+    let by = facts.by[side as usize].as_ref();
+    match (asked, facts.reference) {
+        (Source::Reference, Some(r)) if r.samples > 0 => format!("{}, {} samples", asked.title(), r.samples),
+        (Source::Reference, Some(r)) => format!("{} ({})", asked.title(), r.stage),
+        (Source::Reference, None) => format!("{} (waits until the view rests)", asked.title()),
+        _ => match by.map(|by| (state.title(by.source), &by.why)) {
+            Some((title, Some(why))) => format!("{title} ({why})"),
+            Some((title, None)) => title,
+            None => format!("building {}", state.title(asked)),
+        },
+    }
+}
+
+fn waits_for_reference(state: &State, facts: &Facts<'_>) -> bool {
+    state.wants_reference() && facts.reference.is_none_or(|r| r.samples == 0)
+}
+
 /// Names of the sides, the channel on show.
 pub(super) fn marks(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect) {
     let s = &state.settings;
     let painter = ui.painter().with_clip_rect(rect);
+    let [left, right] = [Side::Left, Side::Right].map(|side| name(state, facts, side));
     if s.split && s.view.has_sides() {
         let line = rect.left() + rect.width() * s.line;
-        let name = |source: Source| match (source, facts.reference) {
-            (Source::Reference, Some(r)) => format!("reference {}", r.samples),
-            (source, _) => source.name().into(),
-        };
         let y = rect.top() + 8.0;
-        label(&painter, Pos2::new(line - 8.0, y), Align2::RIGHT_TOP, &name(s.left), false);
-        label(&painter, Pos2::new(line + 8.0, y), Align2::LEFT_TOP, &name(s.right), false);
+        // Reasons stand below the names, so that both fit beside the line.
+        let lines = |name: &str| name.replacen(" (", "\n(", 1);
+        label(&painter, Pos2::new(line - 8.0, y), Align2::RIGHT_TOP, &lines(&left), false);
+        label(&painter, Pos2::new(line + 8.0, y), Align2::LEFT_TOP, &lines(&right), false);
     } else {
+        let waits = facts.by[0].as_ref().is_some_and(|by| by.why.is_some());
         let text = match (s.view, facts.feature) {
-            (View::Picture, _) => s.left.name().to_string(),
-            (View::Wireframe, _) => format!("wireframe over {}", s.left.name()),
+            (View::Picture, _) => left,
+            (View::Wireframe, _) => format!("wireframe over {left}"),
             (View::Feature, Some((name, [low, high]))) => format!("{name}: {low:.3} to {high:.3}"),
             (View::Layer, Some((name, [low, high]))) => format!("{name}; all {low:.3} to {high:.3}"),
+            (View::Feature | View::Layer, None) if waits => format!("the network has not run yet: {left}"),
             (View::Feature | View::Layer, None) => "only `neural` has a network".into(),
-            (View::Error, _) => format!("error: {} against {}, bright at 0.25", s.left.name(), s.right.name()),
+            (View::Error, _) if waits_for_reference(state, facts) => {
+                "error: waiting for the reference's first sample".into()
+            }
+            (View::Error, _) => format!("error: {left} against {right}, bright at 0.25"),
             (view, _) => view.doc().to_string(),
         };
         label(&painter, rect.left_top() + Vec2::splat(8.0), Align2::LEFT_TOP, &text, false);
@@ -39,7 +64,7 @@ pub(super) fn marks(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect) {
 }
 
 /// Text on a dark ground, so that it is read on any picture.
-fn label(painter: &egui::Painter, at: Pos2, align: Align2, text: &str, error: bool) -> Rect {
+pub(super) fn label(painter: &egui::Painter, at: Pos2, align: Align2, text: &str, error: bool) -> Rect {
     let galley = painter.layout_no_wrap(text.into(), FontId::proportional(13.0), Color32::WHITE);
     let rect = align.anchor_size(at, galley.size());
     let ground = if error { Color32::from_rgb(0x8a, 0x2c, 0x00) } else { Color32::from_black_alpha(190) };

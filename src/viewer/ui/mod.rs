@@ -1,20 +1,28 @@
 //! The overlay: panels around the picture, marks on it, and what hands do over it. It draws with
 //! egui and changes nothing but the [`State`], so tests run it without a window.
 
+mod camera;
 mod frontier;
+pub mod gizmo;
 pub mod hands;
+mod heat;
 mod help;
 mod light;
 pub mod marks;
+mod number;
 mod panel;
 mod table;
 mod times;
+mod timing;
+mod welcome;
 
-use super::choice::{Side, Source};
+use super::choice::{Side, Source, View};
+use super::frames::Times;
 use super::jobs::Job;
 use super::judge::Verdict;
+use super::stage::DrawnBy;
 use super::state::{Action, State};
-use super::stats::{Times, Track};
+use super::stats::Track;
 use crate::render::DrawnCount;
 use egui::{Color32, Pos2, Rect, Sense, Ui};
 use std::collections::BTreeMap;
@@ -25,8 +33,6 @@ pub const SKY: Color32 = Color32::from_rgb(0x56, 0xb4, 0xe9);
 pub const ORANGE: Color32 = Color32::from_rgb(0xe6, 0x9f, 0x00);
 pub const VERMILLION: Color32 = Color32::from_rgb(0xd5, 0x5e, 0x00);
 
-/// Width of the panel, points.
-const PANEL: f32 = 300.0;
 /// What the overlay tells of the world outside.
 pub struct Facts<'a> {
     pub adapter: &'a str,
@@ -39,15 +45,22 @@ pub struct Facts<'a> {
     pub verdict: Option<Verdict>,
     /// Median GPU time of methods drawn in this session, milliseconds.
     pub measured: &'a BTreeMap<usize, f64>,
-    pub still: u32,
+    /// Frames drawn of the still view, and how many there will be.
+    pub still: [u32; 2],
     pub feature: Option<(&'a str, [f32; 2])>,
     /// Names of the network's layers.
     pub layers: &'a [&'a str],
     pub flicker: Option<f64>,
-    /// What draws in the place of the left side's method, and why.
-    pub instead: Option<&'a (&'static str, String)>,
+    /// What is drawn on each side, and why it is not what was chosen.
+    pub by: [Option<DrawnBy>; 2],
     /// Draw calls, triangles and shadow maps of the left side's last frame.
     pub drawn: DrawnCount,
+    /// Frames follow each other.
+    pub live: bool,
+    /// The method that is being measured, while all are.
+    pub touring: Option<Source>,
+    /// Bytes of memory that the process holds, where the system tells.
+    pub resident: Option<u64>,
 }
 
 #[cfg(test)]
@@ -64,12 +77,15 @@ impl<'a> Facts<'a> {
             reference: None,
             verdict: None,
             measured,
-            still: 1,
+            still: [1, 1],
             feature: None,
             layers: &[],
             flicker: None,
-            instead: None,
+            by: [None, None],
             drawn: DrawnCount::default(),
+            live: false,
+            touring: None,
+            resident: None,
         }
     }
 }
@@ -90,10 +106,15 @@ pub struct ReferenceFacts {
 pub struct Memory {
     path: String,
     weights: String,
+    /// Objects whose names hold this are listed.
+    search: String,
     /// Where named things of the panel are seen, points; for scripts.
     pub places: BTreeMap<String, [f32; 2]>,
     /// The drag over the picture that is under way.
     pub drag: Option<hands::Drag>,
+    /// Where the pointer was last.
+    pointer: Option<Pos2>,
+    timing: timing::Look,
 }
 
 impl Memory {
@@ -112,27 +133,65 @@ pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
     hands::keyboard(ui, state);
     if state.settings.panel {
         if facts.software {
-            banner(ui, state, facts);
+            banner(ui, facts);
         }
         egui::Panel::bottom("status").resizable(false).show(ui, |ui| status(ui, state, facts));
-        let height = ui.available_height();
-        egui::Panel::right("panel").resizable(false).exact_size(PANEL.min(0.6 * ui.available_width())).show(ui, |ui| {
-            egui::ScrollArea::vertical().max_height(height).auto_shrink([false; 2]).show(ui, |ui| {
-                panel::show(ui, state, memory, facts);
-            });
-        });
+        side(ui, state, memory, facts);
     }
-    let rect = ui.available_rect_before_wrap();
+    let mut rect = ui.available_rect_before_wrap();
+    if state.settings.panel {
+        // Not what the panel's contents would like: then each that is opened would change the picture's size.
+        rect.max.x = ui.max_rect().right() - panel_width(ui, state);
+    }
     let rect = pixel_aligned(rect, ui.ctx().pixels_per_point());
     let response = ui.interact(rect, ui.scope_id().with("picture"), Sense::click_and_drag());
     hands::hands(ui, state, memory, &response, rect);
     marks::marks(ui, state, facts, rect);
+    if state.settings.view == View::Error && facts.reference.is_none_or(|r| r.samples > 0) {
+        heat::show(ui, state, facts, rect);
+    }
+    welcome::show(ui, state, memory, facts, rect);
+    timing::show(ui, state, memory, facts, rect);
     marks::messages(ui, state, rect);
     marks::jobs(ui, state, facts, rect);
     if state.help {
         help::show(ui, state);
     }
     rect
+}
+
+/// Width of the panel in this window, points.
+fn panel_width(ui: &Ui, state: &State) -> f32 {
+    state.settings.panel_width.min(0.6 * ui.max_rect().width()).round()
+}
+
+/// The panel at the right, whose edge can be dragged.
+fn side(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
+    let height = ui.available_height();
+    let width = panel_width(ui, state);
+    let edge = ui.max_rect().right() - width;
+    let rows = ui.available_rect_before_wrap().y_range();
+    egui::Panel::right("panel").resizable(false).exact_size(width).show(ui, |ui| {
+        let inner = ui.available_width();
+        egui::ScrollArea::vertical().max_height(height).auto_shrink([false; 2]).show(ui, |ui| {
+            // The scroll bar lies over what it scrolls.
+            ui.set_max_width(inner - 10.0);
+            panel::show(ui, state, memory, facts);
+        });
+    });
+    let handle = Rect::from_x_y_ranges(edge - 3.0..=edge + 3.0, rows);
+    let response = ui.interact(handle, ui.scope_id().with("panel's edge"), Sense::drag());
+    memory.place("panel's edge", &response);
+    if response.hovered() || response.dragged() {
+        ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
+        let colour = ui.visuals().widgets.hovered.fg_stroke;
+        ui.painter().vline(edge, rows, colour);
+    }
+    if response.dragged()
+        && let Some(p) = response.interact_pointer_pos()
+    {
+        state.settings.panel_width = (ui.max_rect().right() - p.x).clamp(220.0, 800.0);
+    }
 }
 
 /// Edges on whole pixels, so that the picture is drawn texel by texel.
@@ -143,34 +202,34 @@ fn pixel_aligned(rect: Rect, density: f32) -> Rect {
 }
 
 /// Says plainly that numbers are not a GPU's.
-fn banner(ui: &mut Ui, state: &State, facts: &Facts<'_>) {
+fn banner(ui: &mut Ui, facts: &Facts<'_>) {
     let frame = egui::Frame::new().fill(ORANGE).inner_margin(egui::Margin::symmetric(8, 3));
     egui::Panel::top("banner").resizable(false).frame(frame).show(ui, |ui| {
-        let text = format!(
-            "Software rendering on the CPU ({}): `{}` is right, but takes long, which says nothing about a GPU. M: others.",
-            facts.adapter,
-            state.settings.left.name()
-        );
+        let text =
+            format!("Software rendering ({}): images are correct, timings are not representative.", facts.adapter);
         ui.add(egui::Label::new(egui::RichText::new(text).color(Color32::BLACK)).truncate());
     });
 }
 
 fn status(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
     ui.horizontal(|ui| {
-        let ms = |track: &Track| track.spread().map_or("–".into(), |s| format!("{:.2}", s.median));
-        let times = facts.times;
-        let gpu = if facts.timestamps {
-            format!("GPU {} ms", ms(&times.gpu))
-        } else {
-            format!("frame {} ms (no GPU timestamps; waited for)", ms(&times.wall))
+        let [w, h] = state.size;
+        let mut text = format!("{w}×{h}");
+        // The overlay tells more of it.
+        if !state.settings.timing.shown {
+            let ms = |track: &Track| track.median().map_or("–".into(), |v| format!("{v:.2}"));
+            let times = &facts.times.now;
+            let (name, main) = if facts.timestamps { ("GPU", &times.gpu) } else { ("frame, waited for,", &times.wall) };
+            text += &format!("  ·  {name} {} ms  ·  CPU {} ms", ms(main), ms(&times.cpu));
+        }
+        let [still, all] = facts.still;
+        text += &match all {
+            _ if still < all => format!("  ·  Accumulating {still} of {all}"),
+            1 => "  ·  1 frame".into(),
+            _ => format!("  ·  {all} frames accumulated"),
         };
-        // Most frames draw the overlay as it was, so its median says little.
-        let overlay = times.overlay.spread().map_or("–".into(), |s| format!("{:.2} ms on average", s.mean));
-        let mut text =
-            format!("{}×{}  ·  {gpu}  ·  CPU {} ms, overlay {overlay}", state.size[0], state.size[1], ms(&times.cpu),);
-        text += &format!("  ·  {} of {} frames averaged", facts.still, state.settings.samples);
         if let Some(r) = facts.reference {
-            text += &format!("  ·  reference {} of {}", r.samples, state.settings.spp);
+            text += &format!("  ·  Reference: {} of {} samples", r.samples, state.settings.spp);
         }
         if ui.button("Help (H)").clicked() {
             state.apply(Action::Help);
@@ -183,9 +242,9 @@ fn status(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
 fn source_box(ui: &mut Ui, id: &str, state: &mut State, side: Side) {
     let now = if side == Side::Left { state.settings.left } else { state.settings.right };
     let mut chosen = now;
-    egui::ComboBox::from_id_salt(id).selected_text(now.name()).width(130.0).show_ui(ui, |ui| {
+    egui::ComboBox::from_id_salt(id).selected_text(now.title()).width(panel::wide(ui)).show_ui(ui, |ui| {
         for source in Source::ALL {
-            ui.selectable_value(&mut chosen, source, source.name()).on_hover_text(source.doc());
+            ui.selectable_value(&mut chosen, source, source.title()).on_hover_text(source.doc());
         }
     });
     if chosen != now {
@@ -194,121 +253,4 @@ fn source_box(ui: &mut Ui, id: &str, state: &mut State, side: Side) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::viewer::choice::View;
-    use egui::{PointerButton, Vec2};
-    use std::sync::Arc;
-
-    /// Runs the overlay without any window, one frame for each list of events.
-    fn run(state: &mut State, frames: Vec<Vec<egui::Event>>) -> Rect {
-        run_in(&egui::Context::default(), state, frames)
-    }
-
-    fn run_in(context: &egui::Context, state: &mut State, frames: Vec<Vec<egui::Event>>) -> Rect {
-        let mut memory = Memory::default();
-        let (times, measured) = (Times::default(), BTreeMap::new());
-        let mut place = Rect::NOTHING;
-        for events in frames {
-            let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 500.0)));
-            let input = egui::RawInput { screen_rect, events, focused: true, ..Default::default() };
-            let facts = Facts::bare(&times, &measured);
-            let mut output = context.run_ui(input, |ui| place = show(ui, state, &mut memory, &facts));
-            output.textures_delta.clear();
-        }
-        place
-    }
-
-    fn state() -> State {
-        let mut state = State::new(Default::default());
-        state.show("cornell".into(), Arc::new(crate::scene::bundled::scene("cornell").expect("bundled")));
-        state
-    }
-
-    fn press(key: egui::Key) -> egui::Event {
-        egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Default::default() }
-    }
-
-    fn button(pos: Pos2, pressed: bool) -> egui::Event {
-        egui::Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Default::default() }
-    }
-
-    #[test]
-    fn the_panel_leaves_the_rest_to_the_picture() {
-        let mut state = state();
-        let place = run(&mut state, vec![vec![], vec![]]);
-        assert_eq!((place.left(), place.right()), (0.0, 500.0));
-        assert!(place.top() > 10.0 && place.bottom() < 490.0, "banner and status: {place}");
-        state.apply(Action::Panel);
-        assert_eq!(run(&mut state, vec![vec![], vec![]]), Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 500.0)));
-    }
-
-    #[test]
-    fn hands_over_the_picture_move_the_camera_and_over_the_panel_they_do_not() {
-        let drag = |from: Pos2| {
-            let to = from + Vec2::new(30.0, 0.0);
-            vec![
-                vec![egui::Event::PointerMoved(from)],
-                vec![button(from, true)],
-                vec![egui::Event::PointerMoved(to)],
-                vec![button(to, false)],
-            ]
-        };
-        let mut state = state();
-        let eye = state.navigator.eye;
-        run(&mut state, drag(Pos2::new(700.0, 420.0)));
-        assert_eq!(state.navigator.eye, eye, "the panel is no picture");
-        run(&mut state, drag(Pos2::new(200.0, 200.0)));
-        assert_ne!(state.navigator.eye, eye);
-        // The line is nearer than the camera to a hand that grabs it.
-        state.settings.split = true;
-        let (eye, line) = (state.navigator.eye, state.settings.line);
-        run(&mut state, drag(Pos2::new(250.0, 200.0)));
-        assert_eq!(state.navigator.eye, eye);
-        assert!((state.settings.line - line - 30.0 / 500.0).abs() < 1e-3, "{}", state.settings.line);
-    }
-
-    #[test]
-    fn keys_reach_the_state_but_not_while_somebody_types() {
-        let mut state = state();
-        run(&mut state, vec![vec![press(egui::Key::Num4)], vec![press(egui::Key::H)]]);
-        assert_eq!((state.settings.view, state.help), (View::Depth, true));
-        state.apply(Action::Escape);
-        // Tab goes to the first control; from then on letters are its own.
-        let mut tabbed = vec![vec![]];
-        tabbed.extend((0..3).map(|_| vec![press(egui::Key::Tab)]));
-        tabbed.push(vec![press(egui::Key::Num1)]);
-        run(&mut state, tabbed);
-        assert_eq!(state.settings.view, View::Depth);
-    }
-
-    #[test]
-    fn tab_reaches_every_control_and_space_presses_it() {
-        let (mut state, context) = (state(), egui::Context::default());
-        let mut seen = std::collections::HashSet::new();
-        for _ in 0..60 {
-            run_in(&context, &mut state, vec![vec![press(egui::Key::Tab)]]);
-            let Some(id) = context.memory(|m| m.focused()) else { continue };
-            // The first time a control has the focus it is pressed; what that changes is changed
-            // back.
-            if seen.insert(id) {
-                let (split, help) = (state.settings.split, state.help);
-                run_in(&context, &mut state, vec![vec![press(egui::Key::Space)], vec![]]);
-                if state.settings.split != split {
-                    seen.insert(egui::Id::unique("split was pressed"));
-                    state.apply(Action::Split);
-                }
-                if state.help != help {
-                    seen.insert(egui::Id::unique("help was pressed"));
-                    state.apply(Action::Help);
-                }
-                run_in(&context, &mut state, vec![vec![press(egui::Key::Space)], vec![]]);
-                (state.help, state.settings.split) = (help, split);
-            }
-        }
-        let pressed = ["split was pressed", "help was pressed"].map(|name| seen.contains(&egui::Id::unique(name)));
-        assert_eq!(pressed, [true, true]);
-        // Ten rooms, the status line, and what the four open ones hold.
-        assert!(seen.len() >= 24, "{} controls", seen.len());
-    }
-}
+mod tests;
