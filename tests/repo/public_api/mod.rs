@@ -1,7 +1,7 @@
 //! The library's public items, as `docs/public-api.txt` lists them: what changes there changes what
 //! others have built on, so it is changed by hand and said in CHANGELOG.md. Renew the list by
 //!
-//!     RENEW=1 cargo test --test public_api
+//!     RENEW=1 cargo test --test repo
 //!
 //! Read from the sources by `syn`, since rustdoc's JSON needs a nightly compiler. What macros would
 //! make public is not seen; there is none. The program (`cli`) and its window (`viewer`) are no
@@ -42,7 +42,7 @@ fn public_items_are_those_that_are_listed() {
     assert!(
         found == said,
         "the public items are not those of {LIST}.\nnew: {new:#?}\ngone: {gone:#?}\n\
-         If that is meant, run `RENEW=1 cargo test --test public_api` and say it in CHANGELOG.md."
+         If that is meant, run `RENEW=1 cargo test --test repo` and say it in CHANGELOG.md."
     );
     assert!(found.lines().count() > 800, "{} lines", found.lines().count());
     // What hosts use is there.

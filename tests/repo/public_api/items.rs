@@ -1,6 +1,6 @@
 //! What is public of a crate, one line an item.
 
-use crate::modules::{Found, Modules, for_tests, join, leaves, name};
+use super::modules::{Found, Modules, for_tests, join, leaves, name};
 use proc_macro2::{TokenStream, TokenTree};
 use quote::ToTokens;
 use std::collections::BTreeMap;
