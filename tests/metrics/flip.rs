@@ -57,7 +57,7 @@ mod against_the_reference {
 
     fn pairs(kind: &str, count: usize) -> Vec<Pair> {
         let all: Value =
-            serde_json::from_str(include_str!("fixtures/metrics/flip/expected.json")).expect("expected.json");
+            serde_json::from_str(include_str!("../fixtures/metrics/flip/expected.json")).expect("expected.json");
         let rows = all[kind].as_array().expect("rows").clone();
         assert_eq!(rows.len(), count);
         rows.into_iter()

@@ -51,7 +51,7 @@ mod against_scikit_image {
 
     fn expected() -> Vec<serde_json::Value> {
         let all: serde_json::Value =
-            serde_json::from_str(include_str!("fixtures/metrics/expected.json")).expect("expected.json");
+            serde_json::from_str(include_str!("../fixtures/metrics/expected.json")).expect("expected.json");
         let pairs = all["pairs"].as_array().expect("pairs").clone();
         assert_eq!(pairs.len(), 4);
         pairs
