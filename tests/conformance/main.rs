@@ -11,7 +11,7 @@
 mod common;
 mod draw;
 mod geometry;
-#[path = "../scene/glb.rs"]
+#[path = "../common/glb.rs"]
 #[allow(dead_code, reason = "each test binary uses a part")]
 mod glb;
 mod lights;

@@ -7,7 +7,7 @@ mod build;
 mod common;
 mod figures;
 mod files;
-#[path = "../scene/glb.rs"]
+#[path = "../common/glb.rs"]
 #[allow(dead_code, reason = "the scene tests use more of it")]
 mod glb;
 mod light;

@@ -9,12 +9,12 @@
 #[path = "../deform/figures.rs"]
 #[allow(dead_code, reason = "the tests of deformation use more of it")]
 mod figures;
-#[path = "../scene/glb.rs"]
+#[path = "../common/glb.rs"]
 #[allow(dead_code, reason = "the scene tests use more of it")]
 mod glb;
-#[path = "../scene/packed.rs"]
+#[path = "../common/packed.rs"]
 mod packed;
-#[path = "../scene/shared.rs"]
+#[path = "../common/shared.rs"]
 #[allow(dead_code, reason = "the scene tests use more of it")]
 mod shared;
 #[path = "../common/spoil.rs"]

@@ -1,5 +1,7 @@
 //! A tiny writer of glTF files, so that each test can spoil exactly one thing.
 
+#![allow(dead_code, reason = "each test binary uses a part")]
+
 use std::path::{Path, PathBuf};
 
 use bouncelight::scene::{self, Scene, SceneError};

@@ -1,9 +1,7 @@
 //! Picture files: what is written reads back, what is broken is refused in words, nothing is left
 //! half-written.
-#![cfg(feature = "io")]
 
-mod common;
-
+use crate::common;
 use bouncelight::image_io::{self, Decoded, ImageError, Layer, read_exr, read_png, write_exr, write_png, write_whole};
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,7 @@
 //! What several of the scene tests need.
 
+#![allow(dead_code, reason = "each test binary uses a part")]
+
 use bouncelight::scene::Scene;
 use glam::{Mat4, Vec3};
 

@@ -1,5 +1,7 @@
 //! A file with EXT_meshopt_compression, made of the cases that meshoptimizer packed.
 
+#![allow(dead_code, reason = "each test binary uses a part")]
+
 use serde_json::{Value, json};
 
 /// A case of `tests/fixtures/meshopt/cases.json`.
