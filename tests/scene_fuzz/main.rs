@@ -6,7 +6,7 @@
 //! binary has one test.
 #![cfg(feature = "io")]
 
-#[path = "../deform/figures.rs"]
+#[path = "../common/figures.rs"]
 #[allow(dead_code, reason = "the tests of deformation use more of it")]
 mod figures;
 #[path = "../common/glb.rs"]

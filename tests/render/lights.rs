@@ -1,16 +1,13 @@
 //! Many lights: lists of tiles leave out nothing that is seen, and shadows go to the lamps that
 //! matter.
 
-#[path = "common/build.rs"]
-mod build;
-mod common;
-
+use crate::build::*;
+use crate::common;
 use bouncelight::gpu::Gpu;
 use bouncelight::render::capture::{CaptureOptions, Picture, capture};
 use bouncelight::render::{Blending, LightOptions, Renderer, RendererOptions};
 use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{AlphaMode, Camera, Light, LightKind, Scene};
-use build::*;
 use glam::Vec3;
 
 const SIZE: [u32; 2] = [160, 96];

@@ -1,8 +1,7 @@
 //! The tonemap curves against colours that went through Blender's own views, and the shader against
 //! the CPU form.
 
-mod common;
-
+use crate::common;
 use bouncelight::render::tonemap_curve::Tonemap;
 
 /// Rows of samples.bin: linear r g b, then what Blender shows through Filmic, AgX and Khronos PBR
@@ -13,7 +12,7 @@ const ROWS: usize = 4400;
 const SCENE_ROWS: usize = 2100;
 
 fn samples() -> Vec<[f32; 12]> {
-    let bytes = include_bytes!("fixtures/tonemap/samples.bin");
+    let bytes = include_bytes!("../fixtures/tonemap/samples.bin");
     let rows: Vec<[f32; 12]> = bytes
         .chunks_exact(48)
         .map(|r| std::array::from_fn(|i| f32::from_le_bytes(std::array::from_fn(|b| r[4 * i + b]))))
@@ -132,7 +131,7 @@ fn shader_and_cpu_form_agree() {
     for view in Tonemap::ALL {
         light.extend(samples().iter().map(|r| [r[0], r[1], r[2], view.kind() as f32]));
     }
-    let source = [include_str!("../shaders/lib/tonemap.wgsl"), WRAPPER].concat();
+    let source = [include_str!("../../shaders/lib/tonemap.wgsl"), WRAPPER].concat();
     let shown = run(&gpu, &source, &light);
     let mut worst = [0.0f32; 4];
     for (input, out) in light.iter().zip(&shown) {

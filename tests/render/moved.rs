@@ -1,17 +1,14 @@
 //! Motion vectors of objects: what moves points to where it was, what stays points nowhere, whoever
 //! looks and however often.
 
-#[path = "common/build.rs"]
-mod build;
-mod common;
-
+use crate::build::*;
+use crate::common;
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{Renderer, View};
 use bouncelight::scene::shapes::{self, Shape};
 use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{Camera, Scene};
-use build::*;
 use glam::{Mat4, Vec3};
 
 const SIZE: [u32; 2] = [128, 80];

@@ -1,17 +1,14 @@
 //! Panes and other veils: drawn over the picture in order, with the light that many frames by lot
 //! have.
 
-#[path = "common/build.rs"]
-mod build;
-mod common;
-
+use crate::build::{center, look_at, material, quad, scene, sun};
+use crate::{build, common};
 use bouncelight::gi::Method;
 use bouncelight::gpu::Gpu;
 use bouncelight::render::capture::{CaptureOptions, Picture, capture};
 use bouncelight::render::{Backdrop, Blending, Renderer, RendererOptions};
 use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{AlphaMode, Camera, Material, Scene};
-use build::{center, look_at, material, quad, scene, sun};
 
 const SIZE: [u32; 2] = [32, 32];
 

@@ -1,5 +1,7 @@
 //! Small figures made by code.
 
+#![allow(dead_code, reason = "each test binary uses a part")]
+
 use crate::glb::Glb;
 use serde_json::{Value, json};
 

@@ -1,9 +1,7 @@
 //! Textures, normal maps and the display pass.
 
-#[path = "common/build.rs"]
-mod build;
-mod common;
-
+use crate::build::*;
+use crate::common;
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::render::capture::Layer;
 use bouncelight::render::tonemap::{TonemapOptions, TonemapPass};
@@ -12,7 +10,6 @@ use bouncelight::render::{Renderer, View};
 use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{AlphaMode, ColorSpace, Image, Sampler, Scene, TextureRef};
 use bouncelight::wgpu;
-use build::*;
 
 fn image(rgba: &[[u8; 4]], width: u32, color_space: ColorSpace) -> Image {
     let height = rgba.len() as u32 / width;

@@ -1,7 +1,6 @@
 //! Whole frames with the shipped network: memory, steadiness, laws of light from scene to picture.
 
-mod common;
-
+use crate::common;
 use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::net::format::Weights;

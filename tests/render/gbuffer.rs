@@ -1,9 +1,7 @@
 //! The G-buffer, its layers, and pictures of odd sizes and odd scenes.
 
-#[path = "common/build.rs"]
-mod build;
-mod common;
-
+use crate::build::*;
+use crate::common;
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{RenderError, Renderer, View};
@@ -11,7 +9,6 @@ use bouncelight::scene::environment::EnvironmentImage;
 use bouncelight::scene::shapes::{self, Shape};
 use bouncelight::scene::upload::{SceneGpu, UploadError};
 use bouncelight::scene::{AlphaMode, Environment, Instance, Light, Scene};
-use build::*;
 use glam::{Mat4, Vec3};
 use std::f32::consts::PI;
 

@@ -1,16 +1,13 @@
 //! What is left out because it cannot be seen changes no picture, and shadow maps that stay are
 //! those that would be drawn.
 
-#[path = "common/build.rs"]
-mod build;
-mod common;
-
+use crate::build::*;
+use crate::common;
 use bouncelight::gpu::Gpu;
 use bouncelight::render::capture::{CaptureOptions, capture};
 use bouncelight::render::{DrawnCount, Renderer};
 use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{AlphaMode, Camera, Instance, Light, LightKind, Scene};
-use build::*;
 use glam::{Mat4, Vec3};
 
 const SIZE: [u32; 2] = [96, 64];

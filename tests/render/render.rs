@@ -1,12 +1,9 @@
 //! The rasteriser against analytic answers.
 
-#[path = "common/build.rs"]
-mod build;
-mod common;
-
+use crate::build::*;
+use crate::common;
 use bouncelight::render::capture::{Layer, Picture};
 use bouncelight::scene::{Light, LightKind};
-use build::*;
 use glam::Vec3;
 use std::f32::consts::PI;
 
