@@ -1,8 +1,7 @@
 //! The path tracer's host, told by a kernel whose every sample is known: nothing is lost, doubled
 //! or mixed up, however the work is cut.
 
-mod common;
-
+use crate::common;
 use bouncelight::gpu::Gpu;
 use bouncelight::reference::{
     JUDGED, Job, Kernel, Layer, ReferenceScene, Subject, Traced, Tracer, TracerError, TracerOptions, job,
@@ -57,8 +56,9 @@ struct Bench {
 
 fn bench(path: &str) -> Option<Bench> {
     let gpu = common::gpu()?;
-    let library = [include_str!("../shaders/reference/types.wgsl"), include_str!("../shaders/lib/hash.wgsl")].concat();
-    let film = include_str!("../shaders/reference/film.wgsl");
+    let library =
+        [include_str!("../../shaders/reference/types.wgsl"), include_str!("../../shaders/lib/hash.wgsl")].concat();
+    let film = include_str!("../../shaders/reference/film.wgsl");
     let kernel = Kernel::from_wgsl(&gpu.device, &[&library, film, path].concat(), &[&library, FIRST_HIT].concat());
     let scene = ReferenceScene::new(&gpu.device, &gpu.queue, &Scene::default()).unwrap();
     let camera = Camera::look_at([0.0; 3], [0.0, 0.0, -1.0], 1.0);

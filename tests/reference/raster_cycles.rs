@@ -1,16 +1,12 @@
 //! G-buffer and direct light against Blender's Cycles: committed fixtures of sunlight alone, and
 //! the folder of reference renders where there is one.
-#![cfg(feature = "io")]
 
-#[path = "common/build.rs"]
-mod build;
-mod common;
-
+use crate::build::*;
+use crate::common;
 use bouncelight::gpu::Gpu;
 use bouncelight::image_io::{self, Image};
 use bouncelight::render::capture::{CapturedFrame, Layer};
 use bouncelight::scene::{self, Camera, LightKind, Scene};
-use build::*;
 use glam::{Mat3, Mat4, Vec3};
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! How vertices, nodes and copies are written.
 
+use super::studio::{Feature, SUN, Shape, copy, letter, of, pictured, plain as plain_material, stage, turn};
 use crate::glb::Glb;
-use crate::studio::{Feature, SUN, Shape, copy, letter, of, pictured, plain as plain_material, stage, turn};
 use serde_json::{Value, json};
 
 const PRIMITIVE: &str = "/meshes/0/primitives/0";
@@ -229,8 +229,8 @@ fn packed() -> Vec<Feature> {
         glb.json["nodes"][0]["translation"] = json!([0.0, 1.0, 0.0]);
         glb
     };
-    let draco = ball(include_bytes!("../fixtures/compressed/edgebreaker.glb"));
-    let plain = ball(include_bytes!("../fixtures/compressed/edgebreaker-unpacked.glb"));
+    let draco = ball(include_bytes!("../../fixtures/compressed/edgebreaker.glb"));
+    let plain = ball(include_bytes!("../../fixtures/compressed/edgebreaker-unpacked.glb"));
     assert_eq!(draco.json["nodes"].as_array().expect("nodes").len(), SUN + 1);
     vec![
         Feature::new("EXT_meshopt_compression", "vertices packed, without fallback", meshopt, |json| {

@@ -1,9 +1,6 @@
 //! The path tracer's rays hit what they must: against brute force, against leaks, at odd places and
 //! scales.
-#![cfg(feature = "reference")]
 
-#[path = "../common/mod.rs"]
-mod common;
 mod instances;
 mod oracle;
 

@@ -1,7 +1,7 @@
 //! Trees of meshes under a tree of instances: rays must meet what they meet where all triangles
 //! stand in one list.
 
-use crate::oracle::*;
+use super::oracle::*;
 use bouncelight::accel::{Accel, RayCaster, SceneBlocks, SceneRays};
 use bouncelight::scene::{Instance, Material, Mesh, Scene};
 use glam::{Mat4, Quat, Vec3};

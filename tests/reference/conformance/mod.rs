@@ -5,15 +5,9 @@
 //! another value of it: it must be farther off than any bound allows.
 //!
 //! `cargo xtask conformance` draws them larger and writes `docs/conformance.md`.
-#![cfg(feature = "reference")]
 
-#[path = "../common/mod.rs"]
-mod common;
 mod draw;
 mod geometry;
-#[path = "../common/glb.rs"]
-#[allow(dead_code, reason = "each test binary uses a part")]
-mod glb;
 mod lights;
 mod materials;
 mod motion;
@@ -21,6 +15,7 @@ mod page;
 mod studio;
 mod textures;
 
+use crate::common;
 use draw::{Drawn, Painter};
 use studio::Feature;
 

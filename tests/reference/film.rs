@@ -1,7 +1,6 @@
 //! The film's sums stay exact over 100,000 samples, whatever they are.
 
-mod common;
-
+use crate::common;
 use bouncelight::gpu::{Gpu, readback};
 use wgpu::util::DeviceExt;
 
@@ -50,7 +49,7 @@ fn value_of(point: u32, i: u32) -> [f64; 4] {
 /// plain sums.
 fn run(gpu: &Gpu, body: &str, samples: u32, step: u32) -> (Vec<f32>, Vec<f32>) {
     let text =
-        [include_str!("../shaders/lib/hash.wgsl"), include_str!("../shaders/reference/film.wgsl"), body].concat();
+        [include_str!("../../shaders/lib/hash.wgsl"), include_str!("../../shaders/reference/film.wgsl"), body].concat();
     let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("film test"),
         source: wgpu::ShaderSource::Wgsl(text.into()),

@@ -1,7 +1,7 @@
 //! Animations by each kind of interpolation, skins and morph targets, at a moment.
 
+use super::studio::{Feature, Shape, copy, letter, of, pictured, turn};
 use crate::glb::Glb;
-use crate::studio::{Feature, Shape, copy, letter, of, pictured, turn};
 use serde_json::{Value, json};
 
 /// Adds an animation of one channel to a file.

@@ -1,7 +1,7 @@
 //! Surfaces: coverage, sides, and the material extensions.
 
+use super::studio::{Feature, Shape, copy, of, pictured, plain, png};
 use crate::glb::Glb;
-use crate::studio::{Feature, Shape, copy, of, pictured, plain, png};
 use serde_json::{Value, json};
 
 pub fn features() -> Vec<Feature> {

@@ -1,7 +1,7 @@
 //! Lights of every kind, and cameras.
 
+use super::studio::{Feature, SUN, Shape, of, turn};
 use crate::glb::Glb;
-use crate::studio::{Feature, SUN, Shape, of, turn};
 use serde_json::{Value, json};
 
 fn list(json: &mut Value) -> &mut Value {

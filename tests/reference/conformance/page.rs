@@ -1,8 +1,8 @@
 //! `docs/conformance.md` and its contact sheet.
 
-use crate::draw::{Drawn, PAGE};
-use crate::studio::Feature;
-use crate::{BOUND, CONTROL};
+use super::draw::{Drawn, PAGE};
+use super::studio::Feature;
+use super::{BOUND, CONTROL};
 use bouncelight::gpu::Gpu;
 use std::fmt::Write;
 use std::path::Path;

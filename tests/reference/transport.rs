@@ -1,18 +1,12 @@
 //! The path tracer's light transport: strategies agree, nothing counts twice, sides and coverage
 //! are as documented.
-#![cfg(feature = "reference")]
 
-#[path = "common/build.rs"]
-mod build;
-mod common;
-#[path = "common/trace.rs"]
-mod trace;
-
+use crate::build::*;
+use crate::common;
+use crate::trace::*;
 use bouncelight::reference::job::{self, Job};
 use bouncelight::scene::environment::EnvironmentImage;
 use bouncelight::scene::{AlphaMode, Environment, Material, Scene};
-use build::*;
-use trace::*;
 
 /// Diffuse and glossy surfaces under all kinds of light with size: a wide sun, a point, a spot, two
 /// glowing quads, a sky.

@@ -1,7 +1,7 @@
 //! Pictures, where they lie, what between their texels is, and bumps.
 
+use super::studio::{Feature, Shape, letter, of, pattern, pictured, plain, png, texture};
 use crate::glb::Glb;
-use crate::studio::{Feature, Shape, letter, of, pattern, pictured, plain, png, texture};
 use serde_json::{Value, json};
 
 const COLOR: &str = "baseColorTexture";
@@ -97,11 +97,11 @@ fn files() -> Vec<Feature> {
     let card = Shape::card(1);
     // 16 by 12 texels with nothing smooth: shown as they are.
     let near = json!({"magFilter": 9728, "minFilter": 9728});
-    let mut basis = pictured(&card, include_bytes!("../fixtures/compressed/uastc.ktx2"), Some(near.clone()));
+    let mut basis = pictured(&card, include_bytes!("../../fixtures/compressed/uastc.ktx2"), Some(near.clone()));
     basis.json["images"][0]["mimeType"] = json!("image/ktx2");
     basis.json["textures"][0] = json!({"sampler": 0, "extensions": {"KHR_texture_basisu": {"source": 0}}});
     basis.json["extensionsRequired"] = json!(["KHR_texture_basisu"]);
-    let texels = include_bytes!("../fixtures/compressed/uastc.rgba");
+    let texels = include_bytes!("../../fixtures/compressed/uastc.rgba");
     let unpacked = png(48, |x, y| {
         let at = 4 * ((y / 4) * 16 + x / 3) as usize;
         texels[at..at + 4].try_into().expect("a texel")

@@ -1,8 +1,8 @@
 //! Pictures of a feature, and how far apart they are.
 
+use super::studio::Feature;
+use super::{BOUND, CONTROL};
 use crate::glb::Glb;
-use crate::studio::Feature;
-use crate::{BOUND, CONTROL};
 use bouncelight::gi::{Method, gather};
 use bouncelight::gpu::Gpu;
 use bouncelight::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions};
