@@ -1,10 +1,6 @@
 //! `fit`: no more model than a scene needs, kept beside it and obeyed until the scene changes.
-#![cfg(feature = "cli")]
 
-#[path = "common/build.rs"]
-mod build;
-mod common;
-
+use crate::{build, common};
 use bouncelight::gi::fitted::Fitted;
 use bouncelight::gi::name::MethodName;
 use bouncelight::scene::{Scene, export};

@@ -1,8 +1,6 @@
 //! Studies draw through one place: its pictures, sequences and references keep what they promise.
-#![cfg(all(feature = "reference", feature = "io"))]
 
-mod common;
-
+use crate::common;
 use bouncelight::gi::Method;
 use bouncelight::render::capture::Layer;
 use bouncelight::scene::{self, Environment, LightKind};

@@ -1,9 +1,7 @@
 //! `bouncelight stability`: tests that the truth passes and its spoilt copy fails, verdicts,
 //! record, page, pictures, exit codes.
-#![cfg(feature = "cli")]
 
-mod common;
-
+use crate::common;
 use assert_cmd::Command;
 use bouncelight::gi::Method;
 use bouncelight::image_io;

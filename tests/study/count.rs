@@ -1,8 +1,7 @@
 //! What shaders count while they draw, against what is known of a frame and what methods say of
 //! themselves.
 
-mod common;
-
+use crate::common;
 use bouncelight::gi::{Method, gather};
 use bouncelight::gpu::Gpu;
 use bouncelight::render::RendererOptions;
