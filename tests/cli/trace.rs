@@ -1,12 +1,9 @@
 //! `bouncelight trace` as a user meets it: flags, metadata, exit codes, files that appear
 //! or do not.
 
-mod common;
-#[path = "common/program.rs"]
-mod program;
-
+use crate::common;
+use crate::program::{bouncelight, fails};
 use bouncelight::image_io::{Layers, read_exr};
-use program::{bouncelight, fails};
 use std::path::Path;
 
 /// Traces the Cornell box with `flags` into `name`; gives the file and what was said.

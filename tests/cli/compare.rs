@@ -1,6 +1,5 @@
 //! `bouncelight compare` as a user meets it: names, numbers, heat maps, records, layers, errors.
 //! Needs no adapter.
-#![cfg(feature = "cli")]
 
 use assert_cmd::Command;
 use bouncelight::image_io::{Layer, read_png, write_exr, write_png};
@@ -42,7 +41,8 @@ fn fixture(name: &str) -> String {
 }
 
 fn expected(kind: &str, a: &str) -> Value {
-    let all: Value = serde_json::from_str(include_str!("fixtures/metrics/flip/expected.json")).expect("expected.json");
+    let all: Value =
+        serde_json::from_str(include_str!("../fixtures/metrics/flip/expected.json")).expect("expected.json");
     let rows = all[kind].as_array().expect("rows");
     rows.iter().find(|row| row["a"] == a).expect("the pair").clone()
 }

@@ -1,11 +1,8 @@
 //! The program as a user meets it: exit codes, messages, files that appear or do not.
 
-mod common;
-#[path = "common/program.rs"]
-mod program;
-
+use crate::common;
+use crate::program::{bouncelight, fails, path};
 use assert_cmd::Command;
-use program::{bouncelight, fails, path};
 use std::path::Path;
 
 fn is_empty(dir: &Path) -> bool {
@@ -244,7 +241,7 @@ fn whoever_takes_a_ray_the_picture_is_the_same() {
         bouncelight::image_io::read_exr(Path::new(&file)).unwrap().image("Combined").unwrap().to_rgb()
     };
     let taken = "select(atomicAdd(&taken, 1u), own, (gather.flags & GATHER_IN_TURN) != 0u)";
-    let queue = include_str!("../shaders/gi/gather/queue.wgsl");
+    let queue = include_str!("../../shaders/gi/gather/queue.wgsl");
     assert!(queue.contains(taken));
     let in_turn = drawn(taken, "own");
     assert_eq!(drawn(taken, "atomicAdd(&taken, 1u)"), in_turn);

@@ -1,10 +1,7 @@
 //! `bouncelight export`: what is written agrees with the shaders, and with what the pass records.
 
-#[path = "common/mod.rs"]
-mod common;
-#[path = "common/program.rs"]
-mod program;
-
+use crate::common;
+use crate::program::{bouncelight, fails, path};
 use bouncelight::export::manifest::{Binding, Manifest};
 use bouncelight::export::{self, Package, Target};
 use bouncelight::gi::{CameraMatrices, Inputs, Lights, Method, Neural, Rays, method};
@@ -14,7 +11,6 @@ use bouncelight::scene::{self, upload::SceneGpu};
 use bouncelight::wgpu::{self, TextureFormat as F, TextureUsages as U};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{AddressSpace, Module, TypeInner};
-use program::{bouncelight, fails, path};
 use std::collections::BTreeSet;
 
 const SIZE: [u32; 2] = [67, 41];

@@ -1,11 +1,8 @@
 //! Scenes as the command line meets them: what they may name, scenes of nothing, surroundings that
 //! replace default light.
 
-mod common;
-#[path = "common/program.rs"]
-mod program;
-
-use program::{bouncelight, fails, path};
+use crate::common;
+use crate::program::{bouncelight, fails, path};
 use std::path::Path;
 
 /// Three positions, a triangle; whatever else a test needs comes in `more`.

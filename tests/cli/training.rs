@@ -1,8 +1,7 @@
 //! The training package's own tests, where Python with PyTorch and OpenEXR is at hand; a visible
 //! skip elsewhere.
 
-mod common;
-
+use crate::common;
 use std::path::Path;
 use std::process::Command;
 

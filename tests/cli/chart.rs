@@ -1,9 +1,7 @@
 //! `bouncelight chart` from the command line: a small chart, taken up again, with a scene that
 //! fails.
-#![cfg(feature = "cli")]
 
-mod common;
-
+use crate::common;
 use assert_cmd::Command;
 use bouncelight::study::chart::{Metric, Record, report};
 use std::path::Path;

@@ -1,10 +1,7 @@
 //! `dataset` as a user meets it: shards, checksums, what a lesson's file holds.
 
-mod common;
-#[path = "common/program.rs"]
-mod program;
-
-use program::bouncelight;
+use crate::common;
+use crate::program::bouncelight;
 use std::path::Path;
 
 /// A dataset of the tests' size into `out`.
