@@ -4,7 +4,9 @@
 //! `WEIGHTS_FUZZ_CASES` and `WEIGHTS_FUZZ_SEED` make a longer run; `weights-format/README.md`
 //! records one. The allocator counts for the whole program, so this binary has one test.
 
+#[path = "../common/corpus.rs"]
 mod corpus;
+#[path = "../common/mutate.rs"]
 mod mutate;
 #[path = "../common/spoil.rs"]
 mod spoil;

@@ -1,9 +1,9 @@
 //! Pictures through the networks: against PyTorch's outputs, through the program, with the authors'
 //! own pictures.
 
-use super::common;
 use super::convert::{converted, named, norm};
 use super::state::{bytes, hashes, state};
+use crate::common;
 use bouncelight::image_io;
 use bouncelight::net::cpu;
 use bouncelight::net::format::{Dtype, Weights};

@@ -1,15 +1,8 @@
 //! The Python package and this reader: each reads what the other writes, and both find the same
 //! faults.
 
-mod common;
-#[path = "weights_fuzz/corpus.rs"]
-mod corpus;
-#[path = "weights_fuzz/mutate.rs"]
-mod mutate;
-#[path = "common/spoil.rs"]
-mod spoil;
-
-use common::Need;
+use crate::common::Need;
+use crate::{common, corpus, mutate, spoil};
 
 use bouncelight::net::format::{Dtype, Weights};
 use std::collections::BTreeSet;

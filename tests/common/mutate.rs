@@ -1,5 +1,7 @@
 //! Mutations: of the document's and the header's structure, of their text, of the file's bytes.
 
+#![allow(dead_code, reason = "each test binary uses a part")]
+
 use super::corpus::File;
 use super::spoil::{Random, TOKENS, spoil_text, spoil_value};
 use serde_json::{Value, json};
