@@ -5,10 +5,8 @@
 //! frames.
 //!
 //! The fixtures are made by `cargo test --release --test truth -- --ignored make_the_truth`.
-#![cfg(all(feature = "reference", feature = "io"))]
 
-mod common;
-
+use crate::common;
 use bouncelight::gi::Method;
 use bouncelight::gi::inputs::{cells_of, sample_pixel};
 use bouncelight::gpu::Gpu;
