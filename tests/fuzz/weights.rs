@@ -2,29 +2,20 @@
 //! the file.
 //!
 //! `WEIGHTS_FUZZ_CASES` and `WEIGHTS_FUZZ_SEED` make a longer run; `weights-format/README.md`
-//! records one. The allocator counts for the whole program, so this binary has one test.
+//! records one.
 
-#[path = "../common/corpus.rs"]
-mod corpus;
-#[path = "../common/mutate.rs"]
-mod mutate;
-#[path = "../common/spoil.rs"]
-mod spoil;
-
+use crate::spoil::Random;
+use crate::{MEMORY, apart, cases, setting};
+use crate::{corpus, mutate};
 use bouncelight::net::convert::{Arch, ConvertError, Norm, Recipe, convert};
 use bouncelight::net::format::{Dtype, Provenance, Weights};
-use peak_alloc::PeakAlloc;
-use spoil::Random;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-#[global_allocator]
-static MEMORY: PeakAlloc = PeakAlloc;
-
-/// Cases of an ordinary test run.
-const CASES: u64 = 6_000;
+/// Cases where tests run whole.
+const CASES: u64 = 60_000;
 const SEED: u64 = 20_260_101;
 /// Longest that one file may take. The honest ones take about a millisecond; a loaded machine may
 /// stop any of them for a while.
@@ -115,13 +106,13 @@ fn header_length(bytes: &[u8]) -> usize {
     usize::try_from(claimed).unwrap_or(usize::MAX).saturating_add(8).min(bytes.len())
 }
 
-fn setting(name: &str, otherwise: u64) -> u64 {
-    std::env::var(name).map_or(otherwise, |text| text.parse().expect("a whole number"))
-}
-
 #[test]
 fn hostile_files() {
-    let (cases, seed) = (setting("WEIGHTS_FUZZ_CASES", CASES), setting("WEIGHTS_FUZZ_SEED", SEED));
+    apart("weights::hostile_files", 1, |_| read_all());
+}
+
+fn read_all() {
+    let (cases, seed) = (cases("WEIGHTS_FUZZ_CASES", CASES), setting("WEIGHTS_FUZZ_SEED", SEED));
     let (files, states) = (corpus::weights(), corpus::state_dicts());
     let mut tally = Tally::default();
     for file in &files {

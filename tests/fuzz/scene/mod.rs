@@ -2,40 +2,22 @@
 //! pictures of the surroundings. No panic, no hang, bounded memory.
 //!
 //! `SCENE_FUZZ_CASES` (of each of the three kinds) and `SCENE_FUZZ_SEED` make a longer run;
-//! `docs/log/2026-11-24-compressed.md` records one. The allocator counts for the whole program, so this
-//! binary has one test.
-#![cfg(feature = "io")]
+//! `docs/log/2026-11-24-compressed.md` records one.
 
-#[path = "../common/figures.rs"]
-#[allow(dead_code, reason = "the tests of deformation use more of it")]
-mod figures;
-#[path = "../common/glb.rs"]
-#[allow(dead_code, reason = "the scene tests use more of it")]
-mod glb;
-#[path = "../common/packed.rs"]
-mod packed;
-#[path = "../common/shared.rs"]
-#[allow(dead_code, reason = "the scene tests use more of it")]
-mod shared;
-#[path = "../common/spoil.rs"]
-mod spoil;
 mod texts;
 
+use crate::glb::Glb;
+use crate::spoil::{Random, TOKENS, spoil_text, spoil_value};
+use crate::{MEMORY, apart, cases, setting};
+use crate::{figures, glb, packed, shared};
 use bouncelight::scene::{self, Environment, export};
-use glb::Glb;
-use peak_alloc::PeakAlloc;
 use serde_json::{Value, json};
-use spoil::{Random, TOKENS, spoil_text, spoil_value};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-#[global_allocator]
-static MEMORY: PeakAlloc = PeakAlloc;
-
-/// Cases of each kind in an ordinary test run: a tenth of what a change to a loader is tried with.
-const CASES: u64 = 10_000;
+/// Cases of each kind where tests run whole, which is what a change to a loader is tried with.
+const CASES: u64 = 100_000;
 const SEED: u64 = 20_261_124;
 /// Longest that one file may take. The honest ones take less than a millisecond; a loaded machine
 /// may stop any of them for a while, and a picture of the largest size that is allowed takes its
@@ -97,11 +79,11 @@ fn corpus() -> Vec<Glb> {
         plain,
         skinned,
         packed,
-        taken_apart(include_bytes!("../fixtures/compressed/edgebreaker.glb")),
-        taken_apart(include_bytes!("../fixtures/compressed/sequential.glb")),
-        textured(include_bytes!("../fixtures/compressed/etc1s.ktx2")),
-        textured(include_bytes!("../fixtures/compressed/uastc.ktx2")),
-        textured(include_bytes!("../fixtures/compressed/uastc-zstd.ktx2")),
+        taken_apart(include_bytes!("../../fixtures/compressed/edgebreaker.glb")),
+        taken_apart(include_bytes!("../../fixtures/compressed/sequential.glb")),
+        textured(include_bytes!("../../fixtures/compressed/etc1s.ktx2")),
+        textured(include_bytes!("../../fixtures/compressed/uastc.ktx2")),
+        textured(include_bytes!("../../fixtures/compressed/uastc-zstd.ktx2")),
     ]
 }
 
@@ -187,10 +169,6 @@ fn case(files: &[Glb], random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-fn setting(name: &str, otherwise: u64) -> u64 {
-    std::env::var(name).map_or(otherwise, |text| text.parse().expect("a whole number"))
-}
-
 /// What came of a file.
 #[derive(Default)]
 struct Tally {
@@ -248,38 +226,15 @@ impl Tally {
     }
 }
 
-/// The program runs itself once a processor, since its allocator counts for all of its threads:
-/// such a run is told here which part of the cases is its own.
-const PART: &str = "SCENE_FUZZ_PART";
-
 #[test]
 fn hostile_files() {
     let parts = std::thread::available_parallelism().map_or(1, usize::from) as u64;
-    match std::env::var(PART) {
-        Ok(part) => read_part(part.parse().expect("a whole number"), parts),
-        Err(_) => read_in_parts(parts),
-    }
-}
-
-fn read_in_parts(parts: u64) {
-    let program = std::env::current_exe().expect("the test's own program");
-    let begin = |part: u64| {
-        let mut command = Command::new(&program);
-        command.args(["--exact", "hostile_files", "--nocapture"]).env(PART, part.to_string());
-        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it can be started")
-    };
-    let runs: Vec<_> = (0..parts).map(begin).collect();
-    let ended = runs.into_iter().map(|run| run.wait_with_output().expect("it ends")).collect::<Vec<_>>();
-    for output in &ended {
-        print!("{}", String::from_utf8_lossy(&output.stdout));
-        eprint!("{}", String::from_utf8_lossy(&output.stderr));
-    }
-    assert!(ended.iter().all(|output| output.status.success()), "a part failed; its message is above");
+    apart("scene::hostile_files", parts, |part| read_part(part, parts));
 }
 
 /// Cases `part`, `part + parts` and so on.
 fn read_part(part: u64, parts: u64) {
-    let (cases, seed) = (setting("SCENE_FUZZ_CASES", CASES), setting("SCENE_FUZZ_SEED", SEED));
+    let (cases, seed) = (cases("SCENE_FUZZ_CASES", CASES), setting("SCENE_FUZZ_SEED", SEED));
     let folder = tempfile::tempdir().expect("a temporary folder");
     let at = |name: &str| folder.path().join(name);
     let numbers = || (part..cases).step_by(parts as usize).map(|n| (n, Random::new(seed, n)));
