@@ -38,6 +38,7 @@ mod sky_sun;
 mod stages;
 mod surroundings;
 mod taa;
+mod truth;
 mod warm_up;
 mod weights;
 mod world;

@@ -3,12 +3,22 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/corpus.rs"]
+mod corpus;
 mod hashed;
 mod life;
+#[path = "../common/mutate.rs"]
+mod mutate;
 mod norms;
 mod operators;
+mod plan;
+mod published;
+mod python;
+#[path = "../common/spoil.rs"]
+mod spoil;
 mod tap;
 mod tune;
+mod weights;
 mod whole;
 
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};

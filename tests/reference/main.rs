@@ -4,21 +4,28 @@
 //! Every estimate comes with an error bar from the two halves of its samples (`stats.rs`); an
 //! answer more than four standard errors away fails, and so does an error bar too wide to see 2 %.
 //! Seeds are fixed.
-#![cfg(all(feature = "reference", feature = "io"))]
 
-#[path = "../common/mod.rs"]
-mod common;
-
-#[path = "../common/build.rs"]
-mod build;
-
+mod accel;
 mod agreement;
 mod bad_input;
+#[path = "../common/build.rs"]
+mod build;
+#[path = "../common/mod.rs"]
+mod common;
+mod conformance;
 mod cycles;
+mod film;
 mod furnace;
+#[path = "../common/glb.rs"]
+mod glb;
 mod harness;
 mod light;
 mod lobe;
 mod raster;
+mod raster_cycles;
 mod scenes;
 mod stats;
+#[path = "../common/trace.rs"]
+mod trace;
+mod tracer;
+mod transport;

@@ -1,0 +1,6 @@
+//! What moves: skins, morph targets, lights and cameras of files; drawn, traced and played.
+
+mod files;
+mod light;
+mod motion;
+mod rays;

@@ -1,0 +1,22 @@
+//! The rasteriser: G-buffers, lights, textures, what blends and what moves, whole frames and the tone curve.
+
+#[path = "../common/build.rs"]
+mod build;
+#[path = "../common/mod.rs"]
+mod common;
+mod culling;
+mod deform;
+#[path = "../common/figures.rs"]
+mod figures;
+mod frame;
+mod gbuffer;
+#[path = "../common/glb.rs"]
+mod glb;
+mod lights;
+mod moved;
+#[path = "../common/program.rs"]
+mod program;
+mod render;
+mod textures;
+mod tonemap;
+mod veils;
