@@ -26,6 +26,8 @@ pub enum Need {
     Shared,
     /// The paper's generator at full width.
     Generator,
+    /// A driver and processor whose pictures are known to the bit.
+    Driver,
 }
 
 impl Need {
@@ -39,6 +41,7 @@ impl Need {
             Self::Torch => "PyTorch",
             Self::Shared => "shared folder",
             Self::Generator => "generator",
+            Self::Driver => "known driver",
         }
     }
 
@@ -52,7 +55,7 @@ impl Need {
             // Continuous integration has none of these: PyTorch and the generator's weights are
             // gigabytes and 218 MB, the shared folder is not part of the repository.
             // `cargo xtask hosts` needs the network anyway, and installs spirv-val.
-            Self::Screen | Self::SpirvVal | Self::Torch | Self::Shared | Self::Generator => None,
+            Self::Screen | Self::SpirvVal | Self::Torch | Self::Shared | Self::Generator | Self::Driver => None,
         }
     }
 }

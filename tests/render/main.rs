@@ -14,6 +14,7 @@ mod gbuffer;
 mod glb;
 mod lights;
 mod moved;
+mod pictures;
 #[path = "../common/program.rs"]
 mod program;
 mod render;

@@ -42,7 +42,7 @@ impl Stage {
         if self.still == 0 || slot.renderer.size() != state.size {
             return Ok(());
         }
-        if self.instead().is_some() && !self.is_known(wanted) {
+        if self.instead().is_some() {
             self.feature = None;
             return Ok(());
         }
@@ -71,14 +71,6 @@ impl Stage {
         self.show.forget();
         self.feature = Some(Feature { texture, range, which: wanted, name });
         Ok(())
-    }
-
-    /// What is known of the network before it has run: its inputs, but for those that it draws itself.
-    fn is_known(&self, (view, number): (View, u32)) -> bool {
-        use crate::gi::features::FEATURES;
-        let all: u32 = FEATURES.iter().map(|f| f.channels).sum();
-        let own: u32 = FEATURES.iter().filter(|f| f.name == "guess").map(|f| f.channels).sum();
-        view == View::Feature && number % all < all - own
     }
 
     /// What of the network is on show, and its range.

@@ -120,7 +120,7 @@ fn tab_reaches_every_control_and_space_presses_it() {
 fn open_all(context: &egui::Context, state: &mut State, seen: &mut dyn FnMut(&str, &State, Rect)) {
     let (times, measured, mut memory) = (Times::default(), BTreeMap::new(), Memory::default());
     context.all_styles_mut(|style| style.animation_time = 0.0);
-    let mut frame = |state: &mut State, memory: &mut Memory, events: Vec<egui::Event>| {
+    let frame = |state: &mut State, memory: &mut Memory, events: Vec<egui::Event>| {
         let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 4000.0)));
         let input = egui::RawInput { screen_rect, events, focused: true, ..Default::default() };
         let mut place = Rect::NOTHING;
