@@ -30,7 +30,7 @@ fn file<'a>(package: &'a Package, name: &str) -> &'a [u8] {
 }
 
 fn validated(module: &Module, name: &str) -> naga::valid::ModuleInfo {
-    // As in `tests/shaders.rs`.
+    // As in `tests/repo/shaders.rs`.
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32);
     validator.validate(module).unwrap_or_else(|e| panic!("{name}: {e:?}"))
 }

@@ -5,8 +5,7 @@
 //! records one.
 
 use crate::spoil::Random;
-use crate::{MEMORY, apart, cases, setting};
-use crate::{corpus, mutate};
+use crate::{MEMORY, apart, cases, corpus, mutate, setting};
 use bouncelight::net::convert::{Arch, ConvertError, Norm, Recipe, convert};
 use bouncelight::net::format::{Dtype, Provenance, Weights};
 use std::collections::BTreeMap;

@@ -4,7 +4,7 @@
 //! Takes a minute and a half on two cores: four rooms by four methods, two of which settle over 32
 //! frames.
 //!
-//! The fixtures are made by `cargo test --release --test truth -- --ignored make_the_truth`.
+//! The fixtures are made by `cargo test --release --test gi -- --ignored make_the_truth`.
 
 use crate::common;
 use bouncelight::gi::Method;
@@ -80,7 +80,7 @@ fn make_the_truth() {
         let data = bytemuck::cast_slice(&light);
         let view = TensorView::new(Dtype::F32, vec![h, w, 3], data).expect("sizes agree");
         let words = [
-            ("command", "cargo test --release --test truth -- --ignored make_the_truth".into()),
+            ("command", "cargo test --release --test gi -- --ignored make_the_truth".into()),
             ("device", gpu.sentence()),
             ("paths", PATHS.to_string()),
             ("seed", SEED.to_string()),

@@ -1,9 +1,8 @@
 //! The Python package and this reader: each reads what the other writes, and both find the same
 //! faults.
 
-use crate::common::Need;
-use crate::{common, corpus, mutate, spoil};
-
+use crate::common::{self, Need};
+use crate::{corpus, mutate, spoil};
 use bouncelight::net::format::{Dtype, Weights};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

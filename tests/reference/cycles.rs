@@ -7,6 +7,7 @@
 //! those 4096 pixels; the whole pictures are behind `--ignored`.
 
 use crate::agreement::{Agreement, Value, tiles};
+use crate::common::{self, Need};
 use crate::harness::{Lab, Options, Traced, lab};
 use bouncelight::image_io::{self, Image, Layers};
 use bouncelight::render::capture::Picture;
@@ -165,7 +166,7 @@ fn right(_: usize, _: usize) -> [f64; 2] {
 #[test]
 fn light_is_that_of_cycles() {
     let Some(lab) = lab() else { return };
-    let Some(shared) = crate::common::shared() else { return };
+    let Some(shared) = common::shared() else { return };
     let (mut squares, mut biases) = (Vec::new(), Vec::new());
     for name in SCENES {
         let scene = reference_scene(&shared, name);
@@ -203,15 +204,15 @@ fn light_is_that_of_cycles() {
 
 /// `BOUNCELIGHT_SECOND=out/second cargo test --release --test reference -- --ignored --nocapture whole_pictures`,
 /// where the folder holds the whole second renders that `tests/fixtures/cycles/second.py` makes.
-/// `BOUNCELIGHT_SPP` (default
-/// 64) samples a pixel, `BOUNCELIGHT_SCENES` a list of scenes instead of all.
+/// `BOUNCELIGHT_SPP` (default 64) samples a pixel, `BOUNCELIGHT_SCENES` a list of scenes instead of
+/// all.
 #[test]
 #[ignore = "minutes; needs the whole second renders"]
 fn whole_pictures_are_those_of_cycles() {
     let Some(lab) = lab() else { return };
-    let Some(shared) = crate::common::shared() else { return };
+    let Some(shared) = common::shared() else { return };
     let Some(folder) = std::env::var_os("BOUNCELIGHT_SECOND").map(PathBuf::from) else {
-        panic!("BOUNCELIGHT_SECOND names no folder of second renders");
+        return common::skip(Need::Shared, "BOUNCELIGHT_SECOND names no folder of second renders");
     };
     let spp: u32 = std::env::var("BOUNCELIGHT_SPP").map_or(64, |v| v.parse().expect("a number of samples"));
     let wanted = std::env::var("BOUNCELIGHT_SCENES").unwrap_or_default();

@@ -212,7 +212,7 @@ class Toy(unittest.TestCase):
 
 class Filmic(unittest.TestCase):
     def test_is_what_blender_shows(self):
-        # Linear red, green, blue, then what Blender shows through Filmic, AgX and Neutral; the limits are tests/tonemap.rs's.
+        # Linear red, green, blue, then what Blender shows through Filmic, AgX and Neutral; the limits are tests/render/tonemap.rs's.
         path = os.path.join(HERE, "..", "..", "tests", "fixtures", "tonemap", "samples.bin")
         samples = np.fromfile(path, "<f4").reshape(-1, 12)
         difference = 255 * np.abs(filmic.filmic(samples[:, :3]) - samples[:, 3:6])

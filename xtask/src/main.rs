@@ -15,8 +15,10 @@ const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   demo   draw the bundled interior with the shipped weights: out/demo.png and a timing table
-  test   every test, and which were skipped (an adapter is made sure of first; REQUIRE_GPU=1 makes a missing one an
-         error, REQUIRE_ALL=1 all that .ci/run installs)
+  test [--all]
+         every test, which were skipped, and which were slowest (an adapter is made sure of first; REQUIRE_GPU=1 makes a
+         missing one an error, REQUIRE_ALL=1 all that .ci/run installs)
+         --all runs heavy tests whole, which otherwise do a tenth, and those that are otherwise ignored: hours
   hosts  the pass in other renderers: exports, sets up Python with moderngl in target/hosts, runs examples/moderngl/test.py
          and a picture (needs python3 with venv, the network for pip, and EGL); the page of examples/webgpu in Chromium,
          where there is one; then examples/bevy, its test and a picture
@@ -81,7 +83,8 @@ fn test() -> Result<(), String> {
     if skips.exists() {
         std::fs::remove_file(&skips).map_err(|e| format!("{}: {e}", skips.display()))?;
     }
-    let tested = tests::run_all(programs, &skips);
+    let all = std::env::args().any(|word| word == "--all");
+    let tested = tests::run_all(programs, &tests::Plan { skips: &skips, all });
     print_skips(&std::fs::read_to_string(&skips).unwrap_or_default());
     tested
 }
@@ -119,9 +122,9 @@ fn gpu_report(mut args: Vec<String>) -> Result<(), String> {
 
 /// The page of glTF's features, written by the test that holds their bounds.
 fn conformance() -> Result<(), String> {
-    cargo(&["test", "--test", "conformance", "--no-run"])?;
+    cargo(&["test", "--test", "reference", "--no-run"])?;
     make_sure_of_adapter(&built("debug")?)?;
-    let words = ["test", "--test", "conformance", "--", "page", "--nocapture"];
+    let words = ["test", "--test", "reference", "--", "--exact", "conformance::page", "--nocapture"];
     // Tests run in their package's folder.
     run(command("cargo", &words).env("CONFORMANCE_DOCS", "docs"))
 }
@@ -137,7 +140,7 @@ fn hosts() -> Result<(), String> {
         eprintln!("xtask: no spirv-val; installing spirv-tools with apt-get");
         apt(&["install", "-y", "-q", "--no-install-recommends", "spirv-tools"])?;
     }
-    cargo(&["test", "--test", "export"])?;
+    cargo(&["test", "--test", "cli", "export::"])?;
     let folder = program.parent().ok_or("the program has no folder")?;
     let work = folder.with_file_name("hosts");
     std::fs::create_dir_all(&work).map_err(|e| format!("{}: {e}", work.display()))?;

@@ -25,7 +25,7 @@ Made by
 
 on {}. Do not edit.
 
-Each line is a small file that the tests make (`tests/conformance`), with one feature in it, on a floor under a sun and a
+Each line is a small file that the tests make (`tests/reference/conformance`), with one feature in it, on a floor under a sun and a
 sky. **Off** is how far the rasteriser's picture (`gather`, 32 frames, eight samples: what `render` draws) is from the
 path tracer's ({} paths a pixel): the mean difference of display values, of 255, at {}×{} pixels; at most {BOUND}.
 Where the same picture can be said without the feature, the path tracer draws *that* file (**equivalent**: coordinates moved by

@@ -12,7 +12,7 @@ use bouncelight::scene::{Camera, Scene};
 use glam::{Mat4, Vec3};
 
 const SIZE: [u32; 2] = [96, 96];
-/// Pixels, as in tests/moved.rs.
+/// Pixels, as in tests/render/moved.rs.
 const SMALL: f32 = 0.02;
 
 fn bent() -> Scene {
