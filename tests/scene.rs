@@ -22,6 +22,8 @@ mod compressed;
 mod defaults;
 #[path = "scene/extensions.rs"]
 mod extensions;
+#[path = "scene/far.rs"]
+mod far;
 #[path = "scene/glb.rs"]
 mod glb;
 #[path = "scene/gltf_features.rs"]
