@@ -227,6 +227,15 @@ fn a_number_that_is_none_takes_one_triangle_or_nothing() {
         warned(&scene, &["POSITION", "triangles are left out"]);
         assert!(strict(&glb).is_err());
     }
+    // A copy that is nowhere.
+    let mut glb = square();
+    let places = glb.floats("VEC3", &[0.0, 0.0, 0.0, f32::NAN, 0.0, 0.0, 4.0, 0.0, 0.0]);
+    let copies = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}});
+    glb.json["nodes"] = json!([{"mesh": 0, "extensions": copies}]);
+    let scene = load(&glb);
+    assert_eq!((scene.instances.len(), scene.instances[1].transform[3][0]), (2, 4.0));
+    warned(&scene, &["1 copies", "left out"]);
+    assert!(strict(&glb).is_err());
     // A node that is nowhere.
     let mut glb = square();
     glb.json["nodes"] =
