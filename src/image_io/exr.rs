@@ -86,6 +86,13 @@ pub fn read_exr(path: &Path) -> Result<Layers, ImageError> {
     read_with_windows(path).map(|(layers, _)| layers)
 }
 
+/// Bytes of pixels that a byte of a file can hold at most: those of a picture of one colour, packed as
+/// well as any.
+const MOST_PACKED: u64 = 1 << 16;
+
+/// Bytes of pixels that are never asked about.
+const MOST_BEFORE: u64 = 16 << 20;
+
 /// Where the pixels that a file has lie in the picture that it shows.
 pub(crate) struct Windows {
     /// Column and row of the first pixel, counted from the picture's.
@@ -104,8 +111,15 @@ pub(crate) fn read_with_windows(path: &Path) -> Result<(Layers, Windows), ImageE
         ::exr::error::Error::NotSupported(message) => unsupported(path, &message),
         e => ImageError::broken(path, "EXR", e),
     };
-    let (width, height) =
-        check_headers(path, &MetaData::read_from_buffered(Cursor::new(&bytes), false).map_err(failed)?)?;
+    let meta = MetaData::read_from_buffered(Cursor::new(&bytes), false).map_err(failed)?;
+    let (width, height) = check_headers(path, &meta)?;
+    // Memory is taken before pixels are decoded, and a few bytes can claim any size.
+    let channels: u64 = meta.headers.iter().map(|h| h.channels.list.len() as u64).sum();
+    let claimed = 4 * channels * u64::from(width) * u64::from(height);
+    if claimed > MOST_BEFORE + MOST_PACKED * bytes.len() as u64 {
+        let problem = format!("{} bytes cannot hold the {width}x{height} pixels that it claims", bytes.len());
+        return Err(ImageError::broken(path, "EXR", problem));
+    }
 
     let image = ::exr::prelude::read()
         .no_deep_data()

@@ -119,11 +119,14 @@ fn hit([a, b, c]: [Vec3; 3], direction: Vec3) -> Option<(f32, [f32; 3])> {
     inside.then_some((distance, [1.0 - u - v, u, v]))
 }
 
+/// A picture, its coordinates at the vertices, and how they are moved.
+type Placed<'a> = (&'a super::Image, &'a [[f32; 2]], [[f32; 3]; 2]);
+
 /// What the sky's places look like.
 struct Shade<'a> {
     mesh: &'a Mesh,
     factor: [f32; 4],
-    image: Option<(&'a super::Image, &'a [[f32; 2]], [[f32; 3]; 2])>,
+    image: Option<Placed<'a>>,
     table: [f32; 256],
 }
 

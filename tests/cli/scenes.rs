@@ -89,8 +89,13 @@ fn a_picture_without_a_background_has_alpha() {
     let dir = tempfile::tempdir().unwrap();
     let scene = path(&dir, "half.obj");
     std::fs::write(path(&dir, "m.mtl"), "newmtl wall\nKd 0.5 0.5 0.5\nnewmtl pane\nKd 0.5 0.5 0.5\nd 0.5\n").unwrap();
-    let wall = "v -1 -0.5 0\nv 0 -0.5 0\nv 0 0.5 0\nv -1 0.5 0\nv 1 -0.5 0\nv 1 0.5 0\n";
-    std::fs::write(&scene, format!("mtllib m.mtl\n{wall}usemtl wall\nf 1 2 3 4\nusemtl pane\nf 2 5 6 3\n")).unwrap();
+    let wall =
+        "v -1 -0.5 0\nv 0 -0.5 0\nv 0 0.5 0\nv -1 0.5 0\nv 1 -0.5 0\nv 1 0.5 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    std::fs::write(
+        &scene,
+        format!("mtllib m.mtl\n{wall}usemtl wall\nf 1/1 2/2 3/3 4/4\nusemtl pane\nf 2/1 5/2 6/3 3/4\n"),
+    )
+    .unwrap();
     let drawn = |name: &str, more: &[&str]| {
         let out = path(&dir, name);
         let seen = ["--size", "32x32", "--method", "direct", "--eye", "0,0,5", "--look-at", "0,0,0", "--fov", "34"];
@@ -110,7 +115,7 @@ fn a_picture_without_a_background_has_alpha() {
         }
         // Colours of the PNG are not multiplied: pane and wall are lit the same.
         let [wall, pane] = [11 + 16 * 32, 20 + 16 * 32].map(|i| png.pixels[4 * i]);
-        assert!((wall - pane).abs() < 0.03 && wall > 0.2, "{wall} {pane}");
+        assert!((wall - pane).abs() < 0.06 && wall > 0.2, "{wall} {pane}");
     }
     // Negative control: with a background there is no alpha.
     assert_eq!(bouncelight::image_io::read_png(Path::new(&drawn("b.png", &[]))).unwrap().channels, 3);

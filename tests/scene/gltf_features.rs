@@ -171,7 +171,12 @@ fn materials() {
     assert!(close(normal.transform.as_flattened(), &expected), "{:?}", normal.transform);
     // One file image becomes three: read as colour, as data, as normals.
     assert_eq!(scene.images.len(), 3);
-    assert!(scene.images.iter().all(|i| (i.width, i.height) == (4, 2) && i.rgba[..4] == [10, 20, 30, 255]));
+    let texels: Vec<&[u8]> = scene.images.iter().map(|i| &i.rgba[..4]).collect();
+    assert!(scene.images.iter().all(|i| (i.width, i.height) == (4, 2)));
+    // As a normal it points nowhere, and is flat.
+    assert!(
+        texels.iter().filter(|t| ***t == [10, 20, 30, 255]).count() == 2 && texels.contains(&&[128, 128, 255, 255][..])
+    );
     // The glow of a file without lights is lit by a light.
     assert!(matches!(scene.lights[0].kind, LightKind::Spot { .. }));
     assert!(scene.warnings.iter().any(|w| w.contains("glowing")), "{:?}", scene.warnings);
@@ -203,7 +208,7 @@ fn tangents_follow_the_texture() {
 #[test]
 fn broken_textures_are_named_and_replaced() {
     let mut cut = png([1, 2, 3, 4], 64, 64);
-    cut.truncate(cut.len() / 2);
+    cut.truncate(36);
     let color = json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
     for (bytes, word) in [(&cut[..], "decoded"), (b"no picture at all", "decoded")] {
         let mut glb = textured(bytes);

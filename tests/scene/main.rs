@@ -13,6 +13,7 @@ mod common;
 mod compressed;
 mod defaults;
 mod extensions;
+mod far;
 #[path = "../common/glb.rs"]
 mod glb;
 mod gltf_features;

@@ -3,8 +3,8 @@
 
 use glam::{DMat4, DVec3, Mat4};
 
-/// Nearer ones stay: floats are a thousandth of a metre apart there.
-const FAR: f64 = 8192.0;
+/// Nearer ones stay: floats are less than a hundredth of a metre apart there.
+const FAR: f64 = 65_536.0;
 
 /// Where a scene is to have its origin: whole metres at the middle of its meshes where these are far
 /// away together, else the file's own.

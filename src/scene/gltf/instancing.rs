@@ -57,7 +57,7 @@ impl<'a> Loader<'a> {
         if given.any(|c| c != count) {
             return Err(self.broken(place, format!("has attributes of different lengths ({counts:?})")));
         }
-        let mut copies = Vec::with_capacity(count);
+        let (mut copies, mut lost) = (Vec::with_capacity(count), 0);
         for i in 0..count {
             let mut copy = Copy::SELF;
             if let Some(t) = &translations {
@@ -71,9 +71,16 @@ impl<'a> Loader<'a> {
                 copy.scale = s[i];
             }
             if !copy.matrix().is_finite() {
-                return Err(self.broken(place, format!("copy {i} has a transform that is not finite")));
+                if self.strict {
+                    return Err(self.broken(place, format!("copy {i} has a transform that is not finite")));
+                }
+                lost += 1;
+                continue;
             }
             copies.push(copy);
+        }
+        if lost > 0 {
+            self.warn(&place, &format!("{lost} copies have a transform that is not finite and are left out"));
         }
         Ok(copies)
     }

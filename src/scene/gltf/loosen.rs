@@ -4,12 +4,15 @@
 use super::mend::Warning;
 use serde_json::{Number, Value};
 
+/// The text that was mended, and what of it.
+type Loosened = Option<(Vec<u8>, Vec<Warning>)>;
+
 /// Reads a file's JSON; what a strict reader refuses is mended first, if it can be, and told. The
 /// mended text comes back for whoever reads it again.
 ///
 /// # Errors
 /// What the strict reader said.
-pub(super) fn read(json: &[u8]) -> Result<(gltf::json::Root, Option<(Vec<u8>, Vec<Warning>)>), serde_json::Error> {
+pub(super) fn read(json: &[u8]) -> Result<(gltf::json::Root, Loosened), serde_json::Error> {
     let refused = match gltf::json::deserialize::from_slice(json) {
         Ok(root) => return Ok((root, None)),
         Err(refused) => refused,
