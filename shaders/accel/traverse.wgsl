@@ -243,6 +243,13 @@ fn walk_boxes(w: ptr<function, Walk>, head: vec4u, x: vec4u, y: vec4u, z: vec4u)
         | (or_all(select(vec4u(0u), ray.rank_bits, high)) << (4u - ray.low_half));
 }
 
+// p.x q.y - p.y q.x with the right sign, also where a driver fuses multiplication and addition
+// (Kahan's difference of products): two leaves that share an edge then agree about it.
+fn crossed(p: vec2f, q: vec2f) -> f32 {
+    let w = p.y * q.x;
+    return fma(p.x, q.y, -w) + fma(-p.y, q.x, w);
+}
+
 // Both triangles of a leaf.
 fn walk_triangles(w: ptr<function, Walk>, block: u32, head: vec4u, x: vec4u, y: vec4u, z: vec4u) {
     let ray = (*w).ray;
@@ -257,11 +264,11 @@ fn walk_triangles(w: ptr<function, Walk>, block: u32, head: vec4u, x: vec4u, y: 
     let c = vec2f(dot(r, ray.across), dot(r, ray.up));
     let d = vec2f(dot(s, ray.across), dot(s, ray.up));
     let depths = vec4f(dot(p, ray.along), dot(q, ray.along), dot(r, ray.along), dot(s, ray.along));
-    let bc = c.x * b.y - c.y * b.x;
-    let ca = a.x * c.y - a.y * c.x;
-    let ab = b.x * a.y - b.y * a.x;
-    let cd = d.x * c.y - d.y * c.x;
-    let da = a.x * d.y - a.y * d.x;
+    let bc = crossed(c, b);
+    let ca = crossed(a, c);
+    let ab = crossed(b, a);
+    let cd = crossed(d, c);
+    let da = crossed(a, d);
     let sum1 = bc + ca + ab;
     let t1 = (bc * depths.x + ca * depths.y + ab * depths.z) / sum1;
     let inside1 = (bc >= 0.0 && ca >= 0.0 && ab >= 0.0) || (bc <= 0.0 && ca <= 0.0 && ab <= 0.0);

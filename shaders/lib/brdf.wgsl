@@ -93,7 +93,7 @@ fn index_of(f0: f32) -> f32 {
 
 // Reflected share of unpolarised light; c: cosine of the angle of incidence.
 fn fresnel_dielectric(index: f32, c: f32) -> f32 {
-    let g = sqrt(index * index - 1.0 + c * c);
+    let g = sqrt(max(index * index - 1.0 + c * c, 0.0));
     let a = (g - c) / max(g + c, 1e-6);
     let b = (c * (g + c) - 1.0) / (c * (g - c) + 1.0);
     return 0.5 * a * a * (1.0 + b * b);
@@ -126,7 +126,8 @@ fn ggx(n: vec3f, v: vec3f, l: vec3f, f0: vec3f, roughness: f32) -> vec3f {
     // 1 - n_h^2 from the cross product: the plain form loses all digits near the peak of a smooth
     // surface.
     let c = cross(n, h);
-    let d_root = a2 * n_h * n_h + dot(c, c);
+    // Never less than a2, but for h = 0.
+    let d_root = max(a2 * n_h * n_h + dot(c, c), 0.5 * a2);
     let d = a2 / (PI * d_root * d_root);
     let vis = 0.5 / max(n_l * sqrt(n_v * n_v * (1.0 - a2) + a2) + n_v * sqrt(n_l * n_l * (1.0 - a2) + a2), 1e-6);
     return d * vis * fresnel_of(f0, v_h);

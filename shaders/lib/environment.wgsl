@@ -18,7 +18,9 @@ fn environment_seen(direction: vec3f) -> vec3f {
 fn environment_with(direction: vec3f, sun: f32) -> vec3f {
     let size = vec2i(textureDimensions(environment_picture));
     if all(size == vec2i(1)) { return textureLoad(environment_picture, vec2i(0), 0).rgb; }
-    let uv = vec2f(atan2(direction.z, direction.x) / (2.0 * PI) + 0.5, acos(clamp(direction.y, -1.0, 1.0)) / PI);
+    // atan2(0, 0), straight up, is whatever a driver makes of it.
+    let x = select(direction.x, 1.0, all(direction.xz == vec2f(0.0)));
+    let uv = vec2f(atan2(direction.z, x) / (2.0 * PI) + 0.5, acos(clamp(direction.y, -1.0, 1.0)) / PI);
     let p = uv * vec2f(size) - 0.5;
     let t = p - floor(p);
     let low = vec2i(floor(p));

@@ -55,7 +55,7 @@ fn gloss_lobe(s: Surface, l: vec3f) -> Lobe {
     let alpha = s.alpha;
     let a2 = alpha * alpha;
     let c = cross(s.n, h);
-    let root = a2 * n_h * n_h + dot(c, c);
+    let root = max(a2 * n_h * n_h + dot(c, c), 0.5 * a2);
     let d = a2 / (PI * root * root);
     let g_v = sqrt(s.n_v * s.n_v * (1.0 - a2) + a2);
     let g_l = sqrt(n_l * n_l * (1.0 - a2) + a2);

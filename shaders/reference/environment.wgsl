@@ -14,7 +14,9 @@ fn environment_texel(x: i32, y: i32) -> vec3f {
 }
 
 fn environment_coordinates(l: vec3f) -> vec2f {
-    return vec2f(atan2(l.z, l.x) / (2.0 * PI) + 0.5, acos(clamp(l.y, -1.0, 1.0)) / PI);
+    // atan2(0, 0), straight up, is whatever a driver makes of it.
+    let x = select(l.x, 1.0, all(l.xz == vec2f(0.0)));
+    return vec2f(atan2(l.z, x) / (2.0 * PI) + 0.5, acos(clamp(l.y, -1.0, 1.0)) / PI);
 }
 
 fn environment_radiance(l: vec3f) -> vec3f {

@@ -79,5 +79,5 @@ fn coverage_threshold(in: Varying, facing: bool, depth: f32) -> f32 {
     let start = hash01(q.x, q.y, layer, distance);
     let step = 0.618034 + 0.06 * (hash01(q.y, layer, distance, q.x) - 0.5);
     // In whole numbers, which frames without end do not wear out.
-    return 1.0 - f32(u32(start * 16777215.0) + frame.seed * u32(step * 16777216.0) & 0xffffffu) / 16777216.0;
+    return 1.0 - f32((u32(start * 16777215.0) + frame.seed * u32(step * 16777216.0)) & 0xffffffu) / 16777216.0;
 }

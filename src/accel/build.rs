@@ -64,8 +64,7 @@ fn build_with(triangles: &[Triangle], places: Option<&pairs::Places>) -> Accel {
         }
     }
     accel.triangles = kept.len();
-    // A leaf that nothing hits.
-    accel.blocks = vec![[0; wide::WORDS]];
+    accel.blocks = vec![wide::NOTHING];
     if kept.is_empty() {
         return accel;
     }
@@ -91,7 +90,7 @@ fn build_with(triangles: &[Triangle], places: Option<&pairs::Places>) -> Accel {
 /// so it is quick to build and no deeper than `levels`.
 pub(super) fn over_boxes(boxes: &[Aabb], levels: usize, leaf: impl Fn(usize) -> wide::Block) -> Vec<wide::Block> {
     if boxes.is_empty() {
-        return vec![[0; wide::WORDS]];
+        return vec![wide::NOTHING];
     }
     if most_alike(boxes) <= MOST_ALIKE {
         let blocks = wide::blocks(&clustered(boxes, REINSERTION_OF_THINGS), &leaf);

@@ -29,6 +29,14 @@ pub(crate) const WORDS: usize = 16;
 /// A block's words.
 pub(crate) type Block = [u32; WORDS];
 
+/// A leaf that nothing hits, however drivers round: its corners are one point, and both of its
+/// triangles let all rays through.
+pub(crate) const NOTHING: Block = {
+    let mut block = [0; WORDS];
+    block[15] = 0xffff;
+    block
+};
+
 /// Marks a node.
 pub(crate) const NODE: u32 = 1 << 31;
 
@@ -178,7 +186,7 @@ pub(super) fn blocks(tree: &Bvh2, leaf: impl Fn(usize) -> Block) -> Vec<Block> {
     }
     let covers = covers(tree, &order);
     drop(order);
-    let mut blocks = vec![[0; WORDS]];
+    let mut blocks = vec![NOTHING];
     // Depth first, so that what is near in space is near in memory.
     let mut open = vec![(0u32, 0usize)];
     while let Some((index, block)) = open.pop() {
@@ -190,7 +198,7 @@ pub(super) fn blocks(tree: &Bvh2, leaf: impl Fn(usize) -> Block) -> Vec<Block> {
         let placed = places(tree, index, &children(tree, &covers, index));
         // Families start at multiples of eight; the root's has only the root.
         let first = blocks.len().next_multiple_of(8);
-        blocks.resize(first + 8, [0; WORDS]);
+        blocks.resize(first + 8, NOTHING);
         blocks[block] = node_block(tree, index, &placed, first);
         open.extend(placed.iter().enumerate().filter_map(|(place, child)| Some(((*child)?, first + place))));
     }

@@ -248,7 +248,9 @@ fn blur_cell(id: vec3u, index: u32, wide: bool) {
     var usual = Usual(sum, total, squares, parts);
     var rare = vec3f(0.0);
     let others = (luminance(sum) - brightest.x) / max(total - brightest.y, 1e-30);
-    if radius > 0 && changes[cell].a == 0.0 && brightest.x - others * brightest.y > BLOTCH * others * total {
+    // A cell without others has nobody to be compared with.
+    let alone = total - brightest.y <= 1e-4 * total;
+    if radius > 0 && !alone && changes[cell].a == 0.0 && brightest.x - others * brightest.y > BLOTCH * others * total {
         usual = without_rare(centre, others, total);
         rare = saturate(1.0 - usual.light / max(usual.total * mean, vec3f(1e-30)));
     }

@@ -116,7 +116,7 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
         let to = y - p.x;
         let d2 = max(dot(to, to), 1e-20);
         let l = to * inverseSqrt(d2);
-        let facing = -dot(across, l) * inverseSqrt(max(dot(across, across), 1e-38));
+        let facing = -dot(across, l) * inverseSqrt(max(dot(across, across), 1e-37));
         let n_l = dot(p.n, l);
         if n_l > 0.0 && (facing > 0.0 || ((e.flags & MET_DOUBLE_SIDED) != 0u && facing != 0.0)) {
             let density = e.by_area * gather.inverse_power * d2 / abs(facing);

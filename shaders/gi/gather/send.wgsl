@@ -9,7 +9,7 @@
 
 fn shared_exponent(c: vec3f) -> u32 {
     let most = max(max(c.x, c.y), max(c.z, 1e-9));
-    let exponent = clamp((bitcast<u32>(most) >> 23u) - 110u, 0u, 31u);
+    let exponent = clamp(bitcast<u32>(most) >> 23u, 110u, 141u) - 110u;
     let code = min(vec3u(max(c, vec3f(0.0)) * exp2(24.0 - f32(exponent)) + 0.5), vec3u(511u));
     return code.x | (code.y << 9u) | (code.z << 18u) | (exponent << 27u);
 }

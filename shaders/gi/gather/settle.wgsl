@@ -80,7 +80,7 @@ fn followed(past: Past, gain: f32, rest: vec3f) -> Past {
     now.light = max(gain * past.light + rest, vec3f(0.0));
     now.lately = max(gain * past.lately + rest, vec3f(0.0));
     let l = luminance(past.light);
-    let ratio = select(1.0, luminance(now.light) / l, l > 0.0);
+    let ratio = select(1.0, min(luminance(now.light) / max(l, 1e-30), 1e18), l > 0.0);
     now.vector *= ratio;
     now.square *= ratio * ratio;
     return now;
