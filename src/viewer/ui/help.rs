@@ -53,8 +53,8 @@ fn columns(blocks: Vec<Block>, count: usize) -> Vec<Vec<Block>> {
     let (mut at, mut before) = (0, 0);
     for block in blocks {
         let own = height(&block);
-        // Into the next column where more than half of it would be below the column's end.
-        if before + own / 2 > (at + 1) * all / count && at + 1 < count {
+        // Into the next column where more than two fifths of it would be below the column's end.
+        if before + 3 * own / 5 > (at + 1) * all / count && at + 1 < count {
             at += 1;
         }
         before += own;
@@ -101,12 +101,13 @@ pub fn show(ui: &Ui, state: &mut State) {
 
 fn show_block(ui: &mut Ui, (title, rows): &Block) {
     ui.label(RichText::new(*title).strong().size(14.0));
-    let width = ui.available_width();
+    // As high as text, not as buttons.
+    ui.spacing_mut().interact_size.y = 14.0;
     egui::Grid::new(*title).striped(true).num_columns(2).spacing([8.0, 2.0]).show(ui, |ui| {
         for [key, doc, now] in rows {
             ui.label(RichText::new(key).strong().size(12.0));
             ui.horizontal(|ui| {
-                ui.set_max_width(width - 110.0);
+                ui.spacing_mut().item_spacing.x = 6.0;
                 let text = RichText::new(doc).size(12.0);
                 ui.label(text);
                 if !now.is_empty() {
@@ -133,7 +134,7 @@ mod tests {
             let columns = columns(blocks(&state), count);
             let heights: Vec<usize> = columns.iter().map(|c| c.iter().map(|b| b.1.len() + 2).sum()).collect();
             let (least, most) = (heights.iter().min().unwrap(), heights.iter().max().unwrap());
-            assert!(most - least <= 14, "{heights:?}");
+            assert!(most - least <= 20, "{heights:?}");
         }
     }
 }

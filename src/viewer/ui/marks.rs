@@ -33,13 +33,20 @@ fn waits_for_reference(state: &State, facts: &Facts<'_>) -> bool {
 }
 
 /// Names of the sides, the channel on show.
-pub(super) fn marks(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect) {
+pub(super) fn marks(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect, timing: Option<Rect>) {
     let s = &state.settings;
     let painter = ui.painter().with_clip_rect(rect);
     let [left, right] = [Side::Left, Side::Right].map(|side| name(state, facts, side));
     if s.split && s.view.has_sides() {
         let line = rect.left() + rect.width() * s.line;
-        let y = rect.top() + 8.0;
+        // Below the timing overlay, or at the picture's other end where that leaves no room.
+        let over =
+            timing.filter(|t| t.top() < rect.top() + 50.0 && t.left() < line + 200.0 && t.right() > line - 200.0);
+        let y = match over.map(|t| t.bottom() + 8.0) {
+            None => rect.top() + 8.0,
+            Some(y) if y < rect.center().y => y,
+            Some(_) => rect.bottom() - 44.0,
+        };
         // Reasons stand below the names, so that both fit beside the line.
         let lines = |name: &str| name.replacen(" (", "\n(", 1);
         label(&painter, Pos2::new(line - 8.0, y), Align2::RIGHT_TOP, &lines(&left), false);

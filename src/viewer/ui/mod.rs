@@ -146,12 +146,12 @@ pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
     let rect = pixel_aligned(rect, ui.ctx().pixels_per_point());
     let response = ui.interact(rect, ui.scope_id().with("picture"), Sense::click_and_drag());
     hands::hands(ui, state, memory, &response, rect);
-    marks::marks(ui, state, facts, rect);
     if state.settings.view == View::Error && facts.reference.is_none_or(|r| r.samples > 0) {
         heat::show(ui, state, facts, rect);
     }
     welcome::show(ui, state, memory, facts, rect);
     timing::show(ui, state, memory, facts, rect);
+    marks::marks(ui, state, facts, rect, memory.timing.seen);
     marks::messages(ui, state, rect);
     marks::jobs(ui, state, facts, rect);
     if state.help {

@@ -57,7 +57,10 @@ fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
                 ui.add(egui::Label::new(RichText::new(tail(folder, 40)).weak().small()).truncate())
                     .on_hover_text(&shown.spec);
             }
-            ui.label(format!("{} objects, {triangles} triangles, {} lights", s.instances.len(), s.lights.len()));
+            let count = |n: usize, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
+            let [objects, triangles, lights] =
+                [count(s.instances.len(), "object"), count(triangles, "triangle"), count(s.lights.len(), "light")];
+            ui.label(format!("{objects}, {triangles}, {lights}"));
             if let Some(size) = shown.extent {
                 let [x, y, z] = size.map(length);
                 let told = "width, height and depth; if the file's unit is another than the metre, start with --scale";

@@ -19,7 +19,7 @@ impl<'a> Line<'a> {
 }
 
 /// Width of a number, points.
-const NUMBER: f32 = 58.0;
+const NUMBER: f32 = 54.0;
 
 /// Paints `count` lines; `line` is only asked for those that are seen.
 pub fn table<'a>(ui: &mut Ui, heads: [&str; 2], count: usize, line: impl Fn(usize) -> Line<'a>) {
@@ -40,7 +40,7 @@ pub fn table<'a>(ui: &mut Ui, heads: [&str; 2], count: usize, line: impl Fn(usiz
         cell(column, 0, head.into(), &body, weak);
     }
     // Names end where numbers begin.
-    let limit = Rect::from_min_max(rect.min, Pos2::new(right(0) - NUMBER + 8.0, rect.bottom()));
+    let limit = Rect::from_min_max(rect.min, Pos2::new(right(0) - 40.0, rect.bottom()));
     let named = painter.with_clip_rect(painter.clip_rect().intersect(limit));
     let seen = |y: f32| ((y - rect.top()) / height).max(0.0) as usize;
     for row in seen(clip.top()).max(1)..(seen(clip.bottom()) + 1).min(count + 1) {

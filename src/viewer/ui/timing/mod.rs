@@ -29,12 +29,15 @@ const WIDTH: f32 = 384.0;
 #[derive(Debug, Default)]
 pub struct Look {
     size: Vec2,
+    /// Where it is, if it is to be seen.
+    pub seen: Option<Rect>,
     /// Milliseconds at the graph's top, which follows the frames, but not each of them.
     top: f32,
 }
 
 /// Draws it over the picture at `rect`.
 pub fn show(ui: &Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>, rect: Rect) {
+    memory.timing.seen = None;
     if !state.settings.timing.shown || rect.width() < 120.0 || rect.height() < 60.0 {
         return;
     }
@@ -62,6 +65,7 @@ pub fn show(ui: &Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>, 
     });
     let response = shown.response;
     memory.timing.size = response.rect.size();
+    memory.timing.seen = Some(response.rect);
     memory.place("timing", &response);
     if response.dragged() {
         ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
@@ -183,7 +187,8 @@ fn whole(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>,
     let run = &facts.times.run;
     let [w, h] = run.size;
     let count = main(facts).2.map_or(0, |s| s.count);
-    let of = format!("{} · {w}×{h} · median of {count} frames", run.method);
+    let frames = if count == 1 { "frame" } else { "frames" };
+    let of = format!("{} · {w}×{h} · median of {count} {frames}", run.method);
     ui.add(egui::Label::new(RichText::new(of).size(12.0).color(WEAK)).truncate());
     if facts.software {
         let told = "Software rendering: images are correct, timings are not representative.";
