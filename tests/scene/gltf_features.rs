@@ -223,7 +223,7 @@ fn broken_textures_are_named_and_replaced() {
     for (image, word) in [
         (json!({"uri": "not%20here.png"}), "not here.png"),
         (json!({"uri": "data:image/png;base64,AAAA"}), "decoded"),
-        (json!({"uri": "data:image/png,AAAA"}), "base64"),
+        (json!({"uri": "data:image/png,AAAA"}), "decoded"),
         (json!({"bufferView": 2, "mimeType": "image/png"}), "decoded"),
     ] {
         glb.json["images"] = json!([image]);
