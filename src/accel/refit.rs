@@ -26,11 +26,10 @@ pub(super) struct Refit {
 impl Refit {
     /// Of `blocks` that begin at block `root` of the texture.
     pub fn new(blocks: &[Block], root: u32, triangles: Vec<[u32; 3]>, surfaces: Vec<surfaces::Surface>) -> Self {
-        let leaf = |b: &Block| b[3] & NODE == 0 && b.iter().any(|w| *w != 0);
-        let holds = |b: &Block| b[3] & NODE != 0 || leaf(b);
+        let holds = |b: &Block| b[3] & NODE != 0 || wide::is_leaf(b);
         let held = |b: &Block| {
             if b[3] & NODE == 0 {
-                return u8::from(leaf(b));
+                return u8::from(wide::is_leaf(b));
             }
             let first = ((b[3] & !NODE) - root) as usize;
             (0..8).map(|i| u8::from(holds(&blocks[first + i])) << i).sum()

@@ -6,7 +6,7 @@ use super::gpu::ROW;
 use super::image::Reductions;
 use super::refit::Refit;
 use super::wide::{Block, NODE, WORDS};
-use super::{Accel, AccelError, build, cutout, surfaces, threads};
+use super::{Accel, AccelError, build, cutout, surfaces, threads, wide};
 use crate::scene::deform::{Deform, Joint, Vertices};
 use crate::scene::{Instance, Material, Mesh, Scene, octahedral::octahedral_word};
 use glam::Vec3;
@@ -325,7 +325,7 @@ fn moved(block: &Block, root: u32, surfaces: &[surfaces::Surface], number: impl 
     let mut block = *block;
     if block[3] & NODE != 0 {
         block[3] += root;
-    } else if block.iter().any(|w| *w != 0) {
+    } else if wide::is_leaf(&block) {
         for at in [7, 11] {
             block[at] = block[at] & 0xff00_0000 | number(block[at] & 0x00ff_ffff);
         }
@@ -338,7 +338,7 @@ fn moved(block: &Block, root: u32, surfaces: &[surfaces::Surface], number: impl 
 /// Corners of all that is in a tree; `None` for an empty one.
 fn bounds(accel: &Accel) -> Option<(Vec3, Vec3)> {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for block in accel.blocks.iter().filter(|b| b[3] & NODE == 0 && b.iter().any(|w| *w != 0)) {
+    for block in accel.blocks.iter().filter(|b| wide::is_leaf(b)) {
         for corner in block.chunks_exact(4) {
             let p = Vec3::new(f32::from_bits(corner[0]), f32::from_bits(corner[1]), f32::from_bits(corner[2]));
             (low, high) = (low.min(p), high.max(p));

@@ -37,6 +37,11 @@ pub(crate) const NOTHING: Block = {
     block
 };
 
+/// Whether a block is a leaf with triangles, or an instance; no node, no empty place, no mere room.
+pub(crate) fn is_leaf(block: &Block) -> bool {
+    block[3] & NODE == 0 && *block != NOTHING && *block != [0; WORDS]
+}
+
 /// Marks a node.
 pub(crate) const NODE: u32 = 1 << 31;
 

@@ -46,15 +46,15 @@ impl Tracer {
             let usage = usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
             gpu.device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
         };
-        let uniform = make(size_of::<Job>() as u64, wgpu::BufferUsages::UNIFORM);
-        gpu.queue.write_buffer(&uniform, 0, bytemuck::bytes_of(&job));
+        let job_buffer = make(size_of::<Job>() as u64, wgpu::BufferUsages::STORAGE);
+        gpu.queue.write_buffer(&job_buffer, 0, bytemuck::bytes_of(&job));
         let points = make(16, wgpu::BufferUsages::STORAGE);
         let film = make(256 * u64::from(count), wgpu::BufferUsages::STORAGE);
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &job::film_layout(&gpu.device),
             entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 0, resource: job_buffer.as_entire_binding() },
                 wgpu::BindGroupEntry { binding: 1, resource: points.as_entire_binding() },
                 wgpu::BindGroupEntry { binding: 2, resource: film.as_entire_binding() },
             ],

@@ -66,7 +66,7 @@ impl Lab {
             let usage = usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
             device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
         };
-        let uniform = buffer(size_of::<Job>() as u64, wgpu::BufferUsages::UNIFORM);
+        let job_buffer = buffer(size_of::<Job>() as u64, wgpu::BufferUsages::STORAGE);
         let list = buffer(8 * points.len() as u64, wgpu::BufferUsages::STORAGE);
         queue.write_buffer(&list, 0, bytemuck::cast_slice(points));
         let job = options.job(camera, size);
@@ -76,7 +76,7 @@ impl Lab {
             let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: None,
                 layout: &job::film_layout(device),
-                entries: &[entry(0, &uniform), entry(1, &list), entry(2, &film)],
+                entries: &[entry(0, &job_buffer), entry(1, &list), entry(2, &film)],
             });
             // Dispatches of about a million samples, so that no watchdog minds.
             let step = ((1 << 20) / points.len() as u32).clamp(1, options.samples.min(16));
@@ -88,7 +88,7 @@ impl Lab {
                     point_count: points.len() as u32,
                     ..job
                 };
-                queue.write_buffer(&uniform, 0, bytemuck::bytes_of(&job));
+                queue.write_buffer(&job_buffer, 0, bytemuck::bytes_of(&job));
                 let mut encoder = device.create_command_encoder(&Default::default());
                 {
                     let mut pass = encoder.begin_compute_pass(&Default::default());

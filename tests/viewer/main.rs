@@ -48,17 +48,17 @@ fn backdrops_and_coarse_motion() {
     }
     // There and back: what rests is whole again.
     script.extend([
-        json!({ "drag": [[240, 150], [250, 150], [240, 150]] }),
+        json!({ "drag": [[120, 75], [125, 75], [120, 75]] }),
         json!({ "screenshot": "moving.png" }),
         json!({ "wait": "idle" }),
         json!({ "key": "C" }),
         json!({ "wait": "idle" }),
         json!({ "screenshot": "rests.png" }),
     ]);
-    let arguments = ["interior", "--method", "gather", "--size", "960x600"];
+    let arguments = ["interior", "--method", "gather", "--size", "480x300"];
     succeeds(&session(&display, dir.path(), json!(script), &arguments));
     // Below is what the window tells of the line that was copied, for a while.
-    let all = |name: &str| mean(&dir.path().join(name), 0..960, 0..560);
+    let all = |name: &str| mean(&dir.path().join(name), 0..480, 0..260);
     let apart = |a: &str, b: &str| (0..3).map(|c| (all(a)[c] - all(b)[c]).abs()).fold(0.0, f64::max);
     assert!(apart("shown.png", "rests.png") < 0.5, "{:?} {:?}", all("shown.png"), all("rests.png"));
     assert!(apart("shown.png", "moving.png") < 8.0, "{:?} {:?}", all("shown.png"), all("moving.png"));
