@@ -141,7 +141,7 @@ impl Accel {
 
     /// Leaves that hold a triangle or two; what fills its box badly stands in several.
     pub fn leaf_count(&self) -> usize {
-        self.blocks.iter().filter(|b| b[3] & wide::NODE == 0 && b.iter().any(|w| *w != 0)).count()
+        self.blocks.iter().filter(|b| wide::is_leaf(b)).count()
     }
 
     /// Triangles that can be hit.

@@ -48,7 +48,7 @@ fn backdrops_and_coarse_motion() {
     }
     // There and back: what rests is whole again.
     script.extend([
-        json!({ "drag": [[120, 75], [125, 75], [120, 75]] }),
+        json!({ "drag": [[120, 75], [130, 75], [120, 75]] }),
         json!({ "screenshot": "moving.png" }),
         json!({ "wait": "idle" }),
         json!({ "key": "C" }),
