@@ -351,7 +351,9 @@ fn a_spot_without_its_cone_is_the_default_one() {
         load(glb).lights[0].kind
     };
     let given = lit(&mut glb, json!({"type": "spot", "spot": {}}));
-    assert!(matches!(given, LightKind::Spot { outer_angle, .. } if (outer_angle - 0.785_398).abs() < 1e-5));
+    assert!(
+        matches!(given, LightKind::Spot { outer_angle, .. } if (outer_angle - std::f32::consts::FRAC_PI_4).abs() < 1e-5)
+    );
     assert_eq!(lit(&mut glb, json!({"type": "spot"})), given);
     assert_ne!(lit(&mut glb, json!({"type": "spot", "spot": {"outerConeAngle": 0.5}})), given);
 }

@@ -310,7 +310,7 @@ fn map_coordinates_keep_their_digits() {
         let c = corners(scene);
         [(c[1][0] - c[0][0]), (c[2][1] - c[1][1])]
     };
-    let far = load(&square(500_123.4375, 4_649_776.0625), "");
+    let far = load(&square(500_123.437_5, 4_649_776.062_5), "");
     assert_eq!(sides(&far), [0.125; 2]);
     assert!(warned(&far, &["far from the file's origin", "(500123, 4649776, 0)"]), "{:?}", far.warnings);
     // Negative controls: near ones stay, and so does what reaches as far as it is away.
