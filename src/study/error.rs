@@ -25,7 +25,6 @@ pub enum DatasetError {
 }
 
 /// Why a trial failed.
-#[cfg(all(feature = "io", feature = "reference"))]
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum TrialError {

@@ -7,6 +7,7 @@ mod changes;
 pub mod chart;
 #[cfg(feature = "reference")]
 pub mod count;
+#[cfg(all(feature = "io", feature = "reference"))]
 mod error;
 #[cfg(all(feature = "io", feature = "reference"))]
 pub mod fit;

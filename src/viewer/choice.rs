@@ -63,7 +63,8 @@ impl View {
         View::Wireframe,
     ];
 
-    /// Name in lists, scripts and saved state.
+    /// Name in scripts.
+    #[cfg(any(test, feature = "script"))]
     pub fn name(self) -> &'static str {
         [
             "picture",

@@ -41,6 +41,7 @@ impl History {
     }
 
     /// How many steps can be taken back, and made again.
+    #[cfg(any(test, feature = "script"))]
     pub fn len(&self) -> [usize; 2] {
         [self.past.len(), self.future.len()]
     }
