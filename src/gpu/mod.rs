@@ -16,6 +16,5 @@ pub(crate) mod shared;
 pub(crate) mod tape;
 pub mod timing;
 
-#[cfg(feature = "io")]
 pub(crate) use choose::is_software;
 pub use choose::{Backend, Gpu, GpuError, GpuOptions, candidates, wanted_features};

@@ -1,10 +1,8 @@
-//! What a driver gets wrong, found by trying it. For `bouncelight doctor`: the passes themselves are
+//! What a driver gets wrong, found by trying it where that can be tried. For `bouncelight doctor`: the passes themselves are
 //! written so that neither fault harms a picture.
 
 use super::readback::{self, ReadbackError};
-use super::{Gpu, bind, shaders};
-use std::time::{Duration, Instant};
-use wgpu::util::DeviceExt;
+use super::{Gpu, shaders};
 
 /// A fault of a driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,13 +40,13 @@ impl DriverFault {
     }
 }
 
-/// The faults of `gpu`'s driver. Submits and waits, a quarter of a second at most.
+/// The faults of `gpu`'s driver. Submits and waits.
 ///
 /// # Errors
 /// [`ReadbackError`] when the device is lost meanwhile.
 pub fn driver_faults(gpu: &Gpu) -> Result<Vec<DriverFault>, ReadbackError> {
     let mut faults = Vec::new();
-    if recompiles(gpu)? {
+    if recompiles(&gpu.info) {
         faults.push(DriverFault::Recompiles);
     }
     if !still_coordinates_are_finite(gpu)? {
@@ -57,52 +55,10 @@ pub fn driver_faults(gpu: &Gpu) -> Result<Vec<DriverFault>, ReadbackError> {
     Ok(faults)
 }
 
-/// Dispatches of each kind that are timed.
-const DISPATCHES: u32 = 12;
-/// A dispatch of next to nothing takes a fraction of this, compiling the smallest shader as long.
-const COMPILED: Duration = Duration::from_micros(1500);
-
-/// Times dispatches of a shader that a uniform leads, each time to another value, beside those of one
-/// that does the same unasked.
-fn recompiles(gpu: &Gpu) -> Result<bool, ReadbackError> {
-    let device = &gpu.device;
-    let module = shaders::module(device, "probe.branch");
-    let types = [wgpu::BufferBindingType::Uniform, wgpu::BufferBindingType::Storage { read_only: false }]
-        .map(|ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None });
-    let mut binder = bind::Binder::new(device, "probe.branch", &types);
-    let buffer = |usage| {
-        let descriptor = wgpu::util::BufferInitDescriptor { label: Some("probe.branch"), contents: &[0; 16], usage };
-        device.create_buffer_init(&descriptor)
-    };
-    let step = buffer(wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
-    let state = buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
-    let group = binder.group([(&step).into(), (&state).into()]);
-    let typical = |entry: &str| -> Result<Duration, ReadbackError> {
-        let pipeline = bind::pipeline(device, "probe.branch", &module, entry, &[binder.layout()]);
-        let mut times = Vec::new();
-        for number in 0..DISPATCHES {
-            gpu.queue.write_buffer(&step, 0, &(number + 1).to_le_bytes());
-            let mut encoder = device.create_command_encoder(&Default::default());
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(1, 1, 1);
-            drop(pass);
-            let begun = Instant::now();
-            gpu.queue.submit([encoder.finish()]);
-            readback::buffer(device, &gpu.queue, &state, 0, 4)?;
-            times.push(begun.elapsed());
-        }
-        Ok(median(times))
-    };
-    let (unasked, asked) = (typical("straight")?, typical("branch")?);
-    tracing::debug!("a dispatch takes {unasked:?}, where a uniform leads it {asked:?}");
-    Ok(asked > COMPILED.max(3 * unasked))
-}
-
-fn median(mut times: Vec<Duration>) -> Duration {
-    times.sort();
-    times[times.len() / 2]
+/// By its version: what it compiles again its cache on disk may answer, so no clock tells.
+fn recompiles(info: &wgpu::AdapterInfo) -> bool {
+    let version = info.driver_info.split("Mesa ").nth(1).and_then(|rest| rest.split('.').next()?.parse::<u32>().ok());
+    super::is_software(info) && version.is_some_and(|major| major < 23)
 }
 
 fn still_coordinates_are_finite(gpu: &Gpu) -> Result<bool, ReadbackError> {
@@ -188,4 +144,21 @@ fn still_coordinates_are_finite(gpu: &Gpu) -> Result<bool, ReadbackError> {
     let bytes = readback::texture(device, &gpu.queue, &target)?;
     let values: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes);
     Ok(values.iter().all(|v| v.is_finite()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn old_mesa_on_the_cpu_is_known() {
+        let known = |name: &str, version: &str| {
+            let mut info = wgpu::AdapterInfo::new(wgpu::DeviceType::Cpu, wgpu::Backend::Vulkan);
+            (info.name, info.driver_info) = (name.into(), version.into());
+            recompiles(&info)
+        };
+        assert!(known("llvmpipe (LLVM 15.0.6, 256 bits)", "Mesa 22.3.6 (LLVM 15.0.6)"));
+        assert!(!known("llvmpipe (LLVM 15.0.6, 256 bits)", "Mesa 25.0.7-2~bpo12+1 (LLVM 15.0.6)"));
+        assert!(!known("SwiftShader Device", ""));
+    }
 }

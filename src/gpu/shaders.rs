@@ -47,7 +47,6 @@ const FILES: &[(&str, &str)] = &[
     ("gi.features", "gi/features.wgsl"),
     ("reference.path", "reference/path.wgsl"),
     ("reference.first_hit", "reference/first_hit.wgsl"),
-    ("probe.branch", "probe/branch.wgsl"),
     ("probe.still", "probe/still.wgsl"),
     ("viewer.sum", "viewer/sum.wgsl"),
     ("viewer.flicker", "viewer/flicker.wgsl"),
