@@ -95,7 +95,7 @@ mod tests {
             scene.meshes = vec![crate::scene::Mesh { colors, ..Default::default() }];
             veils(&scene)[0]
         };
-        assert!(coloured(&[], [0.25; 4]) && coloured(&[255], [0.5; 4]) && coloured(&[], [0.0, 0.1, 0.5, 1.0]));
+        assert!(coloured(&[], [0.25; 4]) && coloured(&[255], [0.5; 4]) && coloured(&[], [0.0, 0.3, 0.6, 0.9]));
         assert!(!coloured(&[], [1.0; 4]) && !coloured(&[], [1.0, 1.0, 1.0, 0.0]));
         // Masks are cut-outs whatever they hold.
         assert!(!veils(&scene(&[100, 120], 0.5, AlphaMode::Mask { cutoff: 0.2 }))[0]);
