@@ -34,7 +34,10 @@ fn record(at: u32) {
 // if it may claim an entry, `to` its record.
 fn send(at: u32, x: vec3f, n: vec3f, d: vec3f, query: u32, ray: u32, to: u32) {
     set_out(at, x, d, max(dot(n, d), 1e-4), above(x), query, ray, vec3f(1.0), to);
-    if gather.emitter_count > 0u && (gather.flags & GATHER_STANDS_IN) == 0u {
+    // The list's length is asked, too, and no `&&`, which is a branch of its own: Mesa's CPU driver
+    // before 23 compiles what uniforms alone branch on anew for each dispatch.
+    let glowing = min(gather.emitter_count, arrayLength(&emitters)) > 0u;
+    if glowing & ((gather.flags & GATHER_STANDS_IN) == 0u) {
         let seed = pcg3(vec3u(ray, gather.round, 0x51ed270bu));
         // Of an even white surface without gloss.
         let chosen = choose_light(Place(x, n, n, vec3f(1.0), vec3f(0.0), 1.0), false, seed);
