@@ -41,11 +41,12 @@ const WITHIN: [&str; 6] = ["green", "blue", "rough_use", "normal_use", "occlusio
 fn rows() -> Vec<(&'static str, Layout)> {
     use crate::accel::{EmitterGpu, HitGpu, RayGpu};
     use crate::gi::{exposure::Exposure, gather, inputs::Params, world::sample::Sample};
+    use crate::gpu_scene::{DeformGpu, MaterialGpu, TextureUse};
+    use crate::lights::LightGpu;
     use crate::net::gpu::build::StepUniform;
     use crate::reference::Job;
     use crate::reference::scene::{ImageUse, RefMaterial, SceneInfo};
     use crate::render::{light_choice::LightShadowGpu, shadow::ShadowViewGpu, taa::Blend, tonemap, view::FrameUniform};
-    use crate::scene::upload::{DeformGpu, LightGpu, MaterialGpu, TextureUse};
     use crate::viewer::show::ShowUniform;
     vec![
         row!("Frame", FrameUniform =>

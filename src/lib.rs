@@ -4,14 +4,15 @@
 //! ```text
 //!  file or name        GPU, one command encoder a frame (render/frame.rs tells it in order)
 //!  ───────────         ─────────────────────────────────────────────────────────────────────
-//!  scene::load ──► scene::upload ──► shadow ──► gbuffer ──► direct ──► gi ──► composite ──► tonemap
+//!  scene::load ──► gpu_scene     ──► shadow ──► gbuffer ──► direct ──► gi ──► composite ──► tonemap
 //!                                                  │           │        ▲                     │
 //!                                                  └───────────┴► pack ─┤                     ▼
 //!  net::format ──► net::graph ──► net::plan ──► net::gpu ── U-Net ──────┘            image_io, viewer
 //! ```
 //!
 //! Module map, in the direction of the data:
-//! - [`scene`]: what is drawn, without any wgpu type except in `scene::upload`.
+//! - [`scene`]: what is drawn, without any wgpu type.
+//! - [`gpu_scene`]: the same on the GPU; [`lights`]: lights and surroundings as shaders read them.
 //! - [`accel`]: triangles in trees, on the CPU and the GPU, and what rays hit of them.
 //! - [`gpu`]: device choice, shader sources, readback, pass timing.
 //! - [`render`]: the rasteriser, one file a pass.
@@ -31,11 +32,13 @@ pub mod accel;
 pub mod export;
 pub mod gi;
 pub mod gpu;
+pub mod gpu_scene;
 #[cfg(feature = "io")]
 pub mod image_io;
 // With all shaders there are, the viewer's included.
 #[cfg(all(test, feature = "viewer"))]
 mod layouts;
+pub mod lights;
 pub mod metrics;
 pub mod net;
 mod numbers;

@@ -8,11 +8,12 @@ mod common;
 
 use bouncelight::gi::Method;
 use bouncelight::gpu::timing::Recorder;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::net::format::Weights;
 use bouncelight::reference::{Kernel, ReferenceScene, Subject, Tracer, TracerOptions};
 use bouncelight::render::shadow::ShadowOptions;
 use bouncelight::render::{Renderer, RendererOptions, View, sampling};
-use bouncelight::scene::{self, upload::SceneGpu};
+use bouncelight::scene;
 
 const MIB: u64 = 1 << 20;
 

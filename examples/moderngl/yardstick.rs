@@ -8,8 +8,9 @@
 use bouncelight::gi::Neural;
 use bouncelight::gi::{CameraMatrices, Conventions, Depth, Inputs, Lights, Method, Rays, method};
 use bouncelight::gpu::{Gpu, GpuOptions, readback, timing::Recorder};
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::net::format::Weights;
-use bouncelight::scene::{self, upload::SceneGpu};
+use bouncelight::scene;
 use bouncelight::wgpu::{self, TextureFormat as F};
 use std::error::Error;
 use std::path::Path;

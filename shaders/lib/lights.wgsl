@@ -1,4 +1,4 @@
-// Analytic lights; in Rust `scene::upload::LightGpu`.
+// Analytic lights; in Rust `lights::LightGpu`.
 
 const LIGHT_SUN: u32 = 0u;
 const LIGHT_POINT: u32 = 1u;

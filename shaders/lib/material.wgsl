@@ -1,4 +1,4 @@
-// A material and its textures; in Rust `scene::upload::MaterialGpu`. Bind group 1 of the geometry
+// A material and its textures; in Rust `gpu_scene::MaterialGpu`. Bind group 1 of the geometry
 // passes.
 
 struct TextureUse {

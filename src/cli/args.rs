@@ -2,15 +2,13 @@
 
 use super::error::CliError;
 pub use crate::gi::name::MethodName;
-use crate::{
-    gi::{Method, Neural},
-    gpu::{Backend, Gpu, GpuOptions},
-    net::{format::Weights, plan::Precision},
-    scene::{
-        LoadOptions,
-        units::{Units, Up},
-        upload::TextureMemory,
-    },
+use crate::gi::{Method, Neural};
+use crate::gpu::{Backend, Gpu, GpuOptions};
+use crate::gpu_scene::TextureMemory;
+use crate::net::{format::Weights, plan::Precision};
+use crate::scene::{
+    LoadOptions,
+    units::{Units, Up},
 };
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};

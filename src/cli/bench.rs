@@ -7,17 +7,15 @@ use super::{
     error::CliError,
     scene_args::SceneArgs,
 };
-use crate::{
-    gi::Method,
-    gpu::Gpu,
-    render::{DrawnCount, Renderer, RendererOptions, cull::Count},
-    scene::upload::SceneGpu,
-    study::{
-        bench::{BenchOptions, Measurement, measure},
-        count,
-        layers::Layers,
-        projection::{self, Cost, EFFICIENCY, GTX_1050},
-    },
+use crate::gi::Method;
+use crate::gpu::Gpu;
+use crate::gpu_scene::SceneGpu;
+use crate::render::{DrawnCount, Renderer, RendererOptions, cull::Count};
+use crate::study::{
+    bench::{BenchOptions, Measurement, measure},
+    count,
+    layers::Layers,
+    projection::{self, Cost, EFFICIENCY, GTX_1050},
 };
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};

@@ -2,20 +2,18 @@
 //! timing table.
 
 use super::{args::Global, interrupt, progress::Progress, stdout::say};
-use crate::{
-    cli::error::CliError,
-    gi::Method,
-    gpu::Gpu,
-    image_io,
-    net::format::Weights,
-    render::{
-        Renderer, RendererOptions,
-        capture::{CaptureOptions, capture_with},
-        tonemap_curve::Tonemap,
-    },
-    scene::{self, upload::SceneGpu},
-    study::bench::{BenchOptions, measure},
+use crate::cli::error::CliError;
+use crate::gi::Method;
+use crate::gpu::Gpu;
+use crate::gpu_scene::SceneGpu;
+use crate::net::format::Weights;
+use crate::render::{
+    Renderer, RendererOptions,
+    capture::{CaptureOptions, capture_with},
+    tonemap_curve::Tonemap,
 };
+use crate::study::bench::{BenchOptions, measure};
+use crate::{image_io, scene};
 use anyhow::Result;
 use std::path::{Path, PathBuf};
 

@@ -4,7 +4,7 @@ use super::args::Global;
 use super::stdout::say;
 use crate::gpu::probe::driver_faults;
 use crate::gpu::{self, Gpu};
-use crate::scene::upload::TextureMemory;
+use crate::gpu_scene::TextureMemory;
 use anyhow::Result;
 use serde_json::json;
 

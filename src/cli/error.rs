@@ -1,15 +1,14 @@
 //! Exit codes: every error that reaches `main` is sorted here, once.
 
-use crate::{
-    accel::AccelError,
-    export::ExportError,
-    gi::{GiError, fitted::FittedError},
-    gpu::GpuError,
-    net::{convert::ConvertError, format::WeightsError, pictures::PicturesError},
-    reference::PackError,
-    render::RenderError,
-    scene::{SceneError, environment::EnvironmentError, upload::UploadError},
-};
+use crate::accel::AccelError;
+use crate::export::ExportError;
+use crate::gi::{GiError, fitted::FittedError};
+use crate::gpu::GpuError;
+use crate::gpu_scene::UploadError;
+use crate::net::{convert::ConvertError, format::WeightsError, pictures::PicturesError};
+use crate::reference::PackError;
+use crate::render::RenderError;
+use crate::scene::{SceneError, environment::EnvironmentError};
 use thiserror::Error;
 
 /// Something went wrong while running.

@@ -12,19 +12,15 @@ use super::{
     sequence,
     showing::Showing,
 };
-use crate::{
-    gi::{Method, Neural, gather},
-    gpu::Gpu,
-    image_io,
-    render::{
-        Backdrop, Blending, Renderer, RendererOptions,
-        capture::{CaptureOptions, Layer, Picture, capture_with},
-    },
-    scene::{
-        Camera, Scene,
-        upload::{SceneGpu, TextureMemory, UploadError},
-    },
+use crate::gi::{Method, Neural, gather};
+use crate::gpu::Gpu;
+use crate::gpu_scene::{SceneGpu, TextureMemory, UploadError};
+use crate::image_io;
+use crate::render::{
+    Backdrop, Blending, Renderer, RendererOptions,
+    capture::{CaptureOptions, Layer, Picture, capture_with},
 };
+use crate::scene::{Camera, Scene};
 use anyhow::Result;
 use std::path::PathBuf;
 

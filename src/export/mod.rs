@@ -18,7 +18,8 @@ pub use package::{Package, check_folder};
 use crate::accel::AccelError;
 use crate::gi::{GiError, Method};
 use crate::gpu::readback::ReadbackError;
-use crate::scene::{Scene, upload::UploadError};
+use crate::gpu_scene::UploadError;
+use crate::scene::Scene;
 use std::path::PathBuf;
 use thiserror::Error;
 

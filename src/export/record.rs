@@ -6,8 +6,9 @@ use crate::gi::{CameraMatrices, Inputs, Lights, Method, Outputs, Rays, method};
 use crate::gpu::bind::Bound;
 use crate::gpu::tape::{Dispatch, Running};
 use crate::gpu::{readback, timing::Recorder};
+use crate::gpu_scene::SceneGpu;
 use crate::net::gpu::{Permutation, Source, Variant};
-use crate::scene::{Scene, upload::SceneGpu};
+use crate::scene::Scene;
 
 /// Frames that are recorded: methods are at rest well before.
 pub(super) const FRAMES: usize = 64;

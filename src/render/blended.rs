@@ -5,7 +5,7 @@ use super::targets::Targets;
 use super::tool;
 use super::view::View;
 use crate::gpu::{shaders, tape, timing::Recorder};
-use crate::scene::upload::{Draw, SceneGpu, attribute_layouts, material_layout};
+use crate::gpu_scene::{Draw, SceneGpu, attribute_layouts, material_layout};
 use glam::Vec3;
 
 /// How veils are drawn: panes, smoke and whatever else covers a share of what is behind (glTF's

@@ -5,8 +5,8 @@ use super::decode::Decoder;
 use super::view::View;
 use super::{Purpose, RenderError, Renderer, sampling};
 use crate::gpu::{Gpu, timing::Recorder};
+use crate::gpu_scene::SceneGpu;
 use crate::scene::Camera;
-use crate::scene::upload::SceneGpu;
 
 /// Layers beside the picture. Names and meanings are those of Blender's passes:
 /// picture = DiffCol · (DiffDir + DiffInd) + GlossCol · (GlossDir + GlossInd) + Emit + background.

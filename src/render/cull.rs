@@ -5,7 +5,7 @@
 //! of the pyramid or box that is seen. Between a light and what it shines on nothing is cut away: a
 //! map's volume begins at the lamp, or at the top of the scene for a sun.
 
-use crate::scene::upload::{Bounds, Draw, SceneGpu};
+use crate::gpu_scene::{Bounds, Draw, SceneGpu};
 use glam::{Mat4, Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;

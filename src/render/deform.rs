@@ -8,7 +8,7 @@
 
 use super::tool;
 use crate::gpu::timing::Recorder;
-use crate::scene::upload::{DeformGpu, SceneGpu};
+use crate::gpu_scene::{DeformGpu, SceneGpu};
 
 /// Threads of a workgroup.
 const GROUP: u32 = 64;
@@ -74,7 +74,7 @@ impl DeformPass {
             for which in 0..1 + usize::from(self.moving) {
                 pass.set_pipeline(&self.pipelines[which]);
                 for (i, count) in (0u64..).zip(&shapes.counts) {
-                    let offset = (i * crate::scene::upload::DEFORM_STRIDE) as u32;
+                    let offset = (i * crate::gpu_scene::DEFORM_STRIDE) as u32;
                     pass.set_bind_group(0, &bound.groups[which], &[offset]);
                     pass.dispatch_workgroups(count.div_ceil(GROUP), 1, 1);
                 }

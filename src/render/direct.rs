@@ -5,7 +5,7 @@ use super::shadow::ShadowMaps;
 use super::targets::Targets;
 use super::tool;
 use crate::gpu::timing::Recorder;
-use crate::scene::upload::SceneGpu;
+use crate::gpu_scene::SceneGpu;
 
 /// Lambert and GGX under every light, with soft shadows.
 pub struct DirectPass {

@@ -24,9 +24,9 @@ use crate::gi::{
 };
 use crate::gpu::shared::Shared;
 use crate::gpu::timing::Recorder;
+use crate::gpu_scene::SceneGpu;
 use crate::net::gpu::Tap;
 use crate::net::plan::Plan;
-use crate::scene::upload::SceneGpu;
 
 /// How a [`Renderer`] is made.
 #[derive(Debug, Clone, Default)]

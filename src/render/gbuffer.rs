@@ -32,7 +32,7 @@ use super::targets::Targets;
 use super::tool;
 use super::view::View;
 use crate::gpu::{shaders, tape, timing::Recorder};
-use crate::scene::upload::{Draw, SceneGpu, material_layout, motion_layouts};
+use crate::gpu_scene::{Draw, SceneGpu, material_layout, motion_layouts};
 use glam::{Vec3, Vec4};
 
 /// What [`GbufferPass`] draws.

@@ -4,7 +4,7 @@ use super::targets::Targets;
 use super::view::View;
 use crate::gi;
 use crate::gpu::timing::Recorder;
-use crate::scene::upload::SceneGpu;
+use crate::gpu_scene::SceneGpu;
 
 /// What a GI method reads of a frame in `targets`.
 pub(super) fn gi_inputs<'a>(

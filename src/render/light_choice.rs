@@ -7,7 +7,8 @@
 //! are not known: a lamp behind one counts for what it would give.
 
 use super::view::View;
-use crate::scene::upload::{Bounds, LightGpu};
+use crate::gpu_scene::Bounds;
+use crate::lights::LightGpu;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 

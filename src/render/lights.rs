@@ -5,7 +5,7 @@ use super::shadow::ShadowMaps;
 use super::targets::Targets;
 use super::tool;
 use crate::gpu::timing::Recorder;
-use crate::scene::upload::SceneGpu;
+use crate::gpu_scene::SceneGpu;
 
 /// Side of a tile, pixels; `TILE` in `shaders/lib/light_list.wgsl`.
 const TILE: u32 = 16;

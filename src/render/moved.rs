@@ -7,7 +7,7 @@
 //! mirrored transform, another material) and slots then change hands. While nothing moves nothing
 //! is written: the rows of this frame are those of the one before.
 
-use crate::scene::upload::{Rows, SceneGpu};
+use crate::gpu_scene::{Rows, SceneGpu};
 
 /// A renderer's memory of placements. The first frame of a scene knows none: nothing moves in it.
 #[derive(Default)]
@@ -45,7 +45,7 @@ impl Moved {
     }
 
     /// The rows before this frame's: for the last slot of
-    /// [`motion_layouts`](crate::scene::upload::motion_layouts).
+    /// [`motion_layouts`](crate::gpu_scene::motion_layouts).
     pub fn before<'a>(&'a self, scene: &'a SceneGpu) -> &'a wgpu::Buffer {
         self.buffer.as_ref().filter(|_| self.is_moving(scene)).unwrap_or(&scene.instances)
     }

@@ -15,7 +15,7 @@ pub use super::shadow_maps::{MAX_LOCAL_LAYERS, MAX_SUNS, ShadowMaps, ShadowOptio
 pub use super::shadow_view::ShadowViewGpu;
 use super::tool;
 use crate::gpu::{shaders, shared, tape, timing::Recorder};
-use crate::scene::upload::{SceneGpu, attribute_layouts, material_layout, position_layouts};
+use crate::gpu_scene::{SceneGpu, attribute_layouts, material_layout, position_layouts};
 
 /// Draws depth from the lights.
 pub struct ShadowPass {

@@ -1,7 +1,7 @@
 //! What a shadow map was drawn of, so that it stays as it is while a new one would hold the same.
 
 use super::cull::{Count, Volume};
-use crate::scene::upload::SceneGpu;
+use crate::gpu_scene::SceneGpu;
 
 /// All that a map depends on: who saw what, and which lots were drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]

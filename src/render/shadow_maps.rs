@@ -6,7 +6,8 @@ use super::shadow_sun::{self, Stage};
 use super::shadow_view::ShadowViewGpu;
 use super::view::View;
 use super::{cull::Volume, shadow_local};
-use crate::scene::upload::{LightGpu, SceneGpu, fits_one_map};
+use crate::gpu_scene::SceneGpu;
+use crate::lights::{LightGpu, fits_one_map};
 use crate::scene::{Light, LightKind};
 use glam::Vec3;
 

@@ -5,7 +5,7 @@
 
 use super::shadow_view::ShadowViewGpu;
 use super::view::View;
-use crate::scene::upload::Bounds;
+use crate::gpu_scene::Bounds;
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
 /// Texels that a map keeps free around what it covers, for the filter's reach.

@@ -19,7 +19,7 @@ use super::targets::{Target, Targets};
 use super::tool;
 use super::view::View;
 use crate::gpu::timing::Recorder;
-use crate::scene::upload::SceneGpu;
+use crate::gpu_scene::SceneGpu;
 
 /// What history is worth in a frame; `mode` in the shader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,8 +6,6 @@
 //! lm/W at the border. Nothing here knows wgpu except [`upload`], which turns a [`Scene`] into GPU
 //! buffers.
 
-pub mod upload;
-
 pub mod bounds;
 #[cfg(feature = "io")]
 pub mod bundled;

@@ -1,15 +1,14 @@
 //! Time and memory of one method: GPU milliseconds per pass from timestamps, synchronised wall
 //! clock beside them.
 
-use crate::{
-    gpu::{
-        Gpu,
-        timing::{self, Recorder},
-    },
-    render::{DrawnCount, RenderError, Renderer, View},
-    scene::{Camera, upload::SceneGpu},
-    study::projection::{Cost, is_indirect},
+use crate::gpu::{
+    Gpu,
+    timing::{self, Recorder},
 };
+use crate::gpu_scene::SceneGpu;
+use crate::render::{DrawnCount, RenderError, Renderer, View};
+use crate::scene::Camera;
+use crate::study::projection::{Cost, is_indirect};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use thiserror::Error;

@@ -2,13 +2,10 @@
 //! changes.
 
 use super::error::DatasetError;
-use crate::{
-    gpu::Gpu,
-    numbers::SplitMix,
-    scene::{
-        Camera, Light, LightKind, Scene, bounds::instance_bounds, environment::EnvironmentImage, upload::SceneGpu,
-    },
-};
+use crate::gpu::Gpu;
+use crate::gpu_scene::SceneGpu;
+use crate::numbers::SplitMix;
+use crate::scene::{Camera, Light, LightKind, Scene, bounds::instance_bounds, environment::EnvironmentImage};
 use glam::{Mat4, Quat, Vec3};
 use std::{ops::Range, sync::Arc};
 

@@ -1,14 +1,10 @@
 //! What the passes of a frame do, counted by the shaders themselves while they draw it.
 
 use super::projection::Cost;
-use crate::{
-    gpu::{Gpu, GpuError, count::Count, readback::ReadbackError, timing::Recorder},
-    render::{RenderError, Renderer, RendererOptions, View},
-    scene::{
-        Camera, Scene,
-        upload::{SceneGpu, UploadError},
-    },
-};
+use crate::gpu::{Gpu, GpuError, count::Count, readback::ReadbackError, timing::Recorder};
+use crate::gpu_scene::{SceneGpu, UploadError};
+use crate::render::{RenderError, Renderer, RendererOptions, View};
+use crate::scene::{Camera, Scene};
 use thiserror::Error;
 
 /// Why nothing could be counted.

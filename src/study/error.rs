@@ -15,7 +15,7 @@ pub enum DatasetError {
     Readback(#[from] readback::ReadbackError),
     /// What changes in a scene could not be uploaded.
     #[error(transparent)]
-    Upload(#[from] crate::scene::upload::UploadError),
+    Upload(#[from] crate::gpu_scene::UploadError),
     /// The GI pass did not give its inputs.
     #[error(transparent)]
     Gi(#[from] crate::gi::GiError),
@@ -30,7 +30,7 @@ pub enum DatasetError {
 pub enum TrialError {
     /// The scene does not fit.
     #[error(transparent)]
-    Upload(#[from] crate::scene::upload::UploadError),
+    Upload(#[from] crate::gpu_scene::UploadError),
     /// The path tracer cannot have the scene.
     #[error(transparent)]
     Pack(#[from] crate::reference::PackError),

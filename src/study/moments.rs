@@ -8,20 +8,19 @@
 
 use super::changes::Change;
 pub use super::error::DatasetError;
-use crate::{
-    accel::luminance,
-    gi::{
-        ExposurePass,
-        gather::PAST,
-        inputs::{CELL, InputGroup, cells_of},
-        memory::{CHANNELS, FeaturesPass, PITCH},
-    },
-    gpu::{Gpu, bind::Bound, readback, timing::Recorder},
-    net::plan::Precision,
-    numbers::SplitMix,
-    render::{Purpose, Renderer, View},
-    scene::{Camera, Scene, upload::SceneGpu},
+use crate::accel::luminance;
+use crate::gi::{
+    ExposurePass,
+    gather::PAST,
+    inputs::{CELL, InputGroup, cells_of},
+    memory::{CHANNELS, FeaturesPass, PITCH},
 };
+use crate::gpu::{Gpu, bind::Bound, readback, timing::Recorder};
+use crate::gpu_scene::SceneGpu;
+use crate::net::plan::Precision;
+use crate::numbers::SplitMix;
+use crate::render::{Purpose, Renderer, View};
+use crate::scene::{Camera, Scene};
 use glam::{Mat4, Quat, Vec3};
 use safetensors::{Dtype, tensor::TensorView};
 

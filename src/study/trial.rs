@@ -11,16 +11,15 @@ use super::{
     truth,
     truth::Reference,
 };
-use crate::{
-    gi::Method,
-    gpu::Gpu,
-    reference::{Kernel, ReferenceScene, TracerOptions},
-    render::{
-        Blending, Renderer, RendererOptions,
-        capture::{CaptureOptions, Layer, capture_with},
-    },
-    scene::{Camera, Scene, upload::SceneGpu},
+use crate::gi::Method;
+use crate::gpu::Gpu;
+use crate::gpu_scene::SceneGpu;
+use crate::reference::{Kernel, ReferenceScene, TracerOptions};
+use crate::render::{
+    Blending, Renderer, RendererOptions,
+    capture::{CaptureOptions, Layer, capture_with},
 };
+use crate::scene::{Camera, Scene};
 pub use shot::{Edits, FrameChange, Settling, Shot};
 use std::path::PathBuf;
 

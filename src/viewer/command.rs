@@ -3,9 +3,10 @@
 
 use super::choice::Source;
 use super::state::State;
+use crate::gpu_scene::TextureMemory;
 use crate::net::plan::Precision;
 use crate::render::Backdrop;
-use crate::scene::{units::Up, upload::TextureMemory};
+use crate::scene::units::Up;
 
 /// The line for the left side of the view. `output` is the file it writes, `view.png` if nobody
 /// says.

@@ -6,15 +6,13 @@ use super::command;
 use super::state::State;
 use crate::accel::{AccelError, SceneRays};
 use crate::gi::{Method, Neural, ambient::Unseen, fitted::Fitted, gather};
+use crate::gpu_scene::{SceneGpu, TextureMemory};
 use crate::image_io;
 use crate::net::{format::Weights, gpu::Tuned, plan::Precision};
 use crate::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
 use crate::render::capture::{CaptureOptions, Layer, capture_with};
 use crate::render::{Backdrop, Renderer, RendererOptions};
-use crate::scene::{
-    self, Camera, Environment, Scene,
-    upload::{SceneGpu, TextureMemory},
-};
+use crate::scene::{self, Camera, Environment, Scene};
 use crate::study::hash;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};

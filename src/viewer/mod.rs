@@ -72,7 +72,7 @@ pub struct Options {
     /// Which adapter.
     pub gpu: GpuOptions,
     /// How textures lie in the device's memory.
-    pub textures: crate::scene::upload::TextureMemory,
+    pub textures: crate::gpu_scene::TextureMemory,
     /// How networks store their numbers; `None`: each as it is best.
     pub precision: Option<Precision>,
     /// What a tuner has found on a device, if somebody knows.

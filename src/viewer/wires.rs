@@ -1,9 +1,9 @@
 //! The pass `wires`: edges of all triangles that are seen, a pixel wide, for the view `wireframe`.
 
 use crate::gpu::{shaders, shared, tape, timing::Recorder};
+use crate::gpu_scene::{SceneGpu, position_layouts};
 use crate::render::cull::{Count, Volume};
 use crate::render::{Renderer, View, gbuffer, targets::Target, tool};
-use crate::scene::upload::{SceneGpu, position_layouts};
 
 /// What a device needs to draw lines where it would fill triangles.
 pub const NEEDS: wgpu::Features = wgpu::Features::POLYGON_MODE_LINE;

@@ -3,9 +3,9 @@
 #![allow(dead_code, reason = "each test binary uses a part")]
 
 use bouncelight::gpu::Gpu;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, CapturedFrame, Layer, Picture, capture};
 use bouncelight::render::{Blending, Renderer, RendererOptions};
-use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{Camera, Environment, Instance, Light, LightKind, Material, Mesh, Scene};
 
 pub const IDENTITY: [[f32; 4]; 4] =

@@ -6,8 +6,9 @@ use crate::world::{self, BACKWARDS, GREY, difference, hall, mean, sun};
 use bouncelight::accel::{AccelError, SceneRays};
 use bouncelight::gi::{Method, gather::Options};
 use bouncelight::gpu::Gpu;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::{Renderer, RendererOptions};
-use bouncelight::scene::{Mesh, Scene, upload::SceneGpu};
+use bouncelight::scene::{Mesh, Scene};
 use std::sync::Mutex;
 
 fn room() -> Scene {

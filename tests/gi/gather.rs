@@ -5,9 +5,9 @@ use crate::world::{self, GREY, difference, hall, mean, scene, sun};
 use bouncelight::gi::Method;
 use bouncelight::gi::gather::Options;
 use bouncelight::gpu::{Gpu, timing::Recorder};
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Layer, Picture, capture};
 use bouncelight::render::{Renderer, View};
-use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{Camera, LightKind, Scene};
 
 const PLAIN: Method = Method::Gather(Options { slots: world::FEW_SLOTS, ..Options::PLAIN });

@@ -6,10 +6,11 @@ use crate::shot::{Write, texture_with};
 use crate::{common, read_light};
 use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, timing::Recorder};
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::glossy::{GlossyInputs, GlossyPass};
 use bouncelight::render::{Renderer, RendererOptions, View};
-use bouncelight::scene::{Camera, Environment, Scene, upload::SceneGpu};
+use bouncelight::scene::{Camera, Environment, Scene};
 use half::f16;
 
 const SIZE: [u32; 2] = [128, 96];

@@ -7,9 +7,10 @@ use crate::gather::uploaded;
 use crate::world::{self, difference, mean};
 use bouncelight::gi::{Method, gather::Options};
 use bouncelight::gpu::Gpu;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::Renderer;
 use bouncelight::render::capture::{CaptureOptions, CapturedFrame, Layer, capture};
-use bouncelight::scene::{AlphaMode, Camera, Material, Mesh, Scene, defaults, upload::SceneGpu};
+use bouncelight::scene::{AlphaMode, Camera, Material, Mesh, Scene, defaults};
 
 const PLAIN: Method = Method::Gather(Options { slots: world::FEW_SLOTS, ..Options::PLAIN });
 

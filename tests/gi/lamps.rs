@@ -5,8 +5,9 @@ use crate::gather::{go_on, uploaded};
 use crate::world::{self, GREY, hall, mean, sun};
 use bouncelight::gi::{Method, gather::Options};
 use bouncelight::gpu::Gpu;
+use bouncelight::lights::LightGpu;
 use bouncelight::render::{Renderer, RendererOptions, shadow::ShadowOptions};
-use bouncelight::scene::{LightKind, Scene, upload::LightGpu};
+use bouncelight::scene::{LightKind, Scene};
 
 /// Lamps all over a hall, of very different power, and a sun.
 fn lights(count: usize) -> Vec<LightKind> {

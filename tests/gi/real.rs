@@ -4,7 +4,7 @@ use crate::common;
 use crate::gather::{go_on, lit, uploaded};
 use crate::world;
 use bouncelight::gpu::Gpu;
-use bouncelight::scene::upload::SceneGpu;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::scene::{Environment, LightKind, Scene, gltf};
 
 const SIZE: [u32; 2] = [128, 64];

@@ -7,9 +7,10 @@ use crate::gather::uploaded;
 use crate::world::{self, mean};
 use bouncelight::gi::{Method, gather::Options};
 use bouncelight::gpu::Gpu;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, CapturedFrame, Layer, capture};
 use bouncelight::scene::environment::EnvironmentImage;
-use bouncelight::scene::{Environment, Material, Scene, upload::SceneGpu};
+use bouncelight::scene::{Environment, Material, Scene};
 use glam::Vec3;
 
 const SIZE: [u32; 2] = [128, 64];

@@ -4,10 +4,11 @@
 use crate::{build, common, read_light};
 use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, timing::Recorder};
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::shadow::ShadowOptions;
 use bouncelight::render::{Renderer, RendererOptions, View, sampling};
-use bouncelight::scene::{self, Camera, Scene, upload::SceneGpu};
+use bouncelight::scene::{self, Camera, Scene};
 use glam::Mat4;
 
 const SIZE: [u32; 2] = [96, 48];

@@ -5,10 +5,10 @@ use crate::gather::uploaded;
 use crate::world;
 use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::net::format::Weights;
 use bouncelight::render::capture::{CaptureOptions, capture};
 use bouncelight::render::{Renderer, View, sampling};
-use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{self, Camera};
 
 const SIZE: [u32; 2] = [96, 64];

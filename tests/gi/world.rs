@@ -4,10 +4,10 @@
 use crate::common;
 use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, timing::Recorder};
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Layer, Picture, capture};
 use bouncelight::render::shadow::ShadowOptions;
 use bouncelight::render::{Renderer, RendererOptions, View};
-use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{Camera, Environment, Instance, Light, LightKind, Material, Scene, shapes};
 
 /// A Lambertian box from `low` to `high`.

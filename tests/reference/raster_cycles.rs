@@ -325,8 +325,8 @@ fn other_files_have_the_colours_of_the_path_tracer() {
 fn a_paper_room_fits_into_120_megabytes() {
     let Some(gpu) = common::gpu() else { return };
     use bouncelight::gpu::timing::{Recorder, milliseconds};
+    use bouncelight::gpu_scene::SceneGpu;
     use bouncelight::render::{Renderer, View};
-    use bouncelight::scene::upload::SceneGpu;
     use wgpu_profiler::{GpuProfiler, GpuProfilerSettings};
     let scene = scene::paper_room::scene(2);
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene).unwrap();

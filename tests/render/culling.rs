@@ -4,9 +4,9 @@
 use crate::build::*;
 use crate::common;
 use bouncelight::gpu::Gpu;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, capture};
 use bouncelight::render::{DrawnCount, Renderer};
-use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{AlphaMode, Camera, Instance, Light, LightKind, Scene};
 use glam::{Mat4, Vec3};
 

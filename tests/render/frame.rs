@@ -3,10 +3,11 @@
 use crate::common;
 use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, timing::Recorder};
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::net::format::Weights;
 use bouncelight::render::capture::{CaptureOptions, CapturedFrame, Layer, capture};
 use bouncelight::render::{Renderer, RendererOptions, View};
-use bouncelight::scene::{self, LightKind, Scene, upload::SceneGpu};
+use bouncelight::scene::{self, LightKind, Scene};
 
 fn neural() -> RendererOptions {
     let weights = Weights::shipped().expect("the shipped weights are sound");

@@ -3,11 +3,11 @@
 use crate::build::*;
 use crate::common;
 use bouncelight::gpu::timing::Recorder;
+use bouncelight::gpu_scene::{SceneGpu, UploadError};
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{RenderError, Renderer, View};
 use bouncelight::scene::environment::EnvironmentImage;
 use bouncelight::scene::shapes::{self, Shape};
-use bouncelight::scene::upload::{SceneGpu, UploadError};
 use bouncelight::scene::{AlphaMode, Environment, Instance, Light, Scene};
 use glam::{Mat4, Vec3};
 use std::f32::consts::PI;

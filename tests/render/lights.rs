@@ -4,9 +4,9 @@
 use crate::build::*;
 use crate::common;
 use bouncelight::gpu::Gpu;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Picture, capture};
 use bouncelight::render::{Blending, LightOptions, Renderer, RendererOptions};
-use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{AlphaMode, Camera, Light, LightKind, Scene};
 use glam::Vec3;
 

@@ -4,10 +4,10 @@
 use crate::build::*;
 use crate::common;
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{Renderer, View};
 use bouncelight::scene::shapes::{self, Shape};
-use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{Camera, Scene};
 use glam::{Mat4, Vec3};
 

@@ -5,10 +5,11 @@
 use crate::common::{self, Need};
 use bouncelight::gi::Method;
 use bouncelight::gpu::Gpu;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::net::format::Weights;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{Renderer, RendererOptions};
-use bouncelight::scene::{self, Scene, upload::SceneGpu};
+use bouncelight::scene::{self, Scene};
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -264,8 +264,9 @@ fn in_units(s: &bouncelight::scene::Scene, k: f32) -> bouncelight::scene::Scene 
 /// Shadows, near plane, first camera, temporal anti-aliasing: nothing knows how long a metre is.
 #[test]
 fn a_scene_looks_the_same_whatever_its_unit() {
+    use bouncelight::gpu_scene::SceneGpu;
     use bouncelight::render::{Renderer, RendererOptions, capture};
-    use bouncelight::scene::{Camera, defaults, upload::SceneGpu};
+    use bouncelight::scene::{Camera, defaults};
     let Some(gpu) = common::gpu() else { return };
     let lamp = spot([-3.0, 5.0, 4.0], [0.4, -1.0, -0.5], 0.3, 0.6, 0.1);
     let s = corner(vec![sun([0.3, -1.0, -0.4], 1.0, 0.02), point([3.0, 3.0, 2.0], 20.0, 0.0), lamp]);
@@ -306,9 +307,10 @@ fn a_scene_looks_the_same_whatever_its_unit() {
 #[test]
 fn a_backdrop_is_shown_blurred_or_hidden_and_lights_the_scene_in_any_case() {
     use bouncelight::gi::Method;
+    use bouncelight::gpu_scene::SceneGpu;
     use bouncelight::render::capture::{CaptureOptions, capture};
     use bouncelight::render::{Backdrop, Renderer, RendererOptions};
-    use bouncelight::scene::{Environment, environment::EnvironmentImage, upload::SceneGpu};
+    use bouncelight::scene::{Environment, environment::EnvironmentImage};
     let Some(gpu) = common::gpu() else { return };
     let mut s = scene(vec![floor(1.0, 0.0)], vec![]);
     // Black and white stripes, a degree wide.

@@ -3,11 +3,11 @@
 use crate::build::*;
 use crate::common;
 use bouncelight::gpu::timing::Recorder;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::Layer;
 use bouncelight::render::tonemap::{TonemapOptions, TonemapPass};
 use bouncelight::render::tonemap_curve::Tonemap;
 use bouncelight::render::{Renderer, View};
-use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{AlphaMode, ColorSpace, Image, Sampler, Scene, TextureRef};
 use bouncelight::wgpu;
 
@@ -408,7 +408,7 @@ fn blocks_lose_little_of_any_kind_of_map() {
 
 #[test]
 fn textures_in_blocks_look_the_same_and_take_a_quarter() {
-    use bouncelight::scene::upload::TextureMemory;
+    use bouncelight::gpu_scene::TextureMemory;
     let Some(gpu) = common::gpu() else { return };
     if !gpu.device.features().contains(wgpu::Features::TEXTURE_COMPRESSION_BC) {
         return common::skip(common::Need::Adapter, "the device has no compressed textures");

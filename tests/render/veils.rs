@@ -5,9 +5,9 @@ use crate::build::{center, look_at, material, quad, scene, sun};
 use crate::{build, common};
 use bouncelight::gi::Method;
 use bouncelight::gpu::Gpu;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Picture, capture};
 use bouncelight::render::{Backdrop, Blending, Renderer, RendererOptions};
-use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{AlphaMode, Camera, Material, Scene};
 
 const SIZE: [u32; 2] = [32, 32];

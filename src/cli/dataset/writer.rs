@@ -4,17 +4,16 @@ use super::{
     super::{args::load_weights, interrupt},
     Args,
 };
-use crate::{
-    gi::{
-        Method, gather,
-        inputs::{cells_of, sample_pixel},
-    },
-    gpu::{Gpu, readback, timing::Recorder},
-    image_io::write_whole,
-    render::{Blending, Renderer, RendererOptions, View},
-    scene::{Camera, Scene, upload::SceneGpu},
-    study::moments::{self, When},
+use crate::gi::{
+    Method, gather,
+    inputs::{cells_of, sample_pixel},
 };
+use crate::gpu::{Gpu, readback, timing::Recorder};
+use crate::gpu_scene::SceneGpu;
+use crate::image_io::write_whole;
+use crate::render::{Blending, Renderer, RendererOptions, View};
+use crate::scene::{Camera, Scene};
+use crate::study::moments::{self, When};
 use anyhow::{Context, Result};
 use sha2::{Digest, Sha256};
 use std::{collections::HashSet, io::Write, path::PathBuf};

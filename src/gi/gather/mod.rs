@@ -229,7 +229,7 @@ impl GatherGi {
             store: Store::new(device, size, options.slots, workgroups),
             workgroups,
             checked: size,
-            no_lights: unused("gi.no_lights", size_of::<crate::scene::upload::LightGpu>() as u64),
+            no_lights: unused("gi.no_lights", size_of::<crate::lights::LightGpu>() as u64),
             no_guidance: unused("gi.no_guidance", GUIDANCE),
             no_motion: stage::absent(device, "gi.no_motion", wgpu::TextureFormat::Rg16Float),
             no_specular: stage::absent(device, "gi.no_specular", wgpu::TextureFormat::Rgba8Unorm),

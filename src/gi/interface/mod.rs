@@ -141,7 +141,7 @@ impl std::fmt::Debug for Rays<'_> {
 /// The analytic lights on the GPU.
 #[derive(Debug, Clone, Copy)]
 pub struct Lights<'a> {
-    /// [`crate::scene::upload::LightGpu`] for each.
+    /// [`crate::lights::LightGpu`] for each.
     pub buffer: &'a wgpu::Buffer,
     /// How many.
     pub count: u32,

@@ -21,7 +21,7 @@ pub use view::View;
 use super::interface::{GiError, Inputs, Lights, Rays};
 use crate::accel::{MeshPart, RayCounts, SceneRays};
 use crate::gpu::shared::Shared;
-use crate::scene::upload::{self, LightGpu};
+use crate::lights::{LightGpu, whole_sky};
 use crate::scene::{Environment, Light};
 use std::collections::BTreeMap;
 
@@ -286,7 +286,7 @@ impl World {
             queue.write_buffer(&gpu.lights, 0, bytes);
         }
         if self.changed.sky {
-            let sky = upload::whole_sky(&self.device, queue, &self.environment);
+            let sky = whole_sky(&self.device, queue, &self.environment);
             gpu.sky = sky.map_err(|e| GiError::Sky(e.to_string()))?;
             self.allocations += 1;
         }
@@ -318,7 +318,7 @@ impl World {
                 (before.lights.clone(), before.sky.clone())
             }
             None => {
-                let sky = upload::whole_sky(&self.device, queue, &self.environment);
+                let sky = whole_sky(&self.device, queue, &self.environment);
                 (light_buffer(&self.device, 0), sky.map_err(|e| GiError::Sky(e.to_string()))?)
             }
         };

@@ -20,13 +20,12 @@ use super::{
     projection::Cost,
     trial::TrialError,
 };
-use crate::{
-    gpu::Gpu,
-    image_io::ImageError,
-    metrics::MetricError,
-    net::{gpu::NetError, pictures::PicturesError},
-    scene::{SceneError, upload::UploadError},
-};
+use crate::gpu::Gpu;
+use crate::gpu_scene::UploadError;
+use crate::image_io::ImageError;
+use crate::metrics::MetricError;
+use crate::net::{gpu::NetError, pictures::PicturesError};
+use crate::scene::SceneError;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use thiserror::Error;

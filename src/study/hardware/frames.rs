@@ -1,17 +1,16 @@
 //! Whole frames of every method.
 
 use super::{Projected, Run};
-use crate::{
-    gi::{Method, Neural, name::MethodName},
-    gpu::Gpu,
-    net::plan::Precision,
-    render::{Renderer, RendererOptions},
-    scene::{Camera, Scene, upload::SceneGpu},
-    study::{
-        bench::{BenchError, BenchOptions, Measurement, measure},
-        count,
-        projection::{Card, is_indirect},
-    },
+use crate::gi::{Method, Neural, name::MethodName};
+use crate::gpu::Gpu;
+use crate::gpu_scene::SceneGpu;
+use crate::net::plan::Precision;
+use crate::render::{Renderer, RendererOptions};
+use crate::scene::{Camera, Scene};
+use crate::study::{
+    bench::{BenchError, BenchOptions, Measurement, measure},
+    count,
+    projection::{Card, is_indirect},
 };
 use serde::{Deserialize, Serialize};
 

@@ -15,11 +15,9 @@ use super::wires::WiresPass;
 use crate::accel::SceneRays;
 use crate::gi::Method;
 use crate::gpu::{Gpu, readback, timing::Recorder};
+use crate::gpu_scene::{SceneGpu, TextureMemory};
 use crate::render::{Backdrop, DrawnCount, Purpose, RenderError, Renderer, View as Eye, sampling};
-use crate::scene::{
-    Camera, Scene,
-    upload::{SceneGpu, TextureMemory},
-};
+use crate::scene::{Camera, Scene};
 pub use drawn::DrawnBy;
 use feature::Feature;
 use sides::Reference;

@@ -13,12 +13,10 @@ use super::choice::{Side, Source, View};
 use super::film::Film;
 use super::navigate::{Navigator, Preset};
 use super::saved::Settings;
+use crate::gpu_scene::TextureMemory;
 use crate::net::plan::Precision;
 use crate::render::{Backdrop, tonemap_curve::Tonemap};
-use crate::scene::{
-    Environment, Light, Scene, bounds::world_bounds, look::FRAMING, path::CameraPath, units::Units,
-    upload::TextureMemory,
-};
+use crate::scene::{Environment, Light, Scene, bounds::world_bounds, look::FRAMING, path::CameraPath, units::Units};
 pub use action::{Action, Request};
 pub use edit::{angles, from_angles};
 use std::collections::BTreeMap;

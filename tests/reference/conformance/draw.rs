@@ -5,11 +5,12 @@ use super::{BOUND, CONTROL};
 use crate::glb::Glb;
 use bouncelight::gi::{Method, gather};
 use bouncelight::gpu::Gpu;
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions};
 use bouncelight::render::capture::{CaptureOptions, capture};
 use bouncelight::render::tonemap_curve::Tonemap;
 use bouncelight::render::{Renderer, RendererOptions};
-use bouncelight::scene::{Scene, upload::SceneGpu};
+use bouncelight::scene::Scene;
 
 /// Pictures as they are shown, three bytes a pixel.
 pub struct Drawn {

@@ -5,9 +5,9 @@ use crate::figures::{Coded, bends, chest, strip};
 use crate::program::{bouncelight, fails, path};
 use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{Renderer, RendererOptions, View};
-use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{Camera, Environment, Light, LightKind, Scene};
 
 const SIZE: [u32; 2] = [48, 48];

@@ -5,9 +5,9 @@ use crate::build::{direct_only, look_at};
 use crate::common;
 use crate::figures::{Coded, bends, strip};
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
+use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::{Renderer, View};
 use bouncelight::scene::deform::Vertices;
-use bouncelight::scene::upload::SceneGpu;
 use bouncelight::scene::{Camera, Scene};
 use glam::{Mat4, Vec3};
 

@@ -1,11 +1,21 @@
 //! The environment as a lat-long texture.
 
-use super::UploadError;
 use crate::scene::environment::{Environment, EnvironmentImage};
 use crate::scene::{Light, LightKind};
+use thiserror::Error;
+
+/// A picture of the surroundings whose values do not fit its size.
+#[derive(Debug, Error)]
+#[error("image `{image}`: {reason}")]
+pub(crate) struct SkyError {
+    /// The picture's name.
+    pub image: String,
+    /// What is wrong.
+    pub reason: String,
+}
 
 /// The surroundings on the GPU.
-pub(super) struct Sky {
+pub(crate) struct Sky {
     /// A picture's rest, once its sun is taken out; alpha is what the eye sees beside that, as a
     /// multiple: 0 but for the sun's texels.
     pub view: wgpu::TextureView,
@@ -30,23 +40,23 @@ fn texels(image: &EnvironmentImage, rest: Option<&EnvironmentImage>) -> Vec<[f32
 
 /// `Rgba32Float`, without mip levels: nothing filters it but `shaders/lib/environment.wgsl`.
 /// Pictures larger than the device allows are halved until they fit, with a warning.
-pub(super) fn upload(
+pub(crate) fn upload(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
     environment: &Environment,
     warnings: &mut Vec<String>,
-) -> Result<Sky, UploadError> {
+) -> Result<Sky, SkyError> {
     upload_with(device, queue, environment, true, warnings)
 }
 
 /// The same; a sun is only looked for if `take_sun`, else it stays in the picture.
-pub(super) fn upload_with(
+fn upload_with(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
     environment: &Environment,
     take_sun: bool,
     warnings: &mut Vec<String>,
-) -> Result<Sky, UploadError> {
+) -> Result<Sky, SkyError> {
     let [r, g, b] = environment.radiance;
     let (mut own, mut light) = (environment.clone(), None);
     let (mut width, mut height, mut texels) = (1, 1, vec![[r, g, b, 0.0]]);
@@ -54,7 +64,7 @@ pub(super) fn upload_with(
         (width, height) = (image.width, image.height);
         if image.rgb.len() as u64 != 3 * u64::from(width) * u64::from(height) || image.rgb.is_empty() {
             let reason = format!("{} values for {width}×{height} pixels", image.rgb.len());
-            return Err(UploadError::Image { image: image.name.clone(), reason });
+            return Err(SkyError { image: image.name.clone(), reason });
         }
         let sun = if take_sun { image.sun() } else { None };
         texels = self::texels(image, sun.as_ref().map(|s| &s.rest));
@@ -96,6 +106,16 @@ pub(super) fn upload_with(
     );
     let bytes = std::mem::size_of_val(texels.as_slice()) as u64;
     Ok(Sky { view: texture.create_view(&Default::default()), bytes, environment: own, sun: light })
+}
+
+/// The surroundings as a lat-long picture ([`SceneGpu::environment_view`]), a sun in it left where
+/// it is.
+pub(crate) fn whole_sky(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    environment: &Environment,
+) -> Result<wgpu::TextureView, SkyError> {
+    Ok(upload_with(device, queue, environment, false, &mut Vec::new())?.view)
 }
 
 /// Averages of 2×2 pixels; an odd last row or column is dropped.

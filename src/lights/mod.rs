@@ -1,4 +1,8 @@
-//! Lights as shaders read them.
+//! Lights and surroundings as shaders read them.
+
+pub(crate) mod sky;
+
+pub(crate) use sky::whole_sky;
 
 use crate::scene::{Light, LightKind};
 use bytemuck::{Pod, Zeroable};

@@ -9,8 +9,6 @@
 mod closed;
 mod compress;
 mod deform;
-mod environment;
-mod light;
 mod material;
 mod mesh;
 mod texture;
@@ -18,15 +16,14 @@ mod veil;
 
 pub use deform::DeformGpu;
 pub(crate) use deform::{STRIDE as DEFORM_STRIDE, Shapes};
-pub(crate) use light::fits_one_map;
-pub use light::{CANDIDATES, LightGpu};
 pub use material::{MaterialGpu, TextureUse, material_layout};
 pub use mesh::{AttributeVertex, Bounds, Draw, Rows, Slot, attribute_layouts, motion_layouts, position_layouts};
 pub use texture::{TextureBytes, TextureMemory};
 
-use super::deform::pose_of;
-use super::{AlphaMode, Environment, Light, Scene};
 use crate::accel::{AccelError, SceneRays};
+use crate::lights::{LightGpu, fits_one_map, sky};
+use crate::scene::deform::pose_of;
+use crate::scene::{AlphaMode, Environment, Light, Scene};
 use bytemuck::Pod;
 use std::sync::atomic::{AtomicU64, Ordering};
 use thiserror::Error;
@@ -82,6 +79,12 @@ pub enum UploadError {
         /// How many there are.
         count: usize,
     },
+}
+
+impl From<sky::SkyError> for UploadError {
+    fn from(error: sky::SkyError) -> Self {
+        Self::Image { image: error.image, reason: error.reason }
+    }
 }
 
 /// A scene on the GPU. Lights, the surroundings and placements can be changed in place; upload
@@ -165,7 +168,7 @@ impl SceneGpu {
         let shapes = Shapes::new(device, queue, scene)?;
         let textures = texture::upload(device, queue, scene, memory, &mut warnings)?;
         let materials = material::upload(device, queue, (scene, &veils), &textures)?;
-        let sky = environment::upload(device, queue, &scene.environment, &mut warnings)?;
+        let sky = sky::upload(device, queue, &scene.environment, &mut warnings)?;
         let lights: Vec<Light> = scene.lights.iter().chain(&sky.sun).cloned().collect();
         let list = LightGpu::list(&lights);
         let light_buffer = filled(device, queue, "scene.lights", wgpu::BufferUsages::STORAGE, &list);
@@ -265,7 +268,7 @@ impl SceneGpu {
         scene: &Scene,
     ) -> Result<(), UploadError> {
         let mut warnings = Vec::new();
-        let sky = environment::upload(device, queue, &scene.environment, &mut warnings)?;
+        let sky = sky::upload(device, queue, &scene.environment, &mut warnings)?;
         self.lights_epoch += 1;
         self.environment = sky.environment;
         self.environment_view = sky.view;
@@ -331,16 +334,6 @@ impl SceneGpu {
     pub fn bytes(&self) -> u64 {
         self.bytes + self.rays.as_ref().map_or(0, |r| r.counts().bytes)
     }
-}
-
-/// The surroundings as a lat-long picture ([`SceneGpu::environment_view`]), a sun in it left where
-/// it is.
-pub(crate) fn whole_sky(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    environment: &Environment,
-) -> Result<wgpu::TextureView, UploadError> {
-    Ok(environment::upload_with(device, queue, environment, false, &mut Vec::new())?.view)
 }
 
 /// Number of the next upload.
