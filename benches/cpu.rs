@@ -3,11 +3,11 @@
 
 use bouncelight::accel::{Accel, SceneRays};
 use bouncelight::gpu::{Gpu, GpuOptions};
-use bouncelight::image_io::{Layer, write_exr};
 use bouncelight::net::convert::{Arch, Norm, published};
 use bouncelight::net::format::Weights;
 use bouncelight::net::plan::Plan;
-use bouncelight::scene::{self, Scene};
+use bouncelight::scene::Scene;
+use bouncelight_scene::image_io::{Layer, write_exr};
 use divan::{Bencher, black_box};
 
 fn main() {
@@ -42,7 +42,7 @@ fn place_instances(bencher: Bencher) {
         eprintln!("SKIP: no adapter, and rays live on one");
         return;
     };
-    let mut scene: Scene = scene::load("paper-room:2").expect("made by code");
+    let mut scene: Scene = bouncelight_lab::scenes::load("paper-room:2").expect("made by code");
     let mut rays = SceneRays::new(&gpu.device, &gpu.queue, &scene).expect("a room has few triangles");
     let mut step = 0.0;
     bencher.bench_local(|| {

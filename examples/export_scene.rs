@@ -7,8 +7,6 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use bouncelight::scene;
-
 fn main() -> ExitCode {
     let mut args: Vec<String> = std::env::args().skip(1).collect();
     let bare = args.iter().position(|a| a == "--bare").map(|i| args.remove(i)).is_some();
@@ -16,12 +14,12 @@ fn main() -> ExitCode {
         eprintln!("usage: export_scene [--bare] SCENE OUT.glb");
         return ExitCode::from(2);
     };
-    let written = scene::load(spec).and_then(|mut scene| {
+    let written = bouncelight_lab::scenes::load(spec).and_then(|mut scene| {
         if bare {
-            scene::export::strip(&mut scene);
+            bouncelight_scene::export::strip(&mut scene);
         }
         scene.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
-        scene::export::write_glb(&scene, Path::new(out))
+        bouncelight_scene::export::write_glb(&scene, Path::new(out))
     });
     match written {
         Ok(()) => ExitCode::SUCCESS,

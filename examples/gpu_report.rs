@@ -3,9 +3,8 @@
 //!     gpu_report [--out FOLDER] [--minutes M] [--sizes WxH,WxH,…] [--scenes NAME,…] [--triangles N,…] [--commit HASH] [--no-pytorch]
 
 use bouncelight::gpu::{Gpu, GpuOptions};
-use bouncelight::image_io::write_whole;
-use bouncelight::scene;
-use bouncelight::study::hardware::{HardwareOptions, HardwareReport, measure};
+use bouncelight_lab::study::hardware::{HardwareOptions, HardwareReport, measure};
+use bouncelight_scene::image_io::write_whole;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -87,8 +86,8 @@ fn report(args: Args) -> Result<(), Box<dyn std::error::Error>> {
     let sizes = sizes.split(',').map(size).collect::<Result<Vec<_>, _>>()?;
     let scenes = scenes
         .split(',')
-        .map(|name| Ok((name.to_owned(), scene::load(name)?)))
-        .collect::<Result<Vec<_>, bouncelight::scene::SceneError>>()?;
+        .map(|name| Ok((name.to_owned(), bouncelight_lab::scenes::load(name)?)))
+        .collect::<Result<Vec<_>, bouncelight_scene::SceneError>>()?;
     let triangles = triangles
         .split(',')
         .map(|n| n.parse().map_err(|e| format!("--triangles {n}: {e}")))

@@ -67,7 +67,7 @@ fn main() -> Result<(), Failure> {
         }
     }
     let size = [(w * ACROSS) as u32, (h * rows) as u32];
-    Ok(bouncelight::image_io::write_png(path.as_ref(), size[0], size[1], &sheet, &[])?)
+    Ok(bouncelight_scene::image_io::write_png(path.as_ref(), size[0], size[1], &sheet, &[])?)
 }
 
 /// An sRGB byte of so many times the light.

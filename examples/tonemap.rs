@@ -4,7 +4,8 @@
 //! The same curve as `bouncelight render`, for pictures from elsewhere, such as a path tracer's
 //! reference.
 
-use bouncelight::{image_io, render::tonemap_curve::Tonemap};
+use bouncelight::render::tonemap_curve::Tonemap;
+use bouncelight_scene::image_io;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -10,7 +10,8 @@
 //! `docs/rays.md`, what was tried in `docs/log/2026-11-rays.md`. [`Accel::closest`] is the
 //! same walk on the CPU.
 
-pub(crate) mod alias;
+#[doc(hidden)]
+pub mod alias;
 mod build;
 mod caster;
 mod cpu;
@@ -34,7 +35,7 @@ pub use emitters::EmitterGpu;
 pub use gpu::AccelGpu;
 pub(crate) use image::Reductions;
 pub use scene::{RayCounts, SceneRays};
-pub(crate) use surfaces::luminance;
+pub use surfaces::luminance;
 pub(crate) use trees::{MeshPart, corners};
 
 use thiserror::Error;

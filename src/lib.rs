@@ -4,7 +4,7 @@
 //! ```text
 //!  file or name        GPU, one command encoder a frame (render/frame.rs tells it in order)
 //!  ───────────         ─────────────────────────────────────────────────────────────────────
-//!  scene::load ──► gpu_scene     ──► shadow ──► gbuffer ──► direct ──► gi ──► composite ──► tonemap
+//!  bouncelight_scene::load ──► gpu_scene     ──► shadow ──► gbuffer ──► direct ──► gi ──► composite ──► tonemap
 //!                                                  │           │        ▲                     │
 //!                                                  └───────────┴► pack ─┤                     ▼
 //!  net::format ──► net::graph ──► net::plan ──► net::gpu ── U-Net ──────┘            image_io, viewer
@@ -28,31 +28,19 @@
 //! Conventions (units, spaces, encodings) stand in `docs/architecture.md`.
 
 pub mod accel;
-#[cfg(feature = "export")]
-pub mod export;
 pub mod gi;
 pub mod gpu;
+#[cfg(feature = "render")]
 pub mod gpu_scene;
-#[cfg(feature = "io")]
-pub mod image_io;
-// With all shaders there are, the viewer's included.
-#[cfg(all(test, feature = "viewer"))]
+#[cfg(test)]
 mod layouts;
 pub mod lights;
-pub mod metrics;
 pub mod net;
-mod numbers;
-#[cfg(feature = "reference")]
-pub mod reference;
+#[doc(hidden)]
+pub mod numbers;
+#[cfg(feature = "render")]
 pub mod render;
 pub mod scene;
-mod srgb;
-pub mod study;
-
-#[cfg(feature = "cli")]
-pub mod cli;
-
-#[cfg(feature = "viewer")]
-pub mod viewer;
+pub mod srgb;
 
 pub use wgpu;

@@ -12,8 +12,7 @@ pub fn encode(linear: f32) -> f32 {
 }
 
 /// CIE XYZ as linear Rec.709; the white of both is D65.
-#[cfg(feature = "io")]
-pub(crate) fn from_xyz([x, y, z]: [f32; 3]) -> [f32; 3] {
+pub fn from_xyz([x, y, z]: [f32; 3]) -> [f32; 3] {
     [
         3.240_454_2 * x - 1.537_138_5 * y - 0.498_531_4 * z,
         -0.969_266 * x + 1.876_010_8 * y + 0.041_556 * z,

@@ -10,10 +10,9 @@ use bouncelight::gi::Method;
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::net::format::Weights;
-use bouncelight::reference::{Kernel, ReferenceScene, Subject, Tracer, TracerOptions};
 use bouncelight::render::shadow::ShadowOptions;
 use bouncelight::render::{Renderer, RendererOptions, View, sampling};
-use bouncelight::scene;
+use bouncelight_lab::reference::{Kernel, ReferenceScene, Subject, Tracer, TracerOptions};
 
 const MIB: u64 = 1 << 20;
 
@@ -36,7 +35,7 @@ const MOST: u64 = 20 * MIB;
 #[test]
 fn frames_and_samples_take_no_memory() {
     let Some(gpu) = common::own_gpu() else { return };
-    let scene = scene::load("paper-room:60").expect("the room is made by code");
+    let scene = bouncelight_lab::scenes::load("paper-room:60").expect("the room is made by code");
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("the scene fits");
     let network = Weights::shipped().expect("the shipped file is sound");
     let methods = [

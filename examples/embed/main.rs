@@ -97,7 +97,7 @@ fn main() -> Result<(), Failure> {
             let path = std::path::Path::new(&folder).join(format!("{number:03}.png"));
             let rgba = bouncelight::gpu::readback::texture(&device, &queue, &host.renderer.picture)?;
             let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-            bouncelight::image_io::write_png(&path, host.renderer.size[0], host.renderer.size[1], &rgb, &[])?;
+            bouncelight_scene::image_io::write_png(&path, host.renderer.size[0], host.renderer.size[1], &rgb, &[])?;
         }
     }
     Ok(())

@@ -10,7 +10,6 @@ use bouncelight::gi::{CameraMatrices, Conventions, Depth, Inputs, Lights, Method
 use bouncelight::gpu::{Gpu, GpuOptions, readback, timing::Recorder};
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::net::format::Weights;
-use bouncelight::scene;
 use bouncelight::wgpu::{self, TextureFormat as F};
 use std::error::Error;
 use std::path::Path;
@@ -44,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [scene, method, folder] = &args[..] else {
         return Err("usage: moderngl_yardstick SCENE gather|neural FOLDER".into());
     };
-    let (scene, folder) = (scene::load(scene)?, Path::new(folder));
+    let (scene, folder) = (bouncelight_lab::scenes::load(scene)?, Path::new(folder));
     let method = match method.as_str() {
         "neural" => Method::Neural(Box::new(Neural::from(Weights::shipped()?))),
         _ => Method::Gather(Default::default()),

@@ -2,7 +2,7 @@
 
 /// Entries (threshold, other entry, chance, id), the integers as bits: entry i with a second number
 /// below the threshold gives i, else the other entry.
-pub(crate) fn alias(choices: &[(u32, f64)]) -> Vec<[f32; 4]> {
+pub fn alias(choices: &[(u32, f64)]) -> Vec<[f32; 4]> {
     let n = choices.len();
     let mut scaled: Vec<f64> = choices.iter().map(|c| c.1 * n as f64).collect();
     let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..n).partition(|&i| scaled[i] < 1.0);

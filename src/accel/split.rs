@@ -121,12 +121,12 @@ pub(super) fn leaves(pairs: &[Pair]) -> (Vec<Aabb>, Vec<u32>) {
 mod tests {
     use super::super::pairs;
     use super::*;
-    use rand_mt::Mt;
+    use crate::numbers::SplitMix;
 
     /// Long triangles that lean, as in a bundle of rods thrown down.
     fn rods() -> Vec<[[f32; 3]; 3]> {
-        let mut random = Mt::new(5);
-        let mut number = || (random.next_u32() >> 8) as f32 / 16_777_216.0;
+        let mut random = SplitMix::new(5);
+        let mut number = || random.next();
         let mut point = |reach: f32, from: [f32; 3]| from.map(|x| x + reach * (number() - 0.5));
         let rod = |_| {
             let (a, b) = (point(10.0, [1000.0; 3]), point(10.0, [1000.0; 3]));

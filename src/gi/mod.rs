@@ -45,7 +45,7 @@ pub use interface::{
     AlbedoEncoding, CameraMatrices, Conventions, Depth, Forward, GiError, Inputs, Jitter, LightScale, Lights,
     MotionJitter, MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Outputs, Rays, technique,
 };
-pub use method::{Method, fitted, name};
+pub use method::{Method, name};
 pub use neural::{Neural, memory};
 pub use preludes::example_preludes;
 pub use screen::{ambient, bitmask, occlusion, ssgi};

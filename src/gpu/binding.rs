@@ -1,13 +1,13 @@
 //! Types of bindings that passes have.
 
-pub(crate) const UNIFORM: wgpu::BindingType = wgpu::BindingType::Buffer {
+pub const UNIFORM: wgpu::BindingType = wgpu::BindingType::Buffer {
     ty: wgpu::BufferBindingType::Uniform,
     has_dynamic_offset: false,
     min_binding_size: None,
 };
 
-pub(crate) const READ: wgpu::BindingType = storage(true);
-pub(crate) const READ_WRITE: wgpu::BindingType = storage(false);
+pub const READ: wgpu::BindingType = storage(true);
+pub const READ_WRITE: wgpu::BindingType = storage(false);
 
 const fn storage(read_only: bool) -> wgpu::BindingType {
     wgpu::BindingType::Buffer {
@@ -18,11 +18,11 @@ const fn storage(read_only: bool) -> wgpu::BindingType {
 }
 
 /// A colour or depth texture read with `textureLoad`.
-pub(crate) const LOAD: wgpu::BindingType = texture(LOADED, wgpu::TextureViewDimension::D2);
+pub const LOAD: wgpu::BindingType = texture(LOADED, wgpu::TextureViewDimension::D2);
 /// Layers of depth read with `textureLoad`.
-pub(crate) const LOAD_ARRAY: wgpu::BindingType = texture(LOADED, wgpu::TextureViewDimension::D2Array);
+pub const LOAD_ARRAY: wgpu::BindingType = texture(LOADED, wgpu::TextureViewDimension::D2Array);
 /// Layers of depth read through a comparison sampler.
-pub(crate) const COMPARE_ARRAY: wgpu::BindingType =
+pub const COMPARE_ARRAY: wgpu::BindingType =
     texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2Array);
 
 // Depth, too: GLSL has no plain load from a depth texture, so the GL backends would refuse `Depth`
@@ -37,13 +37,13 @@ const fn texture(
 }
 
 /// A colour texture read through a filtering sampler.
-pub(crate) const SAMPLE: wgpu::BindingType =
+pub const SAMPLE: wgpu::BindingType =
     texture(wgpu::TextureSampleType::Float { filterable: true }, wgpu::TextureViewDimension::D2);
 /// The sampler for it.
-pub(crate) const SAMPLER: wgpu::BindingType = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+pub const SAMPLER: wgpu::BindingType = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
 
 /// An `Rgba16Float` texture written by a compute shader.
-pub(crate) const STORE_HALF: wgpu::BindingType = wgpu::BindingType::StorageTexture {
+pub const STORE_HALF: wgpu::BindingType = wgpu::BindingType::StorageTexture {
     access: wgpu::StorageTextureAccess::WriteOnly,
     format: wgpu::TextureFormat::Rgba16Float,
     view_dimension: wgpu::TextureViewDimension::D2,

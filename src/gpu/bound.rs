@@ -28,7 +28,7 @@ impl From<&wgpu::TextureView> for Bound {
 impl Bound {
     /// What a group's entry holds; `None` for samplers and lists, which compute passes here do
     /// without.
-    pub(super) fn of(resource: &wgpu::BindingResource<'_>) -> Option<Self> {
+    pub fn of(resource: &wgpu::BindingResource<'_>) -> Option<Self> {
         match resource {
             wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset, size }) => {
                 let size = size.map_or(buffer.size() - offset, |s| s.get());
@@ -39,7 +39,7 @@ impl Bound {
         }
     }
 
-    pub(super) fn resource(&self) -> wgpu::BindingResource<'_> {
+    pub fn resource(&self) -> wgpu::BindingResource<'_> {
         match self {
             Bound::Buffer(buffer) => buffer.as_entire_binding(),
             Bound::Slot(buffer, size) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {

@@ -177,8 +177,8 @@ impl Gpu {
 
     /// Another device on the same adapter, with room for a storage buffer more a stage and for what
     /// workgroups count.
-    #[cfg(feature = "reference")]
-    pub(crate) fn for_counting(&self) -> Result<Self, GpuError> {
+    #[doc(hidden)]
+    pub fn for_counting(&self) -> Result<Self, GpuError> {
         let granted = self.adapter.limits();
         let mut limits = wgpu::Limits::default().or_worse_values_from(&granted);
         limits.max_storage_buffers_per_shader_stage += 1;

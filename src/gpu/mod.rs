@@ -2,18 +2,18 @@
 //! readback, timing.
 
 pub mod bind;
-pub(crate) mod binding;
-mod bound;
+#[doc(hidden)]
+pub mod binding;
+#[doc(hidden)]
+pub mod bound;
 mod choose;
-#[cfg(feature = "reference")]
-pub(crate) mod count;
-#[cfg(feature = "reference")]
-mod instrument;
 pub mod probe;
 pub mod readback;
 pub mod shaders;
-pub(crate) mod shared;
-pub(crate) mod tape;
+#[doc(hidden)]
+pub mod shared;
+#[doc(hidden)]
+pub mod tape;
 pub mod timing;
 
 pub(crate) use choose::is_software;

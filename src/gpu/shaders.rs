@@ -54,6 +54,11 @@ const FILES: &[(&str, &str)] = &[
     ("viewer.wires", "viewer/wires.wgsl"),
 ];
 
+/// The folder of the shaders that this program was built from; it may be gone.
+pub fn sources() -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders")
+}
+
 /// Names of all shaders that there are.
 pub fn names() -> impl Iterator<Item = String> {
     FILES.iter().map(|(name, _)| (*name).to_owned()).chain(NetKernel::all().map(NetKernel::name))

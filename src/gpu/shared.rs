@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 /// As long as there is one for a device, or a clone of it, what is compiled on that device stays.
 #[derive(Clone)]
-pub(crate) struct Shared(#[allow(dead_code, reason = "it is there to be there")] Arc<Shelves>);
+pub struct Shared(#[allow(dead_code, reason = "it is there to be there")] Arc<Shelves>);
 
 /// Each place has a lock of its own, so that two threads compile two things at once.
 type Shelf<K, V> = Mutex<HashMap<K, Arc<Mutex<Option<V>>>>>;
@@ -33,7 +33,7 @@ static ALL: Mutex<Vec<Weak<Shelves>>> = Mutex::new(Vec::new());
 static KEEPS: AtomicBool = AtomicBool::new(true);
 
 /// From here on, what is made is kept, or is not.
-pub(super) fn keeps(keeps: bool) {
+pub fn keeps(keeps: bool) {
     KEEPS.store(keeps, Ordering::Relaxed);
 }
 
@@ -114,7 +114,7 @@ fn get<K: Eq + Hash, V: Clone>(
 }
 
 /// A module of WGSL; `make` compiles it.
-pub(super) fn shader_module(
+pub fn shader_module(
     device: &wgpu::Device,
     name: &str,
     text: &str,
@@ -124,7 +124,7 @@ pub(super) fn shader_module(
 }
 
 /// The layout of a bind group.
-pub(crate) fn bind_group_layout(
+pub fn bind_group_layout(
     device: &wgpu::Device,
     descriptor: &wgpu::BindGroupLayoutDescriptor<'_>,
 ) -> wgpu::BindGroupLayout {
@@ -133,16 +133,13 @@ pub(crate) fn bind_group_layout(
 }
 
 /// The layout of a pipeline.
-pub(super) fn pipeline_layout(
-    device: &wgpu::Device,
-    descriptor: &wgpu::PipelineLayoutDescriptor<'_>,
-) -> wgpu::PipelineLayout {
+pub fn pipeline_layout(device: &wgpu::Device, descriptor: &wgpu::PipelineLayoutDescriptor<'_>) -> wgpu::PipelineLayout {
     let key = || descriptor.bind_group_layouts.iter().map(|group| group.cloned()).collect();
     get(device, |s| &s.layouts, key, || device.create_pipeline_layout(descriptor))
 }
 
 /// A pipeline of a compute pass.
-pub(super) fn compute_pipeline(
+pub fn compute_pipeline(
     device: &wgpu::Device,
     descriptor: &wgpu::ComputePipelineDescriptor<'_>,
 ) -> wgpu::ComputePipeline {
@@ -154,10 +151,7 @@ pub(super) fn compute_pipeline(
 }
 
 /// A pipeline of a render pass.
-pub(crate) fn render_pipeline(
-    device: &wgpu::Device,
-    descriptor: &wgpu::RenderPipelineDescriptor<'_>,
-) -> wgpu::RenderPipeline {
+pub fn render_pipeline(device: &wgpu::Device, descriptor: &wgpu::RenderPipelineDescriptor<'_>) -> wgpu::RenderPipeline {
     get(device, |s| &s.render, || Drawing::of(descriptor), || device.create_render_pipeline(descriptor))
 }
 

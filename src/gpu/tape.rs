@@ -15,18 +15,17 @@ thread_local! {
 
 /// A compiled shader's name and text.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Source {
+pub struct Source {
     pub name: String,
     pub text: String,
 }
 
 /// Resources of one group by number of the binding.
-pub(crate) type Group = Vec<(u32, Bound)>;
+pub type Group = Vec<(u32, Bound)>;
 
 /// One dispatch as it was recorded.
 #[derive(Debug, Clone)]
-#[cfg_attr(not(feature = "export"), allow(dead_code, reason = "not all who read a tape read all of it"))]
-pub(crate) struct Dispatch {
+pub struct Dispatch {
     /// Of the compute pass.
     pub label: String,
     pub source: Source,
@@ -37,8 +36,7 @@ pub(crate) struct Dispatch {
 }
 
 /// A pipeline, and what it was made of.
-#[cfg_attr(not(feature = "reference"), allow(dead_code, reason = "only who counts makes pipelines anew"))]
-pub(super) struct Made {
+pub struct Made {
     pub pipeline: wgpu::ComputePipeline,
     pub source: Source,
     pub entry: String,
@@ -46,8 +44,7 @@ pub(super) struct Made {
 }
 
 /// Hears of each dispatch, and may set another pipeline for it.
-#[cfg(feature = "reference")]
-pub(super) trait Listener {
+pub trait Listener {
     /// It is about to be recorded. `made` is `None` where the pipeline was made before the tape
     /// began.
     fn before(&mut self, pass: &mut wgpu::ComputePass<'_>, made: Option<&Made>);
@@ -55,7 +52,6 @@ pub(super) trait Listener {
 
 #[derive(Default)]
 struct Tape {
-    #[cfg(feature = "reference")]
     listener: Option<std::rc::Rc<RefCell<dyn Listener>>>,
     sources: Vec<(wgpu::ShaderModule, Source)>,
     layouts: Vec<(wgpu::PipelineLayout, Vec<Option<wgpu::BindGroupLayout>>)>,
@@ -65,10 +61,8 @@ struct Tape {
 }
 
 /// A tape that runs on this thread until it is dropped. There is one at a time.
-#[cfg(any(feature = "export", feature = "reference"))]
-pub(crate) struct Running(());
+pub struct Running(());
 
-#[cfg(any(feature = "export", feature = "reference"))]
 impl Running {
     /// Starts.
     pub fn start() -> Self {
@@ -78,15 +72,13 @@ impl Running {
     }
 
     /// Starts, for dispatches that will be counted.
-    #[cfg(feature = "reference")]
-    pub(super) fn to_count() -> Self {
+    pub fn to_count() -> Self {
         COUNTS.set(true);
         Self::start()
     }
 
     /// From here on `listener` hears of dispatches, or nobody does.
-    #[cfg(feature = "reference")]
-    pub(super) fn listen(&mut self, listener: Option<std::rc::Rc<RefCell<dyn Listener>>>) {
+    pub fn listen(&mut self, listener: Option<std::rc::Rc<RefCell<dyn Listener>>>) {
         TAPE.with_borrow_mut(|tape| tape.listener = listener);
     }
 
@@ -96,7 +88,6 @@ impl Running {
     }
 }
 
-#[cfg(any(feature = "export", feature = "reference"))]
 impl Drop for Running {
     fn drop(&mut self) {
         RUNS.set(false);
@@ -112,12 +103,12 @@ impl Tape {
 }
 
 /// Whether one runs on this thread.
-pub(crate) fn runs() -> bool {
+pub fn runs() -> bool {
     RUNS.get()
 }
 
 /// Whether dispatches of this thread will be counted on this device.
-pub(crate) fn counts() -> bool {
+pub fn counts() -> bool {
     COUNTS.get()
 }
 
@@ -131,12 +122,12 @@ fn write(note: impl FnOnce(&mut Tape)) {
 static COMPILED: AtomicU32 = AtomicU32::new(0);
 
 /// How many modules this process has compiled so far.
-pub(super) fn compiled() -> u32 {
+pub fn compiled() -> u32 {
     COMPILED.load(Ordering::Relaxed)
 }
 
 /// Compiles WGSL.
-pub(crate) fn shader_module(device: &wgpu::Device, name: &str, text: String) -> wgpu::ShaderModule {
+pub fn shader_module(device: &wgpu::Device, name: &str, text: String) -> wgpu::ShaderModule {
     let make = || {
         COMPILED.fetch_add(1, Ordering::Relaxed);
         let source = wgpu::ShaderSource::Wgsl(text.as_str().into());
@@ -151,7 +142,7 @@ pub(crate) fn shader_module(device: &wgpu::Device, name: &str, text: String) -> 
 }
 
 /// Makes the layout of a pipeline.
-pub(crate) fn pipeline_layout(
+pub fn pipeline_layout(
     device: &wgpu::Device,
     label: &str,
     groups: &[Option<&wgpu::BindGroupLayout>],
@@ -167,7 +158,7 @@ pub(crate) fn pipeline_layout(
 }
 
 /// Makes a pipeline.
-pub(crate) fn compute_pipeline(
+pub fn compute_pipeline(
     device: &wgpu::Device,
     descriptor: &wgpu::ComputePipelineDescriptor<'_>,
 ) -> wgpu::ComputePipeline {
@@ -188,7 +179,7 @@ pub(crate) fn compute_pipeline(
 }
 
 /// Makes a bind group.
-pub(crate) fn bind_group(device: &wgpu::Device, descriptor: &wgpu::BindGroupDescriptor<'_>) -> wgpu::BindGroup {
+pub fn bind_group(device: &wgpu::Device, descriptor: &wgpu::BindGroupDescriptor<'_>) -> wgpu::BindGroup {
     let group = device.create_bind_group(descriptor);
     write(|tape| {
         let bound = |e: &wgpu::BindGroupEntry<'_>| Some((e.binding, Bound::of(&e.resource)?));
@@ -206,7 +197,7 @@ pub struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    pub(crate) fn new(pass: wgpu::ComputePass<'a>, label: &'a str) -> Self {
+    pub fn new(pass: wgpu::ComputePass<'a>, label: &'a str) -> Self {
         Self { pass, label, pipeline: None, groups: Vec::new() }
     }
 
@@ -230,7 +221,6 @@ impl<'a> Pass<'a> {
 
     /// As [`wgpu::ComputePass::dispatch_workgroups`].
     pub fn dispatch_workgroups(&mut self, x: u32, y: u32, z: u32) {
-        #[cfg(feature = "reference")]
         write(|tape| {
             if let Some(listener) = &tape.listener {
                 listener.borrow_mut().before(&mut self.pass, tape.made(self.pipeline.as_ref()));
@@ -240,7 +230,6 @@ impl<'a> Pass<'a> {
         write(|tape| {
             // What was made before the tape began leaves an empty place, which `export` refuses.
             let made = tape.made(self.pipeline.as_ref());
-            #[cfg(feature = "reference")]
             if let Some(made) = made.filter(|_| tape.listener.is_some()) {
                 self.pass.set_pipeline(&made.pipeline);
             }

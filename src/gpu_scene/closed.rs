@@ -9,7 +9,7 @@ const MOST: usize = 200_000;
 
 /// True where every edge of `mesh` borders exactly two triangles that wind the same way, and these
 /// face outwards. Vertices of one place (to a hundred-thousandth of the mesh's reach) are one.
-pub(super) fn is_closed(mesh: &Mesh) -> bool {
+pub fn is_closed(mesh: &Mesh) -> bool {
     if mesh.indices.is_empty() || mesh.indices.len() > 3 * MOST {
         return false;
     }
@@ -40,28 +40,4 @@ pub(super) fn is_closed(mesh: &Mesh) -> bool {
         volume += f64::from(a.dot(b.cross(c)));
     }
     volume > 0.0 && edges.iter().all(|(&(a, b), &n)| n == 1 && edges.get(&(b, a)) == Some(&1))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::shapes::{self, Shape};
-
-    #[test]
-    fn bodies_are_closed_and_what_is_open_or_turned_inside_out_is_not() {
-        for shape in [Shape::Cube, Shape::Cylinder, Shape::Cone, Shape::UvSphere, Shape::IcoSphere, Shape::Torus] {
-            let mesh = shapes::flat(shape);
-            assert!(is_closed(&mesh), "{shape:?}");
-            let mut open = mesh.clone();
-            open.indices.truncate(mesh.indices.len() - 3);
-            assert!(!is_closed(&open), "{shape:?} without a triangle");
-            let mut inverted = mesh.clone();
-            inverted.indices.reverse();
-            assert!(!is_closed(&inverted), "{shape:?} inside out");
-            let mut twice = mesh.clone();
-            twice.indices.extend_from_slice(&mesh.indices);
-            assert!(!is_closed(&twice), "{shape:?} twice");
-        }
-        assert!(!is_closed(&Mesh::default()));
-    }
 }

@@ -3,16 +3,16 @@
 //! device is one itself, whose driver takes two minutes and a half to compile them.
 
 use crate::scene::mips::Level;
-#[cfg(feature = "io")]
+#[cfg(feature = "compression")]
 use block_compression::{BC7Settings, CompressionVariant, GpuBlockCompressor, encode::compress_rgba8};
 
 /// Texels of a block's side.
 const BLOCK: u32 = 4;
 /// Rows of blocks in a buffer begin at multiples of 256 bytes, which are 16 blocks of 16 bytes.
-#[cfg(feature = "io")]
+#[cfg(feature = "compression")]
 const STRIDE: u32 = 64;
 /// Texels whose encoding is waited for, so that large scenes do not lie on the device twice.
-#[cfg(feature = "io")]
+#[cfg(feature = "compression")]
 const WAIT: u64 = 16 << 20;
 
 /// Whether a picture can be kept in blocks: its sides are whole numbers of them.
@@ -26,10 +26,10 @@ pub(super) fn bytes(width: u32, height: u32) -> u64 {
 }
 
 /// Without the encoders there is none.
-#[cfg(not(feature = "io"))]
+#[cfg(not(feature = "compression"))]
 pub(super) enum Compressor {}
 
-#[cfg(not(feature = "io"))]
+#[cfg(not(feature = "compression"))]
 impl Compressor {
     pub fn new(_: &wgpu::Device, _: &wgpu::Queue) -> Option<Self> {
         None
@@ -41,7 +41,7 @@ impl Compressor {
 }
 
 /// Encodes textures one after the other.
-#[cfg(feature = "io")]
+#[cfg(feature = "compression")]
 pub(super) struct Compressor {
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -51,7 +51,7 @@ pub(super) struct Compressor {
     pending: u64,
 }
 
-#[cfg(feature = "io")]
+#[cfg(feature = "compression")]
 impl Compressor {
     /// `None` on a device that cannot sample such textures.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Option<Self> {
@@ -117,20 +117,20 @@ impl Compressor {
     }
 }
 
-#[cfg(feature = "io")]
+#[cfg(feature = "compression")]
 fn extent([width, height]: [u32; 2]) -> wgpu::Extent3d {
     wgpu::Extent3d { width, height, depth_or_array_layers: 1 }
 }
 
 /// Four channels: alpha is coverage.
-#[cfg(feature = "io")]
+#[cfg(feature = "compression")]
 fn variant() -> CompressionVariant {
     CompressionVariant::BC7(BC7Settings::alpha_fast())
 }
 
 /// Blocks of a level, row by row, and the bytes of a row of them; what lacks to whole blocks
 /// repeats the last column and row.
-#[cfg(feature = "io")]
+#[cfg(feature = "compression")]
 fn blocks(level: &Level<'_>) -> (Vec<u8>, u32) {
     let variant = variant();
     let [width, height] = [level.width, level.height].map(|n| n.next_multiple_of(BLOCK));
@@ -150,7 +150,7 @@ fn blocks(level: &Level<'_>) -> (Vec<u8>, u32) {
 }
 
 /// A level with its last column and row repeated up to `size`.
-#[cfg(feature = "io")]
+#[cfg(feature = "compression")]
 fn padded(level: &Level<'_>, [width, height]: [u32; 2]) -> Vec<u8> {
     let mut out = Vec::with_capacity(4 * width as usize * height as usize);
     for y in 0..height {
@@ -164,7 +164,7 @@ fn padded(level: &Level<'_>, [width, height]: [u32; 2]) -> Vec<u8> {
     out
 }
 
-#[cfg(all(test, feature = "io"))]
+#[cfg(all(test, feature = "compression"))]
 mod tests {
     use super::*;
     use std::borrow::Cow;

@@ -14,6 +14,7 @@ mod mesh;
 mod texture;
 mod veil;
 
+pub use closed::is_closed;
 pub use deform::DeformGpu;
 pub(crate) use deform::{STRIDE as DEFORM_STRIDE, Shapes};
 pub use material::{MaterialGpu, TextureUse, material_layout};

@@ -97,7 +97,7 @@ impl std::ops::AddAssign for Count {
 impl Count {
     /// Passes on the runs of `draw`'s instances that are to be drawn because `volume` meets one of
     /// them, and counts.
-    pub(crate) fn runs(&mut self, scene: &SceneGpu, draw: &Draw, volume: &Volume, mut each: impl FnMut(Range<u32>)) {
+    pub fn runs(&mut self, scene: &SceneGpu, draw: &Draw, volume: &Volume, mut each: impl FnMut(Range<u32>)) {
         let triangles = u64::from(draw.indices.end - draw.indices.start) / 3;
         let seen = |slot: &u32| scene.slots.get(*slot as usize).is_none_or(|s| volume.meets(&s.bounds));
         let mut drawn = 0;

@@ -58,14 +58,17 @@ struct Lighting {
 
 /// What a frame is drawn for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Purpose {
+pub enum Purpose {
     /// To be seen.
     Picture,
     /// Another sample of the picture before: shadow maps stay as they are and, without temporal
     /// anti-aliasing, to which each sample is a frame, motion vectors of objects.
     FurtherSample,
-    /// To be remembered: targets hold no picture after it. `first`: of a picture.
-    WarmUp { first: bool },
+    /// To be remembered: targets hold no picture after it.
+    WarmUp {
+        /// Of a picture.
+        first: bool,
+    },
 }
 
 /// The rasteriser. The host owns device, queue and encoder; a steady frame allocates nothing on the
@@ -291,7 +294,7 @@ impl Renderer {
     }
 
     /// As [`Renderer::record`], no more than `purpose` needs.
-    pub(crate) fn record_frame(
+    pub fn record_frame(
         &mut self,
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,

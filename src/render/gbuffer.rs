@@ -133,12 +133,12 @@ fn variant(draw: &Draw, view: &View) -> usize {
 /// What is closed shows its outer faces alone from outside, whatever its material says: where an
 /// inner face meets an outer one at a silhouette, both cover a pixel at depths that only rounding
 /// tells apart, and the inner one would now and then win.
-pub(crate) fn culled(draw: &Draw, view: &View) -> usize {
+pub fn culled(draw: &Draw, view: &View) -> usize {
     if draw.double_sided && !(draw.closed && is_outside(view, draw)) { 2 } else { usize::from(draw.mirrored) }
 }
 
 /// Back faces, the front faces of what is mirrored, none.
-pub(crate) const CULLED: [Option<wgpu::Face>; 3] = [Some(wgpu::Face::Back), Some(wgpu::Face::Front), None];
+pub const CULLED: [Option<wgpu::Face>; 3] = [Some(wgpu::Face::Back), Some(wgpu::Face::Front), None];
 
 /// True where the eye is well outside a draw's bounds, and the near plane cuts nothing open.
 fn is_outside(view: &View, draw: &Draw) -> bool {

@@ -27,14 +27,15 @@ pub mod taa;
 pub mod targets;
 pub mod tonemap;
 pub mod tonemap_curve;
-pub(crate) mod tool;
+#[doc(hidden)]
+pub mod tool;
 pub mod view;
 
 pub use blended::Blending;
 pub use composite::Backdrop;
 pub use cull::DrawnCount;
 pub use exposure::Exposure;
-pub(crate) use frame::Purpose;
+pub use frame::Purpose;
 pub use frame::{Renderer, RendererOptions};
 pub use light_choice::LightOptions;
 pub use targets::Targets;

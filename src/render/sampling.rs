@@ -76,7 +76,7 @@ pub(crate) fn window(x: f32) -> f32 {
 }
 
 /// Position below which a share `u` of the window's integral lies.
-pub(crate) fn inverse(u: f32) -> f32 {
+pub fn inverse(u: f32) -> f32 {
     static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
     let table = TABLE.get_or_init(|| {
         let at = |i: usize| FILTER_WIDTH * (2.0 * i as f32 / STEPS as f32 - 1.0);

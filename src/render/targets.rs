@@ -15,7 +15,8 @@ pub struct Target {
 }
 
 impl Target {
-    pub(crate) fn new(
+    /// A texture of one mip level and its view, that can be read back.
+    pub fn new(
         device: &wgpu::Device,
         name: &'static str,
         size: [u32; 2],

@@ -1,10 +1,10 @@
 //! Short forms for what every pass says to wgpu.
 
-pub(crate) use crate::gpu::binding::*;
+pub use crate::gpu::binding::*;
 use crate::gpu::{shared, tape};
 
 /// A bind group layout entry for one stage set, numbered by the list it stands in.
-pub(crate) fn layout(
+pub fn layout(
     device: &wgpu::Device,
     label: &str,
     visibility: wgpu::ShaderStages,
@@ -18,7 +18,7 @@ pub(crate) fn layout(
 }
 
 /// A bind group whose bindings are numbered by the list.
-pub(crate) fn group(
+pub fn group(
     device: &wgpu::Device,
     label: &str,
     layout: &wgpu::BindGroupLayout,
@@ -32,12 +32,12 @@ pub(crate) fn group(
 }
 
 /// A target as something to bind.
-pub(crate) fn view(target: &super::targets::Target) -> wgpu::BindingResource<'_> {
+pub fn view(target: &super::targets::Target) -> wgpu::BindingResource<'_> {
     wgpu::BindingResource::TextureView(&target.view)
 }
 
 /// A compute pipeline of shader `name` whose entry point is `entry`.
-pub(crate) fn compute(
+pub fn compute(
     device: &wgpu::Device,
     name: &str,
     entry: &str,
@@ -48,7 +48,7 @@ pub(crate) fn compute(
 }
 
 /// As [`compute`], where some groups are left out.
-pub(crate) fn compute_with(
+pub fn compute_with(
     device: &wgpu::Device,
     name: &str,
     entry: &str,
@@ -68,13 +68,13 @@ pub(crate) fn compute_with(
 }
 
 /// Dispatches enough 8×8 workgroups for `size`.
-pub(crate) fn dispatch(pass: &mut crate::gpu::timing::Pass<'_>, size: [u32; 2]) {
+pub fn dispatch(pass: &mut crate::gpu::timing::Pass<'_>, size: [u32; 2]) {
     pass.dispatch_workgroups(size[0].div_ceil(8), size[1].div_ceil(8), 1);
 }
 
 /// A pipeline that draws the fragments of shader `name` over a whole target of `format`; it needs
 /// `lib/screen.wgsl`.
-pub(crate) fn screen(
+pub fn screen(
     device: &wgpu::Device,
     name: &str,
     format: wgpu::TextureFormat,
@@ -109,7 +109,7 @@ pub(crate) fn screen(
 }
 
 /// How [`mesh`] draws.
-pub(crate) struct Drawn<'a> {
+pub struct Drawn<'a> {
     /// Where vertices come from.
     pub buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
     pub targets: &'a [Option<wgpu::ColorTargetState>],
@@ -121,7 +121,7 @@ pub(crate) struct Drawn<'a> {
 }
 
 /// A pipeline that draws a scene's meshes with reversed depth.
-pub(crate) fn mesh(
+pub fn mesh(
     device: &wgpu::Device,
     label: &str,
     (layout, module): (&wgpu::PipelineLayout, &wgpu::ShaderModule),
@@ -163,7 +163,7 @@ pub(crate) fn mesh(
 }
 
 /// A uniform buffer of `size` bytes that the queue writes.
-pub(crate) fn uniform(device: &wgpu::Device, label: &str, size: usize) -> wgpu::Buffer {
+pub fn uniform(device: &wgpu::Device, label: &str, size: usize) -> wgpu::Buffer {
     device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size: size as u64,

@@ -105,7 +105,7 @@ impl View {
 
     /// World position of the point at view-space distance `z` along the axis, `ndc` in [−1, 1] (y
     /// up).
-    pub(crate) fn frustum_point(&self, ndc: [f32; 2], z: f32) -> Vec3 {
+    pub fn frustum_point(&self, ndc: [f32; 2], z: f32) -> Vec3 {
         let p = Vec3::new(ndc[0] * self.tan_half[0] * z, ndc[1] * self.tan_half[1] * z, -z);
         Mat4::from_cols_array_2d(&self.world_from_view).transform_point3(p)
     }

@@ -58,9 +58,9 @@ pub struct Shape {
     /// What targets do to vertices, vertex after vertex.
     pub deltas: Vec<Delta>,
     /// Boxes around what each joint holds at rest; without a skin one around everything.
-    pub(crate) reach: Vec<(usize, Vec3, Vec3)>,
+    pub reach: Vec<(usize, Vec3, Vec3)>,
     /// Box around what each target adds, with the origin.
-    pub(crate) swing: Vec<(Vec3, Vec3)>,
+    pub swing: Vec<(Vec3, Vec3)>,
 }
 
 /// A mesh of a scene that deforms, as it stands now.

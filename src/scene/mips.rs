@@ -4,7 +4,7 @@ use super::ColorSpace;
 use std::borrow::Cow;
 
 /// An image at one of its sizes.
-pub(crate) struct Level<'a> {
+pub struct Level<'a> {
     pub width: u32,
     pub height: u32,
     /// Four bytes a pixel.
@@ -41,7 +41,7 @@ impl Level<'_> {
 /// A normal map as it is drawn: alpha holds √(1 − r), r the length of the mean of the normals that
 /// a texel stands for (Toksvig 2005). None are averaged at full size, so r is 1 whatever the length
 /// that eight bits leave of a normal.
-pub(crate) fn normals<'a>(level: &Level<'a>) -> Level<'a> {
+pub fn normals<'a>(level: &Level<'a>) -> Level<'a> {
     let mut rgba = level.rgba.to_vec();
     rgba.iter_mut().skip(3).step_by(4).for_each(|a| *a = 0);
     Level { width: level.width, height: level.height, rgba: Cow::Owned(rgba) }
@@ -49,7 +49,7 @@ pub(crate) fn normals<'a>(level: &Level<'a>) -> Level<'a> {
 
 /// The next mip level of [`normals`]: directions of means of 2×2 normals, and how much shorter than
 /// 1 those are.
-pub(crate) fn halved_normals(level: &Level<'_>) -> Level<'static> {
+pub fn halved_normals(level: &Level<'_>) -> Level<'static> {
     let (width, height) = ((level.width / 2).max(1), (level.height / 2).max(1));
     let mean = |x: u32, y: u32| {
         let (x, y) = (x.min(level.width - 1), y.min(level.height - 1));

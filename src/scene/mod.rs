@@ -7,59 +7,16 @@
 //! buffers.
 
 pub mod bounds;
-#[cfg(feature = "io")]
-pub mod bundled;
 mod camera;
-#[cfg(feature = "io")]
-mod cut_off;
-pub mod defaults;
 pub mod deform;
-#[cfg(feature = "io")]
-mod dome;
-pub mod edit;
 pub mod environment;
-#[cfg(feature = "io")]
-mod error;
-#[cfg(feature = "io")]
-pub mod export;
-#[cfg(feature = "io")]
-mod files;
-#[cfg(feature = "io")]
-mod geometry;
-#[cfg(feature = "io")]
-pub mod gltf;
-#[cfg(feature = "io")]
-pub mod home;
-#[cfg(feature = "io")]
-mod ktx2;
-#[cfg(feature = "io")]
-mod load;
-pub mod look;
-pub(crate) mod mips;
-#[cfg(feature = "io")]
-pub mod obj;
-pub(crate) mod octahedral;
-#[cfg(feature = "io")]
-pub mod paper_room;
-#[cfg(feature = "io")]
-pub mod path;
+#[doc(hidden)]
+pub mod mips;
+#[doc(hidden)]
+pub mod octahedral;
 pub mod rig;
-pub mod shapes;
-#[cfg(feature = "io")]
-pub mod sound;
-#[cfg(feature = "io")]
-mod texture;
-pub mod triangles;
-#[cfg(feature = "io")]
-pub mod units;
 
 pub use environment::Environment;
-#[cfg(feature = "io")]
-pub use error::SceneError;
-#[cfg(feature = "io")]
-pub use files::LoadOptions;
-#[cfg(feature = "io")]
-pub use load::{load, load_with};
 
 /// A whole scene, ready to be uploaded.
 #[derive(Debug, Clone, Default)]
@@ -128,7 +85,7 @@ impl Mesh {
     ///
     /// # Errors
     /// What disagrees, in words that follow the mesh's name.
-    pub(crate) fn check(&self, materials: usize) -> Result<(), String> {
+    pub fn check(&self, materials: usize) -> Result<(), String> {
         let n = self.positions.len();
         let arrays = [
             ("normals", self.normals.len(), false),

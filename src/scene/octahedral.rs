@@ -5,7 +5,7 @@
 ///
 /// Source: Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors",
 /// JCGT 3(2), 2014.
-pub(crate) fn octahedral(v: [f32; 3]) -> [i16; 2] {
+pub fn octahedral(v: [f32; 3]) -> [i16; 2] {
     let v = v.map(f64::from);
     let sum = v.iter().map(|c| c.abs()).sum::<f64>();
     let v = if sum > 0.0 && sum.is_finite() { v.map(|c| c / sum) } else { [0.0, 0.0, 1.0] };
@@ -17,7 +17,7 @@ pub(crate) fn octahedral(v: [f32; 3]) -> [i16; 2] {
 }
 
 /// [`octahedral`] in one word, as `unpack2x16snorm` has it: x in the low half.
-pub(crate) fn octahedral_word(v: [f32; 3]) -> u32 {
+pub fn octahedral_word(v: [f32; 3]) -> u32 {
     let [x, y] = octahedral(v).map(|c| u32::from(c as u16));
     x | y << 16
 }

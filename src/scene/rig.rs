@@ -158,7 +158,7 @@ impl Rig {
 impl Camera {
     /// Puts the camera where a node is, whose scale and shear are not a camera's. False, and
     /// nothing is done, where the node has no rotation.
-    pub(super) fn place(&mut self, world: Mat4) -> bool {
+    pub fn place(&mut self, world: Mat4) -> bool {
         let (_, rotation, position) = world.to_scale_rotation_translation();
         let sound = rotation.is_finite() && rotation.length_squared() >= 0.5 && position.is_finite();
         if sound {
@@ -171,7 +171,7 @@ impl Camera {
 impl LightKind {
     /// Puts the light where a node is, shining along its −Z. False, and nothing is done, where that
     /// is nowhere.
-    pub(super) fn place(&mut self, world: Mat4) -> bool {
+    pub fn place(&mut self, world: Mat4) -> bool {
         let to = world.w_axis.truncate();
         let Some(along) = world.transform_vector3(Vec3::NEG_Z).try_normalize().filter(|_| to.is_finite()) else {
             return false;

@@ -4,7 +4,8 @@
 
 use std::path::{Path, PathBuf};
 
-use bouncelight::scene::{self, Scene, SceneError};
+use bouncelight::scene::Scene;
+use bouncelight_scene::SceneError;
 use serde_json::{Value, json};
 
 /// A file under construction: JSON with the binary chunk.
@@ -95,7 +96,7 @@ impl Glb {
 pub fn load_bytes(name: &str, bytes: &[u8]) -> Result<Scene, SceneError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = put(folder.path(), name, bytes);
-    scene::load(path.to_str().expect("a readable path"))
+    bouncelight_lab::scenes::load(path.to_str().expect("a readable path"))
 }
 
 pub fn put(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {

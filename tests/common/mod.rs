@@ -110,11 +110,16 @@ pub fn own_gpu() -> Option<Gpu> {
     }
 }
 
+/// The repository's folder, whichever package the test is of.
+pub fn root() -> PathBuf {
+    let package = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    package.ancestors().find(|folder| folder.join("tests/common").is_dir()).unwrap_or(package).to_owned()
+}
+
 /// A path below the folder of reference renders and other people's scenes (`BOUNCELIGHT_SHARED`,
 /// else `../shared`), or `None` after a [`skip`].
 pub fn shared_path(relative: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("BOUNCELIGHT_SHARED")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+    let root = std::env::var_os("BOUNCELIGHT_SHARED").map_or_else(|| root().join("../shared"), PathBuf::from);
     let path = root.join(relative);
     if !path.exists() {
         skip(Need::Shared, format_args!("{} is not here", path.display()));

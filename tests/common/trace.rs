@@ -3,10 +3,10 @@
 #![allow(dead_code, reason = "each test binary uses a part")]
 
 use bouncelight::gpu::{Gpu, readback, shaders};
-use bouncelight::reference::job::{self, Job};
-use bouncelight::reference::scene::ReferenceScene;
 use bouncelight::scene::Scene;
 use bouncelight::wgpu;
+use bouncelight_lab::reference::job::{self, Job};
+use bouncelight_lab::reference::scene::ReferenceScene;
 
 /// Sums of a point: diffuse direct, indirect, glossy direct, indirect, emitted, diffuse colour,
 /// glossy colour, analytic; the fourth components as `reference::film` tells.

@@ -5,8 +5,8 @@ use crate::gather::{go_on, uploaded};
 use crate::world::{self, difference, mean};
 use bouncelight::gi::{Conventions, Depth, Method, NormalRange, NormalSpace};
 use bouncelight::gpu::{Gpu, readback};
-use bouncelight::metrics::{Picture, flip};
 use bouncelight::scene::{Camera, Scene};
+use bouncelight_lab::metrics::{Picture, flip};
 use host::scene::{BLOCKS, place};
 
 #[path = "../../examples/embed/main.rs"]

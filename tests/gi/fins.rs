@@ -6,8 +6,8 @@ use crate::gather::lit;
 use crate::world::{self, GREY, mean, scene, sun};
 use bouncelight::gi::Method;
 use bouncelight::gi::gather::Options;
-use bouncelight::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions};
 use bouncelight::scene::{Camera, Scene};
+use bouncelight_lab::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions};
 
 /// A floor before a wall full of sunlit shelves. A tenth of a metre apart they are places that do
 /// not see each other, of which each cell of the table, half a metre and wider at this distance,

@@ -34,7 +34,7 @@ pub fn eye(step: u32) -> (Vec3, Vec3) {
 
 /// Corners of a box of 2 m, each face's own.
 pub fn cube() -> (Vec<[f32; 3]>, Vec<u32>) {
-    let mesh = bouncelight::scene::shapes::flat(bouncelight::scene::shapes::Shape::Cube);
+    let mesh = bouncelight_scene::shapes::flat(bouncelight_scene::shapes::Shape::Cube);
     (mesh.positions, mesh.indices)
 }
 

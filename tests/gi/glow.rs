@@ -10,7 +10,8 @@ use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::Renderer;
 use bouncelight::render::capture::{CaptureOptions, CapturedFrame, Layer, capture};
-use bouncelight::scene::{AlphaMode, Camera, Material, Mesh, Scene, defaults};
+use bouncelight::scene::{AlphaMode, Camera, Material, Mesh, Scene};
+use bouncelight_scene::defaults;
 
 const PLAIN: Method = Method::Gather(Options { slots: world::FEW_SLOTS, ..Options::PLAIN });
 
@@ -113,10 +114,9 @@ fn six_panels() -> Scene {
     scene
 }
 
-#[cfg(feature = "reference")]
 #[test]
 fn six_panels_light_a_room_once_each() {
-    use bouncelight::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
+    use bouncelight_lab::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
     let Some(gpu) = common::gpu() else { return };
     let scene = six_panels();
     let sum = |f: &CapturedFrame| mean(layer(f, Layer::DiffDir)) + mean(layer(f, Layer::DiffInd));

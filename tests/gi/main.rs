@@ -11,11 +11,9 @@ mod common;
 mod contract;
 mod conventions;
 mod edges;
-#[cfg(feature = "io")]
 mod embed;
 mod embedding;
 mod filter;
-#[cfg(feature = "reference")]
 mod fins;
 mod foreign;
 mod gather;
@@ -28,7 +26,6 @@ mod lamps;
 mod linear;
 mod mirror;
 mod noise;
-#[cfg(feature = "io")]
 mod readback;
 mod real;
 mod repeat;

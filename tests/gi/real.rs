@@ -5,7 +5,8 @@ use crate::gather::{go_on, lit, uploaded};
 use crate::world;
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::SceneGpu;
-use bouncelight::scene::{Environment, LightKind, Scene, gltf};
+use bouncelight::scene::{Environment, LightKind, Scene};
+use bouncelight_scene::gltf;
 
 const SIZE: [u32; 2] = [128, 64];
 

@@ -5,7 +5,8 @@ use crate::gather::{go_on, uploaded};
 use crate::world;
 use bouncelight::gi::Method;
 use bouncelight::gi::gather::Options;
-use bouncelight::scene::{Camera, home};
+use bouncelight::scene::Camera;
+use bouncelight_lab::scenes::home;
 use glam::{Mat4, Quat};
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -260,7 +260,7 @@ fn screen_light_is_linear_and_none_gives_none() {
 fn what_a_light_stands_in_for_lights_once() {
     let Some(gpu) = common::gpu() else { return };
     let light = |method: Method, glows: bool, stands_in: bool| {
-        let mut scene = bouncelight::scene::load("cornell").expect("it is bundled");
+        let mut scene = bouncelight_lab::scenes::load("cornell").expect("it is bundled");
         scene.lights.iter_mut().for_each(|l| l.stands_in = stands_in);
         if !glows {
             scene.materials.iter_mut().for_each(|m| m.emissive = [0.0; 3]);

@@ -55,10 +55,9 @@ fn all_light(frame: &CapturedFrame) -> Vec<f32> {
     layer(Layer::DiffDir).iter().zip(layer(Layer::DiffInd)).map(|(a, b)| a + b).collect()
 }
 
-#[cfg(feature = "reference")]
 #[test]
 fn a_sky_without_its_sun_and_the_sun_are_the_sky() {
-    use bouncelight::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
+    use bouncelight_lab::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
     let Some(gpu) = common::gpu() else { return };
     let kernel = Kernel::new(&gpu.device);
     let traced = |scene: &Scene| {

@@ -75,7 +75,7 @@ fn turned(camera: &Camera, angle: f32) -> Camera {
 }
 
 fn room() -> (Scene, Camera) {
-    let scene = scene::load("paper-room:60").expect("the room is made by code");
+    let scene = bouncelight_lab::scenes::load("paper-room:60").expect("the room is made by code");
     let camera = scene.cameras[0].clone();
     (scene, camera)
 }
@@ -246,7 +246,7 @@ fn resize_cut_and_another_scene_leave_no_ghost() {
     on.renderer.resize(SIZE).expect("the size fits");
     assert_eq!(on.frame(&other, 40), plain, "a new size");
 
-    let (first, second) = (scene::load("paper-room:61").expect("made"), scene);
+    let (first, second) = (bouncelight_lab::scenes::load("paper-room:61").expect("made"), scene);
     let mut on = Stage::new(&gpu, &first, Method::Direct, true);
     (0..6).for_each(|i| drop(on.frame(&first.cameras[0], i)));
     on.uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &second).expect("the scene fits");

@@ -13,9 +13,9 @@ use bouncelight::gpu::Gpu;
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::net::format::Weights;
-use bouncelight::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions};
 use bouncelight::render::{Renderer, RendererOptions, View};
-use bouncelight::scene::{self, LightKind, Scene};
+use bouncelight::scene::{LightKind, Scene};
+use bouncelight_lab::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions};
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -30,8 +30,8 @@ const FRAMES: u32 = 32;
 /// One of the paper's rooms, an interior with windows, the same at night, and the room with metal
 /// in it.
 fn rooms() -> [(&'static str, Scene); 4] {
-    let room = || scene::load("paper-room:7").expect("made by code");
-    let interior = || scene::load("interior").expect("bundled");
+    let room = || bouncelight_lab::scenes::load("paper-room:7").expect("made by code");
+    let interior = || bouncelight_lab::scenes::load("interior").expect("bundled");
     let mut night = interior();
     night.environment.radiance = [0.0; 3];
     night.environment.image = None;

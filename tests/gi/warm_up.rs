@@ -9,7 +9,7 @@ use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::net::format::Weights;
 use bouncelight::render::capture::{CaptureOptions, capture};
 use bouncelight::render::{Renderer, View, sampling};
-use bouncelight::scene::{self, Camera};
+use bouncelight::scene::Camera;
 
 const SIZE: [u32; 2] = [96, 64];
 
@@ -37,7 +37,7 @@ fn warmed(gpu: &Gpu, renderer: &mut Renderer, scene: &SceneGpu, camera: &Camera,
 #[test]
 fn pictures_after_warm_up_are_those_after_whole_frames() {
     let Some(gpu) = common::gpu() else { return };
-    let mut scene = scene::load("interior").expect("it is bundled");
+    let mut scene = bouncelight_lab::scenes::load("interior").expect("it is bundled");
     let neural = || Method::Neural(Box::new(Weights::shipped().expect("they are read").into()));
     // `ssgi` remembers nothing, and all its frames are whole.
     let methods: [&dyn Fn() -> Method; 3] = [&world::gather, &neural, &|| Method::Ssgi];

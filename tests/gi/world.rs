@@ -8,7 +8,8 @@ use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Layer, Picture, capture};
 use bouncelight::render::shadow::ShadowOptions;
 use bouncelight::render::{Renderer, RendererOptions, View};
-use bouncelight::scene::{Camera, Environment, Instance, Light, LightKind, Material, Scene, shapes};
+use bouncelight::scene::{Camera, Environment, Instance, Light, LightKind, Material, Scene};
+use bouncelight_scene::shapes;
 
 /// A Lambertian box from `low` to `high`.
 pub(crate) type Block = ([f32; 3], [f32; 3], [f32; 3]);

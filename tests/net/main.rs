@@ -12,7 +12,6 @@ mod mutate;
 mod norms;
 mod operators;
 mod plan;
-mod published;
 mod python;
 #[path = "../common/spoil.rs"]
 mod spoil;

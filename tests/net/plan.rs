@@ -392,7 +392,7 @@ proptest! {
 
 #[test]
 fn the_shipped_filter_is_projected_within_a_millisecond() {
-    use bouncelight::study::projection::{Cost, EFFICIENCY, GTX_1050, total_ms};
+    use bouncelight_lab::study::projection::{Cost, EFFICIENCY, GTX_1050, total_ms};
     let weights = Weights::shipped().expect("it is whole");
     let ms = |precision, packed_input| {
         let options = Options { precision, packed_input, ..Options::default() };

@@ -7,7 +7,7 @@ use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::net::format::Weights;
 use bouncelight::render::capture::{CaptureOptions, CapturedFrame, Layer, capture};
 use bouncelight::render::{Renderer, RendererOptions, View};
-use bouncelight::scene::{self, LightKind, Scene};
+use bouncelight::scene::{LightKind, Scene};
 
 fn neural() -> RendererOptions {
     let weights = Weights::shipped().expect("the shipped weights are sound");
@@ -37,7 +37,7 @@ fn dimmed(scene: &Scene, factor: f32) -> Scene {
 #[test]
 fn a_paper_room_with_the_network_stays_below_200_mb_and_steady_frames_allocate_nothing() {
     let Some(gpu) = common::own_gpu() else { return };
-    let scene = scene::load("paper-room:2").expect("the room is made by code");
+    let scene = bouncelight_lab::scenes::load("paper-room:2").expect("the room is made by code");
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("the scene fits");
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, [1024, 512], neural()).expect("the size fits");
     let frame = |renderer: &mut Renderer, seed: u32| {
@@ -73,7 +73,7 @@ fn a_paper_room_with_the_network_stays_below_200_mb_and_steady_frames_allocate_n
 #[test]
 fn light_scales_through_the_whole_frame_and_darkness_is_dark() {
     let Some(gpu) = common::gpu() else { return };
-    let scene = scene::load("paper-room:3").expect("the room is made by code");
+    let scene = bouncelight_lab::scenes::load("paper-room:3").expect("the room is made by code");
     let size = [128, 64];
     let once = draw(&gpu, &scene, size);
     let indirect = |frame: &CapturedFrame| frame.layer(Layer::DiffInd).expect("it was asked for").data.clone();
@@ -99,8 +99,8 @@ fn light_scales_through_the_whole_frame_and_darkness_is_dark() {
 fn odd_sizes_and_every_bundled_scene_give_finite_pictures() {
     let Some(gpu) = common::gpu() else { return };
     let mut seen = 0;
-    for name in scene::bundled::NAMES {
-        let scene = scene::load(name).expect("bundled scenes load");
+    for name in bouncelight_scene::bundled::NAMES {
+        let scene = bouncelight_lab::scenes::load(name).expect("bundled scenes load");
         for size in [[1, 1], [17, 13], [96, 48]] {
             // `capture` refuses pixels that are not finite.
             let frame = draw(&gpu, &scene, size);
@@ -108,7 +108,8 @@ fn odd_sizes_and_every_bundled_scene_give_finite_pictures() {
             seen += 1;
         }
     }
-    let empty = Scene { cameras: scene::load("cornell").expect("bundled").cameras, ..Default::default() };
+    let empty =
+        Scene { cameras: bouncelight_lab::scenes::load("cornell").expect("bundled").cameras, ..Default::default() };
     assert!(draw(&gpu, &empty, [17, 13]).beauty.data.chunks_exact(4).all(|p| p[..3] == [0.0; 3]));
     assert_eq!(seen, 6);
 }
@@ -123,7 +124,7 @@ fn files_made_by_others_draw_with_the_network() {
     let files = files.chain(rooms.iter().map(|f| shared.join("reference/cycles").join(f).join("scene.glb")));
     let mut seen = 0;
     for file in files {
-        let scene = scene::load(file.to_str().expect("a path in UTF-8")).expect("the file loads");
+        let scene = bouncelight_lab::scenes::load(file.to_str().expect("a path in UTF-8")).expect("the file loads");
         let frame = draw(&gpu, &scene, [128, 64]);
         let lit = frame.beauty.data.chunks_exact(4).filter(|p| p[0] + p[1] + p[2] > 0.0).count();
         assert!(lit * 10 > frame.beauty.width * frame.beauty.height, "{} shows something", file.display());

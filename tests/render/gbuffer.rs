@@ -7,8 +7,8 @@ use bouncelight::gpu_scene::{SceneGpu, UploadError};
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{RenderError, Renderer, View};
 use bouncelight::scene::environment::EnvironmentImage;
-use bouncelight::scene::shapes::{self, Shape};
 use bouncelight::scene::{AlphaMode, Environment, Instance, Light, Scene};
+use bouncelight_scene::shapes::{self, Shape};
 use glam::{Mat4, Vec3};
 use std::f32::consts::PI;
 

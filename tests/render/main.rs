@@ -2,6 +2,7 @@
 
 #[path = "../common/build.rs"]
 mod build;
+mod closed;
 #[path = "../common/mod.rs"]
 mod common;
 mod culling;
@@ -15,8 +16,6 @@ mod glb;
 mod lights;
 mod moved;
 mod pictures;
-#[path = "../common/program.rs"]
-mod program;
 mod render;
 mod textures;
 mod tonemap;

@@ -7,8 +7,8 @@ use bouncelight::gpu::{Gpu, readback, timing::Recorder};
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{Renderer, View};
-use bouncelight::scene::shapes::{self, Shape};
 use bouncelight::scene::{Camera, Scene};
+use bouncelight_scene::shapes::{self, Shape};
 use glam::{Mat4, Vec3};
 
 const SIZE: [u32; 2] = [128, 80];

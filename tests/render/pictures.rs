@@ -9,7 +9,7 @@ use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::net::format::Weights;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{Renderer, RendererOptions};
-use bouncelight::scene::{self, Scene};
+use bouncelight::scene::Scene;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -64,7 +64,7 @@ fn pictures(gpu: &Gpu) -> BTreeMap<String, String> {
     };
     let mut all = BTreeMap::new();
     for name in ["interior", "paper-room:2"] {
-        let scene = scene::load(name).expect("it is made by code");
+        let scene = bouncelight_lab::scenes::load(name).expect("it is made by code");
         for method in methods() {
             all.insert(format!("{name} {}", method.name()), draw(gpu, &scene, method));
         }

@@ -266,7 +266,8 @@ fn in_units(s: &bouncelight::scene::Scene, k: f32) -> bouncelight::scene::Scene 
 fn a_scene_looks_the_same_whatever_its_unit() {
     use bouncelight::gpu_scene::SceneGpu;
     use bouncelight::render::{Renderer, RendererOptions, capture};
-    use bouncelight::scene::{Camera, defaults};
+    use bouncelight::scene::Camera;
+    use bouncelight_scene::defaults;
     let Some(gpu) = common::gpu() else { return };
     let lamp = spot([-3.0, 5.0, 4.0], [0.4, -1.0, -0.5], 0.3, 0.6, 0.1);
     let s = corner(vec![sun([0.3, -1.0, -0.4], 1.0, 0.02), point([3.0, 3.0, 2.0], 20.0, 0.0), lamp]);

@@ -98,12 +98,11 @@ fn bytes_round_to_nearest() {
 
 /// The scene rows are what they claim to be, so their bounds speak for the reference pictures
 /// (make.py measures all pixels).
-#[cfg(feature = "io")]
 #[test]
 fn scene_rows_are_pixels_of_the_references() {
     let Some(shared) = common::shared() else { return };
-    let layers =
-        bouncelight::image_io::read_exr(&shared.join("reference/cycles/point_201/frame0000.exr")).expect("readable");
+    let layers = bouncelight_scene::image_io::read_exr(&shared.join("reference/cycles/point_201/frame0000.exr"))
+        .expect("readable");
     let image = layers.image("Combined").expect("beauty");
     let pixels: std::collections::HashSet<[u32; 3]> =
         image.pixels.chunks_exact(4).map(|p| [p[0].to_bits(), p[1].to_bits(), p[2].to_bits()]).collect();

@@ -1,7 +1,6 @@
 //! The list of methods, and how one is made: nothing below knows it.
 
 mod below;
-pub mod fitted;
 pub mod name;
 
 use super::gather::{self, GatherGi};

@@ -36,6 +36,12 @@ impl MethodName {
         ["direct", "ambient", "ssgi", "gather", "neural", "reference"][self as usize]
     }
 
+    /// What windows call it.
+    pub fn title(self) -> &'static str {
+        ["Direct only", "Ambient + AO", "SSGI", "Ray-traced gather", "Gather + neural filter", "Path-traced reference"]
+            [self as usize]
+    }
+
     /// What lists say beside the name.
     pub fn doc(self) -> &'static str {
         [
@@ -67,17 +73,6 @@ impl MethodName {
     /// The one called `name`.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|m| m.name() == name)
-    }
-}
-
-#[cfg(feature = "cli")]
-impl clap::ValueEnum for MethodName {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Self::ALL
-    }
-
-    fn to_possible_value(&self) -> Option<clap::builder::PossibleValue> {
-        Some(clap::builder::PossibleValue::new(self.name()).help(self.doc()))
     }
 }
 

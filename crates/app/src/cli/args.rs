@@ -1,0 +1,253 @@
+//! Flags that all subcommands share, and how they turn into a device and a method.
+
+use super::error::CliError;
+use anyhow::Result;
+pub use bouncelight::gi::name::MethodName;
+use bouncelight::gi::{Method, Neural};
+use bouncelight::gpu::{Backend, Gpu, GpuOptions};
+use bouncelight::gpu_scene::TextureMemory;
+use bouncelight::net::{format::Weights, plan::Precision};
+use bouncelight_scene::LoadOptions;
+use bouncelight_scene::units::{Units, Up};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::error::ErrorKind;
+use clap::{Arg, Args, Command, ValueEnum};
+use serde::{Deserialize, Serialize};
+use std::{ffi::OsStr, path::PathBuf};
+
+/// Flags every subcommand takes.
+#[derive(Debug, Args)]
+pub struct Global {
+    /// Part of the adapter's name, or `cpu` for a software adapter.
+    #[arg(long, global = true, value_name = "NAME")]
+    pub adapter: Option<String>,
+    /// Graphics API.
+    #[arg(long, global = true, value_enum, default_value = "auto")]
+    pub backend: BackendName,
+    /// How a network's numbers are stored on the GPU; when absent 16 bits for networks that filter
+    /// light, 32 for others.
+    #[arg(long, global = true, value_enum)]
+    pub precision: Option<PrecisionName>,
+    /// Only errors.
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// Buffers, textures and material libraries may lie outside the folder of the scene file that
+    /// names them.
+    #[arg(long, global = true)]
+    pub allow_outside: bool,
+    /// A glTF file that says something wrong is refused instead of mended with a warning.
+    #[arg(long, global = true)]
+    pub strict: bool,
+    /// Metres of a scene file's unit of length: 0.001 for one that counts in millimetres.
+    #[arg(long, global = true, default_value_t = 1.0, allow_hyphen_values = true, value_parser = parse_scale, value_name = "M")]
+    pub scale: f32,
+    /// Axis of a scene file that points up.
+    #[arg(long, global = true, value_enum, default_value = "y")]
+    pub up: UpName,
+    /// How textures lie in the device's memory: `compressed` in blocks of a byte a texel (BC7)
+    /// where the device has them, `full` with four bytes a texel, `auto` in blocks where a scene's
+    /// would take more than 512 MiB.
+    #[arg(long, global = true, value_enum, default_value = "auto")]
+    pub textures: TexturesName,
+    /// More log lines; twice for yet more.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// Reads shaders from this folder where it has them: for who works on them.
+    #[arg(long, global = true, value_name = "DIR", hide = true)]
+    pub shaders: Option<PathBuf>,
+    /// How progress is shown on standard error.
+    #[arg(long, global = true, value_enum, default_value = "auto")]
+    pub progress: ProgressKind,
+}
+
+/// Names of the graphics APIs.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+#[allow(missing_docs, reason = "the variants are their own words on the command line")]
+pub enum BackendName {
+    Auto,
+    Vulkan,
+    Gl,
+    Metal,
+    Dx12,
+}
+
+/// How a network's numbers are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PrecisionName {
+    /// 32 bits.
+    #[default]
+    F32,
+    /// 16 bits; arithmetic stays in 32.
+    F16,
+}
+
+impl PrecisionName {
+    /// As the runtime knows it.
+    pub fn precision(self) -> Precision {
+        match self {
+            PrecisionName::F32 => Precision::F32,
+            PrecisionName::F16 => Precision::F16,
+        }
+    }
+}
+
+/// How textures lie in the device's memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+#[allow(missing_docs, reason = "the variants are their own words on the command line")]
+pub enum TexturesName {
+    #[default]
+    Auto,
+    Full,
+    Compressed,
+}
+
+/// Axes that may point up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+#[allow(missing_docs, reason = "the variants are their own words on the command line")]
+pub enum UpName {
+    #[default]
+    Y,
+    Z,
+}
+
+/// How progress is shown.
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+pub enum ProgressKind {
+    /// A bar on a terminal, else plain lines.
+    Auto,
+    /// A bar.
+    Bar,
+    /// A plain line every few seconds.
+    Plain,
+    /// Nothing.
+    None,
+}
+
+impl Global {
+    /// How networks store their numbers, where it is said.
+    pub fn precision(&self) -> Option<Precision> {
+        self.precision.map(PrecisionName::precision)
+    }
+
+    /// What a scene file may do.
+    pub fn load_options(&self) -> LoadOptions {
+        let up = if self.up == UpName::Y { Up::Y } else { Up::Z };
+        LoadOptions { allow_outside: self.allow_outside, strict: self.strict, units: Units { scale: self.scale, up } }
+    }
+
+    /// How textures are uploaded.
+    pub fn textures(&self) -> TextureMemory {
+        match self.textures {
+            TexturesName::Auto => TextureMemory::Auto,
+            TexturesName::Full => TextureMemory::Full,
+            TexturesName::Compressed => TextureMemory::Compressed,
+        }
+    }
+
+    /// What is asked of the device.
+    pub fn gpu_options(&self) -> GpuOptions {
+        let backend = match self.backend {
+            BackendName::Auto => Backend::Auto,
+            BackendName::Vulkan => Backend::Vulkan,
+            BackendName::Gl => Backend::Gl,
+            BackendName::Metal => Backend::Metal,
+            BackendName::Dx12 => Backend::Dx12,
+        };
+        GpuOptions { backend, adapter: self.adapter.clone() }
+    }
+
+    /// Opens the device and says on standard error which one it is.
+    pub fn open_gpu(&self) -> Result<Gpu> {
+        let gpu = Gpu::open(&self.gpu_options())?;
+        // Whatever the driver refuses later is no fault of the user's, but it deserves a sentence,
+        // not a stack trace.
+        gpu.device.on_uncaptured_error(std::sync::Arc::new(|e| {
+            eprintln!(
+                "error: the GPU driver refused a command; `bouncelight doctor` lists other adapters\n{}",
+                bouncelight::gpu::shaders::located(&e.to_string())
+            );
+            std::process::exit(super::error::RUNTIME.into());
+        }));
+        if !self.quiet {
+            eprintln!("{}", gpu.sentence());
+        }
+        Ok(gpu)
+    }
+}
+
+/// Methods that there were.
+const REPLACED: [&str; 3] = ["rsm", "cache", "probes"];
+
+/// What is said to who asks for one of them.
+pub fn replaced(text: &str) -> Option<String> {
+    REPLACED.contains(&text).then(|| format!("method `{text}` was replaced by `gather`"))
+}
+
+/// What is said to who asks for paths where frames are drawn.
+pub const TRACED: &str = "paths are traced by `bouncelight trace`, a command of its own";
+
+/// Parses a method's name, one of those given, and says where to look for others that there are or
+/// were.
+#[derive(Debug, Clone)]
+pub struct MethodParser(pub &'static [MethodName]);
+
+impl TypedValueParser for MethodParser {
+    type Value = MethodName;
+
+    fn parse_ref(&self, cmd: &Command, arg: Option<&Arg>, value: &OsStr) -> Result<MethodName, clap::Error> {
+        let error = |reason: String| clap::Error::raw(ErrorKind::InvalidValue, reason).with_cmd(cmd);
+        let asked = value.to_str().unwrap_or_default();
+        if let Some(reason) = replaced(asked) {
+            return Err(error(reason));
+        }
+        if asked == MethodName::Reference.name() && !self.0.contains(&MethodName::Reference) {
+            return Err(error(TRACED.into()));
+        }
+        let names = PossibleValuesParser::new(self.possible_values().into_iter().flatten());
+        let name = names.parse_ref(cmd, arg, value)?;
+        MethodName::from_name(&name).ok_or_else(|| error(format!("`{name}` is no method")))
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(self.0.iter().map(|m| PossibleValue::new(m.name()).help(m.doc()))))
+    }
+}
+
+/// The real-time method called `name` with its weights: `weights`, or the shipped ones. `tuned` adds
+/// what a device is needed for.
+pub fn real_time(name: MethodName, global: &Global, weights: Option<&PathBuf>) -> Result<Method> {
+    match (name.plain(), name) {
+        (Some(method), _) => Ok(method),
+        (None, MethodName::Neural) => {
+            let neural = Neural::from(load_weights(weights)?).stored(global.precision());
+            Ok(Method::Neural(Box::new(neural)))
+        }
+        (None, _) => Err(usage(format!("`{}` is no real-time method", name.name()))),
+    }
+}
+
+/// The weights in `path`, or the shipped ones of that name; without a path those shipped as the
+/// default.
+pub fn load_weights(path: Option<&PathBuf>) -> Result<Weights> {
+    Ok(Weights::find(path.map(PathBuf::as_path))?)
+}
+
+/// A usage error (exit code 2).
+pub fn usage(message: String) -> anyhow::Error {
+    CliError::Usage(message).into()
+}
+
+pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let (w, h) = text.split_once(['x', 'X']).ok_or("write it as WIDTHxHEIGHT, such as 1024x512")?;
+    let side = |t: &str| t.parse::<u32>().map_err(|_| format!("`{t}` is no number of pixels"));
+    match [side(w)?, side(h)?] {
+        [0, _] | [_, 0] => Err("width and height must be at least 1".into()),
+        size => Ok(size),
+    }
+}
+
+fn parse_scale(text: &str) -> Result<f32, String> {
+    let scale: f32 = text.parse().map_err(|e| format!("{e}"))?;
+    if (1e-9..=1e9).contains(&scale) { Ok(scale) } else { Err("a scale is between 1e-9 and 1e9".into()) }
+}

@@ -1,0 +1,339 @@
+//! `bouncelight chart`: speed against accuracy, as a table, a page and records.
+
+use super::{
+    args::{Global, MethodName, parse_size, real_time, usage},
+    error::CliError,
+    interrupt,
+    progress::Progress,
+    stdout::say,
+};
+use anyhow::{Context, Result};
+use bouncelight::gi::{Method, gather};
+use bouncelight::net::{format::Weights, pictures};
+use bouncelight_lab::study::{
+    bench::BenchOptions,
+    chart::{
+        ChartError, Metric, Provenance, Record,
+        entries::{Entry, path_counts},
+        plan::Plan,
+        report,
+        run::{self, Hooks},
+        scenes::{self, sources},
+    },
+};
+use bouncelight_scene::image_io;
+use sha2::{Digest, Sha256};
+use std::{
+    cell::RefCell,
+    path::{Path, PathBuf},
+};
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Scenes by name, files, or folders of references (scene.glb, frame0000.exr, meta.json; or
+    /// roomIIII_view0.exr). Two bundled scenes and three of the paper's rooms when absent, against
+    /// our own path tracer.
+    #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
+    scenes: Vec<String>,
+    /// Real-time methods, or `all` of them.
+    #[arg(long, value_delimiter = ',', default_value = "all", value_name = "M,...", value_parser = parse_method)]
+    methods: Vec<Option<MethodName>>,
+    /// Also `gather` with other numbers than its own, such as `cell_frames=32`; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE,...")]
+    gather: Vec<gather::Options>,
+    /// Also the network of this file: one over the scene, or one on pictures; may be repeated.
+    #[arg(long, value_name = "W")]
+    weights: Vec<PathBuf>,
+    /// What is up: light (error of the light that is added), flip, l1 (the paper's). All are in the
+    /// records.
+    #[arg(long, value_enum, default_value = "light")]
+    metric: MetricName,
+    /// Folder for chart.csv and chart.json, of which `training/chart.py` draws a picture. What is in
+    /// chart.json already is not done again.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Where the page goes, such as docs/results.md; DIR/results.md when absent.
+    #[arg(long, value_name = "MD")]
+    page: Option<PathBuf>,
+    /// Width and height of the pictures; a reference from elsewhere has its own.
+    #[arg(long, default_value = "1024x512", value_parser = parse_size, value_name = "WxH")]
+    size: [u32; 2],
+    /// Jittered frames averaged in settled pictures.
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=256))]
+    samples: u32,
+    /// Frames that are timed.
+    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: u32,
+    /// Frames before them.
+    #[arg(long, default_value_t = 10)]
+    warmup: u32,
+    /// Noise of a reference's light at a pixel, divided by its mean, at which tracing ends.
+    #[arg(long, default_value_t = 0.05, value_name = "E", value_parser = parse_error)]
+    error: f64,
+    /// Most samples of a reference's pixel.
+    #[arg(long, default_value_t = 16384, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    most_samples: u32,
+    /// Most paths a pixel on the curve of paths; 0 leaves it out.
+    #[arg(long, default_value_t = 1024, value_name = "N")]
+    paths: u32,
+    /// Leave out what gloss throws on after a diffuse bounce, in our references, paths, `gather`
+    /// and `neural` alike: for folders of references that were rendered so (Cycles without
+    /// "Reflective Caustics").
+    #[arg(long)]
+    no_caustics: bool,
+    /// Leave the paper's generator out.
+    #[arg(long)]
+    no_generator: bool,
+    /// Keep what another build of the program has found, too.
+    #[arg(long)]
+    keep: bool,
+    /// Folder of references that were traced before; DIR/references when absent.
+    #[arg(long, value_name = "DIR")]
+    references: Option<PathBuf>,
+}
+
+/// What is up.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum MetricName {
+    Light,
+    Flip,
+    L1,
+}
+
+/// `None` for all.
+fn parse_method(text: &str) -> Result<Option<MethodName>, String> {
+    match MethodName::from_name(text) {
+        _ if text == "all" => Ok(None),
+        Some(MethodName::Reference) => Err("paths are on the chart by --paths".into()),
+        Some(name) => Ok(Some(name)),
+        None => {
+            let known: Vec<&str> = MethodName::REAL_TIME.iter().map(|m| m.name()).collect();
+            Err(super::args::replaced(text).unwrap_or_else(|| format!("there are all, {}", known.join(", "))))
+        }
+    }
+}
+
+fn parse_error(text: &str) -> Result<f64, String> {
+    let error: f64 = text.parse().map_err(|e| format!("{e}"))?;
+    if error.is_finite() && error > 0.0 { Ok(error) } else { Err("it must be above 0, such as 0.05".into()) }
+}
+
+impl Args {
+    /// It runs networks on a device.
+    pub fn runs_network(&self) -> bool {
+        true
+    }
+}
+
+pub fn run(global: &Global, args: Args) -> Result<()> {
+    let metric = Metric::ALL[args.metric as usize];
+    let words = if args.scenes.is_empty() { scenes::DEFAULT.map(String::from).to_vec() } else { args.scenes.clone() };
+    let sources = sources(&words).map_err(|e| usage(e.to_string()))?;
+    let mut entries = entries(global, &args)?;
+    std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
+    let place = |name: &str| args.out.join(name);
+    for path in args.page.iter().chain([&place("chart.json")]) {
+        image_io::check_writable(path)?;
+    }
+    let before = read(&place("chart.json"))?;
+    interrupt::install()?;
+    let gpu = global.open_gpu()?;
+    for entry in &mut entries {
+        if let Entry::Method { method, .. } = entry {
+            *method = super::tuned::tuned(method.clone(), &gpu, global.quiet);
+        }
+    }
+    let plan = Plan {
+        entries,
+        sources,
+        load: global.load_options(),
+        size: args.size,
+        samples: args.samples,
+        bench: BenchOptions { frames: args.frames, warmup: args.warmup },
+        reference: (args.error, args.most_samples),
+        kept: args.references.clone().unwrap_or_else(|| place("references")),
+        generator: !args.no_generator,
+        no_caustics: args.no_caustics,
+    };
+    let provenance = provenance(args.keep.then_some(&before).and_then(|b| b.as_ref()));
+    let progress = RefCell::new(Progress::new(global, "parts of the work", 1));
+    let hooks = Hooks {
+        tell: &|done, all, what| {
+            tracing::info!("{what}");
+            progress.borrow_mut().at(done, all.ceil() as u64);
+        },
+        warn: &|text| eprintln!("warning: {text}"),
+        go_on: &|| !interrupt::requested(),
+        save: &|record| Ok(image_io::write_whole(&place("chart.json"), json(record)?.as_bytes())?),
+    };
+    let record = run::run(&gpu, &plan, before, provenance, &hooks);
+    progress.into_inner().finish();
+    let record = match record {
+        Err(ChartError::Stopped) => {
+            eprintln!(
+                "what was done is kept in {}; the same command goes on from there",
+                place("chart.json").display()
+            );
+            return Err(CliError::Interrupted.into());
+        }
+        record => record?,
+    };
+    write(&args, &record, metric)?;
+    print(&args, &record, metric);
+    let missing = run::missing(&record, metric);
+    let failed = record.units.iter().any(|u| u.failed.is_some()) || record.scenes.iter().any(|s| s.failed.is_some());
+    if failed {
+        anyhow::bail!("{} of the pieces failed, the others are charted: {}", missing.len(), missing.join("; "));
+    }
+    Ok(())
+}
+
+/// Everything that is compared, in the order of the table.
+fn entries(global: &Global, args: &Args) -> Result<Vec<Entry>> {
+    let mut names: Vec<MethodName> = Vec::new();
+    for name in &args.methods {
+        let more = name.map_or(MethodName::REAL_TIME.to_vec(), |n| vec![n]);
+        names.extend(more);
+    }
+    let mut entries = Vec::new();
+    for name in names {
+        let method = real_time(name, global, None)?;
+        entries.push(Entry::Method { name: method.name().into(), method });
+    }
+    for options in &args.gather {
+        let name = format!("gather {}", options.words().unwrap_or_else(|| "again".into()));
+        entries.push(Entry::Method { name, method: Method::Gather(*options) });
+    }
+    for path in &args.weights {
+        let weights = Weights::find(Some(path))?;
+        let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+        if weights.table.name == "images" {
+            pictures::check(&weights)?;
+            entries.push(Entry::Pictures { name: format!("{stem} on pictures"), weights: Box::new(weights) });
+        } else {
+            let method = real_time(MethodName::Neural, global, Some(path))?;
+            entries.push(Entry::Method { name: format!("neural {stem}"), method });
+        }
+    }
+    if args.no_caustics {
+        for entry in &mut entries {
+            match entry {
+                Entry::Method { method: Method::Gather(options), .. } => options.caustics = false,
+                Entry::Method { method: Method::Neural(neural), .. } => neural.gather.caustics = false,
+                _ => {}
+            }
+        }
+    }
+    entries.extend(path_counts(args.paths).into_iter().map(Entry::Paths));
+    let mut seen = Vec::new();
+    for entry in &entries {
+        if seen.contains(&entry.name()) {
+            return Err(usage(format!("`{}` is asked for twice", entry.name())));
+        }
+        seen.push(entry.name());
+    }
+    Ok(entries)
+}
+
+fn json(record: &Record) -> Result<String, ChartError> {
+    Ok(format!("{}\n", serde_json::to_string_pretty(record)?))
+}
+
+/// The record of an earlier run; none where there is none.
+fn read(path: &Path) -> Result<Option<Record>> {
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(e).with_context(|| format!("cannot read {}", path.display())),
+    };
+    let words = "is no record of `chart`; move it away, or name another --out";
+    let record: Record = serde_json::from_str(&text).with_context(|| format!("{} {words}", path.display()))?;
+    if record.schema != 1 {
+        return Err(usage(format!("{}: schema {} is not known", path.display(), record.schema)));
+    }
+    Ok(Some(record))
+}
+
+/// Where this run comes from; `before` is a run whose results are kept, whoever made them.
+fn provenance(before: Option<&Record>) -> Provenance {
+    let program = || -> Option<String> {
+        let bytes = std::fs::read(std::env::current_exe().ok()?).ok()?;
+        Some(Sha256::digest(&bytes).iter().take(8).map(|b| format!("{b:02x}")).collect())
+    };
+    let program = before.map(|b| b.provenance.program.clone()).or_else(program);
+    let git = |args: &[&str]| -> Option<String> {
+        let done = std::process::Command::new("git").args(args).output().ok()?;
+        done.status.success().then(|| String::from_utf8_lossy(&done.stdout).trim().to_owned())
+    };
+    // Of the folder that it runs in, if that is this program's repository.
+    let ours = std::fs::read_to_string("Cargo.toml").is_ok_and(|text| text.contains("name = \"bouncelight\""));
+    let commit = ours.then(|| git(&["rev-parse", "--short=12", "HEAD"])).flatten();
+    let changed =
+        git(&["status", "--porcelain", "--untracked-files=no", "--", "src", "shaders", "assets", "Cargo.toml"]);
+    let commit = commit.map(|c| if changed.is_some_and(|c| !c.is_empty()) { format!("{c}+") } else { c });
+    // What is kept was measured by the program of then.
+    let commit = before.map(|b| b.provenance.commit.clone()).or(commit);
+    Provenance {
+        command: format!("bouncelight {}", std::env::args().skip(1).collect::<Vec<_>>().join(" ")),
+        version: env!("CARGO_PKG_VERSION").into(),
+        commit: commit.unwrap_or_else(|| "unknown".into()),
+        program: program.unwrap_or_else(|| "unknown".into()),
+        date: today(),
+    }
+}
+
+/// The day, UTC, as YYYY-MM-DD (Hinnant's civil-from-days).
+fn today() -> String {
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    let days = (now.as_secs() / 86_400) as i64 + 719_468;
+    let (era, day) = (days / 146_097, days % 146_097);
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let of_year = day - (365 * year + year / 4 - year / 100);
+    let shifted = (5 * of_year + 2) / 153;
+    let (d, m) = (of_year - (153 * shifted + 2) / 5 + 1, if shifted < 10 { shifted + 3 } else { shifted - 9 });
+    format!("{:04}-{m:02}-{d:02}", year + era * 400 + i64::from(m <= 2))
+}
+
+fn write(args: &Args, record: &Record, metric: Metric) -> Result<()> {
+    let place = |name: &str| args.out.join(name);
+    image_io::write_whole(&place("chart.json"), json(record)?.as_bytes())?;
+    image_io::write_whole(&place("chart.csv"), report::csv(record).as_bytes())?;
+    let page = args.page.clone().unwrap_or_else(|| place("results.md"));
+    let picture = relative(&page, &place("chart.svg"));
+    image_io::write_whole(&page, report::page(record, metric, &picture).as_bytes())?;
+    Ok(())
+}
+
+/// `file` as a page in the folder of `page` names it; as it is where they share no beginning.
+fn relative(page: &Path, file: &Path) -> String {
+    let folder = page.parent().unwrap_or(Path::new(""));
+    let inside = file.strip_prefix(folder).unwrap_or(file);
+    inside.to_string_lossy().replace('\\', "/")
+}
+
+fn print(args: &Args, record: &Record, metric: Metric) {
+    let [w, h] = record.size;
+    say!("{} at {w}x{h}, {} scenes, on {}", metric.title(), record.sound_scenes(), record.device.sentence());
+    say!("{}", report::table(record, metric).trim_end());
+    if let Some(g) = &record.generator {
+        let ms = g.wall_ms.map_or("not run".to_owned(), |s| format!("{:.1} ms here", s.median));
+        say!("the paper's generator: {ms}, {:.1} GFLOP, projected {:.1} ms", g.gflop(), g.projected_ms());
+    }
+    say!("{}; `python training/chart.py {}` draws it", args.out.join("chart.json").display(), args.out.display());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_understood() {
+        assert_eq!(parse_method("all"), Ok(None));
+        assert_eq!(parse_method("gather"), Ok(Some(MethodName::Gather)));
+        assert!(["reference", "rsm", "magic"].iter().all(|m| parse_method(m).is_err()));
+        assert_eq!(relative(Path::new("docs/results.md"), Path::new("docs/results/chart.svg")), "results/chart.svg");
+        assert_eq!(relative(Path::new("r.md"), Path::new("out/chart.svg")), "out/chart.svg");
+        let date = today();
+        assert!(date.len() == 10 && date.starts_with("20"), "{date}");
+    }
+}

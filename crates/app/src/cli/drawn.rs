@@ -1,0 +1,127 @@
+//! A picture that was rasterised or traced, on its way into a file.
+
+use super::{args::usage, compare::shown_bytes};
+use anyhow::Result;
+use bouncelight::gpu::Gpu;
+use bouncelight::render::{Exposure, capture::CapturedFrame, exposure, tonemap_curve::Tonemap};
+use bouncelight_scene::image_io::{self, Metadata};
+use std::path::Path;
+
+/// What the output's name asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Format {
+    /// Through a view transform, after the exposure.
+    Png(Tonemap),
+    /// Radiance and layers.
+    Exr,
+}
+
+impl Format {
+    /// Of a file's name, or of `-`, which is a PNG.
+    pub fn of(path: &Path, tonemap: Tonemap) -> Result<Self> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        match extension.as_str() {
+            "exr" => Ok(Self::Exr),
+            "png" => Ok(Self::Png(tonemap)),
+            _ if path.as_os_str() == "-" => Ok(Self::Png(tonemap)),
+            _ => Err(usage(format!("{}: the picture's name must end in .png or .exr", path.display()))),
+        }
+    }
+}
+
+/// A picture ready to be written and judged.
+pub(super) struct Drawn {
+    /// The picture; its layers are in `layers`.
+    pub frame: CapturedFrame,
+    /// Layers of an EXR beside the picture.
+    pub layers: Vec<image_io::Layer>,
+    /// What is worth knowing of how it was made.
+    pub facts: Metadata,
+}
+
+impl Drawn {
+    /// The picture without alpha.
+    pub fn rgb(&self) -> Vec<f32> {
+        self.frame.beauty.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
+    }
+
+    /// Bytes of a PNG `stops` brighter; with alpha where something of it is not covered.
+    fn shown(&self, stops: f32, tonemap: Tonemap) -> Vec<u8> {
+        let pixels = || self.frame.beauty.data.chunks_exact(4);
+        if pixels().all(|p| p[3] >= 1.0) {
+            return shown_bytes(&self.rgb(), stops, tonemap);
+        }
+        // Radiance is multiplied by alpha, a PNG's colours are not.
+        let plain: Vec<f32> =
+            pixels().flat_map(|p| [0, 1, 2].map(|c| if p[3] > 0.0 { p[c] / p[3] } else { 0.0 })).collect();
+        let rgb = shown_bytes(&plain, stops, tonemap);
+        let alpha = pixels().map(|p| (p[3].clamp(0.0, 1.0) * 255.0).round() as u8);
+        rgb.chunks_exact(3).zip(alpha).flat_map(|(p, a)| [p[0], p[1], p[2], a]).collect()
+    }
+
+    /// Stops by which it is to be shown brighter; `background` is the colour where nothing is, if
+    /// it is one.
+    pub fn stops(&self, exposure: Exposure, background: Option<[f32; 3]>) -> f32 {
+        match exposure {
+            Exposure::Stops(stops) => stops,
+            Exposure::Auto => exposure::measure(&self.frame.beauty.data, 4, background),
+        }
+    }
+
+    /// Writes it whole or not at all, with the device, the command line and its facts as metadata;
+    /// a PNG `stops` brighter.
+    pub fn write(&self, gpu: &Gpu, output: &Path, format: Format, stops: f32) -> Result<()> {
+        let beauty = &self.frame.beauty;
+        let [width, height] = [beauty.width as u32, beauty.height as u32];
+        let mut metadata = self.metadata(gpu);
+        match format {
+            Format::Png(tonemap) => {
+                metadata.push(("Exposure".into(), format!("{stops} EV")));
+                let pixels = self.shown(stops, tonemap);
+                image_io::write_png(output, width, height, &pixels, &metadata)?;
+            }
+            Format::Exr => {
+                let mut layers = vec![image_io::Layer::new("", "RGBA", &beauty.data)];
+                layers.extend(self.layers.iter().cloned());
+                image_io::write_exr(output, width, height, &layers, &metadata)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn metadata(&self, gpu: &Gpu) -> Metadata {
+        let command: Vec<String> = std::env::args().skip(1).collect();
+        let driver = format!("{} {}", gpu.info.driver, gpu.info.driver_info);
+        let software = format!("bouncelight {}", env!("CARGO_PKG_VERSION"));
+        [
+            ("Software", software),
+            ("Command", format!("bouncelight {}", command.join(" "))),
+            ("Adapter", gpu.info.name.clone()),
+            ("Backend", format!("{:?}", gpu.info.backend).to_lowercase()),
+            ("Driver", driver.trim().into()),
+        ]
+        .map(|(k, v)| (k.to_string(), v))
+        .into_iter()
+        .chain(self.facts.clone())
+        .collect()
+    }
+}
+
+/// Layers by name: `all`, or a list, whose words `name` gives.
+pub(super) fn parse_layers<L: Copy>(text: &str, all: &[L], name: impl Fn(L) -> &'static str) -> Result<Vec<L>> {
+    if text == "all" {
+        return Ok(all.to_vec());
+    }
+    let mut layers = Vec::new();
+    for word in text.split(',') {
+        let Some(i) = all.iter().position(|&l| name(l) == word) else {
+            let known = all.iter().map(|&l| name(l)).collect::<Vec<_>>().join(", ");
+            return Err(usage(format!("--aov: `{word}` is no layer of this method; there are: {known}")));
+        };
+        if layers.contains(&i) {
+            return Err(usage(format!("--aov: `{word}` is asked for twice")));
+        }
+        layers.push(i);
+    }
+    Ok(layers.into_iter().map(|i| all[i]).collect())
+}

@@ -1,0 +1,211 @@
+//! `bouncelight fit`: the cheapest method that is good enough for a scene, kept beside it.
+
+use super::{
+    args::{Global, usage},
+    compare::shown_bytes,
+    error::CliError,
+    interrupt,
+    progress::Progress,
+    scene_args::SceneArgs,
+    stdout::say,
+};
+use anyhow::{Context, Result};
+use bouncelight::gi::{Method, Neural};
+use bouncelight::gpu::Gpu;
+use bouncelight::net::format::Weights;
+use bouncelight::render::tonemap_curve::Tonemap;
+use bouncelight_lab::study::fitted::Fitted;
+use bouncelight_lab::study::{
+    fit::{self, Fit, FitError, FitOptions, Network, Yardstick},
+    trial::{Trial, TrialError, TrialOptions},
+};
+use bouncelight_scene::image_io;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// What is good enough, in every view: `light=8%` (mean error of the light that a method has to
+    /// add), or a metric of `compare`.
+    #[arg(long, default_value = "light=10%", value_name = "METRIC=T")]
+    target: Yardstick,
+    /// Most milliseconds a frame that the method's own passes may take, at --size.
+    #[arg(long, value_name = "B", value_parser = parse_budget)]
+    budget_ms: Option<f64>,
+    /// Whose milliseconds: this device's, measured, or a GTX 1050's, projected from counted work.
+    /// `auto` projects on software adapters.
+    #[arg(long, value_enum, default_value = "auto")]
+    cost: Cost,
+    /// Views to judge by: the scene's cameras, then ones chosen to cover it. --eye and --look-at
+    /// replace them all.
+    #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    views: u32,
+    /// Frames of a still camera up to the one that is judged, for methods that settle.
+    #[arg(long, default_value_t = Method::SETTLED, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    gi_frames: u32,
+    /// A network to try beside the shipped ones; may be repeated.
+    #[arg(long, value_name = "W")]
+    weights: Vec<PathBuf>,
+    /// Has left; whoever asks for it is told what there is instead.
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "", value_parser = learning_has_left)]
+    learn: Option<String>,
+    /// Most samples a pixel of a reference.
+    #[arg(long, default_value_t = 1024, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    spp: u32,
+    /// Folder where references are kept for the next time.
+    #[arg(long, value_name = "DIR")]
+    references: Option<PathBuf>,
+    /// Where the result goes; SCENE.gi.toml beside the scene when absent, `-` for standard output
+    /// alone.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Folder for a page that explains the choice with pictures, and a JSON record.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+}
+
+/// Whose milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Cost {
+    /// Measured, but projected on software adapters.
+    Auto,
+    /// Measured on this device.
+    Measured,
+    /// Projected for a GTX 1050.
+    Projected,
+}
+
+fn parse_budget(text: &str) -> Result<f64, String> {
+    let ms: f64 = text.parse().map_err(|e| format!("{e}"))?;
+    if ms.is_finite() && ms >= 0.0 { Ok(ms) } else { Err("a budget is 0 or more milliseconds".into()) }
+}
+
+fn learning_has_left(_: &str) -> Result<String, String> {
+    Err("`fit` no longer learns on the device; `python -m bouncelight_training.filter.scene` fine-tunes the shipped \
+         network to a scene (training/README.md), and `fit --weights FILE` tries what comes of it"
+        .into())
+}
+
+pub fn run(global: &Global, args: Args) -> Result<()> {
+    let output = args.output.clone().unwrap_or_else(|| Fitted::path(&args.scene.scene));
+    if output != Path::new("-") {
+        image_io::check_writable(&output)?;
+    }
+    let scene = args.scene.load(global)?;
+    let fixed = match args.scene.eye {
+        Some(_) => vec![args.scene.camera(&scene)?],
+        None => Vec::new(),
+    };
+    interrupt::install()?;
+    let gpu = global.open_gpu()?;
+    let options = options(global, &gpu, &args)?;
+    let kept = TrialOptions { kept: args.references.clone(), ..TrialOptions::default() };
+    let mut trial = Trial::new(&gpu, scene, args.scene.size, kept).map_err(typed)?.watched(|_| !interrupt::requested());
+    let views = match fixed.is_empty() {
+        true => fit::covering(&mut trial, args.views as usize).map_err(typed)?,
+        false => fixed,
+    };
+    let mut progress = Progress::new(global, "steps", 1);
+    let fitted = fit::fit(&mut trial, &views, &options, &mut |what, done, all| {
+        progress.tell(what);
+        progress.at(f64::from(done), all.into());
+    });
+    progress.finish();
+    let found = fitted.map_err(named)?;
+    let hash = trial.hash().to_owned();
+    let fitted = found.fitted(&options, hash, args.scene.size, gpu.info.name.clone());
+    let heading = format!(
+        "{} at {}x{}: {} {}",
+        args.scene.scene,
+        args.scene.size[0],
+        args.scene.size[1],
+        options.yardstick.name(),
+        options.yardstick.show(options.yardstick.target)
+    );
+    say!("{heading}\n\n{}\n{}", found.table(&options), found.why(&options));
+    if let Some(folder) = &args.report {
+        report(folder, &heading, &found, &options, &fitted)?;
+    }
+    if output == Path::new("-") {
+        say!("\n{}", fitted.text().trim_end());
+    } else {
+        image_io::write_whole(&output, fitted.text().as_bytes())?;
+        say!("\nwritten: {}", output.display());
+    }
+    if found.reached {
+        return Ok(());
+    }
+    let (metric, value) = (options.yardstick.name().to_owned(), found.choice().worst);
+    Err(CliError::AboveThreshold { metric, value, threshold: options.yardstick.target }.into())
+}
+
+/// What a fit cannot do: its cause, where that has an exit code of its own.
+fn named(e: FitError) -> anyhow::Error {
+    match e {
+        FitError::Trial(e) => typed(e),
+        e => usage(e.to_string()),
+    }
+}
+
+/// What `exit_code` sorts by: the cause itself.
+fn typed(e: TrialError) -> anyhow::Error {
+    match e {
+        TrialError::Stopped => CliError::Interrupted.into(),
+        TrialError::Upload(e) => e.into(),
+        TrialError::Pack(e) => e.into(),
+        TrialError::Render(e) => e.into(),
+        e => e.into(),
+    }
+}
+
+fn options(global: &Global, gpu: &Gpu, args: &Args) -> Result<FitOptions> {
+    let mut networks = vec![("filter".into(), Weights::shipped()?)];
+    for path in &args.weights {
+        // The record must still name them when somebody reads it in another folder.
+        let whole = std::fs::canonicalize(path).with_context(|| format!("cannot read {}", path.display()))?;
+        networks.push((whole, Weights::load(path)?));
+    }
+    let tuned = super::tuned::of(&gpu.device, global.quiet);
+    let network = |(file, weights): (PathBuf, Weights)| {
+        let mut neural = Neural::from(weights).stored(global.precision());
+        neural.tuned = tuned.clone();
+        Network { file, neural }
+    };
+    Ok(FitOptions {
+        yardstick: args.target.clone(),
+        budget_ms: args.budget_ms,
+        frames: args.gi_frames,
+        networks: networks.into_iter().map(network).collect(),
+        most_samples: args.spp,
+        timed: args.cost == Cost::Measured || args.cost == Cost::Auto && !gpu.is_software(),
+    })
+}
+
+/// The page, its pictures and the record.
+fn report(folder: &Path, heading: &str, found: &Fit, options: &FitOptions, fitted: &Fitted) -> Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let picture = |name: &str, size: [u32; 2], linear: &[f32]| -> Result<()> {
+        let bytes = shown_bytes(linear, 0.0, Tonemap::Filmic);
+        Ok(image_io::write_png(&folder.join(name), size[0], size[1], &bytes, &[])?)
+    };
+    let mut page = format!("# {heading}\n\n{}\n\n{}\n", found.why(options), found.table(options));
+    for (i, view) in found.views.iter().enumerate() {
+        let reference = &view.reference;
+        page += &format!("\n## View {i}\n\n");
+        let name = format!("view{i}_reference.png");
+        picture(&name, reference.size, &reference.rgb())?;
+        let [fewest, most] = reference.samples;
+        page += &format!("![reference]({name})\n*reference: {fewest} to {most} samples a pixel*\n");
+        for (number, row) in found.rows.iter().enumerate() {
+            let Some(rgb) = row.pictures.get(i) else { continue };
+            let title = row.candidate.name(&options.networks);
+            let name = format!("view{i}_{number}_{}.png", row.candidate.method_name().name());
+            picture(&name, reference.size, rgb)?;
+            page += &format!("\n![{title}]({name})\n*{title}: {}*\n", options.yardstick.show(row.errors[i]));
+        }
+    }
+    image_io::write_whole(&folder.join("fit.md"), page.as_bytes())?;
+    let record = serde_json::to_string_pretty(&found.record(options, fitted.clone()))?;
+    Ok(image_io::write_whole(&folder.join("fit.json"), format!("{record}\n").as_bytes())?)
+}

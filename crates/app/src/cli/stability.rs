@@ -1,0 +1,241 @@
+//! `bouncelight stability`: named tests of where methods fail, over all methods, with contact
+//! sheets, a record and a page.
+
+use super::{
+    args::{Global, MethodName, real_time, usage},
+    error::CliError,
+    interrupt,
+    progress::Progress,
+    stdout::say,
+    tuned::tuned,
+};
+use anyhow::{Context, Result};
+use bouncelight::gi::Method;
+use bouncelight::net::format::Weights;
+use bouncelight_lab::study::{
+    stability::{self, Event, Finding, Record, StabilityError, Subject, Suite, SuiteOptions},
+    trial::TrialError,
+};
+use bouncelight_scene::image_io;
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Tests by name between commas, or `all`; --list tells them.
+    #[arg(long, default_value = "all", value_name = "NAMES")]
+    suite: String,
+    /// Tell the tests with their thresholds, and draw nothing.
+    #[arg(long)]
+    list: bool,
+    /// Methods by name between commas, or `all`; `paper` is the paper's recipe where --paper names
+    /// its weights.
+    #[arg(long, default_value = "all", value_name = "NAMES")]
+    methods: String,
+    /// Weights of `neural`; the shipped ones (`filter`) when absent.
+    #[arg(long, value_name = "W")]
+    weights: Option<PathBuf>,
+    /// Weights of a network on pictures (the paper's recipe, as `weights convert` and training make
+    /// them), tested as `paper`.
+    #[arg(long, value_name = "W")]
+    paper: Option<PathBuf>,
+    /// Which method's failures make the exit code 5: the program's default where it is among those
+    /// tested, else all of them.
+    #[arg(long, value_name = "NAME")]
+    judge: Option<String>,
+    /// Failures that docs/limits.md explains do not count.
+    #[arg(long)]
+    allow_known: bool,
+    /// Folder for contact sheets (NAME.png), short sequences (NAME.apng.png), the record and
+    /// references that were traced.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Tests whose findings are in --out already, of the same program, device and weights, are not
+    /// run again.
+    #[arg(long, requires = "out")]
+    resume: bool,
+    /// Write the record to this file, too; `-` is standard output, which then holds nothing else.
+    #[arg(long, value_name = "F")]
+    json: Option<PathBuf>,
+    /// Write the table of all tests with a sentence on every failure to this file (Markdown).
+    #[arg(long, value_name = "MD")]
+    limits: Option<PathBuf>,
+}
+
+impl Args {
+    /// It runs a network on a device.
+    pub fn runs_network(&self) -> bool {
+        let listed = |name: &str| self.methods.split(',').any(|m| m.trim() == name);
+        self.methods == "all" || listed("neural") || self.paper.is_some()
+    }
+}
+
+/// The method that `render` draws with by default.
+const DEFAULT: MethodName = MethodName::Gather;
+
+pub fn run(global: &Global, args: Args) -> Result<()> {
+    let tests = stability::named(&args.suite).map_err(|e| usage(format!("--suite: {e}")))?;
+    if args.list {
+        tests.iter().for_each(|t| list(t));
+        return Ok(());
+    }
+    for path in args.json.iter().chain(&args.limits) {
+        image_io::check_writable(path)?;
+    }
+    let names = names(&args)?;
+    let mut subjects = names.iter().map(|n| subject(global, &args, *n)).collect::<Result<Vec<_>>>()?;
+    if let Some(path) = &args.paper {
+        let weights = Weights::load(path)?;
+        bouncelight::net::pictures::check(&weights)?;
+        subjects.push(Subject::Paper(Box::new(weights)));
+    }
+    let judged = judged(&args, &subjects)?;
+    if let Some(out) = &args.out {
+        std::fs::create_dir_all(out).with_context(|| format!("{}: the folder cannot be made", out.display()))?;
+    }
+    interrupt::install()?;
+    let gpu = global.open_gpu()?;
+    for subject in &mut subjects {
+        if let Subject::Method { method, .. } = subject {
+            *method = tuned(std::mem::take(method), &gpu, global.quiet);
+        }
+    }
+    let kept = args.out.as_ref().map(|out| out.join("references"));
+    let resume = args.out.clone();
+    if !args.resume {
+        // What lies there is another run's.
+        let stale = |t: &&stability::Test| resume.as_ref().map(|out| out.join(format!("{}.json", t.name)));
+        tests.iter().filter_map(stale).for_each(|path| _ = std::fs::remove_file(path));
+    }
+    let steps_of_test = subjects.len() as u32 + 2;
+    let suite = Suite::new(&gpu, SuiteOptions { tests, subjects, kept, resume });
+    let quiet = args.json.as_deref().is_some_and(|p| p.as_os_str() == "-");
+    let mut progress = Progress::new(global, "tests", suite.steps());
+    let mut begun = 0u32;
+    let record = suite.run(&|| !interrupt::requested(), &mut |event| -> Result<()> {
+        match event {
+            Event::Begun { .. } => {
+                progress.at(f64::from(begun), suite.steps());
+                begun += 1;
+            }
+            Event::Known { finding } => {
+                begun += steps_of_test;
+                if !quiet {
+                    tell(finding);
+                }
+            }
+            Event::Done { finding, sheet } => {
+                if let Some(out) = &args.out {
+                    sheet.write(&out.join(format!("{}.png", finding.name)))?;
+                    sheet.write_film(&out.join(format!("{}.apng.png", finding.name)))?;
+                }
+                if !quiet {
+                    tell(finding);
+                }
+            }
+        }
+        Ok(())
+    });
+    progress.finish();
+    let record = record.map_err(interrupted)?;
+    write(&args, &record)?;
+    verdict(&args, &record, &judged)
+}
+
+fn interrupted(error: anyhow::Error) -> anyhow::Error {
+    match error.downcast_ref::<StabilityError>() {
+        Some(StabilityError::Trial(TrialError::Stopped)) => CliError::Interrupted.into(),
+        _ => error,
+    }
+}
+
+fn names(args: &Args) -> Result<Vec<MethodName>> {
+    if args.methods == "all" {
+        return Ok(MethodName::REAL_TIME.to_vec());
+    }
+    let real_time = |name: &str| {
+        let found = MethodName::from_name(name).filter(|m| MethodName::REAL_TIME.contains(m));
+        let known = || MethodName::REAL_TIME.map(|m| m.name()).join(", ");
+        found.ok_or_else(|| usage(format!("--methods: `{name}` is no real-time method; there are: {}", known())))
+    };
+    args.methods.split(',').map(|name| real_time(name.trim())).collect()
+}
+
+fn subject(global: &Global, args: &Args, name: MethodName) -> Result<Subject> {
+    let method: Method = real_time(name, global, args.weights.as_ref())?;
+    Ok(Subject::Method { name: name.name().into(), method })
+}
+
+/// Whose failures count.
+fn judged(args: &Args, subjects: &[Subject]) -> Result<Vec<String>> {
+    let all: Vec<String> = subjects.iter().map(|s| s.name().to_owned()).collect();
+    match &args.judge {
+        Some(name) if all.contains(name) => Ok(vec![name.clone()]),
+        Some(name) => Err(usage(format!("--judge: `{name}` is not among those tested: {}", all.join(", ")))),
+        None if all.iter().any(|n| n == DEFAULT.name()) => Ok(vec![DEFAULT.name().into()]),
+        None => Ok(all),
+    }
+}
+
+fn list(test: &stability::Test) {
+    let [width, height] = test.size;
+    say!("{:<14} {} ({width}x{height})", test.name, test.question);
+    for limit in test.limits {
+        say!("{:<14}   {}: at most {} ({})", "", limit.name, limit.unit.text(limit.at_most), limit.source);
+    }
+}
+
+fn tell(finding: &Finding) {
+    say!("{}: {}", finding.name, finding.question);
+    if !finding.sound {
+        let why = finding.unsound.as_deref().unwrap_or("the truth fails it, or its spoilt copy passes");
+        say!("  this test says nothing here: {why}");
+    }
+    for (i, criterion) in finding.criteria.iter().enumerate() {
+        let text = |v: Option<f64>| v.map_or("none".into(), |v| criterion.unit.text(v));
+        let at_most = criterion.unit.text(criterion.at_most);
+        say!(
+            "  {} (at most {at_most}; truth {}, control {})",
+            criterion.name,
+            text(criterion.truth),
+            text(criterion.control)
+        );
+        for found in finding.found.iter().filter(|f| f.values.len() > i) {
+            let mark = if found.values[i] <= criterion.at_most { "pass" } else { "FAIL" };
+            say!("    {:<10}{:>12}  {mark}", found.subject, criterion.unit.text(found.values[i]));
+        }
+    }
+    for found in finding.found.iter().filter(|f| f.values.is_empty()) {
+        let word = if found.pass == Some(false) { "FAIL, no answer" } else { "does not apply" };
+        say!("    {:<10}{word}: {}", found.subject, found.reason.as_deref().unwrap_or(""));
+    }
+    for found in finding.found.iter().filter(|f| f.pass.is_some()) {
+        say!("    {:<10}{:>9.1} s", found.subject, found.seconds);
+        found.instead.iter().for_each(|why| say!("    {:<10}{why}", found.subject));
+    }
+}
+
+fn write(args: &Args, record: &Record) -> Result<()> {
+    let text = format!("{}\n", serde_json::to_string_pretty(record)?);
+    let beside = args.out.as_ref().map(|out| out.join("stability.json"));
+    for path in args.json.iter().chain(&beside) {
+        image_io::write_whole(path, text.as_bytes())?;
+    }
+    if let Some(path) = &args.limits {
+        let words: Vec<String> = std::env::args().skip(1).collect();
+        let page = stability::page(record, &format!("bouncelight {}", words.join(" ")));
+        image_io::write_whole(path, page.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Exit code 5 where a judged method fails.
+fn verdict(args: &Args, record: &Record, judged: &[String]) -> Result<()> {
+    let mut failed = Vec::new();
+    for finding in &record.tests {
+        let counts = |f: &&stability::Found| {
+            judged.contains(&f.subject) && f.pass == Some(false) && !(args.allow_known && f.why.is_some())
+        };
+        failed.extend(finding.found.iter().filter(counts).map(|f| format!("{} ({})", finding.name, f.subject)));
+    }
+    if failed.is_empty() { Ok(()) } else { Err(CliError::Unstable(failed.join(", ")).into()) }
+}

@@ -1,0 +1,223 @@
+//! `bouncelight weights info | verify | convert | tune`: what a weights file holds, whether it is
+//! sound, and one from a published network.
+
+use super::args::{Global, parse_size};
+use super::stdout::say;
+use anyhow::{Context, Result};
+use bouncelight::net::convert::{Arch, Norm, Recipe, convert};
+use bouncelight::net::{
+    format::{Dtype, Provenance, Weights},
+    plan::{Options, Plan},
+};
+use bouncelight_scene::image_io;
+use clap::ValueEnum;
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    /// Layers with shapes, FLOPs, bytes and places in memory, for a picture of a given size.
+    Info {
+        /// A weights file, or `filter`, which is shipped.
+        file: PathBuf,
+        /// Width and height of the picture in pixels.
+        #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true,
+            value_name = "WxH")]
+        size: [u32; 2],
+    },
+    /// Check everything a reader can check; says `ok` or lists every fault.
+    Verify {
+        /// A weights file, or `filter`, which is shipped.
+        file: PathBuf,
+    },
+    /// Time the ways in which each convolution can run on this device, and remember the fastest for
+    /// later runs.
+    Tune {
+        file: PathBuf,
+        /// Width and height of the picture in pixels.
+        #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true,
+            value_name = "WxH")]
+        size: [u32; 2],
+        /// Where to remember it; by default the user's cache folder, or $BOUNCELIGHT_TUNED.
+        #[arg(long, value_name = "F")]
+        cache: Option<PathBuf>,
+        /// Also what is known already.
+        #[arg(long)]
+        again: bool,
+    },
+    /// Make a weights file from a published generator's PyTorch state dict, saved as safetensors.
+    Convert(ConvertArgs),
+}
+
+#[derive(Debug, clap::Args)]
+struct ConvertArgs {
+    /// The state dict.
+    input: PathBuf,
+    /// Whose generator it is.
+    #[arg(long, value_enum)]
+    arch: ArchName,
+    /// Normalisation that it was trained with. `instance` for a batch norm network is how it runs
+    /// in training mode.
+    #[arg(long, value_enum)]
+    norm: NormName,
+    /// How weights of convolutions are stored.
+    #[arg(long, value_enum, default_value = "f32")]
+    dtype: DtypeName,
+    /// Name in words; by default the file's own.
+    #[arg(long)]
+    name: Option<String>,
+    /// Licence of the numbers, an SPDX expression.
+    #[arg(long, default_value = "LicenseRef-unknown")]
+    licence: String,
+    /// Weights file to write.
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum ArchName {
+    /// Global Illumination using Pix2Pix GAN.
+    Pix2pix,
+    /// Deep Illumination (Thomas and Forbes 2018).
+    DeepIllumination,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum NormName {
+    Group,
+    Instance,
+    Batch,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum DtypeName {
+    F32,
+    F16,
+}
+
+impl Args {
+    /// It runs a network on a device.
+    pub fn runs_network(&self) -> bool {
+        matches!(self.command, Command::Tune { .. })
+    }
+}
+
+pub fn run(global: &Global, args: Args) -> Result<()> {
+    match args.command {
+        Command::Verify { file } => {
+            let weights = Weights::find(Some(&file))?;
+            say!("ok: {} parameters in {}", weights.graph.parameters(), file.display());
+        }
+        Command::Info { file, size } => info(&Weights::find(Some(&file))?, size)?,
+        Command::Convert(args) => convert_file(&args)?,
+        Command::Tune { file, size, cache, again } => {
+            super::tuned::run(global, &file, size, cache, again)?;
+        }
+    }
+    Ok(())
+}
+
+fn convert_file(args: &ConvertArgs) -> Result<()> {
+    image_io::check_writable(&args.output)?;
+    let bytes = Weights::read_bytes(&args.input)?;
+    let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut provenance = Provenance::new();
+    let command: Vec<String> = std::env::args().skip(1).collect();
+    let hash: String = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
+    provenance.insert("converted_from".into(), name(&args.input).into());
+    provenance.insert("sha256".into(), hash.into());
+    provenance.insert("program".into(), format!("bouncelight {}", env!("CARGO_PKG_VERSION")).into());
+    provenance.insert("command".into(), format!("bouncelight {}", command.join(" ")).into());
+    let recipe = Recipe {
+        arch: match args.arch {
+            ArchName::Pix2pix => Arch::Pix2pix,
+            ArchName::DeepIllumination => Arch::DeepIllumination,
+        },
+        norm: match args.norm {
+            NormName::Group => Norm::Group,
+            NormName::Instance => Norm::Instance,
+            NormName::Batch => Norm::Batch,
+        },
+        dtype: match args.dtype {
+            DtypeName::F32 => Dtype::F32,
+            DtypeName::F16 => Dtype::F16,
+        },
+        name: args.name.clone().unwrap_or_else(|| name(&args.input)),
+        licence: args.licence.clone(),
+        provenance,
+    };
+    let written = convert(&args.input, &bytes, &recipe)?;
+    image_io::write_whole(&args.output, &written)?;
+    let weights = Weights::from_bytes(&written).context("the file just written")?;
+    let width = weights.graph.ops.first().and_then(|op| op.tensors().first().map(|(_, shape)| shape[0])).unwrap_or(0);
+    // The weights themselves may be on standard output.
+    eprintln!(
+        "{}: base width {width}, {} parameters, {} bytes",
+        args.output.display(),
+        weights.graph.parameters(),
+        written.len()
+    );
+    Ok(())
+}
+
+fn info(weights: &Weights, size: [u32; 2]) -> Result<()> {
+    let cells = size.map(|n| n.div_ceil(weights.cell));
+    // What it takes is known for any size.
+    let plan = Plan::with(&weights.graph, cells[0], cells[1], &Options { limit: u64::MAX, ..Default::default() })?;
+    let [width, height] = plan.inner;
+    let features: Vec<_> =
+        weights.inputs.iter().map(|f| format!("{} {} ({})", f.name, f.channels, f.encoding)).collect();
+    say!("name       {}", weights.name);
+    say!("file       {}, hash {}", weights.path.display(), weights.hash_text());
+    say!("licence    {}", weights.licence);
+    say!("inputs     {} (table {} {})", features.join(", "), weights.table.name, weights.table.version);
+    say!("output     {}, {} channels", weights.output.meaning, weights.output.channels);
+    say!("parameters {}, stored as {}", weights.graph.parameters(), stored(weights));
+    say!(
+        "at {}x{} pixels ({}x{} cells, {width}x{height} inside): {:.3} GFLOP, {:.1} MB moved at least, arena of \
+        {:.1} MB\n",
+        size[0],
+        size[1],
+        cells[0],
+        cells[1],
+        plan.flops() as f64 / 1e9,
+        plan.traffic() as f64 / 1e6,
+        plan.arena_bytes as f64 / 1e6
+    );
+    let rows = plan.rows();
+    let wide = rows.iter().map(|row| row.name.len()).max().unwrap_or(0).max("layer".len()) + 2;
+    let head = ["result", "parameters", "MFLOP", "bytes", "offset"];
+    say!("{:<wide$}{:<28}{:>16}{:>12}{:>10}{:>12}{:>12}", "layer", "kind", head[0], head[1], head[2], head[3], head[4]);
+    for row in rows {
+        let shape = format!("{}x{}x{}", row.shape.channels, row.shape.height, row.shape.width);
+        let mflop = row.flops as f64 / 1e6;
+        say!(
+            "{:<wide$}{:<28}{shape:>16}{:>12}{mflop:>10.1}{:>12}{:>12}",
+            row.name,
+            row.kind,
+            row.parameters,
+            row.bytes,
+            row.offset
+        );
+    }
+    if !weights.provenance.is_empty() {
+        say!("\nprovenance {}", serde_json::to_string_pretty(&weights.provenance)?);
+    }
+    Ok(())
+}
+
+/// Number types with how many numbers are stored in each.
+fn stored(weights: &Weights) -> String {
+    let count = |dtype: Dtype| {
+        let own = weights.tensors().values().filter(|t| t.stored == dtype);
+        (own.map(|t| t.data.len()).sum::<usize>(), dtype)
+    };
+    let counts = [Dtype::F32, Dtype::F16, Dtype::I8].map(count).into_iter().filter(|(n, _)| *n > 0);
+    counts.map(|(n, dtype)| format!("{} ({n})", dtype.name())).collect::<Vec<_>>().join(", ")
+}

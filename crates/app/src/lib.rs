@@ -1,0 +1,6 @@
+//! The `bouncelight` program: [`cli`] is its command line, `viewer` (feature `viewer`) the window of
+//! `bouncelight view`.
+
+pub mod cli;
+#[cfg(feature = "viewer")]
+pub mod viewer;

@@ -1,0 +1,125 @@
+//! One scene at work: pictures, scores and times of one entry after the other.
+
+use super::{
+    Scores, Time,
+    entries::Entry,
+    on_pictures,
+    plan::Plan,
+    published::{self, PIXELS},
+};
+use crate::metrics::{Comparison, MetricError};
+use crate::reference;
+use crate::study::{
+    bench::{Measurement, Spread},
+    judge::{self, LightError},
+    projection::Cost,
+    trial::{Settling, Shot, Trial},
+    truth::{self, Reference},
+};
+use bouncelight::gi::Method;
+use bouncelight::gpu::Gpu;
+use bouncelight::scene::Camera;
+
+/// A scene with what it is judged by.
+pub(super) struct Stage<'a> {
+    pub trial: Trial<'a>,
+    pub camera: Camera,
+    pub reference: Reference,
+}
+
+/// What a piece found.
+pub(super) struct Found {
+    pub scores: Scores,
+    pub cold: Option<Scores>,
+    pub time: Time,
+    pub cold_time: Option<Time>,
+    pub costs: Vec<Cost>,
+    pub bytes: u64,
+    pub instead: Option<String>,
+}
+
+impl Stage<'_> {
+    pub fn unit(&mut self, gpu: &Gpu, plan: &Plan, entry: &Entry) -> Result<Found, super::ChartError> {
+        match entry {
+            Entry::Method { method, .. } => {
+                let settling = Settling { samples: plan.samples, ..Settling::SETTLED };
+                let shot = self.trial.picture(method, &self.camera, settling)?;
+                let mut cold = (None, None);
+                if method.has_history() && shot.instead.is_none() {
+                    let first = self.trial.picture(method, &self.camera, Settling::COLD)?;
+                    let measured = self.trial.measure_cuts(method, &self.camera, plan.bench)?;
+                    cold = (Some(self.judged(&first)?), Some(time(&measured)));
+                }
+                let measured = self.trial.measure(method, &self.camera, plan.bench)?;
+                let costs = if shot.instead.is_none() { self.trial.count(method, &self.camera)? } else { Vec::new() };
+                Ok(Found {
+                    scores: self.judged(&shot)?,
+                    cold: cold.0,
+                    time: time(&measured),
+                    cold_time: cold.1,
+                    costs,
+                    bytes: measured.total_bytes(),
+                    instead: shot.instead,
+                })
+            }
+            Entry::Pictures { weights, .. } => {
+                let direct = Method::Direct;
+                let settling = Settling { frames: 1, samples: plan.samples };
+                let shot = self.trial.picture(&direct, &self.camera, settling)?;
+                let sky = self.trial.scene().environment.radiance;
+                let (shown, network) = on_pictures::picture(gpu, weights, &shot, sky)?;
+                let raster = self.trial.measure(&direct, &self.camera, plan.bench)?;
+                let (frame, own) = (raster.wall_ms, published::time(gpu, &network, plan.bench)?);
+                let wall_ms = Spread { median: frame.median + own.median, p95: frame.p95 + own.p95 };
+                let seen = judge::compare_shown(&shown, &self.reference, true)?;
+                Ok(Found {
+                    scores: self.scores(None, &seen),
+                    cold: None,
+                    time: Time { gpu_ms: None, wall_ms },
+                    cold_time: None,
+                    costs: published::costs(&network),
+                    bytes: raster.total_bytes() + network.bytes(),
+                    instead: None,
+                })
+            }
+            Entry::Paths(count) => {
+                let traced = self.trial.trace(&self.camera, &plan.paths(truth::samples(*count, 1)))?;
+                let light = judge::light_error(traced.layer(reference::Layer::Gi), &self.reference);
+                let seen = judge::compare(&traced.rgb(), &self.reference, true)?;
+                let ms = 1e3 * traced.seconds;
+                let pixels = f64::from(traced.size[0]) * f64::from(traced.size[1]);
+                let paths = Cost::new("reference.path", 0.0, 0.0).with_rays(pixels * f64::from(*count));
+                Ok(Found {
+                    scores: self.scores(light, &seen),
+                    cold: None,
+                    time: Time { gpu_ms: None, wall_ms: Spread { median: ms, p95: ms } },
+                    cold_time: None,
+                    costs: vec![paths],
+                    bytes: 0,
+                    instead: None,
+                })
+            }
+        }
+    }
+
+    fn judged(&self, shot: &Shot) -> Result<Scores, MetricError> {
+        let light = judge::light_error(&shot.added(), &self.reference);
+        Ok(self.scores(light, &judge::compare(&shot.rgb(), &self.reference, true)?))
+    }
+
+    fn scores(&self, light: Option<LightError>, seen: &Comparison) -> Scores {
+        let pixels = (seen.width * seen.height) as f64;
+        Scores {
+            light: light.map(|l| l.error),
+            light_bias: light.map(|l| l.bias),
+            flip: seen.flip.unwrap_or(f64::NAN),
+            l1: seen.paper.l1 * PIXELS / pixels,
+            psnr: Some(seen.display.psnr).filter(|v| v.is_finite()),
+            relmse: seen.linear.as_ref().map(|l| l.rel_mse),
+        }
+    }
+}
+
+fn time(measured: &Measurement) -> Time {
+    Time { gpu_ms: measured.gpu_ms, wall_ms: measured.wall_ms }
+}

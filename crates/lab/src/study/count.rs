@@ -1,0 +1,87 @@
+//! What the passes of a frame do, counted by the shaders themselves while they draw it.
+
+use super::projection::Cost;
+use crate::count::Count;
+use bouncelight::gpu::{Gpu, GpuError, readback::ReadbackError, timing::Recorder};
+use bouncelight::gpu_scene::{SceneGpu, UploadError};
+use bouncelight::render::{RenderError, Renderer, RendererOptions, View};
+use bouncelight::scene::{Camera, Scene};
+use thiserror::Error;
+
+/// Why nothing could be counted.
+#[derive(Debug, Error)]
+pub enum CountError {
+    /// A device with room for the sums was refused.
+    #[error("shaders cannot count here: {0}")]
+    Gpu(#[from] GpuError),
+    /// The scene does not fit.
+    #[error(transparent)]
+    Upload(#[from] UploadError),
+    /// The frame could not be drawn.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// The sums could not be read.
+    #[error(transparent)]
+    Readback(#[from] ReadbackError),
+    /// Another method draws the scene in the place of the one that was asked for.
+    #[error("nothing is counted of a method that does not draw: {0}")]
+    Instead(String),
+}
+
+/// What a camera sees.
+#[derive(Debug, Clone, Copy)]
+pub struct Still<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// From where.
+    pub camera: &'a Camera,
+    /// Pixels of the picture.
+    pub size: [u32; 2],
+}
+
+/// Draws `frames` frames of a still camera, and says what the compute passes of the last did, in
+/// its order; on a device of its own, which has room for the sums. Passes that draw triangles are
+/// left out, and the layers of a network are those of its plan ([`Plan`](bouncelight::net::plan::Plan)).
+///
+/// # Errors
+/// [`CountError`].
+pub fn frame(gpu: &Gpu, still: Still<'_>, options: RendererOptions, frames: u32) -> Result<Vec<Cost>, CountError> {
+    let gpu = gpu.for_counting()?;
+    let Still { scene, camera, size } = still;
+    let rays = options.method.needs_rays();
+    let mut count = Count::start();
+    let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
+    if rays && let Err(e) = uploaded.trace(&gpu.device, &gpu.queue, scene) {
+        return Err(CountError::Instead(e.to_string()));
+    }
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, options)?;
+    let view = View::new(camera, size, [0.0; 2]);
+    for left in (0..frames.max(1)).rev() {
+        if left == 0 {
+            count.begin(&gpu.device);
+        }
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, &uploaded, &view)?;
+        gpu.queue.submit([encoder.finish()]);
+        // Drivers let frames pile up otherwise.
+        let _ = gpu.device.poll(wgpu::PollType::wait_indefinitely());
+    }
+    if let Some(instead) = renderer.instead() {
+        return Err(CountError::Instead(instead.why.to_owned()));
+    }
+    let mut costs: Vec<Cost> = Vec::new();
+    for dispatch in count.take(&gpu)? {
+        let at = costs.iter().position(|c| c.pass == dispatch.label).unwrap_or_else(|| {
+            costs.push(Cost::new(&dispatch.label, 0.0, 0.0));
+            costs.len() - 1
+        });
+        let [done, slowest] = dispatch.operations;
+        costs[at].flops += done;
+        costs[at].waited += slowest - done;
+        costs[at].bytes += dispatch.bytes;
+        costs[at].rays += dispatch.rays;
+    }
+    let steps = renderer.plan().map_or(&[][..], |plan| &plan.steps);
+    costs.extend(steps.iter().map(|s| Cost::new(&format!("net.{}", s.name), s.flops as f64, s.traffic as f64)));
+    Ok(costs)
+}

@@ -1,0 +1,22 @@
+//! What is measured over methods and scenes.
+
+pub mod bench;
+mod changes;
+pub mod chart;
+pub mod count;
+mod error;
+pub mod fit;
+pub mod fitted;
+pub mod hardware;
+pub mod hash;
+pub mod judge;
+pub mod layers;
+pub mod moments;
+pub mod projection;
+pub mod rays;
+pub mod stability;
+pub mod trial;
+pub mod truth;
+pub mod varied;
+pub mod views;
+mod wrap;

@@ -1,0 +1,137 @@
+//! Where methods fail, as named tests: small scenes, short sequences, numbers with thresholds, the
+//! path tracer's own number beside each.
+//!
+//! ```text
+//!  tests/*  one function a test, written against [`Play`]: "these frames, please" ─► looks ─► numbers
+//!  play     who draws them: a method, the path tracer, the paper's network; or the path tracer spoilt by a [`Fault`]
+//!  suite    runs test × subject; the path tracer must pass each test, and its spoilt copy must fail it
+//!  record   what JSON and tables are made of;  sheet: contact sheets and short sequences
+//! ```
+//!
+//! A test does not know who draws. So the truth takes every test, too: what it does not pass is no
+//! test of methods; and a test that the truth still passes when it is spoilt on purpose measures
+//! nothing.
+
+mod explain;
+mod fault;
+mod look;
+mod measures;
+mod page;
+mod play;
+mod record;
+mod rooms;
+mod script;
+mod sheet;
+mod suite;
+mod tests;
+
+pub use fault::Fault;
+pub use look::Look;
+pub use page::page;
+pub use play::{Play, Subject};
+pub use record::{Criterion, Finding, Found, Record, SCHEMA};
+pub use script::Script;
+pub use sheet::{Moment, Sheet};
+pub use suite::{Event, Suite, SuiteOptions};
+pub use tests::{all, named};
+
+use super::trial::TrialError;
+use crate::metrics::MetricError;
+use bouncelight::net::{gpu::NetError, pictures::PicturesError};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// What a number means, and how it is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Unit {
+    /// A share, shown in per cent.
+    Share,
+    /// Frames.
+    Frames,
+    /// Pieces: pixels, faults.
+    Count,
+    /// FLIP, 0 to 1.
+    Flip,
+}
+
+impl Unit {
+    /// `value` in this unit.
+    pub fn text(self, value: f64) -> String {
+        match self {
+            _ if !value.is_finite() => "none".into(),
+            Unit::Share if value != 0.0 && value < 0.001 => format!("{:.4} %", 100.0 * value),
+            Unit::Share if value < 0.1 => format!("{:.2} %", 100.0 * value),
+            Unit::Share => format!("{:.0} %", 100.0 * value),
+            Unit::Frames | Unit::Count => format!("{value:.0}"),
+            Unit::Flip => format!("{value:.3}"),
+        }
+    }
+}
+
+/// A number that a test finds, and what it may be at most.
+#[derive(Debug, Clone, Copy)]
+pub struct Limit {
+    /// What is measured.
+    pub name: &'static str,
+    /// In which unit.
+    pub unit: Unit,
+    /// The largest value that passes.
+    pub at_most: f64,
+    /// Where that comes from.
+    pub source: &'static str,
+}
+
+/// A named test.
+pub struct Test {
+    /// Name, as `--suite` takes it.
+    pub name: &'static str,
+    /// What can go wrong, one sentence.
+    pub question: &'static str,
+    /// Its numbers, in the order in which `run` returns them.
+    pub limits: &'static [Limit],
+    /// With what the truth is spoilt, so that the test must fail.
+    pub control: Fault,
+    /// Width and height of its pictures, pixels.
+    pub size: [u32; 2],
+    /// Paths a point of the truth.
+    pub paths: u32,
+    /// Whether the paper's network can take it: it answers pictures, not light.
+    pub pictures: bool,
+    /// Draws and measures.
+    pub run: fn(&Play<'_>) -> Result<Vec<f64>, StabilityError>,
+}
+
+/// Why a test could not be run, which is no answer of a method.
+#[derive(Debug, Error)]
+pub enum StabilityError {
+    /// Drawing or tracing failed.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
+    /// Pictures that cannot be compared.
+    #[error(transparent)]
+    Metric(#[from] MetricError),
+    /// The paper's network cannot be run.
+    #[error(transparent)]
+    Network(#[from] NetError),
+    /// The paper's network wants other pictures.
+    #[error(transparent)]
+    Pictures(#[from] PicturesError),
+    /// A result could not be read back.
+    #[error(transparent)]
+    Readback(#[from] bouncelight::gpu::readback::ReadbackError),
+    /// A picture could not be written.
+    #[error(transparent)]
+    Image(#[from] bouncelight_scene::image_io::ImageError),
+    /// No such test.
+    #[error("there is no test `{name}`; there are: {known}")]
+    NoTest {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// A subject that the test has no meaning for.
+    #[error("{0}")]
+    NotForIt(&'static str),
+}

@@ -1,0 +1,179 @@
+//! What must hold of any light: it is linear, it has its colour, it knows no metres.
+
+use super::super::{Fault, Limit, Look, Play, StabilityError, Test, Unit, measures, rooms};
+use super::SMALL;
+use bouncelight::scene::{Camera, Environment, LightKind, Scene};
+
+/// Frames of each picture.
+const FRAMES: usize = 20;
+
+const LINEAR: &str = "physics: light is linear; half floats have steps of 0.05 %";
+
+fn lamps() -> [LightKind; 2] {
+    [rooms::sun(rooms::BACKWARDS, 2.0), rooms::lamp([2.5, 2.5, -1.0], 6.0)]
+}
+
+/// The hall with sun, lamp and sky times these factors.
+fn hall(sun: f32, lamp: f32, sky: f32) -> Scene {
+    let [s, l] = lamps();
+    let mut scene = rooms::hall(rooms::RED, &[s, l], 0.1 * sky);
+    for (light, factor) in scene.lights.iter_mut().zip([sun, lamp]) {
+        light.color = [factor; 3];
+    }
+    scene
+}
+
+/// A copy with `factor` times the light.
+fn times(look: &Look, factor: f32) -> Look {
+    Look { light: look.light.iter().map(|v| v * factor).collect(), ..look.clone() }
+}
+
+pub static TWICE: Test = Test {
+    name: "twice",
+    question: "Is twice the light exactly twice the answer, and no light none?",
+    limits: &[
+        Limit {
+            name: "difference of half the answer to twice the light",
+            unit: Unit::Share,
+            at_most: 0.001,
+            source: LINEAR,
+        },
+        Limit { name: "values above 0 without any light", unit: Unit::Count, at_most: 0.0, source: "physics" },
+    ],
+    control: Fault::Curve(0.9),
+    size: SMALL,
+    paths: 16,
+    pictures: false,
+    run: |play| {
+        let camera = rooms::hall_camera();
+        let once = play.settled(&hall(1.0, 1.0, 1.0), &camera, FRAMES)?;
+        let twice = play.settled(&hall(2.0, 2.0, 2.0), &camera, FRAMES)?;
+        let none = play.settled(&hall(0.0, 0.0, 0.0), &camera, FRAMES)?;
+        play.keep("once", &once);
+        play.keep("twice", &twice);
+        play.keep("none", &none);
+        let lit = none.light.iter().filter(|v| **v != 0.0).count();
+        Ok(vec![measures::change(&times(&twice, 0.5), &once), lit as f64])
+    },
+};
+
+pub static SUM: Test = Test {
+    name: "sum",
+    question: "Is the light of sun, lamp and sky together the sum of theirs apart?",
+    limits: &[Limit {
+        name: "difference of the whole from the sum, over 4×4 pixels",
+        unit: Unit::Share,
+        at_most: 0.05,
+        source: "physics; 5 % for the noise of four pictures",
+    }],
+    control: Fault::Curve(0.8),
+    size: SMALL,
+    paths: 64,
+    pictures: false,
+    run: |play| {
+        let camera = rooms::hall_camera();
+        let of = |sun, lamp, sky| play.settled(&hall(sun, lamp, sky), &camera, 2 * FRAMES);
+        let whole = of(1.0, 1.0, 1.0)?;
+        let parts = [of(1.0, 0.0, 0.0)?, of(0.0, 1.0, 0.0)?, of(0.0, 0.0, 1.0)?];
+        let mut sum = parts[0].clone();
+        for (i, v) in sum.light.iter_mut().enumerate() {
+            *v += parts[1].light[i] + parts[2].light[i];
+        }
+        play.keep("together", &whole);
+        parts.iter().zip(["sun", "lamp", "sky"]).for_each(|(part, name)| play.keep(name, part));
+        Ok(vec![measures::at_same_places(&sum, &whole).0])
+    },
+};
+
+pub static EXPOSURE: Test = Test {
+    name: "exposure",
+    question: "Is the answer the same, but for its scale, in light 64 times as weak and as strong?",
+    limits: &[Limit {
+        name: "largest difference of the scaled answers",
+        unit: Unit::Share,
+        at_most: 0.005,
+        source: "physics; ten steps of a half float",
+    }],
+    control: Fault::Curve(0.99),
+    size: SMALL,
+    paths: 16,
+    pictures: false,
+    run: |play| {
+        let camera = rooms::hall_camera();
+        let plain = play.settled(&hall(1.0, 1.0, 1.0), &camera, FRAMES)?;
+        let mut worst = 0.0f64;
+        for factor in [1.0 / 64.0, 64.0] {
+            let other = play.settled(&hall(factor, factor, factor), &camera, FRAMES)?;
+            let back = times(&other, 1.0 / factor);
+            worst = worst.max(measures::change(&back, &plain));
+            play.keep(if factor < 1.0 { "/64, scaled back" } else { "x64, scaled back" }, &scaled_back(&other, factor));
+        }
+        Ok(vec![worst])
+    },
+};
+
+fn scaled_back(look: &Look, factor: f32) -> Look {
+    Look { rgb: look.rgb.iter().map(|v| v / factor).collect(), ..times(look, 1.0 / factor) }
+}
+
+pub static SATURATED: Test = Test {
+    name: "saturated",
+    question: "Does pure red light stay pure red?",
+    limits: &[Limit {
+        name: "green and blue over red",
+        unit: Unit::Share,
+        at_most: 0.0,
+        source: "physics: a channel without light has none",
+    }],
+    control: Fault::Grey(0.01),
+    size: SMALL,
+    paths: 16,
+    pictures: false,
+    run: |play| {
+        let mut red = hall(1.0, 1.0, 0.0);
+        red.lights.iter_mut().for_each(|l| l.color = [1.0, 0.0, 0.0]);
+        red.environment = Environment::constant([0.1, 0.0, 0.0]);
+        let look = play.settled(&red, &rooms::hall_camera(), FRAMES)?;
+        play.keep("pure red", &look);
+        let sum = |c: usize| look.light.iter().skip(c).step_by(3).map(|v| f64::from(v.abs())).sum::<f64>();
+        Ok(vec![measures::share(sum(1) + sum(2), sum(0))])
+    },
+};
+
+pub static UNITS: Test = Test {
+    name: "units",
+    question: "Is the light the same in a file whose unit is a thousand times too large or too small?",
+    limits: &[
+        Limit {
+            name: "in millimetres taken for metres (1000 times as large)",
+            unit: Unit::Share,
+            at_most: 0.05,
+            source: "physics: the picture is the same; 5 % for noise",
+        },
+        Limit {
+            name: "in kilometres taken for metres (1000 times as small)",
+            unit: Unit::Share,
+            at_most: 0.05,
+            source: "physics: the picture is the same; 5 % for noise",
+        },
+    ],
+    control: Fault::Metres(0.5),
+    size: SMALL,
+    paths: 32,
+    pictures: false,
+    run: |play| {
+        let (scene, camera) = (hall(1.0, 1.0, 1.0), rooms::hall_camera());
+        let plain = play.settled(&scene, &camera, 2 * FRAMES)?;
+        play.keep("metres", &plain);
+        let large = unit(play, &scene, &camera, 1000.0, "x1000")?;
+        let small = unit(play, &scene, &camera, 0.001, "/1000")?;
+        Ok(vec![measures::change(&large, &plain), measures::change(&small, &plain)])
+    },
+};
+
+fn unit(play: &Play<'_>, scene: &Scene, camera: &Camera, factor: f32, name: &str) -> Result<Look, StabilityError> {
+    let (scene, camera) = rooms::scaled(scene, camera, factor);
+    let look = play.settled(&scene, &camera, 2 * FRAMES)?;
+    play.keep(name, &look);
+    Ok(look)
+}
