@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes docs/gallery.md: the first picture of ten files, ours beside F3D's and that of Khronos' glTF Sample Renderer.
+"""Makes docs/reports/gallery.md: the first picture of ten files, ours beside F3D's and that of Khronos' glTF Sample Renderer.
 
     python3 docs/gallery.py [--program target/release/bouncelight] [--shared ../shared] [--only NAME] [--keep FOLDER]
                             [--khronos FOLDER] [--browser chromium]
@@ -165,7 +165,7 @@ def main():
         "are says little, and how they are framed and coloured says more. It computes no shadows and no light from surface to",
         "surface. It stops at the empty texture of file 6; there it was given a white one.",
         "",
-        "![Ours, F3D's, Khronos'](images/gallery.jpg)",
+        "![Ours, F3D's, Khronos'](../images/gallery.jpg)",
         "",
         "*Ours left, F3D's in the middle, Khronos' right, in the order of the table.*",
         "",
@@ -175,7 +175,7 @@ def main():
     for i, (name, author, hard, seen, *_) in enumerate(rows):
         told = "; ".join(plain(line) for line in said[name])
         lines.append(f"| {i + 1} | {author} | {hard} | {told} | {seen} |")
-    (DOCS / "gallery.md").write_text("\n".join(lines) + "\n")
+    (DOCS / "reports/gallery.md").write_text("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

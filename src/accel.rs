@@ -7,7 +7,7 @@
 //! Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017), collapsed from a
 //! binary one by obvhs (PLOC and reinsertion). Nodes and leaves are blocks of 64 bytes in one
 //! texture; a leaf is a pair of triangles that share an edge. How fast it is stands in
-//! `docs/rays.md`, what was tried in `docs/log/2026-11-rays.md`. [`Accel::closest`] is the
+//! `docs/internals/bvh.md`, what was tried in `docs/log/2026-11-rays.md`. [`Accel::closest`] is the
 //! same walk on the CPU.
 
 #[doc(hidden)]

@@ -25,7 +25,7 @@
 //! - `viewer` (feature `viewer`): the window of `bouncelight view`.
 //! - [`study`]: what is measured over methods and scenes.
 //!
-//! Conventions (units, spaces, encodings) stand in `docs/architecture.md`.
+//! Conventions (units, spaces, encodings) stand in `docs/internals/overview.md`.
 
 pub mod accel;
 pub mod gi;

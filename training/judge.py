@@ -1,4 +1,4 @@
-"""Pictures by every method against Cycles: the accuracy table of docs/accuracy.md.
+"""Pictures by every method against Cycles: the accuracy table of docs/results/accuracy.md.
 
     python training/cycles/paper_rooms.py data/judge --rooms 0,27,33,37,47 --views 1 --size 1024x512 --spp 64 --denoise --judge
     python training/judge.py out/judge data/judge [../shared/reference/cycles] [--rooms 0,27,2200-2239] [--methods direct,ambient,...]

@@ -1,4 +1,4 @@
-"""Reflections by roughness against the path tracer: the roughness table of docs/accuracy.md.
+"""Reflections by roughness against the path tracer: the roughness table of docs/results/accuracy.md.
 
     python training/roughness.py out/roughness ../shared/reference/cycles/metal_301/scene.glb --environment 0.0508761
                                  [--methods direct,gather] [--roughness 0.05,0.15,0.3,0.5,0.7,1] [--spp 256] [--size 256x128]

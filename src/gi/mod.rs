@@ -23,8 +23,8 @@
 //! not finer than a cell (4 pixels).
 //!
 //! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when
-//! all light is off. `docs/gi.md` tells the same with a picture of the data flow and the table of
-//! constants; `docs/embedding.md` how another renderer records them: a [`World`] holds its
+//! all light is off. `docs/internals/gather.md` tells the same with a picture of the data flow and the table of
+//! constants; `docs/guide/embedding.md` how another renderer records them: a [`World`] holds its
 //! triangles, a [`View`] lights its picture.
 //!
 //! # Floors

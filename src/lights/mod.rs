@@ -1,6 +1,7 @@
 //! Lights and surroundings as shaders read them.
 
-pub(crate) mod sky;
+#[doc(hidden)]
+pub mod sky;
 
 pub(crate) use sky::whole_sky;
 
@@ -48,7 +49,7 @@ const EVEN: f64 = 0.3;
 const WIDEST_SPOT: f32 = 60.0 * std::f32::consts::PI / 180.0;
 
 /// True for lights whose cone fits into one shadow map.
-pub(crate) fn fits_one_map(kind: &LightKind) -> bool {
+pub fn fits_one_map(kind: &LightKind) -> bool {
     matches!(kind, LightKind::Spot { outer_angle, .. } if *outer_angle <= WIDEST_SPOT)
 }
 

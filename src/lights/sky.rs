@@ -7,7 +7,7 @@ use thiserror::Error;
 /// A picture of the surroundings whose values do not fit its size.
 #[derive(Debug, Error)]
 #[error("image `{image}`: {reason}")]
-pub(crate) struct SkyError {
+pub struct SkyError {
     /// The picture's name.
     pub image: String,
     /// What is wrong.
@@ -15,7 +15,7 @@ pub(crate) struct SkyError {
 }
 
 /// The surroundings on the GPU.
-pub(crate) struct Sky {
+pub struct Sky {
     /// A picture's rest, once its sun is taken out; alpha is what the eye sees beside that, as a
     /// multiple: 0 but for the sun's texels.
     pub view: wgpu::TextureView,
@@ -40,7 +40,7 @@ fn texels(image: &EnvironmentImage, rest: Option<&EnvironmentImage>) -> Vec<[f32
 
 /// `Rgba32Float`, without mip levels: nothing filters it but `shaders/lib/environment.wgsl`.
 /// Pictures larger than the device allows are halved until they fit, with a warning.
-pub(crate) fn upload(
+pub fn upload(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
     environment: &Environment,
@@ -110,7 +110,7 @@ fn upload_with(
 
 /// The surroundings as a lat-long picture ([`SceneGpu::environment_view`]), a sun in it left where
 /// it is.
-pub(crate) fn whole_sky(
+pub fn whole_sky(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
     environment: &Environment,

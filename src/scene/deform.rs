@@ -211,7 +211,7 @@ impl Deform {
     }
 
     /// Whether its joints turn all of it over, so that front faces wind the other way round.
-    pub(crate) fn turns_over(&self) -> bool {
+    pub fn turns_over(&self) -> bool {
         let turns = |rows: &Joint| {
             let [a, b, c] = rows.map(|row| Vec4::from(row).truncate());
             a.dot(b.cross(c)) < 0.0
@@ -249,7 +249,7 @@ impl Deform {
 }
 
 /// Joints and weights of all that deforms, one after the other, as the GPU reads them.
-pub(crate) fn pose_of(deforms: &[Deform]) -> Vec<f32> {
+pub fn pose_of(deforms: &[Deform]) -> Vec<f32> {
     deforms.iter().flat_map(|d| d.joints.as_flattened().as_flattened().iter().chain(&d.weights).copied()).collect()
 }
 

@@ -58,7 +58,7 @@ fn the_generators_agree_with_pytorch() {
 }
 
 /// Needs what `make_operators.py --full` has written, named by `BOUNCELIGHT_FULL`. Times and errors
-/// are in docs/network.md.
+/// are in docs/internals/network.md.
 #[test]
 #[ignore = "218 MB of weights and 26 GFLOP"]
 fn the_papers_generator_at_full_width() {

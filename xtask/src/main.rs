@@ -27,7 +27,7 @@ usage: cargo xtask COMMAND
          measures on this device all that docs/ projects: docs/measured/DEVICE.json and DEVICE.md, in less than eight minutes
          (--dev builds without release's optimisation: for rehearsals)
   conformance
-         docs/conformance.md: glTF feature by feature, the rasteriser beside the path tracer
+         docs/reports/conformance.md: glTF feature by feature, the rasteriser beside the path tracer
   ci     what continuous integration runs (.ci/run)
 
 Where no GPU answers, Debian and Ubuntu get Mesa's CPU driver (on Debian 12 that of its backports, whose frames take a
@@ -66,7 +66,7 @@ fn main() -> ExitCode {
 
 fn demo() -> Result<(), String> {
     // Without the window, whose crates take two cores a minute and a half.
-    let program = ["--release", "--no-default-features", "--features", "cli", "--bin", "bouncelight"];
+    let program = ["--release", "--package", "bouncelight-app", "--no-default-features"];
     cargo(&[["build"].as_slice(), &program].concat())?;
     make_sure_of_adapter(&built("release")?)?;
     cargo(&[["run", "--quiet"].as_slice(), &program, &["--", "demo"]].concat())
@@ -126,7 +126,8 @@ fn conformance() -> Result<(), String> {
     make_sure_of_adapter(&built("debug")?)?;
     let words = ["test", "--test", "reference", "--", "--exact", "conformance::page", "--nocapture"];
     // Tests run in their package's folder.
-    run(command("cargo", &words).env("CONFORMANCE_DOCS", "docs"))
+    let docs = std::env::current_dir().map_err(|e| format!("own folder: {e}"))?.join("docs");
+    run(command("cargo", &words).env("CONFORMANCE_DOCS", docs))
 }
 
 /// Hosts in other languages; their tests are their own programs.

@@ -15,12 +15,25 @@ const AT_ONCE: usize = 2;
 
 /// Programs that take longest, which begin first: with two at once, one of them at the end would have
 /// the machine for itself.
-const LONGEST: [&str; 6] =
-    ["tests/gi/", "tests/net/", "tests/cli/", "tests/study/", "tests/viewer/", "tests/reference/"];
+const LONGEST: [&str; 6] = [
+    "tests/gi/",
+    "tests/net/",
+    "crates/app/tests/cli/",
+    "crates/lab/tests/study/",
+    "crates/app/tests/viewer/",
+    "crates/lab/tests/reference/",
+];
 
 /// As [`LONGEST`], of a run of all: networks in every way take half an hour, spoilt files minutes.
-const LONGEST_OF_ALL: [&str; 7] =
-    ["tests/net/", "tests/fuzz/", "tests/memory.rs", "tests/gi/", "tests/cli/", "tests/reference/", "tests/viewer/"];
+const LONGEST_OF_ALL: [&str; 7] = [
+    "tests/net/",
+    "crates/scene/tests/fuzz/",
+    "tests/memory.rs",
+    "tests/gi/",
+    "crates/app/tests/cli/",
+    "crates/lab/tests/reference/",
+    "crates/app/tests/viewer/",
+];
 
 /// Ignored tests that assert nothing but write fixtures: they are run by hand.
 const WRITERS: [&str; 1] = ["truth::make_the_truth"];
@@ -72,7 +85,8 @@ fn program(line: &str) -> Result<Option<Program>, String> {
     let path = |value: &serde_json::Value| value.as_str().map(PathBuf::from).ok_or(format!("cargo's message: {line}"));
     let (source, manifest) = (path(&message["target"]["src_path"])?, path(&message["manifest_path"])?);
     let folder = manifest.parent().unwrap_or(Path::new("/")).to_owned();
-    let name = source.strip_prefix(&folder).unwrap_or(&source).to_string_lossy().into_owned();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(&folder);
+    let name = source.strip_prefix(root).unwrap_or(&source).to_string_lossy().into_owned();
     Ok(Some(Program { name, file: file.into(), folder }))
 }
 
@@ -177,13 +191,13 @@ mod checks {
     #[test]
     fn the_longest_begin_first() {
         let begin = |all: bool| {
-            let mut names = ["src/lib.rs", "tests/net/main.rs", "tests/viewer/main.rs", "tests/gi/main.rs"];
+            let mut names = ["src/lib.rs", "tests/net/main.rs", "crates/app/tests/viewer/main.rs", "tests/gi/main.rs"];
             names.sort_by_key(|name| rank(name, all));
             names
         };
         let [first, second] = [false, true].map(begin);
-        assert_eq!(first, ["tests/gi/main.rs", "tests/net/main.rs", "tests/viewer/main.rs", "src/lib.rs"]);
-        assert_eq!(second, ["tests/net/main.rs", "tests/gi/main.rs", "tests/viewer/main.rs", "src/lib.rs"]);
+        assert_eq!(first, ["tests/gi/main.rs", "tests/net/main.rs", "crates/app/tests/viewer/main.rs", "src/lib.rs"]);
+        assert_eq!(second, ["tests/net/main.rs", "tests/gi/main.rs", "crates/app/tests/viewer/main.rs", "src/lib.rs"]);
         // A name that is no longer any program's would sort nothing.
         for prefix in LONGEST.iter().chain(&LONGEST_OF_ALL) {
             assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(prefix).exists(), "{prefix}");

@@ -13,8 +13,6 @@ const WITHOUT_ROW: [&str; 1] = ["MaterialStore"];
 fn rows() -> Vec<(&'static str, Layout)> {
     use crate::reference::Job;
     use crate::reference::scene::{ImageUse, RefMaterial, SceneInfo};
-    use bouncelight::accel::EmitterGpu;
-    use bouncelight::lights::LightGpu;
     vec![
         row!("SceneInfo", SceneInfo =>
             environment, flags, light_count, truth_table, truth_count, analytic_table, environment_share,
@@ -29,10 +27,6 @@ fn rows() -> Vec<(&'static str, Layout)> {
             base_color, emissive, flags, metallic, roughness, normal_scale, alpha_cutoff, specular_tint, f0, base_use,
             rough_use, normal_use, emissive_use,
         ),
-        row!("Light", LightGpu =>
-            position, kind, direction, range, color, radius, cone_scale, cone_offset, stands_in, chance,
-        ),
-        row!("Emitter", EmitterGpu => origin, threshold, edge1, other, edge2, by_area, radiance, flags),
     ]
 }
 

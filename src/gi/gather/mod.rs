@@ -15,7 +15,7 @@
 //!
 //! It asks what stands between, so it needs no constant for that. What it knows of a surface that a
 //! ray meets is one colour a triangle; how finely it knows the light between surfaces is the size
-//! of an entry's cell; the rest is noise, which frames and neighbours average away. `docs/gi.md`
+//! of an entry's cell; the rest is noise, which frames and neighbours average away. `docs/internals/gather.md`
 //! says what it cannot do.
 
 pub mod bring;

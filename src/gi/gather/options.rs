@@ -4,7 +4,7 @@ use crate::numbers::SplitMix;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// How light is gathered. The numbers that are choices stand in the table of `docs/gi.md`.
+/// How light is gathered. The numbers that are choices stand in the table of `docs/internals/gather.md`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Frames that a cell's mean remembers at rest; where it moves, or light or objects do, 128 at

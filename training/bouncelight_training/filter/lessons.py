@@ -1,4 +1,4 @@
-"""What `bouncelight dataset --moments` writes: one safetensors file a view (src/study/moments.rs)."""
+"""What `bouncelight dataset --moments` writes: one safetensors file a view (crates/lab/src/study/moments.rs)."""
 import concurrent.futures
 import glob
 import multiprocessing

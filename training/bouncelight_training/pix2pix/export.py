@@ -22,7 +22,7 @@ from .pairs import Pairs
 from .train import Config, load, validate
 
 TARGETS = "Cycles 4.5, 256x128, 32 samples a pixel, not denoised"
-# Sums in another order; half floats, through sixteen layers and a tangent (docs/network.md).
+# Sums in another order; half floats, through sixteen layers and a tangent (docs/internals/network.md).
 TOLERANCE, TOLERANCE_HALF = 1e-4, 2e-2
 ODD_SIZES = [(37, 21), (256, 256)]
 

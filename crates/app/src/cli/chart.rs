@@ -52,7 +52,7 @@ pub struct Args {
     /// chart.json already is not done again.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Where the page goes, such as docs/results.md; DIR/results.md when absent.
+    /// Where the page goes, such as docs/reports/chart.md; DIR/results.md when absent.
     #[arg(long, value_name = "MD")]
     page: Option<PathBuf>,
     /// Width and height of the pictures; a reference from elsewhere has its own.
@@ -306,9 +306,13 @@ fn write(args: &Args, record: &Record, metric: Metric) -> Result<()> {
 
 /// `file` as a page in the folder of `page` names it; as it is where they share no beginning.
 fn relative(page: &Path, file: &Path) -> String {
-    let folder = page.parent().unwrap_or(Path::new(""));
-    let inside = file.strip_prefix(folder).unwrap_or(file);
-    inside.to_string_lossy().replace('\\', "/")
+    let folder: Vec<_> = page.parent().unwrap_or(Path::new("")).components().collect();
+    let path: Vec<_> = file.components().collect();
+    let shared = folder.iter().zip(&path).take_while(|(a, b)| a == b).count();
+    let up = if shared > 0 { folder.len() - shared } else { 0 };
+    let link: PathBuf =
+        std::iter::repeat_n(std::path::Component::ParentDir, up).chain(path[shared..].to_vec()).collect();
+    link.to_string_lossy().replace('\\', "/")
 }
 
 fn print(args: &Args, record: &Record, metric: Metric) {
@@ -331,7 +335,9 @@ mod tests {
         assert_eq!(parse_method("all"), Ok(None));
         assert_eq!(parse_method("gather"), Ok(Some(MethodName::Gather)));
         assert!(["reference", "rsm", "magic"].iter().all(|m| parse_method(m).is_err()));
-        assert_eq!(relative(Path::new("docs/results.md"), Path::new("docs/results/chart.svg")), "results/chart.svg");
+        assert_eq!(relative(Path::new("docs/chart.md"), Path::new("docs/results/chart.svg")), "results/chart.svg");
+        let beside = relative(Path::new("docs/reports/chart.md"), Path::new("docs/results/chart.svg"));
+        assert_eq!(beside, "../results/chart.svg");
         assert_eq!(relative(Path::new("r.md"), Path::new("out/chart.svg")), "out/chart.svg");
         let date = today();
         assert!(date.len() == 10 && date.starts_with("20"), "{date}");

@@ -21,7 +21,7 @@ pub struct Args {
     a: PathBuf,
     /// The reference.
     b: PathBuf,
-    /// Which metric to print: `all`, `paper` (its four), or one by name. docs/metrics.md explains
+    /// Which metric to print: `all`, `paper` (its four), or one by name. docs/internals/metrics.md explains
     /// them.
     #[arg(long, default_value = "all", value_parser = parse_metric)]
     metric: String,

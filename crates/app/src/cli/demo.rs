@@ -29,7 +29,7 @@ const TIMED: BenchOptions = BenchOptions { frames: 5, warmup: 2 };
 /// White columns and rows between the pictures.
 const GAP: usize = 4;
 
-/// Cycles' picture of the interior at [`SIZE`]; docs/accuracy.md says how it was made.
+/// Cycles' picture of the interior at [`SIZE`]; docs/results/accuracy.md says how it was made.
 const REFERENCE: &[u8] = include_bytes!("../../assets/reference/interior.png");
 
 #[derive(Debug, clap::Args)]

@@ -42,7 +42,7 @@ pub struct Args {
     /// tested, else all of them.
     #[arg(long, value_name = "NAME")]
     judge: Option<String>,
-    /// Failures that docs/limits.md explains do not count.
+    /// Failures that docs/reports/stability.md explains do not count.
     #[arg(long)]
     allow_known: bool,
     /// Folder for contact sheets (NAME.png), short sequences (NAME.apng.png), the record and

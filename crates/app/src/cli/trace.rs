@@ -224,7 +224,7 @@ impl Task {
         Drawn { frame: CapturedFrame { beauty, layers: Vec::new() }, layers, facts }
     }
 
-    /// Metadata of the picture; `docs/reference.md` explains the keys.
+    /// Metadata of the picture; `docs/internals/path-tracer.md` explains the keys.
     fn facts(&self, traced: &Traced) -> Metadata {
         let o = &self.options;
         let limit = |n: u32| if n == job::UNLIMITED { "unlimited".into() } else { n.to_string() };

@@ -19,7 +19,7 @@ pub struct Args {
     /// Load scene and weights again when their files change; in a checkout, shaders, too.
     #[arg(long)]
     watch: bool,
-    /// Run the steps of this file instead of waiting for hands (docs/viewer.md); reads and saves no
+    /// Run the steps of this file instead of waiting for hands (docs/guide/viewer.md); reads and saves no
     /// settings.
     #[cfg(feature = "script")]
     #[arg(long, value_name = "JSON")]

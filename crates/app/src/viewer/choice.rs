@@ -12,7 +12,7 @@ pub fn next(source: Source, by: isize) -> Source {
     Source::REAL_TIME[(at + by).rem_euclid(n) as usize]
 }
 
-/// Mean error of indirect light on the five judged rooms, %, as docs/accuracy.md has it (`light`):
+/// Mean error of indirect light on the five judged rooms, %, as docs/results/accuracy.md has it (`light`):
 /// measured once, on other scenes, not here; `None` where nobody has.
 pub fn static_error(source: Source) -> Option<f64> {
     [Some(100.0), Some(28.8), Some(23.0), Some(5.8), Some(5.8), None][source as usize]
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn errors_are_those_of_the_documentation() {
-        let page = std::fs::read_to_string("../../docs/accuracy.md").expect("the page is there");
+        let page = std::fs::read_to_string("../../docs/results/accuracy.md").expect("the page is there");
         let table = page.split("## Finished pictures").nth(1).expect("the section is there");
         for source in Source::ALL {
             let row = |l: &&str| {

@@ -10,7 +10,7 @@
 //!
 //! `state` knows neither window nor wgpu; `ui` turns hands into its actions; `stage` holds the
 //! GPU's side; `app` brings them together and draws only when something has changed. `script`
-//! drives all of it for tests, whose feature it is. `docs/viewer.md` is for users.
+//! drives all of it for tests, whose feature it is. `docs/guide/viewer.md` is for users.
 
 mod app;
 mod choice;

@@ -94,14 +94,14 @@ fn the_page_of_results_is_made_of_its_record() {
     let docs = crate::common::root().join("docs");
     let record = std::fs::read_to_string(docs.join("results/chart.json")).expect("it is in the repository");
     let record: Record = serde_json::from_str(&record).expect("a record");
-    let made = report::page(&record, Metric::Light, "results/chart.svg");
-    let page = docs.join("results.md");
+    let made = report::page(&record, Metric::Light, "../results/chart.svg");
+    let page = docs.join("reports/chart.md");
     if std::env::var_os("RENEW").is_some() {
         std::fs::write(&page, &made).expect("writable");
     }
     assert!(std::fs::read_to_string(&page).expect("it is there") == made, "changed by hand: RENEW=1 makes it anew");
     let other = Record { samples: record.samples + 1, ..record };
-    assert!(report::page(&other, Metric::Light, "results/chart.svg") != made, "negative control");
+    assert!(report::page(&other, Metric::Light, "../results/chart.svg") != made, "negative control");
 }
 
 /// A folder as other programs' references stand in: its own size, its samples, its sky.

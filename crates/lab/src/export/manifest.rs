@@ -1,5 +1,5 @@
 //! What `bouncelight.json` says: how a host without wgpu makes, binds and dispatches the pass.
-//! `docs/embedding.md`, "Without wgpu", tells it in words.
+//! `docs/guide/embedding.md`, "Without wgpu", tells it in words.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -69,7 +69,7 @@ pub struct Texture {
     pub role: String,
     /// Texels.
     pub size: [u32; 2],
-    /// WebGPU's name; of an input one of those that would do, as `docs/embedding.md` lists them.
+    /// WebGPU's name; of an input one of those that would do, as `docs/guide/embedding.md` lists them.
     pub format: String,
     /// What it holds at first.
     #[serde(flatten)]
@@ -193,7 +193,7 @@ pub struct Write {
 #[serde(untagged)]
 pub enum Value {
     /// A number of the host's: `frame`, `round`, `round + 1` …, or `camera.` and a name of
-    /// `docs/embedding.md`.
+    /// `docs/guide/embedding.md`.
     Host(String),
     /// A constant.
     Number(f64),

@@ -4,7 +4,7 @@
 //! what the field uses, [`flip`] what an eye would see. Every metric takes two [`Picture`]s of one
 //! size without NaN or infinity, and computes in f64 unless it says otherwise. The second picture
 //! is the reference. [`compare`] gives all of them at once; [`heat_map`] shows where two pictures
-//! differ. `docs/metrics.md` has every formula, its range, its source and what it hides.
+//! differ. `docs/internals/metrics.md` has every formula, its range, its source and what it hides.
 
 pub mod basic;
 mod compare;

@@ -26,7 +26,7 @@ pub struct LightError {
 }
 
 /// Compares `light` (rgb a pixel, E/π: [`Shot::added`](super::trial::Shot::added), or another
-/// tracing's [`Layer::Gi`]) with the reference's [`Layer::Gi`] as docs/accuracy.md says: on pixels
+/// tracing's [`Layer::Gi`]) with the reference's [`Layer::Gi`] as docs/results/accuracy.md says: on pixels
 /// with a surface, diffuse reflectance above 0.01 and at least 2 % of the reference's median light,
 /// pooled over blocks of 4×4. `None` where no block is left or the reference has no light there.
 pub fn light_error(light: &[f32], reference: &Reference) -> Option<LightError> {

@@ -25,7 +25,7 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use writer::Writer;
 
-/// Rooms that pictures are judged on; training never sees them (docs/accuracy.md).
+/// Rooms that pictures are judged on; training never sees them (docs/results/accuracy.md).
 const JUDGED: [u32; 10] = [0, 1, 10, 11, 12, 14, 27, 33, 37, 47];
 /// From this index on all rooms are kept for judging.
 const JUDGED_FROM: u32 = 2200;

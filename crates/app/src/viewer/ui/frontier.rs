@@ -35,7 +35,7 @@ fn meant(dots: &[Dot], p: Pos2) -> Option<&Dot> {
     dots.iter().min_by(|a, b| a.at.distance_sq(p).total_cmp(&b.at.distance_sq(p)))
 }
 
-/// Error against time: what was measured here across, what docs/accuracy.md has up. A dot chooses
+/// Error against time: what was measured here across, what docs/results/accuracy.md has up. A dot chooses
 /// its method.
 pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 150.0), Sense::hover());
@@ -132,7 +132,7 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
     ui.label(
         RichText::new(
             "Across: GPU ms measured in this window, of this scene and size, at least 8 frames. Up: mean error of \
-            indirect light on five judged rooms (docs/accuracy.md), not measured here.",
+            indirect light on five judged rooms (docs/results/accuracy.md), not measured here.",
         )
         .small(),
     );

@@ -181,7 +181,7 @@ fn how(record: &Record, metric: Metric) -> String {
         Metric::Light => {
             "Error: Σ|ours − reference| / Σ reference of the diffuse light that a method has to add (E/π), after \
              pooling over 4×4 \
-             pixels, on surfaces with albedo above 0.01 and light above 2 % of the median (docs/accuracy.md)."
+             pixels, on surfaces with albedo above 0.01 and light above 2 % of the median (docs/results/accuracy.md)."
         }
         Metric::Flip => "Error: FLIP of the finished picture through Filmic, in 8 bits.",
         Metric::L1 => "Error: the paper's L1 (each channel stretched on its own), scaled to the pixels of 1024×512.",

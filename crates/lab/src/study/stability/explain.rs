@@ -37,7 +37,7 @@ pub fn why(test: &str, subject: &str) -> Option<&'static str> {
         ("mirror", "gather" | "neural") => {
             "rays into lobes are one a cell of 4×4 pixels and blurred over cells; only what is on the screen is \
              sharp, and the mirrored \
-             wall is not (docs/gi.md: \"mirrors\" stands among what it cannot do)"
+             wall is not"
         }
         ("disocclusion", "gather" | "neural") => {
             "what an object uncovers has eight rays a cell in its first frame, averaged over 5×5 cells: their noise. \

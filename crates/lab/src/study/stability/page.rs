@@ -1,4 +1,4 @@
-//! The page docs/limits.md: a table of method × test, a sentence on every failure, every number
+//! The page docs/reports/stability.md: a table of method × test, a sentence on every failure, every number
 //! with its threshold.
 
 use super::{Finding, Found, Record};

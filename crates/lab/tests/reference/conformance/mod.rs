@@ -4,7 +4,7 @@
 //! a feature that both read wrongly shows. The control is the file without the feature, or with
 //! another value of it: it must be farther off than any bound allows.
 //!
-//! `cargo xtask conformance` draws them larger and writes `docs/conformance.md`.
+//! `cargo xtask conformance` draws them larger and writes `docs/reports/conformance.md`.
 
 mod draw;
 mod geometry;

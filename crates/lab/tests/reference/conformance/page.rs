@@ -1,4 +1,4 @@
-//! `docs/conformance.md` and its contact sheet.
+//! `docs/reports/conformance.md` and its contact sheet.
 
 use super::draw::{Drawn, PAGE};
 use super::studio::Feature;
@@ -33,7 +33,7 @@ hand, a dense accessor, vertex normals in the place of a map), so that what both
 the same file, and the number says that they draw the same surface. **Without** is the control: the
 rasteriser's picture of the file without the feature, or with another value of it, which must be off by at least {CONTROL}.
 
-![Pairs: the rasteriser's picture left, the path tracer's right](images/conformance.jpg)
+![Pairs: the rasteriser's picture left, the path tracer's right](../images/conformance.jpg)
 
 *Pairs in the order of the table: the rasteriser's picture left, the path tracer's right.*
 
@@ -66,7 +66,7 @@ rasteriser's picture of the file without the feature, or with another value of i
     if !warnings.is_empty() {
         let _ = write!(text, "\nWhat the program says of these files:\n\n{}\n", warnings.join("\n"));
     }
-    std::fs::write(docs.join("conformance.md"), text).expect("the page can be written");
+    std::fs::write(docs.join("reports/conformance.md"), text).expect("the page can be written");
 }
 
 fn sheet(path: &Path, drawn: &[(Feature, Drawn)]) {

@@ -23,7 +23,7 @@ const SEED: u64 = 20_261_124;
 /// may stop any of them for a while, and a picture of the largest size that is allowed takes its
 /// time to be cleared.
 const SLOWEST: Duration = Duration::from_secs(5);
-/// What a picture may need to be decoded (docs/scenes.md), and room for the rest.
+/// What a picture may need to be decoded (docs/guide/scenes.md), and room for the rest.
 const MOST_MEMORY: usize = (512 + 64) << 20;
 
 /// JSON and binary chunk of a GLB.

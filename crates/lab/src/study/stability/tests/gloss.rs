@@ -14,7 +14,7 @@ const LIMITS: &[Limit] = &[
         name: "HDR-FLIP on the balls against the truth",
         unit: Unit::Flip,
         at_most: 0.25,
-        source: "FLIP of `ssgi`'s whole pictures is 0.15 to 0.34 (docs/accuracy.md); HDR-FLIP takes the worst exposure",
+        source: "FLIP of `ssgi`'s whole pictures is 0.15 to 0.34 (docs/results/accuracy.md); HDR-FLIP takes the worst exposure",
     },
     Limit {
         name: "all light from the balls against the truth",

@@ -66,7 +66,7 @@ pub static UNSEEN: Test = Test {
         name: "error of light over 4×4 pixels",
         unit: Unit::Share,
         at_most: 0.15,
-        source: "the worst real scene's is 17 % (docs/accuracy.md)",
+        source: "the worst real scene's is 17 % (docs/results/accuracy.md)",
     }],
     control: Fault::Gain(1.3),
     size: [128, 64],
