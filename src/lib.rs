@@ -27,6 +27,7 @@
 //!
 //! Conventions (units, spaces, encodings) stand in `docs/internals/overview.md`.
 
+#[doc(hidden)]
 pub mod accel;
 pub mod gi;
 pub mod gpu;
@@ -34,6 +35,7 @@ pub mod gpu;
 pub mod gpu_scene;
 #[cfg(test)]
 mod layouts;
+#[doc(hidden)]
 pub mod lights;
 pub mod net;
 #[doc(hidden)]
@@ -41,6 +43,7 @@ pub mod numbers;
 #[cfg(feature = "render")]
 pub mod render;
 pub mod scene;
+#[doc(hidden)]
 pub mod srgb;
 
 pub use wgpu;

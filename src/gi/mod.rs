@@ -31,13 +31,18 @@
 //! `interface` ← `stage` ← `screen`, `gather` ← `neural` ← `method` ← `world`: each imports only
 //! what stands before it, and nothing here imports `render`.
 
+#[doc(hidden)]
 pub mod cpu;
 pub mod gather;
+#[doc(hidden)]
 pub mod interface;
+#[doc(hidden)]
 pub mod method;
 pub mod neural;
 mod preludes;
+#[doc(hidden)]
 pub mod screen;
+#[doc(hidden)]
 pub mod stage;
 pub(crate) mod world;
 
@@ -47,8 +52,12 @@ pub use interface::{
 };
 pub use method::{Method, name};
 pub use neural::{Neural, memory};
+#[doc(hidden)]
 pub use preludes::example_preludes;
-pub use screen::{ambient, bitmask, occlusion, ssgi};
+pub use screen::ambient;
+#[doc(hidden)]
+pub use screen::{bitmask, occlusion, ssgi};
+#[doc(hidden)]
 pub use stage::{cells, exposure, exposure::ExposurePass, inputs};
 pub use world::{
     BufferIndices, BufferMesh, BufferVertices, Complaint, ImageSource, Indices, Instance, MeshReadback, MeshSource,

@@ -14,10 +14,14 @@ mod mesh;
 mod texture;
 mod veil;
 
+#[doc(hidden)]
 pub use closed::is_closed;
+#[doc(hidden)]
 pub use deform::DeformGpu;
 pub(crate) use deform::{STRIDE as DEFORM_STRIDE, Shapes};
+#[doc(hidden)]
 pub use material::{MaterialGpu, TextureUse, material_layout};
+#[doc(hidden)]
 pub use mesh::{AttributeVertex, Bounds, Draw, Rows, Slot, attribute_layouts, motion_layouts, position_layouts};
 pub use texture::{TextureBytes, TextureMemory};
 

@@ -12,21 +12,32 @@
 //!
 //! Only [`gpu`] knows wgpu.
 
+#[doc(hidden)]
 pub mod activation;
 mod check;
+#[doc(hidden)]
 pub mod convert;
+#[doc(hidden)]
 pub mod cpu;
 mod document;
+#[doc(hidden)]
 pub mod dropout;
 pub mod format;
+#[doc(hidden)]
 pub mod gpu;
+#[doc(hidden)]
 pub mod graph;
 mod graph_error;
 mod header;
+#[doc(hidden)]
 pub mod op;
+#[doc(hidden)]
 pub mod op_facts;
+#[doc(hidden)]
 pub mod peak;
+#[doc(hidden)]
 pub mod pictures;
+#[doc(hidden)]
 pub mod plan;
 mod problem;
 mod shape;
@@ -38,4 +49,5 @@ pub mod tune;
 mod write;
 
 /// The published generators as graphs.
+#[doc(hidden)]
 pub use convert::published as arch;

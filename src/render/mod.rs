@@ -1,30 +1,44 @@
 //! The rasteriser: one pass, one file; [`frame`] tells the order.
 
+#[doc(hidden)]
 pub mod blended;
 pub mod capture;
+#[doc(hidden)]
 pub mod composite;
+#[doc(hidden)]
 pub mod cull;
 mod decode;
+#[doc(hidden)]
 pub mod deform;
+#[doc(hidden)]
 pub mod direct;
 pub mod exposure;
 pub mod frame;
+#[doc(hidden)]
 pub mod gbuffer;
+#[doc(hidden)]
 pub mod glossy;
 mod handed;
+#[doc(hidden)]
 pub mod light_choice;
+#[doc(hidden)]
 pub mod lights;
+#[doc(hidden)]
 pub mod moved;
 mod passes;
+#[doc(hidden)]
 pub mod sampling;
+#[doc(hidden)]
 pub mod shadow;
 mod shadow_kept;
 mod shadow_local;
 mod shadow_maps;
 mod shadow_sun;
 mod shadow_view;
+#[doc(hidden)]
 pub mod taa;
 pub mod targets;
+#[doc(hidden)]
 pub mod tonemap;
 pub mod tonemap_curve;
 #[doc(hidden)]

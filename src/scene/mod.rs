@@ -6,6 +6,7 @@
 //! lm/W at the border. Nothing here knows wgpu except [`upload`], which turns a [`Scene`] into GPU
 //! buffers.
 
+#[doc(hidden)]
 pub mod bounds;
 mod camera;
 pub mod deform;

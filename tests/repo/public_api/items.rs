@@ -1,6 +1,6 @@
 //! What is public of a crate, one line an item.
 
-use super::modules::{Found, Modules, for_tests, join, leaves, name};
+use super::modules::{Found, Modules, for_tests, hidden, join, leaves, name};
 use proc_macro2::{TokenStream, TokenTree};
 use quote::ToTokens;
 use std::collections::BTreeMap;
@@ -59,11 +59,11 @@ impl Walk<'_> {
         let Some(of) = modules.get(module).filter(|_| depth < 16 && !self.without.contains(&path)) else { return };
         for item in &of.items {
             match item {
-                Item::Mod(m) if is_public(&m.vis) => {
+                Item::Mod(m) if is_public(&m.vis) && !hidden(&m.attrs) => {
                     let name = m.ident.to_string();
                     self.module(&join(module, &name), &join(path, &name), depth + 1);
                 }
-                Item::Use(u) if is_public(&u.vis) => {
+                Item::Use(u) if is_public(&u.vis) && !hidden(&u.attrs) => {
                     for (name, target, all) in leaves(&u.tree) {
                         match modules.find(module, &target) {
                             Found::Module(at) if all => self.module(&at, path, depth + 1),
@@ -107,7 +107,9 @@ impl Walk<'_> {
                 Item::Struct(s) => {
                     let path = format!("{path}{}", plain(&s.generics));
                     self.shape(module, "struct", &path, &s.attrs);
-                    for (number, field) in s.fields.iter().enumerate().filter(|(_, f)| is_public(&f.vis)) {
+                    for (number, field) in
+                        s.fields.iter().enumerate().filter(|(_, f)| is_public(&f.vis) && !hidden(&f.attrs))
+                    {
                         let name = field.ident.as_ref().map_or(number.to_string(), ToString::to_string);
                         self.typed(module, "field", &format!("{path}.{name}"), &field.ty);
                     }
@@ -159,7 +161,7 @@ impl Walk<'_> {
         }
         for item in &of.items {
             match item {
-                ImplItem::Fn(f) if is_public(&f.vis) && !for_tests(&f.attrs) => {
+                ImplItem::Fn(f) if is_public(&f.vis) && !for_tests(&f.attrs) && !hidden(&f.attrs) => {
                     self.function(module, &f.sig, &format!("{path}::{}", f.sig.ident));
                 }
                 ImplItem::Const(c) if is_public(&c.vis) => {

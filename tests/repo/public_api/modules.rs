@@ -53,6 +53,14 @@ pub fn for_tests(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(tests)
 }
 
+/// `#[doc(hidden)]`: what the sister packages need and no host.
+pub fn hidden(attributes: &[syn::Attribute]) -> bool {
+    let hides = |a: &syn::Attribute| {
+        a.path().is_ident("doc") && a.meta.require_list().is_ok_and(|l| l.tokens.to_string() == "hidden")
+    };
+    attributes.iter().any(hides)
+}
+
 impl Modules {
     /// The crate whose root is this file.
     pub fn read(root: &Path) -> Self {

@@ -6,11 +6,11 @@ use bouncelight::gpu::GpuError;
 use bouncelight::gpu_scene::UploadError;
 use bouncelight::net::{convert::ConvertError, format::WeightsError, pictures::PicturesError};
 use bouncelight::render::RenderError;
-use bouncelight::scene::environment::EnvironmentError;
 use bouncelight_lab::export::ExportError;
 use bouncelight_lab::reference::PackError;
 use bouncelight_lab::study::fitted::FittedError;
 use bouncelight_scene::SceneError;
+use bouncelight_scene::sky::SkyError;
 use thiserror::Error;
 
 /// Something went wrong while running.
@@ -122,7 +122,7 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
         if cause.is::<SceneError>()
             || cause.is::<UploadError>()
             || cause.is::<WeightsError>()
-            || cause.is::<EnvironmentError>()
+            || cause.is::<SkyError>()
             || cause.is::<PackError>()
             || cause.is::<AccelError>()
         {

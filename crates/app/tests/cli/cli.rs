@@ -386,8 +386,10 @@ fn gl_draws_the_same_picture_as_vulkan() {
 #[cfg(unix)]
 fn results_may_be_read_in_part_and_a_full_disk_is_said() {
     let run = |more: &str| {
-        let shell =
-            format!("{} weights info assets/weights/filter.safetensors {more}", env!("CARGO_BIN_EXE_bouncelight"));
+        let shell = format!(
+            "{} weights info ../../assets/weights/filter.safetensors {more}",
+            env!("CARGO_BIN_EXE_bouncelight")
+        );
         std::process::Command::new("bash")
             .args(["-c", &format!("set -o pipefail; {shell}")])
             .output()
