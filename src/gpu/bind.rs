@@ -41,7 +41,8 @@ impl Binder {
     }
 
     /// The group of these resources, in the order of the bindings.
-    pub fn group<const N: usize>(&mut self, resources: [Bound; N]) -> wgpu::BindGroup {
+    pub fn group(&mut self, resources: impl Into<Vec<Bound>>) -> wgpu::BindGroup {
+        let resources: Vec<Bound> = resources.into();
         if let Some((_, group)) = self.groups.iter().find(|(kept, _)| kept[..] == resources[..]) {
             return group.clone();
         }
@@ -54,7 +55,7 @@ impl Binder {
             &wgpu::BindGroupDescriptor { label: Some(self.label), layout: &self.layout, entries: &entries },
         );
         self.made += 1;
-        let entry = (resources.to_vec(), group.clone());
+        let entry = (resources, group.clone());
         if self.groups.len() < CAPACITY {
             self.groups.push(entry);
         } else {

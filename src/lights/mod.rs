@@ -36,8 +36,7 @@ pub struct LightGpu {
     pub chance: f32,
 }
 
-/// Lights that a draw by lot looks at; `CANDIDATES` in `shaders/gi/gather/look.wgsl`. Lists that
-/// are no longer are looked at whole.
+/// Lights that a draw by lot looks at. Lists that are no longer are looked at whole.
 pub const CANDIDATES: usize = 8;
 
 /// What all lights of a kind share evenly. Power says nothing of how near a light is: a weak lamp

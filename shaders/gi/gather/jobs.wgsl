@@ -6,7 +6,7 @@
 // vec3u` finds a unit, `wants(block, i) -> bool` is asked once whether place `i` of it has a job,
 // and `begin(at, job) -> bool` sends way `at` on it (false: it is at its end at once).
 
-const UNIT = 1024u;
+// `UNIT`, of `gi::gather::work`: places of a unit.
 // Places after which a workgroup sees whether there is room for the jobs of as many.
 const PART = UNIT / 4u;
 

@@ -39,9 +39,6 @@ fn sends_back(p: Place, l: vec3f, n_l: f32, irradiance: vec3f) -> vec3f {
     return irradiance * n_l * (p.diffuse / PI + ggx(p.n, p.v, l, p.f0, p.roughness));
 }
 
-// Lights of a long list that are looked at; `lights::CANDIDATES`.
-const CANDIDATES = 8u;
-
 // The light that number `at` of [0, 1) draws.
 fn drawn_light(at: f32) -> u32 {
     var low = 0u;

@@ -26,7 +26,7 @@ struct Gather {
     // Most frames that a cell's mean and an entry's remember.
     cell_frames: f32,
     entry_frames: f32,
-    // Lights of this list stand for surfaces that glow: these light no cell a second time.
+    // `GATHER_` and a name: `gi::gather::params` says what each means.
     flags: u32,
     // Cells of the picture. Queries and records of rays into lobes come after theirs, queries of
     // entries after both.
@@ -42,29 +42,6 @@ struct Gather {
     // Turns the lattice of cells' rays: other noise of the same light.
     shift: vec2u,
 }
-
-const GATHER_STANDS_IN = 1u;
-const GATHER_CUT = 2u;
-const GATHER_NO_BLUR = 4u;
-// All frames of a mean count the same.
-const GATHER_EVEN = 8u;
-// The lights are not what they were a few frames ago.
-const GATHER_LIGHTS_CHANGED = 16u;
-// Surfaces that rays meet show no gloss.
-const GATHER_NO_CAUSTICS = 32u;
-// Surfaces of the picture show none that rays would have to find.
-const GATHER_NO_GLOSS = 64u;
-// Lights, or objects, are not what and where they were a short while ago.
-const GATHER_CHANGING = 128u;
-// A network says which cells are averaged.
-const GATHER_GUIDED = 256u;
-// Lights or objects have changed since the frame before.
-const GATHER_CHANGED = 512u;
-// Every entry sends a ray in each round, whoever met it: light has changed lately, or all frames
-// are to be alike.
-const GATHER_ALL_ENTRIES = 1024u;
-// The device runs the threads of a workgroup one after the other.
-const GATHER_IN_TURN = 2048u;
 
 @group(1) @binding(0) var<uniform> gather: Gather;
 @group(1) @binding(1) var accel_blocks: texture_2d<u32>;

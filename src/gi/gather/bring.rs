@@ -7,10 +7,10 @@
 //! Background pixels get 0. A workgroup reads each cell around its 16×8 pixels once, into its shared
 //! memory.
 
+use super::bindings;
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
 use crate::gpu::bind::{self, Binder, Bound};
-use crate::gpu::binding::{LOAD, READ, STORE_HALF};
 use crate::gpu::{shaders, timing::Recorder};
 
 /// Pixels of a workgroup: `WIDE` and `HIGH` of the shader.
@@ -73,7 +73,7 @@ pub struct Brought<'a> {
 impl BringPass {
     /// Compiles the shader.
     pub fn new(device: &wgpu::Device, inputs: &InputGroup) -> Self {
-        let binder = Binder::new(device, "gi.bring", &[READ, READ, READ, STORE_HALF, STORE_HALF, LOAD, READ]);
+        let binder = Binder::new(device, "gi.bring", bindings::Bring::TYPES);
         let module = shaders::module_with(device, "gi.bring", &prelude());
         let pipeline = bind::pipeline(device, "gi.bring", &module, "bring", &[inputs.layout(), binder.layout()]);
         Self { pipeline, binder }
@@ -88,9 +88,17 @@ impl BringPass {
         brought: Brought<'_>,
     ) {
         let Brought { light, glosses, specular, mirrored, output, specular_output } = brought;
-        let [pixels, light, glosses, mirrored] = [cells.pixels(), light, glosses, mirrored].map(Bound::from);
-        let [output, reflected, specular] = [output, specular_output, specular].map(Bound::from);
-        let group = self.binder.group([pixels, light, glosses, output, reflected, specular, mirrored]);
+        let [cell_pixels, light, glosses, mirrored] = [cells.pixels(), light, glosses, mirrored].map(Bound::from);
+        let [output, specular_output, specular_map] = [output, specular_output, specular].map(Bound::from);
+        let group = self.binder.group(bindings::Bring {
+            cell_pixels,
+            light,
+            glosses,
+            output,
+            specular_output,
+            specular_map,
+            mirrored,
+        });
         recorder.compute("gi.bring", |pass| {
             inputs.set(pass);
             pass.set_bind_group(1, &group, &[]);

@@ -1,10 +1,12 @@
 //! One frame of the method: rays and means, then the filter over neighbours.
 
+use super::bindings;
 use super::bring::Brought;
 use super::params::{self, Params};
 use super::pass::Groups;
+use super::schedule::{Events, Frame, HURRIED, Rules, STIR};
 use super::store::{self, Store};
-use super::{GatherGi, HURRIED, HURRY, ROUNDS_RESTED, ROUNDS_YOUNG, STIR, WIDE_FRAMES, YOUNG, looks};
+use super::{GatherGi, looks};
 use crate::gi::interface::{GiError, Inputs, Outputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -38,49 +40,14 @@ impl Settled {
     }
 }
 
-impl GatherGi {
-    /// Those of the first of the frame's rounds.
-    fn params(&self, inputs: &Inputs<'_>, rays: &Rays<'_>, guided: bool, rounds: u32) -> Result<Params, GiError> {
-        let counts = rays.scene.counts();
-        let camera = stage::inputs::Params::of(inputs, None)?;
-        let flags = [
-            (inputs.lights.is_some_and(|l| l.stand_in), params::STANDS_IN),
-            (self.frame == 0, params::CUT),
-            (!self.options.blur, params::NO_BLUR),
-            (self.options.even, params::EVEN),
-            (self.hurry > 0, params::LIGHTS_CHANGED),
-            (!self.options.caustics, params::NO_CAUSTICS),
-            (inputs.specular.is_none(), params::NO_GLOSS),
-            (self.changing > 0, params::CHANGING),
-            (guided, params::GUIDED),
-            (self.frame == 0 || self.stir > 0 || self.options.even, params::ALL_ENTRIES),
-            (self.workgroups.in_turn(), params::IN_TURN),
-        ];
-        Ok(Params {
-            eye: camera.eye_position(),
-            frame: self.frame,
-            light_count: inputs.lights.map_or(0, |l| l.count),
-            emitter_count: counts.emitters as u32,
-            inverse_power: rays.scene.inverse_power(),
-            mask: self.options.slots - 1,
-            entry_scale: self.options.entry_scale.min(widest(camera.tan_half_height())),
-            round: self.round,
-            cell_frames: self.options.cell_frames,
-            entry_frames: if self.changing > 0 {
-                self.options.entry_frames.min(HURRIED)
-            } else {
-                self.options.entry_frames
-            },
-            flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
-            cells: cells::count(inputs.size) as u32,
-            rays: (cells::count(inputs.size) + store::squares(inputs.size)) as u32,
-            since: STIR - self.changing,
-            last_round: self.round + rounds - 1,
-            looks: looks(inputs.size),
-            shift: self.options.shift(),
-        })
-    }
+/// What a frame is drawn of, once nothing can go wrong with it.
+struct Sound<'a> {
+    rays: &'a Rays<'a>,
+    camera: stage::inputs::Params,
+    bound: BoundInputs,
+}
 
+impl GatherGi {
     /// Records the frame up to the cells' means; then [`filter`](Self::filter) is due. `guided`:
     /// whether it gets a network's guidance.
     ///
@@ -93,127 +60,198 @@ impl GatherGi {
         inputs: &Inputs<'_>,
         guided: bool,
     ) -> Result<Settled, GiError> {
+        let sound = self.validate(queue, inputs)?;
+        let rules = Rules { even: self.options.even, first_rounds: self.options.first_rounds };
+        let events = Events {
+            cut: inputs.reset,
+            resized: self.cells.fit(inputs.size),
+            scene: sound.rays.scene.id(),
+            lights: inputs.lights.map_or(0, |l| l.epoch),
+            objects: sound.rays.scene.moves(),
+        };
+        let (frame, schedule) = self.schedule.next(&events, rules);
+        if frame.restart {
+            self.restart(inputs.size);
+        }
+        let params = self.params(inputs, &sound, guided, &frame);
+        let settled = self.record_frame(recorder, queue, inputs, sound, &frame, params);
+        self.schedule = schedule;
+        Ok(settled)
+    }
+
+    /// Everything that can be wrong with `inputs`, before anything changes.
+    fn validate<'a>(&mut self, queue: &wgpu::Queue, inputs: &'a Inputs<'_>) -> Result<Sound<'a>, GiError> {
         let rays = inputs.rays.as_ref().ok_or(GiError::Rays)?;
         if inputs.size != self.checked {
             Self::check(&self.device.limits(), inputs.size, &self.options)?;
             self.checked = inputs.size;
         }
+        let camera = stage::inputs::Params::of(inputs, None)?;
         let bound = self.inputs.bind(queue, inputs)?;
-        if inputs.reset {
-            self.frame = 0;
-        }
-        // Another scene's light is nobody's past.
-        let another = rays.scene.id() != self.scene_id;
-        self.scene_id = rays.scene.id();
-        if self.cells.fit(inputs.size) || another {
-            self.store = Store::new(&self.device, inputs.size, self.options.slots, self.workgroups);
-            // The same scene gets the same rays, whatever was drawn before.
-            self.round = 0;
-            self.bring.forget();
-            self.frame = 0;
-        }
-        let lights = inputs.lights.map_or(&self.no_lights, |l| l.buffer);
-        let scene = self.scene.group([
-            self.params.bound(),
-            rays.scene.accel().view().into(),
-            rays.scene.surfaces().into(),
-            rays.scene.emitters().into(),
-            lights.into(),
-            rays.environment.into(),
-            rays.scene.normals().into(),
-        ]);
-        let store = &self.store;
-        let [keys, lots, queries, asked, entry_light] =
-            [&store.keys, &store.lots, &store.queries, &store.asked, &store.light].map(Bound::from);
-        let specular = Bound::from(inputs.specular.unwrap_or(&self.no_specular));
-        let [pixels, records] = [self.cells.pixels(), &store.records].map(Bound::from);
-        let [before, after] = [self.frame & 1, 1 - (self.frame & 1)].map(|i| Bound::from(&store.pasts[i as usize]));
-        let changes = Bound::from(&store.changes);
-        let table = || [&keys, &lots, &queries, &asked, &entry_light].map(Clone::clone);
+        Ok(Sound { rays, camera, bound })
+    }
 
-        let (epoch, moves) = (inputs.lights.map_or(0, |l| l.epoch), rays.scene.moves());
-        let (mut changed, mut rested) = (false, false);
-        if self.frame > 0 && !self.options.even {
-            changed = epoch != self.lights_epoch || moves != self.moves;
-            if epoch != self.lights_epoch {
-                self.hurry = HURRY;
-            }
-            rested = changed && self.changing == 0;
-            if changed {
-                (self.stir, self.changing) = (STIR, STIR);
-            }
-            // Each frame is to see entries of its own, not the first one's.
-            if self.frame == 1 {
-                self.stir = STIR;
-            }
+    /// Buffers that remember nothing, for pictures of `size` pixels.
+    fn restart(&mut self, size: [u32; 2]) {
+        self.store = Store::new(&self.device, size, self.options.slots, self.workgroups);
+        self.bring.forget();
+    }
+
+    /// Those of the first of the frame's rounds.
+    fn params(&self, inputs: &Inputs<'_>, sound: &Sound<'_>, guided: bool, frame: &Frame) -> Params {
+        let (scene, options) = (sound.rays.scene, &self.options);
+        let changing = frame.since_change.is_some();
+        let flags = [
+            (inputs.lights.is_some_and(|l| l.stand_in), params::STANDS_IN),
+            (frame.number == 0, params::CUT),
+            (!options.blur, params::NO_BLUR),
+            (options.even, params::EVEN),
+            (frame.hurries, params::LIGHTS_CHANGED),
+            (!options.caustics, params::NO_CAUSTICS),
+            (inputs.specular.is_none(), params::NO_GLOSS),
+            (changing, params::CHANGING),
+            (guided, params::GUIDED),
+            (frame.changed, params::CHANGED),
+            (frame.all_entries, params::ALL_ENTRIES),
+            (self.workgroups.in_turn(), params::IN_TURN),
+        ];
+        Params {
+            eye: sound.camera.eye_position(),
+            frame: frame.number,
+            light_count: inputs.lights.map_or(0, |l| l.count),
+            emitter_count: scene.counts().emitters as u32,
+            inverse_power: scene.inverse_power(),
+            mask: options.slots - 1,
+            entry_scale: options.entry_scale.min(widest(sound.camera.tan_half_height())),
+            round: frame.round,
+            cell_frames: options.cell_frames,
+            entry_frames: if changing { options.entry_frames.min(HURRIED) } else { options.entry_frames },
+            flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
+            cells: cells::count(inputs.size) as u32,
+            rays: (cells::count(inputs.size) + store::squares(inputs.size)) as u32,
+            since: frame.since_change.unwrap_or(STIR),
+            last_round: frame.round + frame.rounds - 1,
+            looks: looks(inputs.size),
+            shift: options.shift(),
         }
-        (self.lights_epoch, self.moves) = (epoch, moves);
-        let rounds = match (self.frame, self.stir) {
-            (0, _) => self.options.first_rounds.max(1),
-            _ if rested => ROUNDS_RESTED,
-            (1..=YOUNG, _) => ROUNDS_YOUNG,
-            _ if changed => ROUNDS_YOUNG,
-            (_, 0) => 1,
-            _ => 2,
-        };
-        let mut params = self.params(inputs, rays, guided, rounds)?;
-        if changed {
-            params.flags |= params::CHANGED;
-        }
-        let workgroups = self.workgroups;
-        let [w, h] = cells_of(inputs.size).map(|n| n.div_ceil(8));
+    }
+
+    /// Records the passes of the frame up to the cells' means.
+    fn record_frame(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        queue: &wgpu::Queue,
+        inputs: &Inputs<'_>,
+        sound: Sound<'_>,
+        frame: &Frame,
+        mut params: Params,
+    ) -> Settled {
+        let scene = sound.rays.scene;
+        let group = self.scene.group(bindings::Scene {
+            gather: self.params.bound(),
+            accel_blocks: scene.accel().view().into(),
+            surfaces: scene.surfaces().into(),
+            emitters: scene.emitters().into(),
+            lights: inputs.lights.map_or(&self.no_lights, |l| l.buffer).into(),
+            environment_picture: sound.rays.environment.into(),
+            corner_normals: scene.normals().into(),
+        });
+        let frame_params = self.frame_params.group(bindings::Alone { gather: self.params.bound() });
         let mut offset = self.params.write(queue, &params);
-        let frame_params = self.frame_params.group([self.params.bound()]);
-        let groups = |offset| Groups { inputs: &bound, scene: &scene, offset };
-        let alone = |offset| Groups { scene: &frame_params, ..groups(offset) };
+        let with_scene = |offset| Groups { inputs: &sound.bound, scene: &group, offset };
+        let alone = |offset| Groups { inputs: &sound.bound, scene: &frame_params, offset };
+        let store = &self.store;
+        let specular_map = Bound::from(inputs.specular.unwrap_or(&self.no_specular));
+        let motion_map = Bound::from(inputs.motion.unwrap_or(&self.no_motion));
+        // Means are written beside those of the frame before.
+        let [before, after] = [0, 1].map(|k| Bound::from(&store.pasts[((frame.number + k) & 1) as usize]));
+        let entries = bindings::Entries {
+            entry_keys: (&store.keys).into(),
+            entry_lots: (&store.lots).into(),
+            entry_queries: (&store.queries).into(),
+            entry_asked: (&store.asked).into(),
+            entry_light: (&store.light).into(),
+        };
+        let history = bindings::History {
+            cell_pixels: self.cells.pixels().into(),
+            records: (&store.records).into(),
+            entry_light: (&store.light).into(),
+            before: before.clone(),
+            after: after.clone(),
+            changes: (&store.changes).into(),
+            motion_map: motion_map.clone(),
+            specular_map: specular_map.clone(),
+        };
+        let of_cells = {
+            let [w, h] = cells_of(inputs.size).map(|n| n.div_ceil(8));
+            [w, h, 1]
+        };
+        let (workgroups, slots) = (self.workgroups, self.options.slots);
 
-        self.cells.record(recorder, &bound);
-        let motion = Bound::from(inputs.motion.unwrap_or(&self.no_motion));
-        let own = [&pixels, &records, &entry_light, &before, &after, &changes, &motion, &specular];
-        let history = || own.map(Clone::clone);
-        if changed {
+        self.cells.record(recorder, &sound.bound);
+        if frame.changed {
             // By the random numbers of the frame before.
-            let offset = self.params.write(queue, &Params { round: self.sent, ..params });
-            let own = [&keys, &lots, &queries, &before, &records].map(Clone::clone);
-            self.gradient.record(recorder, groups(offset), own, [workgroups.for_squares(inputs.size), 1, 1]);
+            let offset = self.params.write(queue, &Params { round: frame.round_before, ..params });
+            let own = bindings::Gradient {
+                entry_keys: (&store.keys).into(),
+                entry_lots: (&store.lots).into(),
+                entry_queries: (&store.queries).into(),
+                before,
+                records: (&store.records).into(),
+            };
+            self.gradient.record(recorder, with_scene(offset), own, [workgroups.for_squares(inputs.size), 1, 1]);
         }
-        self.sent = params.round;
-        self.recall.record(recorder, alone(offset), history(), [w, h, 1]);
-        let slots = [self.options.slots.div_ceil(64), 1, 1];
-        self.evict.record(recorder, groups(offset), table(), slots);
-        let own = [&keys, &lots, &queries, &pixels, &records, &specular].map(Clone::clone);
-        self.rays.record(recorder, groups(offset), own, [workgroups.for_cells(inputs.size), 1, 1]);
-        let of_slots = [workgroups.for_slots(self.options.slots), 1, 1];
-        for round in 0..rounds {
+        self.recall.record(recorder, alone(offset), history.clone(), of_cells);
+        self.evict.record(recorder, with_scene(offset), entries.clone(), [slots.div_ceil(64), 1, 1]);
+        let own = bindings::CellRays {
+            entry_keys: (&store.keys).into(),
+            entry_lots: (&store.lots).into(),
+            entry_queries: (&store.queries).into(),
+            cell_pixels: self.cells.pixels().into(),
+            records: (&store.records).into(),
+            specular_map: specular_map.clone(),
+        };
+        self.rays.record(recorder, with_scene(offset), own, [workgroups.for_cells(inputs.size), 1, 1]);
+        for round in 0..frame.rounds {
             if round > 0 {
                 params.round += 1;
                 offset = self.params.write(queue, &params);
             }
-            self.renew.record(recorder, groups(offset), table(), of_slots);
+            self.renew.record(recorder, with_scene(offset), entries.clone(), [workgroups.for_slots(slots), 1, 1]);
         }
         if inputs.specular.is_some() {
-            let own = [&keys, &lots, &queries, &entry_light, &Bound::from(&store.mirrored), &specular, &motion];
-            let of_pixels = [workgroups.for_pixels(inputs.size), 1, 1];
-            self.mirror.record(recorder, groups(offset), own.map(Clone::clone), of_pixels);
+            let own = bindings::Mirror {
+                entry_keys: (&store.keys).into(),
+                entry_lots: (&store.lots).into(),
+                entry_queries: (&store.queries).into(),
+                entry_light: (&store.light).into(),
+                mirrored: (&store.mirrored).into(),
+                specular_map,
+                motion_map,
+            };
+            self.mirror.record(recorder, with_scene(offset), own, [workgroups.for_pixels(inputs.size), 1, 1]);
         }
-        self.mean.record(recorder, alone(offset), history(), [w, h, 1]);
-        self.round = params.round + 1;
-        self.frame += 1;
-        self.hurry = self.hurry.saturating_sub(1);
-        self.stir = self.stir.saturating_sub(1);
-        self.changing = self.changing.saturating_sub(1);
-        let pasts = self.store.pasts[(self.frame & 1) as usize].clone();
-        let specular = inputs.specular.unwrap_or(&self.no_specular).clone();
-        let wide = params.frame < WIDE_FRAMES;
-        Ok(Settled { inputs: bound, specular, pasts, params: frame_params, offset, wide })
+        self.mean.record(recorder, alone(offset), history, of_cells);
+        Settled {
+            pasts: store.pasts[((frame.number + 1) & 1) as usize].clone(),
+            specular: inputs.specular.unwrap_or(&self.no_specular).clone(),
+            inputs: sound.bound,
+            params: frame_params,
+            offset,
+            wide: frame.wide,
+        }
     }
 
     /// Averages means over neighbours and finds where light has changed, which the next frame asks.
     pub(super) fn blur(&mut self, recorder: &mut Recorder<'_>, settled: &Settled, guidance: Bound) {
         let store = &self.store;
-        let [pasts, blurred, changes, glosses] =
-            [&settled.pasts, &store.blurred, &store.changes, &store.glosses].map(Bound::from);
-        let own = [pasts, blurred, changes, glosses, guidance];
+        let own = bindings::Blur {
+            pasts: (&settled.pasts).into(),
+            light: (&store.blurred).into(),
+            changes: (&store.changes).into(),
+            glosses: (&store.glosses).into(),
+            guidance,
+        };
         let blur = if settled.wide { &mut self.blur_wide } else { &mut self.blur };
         blur.record(recorder, settled.groups(), own, settled.workgroups());
     }
@@ -230,9 +268,14 @@ impl GatherGi {
         let guidance = guidance.unwrap_or_else(|| Bound::from(&self.no_guidance));
         self.blur(recorder, settled, guidance.clone());
         let store = &self.store;
-        let [pasts, blurred, light, glosses, gleams] =
-            [&settled.pasts, &store.blurred, &store.cell_light, &store.glosses, &store.gleams].map(Bound::from);
-        let own = [pasts, blurred, light, guidance, glosses, gleams];
+        let own = bindings::Smooth {
+            pasts: (&settled.pasts).into(),
+            blurred: (&store.blurred).into(),
+            light: (&store.cell_light).into(),
+            guidance,
+            glosses: (&store.glosses).into(),
+            gleams: (&store.gleams).into(),
+        };
         // Of 32×32 cells each of sixteen workgroups has those that are four apart.
         let [w, h] = settled.inputs.cells.map(|n| 4 * n.div_ceil(32));
         self.smooth.record(recorder, settled.groups(), own, [w, h, 1]);

@@ -18,11 +18,13 @@
 //! of an entry's cell; the rest is noise, which frames and neighbours average away. `docs/internals/gather.md`
 //! says what it cannot do.
 
+mod bindings;
 pub mod bring;
 mod frame;
 mod options;
 mod params;
 mod pass;
+mod schedule;
 mod store;
 mod work;
 
@@ -36,11 +38,11 @@ use crate::gi::stage;
 use crate::gi::stage::cells::{self, CellsPass};
 use crate::gi::stage::inputs::InputGroup;
 use crate::gpu::bind::{Binder, Bound};
-use crate::gpu::binding::{LOAD, READ, READ_WRITE};
 use crate::gpu::timing::Recorder;
 use bring::BringPass;
 use params::ParamsRing;
 use pass::Pass;
+use schedule::Schedule;
 use store::Store;
 
 /// A ray begins this share of the view distance off its surface: half along the way to the eye,
@@ -51,28 +53,12 @@ const LIFT: f32 = 3e-5;
 /// It begins no nearer than so many steps of the depth's texels.
 const LIFT_STEPS: f32 = 4.0;
 
-/// Frames after a change of the lights for which cells let go of what they remember at less
-/// evidence.
-const HURRY: u32 = 8;
-
-/// Frames after the first, after a change of the lights, or after an object has moved, for which
-/// entries get two rays each and remember no more than [`HURRIED`]. Light between surfaces of
-/// albedo ρ goes with exp(−t (1 − ρ) 2 / HURRIED) then, by frames: of white ones' (0.8) 2 % are
-/// left after so many. With one ray a frame and a memory of eight it would take 160.
-const STIR: u32 = 24;
-const HURRIED: f32 = 2.5;
-
-/// After the first frame entries get so many rays each for so many frames, and in a frame in which
-/// lights or objects change: what cells average is then of other rays in each frame.
-const YOUNG: u32 = 8;
-const ROUNDS_YOUNG: u32 = 4;
-
-/// Rays of each entry in the first frame in which lights or objects change after a rest.
-const ROUNDS_RESTED: u32 = 8;
-
 /// Constants of the shaders as WGSL.
 pub fn prelude() -> String {
-    format!("{}const LIFT = f32({LIFT:?});\nconst LIFT_STEPS = f32({LIFT_STEPS:?});\n", cells::prelude())
+    let flags: String = params::FLAGS.iter().map(|(name, bit)| format!("const GATHER_{name} = {bit}u;\n")).collect();
+    let unit = format!("const UNIT = {}u;\nconst CANDIDATES = {}u;\n", work::UNIT, crate::lights::CANDIDATES);
+    let lift = format!("const LIFT = f32({LIFT:?});\nconst LIFT_STEPS = f32({LIFT_STEPS:?});\n");
+    [cells::prelude(), flags, unit, lift].concat()
 }
 
 /// Most bits of a lot that may name a query (`lot_bits` of `entries.wgsl`): ten are left to draw
@@ -88,9 +74,6 @@ const STORAGE_BUFFERS: u32 = 8;
 pub(super) fn looks(size: [u32; 2]) -> u32 {
     if size.map(u64::from).iter().product::<u64>() <= 1 << 21 { 8 } else { 4 }
 }
-
-/// Frames after a cut that are blurred widely.
-const WIDE_FRAMES: u32 = 5;
 
 /// Bytes that a workgroup remembers of its rays: of 256 ways, thirteen vectors each (`WALKS`
 /// and `PARTS` of `ways.wgsl`).
@@ -143,22 +126,8 @@ pub struct GatherGi {
     no_specular: wgpu::TextureView,
     /// Where what lobes reflect goes if the host does not ask for it: one texel.
     nowhere: wgpu::TextureView,
-    /// Frames since the last cut, rounds since the beginning, and the round of the last frame's
-    /// rays.
-    frame: u32,
-    round: u32,
-    sent: u32,
-    /// The lights' state in the last frame, and frames for which cells forget at less evidence
-    /// because it was another before.
-    lights_epoch: u64,
-    hurry: u32,
-    /// Where objects were in the last frame, and frames for which entries forget quickly because
-    /// lights or objects changed before.
-    moves: u64,
-    stir: u32,
-    /// Frames for which light may be expected to change for the same reasons.
-    changing: u32,
-    scene_id: u64,
+    /// What the next frame has to know of those before it.
+    schedule: Schedule,
 }
 
 impl GatherGi {
@@ -196,35 +165,28 @@ impl GatherGi {
     pub fn new(device: &wgpu::Device, size: [u32; 2], options: Options) -> Self {
         let inputs = InputGroup::geometry(device);
         let params = ParamsRing::new(device);
-        let texels = wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Uint,
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        };
-        let scene = Binder::new(device, "gi.gather", &[ParamsRing::TYPE, texels, READ, READ, READ, LOAD, texels]);
-        let frame_params = Binder::new(device, "gi.gather", &[ParamsRing::TYPE]);
+        let scene = Binder::new(device, "gi.gather", bindings::Scene::TYPES);
+        let frame_params = Binder::new(device, "gi.gather", bindings::Alone::TYPES);
         let (shared, alone) = ((&inputs, &scene), (&inputs, &frame_params));
         let new = |groups, names, types: &[wgpu::BindingType]| Pass::new(device, groups, names, types);
         let unused = |label, size| {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
             device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
         };
-        let rw = READ_WRITE;
-        let table = [rw, rw, rw, rw, rw];
-        let history = [rw, rw, READ, READ, rw, READ, LOAD, LOAD];
+        let (table, history, blur) = (bindings::Entries::TYPES, bindings::History::TYPES, bindings::Blur::TYPES);
         let workgroups = work::Groups::of(device);
         Self {
             cells: CellsPass::new(device, &inputs, size),
-            evict: new(shared, ("gi.evict", "gi.renew", "evict"), &table),
-            gradient: new(shared, ("gi.gradient", "gi.gradient", "gradient"), &[rw, rw, rw, READ, rw]),
-            rays: new(shared, ("gi.rays", "gi.rays", "rays"), &[rw, rw, rw, READ, rw, LOAD]),
-            renew: new(shared, ("gi.renew", "gi.renew", "renew"), &table),
-            mirror: new(shared, ("gi.mirror", "gi.mirror", "mirror"), &[rw, rw, rw, READ, rw, LOAD, LOAD]),
-            recall: new(alone, ("gi.recall", "gi.recall", "recall"), &history),
-            mean: new(alone, ("gi.settle", "gi.settle", "settle"), &history),
-            blur: new(alone, ("gi.blur", "gi.blur", "blur"), &[READ, rw, rw, rw, READ]),
-            blur_wide: new(alone, ("gi.blur", "gi.blur", "blur_wide"), &[READ, rw, rw, rw, READ]),
-            smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), &[READ, READ, rw, READ, READ, rw]),
+            evict: new(shared, ("gi.evict", "gi.renew", "evict"), table),
+            gradient: new(shared, ("gi.gradient", "gi.gradient", "gradient"), bindings::Gradient::TYPES),
+            rays: new(shared, ("gi.rays", "gi.rays", "rays"), bindings::CellRays::TYPES),
+            renew: new(shared, ("gi.renew", "gi.renew", "renew"), table),
+            mirror: new(shared, ("gi.mirror", "gi.mirror", "mirror"), bindings::Mirror::TYPES),
+            recall: new(alone, ("gi.recall", "gi.recall", "recall"), history),
+            mean: new(alone, ("gi.settle", "gi.settle", "settle"), history),
+            blur: new(alone, ("gi.blur", "gi.blur", "blur"), blur),
+            blur_wide: new(alone, ("gi.blur", "gi.blur", "blur_wide"), blur),
+            smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), bindings::Smooth::TYPES),
             bring: BringPass::new(device, &inputs),
             store: Store::new(device, size, options.slots, workgroups),
             workgroups,
@@ -240,21 +202,13 @@ impl GatherGi {
             params,
             scene,
             frame_params,
-            frame: 0,
-            round: 0,
-            sent: 0,
-            lights_epoch: 0,
-            hurry: 0,
-            moves: 0,
-            stir: 0,
-            changing: 0,
-            scene_id: 0,
+            schedule: Schedule::default(),
         }
     }
 
     /// Frames in the longest-lived means: 0 before the first, and 1 after it and after a cut.
     pub fn frames(&self) -> u32 {
-        self.frame
+        self.schedule.frames()
     }
 
     /// Bind groups made since the start; stands still in steady frames.
@@ -296,7 +250,7 @@ impl Technique for GatherGi {
     }
 
     fn memory(&self) -> Option<Memory<'_>> {
-        let pasts = &self.store.pasts[(self.frame & 1) as usize];
+        let pasts = &self.store.pasts[(self.frames() & 1) as usize];
         let Store { cell_light, changes, .. } = &self.store;
         Some(Memory { pasts, pixels: self.cells.pixels(), light: cell_light, changes })
     }
@@ -306,11 +260,11 @@ impl Technique for GatherGi {
     }
 
     fn settled(&self) -> Option<u32> {
-        Some(self.frame)
+        Some(self.frames())
     }
 
     fn cut(&mut self) {
-        self.frame = 0;
+        self.schedule.cut();
     }
 
     fn forget(&mut self) {

@@ -4,33 +4,44 @@
 use crate::gpu::bind::Bound;
 use bytemuck::{Pod, Zeroable};
 
-/// Some lights stand for surfaces that glow.
-pub(super) const STANDS_IN: u32 = 1;
-/// The frame has nothing to do with the one before.
-pub(super) const CUT: u32 = 2;
-/// Cells are shown as they are.
-pub(super) const NO_BLUR: u32 = 4;
-/// All frames of a mean count the same.
-pub(super) const EVEN: u32 = 8;
-/// The lights are not what they were a few frames ago.
-pub(super) const LIGHTS_CHANGED: u32 = 16;
-/// Surfaces that rays meet show no gloss.
-pub(super) const NO_CAUSTICS: u32 = 32;
-/// The host does not say what surfaces mirror.
-pub(super) const NO_GLOSS: u32 = 64;
+/// Bits of [`Params::flags`], which shaders know as `GATHER_` and the name.
+macro_rules! flags {
+    ($($(#[$doc:meta])* $name:ident = $bit:expr),+ $(,)?) => {
+        $($(#[$doc])* pub(super) const $name: u32 = $bit;)+
 
-/// Light or objects are not what they were a short while ago.
-pub(super) const CHANGING: u32 = 128;
+        /// All of them, for the shaders' prelude.
+        pub(super) const FLAGS: &[(&str, u32)] = &[$((stringify!($name), $name)),+];
+    };
+}
 
-/// A network says which cells are averaged.
-pub(super) const GUIDED: u32 = 256;
-
-/// Lights or objects have changed since the frame before.
-pub(super) const CHANGED: u32 = 512;
-/// Every entry sends a ray in each round, whoever met it.
-pub(super) const ALL_ENTRIES: u32 = 1024;
-/// The device runs the threads of a workgroup one after the other.
-pub(super) const IN_TURN: u32 = 2048;
+flags! {
+    /// Some lights stand for surfaces that glow: these light no cell a second time.
+    STANDS_IN = 1,
+    /// The frame has nothing to do with the one before.
+    CUT = 1 << 1,
+    /// Cells are shown as they are.
+    NO_BLUR = 1 << 2,
+    /// All frames of a mean count the same.
+    EVEN = 1 << 3,
+    /// The lights are not what they were a few frames ago.
+    LIGHTS_CHANGED = 1 << 4,
+    /// Surfaces that rays meet show no gloss.
+    NO_CAUSTICS = 1 << 5,
+    /// Surfaces of the picture show none that rays would have to find: the host does not say what they
+    /// mirror.
+    NO_GLOSS = 1 << 6,
+    /// Lights, or objects, are not what and where they were a short while ago.
+    CHANGING = 1 << 7,
+    /// A network says which cells are averaged.
+    GUIDED = 1 << 8,
+    /// Lights or objects have changed since the frame before.
+    CHANGED = 1 << 9,
+    /// Every entry sends a ray in each round, whoever met it: light has changed lately, or all frames
+    /// are to be alike.
+    ALL_ENTRIES = 1 << 10,
+    /// The device runs the threads of a workgroup one after the other.
+    IN_TURN = 1 << 11,
+}
 
 /// `Gather` of `shaders/gi/gather/types.wgsl`, which documents the fields.
 #[repr(C)]

@@ -38,11 +38,11 @@ impl Pass {
     }
 
     /// Dispatches `size` workgroups, bound to `own`.
-    pub fn record<const N: usize>(
+    pub fn record(
         &mut self,
         recorder: &mut Recorder<'_>,
         groups: Groups<'_>,
-        own: [Bound; N],
+        own: impl Into<Vec<Bound>>,
         size: [u32; 3],
     ) {
         let own = self.binder.group(own);

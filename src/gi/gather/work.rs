@@ -4,8 +4,8 @@ use super::looks;
 use crate::gi::stage::inputs::cells_of;
 use crate::gpu::tape;
 
-/// Places of a unit: `UNIT` of `jobs.wgsl`. Of cells or squares they are 32×32 beside each other.
-const UNIT: u32 = BLOCK * BLOCK;
+/// Places of a unit. Of cells or squares they are 32×32 beside each other.
+pub(super) const UNIT: u32 = BLOCK * BLOCK;
 const BLOCK: u32 = 32;
 
 /// How many workgroups a device does well with, and how it runs them.
@@ -93,9 +93,8 @@ mod tests {
     fn buffers_and_groups_are_what_shaders_fill() {
         let ways = include_str!("../../../shaders/gi/gather/ways.wgsl");
         let jobs = include_str!("../../../shaders/gi/gather/jobs.wgsl");
-        assert_eq!(constant(jobs, "UNIT"), u64::from(UNIT));
         assert_eq!(16 * constant(ways, "WALKS") * constant(ways, "PARTS"), WAYS);
-        assert_eq!(u64::from(Groups::GPU.share) * constant(jobs, "UNIT"), 1 << 16, "sixteen bits name a job");
+        assert_eq!(Groups::GPU.share * UNIT, 1 << 16, "sixteen bits name a job");
         let blocks = format!("return (grid + {}u) / {BLOCK}u;", BLOCK - 1);
         assert!(jobs.contains(&blocks), "{blocks}");
     }
