@@ -21,7 +21,9 @@ pub(crate) use deform::{STRIDE as DEFORM_STRIDE, Shapes};
 pub(crate) use light::fits_one_map;
 pub use light::{CANDIDATES, LightGpu};
 pub use material::{MaterialGpu, TextureUse, material_layout};
-pub use mesh::{AttributeVertex, Bounds, Draw, Rows, Slot, attribute_layouts, motion_layouts, position_layouts};
+pub use mesh::{
+    AttributeVertex, Bounds, Draw, Rows, Slot, attribute_layouts, coverage_layouts, motion_layouts, position_layouts,
+};
 pub use texture::{TextureBytes, TextureMemory};
 
 use super::deform::pose_of;
