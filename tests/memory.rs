@@ -28,9 +28,11 @@ fn frames() -> u32 {
     if common::whole() { 1000 } else { 30 }
 }
 
-/// What a driver may keep in so many frames: a shader of ours, compiled once more, takes 1 MiB and
+/// What a driver may keep in so many frames: a shader of ours, compiled once more, takes 0.4 MiB and
 /// more.
-const MOST: u64 = 20 * MIB;
+fn most() -> u64 {
+    if common::whole() { 20 * MIB } else { 8 * MIB }
+}
 
 #[test]
 fn frames_and_samples_take_no_memory() {
@@ -65,7 +67,7 @@ fn frames_and_samples_take_no_memory() {
             }
             let grown = resident().saturating_sub(before);
             println!("{} at {size:?}: {:.1} MiB", method.name(), grown as f64 / MIB as f64);
-            assert!(grown < MOST, "{} at {size:?}: {grown} bytes in {} frames", method.name(), frames());
+            assert!(grown < most(), "{} at {size:?}: {grown} bytes in {} frames", method.name(), frames());
         }
     }
     let traced = ReferenceScene::new(&gpu.device, &gpu.queue, &scene).expect("the scene fits");
@@ -86,9 +88,9 @@ fn frames_and_samples_take_no_memory() {
     let steps = trace(if common::whole() { 256 } else { 64 });
     let grown = resident().saturating_sub(before);
     println!("paths: {:.1} MiB in {steps} dispatches", grown as f64 / MIB as f64);
-    assert!(grown < MOST, "{grown} bytes in {steps} dispatches of the path tracer");
+    assert!(grown < most(), "{grown} bytes in {steps} dispatches of the path tracer");
     // Negative control: what is kept is seen.
     let before = resident();
     let kept: Vec<Vec<u8>> = (0..30).map(|i| vec![i as u8 + 1; 3 * MIB as usize]).collect();
-    assert!(resident() - before > MOST && kept.len() == 30);
+    assert!(resident() - before > most() && kept.len() == 30);
 }

@@ -7,4 +7,3 @@ const FULL = 1u;
 fn store(at: u32, v: vec4f) { arena[at] = v; }
 fn load_full(at: u32) -> vec4f { return arena[at]; }
 fn store_full(at: u32, v: vec4f) { arena[at] = v; }
-fn store_full_lane(at: u32, lane: u32, v: f32) { arena[at][lane] = v; }

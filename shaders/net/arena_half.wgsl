@@ -18,5 +18,3 @@ fn store_full(at: u32, v: vec4f) {
     arena[at] = bitcast<vec2u>(v.xy);
     arena[at + 1u] = bitcast<vec2u>(v.zw);
 }
-
-fn store_full_lane(at: u32, lane: u32, v: f32) { arena[at + lane / 2u][lane % 2u] = bitcast<u32>(v); }

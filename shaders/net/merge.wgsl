@@ -1,6 +1,10 @@
 // The second level of a norm: one workgroup merges the tiles of all channels of a group, two at a
 // time (Chan, Golub and LeVeque 1983), and writes mean, scale and shift of each of its channels.
 
+// The arena number by number: channels of one vector may be of several groups, and what several
+// threads write must not be parts of one vector.
+@group(0) @binding(1) var<storage, read_write> arena: array<f32>;
+
 // Weights of all channels, then biases.
 @group(0) @binding(2) var<storage, read> trained: array<vec4f>;
 
@@ -24,13 +28,14 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) me
     var own = vec3f(0.0);
     for (var i = me; i < step.tiles * vectors; i += 64u) {
         let vector = first / 4u + i % vectors;
-        let at = step.input + (i / vectors * 3u * step.in_vectors + vector) * FULL;
-        let count = load_full(at).x;
-        let mean = load_full(at + step.in_vectors * FULL);
-        let squares = load_full(at + 2u * step.in_vectors * FULL);
+        let at = step.input * ELEMENT + (i / vectors * 3u * step.in_vectors + vector) * 4u;
+        let mean = at + step.in_vectors * 4u;
+        let squares = mean + step.in_vectors * 4u;
         for (var lane = 0u; lane < 4u; lane++) {
             let channel = vector * 4u + lane;
-            if channel >= first && channel < end { own = union_of(own, vec3f(count, mean[lane], squares[lane])); }
+            if channel >= first && channel < end {
+                own = union_of(own, vec3f(arena[at], arena[mean + lane], arena[squares + lane]));
+            }
         }
     }
     parts[me] = own;
@@ -49,8 +54,9 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) me
 fn write(channel: u32, mean: f32, scale: f32) {
     let vector = channel / 4u;
     let lane = channel % 4u;
-    let to = step.output + vector * FULL;
-    store_full_lane(to, lane, mean);
-    store_full_lane(to + step.in_vectors * FULL, lane, scale * trained[vector][lane]);
-    store_full_lane(to + 2u * step.in_vectors * FULL, lane, trained[step.in_vectors + vector][lane]);
+    let to = step.output * ELEMENT + channel;
+    let next = step.in_vectors * 4u;
+    arena[to] = mean;
+    arena[to + next] = scale * trained[vector][lane];
+    arena[to + 2u * next] = trained[step.in_vectors + vector][lane];
 }

@@ -27,7 +27,8 @@ struct Options {
 @group(0) @binding(9) var indirect: texture_2d<f32>;
 @group(0) @binding(10) var indirect_specular: texture_2d<f32>;
 @group(0) @binding(11) var hdr: texture_2d<f32>;
-@group(1) @binding(0) var<uniform> options: Options;
+// No uniform: Mesa's CPU driver 22.3 compiles what uniforms alone branch on anew for each dispatch.
+@group(1) @binding(0) var<storage, read> options: Options;
 @group(1) @binding(1) var<storage, read_write> out: array<vec4f>;
 @group(2) @binding(0) var texture: texture_storage_2d<rgba16float, write>;
 

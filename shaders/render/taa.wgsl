@@ -169,12 +169,15 @@ fn taa(@builtin(global_invocation_id) id: vec3u) {
     var mean = here.value;
     var count = 0.0;
     var share = 1.0;
-    if blend.mode.x == STILL {
-        let old = textureLoad(history, pixel, 0);
+    // A history of no frames is none. It is asked because Mesa's CPU driver 22.3 compiles what
+    // uniforms alone branch on anew for each frame.
+    let old = textureLoad(history, pixel, 0);
+    let mode = select(0, blend.mode.x, old.a > 0.0);
+    if mode == STILL {
         count = min(old.a, MOST_STILL);
         mean = old.rgb;
         share = 1.0 / max(0.5 * (count + 2.0), count + 1.0 - 0.5 * (GROWING - 1.0));
-    } else if blend.mode.x == MOVING {
+    } else if mode == MOVING {
         let there = before(pixel, centre);
         if all(there.place >= vec2f(0.0)) && all(there.place < vec2f(frame.size)) && was_seen(there) {
             count = min(textureLoad(history, vec2i(floor(there.place)), 0).a, MOST_MOVING);

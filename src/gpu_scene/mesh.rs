@@ -77,6 +77,8 @@ pub struct Draw {
 const POSITION: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32x3];
 const ATTRIBUTES: [wgpu::VertexAttribute; 5] =
     wgpu::vertex_attr_array![1 => Snorm16x2, 2 => Snorm16x4, 3 => Float32x2, 4 => Float32x2, 5 => Float16x4];
+/// Those from which a caster's coverage follows: nothing of normals.
+const COVERAGE: &[wgpu::VertexAttribute] = ATTRIBUTES.split_at(2).1;
 const ROWS: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![6 => Float32x4, 7 => Float32x4, 8 => Float32x4];
 const BEFORE: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![9 => Float32x4, 10 => Float32x4, 11 => Float32x4];
 const POSITION_BEFORE: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![12 => Float32x3];
@@ -99,6 +101,12 @@ pub fn position_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 2] {
 pub fn attribute_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 3] {
     let [positions, instances] = position_layouts();
     [positions, instances, layout(36, wgpu::VertexStepMode::Vertex, &ATTRIBUTES)]
+}
+
+/// As [`attribute_layouts`], for passes that ask no attribute but texture coordinates and colour.
+pub fn coverage_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 3] {
+    let [positions, instances] = position_layouts();
+    [positions, instances, layout(36, wgpu::VertexStepMode::Vertex, COVERAGE)]
 }
 
 /// As [`attribute_layouts`], for passes that write motion vectors: slots 3 and 4 have instances and

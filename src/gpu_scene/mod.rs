@@ -22,7 +22,9 @@ pub(crate) use deform::{STRIDE as DEFORM_STRIDE, Shapes};
 #[doc(hidden)]
 pub use material::{MaterialGpu, TextureUse, material_layout};
 #[doc(hidden)]
-pub use mesh::{AttributeVertex, Bounds, Draw, Rows, Slot, attribute_layouts, motion_layouts, position_layouts};
+pub use mesh::{
+    AttributeVertex, Bounds, Draw, Rows, Slot, attribute_layouts, coverage_layouts, motion_layouts, position_layouts,
+};
 pub use texture::{TextureBytes, TextureMemory};
 
 use crate::accel::{AccelError, SceneRays};

@@ -56,7 +56,7 @@ impl LayerWriter {
     pub fn new(device: &wgpu::Device) -> Self {
         let stage = wgpu::ShaderStages::COMPUTE;
         let read_layout = read_layout(device);
-        let options_layout = tool::layout(device, "render.layers", stage, &[tool::UNIFORM]);
+        let options_layout = tool::layout(device, "render.layers", stage, &[tool::READ]);
         let write_layout = tool::layout(device, "render.layers", stage, &[tool::STORE_HALF]);
         let layouts = [&read_layout, &options_layout, &write_layout];
         let pipeline = tool::compute(device, "render.layers", "layer_texture", &layouts);
@@ -75,7 +75,7 @@ impl LayerWriter {
         let options = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("render.layers"),
             contents: bytemuck::cast_slice(&[layer, 0, targets.size[1], 0]),
-            usage: wgpu::BufferUsages::UNIFORM,
+            usage: wgpu::BufferUsages::STORAGE,
         });
         LayerGroups([
             read(device, &self.read_layout, frame, targets, &targets.hdr),
@@ -116,7 +116,7 @@ impl Decoder {
         let t = renderer.targets();
         let stage = wgpu::ShaderStages::COMPUTE;
         let read_layout = read_layout(device);
-        let output_layout = layout(device, "render.layers", stage, &[UNIFORM, READ_WRITE]);
+        let output_layout = layout(device, "render.layers", stage, &[READ, READ_WRITE]);
         let pipeline = compute(device, "render.layers", "layers", &[&read_layout, &output_layout]);
         let reads = |picture| read(device, &read_layout, renderer.frame(), t, picture);
         let picture = reads(&t.hdr);
@@ -131,7 +131,7 @@ impl Decoder {
                 mapped_at_creation: false,
             })
         };
-        let options = make(16, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
+        let options = make(16, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST);
         let buffer = make(row * u64::from(rows), wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
         let resources = [options.as_entire_binding(), buffer.as_entire_binding()];
         let output = group(device, "render.layers", &output_layout, &resources);

@@ -15,7 +15,7 @@ pub use super::shadow_maps::{MAX_LOCAL_LAYERS, MAX_SUNS, ShadowMaps, ShadowOptio
 pub use super::shadow_view::ShadowViewGpu;
 use super::tool;
 use crate::gpu::{shaders, shared, tape, timing::Recorder};
-use crate::gpu_scene::{SceneGpu, attribute_layouts, material_layout, position_layouts};
+use crate::gpu_scene::{SceneGpu, coverage_layouts, material_layout, position_layouts};
 
 /// Draws depth from the lights.
 pub struct ShadowPass {
@@ -42,7 +42,7 @@ impl ShadowPass {
             let material = covered.then(|| material_layout(device));
             let groups = [Some(&layout), material.as_ref()];
             let pipeline_layout = tape::pipeline_layout(device, "render.shadow", &groups[..1 + usize::from(covered)]);
-            let (positions, all) = (position_layouts(), attribute_layouts());
+            let (positions, all) = (position_layouts(), coverage_layouts());
             shared::render_pipeline(
                 device,
                 &wgpu::RenderPipelineDescriptor {

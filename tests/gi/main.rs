@@ -22,6 +22,7 @@ mod glow;
 mod gradient;
 mod in_flight;
 mod lamps;
+mod left_out;
 #[path = "../common/linear.rs"]
 mod linear;
 mod mirror;

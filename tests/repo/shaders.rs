@@ -55,6 +55,79 @@ fn every_shader_validates_in_every_permutation() {
     assert_eq!(permutations.len(), 536);
 }
 
+/// Type of a place in memory that threads share; None for other memory, and inside vectors.
+fn shared_place(
+    module: &naga::Module,
+    function: &naga::Function,
+    place: naga::Handle<naga::Expression>,
+) -> Option<naga::Handle<naga::Type>> {
+    use naga::{AddressSpace, Expression, TypeInner};
+    let inside = |base| Some(&module.types[shared_place(module, function, base)?].inner);
+    match function.expressions[place] {
+        Expression::GlobalVariable(variable) => {
+            let variable = &module.global_variables[variable];
+            let shared = matches!(variable.space, AddressSpace::WorkGroup | AddressSpace::Storage { .. });
+            shared.then_some(variable.ty)
+        }
+        Expression::Access { base, .. } => match inside(base)? {
+            TypeInner::Array { base, .. } => Some(*base),
+            _ => None,
+        },
+        Expression::AccessIndex { base, index } => match inside(base)? {
+            TypeInner::Array { base, .. } => Some(*base),
+            TypeInner::Struct { members, .. } => Some(members[index as usize].ty),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Stores into a component, chosen by a number, of a vector that threads share.
+fn chosen_components(module: &naga::Module, function: &naga::Function, block: &naga::Block) -> usize {
+    use naga::{Expression, Statement, TypeInner};
+    let within = |block: &naga::Block| chosen_components(module, function, block);
+    let one = |statement: &Statement| match statement {
+        Statement::Store { pointer, .. } => {
+            let Expression::Access { base, .. } = function.expressions[*pointer] else { return 0 };
+            let place = shared_place(module, function, base).map(|ty| &module.types[ty].inner);
+            usize::from(matches!(place, Some(TypeInner::Vector { .. })))
+        }
+        Statement::Block(block) => within(block),
+        Statement::If { accept, reject, .. } => within(accept) + within(reject),
+        Statement::Switch { cases, .. } => cases.iter().map(|case| within(&case.body)).sum(),
+        Statement::Loop { body, continuing, .. } => within(body) + within(continuing),
+        _ => 0,
+    };
+    block.iter().map(one).sum()
+}
+
+/// The same, in all of a shader.
+fn all_chosen_components(module: &naga::Module) -> usize {
+    let functions = module.functions.iter().map(|(_, f)| f).chain(module.entry_points.iter().map(|e| &e.function));
+    functions.map(|f| chosen_components(module, f, &f.body)).sum()
+}
+
+/// Components of one vector are no places of their own: what two threads write there at once, one may
+/// lose. Whoever chooses a component by a number leaves the others to other threads.
+#[test]
+fn no_two_threads_write_one_vector() {
+    for (name, prelude) in permutations() {
+        assert_eq!(all_chosen_components(&parse(&name, &prelude).0), 0, "{name}");
+    }
+    // Negative control: in memory of the workgroup, of the device, and of the thread's own.
+    let stores = |place: &str| {
+        let text =
+            "var<workgroup> group: array<vec4f, 2>; @group(0) @binding(0) var<storage, read_write> device: array<vec4f>;
+            @compute @workgroup_size(4) fn main(@builtin(local_invocation_index) i: u32) {
+                var own: array<vec4f, 2>;
+                if i < 3u { PLACE = 1.0; }
+            }";
+        let text = text.replace("PLACE", place);
+        all_chosen_components(&naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{place}: {e}")))
+    };
+    assert_eq!(["group[1][i]", "device[i / 4u][i % 4u]", "own[1][i]", "device[i].x"].map(stores), [1, 1, 0, 0]);
+}
+
 /// Negative control: a shader that uses what it does not have is refused.
 #[test]
 fn a_shader_without_its_numbers_is_refused() {

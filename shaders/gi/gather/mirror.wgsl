@@ -94,7 +94,8 @@ fn begin(at: u32, job: u32) -> bool {
 }
 
 // Rays know of a triangle its mean colours. Where the picture shows the place that was met, it knows
-// them better: a mirror shows textures.
+// them better: a mirror shows textures. What a host leaves out is a smaller texture, which says
+// nothing.
 fn colours(hit: Hit, x: vec3f, side: vec3f) -> Met {
     var surface = met(hit.triangle);
     let pixel = pixel_where(x);
@@ -104,10 +105,11 @@ fn colours(hit: Hit, x: vec3f, side: vec3f) -> Met {
     let facing = dot(world_normal_at(pixel), side) > 0.0;
     if z > 0.0 && facing && abs(dot(world_position_at(pixel, z) - x, side)) < above(x) {
         let specular = surface_at(vec2u(pixel));
-        surface.diffuse = albedo_at(pixel);
+        surface.diffuse = select(surface.diffuse, albedo_at(pixel), all(textureDimensions(albedo_map) == params.size));
         surface.f0 = specular.rgb;
         surface.roughness = specular.a;
-        surface.emission = emissive_at(pixel);
+        let glows = all(textureDimensions(emissive_map) == params.size);
+        surface.emission = select(surface.emission, emissive_at(pixel), glows);
     }
     return surface;
 }

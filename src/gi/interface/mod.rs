@@ -43,14 +43,15 @@ pub struct Inputs<'a> {
     /// [`Conventions::normal_encoding`].
     pub normal: &'a wgpu::TextureView,
     /// Diffuse reflectance in [0, 1] (rgb), 8 or 10 bits or float. Alpha is not read: whoever
-    /// multiplies the light with albedo applies the textures' ambient occlusion, too. `gather` does
-    /// not read it; the others end with [`GiError::Missing`] without.
+    /// multiplies the light with albedo applies the textures' ambient occlusion, too. `gather` reads it
+    /// only for what mirrors show ([`Inputs::specular`]), and does without: mirrors then show each
+    /// triangle's mean colour. The others end with [`GiError::Missing`] without.
     pub albedo: Option<&'a wgpu::TextureView>,
-    /// Emitted radiance, `Rgba16Float`. `gather` does not read it; for the others `None` counts as
-    /// no surface that glows.
+    /// Emitted radiance, `Rgba16Float`. `gather` reads it as it does albedo; for the others `None`
+    /// counts as no surface that glows.
     pub emissive: Option<&'a wgpu::TextureView>,
     /// Direct diffuse light of the analytic lights as E/π, albedo not multiplied in, `Rgba16Float`.
-    /// As of `albedo`: not read by `gather`, needed by the others.
+    /// Not read by `gather`, needed by the others.
     pub direct: Option<&'a wgpu::TextureView>,
     /// The camera that drew them.
     pub camera: CameraMatrices,

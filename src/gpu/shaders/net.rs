@@ -136,7 +136,10 @@ impl NetKernel {
     /// gives one of each kind.
     pub(super) fn files(self) -> Vec<String> {
         let half = |full: &'static str, half: &'static str| if self.half { half } else { full };
-        let mut files = vec!["common", half("arena_full", "arena_half"), half("load_full", "load_half")];
+        let mut files = match self.family {
+            Merge => vec!["common", half("numbers_full", "numbers_half")],
+            _ => vec!["common", half("arena_full", "arena_half"), half("load_full", "load_half")],
+        };
         if self.family.finishes() {
             files.push("epilogue");
         }
