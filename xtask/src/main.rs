@@ -1,10 +1,12 @@
-//! `cargo xtask demo | test | hosts | gpu-report | conformance | ci`: set-up and checks; no product
-//! code.
+//! `cargo xtask demo | test | hosts | gpu-report | conformance | publish | ci`: set-up and checks; no
+//! product code.
 //!
 //! Every command first makes sure of a wgpu adapter (`driver.rs`).
 
 mod driver;
+mod publish;
 mod tests;
+mod time;
 
 use driver::{apt, make_sure_of_adapter};
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,6 +30,9 @@ usage: cargo xtask COMMAND
          (--dev builds without release's optimisation: for rehearsals)
   conformance
          docs/reports/conformance.md: glTF feature by feature, the rasteriser beside the path tracer
+  publish [--verify]
+         a dry run of publishing the packages in order; each must pack below 10 MB (--verify also builds each from its
+         archive)
   ci     what continuous integration runs (.ci/run)
 
 Where no GPU answers, Debian and Ubuntu get Mesa's CPU driver (on Debian 12 that of its backports, whose frames take a
@@ -49,6 +54,7 @@ fn main() -> ExitCode {
         "hosts" => hosts(),
         "gpu-report" => gpu_report(std::env::args().skip(2).filter(|word| word != "--no-install").collect()),
         "conformance" => conformance(),
+        "publish" => publish::dry_run(),
         "ci" => ci(),
         _ => {
             eprintln!("{USAGE}");
@@ -75,7 +81,9 @@ fn demo() -> Result<(), String> {
 fn test() -> Result<(), String> {
     // The program as tests have it: `cargo build` would take other features of dependencies, and
     // compile them twice.
+    let begun = time::Spent::now();
     let programs = tests::build()?;
+    let built_after = time::Spent::now();
     make_sure_of_adapter(&built("debug")?)?;
     make_sure_of_display()?;
     // Tests append what they skip to this file: `tests/common`.
@@ -86,6 +94,8 @@ fn test() -> Result<(), String> {
     let all = std::env::args().any(|word| word == "--all");
     let tested = tests::run_all(programs, &tests::Plan { skips: &skips, all });
     print_skips(&std::fs::read_to_string(&skips).unwrap_or_default());
+    println!("xtask: built in {}", built_after.since(&begun));
+    println!("xtask: built and tested in {}", time::Spent::now().since(&begun));
     tested
 }
 
