@@ -23,7 +23,7 @@ usage: cargo xtask COMMAND
          --all runs heavy tests whole, which otherwise do a tenth, and those that are otherwise ignored: hours
   hosts  the pass in other renderers: exports, sets up Python with moderngl in target/hosts, runs examples/moderngl/test.py
          and a picture (needs python3 with venv, the network for pip, and EGL); the page of examples/webgpu in Chromium,
-         where there is one; then examples/bevy, its test and a picture
+         where there is one; then crates/bevy, its test and a picture
          (some 280 crates, which two cores build in half an hour)
   gpu-report [--dev] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] [--triangles N,...] [--out FOLDER] [--no-pytorch]
          measures on this device all that docs/ projects: docs/measured/DEVICE.json and DEVICE.md, in less than eight minutes
@@ -182,10 +182,10 @@ fn hosts() -> Result<(), String> {
     browser(&program, &python, &glb, &work)?;
 
     // Bevy: a package of its own, which states a newer Rust than it needs.
-    let package = ["--manifest-path", "examples/bevy/Cargo.toml", "--ignore-rust-version", "--locked"];
+    let package = ["--manifest-path", "crates/bevy/Cargo.toml", "--ignore-rust-version", "--locked"];
     cargo(&[["test"].as_slice(), &package].concat())?;
     let picture = text(&work.join("bevy.png"));
-    cargo(&[["run"].as_slice(), &package, &["--", &glb, &picture]].concat())?;
+    cargo(&[["run", "--example", "scene"].as_slice(), &package, &["--", &glb, &picture]].concat())?;
     is_ours(&program, &picture, &ours)
 }
 

@@ -3,8 +3,8 @@
 
 use bevy::prelude::*;
 use bevy::render::RenderApp;
-use bouncelight_bevy::headless::Headless;
-use bouncelight_bevy::{Bouncelight, BouncelightPlugin, Complaints, Views};
+use bevy_bouncelight::headless::Headless;
+use bevy_bouncelight::{Bouncelight, BouncelightPlugin, Complaints, Views};
 
 const SIZE: [u32; 2] = [96, 64];
 

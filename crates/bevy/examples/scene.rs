@@ -1,6 +1,6 @@
 //! Draws a glTF file with Bevy, with and without the pass, into a PNG.
 //!
-//!     bouncelight_bevy SCENE.glb OUT.png [--size WxH] [--frames N] [--without | --beside]
+//!     cargo run --example scene -- SCENE.glb OUT.png [--size WxH] [--frames N] [--without | --beside]
 //!
 //! The picture is to be compared with `bouncelight render --tonemap none`: the file's lights cast
 //! shadows, lamps that stand for glowing surfaces are left out (rays find those), and 1 W/(m²·sr)
@@ -9,8 +9,8 @@
 use bevy::gltf::{GltfExtras, GltfSceneExtras};
 use bevy::light::GlobalAmbientLight;
 use bevy::prelude::*;
-use bouncelight_bevy::headless::Headless;
-use bouncelight_bevy::{Bouncelight, BouncelightPlugin, Complaints, LUMENS_PER_WATT};
+use bevy_bouncelight::headless::Headless;
+use bevy_bouncelight::{Bouncelight, BouncelightPlugin, Complaints, LUMENS_PER_WATT};
 use std::process::ExitCode;
 
 struct Args {
@@ -45,7 +45,7 @@ fn args() -> Option<Args> {
 
 fn main() -> ExitCode {
     let Some(args) = args() else {
-        eprintln!("usage: bouncelight_bevy SCENE.glb OUT.png [--size WxH] [--frames N] [--without | --beside]");
+        eprintln!("usage: scene SCENE.glb OUT.png [--size WxH] [--frames N] [--without | --beside]");
         return ExitCode::from(2);
     };
     match draw(&args) {
@@ -80,7 +80,7 @@ fn draw(args: &Args) -> Result<(), String> {
     let camera = cameras(headless.app.world_mut()).ok_or("there is no camera")?;
     let drawing = headless.camera();
     let mut entity = headless.app.world_mut().entity_mut(camera);
-    entity.insert((drawing, bouncelight_bevy::equipment()));
+    entity.insert((drawing, bevy_bouncelight::equipment()));
     // Bevy asks for a camera's target when the camera or its lens is new.
     if let Some(mut lens) = entity.get_mut::<Projection>() {
         lens.set_changed();

@@ -2,7 +2,7 @@
 //!
 //! ```no_run
 //! use bevy::prelude::*;
-//! use bouncelight_bevy::{Bouncelight, BouncelightPlugin};
+//! use bevy_bouncelight::{Bouncelight, BouncelightPlugin};
 //!
 //! App::new()
 //!     .add_plugins((DefaultPlugins, BouncelightPlugin::default()))
