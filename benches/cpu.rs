@@ -3,10 +3,10 @@
 
 use bouncelight::accel::{Accel, SceneRays};
 use bouncelight::gpu::{Gpu, GpuOptions};
-use bouncelight::net::convert::{Arch, Norm, published};
 use bouncelight::net::format::Weights;
 use bouncelight::net::plan::Plan;
 use bouncelight::scene::Scene;
+use bouncelight_lab::network::convert::{Arch, Norm, published};
 use bouncelight_scene::image_io::{Layer, write_exr};
 use divan::{Bencher, black_box};
 

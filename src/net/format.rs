@@ -40,7 +40,8 @@ pub struct Weights {
     /// 64-bit FNV-1a of the file's bytes: identifies the file in a picture's metadata, protects
     /// against nothing.
     pub content_hash: u64,
-    pub(super) tensors: BTreeMap<String, WeightTensor>,
+    #[doc(hidden)]
+    pub tensors: BTreeMap<String, WeightTensor>,
 }
 
 impl Weights {

@@ -11,20 +11,20 @@ use std::path::Path;
 
 /// Longest header, bytes. The largest network's takes under a hundredth; safetensors itself allows
 /// 100 MB, which a hostile file could turn into gigabytes of small objects.
-pub(super) const MAX_HEADER: u64 = 8 << 20;
+pub const MAX_HEADER: u64 = 8 << 20;
 /// Most tensors.
-pub(super) const MAX_TENSORS: usize = 8192;
+pub const MAX_TENSORS: usize = 8192;
 
 /// Where one tensor lies.
 #[derive(Debug, serde::Deserialize)]
-pub(super) struct TensorInfo {
+pub struct TensorInfo {
     pub dtype: String,
     pub shape: Vec<u64>,
     pub data_offsets: [u64; 2],
 }
 
 /// A header whose tensors are known to lie inside the file.
-pub(super) struct Header<'a> {
+pub struct Header<'a> {
     pub metadata: BTreeMap<String, String>,
     pub tensors: BTreeMap<String, TensorInfo>,
     /// The bytes that offsets count from.
@@ -74,7 +74,7 @@ impl<'de> Deserialize<'de> for Raw {
 }
 
 /// Bytes of one number of `dtype`; `None` for a type that the format does not know.
-pub(super) fn dtype_bytes(dtype: &str) -> Option<u64> {
+pub fn dtype_bytes(dtype: &str) -> Option<u64> {
     Some(match dtype {
         "BOOL" | "U8" | "I8" | "F8_E5M2" | "F8_E4M3" => 1,
         "U16" | "I16" | "F16" | "BF16" => 2,
@@ -86,7 +86,7 @@ pub(super) fn dtype_bytes(dtype: &str) -> Option<u64> {
 
 /// Reads the header of `bytes` and checks every offset. Faults in single tensors go to `problems`,
 /// and the tensor is left out.
-pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8], problems: &mut Vec<Problem>) -> Result<Header<'a>, WeightsError> {
+pub fn parse<'a>(path: &Path, bytes: &'a [u8], problems: &mut Vec<Problem>) -> Result<Header<'a>, WeightsError> {
     let not = |reason: String| WeightsError::NotSafetensors { path: path.into(), reason };
     let found = bytes.len() as u64;
     let Some((length, rest)) = bytes.split_first_chunk::<8>() else {

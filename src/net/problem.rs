@@ -65,11 +65,11 @@ pub enum WeightsError {
 }
 
 /// What is said of networks that answer light, or correct that of `gather`.
-pub(super) const CORRECTS: &str =
+pub const CORRECTS: &str =
     "nothing runs networks that answer light; method `neural` runs those that guide a filter (table `cells`)";
 
 /// Faults as lines, the first forty of them.
-pub(super) fn list(problems: &[Problem]) -> String {
+pub fn list(problems: &[Problem]) -> String {
     const SHOWN: usize = 40;
     let mut text: String = problems.iter().take(SHOWN).map(|p| format!("\n  {p}")).collect();
     if problems.len() > SHOWN {

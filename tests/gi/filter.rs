@@ -9,9 +9,10 @@ use bouncelight::gi::{GiError, Method, Neural};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::format::{CELLS_V1, FeatureRow, IMAGES_V1, Weights};
 use bouncelight::net::gpu::Tap;
-use bouncelight::net::{cpu, plan::Precision};
+use bouncelight::net::plan::Precision;
 use bouncelight::render::{RenderError, Renderer, RendererOptions, View};
 use bouncelight::scene::Scene;
+use bouncelight_lab::network::cpu;
 
 const SIZE: [u32; 2] = [96, 64];
 

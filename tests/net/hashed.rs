@@ -1,9 +1,9 @@
 //! Networks and inputs whose numbers are a hash of their names, as
 //! `weights-format/fixtures/operators` describes them.
 
-use bouncelight::net::cpu::Tensor;
 use bouncelight::net::format::{KEY, Weights};
 use bouncelight::net::graph::{Graph, Op, Shape};
+use bouncelight_lab::network::cpu::Tensor;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 

@@ -6,13 +6,13 @@ use crate::operators::{TOLERANCE, TOLERANCE_HALF};
 use crate::{common, run_gpu, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu::timing::Recorder;
-use bouncelight::net::arch;
-use bouncelight::net::convert::{Arch, Norm};
-use bouncelight::net::cpu::{self, Tensor};
 use bouncelight::net::format::Weights;
 use bouncelight::net::gpu::{NetError, Network, Options, Permutation, Source, Variant};
 use bouncelight::net::graph::{Graph, Shape};
 use bouncelight::net::plan::Precision;
+use bouncelight_lab::network::convert::published;
+use bouncelight_lab::network::convert::{Arch, Norm};
+use bouncelight_lab::network::cpu::{self, Tensor};
 use serde_json::{Value, json};
 
 fn graph(input_channels: u32, ops: Value) -> Graph {
@@ -54,7 +54,7 @@ fn extended(input: &Tensor, [width, height]: [u32; 2]) -> Tensor {
 
 #[test]
 fn any_size_is_padded_inside() {
-    let pix2pix = arch::graph(Arch::Pix2pix, Norm::Group, 4, true);
+    let pix2pix = published::graph(Arch::Pix2pix, Norm::Group, 4, true);
     for (size, inner) in
         [([1, 1], [256, 256]), ([300, 200], [512, 256]), ([256, 512], [256, 512]), ([640, 384], [768, 512])]
     {

@@ -21,10 +21,10 @@ mod weights;
 mod whole;
 
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
-use bouncelight::net::cpu::{self, Tensor};
 use bouncelight::net::format::Weights;
 use bouncelight::net::gpu::{Network, Options, Permutation, Source, Variant};
 use bouncelight::net::graph::Shape;
+use bouncelight_lab::network::cpu::{self, Tensor};
 use safetensors::SafeTensors;
 use std::path::PathBuf;
 

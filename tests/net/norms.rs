@@ -5,11 +5,11 @@ use crate::hashed::{self, error};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
 use crate::{common, fixed, run_gpu, run_network};
 use bouncelight::gpu::Gpu;
-use bouncelight::net::cpu::{self, Tensor};
 use bouncelight::net::format::Weights;
 use bouncelight::net::gpu::{Network, Options, Permutation, Source, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::Precision;
+use bouncelight_lab::network::cpu::{self, Tensor};
 use serde_json::{Value, json};
 
 fn graph(input_channels: u32, ops: Value) -> Graph {

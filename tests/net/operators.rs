@@ -3,12 +3,12 @@
 use crate::hashed::{self, cases, graphs};
 use crate::{common, fixed, run_network};
 use bouncelight::gpu::Gpu;
-use bouncelight::net::cpu;
 use bouncelight::net::gpu::{Network, Options, Permutation, Source, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::op::Op;
 use bouncelight::net::op_facts::KINDS;
 use bouncelight::net::plan::Precision;
+use bouncelight_lab::network::cpu;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 

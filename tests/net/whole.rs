@@ -3,19 +3,19 @@
 use crate::hashed::{self, cases};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
 use crate::{common, fixed, run_network};
-use bouncelight::net::arch;
-use bouncelight::net::convert::{Arch, Norm};
-use bouncelight::net::cpu;
 use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Source, Tuned, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::{self, Plan, Precision};
+use bouncelight_lab::network::convert::published;
+use bouncelight_lab::network::convert::{Arch, Norm};
+use bouncelight_lab::network::cpu;
 
 fn generator(name: &str, width: u32) -> Graph {
     match name {
-        "pix2pix_group" => arch::graph(Arch::Pix2pix, Norm::Group, width, true),
-        "pix2pix_instance" => arch::graph(Arch::Pix2pix, Norm::Instance, width, true),
-        "pix2pix_batch" => arch::graph(Arch::Pix2pix, Norm::Batch, width, true),
-        _ => arch::graph(Arch::DeepIllumination, Norm::Batch, width, true),
+        "pix2pix_group" => published::graph(Arch::Pix2pix, Norm::Group, width, true),
+        "pix2pix_instance" => published::graph(Arch::Pix2pix, Norm::Instance, width, true),
+        "pix2pix_batch" => published::graph(Arch::Pix2pix, Norm::Batch, width, true),
+        _ => published::graph(Arch::DeepIllumination, Norm::Batch, width, true),
     }
 }
 

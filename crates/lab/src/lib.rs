@@ -2,6 +2,7 @@
 //!
 //! - [`reference`]: the path tracer.
 //! - [`metrics`]: image metrics.
+//! - [`network`]: the CPU reference of networks, published generators.
 //! - [`study`]: error against time, stability, the cheapest method that is good enough, this device.
 //! - [`count`]: shaders that count what they do.
 //! - [`scenes`]: scenes made by code in any number: the paper's rooms, homes.
@@ -12,6 +13,7 @@ pub mod export;
 #[cfg(test)]
 mod layouts;
 pub mod metrics;
+pub mod network;
 pub mod reference;
 pub mod scenes;
 pub mod study;

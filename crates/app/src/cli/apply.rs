@@ -5,11 +5,13 @@ use super::progress::Progress;
 use anyhow::Result;
 use bouncelight::gpu::{readback, timing::Recorder};
 use bouncelight::net::{
-    cpu::{self, Tensor},
     format::Weights,
     gpu::{NetError, Network, Options, Setup},
-    pictures,
     plan::PlanError,
+};
+use bouncelight_lab::network::{
+    cpu::{self, Tensor},
+    pictures,
 };
 use bouncelight_scene::image_io::{self, Image};
 use std::io::Read;

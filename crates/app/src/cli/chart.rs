@@ -9,7 +9,8 @@ use super::{
 };
 use anyhow::{Context, Result};
 use bouncelight::gi::{Method, gather};
-use bouncelight::net::{format::Weights, pictures};
+use bouncelight::net::format::Weights;
+use bouncelight_lab::network::pictures;
 use bouncelight_lab::study::{
     bench::BenchOptions,
     chart::{

@@ -6,7 +6,7 @@ use anyhow::Result;
 use bouncelight::gi::{Neural, inputs::cells_of};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::format::Weights;
-use bouncelight::net::peak;
+use bouncelight_lab::network::peak;
 use bouncelight_lab::study::layers::{self, Layers};
 
 /// Times the layers for a picture of `size`.

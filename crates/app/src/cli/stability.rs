@@ -85,7 +85,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let mut subjects = names.iter().map(|n| subject(global, &args, *n)).collect::<Result<Vec<_>>>()?;
     if let Some(path) = &args.paper {
         let weights = Weights::load(path)?;
-        bouncelight::net::pictures::check(&weights)?;
+        bouncelight_lab::network::pictures::check(&weights)?;
         subjects.push(Subject::Paper(Box::new(weights)));
     }
     let judged = judged(&args, &subjects)?;

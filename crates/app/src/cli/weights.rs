@@ -4,11 +4,11 @@
 use super::args::{Global, parse_size};
 use super::stdout::say;
 use anyhow::{Context, Result};
-use bouncelight::net::convert::{Arch, Norm, Recipe, convert};
 use bouncelight::net::{
     format::{Dtype, Provenance, Weights},
     plan::{Options, Plan},
 };
+use bouncelight_lab::network::convert::{Arch, Norm, Recipe, convert};
 use bouncelight_scene::image_io;
 use clap::ValueEnum;
 use sha2::{Digest, Sha256};

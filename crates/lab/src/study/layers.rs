@@ -1,9 +1,9 @@
 //! Each step of a network alone, against what the device can do at best.
 
+use crate::network::peak::Peak;
 use bouncelight::gpu::Gpu;
 use bouncelight::net::format::Weights;
 use bouncelight::net::gpu::{Kernel, NetError, Network, Options, Setup, Tuned};
-use bouncelight::net::peak::Peak;
 use bouncelight::net::tune;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

@@ -6,8 +6,8 @@
 
 use crate::spoil::Random;
 use crate::{MEMORY, apart, cases, corpus, mutate, setting};
-use bouncelight::net::convert::{Arch, ConvertError, Norm, Recipe, convert};
 use bouncelight::net::format::{Dtype, Provenance, Weights};
+use bouncelight_lab::network::convert::{Arch, ConvertError, Norm, Recipe, convert};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

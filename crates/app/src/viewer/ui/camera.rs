@@ -1,7 +1,6 @@
 //! The panel's sections for how one looks: picture, camera, animation, window.
 
-use super::number::{drag, slider};
-use super::panel::wide;
+use super::widgets::{drag, slider, wide};
 use super::{Facts, Memory};
 use crate::viewer::film::Film;
 use crate::viewer::navigate::Preset;

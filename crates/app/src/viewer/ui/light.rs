@@ -1,6 +1,6 @@
 //! Lights and objects: listed, and changed in place.
 
-use super::number::{drag, slider};
+use super::widgets::{drag, slider};
 use super::{Memory, ORANGE, SKY};
 use crate::viewer::state::{Action, State, angles, from_angles};
 use bouncelight::scene::LightKind;

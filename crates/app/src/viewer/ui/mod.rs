@@ -9,12 +9,12 @@ mod heat;
 mod help;
 mod light;
 pub mod marks;
-mod number;
 mod panel;
 mod table;
 mod times;
 mod timing;
 mod welcome;
+mod widgets;
 
 use super::choice::{Side, Source, View};
 use super::frames::Times;
@@ -242,7 +242,7 @@ fn status(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
 fn source_box(ui: &mut Ui, id: &str, state: &mut State, side: Side) {
     let now = if side == Side::Left { state.settings.left } else { state.settings.right };
     let mut chosen = now;
-    egui::ComboBox::from_id_salt(id).selected_text(now.title()).width(panel::wide(ui)).show_ui(ui, |ui| {
+    egui::ComboBox::from_id_salt(id).selected_text(now.title()).width(widgets::wide(ui)).show_ui(ui, |ui| {
         for source in Source::ALL {
             ui.selectable_value(&mut chosen, source, source.title()).on_hover_text(source.doc());
         }

@@ -1,6 +1,6 @@
 //! The panel's sections: scene, method, view.
 
-use super::number::drag;
+use super::widgets::{drag, wide};
 use super::{Facts, Memory, camera, frontier, light, marks, source_box, times};
 use crate::viewer::choice::{Side, Source, View};
 use crate::viewer::state::{Action, NO_LINES, State};
@@ -114,11 +114,6 @@ fn length(metres: f32) -> String {
         m if m >= 0.01 => format!("{:.1} cm", 100.0 * m),
         m => format!("{:.2} mm", 1000.0 * m),
     }
-}
-
-/// Width of a list that takes the rest of the line, its arrow included.
-pub(super) fn wide(ui: &Ui) -> f32 {
-    (ui.available_width() - 12.0).max(60.0)
 }
 
 fn variants(ui: &mut Ui, state: &mut State, names: &[String], now: Option<usize>) {

@@ -4,9 +4,9 @@
 use super::convert::{converted, named, norm};
 use super::state::{bytes, hashes, state};
 use crate::common;
-use bouncelight::net::cpu;
 use bouncelight::net::format::{Dtype, Weights};
-use bouncelight::net::pictures::{self, Pictures};
+use bouncelight_lab::network::cpu;
+use bouncelight_lab::network::pictures::{self, Pictures};
 use bouncelight_scene::image_io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,9 +1,9 @@
 //! Conversion: every norm, any width, every fault at once.
 
 use super::state::{State, bytes, state};
-use bouncelight::net::arch;
-use bouncelight::net::convert::{Arch, ConvertError, Norm, Recipe, convert};
 use bouncelight::net::format::{Dtype, Problem, Provenance, Weights};
+use bouncelight_lab::network::convert::published;
+use bouncelight_lab::network::convert::{Arch, ConvertError, Norm, Recipe, convert};
 use std::path::Path;
 
 pub fn named(name: &str) -> Arch {
@@ -36,7 +36,7 @@ fn faults(state: &State, arch: Arch, norm: Norm) -> Vec<String> {
 
 #[test]
 fn the_papers_generator_has_its_size() {
-    let graph = arch::graph(Arch::Pix2pix, Norm::Group, 64, true);
+    let graph = published::graph(Arch::Pix2pix, Norm::Group, 64, true);
     assert_eq!(graph.check(), []);
     // 54.41 M in convolutions, the rest in norms.
     assert_eq!(graph.parameters(), 54_413_315 + 9_856);
@@ -44,7 +44,7 @@ fn the_papers_generator_has_its_size() {
     // and the like add 0.2.
     let flops = graph.flops(1024, 512).unwrap() as f64 / 1e9;
     assert!((104.0..104.4).contains(&flops), "{flops} GFLOP");
-    let wide = arch::graph(Arch::DeepIllumination, Norm::Batch, 128, true);
+    let wide = published::graph(Arch::DeepIllumination, Norm::Batch, 128, true);
     assert_eq!(wide.check(), []);
     let shapes = wide.shapes(256, 256).unwrap();
     let last = shapes.last().unwrap();
@@ -62,7 +62,7 @@ fn any_width_and_norm() {
     ] {
         let from = state(arch_name, norm_name, width);
         let weights = converted(&from, named(arch_name), norm(norm_name), Dtype::F32).unwrap();
-        assert_eq!(weights.graph, arch::graph(named(arch_name), norm(norm_name), width as u32, true));
+        assert_eq!(weights.graph, published::graph(named(arch_name), norm(norm_name), width as u32, true));
         assert_eq!((weights.table.name.as_str(), weights.provenance["seed"].as_u64()), ("images", Some(1)));
         let key = if arch_name == "pix2pix" { "up3.model.0.weight" } else { "deconv3.weight" };
         assert_eq!(weights.tensors()[key].data, from[key].2);

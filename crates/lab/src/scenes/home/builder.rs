@@ -300,3 +300,9 @@ fn leaves(count: u16) -> Mesh {
     }
     mesh
 }
+
+/// Whether nothing that was placed reaches into a box.
+pub(super) fn clear(b: &Builder, solid: Solid) -> bool {
+    let inner = solid.grown(-5e-4);
+    !b.solids.iter().any(|s| s.meets(inner))
+}

@@ -1,7 +1,7 @@
 //! Fine detail of light, and how much of it a home has; here what hangs on walls. Whatever is put
 //! somewhere keeps clear of the boxes of all that is there already.
 
-use super::builder::{Builder, Form, Solid};
+use super::builder::{Builder, Form, Solid, clear};
 use super::furnish::{Furnisher, turned_from};
 use super::furniture as make;
 use super::mouldings::{RELIEF, panel_fronts};
@@ -16,9 +16,9 @@ const TRIES: usize = 12;
 pub(super) struct Habits {
     /// How much lies about, from 0 to 1; very little in a quarter of homes.
     mess: f32,
-    pub wainscot: bool,
+    wainscot: bool,
     /// Under the ceiling: mouldings, beams, or nothing.
-    pub cornice: bool,
+    cornice: bool,
     beams: bool,
     blinds: bool,
 }
@@ -40,16 +40,10 @@ impl Habits {
     }
 }
 
-/// Whether nothing that was placed reaches into a box.
-pub(super) fn clear(b: &Builder, solid: Solid) -> bool {
-    let inner = solid.grown(-5e-4);
-    !b.solids.iter().any(|s| s.meets(inner))
-}
-
 impl Furnisher<'_> {
     /// What a furnished room has besides, when its lamps are in place.
     pub fn clutter(&mut self, habits: &Habits) {
-        self.mouldings(habits);
+        self.mouldings(habits.wainscot, habits.cornice);
         if habits.beams {
             self.beams();
         }

@@ -1,7 +1,7 @@
 //! Fine detail of light on walls, fronts, ceilings and in windows: creases and slats.
 
+use super::builder::clear;
 use super::builder::{Builder, Form, Solid};
-use super::clutter::{Habits, clear};
 use super::furnish::{Furnisher, turned_from};
 use super::plan::{Opening, SIDES};
 use bouncelight::scene::{Light, LightKind};
@@ -55,9 +55,9 @@ impl Furnisher<'_> {
     }
 
     /// Panels up to a rail, a picture rail, and a stepped cornice.
-    pub fn mouldings(&mut self, habits: &Habits) {
+    pub fn mouldings(&mut self, wainscot: bool, cornice: bool) {
         let (rail, step, top) = (self.b.between(0.75, 1.0), self.b.between(0.5, 1.0), self.room.air.high.y);
-        let picture_rail = habits.wainscot && self.b.chance(0.5) && top > 2.5;
+        let picture_rail = wainscot && self.b.chance(0.5) && top > 2.5;
         for side in SIDES {
             // Those along x end at the others.
             let [from, to] = self.room.span(side);
@@ -66,14 +66,14 @@ impl Furnisher<'_> {
             for i in 0..fields as usize {
                 let edge = |i: usize| from + (to - from) * i as f32 / fields;
                 let along = [edge(i), edge(i + 1)];
-                if habits.cornice {
+                if cornice {
                     self.strip(side, along, [top - 0.05, top], RELIEF);
                     self.strip(side, along, [top - 0.08, top - 0.05], 0.5 * RELIEF);
                 }
                 if picture_rail {
                     self.strip(side, along, [2.14, 2.17], 0.8 * RELIEF);
                 }
-                if !habits.wainscot {
+                if !wainscot {
                     continue;
                 }
                 self.strip(side, along, [rail, rail + 0.035], 0.9 * RELIEF);

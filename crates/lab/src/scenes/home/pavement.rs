@@ -1,7 +1,7 @@
 //! Fine detail of light in streets: shutters, and what stands on pavements.
 
+use super::builder::clear;
 use super::builder::{Builder, Form, Piece, Solid};
-use super::clutter::clear;
 use super::houses::Parts;
 use glam::{Mat4, Quat, Vec3, vec3};
 use std::f32::consts::PI;

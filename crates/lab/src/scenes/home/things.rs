@@ -1,7 +1,7 @@
 //! Fine detail of light, on floors and furniture: what lies and stands about.
 
+use super::builder::clear;
 use super::builder::{Builder, Form, Piece, Solid};
-use super::clutter::clear;
 use super::furnish::{Furnisher, footprint};
 use super::furniture as make;
 use super::look::Look;

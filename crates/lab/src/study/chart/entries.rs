@@ -14,7 +14,7 @@ pub enum Entry {
         /// The method.
         method: Method,
     },
-    /// A network on four pictures of the rasteriser ([`bouncelight::net::pictures`]).
+    /// A network on four pictures of the rasteriser ([`crate::network::pictures`]).
     Pictures {
         /// Name in the chart.
         name: String,

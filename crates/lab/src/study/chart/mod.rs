@@ -21,9 +21,10 @@ use super::{
     trial::TrialError,
 };
 use crate::metrics::MetricError;
+use crate::network::pictures::PicturesError;
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::UploadError;
-use bouncelight::net::{gpu::NetError, pictures::PicturesError};
+use bouncelight::net::gpu::NetError;
 use bouncelight_scene::SceneError;
 use bouncelight_scene::image_io::ImageError;
 use serde::{Deserialize, Serialize};

@@ -3,9 +3,10 @@
 //! such networks learn from in the same way.
 
 use super::{ChartError, published};
+use crate::network::{cpu::Tensor, pictures};
 use crate::study::trial::Shot;
 use bouncelight::gpu::{Gpu, readback};
-use bouncelight::net::{cpu::Tensor, format::Weights, gpu::Network, pictures};
+use bouncelight::net::{format::Weights, gpu::Network};
 use bouncelight::render::{capture::Layer, tonemap_curve::Tonemap};
 
 /// The four pictures of a view, 8-bit display values as shares of 255.

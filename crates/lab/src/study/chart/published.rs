@@ -1,13 +1,13 @@
 //! What the paper printed, and its generator as it runs here.
 
 use super::ChartError;
+use crate::network::convert::{self, Arch, Norm};
 use crate::study::{
     bench::{self, BenchOptions, Spread},
     projection::{self, Cost, EFFICIENCY, GTX_1050},
 };
 use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::net::{
-    convert::{self, Arch, Norm},
     format::Weights,
     gpu::{Network, Options},
 };

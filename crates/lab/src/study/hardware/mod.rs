@@ -17,11 +17,9 @@ pub use network::NetworkRow;
 pub use parts::{RayRow, TracerRow};
 
 use super::projection::{self, Card, Cost, EFFICIENCY, GTX_1050};
+use crate::network::peak;
 use bouncelight::gpu::Gpu;
-use bouncelight::net::{
-    format::{Weights, WeightsError},
-    peak,
-};
+use bouncelight::net::format::{Weights, WeightsError};
 use bouncelight::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};

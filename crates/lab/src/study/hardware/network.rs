@@ -2,11 +2,11 @@
 //! both precisions.
 
 use super::Run;
+use crate::network::peak::Peak;
 use crate::study::layers::{self, Layers};
 use bouncelight::gi::inputs::cells_of;
 use bouncelight::net::{
     gpu::{Options, Tuned},
-    peak::Peak,
     plan::Precision,
     tune::{self, Cache},
 };

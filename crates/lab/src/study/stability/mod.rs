@@ -37,7 +37,8 @@ pub use tests::{all, named};
 
 use super::trial::TrialError;
 use crate::metrics::MetricError;
-use bouncelight::net::{gpu::NetError, pictures::PicturesError};
+use crate::network::pictures::PicturesError;
+use bouncelight::net::gpu::NetError;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

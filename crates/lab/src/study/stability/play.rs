@@ -6,6 +6,10 @@ use super::{
     look::{Look, NOTHING},
     sheet::Moment,
 };
+use crate::network::{
+    cpu::Tensor,
+    pictures::{self, Pictures},
+};
 use crate::reference::{Kernel, Layer as TracedLayer, TracerOptions};
 use crate::study::{
     hash,
@@ -15,10 +19,8 @@ use crate::study::{
 use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
 use bouncelight::net::{
-    cpu::Tensor,
     format::Weights,
     gpu::{Network, Options},
-    pictures::{self, Pictures},
 };
 use bouncelight::render::{capture::Layer, tonemap_curve::Tonemap};
 use bouncelight::scene::{Camera, Scene};

@@ -1,6 +1,6 @@
 //! What a device can do at best, measured: the yardstick for a network's layers.
 
-use crate::gpu::shaders;
+use bouncelight::gpu::shaders;
 use std::time::Instant;
 
 /// Measured peaks.
@@ -36,7 +36,7 @@ pub fn measure(device: &wgpu::Device, queue: &wgpu::Queue) -> Peak {
         })
     };
     let [from, to] = ["peak.from", "peak.to"].map(buffer);
-    let pipeline = crate::gpu::tape::compute_pipeline(
+    let pipeline = bouncelight::gpu::tape::compute_pipeline(
         device,
         &wgpu::ComputePipelineDescriptor {
             label: Some("net.peak"),

@@ -8,7 +8,7 @@
 //!   transposed. Its layers of equal width share one batch norm; here each has its own copy.
 
 use super::{Arch, Norm};
-use crate::net::graph::{
+use bouncelight::net::graph::{
     Activate, Activation, AddAt, BatchNorm, Concat, Conv2d, ConvTranspose2d, Dropout, Graph, GroupNorm, INPUT,
     InstanceNorm, Op, Pad, Padding, Upsample,
 };

@@ -2,8 +2,8 @@
 //! the output.
 
 use super::cpu::Tensor;
-use super::format::Weights;
-use super::graph::Shape;
+use bouncelight::net::format::Weights;
+use bouncelight::net::graph::Shape;
 use thiserror::Error;
 
 /// Four pictures of one size, display values in [0, 1], RGB interleaved, rows from the top.
@@ -102,7 +102,7 @@ pub fn input(weights: &Weights, pictures: &Pictures<'_>) -> Result<Tensor, Pictu
     Ok(Tensor { shape, data })
 }
 
-/// Scale and offset of an encoding, see [`super::format::IMAGES_V1`].
+/// Scale and offset of an encoding, see [`bouncelight::net::format::IMAGES_V1`].
 fn encoding(name: &str, values: &[f32]) -> [f32; 2] {
     match name {
         "signed" => [2.0, -1.0],

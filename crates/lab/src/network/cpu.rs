@@ -5,9 +5,9 @@
 mod conv;
 mod plain;
 
-use super::format::Weights;
-use super::graph::{AddAt, Graph, GraphError, INPUT, Op, Shape};
-use super::{dropout, op::Activation};
+use bouncelight::net::format::Weights;
+use bouncelight::net::graph::{AddAt, Graph, GraphError, INPUT, Op, Shape};
+use bouncelight::net::{dropout, op::Activation};
 use std::collections::HashMap;
 use thiserror::Error;
 

@@ -1,9 +1,9 @@
 //! Everything that is not a convolution.
 
 use super::Tensor;
-use crate::net::dropout as random;
-use crate::net::format::Weights;
-use crate::net::graph::{Padding, Shape};
+use bouncelight::net::dropout as random;
+use bouncelight::net::format::Weights;
+use bouncelight::net::graph::{Padding, Shape};
 
 /// Output values from channel, row and column.
 fn from_fn(shape: Shape, mut value: impl FnMut(usize, usize, usize) -> f32) -> Tensor {

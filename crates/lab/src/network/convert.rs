@@ -4,10 +4,12 @@
 
 pub mod published;
 
-use super::format::{Dtype, Feature, Output, Problem, Provenance, Table, WeightTensor, Weights, WeightsError};
-use super::header::{self, Header, TensorInfo};
-use super::op::Op;
-use super::problem::list;
+use bouncelight::net::format::{
+    Dtype, Feature, Output, Problem, Provenance, Table, WeightTensor, Weights, WeightsError,
+};
+use bouncelight::net::header::{self, Header, TensorInfo};
+use bouncelight::net::op::Op;
+use bouncelight::net::problem::list;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -90,7 +92,7 @@ pub fn convert(path: &Path, bytes: &[u8], recipe: &Recipe) -> Result<Vec<u8>, Co
     }
     let mut problems = Vec::new();
     let mut header = header::parse(path, bytes, &mut problems)?;
-    if header.metadata.contains_key(super::format::KEY) {
+    if header.metadata.contains_key(bouncelight::net::format::KEY) {
         return Err(ConvertError::Already { path: path.into() });
     }
     strip_parallel(&mut header);

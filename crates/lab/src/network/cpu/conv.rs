@@ -1,9 +1,9 @@
 //! Convolutions: one weight at a time, added to a whole row.
 
 use super::Tensor;
-use crate::net::format::Weights;
-use crate::net::graph::Shape;
-use crate::net::op::{Conv2d, ConvTranspose2d};
+use bouncelight::net::format::Weights;
+use bouncelight::net::graph::Shape;
+use bouncelight::net::op::{Conv2d, ConvTranspose2d};
 
 /// Fills each channel with its bias.
 fn with_bias(weights: &Weights, name: &str, shape: Shape) -> Tensor {
