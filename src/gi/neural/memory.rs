@@ -66,16 +66,16 @@ impl FeaturesPass {
         Self { pipeline: bind::pipeline(device, "gi.features", &module, "features", &layouts), binder }
     }
 
-    /// Records the pass into `target` ([`PITCH`] numbers a cell, row by row); `pasts` is what
+    /// Records the pass into `target` ([`PITCH`] numbers a cell, row by row); `histories` is what
     /// cells remember, and the exposure must have been recorded before.
     pub fn record(
         &mut self,
         recorder: &mut Recorder<'_>,
         inputs: &BoundInputs,
-        (pasts, exposure): (&wgpu::Buffer, &ExposurePass),
+        (histories, exposure): (&wgpu::Buffer, &ExposurePass),
         target: Bound,
     ) {
-        let own = self.binder.group([Bound::from(pasts), Bound::from(exposure.buffer()), target]);
+        let own = self.binder.group([Bound::from(histories), Bound::from(exposure.buffer()), target]);
         let [w, h] = inputs.cells.map(|n| n.div_ceil(8));
         recorder.compute("gi.features", |pass| {
             inputs.set(pass);
@@ -91,7 +91,7 @@ impl FeaturesPass {
     }
 
     /// Lets go of what is bound.
-    pub fn forget(&mut self) {
-        self.binder.forget();
+    pub fn release_bindings(&mut self) {
+        self.binder.release_bindings();
     }
 }

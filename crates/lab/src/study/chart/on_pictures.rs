@@ -3,7 +3,7 @@
 //! such networks learn from in the same way.
 
 use super::{ChartError, published};
-use crate::study::trial::Shot;
+use crate::study::session::Frame;
 use bouncelight::gpu::{Gpu, readback};
 use bouncelight::net::{cpu::Tensor, format::Weights, gpu::Network, pictures};
 use bouncelight::render::{capture::Layer, tonemap_curve::Tonemap};
@@ -20,7 +20,7 @@ struct Four {
 impl Four {
     /// Of direct light. `sky`: radiance that comes from everywhere, which Eevee counts as direct,
     /// without occlusion.
-    fn new(shot: &Shot, sky: [f32; 3]) -> Self {
+    fn new(shot: &Frame, sky: [f32; 3]) -> Self {
         let shown = |linear: Vec<f32>| -> Vec<f32> {
             Tonemap::Filmic.apply_to_bytes(&linear).into_iter().map(|b| f32::from(b) / 255.0).collect()
         };
@@ -57,7 +57,7 @@ impl Four {
 pub(super) fn picture(
     gpu: &Gpu,
     weights: &Weights,
-    shot: &Shot,
+    shot: &Frame,
     sky: [f32; 3],
 ) -> Result<(Vec<f32>, Network), ChartError> {
     let four = Four::new(shot, sky);
