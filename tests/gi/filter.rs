@@ -7,7 +7,7 @@ use crate::weights::{constant_filter, random_filter};
 use crate::world::{BACKWARDS, difference, gather, hall, light, mean, renderer, sun};
 use bouncelight::gi::{GiError, Method, Neural};
 use bouncelight::gpu::Gpu;
-use bouncelight::net::format::{CELLS_V1, FeatureRow, IMAGES_V1, Weights};
+use bouncelight::net::format::{CELLS_V1, CELLS_V2, FeatureRow, IMAGES_V1, Weights};
 use bouncelight::net::gpu::LayerReadback;
 use bouncelight::net::{cpu, plan::Precision};
 use bouncelight::render::{RenderError, Renderer, RendererOptions, View};
@@ -80,6 +80,7 @@ fn weights_of_something_else_are_refused_by_name() {
         linear_bytes(table, rows, meaning, &vec![0.0; outputs * channels as usize], &vec![0.0; outputs])
     };
     assert_eq!(refusal(of("cells", CELLS_V1, "filter", 12)), "");
+    assert_eq!(refusal(of("cells", CELLS_V2, "filter", 12)), "");
     for (bytes, named) in [
         (of("images", IMAGES_V1, "filter", 12), "images"),
         (of("cells", &CELLS_V1[..9], "filter", 12), "the whole table"),

@@ -111,16 +111,21 @@ fn network(device: &wgpu::Device, queue: &wgpu::Queue, neural: &Neural, size: [u
 fn check(weights: &Weights) -> Result<(), GiError> {
     let wrong = |name: &str, reason: String| Err(GiError::Feature { name: name.into(), reason });
     let table = &weights.table;
-    if (table.name.as_str(), table.version, weights.cell) != ("cells", 1, stage::inputs::CELL) {
+    let features = match (table.name.as_str(), table.version) {
+        ("cells", 1) => Some(memory::FEATURES_V1),
+        ("cells", 2) => Some(memory::FEATURES),
+        _ => None,
+    };
+    let Some(features) = features.filter(|_| weights.cell == stage::inputs::CELL) else {
         let found = format!("table {} version {}, {} pixels a cell", table.name, table.version, weights.cell);
         let own = stage::inputs::CELL;
         return wrong(
             "(all)",
-            format!("list is made for {found}; a filter is given cells version 1, {own} pixels a cell"),
+            format!("list is made for {found}; a filter is given cells version 1 or 2, {own} pixels a cell"),
         );
-    }
+    };
     let named = || weights.inputs.iter().map(|f| (f.name.as_str(), f.channels));
-    if !named().eq(memory::FEATURES) {
+    if !named().eq(features) {
         let found: Vec<_> = named().map(|(name, _)| name).collect();
         return wrong("(all)", format!("list is {}; a filter is given the whole table", found.join(", ")));
     }

@@ -12,8 +12,8 @@ from safetensors.numpy import load_file
 from ..errors import TrainingError
 from .blur import ATROUS_STRIDE, WIDE_BLUR_FRAMES
 
-# Table `cells`, version 1 (src/gi/neural/memory.rs).
-TABLE = [("light", 1), ("chroma", 2), ("deviation", 1), ("frames", 1), ("lately", 1), ("nearness", 1), ("depth", 1), ("normal", 3), ("hit", 1), ("towards", 3)]
+# Table `cells`, version 2 (src/gi/neural/memory.rs).
+TABLE = [("light", 1), ("chroma", 2), ("deviation", 1), ("history_length", 1), ("fast_history", 1), ("hit_proximity", 1), ("depth", 1), ("normal", 3), ("hit", 1), ("dominant_direction", 3)]
 CHANNELS = sum(n for _, n in TABLE)
 # Cosine between two normals above which a cell's two pixels are taken for one surface.
 SAME_NORMAL = 0.9
