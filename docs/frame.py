@@ -20,27 +20,27 @@ PASSES = [
     ("Raster", "gbuffer", "depth, normal, albedo, …", "0", "2"),
     ("Raster", "lights", "light lists, from nine lights", "0 2", "1"),
     ("Raster", "direct", "analytic lights with shadows", "0 1 2", "3"),
-    ("Trace", "gi.cells", "one pixel for each 4×4 cell", "2", "4"),
+    ("Trace", "gi.downsample", "one pixel for each 4×4 cell", "2", "4"),
     ("Trace", "gi.gradient", "temporal gradient, after changes", "0 2 5 6 7", "6"),
-    ("Trace", "gi.recall", "reproject, find disocclusions", "2 4 5 6", "4 6"),
-    ("Trace", "gi.evict", "free old cache entries", "7", "7"),
-    ("Trace", "gi.rays", "trace cells' rays", "0 2 4 7", "6 7"),
-    ("Trace", "gi.renew", "update the cache, 1 to 32 times", "0 7", "7"),
-    ("Trace", "gi.mirror", "trace specular rays of pixels", "0 2 7 8", "8"),
-    ("Denoise", "gi.settle", "temporal accumulation", "2 4 5 6 7", "5"),
+    ("Trace", "gi.reproject", "reproject, find disocclusions", "2 4 5 6", "4 6"),
+    ("Trace", "gi.cache_evict", "free old cache entries", "7", "7"),
+    ("Trace", "gi.trace", "trace cells' rays", "0 2 4 7", "6 7"),
+    ("Trace", "gi.cache_update", "update the cache, 1 to 32 times", "0 7", "7"),
+    ("Trace", "gi.specular_trace", "trace specular rays of pixels", "0 2 7 8", "8"),
+    ("Denoise", "gi.accumulate", "temporal accumulation", "2 4 5 6 7", "5"),
     ("Denoise", "gi.exposure", "mean light (neural)", "2 3", "9"),
     ("Denoise", "gi.features", "network inputs (neural)", "2 5 9", "9"),
     ("Denoise", "net.*", "U-Net: guidance (neural)", "9", "9"),
     ("Denoise", "gi.blur", "bilateral blur, 5×5 cells", "5 9", "10"),
-    ("Denoise", "gi.smooth", "one à-trous step", "5 9 10", "10"),
-    ("Denoise", "gi.bring", "joint bilateral upsampling", "2 4 8 10", "11"),
+    ("Denoise", "gi.atrous", "one à-trous step", "5 9 10", "10"),
+    ("Denoise", "gi.upsample", "joint bilateral upsampling", "2 4 8 10", "11"),
     ("Picture", "composite", "albedo · (direct + indirect) + …", "2 3 11", "12"),
     ("Picture", "blended", "veils, sorted", "0 1 11 12", "12"),
     ("Picture", "taa", "temporal anti-aliasing, if on", "2 12", "12"),
     ("Picture", "tonemap", "for a display", "12", ""),
 ]
 COLOURS = {"Raster": "#0072b2", "Trace": "#d55e00", "Denoise": "#009e73", "Picture": "#7a5195"}
-LEFT, TOP, ROW, COLUMN = 400, 190, 26, 42
+LEFT, TOP, ROW, COLUMN = 446, 190, 26, 42
 
 
 def text(x, y, words, more=""):
@@ -72,7 +72,7 @@ def main():
         if j % 2 == 0:
             out.append(f'<rect x="40" y="{y}" width="{LEFT + COLUMN * len(RESOURCES) - 40}" height="{ROW}" fill="{colour}" opacity="0.07"/>')
         out.append(text(48, y + 17, name, f'font-family="monospace" font-weight="bold" fill="{colour}"'))
-        out.append(text(150, y + 17, what))
+        out.append(text(196, y + 17, what))
         for i in range(len(RESOURCES)):
             x = LEFT + COLUMN * i + COLUMN // 2
             if str(i) in writes.split():
@@ -88,7 +88,7 @@ def main():
         (208, f'<rect x="200" y="{y - 13}" width="16" height="16" rx="2" fill="#555"/><circle cx="208" cy="{y - 5}" r="4" fill="#fff"/>', "reads and writes"),
     ]:
         out += [shape, text(x + 14, y, words)]
-    out.append(text(400, y, "Time runs downwards: each row is a pass, in the order of recording."))
+    out.append(text(446, y, "Time runs downwards: each row is a pass, in the order of recording."))
     with open(OUT, "w", encoding="utf-8") as file:
         file.write("\n".join(out) + "\n</svg>\n")
 

@@ -26,7 +26,7 @@ fn rows() -> Vec<(&'static str, Layout)> {
             backdrop,
         ),
         row!("Light", LightGpu =>
-            position, kind, direction, range, color, radius, cone_scale, cone_offset, stands_in, chance,
+            position, kind, direction, range, color, radius, cone_scale, cone_offset, is_emissive_proxy, chance,
         ),
         row!("LightShadow", LightShadowGpu => first, count, reach),
         row!("Deforming", DeformGpu =>
@@ -45,8 +45,8 @@ fn rows() -> Vec<(&'static str, Layout)> {
         ),
         row!("Exposure", Exposure => s, ln_m, hit_fraction, nonfinite, outgoing as "red"),
         row!("Gather", gather::Params =>
-            eye, frame, light_count, emitter_count, inverse_power, mask, entry_scale, round, cell_frames, entry_frames,
-            flags, cells, rays, since, last_round, looks, shift,
+            eye, frame, light_count, emitter_count, inverse_power, mask, entry_scale, cache_iteration, cell_frames,
+            entry_frames, flags, cells, rays, frames_since_change, last_iteration, spp, shift,
         ),
         row!("Sample", Sample => depth, normal, plane, offset, mirrored, motion, color, broken),
         row!("Step", StepUniform =>

@@ -89,7 +89,7 @@ def main():
                         shutil.move(os.path.join(folder, f"{number}.exr"), path)
             ours = size(change(*map(layers, frames), cameras)) / mean
             print(f"{name} {row}: {100 * ours:.2f} %, {beside(ours, own)}", flush=True)
-        cut = [alone("cut", i, "render", "--method", "gather", *SEEN, "--gi-frames", "1", "--samples", str(a.samples), "--gather", f"seed={i}") for i in (0, 1)]
+        cut = [alone("cut", i, "render", "--method", "gather", *SEEN, "--accumulate", "1", "--samples", str(a.samples), "--gather", f"seed={i}") for i in (0, 1)]
         ours = size(change(*cut, cameras)) / mean
         print(f"{name} control: {100 * ours:.2f} %, {beside(ours, own)}", flush=True)
 

@@ -191,7 +191,7 @@ def draw(program, scene, row, path, size, samples, inputs):
             subprocess.run([*command, "--path", keys, "-o", os.path.join(folder, "{frame}.exr"), "-q"], check=True)
             shutil.move(os.path.join(folder, f"{PAN_FRAMES}.exr"), path)
         return
-    subprocess.run([*command, "-o", path] + (["--gi-frames", state] if state else []) + ["-q"], check=True)
+    subprocess.run([*command, "-o", path] + (["--accumulate", state] if state else []) + ["-q"], check=True)
 
 
 PAN_FRAMES = 16

@@ -129,7 +129,7 @@ def main():
                 path = os.path.join(a.out, f"{name}_{method}_{degrees:g}.exr")
                 flags, camera = camera_of(meta, degrees)
                 if not os.path.exists(path):
-                    subprocess.run([a.bouncelight, "render", *scene, *flags, "--size", a.size, "--method", method, "--gi-frames", str(a.frames),
+                    subprocess.run([a.bouncelight, "render", *scene, *flags, "--size", a.size, "--method", method, "--accumulate", str(a.frames),
                                     "--samples", str(a.samples), "--aov", "all", "-q", "-o", path], check=True)
                 drawn.append(layers(path))
                 cameras.append(camera)

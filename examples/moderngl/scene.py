@@ -75,7 +75,7 @@ class Scene:
 
     def _light(self, light, world):
         # What stands for a glowing panel is found by rays. Lux and candela become W/m² and W/sr.
-        if light.get("extras", {}).get("bouncelight", {}).get("stands_in"):
+        if light.get("extras", {}).get("bouncelight", {}).get("is_emissive_proxy"):
             return
         strength = np.array(light.get("color", [1, 1, 1])) * light["intensity"] / 683
         self.lights.append({"kind": light["type"], "strength": strength, "place": world[:3, 3], "back": world[:3, 2]})

@@ -109,7 +109,7 @@ def main():
         for dispatch in manifest["dispatches"]:
             shader = manifest["shaders"][dispatch["shader"]]
             for binding, bound in zip(shader["bindings"], dispatch["resources"]):
-                if dispatch["label"] == "gi.settle" and binding["name"] == "after":
+                if dispatch["label"] == "gi.accumulate" and binding["name"] == "history_next":
                     bound["resource"] = "records"
 
     lit = tonemapped(rust[0]).mean()

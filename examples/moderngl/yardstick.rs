@@ -93,16 +93,16 @@ fn main() -> Result<(), Box<dyn Error>> {
             lights: Some(Lights {
                 buffer: &uploaded.light_buffer,
                 count: uploaded.lights.len() as u32,
-                stand_in: false,
-                epoch: uploaded.lights_epoch,
+                has_emissive_proxies: false,
+                version: uploaded.light_version,
             }),
             rays: uploaded.rays.as_ref().map(|scene| Rays { scene, environment: &uploaded.environment_view }),
             ..Inputs::new(drawn.size, depth, normal, matrices)
         };
         let mut encoder = device.create_command_encoder(&Default::default());
         technique.record(&mut Recorder::new(&mut encoder), queue, &inputs, (&output_view).into())?;
-        if let Some(instead) = technique.instead() {
-            return Err(format!("drawn by {}: {}", instead.method, instead.why).into());
+        if let Some(fallback) = technique.fallback() {
+            return Err(format!("drawn by {}: {}", fallback.method, fallback.why).into());
         }
         queue.submit([encoder.finish()]);
     }

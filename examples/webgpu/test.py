@@ -81,7 +81,7 @@ def judge(args, picture, size, method):
         command = [args.program, "-q", "render", args.scene, "--size", "{}x{}".format(*size), "--tonemap", "none"]
         # The page's frame is not averaged over jittered ones.
         command += ["--samples", "1", "--method", method, "-o", f"{folder}/own.png"]
-        command += [] if method == "direct" else ["--gi-frames", str(args.frames)]
+        command += [] if method == "direct" else ["--accumulate", str(args.frames)]
         command += ["--reference", picture, "--metric", "flip", "--threshold", str(THRESHOLD)]
         print(f"beside our own {method}:", end=" ", flush=True)
         return subprocess.run(command, check=False).returncode

@@ -17,7 +17,8 @@ struct Emitter {
     flags: u32,
 }
 
-struct Met {
+// Material at a hit.
+struct HitMaterial {
     // Base colour of the diffuse part, reflectance at normal incidence, emitted radiance.
     diffuse: vec3f,
     f0: vec3f,
@@ -28,21 +29,21 @@ struct Met {
     by_area: f32,
 }
 
-const MET_DOUBLE_SIDED = 1u;
-const MET_UNLIT = 2u;
+const HIT_DOUBLE_SIDED = 1u;
+const HIT_UNLIT = 2u;
 
-fn met(triangle: u32) -> Met {
+fn triangle_material(triangle: u32) -> HitMaterial {
     let packed = surfaces[triangle];
     let d = unpack4x8unorm(packed.x);
     let f = unpack4x8unorm(packed.y);
     let scale = exp2(f32(i32(packed.z >> 27u) - 24));
     let e = vec3f(vec3u(packed.z, packed.z >> 9u, packed.z >> 18u) & vec3u(511u)) * scale;
-    return Met(d.rgb * d.rgb, f.rgb * f.rgb, e, d.a, packed.y >> 24u, bitcast<f32>(packed.w));
+    return HitMaterial(d.rgb * d.rgb, f.rgb * f.rgb, e, d.a, packed.y >> 24u, bitcast<f32>(packed.w));
 }
 
 // Unit normal that the mesh gives the place of the hit, in the space of the ray, on the given side
 // of the triangle.
-fn met_normal(hit: Hit, side: vec3f) -> vec3f {
+fn hit_normal(hit: Hit, side: vec3f) -> vec3f {
     let corners = textureLoad(corner_normals, vec2u(hit.triangle & 8191u, hit.triangle >> 13u), 0);
     var n = (1.0 - hit.uv.x - hit.uv.y) * oct_decode(unpack2x16snorm(corners.x))
         + hit.uv.x * oct_decode(unpack2x16snorm(corners.y))

@@ -1,5 +1,5 @@
 //#import gi/inputs.wgsl
-//#import gi/unseen.wgsl
+//#import gi/ambient_term.wgsl
 
 // The simplest method: every surface receives the same light from all around, as far as what stands
 // near lets it.
@@ -19,7 +19,7 @@ fn ambient(@builtin(global_invocation_id) id: vec3u) {
     if distance_at(pixel) > 0.0 {
         // Occlusion maps are not applied here: composite applies them to every method's light,
         // once.
-        light = min(unseen_light() * textureLoad(visibility, pixel, 0).r, vec3f(LARGEST));
+        light = min(ambient_term() * textureLoad(visibility, pixel, 0).r, vec3f(LARGEST));
     }
     textureStore(output, pixel, vec4f(light, 1.0));
 }

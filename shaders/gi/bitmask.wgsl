@@ -16,7 +16,7 @@
 
 @group(1) @binding(0) var<uniform> pattern: vec4u;   // x: number of the frame, 0 without history
 
-const PI = 3.14159265;
+const HALF_TURN = 3.14159265;
 const SECTORS = 32.0;
 // First step, pixels: one texel of the half resolution.
 const FIRST = 2.0;
@@ -83,7 +83,7 @@ fn arc(slice: Slice, angle: f32) -> f32 {
 }
 
 fn slice_at(here: Receiver, k: i32) -> Slice {
-    let phi = PI * (f32(k) + here.shift.x) / f32(SLICES);
+    let phi = HALF_TURN * (f32(k) + here.shift.x) / f32(SLICES);
     let direction = vec2f(cos(phi), sin(phi));
     // How the ray changes a pixel further: lies in the plane of the slice.
     let step = vec3f(direction * vec2f(1.0, -1.0) * params.unproject.xy / vec2f(params.size), 0.0);
@@ -102,8 +102,8 @@ fn slice_at(here: Receiver, k: i32) -> Slice {
 
 // Where `angle` lies among the sectors, 0 to 32.
 fn place(slice: Slice, angle: f32) -> f32 {
-    let low = slice.tilt - 0.5 * PI;
-    let inside = clamp(angle, low, slice.tilt + 0.5 * PI);
+    let low = slice.tilt - 0.5 * HALF_TURN;
+    let inside = clamp(angle, low, slice.tilt + 0.5 * HALF_TURN);
     let whole = max(slice.cos_tilt + slice.tilt * slice.sin_tilt, 1e-4);
     return SECTORS * (arc(slice, low) + sign(inside) * arc(slice, inside)) / whole;
 }

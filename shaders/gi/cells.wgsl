@@ -5,22 +5,20 @@
 // cell's light says about a direction. A gather joins this file behind gi/inputs.wgsl; the prelude
 // (`gi::stage::cells::prelude`) holds CELL_SIDE, the pixels on a side of a cell.
 
-// A cell beside one, or a plane, that looks elsewhere by more than this (60°) is none of its
-// surface.
+// A neighbouring cell, or a plane, whose normal differs by more than this (60°) is another surface.
 const LEAST_COSINE_OF_PLANE = 0.5;
 
 // A cell without any surface, in `cell_pixels`.
 const NO_PIXEL = 0xffffffffu;
 
-// Beside a pixel: nothing is remembered of the surface there, or its light holds no longer, or it
-// has been remembered for a short while.
-const FRESH = 0x80000000u;
-const STALE = 0x8000u;
-const YOUNG = 0x80008000u;
+// Flags beside a pixel: no history, history invalidated by a change of light, short history.
+const DISOCCLUDED = 0x80000000u;
+const INVALIDATED = 0x8000u;
+const SHORT_HISTORY = 0x80008000u;
 
-// One of the three, or 0.
-fn age_of(packed: u32) -> u32 {
-    return packed & YOUNG;
+// One of the three flags, or 0.
+fn history_state(packed: u32) -> u32 {
+    return packed & SHORT_HISTORY;
 }
 
 // One cell's light, a vec4f a colour channel: E/π(n) = max(0, channel.w + dot(channel.xyz, n)), n a
@@ -85,13 +83,13 @@ fn light_towards(light: CellLight, n: vec3f) -> vec3f {
     return max(vec3f(dot(light.red, direction), dot(light.green, direction), dot(light.blue, direction)), vec3f(0.0));
 }
 
-// Width of a cell at view distance z.
+// Width of a cell at view distance z, metres.
 fn cell_foot(z: f32) -> f32 {
     return 2.0 * params.unproject.y * z * f32(CELL_SIDE) / f32(params.size.y);
 }
 
-// Cells across which what a lobe shows changes little: its width at what is as far from the mirror
-// as the mirror from the eye.
+// Cells over which a reflection changes little on a plane: the lobe's width at an object that is as
+// far from the mirror as the mirror from the eye.
 fn lobe_cells(roughness: f32) -> f32 {
     return 0.5 * roughness * roughness / cell_foot(1.0);
 }

@@ -77,7 +77,7 @@ fn sum_cells(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_inde
 }
 
 @compute @workgroup_size(256)
-fn finish(@builtin(local_invocation_index) index: u32) {
+fn sum_groups(@builtin(local_invocation_index) index: u32) {
     var mine = Partial(0.0, 0.0, 0u, 0u, vec3f(0.0));
     if index < group_count() {
         mine = partials[index];

@@ -10,7 +10,7 @@
 // Distance from the plane, relative to the view distance, at which a weight has fallen to a
 // quarter: half of what a texel covers at 1024x512 and 60 degrees.
 const PLANE = 0.002;
-const LEAST = 1e-15;
+const MIN_WEIGHT = 1e-15;
 
 // The value at `pixel`, which lies `z` metres away; `otherwise` where no texel around shows a
 // surface.
@@ -28,7 +28,7 @@ fn filtered(pixel: vec2i, z: f32, otherwise: vec3f) -> vec3f {
         let value = textureLoad(half_map, texel, 0);
         let off = dot(normal, position_at(half_pixel(texel), value.a) - here);
         let lorentz = 1.0 + min(off * off, 1e12);
-        let w = select(0.0, max(1.0 / (lorentz * lorentz), LEAST), value.a > 0.0);
+        let w = select(0.0, max(1.0 / (lorentz * lorentz), MIN_WEIGHT), value.a > 0.0);
         sum += w * value.rgb;
         weight += w;
     }

@@ -71,6 +71,10 @@ fn finite3(v: vec3f) -> vec3f {
     return select(vec3f(0.0), v, (bitcast<vec3u>(v) & vec3u(EXPONENT)) != vec3u(EXPONENT));
 }
 
+fn finite4(v: vec4f) -> vec4f {
+    return select(vec4f(0.0), v, (bitcast<vec4u>(v) & vec4u(EXPONENT)) != vec4u(EXPONENT));
+}
+
 fn luminance(c: vec3f) -> f32 {
     return dot(c, vec3f(0.2126, 0.7152, 0.0722));
 }

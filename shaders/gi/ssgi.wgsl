@@ -1,6 +1,6 @@
 //#import gi/inputs.wgsl
 //#import gi/bitmask.wgsl
-//#import gi/unseen.wgsl
+//#import gi/ambient_term.wgsl
 
 // One bounce in screen space at half resolution: what each step's surface sends on, weighted by the
 // sectors that it is the first to block; through sectors that nothing blocks comes unseen light.
@@ -45,7 +45,7 @@ fn ssgi(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let here = receiver_at(texel, z);
-    let unseen = unseen_light();
+    let ambient = ambient_term();
     var light = vec3f(0.0);
     var whole = 0.0;
     for (var s = 0; s < SLICES; s++) {
@@ -62,7 +62,7 @@ fn ssgi(@builtin(global_invocation_id) id: vec3u) {
             sum += sent(left, left.bits & ~blocked);
             blocked |= left.bits;
         }
-        light += slice.share * (sum + unseen * (SECTORS - f32(countOneBits(blocked)))) / SECTORS;
+        light += slice.share * (sum + ambient * (SECTORS - f32(countOneBits(blocked)))) / SECTORS;
         whole += slice.share;
     }
     textureStore(output, texel, vec4f(light / whole, z));

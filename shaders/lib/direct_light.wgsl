@@ -63,7 +63,7 @@ fn add_light(
 ) {
     let light = lights[i];
     let shadow = light_shadows[i];
-    if light.stands_in != 0u && frame.picture_only == 0u { return; }
+    if light.is_emissive_proxy != 0u && frame.picture_only == 0u { return; }
     let s = sample_light(light, p);
     let n_l = dot(n, s.l);
     if n_l <= 0.0 || all(s.irradiance <= vec3f(0.0)) { return; }

@@ -21,7 +21,7 @@ struct Light {
     cone_scale: f32,
     cone_offset: f32,
     // 1 for a light that stands for a surface that glows: rays meet the surface itself.
-    stands_in: u32,
+    is_emissive_proxy: u32,
     // For whoever draws lights by lot: see `LightGpu`.
     chance: f32,
 }

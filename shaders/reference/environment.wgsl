@@ -19,7 +19,7 @@ fn environment_coordinates(l: vec3f) -> vec2f {
     return vec2f(atan2(l.z, x) / (2.0 * PI) + 0.5, acos(clamp(l.y, -1.0, 1.0)) / PI);
 }
 
-fn environment_radiance(l: vec3f) -> vec3f {
+fn sky_radiance(l: vec3f) -> vec3f {
     if scene.environment_size.x == 0u { return scene.environment; }
     let p = environment_coordinates(l) * vec2f(scene.environment_size) - 0.5;
     let low = floor(p);
@@ -37,7 +37,7 @@ fn environment_radiance(l: vec3f) -> vec3f {
 fn cell_density(cell: vec2u) -> f32 {
     let size = vec2f(scene.environment_cells);
     let rows = cos(PI * vec2f(f32(cell.y), f32(cell.y + 1u)) / size.y);
-    let chance = bitcast<f32>(lights[scene.environment_table + cell.y * scene.environment_cells.x + cell.x].z);
+    let chance = bitcast<f32>(light_words[scene.environment_table + cell.y * scene.environment_cells.x + cell.x].z);
     return chance * size.x / (2.0 * PI * max(rows.x - rows.y, 1e-9));
 }
 
@@ -56,7 +56,7 @@ fn sample_environment(n: vec3f, u: vec2f, chosen: vec2f, share: f32) -> TrueLigh
         let pdf = share * z / PI;
         if pdf <= 0.0 { return NO_LIGHT; }
         let l = frame_around(n) * vec3f(p, z);
-        return TrueLight(l, FAR, environment_radiance(l) / pdf, pdf, NONE, 1.0);
+        return TrueLight(l, FAR, sky_radiance(l) / pdf, pdf, NONE, 1.0);
     }
     let size = scene.environment_cells;
     let id = choose(scene.environment_table, size.x * size.y, vec2f(chosen.x, chosen.y / share)).id;
@@ -68,5 +68,5 @@ fn sample_environment(n: vec3f, u: vec2f, chosen: vec2f, share: f32) -> TrueLigh
     let l = vec3f(r * cos(phi), y, r * sin(phi));
     let pdf = share * cell_density(cell);
     if pdf <= 0.0 { return NO_LIGHT; }
-    return TrueLight(l, FAR, environment_radiance(l) / pdf, pdf, NONE, 1.0);
+    return TrueLight(l, FAR, sky_radiance(l) / pdf, pdf, NONE, 1.0);
 }

@@ -17,10 +17,10 @@ const TRIANGLE_BIT: u32 = 0x80000000u;
 const NO_SIZE: f32 = 1e-5;
 
 fn light_at(i: u32) -> Light {
-    let a = lights[4u * i];
-    let b = lights[4u * i + 1u];
-    let c = lights[4u * i + 2u];
-    let d = lights[4u * i + 3u];
+    let a = light_words[4u * i];
+    let b = light_words[4u * i + 1u];
+    let c = light_words[4u * i + 2u];
+    let d = light_words[4u * i + 3u];
     return Light(
         bitcast<vec3f>(a.xyz), a.w, bitcast<vec3f>(b.xyz), bitcast<f32>(b.w), bitcast<vec3f>(c.xyz), bitcast<f32>(c.w),
         bitcast<f32>(d.x), bitcast<f32>(d.y), d.z, bitcast<f32>(d.w)
@@ -29,7 +29,7 @@ fn light_at(i: u32) -> Light {
 
 // Chance that a light sample goes to analytic light i; 0 for one that only stands in.
 fn chance_of(i: u32) -> f32 {
-    return bitcast<f32>(lights[4u * i + 3u].w) * (1.0 - environment_share());
+    return bitcast<f32>(light_words[4u * i + 3u].w) * (1.0 - environment_share());
 }
 
 fn environment_share() -> f32 {
@@ -44,9 +44,9 @@ struct Choice {
 // An entry of the alias table at vector `first`.
 fn choose(first: u32, count: u32, u: vec2f) -> Choice {
     let i = min(u32(u.x * f32(count)), count - 1u);
-    let entry = lights[first + i];
+    let entry = light_words[first + i];
     let at = select(entry.y, i, u.y < bitcast<f32>(entry.x));
-    let chosen = lights[first + at];
+    let chosen = light_words[first + at];
     return Choice(chosen.w, bitcast<f32>(chosen.z));
 }
 

@@ -135,7 +135,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                     sums.gloss_dir += light_b;
                     sums.analytic += light_c;
                 } else {
-                    add_light(&sums, vertex - 1u, glossy, light_a);
+                    add_weighted(&sums, vertex - 1u, glossy, light_a);
                 }
                 kind = RAY_NONE;
                 continue;
@@ -152,11 +152,11 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
 
         if hit.triangle == NONE {
             if vertex == 0u {
-                sums.background = environment_radiance(direction);
+                sums.background = sky_radiance(direction);
             } else {
-                let sky = environment_radiance(direction) * hit_weight(pdf, environment_density(direction, n_l));
+                let sky = sky_radiance(direction) * hit_weight(pdf, environment_density(direction, n_l));
                 let c = beta * (sky + analytic_hits(origin, direction, FAR, pdf));
-                add_light(&sums, vertex - 1u, glossy, c);
+                add_weighted(&sums, vertex - 1u, glossy, c);
             }
             continue;
         }
@@ -170,7 +170,7 @@ fn path(@builtin(global_invocation_id) id: vec3u) {
                 glow = select(vec3f(0.0), glow, front || (flags & MATERIAL_DOUBLE_SIDED) != 0u);
             }
             glow += analytic_hits(origin, direction, hit.t, pdf);
-            add_light(&sums, vertex - 1u, glossy, beta * glow);
+            add_weighted(&sums, vertex - 1u, glossy, beta * glow);
         }
         if last || rays >= MOST_RAYS { continue; }
         var s = surface_at(hit, direction);

@@ -30,7 +30,7 @@ fn clamped(c: vec3f, vertex: u32) -> vec3f {
 }
 
 // Adds light that vertex number `vertex` sends back along the path.
-fn add_light(sums: ptr<function, Sums>, vertex: u32, glossy: bool, light: vec3f) {
+fn add_weighted(sums: ptr<function, Sums>, vertex: u32, glossy: bool, light: vec3f) {
     let c = clamped(light, vertex);
     let d = select(c, vec3f(0.0), glossy);
     let g = select(vec3f(0.0), c, glossy);

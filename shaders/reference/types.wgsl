@@ -6,9 +6,9 @@ struct SceneInfo {
     // Constant radiance of the surroundings, W/(m² sr); the mean where there is a picture.
     environment: vec3f,
     flags: u32,
-    // Analytic lights, four vectors each, at the start of `lights`.
+    // Analytic lights, four vectors each, at the start of `light_words`.
     light_count: u32,
-    // Alias table over everything that shines in truth: first vector in `lights`, entries.
+    // Alias table over everything that shines in truth: first vector in `light_words`, entries.
     truth_table: u32,
     truth_count: u32,
     // Alias table over the analytic lights (`light_count` entries): first vector.
@@ -20,7 +20,7 @@ struct SceneInfo {
     // Picture of the surroundings in `texels`, three floats a texel: first word and size; width 0
     // for none.
     environment_texels: u32,
-    // Its alias table: first vector in `lights`.
+    // Its alias table: first vector in `light_words`.
     environment_table: u32,
     environment_size: vec2u,
     // Columns and rows of the table.
@@ -121,7 +121,7 @@ struct MaterialStore {
 // `surface.wgsl` reads them.
 @group(0) @binding(3) var<storage, read> triangles: array<vec4u>;
 @group(0) @binding(4) var<storage, read> materials: MaterialStore;
-@group(0) @binding(5) var<storage, read> lights: array<vec4u>;
+@group(0) @binding(5) var<storage, read> light_words: array<vec4u>;
 @group(0) @binding(6) var<storage, read> texels: array<u32>;
 
 @group(1) @binding(0) var<storage, read> job: Job;

@@ -127,7 +127,7 @@ fn deform(@builtin(global_invocation_id) id: vec3u) {
 
 // Where they were in the frame before.
 @compute @workgroup_size(64)
-fn before(@builtin(global_invocation_id) id: vec3u) {
+fn previous(@builtin(global_invocation_id) id: vec3u) {
     if id.x < mesh.count {
         put(id.x, moved(id.x).position);
     }

@@ -12,7 +12,7 @@
 @group(0) @binding(0) var<uniform> frame: Frame;
 
 // Rows of the world-from-object matrix in the frame before, and where the vertex was in the object.
-struct Before {
+struct Previous {
     @location(9) row0: vec4f,
     @location(10) row1: vec4f,
     @location(11) row2: vec4f,
@@ -20,14 +20,14 @@ struct Before {
 }
 
 @vertex
-fn vertex(v: Vertex, before: Before, @builtin(instance_index) instance: u32) -> Varying {
+fn vertex(v: Vertex, previous: Previous, @builtin(instance_index) instance: u32) -> Varying {
     var out = placed(v, frame.clip_from_world);
     out.instance = instance;
     // Differences first: exactly 0 for what has not moved, whatever the compiler fuses.
     let p = vec4f(v.position, 1.0);
-    let d = before.position - v.position;
-    out.back = vec3f(dot(before.row0 - v.row0, p), dot(before.row1 - v.row1, p), dot(before.row2 - v.row2, p))
-        + vec3f(dot(before.row0.xyz, d), dot(before.row1.xyz, d), dot(before.row2.xyz, d));
+    let d = previous.position - v.position;
+    out.back = vec3f(dot(previous.row0 - v.row0, p), dot(previous.row1 - v.row1, p), dot(previous.row2 - v.row2, p))
+        + vec3f(dot(previous.row0.xyz, d), dot(previous.row1.xyz, d), dot(previous.row2.xyz, d));
     return out;
 }
 

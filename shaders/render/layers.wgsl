@@ -36,12 +36,12 @@ struct Options {
 fn layers(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.size.x || id.y >= options.rows { return; }
     var pixel = vec2u(id.x, id.y + options.first_row);
-    if options.layer >= 9u && options.layer <= 11u { pixel = nearest(pixel); }
+    if options.layer >= 9u && options.layer <= 11u { pixel = nearest_sample(pixel); }
     out[id.y * frame.size.x + id.x] = decode(pixel);
 }
 
 // The pixel whose sample lies nearest to this one's centre: a jitter may be wider than a pixel.
-fn nearest(pixel: vec2u) -> vec2u {
+fn nearest_sample(pixel: vec2u) -> vec2u {
     return vec2u(clamp(vec2i(pixel) - vec2i(round(frame.jitter)), vec2i(0), vec2i(frame.size) - 1));
 }
 

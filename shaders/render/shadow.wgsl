@@ -10,13 +10,13 @@ struct ShadowCamera {
 
 @group(0) @binding(0) var<uniform> camera: ShadowCamera;
 
-struct Varying {
+struct ShadowVarying {
     @builtin(position) position: vec4f,
     @location(0) uv: vec4f,
     @location(1) alpha: f32,
 }
 
-struct Vertex {
+struct ShadowVertex {
     @location(0) position: vec3f,
     @location(3) uv0: vec2f,
     @location(4) uv1: vec2f,
@@ -44,12 +44,12 @@ fn opaque(
 
 // Masked and blended casters.
 @vertex
-fn covered(v: Vertex) -> Varying {
-    return Varying(clip(v.position, v.row0, v.row1, v.row2), vec4f(v.uv0, v.uv1), v.color.a);
+fn covered(v: ShadowVertex) -> ShadowVarying {
+    return ShadowVarying(clip(v.position, v.row0, v.row1, v.row2), vec4f(v.uv0, v.uv1), v.color.a);
 }
 
 @fragment
-fn coverage(in: Varying) {
+fn coverage(in: ShadowVarying) {
     let alpha = material.base_color.a * in.alpha
         * textureSample(base_texture, base_sampler, coordinates(material.base_use, in.uv, in.position.xy)).a;
     let q = vec2u(in.position.xy);

@@ -127,12 +127,12 @@ fn nearest(pixel: vec2i) -> vec2i {
     return best;
 }
 
-struct Before {
+struct Reprojected {
     place: vec2f,      // pixels in the previous frame
     distance: f32,     // metres along its axis; 0: background
 }
 
-fn before(pixel: vec2i, centre: vec2i) -> Before {
+fn reprojected(pixel: vec2i, centre: vec2i) -> Reprojected {
     let size = vec2f(frame.size);
     let front = nearest(centre);
     let depth = textureLoad(depth_texture, front, 0).x;
@@ -140,17 +140,17 @@ fn before(pixel: vec2i, centre: vec2i) -> Before {
         let motion = textureLoad(motion_texture, front, 0).xy;
         let point = world_position(frame, vec2u(front), depth);
         let w = (frame.previous_clip_from_world * vec4f(point, 1.0)).w;
-        return Before(vec2f(pixel) + 0.5 + motion * size, w);
+        return Reprojected(vec2f(pixel) + 0.5 + motion * size, w);
     }
     // The background turns with the camera; the geometry pass leaves its motion at 0.
     let direction = frame.world_from_view * vec4f(view_ray(frame, vec2u(pixel)), 0.0);
     let clip = frame.previous_clip_from_world * direction;
     let uv = clip.xy / max(clip.w, 1e-6) * vec2f(0.5, -0.5) + 0.5;
-    return Before(uv * size - frame.jitter, 0.0);
+    return Reprojected(uv * size - frame.jitter, 0.0);
 }
 
 // Whether the surface was seen in the previous frame around where it was.
-fn was_seen(there: Before) -> bool {
+fn was_seen(there: Reprojected) -> bool {
     var seen = false;
     for (var i = 0; i < 9; i++) {
         let z = textureLoad(history_distance, inside(vec2i(floor(there.place)) + vec2i(i % 3, i / 3) - 1), 0).x;
@@ -178,7 +178,7 @@ fn taa(@builtin(global_invocation_id) id: vec3u) {
         mean = old.rgb;
         share = 1.0 / max(0.5 * (count + 2.0), count + 1.0 - 0.5 * (GROWING - 1.0));
     } else if mode == MOVING {
-        let there = before(pixel, centre);
+        let there = reprojected(pixel, centre);
         if all(there.place >= vec2f(0.0)) && all(there.place < vec2f(frame.size)) && was_seen(there) {
             count = min(textureLoad(history, vec2i(floor(there.place)), 0).a, MOST_MOVING);
             mean = held(here, fetch(there.place, here.least));

@@ -12,11 +12,11 @@ struct Tonemap {
     pad: u32,
 }
 
-@group(0) @binding(0) var<uniform> options: Tonemap;
+@group(0) @binding(0) var<uniform> curve: Tonemap;
 @group(0) @binding(1) var hdr: texture_2d<f32>;
 
 @fragment
 fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let radiance = textureLoad(hdr, vec2u(position.xy), 0).rgb;
-    return screen_color(tonemap(options.kind, radiance * options.exposure), options.linear_target);
+    return screen_color(tonemap(curve.kind, radiance * curve.exposure), curve.linear_target);
 }

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use wgpu::util::DeviceExt;
 
 use super::AccelGpu;
-use crate::gpu::{readback, shaders, shared, tape};
+use crate::gpu::{pipeline_cache, readback, shaders, tape};
 
 /// A ray as `rays.wgsl` reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -67,7 +67,7 @@ impl RayCaster {
             },
             count: None,
         };
-        let layout = shared::bind_group_layout(
+        let layout = pipeline_cache::bind_group_layout(
             device,
             &wgpu::BindGroupLayoutDescriptor {
                 label: Some("accel.rays"),

@@ -49,7 +49,7 @@ pub struct SceneRays {
     counts: RayCounts,
     /// Where each instance is.
     placed: Vec<[[f32; 4]; 4]>,
-    moves: u64,
+    version: u64,
 }
 
 impl SceneRays {
@@ -132,14 +132,14 @@ impl SceneRays {
             top_room: trees.top_room,
             counts: RayCounts { triangles, bytes, ..RayCounts::default() },
             placed: Vec::new(),
-            moves: 0,
+            version: 0,
             device: device.clone(),
         })
     }
 
     /// Counts as the same scene as `before`, of which something has changed.
     pub(crate) fn succeed(&mut self, before: &Self) {
-        (self.id, self.moves) = (before.id, self.moves.max(before.moves) + 1);
+        (self.id, self.version) = (before.id, self.version.max(before.version) + 1);
     }
 
     /// Takes over where the instances of `scene` are and how its meshes are deformed; they are
@@ -164,7 +164,7 @@ impl SceneRays {
             if !mesh.follow(deform) {
                 continue;
             }
-            self.moves += 1;
+            self.version += 1;
             if let Some(own) = &mesh.refit {
                 self.accel.write(queue, own.tree.root, &own.tree.blocks);
                 gpu::write(queue, self.normals.texture(), mesh.first_triangle, &own.normals);
@@ -182,7 +182,7 @@ impl SceneRays {
         let count = instances.len();
         if !self.placed.iter().copied().eq(instances.clone().map(|i| i.1)) {
             self.placed = instances.clone().map(|i| i.1).collect();
-            self.moves += 1;
+            self.version += 1;
         }
         let placed = placed(&self.meshes, instances);
         let top = top(&placed, self.top_room);
@@ -212,9 +212,9 @@ impl SceneRays {
         self.id
     }
 
-    /// Another number whenever an instance is elsewhere than before.
-    pub fn moves(&self) -> u64 {
-        self.moves
+    /// Rises whenever an instance or a vertex moves.
+    pub fn version(&self) -> u64 {
+        self.version
     }
 
     /// Nodes and leaves.

@@ -133,7 +133,7 @@ impl<'a> Picture<'a> {
 
     /// `gi.ambient`: E/π of every pixel, given each pixel's visibility.
     pub fn ambient(&self, exposure: &Exposure, visibility: &[f32]) -> Vec<[f32; 3]> {
-        let unseen: [f32; 3] = std::array::from_fn(|c| {
+        let ambient_term: [f32; 3] = std::array::from_fn(|c| {
             let [sky, bounce] = [self.params.environment[c], exposure.outgoing[c]];
             SKY * sky + BOUNCE * bounce
         });
@@ -141,7 +141,7 @@ impl<'a> Picture<'a> {
             if self.distance_at(pixel) <= 0.0 {
                 return [0.0; 3];
             }
-            unseen.map(|u| (u * visible).min(LARGEST))
+            ambient_term.map(|u| (u * visible).min(LARGEST))
         };
         self.all_pixels().zip(visibility).map(light).collect()
     }

@@ -3,7 +3,7 @@
 //! over the same things every frame makes each group once.
 
 pub use super::bound::Bound;
-use super::{shared, tape};
+use super::{pipeline_cache, tape};
 
 /// Groups that are kept: enough for both halves of a ping-pong under triple buffering.
 const CAPACITY: usize = 8;
@@ -31,7 +31,7 @@ impl Binder {
             })
             .collect();
         let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries };
-        let layout = shared::bind_group_layout(device, &descriptor);
+        let layout = pipeline_cache::bind_group_layout(device, &descriptor);
         Self { device: device.clone(), label, layout, groups: Vec::with_capacity(CAPACITY), next: 0, made: 0 }
     }
 
@@ -66,7 +66,7 @@ impl Binder {
     }
 
     /// Lets go of all groups, and so of what is bound in them.
-    pub fn forget(&mut self) {
+    pub fn release_bindings(&mut self) {
         self.groups.clear();
         self.next = 0;
     }

@@ -4,7 +4,7 @@
 //! `WGPU_BACKEND` and `WGPU_ADAPTER_NAME` are obeyed; explicit options win over them. Every request
 //! is answered by an adapter or by a [`GpuError`] that lists what was found and how to get one.
 
-use super::shared::Shared;
+use super::pipeline_cache::PipelineCache;
 use thiserror::Error;
 
 /// Backends by the names of the command line.
@@ -107,7 +107,7 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// Name, driver, backend, kind.
     pub info: wgpu::AdapterInfo,
-    _shared: Shared,
+    _pipeline_cache: PipelineCache,
 }
 
 impl Gpu {
@@ -205,8 +205,8 @@ impl Gpu {
 
     /// A device that was opened on `adapter`, and its queue.
     pub fn of(adapter: wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        let (info, _shared) = (adapter.get_info(), Shared::of(&device));
-        Self { adapter, device, queue, info, _shared }
+        let (info, _pipeline_cache) = (adapter.get_info(), PipelineCache::of(&device));
+        Self { adapter, device, queue, info, _pipeline_cache }
     }
 
     /// True for an adapter that runs on the CPU.

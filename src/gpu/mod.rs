@@ -9,12 +9,12 @@ pub mod binding;
 pub mod bound;
 mod choose;
 #[doc(hidden)]
+pub mod pipeline_cache;
+#[doc(hidden)]
 pub mod probe;
 pub mod readback;
 #[doc(hidden)]
 pub mod shaders;
-#[doc(hidden)]
-pub mod shared;
 #[doc(hidden)]
 pub mod tape;
 pub mod timing;

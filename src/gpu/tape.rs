@@ -3,7 +3,7 @@
 //! Without one, what is compiled is [`shared`].
 
 use super::bound::Bound;
-use super::shared;
+use super::pipeline_cache;
 use std::cell::{Cell, RefCell};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -61,9 +61,9 @@ struct Tape {
 }
 
 /// A tape that runs on this thread until it is dropped. There is one at a time.
-pub struct Running(());
+pub struct DispatchCapture(());
 
-impl Running {
+impl DispatchCapture {
     /// Starts.
     pub fn start() -> Self {
         TAPE.take();
@@ -88,7 +88,7 @@ impl Running {
     }
 }
 
-impl Drop for Running {
+impl Drop for DispatchCapture {
     fn drop(&mut self) {
         RUNS.set(false);
         COUNTS.set(false);
@@ -134,7 +134,7 @@ pub fn shader_module(device: &wgpu::Device, name: &str, text: String) -> wgpu::S
         device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source })
     };
     if !runs() {
-        return shared::shader_module(device, name, &text, make);
+        return pipeline_cache::shader_module(device, name, &text, make);
     }
     let module = make();
     write(|tape| tape.sources.push((module.clone(), Source { name: name.to_owned(), text })));
@@ -150,7 +150,7 @@ pub fn pipeline_layout(
     let descriptor =
         wgpu::PipelineLayoutDescriptor { label: Some(label), bind_group_layouts: groups, immediate_size: 0 };
     if !runs() {
-        return shared::pipeline_layout(device, &descriptor);
+        return pipeline_cache::pipeline_layout(device, &descriptor);
     }
     let layout = device.create_pipeline_layout(&descriptor);
     write(|tape| tape.layouts.push((layout.clone(), groups.iter().map(|g| g.cloned()).collect())));
@@ -163,7 +163,7 @@ pub fn compute_pipeline(
     descriptor: &wgpu::ComputePipelineDescriptor<'_>,
 ) -> wgpu::ComputePipeline {
     if !runs() {
-        return shared::compute_pipeline(device, descriptor);
+        return pipeline_cache::compute_pipeline(device, descriptor);
     }
     let pipeline = device.create_compute_pipeline(descriptor);
     write(|tape| {

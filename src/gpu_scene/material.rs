@@ -2,7 +2,7 @@
 
 use super::texture::Textures;
 use super::{UploadError, filled};
-use crate::gpu::shared;
+use crate::gpu::pipeline_cache;
 use crate::scene::{AlphaMode, Material, Sampler, Scene, TextureRef, Wrap};
 use bytemuck::{Pod, Zeroable};
 use std::collections::HashMap;
@@ -168,7 +168,7 @@ pub fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         entries.push(entry(6 + i, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)));
     }
     entries.sort_by_key(|e| e.binding);
-    shared::bind_group_layout(
+    pipeline_cache::bind_group_layout(
         device,
         &wgpu::BindGroupLayoutDescriptor { label: Some("scene.material"), entries: &entries },
     )

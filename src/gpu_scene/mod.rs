@@ -121,7 +121,7 @@ pub struct SceneGpu {
     /// The lights, for shadow fitting; a sun that a picture of the surroundings holds is the last.
     pub lights: Vec<Light>,
     /// Another number whenever one of them, or the surroundings, is another than before.
-    pub lights_epoch: u64,
+    pub light_version: u64,
     /// What lights the scene from beyond it: `radiance` is the mean without that sun.
     pub environment: Environment,
     /// The same as a lat-long `Rgba32Float` picture; one texel for a constant. rgb is without the
@@ -196,7 +196,7 @@ impl SceneGpu {
             material_groups: materials.groups,
             light_buffer,
             lights,
-            lights_epoch: 0,
+            light_version: 0,
             environment: sky.environment,
             environment_view: sky.view,
             sky_sun: sky.sun,
@@ -254,7 +254,7 @@ impl SceneGpu {
         // A spot's maps depend on how wide it is.
         let kind = |l: &Light| (std::mem::discriminant(&l.kind), fits_one_map(&l.kind));
         let same = self.lights.iter().map(kind).eq(lights.iter().map(kind));
-        self.lights_epoch += u64::from(self.lights != lights);
+        self.light_version += u64::from(self.lights != lights);
         self.lights = lights;
         if same {
             queue.write_buffer(&self.light_buffer, 0, bytemuck::cast_slice(&list));
@@ -276,7 +276,7 @@ impl SceneGpu {
     ) -> Result<(), UploadError> {
         let mut warnings = Vec::new();
         let sky = sky::upload(device, queue, &scene.environment, &mut warnings)?;
-        self.lights_epoch += 1;
+        self.light_version += 1;
         self.environment = sky.environment;
         self.environment_view = sky.view;
         self.warnings.extend(warnings);

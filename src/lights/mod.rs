@@ -29,7 +29,7 @@ pub struct LightGpu {
     /// Offset of the cone's ramp.
     pub cone_offset: f32,
     /// 1 for a light that stands for a surface that glows: rays meet the surface itself.
-    pub stands_in: u32,
+    pub is_emissive_proxy: u32,
     /// For whoever draws lights by lot: this light is drawn by numbers of [0, 1) below this and not
     /// below the `chance` of the light before it in the list ([`LightGpu::list`]). (The path tracer
     /// keeps its own chance here.)
@@ -55,7 +55,8 @@ pub fn fits_one_map(kind: &LightKind) -> bool {
 impl LightGpu {
     /// The shader's form of `light`; one with anything that is no number gives none.
     pub fn new(light: &Light) -> Self {
-        let dark = Self { direction: [0.0, -1.0, 0.0], stands_in: light.stands_in.into(), ..Self::zeroed() };
+        let dark =
+            Self { direction: [0.0, -1.0, 0.0], is_emissive_proxy: light.is_emissive_proxy.into(), ..Self::zeroed() };
         Self::finite(light).unwrap_or(dark)
     }
 
@@ -71,7 +72,7 @@ impl LightGpu {
     fn of(light: &Light) -> Self {
         let tint = |strength: f32| light.color.map(|c| c * strength);
         let unit = |v: [f32; 3]| glam::Vec3::from(v).try_normalize().unwrap_or(glam::Vec3::NEG_Y).to_array();
-        let zero = Self { stands_in: light.stands_in.into(), ..Self::zeroed() };
+        let zero = Self { is_emissive_proxy: light.is_emissive_proxy.into(), ..Self::zeroed() };
         match light.kind {
             LightKind::Directional { direction, irradiance, angle } => Self {
                 direction: unit(direction),
@@ -135,7 +136,7 @@ impl LightGpu {
 fn power(light: &Light) -> f64 {
     use std::f64::consts::PI;
     let strength = match light.kind {
-        _ if light.stands_in => 0.0,
+        _ if light.is_emissive_proxy => 0.0,
         LightKind::Directional { irradiance, .. } => f64::from(irradiance),
         LightKind::Point { intensity, .. } => f64::from(intensity) * 4.0 * PI,
         LightKind::Spot { intensity, outer_angle, .. } => {
@@ -153,7 +154,7 @@ mod tests {
 
     #[test]
     fn every_light_has_its_share_and_suns_do_not_drown() {
-        let light = |kind, stands_in| Light { name: String::new(), color: [1.0; 3], kind, stands_in };
+        let light = |kind, is_emissive_proxy| Light { name: String::new(), color: [1.0; 3], kind, is_emissive_proxy };
         let lamp = |w| light(LightKind::Point { position: [0.0; 3], intensity: w, radius: 0.1, range: None }, false);
         let sun = light(LightKind::Directional { direction: [0.0, -1.0, 0.0], irradiance: 1.0, angle: 0.0 }, false);
         let mut lights = vec![lamp(1.0), sun, lamp(0.0), lamp(3.0), light(lamp(9.0).kind, true)];

@@ -169,12 +169,14 @@ fn check_fields(document: &Document<'_>, problems: &mut Vec<Problem>) {
 /// Every feature against its table; fills in the encodings that version 1 does not write.
 fn check_inputs(document: &mut Document<'_>, problems: &mut Vec<Problem>) {
     let Table { name, version } = &document.table;
-    if *version != 1 {
-        problems.push(Problem::Version { what: format!("feature table `{name}`"), found: *version, known: 1 });
+    let newest = TABLES.iter().find(|t| t.name == name).map_or(1, |t| t.version);
+    if *version == 0 || *version > u64::from(newest) {
+        problems.push(Problem::Version { what: format!("feature table `{name}`"), found: *version, known: newest });
         return;
     }
-    let Some(table) = TABLES.iter().find(|t| t.name == name) else {
-        let known: Vec<_> = TABLES.iter().map(|t| t.name).collect();
+    let Some(table) = TABLES.iter().find(|t| t.name == name && u64::from(t.version) == *version) else {
+        let mut known: Vec<_> = TABLES.iter().map(|t| t.name).collect();
+        known.dedup();
         problems.push(Problem::Document(match name.as_str() {
             LEFT_TABLE => format!("feature table `{name}` has left: {CORRECTS}"),
             _ => format!("feature table `{name}` is unknown; known: {}", known.join(", ")),
@@ -205,7 +207,7 @@ fn check_inputs(document: &mut Document<'_>, problems: &mut Vec<Problem>) {
             continue;
         }
         let Some(at) = table.features.iter().position(|f| f.name == name.as_str()) else {
-            fault(format!("table `{}` version 1 has no such feature", table.name));
+            fault(format!("table `{}` version {} has no such feature", table.name, table.version));
             continue;
         };
         let row = &table.features[at];

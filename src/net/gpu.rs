@@ -9,23 +9,23 @@ pub(crate) mod build;
 mod conv;
 mod examples;
 mod kernel;
+pub mod kernel_config;
 mod kernels;
 pub mod layer;
+mod layer_readback;
 mod pack;
-pub mod permutation;
-mod tap;
 
 use super::format::Weights;
 use super::graph::Graph;
 use super::plan::{Plan, PlanError, Precision};
-use crate::gpu::{shared::Shared, timing::Recorder};
+use crate::gpu::{pipeline_cache::PipelineCache, timing::Recorder};
 use build::{Layer, Memory};
 pub use examples::example_preludes;
 pub use kernel::{Bound, Choice, Kernel, Numbers, Part, Sum};
+pub use kernel_config::{Facts, KernelConfig, Source, Tuned, Variant};
 pub use layer::Filter;
-pub use permutation::{Facts, Permutation, Source, Tuned, Variant};
+pub use layer_readback::LayerReadback;
 use std::sync::Arc;
-pub use tap::Tap;
 use thiserror::Error;
 
 /// Why a network cannot run on this device.
@@ -127,7 +127,7 @@ pub struct Network {
     options: Options,
     memory: Memory,
     layers: Vec<Layer>,
-    _shared: Shared,
+    _pipeline_cache: PipelineCache,
     tuned: Arc<Tuned>,
 }
 
@@ -145,7 +145,7 @@ impl Network {
         setup: impl Into<Setup>,
     ) -> Result<Self, NetError> {
         let Setup { options, tuned } = setup.into();
-        let _shared = Shared::of(device);
+        let _pipeline_cache = PipelineCache::of(device);
         let plan = build::plan(device, &weights.graph, size, options)?;
         let choice = Choice { variant: options.variant, tuned: &tuned, facts: Facts::of(device) };
         let kernels: Vec<Kernel> = plan.steps.iter().map(|s| Kernel::choose(&plan, s, &choice)).collect();
@@ -154,7 +154,7 @@ impl Network {
         queue.write_buffer(&memory.steps, 0, &build::uniforms(&plan, &kernels, options.dropout));
         let layers = build::layers(device, &plan, kernels, &memory);
         let graph = weights.graph.clone();
-        let network = Self { graph, plan, options, memory, layers, _shared, tuned };
+        let network = Self { graph, plan, options, memory, layers, _pipeline_cache, tuned };
         network.upload(queue, weights);
         Ok(network)
     }
@@ -171,7 +171,7 @@ impl Network {
         weights: &Weights,
         size: [u32; 2],
     ) -> Result<Self, NetError> {
-        let Self { options, tuned, _shared, .. } = self;
+        let Self { options, tuned, _pipeline_cache, .. } = self;
         Self::new(device, queue, weights, size, Setup { options, tuned })
     }
 
@@ -186,7 +186,7 @@ impl Network {
         weights: &Weights,
         tuned: Arc<Tuned>,
     ) -> Result<Self, NetError> {
-        let Self { options, plan, _shared, .. } = self;
+        let Self { options, plan, _pipeline_cache, .. } = self;
         Self::new(device, queue, weights, [plan.width, plan.height], Setup { options, tuned })
     }
 

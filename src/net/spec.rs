@@ -40,6 +40,8 @@ pub struct FeatureRow {
 pub struct FeatureTable {
     /// Name in files.
     pub name: &'static str,
+    /// Version in files.
+    pub version: u32,
     /// Rows; empty where anything goes.
     pub features: &'static [FeatureRow],
     /// A network uses its features in the table's order.
@@ -50,8 +52,21 @@ const fn row(name: &'static str, channels: u32, encodings: &'static [&'static st
     FeatureRow { name, channels, encodings }
 }
 
-/// Table `cells`, version 1: what `gather` remembers of each cell; `gi::neural::memory` says what
-/// the encodings are.
+/// Table `cells`, version 2: the history of each cell; `gi::neural::memory` documents the encodings.
+pub const CELLS_V2: &[FeatureRow] = &[
+    row("light", 1, &["over_sum_with_exposure"]),
+    row("chroma", 2, &["differences_over_sum"]),
+    row("deviation", 1, &["log1p_over_light"]),
+    row("history_length", 1, &["inverse_root"]),
+    row("fast_history", 1, &["difference_over_sum"]),
+    row("hit_proximity", 1, &["twice_width_over_length"]),
+    row("depth", 1, &["log_over_mean"]),
+    row("normal", 3, &["gravity_frame"]),
+    row("hit", 1, &["flag"]),
+    row("dominant_direction", 3, &["gravity_frame"]),
+];
+
+/// Table `cells`, version 1: the same by other names.
 pub const CELLS_V1: &[FeatureRow] = &[
     row("light", 1, &["over_sum_with_exposure"]),
     row("chroma", 2, &["differences_over_sum"]),
@@ -74,9 +89,10 @@ const PICTURE: &[&str] = &["signed", "signed_stretched", "unit"];
 pub const IMAGES_V1: &[FeatureRow] =
     &[row("depth", 3, PICTURE), row("direct", 3, PICTURE), row("diffuse", 3, PICTURE), row("normal", 3, PICTURE)];
 
-/// Every feature table.
+/// Every feature table, the newest version of each first.
 pub const TABLES: &[FeatureTable] = &[
-    FeatureTable { name: "cells", features: CELLS_V1, ordered: true },
-    FeatureTable { name: "images", features: IMAGES_V1, ordered: false },
-    FeatureTable { name: "free", features: &[], ordered: false },
+    FeatureTable { name: "cells", version: 2, features: CELLS_V2, ordered: true },
+    FeatureTable { name: "cells", version: 1, features: CELLS_V1, ordered: true },
+    FeatureTable { name: "images", version: 1, features: IMAGES_V1, ordered: false },
+    FeatureTable { name: "free", version: 1, features: &[], ordered: false },
 ];

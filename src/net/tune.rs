@@ -6,9 +6,9 @@
 //! costs time, never correctness.
 
 use super::format::Weights;
+use super::gpu::kernel_config::MAX_PARTS;
 use super::gpu::layer::Layer;
-use super::gpu::permutation::MAX_PARTS;
-use super::gpu::{Facts, NetError, Network, Options, Permutation, Setup, Tuned};
+use super::gpu::{Facts, KernelConfig, NetError, Network, Options, Setup, Tuned};
 use crate::gpu::timing::Recorder;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -53,7 +53,8 @@ pub enum CacheError {
 #[serde(deny_unknown_fields)]
 pub struct Found {
     /// The fastest.
-    pub permutation: Permutation,
+    #[serde(rename = "permutation")]
+    pub config: KernelConfig,
     /// Its time, milliseconds.
     pub ms: f64,
 }
@@ -86,7 +87,7 @@ impl Cache {
             return Err(CacheError::Version { found: cache.version });
         }
         let sound = |f: &Found| {
-            let p = f.permutation;
+            let p = f.config;
             (1..=4).contains(&p.vectors) && (1..=MAX_PARTS).contains(&p.parts) && f.ms.is_finite() && f.ms >= 0.0
         };
         let wrong = cache.devices.values().flatten().find(|(_, found)| !sound(found));
@@ -105,7 +106,7 @@ impl Cache {
     /// What is known of a device.
     pub fn tuned(&self, info: &wgpu::AdapterInfo) -> Tuned {
         let layers = self.devices.get(&device(info)).into_iter().flatten();
-        layers.map(|(layer, found)| (layer.clone(), found.permutation)).collect()
+        layers.map(|(layer, found)| (layer.clone(), found.config)).collect()
     }
 
     /// Remembers one layer's.
@@ -127,9 +128,9 @@ pub struct Report {
     /// Which.
     pub layer: Layer,
     /// What runs without a tuner, and its milliseconds.
-    pub guess: (Permutation, f64),
+    pub guess: (KernelConfig, f64),
     /// What was found, and its milliseconds.
-    pub best: (Permutation, f64),
+    pub best: (KernelConfig, f64),
     /// How many were timed.
     pub tried: usize,
 }
@@ -156,7 +157,7 @@ pub fn tune(
         |tuned: &Tuned| Network::new(device, queue, weights, size, Setup { options, tuned: Arc::new(tuned.clone()) });
     let mut champion = build(&known)?;
     // Steps of one shape share what is found.
-    let mut rivals: BTreeMap<String, (usize, Layer, Vec<Permutation>)> = BTreeMap::new();
+    let mut rivals: BTreeMap<String, (usize, Layer, Vec<KernelConfig>)> = BTreeMap::new();
     for (step, kernel) in champion.kernels().enumerate() {
         if let Some(layer) = kernel.layer.filter(|l| !known.contains_key(&l.to_string())) {
             rivals.entry(layer.to_string()).or_insert((step, layer, layer.candidates(champion.plan(), facts)));
@@ -172,7 +173,7 @@ pub fn tune(
             stopped = true;
             break;
         }
-        let rival = |name: &String, now: &Permutation| {
+        let rival = |name: &String, now: &KernelConfig| {
             let candidates = rivals.get(name).map(|(_, _, candidates)| candidates);
             (name.clone(), candidates.and_then(|c| c.get(round)).copied().unwrap_or(*now))
         };
@@ -189,11 +190,11 @@ pub fn tune(
         }
         champion = champion.retuned((device, queue), weights, Arc::new(best.clone()))?;
     }
-    let report = |(name, (_, layer, candidates)): (&String, &(usize, Layer, Vec<Permutation>))| {
+    let report = |(name, (_, layer, candidates)): (&String, &(usize, Layer, Vec<KernelConfig>))| {
         let (guess, ms) = times.get(name).copied().unwrap_or_default();
-        let permutation = best[name];
-        cache.insert(&info, layer, Found { permutation, ms });
-        Report { layer: *layer, guess: (candidates[0], guess), best: (permutation, ms), tried: candidates.len() }
+        let config = best[name];
+        cache.insert(&info, layer, Found { config, ms });
+        Report { layer: *layer, guess: (candidates[0], guess), best: (config, ms), tried: candidates.len() }
     };
     Ok(rivals.iter().filter(|(name, _)| !stopped || times.contains_key(name)).map(report).collect())
 }

@@ -1,8 +1,8 @@
 //! Surfaces that cover a share of what is behind them, drawn over the picture from far to near.
 
 use super::cull::{Count, Volume};
+use super::pipelines;
 use super::targets::Targets;
-use super::tool;
 use super::view::View;
 use crate::gpu::{shaders, tape, timing::Recorder};
 use crate::gpu_scene::{Draw, SceneGpu, attribute_layouts, material_layout};
@@ -62,7 +62,12 @@ impl BlendedPass {
     /// [`DirectPass::light_layout`](super::direct::DirectPass::light_layout).
     pub fn new(device: &wgpu::Device, lights: &wgpu::BindGroupLayout) -> Self {
         let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
-        let layout = tool::layout(device, "render.blended", stages, &[tool::UNIFORM, tool::LOAD, tool::LOAD]);
+        let layout = pipelines::layout(
+            device,
+            "render.blended",
+            stages,
+            &[pipelines::UNIFORM, pipelines::LOAD, pipelines::LOAD],
+        );
         let pipeline_layout = tape::pipeline_layout(
             device,
             "render.blended",
@@ -75,22 +80,23 @@ impl BlendedPass {
             write_mask: wgpu::ColorWrites::ALL,
         };
         let pipelines = [Some(wgpu::Face::Back), Some(wgpu::Face::Front), None].map(|cull| {
-            let drawn = tool::Drawn {
+            let drawn = pipelines::Drawn {
                 buffers: &attribute_layouts(),
                 targets: &[Some(target.clone())],
                 cull,
                 writes_depth: false,
                 constants: &[],
             };
-            tool::mesh(device, "render.blended", (&pipeline_layout, &module), drawn)
+            pipelines::mesh(device, "render.blended", (&pipeline_layout, &module), drawn)
         });
         Self { pipelines, layout }
     }
 
     /// Binds what is known of the surfaces behind; rebuilt on resize.
     pub fn picture(&self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets) -> wgpu::BindGroup {
-        let resources = [frame.as_entire_binding(), tool::view(&targets.indirect), tool::view(&targets.emissive)];
-        tool::group(device, "render.blended", &self.layout, &resources)
+        let resources =
+            [frame.as_entire_binding(), pipelines::view(&targets.indirect), pipelines::view(&targets.emissive)];
+        pipelines::group(device, "render.blended", &self.layout, &resources)
     }
 
     /// Draws over `hdr`, and adds to `count`; nothing is recorded where nothing that blends is to

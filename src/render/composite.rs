@@ -1,7 +1,7 @@
 //! Puts light and surface together into `hdr` (compute).
 
+use super::pipelines;
 use super::targets::{Target, Targets};
-use super::tool;
 use crate::gpu::timing::Recorder;
 
 /// What is seen where there is no surface. Surfaces are lit by the surroundings in any case.
@@ -52,10 +52,10 @@ pub struct CompositePass {
 impl CompositePass {
     /// Builds the pipeline.
     pub fn new(device: &wgpu::Device) -> Self {
-        use tool::*;
+        use pipelines::*;
         let types = [UNIFORM, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, STORE_HALF];
         let layout = layout(device, "render.composite", wgpu::ShaderStages::COMPUTE, &types);
-        let sky_layout = tool::layout(device, "render.composite", wgpu::ShaderStages::COMPUTE, &[LOAD]);
+        let sky_layout = pipelines::layout(device, "render.composite", wgpu::ShaderStages::COMPUTE, &[LOAD]);
         let pipeline = compute(device, "render.composite", "composite", &[&layout, &sky_layout]);
         Self { pipeline, layout, sky_layout }
     }
@@ -69,20 +69,20 @@ impl CompositePass {
         output: &Target,
     ) -> wgpu::BindGroup {
         let t = targets;
-        tool::group(
+        pipelines::group(
             device,
             "render.composite",
             &self.layout,
             &[
                 frame.as_entire_binding(),
-                tool::view(&t.depth),
-                tool::view(&t.albedo),
-                tool::view(&t.emissive),
-                tool::view(&t.direct_diffuse),
-                tool::view(&t.direct_specular),
-                tool::view(&t.indirect),
-                tool::view(&t.indirect_specular),
-                tool::view(output),
+                pipelines::view(&t.depth),
+                pipelines::view(&t.albedo),
+                pipelines::view(&t.emissive),
+                pipelines::view(&t.direct_diffuse),
+                pipelines::view(&t.direct_specular),
+                pipelines::view(&t.indirect),
+                pipelines::view(&t.indirect_specular),
+                pipelines::view(output),
             ],
         )
     }
@@ -90,7 +90,7 @@ impl CompositePass {
     /// Binds the environment; rebuilt when the scene changes.
     pub fn sky(&self, device: &wgpu::Device, environment: &wgpu::TextureView) -> wgpu::BindGroup {
         let resources = [wgpu::BindingResource::TextureView(environment)];
-        tool::group(device, "render.composite", &self.sky_layout, &resources)
+        pipelines::group(device, "render.composite", &self.sky_layout, &resources)
     }
 
     /// Fills the output.
@@ -105,7 +105,7 @@ impl CompositePass {
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, picture, &[]);
             pass.set_bind_group(1, sky, &[]);
-            tool::dispatch(pass, size);
+            pipelines::dispatch(pass, size);
         });
     }
 }

@@ -2,7 +2,7 @@
 //! or into a texture each, for temporal anti-aliasing.
 
 use super::targets::{Target, Targets};
-use super::{RenderError, Renderer, tool};
+use super::{RenderError, Renderer, pipelines};
 use crate::gpu::{Gpu, readback, timing::Recorder};
 
 /// The shader's number for the picture itself.
@@ -10,9 +10,9 @@ pub(super) const PICTURE: u32 = 0;
 
 /// What either way reads.
 fn read_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let mut types = vec![tool::UNIFORM];
-    types.extend([tool::LOAD; 11]);
-    tool::layout(device, "render.layers", wgpu::ShaderStages::COMPUTE, &types)
+    let mut types = vec![pipelines::UNIFORM];
+    types.extend([pipelines::LOAD; 11]);
+    pipelines::layout(device, "render.layers", wgpu::ShaderStages::COMPUTE, &types)
 }
 
 /// The frame's textures with `picture` for the picture.
@@ -37,8 +37,8 @@ fn read(
         picture,
     ];
     let mut resources = vec![frame.as_entire_binding()];
-    resources.extend(views.map(tool::view));
-    tool::group(device, "render.layers", layout, &resources)
+    resources.extend(views.map(pipelines::view));
+    pipelines::group(device, "render.layers", layout, &resources)
 }
 
 /// Turns G-buffer texels into textures of layers.
@@ -56,10 +56,10 @@ impl LayerWriter {
     pub fn new(device: &wgpu::Device) -> Self {
         let stage = wgpu::ShaderStages::COMPUTE;
         let read_layout = read_layout(device);
-        let options_layout = tool::layout(device, "render.layers", stage, &[tool::READ]);
-        let write_layout = tool::layout(device, "render.layers", stage, &[tool::STORE_HALF]);
+        let options_layout = pipelines::layout(device, "render.layers", stage, &[pipelines::READ]);
+        let write_layout = pipelines::layout(device, "render.layers", stage, &[pipelines::STORE_HALF]);
         let layouts = [&read_layout, &options_layout, &write_layout];
-        let pipeline = tool::compute(device, "render.layers", "layer_texture", &layouts);
+        let pipeline = pipelines::compute(device, "render.layers", "layer_texture", &layouts);
         Self { pipeline, read_layout, options_layout, write_layout }
     }
 
@@ -79,8 +79,8 @@ impl LayerWriter {
         });
         LayerGroups([
             read(device, &self.read_layout, frame, targets, &targets.hdr),
-            tool::group(device, "render.layers", &self.options_layout, &[options.as_entire_binding()]),
-            tool::group(device, "render.layers", &self.write_layout, &[tool::view(texture)]),
+            pipelines::group(device, "render.layers", &self.options_layout, &[options.as_entire_binding()]),
+            pipelines::group(device, "render.layers", &self.write_layout, &[pipelines::view(texture)]),
         ])
     }
 
@@ -90,7 +90,7 @@ impl LayerWriter {
             for (i, group) in (0..).zip(&groups.0) {
                 pass.set_bind_group(i, group, &[]);
             }
-            tool::dispatch(pass, size);
+            pipelines::dispatch(pass, size);
         });
     }
 }
@@ -112,7 +112,7 @@ pub(super) struct Decoder {
 
 impl Decoder {
     pub fn new(device: &wgpu::Device, renderer: &Renderer) -> Self {
-        use tool::*;
+        use pipelines::*;
         let t = renderer.targets();
         let stage = wgpu::ShaderStages::COMPUTE;
         let read_layout = read_layout(device);
@@ -160,7 +160,7 @@ impl Decoder {
                 pass.set_pipeline(&self.pipeline);
                 pass.set_bind_group(0, picture, &[]);
                 pass.set_bind_group(1, &self.output, &[]);
-                tool::dispatch(pass, [size[0], rows]);
+                pipelines::dispatch(pass, [size[0], rows]);
             });
             gpu.queue.submit([encoder.finish()]);
             let bytes = u64::from(rows) * u64::from(size[0]) * 16;

@@ -3,10 +3,10 @@
 //! Positions, normals and tangents are written into the scene's own vertex buffers, so that
 //! shadows, the G-buffer and veils draw what has moved without knowing of it; any renderer may do
 //! so, for all write the same. Where vertices were in the frame before is each renderer's own
-//! memory, as with [`moved`](super::moved): what it showed last, kept as a few numbers a joint, is
+//! memory, as with [`previous_transforms`](super::previous_transforms): what it showed last, kept as a few numbers a joint, is
 //! evaluated again into a buffer of its own. While the pose stays nothing is recorded.
 
-use super::tool;
+use super::pipelines;
 use crate::gpu::timing::Recorder;
 use crate::gpu_scene::{DeformGpu, SceneGpu};
 
@@ -43,9 +43,10 @@ impl DeformPass {
             has_dynamic_offset: true,
             min_binding_size: None,
         };
-        let types = [mesh, tool::READ, tool::READ, tool::READ_WRITE, tool::READ_WRITE];
-        let layout = tool::layout(device, "render.deform", wgpu::ShaderStages::COMPUTE, &types);
-        let pipelines = ["deform", "before"].map(|entry| tool::compute(device, "render.deform", entry, &[&layout]));
+        let types = [mesh, pipelines::READ, pipelines::READ, pipelines::READ_WRITE, pipelines::READ_WRITE];
+        let layout = pipelines::layout(device, "render.deform", wgpu::ShaderStages::COMPUTE, &types);
+        let pipelines =
+            ["deform", "previous"].map(|entry| pipelines::compute(device, "render.deform", entry, &[&layout]));
         Self { device: device.clone(), layout, pipelines, bound: None, last: None, moving: false }
     }
 
@@ -92,7 +93,7 @@ impl DeformPass {
     }
 
     /// The next frame has nothing to do with the last: a cut.
-    pub fn cut(&mut self) {
+    pub fn reset_history(&mut self) {
         self.last = None;
     }
 
@@ -128,7 +129,7 @@ impl DeformPass {
                 part(positions, 12 * vertices),
                 part(&scene.attributes, 36 * vertices),
             ];
-            tool::group(&self.device, "render.deform", &self.layout, &resources)
+            pipelines::group(&self.device, "render.deform", &self.layout, &resources)
         };
         let groups = [group(&poses[0], &scene.positions), group(&poses[1], &before)];
         Bound { scene: scene.id, poses, groups, before }

@@ -1,9 +1,9 @@
 //! Direct light of the analytic lights (compute): diffuse as E/π, specular as radiance.
 
 use super::lights::LightLists;
+use super::pipelines;
 use super::shadow::ShadowMaps;
 use super::targets::Targets;
-use super::tool;
 use crate::gpu::timing::Recorder;
 use crate::gpu_scene::SceneGpu;
 
@@ -28,7 +28,7 @@ pub struct DirectInputs<'a> {
 impl DirectPass {
     /// Builds the pipeline.
     pub fn new(device: &wgpu::Device) -> Self {
-        use tool::*;
+        use pipelines::*;
         let stage = wgpu::ShaderStages::COMPUTE;
         let comparison = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
         let picture_layout =
@@ -54,17 +54,17 @@ impl DirectPass {
 
     /// Binds the G-buffer.
     pub fn picture(&self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets) -> wgpu::BindGroup {
-        tool::group(
+        pipelines::group(
             device,
             "render.direct",
             &self.picture_layout,
             &[
                 frame.as_entire_binding(),
-                tool::view(&targets.depth),
-                tool::view(&targets.normal),
-                tool::view(&targets.specular),
-                tool::view(&targets.direct_diffuse),
-                tool::view(&targets.direct_specular),
+                pipelines::view(&targets.depth),
+                pipelines::view(&targets.normal),
+                pipelines::view(&targets.specular),
+                pipelines::view(&targets.direct_diffuse),
+                pipelines::view(&targets.direct_specular),
             ],
         )
     }
@@ -82,7 +82,7 @@ impl DirectPass {
         maps: &ShadowMaps,
         lists: &LightLists,
     ) -> wgpu::BindGroup {
-        tool::group(
+        pipelines::group(
             device,
             "render.direct",
             &self.light_layout,
@@ -106,7 +106,7 @@ impl DirectPass {
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, inputs.picture, &[]);
             pass.set_bind_group(2, inputs.lights, &[]);
-            tool::dispatch(pass, inputs.size);
+            pipelines::dispatch(pass, inputs.size);
         });
     }
 }

@@ -1,4 +1,4 @@
-//! The frame, pass by pass: deform → shadow → gbuffer (→ lights) → direct → indirect → glossy →
+//! The frame, pass by pass: deform → shadow → gbuffer (→ lights) → direct → indirect → ssr →
 //! composite → blended (→ taa). A display adds `tonemap` after it.
 
 use super::RenderError;
@@ -7,14 +7,14 @@ use super::composite::Backdrop;
 use super::cull::DrawnCount;
 use super::direct::DirectInputs;
 use super::gbuffer::GbufferInputs;
-use super::glossy::{GlossyInputs, GlossyPass, GlossyPicture};
-use super::handed::{clear, gi_inputs};
+use super::gi_inputs::{clear, gi_inputs};
 use super::light_choice::LightOptions;
 use super::lights::LightLists;
-use super::moved::Moved;
 use super::passes::{Passes, Picture};
+use super::previous_transforms::PreviousTransforms;
 use super::shadow::{ShadowMaps, ShadowOptions};
 use super::shadow_maps::Audience;
+use super::ssr::{SsrInputs, SsrPass, SsrPicture};
 use super::taa::TaaPass;
 use super::targets::{Target, Targets};
 use super::view::{FrameUniform, View};
@@ -22,10 +22,10 @@ use crate::gi::{
     self, Outputs, method,
     technique::{self, Technique},
 };
-use crate::gpu::shared::Shared;
+use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::timing::Recorder;
 use crate::gpu_scene::SceneGpu;
-use crate::net::gpu::Tap;
+use crate::net::gpu::LayerReadback;
 use crate::net::plan::Plan;
 
 /// How a [`Renderer`] is made.
@@ -75,7 +75,7 @@ pub enum Purpose {
 /// GPU.
 pub struct Renderer {
     device: wgpu::Device,
-    _shared: Shared,
+    _pipeline_cache: PipelineCache,
     frame: wgpu::Buffer,
     targets: Targets,
     picture: Picture,
@@ -88,7 +88,7 @@ pub struct Renderer {
     backdrop: Backdrop,
     taa: Option<TaaPass>,
     /// Where objects were in the frame before.
-    moved: Moved,
+    previous_transforms: PreviousTransforms,
     /// What the frame before was seen with, for motion vectors.
     last: Option<View>,
     /// What the last frame drew.
@@ -104,7 +104,7 @@ impl Renderer {
         options: RendererOptions,
     ) -> Result<Self, RenderError> {
         let targets = Targets::new(device, size)?;
-        let shared = Shared::of(device);
+        let shared = PipelineCache::of(device);
         let frame = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("render.frame"),
             size: size_of::<FrameUniform>() as u64,
@@ -117,11 +117,11 @@ impl Renderer {
         let indirect = method::build(device, queue, size, &options.method)?;
         let method = options.method.name();
         let device = device.clone();
-        let (lighting, moved, drawn) = (None, Moved::default(), DrawnCount::default());
+        let (lighting, previous_transforms, drawn) = (None, PreviousTransforms::default(), DrawnCount::default());
         let (lights, last, backdrop) = (options.lights, None, options.backdrop);
         Ok(Self {
             device,
-            _shared: shared,
+            _pipeline_cache: shared,
             frame,
             targets,
             picture,
@@ -132,7 +132,7 @@ impl Renderer {
             lights,
             backdrop,
             taa,
-            moved,
+            previous_transforms,
             last,
             drawn,
         })
@@ -144,7 +144,7 @@ impl Renderer {
             self.targets = Targets::new(&self.device, size)?;
             self.picture = self.passes.bind(&self.device, &self.frame, &self.targets, &mut self.taa);
             if let Some(indirect) = &mut self.indirect {
-                indirect.forget();
+                indirect.release_bindings();
             }
         }
         Ok(())
@@ -157,14 +157,14 @@ impl Renderer {
 
     /// The next frame has nothing to do with the last (a cut): no object has moved since, and
     /// temporal anti-aliasing starts anew.
-    pub fn cut(&mut self) {
-        self.moved.cut();
-        self.passes.deform.cut();
+    pub fn reset_history(&mut self) {
+        self.previous_transforms.reset_history();
+        self.passes.deform.reset_history();
         if let Some(taa) = &mut self.taa {
-            taa.cut();
+            taa.reset_history();
         }
         if let Some(indirect) = &mut self.indirect {
-            indirect.cut();
+            indirect.reset_history();
         }
         self.last = None;
     }
@@ -176,13 +176,13 @@ impl Renderer {
     }
 
     /// What drew the last frame in the method's place, and why; `None` where it drew itself.
-    pub fn instead(&self) -> Option<technique::Instead<'_>> {
-        self.indirect.as_ref()?.instead()
+    pub fn fallback(&self) -> Option<technique::Fallback<'_>> {
+        self.indirect.as_ref()?.fallback()
     }
 
     /// Name of the method that found the last frame's indirect light, as on the command line.
     pub fn drawn_by(&self) -> &'static str {
-        self.instead().map_or(self.method, |i| i.method)
+        self.fallback().map_or(self.method, |i| i.method)
     }
 
     /// Name of the method that finds indirect light, as on the command line.
@@ -210,7 +210,11 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Technique::read_input`].
-    pub fn read_network_input(&mut self, view: &View, environment: [f32; 3]) -> Result<Option<Tap>, gi::GiError> {
+    pub fn read_network_input(
+        &mut self,
+        view: &View,
+        environment: [f32; 3],
+    ) -> Result<Option<LayerReadback>, gi::GiError> {
         let Some(indirect) = &mut self.indirect else { return Ok(None) };
         indirect.read_input(&gi_inputs(&self.targets, view, environment, None))
     }
@@ -230,7 +234,12 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Technique::read_layer`].
-    pub fn read_layer(&mut self, view: &View, environment: [f32; 3], layer: usize) -> Result<Option<Tap>, gi::GiError> {
+    pub fn read_layer(
+        &mut self,
+        view: &View,
+        environment: [f32; 3],
+        layer: usize,
+    ) -> Result<Option<LayerReadback>, gi::GiError> {
         let Some(indirect) = &mut self.indirect else { return Ok(None) };
         indirect.read_layer(&gi_inputs(&self.targets, view, environment, None), layer)
     }
@@ -268,8 +277,8 @@ impl Renderer {
         let mut rows = self.targets.bytes();
         rows.extend(self.lighting.iter().flat_map(|l| l.maps.bytes()));
         rows.extend(self.lighting.iter().map(|l| ("lights", l.lists.buffer.size())));
-        rows.push(("gi.lit", self.picture.glossy.as_ref().map_or(0, GlossyPicture::bytes)));
-        rows.push(("moved", self.moved.bytes()));
+        rows.push(("gi.color_pyramid", self.picture.ssr.as_ref().map_or(0, SsrPicture::bytes)));
+        rows.push(("previous_transforms", self.previous_transforms.bytes()));
         rows.push(("deform", self.passes.deform.bytes()));
         rows.extend(self.taa.iter().flat_map(TaaPass::bytes));
         rows.push((self.method, self.indirect.as_ref().map_or(0, |i| i.bytes())));
@@ -316,26 +325,26 @@ impl Renderer {
             None => last.map_or(*view, |last| view.after(&last)),
         };
         self.last = Some(*view);
-        let picture_only = !self.indirect.as_ref().is_some_and(|i| i.knows_scene(scene.rays.is_some()));
+        let picture_only = !self.indirect.as_ref().is_some_and(|i| i.uses_rays(scene.rays.is_some()));
         let counts = [scene.lights.len() as u32, lighting.lists.words];
         let uniform = view.uniform(&scene.environment, counts, picture_only, self.backdrop);
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
 
         let mut drawn = DrawnCount::default();
-        if new_picture || self.taa.is_some() || !self.moved.knows(scene) {
-            self.moved.follow(&self.device, queue, scene);
+        if new_picture || self.taa.is_some() || !self.previous_transforms.knows(scene) {
+            self.previous_transforms.follow(&self.device, queue, scene);
             self.passes.deform.record(recorder, queue, scene);
         }
         if new_picture || fresh {
             let audience = Audience { scene, view, options: &self.lights, stand_ins: picture_only };
             self.passes.shadow.record(recorder, queue, &audience, &mut lighting.maps, &mut drawn);
         }
-        let (before, deformed) = (self.moved.before(scene), self.passes.deform.before());
+        let (before, deformed) = (self.previous_transforms.before(scene), self.passes.deform.before());
         let inputs = GbufferInputs { scene, before, deformed, view };
         self.passes.gbuffer.record(recorder, inputs, &self.targets, &mut drawn.camera);
         let mut inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene));
         if let Some(lights) = &mut inputs.lights {
-            lights.stand_in &= picture_only;
+            lights.has_emissive_proxies &= picture_only;
         }
         // What a frame leaves behind has no history of pictures but that of temporal anti-aliasing.
         if let (Purpose::WarmUp { .. }, Some(indirect), None) = (purpose, &mut self.indirect, &self.taa)
@@ -355,11 +364,11 @@ impl Renderer {
                 let Targets { indirect: light, indirect_specular: specular, .. } = &self.targets;
                 let outputs = Outputs { light: &light.view, specular: Some(&specular.view) };
                 indirect.record(recorder, queue, &inputs, outputs)?;
-                if !indirect.shows_lobes() {
-                    let glossy = self.passes.glossy.get_or_insert_with(|| GlossyPass::new(&self.device));
-                    let made = || glossy.picture(&self.device, &self.frame, &self.targets);
-                    let picture = self.picture.glossy.get_or_insert_with(made);
-                    glossy.record(recorder, GlossyInputs { picture, sky: &scene.environment_view }, size);
+                if !indirect.writes_specular() {
+                    let ssr = self.passes.ssr.get_or_insert_with(|| SsrPass::new(&self.device));
+                    let made = || ssr.picture(&self.device, &self.frame, &self.targets);
+                    let picture = self.picture.ssr.get_or_insert_with(made);
+                    ssr.record(recorder, SsrInputs { picture, sky: &scene.environment_view }, size);
                 }
             }
             None => clear(recorder, &self.targets),

@@ -22,14 +22,14 @@
 //! The five colour attachments take exactly the 32 bytes a sample that WebGPU grants by default.
 //! Unlit materials have albedo and F0 of 0 and their colour in `emissive`. Motion vectors know
 //! where the camera was and where each object and each deforming vertex was
-//! ([`moved`](super::moved), [`deform`](super::deform)); they do not know of lights, nor of
+//! ([`previous_transforms`](super::previous_transforms), [`deform`](super::deform)); they do not know of lights, nor of
 //! textures that move. The background's are 0 whatever the camera does: it follows from the view
 //! alone.
 
 use super::blended::Blending;
 use super::cull::{Count, Volume};
+use super::pipelines;
 use super::targets::Targets;
-use super::tool;
 use super::view::View;
 use crate::gpu::{shaders, tape, timing::Recorder};
 use crate::gpu_scene::{Draw, SceneGpu, material_layout, motion_layouts};
@@ -41,7 +41,7 @@ pub struct GbufferInputs<'a> {
     /// The scene.
     pub scene: &'a SceneGpu,
     /// Its instances as they were in the frame before
-    /// ([`Moved::before`](super::moved::Moved::before)); `scene.instances` where nothing moves.
+    /// ([`PreviousTransforms::before`](super::previous_transforms::PreviousTransforms::before)); `scene.instances` where nothing moves.
     pub before: &'a wgpu::Buffer,
     /// Its deforming vertices as they were then
     /// ([`DeformPass::before`](super::deform::DeformPass::before)), if they were elsewhere.
@@ -60,8 +60,8 @@ impl GbufferPass {
     /// Builds the pipelines; `frame` is the frame's uniform buffer.
     pub fn new(device: &wgpu::Device, frame: &wgpu::Buffer, blending: Blending) -> Self {
         let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
-        let layout = tool::layout(device, "render.gbuffer", stages, &[tool::UNIFORM]);
-        let frame = tool::group(device, "render.gbuffer", &layout, &[frame.as_entire_binding()]);
+        let layout = pipelines::layout(device, "render.gbuffer", stages, &[pipelines::UNIFORM]);
+        let frame = pipelines::group(device, "render.gbuffer", &layout, &[frame.as_entire_binding()]);
         let pipeline_layout =
             tape::pipeline_layout(device, "render.gbuffer", &[Some(&layout), Some(&material_layout(device))]);
         let module = shaders::module(device, "render.gbuffer");
@@ -161,11 +161,11 @@ fn pipeline(
     use wgpu::TextureFormat as F;
     let formats = [F::Rg16Float, F::Rgba8UnormSrgb, F::Rgba8UnormSrgb, F::Rgba16Float, F::Rg16Float];
     let constant = |is: bool| f64::from(u8::from(is));
-    tool::mesh(
+    pipelines::mesh(
         device,
         "render.gbuffer",
         (layout, module),
-        tool::Drawn {
+        pipelines::Drawn {
             buffers: &motion_layouts(),
             targets: &formats.map(|format| Some(format.into())),
             cull: CULLED[variant % 3],

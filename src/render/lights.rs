@@ -1,9 +1,9 @@
 //! Lists of the lights that can reach what each tile of 16×16 pixels shows (compute): 8 bytes a
 //! tile for each 32 lights.
 
+use super::pipelines;
 use super::shadow::ShadowMaps;
 use super::targets::Targets;
-use super::tool;
 use crate::gpu::timing::Recorder;
 use crate::gpu_scene::SceneGpu;
 
@@ -37,7 +37,7 @@ impl LightLists {
 impl LightsPass {
     /// Builds the pipeline.
     pub fn new(device: &wgpu::Device) -> Self {
-        use tool::*;
+        use pipelines::*;
         let stage = wgpu::ShaderStages::COMPUTE;
         let picture_layout = layout(device, "render.lights", stage, &[UNIFORM, LOAD, LOAD]);
         let list_layout = layout(device, "render.lights", stage, &[READ, READ, READ_WRITE]);
@@ -47,8 +47,8 @@ impl LightsPass {
 
     /// Binds the G-buffer.
     pub fn picture(&self, device: &wgpu::Device, frame: &wgpu::Buffer, targets: &Targets) -> wgpu::BindGroup {
-        let resources = [frame.as_entire_binding(), tool::view(&targets.depth), tool::view(&targets.normal)];
-        tool::group(device, "render.lights", &self.picture_layout, &resources)
+        let resources = [frame.as_entire_binding(), pipelines::view(&targets.depth), pipelines::view(&targets.normal)];
+        pipelines::group(device, "render.lights", &self.picture_layout, &resources)
     }
 
     /// Lists for pictures of `size` pixels, if the scene has `from` lights or more.
@@ -70,7 +70,7 @@ impl LightsPass {
             mapped_at_creation: false,
         });
         let resources = [&scene.light_buffer, &maps.light_buffer, &buffer].map(|b| b.as_entire_binding());
-        let group = tool::group(device, "render.lights", &self.list_layout, &resources);
+        let group = pipelines::group(device, "render.lights", &self.list_layout, &resources);
         LightLists { words, buffer, size, group }
     }
 

@@ -16,16 +16,16 @@ pub mod exposure;
 pub mod frame;
 #[doc(hidden)]
 pub mod gbuffer;
-#[doc(hidden)]
-pub mod glossy;
-mod handed;
+mod gi_inputs;
 #[doc(hidden)]
 pub mod light_choice;
 #[doc(hidden)]
 pub mod lights;
-#[doc(hidden)]
-pub mod moved;
 mod passes;
+#[doc(hidden)]
+pub mod pipelines;
+#[doc(hidden)]
+pub mod previous_transforms;
 #[doc(hidden)]
 pub mod sampling;
 #[doc(hidden)]
@@ -36,13 +36,13 @@ mod shadow_maps;
 mod shadow_sun;
 mod shadow_view;
 #[doc(hidden)]
+pub mod ssr;
+#[doc(hidden)]
 pub mod taa;
 pub mod targets;
 #[doc(hidden)]
 pub mod tonemap;
 pub mod tonemap_curve;
-#[doc(hidden)]
-pub mod tool;
 pub mod view;
 
 pub use blended::Blending;

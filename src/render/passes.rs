@@ -7,9 +7,9 @@ use super::composite::CompositePass;
 use super::deform::DeformPass;
 use super::direct::DirectPass;
 use super::gbuffer::GbufferPass;
-use super::glossy::{GlossyPass, GlossyPicture};
 use super::lights::LightsPass;
 use super::shadow::ShadowPass;
+use super::ssr::{SsrPass, SsrPicture};
 use super::taa::TaaPass;
 use super::targets::Targets;
 
@@ -18,7 +18,7 @@ pub(super) struct Picture {
     pub lights: wgpu::BindGroup,
     pub direct: wgpu::BindGroup,
     /// Once a method draws that shows no lobes.
-    pub glossy: Option<GlossyPicture>,
+    pub ssr: Option<SsrPicture>,
     pub composite: wgpu::BindGroup,
     pub blended: Option<wgpu::BindGroup>,
 }
@@ -31,7 +31,7 @@ pub(super) struct Passes {
     pub lights: LightsPass,
     pub direct: DirectPass,
     /// The same.
-    pub glossy: Option<GlossyPass>,
+    pub ssr: Option<SsrPass>,
     pub composite: CompositePass,
     /// `None` where what blends is drawn by lot.
     pub blended: Option<BlendedPass>,
@@ -47,7 +47,7 @@ impl Passes {
             gbuffer: GbufferPass::new(device, frame, options.blending),
             lights: LightsPass::new(device),
             direct,
-            glossy: None,
+            ssr: None,
             composite: CompositePass::new(device),
             blended,
         }
@@ -67,7 +67,7 @@ impl Passes {
         Picture {
             lights: self.lights.picture(device, frame, targets),
             direct: self.direct.picture(device, frame, targets),
-            glossy: None,
+            ssr: None,
             composite: self.composite.picture(device, frame, targets, picture),
             blended: self.blended.as_ref().map(|b| b.picture(device, frame, targets)),
         }

@@ -9,12 +9,12 @@
 //! ([`light_choice`](super::light_choice)); the others shine without, and a warning says so once.
 
 use super::cull::{Count, DrawnCount, Volume};
+use super::pipelines;
 use super::shadow_kept::Kept;
 use super::shadow_maps::{Audience, CAMERA_STRIDE};
 pub use super::shadow_maps::{MAX_LOCAL_LAYERS, MAX_SUNS, ShadowMaps, ShadowOptions};
 pub use super::shadow_view::ShadowViewGpu;
-use super::tool;
-use crate::gpu::{shaders, shared, tape, timing::Recorder};
+use crate::gpu::{pipeline_cache, shaders, tape, timing::Recorder};
 use crate::gpu_scene::{SceneGpu, coverage_layouts, material_layout, position_layouts};
 
 /// Draws depth from the lights.
@@ -36,14 +36,14 @@ impl ShadowPass {
             has_dynamic_offset: true,
             min_binding_size: None,
         };
-        let layout = tool::layout(device, "render.shadow", wgpu::ShaderStages::VERTEX_FRAGMENT, &[uniform]);
+        let layout = pipelines::layout(device, "render.shadow", wgpu::ShaderStages::VERTEX_FRAGMENT, &[uniform]);
         let module = shaders::module(device, "render.shadow");
         let pipeline = |covered: bool| {
             let material = covered.then(|| material_layout(device));
             let groups = [Some(&layout), material.as_ref()];
             let pipeline_layout = tape::pipeline_layout(device, "render.shadow", &groups[..1 + usize::from(covered)]);
             let (positions, all) = (position_layouts(), coverage_layouts());
-            shared::render_pipeline(
+            pipeline_cache::render_pipeline(
                 device,
                 &wgpu::RenderPipelineDescriptor {
                     label: Some("render.shadow"),
@@ -83,7 +83,7 @@ impl ShadowPass {
     pub fn maps(&self, device: &wgpu::Device, scene: &SceneGpu) -> ShadowMaps {
         ShadowMaps::new(device, scene, &self.options, |cameras| {
             let camera = wgpu::BufferBinding { buffer: cameras, offset: 0, size: wgpu::BufferSize::new(CAMERA_SIZE) };
-            tool::group(device, "render.shadow", &self.layout, &[wgpu::BindingResource::Buffer(camera)])
+            pipelines::group(device, "render.shadow", &self.layout, &[wgpu::BindingResource::Buffer(camera)])
         })
     }
 

@@ -200,7 +200,7 @@ impl ShadowMaps {
     pub(super) fn allot(&mut self, queue: &wgpu::Queue, audience: &Audience<'_>) {
         let Audience { scene, view, options, stand_ins } = *audience;
         let lights: Vec<LightGpu> = scene.lights.iter().map(LightGpu::new).collect();
-        let counts: Vec<bool> = scene.lights.iter().map(|l| stand_ins || !l.stands_in).collect();
+        let counts: Vec<bool> = scene.lights.iter().map(|l| stand_ins || !l.is_emissive_proxy).collect();
         let (plan, lamps) = (&self.plan, self.plan.is_sun.iter().filter(|s| !**s).count());
         let wanted = |sun: bool| {
             let of = plan.maps.iter().zip(&plan.is_sun).zip(&counts);

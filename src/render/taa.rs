@@ -14,9 +14,9 @@
 //! comes or goes by more than a few percent of it in a frame starts anew.
 
 use super::decode::{LayerGroups, LayerWriter, PICTURE};
+use super::pipelines;
 use super::sampling;
 use super::targets::{Target, Targets};
-use super::tool;
 use super::view::View;
 use crate::gpu::timing::Recorder;
 use crate::gpu_scene::SceneGpu;
@@ -103,15 +103,15 @@ struct Mean {
 impl TaaPass {
     /// Builds the pipeline.
     pub fn new(device: &wgpu::Device) -> Self {
-        use tool::{LOAD, STORE_HALF, UNIFORM};
+        use pipelines::{LOAD, STORE_HALF, UNIFORM};
         let store_distance = wgpu::BindingType::StorageTexture {
             access: wgpu::StorageTextureAccess::WriteOnly,
             format: wgpu::TextureFormat::R32Float,
             view_dimension: wgpu::TextureViewDimension::D2,
         };
         let types = [UNIFORM, LOAD, LOAD, LOAD, LOAD, LOAD, UNIFORM, STORE_HALF, STORE_HALF, store_distance];
-        let layout = tool::layout(device, "render.taa", wgpu::ShaderStages::COMPUTE, &types);
-        let pipeline = tool::compute(device, "render.taa", "taa", &[&layout]);
+        let layout = pipelines::layout(device, "render.taa", wgpu::ShaderStages::COMPUTE, &types);
+        let pipeline = pipelines::compute(device, "render.taa", "taa", &[&layout]);
         let mode = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("render.taa"),
             size: size_of::<Blend>() as u64,
@@ -131,7 +131,7 @@ impl TaaPass {
         for layer in std::mem::take(&mut self.layers) {
             self.add(device, frame, targets, layer);
         }
-        self.cut();
+        self.reset_history();
     }
 
     /// From the next frame on the layers of these numbers are averaged as well, for
@@ -167,13 +167,13 @@ impl TaaPass {
         let mean = shown.as_ref().map_or(&targets.hdr, |(mean, _)| mean);
         let distance = &textures.distance;
         let groups = [0, 1].map(|i| {
-            let read = [&targets.depth, &targets.motion, &current, &history[i], &distance[i]].map(tool::view);
-            let written = [mean, &history[1 - i], &distance[1 - i]].map(tool::view);
+            let read = [&targets.depth, &targets.motion, &current, &history[i], &distance[i]].map(pipelines::view);
+            let written = [mean, &history[1 - i], &distance[1 - i]].map(pipelines::view);
             let mut resources = vec![frame.as_entire_binding()];
             resources.extend(read);
             resources.push(self.mode.as_entire_binding());
             resources.extend(written);
-            tool::group(device, "render.taa", &self.layout, &resources)
+            pipelines::group(device, "render.taa", &self.layout, &resources)
         });
         textures.means.push(Mean { layer, current, shown, history, groups });
     }
@@ -193,7 +193,7 @@ impl TaaPass {
     }
 
     /// The next frame has nothing to do with the last: a cut.
-    pub fn cut(&mut self) {
+    pub fn reset_history(&mut self) {
         self.last = None;
     }
 
@@ -226,7 +226,7 @@ impl TaaPass {
             recorder.compute("taa", |pass| {
                 pass.set_pipeline(&self.pipeline);
                 pass.set_bind_group(0, &mean.groups[self.frames as usize % 2], &[]);
-                tool::dispatch(pass, view.size);
+                pipelines::dispatch(pass, view.size);
             });
         }
         self.last = Some(Last { scene: scene.id, placement: scene.placement, view: *view });

@@ -1,7 +1,7 @@
 //! From scene-linear radiance to a display target.
 
+use super::pipelines;
 use super::tonemap_curve::Tonemap;
-use super::tool;
 use crate::gpu::timing::Recorder;
 use bytemuck::{Pod, Zeroable};
 
@@ -37,9 +37,9 @@ impl TonemapPass {
     /// For targets of `format`; sRGB formats encode by themselves and are given linear light.
     pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
         let stages = wgpu::ShaderStages::FRAGMENT;
-        let layout = tool::layout(device, "render.tonemap", stages, &[tool::UNIFORM, tool::LOAD]);
-        let pipeline = tool::screen(device, "render.tonemap", format, &layout);
-        let uniform = tool::uniform(device, "render.tonemap", size_of::<Uniform>());
+        let layout = pipelines::layout(device, "render.tonemap", stages, &[pipelines::UNIFORM, pipelines::LOAD]);
+        let pipeline = pipelines::screen(device, "render.tonemap", format, &layout);
+        let uniform = pipelines::uniform(device, "render.tonemap", size_of::<Uniform>());
         Self { device: device.clone(), pipeline, layout, uniform, linear_target: format.is_srgb(), bound: None }
     }
 
@@ -61,7 +61,7 @@ impl TonemapPass {
         queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
         if self.bound.as_ref().is_none_or(|(view, _)| view != hdr) {
             let resources = [self.uniform.as_entire_binding(), wgpu::BindingResource::TextureView(hdr)];
-            let group = tool::group(&self.device, "render.tonemap", &self.layout, &resources);
+            let group = pipelines::group(&self.device, "render.tonemap", &self.layout, &resources);
             self.bound = Some((hdr.clone(), group));
         }
         let Some((_, group)) = &self.bound else { return };

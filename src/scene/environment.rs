@@ -85,7 +85,7 @@ const BRIGHTEST: f32 = 1e9;
 impl EnvironmentImage {
     /// Mends up to a hundredth of the radiances and tells how many; a picture with more is left for
     /// others to refuse.
-    pub fn mend(&mut self) -> Option<String> {
+    pub fn repair(&mut self) -> Option<String> {
         let bad = |v: f32| !(0.0..=BRIGHTEST).contains(&v);
         let count = self.rgb.iter().filter(|v| bad(**v)).count();
         // One texel is always forgiven.
@@ -239,13 +239,13 @@ mod tests {
     fn single_bad_texels_are_mended() {
         let mut spoilt = image(40, 20, |_, _| [1.0; 3]);
         (spoilt.rgb[7], spoilt.rgb[8], spoilt.rgb[100], spoilt.rgb[101]) = (f32::INFINITY, -1.0, f32::NAN, 2e38);
-        let told = spoilt.mend().expect("a sentence");
+        let told = spoilt.repair().expect("a sentence");
         assert!(told.contains("test: 4 radiances"), "{told}");
         assert_eq!((spoilt.rgb[7], spoilt.rgb[8], spoilt.rgb[100], spoilt.rgb[101]), (65_504.0, 0.0, 0.0, 1e9));
         assert!(spoilt.rgb.iter().filter(|v| **v == 1.0).count() == spoilt.rgb.len() - 4);
-        assert!(spoilt.mend().is_none() && Environment::from_image(spoilt).is_ok());
+        assert!(spoilt.repair().is_none() && Environment::from_image(spoilt).is_ok());
         // Negative control: where much is bad, something else is wrong with the picture.
         let mut broken = image(40, 20, |x, _| [if x == 3 { -1.0 } else { 1.0 }; 3]);
-        assert!(broken.mend().is_none() && Environment::from_image(broken).is_err());
+        assert!(broken.repair().is_none() && Environment::from_image(broken).is_err());
     }
 }

@@ -300,13 +300,13 @@ pub struct Light {
     pub kind: LightKind,
     /// It only stands in for a glowing surface of the scene. The rasteriser, which knows no such
     /// light, uses it; the path tracer leaves it out and lets the surface shine.
-    pub stands_in: bool,
+    pub is_emissive_proxy: bool,
 }
 
 impl From<LightKind> for Light {
     /// A white light of its own.
     fn from(kind: LightKind) -> Self {
-        Self { name: String::new(), color: [1.0; 3], kind, stands_in: false }
+        Self { name: String::new(), color: [1.0; 3], kind, is_emissive_proxy: false }
     }
 }
 

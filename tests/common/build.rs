@@ -52,18 +52,18 @@ pub fn scene(meshes: Vec<Mesh>, lights: Vec<Light>) -> Scene {
 pub fn sun(direction: [f32; 3], irradiance: f32, angle: f32) -> Light {
     let direction = glam::Vec3::from(direction).normalize().to_array();
     let kind = LightKind::Directional { direction, irradiance, angle };
-    Light { name: "sun".into(), color: [1.0; 3], kind, stands_in: false }
+    Light { name: "sun".into(), color: [1.0; 3], kind, is_emissive_proxy: false }
 }
 
 pub fn point(position: [f32; 3], intensity: f32, radius: f32) -> Light {
     let kind = LightKind::Point { position, intensity, radius, range: None };
-    Light { name: "point".into(), color: [1.0; 3], kind, stands_in: false }
+    Light { name: "point".into(), color: [1.0; 3], kind, is_emissive_proxy: false }
 }
 
 pub fn spot(position: [f32; 3], direction: [f32; 3], inner_angle: f32, outer_angle: f32, radius: f32) -> Light {
     let direction = glam::Vec3::from(direction).normalize().to_array();
     let kind = LightKind::Spot { position, direction, intensity: 60.0, radius, range: None, inner_angle, outer_angle };
-    Light { name: "spot".into(), color: [1.0; 3], kind, stands_in: false }
+    Light { name: "spot".into(), color: [1.0; 3], kind, is_emissive_proxy: false }
 }
 
 /// A camera at `eye` that looks at `target`.

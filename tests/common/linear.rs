@@ -11,8 +11,12 @@ pub fn linear_bytes(table: &str, rows: &[FeatureRow], meaning: &str, weight: &[f
     let inputs: Vec<String> = rows.iter().map(row).collect();
     let channels: u32 = rows.iter().map(|r| r.channels).sum();
     let outputs = bias.len();
+    // The newest version of which these are rows.
+    let tables = bouncelight::net::format::TABLES;
+    let is_newest = |t: &&bouncelight::net::format::FeatureTable| t.name == table && t.features.starts_with(rows);
+    let version = tables.iter().find(is_newest).map_or(1, |t| t.version);
     let document = format!(
-        r#"{{"version": 2, "licence": "CC0-1.0", "table": {{"name": "{table}", "version": 1}}, "inputs": [{}],
+        r#"{{"version": 2, "licence": "CC0-1.0", "table": {{"name": "{table}", "version": {version}}}, "inputs": [{}],
             "cell": 4, "output": {{"tensor": "y", "meaning": "{meaning}", "channels": {outputs}}},
             "graph": [{{"op": "conv2d", "name": "a", "input": "input", "output": "y", "in_channels": {channels},
                 "out_channels": {outputs}, "kernel": [1, 1]}}]}}"#,

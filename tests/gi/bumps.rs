@@ -30,7 +30,8 @@ fn tilted_pixels_get_what_their_half_space_sends() {
     let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     s.materials[0].normal_texture = Some(TextureRef { image: 0, sampler, uv_set: 0, transform });
     s.meshes[0].tangents = vec![[1.0, 0.0, 0.0, 1.0]; 4];
-    let mut renderer = world::renderer(&gpu, [64, 64], Method::Gather(Options { even: true, ..Default::default() }));
+    let mut renderer =
+        world::renderer(&gpu, [64, 64], Method::Gather(Options { progressive: true, ..Default::default() }));
     let (light, _) = gather::lit(&gpu, &mut renderer, &s, 200);
     let mean = light.data.iter().map(|v| f64::from(*v)).sum::<f64>() / light.data.len() as f64;
     let expected = 0.5 * (1.0 + 15f64.to_radians().cos());

@@ -38,7 +38,7 @@ fn drawn(gpu: &Gpu, change: impl Fn(&mut Conventions), still: u32, moving: u32) 
     for i in 0..still + moving {
         host.frame(time(still, i)).expect("it draws");
     }
-    assert_eq!((host.view.instead(), host.view.settled()), (None, Some(still + moving)));
+    assert_eq!((host.view.fallback(), host.view.settled()), (None, Some(still + moving)));
     let read = |texture| readback::texture(&gpu.device, &gpu.queue, texture).expect("reading back works");
     let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&read(host.renderer.light.texture()));
     let light = halves.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]].map(f32::from)).collect();

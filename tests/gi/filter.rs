@@ -7,8 +7,8 @@ use crate::weights::{constant_filter, random_filter};
 use crate::world::{BACKWARDS, difference, gather, hall, light, mean, renderer, sun};
 use bouncelight::gi::{GiError, Method, Neural};
 use bouncelight::gpu::Gpu;
-use bouncelight::net::format::{CELLS_V1, FeatureRow, IMAGES_V1, Weights};
-use bouncelight::net::gpu::Tap;
+use bouncelight::net::format::{CELLS_V1, CELLS_V2, FeatureRow, IMAGES_V1, Weights};
+use bouncelight::net::gpu::LayerReadback;
 use bouncelight::net::plan::Precision;
 use bouncelight::render::{RenderError, Renderer, RendererOptions, View};
 use bouncelight::scene::Scene;
@@ -81,6 +81,7 @@ fn weights_of_something_else_are_refused_by_name() {
         linear_bytes(table, rows, meaning, &vec![0.0; outputs * channels as usize], &vec![0.0; outputs])
     };
     assert_eq!(refusal(of("cells", CELLS_V1, "filter", 12)), "");
+    assert_eq!(refusal(of("cells", CELLS_V2, "filter", 12)), "");
     for (bytes, named) in [
         (of("images", IMAGES_V1, "filter", 12), "images"),
         (of("cells", &CELLS_V1[..9], "filter", 12), "the whole table"),
@@ -112,7 +113,7 @@ fn the_network_is_seen_at_work() {
     let answer = cpu::run(&weights, &input).expect("it runs").data;
     let last = drawn.layers().len() - 1;
     let mut layer = |i| drawn.read_layer(&view, sky, i).expect("it is read").expect("there is one");
-    let off = |tap: &Tap| tap.values.iter().zip(&answer).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    let off = |tap: &LayerReadback| tap.values.iter().zip(&answer).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     let largest = answer.iter().fold(0.0f32, |most, x| most.max(x.abs()));
     let (first, again) = (layer(last), layer(last));
     assert!(off(&first) < 1e-3 * largest && largest > 0.1, "{} of {largest}", off(&first));

@@ -123,8 +123,8 @@ fn what_is_new_in_the_picture_has_more_rays() {
     let floor = scene(&blocks, &[], 1.0, look(0.0));
     let uploaded = uploaded(&gpu, &floor);
     // Each frame shows its own rays; where all frames are even no cell is young.
-    let alone = |even| {
-        let method = Method::Gather(Options { cell_frames: 1.0, blur: false, even, ..Default::default() });
+    let alone = |progressive| {
+        let method = Method::Gather(Options { cell_frames: 1.0, blur: false, progressive, ..Default::default() });
         world::renderer(&gpu, [96, 64], method)
     };
     let mut renderer = alone(true);

@@ -110,7 +110,7 @@ fn six_panels() -> Scene {
     }
     let mut scene = of_parts(parts, look_at([1.7, 1.5, 1.7], [-0.8, 0.8, -1.0], 1.2));
     defaults::complete(&mut scene);
-    assert_eq!(scene.lights.iter().filter(|l| l.stands_in).count(), 4);
+    assert_eq!(scene.lights.iter().filter(|l| l.is_emissive_proxy).count(), 4);
     scene
 }
 
@@ -135,7 +135,7 @@ fn six_panels_light_a_room_once_each() {
     assert!(layer(&gathered, Layer::DiffDir).iter().all(|v| *v == 0.0), "no lamp is left");
     // Negative control: lamps that are lamps shine beside the panels.
     let mut both = scene.clone();
-    both.lights.iter_mut().for_each(|l| l.stands_in = false);
+    both.lights.iter_mut().for_each(|l| l.is_emissive_proxy = false);
     assert!(sum(&frame(&gpu, &mut renderer, &both, &uploaded(&gpu, &both), 60)) > 1.3 * truth);
     // Where there are no rays, the lamps stand in.
     let plain = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("it fits");

@@ -4,7 +4,7 @@
 use crate::common;
 use crate::gather::{go_on, uploaded};
 use crate::world::{self, GREY, difference};
-use bouncelight::gi::gather::PAST;
+use bouncelight::gi::gather::HISTORY;
 use bouncelight::gpu::{Gpu, readback};
 use bouncelight::render::Renderer;
 use bouncelight::scene::{Camera, LightKind, Scene};
@@ -13,9 +13,9 @@ const SIZE: [u32; 2] = [96, 64];
 
 /// What cells remember: light of three channels and frames.
 fn remembered(gpu: &Gpu, renderer: &Renderer) -> Vec<[f32; 4]> {
-    let pasts = renderer.memory().expect("it remembers").pasts;
-    let bytes = readback::buffer(&gpu.device, &gpu.queue, pasts, 0, pasts.size()).expect("reading back works");
-    bytes.chunks_exact(PAST as usize).map(|p| bytemuck::pod_read_unaligned(&p[..16])).collect()
+    let histories = renderer.memory().expect("it remembers").histories;
+    let bytes = readback::buffer(&gpu.device, &gpu.queue, histories, 0, histories.size()).expect("reading back works");
+    bytes.chunks_exact(HISTORY as usize).map(|p| bytemuck::pod_read_unaligned(&p[..16])).collect()
 }
 
 /// The share of cells that remember no more than this frame's rays after 30 frames at rest and one

@@ -39,7 +39,7 @@ fn lights(count: usize) -> Vec<LightKind> {
 fn means(gpu: &Gpu, scene: &Scene, whole: bool, frames: u32) -> [f64; 2] {
     // Small maps: direct light is not what is asked about.
     let shadow = ShadowOptions { sun_size: 64, cascades: 1, local_size: 64 };
-    let method = Method::Gather(Options { slots: world::FEW_SLOTS, first_rounds: 16, ..Options::PLAIN });
+    let method = Method::Gather(Options { slots: world::FEW_SLOTS, first_updates: 16, ..Options::PLAIN });
     let options = RendererOptions { method, shadow, ..Default::default() };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, [64, 48], options).expect("the size fits");
     let gpu_scene = uploaded(gpu, scene);

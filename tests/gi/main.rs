@@ -1,8 +1,6 @@
 //! `gi/` against its CPU reference, against arithmetic and against the laws it promises, on
 //! hand-made G-buffers.
 
-mod below;
-mod bring;
 #[path = "../common/build.rs"]
 mod build;
 mod bumps;
@@ -13,11 +11,11 @@ mod conventions;
 mod edges;
 mod embed;
 mod embedding;
+mod fallback;
 mod filter;
 mod fins;
 mod foreign;
 mod gather;
-mod glossy;
 mod glow;
 mod gradient;
 mod in_flight;
@@ -25,7 +23,6 @@ mod lamps;
 mod left_out;
 #[path = "../common/linear.rs"]
 mod linear;
-mod mirror;
 mod noise;
 mod readback;
 mod real;
@@ -33,10 +30,13 @@ mod repeat;
 mod screen;
 mod shot;
 mod sky_sun;
+mod specular_trace;
+mod ssr;
 mod stages;
 mod surroundings;
 mod taa;
 mod truth;
+mod upsample;
 mod warm_up;
 mod weights;
 mod world;

@@ -259,9 +259,9 @@ fn screen_light_is_linear_and_none_gives_none() {
 #[test]
 fn what_a_light_stands_in_for_lights_once() {
     let Some(gpu) = common::gpu() else { return };
-    let light = |method: Method, glows: bool, stands_in: bool| {
+    let light = |method: Method, glows: bool, is_emissive_proxy: bool| {
         let mut scene = bouncelight_lab::scenes::load("cornell").expect("it is bundled");
-        scene.lights.iter_mut().for_each(|l| l.stands_in = stands_in);
+        scene.lights.iter_mut().for_each(|l| l.is_emissive_proxy = is_emissive_proxy);
         if !glows {
             scene.materials.iter_mut().for_each(|m| m.emissive = [0.0; 3]);
         }

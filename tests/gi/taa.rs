@@ -237,7 +237,7 @@ fn resize_cut_and_another_scene_leave_no_ghost() {
     // What a renderer shows that knows nothing else.
     let plain = Stage::new(&gpu, &scene, Method::Direct, true).frame(&other, 40);
     (0..6).for_each(|i| drop(on.frame(&camera, i)));
-    on.renderer.cut();
+    on.renderer.reset_history();
     assert_eq!(on.frame(&other, 40), plain, "a cut");
 
     (0..6).for_each(|i| drop(on.frame(&camera, i)));

@@ -32,7 +32,8 @@ pub(crate) fn scene(blocks: &[Block], lights: &[LightKind], sky: f32, camera: Ca
         transform[3] = [middle[0], middle[1], middle[2], 1.0];
         scene.instances.push(Instance { name: String::new(), mesh: i, transform });
     }
-    let light = |kind: &LightKind| Light { name: String::new(), color: [1.0; 3], kind: *kind, stands_in: false };
+    let light =
+        |kind: &LightKind| Light { name: String::new(), color: [1.0; 3], kind: *kind, is_emissive_proxy: false };
     scene.lights = lights.iter().map(light).collect();
     scene
 }
@@ -52,7 +53,7 @@ pub(crate) fn lit(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene) -> (Picture
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene).expect("the scene fits");
     uploaded.trace(&gpu.device, &gpu.queue, scene).expect("its rays fit");
     let warmup = if renderer.settled().is_some() { Method::SETTLED - 1 } else { 0 };
-    renderer.cut();
+    renderer.reset_history();
     let options = CaptureOptions { layers: &[Layer::DiffInd, Layer::Position], warmup, ..Default::default() };
     let frame = capture(gpu, renderer, &uploaded, &scene.cameras[0], options).expect("the frame is drawn");
     let layer = |l| frame.layer(l).expect("it was asked for").clone();
@@ -135,11 +136,11 @@ fn a_red_wall_behind_the_camera_tints_the_floor() {
 #[test]
 fn what_a_light_stands_in_for_does_not_shine_twice() {
     let Some(gpu) = common::gpu() else { return };
-    let run = |glow: f32, stands_in: bool| {
+    let run = |glow: f32, is_emissive_proxy: bool| {
         let mut scene = hall(GREY, &[sun(BACKWARDS, 2.0)], 0.0, 0.9);
         let wall = scene.meshes[scene.instances[4].mesh].material;
         scene.materials[wall].emissive = [glow; 3];
-        scene.lights[0].stands_in = stands_in;
+        scene.lights[0].is_emissive_proxy = is_emissive_proxy;
         let mut renderer = renderer(&gpu, [64, 48], gather());
         lit(&gpu, &mut renderer, &scene).0.data
     };

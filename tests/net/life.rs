@@ -7,7 +7,7 @@ use crate::{common, run_gpu, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{NetError, Network, Options, Permutation, Source, Variant};
+use bouncelight::net::gpu::{KernelConfig, NetError, Network, Options, Source, Variant};
 use bouncelight::net::graph::{Graph, Shape};
 use bouncelight::net::plan::Precision;
 use bouncelight_lab::network::convert::published;
@@ -224,7 +224,7 @@ fn wide_layers_agree_with_the_cpu_reference() {
         let input = hashed::input("x", channels, size);
         let by_cpu = cpu::run(&weights, &input).unwrap();
         let staged = |vectors, parts, half| {
-            Variant::Fixed(Permutation { parts, half, ..Permutation::new(Source::Staged, vectors) })
+            Variant::Fixed(KernelConfig { parts, half, ..KernelConfig::new(Source::Staged, vectors) })
         };
         let full = Options::default();
         let half = Options { precision: Precision::F16, ..full };
@@ -237,7 +237,7 @@ fn wide_layers_agree_with_the_cpu_reference() {
         ] {
             let network = Network::new(&gpu.device, &gpu.queue, &weights, size, options).unwrap();
             let e = error(&run_network(&gpu, &network, &input).data, &by_cpu.data);
-            let ways: Vec<_> = network.kernels().filter_map(|k| k.permutation).map(|p| p.to_string()).collect();
+            let ways: Vec<_> = network.kernels().filter_map(|k| k.config).map(|p| p.to_string()).collect();
             println!("{name}, {}: {e:.1e}", ways.join(", "));
             let tolerance = if options.precision == Precision::F16 { TOLERANCE_HALF } else { TOLERANCE };
             assert!(e <= tolerance, "{name} {options:?}: {e}");

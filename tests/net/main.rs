@@ -22,7 +22,7 @@ mod whole;
 
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{Network, Options, Permutation, Source, Variant};
+use bouncelight::net::gpu::{KernelConfig, Network, Options, Source, Variant};
 use bouncelight::net::graph::Shape;
 use bouncelight_lab::network::cpu::{self, Tensor};
 use safetensors::SafeTensors;
@@ -58,7 +58,7 @@ fn tensor(file: &SafeTensors<'_>, name: &str) -> Tensor {
 
 /// One permutation of the convolutions.
 fn fixed(weights: Source, vectors: u32) -> Variant {
-    Variant::Fixed(Permutation::new(weights, vectors))
+    Variant::Fixed(KernelConfig::new(weights, vectors))
 }
 
 /// Inputs and PyTorch's outputs of a fixture.

@@ -6,7 +6,7 @@ use crate::operators::{TOLERANCE, TOLERANCE_HALF};
 use crate::{common, fixed, run_gpu, run_network};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{Network, Options, Permutation, Source, Variant};
+use bouncelight::net::gpu::{KernelConfig, Network, Options, Source, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::Precision;
 use bouncelight_lab::network::cpu::{self, Tensor};
@@ -50,7 +50,7 @@ fn what_a_convolution_measures_is_what_a_step_of_its_own_does() {
         (8, json!([up(8, 20, 4, 2), norm("c", 20, 2)])),
         (5, json!([up(5, 6, 2, 3), norm("c", 6, 6)])),
     ];
-    let staged = |vectors, parts| Permutation { parts, ..Permutation::new(Source::Staged, vectors) };
+    let staged = |vectors, parts| KernelConfig { parts, ..KernelConfig::new(Source::Staged, vectors) };
     let full = Options::default();
     let half = Options { precision: Precision::F16, ..full };
     let plain = Options { variant: Variant::Plain, ..full };
@@ -128,7 +128,7 @@ fn norms_of_large_means_are_sound() {
         assert!(e <= 2e-3, "{groups} groups: {e}");
         let far = far(groups, conv(6, 6, 1, 1));
         let by_cpu = cpu::run(&far, &near).unwrap();
-        let parts = Variant::Fixed(Permutation { parts: 2, ..Permutation::new(Source::Staged, 2) });
+        let parts = Variant::Fixed(KernelConfig { parts: 2, ..KernelConfig::new(Source::Staged, 2) });
         for variant in [Variant::Auto, fixed(Source::Uniform, 2), parts] {
             let (found, measured) = run(&gpu, &far, &near, Options { variant, ..Options::default() });
             let e = error(&found.data, &by_cpu.data);

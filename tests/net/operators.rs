@@ -3,7 +3,7 @@
 use crate::hashed::{self, cases, graphs};
 use crate::{common, fixed, run_network};
 use bouncelight::gpu::Gpu;
-use bouncelight::net::gpu::{Network, Options, Permutation, Source, Variant};
+use bouncelight::net::gpu::{KernelConfig, Network, Options, Source, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::op::Op;
 use bouncelight::net::op_facts::KINDS;
@@ -74,7 +74,7 @@ fn permutations() -> Vec<Variant> {
     let blocked = (1..=4).flat_map(|vectors| [Source::Uniform, Source::Storage].map(|weights| fixed(weights, vectors)));
     let staged =
         [(1, 1, false), (2, 1, false), (2, 3, false), (1, 1, true), (2, 4, true)].map(|(vectors, parts, half)| {
-            Variant::Fixed(Permutation { parts, half, ..Permutation::new(Source::Staged, vectors) })
+            Variant::Fixed(KernelConfig { parts, half, ..KernelConfig::new(Source::Staged, vectors) })
         });
     blocked.chain(staged).collect()
 }

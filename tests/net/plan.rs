@@ -1,7 +1,7 @@
 //! The planner: totals against counts by hand, fusion, and memory that no two living tensors share.
 
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{Choice, Facts, Kernel, Permutation, Source, Tuned, Variant};
+use bouncelight::net::gpu::{Choice, Facts, Kernel, KernelConfig, Source, Tuned, Variant};
 use bouncelight::net::graph::{
     Activation, Add, AddAt, Concat, Conv2d, Graph, GraphError, Op, Padding, Shape, Upsample,
 };
@@ -341,8 +341,8 @@ fn moments_of_every_kernel_fit() {
                 let step = plan.steps.iter().find(|s| s.moments.is_some()).unwrap();
                 let room = plan.tensors[step.moments.unwrap()].shape.width;
                 let ways = [Source::Uniform, Source::Storage, Source::Staged].into_iter();
-                let ways = ways.flat_map(|w| (1..=4).map(move |v| Permutation::new(w, v)));
-                let cut = ways.clone().map(|p| Permutation { parts: 2, ..p });
+                let ways = ways.flat_map(|w| (1..=4).map(move |v| KernelConfig::new(w, v)));
+                let cut = ways.clone().map(|p| KernelConfig { parts: 2, ..p });
                 let variants = ways.chain(cut).map(Variant::Fixed).chain([Variant::Auto, Variant::Plain]);
                 for (variant, software) in variants.flat_map(|v| [(v, true), (v, false)]) {
                     let facts = Facts { software, half: true };

@@ -26,7 +26,7 @@ fn every_layer_can_be_read_as_the_cpu_reference_computes_it() {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             network.record_until(step, &mut Recorder::new(&mut encoder));
             gpu.queue.submit([encoder.finish()]);
-            let tap = network.read_tap(&gpu.device, &gpu.queue, step).unwrap();
+            let tap = network.read_layer(&gpu.device, &gpu.queue, step).unwrap();
             assert_eq!(tap.name, name);
             let found = Tensor { shape: tap.shape, data: tap.values };
             let place = &network.plan().tensors[network.plan().steps[step].output].name;

@@ -2,12 +2,12 @@
 
 use crate::{TOLERANCE, cases, common, error, fixed, fixture, run_gpu, run_network};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{Network, Options, Permutation, Setup, Source, Tuned, Variant};
+use bouncelight::net::gpu::{KernelConfig, Network, Options, Setup, Source, Tuned, Variant};
 use bouncelight::net::tune::{Cache, CacheError, MAX_TEXT, VERSION, tune};
 use bouncelight::wgpu::{AdapterInfo, Backend, DeviceType};
 use std::sync::Arc;
 
-const GOOD: &str = r#"{"version": 5, "devices": {"a | Vulkan | d 1": {"layer": {"permutation":
+const GOOD: &str = r#"{"version": 5, "devices": {"a | Vulkan | d 1": {"layer": {"config":
     {"weights": "uniform", "vectors": 2}, "ms": 0.5}}}}"#;
 
 fn info(name: &str, driver_info: &str) -> AdapterInfo {
@@ -22,7 +22,7 @@ fn a_cache_survives_its_text_and_knows_its_device() {
     assert_eq!(Cache::parse(&cache.text()).unwrap(), cache);
     assert_eq!(VERSION, 5, "adapt the texts here");
     let known = cache.tuned(&info("a", "1"));
-    assert_eq!(known["layer"], Permutation::new(Source::Uniform, 2));
+    assert_eq!(known["layer"], KernelConfig::new(Source::Uniform, 2));
     // Negative control: another adapter, another driver.
     assert!(cache.tuned(&info("b", "1")).is_empty() && cache.tuned(&info("a", "2")).is_empty());
 }
@@ -76,7 +76,7 @@ fn what_is_tuned_is_remembered_and_right() {
     assert_eq!(tuned.len(), 1);
     let network = Network::new(&gpu.device, &gpu.queue, &weights, size, Setup { tuned, ..Setup::default() }).unwrap();
     let kernel = network.kernels().next().unwrap();
-    assert_eq!(kernel.permutation, Some(report.best.0));
+    assert_eq!(kernel.config, Some(report.best.0));
     assert!(error(&run_network(&gpu, &network, &input), &reference) <= TOLERANCE);
 }
 
@@ -90,8 +90,8 @@ fn wishes_that_cannot_be_met_do_no_harm() {
     let plain = Network::new(&gpu.device, &gpu.queue, &weights, size, Options::default()).unwrap();
     let layer = plain.kernels().next().unwrap().layer.unwrap().to_string();
     for wish in [
-        Permutation { parts: 4000, half: true, ..Permutation::new(Source::Staged, 4000) },
-        Permutation::new(Source::Uniform, 0),
+        KernelConfig { parts: 4000, half: true, ..KernelConfig::new(Source::Staged, 4000) },
+        KernelConfig::new(Source::Uniform, 0),
     ] {
         let tuned: Arc<Tuned> = Arc::new([(layer.clone(), wish)].into());
         let network =
@@ -102,6 +102,6 @@ fn wishes_that_cannot_be_met_do_no_harm() {
     let Variant::Fixed(wanted) = fixed(Source::Storage, 1) else { unreachable!() };
     let options = Options { variant: Variant::Fixed(wanted), ..Options::default() };
     let network = Network::new(&gpu.device, &gpu.queue, &weights, size, options).unwrap();
-    assert_eq!(network.kernels().next().unwrap().permutation, Some(wanted));
+    assert_eq!(network.kernels().next().unwrap().config, Some(wanted));
     assert!(error(&run_gpu(&gpu, &weights, &input, options), &reference) <= TOLERANCE);
 }

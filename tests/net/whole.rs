@@ -3,7 +3,7 @@
 use crate::hashed::{self, cases};
 use crate::operators::{TOLERANCE, TOLERANCE_HALF};
 use crate::{common, fixed, run_network};
-use bouncelight::net::gpu::{Choice, Facts, Kernel, Network, Options, Permutation, Source, Tuned, Variant};
+use bouncelight::net::gpu::{Choice, Facts, Kernel, KernelConfig, Network, Options, Source, Tuned, Variant};
 use bouncelight::net::graph::Graph;
 use bouncelight::net::plan::{self, Plan, Precision};
 use bouncelight_lab::network::convert::published;
@@ -109,9 +109,9 @@ fn small_pictures_can_fill_a_gpu() {
     for step in &plan.steps {
         let way = |variant| Kernel::choose(&plan, step, &Choice { variant, tuned: &Tuned::new(), facts });
         let Some(layer) = way(Variant::Auto).layer else { continue };
-        let groups = |p: &Permutation| {
+        let groups = |p: &KernelConfig| {
             let kernel = way(Variant::Fixed(*p));
-            assert_eq!(kernel.permutation, Some(*p));
+            assert_eq!(kernel.config, Some(*p));
             kernel.parts.iter().map(|part| kernel.workgroups(part).iter().product::<u32>()).max().unwrap_or(0)
         };
         let candidates = layer.candidates(&plan, facts);

@@ -14,8 +14,8 @@ mod gbuffer;
 #[path = "../common/glb.rs"]
 mod glb;
 mod lights;
-mod moved;
 mod pictures;
+mod previous_transforms;
 mod render;
 mod textures;
 mod tonemap;

@@ -225,7 +225,7 @@ fn all_lights_in_one_picture() {
     let spot = Light {
         name: "spot".into(),
         color: [0.3, 0.3, 1.0],
-        stands_in: false,
+        is_emissive_proxy: false,
         kind: LightKind::Spot {
             position: [-10.0, 8.0, 10.0],
             direction: [0.6, -0.8, 0.0],

@@ -2,4 +2,6 @@
 
 mod licences;
 mod public_api;
+mod shader_names;
 mod shaders;
+mod words;

@@ -111,7 +111,7 @@ fn draw(args: &Args) -> Result<(), String> {
 fn correct<L: Lamp>(mut lamps: Query<(Entity, &mut L, Option<&GltfExtras>), Added<L>>, mut commands: Commands) {
     for (entity, mut lamp, extras) in &mut lamps {
         lamp.correct();
-        if extras.is_some_and(|e| e.value.contains("\"stands_in\":true")) {
+        if extras.is_some_and(|e| e.value.contains("\"is_emissive_proxy\":true")) {
             commands.entity(entity).despawn();
         }
     }

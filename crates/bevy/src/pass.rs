@@ -219,7 +219,7 @@ pub(crate) fn light(
         error_once!("{e}");
         return;
     }
-    let known = matrices(&inputs.camera, pass.view.shows_lobes());
+    let known = matrices(&inputs.camera, pass.view.writes_specular());
     queue.write_buffer(&camera.matrices, 0, bytemuck::cast_slice(&known));
     let bound = [
         texture(gbuffer),
@@ -256,10 +256,10 @@ fn draw(
 }
 
 /// `Camera` of `composite.wgsl`.
-fn matrices(camera: &CameraMatrices, shows_lobes: bool) -> [[f32; 4]; 3] {
+fn matrices(camera: &CameraMatrices, writes_specular: bool) -> [[f32; 4]; 3] {
     let (view, p) = (Mat4::from_cols_array_2d(&camera.view_from_world), camera.clip_from_view);
     let axis = |row: usize, over: f32, with: f32| (view.row(row).truncate() / over).extend(with).to_array();
-    [axis(0, p[0][0], p[2][0]), axis(1, p[1][1], p[2][1]), axis(2, 1.0, f32::from(u8::from(shows_lobes)))]
+    [axis(0, p[0][0], p[2][0]), axis(1, p[1][1], p[2][1]), axis(2, 1.0, f32::from(u8::from(writes_specular)))]
 }
 
 const SPECULAR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

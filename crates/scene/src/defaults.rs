@@ -84,7 +84,7 @@ fn illuminate(scene: &mut Scene, daylight: Daylight) -> String {
         name: "default sun".to_owned(),
         color: [1.0; 3],
         kind: LightKind::Directional { direction: direction.into(), irradiance, angle: SUN_ANGLE },
-        stands_in: false,
+        is_emissive_proxy: false,
     };
     match daylight {
         Daylight::Outdoors => {
@@ -285,6 +285,6 @@ impl Emitter {
             let position = if radius > size { center } else { self.centroid };
             LightKind::Point { position: position.into(), intensity: strongest * self.area * 0.25, radius, range: None }
         };
-        Light { name, color, kind, stands_in: true }
+        Light { name, color, kind, is_emissive_proxy: true }
     }
 }

@@ -301,7 +301,7 @@ mod tests {
 
     fn sun() -> Light {
         let kind = LightKind::Directional { direction: [0.1, -0.9, 1.0 / 3.0], irradiance: 2.5, angle: 0.01 };
-        Light { name: "sun".into(), color: [1.0, 0.9, 0.7], kind, stands_in: false }
+        Light { name: "sun".into(), color: [1.0, 0.9, 0.7], kind, is_emissive_proxy: false }
     }
 
     #[test]

@@ -319,8 +319,8 @@ fn light(l: &Light) -> Value {
     };
     out["type"] = json!(kind);
     out["intensity"] = json!(strength * LUMENS_PER_WATT);
-    if l.stands_in {
-        extras["stands_in"] = json!(true);
+    if l.is_emissive_proxy {
+        extras["is_emissive_proxy"] = json!(true);
     }
     out["extras"] = json!({"bouncelight": extras});
     if let Some(range) = range {

@@ -25,10 +25,10 @@ pub mod obj;
 pub mod path;
 pub mod shapes;
 pub mod sky;
-pub mod sound;
 mod texture;
 pub mod triangles;
 pub mod units;
+pub mod validate;
 
 pub use error::SceneError;
 pub use files::LoadOptions;

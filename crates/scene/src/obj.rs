@@ -15,7 +15,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::files::{self, Folder, LoadOptions};
-use super::{SceneError, defaults, error, geometry, sound};
+use super::{SceneError, defaults, error, geometry, validate};
 use bouncelight::scene::{Instance, Material, Scene};
 use faces::Faces;
 use lines::Statement;
@@ -59,7 +59,7 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError>
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let mut scene = Scene { name, ..Scene::default() };
     reading.into_scene(&mut scene, path, options.units.matrix().to_cols_array_2d());
-    sound::settle(&mut scene, path)?;
+    validate::validate(&mut scene, path)?;
     defaults::complete(&mut scene);
     Ok(scene)
 }
@@ -185,7 +185,7 @@ impl Reading<'_> {
         if let Some([x, y, z]) = self.origin.filter(|o| *o != [0.0; 3]) {
             warnings.push(format!(
                 "everything is far from the file's origin, where numbers are coarse; places count from ({x}, {y}, {z}) \
-                 instead"
+                 fallback"
             ));
         }
         let told = [

@@ -47,8 +47,8 @@ pub fn load(path: &Path) -> Result<(Environment, Option<String>), SkyError> {
         return Err(file("neither a Radiance HDR nor an EXR picture (its first bytes say otherwise)".into()));
     };
     let mut image = EnvironmentImage { name: shown, width, height, rgb };
-    let mended = image.mend();
-    Ok((Environment::from_image(image)?, mended))
+    let repaired = image.repair();
+    Ok((Environment::from_image(image)?, repaired))
 }
 
 /// What a picture shows of the pixels that it has: black beyond them, nothing beyond its border.

@@ -1,44 +1,38 @@
 //#import lib/sampling.wgsl
 //#import gi/gather/types.wgsl
 
-// The cache of light between surfaces: entries of a hash table, each for the places of one cell of
-// a grid in the world that face one of six ways. The grid's cells grow with the distance from the
-// eye in powers of two. What an entry knows is irradiance over π of everything but the lights,
-// which whoever reads an entry adds at the place itself.
-//
-// An entry is made when a ray first meets its cell. Which of the rays that met it this frame says
-// where the entry's own rays start is drawn by lot (the lowest number wins, so that the same frame
-// always has the same winner), so that its mean is one over the cell's places as rays meet them,
-// and no ray starts where none was: inside a wall, in the air, behind a corner.
+// The radiance cache: a hash table whose entries each cover a cell of a world grid and one of six
+// facing directions. Grid cells grow with the distance from the eye in powers of two. An entry
+// holds E/π of everything but the lights, which a reader adds at its own place.
+// An entry is made when a ray first hits its cell. Rays propose their hits as origins of the
+// entry's rays, and one wins by random number (the lowest, so that the same frame has the same
+// winner). So origins are distributed as rays meet the cell, and none lies inside a wall.
 
-// 0 for a free slot, LEFT for one whose entry has left while others that were put further on for it
-// are still there.
+// 0: free; TOMBSTONE: evicted, but later entries may have been probed past it; else the hash.
 @group(2) @binding(0) var<storage, read_write> entry_keys: array<atomic<u32>>;
-// Two halves, for even and odd rounds: the winner's lot. From the top: whether entries' rays alone
-// have met the entry; the number that was drawn; whether one ray alone has drawn it; an index into
-// `entry_queries`.
-@group(2) @binding(1) var<storage, read_write> entry_lots: array<atomic<u32>>;
-// Where rays met a cell: position, and the packed normal of the side that they met. First those of
-// the picture's cells, then of entries' own rays for even and odd rounds, then where the entries'
-// rays began in even and odd rounds (last word 0: nowhere yet); behind all, what workgroups
-// remember of their rays (look.wgsl).
-@group(2) @binding(2) var<storage, read_write> entry_queries: array<vec4u>;
+// Winning proposals, two halves for even and odd updates. From the top bit: RANK_INDIRECT; a random
+// number; whether only one ray drew it; index of the proposal vertex.
+@group(2) @binding(1) var<storage, read_write> entry_proposals: array<atomic<u32>>;
+// Where rays hit a cell: position and packed normal. First those of the picture's rays, then of
+// entries' rays for even and odd updates, then origins of entries' rays for both (last word 0: none
+// yet); behind all, the state of paths (path_state.wgsl).
+@group(2) @binding(2) var<storage, read_write> proposal_vertices: array<vec4u>;
 
-// Slots that are looked at before a place goes without an entry. Which one does in a full stretch of
-// the table is a matter of who comes first, so none is to be as long: with half the slots in use
-// none of 100,000 entries comes to one (simulated), with two thirds one in two thousand.
+// Slots that are probed before a place goes without an entry. Which place that is depends on the
+// order of threads, so it must not happen: with half the slots in use none of 100,000 entries
+// probes so far (simulated), with two thirds one in two thousand.
 const ENTRY_PROBES = 32u;
-// Of the lot of an entry that no ray of the picture's cells has met, entries' rays alone.
-const BY_ENTRIES = 0x80000000u;
-// No entry's key, which are all odd.
-const LEFT = 2u;
+// Rank of proposals by entries' own rays: those of the picture's rays win.
+const RANK_INDIRECT = 0x80000000u;
+// No key of an entry, which are odd.
+const TOMBSTONE = 2u;
 
-// Bits of a lot that are the query's index: no more than needed, since the bits above decide.
-fn lot_bits() -> u32 {
+// Bits of a proposal that are the vertex' index: no more than needed, since the bits above decide.
+fn proposal_bits() -> u32 {
     return 32u - countLeadingZeros(gather.rays + 4u * (gather.mask + 1u));
 }
 
-// Hash of the cell around x for the side n, and the cell's size.
+// Hash of the grid cell around x for normal n, and the cell's size in metres.
 struct EntryCell {
     hash: vec2u,
     size: f32,
@@ -57,8 +51,7 @@ fn entry_cell(x: vec3f, n: vec3f) -> EntryCell {
     return EntryCell(vec2u(h.x, h.y | 1u), size);
 }
 
-// The slot with this hash; a new one where there is none yet. NONE where the table is full around
-// there.
+// The slot with this hash, made if it does not exist; NONE where the table is full there.
 fn entry_slot(hash: vec2u) -> u32 {
     var probe = 0u;
     loop {
@@ -70,58 +63,56 @@ fn entry_slot(hash: vec2u) -> u32 {
             probe++;
             continue;
         }
-        // It may fail for no reason; then the slot is asked again.
+        // A weak exchange may fail without reason; then the slot is probed again.
         let taken = atomicCompareExchangeWeak(&entry_keys[slot], 0u, hash.y);
         if taken.exchanged || taken.old_value == hash.y { return slot; }
     }
     return NONE;
 }
 
-// Entries that one cell has at most, for places that do not see each other: both sides of a wall
-// that stands on a floor, the inside of a box. Rays that meet further places go on to others
-// (look.wgsl).
-const ENTRY_ROOMS = 3u;
-// Both ends of the line that asks this are lifted by this share of the cell, so that it goes over
-// what merely lies there.
-const ENTRY_LIFT = 0.02;
+// Entries of a grid cell, for places that do not see each other: both sides of a wall on a floor,
+// the inside of a box.
+const SUB_ENTRIES = 3u;
+// Height, as a share of the cell, by which both ends of a visibility ray are raised: it passes over
+// what lies on the surface.
+const ENTRY_BIAS = 0.02;
 
-// Of a place that asks, the line to where the rays of an entry began: nothing stands in it if the
-// place sees that.
-struct EntryLine {
+// Visibility ray from a place to where an entry's rays start. The entry may be used where it is
+// free.
+struct EntryVisibility {
     slot: u32,
-    // No length: the entry is everybody's, or the place itself.
+    // Length 0: no test is needed.
     start: vec3f,
     to: vec3f,
 }
 
-// Room `room` of the cell of place x that faces n.
-fn entry_room(x: vec3f, n: vec3f, room: u32) -> EntryLine {
+// Sub-entry `sub_index` of the grid cell of x with normal n.
+fn find_sub_entry(x: vec3f, n: vec3f, sub_index: u32) -> EntryVisibility {
     let cell = entry_cell(x, n);
-    let slot = entry_slot(vec2u(cell.hash.x + room * 0x9e3779b9u, (cell.hash.y + room * 0x7f4a7c16u) | 1u));
-    var line = EntryLine(slot, x, vec3f(0.0));
-    if slot == NONE { return line; }
+    let slot = entry_slot(vec2u(cell.hash.x + sub_index * 0x9e3779b9u, (cell.hash.y + sub_index * 0x7f4a7c16u) | 1u));
+    var visibility = EntryVisibility(slot, x, vec3f(0.0));
+    if slot == NONE { return visibility; }
     let slots = gather.mask + 1u;
-    let begin = entry_queries[gather.rays + 2u * slots + (1u - (gather.round & 1u)) * slots + slot];
-    if begin.w == 0u { return line; }
-    let lift = ENTRY_LIFT * cell.size;
-    line.start = x + n * lift;
-    line.to = bitcast<vec3f>(begin.xyz) + unpack_normal(begin.w) * lift - line.start;
-    if dot(line.to, line.to) < 1e-6 * cell.size * cell.size { line.to = vec3f(0.0); }
-    return line;
+    let begin = proposal_vertices[gather.rays + 2u * slots + (1u - (gather.cache_iteration & 1u)) * slots + slot];
+    if begin.w == 0u { return visibility; }
+    let bias = ENTRY_BIAS * cell.size;
+    visibility.start = x + n * bias;
+    visibility.to = bitcast<vec3f>(begin.xyz) + unpack_normal(begin.w) * bias - visibility.start;
+    if dot(visibility.to, visibility.to) < 1e-6 * cell.size * cell.size { visibility.to = vec3f(0.0); }
+    return visibility;
 }
 
-// A ray with number `query` has met x, which faces n and whose entry is in `slot`: round `round`
-// will update it. Rays without a number (NONE) read entries and say nothing of where they begin.
-fn claim_entry(slot: u32, x: vec3f, n: vec3f, query: u32, name: u32, round: u32) {
-    if query == NONE { return; }
-    entry_queries[query] = vec4u(bitcast<vec3u>(x), pack_normal(n));
-    let alone = 1u << lot_bits();
-    var drawn = (pcg3(vec3u(name, round, 0x2545f491u)).x << (lot_bits() + 2u)) >> 1u;
-    // The picture's own rays come before those of entries, which tell what the light between
-    // surfaces is.
-    if query >= gather.rays { drawn |= BY_ENTRIES; }
-    let i = (round & 1u) * (gather.mask + 1u) + slot;
-    let lowest = atomicMin(&entry_lots[i], drawn | alone | query);
-    // Of two that draw the same neither wins: their indices are slots, which go to who comes first.
-    if lowest != NONE && (lowest & ~(2u * alone - 1u)) == drawn { atomicMin(&entry_lots[i], drawn); }
+// Proposes x with normal n as the origin of the rays of the entry in `slot`, for update
+// `cache_iteration`. Without a vertex (NONE) a ray reads entries and proposes nothing.
+fn propose_vertex(slot: u32, x: vec3f, n: vec3f, vertex_index: u32, rng_id: u32, cache_iteration: u32) {
+    if vertex_index == NONE { return; }
+    proposal_vertices[vertex_index] = vec4u(bitcast<vec3u>(x), pack_normal(n));
+    let unique = 1u << proposal_bits();
+    var rank = (pcg3(vec3u(rng_id, cache_iteration, 0x2545f491u)).x << (proposal_bits() + 2u)) >> 1u;
+    // The picture's rays win over entries' rays.
+    if vertex_index >= gather.rays { rank |= RANK_INDIRECT; }
+    let i = (cache_iteration & 1u) * (gather.mask + 1u) + slot;
+    let lowest = atomicMin(&entry_proposals[i], rank | unique | vertex_index);
+    // Ties are discarded, so that results do not depend on the order of threads.
+    if lowest != NONE && (lowest & ~(2u * unique - 1u)) == rank { atomicMin(&entry_proposals[i], rank); }
 }

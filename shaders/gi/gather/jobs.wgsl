@@ -1,16 +1,15 @@
-//#import gi/gather/queue.wgsl
+//#import gi/gather/ray_queue.wgsl
 
-// What a workgroup is to do. What may ask for a job stands in units of 1,024 places. Each workgroup
-// has a share of the units; it notes the jobs of as many as it has room for and does them
-// (`look.wgsl`), and then those of the next. The shader says what they are: `block_of(unit) ->
-// vec3u` finds a unit, `wants(block, i) -> bool` is asked once whether place `i` of it has a job,
-// and `begin(at, job) -> bool` sends way `at` on it (false: it is at its end at once).
+// Work of a workgroup. Places that may have a job are grouped in units of 1,024. Each workgroup has
+// a share of the units, notes as many jobs as there is room for, runs them (`path.wgsl`), and goes
+// on. The shader says what they are: `block_of(unit) -> vec3u`, `wants(block, i) -> bool` (called
+// once for each place), `begin(at, job) -> bool` starts path `at` on a job (false: it has ended
+// already).
 
-// `UNIT`, of `gi::gather::work`: places of a unit.
-// Places after which a workgroup sees whether there is room for the jobs of as many.
+// Places after which a workgroup checks whether there is room for as many jobs.
 const PART = UNIT / 4u;
 
-// What the workgroup has to do, and how much of it is done or being done.
+// Jobs that a workgroup notes at once.
 const JOBS = 1024u;
 // Sixteen bits each.
 var<workgroup> jobs: array<atomic<u32>, JOBS / 2u>;
@@ -18,14 +17,14 @@ var<workgroup> jobs_noted: atomic<u32>;
 var<workgroup> jobs_taken: atomic<u32>;
 var<workgroup> jobs_counted: u32;
 
-// Of a workgroup: its first unit, and how many parts it has.
+// Units of a workgroup: the first, and the number of parts.
 struct Share {
     first: u32,
     parts: u32,
 }
 
-// Every workgroup has a unit at least, and 64 at most, of which sixteen bits tell each place.
-fn share_of(group: u32, groups: u32, units: u32) -> Share {
+// Every workgroup has 1 to 64 units, so that sixteen bits name a place.
+fn group_share(group: u32, groups: u32, units: u32) -> Share {
     let first = group * units / groups;
     return Share(first, ((group + 1u) * units / groups - first) * (UNIT / PART));
 }
@@ -41,24 +40,24 @@ fn place_in_unit(job: u32) -> u32 {
     return job & (UNIT - 1u);
 }
 
-// Notes the jobs of a share from part `first` on; how many parts were asked. All threads call this.
+// Notes the jobs of a share from part `first` on; returns the next part. All threads call it.
 fn note_jobs(thread: u32, share: Share, first: u32) -> u32 {
     workgroupBarrier();
-    for (var i = thread; i < JOBS / 2u; i += WALKERS) { atomicStore(&jobs[i], 0u); }
+    for (var i = thread; i < JOBS / 2u; i += GROUP_SIZE) { atomicStore(&jobs[i], 0u); }
     if thread == 0u {
         atomicStore(&jobs_noted, 0u);
         atomicStore(&jobs_taken, 0u);
-        no_rays();
+        clear_rays();
     }
     workgroupBarrier();
     first_unit = share.first;
     var part = first;
-    // Most that can have been noted.
+    // Upper bound of the jobs noted.
     var most = 0u;
     loop {
         let start = PART * part;
         let block = block_of(unit_of(start));
-        for (var i = thread; i < PART; i += WALKERS) {
+        for (var i = thread; i < PART; i += GROUP_SIZE) {
             if wants(block, place_in_unit(start) + i) { note_job(start + i); }
         }
         part++;
@@ -80,8 +79,8 @@ fn jobs_so_far(thread: u32) -> u32 {
     return workgroupUniformLoad(&jobs_counted);
 }
 
-// The next job that there is for way `at`; what it found for the one before, if there was one, is
-// taken down first.
+// Starts the next job on path `at`; the result of its job before, if there was one, is stored
+// first.
 fn next_job(at: u32, had_one: bool) {
     var is_done = had_one;
     loop {
@@ -99,7 +98,7 @@ fn blocks_of(grid: vec2u) -> vec2u {
     return (grid + 31u) / 32u;
 }
 
-// Place `i` of such a block; 64 that follow each other are a square.
-fn place_of(block: vec2u, i: u32) -> vec2u {
+// Place `i` of a block; 64 consecutive ones are a square.
+fn block_place(block: vec2u, i: u32) -> vec2u {
     return 32u * block + vec2u((i & 7u) | ((i >> 3u) & 24u), ((i >> 3u) & 7u) | ((i >> 5u) & 24u));
 }

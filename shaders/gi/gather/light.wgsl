@@ -74,12 +74,12 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
         // right in the mean whatever the chances are.
         let few = all <= CANDIDATES || lights[all - 1u].chance <= 0.0;
         let shift = unit_floats(pcg3(seed ^ vec3u(0x2c1b3c6du))).x;
-        let looks = select(CANDIDATES, all, few);
-        for (var k = 0u; k < looks; k++) {
+        let candidates = select(CANDIDATES, all, few);
+        for (var k = 0u; k < candidates; k++) {
             var i = k;
             if !few { i = drawn_light((f32(k) + shift) / f32(CANDIDATES)); }
             let light = lights[i];
-            if light.stands_in != 0u { continue; }
+            if light.is_emissive_proxy != 0u { continue; }
             let s = sample_light(light, p.x);
             let n_l = dot(p.n, s.l);
             if n_l <= 0.0 { continue; }
@@ -115,7 +115,7 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
         let l = to * inverseSqrt(d2);
         let facing = -dot(across, l) * inverseSqrt(max(dot(across, across), 1e-37));
         let n_l = dot(p.n, l);
-        if n_l > 0.0 && (facing > 0.0 || ((e.flags & MET_DOUBLE_SIDED) != 0u && facing != 0.0)) {
+        if n_l > 0.0 && (facing > 0.0 || ((e.flags & HIT_DOUBLE_SIDED) != 0u && facing != 0.0)) {
             let density = e.by_area * gather.inverse_power * d2 / abs(facing);
             // Against cosine-distributed rays that meet the same surface (balance heuristic; Veach
             // 1997).

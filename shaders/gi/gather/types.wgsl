@@ -5,41 +5,42 @@
 //#import accel/surface.wgsl
 //#import gi/cells.wgsl
 
-// What the passes of `gather` share: their parameters and the scene as rays meet it (group 1).
+// Parameters and scene of the passes of `gather` (group 1), and helpers that they share.
 
 // `gi::gather::Params` is the Rust side.
 struct Gather {
-    // World space; the eye of the view that is drawn.
+    // World space; the eye of the view.
     eye: vec3f,
-    // Frames since the last cut; the first is 0.
+    // Frames since the last reset; 0 in the first.
     frame: u32,
     light_count: u32,
     emitter_count: u32,
-    // One over the sum of `by_area` times area of all that glows.
+    // One over the sum of `by_area` times area of all emissive triangles.
     inverse_power: f32,
-    // Entries of the cache minus one; a power of two minus one.
+    // Slots of the cache minus one; a power of two minus one.
     mask: u32,
-    // Size of an entry's cell over its distance from the eye.
+    // Size of an entry's cell over its distance from the eye, before it is rounded up to a power of
+    // two.
     entry_scale: f32,
-    // Number of the round of entries, which never begins anew.
-    round: u32,
-    // Most frames that a cell's mean and an entry's remember.
+    // Number of the cache update, which never restarts.
+    cache_iteration: u32,
+    // Longest history of a cell, frames, and of an entry, rays.
     cell_frames: f32,
     entry_frames: f32,
-    // `GATHER_` and a name: `gi::gather::params` says what each means.
+    // `GATHER_` and a name: `gi::gather::params` documents them.
     flags: u32,
-    // Cells of the picture. Queries and records of rays into lobes come after theirs, queries of
-    // entries after both.
+    // Cells of the picture. Records and proposal vertices of specular rays come after theirs, those
+    // of entries after both.
     cells: u32,
-    // Rays of cells and into lobes.
+    // First rays of cells and specular rays.
     rays: u32,
     // Frames since lights or objects changed, while GATHER_CHANGING.
-    since: u32,
-    // The round with which the frame ends.
-    last_round: u32,
-    // Rays of a cell of which nothing is remembered.
-    looks: u32,
-    // Turns the lattice of cells' rays: other noise of the same light.
+    frames_since_change: u32,
+    // The update with which the frame ends.
+    last_iteration: u32,
+    // Rays of a disoccluded cell.
+    spp: u32,
+    // Shift of the cells' lattice by the seed: other noise, same light.
     shift: vec2u,
 }
 
@@ -51,27 +52,26 @@ struct Gather {
 @group(1) @binding(5) var environment_picture: texture_2d<f32>;
 @group(1) @binding(6) var corner_normals: texture_2d<u32>;
 
-// Rays of a cell whose remembered light holds no longer.
-const AGAIN = 4u;
+// Rays of an invalidated cell.
+const SPP_INVALIDATED = 4u;
 
-// A cell is young for so many frames, and sends so many rays in each.
-const YOUNG_FRAMES = 40.0;
-const MORE = 2u;
+// Length below which a history is short, and rays of such a cell.
+const SHORT_HISTORY_FRAMES = 40.0;
+const SPP_SHORT = 2u;
 
-// Rays of a cell, of what stands in `cell_pixels`.
-fn looks_of(packed: u32) -> u32 {
-    switch age_of(packed) {
-        case FRESH: { return gather.looks; }
-        case STALE: { return AGAIN; }
-        case YOUNG: { return MORE; }
+// Rays of a cell in this frame, by its word in `cell_pixels`.
+fn spp_of(packed: u32) -> u32 {
+    switch history_state(packed) {
+        case DISOCCLUDED: { return gather.spp; }
+        case INVALIDATED: { return SPP_INVALIDATED; }
+        case SHORT_HISTORY: { return SPP_SHORT; }
         default: { return 1u; }
     }
 }
 
-// Where ray `look` of a cell stands among the records: the first rays of all cells and those into
-// lobes come first.
-fn cell_record(cell: u32, look: u32) -> u32 {
-    return select(gather.rays + (look - 1u) * gather.cells + cell, cell, look == 0u);
+// Index of a cell's record: first rays of all cells, then specular rays, then further rays.
+fn cell_record(cell: u32, sample_index: u32) -> u32 {
+    return select(gather.rays + (sample_index - 1u) * gather.cells + cell, cell, sample_index == 0u);
 }
 
 const NONE = 0xffffffffu;
@@ -103,8 +103,8 @@ fn unit_floats(bits: vec3u) -> vec3f {
     return vec3f(bits >> vec3u(8u)) / 16777216.0;
 }
 
-// Off a surface at p, which a ray of length t found, on the side of n: further than rounding on the
-// way there and in an instance's space can be wrong.
+// A point off the surface at p, on the side of n, which a ray of length t has hit: further than
+// rounding on the way there and in the instance's space.
 fn off(p: vec3f, n: vec3f, t: f32) -> vec3f {
     let a = abs(p);
     return p + n * (max(max(a.x, a.y), a.z) * 4e-6 + t * 1e-5);

@@ -53,75 +53,75 @@ bindings! {
     /// `gi.gradient`.
     Gradient {
         entry_keys: READ_WRITE,
-        entry_lots: READ_WRITE,
-        entry_queries: READ_WRITE,
-        before: READ,
+        entry_proposals: READ_WRITE,
+        proposal_vertices: READ_WRITE,
+        history_prev: READ,
         records: READ_WRITE,
     }
-    /// `gi.recall` and `gi.settle`.
-    History {
+    /// `gi.reproject` and `gi.accumulate`.
+    Temporal {
         cell_pixels: READ_WRITE,
         records: READ_WRITE,
         entry_light: READ,
-        before: READ,
-        after: READ_WRITE,
+        history_prev: READ,
+        history_next: READ_WRITE,
         changes: READ,
         motion_map: LOAD,
         specular_map: LOAD,
     }
-    /// `gi.rays`.
-    CellRays {
+    /// `gi.trace`.
+    Trace {
         entry_keys: READ_WRITE,
-        entry_lots: READ_WRITE,
-        entry_queries: READ_WRITE,
+        entry_proposals: READ_WRITE,
+        proposal_vertices: READ_WRITE,
         cell_pixels: READ,
         records: READ_WRITE,
         specular_map: LOAD,
     }
-    /// `gi.evict` and `gi.renew`.
-    Entries {
+    /// `gi.cache_evict` and `gi.cache_update`.
+    CacheUpdate {
         entry_keys: READ_WRITE,
-        entry_lots: READ_WRITE,
-        entry_queries: READ_WRITE,
-        entry_asked: READ_WRITE,
+        entry_proposals: READ_WRITE,
+        proposal_vertices: READ_WRITE,
+        entry_last_used: READ_WRITE,
         entry_light: READ_WRITE,
     }
-    /// `gi.mirror`.
-    Mirror {
+    /// `gi.specular_trace`.
+    SpecularTrace {
         entry_keys: READ_WRITE,
-        entry_lots: READ_WRITE,
-        entry_queries: READ_WRITE,
+        entry_proposals: READ_WRITE,
+        proposal_vertices: READ_WRITE,
         entry_light: READ,
-        mirrored: READ_WRITE,
+        pixel_specular: READ_WRITE,
         specular_map: LOAD,
         motion_map: LOAD,
     }
     /// `gi.blur`.
     Blur {
-        pasts: READ,
-        light: READ_WRITE,
+        histories: READ,
+        light_blurred: READ_WRITE,
         changes: READ_WRITE,
-        glosses: READ_WRITE,
+        specular_blurred: READ_WRITE,
         guidance: READ,
     }
-    /// `gi.smooth`.
-    Smooth {
-        pasts: READ,
-        blurred: READ,
-        light: READ_WRITE,
+    /// `gi.atrous`.
+    Atrous {
+        histories: READ,
+        light_blurred: READ,
+        cell_light: READ_WRITE,
         guidance: READ,
-        glosses: READ,
-        gleams: READ_WRITE,
+        specular_blurred: READ,
+        specular_filtered: READ_WRITE,
     }
-    /// `gi.bring`.
-    Bring {
+    /// `gi.upsample`.
+    Upsample {
         cell_pixels: READ,
-        light: READ,
-        glosses: READ,
+        cell_light: READ,
+        specular_filtered: READ,
         output: STORE_HALF,
         specular_output: STORE_HALF,
         specular_map: LOAD,
-        mirrored: READ,
+        pixel_specular: READ,
     }
 }
 
@@ -143,24 +143,24 @@ mod tests {
 
     #[test]
     fn bindings_have_the_names_of_the_shaders_variables() {
-        let (prelude, bring) = (super::super::prelude(), super::super::bring::prelude());
+        let (prelude, upsample) = (super::super::prelude(), super::super::upsample::prelude());
         let rows: [(&str, &str, u32, &[&str]); 16] = [
-            ("gi.rays", &prelude, 1, Scene::NAMES),
-            ("gi.renew", &prelude, 1, Scene::NAMES),
+            ("gi.trace", &prelude, 1, Scene::NAMES),
+            ("gi.cache_update", &prelude, 1, Scene::NAMES),
             ("gi.gradient", &prelude, 1, Scene::NAMES),
-            ("gi.mirror", &prelude, 1, Scene::NAMES),
+            ("gi.specular_trace", &prelude, 1, Scene::NAMES),
             ("gi.gradient", &prelude, 2, Gradient::NAMES),
-            ("gi.recall", &prelude, 2, History::NAMES),
-            ("gi.settle", &prelude, 2, History::NAMES),
-            ("gi.rays", &prelude, 2, CellRays::NAMES),
-            ("gi.renew", &prelude, 2, Entries::NAMES),
-            ("gi.mirror", &prelude, 2, Mirror::NAMES),
+            ("gi.reproject", &prelude, 2, Temporal::NAMES),
+            ("gi.accumulate", &prelude, 2, Temporal::NAMES),
+            ("gi.trace", &prelude, 2, Trace::NAMES),
+            ("gi.cache_update", &prelude, 2, CacheUpdate::NAMES),
+            ("gi.specular_trace", &prelude, 2, SpecularTrace::NAMES),
             ("gi.blur", &prelude, 2, Blur::NAMES),
-            ("gi.smooth", &prelude, 2, Smooth::NAMES),
-            ("gi.bring", &bring, 1, Bring::NAMES),
-            ("gi.settle", &prelude, 1, Scene::NAMES),
+            ("gi.atrous", &prelude, 2, Atrous::NAMES),
+            ("gi.upsample", &upsample, 1, Upsample::NAMES),
+            ("gi.accumulate", &prelude, 1, Scene::NAMES),
             ("gi.blur", &prelude, 1, Scene::NAMES),
-            ("gi.smooth", &prelude, 1, Scene::NAMES),
+            ("gi.atrous", &prelude, 1, Scene::NAMES),
         ];
         let mut compared = 0;
         for (shader, prelude, group, names) in rows {

@@ -1,12 +1,12 @@
 //! One frame of the method: rays and means, then the filter over neighbours.
 
 use super::bindings;
-use super::bring::Brought;
 use super::params::{self, Params};
 use super::pass::Groups;
-use super::schedule::{Events, Frame, HURRIED, Rules, STIR};
+use super::schedule::{CACHE_RESPONSIVE_FRAMES, CACHE_RESPONSIVE_HISTORY, Events, Frame, Rules};
 use super::store::{self, Store};
-use super::{GatherGi, looks};
+use super::upsample::Upsampled;
+use super::{GatherGi, spp};
 use crate::gi::interface::{GiError, Inputs, Outputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -14,21 +14,21 @@ use crate::gi::stage::inputs::{BoundInputs, cells_of};
 use crate::gpu::bind::Bound;
 use crate::gpu::timing::Recorder;
 
-/// A frame whose means are recorded, before its filter.
-pub struct Settled {
+/// A frame whose accumulation is recorded, before its spatial filters.
+pub struct Accumulated {
     inputs: BoundInputs,
     /// F0 and roughness of pixels.
     specular: wgpu::TextureView,
-    /// What cells remember now, [`PAST`](super::PAST) bytes each: `Past` of `past.wgsl`.
-    pub pasts: wgpu::Buffer,
+    /// Histories of cells, [`HISTORY`](super::HISTORY) bytes each: `History` of `history.wgsl`.
+    pub histories: wgpu::Buffer,
     /// Group 1, and where the frame's parameters lie in it.
     params: wgpu::BindGroup,
     offset: u32,
-    /// Whether it is blurred widely.
+    /// The wide blur is used.
     wide: bool,
 }
 
-impl Settled {
+impl Accumulated {
     fn groups(&self) -> Groups<'_> {
         Groups { inputs: &self.inputs, scene: &self.params, offset: self.offset }
     }
@@ -40,47 +40,47 @@ impl Settled {
     }
 }
 
-/// What a frame is drawn of, once nothing can go wrong with it.
-struct Sound<'a> {
+/// Inputs of a frame that passed all checks.
+struct Validated<'a> {
     rays: &'a Rays<'a>,
     camera: stage::inputs::Params,
     bound: BoundInputs,
 }
 
 impl GatherGi {
-    /// Records the frame up to the cells' means; then [`filter`](Self::filter) is due. `guided`:
-    /// whether it gets a network's guidance.
+    /// Records the frame up to `gi.accumulate`; then [`filter`](Self::filter) is due. `guided`:
+    /// whether a network guides the filters.
     ///
     /// # Errors
     /// [`GiError`] when the inputs do not fit; then nothing was recorded.
-    pub fn settle(
+    pub fn accumulate(
         &mut self,
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,
         inputs: &Inputs<'_>,
         guided: bool,
-    ) -> Result<Settled, GiError> {
-        let sound = self.validate(queue, inputs)?;
-        let rules = Rules { even: self.options.even, first_rounds: self.options.first_rounds };
+    ) -> Result<Accumulated, GiError> {
+        let valid = self.validate(queue, inputs)?;
+        let rules = Rules { progressive: self.options.progressive, first_updates: self.options.first_updates };
         let events = Events {
-            cut: inputs.reset,
+            reset: inputs.reset,
             resized: self.cells.fit(inputs.size),
-            scene: sound.rays.scene.id(),
-            lights: inputs.lights.map_or(0, |l| l.epoch),
-            objects: sound.rays.scene.moves(),
+            scene: valid.rays.scene.id(),
+            light_version: inputs.lights.map_or(0, |l| l.version),
+            scene_version: valid.rays.scene.version(),
         };
         let (frame, schedule) = self.schedule.next(&events, rules);
         if frame.restart {
             self.restart(inputs.size);
         }
-        let params = self.params(inputs, &sound, guided, &frame);
-        let settled = self.record_frame(recorder, queue, inputs, sound, &frame, params);
+        let params = self.params(inputs, &valid, guided, &frame);
+        let accumulated = self.record_frame(recorder, queue, inputs, valid, &frame, params);
         self.schedule = schedule;
-        Ok(settled)
+        Ok(accumulated)
     }
 
     /// Everything that can be wrong with `inputs`, before anything changes.
-    fn validate<'a>(&mut self, queue: &wgpu::Queue, inputs: &'a Inputs<'_>) -> Result<Sound<'a>, GiError> {
+    fn validate<'a>(&mut self, queue: &wgpu::Queue, inputs: &'a Inputs<'_>) -> Result<Validated<'a>, GiError> {
         let rays = inputs.rays.as_ref().ok_or(GiError::Rays)?;
         if inputs.size != self.checked {
             Self::check(&self.device.limits(), inputs.size, &self.options)?;
@@ -88,96 +88,101 @@ impl GatherGi {
         }
         let camera = stage::inputs::Params::of(inputs, None)?;
         let bound = self.inputs.bind(queue, inputs)?;
-        Ok(Sound { rays, camera, bound })
+        Ok(Validated { rays, camera, bound })
     }
 
-    /// Buffers that remember nothing, for pictures of `size` pixels.
+    /// Makes empty buffers for pictures of `size` pixels.
     fn restart(&mut self, size: [u32; 2]) {
         self.store = Store::new(&self.device, size, self.options.slots, self.workgroups);
-        self.bring.forget();
+        self.upsample.release_bindings();
     }
 
-    /// Those of the first of the frame's rounds.
-    fn params(&self, inputs: &Inputs<'_>, sound: &Sound<'_>, guided: bool, frame: &Frame) -> Params {
-        let (scene, options) = (sound.rays.scene, &self.options);
-        let changing = frame.since_change.is_some();
+    /// Parameters of the frame's first cache update.
+    fn params(&self, inputs: &Inputs<'_>, valid: &Validated<'_>, guided: bool, frame: &Frame) -> Params {
+        let (scene, options) = (valid.rays.scene, &self.options);
+        let changing = frame.frames_since_change.is_some();
         let flags = [
-            (inputs.lights.is_some_and(|l| l.stand_in), params::STANDS_IN),
-            (frame.number == 0, params::CUT),
+            (inputs.lights.is_some_and(|l| l.has_emissive_proxies), params::EMISSIVE_PROXIES),
+            (frame.number == 0, params::RESET),
             (!options.blur, params::NO_BLUR),
-            (options.even, params::EVEN),
-            (frame.hurries, params::LIGHTS_CHANGED),
+            (options.progressive, params::PROGRESSIVE),
+            (frame.antilag, params::LIGHTS_CHANGED),
             (!options.caustics, params::NO_CAUSTICS),
-            (inputs.specular.is_none(), params::NO_GLOSS),
+            (inputs.specular.is_none(), params::NO_SPECULAR),
             (changing, params::CHANGING),
             (guided, params::GUIDED),
             (frame.changed, params::CHANGED),
             (frame.all_entries, params::ALL_ENTRIES),
-            (self.workgroups.in_turn(), params::IN_TURN),
+            (self.workgroups.are_serial(), params::SERIAL_GROUPS),
         ];
         Params {
-            eye: sound.camera.eye_position(),
+            eye: valid.camera.eye_position(),
             frame: frame.number,
             light_count: inputs.lights.map_or(0, |l| l.count),
             emitter_count: scene.counts().emitters as u32,
             inverse_power: scene.inverse_power(),
             mask: options.slots - 1,
-            entry_scale: options.entry_scale.min(widest(sound.camera.tan_half_height())),
-            round: frame.round,
+            entry_scale: options.entry_scale.min(widest(valid.camera.tan_half_height())),
+            cache_iteration: frame.iteration,
             cell_frames: options.cell_frames,
-            entry_frames: if changing { options.entry_frames.min(HURRIED) } else { options.entry_frames },
+            entry_frames: if changing {
+                options.entry_frames.min(CACHE_RESPONSIVE_HISTORY)
+            } else {
+                options.entry_frames
+            },
             flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
             cells: cells::count(inputs.size) as u32,
             rays: (cells::count(inputs.size) + store::squares(inputs.size)) as u32,
-            since: frame.since_change.unwrap_or(STIR),
-            last_round: frame.round + frame.rounds - 1,
-            looks: looks(inputs.size),
+            frames_since_change: frame.frames_since_change.unwrap_or(CACHE_RESPONSIVE_FRAMES),
+            last_iteration: frame.iteration + frame.updates - 1,
+            spp: spp(inputs.size),
             shift: options.shift(),
         }
     }
 
-    /// Records the passes of the frame up to the cells' means.
+    /// Records the passes up to `gi.accumulate`.
     fn record_frame(
         &mut self,
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,
         inputs: &Inputs<'_>,
-        sound: Sound<'_>,
+        valid: Validated<'_>,
         frame: &Frame,
         mut params: Params,
-    ) -> Settled {
-        let scene = sound.rays.scene;
+    ) -> Accumulated {
+        let scene = valid.rays.scene;
         let group = self.scene.group(bindings::Scene {
             gather: self.params.bound(),
             accel_blocks: scene.accel().view().into(),
             surfaces: scene.surfaces().into(),
             emitters: scene.emitters().into(),
             lights: inputs.lights.map_or(&self.no_lights, |l| l.buffer).into(),
-            environment_picture: sound.rays.environment.into(),
+            environment_picture: valid.rays.environment.into(),
             corner_normals: scene.normals().into(),
         });
         let frame_params = self.frame_params.group(bindings::Alone { gather: self.params.bound() });
         let mut offset = self.params.write(queue, &params);
-        let with_scene = |offset| Groups { inputs: &sound.bound, scene: &group, offset };
-        let alone = |offset| Groups { inputs: &sound.bound, scene: &frame_params, offset };
+        let with_scene = |offset| Groups { inputs: &valid.bound, scene: &group, offset };
+        let alone = |offset| Groups { inputs: &valid.bound, scene: &frame_params, offset };
         let store = &self.store;
         let specular_map = Bound::from(inputs.specular.unwrap_or(&self.no_specular));
         let motion_map = Bound::from(inputs.motion.unwrap_or(&self.no_motion));
-        // Means are written beside those of the frame before.
-        let [before, after] = [0, 1].map(|k| Bound::from(&store.pasts[((frame.number + k) & 1) as usize]));
-        let entries = bindings::Entries {
+        // Histories alternate between two buffers.
+        let [history_prev, history_next] =
+            [0, 1].map(|k| Bound::from(&store.histories[((frame.number + k) & 1) as usize]));
+        let entries = bindings::CacheUpdate {
             entry_keys: (&store.keys).into(),
-            entry_lots: (&store.lots).into(),
-            entry_queries: (&store.queries).into(),
-            entry_asked: (&store.asked).into(),
+            entry_proposals: (&store.proposals).into(),
+            proposal_vertices: (&store.vertices).into(),
+            entry_last_used: (&store.last_used).into(),
             entry_light: (&store.light).into(),
         };
-        let history = bindings::History {
+        let temporal = bindings::Temporal {
             cell_pixels: self.cells.pixels().into(),
             records: (&store.records).into(),
             entry_light: (&store.light).into(),
-            before: before.clone(),
-            after: after.clone(),
+            history_prev: history_prev.clone(),
+            history_next: history_next.clone(),
             changes: (&store.changes).into(),
             motion_map: motion_map.clone(),
             specular_map: specular_map.clone(),
@@ -188,106 +193,111 @@ impl GatherGi {
         };
         let (workgroups, slots) = (self.workgroups, self.options.slots);
 
-        self.cells.record(recorder, &sound.bound);
+        self.cells.record(recorder, &valid.bound);
         if frame.changed {
-            // By the random numbers of the frame before.
-            let offset = self.params.write(queue, &Params { round: frame.round_before, ..params });
+            // With the random numbers of the last frame.
+            let offset = self.params.write(queue, &Params { cache_iteration: frame.previous_iteration, ..params });
             let own = bindings::Gradient {
                 entry_keys: (&store.keys).into(),
-                entry_lots: (&store.lots).into(),
-                entry_queries: (&store.queries).into(),
-                before,
+                entry_proposals: (&store.proposals).into(),
+                proposal_vertices: (&store.vertices).into(),
+                history_prev,
                 records: (&store.records).into(),
             };
             self.gradient.record(recorder, with_scene(offset), own, [workgroups.for_squares(inputs.size), 1, 1]);
         }
-        self.recall.record(recorder, alone(offset), history.clone(), of_cells);
-        self.evict.record(recorder, with_scene(offset), entries.clone(), [slots.div_ceil(64), 1, 1]);
-        let own = bindings::CellRays {
+        self.reproject.record(recorder, alone(offset), temporal.clone(), of_cells);
+        self.cache_evict.record(recorder, with_scene(offset), entries.clone(), [slots.div_ceil(64), 1, 1]);
+        let own = bindings::Trace {
             entry_keys: (&store.keys).into(),
-            entry_lots: (&store.lots).into(),
-            entry_queries: (&store.queries).into(),
+            entry_proposals: (&store.proposals).into(),
+            proposal_vertices: (&store.vertices).into(),
             cell_pixels: self.cells.pixels().into(),
             records: (&store.records).into(),
             specular_map: specular_map.clone(),
         };
         self.rays.record(recorder, with_scene(offset), own, [workgroups.for_cells(inputs.size), 1, 1]);
-        for round in 0..frame.rounds {
-            if round > 0 {
-                params.round += 1;
+        for update in 0..frame.updates {
+            if update > 0 {
+                params.cache_iteration += 1;
                 offset = self.params.write(queue, &params);
             }
-            self.renew.record(recorder, with_scene(offset), entries.clone(), [workgroups.for_slots(slots), 1, 1]);
+            self.cache_update.record(
+                recorder,
+                with_scene(offset),
+                entries.clone(),
+                [workgroups.for_slots(slots), 1, 1],
+            );
         }
         if inputs.specular.is_some() {
-            let own = bindings::Mirror {
+            let own = bindings::SpecularTrace {
                 entry_keys: (&store.keys).into(),
-                entry_lots: (&store.lots).into(),
-                entry_queries: (&store.queries).into(),
+                entry_proposals: (&store.proposals).into(),
+                proposal_vertices: (&store.vertices).into(),
                 entry_light: (&store.light).into(),
-                mirrored: (&store.mirrored).into(),
+                pixel_specular: (&store.pixel_specular).into(),
                 specular_map,
                 motion_map,
             };
-            self.mirror.record(recorder, with_scene(offset), own, [workgroups.for_pixels(inputs.size), 1, 1]);
+            self.specular_trace.record(recorder, with_scene(offset), own, [workgroups.for_pixels(inputs.size), 1, 1]);
         }
-        self.mean.record(recorder, alone(offset), history, of_cells);
-        Settled {
-            pasts: store.pasts[((frame.number + 1) & 1) as usize].clone(),
+        self.accumulate.record(recorder, alone(offset), temporal, of_cells);
+        Accumulated {
+            histories: store.histories[((frame.number + 1) & 1) as usize].clone(),
             specular: inputs.specular.unwrap_or(&self.no_specular).clone(),
-            inputs: sound.bound,
+            inputs: valid.bound,
             params: frame_params,
             offset,
-            wide: frame.wide,
+            wide: frame.wide_blur,
         }
     }
 
-    /// Averages means over neighbours and finds where light has changed, which the next frame asks.
-    pub(super) fn blur(&mut self, recorder: &mut Recorder<'_>, settled: &Settled, guidance: Bound) {
+    /// Records `gi.blur`, whose anti-lag test the next frame reads.
+    pub(super) fn blur(&mut self, recorder: &mut Recorder<'_>, accumulated: &Accumulated, guidance: Bound) {
         let store = &self.store;
         let own = bindings::Blur {
-            pasts: (&settled.pasts).into(),
-            light: (&store.blurred).into(),
+            histories: (&accumulated.histories).into(),
+            light_blurred: (&store.light_blurred).into(),
             changes: (&store.changes).into(),
-            glosses: (&store.glosses).into(),
+            specular_blurred: (&store.specular_blurred).into(),
             guidance,
         };
-        let blur = if settled.wide { &mut self.blur_wide } else { &mut self.blur };
-        blur.record(recorder, settled.groups(), own, settled.workgroups());
+        let blur = if accumulated.wide { &mut self.blur_wide } else { &mut self.blur };
+        blur.record(recorder, accumulated.groups(), own, accumulated.workgroups());
     }
 
-    /// Records the rest of the frame: means averaged over neighbours, brought to full size.
+    /// Records the rest of the frame: means averaged over neighbours, upsampled to full size.
     /// `guidance`: [`GUIDANCE`](super::GUIDANCE) bytes a cell.
     pub fn filter(
         &mut self,
         recorder: &mut Recorder<'_>,
-        settled: &Settled,
+        accumulated: &Accumulated,
         guidance: Option<Bound>,
         outputs: Outputs<'_>,
     ) {
         let guidance = guidance.unwrap_or_else(|| Bound::from(&self.no_guidance));
-        self.blur(recorder, settled, guidance.clone());
+        self.blur(recorder, accumulated, guidance.clone());
         let store = &self.store;
-        let own = bindings::Smooth {
-            pasts: (&settled.pasts).into(),
-            blurred: (&store.blurred).into(),
-            light: (&store.cell_light).into(),
+        let own = bindings::Atrous {
+            histories: (&accumulated.histories).into(),
+            light_blurred: (&store.light_blurred).into(),
+            cell_light: (&store.cell_light).into(),
             guidance,
-            glosses: (&store.glosses).into(),
-            gleams: (&store.gleams).into(),
+            specular_blurred: (&store.specular_blurred).into(),
+            specular_filtered: (&store.specular_filtered).into(),
         };
         // Of 32×32 cells each of sixteen workgroups has those that are four apart.
-        let [w, h] = settled.inputs.cells.map(|n| 4 * n.div_ceil(32));
-        self.smooth.record(recorder, settled.groups(), own, [w, h, 1]);
-        let brought = Brought {
-            light: &store.cell_light,
-            glosses: &store.gleams,
-            specular: &settled.specular,
-            mirrored: &store.mirrored,
+        let [w, h] = accumulated.inputs.cells.map(|n| 4 * n.div_ceil(32));
+        self.atrous.record(recorder, accumulated.groups(), own, [w, h, 1]);
+        let upsampled = Upsampled {
+            cell_light: &store.cell_light,
+            specular_filtered: &store.specular_filtered,
+            specular: &accumulated.specular,
+            pixel_specular: &store.pixel_specular,
             output: outputs.light,
-            specular_output: outputs.specular.unwrap_or(&self.nowhere),
+            specular_output: outputs.specular.unwrap_or(&self.unused_specular),
         };
-        self.bring.record(recorder, &settled.inputs, &self.cells, brought);
+        self.upsample.record(recorder, &accumulated.inputs, &self.cells, upsampled);
     }
 }
 

@@ -1,91 +1,88 @@
-//! The method `gather`: one ray a cell and frame into the scene's triangles, lit where it ends by
-//! the lights (a shadow ray each) and by a cache of light in the world; averaged over frames,
-//! blurred over neighbours, brought to full resolution.
+//! The method `gather`. It traces one ray per 4×4-pixel cell and frame into the scene's triangles,
+//! lights the hits by a shadow ray and a world-space radiance cache, accumulates over frames, blurs
+//! over neighbours and upsamples to full resolution.
 //!
 //! ```text
-//! G-buffer ─► gi.cells ─► gi.rays ───────────► gi.settle ─► gi.blur ─► gi.smooth ─► gi.bring ─► E/π, gloss
-//!                          │  ▲ who was met       ▲   mean of the frames before
-//!                          ▼  │                   │
-//!        gi.evict ─► table of entries ─► gi.renew ┘   one ray an entry, several rounds in a first frame
+//! G-buffer ─► gi.downsample ─► gi.gradient ─► gi.reproject ─► gi.trace ─► gi.accumulate ─► gi.blur ─► gi.atrous
+//!                                                               │  ▲         ▲ history          │
+//!                                              proposals, hits  ▼  │         │                  ▼
+//!                          gi.cache_evict ─► entries ─► gi.cache_update      └─ …          gi.upsample ─► E/π, specular
 //! ```
 //!
-//! Of each 2×2 cells one in turn sends a second ray, into its surface's lobe: what lobes show goes
-//! the same way beside the light ([`Outputs::specular`]). Lobes narrower than cells get rays of
-//! their own, one a frame of each 2×2 pixels (`gi.mirror`).
+//! One cell of each 2×2 also sends a specular ray ([`Outputs::specular`]). Pixels whose reflection
+//! changes within a cell have rays of their own, one a frame for each 2×2 pixels
+//! (`gi.specular_trace`).
 //!
-//! It asks what stands between, so it needs no constant for that. What it knows of a surface that a
-//! ray meets is one colour a triangle; how finely it knows the light between surfaces is the size
-//! of an entry's cell; the rest is noise, which frames and neighbours average away. `docs/internals/gather.md`
-//! says what it cannot do.
+//! Limits: a ray knows one colour of a triangle, indirect light is as fine as an entry's cell, and
+//! the rest is noise. See `docs/internals/gather.md`.
 
 mod bindings;
-pub mod bring;
 mod frame;
 mod options;
 mod params;
 mod pass;
 mod schedule;
 mod store;
+pub mod upsample;
 mod work;
 
-pub use frame::Settled;
+pub use frame::Accumulated;
 pub use options::{Options, OptionsError};
 pub use params::Params;
 
 use crate::gi::interface::technique::{Memory, Technique};
 use crate::gi::interface::{GiError, Inputs, Outputs};
 use crate::gi::stage;
-use crate::gi::stage::cells::{self, CellsPass};
+use crate::gi::stage::cells::{self, DownsamplePass};
 use crate::gi::stage::inputs::InputGroup;
 use crate::gpu::bind::{Binder, Bound};
 use crate::gpu::timing::Recorder;
-use bring::BringPass;
 use params::ParamsRing;
 use pass::Pass;
 use schedule::Schedule;
 use store::Store;
+use upsample::UpsamplePass;
 
-/// A ray begins this share of the view distance off its surface: half along the way to the eye,
-/// half along the normal. At 1024 × 512 and 60° a three-hundredth of a cell's width, and 500 times
-/// the rounding of the depth.
-const LIFT: f32 = 3e-5;
+/// Ray origin offset, as a fraction of the view distance, split between the view direction and the
+/// normal. Prevents self-intersection. At 1024×512 and 60° a three-hundredth of a cell, and 500
+/// times the rounding of the depth.
+const RAY_BIAS: f32 = 3e-5;
 
-/// It begins no nearer than so many steps of the depth's texels.
-const LIFT_STEPS: f32 = 4.0;
+/// Least offset, in steps of the depth texture.
+const RAY_BIAS_STEPS: f32 = 4.0;
 
 /// Constants of the shaders as WGSL.
 pub fn prelude() -> String {
     let flags: String = params::FLAGS.iter().map(|(name, bit)| format!("const GATHER_{name} = {bit}u;\n")).collect();
     let unit = format!("const UNIT = {}u;\nconst CANDIDATES = {}u;\n", work::UNIT, crate::lights::CANDIDATES);
-    let lift = format!("const LIFT = f32({LIFT:?});\nconst LIFT_STEPS = f32({LIFT_STEPS:?});\n");
-    [cells::prelude(), flags, unit, lift].concat()
+    let bias = format!("const RAY_BIAS = f32({RAY_BIAS:?});\nconst RAY_BIAS_STEPS = f32({RAY_BIAS_STEPS:?});\n");
+    [cells::prelude(), flags, unit, bias].concat()
 }
 
-/// Most bits of a lot that may name a query (`lot_bits` of `entries.wgsl`): ten are left to draw
-/// by.
-const LOT_BITS: u32 = 22;
+/// Most bits of a proposal that may index a vertex (`proposal_bits` of `entries.wgsl`): ten are
+/// left for the random number.
+const VERTEX_BITS: u32 = 22;
 
-/// Storage buffers that `gi.rays` and `gi.renew` bind: as many as every WebGPU device has.
+/// Storage buffers that `gi.trace` and `gi.cache_update` bind: as many as every WebGPU device has.
 const STORAGE_BUFFERS: u32 = 8;
 
-/// Rays of a cell of which nothing is remembered: eight in pictures of up to two million pixels.
-/// Larger ones have more cells of the same surfaces, and at 3840×2160 records of eight would not fit
-/// into the 128 MiB that every WebGPU device binds.
-pub(super) fn looks(size: [u32; 2]) -> u32 {
+/// Rays of a disoccluded cell: eight in pictures of up to two million pixels, else four, since
+/// records of eight would not fit into the 128 MiB that every WebGPU device binds.
+pub(super) fn spp(size: [u32; 2]) -> u32 {
     if size.map(u64::from).iter().product::<u64>() <= 1 << 21 { 8 } else { 4 }
 }
 
-/// Bytes that a workgroup remembers of its rays: of 256 ways, thirteen vectors each (`WALKS`
-/// and `PARTS` of `ways.wgsl`).
-const WAYS: u64 = 256 * 13 * 16;
+/// Bytes of the paths of a workgroup: 256 of thirteen vectors each (`PATHS_PER_GROUP` and
+/// `PATH_FIELDS` of `path_state.wgsl`).
+const PATHS: u64 = 256 * 13 * 16;
 
-/// Bytes of what a cell's ray found.
+/// Bytes of a ray's record.
 const RECORD: u64 = 48;
 
-/// Bytes of what a cell remembers.
-pub const PAST: u64 = 80;
+/// Bytes of a cell's history.
+pub const HISTORY: u64 = 80;
 
-/// Bytes of what a network says of a cell; `Guidance` of `guided.wgsl`.
+/// Bytes of a cell's guidance; `Guidance` of `guidance.wgsl`.
 pub const GUIDANCE: u64 = 48;
 
 /// The method at work.
@@ -97,36 +94,35 @@ pub struct GatherGi {
     scene: Binder,
     /// Group 1 of passes that send no rays: the parameters alone.
     frame_params: Binder,
-    cells: CellsPass,
-    /// Sends rays of the frame before once more, where something has changed.
+    cells: DownsamplePass,
+    /// Traces rays of the last frame again, where lights or objects changed.
     gradient: Pass,
-    /// Finds cells of which nothing is remembered that still holds; binds what `settle` binds.
-    recall: Pass,
+    /// Marks cells without a valid history; has the bindings of `accumulate`.
+    reproject: Pass,
     rays: Pass,
-    /// Frees entries that no ray has met for long; binds what `renew` binds.
-    evict: Pass,
-    renew: Pass,
-    /// Rays of smooth pixels.
-    mirror: Pass,
-    mean: Pass,
+    /// Frees entries that no ray has met for long; has the bindings of `cache_update`.
+    cache_evict: Pass,
+    cache_update: Pass,
+    /// Specular rays of smooth pixels.
+    specular_trace: Pass,
+    accumulate: Pass,
     blur: Pass,
     blur_wide: Pass,
-    smooth: Pass,
-    bring: BringPass,
+    atrous: Pass,
+    upsample: UpsamplePass,
     store: Store,
     workgroups: work::Groups,
     /// Size of pictures that the device is known to have room for.
     checked: [u32; 2],
-    /// Bound where the host names no lights or no motion.
+    /// Placeholders, bound when the host provides no lights, no motion or no specular reflectance,
+    /// or when no network guides the filter.
     no_lights: wgpu::Buffer,
-    /// Bound where no network guides the filter.
     no_guidance: wgpu::Buffer,
     no_motion: wgpu::TextureView,
-    /// Bound where the host names no specular reflectance: there is none.
     no_specular: wgpu::TextureView,
-    /// Where what lobes reflect goes if the host does not ask for it: one texel.
-    nowhere: wgpu::TextureView,
-    /// What the next frame has to know of those before it.
+    /// Specular output where the host asks for none: one texel.
+    unused_specular: wgpu::TextureView,
+    /// What the next frame has to know of the earlier ones.
     schedule: Schedule,
 }
 
@@ -151,11 +147,11 @@ impl GatherGi {
             )));
         }
         // A lot's low bits name a query.
-        let queries = cells::count(size) + store::squares(size) + 4 * u64::from(options.slots);
-        if queries >= 1 << LOT_BITS {
+        let vertices = cells::count(size) + store::squares(size) + 4 * u64::from(options.slots);
+        if vertices >= 1 << VERTEX_BITS {
             return Err(GiError::Device(format!(
-                "is asked for {queries} rays a frame, but they are numbered up to {}",
-                1 << LOT_BITS
+                "is last_used for {vertices} rays a frame, but they are numbered up to {}",
+                1 << VERTEX_BITS
             )));
         }
         Ok(())
@@ -173,29 +169,33 @@ impl GatherGi {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
             device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
         };
-        let (table, history, blur) = (bindings::Entries::TYPES, bindings::History::TYPES, bindings::Blur::TYPES);
+        let (table, history, blur) = (bindings::CacheUpdate::TYPES, bindings::Temporal::TYPES, bindings::Blur::TYPES);
         let workgroups = work::Groups::of(device);
         Self {
-            cells: CellsPass::new(device, &inputs, size),
-            evict: new(shared, ("gi.evict", "gi.renew", "evict"), table),
+            cells: DownsamplePass::new(device, &inputs, size),
+            cache_evict: new(shared, ("gi.cache_evict", "gi.cache_update", "cache_evict"), table),
             gradient: new(shared, ("gi.gradient", "gi.gradient", "gradient"), bindings::Gradient::TYPES),
-            rays: new(shared, ("gi.rays", "gi.rays", "rays"), bindings::CellRays::TYPES),
-            renew: new(shared, ("gi.renew", "gi.renew", "renew"), table),
-            mirror: new(shared, ("gi.mirror", "gi.mirror", "mirror"), bindings::Mirror::TYPES),
-            recall: new(alone, ("gi.recall", "gi.recall", "recall"), history),
-            mean: new(alone, ("gi.settle", "gi.settle", "settle"), history),
+            rays: new(shared, ("gi.trace", "gi.trace", "trace_cells"), bindings::Trace::TYPES),
+            cache_update: new(shared, ("gi.cache_update", "gi.cache_update", "cache_update"), table),
+            specular_trace: new(
+                shared,
+                ("gi.specular_trace", "gi.specular_trace", "specular_trace"),
+                bindings::SpecularTrace::TYPES,
+            ),
+            reproject: new(alone, ("gi.reproject", "gi.reproject", "reproject"), history),
+            accumulate: new(alone, ("gi.accumulate", "gi.accumulate", "accumulate"), history),
             blur: new(alone, ("gi.blur", "gi.blur", "blur"), blur),
             blur_wide: new(alone, ("gi.blur", "gi.blur", "blur_wide"), blur),
-            smooth: new(alone, ("gi.smooth", "gi.smooth", "smooth_light"), bindings::Smooth::TYPES),
-            bring: BringPass::new(device, &inputs),
+            atrous: new(alone, ("gi.atrous", "gi.atrous", "atrous"), bindings::Atrous::TYPES),
+            upsample: UpsamplePass::new(device, &inputs),
             store: Store::new(device, size, options.slots, workgroups),
             workgroups,
             checked: size,
             no_lights: unused("gi.no_lights", size_of::<crate::lights::LightGpu>() as u64),
             no_guidance: unused("gi.no_guidance", GUIDANCE),
-            no_motion: stage::absent(device, "gi.no_motion", wgpu::TextureFormat::Rg16Float),
-            no_specular: stage::absent(device, "gi.no_specular", wgpu::TextureFormat::Rgba8Unorm),
-            nowhere: stage::nowhere(device, "gi.nowhere"),
+            no_motion: stage::dummy_view(device, "gi.no_motion", wgpu::TextureFormat::Rg16Float),
+            no_specular: stage::dummy_view(device, "gi.no_specular", wgpu::TextureFormat::Rgba8Unorm),
+            unused_specular: stage::dummy_storage(device, "gi.unused_specular"),
             device: device.clone(),
             options,
             inputs,
@@ -213,9 +213,11 @@ impl GatherGi {
 
     /// Bind groups made since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
-        let rays = [&self.gradient, &self.recall, &self.evict, &self.rays, &self.renew, &self.mirror];
-        let made = rays.into_iter().chain([&self.mean, &self.blur, &self.blur_wide, &self.smooth]).map(Pass::made);
-        self.inputs.made() + self.scene.made() + self.frame_params.made() + self.bring.made() + made.sum::<u64>()
+        let rays =
+            [&self.gradient, &self.reproject, &self.cache_evict, &self.rays, &self.cache_update, &self.specular_trace];
+        let made =
+            rays.into_iter().chain([&self.accumulate, &self.blur, &self.blur_wide, &self.atrous]).map(Pass::made);
+        self.inputs.made() + self.scene.made() + self.frame_params.made() + self.upsample.made() + made.sum::<u64>()
     }
 }
 
@@ -228,8 +230,8 @@ impl Technique for GatherGi {
         outputs: Outputs<'_>,
     ) -> Result<(), GiError> {
         stage::inputs::check_outputs(outputs, inputs.size)?;
-        let settled = self.settle(recorder, queue, inputs, false)?;
-        self.filter(recorder, &settled, None, outputs);
+        let accumulated = self.accumulate(recorder, queue, inputs, false)?;
+        self.filter(recorder, &accumulated, None, outputs);
         Ok(())
     }
 
@@ -239,23 +241,23 @@ impl Technique for GatherGi {
         queue: &wgpu::Queue,
         inputs: &Inputs<'_>,
     ) -> Result<bool, GiError> {
-        let settled = self.settle(recorder, queue, inputs, false)?;
-        // Where light has changed cells are told by their neighbours.
-        self.blur(recorder, &settled, Bound::from(&self.no_guidance));
+        let accumulated = self.accumulate(recorder, queue, inputs, false)?;
+        // The next frame reads the anti-lag test.
+        self.blur(recorder, &accumulated, Bound::from(&self.no_guidance));
         Ok(true)
     }
 
-    fn shows_lobes(&self) -> bool {
+    fn writes_specular(&self) -> bool {
         true
     }
 
     fn memory(&self) -> Option<Memory<'_>> {
-        let pasts = &self.store.pasts[(self.frames() & 1) as usize];
+        let histories = &self.store.histories[(self.frames() & 1) as usize];
         let Store { cell_light, changes, .. } = &self.store;
-        Some(Memory { pasts, pixels: self.cells.pixels(), light: cell_light, changes })
+        Some(Memory { histories, pixels: self.cells.pixels(), light: cell_light, changes })
     }
 
-    fn knows_scene(&self, rays: bool) -> bool {
+    fn uses_rays(&self, rays: bool) -> bool {
         rays
     }
 
@@ -263,18 +265,18 @@ impl Technique for GatherGi {
         Some(self.frames())
     }
 
-    fn cut(&mut self) {
-        self.schedule.cut();
+    fn reset_history(&mut self) {
+        self.schedule.reset_history();
     }
 
-    fn forget(&mut self) {
-        self.inputs.forget();
-        self.scene.forget();
-        self.gradient.forget();
-        self.recall.forget();
-        self.mirror.forget();
-        self.mean.forget();
-        self.bring.forget();
+    fn release_bindings(&mut self) {
+        self.inputs.release_bindings();
+        self.scene.release_bindings();
+        self.gradient.release_bindings();
+        self.reproject.release_bindings();
+        self.specular_trace.release_bindings();
+        self.accumulate.release_bindings();
+        self.upsample.release_bindings();
     }
 
     fn allocations(&self) -> u64 {

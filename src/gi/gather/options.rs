@@ -7,27 +7,29 @@ use thiserror::Error;
 /// How light is gathered. The numbers that are choices stand in the table of `docs/internals/gather.md`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Frames that a cell's mean remembers at rest; where it moves, or light or objects do, 128 at
-    /// most (`BRIEF` in `settle.wgsl`).
+    /// Longest history of a cell at rest, frames (1 and more). Short: noise. Long: slow to follow
+    /// changes that the host does not announce. In motion and after changes 128 at most
+    /// (`MAX_HISTORY_DYNAMIC` in `accumulate.wgsl`).
     pub cell_frames: f32,
-    /// Rays that an entry's mean remembers.
+    /// Longest history of a cache entry, rays (1 and more). Short: noise between surfaces. Long:
+    /// stale light.
     pub entry_frames: f32,
-    /// Slots of the table of entries, a power of two.
+    /// Slots of the cache, a power of two from 64 to 1,048,576. Few: places without an entry.
     pub slots: u32,
     /// Size of an entry's cell over its distance from the eye, before it is rounded up to a power
-    /// of two.
+    /// of two. Large: indirect light is averaged. Small: more entries and rays.
     pub entry_scale: f32,
-    /// Rounds of entries in the first frame after a cut.
-    pub first_rounds: u32,
-    /// Whether means are blurred over neighbours.
+    /// Cache updates in a first frame, 1 to 64. Few: dark first frames. Many: slow ones.
+    pub first_updates: u32,
+    /// Spatial filters.
     pub blur: bool,
-    /// Whether all frames of a mean count the same, however early, and a change of light shortens
-    /// none: for asking what the method converges to.
-    pub even: bool,
-    /// Whether surfaces that rays meet show their gloss. Pictures made by Cycles without
-    /// "Reflective Caustics" are compared with those made without it; light is missing then.
+    /// All frames of a mean count alike, and changes shorten none: to see what the method converges
+    /// to.
+    pub progressive: bool,
+    /// Surfaces that rays hit have specular lobes. Off as in Cycles without "Reflective Caustics";
+    /// light is missing then.
     pub caustics: bool,
-    /// Pictures of another seed have other noise of cells' rays, and the same light.
+    /// Seed of the cells' rays: other noise, same light.
     pub seed: u32,
 }
 
@@ -38,9 +40,9 @@ impl Default for Options {
             entry_frames: 8.0,
             slots: 1 << 16,
             entry_scale: 1.0 / 16.0,
-            first_rounds: 32,
+            first_updates: 32,
             blur: true,
-            even: false,
+            progressive: false,
             caustics: true,
             seed: 0,
         }
@@ -56,9 +58,9 @@ impl Options {
         entry_frames: 8.0,
         slots: 1 << 16,
         entry_scale: 1.0 / 16.0,
-        first_rounds: 64,
+        first_updates: 64,
         blur: false,
-        even: true,
+        progressive: true,
         caustics: true,
         seed: 0,
     };
@@ -75,9 +77,9 @@ impl Options {
                 ("entry_frames", o.entry_frames),
                 ("slots", o.slots as f32),
                 ("entry_scale", o.entry_scale),
-                ("first_rounds", o.first_rounds as f32),
+                ("first_updates", o.first_updates as f32),
                 ("blur", flag(o.blur)),
-                ("even", flag(o.even)),
+                ("progressive", flag(o.progressive)),
                 ("caustics", flag(o.caustics)),
                 ("seed", o.seed as f32),
             ]
@@ -94,13 +96,16 @@ impl Options {
     }
 }
 
+/// Words of earlier versions and what they are called now.
+const RENAMED: [(&str, &str); 2] = [("even", "progressive"), ("first_rounds", "first_updates")];
+
 /// Why a list of numbers cannot be read.
 #[derive(Debug, Error, PartialEq)]
 pub enum OptionsError {
     /// No such number.
     #[error(
-        "`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_rounds=N, \
-         blur=0|1, even=0|1, caustics=0|1, seed=N"
+        "`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_updates=N, \
+         blur=0|1, progressive=0|1, caustics=0|1, seed=N"
     )]
     Unknown(String),
     /// A value that cannot be.
@@ -123,10 +128,12 @@ impl FromStr for Options {
             let wrong = |why| OptionsError::Value(word.into(), why);
             let number: f32 = value.parse().map_err(|_| wrong("is no number"))?;
             let at_least_one = if number >= 1.0 { Ok(number) } else { Err(wrong("must be at least 1")) };
+            // Files of `fit` hold such words: those of earlier versions are read on.
+            let name = RENAMED.iter().find(|(old, _)| *old == name).map_or(name, |(_, new)| new);
             match name {
                 "cell_frames" => options.cell_frames = at_least_one?,
                 "entry_frames" => options.entry_frames = at_least_one?,
-                "first_rounds" => options.first_rounds = at_least_one?.min(64.0) as u32,
+                "first_updates" => options.first_updates = at_least_one?.min(64.0) as u32,
                 "slots" if (64.0..=1_048_576.0).contains(&number) && (number as u32).is_power_of_two() => {
                     options.slots = number as u32;
                 }
@@ -134,7 +141,7 @@ impl FromStr for Options {
                 "entry_scale" if number > 1e-4 && number <= 4.0 => options.entry_scale = number,
                 "entry_scale" => return Err(wrong("must be above 0.0001 and at most 4")),
                 "blur" => options.blur = number != 0.0,
-                "even" => options.even = number != 0.0,
+                "progressive" => options.progressive = number != 0.0,
                 "caustics" => options.caustics = number != 0.0,
                 // What a float counts exactly.
                 "seed" if (0.0..=16_777_216.0).contains(&number) => options.seed = number as u32,
@@ -159,6 +166,7 @@ mod tests {
         {
             assert_eq!(options.words().unwrap().parse(), Ok(options));
         }
+        assert_eq!("even=1,first_rounds=8".parse::<Options>(), "progressive=1,first_updates=8".parse());
         assert_eq!(Options::default().words(), None);
         for bad in ["", "rays=3", "slots=1000", "cell_frames=0", "cell_frames=nan", "entry_scale=-1", "blur", "seed=-1"]
         {

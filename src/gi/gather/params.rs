@@ -1,5 +1,5 @@
-//! What changes from round to round, in a ring of uniform slots: a host may record several views
-//! into one submission.
+//! Parameters of each cache update, in a ring of uniform slots: a host may record several views into
+//! one submission.
 
 use crate::gpu::bind::Bound;
 use bytemuck::{Pod, Zeroable};
@@ -15,32 +15,30 @@ macro_rules! flags {
 }
 
 flags! {
-    /// Some lights stand for surfaces that glow: these light no cell a second time.
-    STANDS_IN = 1,
-    /// The frame has nothing to do with the one before.
-    CUT = 1 << 1,
-    /// Cells are shown as they are.
+    /// Some lights stand in for emissive surfaces: shadow rays to these would count twice.
+    EMISSIVE_PROXIES = 1,
+    /// First frame: no history holds.
+    RESET = 1 << 1,
+    /// No spatial filter.
     NO_BLUR = 1 << 2,
-    /// All frames of a mean count the same.
-    EVEN = 1 << 3,
-    /// The lights are not what they were a few frames ago.
+    /// All frames of a mean count alike.
+    PROGRESSIVE = 1 << 3,
+    /// Lights changed within the last few frames.
     LIGHTS_CHANGED = 1 << 4,
-    /// Surfaces that rays meet show no gloss.
+    /// Surfaces that rays hit have no specular lobe.
     NO_CAUSTICS = 1 << 5,
-    /// Surfaces of the picture show none that rays would have to find: the host does not say what they
-    /// mirror.
-    NO_GLOSS = 1 << 6,
-    /// Lights, or objects, are not what and where they were a short while ago.
+    /// The host names no specular reflectance: no specular rays.
+    NO_SPECULAR = 1 << 6,
+    /// Lights or objects changed a short while ago.
     CHANGING = 1 << 7,
-    /// A network says which cells are averaged.
+    /// A network guides the filters.
     GUIDED = 1 << 8,
-    /// Lights or objects have changed since the frame before.
+    /// Lights or objects changed since the last frame.
     CHANGED = 1 << 9,
-    /// Every entry sends a ray in each round, whoever met it: light has changed lately, or all frames
-    /// are to be alike.
+    /// All entries send a ray in each update.
     ALL_ENTRIES = 1 << 10,
-    /// The device runs the threads of a workgroup one after the other.
-    IN_TURN = 1 << 11,
+    /// The device runs the threads of a workgroup one after the other (CPU drivers).
+    SERIAL_GROUPS = 1 << 11,
 }
 
 /// `Gather` of `shaders/gi/gather/types.wgsl`, which documents the fields.
@@ -55,22 +53,22 @@ pub struct Params {
     pub inverse_power: f32,
     pub mask: u32,
     pub entry_scale: f32,
-    pub round: u32,
+    pub cache_iteration: u32,
     pub cell_frames: f32,
     pub entry_frames: f32,
     pub flags: u32,
     pub cells: u32,
     pub rays: u32,
-    pub since: u32,
-    pub last_round: u32,
-    pub looks: u32,
+    pub frames_since_change: u32,
+    pub last_iteration: u32,
+    pub spp: u32,
     pub shift: [u32; 2],
 }
 
 /// Uniform offsets are multiples of this under WebGPU's default limits.
 const STRIDE: u64 = 256;
-/// Rounds between two submissions that keep their own parameters: as many views as `InputGroup`
-/// allows, with a few first frames among them.
+/// Slots of the ring, one a cache update: as many views as `InputGroup` allows between two
+/// submissions, with a few first frames among them.
 const SLOTS: u32 = 512;
 
 pub(super) struct ParamsRing {

@@ -18,7 +18,7 @@ pub(super) struct Pass {
 pub(super) struct Groups<'a> {
     pub inputs: &'a BoundInputs,
     pub scene: &'a wgpu::BindGroup,
-    /// Where the round's parameters lie.
+    /// Offset of the parameters of the cache update.
     pub offset: u32,
 }
 
@@ -60,8 +60,8 @@ impl Pass {
         self.binder.made()
     }
 
-    /// Lets go of what is bound.
-    pub fn forget(&mut self) {
-        self.binder.forget();
+    /// Drops the kept bind group.
+    pub fn release_bindings(&mut self) {
+        self.binder.release_bindings();
     }
 }

@@ -1,6 +1,6 @@
 //! What `gather` keeps from frame to frame, and between the passes of one.
 
-use super::{PAST, RECORD, WAYS, looks, work};
+use super::{HISTORY, PATHS, RECORD, spp, work};
 use crate::gi::stage::{cells, inputs::cells_of};
 
 /// Squares of 2×2 cells, each of which sends one ray a frame into a lobe.
@@ -9,47 +9,45 @@ pub(super) fn squares(size: [u32; 2]) -> u64 {
 }
 
 pub(super) struct Store {
-    /// Of the table of entries, by slot: key; lots of both halves; queries of cells and of both
-    /// halves' entries, where both halves' rays begin, and what workgroups remember of their rays;
-    /// when it was asked for; light of both halves.
+    /// Of the cache, by slot: keys; proposals of both halves; vertices of proposals, origins of rays and
+    /// state of paths; last use; light of both halves. `entries.wgsl` documents them.
     pub keys: wgpu::Buffer,
-    pub lots: wgpu::Buffer,
-    pub queries: wgpu::Buffer,
-    pub asked: wgpu::Buffer,
+    pub proposals: wgpu::Buffer,
+    pub vertices: wgpu::Buffer,
+    pub last_used: wgpu::Buffer,
     pub light: wgpu::Buffer,
-    /// Of cells: what rays found; what is remembered, before and after this frame in turns; the
-    /// light that is shown.
+    /// Of cells: records of rays; histories of the last and of this frame in turns; directional light.
     pub records: wgpu::Buffer,
-    pub pasts: [wgpu::Buffer; 2],
+    pub histories: [wgpu::Buffer; 2],
     pub cell_light: wgpu::Buffer,
-    /// The same as blurred over neighbours, before what lies further away is asked.
-    pub blurred: wgpu::Buffer,
-    /// Of cells: what light has changed to.
+    /// Directional light after the blur, before the à-trous step.
+    pub light_blurred: wgpu::Buffer,
+    /// Light of cells where the anti-lag test found a change.
     pub changes: wgpu::Buffer,
-    /// What rays into lobes of cells found, over neighbours; what lobes show.
-    pub glosses: wgpu::Buffer,
-    pub gleams: wgpu::Buffer,
-    /// What rays of smooth pixels have found, four halves a pixel: `mirrored` of `mirror.wgsl`.
-    pub mirrored: wgpu::Buffer,
+    /// Specular of cells after the blur; as lobes show it.
+    pub specular_blurred: wgpu::Buffer,
+    pub specular_filtered: wgpu::Buffer,
+    /// Specular history of smooth pixels, four halves each (`specular_trace.wgsl`).
+    pub pixel_specular: wgpu::Buffer,
 }
 
-/// Bytes of `mirrored` of pictures of `size` pixels.
-fn mirrored(size: [u32; 2]) -> u64 {
+/// Bytes of `pixel_specular` of pictures of `size` pixels.
+fn pixel_specular(size: [u32; 2]) -> u64 {
     8 * size.map(|n| u64::from(n.max(1))).iter().product::<u64>()
 }
 
-/// Bytes of `queries`.
-fn queries(size: [u32; 2], slots: u64, groups: work::Groups) -> u64 {
+/// Bytes of `vertices`.
+fn vertices(size: [u32; 2], slots: u64, groups: work::Groups) -> u64 {
     let rays = cells::count(size).max(1) + squares(size);
     let groups = groups.for_pixels(size).max(groups.for_cells(size)).max(groups.for_slots(slots as u32));
-    16 * (rays + 4 * slots) + u64::from(groups) * WAYS
+    16 * (rays + 4 * slots) + u64::from(groups) * PATHS
 }
 
 impl Store {
     pub fn new(device: &wgpu::Device, size: [u32; 2], slots: u32, groups: work::Groups) -> Self {
         let cells = cells::count(size).max(1);
         let rays = cells + squares(size);
-        let records = rays + u64::from(looks(size) - 1) * cells;
+        let records = rays + u64::from(spp(size) - 1) * cells;
         let slots = u64::from(slots);
         let buffer = |label, size| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -59,32 +57,32 @@ impl Store {
                 mapped_at_creation: false,
             })
         };
-        // The least number wins a lot, so none is the greatest.
-        let lots = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("gi.entry_lots"),
+        // The lowest proposal wins, so none is the largest number.
+        let proposals = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("gi.entry_proposals"),
             size: 8 * slots,
             usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: true,
         });
-        if let Ok(mut range) = lots.get_mapped_range_mut(..) {
+        if let Ok(mut range) = proposals.get_mapped_range_mut(..) {
             range.slice(..).fill(0xff);
         }
-        lots.unmap();
-        let past = || buffer("gi.pasts", PAST * cells);
+        proposals.unmap();
+        let history = || buffer("gi.histories", HISTORY * cells);
         Self {
             keys: buffer("gi.entry_keys", 4 * slots),
-            lots,
-            queries: buffer("gi.entry_queries", queries(size, slots, groups)),
-            asked: buffer("gi.entry_asked", 4 * slots),
+            proposals,
+            vertices: buffer("gi.proposal_vertices", vertices(size, slots, groups)),
+            last_used: buffer("gi.entry_last_used", 4 * slots),
             light: buffer("gi.entry_light", 32 * slots),
             records: buffer("gi.records", RECORD * records),
-            pasts: [past(), past()],
+            histories: [history(), history()],
             cell_light: buffer("gi.light", cells::light_bytes(size)),
-            blurred: buffer("gi.blurred", cells::light_bytes(size)),
+            light_blurred: buffer("gi.light_blurred", cells::light_bytes(size)),
             changes: buffer("gi.changes", 16 * cells),
-            glosses: buffer("gi.glosses", 16 * cells),
-            gleams: buffer("gi.gleams", 16 * cells),
-            mirrored: buffer("gi.mirrored", mirrored(size)),
+            specular_blurred: buffer("gi.specular_blurred", 16 * cells),
+            specular_filtered: buffer("gi.specular_filtered", 16 * cells),
+            pixel_specular: buffer("gi.pixel_specular", pixel_specular(size)),
         }
     }
 
@@ -92,30 +90,43 @@ impl Store {
     pub fn largest(size: [u32; 2], slots: u32) -> u64 {
         let (cells, slots) = (cells::count(size).max(1), u64::from(slots));
         let rays = cells + squares(size);
-        let records = rays + u64::from(looks(size) - 1) * cells;
-        let [light, pasts, records] = [32 * slots, PAST * cells, RECORD * records];
-        let queries = queries(size, slots, work::Groups::CPU).max(queries(size, slots, work::Groups::GPU));
-        [queries, light, pasts, records, cells::light_bytes(size), mirrored(size)].into_iter().max().unwrap_or(0)
+        let records = rays + u64::from(spp(size) - 1) * cells;
+        let [light, histories, records] = [32 * slots, HISTORY * cells, RECORD * records];
+        let vertices = vertices(size, slots, work::Groups::CPU).max(vertices(size, slots, work::Groups::GPU));
+        [vertices, light, histories, records, cells::light_bytes(size), pixel_specular(size)]
+            .into_iter()
+            .max()
+            .unwrap_or(0)
     }
 
     pub fn bytes(&self) -> u64 {
         let Self {
             keys,
-            lots,
-            queries,
-            asked,
+            proposals,
+            vertices,
+            last_used,
             light,
             records,
-            pasts: [a, b],
+            histories: [a, b],
             cell_light,
-            blurred,
+            light_blurred,
             changes,
-            glosses,
-            gleams,
-            mirrored,
+            specular_blurred,
+            specular_filtered,
+            pixel_specular,
         } = self;
-        let table = [keys, lots, queries, asked, light];
-        let buffers = table.into_iter().chain([records, a, b, cell_light, blurred, changes, glosses, gleams, mirrored]);
+        let table = [keys, proposals, vertices, last_used, light];
+        let buffers = table.into_iter().chain([
+            records,
+            a,
+            b,
+            cell_light,
+            light_blurred,
+            changes,
+            specular_blurred,
+            specular_filtered,
+            pixel_specular,
+        ]);
         buffers.map(|b| b.size()).sum::<u64>()
     }
 }

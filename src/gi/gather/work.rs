@@ -1,6 +1,6 @@
 //! How the rays of a pass are shared out among workgroups (`jobs.wgsl`).
 
-use super::looks;
+use super::spp;
 use crate::gi::stage::inputs::cells_of;
 use crate::gpu::tape;
 
@@ -16,18 +16,18 @@ pub struct Groups {
     least: u32,
     share: u32,
     /// Threads of a workgroup run one after the other.
-    in_turn: bool,
+    serial: bool,
 }
 
 impl Groups {
     /// A GTX 1050 runs 60 at a time; each holds 53 kB of memory. Sixteen bits name a job.
-    pub const GPU: Self = Self { most: 512, least: 2, share: 65_536 / UNIT, in_turn: false };
+    pub const GPU: Self = Self { most: 512, least: 2, share: 65_536 / UNIT, serial: false };
 
     /// For a processor alone: each vector of threads goes through a whole shader once, whether one
     /// of them has something to do or not. But Mesa's driver ends all loops of a thread after
     /// 65,535 rounds in all, without a word: of a city's first frame, eight rays a cell, shares of
     /// 60 units come to that.
-    pub const CPU: Self = Self { most: 2, least: 1, share: 4, in_turn: true };
+    pub const CPU: Self = Self { most: 2, least: 1, share: 4, serial: true };
 
     /// For a driver that draws on the CPU two a processor; but what is written down of dispatches,
     /// to be counted or exported, is as GPUs have it, and what is exported is for them.
@@ -36,25 +36,24 @@ impl Groups {
             return Self::GPU;
         }
         if tape::runs() {
-            return Self { in_turn: tape::counts(), ..Self::GPU };
+            return Self { serial: tape::counts(), ..Self::GPU };
         }
         let processors = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
         Self { most: processors.saturating_mul(Self::CPU.most).min(Self::GPU.most), ..Self::CPU }
     }
 
-    /// Whether threads of a workgroup run one after the other.
-    pub fn in_turn(self) -> bool {
-        self.in_turn
+    /// True on drivers that execute a workgroup's threads serially (software rasterisers).
+    pub fn are_serial(self) -> bool {
+        self.serial
     }
 
     fn for_units(self, units: u32) -> u32 {
         units.div_ceil(self.least).clamp(1, self.most).max(units.div_ceil(self.share))
     }
 
-    /// Workgroups of `gi.rays`: layers of blocks for rays of cells, for rays into lobes, and for
-    /// each further ray of fresh cells.
+    /// Workgroups of `gi.trace`: layers of blocks for first rays of cells, specular rays, and further rays.
     pub fn for_cells(self, size: [u32; 2]) -> u32 {
-        self.for_units(blocks(cells_of(size)).saturating_mul(1 + looks(size)))
+        self.for_units(blocks(cells_of(size)).saturating_mul(1 + spp(size)))
     }
 
     /// Workgroups of `gi.gradient`, for squares of 2×2 cells.
@@ -62,12 +61,12 @@ impl Groups {
         self.for_units(blocks(cells_of(size).map(|n| n.div_ceil(2))))
     }
 
-    /// Workgroups of `gi.mirror`, for squares of 2×2 pixels.
+    /// Workgroups of `gi.specular_trace`, for squares of 2×2 pixels.
     pub fn for_pixels(self, size: [u32; 2]) -> u32 {
         self.for_units(blocks(size.map(|n| n.div_ceil(2))))
     }
 
-    /// Workgroups of `gi.renew`.
+    /// Workgroups of `gi.cache_update`.
     pub fn for_slots(self, slots: u32) -> u32 {
         self.for_units(slots.div_ceil(UNIT))
     }
@@ -79,7 +78,7 @@ fn blocks(grid: [u32; 2]) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{GatherGi, Options, RECORD, WAYS, looks};
+    use super::super::{GatherGi, Options, PATHS, RECORD, spp};
     use super::{BLOCK, Groups, UNIT, cells_of};
 
     /// A constant of a shader.
@@ -91,9 +90,9 @@ mod tests {
 
     #[test]
     fn buffers_and_groups_are_what_shaders_fill() {
-        let ways = include_str!("../../../shaders/gi/gather/ways.wgsl");
+        let paths = include_str!("../../../shaders/gi/gather/path_state.wgsl");
         let jobs = include_str!("../../../shaders/gi/gather/jobs.wgsl");
-        assert_eq!(16 * constant(ways, "WALKS") * constant(ways, "PARTS"), WAYS);
+        assert_eq!(16 * constant(paths, "PATHS_PER_GROUP") * constant(paths, "PATH_FIELDS"), PATHS);
         assert_eq!(Groups::GPU.share * UNIT, 1 << 16, "sixteen bits name a job");
         let blocks = format!("return (grid + {}u) / {BLOCK}u;", BLOCK - 1);
         assert!(jobs.contains(&blocks), "{blocks}");
@@ -124,9 +123,9 @@ mod tests {
     fn a_picture_of_4k_fits_every_device() {
         let (limits, size) = (wgpu::Limits::default(), [3840, 2160]);
         GatherGi::check(&limits, size, &Options::default()).expect("it fits");
-        // Eight rays for each cell that nothing is remembered of would not.
+        // Eight rays for each disoccluded cell would not.
         let cells: u64 = cells_of(size).map(u64::from).iter().product();
         assert!(8 * RECORD * cells > limits.max_storage_buffer_binding_size);
-        assert_eq!((looks(size), looks([1920, 1080])), (4, 8));
+        assert_eq!((spp(size), spp([1920, 1080])), (4, 8));
     }
 }

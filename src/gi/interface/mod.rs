@@ -114,7 +114,7 @@ pub struct Outputs<'a> {
     /// Becomes what specular lobes reflect of surroundings and bounces, W/(m²·sr), to be added to
     /// the picture; 0 on the background. Of methods that send rays into lobes, with
     /// [`Inputs::specular`]; others leave it as it was
-    /// ([`Technique::shows_lobes`](technique::Technique::shows_lobes)).
+    /// ([`Technique::writes_specular`](technique::Technique::writes_specular)).
     pub specular: Option<&'a wgpu::TextureView>,
 }
 
@@ -146,9 +146,9 @@ pub struct Lights<'a> {
     pub buffer: &'a wgpu::Buffer,
     /// How many.
     pub count: u32,
-    /// Some of them stand for surfaces that glow, and their light is in [`Inputs::direct`].
-    pub stand_in: bool,
-    /// Another number whenever a light is another than before, so that what is remembered of their
-    /// light is forgotten sooner.
-    pub epoch: u64,
+    /// Some of them stand in for emissive surfaces, and their light is in [`Inputs::direct`].
+    pub has_emissive_proxies: bool,
+    /// To be raised whenever a light changes. What is not announced leaves old light for many
+    /// frames.
+    pub version: u64,
 }

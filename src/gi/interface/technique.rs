@@ -2,12 +2,12 @@
 
 use super::{GiError, Inputs, Outputs};
 use crate::gpu::timing::Recorder;
-use crate::net::gpu::Tap;
+use crate::net::gpu::LayerReadback;
 use crate::net::plan::Plan;
 
 /// What draws in a method's place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Instead<'a> {
+pub struct Fallback<'a> {
     /// Its name on the command line.
     pub method: &'static str,
     /// What is missing for the method that was asked for, one sentence without a full stop.
@@ -17,8 +17,9 @@ pub struct Instead<'a> {
 /// What `gather` holds of the cells after a frame, for tools that read it back.
 #[derive(Debug, Clone, Copy)]
 pub struct Memory<'a> {
-    /// What cells remember: `Past` of `past.wgsl`, [`PAST`](crate::gi::gather::PAST) bytes each.
-    pub pasts: &'a wgpu::Buffer,
+    /// Histories of cells: `History` of `history.wgsl`, [`HISTORY`](crate::gi::gather::HISTORY)
+    /// bytes each.
+    pub histories: &'a wgpu::Buffer,
     /// The pixel that stands for each: [`cells`](crate::gi::stage::cells).
     pub pixels: &'a wgpu::Buffer,
     /// The light that the frame shows, 48 bytes each.
@@ -62,29 +63,29 @@ pub trait Technique: Send {
     /// frames; 0 without one.
     fn set_frame(&mut self, _queue: &wgpu::Queue, _frame: u32) {}
 
-    /// The next frame has nothing to do with the last: what is remembered of pixels is of no use.
-    fn cut(&mut self) {}
+    /// The next frame has nothing to do with the last (a camera cut): histories are dropped.
+    fn reset_history(&mut self) {}
 
     /// Frames since the last cut, for methods whose answer settles over frames.
     fn settled(&self) -> Option<u32> {
         None
     }
 
-    /// Whether it asks the scene what glows and what stands between, so that lights that stand for
-    /// glowing surfaces ([`Light::stands_in`](crate::scene::Light::stands_in)) and occlusion maps
-    /// would count twice. `rays`: whether there are any.
-    fn knows_scene(&self, _rays: bool) -> bool {
+    /// Whether it finds emission and occlusion by rays, so that lights in place of emissive
+    /// surfaces ([`Light::is_emissive_proxy`](crate::scene::Light::is_emissive_proxy)) and
+    /// occlusion maps would count twice. `rays`: whether there is a BVH.
+    fn uses_rays(&self, _rays: bool) -> bool {
         false
     }
 
     /// The method that drew the last frame in this one's place, and why; `None` where it drew
     /// itself.
-    fn instead(&self) -> Option<Instead<'_>> {
+    fn fallback(&self) -> Option<Fallback<'_>> {
         None
     }
 
     /// Whether the last recording has written [`Outputs::specular`], if it was given.
-    fn shows_lobes(&self) -> bool {
+    fn writes_specular(&self) -> bool {
         false
     }
 
@@ -108,7 +109,7 @@ pub trait Technique: Send {
     ///
     /// # Errors
     /// As [`Technique::read_layer`].
-    fn read_input(&mut self, _inputs: &Inputs<'_>) -> Result<Option<Tap>, GiError> {
+    fn read_input(&mut self, _inputs: &Inputs<'_>) -> Result<Option<LayerReadback>, GiError> {
         Ok(None)
     }
 
@@ -117,12 +118,12 @@ pub trait Technique: Send {
     ///
     /// # Errors
     /// [`GiError`] when the inputs do not fit or reading back fails.
-    fn read_layer(&mut self, _inputs: &Inputs<'_>, _layer: usize) -> Result<Option<Tap>, GiError> {
+    fn read_layer(&mut self, _inputs: &Inputs<'_>, _layer: usize) -> Result<Option<LayerReadback>, GiError> {
         Ok(None)
     }
 
-    /// The targets are new: lets go of the texture views it remembers.
-    fn forget(&mut self);
+    /// Drops kept bind groups and texture views: the targets are new.
+    fn release_bindings(&mut self);
 
     /// GPU memory of buffers, textures and weights, bytes.
     fn bytes(&self) -> u64;

@@ -1,17 +1,17 @@
 //! The list of methods, and how one is made: nothing below knows it.
 
-mod below;
 pub mod name;
+mod with_fallback;
 
 use super::gather::{self, GatherGi};
 use super::interface::{GiError, technique::Technique};
 use super::neural::Neural;
 use super::neural::filter::FilterGi;
 use super::screen::{
-    ambient::{AmbientGi, Unseen},
+    ambient::{AmbientGi, AmbientTerm},
     ssgi::{SsgiGi, SsgiOptions},
 };
-use below::OrBelow;
+use with_fallback::WithFallback;
 
 /// Which method fills the `indirect` texture of a frame.
 #[derive(Debug, Clone, Default)]
@@ -21,12 +21,12 @@ pub enum Method {
     /// Even light times occlusion, see [`ambient`](super::ambient).
     #[default]
     Ambient,
-    /// The same with a scene's own numbers of unseen light.
-    AmbientWith(Unseen),
+    /// The same with a scene's own ambient term.
+    AmbientWith(AmbientTerm),
     /// One bounce in screen space, see [`ssgi`](super::ssgi).
     Ssgi,
-    /// The same with a scene's own numbers of unseen light.
-    SsgiWith(Unseen),
+    /// The same with a scene's own ambient term.
+    SsgiWith(AmbientTerm),
     /// Rays into the scene's triangles and a cache of light in the world, see [`gather`].
     Gather(gather::Options),
     /// `gather`, whose filter a network guides, see [`neural`](super::neural); `weights.into()`
@@ -86,23 +86,23 @@ pub fn build(
     Ok(match method {
         Method::Direct => None,
         Method::Ambient => Some(Box::new(AmbientGi::new(device))),
-        Method::AmbientWith(unseen) => Some(Box::new(AmbientGi::with(device, *unseen))),
+        Method::AmbientWith(ambient_term) => Some(Box::new(AmbientGi::with(device, *ambient_term))),
         Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
-        Method::SsgiWith(Unseen { sky, bounce }) => {
+        Method::SsgiWith(AmbientTerm { sky, bounce }) => {
             let options = SsgiOptions { sky: *sky, bounce: *bounce, ..SsgiOptions::default() };
             Some(Box::new(SsgiGi::new(device, options)))
         }
         Method::Gather(options) => {
             let above = GatherGi::check(&device.limits(), size, options);
             let above = above.map(|()| Box::new(GatherGi::new(device, size, *options)) as Box<dyn Technique>);
-            Some(Box::new(OrBelow::new(device, above.map_err(|e| e.to_string()))))
+            Some(Box::new(WithFallback::new(device, above.map_err(|e| e.to_string()))))
         }
         Method::Neural(neural) => {
             let above = match GatherGi::check(&device.limits(), size, &Default::default()) {
                 Ok(()) => Ok(Box::new(FilterGi::new(device, queue, neural, size)?) as Box<dyn Technique>),
                 Err(lacks) => Err(lacks.to_string()),
             };
-            Some(Box::new(OrBelow::new(device, above)))
+            Some(Box::new(WithFallback::new(device, above)))
         }
     })
 }

@@ -1,7 +1,7 @@
 //! [`FilterGi`]: method `gather`, whose filter over neighbouring cells a network guides.
 //!
 //! ```text
-//!  G-buffer ─► gather: rays, means ──┬──────────────────────────────► gi.blur ─► gi.smooth ─► gi.bring ─► E/π, gloss
+//!  G-buffer ─► gather: rays, means ──┬──────────────────────────────► gi.blur ─► gi.atrous ─► gi.upsample ─► E/π, gloss
 //!                                    └► gi.features ─► U-Net (net.*) ──► ▲ guidance
 //! ```
 //!
@@ -19,7 +19,7 @@ use crate::gi::stage::inputs::{InputGroup, cells_of};
 use crate::gpu::bind::Bound;
 use crate::gpu::timing::Recorder;
 use crate::net::format::Weights;
-use crate::net::gpu::{Binding, Network, Setup, Tap};
+use crate::net::gpu::{Binding, LayerReadback, Network, Setup};
 use crate::net::plan::Plan;
 
 /// Numbers of a cell: two places in spaces of four dimensions; trust, tolerance, and two that are
@@ -74,7 +74,7 @@ impl FilterGi {
             self.network = network(&self.device, &self.queue, &self.neural, size)?;
             self.size = size;
             self.rebuilds += 1;
-            self.forget();
+            self.release_bindings();
         }
         Ok(())
     }
@@ -89,7 +89,7 @@ impl FilterGi {
         let lit = self.inputs.bind(&self.queue, inputs)?;
         let mut encoder = self.device.create_command_encoder(&Default::default());
         let mut recorder = Recorder::new(&mut encoder);
-        let known = (memory.pasts, &self.exposure);
+        let known = (memory.histories, &self.exposure);
         self.features.record(&mut recorder, &lit, known, bound(self.network.input()));
         if let Some(step) = step {
             self.network.record_until(step, &mut recorder);
@@ -111,16 +111,21 @@ fn network(device: &wgpu::Device, queue: &wgpu::Queue, neural: &Neural, size: [u
 fn check(weights: &Weights) -> Result<(), GiError> {
     let wrong = |name: &str, reason: String| Err(GiError::Feature { name: name.into(), reason });
     let table = &weights.table;
-    if (table.name.as_str(), table.version, weights.cell) != ("cells", 1, stage::inputs::CELL) {
+    let features = match (table.name.as_str(), table.version) {
+        ("cells", 1) => Some(memory::FEATURES_V1),
+        ("cells", 2) => Some(memory::FEATURES),
+        _ => None,
+    };
+    let Some(features) = features.filter(|_| weights.cell == stage::inputs::CELL) else {
         let found = format!("table {} version {}, {} pixels a cell", table.name, table.version, weights.cell);
         let own = stage::inputs::CELL;
         return wrong(
             "(all)",
-            format!("list is made for {found}; a filter is given cells version 1, {own} pixels a cell"),
+            format!("list is made for {found}; a filter is given cells version 1 or 2, {own} pixels a cell"),
         );
-    }
+    };
     let named = || weights.inputs.iter().map(|f| (f.name.as_str(), f.channels));
-    if !named().eq(memory::FEATURES) {
+    if !named().eq(features) {
         let found: Vec<_> = named().map(|(name, _)| name).collect();
         return wrong("(all)", format!("list is {}; a filter is given the whole table", found.join(", ")));
     }
@@ -146,12 +151,12 @@ impl Technique for FilterGi {
         stage::inputs::check_outputs(outputs, inputs.size)?;
         self.fit(inputs.size)?;
         let lit = self.inputs.bind(queue, inputs)?;
-        let settled = self.gather.settle(recorder, queue, inputs, true)?;
+        let accumulated = self.gather.accumulate(recorder, queue, inputs, true)?;
         self.exposure.record(recorder, &lit);
-        let known = (&settled.pasts, &self.exposure);
+        let known = (&accumulated.histories, &self.exposure);
         self.features.record(recorder, &lit, known, bound(self.network.input()));
         self.network.record(recorder);
-        self.gather.filter(recorder, &settled, Some(bound(self.network.output())), outputs);
+        self.gather.filter(recorder, &accumulated, Some(bound(self.network.output())), outputs);
         Ok(())
     }
 
@@ -166,20 +171,20 @@ impl Technique for FilterGi {
         self.gather.warm_up(recorder, queue, inputs)
     }
 
-    fn cut(&mut self) {
-        self.gather.cut();
+    fn reset_history(&mut self) {
+        self.gather.reset_history();
     }
 
     fn settled(&self) -> Option<u32> {
         self.gather.settled()
     }
 
-    fn knows_scene(&self, rays: bool) -> bool {
-        self.gather.knows_scene(rays)
+    fn uses_rays(&self, rays: bool) -> bool {
+        self.gather.uses_rays(rays)
     }
 
-    fn shows_lobes(&self) -> bool {
-        self.gather.shows_lobes()
+    fn writes_specular(&self) -> bool {
+        self.gather.writes_specular()
     }
 
     fn memory(&self) -> Option<Memory<'_>> {
@@ -190,26 +195,26 @@ impl Technique for FilterGi {
         self.network.taps().into_iter().map(|(_, name)| name).collect()
     }
 
-    fn read_input(&mut self, inputs: &Inputs<'_>) -> Result<Option<Tap>, GiError> {
+    fn read_input(&mut self, inputs: &Inputs<'_>) -> Result<Option<LayerReadback>, GiError> {
         if !self.run_again(inputs, None)? {
             return Ok(None);
         }
         Ok(Some(self.network.read_input(&self.device, &self.queue)?))
     }
 
-    fn read_layer(&mut self, inputs: &Inputs<'_>, layer: usize) -> Result<Option<Tap>, GiError> {
+    fn read_layer(&mut self, inputs: &Inputs<'_>, layer: usize) -> Result<Option<LayerReadback>, GiError> {
         let taps = self.network.taps();
         let Some(&(step, _)) = taps.get(layer) else { return Ok(None) };
         if !self.run_again(inputs, Some(step))? {
             return Ok(None);
         }
-        Ok(Some(self.network.read_tap(&self.device, &self.queue, step)?))
+        Ok(Some(self.network.read_layer(&self.device, &self.queue, step)?))
     }
 
-    fn forget(&mut self) {
-        self.inputs.forget();
-        self.features.forget();
-        self.gather.forget();
+    fn release_bindings(&mut self) {
+        self.inputs.release_bindings();
+        self.features.release_bindings();
+        self.gather.release_bindings();
     }
 
     fn allocations(&self) -> u64 {
@@ -231,7 +236,7 @@ mod tests {
     fn the_table_has_the_channels_that_it_says() {
         let sum: u32 = super::memory::FEATURES.iter().map(|(_, channels)| channels).sum();
         assert_eq!(sum, super::memory::CHANNELS);
-        // What `guided.wgsl` reads of a cell.
+        // What `guidance.wgsl` reads of a cell.
         assert_eq!(super::CHANNELS, 12);
     }
 }

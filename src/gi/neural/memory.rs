@@ -1,5 +1,4 @@
-//! What a network that filters is given: of each cell what `gather` remembers of it. Table `cells`,
-//! version 1.
+//! What a network that filters is given: the history of each cell. Table `cells`, version 2.
 
 use crate::gi::stage::exposure::ExposurePass;
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
@@ -8,7 +7,7 @@ use crate::gpu::binding::{READ, READ_WRITE};
 use crate::gpu::{shaders, timing::Recorder};
 use crate::net::plan::Precision;
 
-/// Table `cells` v1: (name, channels), in channel order. s and m (e^ln_m) are
+/// Table `cells` version 2: (name, channels), in channel order. s and m (e^ln_m) are
 /// [`Exposure`](crate::gi::stage::exposure::Exposure)'s, L the luminance of the cell's mean light.
 /// All are 0 where a cell shows no surface, and none changes when all light is multiplied by one
 /// number.
@@ -18,14 +17,28 @@ use crate::net::plan::Precision;
 /// | `light` | L / (L + s) |
 /// | `chroma` | (red − green) and (blue − green) over the sum of the three |
 /// | `deviation` | ln(1 + standard deviation of single frames / L) |
-/// | `frames` | 1/√(frames in the mean) |
-/// | `lately` | (short mean − L) / (short mean + L) |
-/// | `nearness` | mean of 2w/(2w + length of the cell's rays), w the cell's width |
+/// | `history_length` | 1/√(frames in the mean) |
+/// | `fast_history` | (fast mean − L) / (fast mean + L) |
+/// | `hit_proximity` | mean of 2w/(2w + length of the cell's rays), w the cell's width |
 /// | `depth` | ln(z/m) clamped to ±4, z the distance along the view axis |
 /// | `normal` | unit normal in the gravity frame: horizontal right, up, horizontal backward |
 /// | `hit` | 1 |
-/// | `towards` | mean direction of what arrives, weighted by its luminance, in the gravity frame |
+/// | `dominant_direction` | mean direction of what arrives, weighted by its luminance, in the gravity frame |
 pub const FEATURES: [(&str, u32); 10] = [
+    ("light", 1),
+    ("chroma", 2),
+    ("deviation", 1),
+    ("history_length", 1),
+    ("fast_history", 1),
+    ("hit_proximity", 1),
+    ("depth", 1),
+    ("normal", 3),
+    ("hit", 1),
+    ("dominant_direction", 3),
+];
+
+/// Table `cells` version 1: the same by other names.
+pub const FEATURES_V1: [(&str, u32); 10] = [
     ("light", 1),
     ("chroma", 2),
     ("deviation", 1),
@@ -66,16 +79,16 @@ impl FeaturesPass {
         Self { pipeline: bind::pipeline(device, "gi.features", &module, "features", &layouts), binder }
     }
 
-    /// Records the pass into `target` ([`PITCH`] numbers a cell, row by row); `pasts` is what
+    /// Records the pass into `target` ([`PITCH`] numbers a cell, row by row); `histories` is what
     /// cells remember, and the exposure must have been recorded before.
     pub fn record(
         &mut self,
         recorder: &mut Recorder<'_>,
         inputs: &BoundInputs,
-        (pasts, exposure): (&wgpu::Buffer, &ExposurePass),
+        (histories, exposure): (&wgpu::Buffer, &ExposurePass),
         target: Bound,
     ) {
-        let own = self.binder.group([Bound::from(pasts), Bound::from(exposure.buffer()), target]);
+        let own = self.binder.group([Bound::from(histories), Bound::from(exposure.buffer()), target]);
         let [w, h] = inputs.cells.map(|n| n.div_ceil(8));
         recorder.compute("gi.features", |pass| {
             inputs.set(pass);
@@ -91,7 +104,7 @@ impl FeaturesPass {
     }
 
     /// Lets go of what is bound.
-    pub fn forget(&mut self) {
-        self.binder.forget();
+    pub fn release_bindings(&mut self) {
+        self.binder.release_bindings();
     }
 }

@@ -11,7 +11,7 @@ use crate::gi::stage::ViewCache;
 use crate::gi::stage::exposure::{self, ExposurePass, output_entry, storage_entry};
 use crate::gi::stage::inputs::{InputGroup, check_outputs, texture_entry};
 use crate::gpu::timing::Recorder;
-use crate::gpu::{shaders, shared, tape};
+use crate::gpu::{pipeline_cache, shaders, tape};
 use std::str::FromStr;
 
 /// The environment's share in what the screen does not show. Fitted with [`BOUNCE`] to paper rooms
@@ -23,23 +23,23 @@ pub const SKY: f32 = 0.83;
 /// it: stands for all bounces.
 pub const BOUNCE: f32 = 0.56;
 
-/// The two numbers of unseen light. Light is linear in both, so a scene's own can be found from
+/// The ambient term: light of what the screen does not show, by two numbers. Light is linear in both, so a scene's own can be found from
 /// pictures of each alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unseen {
+pub struct AmbientTerm {
     /// The environment's share.
     pub sky: f32,
     /// The share of what the picture's surfaces send on.
     pub bounce: f32,
 }
 
-impl Default for Unseen {
+impl Default for AmbientTerm {
     fn default() -> Self {
         Self { sky: SKY, bounce: BOUNCE }
     }
 }
 
-impl Unseen {
+impl AmbientTerm {
     /// As [`FromStr`] reads them.
     pub fn words(&self) -> String {
         format!("sky={},bounce={}", self.sky, self.bounce)
@@ -47,27 +47,27 @@ impl Unseen {
 }
 
 /// `sky=X,bounce=Y`, either of which may be left out.
-impl FromStr for Unseen {
+impl FromStr for AmbientTerm {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut unseen = Self::default();
+        let mut ambient_term = Self::default();
         for word in text.split(',') {
             let (name, value) = word.split_once('=').ok_or_else(|| format!("`{word}` is none of: sky=X, bounce=Y"))?;
             let number = value.parse::<f32>().ok().filter(|v| (0.0..=16.0).contains(v));
             let number = number.ok_or_else(|| format!("`{word}`: must be a number from 0 to 16"))?;
             match name {
-                "sky" => unseen.sky = number,
-                "bounce" => unseen.bounce = number,
+                "sky" => ambient_term.sky = number,
+                "bounce" => ambient_term.bounce = number,
                 _ => return Err(format!("`{word}` is none of: sky=X, bounce=Y")),
             }
         }
-        Ok(unseen)
+        Ok(ambient_term)
     }
 }
 
-/// The constants of unseen light as WGSL (`shaders/gi/unseen.wgsl`).
-pub fn unseen_prelude(sky: f32, bounce: f32) -> String {
+/// The constants of the ambient term as WGSL (`shaders/gi/ambient_term.wgsl`).
+pub fn ambient_prelude(sky: f32, bounce: f32) -> String {
     format!("const SKY = f32({sky:?});\nconst BOUNCE = f32({bounce:?});\n")
 }
 
@@ -87,22 +87,23 @@ pub struct AmbientGi {
 impl AmbientGi {
     /// Makes pipelines and buffers of a few kilobytes; works for every picture size.
     pub fn new(device: &wgpu::Device) -> Self {
-        Self::with(device, Unseen::default())
+        Self::with(device, AmbientTerm::default())
     }
 
     /// As [`AmbientGi::new`], with a scene's own numbers.
-    pub fn with(device: &wgpu::Device, unseen: Unseen) -> Self {
+    pub fn with(device: &wgpu::Device, ambient_term: AmbientTerm) -> Self {
         let inputs = InputGroup::new(device);
         let exposure = ExposurePass::new(device, &inputs);
         let occlusion = OcclusionPass::new(device, &inputs, March::NEAR);
-        let layout = shared::bind_group_layout(
+        let layout = pipeline_cache::bind_group_layout(
             device,
             &wgpu::BindGroupLayoutDescriptor {
                 label: Some("gi.ambient"),
                 entries: &[storage_entry(0, true), texture_entry(1), output_entry(2)],
             },
         );
-        let module = shaders::module_with(device, "gi.ambient", &unseen_prelude(unseen.sky, unseen.bounce));
+        let module =
+            shaders::module_with(device, "gi.ambient", &ambient_prelude(ambient_term.sky, ambient_term.bounce));
         let pipeline = exposure::pipeline(device, "gi.ambient", &module, "ambient", &inputs, &layout);
         Self {
             device: device.clone(),
@@ -142,7 +143,7 @@ impl Technique for AmbientGi {
     ) -> Result<(), GiError> {
         check_outputs(outputs, inputs.size)?;
         if inputs.size != self.size {
-            self.forget();
+            self.release_bindings();
             self.size = inputs.size;
         }
         let bound = self.inputs.bind(queue, inputs)?;
@@ -174,8 +175,8 @@ impl Technique for AmbientGi {
         self.occlusion.set_frame(queue, frame);
     }
 
-    fn forget(&mut self) {
-        self.inputs.forget();
+    fn release_bindings(&mut self) {
+        self.inputs.release_bindings();
         self.outputs.clear();
     }
 
@@ -194,10 +195,10 @@ mod tests {
 
     #[test]
     fn words_are_read_and_wrong_ones_named() {
-        let unseen = Unseen { sky: 1.0, bounce: 0.25 };
-        assert_eq!((unseen.words().parse(), "sky=0.83".parse()), (Ok(unseen), Ok(Unseen::default())));
+        let ambient_term = AmbientTerm { sky: 1.0, bounce: 0.25 };
+        assert_eq!((ambient_term.words().parse(), "sky=0.83".parse()), (Ok(ambient_term), Ok(AmbientTerm::default())));
         for bad in ["", "sky", "sky=-1", "sky=nan", "bounce=17", "moon=1"] {
-            assert!(bad.parse::<Unseen>().unwrap_err().contains(bad), "{bad}");
+            assert!(bad.parse::<AmbientTerm>().unwrap_err().contains(bad), "{bad}");
         }
     }
 }

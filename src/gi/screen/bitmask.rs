@@ -9,7 +9,7 @@
 use crate::gi::stage::exposure;
 use crate::gi::stage::exposure::storage_entry;
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};
-use crate::gpu::{shaders, shared, tape};
+use crate::gpu::{pipeline_cache, shaders, tape};
 
 /// How far, how densely and how thickly the depth buffer is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -154,7 +154,7 @@ impl Kernel {
         entries: &[wgpu::BindGroupLayoutEntry],
     ) -> Self {
         let layout =
-            shared::bind_group_layout(device, &wgpu::BindGroupLayoutDescriptor { label: Some(label), entries });
+            pipeline_cache::bind_group_layout(device, &wgpu::BindGroupLayoutDescriptor { label: Some(label), entries });
         let module = shaders::module_with(device, label, prelude);
         let entry = label.trim_start_matches("gi.");
         let pipeline = exposure::pipeline(device, label, &module, entry, inputs, &layout);

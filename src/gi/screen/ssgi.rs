@@ -1,5 +1,5 @@
 //! One bounce in screen space: every pixel gathers what the pixels around it send on, by visibility
-//! bitmask ([`bitmask`](super::bitmask)), and unseen light (the sky and a stand-in for later
+//! bitmask ([`bitmask`](super::bitmask)), and the ambient term (the sky and a stand-in for later
 //! bounces, [`ambient`]) through what nothing blocks.
 //!
 //! What it cannot do: anything off the screen or hidden in it. A red wall lights the floor until it
@@ -36,7 +36,7 @@ impl Default for SsgiOptions {
 impl SsgiOptions {
     /// The constants as WGSL, for `gi.ssgi` and `gi.radiance`.
     pub fn prelude(&self) -> String {
-        self.march.prelude() + &ambient::unseen_prelude(self.sky, self.bounce)
+        self.march.prelude() + &ambient::ambient_prelude(self.sky, self.bounce)
     }
 }
 
@@ -94,7 +94,7 @@ impl SsgiGi {
         let half = half_of(size);
         let fresh = self.fine.fit(&self.device, half) | self.half.fit(&self.device, half);
         if self.coarse.fit(&self.device, half.map(|n| n.div_ceil(4))) | fresh {
-            self.inputs.forget();
+            self.inputs.release_bindings();
             self.outputs.clear();
             let light = self.exposure.buffer().as_entire_binding();
             let (fine, coarse) = (bind(self.fine.get()), bind(self.coarse.get()));
@@ -132,8 +132,8 @@ impl Technique for SsgiGi {
         self.pattern.set(queue, frame);
     }
 
-    fn forget(&mut self) {
-        self.inputs.forget();
+    fn release_bindings(&mut self) {
+        self.inputs.release_bindings();
         self.outputs.clear();
     }
 

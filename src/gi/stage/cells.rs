@@ -4,9 +4,9 @@
 //! It is the middle one; in every second cell, as on a chessboard, what stands before the middle's
 //! surface comes first: the nearest such pixel. A cell that shows any surface has a pixel on one.
 //!
-//! A method at low resolution records [`CellsPass`], then its own gather, which joins
-//! `gi/cells.wgsl` behind `gi/inputs.wgsl`, reads [`CellsPass::pixels`] and writes its light buffer
-//! ([`light_bytes`]), then `gi.bring` of the method `gather`.
+//! A method at low resolution records [`DownsamplePass`], then its own gather, which joins
+//! `gi/cells.wgsl` behind `gi/inputs.wgsl`, reads [`DownsamplePass::pixels`] and writes its light buffer
+//! ([`light_bytes`]), then `gi.upsample` of the method `gather`.
 //!
 //! # The light buffer
 //! Three `vec4f` a cell, one a colour channel: `(bx, by, bz, a)` means E/π(n) = max(0, a + b·n) for
@@ -17,7 +17,7 @@
 use super::exposure::{pipeline, storage_entry};
 use super::inputs::{BoundInputs, CELL, InputGroup, cells_of};
 use crate::gpu::timing::Recorder;
-use crate::gpu::{shaders, shared, tape};
+use crate::gpu::{pipeline_cache, shaders, tape};
 
 /// What `cell_pixels` holds for a cell that shows the background only; `NO_PIXEL` in
 /// `shaders/gi/cells.wgsl`.
@@ -40,7 +40,7 @@ pub fn prelude() -> String {
 }
 
 /// The pass that chooses, and the buffer it fills.
-pub struct CellsPass {
+pub struct DownsamplePass {
     device: wgpu::Device,
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
@@ -49,15 +49,15 @@ pub struct CellsPass {
     group: wgpu::BindGroup,
 }
 
-impl CellsPass {
+impl DownsamplePass {
     /// Compiles the shader and makes the buffer for pictures of `size` pixels.
     pub fn new(device: &wgpu::Device, inputs: &InputGroup, size: [u32; 2]) -> Self {
-        let layout = shared::bind_group_layout(
+        let layout = pipeline_cache::bind_group_layout(
             device,
-            &wgpu::BindGroupLayoutDescriptor { label: Some("gi.cells"), entries: &[storage_entry(0, false)] },
+            &wgpu::BindGroupLayoutDescriptor { label: Some("gi.downsample"), entries: &[storage_entry(0, false)] },
         );
-        let module = shaders::module_with(device, "gi.cells", &prelude());
-        let pipeline = pipeline(device, "gi.cells", &module, "choose", inputs, &layout);
+        let module = shaders::module_with(device, "gi.downsample", &prelude());
+        let pipeline = pipeline(device, "gi.downsample", &module, "downsample", inputs, &layout);
         let (pixels, group) = buffer(device, &layout, size);
         Self { device: device.clone(), pipeline, layout, size, pixels, group }
     }
@@ -73,11 +73,11 @@ impl CellsPass {
         true
     }
 
-    /// Records pass `gi.cells` for inputs of the size that was last given to [`new`](Self::new) or
+    /// Records pass `gi.downsample` for inputs of the size that was last given to [`new`](Self::new) or
     /// [`fit`](Self::fit).
     pub fn record(&self, recorder: &mut Recorder<'_>, inputs: &BoundInputs) {
         let [w, h] = cells_of(inputs.size);
-        recorder.compute("gi.cells", |pass| {
+        recorder.compute("gi.downsample", |pass| {
             inputs.set(pass);
             pass.set_bind_group(1, &self.group, &[]);
             pass.set_pipeline(&self.pipeline);
@@ -106,7 +106,7 @@ fn buffer(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, size: [u32; 2])
     let group = tape::bind_group(
         device,
         &wgpu::BindGroupDescriptor {
-            label: Some("gi.cells"),
+            label: Some("gi.downsample"),
             layout,
             entries: &[wgpu::BindGroupEntry { binding: 0, resource: pixels.as_entire_binding() }],
         },

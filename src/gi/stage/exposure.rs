@@ -4,7 +4,7 @@
 use super::inputs::{BoundInputs, InputGroup};
 use crate::gi::interface::GiError;
 use crate::gpu::timing::Recorder;
-use crate::gpu::{bind, readback, shaders, shared, tape};
+use crate::gpu::{bind, pipeline_cache, readback, shaders, tape};
 
 /// Most workgroups of the first level; `MAX_GROUPS` in the shader.
 const MAX_GROUPS: u32 = 256;
@@ -50,7 +50,7 @@ impl ExposurePass {
         };
         let partials = buffer("gi.exposure.partials", u64::from(MAX_GROUPS) * 32, wgpu::BufferUsages::COPY_SRC);
         let result = buffer("gi.exposure", size_of::<Exposure>() as u64, wgpu::BufferUsages::COPY_SRC);
-        let layout = shared::bind_group_layout(
+        let layout = pipeline_cache::bind_group_layout(
             device,
             &wgpu::BindGroupLayoutDescriptor {
                 label: Some("gi.exposure"),
@@ -70,7 +70,7 @@ impl ExposurePass {
         );
         let module = shaders::module(device, "gi.exposure");
         let pipeline = |entry| pipeline(device, "gi.exposure", &module, entry, inputs, &layout);
-        Self { sum: pipeline("sum_cells"), finish: pipeline("finish"), group, partials, result }
+        Self { sum: pipeline("sum_cells"), finish: pipeline("sum_groups"), group, partials, result }
     }
 
     /// Records both levels as pass `gi.exposure`.

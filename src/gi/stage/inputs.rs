@@ -11,7 +11,7 @@ pub use super::params::{CELL, Params, cells_of, sample_pixel};
 use crate::gi::interface::{GiError, Inputs};
 use crate::gi::stage::ViewCache;
 use crate::gpu::timing::Pass;
-use crate::gpu::{shared, tape};
+use crate::gpu::{pipeline_cache, tape};
 
 /// Recordings between two submissions that keep their own parameters.
 pub const SLOTS: u32 = 64;
@@ -29,7 +29,7 @@ pub struct InputGroup {
     /// Only depth and normals are read; else albedo and direct light, too.
     geometry_only: bool,
     /// Bound where the host has nothing: reads as 0.
-    absent: wgpu::TextureView,
+    dummy_view: wgpu::TextureView,
     /// [`Params::shift`] of the last recording.
     shift: Option<[f32; 2]>,
 }
@@ -74,7 +74,7 @@ impl InputGroup {
             },
             count: None,
         };
-        let layout = shared::bind_group_layout(
+        let layout = pipeline_cache::bind_group_layout(
             device,
             &wgpu::BindGroupLayoutDescriptor {
                 label: Some("gi.inputs"),
@@ -94,9 +94,9 @@ impl InputGroup {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
-        let absent = super::absent(device, "gi.absent", wgpu::TextureFormat::Rgba16Float);
+        let dummy_view = super::dummy_view(device, "gi.dummy_view", wgpu::TextureFormat::Rgba16Float);
         let device = device.clone();
-        Self { device, layout, ring, next: 0, cache: ViewCache::new(), geometry_only, absent, shift: None }
+        Self { device, layout, ring, next: 0, cache: ViewCache::new(), geometry_only, dummy_view, shift: None }
     }
 
     /// The layout of group 0.
@@ -115,13 +115,13 @@ impl InputGroup {
         formats::check_inputs(inputs)?;
         let needed = |view: Option<&'_ wgpu::TextureView>, name| match view {
             None if !self.geometry_only => Err(GiError::Missing(name)),
-            _ => Ok(view.unwrap_or(&self.absent).clone()),
+            _ => Ok(view.unwrap_or(&self.dummy_view).clone()),
         };
         let (albedo, direct) = (needed(inputs.albedo, "albedo")?, needed(inputs.direct, "direct")?);
         // What glows lights the picture as a light already; found on the screen it would do so twice, and small and
         // bright as it is, by few of a pixel's steps.
-        let glows = inputs.emissive.filter(|_| !inputs.lights.is_some_and(|l| l.stand_in));
-        let views = [inputs.depth, inputs.normal, &albedo, glows.unwrap_or(&self.absent), &direct];
+        let glows = inputs.emissive.filter(|_| !inputs.lights.is_some_and(|l| l.has_emissive_proxies));
+        let views = [inputs.depth, inputs.normal, &albedo, glows.unwrap_or(&self.dummy_view), &direct];
         let group = self.cache.get(views, || {
             let view = |i: usize| wgpu::BindGroupEntry {
                 binding: i as u32 + 1,
@@ -151,7 +151,7 @@ impl InputGroup {
     }
 
     /// Lets go of all texture views.
-    pub fn forget(&mut self) {
+    pub fn release_bindings(&mut self) {
         self.cache.clear();
     }
 

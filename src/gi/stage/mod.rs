@@ -11,12 +11,12 @@ mod view_cache;
 pub(crate) use view_cache::ViewCache;
 
 /// One texel that reads as 0, bound where a host has nothing.
-pub(crate) fn absent(device: &wgpu::Device, label: &str, format: wgpu::TextureFormat) -> wgpu::TextureView {
+pub(crate) fn dummy_view(device: &wgpu::Device, label: &str, format: wgpu::TextureFormat) -> wgpu::TextureView {
     texel(device, label, format, wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC)
 }
 
 /// One texel, bound where nobody asks for a picture: stores beyond it are lost.
-pub(crate) fn nowhere(device: &wgpu::Device, label: &str) -> wgpu::TextureView {
+pub(crate) fn dummy_storage(device: &wgpu::Device, label: &str) -> wgpu::TextureView {
     texel(device, label, wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::STORAGE_BINDING)
 }
 

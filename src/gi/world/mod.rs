@@ -20,7 +20,7 @@ pub use view::View;
 
 use super::interface::{GiError, Inputs, Lights, Rays};
 use crate::accel::{MeshPart, RayCounts, SceneRays};
-use crate::gpu::shared::Shared;
+use crate::gpu::pipeline_cache::PipelineCache;
 use crate::lights::{LightGpu, whole_sky};
 use crate::scene::{Environment, Light};
 use std::collections::BTreeMap;
@@ -92,7 +92,7 @@ struct Placed {
 pub struct World {
     device: wgpu::Device,
     /// What its views compile is there for views to come.
-    _shared: Shared,
+    _pipeline_cache: PipelineCache,
     options: WorldOptions,
     meshes: BTreeMap<u64, PreparedMesh>,
     instances: BTreeMap<u64, Placed>,
@@ -101,7 +101,7 @@ pub struct World {
     environment: Environment,
     gpu: Option<Uploaded>,
     changed: Changed,
-    lights_epoch: u64,
+    light_version: u64,
     allocations: u64,
 }
 
@@ -134,7 +134,7 @@ impl World {
     pub fn new(device: &wgpu::Device, options: WorldOptions) -> Self {
         Self {
             device: device.clone(),
-            _shared: Shared::of(device),
+            _pipeline_cache: PipelineCache::of(device),
             options,
             meshes: BTreeMap::new(),
             instances: BTreeMap::new(),
@@ -143,7 +143,7 @@ impl World {
             environment: Environment::default(),
             gpu: None,
             changed: Changed::ALL,
-            lights_epoch: 0,
+            light_version: 0,
             allocations: 0,
         }
     }
@@ -290,7 +290,7 @@ impl World {
             gpu.sky = sky.map_err(|e| GiError::Sky(e.to_string()))?;
             self.allocations += 1;
         }
-        self.lights_epoch += u64::from(self.changed.lights || self.changed.sky);
+        self.light_version += u64::from(self.changed.lights || self.changed.sky);
         self.changed = Changed::NOTHING;
         Ok(())
     }
@@ -366,8 +366,8 @@ impl World {
             lights: Some(Lights {
                 buffer: &gpu.lights,
                 count: self.lights.len() as u32,
-                stand_in: false,
-                epoch: self.lights_epoch,
+                has_emissive_proxies: false,
+                version: self.light_version,
             }),
             rays: Some(Rays { scene: &gpu.rays, environment: &gpu.sky }),
             ..*inputs

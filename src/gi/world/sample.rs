@@ -2,7 +2,7 @@
 
 use crate::accel::{RayCaster, RayGpu, SceneRays};
 use crate::gi::interface::{GiError, Inputs};
-use crate::gi::stage::{absent, cells, inputs::InputGroup};
+use crate::gi::stage::{cells, dummy_view, inputs::InputGroup};
 use crate::gpu::bind::{self, Binder, Bound};
 use crate::gpu::binding::{LOAD, READ_WRITE};
 use crate::gpu::{readback, shaders, timing::Recorder};
@@ -47,7 +47,7 @@ pub(super) fn read(device: &wgpu::Device, queue: &wgpu::Queue, inputs: &Inputs<'
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     });
-    let rest = absent(device, "gi.check", wgpu::TextureFormat::Rg16Float);
+    let rest = dummy_view(device, "gi.check", wgpu::TextureFormat::Rg16Float);
     let mut own = Binder::new(device, "gi.check", &[LOAD, READ_WRITE]);
     let own_group = own.group([Bound::from(inputs.motion.unwrap_or(&rest)), Bound::from(&target)]);
     let module = shaders::module_with(device, "gi.check", &prelude());

@@ -2,11 +2,11 @@
 
 use super::check::{Complaint, Evidence};
 use super::{World, sample};
-use crate::gi::interface::technique::{Instead, Technique};
+use crate::gi::interface::technique::{Fallback, Technique};
 use crate::gi::interface::{GiError, Inputs, Outputs};
 use crate::gi::method::{self, Method};
 use crate::gi::stage::inputs::Params;
-use crate::gpu::shared::Shared;
+use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::timing::Recorder;
 
 /// What a method remembers of one camera's picture, and its passes. Make one for each camera; any
@@ -39,7 +39,7 @@ pub struct View {
     size: [u32; 2],
     /// The last frame's camera, and that of the frame before if the last one followed it.
     seen: [Option<Params>; 2],
-    _shared: Shared,
+    _pipeline_cache: PipelineCache,
 }
 
 impl View {
@@ -62,9 +62,9 @@ impl View {
     /// [`GiError::NoMethod`] for [`Method::Direct`], which adds no light; [`GiError`] where a
     /// network does not fit.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, size: [u32; 2], method: &Method) -> Result<Self, GiError> {
-        let _shared = Shared::of(device);
+        let _pipeline_cache = PipelineCache::of(device);
         let technique = method::build(device, queue, size, method)?.ok_or(GiError::NoMethod(method.name()))?;
-        Ok(Self { queue: queue.clone(), technique, size, seen: [None; 2], _shared })
+        Ok(Self { queue: queue.clone(), technique, size, seen: [None; 2], _pipeline_cache })
     }
 
     /// Records all of the method's passes. `outputs`: one view for the diffuse light, or [`Outputs`].
@@ -72,7 +72,7 @@ impl View {
     /// size or the texture views are new. Never submits and never waits.
     ///
     /// With `None` for the world `gather` and `neural` have nothing to ask: `ssgi` draws,
-    /// [`View::instead`] says so, and albedo and direct light must be there.
+    /// [`View::fallback`] says so, and albedo and direct light must be there.
     ///
     /// # Errors
     /// [`GiError`] when inputs or outputs do not fit, or the world has changed since
@@ -89,7 +89,7 @@ impl View {
             None => *inputs,
         };
         if inputs.size != self.size {
-            self.technique.forget();
+            self.technique.release_bindings();
             self.size = inputs.size;
         }
         self.technique.record(&mut Recorder::new(encoder), &self.queue, &inputs, outputs.into())?;
@@ -130,14 +130,14 @@ impl View {
     }
 
     /// What drew the last frame in the method's place, and why; `None` where it drew itself.
-    pub fn instead(&self) -> Option<Instead<'_>> {
-        self.technique.instead()
+    pub fn fallback(&self) -> Option<Fallback<'_>> {
+        self.technique.fallback()
     }
 
     /// Whether the last frame wrote [`Outputs::specular`], if it was given: the method sends rays
     /// into lobes, or another drew in its place that does not.
-    pub fn shows_lobes(&self) -> bool {
-        self.technique.shows_lobes()
+    pub fn writes_specular(&self) -> bool {
+        self.technique.writes_specular()
     }
 
     /// Frames that the answer has settled over since the last reset; `None` where it does not
@@ -148,8 +148,8 @@ impl View {
 
     /// Lets go of the texture views that it remembers, and so of the host's textures. A change of
     /// size does so by itself.
-    pub fn forget(&mut self) {
-        self.technique.forget();
+    pub fn release_bindings(&mut self) {
+        self.technique.release_bindings();
     }
 
     /// Bind groups and rebuilds since the start; stands still in steady frames.

@@ -1,7 +1,7 @@
 //! One WGSL text out of many files: the line `//#import lib/frame.wgsl` brings that file in, once
 //! and before the file that says so.
 
-use crate::gpu::shared;
+use crate::gpu::pipeline_cache;
 use include_dir::{Dir, include_dir};
 use std::path::{Path, PathBuf};
 use std::sync::RwLock;
@@ -20,7 +20,7 @@ static FOLDER: RwLock<Option<PathBuf>> = RwLock::new(None);
 pub fn read_from(folder: Option<PathBuf>) {
     if let Ok(mut place) = FOLDER.write() {
         // What is edited has another text each time, and nobody asks for the one before.
-        shared::keeps(folder.is_none());
+        pipeline_cache::keeps(folder.is_none());
         *place = folder;
     }
 }
@@ -103,10 +103,10 @@ mod tests {
 
     #[test]
     fn a_file_comes_once_and_behind_what_it_imports() {
-        let joined = Joined::new("const A = 1;\n", ["gi/gather/rays.wgsl", "gi/inputs.wgsl"]);
+        let joined = Joined::new("const A = 1;\n", ["gi/gather/trace.wgsl", "gi/inputs.wgsl"]);
         assert!(joined.missing.is_empty());
         let at = |name: &str| joined.files.iter().position(|(_, f)| f == name).expect("it is there");
-        assert!(at("lib/octahedral.wgsl") < at("gi/inputs.wgsl") && at("gi/inputs.wgsl") < at("gi/gather/rays.wgsl"));
+        assert!(at("lib/octahedral.wgsl") < at("gi/inputs.wgsl") && at("gi/inputs.wgsl") < at("gi/gather/trace.wgsl"));
         assert_eq!(joined.files.iter().filter(|(_, f)| f == "gi/inputs.wgsl").count(), 1);
         let (first, file) = &joined.files[2];
         assert_eq!(joined.place(*first), Some((file.as_str(), 1)));
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn a_message_names_the_file_and_its_line() {
-        let joined = Joined::new("const A = 1;\n", ["gi/gather/rays.wgsl"]);
+        let joined = Joined::new("const A = 1;\n", ["gi/gather/trace.wgsl"]);
         let (first, file) = joined.files.last().expect("it has files").clone();
         let said = joined.located(&format!("no such name\n  ┌─ wgsl:{}:5\n", first + 6));
         assert_eq!(said, format!("no such name\n  ┌─ {file}:7:5\n"));

@@ -8,8 +8,8 @@
 use super::super::graph::Padding;
 use super::super::plan::{Kind, Plan, Precision, Step};
 use super::kernel::{Bound, Choice, GROUP, Kernel, Part, Prelude, Sum, in_rows};
+use super::kernel_config::{KernelConfig, Source, Variant};
 use super::layer::{Filter, Layer, Stage, THREADS};
-use super::permutation::{Permutation, Source, Variant};
 use crate::gpu::shaders::{NetFamily, NetKernel};
 use crate::net::graph::Shape;
 
@@ -39,11 +39,11 @@ impl Kernel {
         let group = channels_of_a_group(step.kind, plan.tensors[step.input].shape, out);
         let size = [out.width, out.height];
         let layer = Layer { filter, out_vectors: out.vectors(), size, precision: plan.precision };
-        let permutation = layer.permutation(choice.variant, choice.tuned, plan, choice.facts);
+        let config = layer.config(choice.variant, choice.tuned, plan, choice.facts);
         let row = matches!(step.kind, Kind::Conv { kernel: [3, 3], stride: 1, nearest: 1, padding, .. } if padding == Padding::all(1));
-        (self.filter, self.layer, self.permutation) = (Some(filter), Some(layer), permutation);
-        let plain = Permutation::new(Source::Storage, out.vectors().min(2));
-        let Permutation { weights, vectors, parts, half } = permutation.unwrap_or(plain);
+        (self.filter, self.layer, self.config) = (Some(filter), Some(layer), config);
+        let plain = KernelConfig::new(Source::Storage, out.vectors().min(2));
+        let KernelConfig { weights, vectors, parts, half } = config.unwrap_or(plain);
         let staged = weights == Source::Staged;
         self.vectors = if staged { 1 } else { vectors };
         self.bound = match weights {
@@ -60,7 +60,7 @@ impl Kernel {
             Bound::Storage | Bound::Half if !staged => layer.storage_blocks(self.vectors),
             _ => all,
         };
-        let deep = if permutation.is_none() { vectors } else { parts };
+        let deep = if config.is_none() { vectors } else { parts };
         self.blocks_per_part = all.div_ceil(all.div_ceil(bound.min(MAX_DEPTH / deep)));
         let part = |first_block| {
             let blocks = self.blocks_per_part.min(all - first_block);
@@ -97,8 +97,8 @@ impl Kernel {
         let phases = filter.spread * filter.spread;
         let tiles =
             |kernel: &Self| if parts > 1 { kernel.numbers.tiles } else { phases * kernel.groups[0] * kernel.groups[1] };
-        prelude.add("MADE", if permutation.is_none() { 1 } else { vectors });
-        if permutation.is_none() {
+        prelude.add("MADE", if config.is_none() { 1 } else { vectors });
+        if config.is_none() {
             prelude.add("THREADS", THREADS);
             self.groups = [columns.div_ceil(GROUP[0]), rows.div_ceil(GROUP[1])];
             self.parts.iter_mut().for_each(|p| p.depth *= vectors);

@@ -1,8 +1,8 @@
 //! A kernel of a step: which shader with which numbers, what it binds and how many workgroups it
 //! takes. Pure.
 
+use super::kernel_config::{Facts, KernelConfig, MATRIX, MAX_UNIFORM, Tuned, Variant};
 use super::layer::{Filter, Layer};
-use super::permutation::{Facts, MATRIX, MAX_UNIFORM, Permutation, Tuned, Variant};
 use crate::gpu::shaders::NetKernel;
 
 /// Threads of a workgroup in x and y, as in the shaders.
@@ -85,7 +85,7 @@ pub struct Kernel {
     /// before.
     pub enlarged: Option<(u32, [i32; 2])>,
     /// For blocked convolutions.
-    pub permutation: Option<Permutation>,
+    pub config: Option<KernelConfig>,
     /// Vectors of output channels of a block of weights.
     pub vectors: u32,
     /// Dispatches.

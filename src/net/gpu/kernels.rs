@@ -50,7 +50,7 @@ impl Kernel {
             filter: None,
             layer: None,
             enlarged: None,
-            permutation: None,
+            config: None,
             vectors: 0,
             parts: vec![Part { first_block: 0, blocks: 0, depth: out.vectors() }],
             sum: None,

@@ -9,8 +9,8 @@
 //! directions.
 
 use super::kernel::{Bound, Kernel, Part};
+use super::kernel_config::Source;
 use super::layer::Filter;
-use super::permutation::Source;
 use crate::net::format::Weights;
 use crate::net::graph::Op;
 use crate::net::plan::{Kind, Step};
@@ -166,7 +166,7 @@ impl<'a> Layer<'a> {
         };
         // Blocks of a phase as they are stored, which may be more than a workgroup's.
         let blocks = self.bias.len().div_ceil(4).div_ceil(vectors);
-        let staged = kernel.permutation.is_some_and(|p| p.weights == Source::Staged);
+        let staged = kernel.config.is_some_and(|p| p.weights == Source::Staged);
         for block in part.first_block as usize..(part.first_block + part.blocks) as usize {
             let (phase, spread) = ((block / blocks) as u32, self.filter.spread);
             let phase = [phase % spread, phase / spread];

@@ -152,7 +152,7 @@ impl EnvironmentImage {
                 irradiance: strongest as f32,
                 angle: 2.0 * radius as f32,
             },
-            stands_in: false,
+            is_emissive_proxy: false,
         };
         Some(SkySun { light, rest: Self { rgb: rest, ..self.clone_empty() } })
     }

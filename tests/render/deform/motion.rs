@@ -12,7 +12,7 @@ use bouncelight::scene::{Camera, Scene};
 use glam::{Mat4, Vec3};
 
 const SIZE: [u32; 2] = [96, 96];
-/// Pixels, as in tests/render/moved.rs.
+/// Pixels, as in tests/render/previous_transforms.rs.
 const SMALL: f32 = 0.02;
 
 fn bent() -> Scene {
@@ -140,7 +140,7 @@ fn deforming_surfaces_say_where_they_were() {
     assert!(zero(&draw(&gpu, &mut often, &uploaded, &still)));
     // A cut knows no past.
     go(&mut scene, &mut uploaded, 0.1);
-    often.cut();
+    often.reset_history();
     assert!(zero(&draw(&gpu, &mut often, &uploaded, &still)));
 }
 

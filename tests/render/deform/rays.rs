@@ -154,19 +154,19 @@ fn the_device_has_the_refitted_tree() {
     let all = rays(4000);
     for time in [1.0, 0.3] {
         scene.pose_parts(0, time);
-        let moves = on_gpu.moves();
+        let version = on_gpu.version();
         let begun = Instant::now();
         on_gpu.place(&gpu.queue, &scene);
         let took = begun.elapsed();
-        assert!(on_gpu.moves() > moves, "whoever remembers is told");
+        assert!(on_gpu.version() > version, "whoever remembers is told");
         println!(
             "5000 triangles refitted in {:.2} ms, {:.1} million a second",
             took.as_secs_f64() * 1e3,
             5e-3 / took.as_secs_f64()
         );
-        let moves = on_gpu.moves();
+        let version = on_gpu.version();
         on_gpu.place(&gpu.queue, &scene);
-        assert_eq!(on_gpu.moves(), moves, "the same pose again is no other");
+        assert_eq!(on_gpu.version(), version, "the same pose again is no other");
         let found = caster.trace(&gpu.device, &gpu.queue, on_gpu.accel(), &all).expect("traced");
         let found: Vec<f32> = found.iter().map(|h| if h.triangle == u32::MAX { f32::INFINITY } else { h.t }).collect();
         let expected = hits(&anew(&scene, time), &all);

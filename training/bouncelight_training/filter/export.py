@@ -45,7 +45,7 @@ def export(run, out, name=""):
     }
     tensors = {k: v.half().contiguous() for k, v in model.state_dict().items()}
     try:
-        write(out, tensors, document(model.graph, model.output, inputs=lessons.TABLE, table=("cells", 1), meaning=MEANING, output_channels=blur.GUIDANCE,
+        write(out, tensors, document(model.graph, model.output, inputs=lessons.TABLE, table=("cells", 2), meaning=MEANING, output_channels=blur.GUIDANCE,
                                      name=name or os.path.basename(os.path.normpath(run)), provenance=about))
     except (WeightsError, OSError) as problem:
         raise TrainingError(str(problem)) from problem

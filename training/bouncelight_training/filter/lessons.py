@@ -10,10 +10,10 @@ from safetensors import SafetensorError
 from safetensors.numpy import load_file
 
 from ..errors import TrainingError
-from .blur import STRIDE, WIDE_FRAMES
+from .blur import ATROUS_STRIDE, WIDE_BLUR_FRAMES
 
-# Table `cells`, version 1 (src/gi/neural/memory.rs).
-TABLE = [("light", 1), ("chroma", 2), ("deviation", 1), ("frames", 1), ("lately", 1), ("nearness", 1), ("depth", 1), ("normal", 3), ("hit", 1), ("towards", 3)]
+# Table `cells`, version 2 (src/gi/neural/memory.rs).
+TABLE = [("light", 1), ("chroma", 2), ("deviation", 1), ("history_length", 1), ("fast_history", 1), ("hit_proximity", 1), ("depth", 1), ("normal", 3), ("hit", 1), ("dominant_direction", 3)]
 CHANNELS = sum(n for _, n in TABLE)
 # Cosine between two normals above which a cell's two pixels are taken for one surface.
 SAME_NORMAL = 0.9
@@ -38,8 +38,8 @@ def unpack_normals(bits):
 def within_reach(cells):
     """Of cells [h,w] all whose filter's last step asks one of them, 5x5 in strides."""
     h, w = cells.shape
-    around = np.pad(cells, 2 * STRIDE)
-    return np.any([around[y:y + h, x:x + w] for y in range(0, 4 * STRIDE + 1, STRIDE) for x in range(0, 4 * STRIDE + 1, STRIDE)], axis=0)
+    around = np.pad(cells, 2 * ATROUS_STRIDE)
+    return np.any([around[y:y + h, x:x + w] for y in range(0, 4 * ATROUS_STRIDE + 1, ATROUS_STRIDE) for x in range(0, 4 * ATROUS_STRIDE + 1, ATROUS_STRIDE)], axis=0)
 
 
 class Lesson:
@@ -112,7 +112,7 @@ def stacked(lessons, device="cpu"):
 
 def is_narrow(lesson):
     """Whether the cells of a moment are blurred narrowly."""
-    return lesson.age > WIDE_FRAMES
+    return lesson.age > WIDE_BLUR_FRAMES
 
 
 class Pile:

@@ -139,7 +139,7 @@ def change_of(shown, later, batch, pools=POOLS):
 
 def held(answer):
     """What keeps an answer [n,12,h,w] small where nothing speaks for it, and within its limits."""
-    beyond = (answer[:, 8:10].abs() - blur.MOST_LOG).clamp(min=0)
+    beyond = (answer[:, 8:10].abs() - blur.MAX_LOG).clamp(min=0)
     return 1e-3 * (answer[:, :8] ** 2).mean() + 0.01 * (beyond ** 2).mean()
 
 

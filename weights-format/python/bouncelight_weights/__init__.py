@@ -15,13 +15,13 @@ import tempfile
 import numpy as np
 
 from . import container
-from .document import CELLS_V1, IMAGES_V1, KEY, MEANINGS, SCALE_SUFFIX, TABLES, VERSION, check_tensors, schema
+from .document import CELLS_V1, CELLS_V2, IMAGES_V1, KEY, MEANINGS, OLDER_TABLES, SCALE_SUFFIX, TABLES, VERSION, check_tensors, schema
 from .document import check as check_document
 from .graph import complete
 from .operators import OPERATORS, scaled_axis, tensors
 from .problems import NotReadable, Problem, WeightsError
 
-__all__ = ["CELLS_V1", "IMAGES_V1", "KEY", "OPERATORS", "VERSION", "Problem", "WeightsError", "check", "conv2d", "document",
+__all__ = ["CELLS_V1", "CELLS_V2", "IMAGES_V1", "KEY", "OPERATORS", "VERSION", "Problem", "WeightsError", "check", "conv2d", "document",
            "quantised", "read", "schema", "unet", "verify", "write"]
 
 
@@ -68,7 +68,7 @@ def document(graph, output_tensor, *, inputs=None, table=("cells", 1), cell=4, m
              licence="MIT OR Apache-2.0", name="", provenance=None):
     """The JSON document of a file. `inputs`: (feature, channels) or (feature, channels, encoding), by default the whole table in its
     order; without an encoding it is the table's first, `plain` in table `free`."""
-    rows = TABLES.get(table[0], ({}, False))[0]
+    rows = OLDER_TABLES.get(tuple(table), TABLES.get(table[0], ({}, False))[0])
     inputs = [(n, channels) for n, (channels, _) in rows.items()] if inputs is None else inputs
 
     def feature(name, channels, encoding=None):

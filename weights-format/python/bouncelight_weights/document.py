@@ -16,6 +16,12 @@ LEFT_MEANINGS, LEFT_TABLE = ("log_irradiance_over_exposure", "gain_and_rest_on_g
 CORRECTS = "nothing runs networks that answer light; method `neural` runs those that guide a filter (table `cells`)"
 _PICTURE = ("signed", "signed_stretched", "unit")
 # Feature: (channels, encodings); files of version 1 mean the first encoding.
+CELLS_V2 = {
+    "light": (1, ("over_sum_with_exposure",)), "chroma": (2, ("differences_over_sum",)), "deviation": (1, ("log1p_over_light",)),
+    "history_length": (1, ("inverse_root",)), "fast_history": (1, ("difference_over_sum",)), "hit_proximity": (1, ("twice_width_over_length",)),
+    "depth": (1, ("log_over_mean",)), "normal": (3, ("gravity_frame",)), "hit": (1, ("flag",)), "dominant_direction": (3, ("gravity_frame",)),
+}
+# The same by other names.
 CELLS_V1 = {
     "light": (1, ("over_sum_with_exposure",)), "chroma": (2, ("differences_over_sum",)), "deviation": (1, ("log1p_over_light",)),
     "frames": (1, ("inverse_root",)), "lately": (1, ("difference_over_sum",)), "nearness": (1, ("twice_width_over_length",)),
@@ -23,7 +29,9 @@ CELLS_V1 = {
 }
 IMAGES_V1 = {name: (3, _PICTURE) for name in ("depth", "direct", "diffuse", "normal")}
 # Table: (features, whether a network uses them in the table's order).
-TABLES = {"cells": (CELLS_V1, True), "images": (IMAGES_V1, False), "free": ({}, False)}
+TABLES = {"cells": (CELLS_V2, True), "images": (IMAGES_V1, False), "free": ({}, False)}
+# Newest version of each, where it is not 1, and the features of older ones.
+TABLE_VERSIONS, OLDER_TABLES = {"cells": 2}, {("cells", 1): CELLS_V1}
 SCALE_SUFFIX = "_scale"
 MAX_SCALE = float(np.finfo(np.float32).max) / 128
 
@@ -119,13 +127,16 @@ def _operator(index, op):
 def _inputs(doc):
     """Faults of the features."""
     name, version = doc["table"]["name"], doc["table"]["version"]
-    if version != 1:
-        return [Problem("version", f"feature table `{name}`", f"feature table `{name}` has version {version}; known: 1")]
+    newest = TABLE_VERSIONS.get(name, 1)
+    if not 1 <= version <= newest:
+        known = "1" if newest == 1 else f"1 to {newest}"
+        return [Problem("version", f"feature table `{name}`", f"feature table `{name}` has version {version}; known: {known}")]
     if name not in TABLES:
         why = f"has left: {CORRECTS}" if name == LEFT_TABLE else f"is unknown; known: {', '.join(TABLES)}"
         return [Problem("document", "", f"metadata `{KEY}`: feature table `{name}` {why}")]
     problems = [] if doc["inputs"] else [Problem("document", "", f"metadata `{KEY}`: there is no input feature")]
     rows, ordered = TABLES[name]
+    rows = OLDER_TABLES.get((name, version), rows)
     order, following, seen = list(rows), 0, set()
     for feature in doc["inputs"]:
         own, encoding = feature["name"], feature.get("encoding", "")
@@ -144,7 +155,7 @@ def _inputs(doc):
         if not rows:
             continue
         if own not in rows:
-            fault(f"table `{name}` version 1 has no such feature")
+            fault(f"table `{name}` version {version} has no such feature")
             continue
         channels, encodings = rows[own]
         if feature["channels"] != channels:
@@ -225,7 +236,7 @@ def schema():
         "description": "Made by `python3 -m bouncelight_weights --schema`.",
         **part(["version", "licence", "table", "inputs", "cell", "output", "graph"], {
             "version": {"enum": list(KNOWN_VERSIONS)}, "name": {"type": "string"}, "licence": {"type": "string", "pattern": "\\S"},
-            "table": part(["name", "version"], {"name": {"enum": list(TABLES)}, "version": {"const": 1}}),
+            "table": part(["name", "version"], {"name": {"enum": list(TABLES)}, "version": {"enum": sorted({1, *TABLE_VERSIONS.values()})}}),
             "inputs": {"type": "array", "minItems": 1, "items": feature},
             "cell": {"type": "integer", "minimum": 1, "maximum": 64},
             "output": part(["tensor", "meaning", "channels"], {"tensor": {"type": "string"}, "meaning": {"enum": list(MEANINGS)}, "channels": integer}),

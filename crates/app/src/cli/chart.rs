@@ -73,7 +73,7 @@ pub struct Args {
     error: f64,
     /// Most samples of a reference's pixel.
     #[arg(long, default_value_t = 16384, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
-    most_samples: u32,
+    max_samples: u32,
     /// Most paths a pixel on the curve of paths; 0 leaves it out.
     #[arg(long, default_value_t = 1024, value_name = "N")]
     paths: u32,
@@ -151,7 +151,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         size: args.size,
         samples: args.samples,
         bench: BenchOptions { frames: args.frames, warmup: args.warmup },
-        reference: (args.error, args.most_samples),
+        reference: (args.error, args.max_samples),
         kept: args.references.clone().unwrap_or_else(|| place("references")),
         generator: !args.no_generator,
         no_caustics: args.no_caustics,

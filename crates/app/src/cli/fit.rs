@@ -16,8 +16,8 @@ use bouncelight::net::format::Weights;
 use bouncelight::render::tonemap_curve::Tonemap;
 use bouncelight_lab::study::fitted::Fitted;
 use bouncelight_lab::study::{
-    fit::{self, Fit, FitError, FitOptions, Network, Yardstick},
-    trial::{Trial, TrialError, TrialOptions},
+    fit::{self, Fit, FitError, FitOptions, Network, QualityTarget},
+    session::{Session, SessionError, SessionOptions},
 };
 use bouncelight_scene::image_io;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ pub struct Args {
     /// What is good enough, in every view: `light=8%` (mean error of the light that a method has to
     /// add), or a metric of `compare`.
     #[arg(long, default_value = "light=10%", value_name = "METRIC=T")]
-    target: Yardstick,
+    target: QualityTarget,
     /// Most milliseconds a frame that the method's own passes may take, at --size.
     #[arg(long, value_name = "B", value_parser = parse_budget)]
     budget_ms: Option<f64>,
@@ -43,7 +43,7 @@ pub struct Args {
     views: u32,
     /// Frames of a still camera up to the one that is judged, for methods that settle.
     #[arg(long, default_value_t = Method::SETTLED, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
-    gi_frames: u32,
+    accumulate: u32,
     /// A network to try beside the shipped ones; may be repeated.
     #[arg(long, value_name = "W")]
     weights: Vec<PathBuf>,
@@ -100,28 +100,29 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     interrupt::install()?;
     let gpu = global.open_gpu()?;
     let options = options(global, &gpu, &args)?;
-    let kept = TrialOptions { kept: args.references.clone(), ..TrialOptions::default() };
-    let mut trial = Trial::new(&gpu, scene, args.scene.size, kept).map_err(typed)?.watched(|_| !interrupt::requested());
+    let kept = SessionOptions { kept: args.references.clone(), ..SessionOptions::default() };
+    let mut session =
+        Session::new(&gpu, scene, args.scene.size, kept).map_err(typed)?.watched(|_| !interrupt::requested());
     let views = match fixed.is_empty() {
-        true => fit::covering(&mut trial, args.views as usize).map_err(typed)?,
+        true => fit::covering(&mut session, args.views as usize).map_err(typed)?,
         false => fixed,
     };
     let mut progress = Progress::new(global, "steps", 1);
-    let fitted = fit::fit(&mut trial, &views, &options, &mut |what, done, all| {
+    let fitted = fit::fit(&mut session, &views, &options, &mut |what, done, all| {
         progress.tell(what);
         progress.at(f64::from(done), all.into());
     });
     progress.finish();
     let found = fitted.map_err(named)?;
-    let hash = trial.hash().to_owned();
+    let hash = session.hash().to_owned();
     let fitted = found.fitted(&options, hash, args.scene.size, gpu.info.name.clone());
     let heading = format!(
         "{} at {}x{}: {} {}",
         args.scene.scene,
         args.scene.size[0],
         args.scene.size[1],
-        options.yardstick.name(),
-        options.yardstick.show(options.yardstick.target)
+        options.quality_target.name(),
+        options.quality_target.show(options.quality_target.target)
     );
     say!("{heading}\n\n{}\n{}", found.table(&options), found.why(&options));
     if let Some(folder) = &args.report {
@@ -136,25 +137,25 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     if found.reached {
         return Ok(());
     }
-    let (metric, value) = (options.yardstick.name().to_owned(), found.choice().worst);
-    Err(CliError::AboveThreshold { metric, value, threshold: options.yardstick.target }.into())
+    let (metric, value) = (options.quality_target.name().to_owned(), found.choice().worst);
+    Err(CliError::AboveThreshold { metric, value, threshold: options.quality_target.target }.into())
 }
 
 /// What a fit cannot do: its cause, where that has an exit code of its own.
 fn named(e: FitError) -> anyhow::Error {
     match e {
-        FitError::Trial(e) => typed(e),
+        FitError::Session(e) => typed(e),
         e => usage(e.to_string()),
     }
 }
 
 /// What `exit_code` sorts by: the cause itself.
-fn typed(e: TrialError) -> anyhow::Error {
+fn typed(e: SessionError) -> anyhow::Error {
     match e {
-        TrialError::Stopped => CliError::Interrupted.into(),
-        TrialError::Upload(e) => e.into(),
-        TrialError::Pack(e) => e.into(),
-        TrialError::Render(e) => e.into(),
+        SessionError::Stopped => CliError::Interrupted.into(),
+        SessionError::Upload(e) => e.into(),
+        SessionError::Pack(e) => e.into(),
+        SessionError::Render(e) => e.into(),
         e => e.into(),
     }
 }
@@ -173,11 +174,11 @@ fn options(global: &Global, gpu: &Gpu, args: &Args) -> Result<FitOptions> {
         Network { file, neural }
     };
     Ok(FitOptions {
-        yardstick: args.target.clone(),
+        quality_target: args.target.clone(),
         budget_ms: args.budget_ms,
-        frames: args.gi_frames,
+        frames: args.accumulate,
         networks: networks.into_iter().map(network).collect(),
-        most_samples: args.spp,
+        max_samples: args.spp,
         timed: args.cost == Cost::Measured || args.cost == Cost::Auto && !gpu.is_software(),
     })
 }
@@ -202,7 +203,7 @@ fn report(folder: &Path, heading: &str, found: &Fit, options: &FitOptions, fitte
             let title = row.candidate.name(&options.networks);
             let name = format!("view{i}_{number}_{}.png", row.candidate.method_name().name());
             picture(&name, reference.size, rgb)?;
-            page += &format!("\n![{title}]({name})\n*{title}: {}*\n", options.yardstick.show(row.errors[i]));
+            page += &format!("\n![{title}]({name})\n*{title}: {}*\n", options.quality_target.show(row.errors[i]));
         }
     }
     image_io::write_whole(&folder.join("fit.md"), page.as_bytes())?;

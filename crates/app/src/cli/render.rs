@@ -45,7 +45,7 @@ pub struct Args {
     fitted: super::fitted::Flag,
     /// Jittered frames that are averaged through Cycles' pixel filter; 1 is the raw frame. When
     /// absent: 8; 1 with --aov, with --taa, for frames of a sequence, and for the first frame after
-    /// a cut (--gi-frames 1).
+    /// a cut (--accumulate 1).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     samples: Option<u32>,
     /// Real-time anti-aliasing over this many frames before the one that is written, or before the
@@ -55,7 +55,7 @@ pub struct Args {
     /// Frames of a still camera up to the one that is written, for methods that settle (`gather`,
     /// `neural`): 1 is the first after a cut. 32 when absent.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
-    gi_frames: Option<u32>,
+    accumulate: Option<u32>,
     /// Numbers of `gather` other than its own, such as `blur=0,cell_frames=256`; `plain` forgets
     /// and blurs nothing.
     #[arg(long, value_name = "NAME=VALUE,...")]
@@ -63,7 +63,7 @@ pub struct Args {
     /// Light of what the picture does not show, for `ambient` and `ssgi`: shares of the sky's and
     /// of its surfaces' light.
     #[arg(long, value_name = "sky=X,bounce=Y")]
-    unseen: Option<bouncelight::gi::ambient::Unseen>,
+    ambient_term: Option<bouncelight::gi::ambient::AmbientTerm>,
     /// Surfaces that blend with what is behind: `sorted` are drawn over the picture without grain,
     /// `stochastic` by lot, as paths meet them, for layers and many samples. When absent:
     /// `stochastic` with --aov, else `sorted`.
@@ -89,7 +89,7 @@ impl Args {
     /// Frames that are averaged.
     fn samples(&self) -> u32 {
         let raw =
-            self.picture.aov.is_some() || self.taa.is_some() || self.gi_frames == Some(1) || self.sequence.is_given();
+            self.picture.aov.is_some() || self.taa.is_some() || self.accumulate == Some(1) || self.sequence.is_given();
         self.samples.unwrap_or(if raw { 1 } else { PICTURE_SAMPLES })
     }
 
@@ -105,7 +105,7 @@ impl Args {
 
     /// No flag says how light is found.
     fn asks_fit(&self) -> bool {
-        self.method.is_none() && self.weights.is_none() && self.gather.is_none() && self.unseen.is_none()
+        self.method.is_none() && self.weights.is_none() && self.gather.is_none() && self.ambient_term.is_none()
     }
 
     /// Takes what was fitted for the scene, which is returned where it had to be loaded for that.
@@ -118,8 +118,8 @@ impl Args {
                 eprintln!("method `{}`, as fitted to {}", fitted.method.name(), self.scene.scene);
             }
             let settles = fitted.method()?.has_history();
-            self.gi_frames = self.gi_frames.or(settles.then_some(fitted.frames));
-            (self.gather, self.unseen) = (fitted.gather(), fitted.unseen());
+            self.accumulate = self.accumulate.or(settles.then_some(fitted.frames));
+            (self.gather, self.ambient_term) = (fitted.gather(), fitted.ambient_term());
             self.weights = fitted.weights.map(|w| w.file);
             self.method = Some(fitted.method);
         }
@@ -142,8 +142,8 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let layers = args.picture.aov.as_deref().map(|text| parse_layers(text, &Layer::ALL, Layer::name)).transpose()?;
     let method = match args.method() {
         MethodName::Gather => Method::Gather(args.gather.unwrap_or_default()),
-        MethodName::Ambient => args.unseen.map_or(Method::Ambient, Method::AmbientWith),
-        MethodName::Ssgi => args.unseen.map_or(Method::Ssgi, Method::SsgiWith),
+        MethodName::Ambient => args.ambient_term.map_or(Method::Ambient, Method::AmbientWith),
+        MethodName::Ssgi => args.ambient_term.map_or(Method::Ssgi, Method::SsgiWith),
         name => gathering(real_time(name, global, args.weights.as_ref())?, args.gather),
     };
     let reference = args.picture.reference(args.scene.size)?;
@@ -225,7 +225,7 @@ impl<'a> Raster<'a> {
         if self.drawn > 0 {
             return 0;
         }
-        let settle = if self.settles { args.gi_frames.unwrap_or(Method::SETTLED) - 1 } else { 0 };
+        let settle = if self.settles { args.accumulate.unwrap_or(Method::SETTLED) - 1 } else { 0 };
         args.taa.unwrap_or(0).max(settle)
     }
 
@@ -253,9 +253,9 @@ impl<'a> Raster<'a> {
         let layers = frame.layers.iter().map(layer).collect();
         let mut facts =
             vec![("Method".into(), self.renderer.drawn_by().into()), ("Weights".into(), self.weights.clone())];
-        if let Some(instead) = self.renderer.instead().filter(|_| self.drawn == 0) {
-            let why = self.scene.no_rays.as_deref().unwrap_or(instead.why);
-            eprintln!("warning: `{}` cannot draw this, so `{}` did: {why}", self.asked, instead.method);
+        if let Some(fallback) = self.renderer.fallback().filter(|_| self.drawn == 0) {
+            let why = self.scene.no_rays.as_deref().unwrap_or(fallback.why);
+            eprintln!("warning: `{}` cannot draw this, so `{}` did: {why}", self.asked, fallback.method);
         }
         facts.extend(self.renderer.settled().map(|frames| ("GiFrames".into(), frames.to_string())));
         Ok(Drawn { frame, layers, facts })
@@ -298,16 +298,16 @@ fn check(args: &Args) -> Result<()> {
     }
     let name = args.method().name();
     let settles = [MethodName::Gather, MethodName::Neural].contains(&args.method());
-    if args.gi_frames.is_some() && !settles {
+    if args.accumulate.is_some() && !settles {
         return Err(usage(format!(
-            "--gi-frames belongs to methods gather and neural; `{name}` does not settle over frames"
+            "--accumulate belongs to methods gather and neural; `{name}` does not settle over frames"
         )));
     }
     if args.gather.is_some() && !settles {
         return Err(usage(format!("--gather belongs to methods gather and neural, not to `{name}`")));
     }
-    if args.unseen.is_some() && ![MethodName::Ambient, MethodName::Ssgi].contains(&args.method()) {
-        return Err(usage(format!("--unseen belongs to methods ambient and ssgi, not to `{name}`")));
+    if args.ambient_term.is_some() && ![MethodName::Ambient, MethodName::Ssgi].contains(&args.method()) {
+        return Err(usage(format!("--ambient-term belongs to methods ambient and ssgi, not to `{name}`")));
     }
     Ok(())
 }

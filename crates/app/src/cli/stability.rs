@@ -13,8 +13,8 @@ use anyhow::{Context, Result};
 use bouncelight::gi::Method;
 use bouncelight::net::format::Weights;
 use bouncelight_lab::study::{
+    session::SessionError,
     stability::{self, Event, Finding, Record, StabilityError, Subject, Suite, SuiteOptions},
-    trial::TrialError,
 };
 use bouncelight_scene::image_io;
 use std::path::PathBuf;
@@ -143,7 +143,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 
 fn interrupted(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref::<StabilityError>() {
-        Some(StabilityError::Trial(TrialError::Stopped)) => CliError::Interrupted.into(),
+        Some(StabilityError::Session(SessionError::Stopped)) => CliError::Interrupted.into(),
         _ => error,
     }
 }
@@ -210,7 +210,7 @@ fn tell(finding: &Finding) {
     }
     for found in finding.found.iter().filter(|f| f.pass.is_some()) {
         say!("    {:<10}{:>9.1} s", found.subject, found.seconds);
-        found.instead.iter().for_each(|why| say!("    {:<10}{why}", found.subject));
+        found.fallback.iter().for_each(|why| say!("    {:<10}{why}", found.subject));
     }
 }
 

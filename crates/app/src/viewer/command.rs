@@ -45,7 +45,7 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     }
     // A single frame is one of a history that has not settled.
     if s.samples == 1 && matches!(s.left, Source::Gather | Source::Neural) {
-        flag("gi-frames", "1".into());
+        flag("accumulate", "1".into());
     }
     if let (Source::Neural, Some(weights)) = (s.left, &s.weights) {
         flag("weights", weights.display().to_string());
@@ -53,8 +53,8 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     if let (Source::Gather, Some(numbers)) = (s.left, &state.gather) {
         flag("gather", numbers.clone());
     }
-    if let (Source::Ambient | Source::Ssgi, Some(numbers)) = (s.left, &state.unseen) {
-        flag("unseen", numbers.clone());
+    if let (Source::Ambient | Source::Ssgi, Some(numbers)) = (s.left, &state.ambient_term) {
+        flag("ambient-term", numbers.clone());
     }
     if let (Source::Neural, Some(precision)) = (s.left, state.precision) {
         flag("precision", if precision == Precision::F16 { "f16" } else { "f32" }.into());

@@ -4,7 +4,7 @@
 
 use bouncelight::gpu::readback::{self, ReadbackError};
 use bouncelight::gpu::timing::Recorder;
-use bouncelight::render::{targets::Target, tonemap_curve::Tonemap, tool};
+use bouncelight::render::{pipelines, targets::Target, tonemap_curve::Tonemap};
 
 /// Compares frames.
 pub struct FlickerPass {
@@ -25,10 +25,10 @@ struct Kept {
 impl FlickerPass {
     /// Builds the pipeline.
     pub fn new(device: &wgpu::Device) -> Self {
-        let types = [tool::UNIFORM, tool::LOAD, tool::LOAD, tool::READ_WRITE];
-        let layout = tool::layout(device, "viewer.flicker", wgpu::ShaderStages::COMPUTE, &types);
-        let pipeline = tool::compute(device, "viewer.flicker", "flicker", &[&layout]);
-        let uniform = tool::uniform(device, "viewer.flicker", 16);
+        let types = [pipelines::UNIFORM, pipelines::LOAD, pipelines::LOAD, pipelines::READ_WRITE];
+        let layout = pipelines::layout(device, "viewer.flicker", wgpu::ShaderStages::COMPUTE, &types);
+        let pipeline = pipelines::compute(device, "viewer.flicker", "flicker", &[&layout]);
+        let uniform = pipelines::uniform(device, "viewer.flicker", 16);
         Self { pipeline, layout, uniform, kept: None }
     }
 
@@ -57,9 +57,13 @@ impl FlickerPass {
                 usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
                 mapped_at_creation: false,
             });
-            let resources =
-                [self.uniform.as_entire_binding(), tool::view(hdr), tool::view(&before), sums.as_entire_binding()];
-            let group = tool::group(device, "viewer.flicker", &self.layout, &resources);
+            let resources = [
+                self.uniform.as_entire_binding(),
+                pipelines::view(hdr),
+                pipelines::view(&before),
+                sums.as_entire_binding(),
+            ];
+            let group = pipelines::group(device, "viewer.flicker", &self.layout, &resources);
             self.kept = Some(Kept { hdr: hdr.view.clone(), before, sums, group });
         }
         let Some(kept) = &self.kept else { return Ok(None) };
@@ -71,7 +75,7 @@ impl FlickerPass {
             Recorder::new(&mut encoder).compute("viewer.flicker", |pass| {
                 pass.set_pipeline(&self.pipeline);
                 pass.set_bind_group(0, &kept.group, &[]);
-                tool::dispatch(pass, size);
+                pipelines::dispatch(pass, size);
             });
         }
         let (from, to) = (hdr.texture.as_image_copy(), kept.before.texture.as_image_copy());

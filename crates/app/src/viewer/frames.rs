@@ -58,18 +58,19 @@ pub fn doc(label: &str) -> &'static str {
         "gi.ambient" | "gi.occlusion" | "gi.occlusion_full" => "even light times ambient occlusion",
         "gi.ssgi" | "gi.ssgi_full" => "one bounce of light found on the screen",
         "gi.radiance" => "what surfaces send on, at lower resolutions",
-        "gi.lit" => "the lit picture at lower resolutions, for reflections",
-        "gi.glossy" => "reflections found on the screen",
-        "gi.exposure" => "mean light of the picture, to which methods relate",
-        "gi.cells" => "which pixel stands for each cell",
-        "gi.recall" => "finds what cells knew in the frame before (reprojection)",
-        "gi.rays" => "rays into the scene's triangles",
-        "gi.mirror" => "rays into lobes of smooth surfaces",
-        "gi.gradient" => "asks old rays again where light has changed (temporal gradient)",
-        "gi.settle" => "adds what rays have found to each cell's history",
-        "gi.blur" | "gi.smooth" => "blurs cells over neighbours on the same surface",
-        "gi.bring" => "brings the light of cells to every pixel",
-        "gi.renew" => "brings the cache of light in the world up to date",
+        "gi.color_pyramid" => "the lit picture at lower resolutions (colour pyramid), for reflections",
+        "gi.ssr" => "screen-space reflections",
+        "gi.exposure" => "mean light of the picture",
+        "gi.downsample" => "chooses the pixel that represents each cell",
+        "gi.reproject" => "finds each cell's history in the last frame (reprojection)",
+        "gi.trace" => "traces rays of cells into the scene's triangles",
+        "gi.specular_trace" => "traces specular rays of smooth pixels",
+        "gi.gradient" => "traces old rays again where light has changed (temporal gradient)",
+        "gi.accumulate" => "adds this frame's rays to each cell's history (temporal accumulation)",
+        "gi.blur" | "gi.atrous" => "blurs cells over neighbours on the same surface",
+        "gi.upsample" => "brings the light of cells to every pixel (bilateral upsampling)",
+        "gi.cache_update" => "updates the radiance cache",
+        "gi.cache_evict" => "frees old entries of the radiance cache",
         "gi.features" | "gi.pack" => "what the network is given",
         "gi.reconstruct" => "brings the network's answer to every pixel",
         "viewer.show" => "draws the picture into the window",
@@ -296,7 +297,7 @@ mod tests {
         use Group as G;
         let of = |labels: [&str; 3]| labels.map(Group::of);
         assert_eq!(of(["deform", "gbuffer", "shadow"]), [G::Gbuffer, G::Gbuffer, G::Direct]);
-        assert_eq!(of(["gi.rays", "indirect", "gi.pack"]), [G::Gi, G::Gi, G::Network]);
+        assert_eq!(of(["gi.trace", "indirect", "gi.pack"]), [G::Gi, G::Gi, G::Network]);
         assert_eq!(of(["net.out", "tonemap", "viewer.sum"]), [G::Network, G::Post, G::Viewer]);
     }
 }

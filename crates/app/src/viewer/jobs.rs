@@ -5,7 +5,7 @@ use super::choice::Source;
 use super::command;
 use super::state::State;
 use bouncelight::accel::{AccelError, SceneRays};
-use bouncelight::gi::{Method, Neural, ambient::Unseen, gather};
+use bouncelight::gi::{Method, Neural, ambient::AmbientTerm, gather};
 use bouncelight::gpu_scene::{SceneGpu, TextureMemory};
 use bouncelight::net::{format::Weights, gpu::Tuned, plan::Precision};
 use bouncelight::render::capture::{CaptureOptions, Layer, capture_with};
@@ -211,16 +211,16 @@ pub struct Network {
     pub tuned: Arc<Tuned>,
     /// Numbers of `gather` that were fitted to the scene.
     pub gather: gather::Options,
-    /// Numbers of unseen light that were.
-    pub unseen: Unseen,
+    /// The ambient term that was.
+    pub ambient_term: AmbientTerm,
 }
 
 /// The method behind a source; reads weights.
 fn method(source: Source, weights: Option<&Path>, network: &Network) -> Result<Method, String> {
     Ok(match source {
         Source::Direct | Source::Reference => Method::Direct,
-        Source::Ambient => Method::AmbientWith(network.unseen),
-        Source::Ssgi => Method::SsgiWith(network.unseen),
+        Source::Ambient => Method::AmbientWith(network.ambient_term),
+        Source::Ssgi => Method::SsgiWith(network.ambient_term),
         Source::Gather => Method::Gather(network.gather),
         Source::Neural => {
             let weights = Weights::find(weights).map_err(|e| e.to_string())?;
@@ -306,7 +306,7 @@ impl Shot {
 /// Draws the picture anew, away from the window, just as the command line would, and writes it.
 pub fn capture(gpu: &bouncelight::gpu::Gpu, shot: &Shot, progress: &Progress) -> Result<Product, String> {
     let cancelled = || Err("cancelled".to_string());
-    let mut instead = None;
+    let mut fallback = None;
     let (beauty, layers) = if shot.source == Source::Reference {
         let Some(traced) = trace(gpu, shot, progress)? else { return cancelled() };
         traced
@@ -331,7 +331,7 @@ pub fn capture(gpu: &bouncelight::gpu::Gpu, shot: &Shot, progress: &Progress) ->
             progress.at(f64::from(done) / f64::from(shot.samples + warmup))
         });
         let Some(frame) = frame.map_err(|e| e.to_string())? else { return cancelled() };
-        instead = renderer.instead().map(|i| format!("{} ({})", i.method, i.why));
+        fallback = renderer.fallback().map(|i| format!("{} ({})", i.method, i.why));
         let layer = |(layer, picture): &(Layer, bouncelight::render::capture::Picture)| {
             image_io::Layer::new(layer.name(), &layer.channels().concat(), &picture.data)
         };
@@ -339,7 +339,7 @@ pub fn capture(gpu: &bouncelight::gpu::Gpu, shot: &Shot, progress: &Progress) ->
     };
     let [width, height] = shot.size;
     let mut metadata = shot.metadata.clone();
-    metadata.extend(instead.clone().map(|by| ("DrawnBy".to_string(), by)));
+    metadata.extend(fallback.clone().map(|by| ("DrawnBy".to_string(), by)));
     let written = if shot.is_exr() {
         let mut all = vec![image_io::Layer::new("", "RGBA", &beauty)];
         all.extend(layers);
@@ -350,7 +350,7 @@ pub fn capture(gpu: &bouncelight::gpu::Gpu, shot: &Shot, progress: &Progress) ->
         image_io::write_png(&shot.output, width, height, &shot.tonemap.apply_to_bytes(&rgb), &metadata)
     };
     written.map_err(|e| e.to_string())?;
-    Ok(Product::Captured(shot.output.clone(), instead))
+    Ok(Product::Captured(shot.output.clone(), fallback))
 }
 
 /// The path tracer's picture and layers; `None` when cancelled.

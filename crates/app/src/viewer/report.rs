@@ -38,7 +38,7 @@ pub fn report(app: &App) -> Value {
         "frames": app.frames, "layouts": app.overlay.layouts, "built": app.built, "places": app.overlay.memory.places,
         "density_drawn": app.overlay.density, "scene_frames": app.scene_frames,
         "view": s.view.name(), "left": s.left.name(), "right": s.right.name(), "split": s.split, "line": s.line,
-        "instead": by(Side::Left).and_then(|by| Some(format!("{}: {}", by.source.name(), by.why?))),
+        "fallback": by(Side::Left).and_then(|by| Some(format!("{}: {}", by.source.name(), by.why?))),
         "drawn": { "left": key(Side::Left), "right": key(Side::Right) },
         "backdrop": s.backdrop.name(), "coarse": app.state.is_coarse(), "exposure": app.state.stops(), "auto_exposure": app.state.auto_exposure, "tonemap": s.tonemap.name(), "samples": s.samples,
         "still": stage.map_or(0, |st| st.still()),

@@ -3,7 +3,7 @@
 
 use super::choice::View;
 use bouncelight::gpu::timing::Recorder;
-use bouncelight::render::{Renderer, targets::Target, tonemap_curve::Tonemap, tool};
+use bouncelight::render::{Renderer, pipelines, targets::Target, tonemap_curve::Tonemap};
 use bytemuck::{Pod, Zeroable};
 
 /// Difference of display values that the error view shows brightest.
@@ -74,12 +74,12 @@ pub struct ShowPass {
 impl ShowPass {
     /// For windows of `format`.
     pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
-        use tool::{LOAD, UNIFORM};
+        use pipelines::{LOAD, UNIFORM};
         let mut types = vec![UNIFORM; 2];
         types.extend([LOAD; 13]);
-        let layout = tool::layout(device, "viewer.show", wgpu::ShaderStages::FRAGMENT, &types);
-        let pipeline = tool::screen(device, "viewer.show", format, &layout);
-        let uniform = tool::uniform(device, "viewer.show", size_of::<ShowUniform>());
+        let layout = pipelines::layout(device, "viewer.show", wgpu::ShaderStages::FRAGMENT, &types);
+        let pipeline = pipelines::screen(device, "viewer.show", format, &layout);
+        let uniform = pipelines::uniform(device, "viewer.show", size_of::<ShowUniform>());
         let blank = picture(device, "viewer.blank", [1, 1]).view;
         Self { device: device.clone(), pipeline, layout, uniform, linear_target: format.is_srgb(), blank, bound: None }
     }
@@ -167,7 +167,7 @@ impl ShowPass {
         if self.bound.as_ref().is_none_or(|(bound, _)| *bound != views) {
             let mut resources = vec![inputs.renderer.frame().as_entire_binding(), self.uniform.as_entire_binding()];
             resources.extend(views.iter().map(wgpu::BindingResource::TextureView));
-            let group = tool::group(&self.device, "viewer.show", &self.layout, &resources);
+            let group = pipelines::group(&self.device, "viewer.show", &self.layout, &resources);
             self.bound = Some((views, group));
         }
     }
@@ -209,11 +209,11 @@ impl SumPass {
             format: wgpu::TextureFormat::Rgba32Float,
             view_dimension: wgpu::TextureViewDimension::D2,
         };
-        let types = [tool::LOAD, tool::LOAD, store, tool::UNIFORM];
-        let layout = tool::layout(device, "viewer.sum", wgpu::ShaderStages::COMPUTE, &types);
-        let pipeline = tool::compute(device, "viewer.sum", "sum", &[&layout]);
+        let types = [pipelines::LOAD, pipelines::LOAD, store, pipelines::UNIFORM];
+        let layout = pipelines::layout(device, "viewer.sum", wgpu::ShaderStages::COMPUTE, &types);
+        let pipeline = pipelines::compute(device, "viewer.sum", "sum", &[&layout]);
         let first = [0u32, 1].map(|first| {
-            let buffer = tool::uniform(device, "viewer.sum", 16);
+            let buffer = pipelines::uniform(device, "viewer.sum", 16);
             queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&[first, 0, 0, 0]));
             buffer
         });
@@ -227,12 +227,12 @@ impl SumPass {
         let groups = [0, 1].map(|first: usize| {
             [0, 1].map(|i: usize| {
                 let resources = [
-                    tool::view(hdr),
-                    tool::view(&sums[i]),
-                    tool::view(&sums[1 - i]),
+                    pipelines::view(hdr),
+                    pipelines::view(&sums[i]),
+                    pipelines::view(&sums[1 - i]),
                     self.first[first].as_entire_binding(),
                 ];
-                tool::group(device, "viewer.sum", &self.layout, &resources)
+                pipelines::group(device, "viewer.sum", &self.layout, &resources)
             })
         });
         Sums { size, sums, groups, hdr: hdr.view.clone(), count: 0 }
@@ -244,7 +244,7 @@ impl SumPass {
         recorder.compute("viewer.sum", |pass| {
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, group, &[]);
-            tool::dispatch(pass, sums.size);
+            pipelines::dispatch(pass, sums.size);
         });
         sums.count = sums.count.wrapping_add(1);
     }

@@ -1,9 +1,9 @@
 //! The pass `wires`: edges of all triangles that are seen, a pixel wide, for the view `wireframe`.
 
-use bouncelight::gpu::{shaders, shared, tape, timing::Recorder};
+use bouncelight::gpu::{pipeline_cache, shaders, tape, timing::Recorder};
 use bouncelight::gpu_scene::{SceneGpu, position_layouts};
 use bouncelight::render::cull::{Count, Volume};
-use bouncelight::render::{Renderer, View, gbuffer, targets::Target, tool};
+use bouncelight::render::{Renderer, View, gbuffer, pipelines, targets::Target};
 
 /// What a device needs to draw lines where it would fill triangles.
 pub const NEEDS: wgpu::Features = wgpu::Features::POLYGON_MODE_LINE;
@@ -28,7 +28,7 @@ impl WiresPass {
         if !device.features().contains(NEEDS) {
             return None;
         }
-        let layout = tool::layout(device, "viewer.wires", wgpu::ShaderStages::VERTEX, &[tool::UNIFORM]);
+        let layout = pipelines::layout(device, "viewer.wires", wgpu::ShaderStages::VERTEX, &[pipelines::UNIFORM]);
         let pipelines = gbuffer::CULLED.map(|cull| pipeline(device, &layout, cull));
         Some(Self { device: device.clone(), layout, pipelines, lines: None })
     }
@@ -42,7 +42,8 @@ impl WiresPass {
         let lines = self.lines.insert(known.unwrap_or_else(|| {
             Target::new(&self.device, "viewer.wires", size, format, wgpu::TextureUsages::RENDER_ATTACHMENT)
         }));
-        let group = tool::group(&self.device, "viewer.wires", &self.layout, &[renderer.frame().as_entire_binding()]);
+        let group =
+            pipelines::group(&self.device, "viewer.wires", &self.layout, &[renderer.frame().as_entire_binding()]);
         let color = wgpu::RenderPassColorAttachment {
             view: &lines.view,
             depth_slice: None,
@@ -83,7 +84,7 @@ impl WiresPass {
 fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, cull: Option<wgpu::Face>) -> wgpu::RenderPipeline {
     let module = shaders::module(device, "viewer.wires");
     let layout = tape::pipeline_layout(device, "viewer.wires", &[Some(layout)]);
-    shared::render_pipeline(
+    pipeline_cache::render_pipeline(
         device,
         &wgpu::RenderPipelineDescriptor {
             label: Some("viewer.wires"),

@@ -21,7 +21,7 @@ fn chart(out: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
         "1",
         "--error",
         "0.5",
-        "--most-samples",
+        "--max-samples",
         "32",
         "--paths",
         "4",

@@ -234,13 +234,13 @@ fn whoever_takes_a_ray_the_picture_is_the_same() {
             }
         }
         let file = path(&dir, "x.exr");
-        let args = ["render", "cornell", "--size", "64x48", "--method", "gather", "--gi-frames", "3", "-o", &file];
+        let args = ["render", "cornell", "--size", "64x48", "--method", "gather", "--accumulate", "3", "-o", &file];
         let out = bouncelight(&[&args[..], &["--shaders", &folder]].concat());
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
         bouncelight_scene::image_io::read_exr(Path::new(&file)).unwrap().image("Combined").unwrap().to_rgb()
     };
-    let taken = "select(atomicAdd(&taken, 1u), own, (gather.flags & GATHER_IN_TURN) != 0u)";
-    let queue = include_str!("../../../../shaders/gi/gather/queue.wgsl");
+    let taken = "select(atomicAdd(&taken, 1u), own, (gather.flags & GATHER_SERIAL_GROUPS) != 0u)";
+    let queue = include_str!("../../../../shaders/gi/gather/ray_queue.wgsl");
     assert!(queue.contains(taken));
     let in_turn = drawn(taken, "own");
     assert_eq!(drawn(taken, "atomicAdd(&taken, 1u)"), in_turn);
@@ -433,6 +433,23 @@ fn what_has_left_is_named() {
         fails(&["render", "cornell", "-o", &out, "--weights", &bad(name)], 4, words);
     }
     assert!(is_empty(dir.path()));
+}
+
+/// Options of earlier versions are usage errors that say what they are called now.
+#[test]
+fn renamed_options_are_named() {
+    for (command, old, new) in [
+        (&["render", "cornell", "-o", "out.png", "--gi-frames", "3"][..], "--gi-frames", "--accumulate"),
+        (&["render", "cornell", "-o", "out.png", "--gi-frames=3"], "--gi-frames", "--accumulate"),
+        (&["fit", "cornell", "--gi-frames", "8"], "--gi-frames", "--accumulate"),
+        (&["render", "cornell", "-o", "out.png", "--unseen", "sky=1"], "--unseen", "--ambient-term"),
+        (&["chart", "--out", "out", "--most-samples", "64"], "--most-samples", "--max-samples"),
+    ] {
+        fails(command, 2, &[&format!("`{old}` was renamed to `{new}`")]);
+    }
+    // Negative control: an option that there never was.
+    let out = bouncelight(&["render", "cornell", "-o", "out.png", "--gi-rays", "3"]);
+    assert!(!String::from_utf8_lossy(&out.stderr).contains("renamed"));
 }
 
 #[test]

@@ -222,7 +222,12 @@ fn recorded(gpu: &Gpu, method: &Method, frames: usize) -> Vec<Vec<String>> {
         view_from_world: [x, y, z, w],
         clip_from_view: [x, y, [0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 0.1, 0.0]],
     };
-    let lights = Lights { buffer: &uploaded.light_buffer, count: 1, stand_in: false, epoch: uploaded.lights_epoch };
+    let lights = Lights {
+        buffer: &uploaded.light_buffer,
+        count: 1,
+        has_emissive_proxies: false,
+        version: uploaded.light_version,
+    };
     let inputs = Inputs {
         albedo: Some(&light),
         direct: Some(&light),
@@ -262,8 +267,8 @@ fn every_pass_of_every_frame_is_written_down() {
             let mut told: Vec<_> = frame.dispatches.iter().map(|d| m.dispatches[*d].label.clone()).collect();
             seen += labels.len();
             // A pass of several dispatches has one label there.
-            told.dedup_by(|b, a| a == b && !a.starts_with("gi.renew"));
-            labels.dedup_by(|b, a| a == b && !a.starts_with("gi.renew"));
+            told.dedup_by(|b, a| a == b && !a.starts_with("gi.cache_update"));
+            labels.dedup_by(|b, a| a == b && !a.starts_with("gi.cache_update"));
             assert_eq!(told, labels, "{} frame {k}", m.method);
         }
         assert!(seen >= 32 * 9, "{seen} passes");
@@ -278,8 +283,8 @@ fn rays_are_shared_out_as_for_a_gpu() {
     let m = exported(&gpu, &methods()[0], Target::Wgsl).manifest;
     let workgroups = |label: &str| m.dispatches.iter().find(|d| d.label == label).map(|d| d.workgroups);
     // Two units each: of 1,024 of the table's 65,536 slots; of nine layers of one block of cells.
-    assert_eq!(workgroups("gi.renew"), Some([32, 1, 1]));
-    assert_eq!(workgroups("gi.rays"), Some([5, 1, 1]));
+    assert_eq!(workgroups("gi.cache_update"), Some([32, 1, 1]));
+    assert_eq!(workgroups("gi.trace"), Some([5, 1, 1]));
 }
 
 #[test]

@@ -78,8 +78,8 @@ fn what_was_found_is_kept_and_obeyed_until_the_scene_changes() {
     };
     assert_eq!(drawn(&["--environment", "1"], 0, &["`ambient`, as fitted"]), "ambient");
     assert_eq!(drawn(&["--environment", "1", "--method", "direct"], 0, &[]), "direct");
-    assert_eq!(drawn(&["--environment", "1", "--gi", "none", "--gi-frames", "1"], 0, &[]), "gather");
-    assert_eq!(drawn(&["--environment", "2", "--gi-frames", "1"], 0, &["not obeyed", "fit` again"]), "gather");
+    assert_eq!(drawn(&["--environment", "1", "--gi", "none", "--accumulate", "1"], 0, &[]), "gather");
+    assert_eq!(drawn(&["--environment", "2", "--accumulate", "1"], 0, &["not obeyed", "fit` again"]), "gather");
     let bench = run(&["bench", "open.glb", "--frames", "1", "--warmup", "0"]);
     let text = ends(&bench, 0, &["ambient"]);
     assert!(!text.contains("gather"), "{text}");

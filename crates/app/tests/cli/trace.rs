@@ -41,7 +41,7 @@ fn flags_that_make_no_sense_exit_with_2() {
     traced(&["--aov", "Motion"], &["Motion", "Gi, Analytic"]);
     traced(&["--aov", "Depth,Depth"], &["twice"]);
     // What belongs to frames is no flag of paths, and the other way round.
-    for flag in ["--method", "--samples", "--taa", "--frames", "--backdrop", "--weights", "--gather", "--gi-frames"] {
+    for flag in ["--method", "--samples", "--taa", "--frames", "--backdrop", "--weights", "--gather", "--accumulate"] {
         traced(&[flag, "1"], &[flag]);
     }
     for flag in ["--spp", "--until-error", "--clamp", "--bounces", "--cells"] {

@@ -14,11 +14,11 @@ fn neural_is_drawn_by_neural() {
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
         { "wait": "loaded" }, { "wait": "idle" },
-        { "expect": { "/left": "neural", "/drawn/left": "neural", "/instead": null, "/errors": 0 } },
-        { "expect": { "/passes": { "contains": "gi.rays" } } }, { "expect": { "/passes": { "contains": "net." } } },
+        { "expect": { "/left": "neural", "/drawn/left": "neural", "/fallback": null, "/errors": 0 } },
+        { "expect": { "/passes": { "contains": "gi.trace" } } }, { "expect": { "/passes": { "contains": "net." } } },
         // Another scene has no trees yet: what is drawn meanwhile is what is named.
         { "drop": "paper-room:3" }, { "until": { "/scene/spec": "paper-room:3" } }, { "wait": "idle" },
-        { "expect": { "/drawn/left": "neural", "/instead": null } },
+        { "expect": { "/drawn/left": "neural", "/fallback": null } },
         { "key": "L" }, { "wait": "idle" }, { "expect": { "/feature": { "contains": "layer 1 of" } } }
     ]);
     succeeds(&session(&display, dir.path(), script, &["cornell", "--method", "neural", "--size", "96x72"]));
@@ -29,7 +29,7 @@ fn neural_is_drawn_by_neural() {
     let script = json!([
         { "wait": "loaded" }, { "wait": "idle" },
         { "expect": { "/drawn/left": "direct", "/drawn/right": "neural" } },
-        { "expect": { "/passes": { "contains": "gi.rays" } } }
+        { "expect": { "/passes": { "contains": "gi.trace" } } }
     ]);
     let args = ["cornell", "--size", "96x72", "--settings", file.to_str().unwrap()];
     succeeds(&session(&display, dir.path(), script, &args));

@@ -11,14 +11,14 @@ fn rays_take_over_when_their_trees_are_there() {
     let dir = tempfile::tempdir().unwrap();
     let script = json!([
         { "wait": "loaded" }, { "wait": "idle" },
-        { "expect": { "/drawn/left": "gather", "/instead": null, "/passes": { "contains": "gi.rays" }, "/errors": 0 } },
+        { "expect": { "/drawn/left": "gather", "/fallback": null, "/passes": { "contains": "gi.trace" }, "/errors": 0 } },
         // Another scene has none yet; so has the same one on a new device. Both get theirs.
         { "save": { "frames": "/scene_frames" } },
         { "drop": "paper-room:3" }, { "wait": "idle" },
-        { "expect": { "/scene/spec": "paper-room:3", "/drawn/left": "gather", "/instead": null, "/errors": 0 } },
+        { "expect": { "/scene/spec": "paper-room:3", "/drawn/left": "gather", "/fallback": null, "/errors": 0 } },
         { "expect_not_saved": { "frames": "/scene_frames" } },
         { "lose": "device" }, { "wait": 30 }, { "wait": "idle" },
-        { "expect": { "/rebuilt": 1, "/drawn/left": "gather", "/instead": null, "/errors": 0 } },
+        { "expect": { "/rebuilt": 1, "/drawn/left": "gather", "/fallback": null, "/errors": 0 } },
         // A capture builds rays of its own.
         { "key": "F12" }, { "wait": "idle" }, { "expect": { "/captured": { "contains": ".png" }, "/errors": 0 } },
         { "quit": true }

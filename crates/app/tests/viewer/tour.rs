@@ -56,7 +56,7 @@ fn round() -> Vec<Value> {
     for method in ["direct", "ambient", "ssgi", "gather", "neural"] {
         steps.extend([
             json!({ "wait": "idle" }),
-            json!({ "expect": { "/left": method, "/drawn/left": method, "/instead": null, "/errors": 0 } }),
+            json!({ "expect": { "/left": method, "/drawn/left": method, "/fallback": null, "/errors": 0 } }),
             json!({ "drag": [[100, 70], [108, 72], [100, 70]] }),
             json!({ "key": "M" }),
         ]);

@@ -47,14 +47,14 @@ pub(crate) struct Counted {
 
 /// Counts what is recorded on this thread by passes that were made since; there is one at a time.
 pub(crate) struct Count {
-    tape: tape::Running,
+    tape: tape::DispatchCapture,
     counter: Option<Rc<RefCell<Counter>>>,
 }
 
 impl Count {
     /// From here on it is remembered of what pipelines are made.
     pub fn start() -> Self {
-        Self { tape: tape::Running::to_count(), counter: None }
+        Self { tape: tape::DispatchCapture::to_count(), counter: None }
     }
 
     /// Dispatches count from here on. The device needs room for a storage buffer more a stage than

@@ -140,6 +140,7 @@ pub struct Binding {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Dispatch {
     /// The pass's label, as in timing tables.
+    #[serde(deserialize_with = "crate::labels::read")]
     pub label: String,
     /// Index into `shaders`.
     pub shader: usize,

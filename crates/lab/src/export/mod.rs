@@ -73,7 +73,7 @@ pub enum ExportError {
     Accel(#[from] AccelError),
     /// Another method would draw in this one's place.
     #[error("method `{method}` cannot be had: {why}")]
-    Instead {
+    Fallback {
         /// What was asked for.
         method: &'static str,
         /// What is missing.

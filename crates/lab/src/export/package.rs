@@ -13,7 +13,7 @@ use std::path::Path;
 /// `camera` is what the view decides, the others are counters.
 const HOST: [(&str, &[&str]); 2] = [
     ("Params", &["unproject", "depth", "gravity_from_view", "gravity_from_world", "world_from_view", "eye"]),
-    ("Gather", &["eye", "frame", "round", "last_round"]),
+    ("Gather", &["eye", "frame", "cache_iteration", "last_iteration"]),
 ];
 
 /// Uniform offsets are multiples of this under WebGPU's default limits.
@@ -229,7 +229,7 @@ impl Packing<'_> {
         let mut rounds = 0;
         for (name, changing) in HOST {
             let (Some(slots), Some(layout)) = (written.get(name), self.uniforms.get(name)) else { continue };
-            let round = |bytes: &Vec<u8>| number(bytes, layout, "round");
+            let round = |bytes: &Vec<u8>| number(bytes, layout, "cache_iteration");
             let (first, last) =
                 (slots.iter().map(round).min().unwrap_or(0), slots.iter().map(round).max().unwrap_or(0));
             if name == "Gather" {
@@ -244,7 +244,7 @@ impl Packing<'_> {
                             return Err(ExportError::Recording { pass: name.to_owned(), reason });
                         }
                         "frame" => Value::Host("frame".to_owned()),
-                        name @ ("round" | "last_round") => match number(bytes, layout, name) - first {
+                        name @ ("cache_iteration" | "last_iteration") => match number(bytes, layout, name) - first {
                             0 => Value::Host("round".to_owned()),
                             more => Value::Host(format!("round + {more}")),
                         },

@@ -4,10 +4,10 @@ use super::ExportError;
 use super::Target;
 use bouncelight::gi::{CameraMatrices, Inputs, Lights, Method, Outputs, Rays, method};
 use bouncelight::gpu::bind::Bound;
-use bouncelight::gpu::tape::{Dispatch, Running};
+use bouncelight::gpu::tape::{Dispatch, DispatchCapture};
 use bouncelight::gpu::{readback, timing::Recorder};
 use bouncelight::gpu_scene::SceneGpu;
-use bouncelight::net::gpu::{Permutation, Source, Variant};
+use bouncelight::net::gpu::{KernelConfig, Source, Variant};
 use bouncelight::scene::Scene;
 
 /// Frames that are recorded: methods are at rest well before.
@@ -48,7 +48,7 @@ pub(super) fn record(
     size: [u32; 2],
     target: Target,
 ) -> Result<Recording, ExportError> {
-    let mut tape = Running::start();
+    let mut tape = DispatchCapture::start();
     let mut uploaded = SceneGpu::new(device, queue, scene)?;
     if method.needs_rays() {
         uploaded.trace(device, queue, scene)?;
@@ -74,8 +74,9 @@ pub(super) fn record(
             buffer: &uploaded.light_buffer,
             count: uploaded.lights.len() as u32,
             // Methods that know the scene find what glows themselves.
-            stand_in: !technique.knows_scene(uploaded.rays.is_some()) && uploaded.lights.iter().any(|l| l.stands_in),
-            epoch: uploaded.lights_epoch,
+            has_emissive_proxies: !technique.uses_rays(uploaded.rays.is_some())
+                && uploaded.lights.iter().any(|l| l.is_emissive_proxy),
+            version: uploaded.light_version,
         }),
         rays: uploaded.rays.as_ref().map(|scene| Rays { scene, environment: &uploaded.environment_view }),
         ..Inputs::new(size, depth, normal, ANY)
@@ -85,8 +86,8 @@ pub(super) fn record(
         // What is recorded is never submitted, so that resources stay as they begin.
         let mut encoder = device.create_command_encoder(&Default::default());
         technique.record(&mut Recorder::new(&mut encoder), queue, &inputs, outputs)?;
-        if let Some(instead) = technique.instead() {
-            return Err(ExportError::Instead { method: method.name(), why: instead.why.to_owned() });
+        if let Some(fallback) = technique.fallback() {
+            return Err(ExportError::Fallback { method: method.name(), why: fallback.why.to_owned() });
         }
         frames.push(taken(device, queue, tape.take())?);
     }
@@ -100,7 +101,7 @@ fn plain(method: &Method, target: Target) -> Method {
     let mut method = method.clone();
     if let Method::Neural(neural) = &mut method {
         let weights = if target == Target::Glsl430 { Source::Storage } else { Source::Uniform };
-        neural.network.variant = Variant::Fixed(Permutation::new(weights, 2));
+        neural.network.variant = Variant::Fixed(KernelConfig::new(weights, 2));
         neural.network.precision = bouncelight::net::plan::Precision::F32;
         neural.tuned = Default::default();
     }

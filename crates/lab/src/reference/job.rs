@@ -1,7 +1,7 @@
 //! What one dispatch of the path tracer is asked to do: group 1, binding 0 of
 //! `reference.path` and `reference.first_hit`.
 
-use bouncelight::gpu::shared;
+use bouncelight::gpu::pipeline_cache;
 use bouncelight::render::View;
 use bouncelight::scene::Camera;
 use bytemuck::{Pod, Zeroable};
@@ -110,7 +110,7 @@ pub fn film_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         count: None,
     };
     let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
-    shared::bind_group_layout(
+    pipeline_cache::bind_group_layout(
         device,
         &wgpu::BindGroupLayoutDescriptor {
             label: Some("reference.film"),

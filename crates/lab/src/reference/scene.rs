@@ -7,7 +7,7 @@
 //! glows on its front only. Masked and blended materials let rays of every kind through with
 //! probability 1 − coverage. Occlusion maps are left out: occlusion is found by tracing. Unlit
 //! surfaces show their colour to the camera and are black to all other rays. Lights with
-//! [`Light::stands_in`](bouncelight::scene::Light::stands_in) are left out of the truth, where the
+//! [`Light::is_emissive_proxy`](bouncelight::scene::Light::is_emissive_proxy) are left out of the truth, where the
 //! surfaces they stand for shine themselves.
 
 mod lights;
@@ -19,7 +19,7 @@ mod triangles;
 pub use materials::{ImageUse, RefMaterial};
 
 use bouncelight::accel::{self, Accel, AccelGpu};
-use bouncelight::gpu::shared;
+use bouncelight::gpu::pipeline_cache;
 use bouncelight::scene::Scene;
 use bytemuck::{Pod, Zeroable};
 use thiserror::Error;
@@ -175,7 +175,7 @@ impl ReferenceScene {
         };
         let ty = wgpu::BufferBindingType::Storage { read_only: true };
         let read = wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
-        shared::bind_group_layout(
+        pipeline_cache::bind_group_layout(
             device,
             &wgpu::BindGroupLayoutDescriptor {
                 label: Some("reference.scene"),

@@ -160,7 +160,7 @@ pub fn scene(index: u32) -> Scene {
         name: "sun".to_owned(),
         color: [1.0; 3],
         kind: LightKind::Directional { direction: direction.as_vec3().into(), irradiance: 1.0, angle: SUN_ANGLE },
-        stands_in: false,
+        is_emissive_proxy: false,
     });
     let camera = DMat4::from_translation(DVec3::new(0.0, 0.0, 10.0)) * euler_xyz([room.pitch, 0.0, room.yaw]);
     scene.cameras.push(Camera {

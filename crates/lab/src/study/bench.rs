@@ -36,6 +36,7 @@ pub struct Spread {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PassTime {
     /// Label of the pass (`render.gbuffer`, `net.enc0.0`, …).
+    #[serde(deserialize_with = "crate::labels::read")]
     pub pass: String,
     /// GPU time, milliseconds.
     pub ms: Spread,
@@ -53,6 +54,7 @@ pub struct Measurement {
     /// From before recording until the device is idle, milliseconds.
     pub wall_ms: Spread,
     /// Resident GPU bytes by owner.
+    #[serde(deserialize_with = "crate::labels::read_rows")]
     pub bytes: Vec<(String, u64)>,
     /// What passes of a frame at rest do, where somebody has counted it (`study::count`).
     #[serde(default)]
@@ -164,7 +166,7 @@ fn measure_frames(
     let mut wall = Vec::new();
     for frame in 0..options.warmup + options.frames {
         if cuts {
-            renderer.cut();
+            renderer.reset_history();
         }
         let start = Instant::now();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());

@@ -57,7 +57,7 @@ impl Change {
             LightKind::Directional { .. } => 0.0,
             LightKind::Point { position, .. } | LightKind::Spot { position, .. } => looked_at.distance(position.into()),
         };
-        let own = scene.lights.iter().enumerate().filter(|(_, l)| !l.stands_in);
+        let own = scene.lights.iter().enumerate().filter(|(_, l)| !l.is_emissive_proxy);
         let mut near: Vec<(f32, usize)> = own.map(|(i, l)| (distance(l), i)).collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
         near.truncate(LAMPS);
@@ -208,7 +208,7 @@ mod tests {
             transform: Mat4::from_translation(Vec3::Z * z).to_cols_array_2d(),
         };
         Scene {
-            lights: vec![point(0.0, 50.0), point(0.0, -2.0), Light { stands_in: true, ..point(0.0, -2.0) }],
+            lights: vec![point(0.0, 50.0), point(0.0, -2.0), Light { is_emissive_proxy: true, ..point(0.0, -2.0) }],
             meshes: vec![mesh],
             instances: vec![at("behind", 3.0), at("cube", -3.0), at("cube", -3.1), at("far", -90.0)],
             ..Scene::default()

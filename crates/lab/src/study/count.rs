@@ -25,7 +25,7 @@ pub enum CountError {
     Readback(#[from] ReadbackError),
     /// Another method draws the scene in the place of the one that was asked for.
     #[error("nothing is counted of a method that does not draw: {0}")]
-    Instead(String),
+    Fallback(String),
 }
 
 /// What a camera sees.
@@ -52,7 +52,7 @@ pub fn frame(gpu: &Gpu, still: Still<'_>, options: RendererOptions, frames: u32)
     let mut count = Count::start();
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
     if rays && let Err(e) = uploaded.trace(&gpu.device, &gpu.queue, scene) {
-        return Err(CountError::Instead(e.to_string()));
+        return Err(CountError::Fallback(e.to_string()));
     }
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, options)?;
     let view = View::new(camera, size, [0.0; 2]);
@@ -66,8 +66,8 @@ pub fn frame(gpu: &Gpu, still: Still<'_>, options: RendererOptions, frames: u32)
         // Drivers let frames pile up otherwise.
         let _ = gpu.device.poll(wgpu::PollType::wait_indefinitely());
     }
-    if let Some(instead) = renderer.instead() {
-        return Err(CountError::Instead(instead.why.to_owned()));
+    if let Some(fallback) = renderer.fallback() {
+        return Err(CountError::Fallback(fallback.why.to_owned()));
     }
     let mut costs: Vec<Cost> = Vec::new();
     for dispatch in count.take(&gpu)? {

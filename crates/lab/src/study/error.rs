@@ -27,7 +27,7 @@ pub enum DatasetError {
 /// Why a trial failed.
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
-pub enum TrialError {
+pub enum SessionError {
     /// The scene does not fit.
     #[error(transparent)]
     Upload(#[from] bouncelight::gpu_scene::UploadError),

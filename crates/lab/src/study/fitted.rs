@@ -2,7 +2,7 @@
 //! method that it names.
 
 use bouncelight::gi::{Method, name::MethodName};
-use bouncelight::gi::{Neural, ambient::Unseen, gather};
+use bouncelight::gi::{Neural, ambient::AmbientTerm, gather};
 use bouncelight::net::format::{Weights, WeightsError};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -25,10 +25,10 @@ pub struct Fitted {
     /// Numbers of `gather` that differ from its own, as `render --gather` takes them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gather: Option<String>,
-    /// Numbers of unseen light that were fitted to the scene, for `ambient` and `ssgi`, as `render
-    /// --unseen` takes them.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unseen: Option<String>,
+    /// The ambient term that was fitted to the scene, for `ambient` and `ssgi`, as `render
+    /// --ambient-term` takes them.
+    #[serde(default, alias = "unseen", skip_serializing_if = "Option::is_none")]
+    pub ambient_term: Option<String>,
     /// Frames of a still camera after which the target was met, for methods that settle; 1 for
     /// others.
     pub frames: u32,
@@ -141,8 +141,8 @@ impl Fitted {
         if let Some(method) = self.method.plain() {
             return Ok(match (method, self.gather()) {
                 (Method::Gather(_), Some(options)) => Method::Gather(options),
-                (Method::Ambient, _) => self.unseen().map_or(Method::Ambient, Method::AmbientWith),
-                (Method::Ssgi, _) => self.unseen().map_or(Method::Ssgi, Method::SsgiWith),
+                (Method::Ambient, _) => self.ambient_term().map_or(Method::Ambient, Method::AmbientWith),
+                (Method::Ssgi, _) => self.ambient_term().map_or(Method::Ssgi, Method::SsgiWith),
                 (method, _) => method,
             });
         }
@@ -175,9 +175,9 @@ impl Fitted {
         self.gather.as_deref()?.parse().ok()
     }
 
-    /// The numbers of unseen light, where they were fitted.
-    pub fn unseen(&self) -> Option<Unseen> {
-        self.unseen.as_deref()?.parse().ok()
+    /// The ambient term, where it was fitted.
+    pub fn ambient_term(&self) -> Option<AmbientTerm> {
+        self.ambient_term.as_deref()?.parse().ok()
     }
 
     /// What is wrong with it, if anything.
@@ -194,11 +194,14 @@ impl Fitted {
             }
             text.parse::<gather::Options>().map_err(|e| format!("gather: {e}"))?;
         }
-        if let Some(text) = &self.unseen {
+        if let Some(text) = &self.ambient_term {
             if !matches!(self.method, MethodName::Ambient | MethodName::Ssgi) {
-                return Err(format!("`unseen` belongs to methods ambient and ssgi, not to `{}`", self.method.name()));
+                return Err(format!(
+                    "`ambient_term` belongs to methods ambient and ssgi, not to `{}`",
+                    self.method.name()
+                ));
             }
-            text.parse::<Unseen>().map_err(|e| format!("unseen: {e}"))?;
+            text.parse::<AmbientTerm>().map_err(|e| format!("ambient_term: {e}"))?;
         }
         if self.weights.is_some() != (self.method == MethodName::Neural) {
             return Err("method neural has `weights`, and no other method has".into());
@@ -259,7 +262,7 @@ mod tests {
             scene: "0123456789abcdef".into(),
             method: MethodName::Gather,
             gather: Some("entry_scale=0.125".into()),
-            unseen: None,
+            ambient_term: None,
             frames: 8,
             weights: None,
             target: Target { metric: "light".into(), value: 0.08, budget_ms: Some(5.0) },
@@ -283,7 +286,7 @@ mod tests {
         let plain = Fitted { method: MethodName::Ambient, gather: None, frames: 1, ..fitted() };
         assert_eq!(Fitted::parse(&plain.text(), path).unwrap(), plain);
         assert!(matches!(fitted().method().unwrap(), Method::Gather(o) if o.entry_scale == 0.125));
-        let own = Fitted { unseen: Some("sky=1,bounce=0.5".into()), ..plain };
+        let own = Fitted { ambient_term: Some("sky=1,bounce=0.5".into()), ..plain };
         assert_eq!(Fitted::parse(&own.text(), path).unwrap(), own);
         assert!(matches!(own.method().unwrap(), Method::AmbientWith(u) if (u.sky, u.bounce) == (1.0, 0.5)));
         assert_eq!(Fitted::path("a/flat.glb"), Path::new("a/flat.glb.gi.toml"));
@@ -302,7 +305,7 @@ mod tests {
             ("method = \"gather\"", "method = \"ssgi\"", "belongs to method gather"),
             ("method = \"gather\"", "method = \"neural\"", "gather"),
             ("entry_scale=0.125", "entry_scale=-1", "entry_scale"),
-            ("frames = 8", "frames = 8\nunseen = \"sky=1\"", "unseen"),
+            ("frames = 8", "frames = 8\nunseen = \"sky=1\"", "ambient_term"),
             ("frames = 8", "frames = 0", "frames = 0"),
             ("frames = 8", "frames = 8\nfrom = \"mars\"", "from"),
             ("floor = 0.01", "", "floor"),

@@ -25,7 +25,7 @@ pub struct LightError {
     pub floor: f64,
 }
 
-/// Compares `light` (rgb a pixel, E/π: [`Shot::added`](super::trial::Shot::added), or another
+/// Compares `light` (rgb a pixel, E/π: [`Frame::added`](super::session::Frame::added), or another
 /// tracing's [`Layer::Gi`]) with the reference's [`Layer::Gi`] as docs/results/accuracy.md says: on pixels
 /// with a surface, diffuse reflectance above 0.01 and at least 2 % of the reference's median light,
 /// pooled over blocks of 4×4. `None` where no block is left or the reference has no light there.

@@ -66,7 +66,7 @@ pub fn measure(
             name: row.name,
             kind: row.kind,
             shape: row.shape.to_string(),
-            kernel: kernel.permutation.map_or_else(|| kernel.shader.name(), |p| p.to_string()),
+            kernel: kernel.config.map_or_else(|| kernel.shader.name(), |p| p.to_string()),
             ms,
             flops: row.flops,
             bytes: row.traffic,

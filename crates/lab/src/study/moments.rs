@@ -11,7 +11,7 @@ pub use super::error::DatasetError;
 use bouncelight::accel::luminance;
 use bouncelight::gi::{
     ExposurePass,
-    gather::PAST,
+    gather::HISTORY,
     inputs::{CELL, InputGroup, cells_of},
     memory::{CHANNELS, FeaturesPass, PITCH},
 };
@@ -67,7 +67,7 @@ pub fn ages(moments: &[When]) -> Option<Vec<u32>> {
 }
 
 /// Planes that a moment takes: features, memory, light, changes.
-pub const PLANES: u64 = CHANNELS as u64 + PAST / 4 + 13;
+pub const PLANES: u64 = CHANNELS as u64 + HISTORY / 4 + 13;
 
 /// The memory of all cells at one moment; planes of rows.
 #[derive(Debug, Clone)]
@@ -78,7 +78,7 @@ pub struct Moment {
     pub age: u32,
     /// What the network is given: [`CHANNELS`] planes.
     pub features: Vec<f32>,
-    /// What cells remember: 20 planes, as `Past` lies in memory, the normal and the halves of its
+    /// Histories of cells: 20 planes, as `History` lies in memory, the normal and the halves of its
     /// fourth vector as bits.
     pub past: Vec<f32>,
     /// The light that `gather` shows of each cell: three vectors, 12 planes.
@@ -122,7 +122,7 @@ pub fn lesson(
 ) -> Result<Option<Lesson>, DatasetError> {
     let size = renderer.size();
     let mut read = Vec::new();
-    renderer.cut();
+    renderer.reset_history();
     let (mut drawn, mut first) = (0, true);
     let ages = ages(moments).unwrap_or_default();
     for (&when, age) in moments.iter().zip(ages) {
@@ -165,7 +165,7 @@ pub fn lesson(
         let view = View::new(camera, size, [0.0; 2]);
         read.push(reader.read(gpu, renderer, &view, raster.environment.radiance, (when, age))?);
     }
-    teacher.cut();
+    teacher.reset_history();
     for frame in 0..frames {
         if !go_on() {
             return Ok(None);
@@ -278,19 +278,19 @@ impl Reader {
         let mut encoder = device.create_command_encoder(&Default::default());
         let mut recorder = Recorder::new(&mut encoder);
         self.exposure.record(&mut recorder, &bound);
-        self.features.record(&mut recorder, &bound, (memory.pasts, &self.exposure), Bound::from(&target));
+        self.features.record(&mut recorder, &bound, (memory.histories, &self.exposure), Bound::from(&target));
         queue.submit([encoder.finish()]);
         let planes = |buffer: &wgpu::Buffer, pitch: usize, channels: usize| -> Result<Vec<f32>, DatasetError> {
             let raw = readback::buffer(device, queue, buffer, 0, count * 4 * pitch as u64)?;
             let rows: Vec<f32> = bytemuck::pod_collect_to_vec(&raw);
             Ok((0..channels).flat_map(|c| rows.iter().skip(c).step_by(pitch).copied()).collect())
         };
-        let past = PAST as usize / 4;
+        let past = HISTORY as usize / 4;
         Ok(Moment {
             when,
             age,
             features: planes(&target, PITCH as usize, CHANNELS as usize)?,
-            past: planes(memory.pasts, past, past)?,
+            past: planes(memory.histories, past, past)?,
             shown: planes(memory.light, 12, 12)?,
             changed: planes(memory.changes, 4, 4)?.split_off(3 * count as usize),
         })

@@ -1,7 +1,7 @@
 //! What methods are judged by: a path-traced picture with its layers and its stated noise, kept in
 //! a folder once it is traced.
 
-use super::{error::TrialError, hash};
+use super::{error::SessionError, hash};
 use crate::reference::{Kernel, Layer, Noise, ReferenceScene, Subject, Tracer, TracerOptions};
 use bouncelight::gpu::{Gpu, shaders};
 use bouncelight::scene::Camera;
@@ -69,7 +69,7 @@ pub fn until(layer: Layer, error: f64, most: u32, seed: u32) -> TracerOptions {
 /// Traces the picture. `go_on` hears the share that is done and asked whether to go on.
 ///
 /// # Errors
-/// What the tracer reports; [`TrialError::Stopped`].
+/// What the tracer reports; [`SessionError::Stopped`].
 pub(super) fn trace(
     gpu: &Gpu,
     kernel: &Kernel,
@@ -77,7 +77,7 @@ pub(super) fn trace(
     (camera, size): (&Camera, [u32; 2]),
     options: &TracerOptions,
     go_on: &dyn Fn(f64) -> bool,
-) -> Result<Reference, TrialError> {
+) -> Result<Reference, SessionError> {
     let subject = Subject { camera, size, points: None };
     let mut options = TracerOptions { layers: LAYERS.to_vec(), ..options.clone() };
     if gpu.is_software() {
@@ -87,7 +87,7 @@ pub(super) fn trace(
     let mut tracer = Tracer::new(&gpu.device, &gpu.queue, kernel, scene, subject, options)?;
     while tracer.step()? {
         if !go_on(tracer.progress()) {
-            return Err(TrialError::Stopped);
+            return Err(SessionError::Stopped);
         }
     }
     let traced = tracer.finish()?;
@@ -132,7 +132,7 @@ struct Facts {
 }
 
 /// Keeps a picture.
-pub(super) fn keep(path: &Path, reference: &Reference, device: &str) -> Result<(), TrialError> {
+pub(super) fn keep(path: &Path, reference: &Reference, device: &str) -> Result<(), SessionError> {
     let number = |v: f64| v.is_finite().then_some(v);
     let facts = Facts {
         schema: 1,
@@ -142,14 +142,14 @@ pub(super) fn keep(path: &Path, reference: &Reference, device: &str) -> Result<(
         seconds: reference.seconds,
         device: device.into(),
     };
-    let broken = |e: &dyn std::fmt::Display| TrialError::Kept { path: path.into(), reason: e.to_string() };
+    let broken = |e: &dyn std::fmt::Display| SessionError::Kept { path: path.into(), reason: e.to_string() };
     let words = HashMap::from([("facts".to_owned(), serde_json::to_string(&facts).map_err(|e| broken(&e))?)]);
     let [width, height] = reference.size.map(|n| n as usize);
     let views = reference.layers.iter().map(|(layer, data)| {
         let shape = vec![height, width, layer.channels().len()];
         Ok((layer.name(), TensorView::new(Dtype::F32, shape, bytemuck::cast_slice(data)).map_err(|e| broken(&e))?))
     });
-    let views = views.collect::<Result<Vec<_>, TrialError>>()?;
+    let views = views.collect::<Result<Vec<_>, SessionError>>()?;
     let bytes = safetensors::serialize(views, Some(words)).map_err(|e| broken(&e))?;
     Ok(image_io::write_whole(path, &bytes)?)
 }

@@ -147,7 +147,7 @@ impl Room {
             }
         };
         let color = self.tint(0.4);
-        self.scene.lights.push(Light { name: "light".into(), color, kind, stands_in: false });
+        self.scene.lights.push(Light { name: "light".into(), color, kind, is_emissive_proxy: false });
         let sky = if self.chance(0.1) { 0.0 } else { self.between(0.01, 0.15) };
         self.scene.environment = Environment::constant(self.tint(0.5).map(|c| c * sky));
     }

@@ -101,7 +101,7 @@ pub fn spot(position: [f32; 3], direction: [f32; 3], intensity: f32, inner_angle
 }
 
 fn light(name: &str, kind: LightKind) -> Light {
-    Light { name: name.into(), color: [1.0; 3], kind, stands_in: false }
+    Light { name: name.into(), color: [1.0; 3], kind, is_emissive_proxy: false }
 }
 
 /// A camera at `eye` that looks at `target`.

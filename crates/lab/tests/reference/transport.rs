@@ -218,7 +218,7 @@ fn coverage_lets_its_share_of_light_through() {
 fn stand_ins_light_the_rasteriser_only() {
     let Some(gpu) = common::gpu() else { return };
     let mut s = scene(vec![floor(4.0, 0.0)], vec![sun([0.0, -1.0, 0.0], 2.0, 0.0), sun([0.0, -1.0, 0.0], 1.0, 0.0)]);
-    s.lights[1].stands_in = true;
+    s.lights[1].is_emissive_proxy = true;
     let camera = look_at([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 0.5);
     let base = Job { sample_count: 64, flags: job::LAMBERT, ..Job::new(&camera, [8, 8]) };
     let tracer = Tracer::new(&gpu, &s);

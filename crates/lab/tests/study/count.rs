@@ -23,7 +23,7 @@ fn of<'a>(costs: &'a [Cost], pass: &str) -> &'a Cost {
 fn a_picture_of_four_times_as_many_pixels_takes_four_times_as_much() {
     let Some(gpu) = common::gpu() else { return };
     let [small, large] = [[64, 32], [128, 64]].map(|size| counted(&gpu, Method::Ambient, size, 1));
-    for pass in ["gi.ambient", "gi.lit"] {
+    for pass in ["gi.ambient", "gi.color_pyramid"] {
         let ratio = |f: fn(&Cost) -> f64| f(of(&large, pass)) / f(of(&small, pass));
         let [flops, bytes] = [ratio(|c| c.flops), ratio(|c| c.bytes)];
         assert!((flops - 4.0).abs() < 0.5 && (bytes - 4.0).abs() < 0.5, "{pass}: {flops}, {bytes}");
@@ -48,7 +48,7 @@ fn passes_that_find_no_light_are_counted_and_those_that_cannot_draw_are_not() {
     let method = Method::Gather(gather::Options { slots: 1 << 20, ..Default::default() });
     let options = RendererOptions { method, ..Default::default() };
     let refused = frame(&gpu, still, options, 1).expect_err("too many");
-    assert!(matches!(refused, CountError::Instead(_)), "{refused}");
+    assert!(matches!(refused, CountError::Fallback(_)), "{refused}");
 }
 
 #[test]
@@ -58,16 +58,16 @@ fn rays_are_those_that_a_frame_at_rest_sends() {
     // A look a cell and one for each 2×2: the nearest hit, a line to a light, a line to where an
     // entry's rays begin.
     let looks = 32.0 * 16.0 * 1.25;
-    let rays = of(&costs, "gi.rays").rays;
+    let rays = of(&costs, "gi.trace").rays;
     assert!(rays > looks && rays <= 3.0 * looks, "{rays} rays for {looks} looks");
     for cost in costs.iter().filter(|c| c.pass.starts_with("gi.")) {
         assert!(cost.flops > 0.0, "{cost:?}");
     }
     // A young cell sends a ray more than one at rest.
     let young = counted(&gpu, Method::Gather(gather::Options::default()), [128, 64], 16);
-    let more = of(&young, "gi.rays").rays / rays;
+    let more = of(&young, "gi.trace").rays / rays;
     assert!((1.5..2.2).contains(&more), "{more}");
     // A first frame sends eight rays a cell, and more for entries.
     let first = counted(&gpu, Method::Gather(gather::Options::default()), [128, 64], 1);
-    assert!(of(&first, "gi.rays").rays > 2.5 * rays, "{first:?}");
+    assert!(of(&first, "gi.trace").rays > 2.5 * rays, "{first:?}");
 }

@@ -4,7 +4,7 @@ use crate::{build, common};
 use bouncelight::gi::name::MethodName;
 use bouncelight::scene::Scene;
 use bouncelight_lab::study::fit::{Candidate, Fit, FitOptions, Verdict, fit};
-use bouncelight_lab::study::trial::{Trial, TrialOptions};
+use bouncelight_lab::study::session::{Session, SessionOptions};
 
 const SIZE: [u32; 2] = [64, 32];
 
@@ -26,15 +26,15 @@ fn open() -> Scene {
 }
 
 fn options(target: &str, budget_ms: Option<f64>) -> FitOptions {
-    let yardstick = target.parse().expect("the test's target is one");
-    FitOptions { yardstick, budget_ms, frames: 16, networks: Vec::new(), most_samples: 128, timed: false }
+    let quality_target = target.parse().expect("the test's target is one");
+    FitOptions { quality_target, budget_ms, frames: 16, networks: Vec::new(), max_samples: 128, timed: false }
 }
 
 fn fitted(gpu: &bouncelight::gpu::Gpu, scene: Scene, options: &FitOptions) -> Fit {
     let camera = scene.cameras[0].clone();
-    let mut trial = Trial::new(gpu, scene, SIZE, TrialOptions::default()).expect("it fits");
+    let mut session = Session::new(gpu, scene, SIZE, SessionOptions::default()).expect("it fits");
     let mut told = Vec::new();
-    let found = fit(&mut trial, &[camera], options, &mut |what, done, all| {
+    let found = fit(&mut session, &[camera], options, &mut |what, done, all| {
         assert!(done < all, "{what}: step {done} of {all}");
         told.push(what.to_owned());
     });
@@ -70,7 +70,7 @@ fn a_room_in_the_sun_needs_more_and_a_budget_says_how_much_it_gets() {
     let row = found.choice();
     // Negative control of the test above: the same search does not always end there.
     assert!(
-        found.reached && matches!(row.candidate, Candidate::Ssgi(_)) && asked.yardstick.is_met(row.worst),
+        found.reached && matches!(row.candidate, Candidate::Ssgi(_)) && asked.quality_target.is_met(row.worst),
         "{row:?}"
     );
     let worst = |at: usize| {

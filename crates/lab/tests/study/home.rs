@@ -115,8 +115,9 @@ fn homes_are_of_every_kind() {
             closed += u32::from(!street && !has(&home, "window frame"));
         }
         points += u32::from(home.lights.iter().any(|l| matches!(l.kind, LightKind::Point { .. })));
-        spots += u32::from(home.lights.iter().any(|l| matches!(l.kind, LightKind::Spot { .. }) && !l.stands_in));
-        panels += u32::from(home.lights.iter().any(|l| l.stands_in));
+        spots +=
+            u32::from(home.lights.iter().any(|l| matches!(l.kind, LightKind::Spot { .. }) && !l.is_emissive_proxy));
+        panels += u32::from(home.lights.iter().any(|l| l.is_emissive_proxy));
         glowing += u32::from(has(&home, "glowing shade"));
         let materials = home.instances.iter().map(|i| &home.materials[home.meshes[i.mesh].material]);
         shiny += materials.filter(|m| m.metallic > 0.5 || m.roughness < 0.25).count();

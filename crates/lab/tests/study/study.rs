@@ -6,7 +6,7 @@ use bouncelight::render::capture::Layer;
 use bouncelight::scene::{Environment, LightKind};
 use bouncelight_lab::study::judge::{compare, light_error};
 use bouncelight_lab::study::projection::{EFFICIENCY, GTX_1050, total_ms};
-use bouncelight_lab::study::trial::{Edits, FrameChange, Settling, Trial, TrialError, TrialOptions};
+use bouncelight_lab::study::session::{Edits, FrameChange, Session, SessionError, SessionOptions, Settling};
 use bouncelight_lab::study::truth;
 
 const SIZE: [u32; 2] = [64, 32];
@@ -21,26 +21,26 @@ fn pictures_are_judged_by_a_kept_reference() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = bouncelight_lab::scenes::load("paper-room:7").expect("made by code");
     let camera = scene.cameras[0].clone();
-    let options = TrialOptions { kept: Some(folder.path().join("kept")), ..TrialOptions::default() };
-    let mut trial = Trial::new(&gpu, scene, SIZE, options).expect("it fits");
-    let truth = trial.reference(&camera, &truth::samples(64, 1)).expect("traced");
+    let options = SessionOptions { kept: Some(folder.path().join("kept")), ..SessionOptions::default() };
+    let mut session = Session::new(&gpu, scene, SIZE, options).expect("it fits");
+    let truth = session.reference(&camera, &truth::samples(64, 1)).expect("traced");
     assert!(!truth.kept && truth.samples == [64, 64] && truth.light_noise() > 0.0);
-    let again = trial.reference(&camera, &truth::samples(64, 1)).expect("read");
+    let again = session.reference(&camera, &truth::samples(64, 1)).expect("read");
     assert!(again.kept && again.layers == truth.layers && again.samples == truth.samples);
     // Numbers go through JSON, whose reader may miss the last bit.
     assert!((again.light_noise() / truth.light_noise() - 1.0).abs() < 1e-12);
     // Other paths are another picture, whose error is about the noise that both state.
-    let other = trial.reference(&camera, &truth::samples(64, 2)).expect("traced");
+    let other = session.reference(&camera, &truth::samples(64, 2)).expect("traced");
     assert!(!other.kept && other.layers != truth.layers);
     let apart = light_error(other.layer(bouncelight_lab::reference::Layer::Gi), &truth).expect("there is light");
     let ratio = apart.error / (apart.floor * 2f64.sqrt());
     assert!((0.4..2.5).contains(&ratio), "{apart:?}");
     let mut of = |method: Method| {
-        let shot = trial.picture(&method, &camera, Settling::SETTLED).expect("drawn");
-        assert_eq!((shot.drawn_by, shot.instead.as_ref()), (method.name(), None));
+        let shot = session.picture(&method, &camera, Settling::SETTLED).expect("drawn");
+        assert_eq!((shot.drawn_by, shot.fallback.as_ref()), (method.name(), None));
         let light = light_error(&shot.added(), &truth).expect("there is light").error;
         let seen = compare(&shot.rgb(), &truth, false).expect("sizes agree");
-        let costs = trial.count(&method, &camera).expect("counted");
+        let costs = session.count(&method, &camera).expect("counted");
         let projected = total_ms(&costs, &GTX_1050, EFFICIENCY);
         (light, seen.display.psnr, projected, shot.settled)
     };
@@ -69,8 +69,8 @@ fn sequences_keep_their_history_and_leave_the_scene_as_it_was() {
         environment: Some(Environment::constant([0.0; 3])),
         placements: vec![(0, scene.instances[1].transform)],
     };
-    let mut trial = Trial::new(&gpu, scene, SIZE, TrialOptions::default()).expect("it fits");
-    let hash = trial.hash().to_owned();
+    let mut session = Session::new(&gpu, scene, SIZE, SessionOptions::default()).expect("it fits");
+    let hash = session.hash().to_owned();
     let method = Method::Gather(Default::default());
     let mut change = |frame: u32| FrameChange {
         edits: if frame == 2 { off.clone() } else { Edits::default() },
@@ -78,21 +78,21 @@ fn sequences_keep_their_history_and_leave_the_scene_as_it_was() {
         cut: frame == 3,
         ..FrameChange::still(&camera)
     };
-    let shots = trial.sequence(&method, &mut change, 4).expect("drawn");
+    let shots = session.sequence(&method, &mut change, 4).expect("drawn");
     assert_eq!(shots.iter().map(|s| s.number).collect::<Vec<_>>(), [0, 2, 3]);
     // History goes on through frame 1, which nobody read, and ends at the cut.
     assert_eq!(shots.iter().map(|s| s.settled).collect::<Vec<_>>(), [Some(1), Some(3), Some(1)]);
     let direct = |i: usize| mean(&shots[i].layer(Layer::DiffDir).data);
     assert!(direct(0) > 0.01 && direct(1) == 0.0, "{} {}", direct(0), direct(1));
-    assert_eq!(trial.hash(), hash);
-    let after = trial.picture(&method, &camera, Settling::COLD).expect("drawn");
+    assert_eq!(session.hash(), hash);
+    let after = session.picture(&method, &camera, Settling::COLD).expect("drawn");
     assert_eq!(after.frame.beauty.data, shots[0].frame.beauty.data);
     // Edits of what is not there change nothing.
     let wrong = Edits { placements: vec![(9999, off.placements[0].1)], ..Edits::default() };
-    assert!(matches!(trial.edit(&wrong), Err(TrialError::Instance { index: 9999, .. })));
-    trial.edit(&off).expect("it is there");
-    assert_ne!(trial.hash(), hash);
-    let traced = trial.reference(&camera, &truth::samples(4, 0)).expect("traced");
+    assert!(matches!(session.edit(&wrong), Err(SessionError::Instance { index: 9999, .. })));
+    session.edit(&off).expect("it is there");
+    assert_ne!(session.hash(), hash);
+    let traced = session.reference(&camera, &truth::samples(4, 0)).expect("traced");
     assert!(traced.rgb().iter().all(|v| *v == 0.0), "no light at all");
 }
 
@@ -100,12 +100,12 @@ fn sequences_keep_their_history_and_leave_the_scene_as_it_was() {
 fn lamps_that_stand_in_for_surfaces_are_counted_once() {
     let Some(gpu) = common::gpu() else { return };
     let scene = bouncelight_lab::scenes::load("cornell").expect("bundled");
-    assert!(scene.lights.iter().any(|l| l.stands_in));
+    assert!(scene.lights.iter().any(|l| l.is_emissive_proxy));
     let camera = scene.cameras[0].clone();
-    let mut trial = Trial::new(&gpu, scene, [64, 64], TrialOptions::default()).expect("it fits");
-    let truth = trial.reference(&camera, &truth::samples(64, 1)).expect("traced");
-    let direct = trial.picture(&Method::Direct, &camera, Settling::COLD).expect("drawn");
-    let shot = trial.picture(&Method::Gather(Default::default()), &camera, Settling::SETTLED).expect("drawn");
+    let mut session = Session::new(&gpu, scene, [64, 64], SessionOptions::default()).expect("it fits");
+    let truth = session.reference(&camera, &truth::samples(64, 1)).expect("traced");
+    let direct = session.picture(&Method::Direct, &camera, Settling::COLD).expect("drawn");
+    let shot = session.picture(&Method::Gather(Default::default()), &camera, Settling::SETTLED).expect("drawn");
     let error = |light: &[f32]| light_error(light, &truth).expect("there is light").error;
     let (added, naive) = (error(&shot.added()), error(&shot.layer(Layer::DiffInd).data));
     println!("direct {}, DiffInd alone {naive}, added {added}", error(&direct.added()));
@@ -118,10 +118,10 @@ fn whoever_watches_can_stop() {
     let Some(gpu) = common::gpu() else { return };
     let scene = bouncelight_lab::scenes::load("cornell").expect("bundled");
     let camera = scene.cameras[0].clone();
-    let mut trial = Trial::new(&gpu, scene, SIZE, TrialOptions::default()).expect("it fits").watched(|_| false);
+    let mut session = Session::new(&gpu, scene, SIZE, SessionOptions::default()).expect("it fits").watched(|_| false);
     let method = Method::Gather(Default::default());
-    let stopped = |e| matches!(e, Err(TrialError::Stopped));
-    assert!(stopped(trial.picture(&method, &camera, Settling::SETTLED).map(|_| ())));
-    assert!(stopped(trial.trace(&camera, &truth::samples(4, 0)).map(|_| ())));
-    assert!(stopped(trial.sequence(&Method::Direct, &mut |_| FrameChange::still(&camera), 2).map(|_| ())));
+    let stopped = |e| matches!(e, Err(SessionError::Stopped));
+    assert!(stopped(session.picture(&method, &camera, Settling::SETTLED).map(|_| ())));
+    assert!(stopped(session.trace(&camera, &truth::samples(4, 0)).map(|_| ())));
+    assert!(stopped(session.sequence(&Method::Direct, &mut |_| FrameChange::still(&camera), 2).map(|_| ())));
 }

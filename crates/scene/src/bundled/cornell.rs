@@ -66,7 +66,7 @@ pub(super) fn scene() -> Scene {
             inner_angle: 0.0,
             outer_angle: FRAC_PI_2,
         },
-        stands_in: true,
+        is_emissive_proxy: true,
     });
     let camera = Camera::look_at([0.0, h, h + 2.9], [0.0, h, 0.0], 2.0 * (h * 1.04 / 2.9f32).atan());
     scene.cameras.push(Camera { name: "front".to_owned(), near: 2.9e-3, ..camera });

@@ -66,7 +66,7 @@ pub(super) fn scene() -> Scene {
             irradiance: 30.0,
             angle: SUN_ANGLE,
         },
-        stands_in: false,
+        is_emissive_proxy: false,
     });
     let camera = Camera::look_at([1.0, 1.50, 2.15], [-0.16, 0.88, -1.2], 52f32.to_radians());
     scene.cameras.push(Camera { name: "room".to_owned(), near: 0.05, ..camera });
@@ -369,6 +369,6 @@ fn lamp(b: &mut Builder, palette: &Palette) {
             radius: 0.045,
             range: None,
         },
-        stands_in: false,
+        is_emissive_proxy: false,
     });
 }

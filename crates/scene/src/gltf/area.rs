@@ -112,7 +112,7 @@ impl Loader<'_> {
                 inner_angle: 0.0,
                 outer_angle: FRAC_PI_2,
             },
-            stands_in: true,
+            is_emissive_proxy: true,
         });
     }
 }

@@ -31,7 +31,7 @@ pub(super) fn origin<'a>(roots: &[gltf::Node<'a>], nodes: usize) -> DVec3 {
     }
     let (middle, reach) = (0.5 * (low + high), 0.5 * (high - low).max_element());
     let away = middle.abs().max_element();
-    if away > FAR && away > reach && away < f64::from(crate::sound::MAX_DISTANCE) {
+    if away > FAR && away > reach && away < f64::from(crate::validate::MAX_DISTANCE) {
         middle.round()
     } else {
         DVec3::ZERO

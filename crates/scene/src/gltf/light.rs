@@ -12,7 +12,8 @@ use bouncelight::scene::{LUMENS_PER_WATT, Light, LightKind, SUN_ANGLE};
 struct Extent {
     radius: Option<f32>,
     angle: Option<f32>,
-    stands_in: bool,
+    #[serde(alias = "stands_in")]
+    is_emissive_proxy: bool,
 }
 
 #[derive(serde::Deserialize)]
@@ -50,6 +51,11 @@ impl Loader<'_> {
                 LightKind::Spot { position, direction, intensity: strength, radius, range, inner_angle, outer_angle }
             }
         };
-        self.scene.lights.push(Light { name: node.to_owned(), color, kind, stands_in: extent.stands_in });
+        self.scene.lights.push(Light {
+            name: node.to_owned(),
+            color,
+            kind,
+            is_emissive_proxy: extent.is_emissive_proxy,
+        });
     }
 }

@@ -1,7 +1,7 @@
 //! JSON as files have it that a strict reader refuses: whole numbers written as `4.0`, places that are
 //! null, animations that move nothing.
 
-use super::mend::Warning;
+use super::repair::Warning;
 use serde_json::{Number, Value};
 
 /// The text that was mended, and what of it.
@@ -18,17 +18,17 @@ pub(super) fn read(json: &[u8]) -> Result<(gltf::json::Root, Loosened), serde_js
         Err(refused) => refused,
     };
     let Ok(mut root) = serde_json::from_slice::<Value>(json) else { return Err(refused) };
-    let mut mended = Mended::default();
-    mended.value(&mut root);
+    let mut repaired = Mended::default();
+    repaired.value(&mut root);
     let mut warnings = channels_without_target(&mut root);
-    if mended.numbers > 0 {
-        warnings.push(("JSON".into(), format!("{} whole numbers are written as fractions", mended.numbers)));
+    if repaired.numbers > 0 {
+        warnings.push(("JSON".into(), format!("{} whole numbers are written as fractions", repaired.numbers)));
     }
-    if mended.large > 0 {
-        warnings.push(("JSON".into(), format!("{} numbers are larger than 32 bits hold", mended.large)));
+    if repaired.large > 0 {
+        warnings.push(("JSON".into(), format!("{} numbers are larger than 32 bits hold", repaired.large)));
     }
-    if mended.nulls > 0 {
-        warnings.push(("JSON".into(), format!("{} places are null and were left out", mended.nulls)));
+    if repaired.nulls > 0 {
+        warnings.push(("JSON".into(), format!("{} places are null and were left out", repaired.nulls)));
     }
     let read = |root: &Value| {
         let text = serde_json::to_vec(root).ok()?;

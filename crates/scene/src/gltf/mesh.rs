@@ -143,7 +143,7 @@ impl<'a> Loader<'a> {
     /// Numbers that are none: a triangle without a place is left out, every other attribute gets
     /// what a mesh without it has.
     fn mend_numbers(&mut self, place: &str, uv: &[String; 2], mesh: &mut Mesh) -> Result<(), SceneError> {
-        fn mend<const N: usize>(values: &mut [[f32; N]], by: [f32; N]) -> Vec<usize> {
+        fn repair<const N: usize>(values: &mut [[f32; N]], by: [f32; N]) -> Vec<usize> {
             let bad = |v: &[f32; N]| v.iter().any(|c| !c.is_finite());
             let mut found = Vec::new();
             for (i, v) in values.iter_mut().enumerate().filter(|(_, v)| bad(v)) {
@@ -152,14 +152,14 @@ impl<'a> Loader<'a> {
             }
             found
         }
-        let lost = mend(&mut mesh.positions, [0.0; 3]);
+        let lost = repair(&mut mesh.positions, [0.0; 3]);
         let found = [
             ("POSITION", lost.clone(), "their triangles are left out"),
-            ("NORMAL", mend(&mut mesh.normals, [0.0; 3]), "their triangles' are used"),
-            ("TANGENT", mend(&mut mesh.tangents, [0.0; 4]), "they are made anew where a map needs them"),
-            (&*uv[0], mend(&mut mesh.uv0, [0.0; 2]), "(0, 0) is used"),
-            (&*uv[1], mend(&mut mesh.uv1, [0.0; 2]), "(0, 0) is used"),
-            ("COLOR_0", mend(&mut mesh.colors, [1.0; 4]), "they are white"),
+            ("NORMAL", repair(&mut mesh.normals, [0.0; 3]), "their triangles' are used"),
+            ("TANGENT", repair(&mut mesh.tangents, [0.0; 4]), "they are made anew where a map needs them"),
+            (&*uv[0], repair(&mut mesh.uv0, [0.0; 2]), "(0, 0) is used"),
+            (&*uv[1], repair(&mut mesh.uv1, [0.0; 2]), "(0, 0) is used"),
+            ("COLOR_0", repair(&mut mesh.colors, [1.0; 4]), "they are white"),
         ];
         for (name, at, remedy) in found.iter().filter(|f| !f.1.is_empty()) {
             if self.strict {

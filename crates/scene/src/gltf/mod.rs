@@ -17,11 +17,11 @@ mod layers;
 mod light;
 mod loosen;
 mod material;
-mod mend;
 mod mesh;
 mod meshopt;
 mod motion;
 mod pointer;
+mod repair;
 mod source;
 mod specular;
 mod texture;
@@ -35,7 +35,7 @@ use glam::{DMat4, DVec3, Mat4};
 use gltf::json::validation::{Error as Invalid, Validate};
 
 use super::files::{self, LoadOptions};
-use super::{SceneError, defaults, dome, error, sound};
+use super::{SceneError, defaults, dome, error, validate};
 use bouncelight::scene::{Environment, Instance, Scene};
 use source::Source;
 
@@ -68,17 +68,17 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError>
     let (mut root, loosened) = read.map_err(|e| SceneError::broken(path, "JSON", e.to_string()))?;
     let json = loosened.as_ref().map_or(json, |l| &l.0);
     extensions::check_required(path, &root)?;
-    let mut mended = mend::mend(&mut root);
+    let mut repaired = repair::repair(&mut root);
     if !options.strict {
-        mended.extend(words::mend(&mut root));
+        repaired.extend(words::repair(&mut root));
     }
-    mended.extend(loosened.iter().flat_map(|l| l.1.iter().cloned()));
+    repaired.extend(loosened.iter().flat_map(|l| l.1.iter().cloned()));
     units::apply(&mut root, options.units);
     validate(path, &root)?;
     let document = gltf::Document::from_json_without_validation(root);
     let source = Source::open(path, &document, blob, options)?;
     let mut loader = Loader::new(path, &source, &document, options.strict);
-    mended.iter().chain(pointed.iter().flat_map(|p| &p.1)).for_each(|(place, what)| loader.warn(place, what));
+    repaired.iter().chain(pointed.iter().flat_map(|p| &p.1)).for_each(|(place, what)| loader.warn(place, what));
     for extension in document.extensions_used().filter(|e| !extensions::is_known(e)) {
         loader.warn("extensionsUsed", &format!("{extension} is not supported; the file is shown without it"));
     }
@@ -86,7 +86,7 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<Scene, SceneError>
     loader.variants(json);
     loader.settle_deforms();
     let mut scene = loader.scene;
-    sound::settle(&mut scene, path)?;
+    validate::validate(&mut scene, path)?;
     let sky = dome::take(&mut scene);
     defaults::complete(&mut scene);
     // It stands in for what was added, and leaves a sun that was.

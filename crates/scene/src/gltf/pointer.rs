@@ -1,6 +1,6 @@
 //! KHR_animation_pointer: channels that name what they move by its place in the file's JSON.
 
-use super::mend::Warning;
+use super::repair::Warning;
 use serde_json::{Value, json};
 
 /// The extension's name.

@@ -1,7 +1,7 @@
 //! Words that this reader does not know, in places that no picture needs: attributes of extensions,
 //! enumerations, component types of accessors that nobody reads.
 
-use super::mend::Warning;
+use super::repair::Warning;
 use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf::json::camera::{Perspective, Type as Lens};
 use gltf::json::extensions::scene::khr_lights_punctual::{Spot, Type as Lamp};
@@ -13,7 +13,7 @@ use gltf::json::{Index, Root};
 use std::collections::BTreeSet;
 
 /// Sets right what is unknown and not needed; tells what was.
-pub(super) fn mend(root: &mut Root) -> Vec<Warning> {
+pub(super) fn repair(root: &mut Root) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let mut tell = |place: String, what: &str| warnings.push((place, what.to_owned()));
     attributes(root, &mut tell);

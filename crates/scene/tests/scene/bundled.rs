@@ -103,7 +103,7 @@ fn differences(a: &Scene, b: &Scene) -> Vec<String> {
     let numbers = |s: &Scene| -> Vec<f32> {
         let lights = s.lights.iter().flat_map(|l| {
             let mut v = l.color.to_vec();
-            v.push(f32::from(u8::from(l.stands_in)));
+            v.push(f32::from(u8::from(l.is_emissive_proxy)));
             match l.kind {
                 LightKind::Directional { direction, irradiance, angle } => {
                     v.extend(direction);
@@ -159,7 +159,7 @@ fn scenes_survive_being_written_and_read() {
             ("base colour", |s| s.materials[s.meshes[0].material].base_color[0] *= 0.99),
             ("instance", |s| s.instances[0].transform[3][0] += 1e-4),
             ("lights and cameras", |s| s.cameras[0].yfov += 1e-3),
-            ("lights and cameras", |s| s.lights[0].stands_in ^= true),
+            ("lights and cameras", |s| s.lights[0].is_emissive_proxy ^= true),
             ("environment", |s| s.environment.radiance[0] += 1e-2),
         ];
         for (what, change) in changes {

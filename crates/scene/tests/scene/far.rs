@@ -3,7 +3,7 @@
 use bouncelight::scene::{LightKind, Scene};
 use serde_json::json;
 
-use crate::mended::{load, square, warned};
+use crate::repaired::{load, square, warned};
 use crate::shared::world_points;
 
 #[test]

@@ -20,13 +20,13 @@ mod gltf_features;
 mod images;
 mod layers;
 mod limits;
-mod mended;
 mod meshopt;
 mod nothing;
 mod obj;
 #[path = "../../../../tests/common/packed.rs"]
 mod packed;
 mod real_files;
+mod repaired;
 #[path = "../../../../tests/common/shared.rs"]
 mod shared;
 mod skies;

@@ -72,7 +72,7 @@ fn a_faint_glow_is_no_light() {
         let scene = glowing(radiance);
         assert_eq!(sun(&scene), !own, "{radiance}");
         assert_eq!(scene.default_light, !own);
-        assert_eq!(scene.lights.iter().any(|l| l.stands_in), own, "{radiance}: {:?}", scene.lights);
+        assert_eq!(scene.lights.iter().any(|l| l.is_emissive_proxy), own, "{radiance}: {:?}", scene.lights);
         assert_eq!((told(&scene, "faint glow"), told(&scene, "stand in")), (!own, own), "{:?}", scene.warnings);
     }
     // The same in another unit of length.
@@ -103,6 +103,6 @@ fn given_surroundings_replace_default_sky_and_sun() {
     // somebody gave.
     let mut faint = glowing(0.5);
     bouncelight_scene::defaults::surround(&mut faint, Environment::constant([0.1; 3]));
-    assert!(faint.lights.len() == 1 && faint.lights[0].stands_in, "{:?}", faint.lights);
+    assert!(faint.lights.len() == 1 && faint.lights[0].is_emissive_proxy, "{:?}", faint.lights);
     assert!(!faint.warnings.iter().any(|w| w.contains("sun")), "{:?}", faint.warnings);
 }

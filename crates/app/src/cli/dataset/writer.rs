@@ -99,7 +99,7 @@ impl Writer {
         interrupt::check()?;
         let (device, queue, size) = (&self.gpu.device, &self.gpu.queue, self.renderer.size());
         let view = View::new(camera, size, [0.0; 2]);
-        self.renderer.cut();
+        self.renderer.reset_history();
         let mut encoder = device.create_command_encoder(&Default::default());
         self.renderer.record(&mut Recorder::new(&mut encoder), queue, scene, &view)?;
         queue.submit([encoder.finish()]);

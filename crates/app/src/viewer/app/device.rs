@@ -65,7 +65,7 @@ impl App {
     }
 
     /// The device is gone: everything on it is made anew, from what memory holds.
-    pub(super) fn hear_loss(&mut self, generation: u32, message: String, event_loop: &ActiveEventLoop) {
+    pub(super) fn on_device_lost(&mut self, generation: u32, message: String, event_loop: &ActiveEventLoop) {
         if generation != self.generation {
             return;
         }
@@ -90,7 +90,7 @@ impl App {
             return;
         }
         self.rebuilt += 1;
-        self.state.tell(format!("the GPU was lost ({message}); everything was built anew"), false);
+        self.state.notify(format!("the GPU was lost ({message}); everything was built anew"), false);
         self.start(Request::Upload);
     }
 }

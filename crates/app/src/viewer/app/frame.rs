@@ -173,7 +173,7 @@ impl App {
         let (Some(stage), Some(shown)) = (&mut self.stage, &self.state.shown) else { return false };
         let stale = std::mem::take(&mut self.state.stale);
         if let Err(e) = stage.refresh(&shown.scene, stale) {
-            self.state.tell(e, true);
+            self.state.notify(e, true);
             return false;
         }
         let camera = self.state.navigator.camera(&shown.scene);
@@ -195,7 +195,7 @@ impl App {
         let drawn = match stage.draw(&mut recorder, &self.state, &camera, again) {
             Ok(drawn) => drawn,
             Err(e) => {
-                self.state.tell(e.to_string(), true);
+                self.state.notify(e.to_string(), true);
                 false
             }
         };
@@ -205,7 +205,7 @@ impl App {
             if self.state.settings.flicker {
                 match stage.measure_flicker(&self.state) {
                     Ok(found) => self.meter.flicker = found.or(self.meter.flicker.filter(|_| stage.still() > 1)),
-                    Err(e) => self.state.tell(e.to_string(), true),
+                    Err(e) => self.state.notify(e.to_string(), true),
                 }
             }
             if stage.still() == 1 {
@@ -216,7 +216,7 @@ impl App {
             }
         }
         if let Err(e) = stage.update_feature(&self.state, &camera) {
-            self.state.tell(e, true);
+            self.state.notify(e, true);
         }
         if drawn {
             self.mark_run();
@@ -247,7 +247,7 @@ impl App {
                 self.state.measured = Some(stops);
             }
             Ok(None) => {}
-            Err(e) => self.state.tell(e.to_string(), true),
+            Err(e) => self.state.notify(e.to_string(), true),
         }
     }
 

@@ -141,7 +141,7 @@ impl App {
     pub(super) fn learn(&mut self) {
         let Some(stage) = &self.stage else { return };
         // What another method draws in its place says nothing of this one, nor do smaller frames.
-        let own = stage.instead().is_none() && stage.drawn_size(&self.state) == self.state.size;
+        let own = stage.fallback().is_none() && stage.drawn_size(&self.state) == self.state.size;
         let timed = self.screen.as_ref().is_some_and(|s| s.profiler.is_some());
         let numbers = &self.meter.times.now;
         let track = if timed { &numbers.gpu } else { &numbers.wall };
@@ -177,8 +177,8 @@ impl App {
         let written = write(&file, records::passes_csv(&self.meter.times, &about))
             .and_then(|()| write(&frames, records::frames_csv(&self.meter.times)));
         match written {
-            Ok(()) => self.state.tell(format!("written: {} and {}", file.display(), frames.display()), false),
-            Err(e) => self.state.tell(e, true),
+            Ok(()) => self.state.notify(format!("written: {} and {}", file.display(), frames.display()), false),
+            Err(e) => self.state.notify(e, true),
         }
         self.redraw = true;
     }

@@ -135,7 +135,7 @@ pub fn run(options: Options) -> Result<(), ViewError> {
     let mut state = State::new(settings);
     (state.textures, state.units) = (options.textures, options.load.units);
     if let Some(text) = trouble {
-        state.tell(text, true);
+        state.notify(text, true);
     }
     let now = Instant::now();
     let mut app = App {
@@ -250,22 +250,22 @@ impl ApplicationHandler<Event> for App {
 
     fn user_event(&mut self, event_loop: &ActiveEventLoop, event: Event) {
         match event {
-            Event::Job(done) => self.hear_job(done),
-            Event::Reference(subject, report) => self.hear_reference(subject, report),
+            Event::Job(done) => self.on_job(done),
+            Event::Reference(subject, report) => self.on_reference(subject, report),
             Event::Judged(number, verdict) => {
                 if self.tracing.judging == Some(number) {
                     self.tracing.judging = None;
                     match verdict {
                         Ok(verdict) => self.tracing.verdict = Some(verdict),
-                        Err(e) => self.state.tell(format!("comparing: {e}"), true),
+                        Err(e) => self.state.notify(format!("comparing: {e}"), true),
                     }
                     self.redraw = true;
                 }
             }
-            Event::DeviceLost(generation, message) => self.hear_loss(generation, message, event_loop),
-            Event::Chosen(path) => self.hear_choice(path),
+            Event::DeviceLost(generation, message) => self.on_device_lost(generation, message, event_loop),
+            Event::Chosen(path) => self.on_choice(path),
             Event::GpuError(text) => {
-                self.state.tell(format!("the GPU driver refused a command: {text}"), true);
+                self.state.notify(format!("the GPU driver refused a command: {text}"), true);
                 self.redraw = true;
             }
         }

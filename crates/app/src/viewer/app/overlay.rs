@@ -8,7 +8,7 @@ use crate::viewer::film::Film;
 use crate::viewer::jobs::Kind;
 use crate::viewer::stage::{DrawnBy, Stage};
 use crate::viewer::state::State;
-use crate::viewer::ui::{self, gizmo, hands, marks};
+use crate::viewer::ui::{self, gizmo, input, marks};
 use egui::{ClippedPrimitive, Event, Rect, epaint::ClippedShape};
 use std::time::{Duration, Instant};
 
@@ -134,13 +134,13 @@ impl Overlay {
         match event {
             Event::PointerMoved(_) | Event::MouseMoved(_) => self.memory.drag.is_some(),
             Event::Key { key, pressed: true, .. } => {
-                hands::FLY.contains(key)
+                input::FLY.contains(key)
                     && self.egui.input(|i| i.key_down(*key))
                     && !self.egui.egui_wants_keyboard_input()
             }
             Event::Text(text) => {
                 let flies = |c: char| "wasdqe".contains(c.to_ascii_lowercase());
-                self.egui.input(|i| hands::FLY.iter().any(|k| i.key_down(*k)))
+                self.egui.input(|i| input::FLY.iter().any(|k| i.key_down(*k)))
                     && text.chars().all(flies)
                     && !self.egui.egui_wants_keyboard_input()
             }
@@ -166,7 +166,7 @@ impl App {
             // Hands that only move the camera are heard here.
             let at = heard.iter().rev().find_map(|e| if let Event::PointerMoved(p) = e { Some(*p) } else { None });
             if let Some(at) = at {
-                hands::drag(&mut self.state, &mut self.overlay.memory, at, self.overlay.place);
+                input::drag(&mut self.state, &mut self.overlay.memory, at, self.overlay.place);
             }
             if scripted {
                 self.overlay.defer(&mut self.scripted);
@@ -281,7 +281,7 @@ impl App {
     fn fly(&mut self, now: Instant) {
         self.again |= self.state.roll(now);
         let seconds = self.overlay.flew.map_or(1.0 / 60.0, |t| now.duration_since(t).as_secs_f32().min(0.1));
-        let flies = hands::fly(&self.overlay.egui, &mut self.state, seconds);
+        let flies = input::fly(&self.overlay.egui, &mut self.state, seconds);
         self.overlay.flew = flies.then_some(now);
         self.again |= flies;
     }

@@ -93,7 +93,7 @@ impl App {
         self.tracing.live = Some(Live::start(handles, kept, scene, (camera, stage.gpu.is_software()), subject, send));
     }
 
-    pub(super) fn hear_reference(&mut self, subject: Subjects, report: Report) {
+    pub(super) fn on_reference(&mut self, subject: Subjects, report: Report) {
         if self.tracing.live.as_ref().is_none_or(|l| l.subject != subject) {
             return;
         }
@@ -129,7 +129,7 @@ impl App {
                 }
             }
             Report::Failed(text) => {
-                self.state.tell(format!("reference: {text}"), true);
+                self.state.notify(format!("reference: {text}"), true);
                 self.tracing.live = None;
                 self.tracing.failed = Some(subject);
             }

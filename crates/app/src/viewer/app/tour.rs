@@ -46,7 +46,7 @@ impl App {
         let key = self.key(source);
         let numbers = &self.meter.times.now;
         let (Some(stage), Some(tour)) = (&self.stage, &mut self.tour) else { return };
-        let own = stage.key(0) == Some(key) && stage.instead().is_none();
+        let own = stage.key(0) == Some(key) && stage.fallback().is_none();
         let count = numbers.gpu.spread().or(numbers.wall.spread()).map_or(0, |s| s.count);
         let never = self.failed.contains(&key) || (stage.key(0) == Some(key) && stage.has_no_rays() && !own);
         if never || (own && count >= FRAMES) {

@@ -53,7 +53,7 @@ impl App {
                 self.end_tour();
                 for job in std::mem::take(&mut self.jobs) {
                     job.progress.cancel();
-                    self.state.tell(format!("cancelled: {}", job.name), false);
+                    self.state.notify(format!("cancelled: {}", job.name), false);
                     if job.kind == Kind::Rays
                         && let (Some(stage), Some(shown)) = (&mut self.stage, &self.state.shown)
                     {
@@ -77,9 +77,9 @@ impl App {
                 Ok(found) => {
                     let text = format!("{}: {:.1} seconds; Y plays it", path.display(), found.end());
                     self.state.path = Some(found);
-                    self.state.tell(text, false);
+                    self.state.notify(text, false);
                 }
-                Err(e) => self.state.tell(e.to_string(), true),
+                Err(e) => self.state.notify(e.to_string(), true),
             },
             Request::SavePath => {
                 let Some(path) = &self.state.path else { return };
@@ -88,7 +88,7 @@ impl App {
                     Ok(()) => (format!("written: {}; Y plays it", file.display()), false),
                     Err(e) => (e.to_string(), true),
                 };
-                self.state.tell(told.0, told.1);
+                self.state.notify(told.0, told.1);
             }
             Request::Browse(surroundings) => self.browse(surroundings),
             Request::SaveTimes => self.save_times(),
@@ -119,16 +119,16 @@ impl App {
             let _ = proxy.send_event(Event::Chosen(chosen));
         };
         if let Err(e) = std::thread::Builder::new().name("file dialog".into()).spawn(wait) {
-            self.state.tell(format!("no thread for the file dialog: {e}"), true);
+            self.state.notify(format!("no thread for the file dialog: {e}"), true);
         }
     }
 
     /// What the dialog gave: nothing, too, where there is neither a desktop portal nor zenity.
-    pub(super) fn hear_choice(&mut self, chosen: Option<PathBuf>) {
+    pub(super) fn on_choice(&mut self, chosen: Option<PathBuf>) {
         match chosen {
             Some(path) => self.state.apply(Action::Open(path.display().to_string())),
             None => {
-                self.state.tell("no file was chosen; on Linux the dialog needs xdg-desktop-portal or zenity", false)
+                self.state.notify("no file was chosen; on Linux the dialog needs xdg-desktop-portal or zenity", false)
             }
         }
         self.redraw = true;
@@ -158,7 +158,7 @@ impl App {
         (1..10_000).map(name).find(|p| !p.exists()).unwrap_or_else(|| name(0))
     }
 
-    pub(super) fn hear_job(&mut self, done: Done) {
+    pub(super) fn on_job(&mut self, done: Done) {
         let Some(at) = self.jobs.iter().position(|j| j.kind == done.kind && !done.progress.stopped()) else { return };
         let job = self.jobs.remove(at);
         self.redraw = true;
@@ -184,7 +184,7 @@ impl App {
                 let shown = self.state.shown.as_ref().filter(|_| stamp == self.uploads);
                 let Some(scene) = shown.map(|s| s.scene.clone()) else { return };
                 if let Err(why) = &rays {
-                    self.state.tell(format!("there are no rays into this scene, so `ssgi` draws: {why}"), true);
+                    self.state.notify(format!("there are no rays into this scene, so `ssgi` draws: {why}"), true);
                 }
                 stage.set_rays(&scene, rays.map(|r| *r));
                 self.meter.begin();
@@ -205,13 +205,13 @@ impl App {
                     self.meter.begin();
                 }
             }
-            Ok(Product::Captured(path, instead)) => {
+            Ok(Product::Captured(path, fallback)) => {
                 self.captured = Some(path.display().to_string());
-                let by = instead.map_or(String::new(), |by| format!(", drawn by {by}"));
-                self.state.tell(format!("written: {}{by}", path.display()), false);
+                let by = fallback.map_or(String::new(), |by| format!(", drawn by {by}"));
+                self.state.notify(format!("written: {}{by}", path.display()), false);
             }
             Err(text) => {
-                self.state.tell(format!("{}: {text}", job.name), true);
+                self.state.notify(format!("{}: {text}", job.name), true);
                 if let Kind::Renderer(side) = job.kind
                     && let Some(key) = self.building[side].take()
                 {
@@ -227,21 +227,21 @@ impl App {
     fn obey(&mut self, fitted: Option<Result<Box<Fitted>, String>>) {
         let fitted = match fitted {
             Some(Err(why)) => {
-                self.state.tell(format!("what was fitted is not obeyed: {why}"), true);
+                self.state.notify(format!("what was fitted is not obeyed: {why}"), true);
                 None
             }
             found => found.and_then(Result::ok),
         };
         let gather = fitted.as_deref().and_then(Fitted::gather);
-        let unseen = fitted.as_deref().and_then(Fitted::unseen);
-        let now = (gather.unwrap_or_default(), unseen.unwrap_or_default());
-        if now != (self.network.gather, self.network.unseen) {
-            (self.network.gather, self.network.unseen) = now;
-            (self.state.gather, self.state.unseen) = (now.0.words(), unseen.map(|u| u.words()));
+        let ambient_term = fitted.as_deref().and_then(Fitted::ambient_term);
+        let now = (gather.unwrap_or_default(), ambient_term.unwrap_or_default());
+        if now != (self.network.gather, self.network.ambient_term) {
+            (self.network.gather, self.network.ambient_term) = now;
+            (self.state.gather, self.state.ambient_term) = (now.0.words(), ambient_term.map(|u| u.words()));
             self.stamps[2] += 1;
         }
         let Some(fitted) = fitted else { return };
-        self.state.tell(format!("method `{}`, as fitted to the scene", fitted.method.name()), false);
+        self.state.notify(format!("method `{}`, as fitted to the scene", fitted.method.name()), false);
         self.state.settings.left = fitted.method;
         if let Some(weights) = fitted.weights {
             self.state.settings.weights = Some(weights.file);

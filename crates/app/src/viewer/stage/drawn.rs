@@ -55,18 +55,18 @@ impl Stage {
     }
 
     /// What draws in the place of the left side's method, and why.
-    pub fn instead(&self) -> Option<(&'static str, String)> {
+    pub fn fallback(&self) -> Option<(&'static str, String)> {
         self.below(self.slots[0].as_ref()?)
     }
 
     fn below(&self, slot: &Slot) -> Option<(&'static str, String)> {
-        let instead = slot.renderer.instead()?;
+        let fallback = slot.renderer.fallback()?;
         let scene = self.scene.as_ref()?;
         let why = match &scene.no_rays {
             Some(why) => why.clone(),
             None if scene.rays.is_none() => format!("building BVH for {}", slot.key.0.title()),
-            None => instead.why.into(),
+            None => fallback.why.into(),
         };
-        Some((instead.method, why))
+        Some((fallback.method, why))
     }
 }

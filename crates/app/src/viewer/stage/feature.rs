@@ -5,7 +5,7 @@ use super::Stage;
 use crate::viewer::choice::View;
 use crate::viewer::show::picture;
 use crate::viewer::state::State;
-use bouncelight::net::gpu::Tap;
+use bouncelight::net::gpu::LayerReadback;
 use bouncelight::render::{View as Eye, targets::Target};
 use bouncelight::scene::Camera;
 
@@ -42,7 +42,7 @@ impl Stage {
         if self.still == 0 || slot.renderer.size() != state.size {
             return Ok(());
         }
-        if self.instead().is_some() {
+        if self.fallback().is_some() {
             self.feature = None;
             return Ok(());
         }
@@ -93,7 +93,7 @@ struct Tiles {
 }
 
 /// A channel of the network's inputs.
-fn channel(read: &Tap, wanted: u32) -> Tiles {
+fn channel(read: &LayerReadback, wanted: u32) -> Tiles {
     let (channels, size) = (read.shape.channels, [read.shape.width, read.shape.height]);
     let channel = wanted % channels;
     let plane = (size[0] * size[1]) as usize;
@@ -104,7 +104,7 @@ fn channel(read: &Tap, wanted: u32) -> Tiles {
 }
 
 /// All channels of a layer beside each other, as large as `window` allows.
-fn tiles(tap: &Tap, layer: usize, count: usize, window: [u32; 2]) -> Tiles {
+fn tiles(tap: &LayerReadback, layer: usize, count: usize, window: [u32; 2]) -> Tiles {
     let (n, w, h) = (tap.shape.channels, tap.shape.width, tap.shape.height);
     let zoom = |columns: u32| {
         let rows = n.div_ceil(columns);
@@ -165,7 +165,7 @@ mod tests {
     fn channels_are_tiled_with_a_gap_and_fill_the_window() {
         let shape = Shape { channels: 3, width: 2, height: 2 };
         let values = vec![0.0, 1.0, 2.0, 4.0, 7.0, 7.0, 7.0, 7.0, -1.0, 0.0, 0.0, 1.0];
-        let tap = Tap { name: "a".into(), shape, values };
+        let tap = LayerReadback { name: "a".into(), shape, values };
         let wide = tiles(&tap, 0, 9, [300, 100]);
         assert_eq!((wide.size, wide.range), ([9, 3], [-1.0, 7.0]));
         let red = |x: usize, y: usize| wide.texels[4 * (9 * y + x)];

@@ -99,7 +99,7 @@ impl State {
                 self.stale.lights = true;
                 self.version += 1;
             }
-            Err(e) => self.tell(e.to_string(), true),
+            Err(e) => self.notify(e.to_string(), true),
         }
     }
 
@@ -112,7 +112,7 @@ impl State {
     /// Turns the first sun about the vertical and up or down, as a drag over the picture does.
     pub(super) fn turn_sun(&mut self, dx: f32, dy: f32) {
         let Some((light, shown)) = self.sun().zip(self.shown.as_ref()) else {
-            self.tell("this scene has no sun to turn", false);
+            self.notify("this scene has no sun to turn", false);
             return;
         };
         if let bouncelight::scene::LightKind::Directional { direction, .. } = shown.scene.lights[light].kind {
@@ -200,7 +200,7 @@ impl State {
     /// Plays the animation that was chosen last from where it stands, from its beginning if it is
     /// at its end; or stops it.
     pub(super) fn animate(&mut self, now: Instant) {
-        let Some(end) = self.animation_end() else { return self.tell("this scene has no animation", false) };
+        let Some(end) = self.animation_end() else { return self.notify("this scene has no animation", false) };
         if self.animated.take().is_some() {
             self.settle();
             return;

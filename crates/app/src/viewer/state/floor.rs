@@ -27,7 +27,7 @@ impl State {
         self.settle();
         match self.above_floor() {
             Some(gap) => self.move_selected(Vec3::NEG_Y * gap),
-            None => self.tell("nothing is selected, or nothing lies below it", false),
+            None => self.notify("nothing is selected, or nothing lies below it", false),
         }
     }
 }

@@ -106,8 +106,8 @@ pub struct State {
     pub units: Units,
     /// Numbers of `gather` that were fitted to the scene, where they are not its own.
     pub gather: Option<String>,
-    /// Numbers of unseen light that were.
-    pub unseen: Option<String>,
+    /// The ambient term that was.
+    pub ambient_term: Option<String>,
     /// The camera path that was recorded or dropped last.
     pub path: Option<CameraPath>,
     /// What is done with it.
@@ -164,7 +164,7 @@ impl State {
     }
 
     /// Tells the user.
-    pub fn tell(&mut self, text: impl Into<String>, error: bool) {
+    pub fn notify(&mut self, text: impl Into<String>, error: bool) {
         let text = text.into();
         self.messages.retain(|m| m.text != text);
         self.messages.push(Message { text, error, at: Instant::now() });
@@ -181,7 +181,7 @@ impl State {
         // How large it is stands in the panel, and the camera is as far away in any case.
         let told = scene.warnings.iter().filter(|w| !w.contains("across; if its unit is"));
         for warning in told {
-            self.tell(warning.clone(), false);
+            self.notify(warning.clone(), false);
         }
         if !same {
             self.navigator = Navigator { fly: self.navigator.fly, ..Navigator::default() };
@@ -255,7 +255,7 @@ impl State {
         self.remember(&action, Instant::now());
         let cameras = self.shown.as_ref().map_or(0, |s| s.scene.cameras.len());
         match action {
-            A::View(View::Wireframe) if self.no_lines => self.tell(NO_LINES, true),
+            A::View(View::Wireframe) if self.no_lines => self.notify(NO_LINES, true),
             A::View(view) => {
                 self.settings.view = view;
                 if view == View::Error && self.settings.left == self.settings.right {
@@ -311,7 +311,7 @@ impl State {
             }
             A::CopyTimes => {
                 self.requests.push(Request::CopyTimes);
-                self.tell("copied: the times of this view", false);
+                self.notify("copied: the times of this view", false);
             }
             A::SaveTimes => self.requests.push(Request::SaveTimes),
             A::MeasureAll => self.requests.push(Request::MeasureAll),
@@ -336,7 +336,7 @@ impl State {
             }
             A::CopyCommand => {
                 self.requests.push(Request::CopyCommand);
-                self.tell("copied: the command line of this view", false);
+                self.notify("copied: the command line of this view", false);
             }
             A::Open(path) => self.open(&path),
             A::Weights(path) => self.requests.push(Request::Weights(path)),

@@ -14,7 +14,7 @@ impl State {
             }
             _ => {
                 self.film = Film::Records(Recording::new(&self.navigator, now));
-                self.tell("the camera is recorded until R is pressed again", false);
+                self.notify("the camera is recorded until R is pressed again", false);
             }
         }
     }
@@ -23,7 +23,7 @@ impl State {
         match (&self.film, &self.path) {
             (Film::Plays { .. }, _) => self.film = Film::Rests,
             (_, Some(_)) => self.film = Film::Plays { since: Instant::now() },
-            (_, None) => self.tell("there is no camera path yet: record one (R) or drop its file", false),
+            (_, None) => self.notify("there is no camera path yet: record one (R) or drop its file", false),
         }
     }
 

@@ -19,7 +19,7 @@ impl State {
         if !is_file || scene.lights.is_empty() || scene.default_light || scene.lightless {
             return;
         }
-        if scene.environment != Environment::default() || scene.lights.iter().all(|l| l.stands_in) {
+        if scene.environment != Environment::default() || scene.lights.iter().all(|l| l.is_emissive_proxy) {
             return;
         }
         let suns = scene.lights.iter().filter_map(|l| match l.kind {

@@ -107,7 +107,7 @@ impl State {
         let History { past, future, .. } = &mut self.history;
         let (from, to) = if back { (past, future) } else { (future, past) };
         let Some(step) = from.pop() else {
-            return self.tell(if back { "nothing to undo" } else { "nothing to redo" }, false);
+            return self.notify(if back { "nothing to undo" } else { "nothing to redo" }, false);
         };
         to.push(now);
         self.history.last = None;

@@ -29,7 +29,7 @@ pub fn lights(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
         let name = if light.name.is_empty() { kind.to_string() } else { format!("{} ({kind})", light.name) };
         let header = egui::CollapsingHeader::new(format!("{i}: {name}")).id_salt(("light", i)).default_open(i == 0);
         let shown = header.show(ui, |ui| {
-            if light.stands_in {
+            if light.is_emissive_proxy {
                 ui.label(RichText::new("stands in for a glowing surface; the reference lets the surface shine").weak());
             }
             if let Some(edit) = light_grid(ui, i, &LightEdit::of(i, light)) {

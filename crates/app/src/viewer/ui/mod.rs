@@ -4,9 +4,9 @@
 mod camera;
 mod frontier;
 pub mod gizmo;
-pub mod hands;
 mod heat;
 mod help;
+pub mod input;
 mod light;
 pub mod marks;
 mod panel;
@@ -111,7 +111,7 @@ pub struct Memory {
     /// Where named things of the panel are seen, points; for scripts.
     pub places: BTreeMap<String, [f32; 2]>,
     /// The drag over the picture that is under way.
-    pub drag: Option<hands::Drag>,
+    pub drag: Option<input::Drag>,
     /// Where the pointer was last.
     pointer: Option<Pos2>,
     timing: timing::Look,
@@ -130,7 +130,7 @@ impl Memory {
 /// Draws the overlay and lets hands act on `state`. Returns the picture's place, points.
 pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) -> Rect {
     memory.places.clear();
-    hands::keyboard(ui, state);
+    input::keyboard(ui, state);
     if state.settings.panel {
         if facts.software {
             banner(ui, facts);
@@ -145,7 +145,7 @@ pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
     }
     let rect = pixel_aligned(rect, ui.ctx().pixels_per_point());
     let response = ui.interact(rect, ui.scope_id().with("picture"), Sense::click_and_drag());
-    hands::hands(ui, state, memory, &response, rect);
+    input::pointer(ui, state, memory, &response, rect);
     if state.settings.view == View::Error && facts.reference.is_none_or(|r| r.samples > 0) {
         heat::show(ui, state, facts, rect);
     }

@@ -44,7 +44,7 @@ pub(super) fn pack(scene: &Scene, flat: &Flat) -> Lights {
     // The disc that the scene shows to each direction, times the sphere of directions.
     let sky_power = luminance(sky) * 4.0 * PI * PI * reach * reach;
 
-    let true_lights = analytic.iter().filter(|c| !scene.lights[c.id as usize].stands_in && c.power > 0.0);
+    let true_lights = analytic.iter().filter(|c| !scene.lights[c.id as usize].is_emissive_proxy && c.power > 0.0);
     let mut groups: Vec<Vec<(u32, f64)>> = true_lights.map(|c| vec![(c.id, c.power)]).collect();
     if !glowing.is_empty() {
         groups.push(glowing.iter().map(|e| (TRIANGLE | e.id, e.power)).collect());
@@ -66,7 +66,7 @@ pub(super) fn pack(scene: &Scene, flat: &Flat) -> Lights {
         .collect();
     let rasterised = chances(&analytic.iter().map(|c| vec![(c.id, c.power)]).collect::<Vec<_>>());
 
-    let apart = truth.iter().any(|t| t.0 & TRIANGLE != 0) || scene.lights.iter().any(|l| l.stands_in);
+    let apart = truth.iter().any(|t| t.0 & TRIANGLE != 0) || scene.lights.iter().any(|l| l.is_emissive_proxy);
     let known: f64 = groups.iter().flatten().map(|g| g.1).sum();
     // A constant sky is found as well by the rays that leave anyway; it takes no light samples.
     let alone = match (truth.is_empty(), sky_power > 0.0) {

@@ -27,7 +27,7 @@ pub(super) fn sun(b: &mut Builder, from: f32, irradiance: f32) {
     let (green, blue) = (0.75 + 0.2 * up.sin(), 0.45 + 0.45 * up.sin());
     let direction = vec3(-from.cos() * up.cos(), -up.sin(), -from.sin() * up.cos());
     let kind = LightKind::Directional { direction: direction.normalize().into(), irradiance, angle: SUN_ANGLE };
-    b.scene.lights.push(Light { name: "sun".into(), color: [1.0, green, blue], kind, stands_in: false });
+    b.scene.lights.push(Light { name: "sun".into(), color: [1.0, green, blue], kind, is_emissive_proxy: false });
 }
 
 /// From candles to overcast noon; a tenth are coloured.
@@ -96,7 +96,7 @@ fn intensity(room: &Room, wanted: f32) -> f32 {
 
 fn point(b: &mut Builder, at: Vec3, color: [f32; 3], intensity: f32, radius: f32) {
     let kind = LightKind::Point { position: at.into(), intensity, radius, range: None };
-    b.scene.lights.push(Light { name: "lamp".into(), color, kind, stands_in: false });
+    b.scene.lights.push(Light { name: "lamp".into(), color, kind, is_emissive_proxy: false });
 }
 
 fn lamp(f: &mut Furnisher<'_>, wanted: f32) {
@@ -200,7 +200,7 @@ fn spots(f: &mut Furnisher<'_>, at: Vec3, wanted: f32) {
             inner_angle: 0.6 * outer_angle,
             outer_angle,
         };
-        f.b.scene.lights.push(Light { name: "spot".into(), color, kind, stands_in: false });
+        f.b.scene.lights.push(Light { name: "spot".into(), color, kind, is_emissive_proxy: false });
     }
 }
 
@@ -216,7 +216,7 @@ pub(super) fn stand_in(b: &mut Builder, at: Vec3, direction: Vec3, color: [f32; 
         inner_angle: 0.0,
         outer_angle: FRAC_PI_2,
     };
-    b.scene.lights.push(Light { name: "panel".into(), color, kind, stands_in: true });
+    b.scene.lights.push(Light { name: "panel".into(), color, kind, is_emissive_proxy: true });
 }
 
 /// Glowing, in a box at the ceiling.

@@ -121,7 +121,7 @@ fn lamp(b: &mut Builder, parts: &Parts, at: Vec3, side: f32, color: Option<[f32;
         inner_angle: 0.6,
         outer_angle: b.between(1.1, 1.4),
     };
-    b.scene.lights.push(Light { name: "street lamp".into(), color, kind, stands_in: false });
+    b.scene.lights.push(Light { name: "street lamp".into(), color, kind, is_emissive_proxy: false });
 }
 
 /// Along x from `at`, 4.2 m long.

@@ -18,7 +18,7 @@ pub mod summary;
 use super::{
     bench::{BenchError, Spread},
     projection::Cost,
-    trial::TrialError,
+    session::SessionError,
 };
 use crate::metrics::MetricError;
 use crate::network::pictures::PicturesError;
@@ -129,7 +129,8 @@ pub struct Unit {
     /// GPU memory of everything, bytes.
     pub bytes: u64,
     /// Which method drew in its place, and why.
-    pub instead: Option<String>,
+    #[serde(alias = "instead")]
+    pub fallback: Option<String>,
 }
 
 /// What kind of thing an entry is.
@@ -272,7 +273,7 @@ pub enum ChartError {
     Image(#[from] ImageError),
     /// Drawing or tracing failed.
     #[error(transparent)]
-    Trial(#[from] TrialError),
+    Session(#[from] SessionError),
     /// Comparing failed.
     #[error(transparent)]
     Metric(#[from] MetricError),

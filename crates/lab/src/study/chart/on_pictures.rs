@@ -4,7 +4,7 @@
 
 use super::{ChartError, published};
 use crate::network::{cpu::Tensor, pictures};
-use crate::study::trial::Shot;
+use crate::study::session::Frame;
 use bouncelight::gpu::{Gpu, readback};
 use bouncelight::net::{format::Weights, gpu::Network};
 use bouncelight::render::{capture::Layer, tonemap_curve::Tonemap};
@@ -21,7 +21,7 @@ struct Four {
 impl Four {
     /// Of direct light. `sky`: radiance that comes from everywhere, which Eevee counts as direct,
     /// without occlusion.
-    fn new(shot: &Shot, sky: [f32; 3]) -> Self {
+    fn new(shot: &Frame, sky: [f32; 3]) -> Self {
         let shown = |linear: Vec<f32>| -> Vec<f32> {
             Tonemap::Filmic.apply_to_bytes(&linear).into_iter().map(|b| f32::from(b) / 255.0).collect()
         };
@@ -58,7 +58,7 @@ impl Four {
 pub(super) fn picture(
     gpu: &Gpu,
     weights: &Weights,
-    shot: &Shot,
+    shot: &Frame,
     sky: [f32; 3],
 ) -> Result<(Vec<f32>, Network), ChartError> {
     let four = Four::new(shot, sky);

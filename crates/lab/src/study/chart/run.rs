@@ -11,7 +11,7 @@ use super::{
 use crate::reference;
 use crate::study::{
     hash, judge,
-    trial::{Trial, TrialError, TrialOptions},
+    session::{Session, SessionError, SessionOptions},
     truth,
 };
 use bouncelight::gpu::Gpu;
@@ -150,7 +150,7 @@ impl<'a> Work<'a> {
         let entries: f64 = self.plan.entries.iter().map(|e| self.plan.parts(e)).sum();
         let parts = self.plan.reference_parts(source);
         match self.guarded(|| self.prepare(source)) {
-            Err(ChartError::Stopped | ChartError::Trial(TrialError::Stopped)) => Err(ChartError::Stopped),
+            Err(ChartError::Stopped | ChartError::Session(SessionError::Stopped)) => Err(ChartError::Stopped),
             Err(e) => {
                 (self.hooks.warn)(&format!("{} is left out: {e}", source.name));
                 let failed = Some(e.to_string());
@@ -174,16 +174,16 @@ impl<'a> Work<'a> {
         let scene = source.load(self.plan.load)?;
         let camera = scene.cameras[0].clone();
         let size = source.reference_size()?.unwrap_or(self.plan.size);
-        let mut layers = crate::study::trial::LAYERS.to_vec();
+        let mut layers = crate::study::session::LAYERS.to_vec();
         layers.push(Layer::GlossCol);
-        let options = TrialOptions { layers, kept: Some(self.plan.kept.clone()), ..TrialOptions::default() };
+        let options = SessionOptions { layers, kept: Some(self.plan.kept.clone()), ..SessionOptions::default() };
         let hooks = self.hooks;
         let (done, all, name) = (self.done, self.all, source.name.clone());
         let parts = self.plan.reference_parts(source);
-        let mut trial = Trial::new(self.gpu, scene, size, options)?;
+        let mut session = Session::new(self.gpu, scene, size, options)?;
         let tracing = std::rc::Rc::new(std::cell::Cell::new(true));
         let told = tracing.clone();
-        trial = trial.watched(move |share| {
+        session = session.watched(move |share| {
             if told.get() {
                 (hooks.tell)(done + share * parts, all, &format!("{name}: reference"));
             }
@@ -191,10 +191,10 @@ impl<'a> Work<'a> {
         });
         let (error, most) = self.plan.reference;
         let reference = match &source.reference {
-            Some(path) => scenes::reference(path, &mut trial, self.plan.samples)?,
+            Some(path) => scenes::reference(path, &mut session, self.plan.samples)?,
             None => {
                 let options = truth::until(reference::Layer::Gi, error, most, REFERENCE_SEED);
-                trial.reference(&camera, &self.plan.paths(options))?
+                session.reference(&camera, &self.plan.paths(options))?
             }
         };
         tracing.set(false);
@@ -202,20 +202,20 @@ impl<'a> Work<'a> {
         let noise = reference.light_noise();
         let facts = SceneFacts {
             name: source.name.clone(),
-            hash: trial.hash().to_owned(),
+            hash: session.hash().to_owned(),
             size,
             reference: source.origin(),
             samples: if traced { Some(reference.samples) } else { source.samples.map(|n| [n; 2]) },
             noise: (traced && noise.is_finite()).then_some([noise, noise / judge::BLOCK as f64]),
             failed: None,
         };
-        Ok((Stage { trial, camera, reference }, facts))
+        Ok((Stage { session, camera, reference }, facts))
     }
 
     fn unit(&mut self, source: &Source, entry: &Entry, stage: &mut Stage<'a>) -> Result<(), ChartError> {
         let (name, parts) = (entry.name(), self.plan.parts(entry));
         self.begin(&format!("{}: {name}", source.name))?;
-        let seen = (stage.trial.hash().to_owned(), hash::of_camera(&stage.camera), stage.trial.size());
+        let seen = (stage.session.hash().to_owned(), hash::of_camera(&stage.camera), stage.session.size());
         let key = self.key(&(entry.key(), seen, source));
         let known = |units: &[Unit]| units.iter().find(|u| u.key == key && u.failed.is_none()).cloned();
         let unit = match known(&self.before.units) {
@@ -233,10 +233,10 @@ impl<'a> Work<'a> {
                     cold_time: None,
                     costs: Vec::new(),
                     bytes: 0,
-                    instead: None,
+                    fallback: None,
                 };
                 match done {
-                    Err(ChartError::Stopped | ChartError::Trial(TrialError::Stopped)) => {
+                    Err(ChartError::Stopped | ChartError::Session(SessionError::Stopped)) => {
                         return Err(ChartError::Stopped);
                     }
                     Err(e) => {
@@ -244,7 +244,7 @@ impl<'a> Work<'a> {
                         empty(Some(e.to_string()))
                     }
                     Ok(found) => {
-                        let failed = found.instead.clone();
+                        let failed = found.fallback.clone();
                         if let Some(why) = &failed {
                             (self.hooks.warn)(&format!("{name} is not drawn in {}: {why}", source.name));
                         }
@@ -255,7 +255,7 @@ impl<'a> Work<'a> {
                             cold_time: found.cold_time,
                             costs: found.costs,
                             bytes: found.bytes,
-                            instead: found.instead,
+                            fallback: found.fallback,
                             ..empty(failed)
                         }
                     }

@@ -3,7 +3,7 @@
 use super::ChartError;
 use crate::reference::{Layer, Noise};
 use crate::study::{
-    trial::{Settling, Trial},
+    session::{Session, Settling},
     truth::Reference,
 };
 use bouncelight::gi::Method;
@@ -166,7 +166,7 @@ impl Source {
 ///
 /// # Errors
 /// A file that cannot be read or lacks a layer; drawing direct light.
-pub fn reference(path: &Path, trial: &mut Trial<'_>, samples: u32) -> Result<Reference, ChartError> {
+pub fn reference(path: &Path, session: &mut Session<'_>, samples: u32) -> Result<Reference, ChartError> {
     let Decoded::Linear(layers) = image_io::read(path)? else {
         return Err(file(path, &"a reference is an EXR with layers, this is a PNG"));
     };
@@ -175,8 +175,8 @@ pub fn reference(path: &Path, trial: &mut Trial<'_>, samples: u32) -> Result<Ref
         Ok(layers.image(name)?.to_rgb())
     };
     let (diff_dir, diff_ind) = (read("DiffDir")?, read("DiffInd")?);
-    let camera = trial.scene().cameras[0].clone();
-    let direct = trial.picture(&Method::Direct, &camera, Settling { frames: 1, samples })?;
+    let camera = session.scene().cameras[0].clone();
+    let direct = session.picture(&Method::Direct, &camera, Settling { frames: 1, samples })?;
     let drawn = |layer| direct.layer(layer).data.clone();
     let ours = drawn(capture::Layer::DiffDir);
     let gi = diff_dir.iter().zip(&diff_ind).zip(&ours).map(|((d, i), o)| d + i - o).collect();

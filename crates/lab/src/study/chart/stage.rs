@@ -13,7 +13,7 @@ use crate::study::{
     bench::{Measurement, Spread},
     judge::{self, LightError},
     projection::Cost,
-    trial::{Settling, Shot, Trial},
+    session::{Frame, Session, Settling},
     truth::{self, Reference},
 };
 use bouncelight::gi::Method;
@@ -22,7 +22,7 @@ use bouncelight::scene::Camera;
 
 /// A scene with what it is judged by.
 pub(super) struct Stage<'a> {
-    pub trial: Trial<'a>,
+    pub session: Session<'a>,
     pub camera: Camera,
     pub reference: Reference,
 }
@@ -35,7 +35,7 @@ pub(super) struct Found {
     pub cold_time: Option<Time>,
     pub costs: Vec<Cost>,
     pub bytes: u64,
-    pub instead: Option<String>,
+    pub fallback: Option<String>,
 }
 
 impl Stage<'_> {
@@ -43,15 +43,16 @@ impl Stage<'_> {
         match entry {
             Entry::Method { method, .. } => {
                 let settling = Settling { samples: plan.samples, ..Settling::SETTLED };
-                let shot = self.trial.picture(method, &self.camera, settling)?;
+                let shot = self.session.picture(method, &self.camera, settling)?;
                 let mut cold = (None, None);
-                if method.has_history() && shot.instead.is_none() {
-                    let first = self.trial.picture(method, &self.camera, Settling::COLD)?;
-                    let measured = self.trial.measure_cuts(method, &self.camera, plan.bench)?;
+                if method.has_history() && shot.fallback.is_none() {
+                    let first = self.session.picture(method, &self.camera, Settling::COLD)?;
+                    let measured = self.session.measure_cuts(method, &self.camera, plan.bench)?;
                     cold = (Some(self.judged(&first)?), Some(time(&measured)));
                 }
-                let measured = self.trial.measure(method, &self.camera, plan.bench)?;
-                let costs = if shot.instead.is_none() { self.trial.count(method, &self.camera)? } else { Vec::new() };
+                let measured = self.session.measure(method, &self.camera, plan.bench)?;
+                let costs =
+                    if shot.fallback.is_none() { self.session.count(method, &self.camera)? } else { Vec::new() };
                 Ok(Found {
                     scores: self.judged(&shot)?,
                     cold: cold.0,
@@ -59,16 +60,16 @@ impl Stage<'_> {
                     cold_time: cold.1,
                     costs,
                     bytes: measured.total_bytes(),
-                    instead: shot.instead,
+                    fallback: shot.fallback,
                 })
             }
             Entry::Pictures { weights, .. } => {
                 let direct = Method::Direct;
                 let settling = Settling { frames: 1, samples: plan.samples };
-                let shot = self.trial.picture(&direct, &self.camera, settling)?;
-                let sky = self.trial.scene().environment.radiance;
+                let shot = self.session.picture(&direct, &self.camera, settling)?;
+                let sky = self.session.scene().environment.radiance;
                 let (shown, network) = on_pictures::picture(gpu, weights, &shot, sky)?;
-                let raster = self.trial.measure(&direct, &self.camera, plan.bench)?;
+                let raster = self.session.measure(&direct, &self.camera, plan.bench)?;
                 let (frame, own) = (raster.wall_ms, published::time(gpu, &network, plan.bench)?);
                 let wall_ms = Spread { median: frame.median + own.median, p95: frame.p95 + own.p95 };
                 let seen = judge::compare_shown(&shown, &self.reference, true)?;
@@ -79,11 +80,11 @@ impl Stage<'_> {
                     cold_time: None,
                     costs: published::costs(&network),
                     bytes: raster.total_bytes() + network.bytes(),
-                    instead: None,
+                    fallback: None,
                 })
             }
             Entry::Paths(count) => {
-                let traced = self.trial.trace(&self.camera, &plan.paths(truth::samples(*count, 1)))?;
+                let traced = self.session.trace(&self.camera, &plan.paths(truth::samples(*count, 1)))?;
                 let light = judge::light_error(traced.layer(reference::Layer::Gi), &self.reference);
                 let seen = judge::compare(&traced.rgb(), &self.reference, true)?;
                 let ms = 1e3 * traced.seconds;
@@ -96,13 +97,13 @@ impl Stage<'_> {
                     cold_time: None,
                     costs: vec![paths],
                     bytes: 0,
-                    instead: None,
+                    fallback: None,
                 })
             }
         }
     }
 
-    fn judged(&self, shot: &Shot) -> Result<Scores, MetricError> {
+    fn judged(&self, shot: &Frame) -> Result<Scores, MetricError> {
         let light = judge::light_error(&shot.added(), &self.reference);
         Ok(self.scores(light, &judge::compare(&shot.rgb(), &self.reference, true)?))
     }

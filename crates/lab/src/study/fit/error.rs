@@ -1,13 +1,13 @@
 //! Why nothing could be fitted.
 
-use crate::study::trial::TrialError;
+use crate::study::session::SessionError;
 
 /// Why nothing could be fitted.
 #[derive(Debug, thiserror::Error)]
 pub enum FitError {
     /// A picture could not be drawn or traced.
     #[error(transparent)]
-    Trial(#[from] TrialError),
+    Session(#[from] SessionError),
     /// Nothing to look at.
     #[error(
         "there is no view to judge: the scene has no camera that sees a surface; name one with --eye and --look-at"

@@ -10,23 +10,23 @@
 //! bisections take it that error falls as cost rises; what they return has been measured to meet
 //! the target in any case.
 
+mod ambient_term;
 mod error;
+mod quality_target;
 mod report;
 mod rows;
-mod unseen;
 mod views;
-mod yardstick;
 
 pub use error::FitError;
+pub use quality_target::{Metric, QualityTarget};
 pub use report::{Record, RecordRow};
 pub use rows::{Candidate, Row, Verdict};
 pub use views::covering;
-pub use yardstick::{Metric, Yardstick};
 
 use super::{
     count::CountError,
     projection::{self, EFFICIENCY, GTX_1050},
-    trial::{Settling, Shot, Trial, TrialError},
+    session::{Frame, Session, SessionError, Settling},
     truth::Reference,
 };
 use bouncelight::gi::{Neural, gather};
@@ -50,7 +50,7 @@ pub struct Network {
 /// What is asked for.
 pub struct FitOptions {
     /// What is measured, and the bound that must hold in every view.
-    pub yardstick: Yardstick,
+    pub quality_target: QualityTarget,
     /// Most milliseconds of a method's own passes; what is dearer is not tried.
     pub budget_ms: Option<f64>,
     /// Frames of a still camera, for methods that settle.
@@ -58,7 +58,7 @@ pub struct FitOptions {
     /// Networks beside the other methods.
     pub networks: Vec<Network>,
     /// Most samples a pixel of a reference.
-    pub most_samples: u32,
+    pub max_samples: u32,
     /// Costs are measured on this device; else projected from counted work.
     pub timed: bool,
 }
@@ -103,13 +103,13 @@ impl Fit {
 /// # Errors
 /// [`FitError`]. That the target is out of reach is no error: [`Fit::reached`].
 pub fn fit(
-    trial: &mut Trial<'_>,
+    session: &mut Session<'_>,
     cameras: &[Camera],
     options: &FitOptions,
     told: &mut dyn FnMut(&str, u32, u32),
 ) -> Result<Fit, FitError> {
     let mut search =
-        Search { trial, options, views: Vec::new(), rows: Vec::new(), costs: Vec::new(), told, done: 0, expected: 0 };
+        Search { session, options, views: Vec::new(), rows: Vec::new(), costs: Vec::new(), told, done: 0, expected: 0 };
     search.expected = search.guess(cameras.len());
     search.trace(cameras)?;
     let found = search.climb()?;
@@ -122,10 +122,10 @@ pub fn fit(
 }
 
 /// The metric in each view, and the pictures.
-type Judged = (Vec<f64>, Vec<Shot>);
+type Judged = (Vec<f64>, Vec<Frame>);
 
 struct Search<'a, 'b> {
-    trial: &'a mut Trial<'b>,
+    session: &'a mut Session<'b>,
     options: &'a FitOptions,
     views: Vec<Seen>,
     rows: Vec<Row>,
@@ -150,11 +150,11 @@ impl Search<'_, '_> {
     }
 
     fn trace(&mut self, cameras: &[Camera]) -> Result<(), FitError> {
-        let options = self.options.yardstick.reference(self.options.most_samples);
+        let options = self.options.quality_target.reference(self.options.max_samples);
         for (view, camera) in cameras.iter().enumerate() {
             self.tell(&format!("reference of view {view}"));
-            let reference = self.trial.reference(camera, &options)?;
-            let floor = self.options.yardstick.noise(&reference);
+            let reference = self.session.reference(camera, &options)?;
+            let floor = self.options.quality_target.noise(&reference);
             let floor = floor.map_err(|reason| FitError::Blind { view, reason })?;
             self.views.push(Seen { camera: camera.clone(), reference, floor });
         }
@@ -204,19 +204,19 @@ impl Search<'_, '_> {
     /// `None` for the others.
     fn own_numbers(&mut self, row: Option<usize>) -> Result<Option<Candidate>, FitError> {
         let Some(candidate) = row.map(|row| self.rows[row].candidate.clone()) else { return Ok(None) };
-        let mut problem = unseen::Problem::default();
+        let mut problem = ambient_term::Problem::default();
         for view in 0..self.views.len() {
             let mut light = Vec::new();
-            for numbers in unseen::ASKED {
-                let Some(asked) = candidate.with_unseen(numbers) else { return Ok(None) };
+            for numbers in ambient_term::ASKED {
+                let Some(asked) = candidate.with_ambient_term(numbers) else { return Ok(None) };
                 self.tell(&format!("{} in view {view}", asked.name(&self.options.networks)));
                 let method = asked.method(&self.options.networks);
-                let shot = self.trial.picture(&method, &self.views[view].camera, Settling::COLD)?;
+                let shot = self.session.picture(&method, &self.views[view].camera, Settling::COLD)?;
                 light.push(shot.layer(Layer::DiffInd).data.clone());
             }
             problem.add(&light, &self.views[view].reference);
         }
-        Ok(problem.solve().and_then(|own| candidate.with_unseen(own)))
+        Ok(problem.solve().and_then(|own| candidate.with_ambient_term(own)))
     }
 
     /// Cheaper numbers of a candidate that is good enough, if they are, too; else the row itself.
@@ -263,8 +263,8 @@ impl Search<'_, '_> {
         while high - low > (high / 8).max(1) {
             let middle = (low + high) / 2;
             let errors = self.errors(&candidate, middle.max(1))?.map(|(errors, _)| errors);
-            let worst = errors.map_or(f64::NAN, |e| self.options.yardstick.worst(&e));
-            let enough = self.options.yardstick.is_met(worst);
+            let worst = errors.map_or(f64::NAN, |e| self.options.quality_target.worst(&e));
+            let enough = self.options.quality_target.is_met(worst);
             self.rows[chosen].settling.push((middle.max(1), worst));
             if enough { high = middle } else { low = middle }
         }
@@ -276,7 +276,7 @@ impl Search<'_, '_> {
     /// The nearest to the target of those that were tried.
     fn nearest(&self) -> Option<usize> {
         let tried = self.rows.iter().enumerate().filter(|(_, r)| r.verdict == Verdict::TooFar);
-        tried.min_by(|a, b| self.options.yardstick.order(a.1.worst, b.1.worst)).map(|(i, _)| i)
+        tried.min_by(|a, b| self.options.quality_target.order(a.1.worst, b.1.worst)).map(|(i, _)| i)
     }
 
     /// Tries a candidate in every view and adds its row; `None` where it is too dear or cannot draw
@@ -301,10 +301,10 @@ impl Search<'_, '_> {
             self.rows.push(row);
             return Ok(None);
         };
-        let worst = self.options.yardstick.worst(&errors);
-        let verdict = if self.options.yardstick.is_met(worst) { Verdict::GoodEnough } else { Verdict::TooFar };
+        let worst = self.options.quality_target.worst(&errors);
+        let verdict = if self.options.quality_target.is_met(worst) { Verdict::GoodEnough } else { Verdict::TooFar };
         let bytes = shots.first().map_or(0, |s| s.bytes);
-        let pictures = shots.iter().map(Shot::rgb).collect();
+        let pictures = shots.iter().map(Frame::rgb).collect();
         let row =
             Row { errors, worst, cost_ms: Some(cost_ms), bytes, frames, pictures, ..Row::blank(candidate, verdict) };
         self.rows.push(row);
@@ -314,15 +314,15 @@ impl Search<'_, '_> {
     /// The metric in every view, and the pictures; `None` where another method drew in its place.
     fn errors(&mut self, candidate: &Candidate, frames: u32) -> Result<Option<Judged>, FitError> {
         let method = candidate.method(&self.options.networks);
-        let settling = Settling { frames, samples: self.options.yardstick.samples() };
+        let settling = Settling { frames, samples: self.options.quality_target.samples() };
         let (mut errors, mut shots) = (Vec::new(), Vec::new());
         for view in 0..self.views.len() {
             self.tell(&format!("{} in view {view}, {frames} frames", candidate.name(&self.options.networks)));
-            let shot = self.trial.picture(&method, &self.views[view].camera, settling)?;
-            if shot.instead.is_some() {
+            let shot = self.session.picture(&method, &self.views[view].camera, settling)?;
+            if shot.fallback.is_some() {
                 return Ok(None);
             }
-            let error = self.options.yardstick.of(&shot, &self.views[view].reference);
+            let error = self.options.quality_target.of(&shot, &self.views[view].reference);
             errors.push(error.map_err(|reason| FitError::Blind { view, reason })?);
             shots.push(shot);
         }
@@ -347,7 +347,7 @@ impl Search<'_, '_> {
         let camera = self.views[0].camera.clone();
         if self.options.timed {
             let options = super::bench::BenchOptions { frames: 40, warmup: 20 };
-            let measured = self.trial.measure(&method, &camera, options)?;
+            let measured = self.session.measure(&method, &camera, options)?;
             if measured.method != method.name() {
                 return Ok(None);
             }
@@ -356,12 +356,12 @@ impl Search<'_, '_> {
             }
             // Without timestamps that can be believed: the clock, less that of the rasteriser
             // alone.
-            let bare = self.trial.measure(&bouncelight::gi::Method::Direct, &camera, options)?;
+            let bare = self.session.measure(&bouncelight::gi::Method::Direct, &camera, options)?;
             return Ok(Some((measured.wall_ms.median - bare.wall_ms.median).max(0.0)));
         }
-        match self.trial.count(&method, &camera) {
+        match self.session.count(&method, &camera) {
             Ok(costs) => Ok(Some(projection::total_ms(&costs, &GTX_1050, EFFICIENCY))),
-            Err(TrialError::Count(CountError::Instead(_))) => Ok(None),
+            Err(SessionError::Count(CountError::Fallback(_))) => Ok(None),
             Err(e) => Err(e.into()),
         }
     }

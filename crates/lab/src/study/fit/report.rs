@@ -55,12 +55,12 @@ impl Fit {
             scene,
             method: row.candidate.method_name(),
             gather: row.candidate.gather(),
-            unseen: row.candidate.unseen().map(|u| u.words()),
+            ambient_term: row.candidate.ambient_term().map(|u| u.words()),
             frames: row.frames,
             weights,
             target: Target {
-                metric: options.yardstick.name().into(),
-                value: options.yardstick.target,
+                metric: options.quality_target.name().into(),
+                value: options.quality_target.target,
                 budget_ms: options.budget_ms,
             },
             measured: Measured {
@@ -101,15 +101,15 @@ impl Fit {
     }
 
     fn write_table(&self, options: &FitOptions, out: &mut String) -> std::fmt::Result {
-        let yardstick = &options.yardstick;
+        let quality_target = &options.quality_target;
         let views: String = (0..self.views.len()).map(|i| format!(" view {i} |")).collect();
         let ms = if options.timed { "ms, measured" } else { "GTX 1050 ms, projected" };
-        writeln!(out, "| method | {} in{views} {ms} | |", yardstick.name())?;
+        writeln!(out, "| method | {} in{views} {ms} | |", quality_target.name())?;
         writeln!(out, "|---|{}---|---|", "---|".repeat(self.views.len()))?;
         for (i, row) in self.rows.iter().enumerate() {
             let name = row.candidate.name(&options.networks);
             let name = if i == self.chosen { format!("**{name}**") } else { name };
-            let error = |view: usize| row.errors.get(view).map_or("-".into(), |e| yardstick.show(*e));
+            let error = |view: usize| row.errors.get(view).map_or("-".into(), |e| quality_target.show(*e));
             let errors: String = (0..self.views.len()).map(|view| format!(" {} |", error(view))).collect();
             let cost = row.cost_ms.map_or("-".into(), |c| format!("{c:.2}"));
             let verdict = match (i == self.chosen, self.reached) {
@@ -124,7 +124,7 @@ impl Fit {
 
     /// What was chosen and why, in sentences.
     pub fn why(&self, options: &FitOptions) -> String {
-        let (row, y) = (self.choice(), &options.yardstick);
+        let (row, y) = (self.choice(), &options.quality_target);
         let name = row.candidate.name(&options.networks);
         let mut text = if self.reached {
             format!("`{name}` meets {} {} in every view (worst {}).", y.name(), y.show(y.target), y.show(row.worst))

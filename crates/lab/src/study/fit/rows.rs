@@ -1,7 +1,7 @@
 //! What is tried, and what comes of it.
 
 use super::Network;
-use bouncelight::gi::{Method, ambient::Unseen, gather, name::MethodName};
+use bouncelight::gi::{Method, ambient::AmbientTerm, gather, name::MethodName};
 
 /// Something to try: a method with its numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -9,9 +9,9 @@ pub enum Candidate {
     /// No indirect light.
     Direct,
     /// Even light, with these numbers of what the picture does not show.
-    Ambient(Unseen),
+    Ambient(AmbientTerm),
     /// Screen space, with these.
-    Ssgi(Unseen),
+    Ssgi(AmbientTerm),
     /// Rays, with these numbers.
     Gather(gather::Options),
     /// The network of this index.
@@ -23,8 +23,8 @@ impl Candidate {
     pub fn method(&self, networks: &[Network]) -> Method {
         match self {
             Candidate::Direct => Method::Direct,
-            Candidate::Ambient(unseen) => Method::AmbientWith(*unseen),
-            Candidate::Ssgi(unseen) => Method::SsgiWith(*unseen),
+            Candidate::Ambient(ambient_term) => Method::AmbientWith(*ambient_term),
+            Candidate::Ssgi(ambient_term) => Method::SsgiWith(*ambient_term),
             Candidate::Gather(options) => Method::Gather(*options),
             Candidate::Neural(index) => Method::Neural(Box::new(networks[*index].neural.clone())),
         }
@@ -49,19 +49,21 @@ impl Candidate {
         }
     }
 
-    /// Numbers of unseen light that are not those which methods have for every scene.
-    pub fn unseen(&self) -> Option<Unseen> {
+    /// The ambient term, where it is not the one that methods have for every scene.
+    pub fn ambient_term(&self) -> Option<AmbientTerm> {
         match self {
-            Candidate::Ambient(unseen) | Candidate::Ssgi(unseen) => Some(*unseen).filter(|u| *u != Unseen::default()),
+            Candidate::Ambient(ambient_term) | Candidate::Ssgi(ambient_term) => {
+                Some(*ambient_term).filter(|u| *u != AmbientTerm::default())
+            }
             _ => None,
         }
     }
 
-    /// The same method with other numbers of unseen light, where it has them.
-    pub fn with_unseen(&self, unseen: Unseen) -> Option<Self> {
+    /// The same method with another ambient term, where it has one.
+    pub fn with_ambient_term(&self, ambient_term: AmbientTerm) -> Option<Self> {
         match self {
-            Candidate::Ambient(_) => Some(Candidate::Ambient(unseen)),
-            Candidate::Ssgi(_) => Some(Candidate::Ssgi(unseen)),
+            Candidate::Ambient(_) => Some(Candidate::Ambient(ambient_term)),
+            Candidate::Ssgi(_) => Some(Candidate::Ssgi(ambient_term)),
             _ => None,
         }
     }
@@ -70,7 +72,7 @@ impl Candidate {
     pub fn name(&self, networks: &[Network]) -> String {
         match self {
             Candidate::Neural(index) => format!("neural {}", networks[*index].file.display()),
-            candidate => match candidate.gather().or(candidate.unseen().map(|u| u.words())) {
+            candidate => match candidate.gather().or(candidate.ambient_term().map(|u| u.words())) {
                 Some(numbers) => format!("{} {numbers}", candidate.method_name().name()),
                 None => candidate.method_name().name().into(),
             },

@@ -1,7 +1,7 @@
 //! Cameras that cover a scene, where its own do not.
 
 use crate::study::{
-    trial::{Settling, Trial, TrialError},
+    session::{Session, SessionError, Settling},
     views,
 };
 use bouncelight::gi::Method;
@@ -25,21 +25,21 @@ const NEAREST: f32 = 0.02;
 ///
 /// # Errors
 /// A picture that cannot be drawn.
-pub fn covering(trial: &mut Trial<'_>, count: usize) -> Result<Vec<Camera>, TrialError> {
-    let own: Vec<Camera> = trial.scene().cameras.iter().take(count).cloned().collect();
-    let Some(bounds) = world_bounds(trial.scene()) else { return Ok(own) };
+pub fn covering(session: &mut Session<'_>, count: usize) -> Result<Vec<Camera>, SessionError> {
+    let own: Vec<Camera> = session.scene().cameras.iter().take(count).cloned().collect();
+    let Some(bounds) = world_bounds(session.scene()) else { return Ok(own) };
     if own.len() == count {
         return Ok(own);
     }
     let wanted = count - own.len();
     let mut known = HashSet::new();
     for camera in &own {
-        known.extend(seen(trial, camera, bounds)?);
+        known.extend(seen(session, camera, bounds)?);
     }
-    let scattered: Vec<Camera> = views::around(trial.scene(), 1).take(TRIED * wanted).collect();
+    let scattered: Vec<Camera> = views::around(session.scene(), 1).take(TRIED * wanted).collect();
     let mut candidates = Vec::new();
     for camera in scattered {
-        let cells = seen(trial, &camera, bounds)?;
+        let cells = seen(session, &camera, bounds)?;
         candidates.push((camera, cells));
     }
     let mut chosen = own;
@@ -58,12 +58,12 @@ pub fn covering(trial: &mut Trial<'_>, count: usize) -> Result<Vec<Camera>, Tria
 
 /// Cells of the scene's box whose surfaces the camera shows; none where it shows hardly anything.
 fn seen(
-    trial: &mut Trial<'_>,
+    session: &mut Session<'_>,
     camera: &Camera,
     (low, high): ([f32; 3], [f32; 3]),
-) -> Result<HashSet<[u8; 3]>, TrialError> {
-    let shot = trial.picture(&Method::Direct, camera, Settling::COLD)?;
-    let [width, height] = trial.size();
+) -> Result<HashSet<[u8; 3]>, SessionError> {
+    let shot = session.picture(&Method::Direct, camera, Settling::COLD)?;
+    let [width, height] = session.size();
     let depth = &shot.layer(Layer::Depth).data;
     Ok(cells(camera, [width, height], depth, (low.into(), high.into())))
 }

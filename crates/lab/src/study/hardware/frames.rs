@@ -179,7 +179,7 @@ mod tests {
         let pass = |pass: &str, ms| PassTime { pass: pass.into(), ms: at(ms) };
         let mut m = Measurement {
             method: "ambient".into(),
-            passes: vec![pass("render.gbuffer", 3.0), pass("gi.ambient", 1.0), pass("gi.glossy", 0.5)],
+            passes: vec![pass("render.gbuffer", 3.0), pass("gi.ambient", 1.0), pass("gi.ssr", 0.5)],
             gpu_ms: Some(at(4.5)),
             wall_ms: at(4.6),
             bytes: Vec::new(),

@@ -1,9 +1,9 @@
 //! What is measured between looks: pure functions.
 
-use super::look::{Fetch, Look};
+use super::observation::{Fetch, Observation};
 
 /// Σ|b − a| / Σb over pixels that are surface in both. Infinite where b is dark and a is not.
-pub fn change(a: &Look, b: &Look) -> f64 {
+pub fn change(a: &Observation, b: &Observation) -> f64 {
     let pairs = (0..a.pixels()).filter(|&p| a.is_surface(p) && b.is_surface(p)).map(|p| (a.light_at(p), b.light_at(p)));
     ratio(pairs)
 }
@@ -25,7 +25,7 @@ pub fn share(a: f64, b: f64) -> f64 {
 }
 
 /// The change of a pixel that one in a thousand exceeds, relative to the mean light.
-pub fn largest_change(a: &Look, b: &Look) -> f64 {
+pub fn largest_change(a: &Observation, b: &Observation) -> f64 {
     let pixel = |p: usize| {
         let (a, b) = (a.light_at(p), b.light_at(p));
         (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max)
@@ -45,7 +45,7 @@ const BLOCK: usize = 4;
 /// Σ|Δ| / Σ of the light at places that both looks show, each fetched from `a` where `b` shows it,
 /// over blocks of `b`'s pixels half of which are found at least; and the share of `b`'s surfaces
 /// that both show.
-pub fn at_same_places(a: &Look, b: &Look) -> (f64, f64) {
+pub fn at_same_places(a: &Observation, b: &Observation) -> (f64, f64) {
     let fetch = Fetch::new(a);
     let width = b.size[0] as usize;
     let columns = width.div_ceil(BLOCK);
@@ -68,7 +68,7 @@ pub fn at_same_places(a: &Look, b: &Look) -> (f64, f64) {
 }
 
 /// Mean light of the places that `b` shows, too: in `a` and in `b`.
-pub fn means_at_same_places(a: &Look, b: &Look) -> [[f64; 3]; 2] {
+pub fn means_at_same_places(a: &Observation, b: &Observation) -> [[f64; 3]; 2] {
     let fetch = Fetch::new(a);
     let (mut sums, mut count) = ([[0.0; 3]; 2], 0.0f64);
     for (pixel, place) in b.positions().into_iter().enumerate() {
@@ -82,7 +82,7 @@ pub fn means_at_same_places(a: &Look, b: &Look) -> [[f64; 3]; 2] {
 }
 
 /// Pixels of `b` whose places `a` did not show, and those within `reach` pixels of them.
-pub fn uncovered(a: &Look, b: &Look, reach: usize) -> Vec<bool> {
+pub fn uncovered(a: &Observation, b: &Observation, reach: usize) -> Vec<bool> {
     let fetch = Fetch::new(a);
     let fresh = |(pixel, place): (usize, Option<glam::Vec3>)| {
         place.is_some_and(|place| fetch.at(place, b.normal_at(pixel)).is_none())
@@ -120,7 +120,7 @@ pub fn frames_to_ninety(values: &[f64], from: f64, to: f64) -> f64 {
 
 /// Standard deviation over mean of the light where `mask` is set, after blocks of `block`² pixels
 /// were averaged (1 for none).
-pub fn unevenness(look: &Look, mask: impl Fn(usize, usize) -> bool, block: usize) -> f64 {
+pub fn unevenness(look: &Observation, mask: impl Fn(usize, usize) -> bool, block: usize) -> f64 {
     let [w, h] = look.size.map(|n| n as usize);
     let mut means = Vec::new();
     for (bx, by) in (0..h / block).flat_map(|y| (0..w / block).map(move |x| (x, y))) {
@@ -143,11 +143,11 @@ mod unit {
     use bouncelight::scene::Camera;
 
     /// A wall across the view, 4 m away, of a camera at x; light is `light` of the world's x.
-    fn wall(x: f32, light: impl Fn(f32) -> f32) -> Look {
+    fn wall(x: f32, light: impl Fn(f32) -> f32) -> Observation {
         let size = [32, 16];
         let camera = Camera::look_at([x, 0.0, 0.0], [x, 0.0, -1.0], std::f32::consts::FRAC_PI_2);
         let pixels = 32 * 16;
-        let mut look = Look {
+        let mut look = Observation {
             size,
             light: vec![0.0; 3 * pixels],
             rgb: vec![0.0; 3 * pixels],

@@ -2,8 +2,8 @@
 //! path tracer's own number beside each.
 //!
 //! ```text
-//!  tests/*  one function a test, written against [`Play`]: "these frames, please" ─► looks ─► numbers
-//!  play     who draws them: a method, the path tracer, the paper's network; or the path tracer spoilt by a [`Fault`]
+//!  tests/*  one function a test, written against [`TestRun`]: "these frames, please" ─► observations ─► numbers
+//!  test_run who draws them: a method, the path tracer, the paper's network; or the path tracer spoilt by a [`Corruption`]
 //!  suite    runs test × subject; the path tracer must pass each test, and its spoilt copy must fail it
 //!  record   what JSON and tables are made of;  sheet: contact sheets and short sequences
 //! ```
@@ -12,30 +12,30 @@
 //! test of methods; and a test that the truth still passes when it is spoilt on purpose measures
 //! nothing.
 
+mod corruption;
 mod explain;
-mod fault;
-mod look;
 mod measures;
+mod observation;
 mod page;
-mod play;
 mod record;
 mod rooms;
 mod script;
 mod sheet;
 mod suite;
+mod test_run;
 mod tests;
 
-pub use fault::Fault;
-pub use look::Look;
+pub use corruption::Corruption;
+pub use observation::Observation;
 pub use page::page;
-pub use play::{Play, Subject};
 pub use record::{Criterion, Finding, Found, Record, SCHEMA};
 pub use script::Script;
 pub use sheet::{Moment, Sheet};
 pub use suite::{Event, Suite, SuiteOptions};
+pub use test_run::{Subject, TestRun};
 pub use tests::{all, named};
 
-use super::trial::TrialError;
+use super::session::SessionError;
 use crate::metrics::MetricError;
 use crate::network::pictures::PicturesError;
 use bouncelight::net::gpu::NetError;
@@ -92,7 +92,7 @@ pub struct Test {
     /// Its numbers, in the order in which `run` returns them.
     pub limits: &'static [Limit],
     /// With what the truth is spoilt, so that the test must fail.
-    pub control: Fault,
+    pub control: Corruption,
     /// Width and height of its pictures, pixels.
     pub size: [u32; 2],
     /// Paths a point of the truth.
@@ -100,7 +100,7 @@ pub struct Test {
     /// Whether the paper's network can take it: it answers pictures, not light.
     pub pictures: bool,
     /// Draws and measures.
-    pub run: fn(&Play<'_>) -> Result<Vec<f64>, StabilityError>,
+    pub run: fn(&TestRun<'_>) -> Result<Vec<f64>, StabilityError>,
 }
 
 /// Why a test could not be run, which is no answer of a method.
@@ -108,7 +108,7 @@ pub struct Test {
 pub enum StabilityError {
     /// Drawing or tracing failed.
     #[error(transparent)]
-    Trial(#[from] TrialError),
+    Session(#[from] SessionError),
     /// Pictures that cannot be compared.
     #[error(transparent)]
     Metric(#[from] MetricError),

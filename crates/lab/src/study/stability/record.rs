@@ -96,7 +96,8 @@ pub struct Found {
     pub reason: Option<String>,
     /// Another method drew in its place, and why.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub instead: Option<String>,
+    #[serde(alias = "instead")]
+    pub fallback: Option<String>,
     /// Why it fails, where that is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
@@ -204,7 +205,7 @@ mod unit {
 
     fn found(subject: &str, values: Vec<f64>, test: &Test) -> Found {
         let pass = Some(passes(test, &values));
-        Found { subject: subject.into(), values, pass, seconds: 1.0, reason: None, instead: None, why: None }
+        Found { subject: subject.into(), values, pass, seconds: 1.0, reason: None, fallback: None, why: None }
     }
 
     #[test]

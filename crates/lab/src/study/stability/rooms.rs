@@ -23,7 +23,7 @@ pub fn scene(blocks: &[Block], lights: &[LightKind], sky: f32) -> Scene {
 }
 
 pub fn light(kind: LightKind, color: [f32; 3]) -> Light {
-    Light { name: String::new(), color, kind, stands_in: false }
+    Light { name: String::new(), color, kind, is_emissive_proxy: false }
 }
 
 /// A dielectric without gloss.

@@ -1,6 +1,6 @@
 //! What a test asks to be drawn: frames, changes before them, and which of them are looked at.
 
-use crate::study::trial::{Edits, FrameChange};
+use crate::study::session::{Edits, FrameChange};
 use bouncelight::scene::Camera;
 
 /// What frames show, one after the other.

@@ -1,6 +1,6 @@
 //! Contact sheets and short sequences, for what a number does not say.
 
-use super::{Look, StabilityError, Test};
+use super::{Observation, StabilityError, Test};
 use bouncelight::render::tonemap_curve::Tonemap;
 use bouncelight_scene::image_io;
 use font8x8::UnicodeFonts;
@@ -18,7 +18,7 @@ pub struct Moment {
 
 impl Moment {
     /// `shown` says that the look's picture has been through a view transform already.
-    pub(super) fn new(name: &str, look: &Look, shown: bool) -> Self {
+    pub(super) fn new(name: &str, look: &Observation, shown: bool) -> Self {
         Self { name: name.into(), size: look.size.map(|n| n as usize), rgb: look.rgb.clone(), shown }
     }
 

@@ -1,12 +1,12 @@
 //! Runs tests: the truth, the truth spoilt, then everybody else.
 
 use super::{
-    Finding, Found, Play, Record, Sheet, StabilityError, Subject, Test, explain,
-    play::Stage,
+    Finding, Found, Record, Sheet, StabilityError, Subject, Test, TestRun, explain,
     record::{Kept, SCHEMA, SubjectRecord, passes},
     sheet::Row,
+    test_run::Stage,
 };
-use crate::study::trial::TrialError;
+use crate::study::session::SessionError;
 use bouncelight::gpu::Gpu;
 use bouncelight_scene::image_io;
 use std::{path::PathBuf, time::Instant};
@@ -68,7 +68,7 @@ impl<'a> Suite<'a> {
     /// `go_on` is asked all the time.
     ///
     /// # Errors
-    /// [`TrialError::Stopped`] where `go_on` said no; what `told` returns.
+    /// [`SessionError::Stopped`] where `go_on` said no; what `told` returns.
     pub fn run<E: From<StabilityError>>(
         &self,
         go_on: &dyn Fn() -> bool,
@@ -138,10 +138,10 @@ impl<'a> Suite<'a> {
         let mut finding = Finding::new(test);
         let mut sheet = Sheet::new(test);
         let mut begun = |subject: &str| told(Event::Begun { test, subject });
-        let take = |subject: &Subject, fault| {
-            let play = Play::new(stage, subject, fault, test.size, test.paths);
-            let values = (test.run)(&play);
-            (values, play.end())
+        let take = |subject: &Subject, corruption| {
+            let run = TestRun::new(stage, subject, corruption, test.size, test.paths);
+            let values = (test.run)(&run);
+            (values, run.end())
         };
         // The truth first: the sheet's exposure is its.
         begun("reference")?;
@@ -174,7 +174,7 @@ impl<'a> Suite<'a> {
                 pass: None,
                 seconds: started.elapsed().as_secs_f64(),
                 reason: None,
-                instead: kept.instead,
+                fallback: kept.fallback,
                 why: None,
             };
             let shown;
@@ -206,7 +206,7 @@ impl<'a> Suite<'a> {
 /// An interruption ends everything; any other failure is an answer of its own.
 fn keep_going(values: Result<Vec<f64>, StabilityError>) -> Result<Result<Vec<f64>, StabilityError>, StabilityError> {
     match values {
-        Err(StabilityError::Trial(TrialError::Stopped)) => Err(TrialError::Stopped.into()),
+        Err(StabilityError::Session(SessionError::Stopped)) => Err(SessionError::Stopped.into()),
         values => Ok(values),
     }
 }
@@ -218,7 +218,7 @@ fn not_for_it(subject: &Subject, why: &str) -> Found {
         pass: None,
         seconds: 0.0,
         reason: Some(why.into()),
-        instead: None,
+        fallback: None,
         why: None,
     }
 }

@@ -166,7 +166,7 @@ fn meshes_in_one_place_share_a_tree_until_one_goes() {
     let mut rays = SceneRays::new(&gpu.device, &gpu.queue, &scene).expect("they fit");
     assert!(different(&gpu, &caster, &rays, &world_triangles(&scene)) < 1e-3);
     assert_eq!((rays.counts().instances, rays.counts().left_out), (8, 0));
-    let (id, moves) = (rays.id(), rays.moves());
+    let (id, version) = (rays.id(), rays.version());
     // All go: the tree stays.
     scene.instances.iter_mut().for_each(|i| i.transform[3][2] += 0.3);
     assert!(!rays.place(&gpu.queue, &scene));
@@ -176,7 +176,7 @@ fn meshes_in_one_place_share_a_tree_until_one_goes() {
     assert!(rays.place(&gpu.queue, &scene), "what is bound is another");
     assert!(different(&gpu, &caster, &rays, &world_triangles(&scene)) < 1e-3);
     assert_eq!((rays.counts().instances, rays.counts().left_out), (8, 0));
-    assert!(rays.id() == id && rays.moves() > moves + 1);
+    assert!(rays.id() == id && rays.version() > version + 1);
 }
 
 #[test]

@@ -98,7 +98,7 @@ impl<'a> Painter<'a> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let mut uploaded = SceneGpu::new(device, queue, scene).expect("the fixture uploads");
         uploaded.trace(device, queue, scene).expect("the fixture has rays");
-        self.renderer.cut();
+        self.renderer.reset_history();
         let [warmup, samples] = self.effort.frames;
         let options = CaptureOptions { samples, warmup, ..Default::default() };
         let frame = capture(self.gpu, &mut self.renderer, &uploaded, &scene.cameras[0], options).expect("it draws");

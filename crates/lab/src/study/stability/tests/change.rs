@@ -1,8 +1,8 @@
 //! Lights and doors that change under a still camera.
 
-use super::super::{Fault, Limit, Look, Script, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, Script, Test, Unit, measures, rooms};
 use super::{LONG, SMALL};
-use crate::study::trial::Edits;
+use crate::study::session::Edits;
 use bouncelight::scene::{Camera, Light};
 
 const SOON: &str = "a tenth of a second at 60 frames: what happens later no longer seems to be caused by the switch";
@@ -26,25 +26,25 @@ pub static SWITCH: Test = Test {
             source: "a fourteenth of a stop",
         },
     ],
-    control: Fault::Late(0.93),
+    control: Corruption::Late(0.93),
     size: SMALL,
     paths: 16,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let lamp = |w: f32| rooms::lamp([1.5, 3.0, 0.5], w);
         let hall = |w: f32| rooms::hall(rooms::GREY, &[lamp(w)], 0.02);
         let switch = |w: f32| Edits { lights: Some(hall(w).lights), ..Edits::default() };
         let camera = rooms::hall_camera();
         let after = |script: Script| script.looks(&camera, 8).rest(&camera, 21).look(&camera);
         let script = after(Script::new().rest(&camera, LONG).look(&camera).edit(switch(0.0)));
-        let looks = play.film(&hall(20.0), after(script.edit(switch(20.0))))?;
-        play.roll(&looks);
+        let looks = run.render_sequence(&hall(20.0), after(script.edit(switch(20.0))))?;
+        run.roll(&looks);
         let names = ["on", "off, frame 1", "off, frame 6", "off, frame 30", "on, frame 1", "on, frame 30"];
         let kept = [0, 1, 6, 9, 10, 18];
-        kept.into_iter().zip(names).for_each(|(i, name)| play.keep(name, &looks[i]));
-        let means: Vec<f64> = looks.iter().map(Look::mean).collect();
-        let dark = play.settled(&hall(0.0), &camera, LONG)?.mean();
-        let bright = play.settled(&hall(20.0), &camera, LONG)?.mean();
+        kept.into_iter().zip(names).for_each(|(i, name)| run.keep(name, &looks[i]));
+        let means: Vec<f64> = looks.iter().map(Observation::mean).collect();
+        let dark = run.settled(&hall(0.0), &camera, LONG)?.mean();
+        let bright = run.settled(&hall(20.0), &camera, LONG)?.mean();
         let off = measures::frames_to_ninety(&means[1..9], means[0], dark);
         let on = measures::frames_to_ninety(&means[10..18], means[9], bright);
         let left = measures::share((means[9] - dark).abs(), (bright - dark).abs());
@@ -75,13 +75,13 @@ pub static SWEEP: Test = Test {
             source: "twice the least contrast that an eye sees",
         },
     ],
-    control: Fault::Late(0.93),
+    control: Corruption::Late(0.93),
     // All light is the mean of as many rays as there are cells: at 96×64 `gather` has 2.3 % of
     // noise (docs/log).
     size: [192, 128],
     paths: 16,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let lamp = |i: usize| rooms::lamp([-3.0 + 0.25 * i as f32, 2.5, 1.5], 10.0);
         let hall = |i: usize| rooms::hall(rooms::GREY, &[lamp(i)], 0.02);
         let camera = rooms::hall_camera();
@@ -92,18 +92,18 @@ pub static SWEEP: Test = Test {
             script = script.edit(Edits { lights: Some(lights), ..Edits::default() });
             script = script.look(&camera);
         }
-        let looks = play.film(&hall(0), script)?;
-        play.roll(&looks);
+        let looks = run.render_sequence(&hall(0), script)?;
+        run.roll(&looks);
         let mut lag = 0.0;
         for (i, name) in [(16, "frame 16"), (20, "frame 20")] {
             let look = &looks[i];
-            let rest = play.settled(&hall(i), &camera, LONG)?;
+            let rest = run.settled(&hall(i), &camera, LONG)?;
             lag += 0.5 * measures::change(look, &rest);
-            play.keep(name, look);
-            play.keep("at rest", &rest);
+            run.keep(name, look);
+            run.keep("at rest", &rest);
         }
         // Of the frames in which it moves: eighteen, since three would be a draw of lots.
-        let means: Vec<f64> = looks[1..].iter().map(Look::mean).collect();
+        let means: Vec<f64> = looks[1..].iter().map(Observation::mean).collect();
         let bends: f64 = means.windows(3).map(|m| (m[0] - 2.0 * m[1] + m[2]).abs() / m[1]).sum();
         Ok(vec![lag, bends / (means.len() - 2) as f64])
     },
@@ -132,11 +132,11 @@ pub static DOOR: Test = Test {
             source: "a seventh of a stop",
         },
     ],
-    control: Fault::Late(0.95),
+    control: Corruption::Late(0.95),
     size: SMALL,
     paths: 16,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let mut rooms_ =
             rooms::scene(&rooms::two_rooms(0.2, true, rooms::WHITE), &[rooms::lamp([-2.5, 2.4, 0.6], 20.0)], 0.0);
         // It slides into the wall.
@@ -157,12 +157,12 @@ pub static DOOR: Test = Test {
         for i in 1..=10 {
             script = script.edit(at(1.0 - 0.1 * i as f32)).rest(&camera, 1);
         }
-        let looks = play.film(&rooms_, script.rest(&camera, 29).look(&camera))?;
-        play.roll(&looks);
+        let looks = run.render_sequence(&rooms_, script.rest(&camera, 29).look(&camera))?;
+        run.roll(&looks);
         let kept =
             [(0, "open"), (1, "just shut"), (12, "12 frames later"), (17, "30 frames later"), (18, "open again")];
-        kept.into_iter().for_each(|(i, name)| play.keep(name, &looks[i]));
-        let means: Vec<f64> = looks.iter().map(Look::mean).collect();
+        kept.into_iter().for_each(|(i, name)| run.keep(name, &looks[i]));
+        let means: Vec<f64> = looks.iter().map(Observation::mean).collect();
         let gone = measures::frames_to_ninety(&means[1..17], means[0], 0.0);
         let left = measures::share(means[17], means[0]);
         let back = measures::share((means[18] - means[0]).abs(), means[0]);

@@ -1,6 +1,6 @@
 //! How much light there must be.
 
-use super::super::{Fault, Limit, Look, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, Test, Unit, measures, rooms};
 use super::{LONG, SMALL};
 use bouncelight::scene::{Camera, Scene};
 
@@ -21,20 +21,20 @@ pub static ALBEDO: Test = Test {
             source: "a seventh of a stop",
         },
     ],
-    control: Fault::Gain(1.5),
+    control: Corruption::Gain(1.5),
     size: SMALL,
     paths: 48,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let camera = rooms::hall_camera();
         let of = |albedo: f32| rooms::hall_of([albedo; 3], [albedo; 3], &[], 1.0);
-        let black = play.settled(&of(0.001), &camera, LONG)?;
-        let white = play.settled(&of(1.0), &camera, LONG)?;
-        play.keep("albedo 0.001", &black);
-        play.keep("albedo 1", &white);
+        let black = run.settled(&of(0.001), &camera, LONG)?;
+        let white = run.settled(&of(1.0), &camera, LONG)?;
+        run.keep("albedo 0.001", &black);
+        run.keep("albedo 1", &white);
         let brightest = black.light.iter().copied().fold(0.0, f32::max);
         let excess = f64::from((brightest - 1.0).max(0.0));
-        Ok(vec![excess, (white.mean() / play.truth(&of(1.0), &camera)?.mean() - 1.0).abs()])
+        Ok(vec![excess, (white.mean() / run.truth(&of(1.0), &camera)?.mean() - 1.0).abs()])
     },
 };
 
@@ -55,16 +55,16 @@ pub static FURNACE: Test = Test {
             source: "physics: exact; at 0.8 the twentieth bounce still has 1 %",
         },
     ],
-    control: Fault::Gain(1.1),
+    control: Corruption::Gain(1.1),
     size: SMALL,
     paths: 16,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let camera = Camera::look_at([-1.5, 1.8, 1.2], [1.0, 1.1, -1.0], 1.2);
         let mut found = Vec::new();
         for albedo in [0.5, 0.8f32] {
-            let look = play.settled(&furnace(albedo), &camera, 2 * LONG)?;
-            play.keep(&format!("albedo {albedo}"), &look);
+            let look = run.settled(&furnace(albedo), &camera, 2 * LONG)?;
+            run.keep(&format!("albedo {albedo}"), &look);
             found.push((look.mean() * f64::from(1.0 - albedo) - 1.0).abs());
         }
         Ok(found)
@@ -89,15 +89,15 @@ pub static SEALED: Test = Test {
     name: "sealed",
     question: "Does a closed room stay dark under a bright sky and sun?",
     limits: &[SEALED_LIMIT],
-    control: Fault::Leak(0.01),
+    control: Corruption::Leak(0.01),
     size: SMALL,
     paths: 16,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let blocks = rooms::shell([-3.0, 0.0, -3.0], [3.0, 3.0, 3.0], rooms::GREY);
         let room = rooms::scene(&blocks, &[rooms::sun([0.3, -0.9, 0.3], 3.0)], 1.0);
-        let look = play.settled(&room, &Camera::look_at([1.0, 1.5, 2.0], [0.0, 1.0, -3.0], 1.0), 32)?;
-        play.keep("closed", &look);
+        let look = run.settled(&room, &Camera::look_at([1.0, 1.5, 2.0], [0.0, 1.0, -3.0], 1.0), 32)?;
+        run.keep("closed", &look);
         // Outside there is the sky's radiance and more.
         Ok(vec![look.mean()])
     },
@@ -107,13 +107,13 @@ pub static THIN_WALL: Test = Test {
     name: "thin-wall",
     question: "Does a wall of 2 cm keep the light of the next room out?",
     limits: &[Limit { name: "light behind the wall over light before it", ..SEALED_LIMIT }],
-    run: |play| {
+    run: |run| {
         let rooms =
             rooms::scene(&rooms::two_rooms(0.02, false, rooms::GREY), &[rooms::lamp([-2.0, 2.2, 0.3], 10.0)], 0.0);
         let at = |x: f32| Camera::look_at([x, 1.6, 1.6], [x - 1.0, 0.6, -1.0], 1.2);
-        let (dark, bright) = (play.settled(&rooms, &at(1.6), 32)?, play.settled(&rooms, &at(-2.0), 32)?);
-        play.keep("lit room", &bright);
-        play.keep("behind the wall", &dark);
+        let (dark, bright) = (run.settled(&rooms, &at(1.6), 32)?, run.settled(&rooms, &at(-2.0), 32)?);
+        run.keep("lit room", &bright);
+        run.keep("behind the wall", &dark);
         Ok(vec![measures::share(dark.mean(), bright.mean().max(1e-9))])
     },
     ..SEALED
@@ -131,15 +131,15 @@ pub static CORNER: Test = Test {
             source: "a quarter of a stop",
         },
     ],
-    control: Fault::Screen(1.0),
+    control: Corruption::Screen(1.0),
     size: SMALL,
     paths: 64,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let (scene, camera) = corridor();
-        let look = play.settled(&scene, &camera, LONG)?;
-        play.keep("around the corner", &look);
-        let truth = play.truth(&scene, &camera)?;
+        let look = run.settled(&scene, &camera, LONG)?;
+        run.keep("around the corner", &look);
+        let truth = run.truth(&scene, &camera)?;
         let fall = near_over_far(&look) / near_over_far(&truth);
         Ok(vec![(look.mean() / truth.mean() - 1.0).abs(), (fall - 1.0).abs()])
     },
@@ -156,7 +156,7 @@ fn corridor() -> (Scene, Camera) {
 }
 
 /// Light of the picture's right half over that of its left.
-fn near_over_far(look: &Look) -> f64 {
+fn near_over_far(look: &Observation) -> f64 {
     let width = look.size[0] as usize;
     let (mut near, mut far) = (0.0, 0.0);
     for pixel in 0..look.pixels() {

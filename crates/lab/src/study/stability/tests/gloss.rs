@@ -1,6 +1,6 @@
 //! Metal and mirrors: pictures, since what they show is no diffuse light.
 
-use super::super::{Fault, Limit, Look, Play, StabilityError, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, StabilityError, Test, TestRun, Unit, measures, rooms};
 use super::LONG;
 use crate::metrics::{Picture, flip};
 use bouncelight::scene::{Camera, Material, Scene};
@@ -28,17 +28,17 @@ pub static METAL: Test = Test {
     name: "metal",
     question: "Do metals of roughness 0.3 to 1 show what is around them?",
     limits: LIMITS,
-    control: Fault::Gain(2.0),
+    control: Corruption::Gain(2.0),
     size: SIZE,
     paths: 128,
     pictures: false,
-    run: |play| against_truth(play, [0.3, 0.5, 0.75, 1.0]),
+    run: |run| against_truth(run, [0.3, 0.5, 0.75, 1.0]),
 };
 
 pub static MIRROR: Test = Test {
     name: "mirror",
     question: "Do mirrors (roughness 0 to 0.15) show what is around them?",
-    run: |play| against_truth(play, [0.0, 0.05, 0.1, 0.15]),
+    run: |run| against_truth(run, [0.0, 0.05, 0.1, 0.15]),
     ..METAL
 };
 
@@ -59,16 +59,16 @@ fn middle(ball: usize) -> Vec3 {
     Vec3::new(-1.65 + 1.1 * ball as f32, 0.5, 0.8)
 }
 
-fn against_truth(play: &Play<'_>, roughness: [f32; 4]) -> Result<Vec<f64>, StabilityError> {
+fn against_truth(run: &TestRun<'_>, roughness: [f32; 4]) -> Result<Vec<f64>, StabilityError> {
     let (scene, camera) = balls(roughness);
-    let look = play.settled(&scene, &camera, LONG)?;
-    let truth = play.truth(&scene, &camera)?;
-    play.keep("settled", &look);
+    let look = run.settled(&scene, &camera, LONG)?;
+    let truth = run.truth(&scene, &camera)?;
+    run.keep("settled", &look);
     let mask = ball_pixels(&truth);
     let [w, h] = look.size.map(|n| n as usize);
     let (ours, theirs) = (Picture::new("picture", w, h, &look.rgb)?, Picture::new("truth", w, h, &truth.rgb)?);
     let (map, _) = flip::hdr_flip(ours, theirs, flip::PIXELS_PER_DEGREE)?;
-    let sum = |look: &Look| -> f64 {
+    let sum = |look: &Observation| -> f64 {
         let inside = look.rgb.chunks_exact(3).zip(&mask).filter(|(_, m)| **m);
         inside.map(|(p, _)| f64::from(p.iter().sum::<f32>())).sum()
     };
@@ -76,7 +76,7 @@ fn against_truth(play: &Play<'_>, roughness: [f32; 4]) -> Result<Vec<f64>, Stabi
 }
 
 /// Pixels within the balls, by place.
-fn ball_pixels(look: &Look) -> Vec<bool> {
+fn ball_pixels(look: &Observation) -> Vec<bool> {
     let within = |p: Vec3| (0..4).any(|i| p.distance(middle(i)) < 0.505);
     look.positions().into_iter().map(|p| p.is_some_and(within)).collect()
 }

@@ -1,6 +1,6 @@
 //! What must hold of any light: it is linear, it has its colour, it knows no metres.
 
-use super::super::{Fault, Limit, Look, Play, StabilityError, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, StabilityError, Test, TestRun, Unit, measures, rooms};
 use super::SMALL;
 use bouncelight::scene::{Camera, Environment, LightKind, Scene};
 
@@ -24,8 +24,8 @@ fn hall(sun: f32, lamp: f32, sky: f32) -> Scene {
 }
 
 /// A copy with `factor` times the light.
-fn times(look: &Look, factor: f32) -> Look {
-    Look { light: look.light.iter().map(|v| v * factor).collect(), ..look.clone() }
+fn times(look: &Observation, factor: f32) -> Observation {
+    Observation { light: look.light.iter().map(|v| v * factor).collect(), ..look.clone() }
 }
 
 pub static TWICE: Test = Test {
@@ -40,18 +40,18 @@ pub static TWICE: Test = Test {
         },
         Limit { name: "values above 0 without any light", unit: Unit::Count, at_most: 0.0, source: "physics" },
     ],
-    control: Fault::Curve(0.9),
+    control: Corruption::Curve(0.9),
     size: SMALL,
     paths: 16,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let camera = rooms::hall_camera();
-        let once = play.settled(&hall(1.0, 1.0, 1.0), &camera, FRAMES)?;
-        let twice = play.settled(&hall(2.0, 2.0, 2.0), &camera, FRAMES)?;
-        let none = play.settled(&hall(0.0, 0.0, 0.0), &camera, FRAMES)?;
-        play.keep("once", &once);
-        play.keep("twice", &twice);
-        play.keep("none", &none);
+        let once = run.settled(&hall(1.0, 1.0, 1.0), &camera, FRAMES)?;
+        let twice = run.settled(&hall(2.0, 2.0, 2.0), &camera, FRAMES)?;
+        let none = run.settled(&hall(0.0, 0.0, 0.0), &camera, FRAMES)?;
+        run.keep("once", &once);
+        run.keep("twice", &twice);
+        run.keep("none", &none);
         let lit = none.light.iter().filter(|v| **v != 0.0).count();
         Ok(vec![measures::change(&times(&twice, 0.5), &once), lit as f64])
     },
@@ -66,21 +66,21 @@ pub static SUM: Test = Test {
         at_most: 0.05,
         source: "physics; 5 % for the noise of four pictures",
     }],
-    control: Fault::Curve(0.8),
+    control: Corruption::Curve(0.8),
     size: SMALL,
     paths: 64,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let camera = rooms::hall_camera();
-        let of = |sun, lamp, sky| play.settled(&hall(sun, lamp, sky), &camera, 2 * FRAMES);
+        let of = |sun, lamp, sky| run.settled(&hall(sun, lamp, sky), &camera, 2 * FRAMES);
         let whole = of(1.0, 1.0, 1.0)?;
         let parts = [of(1.0, 0.0, 0.0)?, of(0.0, 1.0, 0.0)?, of(0.0, 0.0, 1.0)?];
         let mut sum = parts[0].clone();
         for (i, v) in sum.light.iter_mut().enumerate() {
             *v += parts[1].light[i] + parts[2].light[i];
         }
-        play.keep("together", &whole);
-        parts.iter().zip(["sun", "lamp", "sky"]).for_each(|(part, name)| play.keep(name, part));
+        run.keep("together", &whole);
+        parts.iter().zip(["sun", "lamp", "sky"]).for_each(|(part, name)| run.keep(name, part));
         Ok(vec![measures::at_same_places(&sum, &whole).0])
     },
 };
@@ -94,26 +94,26 @@ pub static EXPOSURE: Test = Test {
         at_most: 0.005,
         source: "physics; ten steps of a half float",
     }],
-    control: Fault::Curve(0.99),
+    control: Corruption::Curve(0.99),
     size: SMALL,
     paths: 16,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let camera = rooms::hall_camera();
-        let plain = play.settled(&hall(1.0, 1.0, 1.0), &camera, FRAMES)?;
+        let plain = run.settled(&hall(1.0, 1.0, 1.0), &camera, FRAMES)?;
         let mut worst = 0.0f64;
         for factor in [1.0 / 64.0, 64.0] {
-            let other = play.settled(&hall(factor, factor, factor), &camera, FRAMES)?;
+            let other = run.settled(&hall(factor, factor, factor), &camera, FRAMES)?;
             let back = times(&other, 1.0 / factor);
             worst = worst.max(measures::change(&back, &plain));
-            play.keep(if factor < 1.0 { "/64, scaled back" } else { "x64, scaled back" }, &scaled_back(&other, factor));
+            run.keep(if factor < 1.0 { "/64, scaled back" } else { "x64, scaled back" }, &scaled_back(&other, factor));
         }
         Ok(vec![worst])
     },
 };
 
-fn scaled_back(look: &Look, factor: f32) -> Look {
-    Look { rgb: look.rgb.iter().map(|v| v / factor).collect(), ..times(look, 1.0 / factor) }
+fn scaled_back(look: &Observation, factor: f32) -> Observation {
+    Observation { rgb: look.rgb.iter().map(|v| v / factor).collect(), ..times(look, 1.0 / factor) }
 }
 
 pub static SATURATED: Test = Test {
@@ -125,16 +125,16 @@ pub static SATURATED: Test = Test {
         at_most: 0.0,
         source: "physics: a channel without light has none",
     }],
-    control: Fault::Grey(0.01),
+    control: Corruption::Grey(0.01),
     size: SMALL,
     paths: 16,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let mut red = hall(1.0, 1.0, 0.0);
         red.lights.iter_mut().for_each(|l| l.color = [1.0, 0.0, 0.0]);
         red.environment = Environment::constant([0.1, 0.0, 0.0]);
-        let look = play.settled(&red, &rooms::hall_camera(), FRAMES)?;
-        play.keep("pure red", &look);
+        let look = run.settled(&red, &rooms::hall_camera(), FRAMES)?;
+        run.keep("pure red", &look);
         let sum = |c: usize| look.light.iter().skip(c).step_by(3).map(|v| f64::from(v.abs())).sum::<f64>();
         Ok(vec![measures::share(sum(1) + sum(2), sum(0))])
     },
@@ -157,23 +157,29 @@ pub static UNITS: Test = Test {
             source: "physics: the picture is the same; 5 % for noise",
         },
     ],
-    control: Fault::Metres(0.5),
+    control: Corruption::Metres(0.5),
     size: SMALL,
     paths: 32,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let (scene, camera) = (hall(1.0, 1.0, 1.0), rooms::hall_camera());
-        let plain = play.settled(&scene, &camera, 2 * FRAMES)?;
-        play.keep("metres", &plain);
-        let large = unit(play, &scene, &camera, 1000.0, "x1000")?;
-        let small = unit(play, &scene, &camera, 0.001, "/1000")?;
+        let plain = run.settled(&scene, &camera, 2 * FRAMES)?;
+        run.keep("metres", &plain);
+        let large = unit(run, &scene, &camera, 1000.0, "x1000")?;
+        let small = unit(run, &scene, &camera, 0.001, "/1000")?;
         Ok(vec![measures::change(&large, &plain), measures::change(&small, &plain)])
     },
 };
 
-fn unit(play: &Play<'_>, scene: &Scene, camera: &Camera, factor: f32, name: &str) -> Result<Look, StabilityError> {
+fn unit(
+    run: &TestRun<'_>,
+    scene: &Scene,
+    camera: &Camera,
+    factor: f32,
+    name: &str,
+) -> Result<Observation, StabilityError> {
     let (scene, camera) = rooms::scaled(scene, camera, factor);
-    let look = play.settled(&scene, &camera, 2 * FRAMES)?;
-    play.keep(name, &look);
+    let look = run.settled(&scene, &camera, 2 * FRAMES)?;
+    run.keep(name, &look);
     Ok(look)
 }

@@ -1,6 +1,6 @@
 //! What networks are known to do: splotches, coarse numbers, scenes unlike those they have learnt.
 
-use super::super::{Fault, Limit, Look, StabilityError, Subject, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, StabilityError, Subject, Test, Unit, measures, rooms};
 use super::{LONG, PAPER, SMALL};
 use bouncelight::gi::Method;
 use bouncelight::net::plan::Precision;
@@ -17,16 +17,16 @@ pub static FLAT: Test = Test {
         at_most: 0.02,
         source: "physics: under an open sky a floor has one light; twice the least contrast that an eye sees",
     }],
-    control: Fault::Screen(0.5),
+    control: Corruption::Screen(0.5),
     size: PAPER,
     paths: 8,
     pictures: true,
-    run: |play| {
+    run: |run| {
         // Nothing but a floor under the sky and a sun: the same light everywhere.
         let floor = [([-40.0, -0.2, -40.0], [40.0, 0.0, 40.0], rooms::GREY)];
         let scene = rooms::scene(&floor, &[rooms::sun([0.3, -0.9, 0.1], 1.0)], 0.3);
-        let look = play.settled(&scene, &Camera::look_at([0.0, 4.0, 4.0], [0.0, 0.0, -1.0], 0.8), 24)?;
-        play.keep("an even floor", &look);
+        let look = run.settled(&scene, &Camera::look_at([0.0, 4.0, 4.0], [0.0, 0.0, -1.0], 0.8), 24)?;
+        run.keep("an even floor", &look);
         Ok(vec![measures::unevenness(&look, |_, _| true, 8)])
     },
 };
@@ -35,26 +35,26 @@ pub static HALF: Test = Test {
     name: "half",
     question: "Is the answer of a network stored in 16 bits that of 32?",
     limits: &[Limit { name: "difference", unit: Unit::Share, at_most: 0.005, source: "ten steps of a half float" }],
-    control: Fault::Noise(0.1),
+    control: Corruption::Noise(0.1),
     size: SMALL,
     paths: 8,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let (scene, camera) =
             (rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.1), rooms::hall_camera());
-        let of = |precision| match play.subject() {
+        let of = |precision| match run.subject() {
             Subject::Method { name, method: Method::Neural(neural) } => {
                 let mut neural = neural.clone();
                 neural.network.precision = precision;
                 let subject = Subject::Method { name: name.clone(), method: Method::Neural(neural) };
-                play.as_other(&subject).settled(&scene, &camera, 8)
+                run.as_other(&subject).settled(&scene, &camera, 8)
             }
-            Subject::Truth => play.settled(&scene, &camera, 8),
+            Subject::Truth => run.settled(&scene, &camera, 8),
             _ => Err(StabilityError::NotForIt("it has no network")),
         };
         let (full, half) = (of(Precision::F32)?, of(Precision::F16)?);
-        play.keep("32 bits", &full);
-        play.keep("16 bits", &half);
+        run.keep("32 bits", &full);
+        run.keep("16 bits", &half);
         Ok(vec![measures::change(&half, &full)])
     },
 };
@@ -68,14 +68,14 @@ pub static UNSEEN: Test = Test {
         at_most: 0.15,
         source: "the worst real scene's is 17 % (docs/results/accuracy.md)",
     }],
-    control: Fault::Gain(1.3),
+    control: Corruption::Gain(1.3),
     size: [128, 64],
     paths: 128,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let (scene, camera) = still_life();
-        let (look, truth) = (play.settled(&scene, &camera, LONG)?, play.truth(&scene, &camera)?);
-        play.keep("shapes and checks", &look);
+        let (look, truth) = (run.settled(&scene, &camera, LONG)?, run.truth(&scene, &camera)?);
+        run.keep("shapes and checks", &look);
         Ok(vec![pooled_error(&look, &truth)])
     },
 };
@@ -109,14 +109,14 @@ fn still_life() -> (Scene, Camera) {
 }
 
 /// Σ|Δ| / Σ after 4×4 pooling over blocks that are all surface.
-fn pooled_error(look: &Look, truth: &Look) -> f64 {
+fn pooled_error(look: &Observation, truth: &Observation) -> f64 {
     let [w, h] = truth.size.map(|n| n as usize);
     let (mut apart, mut all) = (0.0, 0.0);
     for (bx, by) in (0..h / 4).flat_map(|y| (0..w / 4).map(move |x| (x, y))) {
         let pixels: Vec<usize> = (0..16).map(|i| (4 * by + i / 4) * w + 4 * bx + i % 4).collect();
         if pixels.iter().all(|&p| truth.is_surface(p)) {
             for c in 0..3 {
-                let mean = |l: &Look| pixels.iter().map(|p| f64::from(l.light[3 * p + c])).sum::<f64>() / 16.0;
+                let mean = |l: &Observation| pixels.iter().map(|p| f64::from(l.light[3 * p + c])).sum::<f64>() / 16.0;
                 apart += (mean(look) - mean(truth)).abs();
                 all += mean(truth);
             }

@@ -1,6 +1,6 @@
 //! A still camera before a still scene.
 
-use super::super::{Fault, Limit, Play, Script, StabilityError, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Script, StabilityError, Test, TestRun, Unit, measures, rooms};
 use super::{LONG, PAPER, SMALL};
 use bouncelight::scene::{Camera, Scene};
 
@@ -22,12 +22,12 @@ pub static FROZEN: Test = Test {
         SPARK,
         Limit { name: "change of all light since frame 50", unit: Unit::Share, at_most: 0.01, source: "1 % (Weber)" },
     ],
-    control: Fault::Noise(0.1),
+    control: Corruption::Noise(0.1),
     size: SMALL,
     paths: 16,
     pictures: false,
-    run: |play| {
-        at_rest(play, &rooms::hall(rooms::GREY, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.02), &rooms::hall_camera(), 100)
+    run: |run| {
+        at_rest(run, &rooms::hall(rooms::GREY, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.02), &rooms::hall_camera(), 100)
     },
 };
 
@@ -44,9 +44,9 @@ pub static DARK_ROOM: Test = Test {
             source: "twice the least contrast that an eye sees, over three seconds",
         },
     ],
-    run: |play| {
+    run: |run| {
         let (room, camera) = dark_room();
-        at_rest(play, &room, &camera, 200)
+        at_rest(run, &room, &camera, 200)
     },
     ..FROZEN
 };
@@ -60,16 +60,16 @@ pub static REPEAT: Test = Test {
         at_most: 0.0,
         source: "to the bit: what differs by chance flickers",
     }],
-    control: Fault::Noise(0.01),
+    control: Corruption::Noise(0.01),
     size: PAPER,
     paths: 4,
     pictures: true,
-    run: |play| {
+    run: |run| {
         let hall = rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.05);
         let camera = rooms::hall_camera();
-        let (a, b) = (play.settled(&hall, &camera, 8)?, play.settled(&hall, &camera, 8)?);
-        play.keep("once", &a);
-        play.keep("again", &b);
+        let (a, b) = (run.settled(&hall, &camera, 8)?, run.settled(&hall, &camera, 8)?);
+        run.keep("once", &a);
+        run.keep("again", &b);
         let largest = a.light.iter().zip(&b.light).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         Ok(vec![measures::share(f64::from(largest), b.mean())])
     },
@@ -90,12 +90,12 @@ pub(super) fn dark_room() -> (Scene, Camera) {
     (room, Camera::look_at([-0.5, 1.5, 0.5], [-3.0, 1.3, -0.6], 1.0))
 }
 
-fn at_rest(play: &Play<'_>, scene: &Scene, camera: &Camera, frames: usize) -> Result<Vec<f64>, StabilityError> {
+fn at_rest(run: &TestRun<'_>, scene: &Scene, camera: &Camera, frames: usize) -> Result<Vec<f64>, StabilityError> {
     let half = frames / 2;
     let script = Script::new().rest(camera, half - 1).look(camera).rest(camera, frames - half - 2).looks(camera, 2);
-    let looks = play.film(scene, script)?;
-    play.keep(&format!("frame {half}"), &looks[0]);
-    play.keep(&format!("frame {frames}"), &looks[2]);
+    let looks = run.render_sequence(scene, script)?;
+    run.keep(&format!("frame {half}"), &looks[0]);
+    run.keep(&format!("frame {frames}"), &looks[2]);
     debug_assert!(frames >= LONG);
     let change = measures::change(&looks[1], &looks[2]);
     let largest = measures::largest_change(&looks[1], &looks[2]);

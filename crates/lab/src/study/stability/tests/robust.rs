@@ -1,8 +1,8 @@
 //! Odd sizes, odd scenes, numbers that are none.
 
-use super::super::{Fault, Limit, Look, Play, Script, StabilityError, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, Script, StabilityError, Test, TestRun, Unit, measures, rooms};
 use super::SMALL;
-use crate::study::trial::TrialError;
+use crate::study::session::SessionError;
 use bouncelight::render::RenderError;
 use bouncelight::scene::{Camera, LightKind, Mesh, Scene};
 
@@ -10,25 +10,25 @@ pub static SIZES: Test = Test {
     name: "sizes",
     question: "Are pictures of any size, and of scenes with next to nothing in them, finite and whole?",
     limits: &[Limit { name: "pictures that are not", unit: Unit::Count, at_most: 0.0, source: "a program that works" }],
-    control: Fault::Broken,
+    control: Corruption::Broken,
     size: SMALL,
     paths: 1,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let camera = rooms::hall_camera();
         let hall = rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.1);
         let empty = rooms::scene(&[], &[rooms::sun(rooms::BACKWARDS, 2.0)], 1.0);
         let mut faults = 0;
         for size in [[1, 1], [17, 13], [1, 64], [64, 1], [3, 2]] {
-            faults += fails(play, &hall, &camera, size)?;
+            faults += fails(run, &hall, &camera, size)?;
         }
         // As wide, and as high, as 8K.
-        let limit = play.stage.gpu.device.limits().max_texture_dimension_2d;
+        let limit = run.stage.gpu.device.limits().max_texture_dimension_2d;
         for size in [[7680, 4], [4, 4320]] {
-            faults += fails(play, &hall, &camera, size.map(|n: u32| n.min(limit)))?;
+            faults += fails(run, &hall, &camera, size.map(|n: u32| n.min(limit)))?;
         }
         for scene in [&empty, &sky_only(), &triangle()] {
-            faults += fails(play, scene, &camera, [32, 24])?;
+            faults += fails(run, scene, &camera, [32, 24])?;
         }
         Ok(vec![f64::from(faults)])
     },
@@ -50,12 +50,12 @@ fn triangle() -> Scene {
 }
 
 /// 1 for a picture that cannot be drawn, has another size or holds what is no number.
-fn fails(play: &Play<'_>, scene: &Scene, camera: &Camera, size: [u32; 2]) -> Result<u32, StabilityError> {
-    let scope = play.stage.gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let looks = play.film_at(scene, size, Script::new().rest(camera, 2).look(camera));
+fn fails(run: &TestRun<'_>, scene: &Scene, camera: &Camera, size: [u32; 2]) -> Result<u32, StabilityError> {
+    let scope = run.stage.gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let looks = run.render_sequence_at(scene, size, Script::new().rest(camera, 2).look(camera));
     let refused = pollster::block_on(scope.pop());
     match looks {
-        Err(StabilityError::Trial(TrialError::Stopped)) => Err(TrialError::Stopped.into()),
+        Err(StabilityError::Session(SessionError::Stopped)) => Err(SessionError::Stopped.into()),
         Err(e) => {
             tracing::warn!("{}×{}: {e}", size[0], size[1]);
             Ok(1)
@@ -68,7 +68,7 @@ fn fails(play: &Play<'_>, scene: &Scene, camera: &Camera, size: [u32; 2]) -> Res
 }
 
 /// Values that are no numbers.
-fn broken(look: &Look) -> usize {
+fn broken(look: &Observation) -> usize {
     look.broken + look.light.iter().chain(&look.rgb).filter(|v| !v.is_finite()).count()
 }
 
@@ -89,28 +89,28 @@ pub static BROKEN: Test = Test {
             source: "the broken box and lamp take part of the room's light with them",
         },
     ],
-    control: Fault::Broken,
+    control: Corruption::Broken,
     size: SMALL,
     paths: 16,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let camera = rooms::hall_camera();
         let mut hall = rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.1);
         let at = ([1.8, 0.0, -2.2], [2.2, 0.4, -1.8]);
         let number = rooms::block(&mut hall, at.0, at.1, rooms::GREY);
-        let sane = play.settled(&hall, &camera, 20)?;
+        let sane = run.settled(&hall, &camera, 20)?;
         let mesh = hall.instances[number].mesh;
         hall.meshes[mesh].normals.iter_mut().for_each(|n| *n = [f32::NAN; 3]);
         hall.materials[number].emissive = [f32::INFINITY, f32::NAN, 1.0];
         let lamp = LightKind::Point { position: [0.0, f32::NAN, 0.0], intensity: f32::NAN, radius: 0.1, range: None };
         hall.lights.push(rooms::light(lamp, [1.0; 3]));
-        play.keep("sound", &sane);
-        match play.settled(&hall, &camera, 20) {
+        run.keep("sound", &sane);
+        match run.settled(&hall, &camera, 20) {
             Ok(look) => {
-                play.keep("broken", &look);
+                run.keep("broken", &look);
                 Ok(vec![broken(&look) as f64, change_elsewhere(&sane, &look, at)])
             }
-            Err(StabilityError::Trial(TrialError::Render(RenderError::NotFinite { count, .. }))) => {
+            Err(StabilityError::Session(SessionError::Render(RenderError::NotFinite { count, .. }))) => {
                 Ok(vec![count as f64, f64::INFINITY])
             }
             Err(e) => Err(e),
@@ -119,7 +119,7 @@ pub static BROKEN: Test = Test {
 };
 
 /// Change of light at places outside the box.
-fn change_elsewhere(a: &Look, b: &Look, (low, high): ([f32; 3], [f32; 3])) -> f64 {
+fn change_elsewhere(a: &Observation, b: &Observation, (low, high): ([f32; 3], [f32; 3])) -> f64 {
     let (low, high) = (glam::Vec3::from(low) - 0.01, glam::Vec3::from(high) + 0.01);
     let inside = |p: glam::Vec3| p.cmpge(low).all() && p.cmple(high).all();
     let mut a = a.clone();

@@ -1,6 +1,6 @@
 //! What is seen must not decide what light there is.
 
-use super::super::{Fault, Limit, Script, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Script, Test, Unit, measures, rooms};
 use super::{LONG, PAPER, SMALL};
 use bouncelight::scene::Camera;
 
@@ -23,11 +23,11 @@ pub static RED_WALL: Test = Test {
             source: "twice the least contrast that an eye sees",
         },
     ],
-    control: Fault::Screen(0.5),
+    control: Corruption::Screen(0.5),
     size: PAPER,
     paths: 128,
     pictures: true,
-    run: |play| {
+    run: |run| {
         let hall = rooms::hall(rooms::RED, &[rooms::sun([0.0, -0.6, 0.8], 3.0)], 0.05);
         let eye = [0.0, 1.8, 1.0];
         let (wall, floor) = (Camera::look_at(eye, [0.0, 0.8, 6.0], 1.0), Camera::look_at(eye, [0.0, 0.0, 2.2], 1.0));
@@ -36,9 +36,9 @@ pub static RED_WALL: Test = Test {
             let t = i as f32 / 12.0;
             script = script.rest(&Camera::look_at(eye, [0.0, 0.8 - 0.8 * t, 6.0 - 3.8 * t], 1.0), 1);
         }
-        let looks = play.film(&hall, script.rest(&floor, LONG).look(&floor))?;
-        play.keep("wall in view", &looks[0]);
-        play.keep("wall out of view", &looks[1]);
+        let looks = run.render_sequence(&hall, script.rest(&floor, LONG).look(&floor))?;
+        run.keep("wall in view", &looks[0]);
+        run.keep("wall out of view", &looks[1]);
         let [then, now] = measures::means_at_same_places(&looks[0], &looks[1]);
         let tint = |m: [f64; 3]| measures::share(m[0], m[1]);
         let turned = measures::share((tint(now) - tint(then)).abs(), tint(then));
@@ -55,17 +55,17 @@ pub static CROP: Test = Test {
         at_most: 0.05,
         source: SAME,
     }],
-    control: Fault::Screen(1.0),
+    control: Corruption::Screen(1.0),
     size: PAPER,
     paths: 160,
     pictures: true,
-    run: |play| {
+    run: |run| {
         let hall = rooms::hall([0.9, 0.1, 0.1], &[rooms::sun(rooms::BACKWARDS, 3.0)], 0.05);
         // Twice as long a lens on as many pixels: networks take the size that they have learnt.
         let of = |tangent: f32| Camera { yfov: 2.0 * tangent.atan(), ..rooms::hall_camera() };
-        let (wide, narrow) = (play.settled(&hall, &of(0.8), LONG)?, play.settled(&hall, &of(0.4), LONG)?);
-        play.keep("wide", &wide);
-        play.keep("narrow", &narrow);
+        let (wide, narrow) = (run.settled(&hall, &of(0.8), LONG)?, run.settled(&hall, &of(0.4), LONG)?);
+        run.keep("wide", &wide);
+        run.keep("narrow", &narrow);
         Ok(vec![measures::at_same_places(&wide, &narrow).0])
     },
 };
@@ -79,17 +79,17 @@ pub static TWO_PLACES: Test = Test {
         at_most: 0.05,
         source: SAME,
     }],
-    control: Fault::Screen(0.5),
+    control: Corruption::Screen(0.5),
     size: SMALL,
     paths: 96,
     pictures: false,
-    run: |play| {
+    run: |run| {
         let hall = rooms::hall(rooms::RED, &[rooms::sun(rooms::BACKWARDS, 3.0)], 0.05);
         let from = |eye: [f32; 3]| Camera::look_at(eye, [0.0, 0.4, -2.5], 1.0);
-        let left = play.settled(&hall, &from([-4.0, 1.6, 2.0]), LONG)?;
-        let right = play.settled(&hall, &from([3.0, 2.4, 3.0]), LONG)?;
-        play.keep("from the left", &left);
-        play.keep("from the right", &right);
+        let left = run.settled(&hall, &from([-4.0, 1.6, 2.0]), LONG)?;
+        let right = run.settled(&hall, &from([3.0, 2.4, 3.0]), LONG)?;
+        run.keep("from the left", &left);
+        run.keep("from the right", &right);
         Ok(vec![measures::at_same_places(&left, &right).0])
     },
 };

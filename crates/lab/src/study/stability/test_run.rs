@@ -1,0 +1,343 @@
+//! Who draws what a test asks for: a method frame by frame with its history, the path tracer, or
+//! the paper's network.
+
+use super::{
+    Corruption, Script, StabilityError,
+    observation::{NOTHING, Observation},
+    sheet::Moment,
+};
+use crate::network::{
+    cpu::Tensor,
+    pictures::{self, Pictures},
+};
+use crate::reference::{Kernel, Layer as TracedLayer, TracerOptions};
+use crate::study::{
+    hash,
+    session::{Frame, Session, SessionError, SessionOptions, Settling},
+    truth,
+};
+use bouncelight::gi::Method;
+use bouncelight::gpu::{Gpu, readback, timing::Recorder};
+use bouncelight::net::{
+    format::Weights,
+    gpu::{Network, Options},
+};
+use bouncelight::render::{capture::Layer, tonemap_curve::Tonemap};
+use bouncelight::scene::{Camera, Scene};
+use std::{
+    cell::{Cell, OnceCell, RefCell},
+    collections::HashMap,
+    path::PathBuf,
+    rc::Rc,
+};
+
+/// Who draws.
+#[derive(Debug, Clone)]
+pub enum Subject {
+    /// A real-time method.
+    Method {
+        /// Name for tables.
+        name: String,
+        /// The method.
+        method: Method,
+    },
+    /// The path tracer.
+    Truth,
+    /// The paper's recipe: a network on four pictures, with dropout on as published.
+    Paper(Box<Weights>),
+}
+
+impl Subject {
+    /// Name in tables and records.
+    pub fn name(&self) -> &str {
+        match self {
+            Subject::Method { name, .. } => name,
+            Subject::Truth => "reference",
+            Subject::Paper(_) => "paper",
+        }
+    }
+
+    /// Hash of its weights, if it has any.
+    pub fn weights_hash(&self) -> Option<String> {
+        match self {
+            Subject::Method { method: Method::Neural(neural), .. } => Some(neural.weights.hash_text()),
+            Subject::Paper(weights) => Some(weights.hash_text()),
+            _ => None,
+        }
+    }
+}
+
+/// What all tests share: the device, the compiled path tracer, pictures that were traced before.
+pub(super) struct Stage<'a> {
+    pub gpu: &'a Gpu,
+    pub kept: Option<PathBuf>,
+    pub go_on: &'a dyn Fn() -> bool,
+    kernel: OnceCell<Kernel>,
+    traced: RefCell<HashMap<String, Rc<Observation>>>,
+}
+
+impl<'a> Stage<'a> {
+    pub fn new(gpu: &'a Gpu, kept: Option<PathBuf>, go_on: &'a dyn Fn() -> bool) -> Self {
+        Self { gpu, kept, go_on, kernel: OnceCell::new(), traced: RefCell::default() }
+    }
+
+    fn kernel(&self) -> Kernel {
+        self.kernel.get_or_init(|| Kernel::new(&self.gpu.device)).clone()
+    }
+
+    /// Forgets the pictures that are in memory: the next test has other scenes.
+    pub fn forget(&self) {
+        self.traced.borrow_mut().clear();
+    }
+}
+
+/// What a play leaves behind beside its numbers.
+pub(super) struct Kept {
+    /// For the contact sheet.
+    pub moments: Vec<Moment>,
+    /// For the short sequence.
+    pub rolls: Vec<Moment>,
+    /// Why another method drew in this one's place, if one did.
+    pub fallback: Option<String>,
+}
+
+/// One test drawn by one subject.
+pub struct TestRun<'a> {
+    pub(super) stage: &'a Stage<'a>,
+    subject: &'a Subject,
+    corruption: Option<Corruption>,
+    size: [u32; 2],
+    paths: u32,
+    moments: RefCell<Vec<Moment>>,
+    rolls: RefCell<Vec<Moment>>,
+    frames: Cell<u64>,
+    fallback: RefCell<Option<String>>,
+}
+
+impl<'a> TestRun<'a> {
+    pub(super) fn new(
+        stage: &'a Stage<'a>,
+        subject: &'a Subject,
+        corruption: Option<Corruption>,
+        size: [u32; 2],
+        paths: u32,
+    ) -> Self {
+        let (moments, rolls, fallback) = (RefCell::default(), RefCell::default(), RefCell::default());
+        Self { stage, subject, corruption, size, paths, moments, rolls, frames: Cell::new(0), fallback }
+    }
+
+    /// Whether the path tracer draws. It has no history and takes seconds a frame, so tests ask it
+    /// for fewer frames.
+    pub fn is_truth(&self) -> bool {
+        matches!(self.subject, Subject::Truth)
+    }
+
+    /// Who draws.
+    pub fn subject(&self) -> &Subject {
+        self.subject
+    }
+
+    /// What is true of a still scene, not spoilt, whoever draws.
+    pub fn truth(&self, scene: &Scene, camera: &Camera) -> Result<Observation, StabilityError> {
+        let mut looks = self.traced(scene, self.size, &Script::new().look(camera))?;
+        Ok(looks.pop().expect("one frame was wanted"))
+    }
+
+    /// The same test drawn by another subject.
+    pub fn as_other<'b>(&'b self, subject: &'b Subject) -> TestRun<'b> {
+        TestRun::new(self.stage, subject, self.corruption, self.size, self.paths)
+    }
+
+    /// Keeps frames for the short sequence.
+    pub fn roll(&self, looks: &[Observation]) {
+        let shown = matches!(self.subject, Subject::Paper(_));
+        self.rolls.borrow_mut().extend((1..).zip(looks).map(|(i, l)| Moment::new(&format!("{i}"), l, shown)));
+    }
+
+    /// Keeps a look for the contact sheet.
+    pub fn keep(&self, name: &str, look: &Observation) {
+        self.moments.borrow_mut().push(Moment::new(name, look, matches!(self.subject, Subject::Paper(_))));
+    }
+
+    /// What was kept.
+    pub(super) fn end(self) -> Kept {
+        Kept {
+            moments: self.moments.into_inner(),
+            rolls: self.rolls.into_inner(),
+            fallback: self.fallback.into_inner(),
+        }
+    }
+
+    /// A look at a still scene after so many frames.
+    pub fn settled(&self, scene: &Scene, camera: &Camera, frames: usize) -> Result<Observation, StabilityError> {
+        let mut looks = self.render_sequence(scene, Script::new().rest(camera, frames - 1).look(camera))?;
+        Ok(looks.pop().expect("one frame was wanted"))
+    }
+
+    /// Draws a script; the frames that it wants.
+    pub fn render_sequence(&self, scene: &Scene, script: Script) -> Result<Vec<Observation>, StabilityError> {
+        self.render_sequence_at(scene, self.size, script)
+    }
+
+    /// As [`Self::render_sequence`], at another size than the test's.
+    pub fn render_sequence_at(
+        &self,
+        scene: &Scene,
+        size: [u32; 2],
+        script: Script,
+    ) -> Result<Vec<Observation>, StabilityError> {
+        let mut looks = match self.subject {
+            Subject::Method { method, .. } => self.drawn(method, scene, size, &script)?,
+            Subject::Truth => self.traced(scene, size, &script)?,
+            Subject::Paper(weights) => self.painted(weights, scene, size, &script)?,
+        };
+        if let Some(corruption) = self.corruption {
+            let wanted: Vec<u32> = (0..).zip(&script.0).filter(|(_, f)| f.wanted).map(|(i, _)| i).collect();
+            let mut before: Option<(u32, Observation)> = None;
+            for (look, number) in looks.iter_mut().zip(wanted) {
+                self.frames.set(self.frames.get() + 1);
+                let passed = before.as_ref().map_or(0, |(n, _)| number - n);
+                corruption.spoil(look, self.frames.get(), before.as_ref().map(|(_, l)| l), passed);
+                before = Some((number, look.clone()));
+            }
+        }
+        Ok(looks)
+    }
+
+    fn session(&self, scene: &Scene, size: [u32; 2], layers: &[Layer]) -> Result<Session<'a>, SessionError> {
+        let options =
+            SessionOptions { layers: layers.to_vec(), kept: self.stage.kept.clone(), ..SessionOptions::default() };
+        let go_on = self.stage.go_on;
+        Ok(Session::new(self.stage.gpu, scene.clone(), size, options)?.watched(move |_| go_on()))
+    }
+
+    fn drawn(
+        &self,
+        method: &Method,
+        scene: &Scene,
+        size: [u32; 2],
+        script: &Script,
+    ) -> Result<Vec<Observation>, StabilityError> {
+        let mut session = self.session(scene, size, &[Layer::DiffInd, Layer::Depth, Layer::Normal])?;
+        let script = if method.has_history() { script.clone() } else { script.wanted_only() };
+        let mut cameras = script.0.iter().filter(|f| f.wanted).map(|f| f.camera.clone());
+        let mut looks = Vec::new();
+        let mut take = |shot: Frame| {
+            if let Some(why) = &shot.fallback {
+                *self.fallback.borrow_mut() = Some(format!("`{}` drew: {why}", shot.drawn_by));
+            }
+            let camera = cameras.next().expect("a camera for each wanted frame");
+            looks.push(look_of(&shot, camera));
+        };
+        let mut change = |number: u32| script.0[number as usize].clone();
+        session.render_sequence(method, &mut change, script.0.len() as u32, &mut take)?;
+        Ok(looks)
+    }
+
+    fn traced(&self, scene: &Scene, size: [u32; 2], script: &Script) -> Result<Vec<Observation>, StabilityError> {
+        let mut session = self.session(scene, size, &[])?;
+        session.share_kernel(self.stage.kernel());
+        // Through the pixels' centres, as the methods look.
+        let options = TracerOptions { filter_width: 0.0, ..truth::samples(self.paths, 0) };
+        let mut looks = Vec::new();
+        for frame in script.wanted_only().0 {
+            session.edit(&frame.edits)?;
+            let key = format!("{} {} {size:?} {}", session.hash(), hash::of_camera(&frame.camera), self.paths);
+            let known = self.stage.traced.borrow().get(&key).cloned();
+            let look = match known {
+                Some(look) => look,
+                None => {
+                    let reference = session.reference(&frame.camera, &options)?;
+                    let data = |layer| reference.layer(layer).to_vec();
+                    let look = Rc::new(Observation {
+                        size,
+                        light: data(TracedLayer::Gi),
+                        rgb: reference.rgb(),
+                        depth: data(TracedLayer::Depth),
+                        normal: data(TracedLayer::Normal),
+                        broken: 0,
+                        camera: frame.camera.clone(),
+                    });
+                    self.stage.traced.borrow_mut().insert(key, look.clone());
+                    look
+                }
+            };
+            looks.push(look.as_ref().clone());
+        }
+        Ok(looks)
+    }
+
+    /// The paper's network: pictures as `training/bouncelight_training/pix2pix/pairs.py` makes
+    /// them, dropout as published.
+    fn painted(
+        &self,
+        weights: &Weights,
+        scene: &Scene,
+        size: [u32; 2],
+        script: &Script,
+    ) -> Result<Vec<Observation>, StabilityError> {
+        let layers = [Layer::DiffInd, Layer::Depth, Layer::Normal, Layer::DiffCol, Layer::GlossCol];
+        let gpu = self.stage.gpu;
+        let mut session = self.session(scene, size, &layers)?;
+        let options = Options { dropout: Some(0), ..Options::default() };
+        let mut network = Network::new(&gpu.device, &gpu.queue, weights, size, options)?;
+        let mut looks = Vec::new();
+        for frame in script.wanted_only().0 {
+            session.edit(&frame.edits)?;
+            let shot = session.picture(&Method::Direct, &frame.camera, Settling::COLD)?;
+            let [depth, direct, diffuse, normal] = four_pictures(&shot, session.scene().environment.radiance);
+            let input = Pictures { size, depth: &depth, direct: &direct, diffuse: &diffuse, normal: &normal };
+            let input = pictures::input(weights, &input)?;
+            self.frames.set(self.frames.get() + 1);
+            network.set_seed(&gpu.queue, self.frames.get() as u32);
+            let place = network.input();
+            gpu.queue.write_buffer(place.buffer, place.offset, bytemuck::cast_slice(&input.to_padded()));
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            network.record(&mut Recorder::new(&mut encoder));
+            gpu.queue.submit([encoder.finish()]);
+            let place = network.output();
+            let bytes = readback::buffer(&gpu.device, &gpu.queue, place.buffer, place.offset, place.size)?;
+            let shape = network.plan().tensors[network.plan().output].shape;
+            let output = Tensor::from_padded(shape, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes));
+            let mut look = look_of(&shot, frame.camera);
+            look.light = pictures::picture(&output);
+            look.rgb.clone_from(&look.light);
+            looks.push(look);
+        }
+        Ok(looks)
+    }
+}
+
+fn look_of(shot: &Frame, camera: Camera) -> Observation {
+    let data = |layer| shot.layer(layer).data.clone();
+    let size = [shot.frame.beauty.width as u32, shot.frame.beauty.height as u32];
+    let (light, rgb) = (data(Layer::DiffInd), shot.rgb());
+    Observation { size, light, rgb, depth: data(Layer::Depth), normal: data(Layer::Normal), broken: 0, camera }
+}
+
+/// Depth, direct light, albedo and normals as the paper's network takes them: through Filmic, in
+/// 8-bit steps.
+fn four_pictures(shot: &Frame, sky: [f32; 3]) -> [Vec<f32>; 4] {
+    let shown = |linear: &[f32]| -> Vec<f32> {
+        Tonemap::Filmic.apply_to_bytes(linear).into_iter().map(|b| f32::from(b) / 255.0).collect()
+    };
+    let depth = &shot.layer(Layer::Depth).data;
+    let surfaces = depth.iter().copied().filter(|z| *z < NOTHING);
+    let (near, far) = surfaces.fold((f32::MAX, f32::MIN), |(near, far), z| (near.min(z), far.max(z)));
+    let scaled = |z: f32| if z < NOTHING { (z - near) / (far - near).max(1e-6) } else { 1.0 };
+    let grey: Vec<f32> = depth.iter().flat_map(|z| [scaled(*z); 3]).collect();
+    let (diffuse, glossy) = (&shot.layer(Layer::DiffCol).data, &shot.layer(Layer::GlossCol).data);
+    // The sky without occlusion, as Eevee counts it to direct light.
+    let direct: Vec<f32> = shot
+        .rgb()
+        .iter()
+        .enumerate()
+        .map(|(i, v)| {
+            let surface = if depth[i / 3] < NOTHING { 1.0 } else { 0.0 };
+            v + surface * sky[i % 3] * (diffuse[i] + glossy[i])
+        })
+        .collect();
+    let normals = shot.layer(Layer::Normal).data.chunks_exact(3);
+    let normal: Vec<f32> = normals.flat_map(|n| [n[0].max(0.0), (-n[2]).max(0.0), n[1].max(0.0)]).collect();
+    [shown(&grey), shown(&direct), shown(diffuse), shown(&normal)]
+}
