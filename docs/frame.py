@@ -12,6 +12,7 @@ RESOURCES = [
     "scene: triangles, BVH, lights", "shadow maps, light lists", "G-buffer", "direct light, E/π", "cell pixels",
     "history of cells", "what rays found", "radiance cache", "specular history of pixels", "exposure, tensors",
     "cell light", "indirect light, E/π and specular", "HDR picture",
+    "anti-lag result",
 ]
 # Group, pass, what it does, resources read, resources written.
 PASSES = [
@@ -22,16 +23,16 @@ PASSES = [
     ("Raster", "direct", "analytic lights with shadows", "0 1 2", "3"),
     ("Trace", "gi.downsample", "one pixel for each 4×4 cell", "2", "4"),
     ("Trace", "gi.gradient", "temporal gradient, after changes", "0 2 5 6 7", "6"),
-    ("Trace", "gi.reproject", "reproject, find disocclusions", "2 4 5 6", "4 6"),
+    ("Trace", "gi.reproject", "reproject, find disocclusions", "2 4 5 6 13", "4 6"),
     ("Trace", "gi.cache_evict", "free old cache entries", "7", "7"),
     ("Trace", "gi.trace", "trace cells' rays", "0 2 4 7", "6 7"),
     ("Trace", "gi.cache_update", "update the cache, 1 to 32 times", "0 7", "7"),
     ("Trace", "gi.specular_trace", "trace specular rays of pixels", "0 2 7 8", "8"),
-    ("Denoise", "gi.accumulate", "temporal accumulation", "2 4 5 6 7", "5"),
+    ("Denoise", "gi.accumulate", "temporal accumulation", "2 4 5 6 7 13", "5"),
     ("Denoise", "gi.exposure", "mean light (neural)", "2 3", "9"),
     ("Denoise", "gi.features", "network inputs (neural)", "2 5 9", "9"),
     ("Denoise", "net.*", "U-Net: guidance (neural)", "9", "9"),
-    ("Denoise", "gi.blur", "bilateral blur, 5×5 cells", "5 9", "10"),
+    ("Denoise", "gi.blur", "bilateral blur, 5×5 cells; anti-lag", "5 9", "10 13"),
     ("Denoise", "gi.atrous", "one à-trous step", "5 9 10", "10"),
     ("Denoise", "gi.upsample", "joint bilateral upsampling", "2 4 8 10", "11"),
     ("Picture", "composite", "albedo · (direct + indirect) + …", "2 3 11", "12"),

@@ -1,31 +1,24 @@
-//! bouncelight draws a scene with a deferred rasteriser on wgpu and adds global illumination with a
-//! small U-Net that runs in compute shaders on the same GPU.
+//! bouncelight adds global illumination to rasterised scenes on GPUs without ray-tracing hardware.
+//! Compute shaders trace one ray per 4×4-pixel cell into the scene's triangles, cache radiance in
+//! world space, and denoise over frames and neighbours; a small U-Net can guide the denoiser.
+//!
+//! A renderer of your own embeds [`gi::World`] (triangles, transforms, lights, sky) and [`gi::View`]
+//! (one camera's picture). With feature `render` there is a deferred rasteriser, too:
 //!
 //! ```text
-//!  file or name        GPU, one command encoder a frame (render/frame.rs tells it in order)
-//!  ───────────         ─────────────────────────────────────────────────────────────────────
-//!  bouncelight_scene::load ──► gpu_scene     ──► shadow ──► gbuffer ──► direct ──► gi ──► composite ──► tonemap
-//!                                                  │           │        ▲                     │
-//!                                                  └───────────┴► pack ─┤                     ▼
-//!  net::format ──► net::graph ──► net::plan ──► net::gpu ── U-Net ──────┘            image_io, viewer
+//! Scene ─► SceneGpu ─► deform ─► shadow ─► gbuffer ─► lights ─► direct ─► gi.* (net.*) ─► composite ─► blended ─► taa ─► tonemap
 //! ```
 //!
-//! Module map, in the direction of the data:
-//! - [`scene`]: what is drawn, without any wgpu type.
-//! - [`gpu_scene`]: the same on the GPU; [`lights`]: lights and surroundings as shaders read them.
-//! - [`accel`]: triangles in trees, on the CPU and the GPU, and what rays hit of them.
-//! - [`gpu`]: device choice, shader sources, readback, pass timing.
-//! - [`render`]: the rasteriser, one file a pass.
-//! - [`net`]: weights file, graph, plan, the slow CPU reference and the WGSL kernels' host side.
-//! - [`gi`]: global-illumination methods, cheapest first; [`gi::World`] and [`gi::View`] are what
-//!   other renderers embed.
-//! - `reference` (feature `reference`): the path tracer that everything else is measured against.
-//! - [`metrics`]: image metrics, no wgpu.
-//! - `export` (feature `export`): the pass for hosts without wgpu.
-//! - `viewer` (feature `viewer`): the window of `bouncelight view`.
-//! - [`study`]: what is measured over methods and scenes.
+//! - [`gi`]: the methods, cheapest first, and what other renderers embed.
+//! - [`scene`]: what is drawn, without any wgpu type; [`gpu_scene`]: the same on the GPU.
+//! - [`render`]: the rasteriser, a pass a file; `render::frame` tells the order.
+//! - [`net`]: weights files and the networks' kernels.
+//! - [`gpu`]: the choice of a device, readback, pass timing.
 //!
-//! Conventions (units, spaces, encodings) stand in `docs/internals/overview.md`.
+//! The host owns the device: nothing here creates one, submits or waits unless its name says so.
+//! Sister packages: `bouncelight-scene` reads files, `bouncelight-lab` has the path tracer, metrics and
+//! exports, `bouncelight-app` is the program. Conventions (units, spaces, encodings) stand in
+//! `docs/internals/overview.md`.
 
 #[doc(hidden)]
 pub mod accel;

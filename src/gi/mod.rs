@@ -27,7 +27,7 @@
 //! constants; `docs/guide/embedding.md` how another renderer records them: a [`World`] holds its
 //! triangles, a [`View`] lights its picture.
 //!
-//! # Floors
+//! # Layers
 //! `interface` ← `stage` ← `screen`, `gather` ← `neural` ← `method` ← `world`: each imports only
 //! what stands before it, and nothing here imports `render`.
 

@@ -146,11 +146,11 @@ impl GatherGi {
                 "binds {limit} bytes at once, but a picture of {w}x{h} pixels by rays needs {bytes}"
             )));
         }
-        // A lot's low bits name a query.
+        // The low bits of a proposal index its vertex.
         let vertices = cells::count(size) + store::squares(size) + 4 * u64::from(options.slots);
         if vertices >= 1 << VERTEX_BITS {
             return Err(GiError::Device(format!(
-                "is last_used for {vertices} rays a frame, but they are numbered up to {}",
+                "would need {vertices} proposal vertices for this picture and cache, but they are numbered up to {}",
                 1 << VERTEX_BITS
             )));
         }

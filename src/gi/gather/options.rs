@@ -4,7 +4,7 @@ use crate::numbers::SplitMix;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// How light is gathered. The numbers that are choices stand in the table of `docs/internals/gather.md`.
+/// How light is gathered. The numbers that are choices stand in the table of `docs/internals/constants.md`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Longest history of a cell at rest, frames (1 and more). Short: noise. Long: slow to follow
@@ -51,8 +51,7 @@ impl Default for Options {
 
 impl Options {
     /// Cells forget nothing and nothing is blurred: for asking what the method converges to.
-    /// (Entries that remember n rays take n / (1 − albedo) rounds to forget that they once knew
-    /// nothing of each other.)
+    /// (Entries that remember n rays take n / (1 − albedo) updates to forget the black they began with.)
     pub const PLAIN: Self = Self {
         cell_frames: 1e9,
         entry_frames: 8.0,

@@ -182,16 +182,16 @@ mod tests {
     }
 
     #[test]
-    fn a_still_view_begins_with_many_rounds_and_comes_to_rest() {
+    fn a_still_view_begins_with_many_updates_and_comes_to_rest() {
         let found = frames(&[STILL; 40], RULES);
         let updates: Vec<u32> = found.iter().map(|f| f.updates).collect();
-        assert_eq!(updates[..9], [4; 9], "the first, and eight young ones");
+        assert_eq!(updates[..9], [4; 9], "the first, and eight warm-up frames");
         assert!(updates[9..25].iter().all(|&r| r == 2) && updates[25..].iter().all(|&r| r == 1), "{updates:?}");
         assert!(found[0].restart && found[1..].iter().all(|f| !f.restart));
         assert!(found.iter().all(|f| !f.changed && !f.antilag && f.frames_since_change.is_none()));
         assert_eq!(found.iter().filter(|f| f.wide_blur).count(), 5);
         assert!(found[24].all_entries && !found[25].all_entries);
-        // Rounds are numbered without gaps, and each frame knows those of the one before.
+        // Updates are numbered without gaps, and each frame knows those of the one before.
         for pair in found.windows(2) {
             assert_eq!(
                 (pair[1].iteration, pair[1].previous_iteration),
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn even_frames_notice_nothing() {
+    fn progressive_frames_ignore_changes() {
         let mut events = [STILL; 30];
         events[20..].iter_mut().for_each(|e| (e.light_version, e.scene_version) = (9, 9));
         let found = frames(&events, Rules { progressive: true, ..RULES });

@@ -47,11 +47,11 @@ pub struct Inputs<'a> {
     /// only for what mirrors show ([`Inputs::specular`]), and does without: mirrors then show each
     /// triangle's mean colour. The others end with [`GiError::Missing`] without.
     pub albedo: Option<&'a wgpu::TextureView>,
-    /// Emitted radiance, `Rgba16Float`. `gather` reads it as it does albedo; for the others `None`
+    /// Emitted radiance, `Rgba16Float`, `Rgba32Float` or `Rg11b10Ufloat`. `gather` reads it as it does albedo; for the others `None`
     /// counts as no surface that glows.
     pub emissive: Option<&'a wgpu::TextureView>,
-    /// Direct diffuse light of the analytic lights as E/π, albedo not multiplied in, `Rgba16Float`.
-    /// Not read by `gather`, needed by the others.
+    /// Direct diffuse light of the analytic lights as E/π, albedo not multiplied in, in a format
+    /// as `emissive`. Not read by `gather`, needed by the others.
     pub direct: Option<&'a wgpu::TextureView>,
     /// The camera that drew them.
     pub camera: CameraMatrices,
@@ -66,8 +66,8 @@ pub struct Inputs<'a> {
     /// ([`Method::needs_rays`](super::Method::needs_rays)).
     pub rays: Option<Rays<'a>>,
     /// Where each pixel's surface was in the frame before: texture coordinates then minus now, y
-    /// down, free of jitter, unless [`Conventions`] say otherwise; `Rg16Float`, `Rg32Float` or
-    /// `Rgba16Float`. For methods that remember frames. `None` counts as everything at rest: what
+    /// down, free of jitter, unless [`Conventions`] say otherwise; `Rg16Float`, `Rg32Float`,
+    /// `Rgba16Float` or `Rgba32Float`. For methods that remember frames. `None` counts as everything at rest: what
     /// moves on the screen starts anew where plane or normal differ, and drags its light where not.
     pub motion: Option<&'a wgpu::TextureView>,
     /// `Rgba8Unorm(Srgb)`: F0 and perceptual roughness, for methods that find what lobes show

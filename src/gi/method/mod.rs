@@ -18,7 +18,8 @@ use with_fallback::WithFallback;
 pub enum Method {
     /// None: `indirect` is 0. Shows what direct light alone gives.
     Direct,
-    /// Even light times occlusion, see [`ambient`](super::ambient).
+    /// Even light times occlusion, see [`ambient`](super::ambient). Default of the type: it needs neither
+    /// rays nor weights. The program's is `gather`.
     #[default]
     Ambient,
     /// The same with a scene's own ambient term.
@@ -45,7 +46,7 @@ impl Method {
     }
 
     /// Frames of a still camera after which a frame does no more than all later ones: what it costs
-    /// is counted then. (Cells of `gather` that are young send more rays.)
+    /// is counted then. (Cells with a short history send more rays.)
     pub fn frames_to_rest(&self) -> u32 {
         if self.has_history() { Self::SETTLED + 16 } else { 1 }
     }

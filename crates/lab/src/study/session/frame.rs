@@ -40,7 +40,7 @@ pub struct FrameChange {
     /// What changes in the scene before it is drawn.
     pub edits: Edits,
     /// It has nothing to do with the frame before, and the program says so
-    /// ([`Renderer::cut`](bouncelight::render::Renderer::cut)).
+    /// ([`Renderer::reset_history`](bouncelight::render::Renderer::reset_history)).
     pub cut: bool,
     /// Whether its picture is wanted; one that is not is drawn all the same, but its layers are not
     /// read back.
