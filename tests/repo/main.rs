@@ -1,5 +1,8 @@
 //! What the repository promises of itself: shaders that compile, licences, public items. No adapter.
 
+#[path = "../common/mod.rs"]
+mod common;
+mod docs;
 mod licences;
 mod public_api;
 mod shader_names;

@@ -187,3 +187,44 @@ fn init_logging(global: &args::Global) {
         .event_format(log::Line { target: global.verbose > 1 })
         .init();
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    /// Commands that a page shows: lines of code and spans that begin with the program's name.
+    fn commands(page: &str) -> Vec<String> {
+        let lines = page.lines().filter_map(|line| line.strip_prefix("    "));
+        let spans =
+            page.lines().filter(|line| !line.starts_with("    ")).flat_map(|line| line.split('`').skip(1).step_by(2));
+        let all = lines.chain(spans).filter_map(|text| text.trim().strip_prefix("bouncelight "));
+        // A remark follows two spaces and a number sign; words in capitals and brackets stand for something.
+        let plain = all.map(|text| text.split(" #").next().unwrap_or_default().trim().to_owned());
+        plain.filter(|text| !text.contains(['[', '|', '…']) && text.contains(' ')).collect()
+    }
+
+    #[test]
+    fn commands_of_the_documents_are_understood() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let mut seen = 0;
+        for page in [
+            "README.md",
+            "docs/guide/cli.md",
+            "docs/guide/viewer.md",
+            "docs/guide/scenes.md",
+            "docs/guide/without-wgpu.md",
+        ] {
+            let text = std::fs::read_to_string(root.join(page)).expect("the page is there");
+            for command in commands(&text) {
+                let words = std::iter::once("bouncelight").chain(command.split_whitespace());
+                if let Err(e) = Cli::try_parse_from(words) {
+                    assert!(!e.use_stderr(), "{page}: `bouncelight {command}`: {e}");
+                }
+                seen += 1;
+            }
+        }
+        assert!(seen > 30, "{seen} commands");
+        assert!(Cli::try_parse_from(["bouncelight", "render", "--no-such-option"]).is_err(), "negative control");
+    }
+}
