@@ -1,6 +1,6 @@
 //! A tape of what compute passes are: while one runs on this thread, shaders, pipelines, bind
 //! groups and dispatches are written down as they are made, for `export` and for whoever listens.
-//! Without one, what is compiled is [`shared`].
+//! Without one, what is compiled is shared ([`pipeline_cache`]).
 
 use super::bound::Bound;
 use super::pipeline_cache;

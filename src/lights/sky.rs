@@ -108,7 +108,7 @@ fn upload_with(
     Ok(Sky { view: texture.create_view(&Default::default()), bytes, environment: own, sun: light })
 }
 
-/// The surroundings as a lat-long picture ([`SceneGpu::environment_view`]), a sun in it left where
+/// The surroundings as a lat-long picture (`SceneGpu::environment_view`), a sun in it left where
 /// it is.
 pub fn whole_sky(
     device: &wgpu::Device,

@@ -3,8 +3,7 @@
 //!
 //! Scene space is glTF's: right-handed, +Y up, metres; cameras look down −Z. Colours are linear
 //! Rec.709. Light is radiometric (W/m², W/sr, W/(m²·sr)); photometric file units are divided by 683
-//! lm/W at the border. Nothing here knows wgpu except [`upload`], which turns a [`Scene`] into GPU
-//! buffers.
+//! lm/W at the border. Nothing here knows wgpu.
 
 #[doc(hidden)]
 pub mod bounds;
@@ -45,7 +44,7 @@ pub struct Scene {
     /// How the objects move, if they do; see [`Scene::pose`].
     pub rig: Option<rig::Rig>,
     /// The sun and the sky are those that the loader adds where a file has no light; see
-    /// [`Scene::surround`].
+    /// `bouncelight_scene::defaults::surround`.
     pub default_light: bool,
     /// The file has no lights, only glow if anything, so nobody knows how bright pictures of it are
     /// meant to be: they are exposed by measure unless somebody says otherwise.

@@ -222,7 +222,7 @@ fn is_ours(program: &str, picture: &str, ours: &str) -> Result<(), String> {
         }
         other => return Err(format!("without the pass's light the pictures should differ: {other:?}")),
     }
-    run(&mut command(program, &[render.as_slice(), &["--method", "gather", "--gi-frames", "64"]].concat()))
+    run(&mut command(program, &[render.as_slice(), &["--method", "gather", "--accumulate", "64"]].concat()))
 }
 
 fn ci() -> Result<(), String> {

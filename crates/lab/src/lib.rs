@@ -1,6 +1,6 @@
 //! What [`bouncelight`] is measured by and against.
 //!
-//! - [`reference`]: the path tracer.
+//! - [`mod@reference`]: the path tracer.
 //! - [`metrics`]: image metrics.
 //! - [`network`]: the CPU reference of networks, published generators.
 //! - [`study`]: error against time, stability, the cheapest method that is good enough, this device.

@@ -1,5 +1,5 @@
-//! What compute passes do, counted while they run: between [`Count::begin`] and [`Count::take`]
-//! each dispatch is done by a pipeline that counts ([`instrument`](crate::count::instrument)), which adds
+//! What compute passes do, counted while they run: between `Count::begin` and `Count::take`
+//! each dispatch is done by a pipeline that counts (`instrument`), which adds
 //! up in a place of its own.
 
 mod instrument;
