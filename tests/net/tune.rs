@@ -7,7 +7,7 @@ use bouncelight::net::tune::{Cache, CacheError, MAX_TEXT, VERSION, tune};
 use bouncelight::wgpu::{AdapterInfo, Backend, DeviceType};
 use std::sync::Arc;
 
-const GOOD: &str = r#"{"version": 5, "devices": {"a | Vulkan | d 1": {"layer": {"config":
+const GOOD: &str = r#"{"version": 5, "devices": {"a | Vulkan | d 1": {"layer": {"permutation":
     {"weights": "uniform", "vectors": 2}, "ms": 0.5}}}}"#;
 
 fn info(name: &str, driver_info: &str) -> AdapterInfo {
