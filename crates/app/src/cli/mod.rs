@@ -201,7 +201,11 @@ mod tests {
         let all = lines.chain(spans).filter_map(|text| text.trim().strip_prefix("bouncelight "));
         // A remark follows two spaces and a number sign; words in capitals and brackets stand for something.
         let plain = all.map(|text| text.split(" #").next().unwrap_or_default().trim().to_owned());
-        plain.filter(|text| !text.contains(['[', '|', '…']) && text.contains(' ')).collect()
+        plain
+            .filter(|text| {
+                !text.contains(['[', '|', '…']) && text.contains(' ') && !text.starts_with(char::is_uppercase)
+            })
+            .collect()
     }
 
     #[test]

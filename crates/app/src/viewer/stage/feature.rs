@@ -158,7 +158,7 @@ mod tests {
     fn channels_have_the_names_of_the_table() {
         let names: Vec<_> = (0..16).map(channel_name).collect();
         let some = [0, 2, 7, 11, 14, 15].map(|i: usize| names[i].as_str());
-        assert_eq!(some, ["light", "chroma.1", "depth", "hit", "towards.2", "15"]);
+        assert_eq!(some, ["light", "chroma.1", "depth", "hit", "dominant_direction.2", "15"]);
     }
 
     #[test]
