@@ -51,27 +51,28 @@ const INDIRECT_INTERVAL = 4u;
 fn needs_update(slot: u32) -> bool {
     let slots = gather.mask + 1u;
     if slot >= slots { return false; }
-    let odd = (gather.cache_iteration & 1u) * slots;
+    // Offset of the half that this update writes; the other holds the last update's.
+    let write_half = (gather.cache_iteration & 1u) * slots;
     let key = atomicLoad(&entry_keys[slot]);
-    let proposal = atomicLoad(&entry_proposals[odd + slot]);
+    let proposal = atomicLoad(&entry_proposals[write_half + slot]);
     if key == 0u || key == TOMBSTONE { return false; }
     // Origins of rays, of the last update and of this one.
     let places = gather.rays + 2u * slots + slot;
-    var origin = proposal_vertices[places + slots - odd];
+    var origin = proposal_vertices[places + slots - write_half];
     var last_used = entry_last_used[slot];
     if proposal != NONE {
         let unique = 1u << proposal_bits();
         if (proposal & unique) != 0u { origin = proposal_vertices[proposal & (unique - 1u)]; }
         last_used = gather.last_iteration + 1u;
-        atomicStore(&entry_proposals[odd + slot], NONE);
+        atomicStore(&entry_proposals[write_half + slot], NONE);
     }
     // Made in this update, or without a winner yet.
     if origin.w == 0u { return false; }
     entry_last_used[slot] = last_used;
-    proposal_vertices[places + odd] = origin;
+    proposal_vertices[places + write_half] = origin;
     let far = proposal >= RANK_INDIRECT && (gather.flags & GATHER_ALL_ENTRIES) == 0u;
     if far && ((key >> 1u) + gather.cache_iteration) % INDIRECT_INTERVAL != 0u {
-        entry_light[odd + slot] = entry_light[slots - odd + slot];
+        entry_light[write_half + slot] = entry_light[slots - write_half + slot];
         return false;
     }
     return true;
@@ -98,14 +99,14 @@ fn hit_material(hit: Hit, x: vec3f, side: vec3f) -> HitMaterial {
 fn begin(at: u32, job: u32) -> bool {
     let slot = slot_of(job);
     let slots = gather.mask + 1u;
-    let odd = (gather.cache_iteration & 1u) * slots;
-    let even = slots - odd;
+    let write_half = (gather.cache_iteration & 1u) * slots;
+    let read_half = slots - write_half;
     let key = atomicLoad(&entry_keys[slot]);
-    let place = proposal_vertices[gather.rays + 2u * slots + slot + odd];
+    let place = proposal_vertices[gather.rays + 2u * slots + slot + write_half];
     let n = unpack_normal(place.w);
     let shift = pcg3(vec3u(key, 0x7f4a7c15u, 3u));
     let d = cosine_direction(n, lattice(gather.cache_iteration, shift.xy));
-    let vertex_index = gather.rays + even + slot;
+    let vertex_index = gather.rays + read_half + slot;
     start_path(at, bitcast<vec3f>(place.xyz), d, max(dot(n, d), 1e-4), 0.0, vertex_index, key, vec3f(1.0), job);
     queue_ray(at);
     return true;
@@ -115,19 +116,19 @@ fn begin(at: u32, job: u32) -> bool {
 fn finish(at: u32) {
     let slot = slot_of(job_of(at));
     let slots = gather.mask + 1u;
-    let odd = (gather.cache_iteration & 1u) * slots;
-    let even = slots - odd;
-    let previous = entry_light[even + slot];
+    let write_half = (gather.cache_iteration & 1u) * slots;
+    let read_half = slots - write_half;
+    let previous = entry_light[read_half + slot];
     let found = path_result(at);
     var light = found.radiance;
-    if found.slot != NONE { light += found.throughput * entry_light[even + found.slot].rgb; }
+    if found.slot != NONE { light += found.throughput * entry_light[read_half + found.slot].rgb; }
     // Ray n counts n^(k - 1), because early rays met entries that knew little. Light between
     // surfaces of albedo ρ then lacks n^(-k (1 - ρ)) after n rays, and noise is that of (2k - 1)/k²
     // n rays. In a first frame no entry knows anything, later most do.
     let k = select(4.0, 8.0, (gather.flags & GATHER_RESET) != 0u);
     let n_rays = min(previous.a + 1.0, 4.0 * gather.entry_frames);
     let share = max(k / (n_rays + k - 1.0), 1.0 / gather.entry_frames);
-    entry_light[odd + slot] = vec4f(mix(previous.rgb, finite3(light), share), n_rays);
+    entry_light[write_half + slot] = vec4f(mix(previous.rgb, finite3(light), share), n_rays);
 }
 
 @compute @workgroup_size(GROUP_SIZE)
