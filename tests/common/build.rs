@@ -128,3 +128,20 @@ pub fn show(name: &str, p: &Picture, scale: f32) {
     encoder.set_color(png::ColorType::Rgb);
     encoder.write_header().unwrap().write_image_data(&rgb).unwrap();
 }
+
+/// A floor with two low walls and nothing above: only the sky lights it, evenly.
+pub fn open_walls() -> Scene {
+    let mut scene = scene(
+        vec![
+            floor(60.0, 0.0),
+            quad([-3.0, 0.0, -1.0], [2.0, 0.0, 0.0], [0.0, 0.6, 0.0]),
+            quad([1.5, 0.0, 0.5], [1.5, 0.0, -1.0], [0.0, 0.5, 0.0]),
+        ],
+        Vec::new(),
+    );
+    scene.materials[0].base_color = [0.3, 0.3, 0.3, 1.0];
+    scene.materials[0].roughness = 1.0;
+    scene.environment = environment(1.0);
+    scene.cameras = vec![look_at([0.0, 2.5, 5.0], [0.0, 0.0, -1.0], 0.9)];
+    scene
+}

@@ -2,28 +2,10 @@
 
 use crate::{build, common};
 use bouncelight::gi::name::MethodName;
-use bouncelight::scene::Scene;
 use bouncelight_lab::study::fitted::Fitted;
 use bouncelight_scene::export;
 use std::path::{Path, PathBuf};
 use std::process::Output;
-
-/// A floor with two low walls and nothing above: only the sky lights it, evenly.
-fn open() -> Scene {
-    let mut scene = build::scene(
-        vec![
-            build::floor(60.0, 0.0),
-            build::quad([-3.0, 0.0, -1.0], [2.0, 0.0, 0.0], [0.0, 0.6, 0.0]),
-            build::quad([1.5, 0.0, 0.5], [1.5, 0.0, -1.0], [0.0, 0.5, 0.0]),
-        ],
-        Vec::new(),
-    );
-    scene.materials[0].base_color = [0.3, 0.3, 0.3, 1.0];
-    scene.materials[0].roughness = 1.0;
-    scene.environment = build::environment(1.0);
-    scene.cameras = vec![build::look_at([0.0, 2.5, 5.0], [0.0, 0.0, -1.0], 0.9)];
-    scene
-}
 
 fn bouncelight(folder: &Path, args: &[&str]) -> Output {
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_bouncelight"));
@@ -57,7 +39,7 @@ fn what_was_found_is_kept_and_obeyed_until_the_scene_changes() {
     }
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    export::write_glb(&open(), &at("open.glb")).unwrap();
+    export::write_glb(&build::open_walls(), &at("open.glb")).unwrap();
     let light = ["--environment", "1", "--size", "64x32"];
     let run = |args: &[&str]| bouncelight(folder.path(), &[args, &light].concat());
     let out = run(&["fit", "open.glb", "--target", "light=12%", "--views", "1", "--spp", "128", "--report", "page"]);

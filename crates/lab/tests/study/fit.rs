@@ -8,23 +8,6 @@ use bouncelight_lab::study::session::{Session, SessionOptions};
 
 const SIZE: [u32; 2] = [64, 32];
 
-/// A floor with two low walls and nothing above: only the sky lights it, evenly.
-fn open() -> Scene {
-    let mut scene = build::scene(
-        vec![
-            build::floor(60.0, 0.0),
-            build::quad([-3.0, 0.0, -1.0], [2.0, 0.0, 0.0], [0.0, 0.6, 0.0]),
-            build::quad([1.5, 0.0, 0.5], [1.5, 0.0, -1.0], [0.0, 0.5, 0.0]),
-        ],
-        Vec::new(),
-    );
-    scene.materials[0].base_color = [0.3, 0.3, 0.3, 1.0];
-    scene.materials[0].roughness = 1.0;
-    scene.environment = build::environment(1.0);
-    scene.cameras = vec![build::look_at([0.0, 2.5, 5.0], [0.0, 0.0, -1.0], 0.9)];
-    scene
-}
-
 fn options(target: &str, budget_ms: Option<f64>) -> FitOptions {
     let quality_target = target.parse().expect("the test's target is one");
     FitOptions { quality_target, budget_ms, frames: 16, networks: Vec::new(), max_samples: 128, timed: false }
@@ -46,7 +29,7 @@ fn fitted(gpu: &bouncelight::gpu::Gpu, scene: Scene, options: &FitOptions) -> Fi
 fn an_open_scene_under_an_even_sky_ends_at_ambient() {
     let Some(gpu) = common::gpu() else { return };
     let asked = options("light=12%", None);
-    let found = fitted(&gpu, open(), &asked);
+    let found = fitted(&gpu, build::open_walls(), &asked);
     let row = found.choice();
     println!("{}\n{}", found.table(&asked), found.why(&asked));
     assert!(found.reached && matches!(row.candidate, Candidate::Ambient(_)) && row.worst <= 0.12, "{row:?}");
