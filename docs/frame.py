@@ -26,6 +26,7 @@ PASSES = [
     ("Trace", "gi.reproject", "reproject, find disocclusions", "2 4 5 6 13", "4 6"),
     ("Trace", "gi.cache_evict", "free old cache entries", "7", "7"),
     ("Trace", "gi.trace", "trace cells' rays", "0 2 4 7", "6 7"),
+    ("Trace", "gi.cache_select", "entries that are due in an update", "7", "7"),
     ("Trace", "gi.cache_update", "update the cache, 1 to 32 times", "0 7", "7"),
     ("Trace", "gi.specular_trace", "trace specular rays of pixels", "0 2 7 8", "8"),
     ("Denoise", "gi.accumulate", "temporal accumulation", "2 4 5 6 7 13", "5"),

@@ -12,6 +12,7 @@ pub fn example_preludes() -> Vec<(&'static str, String)> {
         ("gi.ssgi", super::screen::ssgi::SsgiOptions::default().prelude()),
         ("gi.downsample", super::stage::cells::prelude()),
         ("gi.trace", super::gather::prelude()),
+        ("gi.cache_select", super::gather::prelude()),
         ("gi.cache_update", super::gather::prelude()),
         ("gi.gradient", super::gather::prelude()),
         ("gi.specular_trace", super::gather::prelude()),

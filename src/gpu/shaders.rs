@@ -35,6 +35,7 @@ const FILES: &[(&str, &str)] = &[
     ("gi.ssr", "gi/ssr.wgsl"),
     ("gi.downsample", "gi/downsample.wgsl"),
     ("gi.trace", "gi/gather/trace.wgsl"),
+    ("gi.cache_select", "gi/gather/cache_select.wgsl"),
     ("gi.cache_update", "gi/gather/cache_update.wgsl"),
     ("gi.gradient", "gi/gather/gradient.wgsl"),
     ("gi.specular_trace", "gi/gather/specular_trace.wgsl"),

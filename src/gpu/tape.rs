@@ -9,7 +9,6 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 thread_local! {
     static RUNS: Cell<bool> = const { Cell::new(false) };
-    static COUNTS: Cell<bool> = const { Cell::new(false) };
     static TAPE: RefCell<Tape> = RefCell::default();
 }
 
@@ -71,12 +70,6 @@ impl DispatchCapture {
         Self(())
     }
 
-    /// Starts, for dispatches that will be counted.
-    pub fn to_count() -> Self {
-        COUNTS.set(true);
-        Self::start()
-    }
-
     /// From here on `listener` hears of dispatches, or nobody does.
     pub fn listen(&mut self, listener: Option<std::rc::Rc<RefCell<dyn Listener>>>) {
         TAPE.with_borrow_mut(|tape| tape.listener = listener);
@@ -91,7 +84,6 @@ impl DispatchCapture {
 impl Drop for DispatchCapture {
     fn drop(&mut self) {
         RUNS.set(false);
-        COUNTS.set(false);
         TAPE.take();
     }
 }
@@ -105,11 +97,6 @@ impl Tape {
 /// Whether one runs on this thread.
 pub fn runs() -> bool {
     RUNS.get()
-}
-
-/// Whether dispatches of this thread will be counted on this device.
-pub fn counts() -> bool {
-    COUNTS.get()
 }
 
 fn write(note: impl FnOnce(&mut Tape)) {

@@ -52,7 +52,7 @@ fn every_shader_validates_in_every_permutation() {
     let seen: std::collections::BTreeSet<_> = permutations.iter().map(|p| p.0.clone()).collect();
     assert_eq!(seen, shaders::names().collect(), "every shader was seen");
     assert_eq!(shaders::NetKernel::all().count(), 46);
-    assert_eq!(permutations.len(), 536);
+    assert_eq!(permutations.len(), 537);
 }
 
 /// Type of a place in memory that threads share; None for other memory, and inside vectors.

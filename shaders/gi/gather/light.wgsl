@@ -8,7 +8,7 @@
 
 // A light that a shadow ray is sent to, chosen among all by what it would give.
 struct Chosen {
-    // Unit vector, and how far.
+    // Unit vector, and how far; 0: none was chosen.
     l: vec3f,
     reach: f32,
     // What arrives along it, cosine and brdf multiplied in, over the chance of the choice.
@@ -63,7 +63,8 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
     var chosen = Chosen(vec3f(0.0), 0.0, vec3f(0.0), vec3f(0.0));
     var total = 0.0;
     var best = 0.0;
-    var lot = u.x;
+    var chosen_light = NONE;
+    var remaining = u.x;
     // The lengths of the lists are asked, too: Mesa's CPU driver compiles what uniforms alone
     // branch on anew for each dispatch.
     let all = min(gather.light_count, arrayLength(&lights));
@@ -91,16 +92,16 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
             total += w;
             // Weighted reservoir of one, with one random number that is used up bit by bit.
             let take = w / total;
-            if lot < take {
-                lot /= take;
+            if remaining < take {
+                remaining /= take;
                 best = bright;
-                chosen = Chosen(s.l, f32(i), value, s.irradiance * (n_l / PI));
+                chosen_light = i;
+                chosen = Chosen(s.l, 0.0, value, s.irradiance * (n_l / PI));
             } else {
-                lot = (lot - take) / max(1.0 - take, 1e-7);
+                remaining = (remaining - take) / max(1.0 - take, 1e-7);
             }
         }
     }
-    var towards_light = best > 0.0;
     if glowing > 0u {
         let more = unit_floats(pcg3(seed ^ vec3u(0x68bc21ebu)));
         let scaled = u.y * f32(glowing);
@@ -124,9 +125,9 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
             let w = weight_of(value);
             if w > 0.0 {
                 total += w;
-                if lot * total < w {
+                if remaining * total < w {
                     best = w;
-                    towards_light = false;
+                    chosen_light = NONE;
                     // Short of the surface itself.
                     chosen = Chosen(l, sqrt(d2) * 0.999, value, irradiance * (n_l / PI));
                 }
@@ -134,9 +135,9 @@ fn choose_light(p: Place, lamps: bool, seed: vec3u) -> Chosen {
         }
     }
     if best <= 0.0 { return Chosen(vec3f(0.0), 0.0, vec3f(0.0), vec3f(0.0)); }
-    if towards_light {
+    if chosen_light != NONE {
         // A point of the light's disc.
-        let light = lights[u32(chosen.reach)];
+        let light = lights[chosen_light];
         let a = 2.0 * PI * u.y;
         let disc = light.radius * sqrt(u.z) * vec3f(cos(a), sin(a), 0.0);
         if light.kind == LIGHT_SUN {

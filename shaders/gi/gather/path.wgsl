@@ -2,15 +2,35 @@
 //#import lib/brdf.wgsl
 //#import lib/environment.wgsl
 //#import lib/sampling.wgsl
+//#import accel/traverse.wgsl
 //#import accel/surface.wgsl
 //#import gi/gather/types.wgsl
 //#import gi/gather/light.wgsl
 //#import gi/gather/entries.wgsl
-//#import gi/gather/jobs.wgsl
 
 // Paths: a ray finds the sky, or a surface, whose emission and reflected direct light it adds, and
-// the cache entry that knows the rest. The shader that imports this file says by `hit_material(hit,
-// x, side) -> HitMaterial` what a path's first ray has hit at x, on the side that faces `side`.
+// the cache entry that knows the rest. One thread traces a path with its state in registers. The
+// shader that imports this file says by `hit_material(hit, x, side) -> HitMaterial` what a path's
+// first ray has hit at x, on the side that faces `side`.
+
+struct Path {
+    // Origin and direction of its first ray, and the normal there.
+    x: vec3f,
+    direction: vec3f,
+    n: vec3f,
+    // Cosine by which emission at the first hit is weighted against light samples from the origin;
+    // UNWEIGHTED where nobody takes any.
+    cosine: f32,
+    // Whether the path takes one: a shadow ray to an emissive surface.
+    samples_emitters: bool,
+    // Height above the origin's plane below which a hit counts as black: a ray about a shading
+    // normal may go below its own surface.
+    min_height: f32,
+    throughput: vec3f,
+    // Its proposal vertex or NONE, and what seeds its random numbers.
+    vertex_index: u32,
+    rng_id: u32,
+}
 
 struct PathResult {
     // Radiance without the cache.
@@ -20,6 +40,9 @@ struct PathResult {
     throughput: vec3f,
     // Of the first hit, FAR without one.
     distance: f32,
+    // E/π of an emissive surface, by the shadow ray from the origin, and the packed direction to it.
+    emitter_light: vec3f,
+    emitter_direction: u32,
 }
 
 // Cosine of rays without a shadow ray to emissive surfaces: larger than any density of these.
@@ -31,231 +54,190 @@ const UNWEIGHTED = 1e12;
 // take a ninth more time in a city (docs/log/2026-11-25-lists.md).
 const SEGMENTS = 4u;
 
-// Paths that look up an entry, and paths that have ended.
-var<workgroup> lookups: array<u32, PATHS_PER_GROUP>;
-var<workgroup> lookup_count: atomic<u32>;
-var<workgroup> ended: array<u32, PATHS_PER_GROUP>;
-var<workgroup> ended_count: atomic<u32>;
+// What a path does next: send its ray; choose a light for the place where it is, and see whether
+// that light is visible; look up the place's entry, and see whether the entry's origin is visible.
+const SEND_RAY = 0u;
+const CHOOSE_LIGHT = 1u;
+const SHADOW_RAY = 2u;
+const LOOK_UP_ENTRY = 3u;
+const VISIBILITY_RAY = 4u;
+const ENDED = 5u;
 
-// Starts path `at` from o along d. `n_d`: cosine, see DIRECTION; `height`: see RNG; `weight`:
-// throughput. Its ray is still to be queued.
-fn start_path(
-    at: u32, o: vec3f, d: vec3f, n_d: f32, height: f32, vertex_index: u32, rng_id: u32, weight: vec3f, job: u32,
-) {
-    let seed = pcg3(vec3u(rng_id, gather.cache_iteration, 0x9e3779b9u));
-    store_field(at, POSITION, o, WAIT_HIT);
-    store_field(at, DIRECTION, d, bitcast<u32>(n_d));
-    store_field(at, NORMAL, vec3f(0.0), NONE);
-    store_field_bits(at, RNG, vec4u(seed, bitcast<u32>(height)));
-    store_field(at, RADIANCE, vec3f(0.0), bitcast<u32>(FAR));
-    store_field(at, THROUGHPUT, weight, pack_normal(d));
-    store_field(at, EMITTER_LIGHT, vec3f(0.0), 0u);
-    store_field_bits(at, IDS, vec4u(vertex_index, rng_id, job, 0u));
+struct PathState {
+    stage: u32,
+    // Hits so far, and sub-entries tried at the last one.
+    hits: u32,
+    sub_index: u32,
+    // The entry that is tried.
+    slot: u32,
+    seed: vec3u,
+    // As in `Path`, of the next hit.
+    cosine: f32,
+    // Throughput without the reflectance of the place where the path is.
+    weight: vec3f,
+    // That place: the origin, as a white diffuse surface; later the last hit.
+    place: Place,
+    // Light that arrives there, unless something is in between.
+    light: vec3f,
+    // The ray to trace, up to `reach` lengths of its direction.
+    origin: vec3f,
+    direction: vec3f,
+    reach: f32,
+    ray_seed: u32,
+    result: PathResult,
 }
 
-// Result of a path that has ended.
-fn path_result(at: u32) -> PathResult {
-    let radiance = load_field(at, RADIANCE);
-    let throughput = load_field(at, THROUGHPUT);
-    let slot = load_field(at, NORMAL).w;
-    return PathResult(bitcast<vec3f>(radiance.xyz), slot, bitcast<vec3f>(throughput.xyz), bitcast<f32>(radiance.w));
-}
-
-fn job_of(at: u32) -> u32 {
-    return load_field(at, IDS).z;
-}
-
-// Runs all jobs of a share. `finish(at)` of the shader that imports this file stores a result.
-// `cache_iteration`: the update that will use the proposals. `count_emission`: whether emission
-// counts at the first hit.
-fn trace_paths(thread: u32, share: Share, cache_iteration: u32, count_emission: bool) {
-    var part = 0u;
+// Traces a path. `cache_iteration`: the update that will use its proposals. `count_emission`:
+// whether emission counts at the first hit. One loop calls each function once, since drivers inline
+// every call; and threads of a subgroup traverse together, whatever their rays are for.
+fn trace_path(path: Path, cache_iteration: u32, count_emission: bool) -> PathResult {
+    var s = begin_path(path);
     loop {
-        part = note_jobs(thread, share, part);
-        run_jobs(thread, cache_iteration, count_emission);
-        if part == share.parts { break; }
-    }
-}
-
-// Runs the noted jobs, a path each. As soon as a path has ended, another starts in its place, so
-// that there are rays for all threads.
-fn run_jobs(thread: u32, cache_iteration: u32, count_emission: bool) {
-    for (var at = thread; at < PATHS_PER_GROUP; at += GROUP_SIZE) { ended[at] = at; }
-    if thread == 0u { atomicStore(&ended_count, PATHS_PER_GROUP); }
-    var begun = false;
-    loop {
-        group_barrier();
-        for (var i = thread; i < atomicLoad(&ended_count); i += GROUP_SIZE) { next_job(ended[i], begun); }
-        begun = true;
-        workgroupBarrier();
-        if thread == 0u {
-            atomicStore(&lookup_count, 0u);
-            atomicStore(&ended_count, 0u);
-        }
-        if !trace_queue(thread) { break; }
-        for (var i = thread; i < sent_nearest; i += GROUP_SIZE) { on_hit(sent_ray(i), count_emission); }
-        for (var i = sent_nearest + thread; i < sent_all; i += GROUP_SIZE) {
-            if sent_ray(i) < SHADOW_ID { on_visibility(sent_ray(i), cache_iteration); }
-        }
-        group_barrier();
-        for (var i = thread; i < atomicLoad(&lookup_count); i += GROUP_SIZE) {
-            lookup_entry(lookups[i], cache_iteration);
+        if s.stage == CHOOSE_LIGHT { send_shadow_ray(&s, path.rng_id); }
+        if s.stage == LOOK_UP_ENTRY { try_entry(&s, path, cache_iteration); }
+        if s.stage == ENDED { break; }
+        let hit = trace_seeded(s.origin, s.direction, s.reach, s.stage != SEND_RAY, s.ray_seed);
+        let free = hit.triangle == NO_TRIANGLE;
+        if s.stage == SEND_RAY {
+            on_hit(&s, hit, path.min_height, count_emission);
+        } else if s.stage == SHADOW_RAY {
+            on_shadow_ray(&s, path, free);
+        } else if free {
+            use_entry(&s, path, cache_iteration);
+        } else {
+            s.sub_index += 1u;
+            s.stage = LOOK_UP_ENTRY;
         }
     }
+    return s.result;
 }
 
-fn end_path(at: u32) {
-    ended[atomicAdd(&ended_count, 1u)] = at;
+fn begin_path(path: Path) -> PathState {
+    let n = path.n;
+    var s: PathState;
+    s.seed = pcg3(vec3u(path.rng_id, gather.cache_iteration, 0x9e3779b9u));
+    s.cosine = path.cosine;
+    s.place = Place(path.x, n, n, vec3f(1.0), vec3f(0.0), 1.0);
+    s.result = PathResult(vec3f(0.0), NONE, path.throughput, FAR, vec3f(0.0), 0u);
+    send_ray(&s, path.x, path.direction);
+    // The list's length is read, too, and no `&&`, which is a branch: Mesa's CPU driver before 23
+    // recompiles for each value of a uniform that alone decides a branch.
+    let glowing = min(gather.emitter_count, arrayLength(&emitters)) > 0u;
+    let counts = (gather.flags & GATHER_EMISSIVE_PROXIES) == 0u;
+    s.stage = select(SEND_RAY, CHOOSE_LIGHT, path.samples_emitters & glowing & counts);
+    return s;
 }
 
-fn queue_lookup(at: u32) {
-    lookups[atomicAdd(&lookup_count, 1u)] = at;
+fn send_ray(s: ptr<function, PathState>, x: vec3f, direction: vec3f) {
+    (*s).stage = SEND_RAY;
+    (*s).origin = x;
+    (*s).direction = direction;
+    (*s).reach = FAR;
+    (*s).ray_seed = (*s).seed.x;
 }
 
-// The ray of path `at` has hit something, or the sky.
-fn on_hit(at: u32, count_emission: bool) {
-    let hit = path_hit(at);
-    let place = load_field(at, POSITION);
-    let direction_field = load_field(at, DIRECTION);
-    let along = bitcast<vec3f>(direction_field.xyz);
-    let cosine = bitcast<f32>(direction_field.w);
-    let throughput_field = load_field(at, THROUGHPUT);
-    let weight = bitcast<vec3f>(throughput_field.xyz);
-    let so_far = load_field(at, RADIANCE);
-    var radiance = bitcast<vec3f>(so_far.xyz);
-    if hit.triangle == NO_TRIANGLE {
-        store_field(at, RADIANCE, radiance + weight * finite3(environment_radiance(along)), so_far.w);
-        end_path(at);
+// Sends a shadow ray to one light; at the origin to a point of an emissive surface.
+fn send_shadow_ray(s: ptr<function, PathState>, rng_id: u32) {
+    let at_hit = (*s).hits > 0u;
+    let origin_seed = pcg3(vec3u(rng_id, gather.cache_iteration, 0x51ed270bu));
+    let chosen = choose_light((*s).place, at_hit, select(origin_seed, pcg3((*s).seed), vec3<bool>(at_hit)));
+    if !(chosen.reach > 0.0) {
+        (*s).stage = select(SEND_RAY, LOOK_UP_ENTRY, at_hit);
         return;
     }
-    let first = ((place.w >> 8u) & 255u) == 0u;
-    let distance = select(so_far.w, bitcast<u32>(hit.t), first);
+    (*s).stage = SHADOW_RAY;
+    (*s).light = select(chosen.even, (*s).weight * chosen.radiance, vec3<bool>(at_hit));
+    (*s).origin = (*s).place.x;
+    (*s).direction = chosen.l;
+    (*s).reach = chosen.reach;
+    (*s).ray_seed = select(origin_seed.z, (*s).seed.y, at_hit);
+}
+
+fn on_shadow_ray(s: ptr<function, PathState>, path: Path, free: bool) {
+    if (*s).hits > 0u {
+        if free { (*s).result.radiance += (*s).light; }
+        (*s).stage = LOOK_UP_ENTRY;
+        return;
+    }
+    if free {
+        (*s).result.emitter_light = (*s).light;
+        (*s).result.emitter_direction = pack_normal((*s).direction);
+    }
+    send_ray(s, path.x, path.direction);
+}
+
+// The path's ray has hit something, or the sky.
+fn on_hit(s: ptr<function, PathState>, hit: Hit, min_height: f32, count_emission: bool) {
+    let along = (*s).direction;
+    let first = (*s).hits == 0u;
+    let weight = (*s).result.throughput;
+    (*s).stage = ENDED;
+    if hit.triangle == NO_TRIANGLE {
+        (*s).result.radiance += weight * finite3(environment_radiance(along));
+        return;
+    }
+    if first { (*s).result.distance = hit.t; }
     let front = trace_normal(hit);
     let facing = -dot(front, along);
-    let rng = load_field(at, RNG);
-    if first && abs(facing) * hit.t < bitcast<f32>(rng.w) {
-        store_field(at, RADIANCE, radiance, distance);
-        end_path(at);
-        return;
-    }
+    if first && abs(facing) * hit.t < min_height { return; }
     let side = select(-front, front, facing > 0.0);
     let n = hit_normal(hit, side);
-    let on_it = bitcast<vec3f>(place.xyz) + along * hit.t;
+    let on_it = (*s).origin + along * hit.t;
     var surface: HitMaterial;
     if first { surface = hit_material(hit, on_it, side); } else { surface = triangle_material(hit.triangle); }
     if (gather.flags & GATHER_NO_CAUSTICS) != 0u { surface.f0 = vec3f(0.0); }
     let counts = (count_emission || !first) && (facing > 0.0 || (surface.flags & HIT_DOUBLE_SIDED) != 0u);
     if counts && any(surface.emission > vec3f(0.0)) {
+        let cosine = (*s).cosine;
         let density = surface.by_area * gather.inverse_power * hit.t * hit.t / max(abs(facing), 1e-6);
-        radiance += weight * surface.emission * (cosine / PI) / (cosine / PI + density);
+        (*s).result.radiance += weight * surface.emission * (cosine / PI) / (cosine / PI + density);
     }
-    store_field(at, RADIANCE, radiance, distance);
     let n_v = max(-dot(n, along), 1e-4);
     let lobe = env_brdf(surface.f0, surface.roughness, n_v);
-    let most = max(surface.f0.x, max(surface.f0.y, surface.f0.z));
-    let diffuse = surface.diffuse * (1.0 - diffuse_loss(most, surface.roughness, n_v));
+    let strongest = max(surface.f0.x, max(surface.f0.y, surface.f0.z));
+    let diffuse = surface.diffuse * (1.0 - diffuse_loss(strongest, surface.roughness, n_v));
     let reflectance = diffuse + lobe;
-    if all(reflectance <= vec3f(0.0)) || (surface.flags & HIT_UNLIT) != 0u {
-        end_path(at);
-        return;
-    }
-    let x = off(on_it, side, hit.t);
-    let here = Place(x, n, -along, diffuse, surface.f0, max(surface.roughness, LEAST_ROUGHNESS));
-    let chosen = choose_light(here, true, pcg3(rng.xyz));
-    store_field(at, NORMAL, n, NONE);
-    store_field(at, THROUGHPUT, weight * reflectance, throughput_field.w);
-    var stage = WAIT_ENTRY;
-    if chosen.reach > 0.0 {
-        store_field(at, CHOSEN_LIGHT, weight * chosen.radiance, 0u);
-        queue_shadow_ray(SHADOW_ID + at, x, chosen.l, chosen.reach, rng.y);
-        stage |= SHADOW_PENDING;
-    }
-    // Sub-entries start anew in another cell.
-    store_field(at, POSITION, x, (place.w & 0xff00u) | stage);
-    queue_lookup(at);
+    if all(reflectance <= vec3f(0.0)) || (surface.flags & HIT_UNLIT) != 0u { return; }
+    (*s).stage = CHOOSE_LIGHT;
+    (*s).hits += 1u;
+    (*s).sub_index = 0u;
+    (*s).place =
+        Place(off(on_it, side, hit.t), n, -along, diffuse, surface.f0, max(surface.roughness, LEAST_ROUGHNESS));
+    (*s).weight = weight;
+    (*s).result.throughput = weight * reflectance;
 }
 
-// The shadow ray of path `at` is free, or not: at its origin, beside its first ray, one to an
-// emissive surface, later one to the chosen light.
-fn on_shadow_ray(at: u32, direction: vec3f, free: bool) {
-    let waits = load_field(at, POSITION).w;
-    if free {
-        let light = bitcast<vec3f>(load_field(at, CHOSEN_LIGHT).xyz);
-        if (waits & 0xffffu) == WAIT_HIT {
-            store_field(at, EMITTER_LIGHT, light, pack_normal(direction));
-        } else {
-            let so_far = load_field(at, RADIANCE);
-            store_field(at, RADIANCE, bitcast<vec3f>(so_far.xyz) + light, so_far.w);
-        }
-    }
-    if (waits & 127u) == WAIT_SHADOW { end_path(at); }
-}
-
-// The visibility ray of path `at` to where an entry's rays start is free, or not.
-fn on_visibility(at: u32, cache_iteration: u32) {
-    let place = load_field(at, POSITION);
-    if is_visible(at) {
-        let side = load_field(at, NORMAL);
-        propose(at, side.w, bitcast<vec3f>(place.xyz), bitcast<vec3f>(side.xyz), cache_iteration);
-        end_path(at);
-        return;
-    }
-    // Its shadow ray has ended by now, too.
-    store_field(at, POSITION, bitcast<vec3f>(place.xyz), (place.w & ~SHADOW_PENDING) + 0x10000u);
-    queue_lookup(at);
-}
-
-// Ends path `at` when its shadow ray has ended.
-fn end_after_shadow_ray(at: u32, place: vec4u) {
-    if (place.w & SHADOW_PENDING) == 0u {
-        end_path(at);
-        return;
-    }
-    store_field(at, POSITION, bitcast<vec3f>(place.xyz), (place.w & 0xff00u) | WAIT_SHADOW);
-}
-
-fn propose(at: u32, slot: u32, x: vec3f, n: vec3f, cache_iteration: u32) {
-    let ids = load_field(at, IDS);
-    propose_vertex(slot, x, n, ids.x, ids.y, cache_iteration);
-}
-
-// Queues the ray of path `at` if its result counts; otherwise the path has ended.
-fn send_if_weighted(at: u32, weight: vec3f) -> bool {
-    if !any(weight > vec3f(0.0)) { return false; }
-    queue_ray(at);
-    return true;
-}
-
-// Tries the next sub-entry of the hit's cell.
-fn lookup_entry(at: u32, cache_iteration: u32) {
-    let place = load_field(at, POSITION);
-    let x = bitcast<vec3f>(place.xyz);
-    let n = bitcast<vec3f>(load_field(at, NORMAL).xyz);
-    let sub_index = place.w >> 16u;
-    if sub_index < SUB_ENTRIES {
-        let visibility = find_sub_entry(x, n, sub_index);
+// Tries the next sub-entry of the place's cell.
+fn try_entry(s: ptr<function, PathState>, path: Path, cache_iteration: u32) {
+    let place = (*s).place;
+    if (*s).sub_index < SUB_ENTRIES {
+        let visibility = find_sub_entry(place.x, place.n, (*s).sub_index);
         if visibility.slot != NONE {
-            store_field(at, NORMAL, n, visibility.slot);
-            if any(visibility.to != vec3f(0.0)) {
-                queue_shadow_ray(at, visibility.start, visibility.to, 1.0, 0u);
-            } else {
-                propose(at, visibility.slot, x, n, cache_iteration);
-                end_after_shadow_ray(at, place);
+            (*s).slot = visibility.slot;
+            if all(visibility.to == vec3f(0.0)) {
+                use_entry(s, path, cache_iteration);
+                return;
             }
+            (*s).stage = VISIBILITY_RAY;
+            (*s).origin = visibility.start;
+            (*s).direction = visibility.to;
+            (*s).reach = 1.0;
+            (*s).ray_seed = 0u;
             return;
         }
     }
-    store_field(at, NORMAL, n, NONE);
-    let segment = ((place.w >> 8u) & 255u) + 1u;
-    if segment == SEGMENTS {
-        end_after_shadow_ray(at, place);
-        return;
-    }
-    let rng = load_field(at, RNG);
-    let seed = pcg3(rng.xyz ^ vec3u(0x85ebca6bu));
-    let along = cosine_direction(n, unit_floats(pcg3(seed ^ vec3u(0x27d4eb2fu))).xy);
-    store_field_bits(at, RNG, vec4u(seed, rng.w));
-    store_field(at, DIRECTION, along, bitcast<u32>(max(dot(n, along), 1e-4)));
-    store_field(at, POSITION, x, (segment << 8u) | WAIT_HIT);
-    queue_ray(at);
+    (*s).stage = ENDED;
+    if (*s).hits == SEGMENTS { return; }
+    // Without an entry the light that falls on the place comes by the place's own ray.
+    (*s).seed = pcg3((*s).seed ^ vec3u(0x85ebca6bu));
+    let along = cosine_direction(place.n, unit_floats(pcg3((*s).seed ^ vec3u(0x27d4eb2fu))).xy);
+    (*s).cosine = max(dot(place.n, along), 1e-4);
+    send_ray(s, place.x, along);
+}
+
+// The entry gives the rest of the light, and may start its rays at the place.
+fn use_entry(s: ptr<function, PathState>, path: Path, cache_iteration: u32) {
+    (*s).result.slot = (*s).slot;
+    (*s).stage = ENDED;
+    propose_vertex((*s).slot, (*s).place.x, (*s).place.n, path.vertex_index, path.rng_id, cache_iteration);
 }

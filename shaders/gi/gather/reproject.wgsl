@@ -1,7 +1,10 @@
 //#import gi/gather/history_lookup.wgsl
 //#import gi/gather/apply_gradient.wgsl
+//#import gi/gather/jobs.wgsl
 
-// Marks each cell whose history is missing, invalid or short, before rays are traced.
+// Marks each cell whose history is missing, invalid or short, and notes the rays of the frame.
+
+@group(2) @binding(8) var<storage, read_write> jobs: array<atomic<u32>>;
 
 // The pixel of a cell, nearest to its middle, that is static and shows the surface of `history`;
 // NO_PIXEL where none does.
@@ -23,25 +26,21 @@ fn pixel_of_surface(history: History, cell: vec2u) -> u32 {
     return best;
 }
 
-// At rest a cell keeps its surface as long as one of its pixels shows it: jittered foliage has
-// another surface in the middle of a cell in every frame.
-@compute @workgroup_size(8, 8)
-fn reproject(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= cell_grid()) { return; }
-    let cell = cell_index(id.xy);
-    let packed = cell_pixels[cell];
-    if packed == NO_PIXEL { return; }
+// The pixel of a cell with its state. At rest a cell keeps its surface as long as one of its pixels
+// shows it: jittered foliage has another surface in the middle of a cell in every frame.
+fn marked_pixel(at_cell: vec2u, packed: u32) -> u32 {
+    let cell = cell_index(at_cell);
     let pixel = unpack_pixel(packed);
     let z = distance_at(pixel);
     let x = world_position_at(pixel, z);
     let motion = motion_of(pixel);
-    var history = reproject_history(id.xy, pixel, motion, x, world_normal_at(pixel), cell_foot(z));
+    var history = reproject_history(at_cell, pixel, motion, x, world_normal_at(pixel), cell_foot(z));
     var marked = packed;
     if history.history_length <= 0.0 {
         marked = NO_PIXEL;
         history = previous_history_at(cell);
         if (gather.flags & GATHER_RESET) == 0u && history.history_length > 0.0 && is_static(motion) {
-            marked = pixel_of_surface(history, id.xy);
+            marked = pixel_of_surface(history, at_cell);
         }
     }
     if marked == NO_PIXEL {
@@ -56,5 +55,31 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     } else if history.history_length < SHORT_HISTORY_FRAMES && (gather.flags & GATHER_PROGRESSIVE) == 0u {
         marked |= SHORT_HISTORY;
     }
-    cell_pixels[cell] = marked;
+    return marked;
+}
+
+// Whether the cell sends a ray into its lobe in this frame.
+fn has_specular_ray(cell: vec2u, packed: u32) -> bool {
+    if any(specular_cell(cell / 2u) != cell) { return false; }
+    records[3u * specular_record(cell / 2u) + 1u].z = 0.0;
+    return (gather.flags & GATHER_NO_SPECULAR) == 0u && has_lobe(textureLoad(specular_map, unpack_pixel(packed), 0));
+}
+
+@compute @workgroup_size(8, 8)
+fn reproject(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= cell_grid()) { return; }
+    let cell = cell_index(id.xy);
+    if cell_pixels[cell] == NO_PIXEL { return; }
+    let packed = marked_pixel(id.xy, cell_pixels[cell]);
+    cell_pixels[cell] = packed;
+    let samples = spp_of(packed);
+    let specular = has_specular_ray(id.xy, packed);
+    let first = atomicAdd(&jobs[CELL_JOBS], samples + select(0u, 1u, specular));
+    for (var i = 0u; i < samples; i++) { note_job(first + i, packed, (cell << SAMPLE_BITS) | i); }
+    if specular { note_job(first + samples, packed, (cell << SAMPLE_BITS) | SPECULAR_SAMPLE); }
+}
+
+fn note_job(i: u32, a: u32, b: u32) {
+    atomicStore(&jobs[JOB_COUNTS + 2u * i], a);
+    atomicStore(&jobs[JOB_COUNTS + 2u * i + 1u], b);
 }

@@ -17,34 +17,23 @@ fn hit_material(hit: Hit, x: vec3f, side: vec3f) -> HitMaterial {
     return triangle_material(hit.triangle);
 }
 
-// Stores the result of path `at` in its record.
-fn write_record(at: u32) {
-    let found = path_result(at);
-    let to = job_of(at);
-    let glow = load_field(at, EMITTER_LIGHT);
-    records[3u * to] = vec4f(found.radiance, bitcast<f32>(found.slot));
-    let throughput = shared_exponent(found.throughput);
-    records[3u * to + 1u] =
-        vec4f(bitcast<f32>(throughput), bitcast<f32>(load_field(at, THROUGHPUT).w), found.distance, 0.0);
-    records[3u * to + 2u] = bitcast<vec4f>(glow);
+// Traces a path and stores its record.
+fn trace_record(path: Path, record: u32) {
+    var found = PathResult(vec3f(0.0), NONE, path.throughput, FAR, vec3f(0.0), 0u);
+    // A lobe's direction below the surface has no weight and no ray.
+    if any(path.throughput > vec3f(0.0)) {
+        let count_emission = (gather.flags & GATHER_EMISSIVE_PROXIES) == 0u;
+        found = trace_path(path, gather.cache_iteration, count_emission);
+    }
+    let throughput = bitcast<f32>(shared_exponent(found.throughput));
+    let direction = bitcast<f32>(pack_normal(path.direction));
+    records[3u * record] = vec4f(found.radiance, bitcast<f32>(found.slot));
+    records[3u * record + 1u] = vec4f(throughput, direction, found.distance, 0.0);
+    records[3u * record + 2u] = vec4f(found.emitter_light, bitcast<f32>(found.emitter_direction));
 }
 
-// Starts path `at` from x along d, for the surface with normal n, and where there are emissive
-// surfaces queues a shadow ray to a point of one. `ray` seeds its random numbers, `vertex_index` is
-// its proposal vertex or NONE, `to` its record.
-fn send(at: u32, x: vec3f, n: vec3f, d: vec3f, vertex_index: u32, ray: u32, to: u32) {
-    start_path(at, x, d, max(dot(n, d), 1e-4), max_origin_height(x), vertex_index, ray, vec3f(1.0), to);
-    // The list's length is read, too, and no `&&`, which is a branch: Mesa's CPU driver before 23
-    // recompiles for each value of a uniform that alone decides a branch.
-    let glowing = min(gather.emitter_count, arrayLength(&emitters)) > 0u;
-    if glowing & ((gather.flags & GATHER_EMISSIVE_PROXIES) == 0u) {
-        let seed = pcg3(vec3u(ray, gather.cache_iteration, 0x51ed270bu));
-        // For a white diffuse surface.
-        let chosen = choose_light(Place(x, n, n, vec3f(1.0), vec3f(0.0), 1.0), false, seed);
-        if chosen.reach > 0.0 {
-            store_field(at, CHOSEN_LIGHT, chosen.even, 0u);
-            queue_shadow_ray(SHADOW_ID + at, x, chosen.l, chosen.reach, seed.z);
-        }
-    }
-    queue_ray(at);
+// The path of a cosine-distributed ray from x along d, for the surface with normal n. `vertex_index`
+// is its proposal vertex or NONE, `ray` seeds its random numbers.
+fn diffuse_path(x: vec3f, n: vec3f, d: vec3f, vertex_index: u32, ray: u32) -> Path {
+    return Path(x, d, n, max(dot(n, d), 1e-4), true, max_origin_height(x), vec3f(1.0), vertex_index, ray);
 }

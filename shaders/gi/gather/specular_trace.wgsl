@@ -43,55 +43,30 @@ fn is_smooth(pixel: vec2u) -> bool {
 // Pixels of a square of 2×2 in the order of their phases.
 const PHASES = array<vec2u, 4>(vec2u(0u, 0u), vec2u(1u, 1u), vec2u(1u, 0u), vec2u(0u, 1u));
 
-// The smooth pixel of a square that sends a ray in this frame; the picture's size where there is
-// none.
-fn traced_pixel(first: vec2u) -> vec2u {
-    var own = params.size;
-    for (var i = 0u; i < 4u; i++) {
-        let pixel = first + PHASES[(gather.frame + 3u - i) & 3u];
-        if is_smooth(pixel) { own = pixel; }
-    }
-    return own;
+// Which pixels of a square are smooth, a bit each in the order of PHASES.
+fn smooth_pixels(first: vec2u) -> u32 {
+    var bits = 0u;
+    for (var i = 0u; i < 4u; i++) { bits |= select(0u, 1u << i, is_smooth(first + PHASES[i])); }
+    return bits;
 }
 
-fn blocks() -> vec2u {
-    return blocks_of((params.size + 1u) / 2u);
+// The one of them whose turn it is to send the frame's ray.
+fn traced_pixel(bits: u32) -> u32 {
+    // From this frame's phase on, twice round.
+    return (gather.frame + firstTrailingBit((bits | (bits << 4u)) >> (gather.frame & 3u))) & 3u;
 }
 
-fn block_of(unit: u32) -> vec3u {
-    let across = blocks().x;
-    return vec3u(unit % across, unit / across, 0u);
-}
-
-fn wants(block: vec3u, i: u32) -> bool {
-    return any(traced_pixel(2u * block_place(block.xy, i)) < params.size);
-}
-
-// The first pixel of a job's square.
-fn quad_origin(job: u32) -> vec2u {
-    return 2u * block_place(block_of(unit_of(job)).xy, place_in_unit(job));
-}
-
-// Identifier that seeds a pixel's random numbers: its index, after those of other rays; and the
-// pixel of an identifier.
+// Seeds a pixel's random numbers: its index, after those of other rays.
 fn rng_id_of(pixel: vec2u) -> u32 {
     return gather.rays + pixel.y * params.size.x + pixel.x;
 }
 
-fn pixel_of_id(rng_id: u32) -> vec2u {
-    let number = rng_id - gather.rays;
-    return vec2u(number % params.size.x, number / params.size.x);
-}
-
-// A ray into the lobe of the square's pixel.
-fn begin(at: u32, job: u32) -> bool {
-    let pixel = traced_pixel(quad_origin(job));
+// The path of a ray into the lobe of a pixel.
+fn pixel_path(pixel: vec2u) -> Path {
     let start = start_at(vec2i(pixel));
     let shift = pcg3(vec3u(pixel, 0x6a09e667u)).xy;
     let lobe = lobe_ray(start, specular_at(pixel), lattice(gather.frame >> 2u, shift));
-    let rng_id = rng_id_of(pixel);
-    start_path(at, start.x, lobe.d, UNWEIGHTED, 0.0, NONE, rng_id, lobe.weight, job);
-    return send_if_weighted(at, lobe.weight);
+    return Path(start.x, lobe.d, start.n, UNWEIGHTED, false, 0.0, lobe.weight, NONE, rng_id_of(pixel));
 }
 
 // A triangle has mean colours only. Where the picture shows the hit, the pixel's material is taken:
@@ -114,24 +89,33 @@ fn hit_material(hit: Hit, x: vec3f, side: vec3f) -> HitMaterial {
     return surface;
 }
 
-// Stores the result in the histories of the square's pixels.
-fn finish(at: u32) {
-    let first = quad_origin(job_of(at));
-    let own = pixel_of_id(load_field(at, IDS).y);
-    let by_ray = path_result(at);
-    var radiance = by_ray.radiance;
-    if by_ray.slot != NONE {
+// What the ray of a pixel finds.
+fn traced_radiance(pixel: vec2u) -> vec3f {
+    let path = pixel_path(pixel);
+    if !any(path.throughput > vec3f(0.0)) { return vec3f(0.0); }
+    let found = trace_path(path, gather.cache_iteration, (gather.flags & GATHER_EMISSIVE_PROXIES) == 0u);
+    var radiance = found.radiance;
+    if found.slot != NONE {
         let half = (gather.cache_iteration & 1u) * (gather.mask + 1u);
-        radiance += by_ray.throughput * entry_light[half + by_ray.slot].rgb;
+        radiance += found.throughput * entry_light[half + found.slot].rgb;
     }
-    let found = min(finite3(radiance), vec3f(LARGEST));
+    return min(finite3(radiance), vec3f(LARGEST));
+}
+
+@compute @workgroup_size(8, 8)
+fn specular_trace(@builtin(global_invocation_id) id: vec3u) {
+    let first = 2u * id.xy;
+    let bits = smooth_pixels(first);
+    if bits == 0u { return; }
+    let own = first + PHASES[traced_pixel(bits)];
+    let found = traced_radiance(own);
     let n = world_normal_at(vec2i(own));
     let changing = (gather.flags & GATHER_CHANGING) != 0u;
     let kept = (gather.flags & (GATHER_RESET | GATHER_CHANGED)) == 0u;
     let most = select(MAX_PIXEL_HISTORY, MAX_PIXEL_HISTORY_DYNAMIC, changing);
     for (var i = 0u; i < 4u; i++) {
         let pixel = first + PHASES[i];
-        if !is_smooth(pixel) { continue; }
+        if (bits & (1u << i)) == 0u { continue; }
         let i_pixel = pixel.y * params.size.x + pixel.x;
         let packed = select(vec2u(0u), pixel_specular[i_pixel], kept & is_static(motion_of(vec2i(pixel))));
         var here = vec4f(unpack2x16float(packed.x), unpack2x16float(packed.y));
@@ -145,15 +129,4 @@ fn finish(at: u32) {
         }
         pixel_specular[i_pixel] = vec2u(pack2x16float(here.rg), pack2x16float(here.ba));
     }
-}
-
-@compute @workgroup_size(GROUP_SIZE)
-fn specular_trace(
-    @builtin(workgroup_id) id: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    group = id.x;
-    let share = group_share(id.x, groups.x, blocks().x * blocks().y);
-    trace_paths(thread, share, gather.cache_iteration, (gather.flags & GATHER_EMISSIVE_PROXIES) == 0u);
 }

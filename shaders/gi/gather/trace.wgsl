@@ -5,12 +5,13 @@
 //#import gi/gather/types.wgsl
 //#import gi/gather/specular_rays.wgsl
 //#import gi/gather/ray_origin.wgsl
+//#import gi/gather/jobs.wgsl
 //#import gi/gather/send.wgsl
 
 // Traces rays of cells: one cosine-distributed ray each, more where history is missing, invalid or
 // short, with a shadow ray to an emissive surface. One cell of each 2×2 sends a specular ray, too.
 
-@group(2) @binding(3) var<storage, read> cell_pixels: array<u32>;
+@group(2) @binding(3) var<storage, read> noted_jobs: array<vec2u>;
 // `send.wgsl` documents a record. Order: first rays of cells, specular rays, further rays of cells.
 @group(2) @binding(4) var<storage, read_write> records: array<vec4f>;
 // F0 and roughness.
@@ -45,84 +46,40 @@ fn specular_sample(square: vec2u) -> vec2f {
     return lattice(gather.frame >> 2u, pcg3(vec3u(square, 2u * (gather.frame & 3u) + 1u)).xy);
 }
 
-// Whether the square sends a ray into the lobe of this frame's cell.
-fn has_specular_ray(square: vec2u) -> bool {
-    if any(square >= specular_grid()) { return false; }
-    records[3u * specular_record(square) + 1u].z = 0.0;
-    let cell = specular_cell(square);
-    if (gather.flags & GATHER_NO_SPECULAR) != 0u || any(cell >= cell_grid()) { return false; }
-    let packed = cell_pixels[cell_index(cell)];
-    return packed != NO_PIXEL && has_lobe(textureLoad(specular_map, unpack_pixel(packed), 0));
-}
-
-fn specular_ray(at: u32, square: vec2u) -> bool {
+fn specular_path(pixel: vec2i, square: vec2u) -> Path {
     let ray = specular_record(square);
-    let pixel = unpack_pixel(cell_pixels[cell_index(specular_cell(square))]);
     let start = start_at(pixel);
     let lobe = lobe_ray(start, textureLoad(specular_map, pixel, 0), specular_sample(square));
-    start_path(at, start.x, lobe.d, UNWEIGHTED, 0.0, ray, ray, lobe.weight, ray);
-    return send_if_weighted(at, lobe.weight);
+    return Path(start.x, lobe.d, start.n, UNWEIGHTED, false, 0.0, lobe.weight, ray, ray);
 }
 
-// Whether a cell sends ray `sample_index`.
-fn has_ray(cell: vec2u, sample_index: u32) -> bool {
-    if any(cell >= cell_grid()) { return false; }
-    let packed = cell_pixels[cell_index(cell)];
-    return packed != NO_PIXEL && sample_index < spp_of(packed);
+fn cell_path(pixel: vec2i, cell: vec2u, sample_index: u32, state: u32) -> Path {
+    let first = cell_index(cell);
+    let ray = cell_record(first, sample_index);
+    let start = start_at(pixel);
+    let d = cosine_direction(start.n, cell_sample(cell, sample_index, state));
+    return diffuse_path(start.x, start.n, d, select(NONE, first, sample_index == 0u), ray);
 }
 
-fn cell_ray(at: u32, at_cell: vec2u, sample_index: u32) {
-    let cell = cell_index(at_cell);
-    let ray = cell_record(cell, sample_index);
-    let packed = cell_pixels[cell];
-    let start = start_at(unpack_pixel(packed));
-    let d = cosine_direction(start.n, cell_sample(at_cell, sample_index, history_state(packed)));
-    send(at, start.x, start.n, d, select(NONE, cell, ray == cell), ray, ray);
-}
-
-// Each block of cells has layers: first rays, further rays, and amid these specular rays. So no
-// workgroup has all jobs that come in every frame.
-fn block_of(unit: u32) -> vec3u {
-    let layers = 1u + gather.spp;
-    let block = unit / layers;
-    let across = blocks_of(cell_grid()).x;
-    return vec3u(block % across, block / across, unit % layers);
-}
-
-fn is_specular_layer(block: vec3u) -> bool {
-    return block.z == gather.spp / 2u;
-}
-
-fn layer_sample(block: vec3u) -> u32 {
-    return block.z - select(0u, 1u, block.z > gather.spp / 2u);
-}
-
-fn wants(block: vec3u, i: u32) -> bool {
-    let place = block_place(block.xy, i);
-    if is_specular_layer(block) { return has_specular_ray(place); }
-    return has_ray(place, layer_sample(block));
-}
-
-fn begin(at: u32, job: u32) -> bool {
-    let block = block_of(unit_of(job));
-    let place = block_place(block.xy, place_in_unit(job));
-    if is_specular_layer(block) { return specular_ray(at, place); }
-    cell_ray(at, place, layer_sample(block));
-    return true;
-}
-
-fn finish(at: u32) {
-    write_record(at);
-}
-
-@compute @workgroup_size(GROUP_SIZE)
-fn trace_cells(
-    @builtin(workgroup_id) id: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_index) thread: u32,
-) {
-    group = id.x;
-    let blocks = blocks_of(cell_grid());
-    let share = group_share(id.x, groups.x, (1u + gather.spp) * blocks.x * blocks.y);
-    trace_paths(thread, share, gather.cache_iteration, (gather.flags & GATHER_EMISSIVE_PROXIES) == 0u);
+@compute @workgroup_size(64)
+fn trace_cells(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let count = noted_jobs[CELL_JOBS / 2u][CELL_JOBS & 1u];
+    for (var i = id.x; i < count; i += 64u * groups.x) {
+        let job = noted_jobs[JOB_COUNTS / 2u + i];
+        let pixel = unpack_pixel(job.x);
+        let across = cell_grid().x;
+        let index = job.y >> SAMPLE_BITS;
+        let cell = vec2u(index % across, index / across);
+        let sample_index = job.y & SPECULAR_SAMPLE;
+        var path: Path;
+        var record: u32;
+        if sample_index == SPECULAR_SAMPLE {
+            path = specular_path(pixel, cell / 2u);
+            record = specular_record(cell / 2u);
+        } else {
+            path = cell_path(pixel, cell, sample_index, history_state(job.x));
+            record = cell_record(index, sample_index);
+        }
+        trace_record(path, record);
+    }
 }

@@ -68,23 +68,33 @@ bindings! {
         changes: READ,
         motion_map: LOAD,
         specular_map: LOAD,
+        jobs: READ_WRITE,
     }
     /// `gi.trace`.
     Trace {
         entry_keys: READ_WRITE,
         entry_proposals: READ_WRITE,
         proposal_vertices: READ_WRITE,
-        cell_pixels: READ,
+        noted_jobs: READ,
         records: READ_WRITE,
         specular_map: LOAD,
     }
-    /// `gi.cache_evict` and `gi.cache_update`.
-    CacheUpdate {
+    /// `gi.cache_evict` and `gi.cache_select`.
+    CacheSelect {
         entry_keys: READ_WRITE,
         entry_proposals: READ_WRITE,
         proposal_vertices: READ_WRITE,
         entry_last_used: READ_WRITE,
         entry_light: READ_WRITE,
+        jobs: READ_WRITE,
+    }
+    /// `gi.cache_update`.
+    CacheUpdate {
+        entry_keys: READ_WRITE,
+        entry_proposals: READ_WRITE,
+        proposal_vertices: READ_WRITE,
+        entry_light: READ_WRITE,
+        noted_jobs: READ,
     }
     /// `gi.specular_trace`.
     SpecularTrace {
@@ -144,7 +154,7 @@ mod tests {
     #[test]
     fn bindings_have_the_names_of_the_shaders_variables() {
         let (prelude, upsample) = (super::super::prelude(), super::super::upsample::prelude());
-        let rows: [(&str, &str, u32, &[&str]); 16] = [
+        let rows: [(&str, &str, u32, &[&str]); 17] = [
             ("gi.trace", &prelude, 1, Scene::NAMES),
             ("gi.cache_update", &prelude, 1, Scene::NAMES),
             ("gi.gradient", &prelude, 1, Scene::NAMES),
@@ -153,6 +163,7 @@ mod tests {
             ("gi.reproject", &prelude, 2, Temporal::NAMES),
             ("gi.accumulate", &prelude, 2, Temporal::NAMES),
             ("gi.trace", &prelude, 2, Trace::NAMES),
+            ("gi.cache_select", &prelude, 2, CacheSelect::NAMES),
             ("gi.cache_update", &prelude, 2, CacheUpdate::NAMES),
             ("gi.specular_trace", &prelude, 2, SpecularTrace::NAMES),
             ("gi.blur", &prelude, 2, Blur::NAMES),

@@ -6,7 +6,7 @@ use super::pass::Groups;
 use super::schedule::{CACHE_RESPONSIVE_FRAMES, CACHE_RESPONSIVE_HISTORY, Events, Frame, Rules};
 use super::store::{self, Store};
 use super::upsample::Upsampled;
-use super::{GatherGi, spp};
+use super::{GatherGi, spp, work};
 use crate::gi::interface::{GiError, Inputs, Outputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -35,8 +35,7 @@ impl Accumulated {
 
     /// Of passes of a thread a cell.
     fn workgroups(&self) -> [u32; 3] {
-        let [w, h] = self.inputs.cells.map(|n| n.div_ceil(8));
-        [w, h, 1]
+        work::of_grid(self.inputs.cells)
     }
 }
 
@@ -93,7 +92,7 @@ impl GatherGi {
 
     /// Makes empty buffers for pictures of `size` pixels.
     fn restart(&mut self, size: [u32; 2]) {
-        self.store = Store::new(&self.device, size, self.options.slots, self.workgroups);
+        self.store = Store::new(&self.device, size, self.options.slots);
         self.upsample.release_bindings();
     }
 
@@ -113,7 +112,6 @@ impl GatherGi {
             (guided, params::GUIDED),
             (frame.changed, params::CHANGED),
             (frame.all_entries, params::ALL_ENTRIES),
-            (self.workgroups.are_serial(), params::SERIAL_GROUPS),
         ];
         Params {
             eye: valid.camera.eye_position(),
@@ -170,12 +168,20 @@ impl GatherGi {
         // Histories alternate between two buffers.
         let [history_prev, history_next] =
             [0, 1].map(|k| Bound::from(&store.histories[((frame.number + k) & 1) as usize]));
-        let entries = bindings::CacheUpdate {
+        let select = bindings::CacheSelect {
             entry_keys: (&store.keys).into(),
             entry_proposals: (&store.proposals).into(),
             proposal_vertices: (&store.vertices).into(),
             entry_last_used: (&store.last_used).into(),
             entry_light: (&store.light).into(),
+            jobs: (&store.jobs).into(),
+        };
+        let update = bindings::CacheUpdate {
+            entry_keys: (&store.keys).into(),
+            entry_proposals: (&store.proposals).into(),
+            proposal_vertices: (&store.vertices).into(),
+            entry_light: (&store.light).into(),
+            noted_jobs: (&store.jobs).into(),
         };
         let temporal = bindings::Temporal {
             cell_pixels: self.cells.pixels().into(),
@@ -186,12 +192,10 @@ impl GatherGi {
             changes: (&store.changes).into(),
             motion_map: motion_map.clone(),
             specular_map: specular_map.clone(),
+            jobs: (&store.jobs).into(),
         };
-        let of_cells = {
-            let [w, h] = cells_of(inputs.size).map(|n| n.div_ceil(8));
-            [w, h, 1]
-        };
-        let (workgroups, slots) = (self.workgroups, self.options.slots);
+        let of_cells = work::of_grid(cells_of(inputs.size));
+        let slots = self.options.slots;
 
         self.cells.record(recorder, &valid.bound);
         if frame.changed {
@@ -204,30 +208,26 @@ impl GatherGi {
                 history_prev,
                 records: (&store.records).into(),
             };
-            self.gradient.record(recorder, with_scene(offset), own, [workgroups.for_squares(inputs.size), 1, 1]);
+            self.gradient.record(recorder, with_scene(offset), own, work::of_grid(work::halved(cells_of(inputs.size))));
         }
         self.reproject.record(recorder, alone(offset), temporal.clone(), of_cells);
-        self.cache_evict.record(recorder, with_scene(offset), entries.clone(), [slots.div_ceil(64), 1, 1]);
+        self.cache_evict.record(recorder, alone(offset), select.clone(), work::of_list(slots));
         let own = bindings::Trace {
             entry_keys: (&store.keys).into(),
             entry_proposals: (&store.proposals).into(),
             proposal_vertices: (&store.vertices).into(),
-            cell_pixels: self.cells.pixels().into(),
+            noted_jobs: (&store.jobs).into(),
             records: (&store.records).into(),
             specular_map: specular_map.clone(),
         };
-        self.rays.record(recorder, with_scene(offset), own, [workgroups.for_cells(inputs.size), 1, 1]);
-        for update in 0..frame.updates {
-            if update > 0 {
+        self.rays.record(recorder, with_scene(offset), own, work::for_cells(inputs.size));
+        for k in 0..frame.updates {
+            if k > 0 {
                 params.cache_iteration += 1;
                 offset = self.params.write(queue, &params);
             }
-            self.cache_update.record(
-                recorder,
-                with_scene(offset),
-                entries.clone(),
-                [workgroups.for_slots(slots), 1, 1],
-            );
+            self.cache_select.record(recorder, alone(offset), select.clone(), work::of_list(slots));
+            self.cache_update.record(recorder, with_scene(offset), update.clone(), work::for_entries(slots));
         }
         if inputs.specular.is_some() {
             let own = bindings::SpecularTrace {
@@ -239,7 +239,7 @@ impl GatherGi {
                 specular_map,
                 motion_map,
             };
-            self.specular_trace.record(recorder, with_scene(offset), own, [workgroups.for_pixels(inputs.size), 1, 1]);
+            self.specular_trace.record(recorder, with_scene(offset), own, work::of_grid(work::halved(inputs.size)));
         }
         self.accumulate.record(recorder, alone(offset), temporal, of_cells);
         Accumulated {

@@ -6,12 +6,14 @@
 //! G-buffer ─► gi.downsample ─► gi.gradient ─► gi.reproject ─► gi.trace ─► gi.accumulate ─► gi.blur ─► gi.atrous
 //!                                                               │  ▲         ▲ history          │
 //!                                              proposals, hits  ▼  │         │                  ▼
-//!                          gi.cache_evict ─► entries ─► gi.cache_update      └─ …          gi.upsample ─► E/π, specular
+//!         gi.cache_evict ─► entries ─► gi.cache_select ─► gi.cache_update   └─ …          gi.upsample ─► E/π, specular
 //! ```
 //!
 //! One cell of each 2×2 also sends a specular ray ([`Outputs::specular`]). Pixels whose reflection
 //! changes within a cell have rays of their own, one a frame for each 2×2 pixels
 //! (`gi.specular_trace`).
+//!
+//! A ray is a thread's: `gi.reproject` and `gi.cache_select` note in a list which rays are due.
 //!
 //! Limits: a ray knows one colour of a triangle, indirect light is as fine as an entry's cell, and
 //! the rest is noise. See `docs/internals/gather.md`.
@@ -54,9 +56,9 @@ const RAY_BIAS_STEPS: f32 = 4.0;
 /// Constants of the shaders as WGSL.
 pub fn prelude() -> String {
     let flags: String = params::FLAGS.iter().map(|(name, bit)| format!("const GATHER_{name} = {bit}u;\n")).collect();
-    let unit = format!("const UNIT = {}u;\nconst CANDIDATES = {}u;\n", work::UNIT, crate::lights::CANDIDATES);
+    let candidates = format!("const CANDIDATES = {}u;\n", crate::lights::CANDIDATES);
     let bias = format!("const RAY_BIAS = f32({RAY_BIAS:?});\nconst RAY_BIAS_STEPS = f32({RAY_BIAS_STEPS:?});\n");
-    [cells::prelude(), flags, unit, bias].concat()
+    [cells::prelude(), flags, candidates, bias].concat()
 }
 
 /// Most bits of a proposal that may index a vertex (`proposal_bits` of `entries.wgsl`): ten are
@@ -71,10 +73,6 @@ const STORAGE_BUFFERS: u32 = 8;
 pub(super) fn spp(size: [u32; 2]) -> u32 {
     if size.map(u64::from).iter().product::<u64>() <= 1 << 21 { 8 } else { 4 }
 }
-
-/// Bytes of the paths of a workgroup: 256 of thirteen vectors each (`PATHS_PER_GROUP` and
-/// `PATH_FIELDS` of `path_state.wgsl`).
-const PATHS: u64 = 256 * 13 * 16;
 
 /// Bytes of a ray's record.
 const RECORD: u64 = 48;
@@ -100,8 +98,10 @@ pub struct GatherGi {
     /// Marks cells without a valid history; has the bindings of `accumulate`.
     reproject: Pass,
     rays: Pass,
-    /// Frees entries that no ray has met for long; has the bindings of `cache_update`.
+    /// Frees entries that no ray has met for long; has the bindings of `cache_select`.
     cache_evict: Pass,
+    /// Notes entries that send a ray.
+    cache_select: Pass,
     cache_update: Pass,
     /// Specular rays of smooth pixels.
     specular_trace: Pass,
@@ -111,7 +111,6 @@ pub struct GatherGi {
     atrous: Pass,
     upsample: UpsamplePass,
     store: Store,
-    workgroups: work::Groups,
     /// Size of pictures that the device is known to have room for.
     checked: [u32; 2],
     /// Placeholders, bound when the host provides no lights, no motion or no specular reflectance,
@@ -169,14 +168,18 @@ impl GatherGi {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
             device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
         };
-        let (table, history, blur) = (bindings::CacheUpdate::TYPES, bindings::Temporal::TYPES, bindings::Blur::TYPES);
-        let workgroups = work::Groups::of(device);
+        let (select, history, blur) = (bindings::CacheSelect::TYPES, bindings::Temporal::TYPES, bindings::Blur::TYPES);
         Self {
             cells: DownsamplePass::new(device, &inputs, size),
-            cache_evict: new(shared, ("gi.cache_evict", "gi.cache_update", "cache_evict"), table),
+            cache_evict: new(alone, ("gi.cache_evict", "gi.cache_select", "cache_evict"), select),
+            cache_select: new(alone, ("gi.cache_select", "gi.cache_select", "cache_select"), select),
             gradient: new(shared, ("gi.gradient", "gi.gradient", "gradient"), bindings::Gradient::TYPES),
             rays: new(shared, ("gi.trace", "gi.trace", "trace_cells"), bindings::Trace::TYPES),
-            cache_update: new(shared, ("gi.cache_update", "gi.cache_update", "cache_update"), table),
+            cache_update: new(
+                shared,
+                ("gi.cache_update", "gi.cache_update", "cache_update"),
+                bindings::CacheUpdate::TYPES,
+            ),
             specular_trace: new(
                 shared,
                 ("gi.specular_trace", "gi.specular_trace", "specular_trace"),
@@ -188,8 +191,7 @@ impl GatherGi {
             blur_wide: new(alone, ("gi.blur", "gi.blur", "blur_wide"), blur),
             atrous: new(alone, ("gi.atrous", "gi.atrous", "atrous"), bindings::Atrous::TYPES),
             upsample: UpsamplePass::new(device, &inputs),
-            store: Store::new(device, size, options.slots, workgroups),
-            workgroups,
+            store: Store::new(device, size, options.slots),
             checked: size,
             no_lights: unused("gi.no_lights", size_of::<crate::lights::LightGpu>() as u64),
             no_guidance: unused("gi.no_guidance", GUIDANCE),
@@ -214,9 +216,12 @@ impl GatherGi {
     /// Bind groups made since the start; stands still in steady frames.
     pub fn allocations(&self) -> u64 {
         let rays =
-            [&self.gradient, &self.reproject, &self.cache_evict, &self.rays, &self.cache_update, &self.specular_trace];
-        let made =
-            rays.into_iter().chain([&self.accumulate, &self.blur, &self.blur_wide, &self.atrous]).map(Pass::made);
+            [&self.gradient, &self.reproject, &self.cache_evict, &self.cache_select, &self.rays, &self.cache_update];
+        let made = rays
+            .into_iter()
+            .chain([&self.specular_trace])
+            .chain([&self.accumulate, &self.blur, &self.blur_wide, &self.atrous])
+            .map(Pass::made);
         self.inputs.made() + self.scene.made() + self.frame_params.made() + self.upsample.made() + made.sum::<u64>()
     }
 }

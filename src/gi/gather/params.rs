@@ -37,8 +37,6 @@ flags! {
     CHANGED = 1 << 9,
     /// All entries send a ray in each update.
     ALL_ENTRIES = 1 << 10,
-    /// The device runs the threads of a workgroup one after the other (CPU drivers).
-    SERIAL_GROUPS = 1 << 11,
 }
 
 /// `Gather` of `shaders/gi/gather/types.wgsl`, which documents the fields.

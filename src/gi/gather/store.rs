@@ -1,6 +1,6 @@
 //! What `gather` keeps from frame to frame, and between the passes of one.
 
-use super::{HISTORY, PATHS, RECORD, spp, work};
+use super::{HISTORY, RECORD, spp};
 use crate::gi::stage::{cells, inputs::cells_of};
 
 /// Squares of 2×2 cells, each of which sends one ray a frame into a lobe.
@@ -9,13 +9,15 @@ pub(super) fn squares(size: [u32; 2]) -> u64 {
 }
 
 pub(super) struct Store {
-    /// Of the cache, by slot: keys; proposals of both halves; vertices of proposals, origins of rays and
-    /// state of paths; last use; light of both halves. `entries.wgsl` documents them.
+    /// Of the cache, by slot: keys; proposals of both halves; vertices of proposals and origins of rays;
+    /// last use; light of both halves. `entries.wgsl` documents them.
     pub keys: wgpu::Buffer,
     pub proposals: wgpu::Buffer,
     pub vertices: wgpu::Buffer,
     pub last_used: wgpu::Buffer,
     pub light: wgpu::Buffer,
+    /// Rays of the frame, then of each cache update (`jobs.wgsl`).
+    pub jobs: wgpu::Buffer,
     /// Of cells: records of rays; histories of the last and of this frame in turns; directional light.
     pub records: wgpu::Buffer,
     pub histories: [wgpu::Buffer; 2],
@@ -37,17 +39,23 @@ fn pixel_specular(size: [u32; 2]) -> u64 {
 }
 
 /// Bytes of `vertices`.
-fn vertices(size: [u32; 2], slots: u64, groups: work::Groups) -> u64 {
-    let rays = cells::count(size).max(1) + squares(size);
-    let groups = groups.for_pixels(size).max(groups.for_cells(size)).max(groups.for_slots(slots as u32));
-    16 * (rays + 4 * slots) + u64::from(groups) * PATHS
+fn vertices(size: [u32; 2], slots: u64) -> u64 {
+    16 * (cells::count(size).max(1) + squares(size) + 4 * slots)
+}
+
+/// Records of rays of a picture.
+fn records(size: [u32; 2]) -> u64 {
+    u64::from(spp(size)) * cells::count(size).max(1) + squares(size)
+}
+
+/// Bytes of `jobs`: four counts, and eight bytes a job.
+fn jobs(size: [u32; 2], slots: u64) -> u64 {
+    16 + 8 * records(size).max(slots)
 }
 
 impl Store {
-    pub fn new(device: &wgpu::Device, size: [u32; 2], slots: u32, groups: work::Groups) -> Self {
+    pub fn new(device: &wgpu::Device, size: [u32; 2], slots: u32) -> Self {
         let cells = cells::count(size).max(1);
-        let rays = cells + squares(size);
-        let records = rays + u64::from(spp(size) - 1) * cells;
         let slots = u64::from(slots);
         let buffer = |label, size| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -72,10 +80,11 @@ impl Store {
         Self {
             keys: buffer("gi.entry_keys", 4 * slots),
             proposals,
-            vertices: buffer("gi.proposal_vertices", vertices(size, slots, groups)),
+            vertices: buffer("gi.proposal_vertices", vertices(size, slots)),
             last_used: buffer("gi.entry_last_used", 4 * slots),
             light: buffer("gi.entry_light", 32 * slots),
-            records: buffer("gi.records", RECORD * records),
+            jobs: buffer("gi.jobs", jobs(size, slots)),
+            records: buffer("gi.records", RECORD * records(size)),
             histories: [history(), history()],
             cell_light: buffer("gi.light", cells::light_bytes(size)),
             light_blurred: buffer("gi.light_blurred", cells::light_bytes(size)),
@@ -89,14 +98,19 @@ impl Store {
     /// Bytes of the largest buffer, on whatever device.
     pub fn largest(size: [u32; 2], slots: u32) -> u64 {
         let (cells, slots) = (cells::count(size).max(1), u64::from(slots));
-        let rays = cells + squares(size);
-        let records = rays + u64::from(spp(size) - 1) * cells;
-        let [light, histories, records] = [32 * slots, HISTORY * cells, RECORD * records];
-        let vertices = vertices(size, slots, work::Groups::CPU).max(vertices(size, slots, work::Groups::GPU));
-        [vertices, light, histories, records, cells::light_bytes(size), pixel_specular(size)]
-            .into_iter()
-            .max()
-            .unwrap_or(0)
+        let [light, histories, records] = [32 * slots, HISTORY * cells, RECORD * records(size)];
+        [
+            vertices(size, slots),
+            jobs(size, slots),
+            light,
+            histories,
+            records,
+            cells::light_bytes(size),
+            pixel_specular(size),
+        ]
+        .into_iter()
+        .max()
+        .unwrap_or(0)
     }
 
     pub fn bytes(&self) -> u64 {
@@ -106,6 +120,7 @@ impl Store {
             vertices,
             last_used,
             light,
+            jobs,
             records,
             histories: [a, b],
             cell_light,
@@ -117,6 +132,7 @@ impl Store {
         } = self;
         let table = [keys, proposals, vertices, last_used, light];
         let buffers = table.into_iter().chain([
+            jobs,
             records,
             a,
             b,

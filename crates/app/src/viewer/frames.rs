@@ -70,6 +70,7 @@ pub fn doc(label: &str) -> &'static str {
         "gi.blur" | "gi.atrous" => "blurs cells over neighbours on the same surface",
         "gi.upsample" => "brings the light of cells to every pixel (bilateral upsampling)",
         "gi.cache_update" => "updates the radiance cache",
+        "gi.cache_select" => "finds entries of the radiance cache that are due",
         "gi.cache_evict" => "frees old entries of the radiance cache",
         "gi.features" | "gi.pack" => "what the network is given",
         "gi.reconstruct" => "brings the network's answer to every pixel",

@@ -210,9 +210,8 @@ fn the_same_command_gives_the_same_picture_and_all_layers() {
     }
 }
 
-/// Rays of a workgroup go to whoever is free; on the CPU's driver, to each thread in turn.
 #[test]
-fn whoever_takes_a_ray_the_picture_is_the_same() {
+fn rays_in_another_order_give_the_same_picture() {
     if common::gpu().is_none() {
         return;
     }
@@ -239,13 +238,17 @@ fn whoever_takes_a_ray_the_picture_is_the_same() {
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
         bouncelight_scene::image_io::read_exr(Path::new(&file)).unwrap().image("Combined").unwrap().to_rgb()
     };
-    let taken = "select(atomicAdd(&taken, 1u), own, (gather.flags & GATHER_SERIAL_GROUPS) != 0u)";
-    let queue = include_str!("../../../../shaders/gi/gather/ray_queue.wgsl");
-    assert!(queue.contains(taken));
-    let in_turn = drawn(taken, "own");
-    assert_eq!(drawn(taken, "atomicAdd(&taken, 1u)"), in_turn);
-    // Negative control: every second ray is taken by nobody.
-    assert_ne!(drawn(taken, "2u * own"), in_turn);
+    let next = "noted_jobs[JOB_COUNTS / 2u + i]";
+    for shader in [
+        include_str!("../../../../shaders/gi/gather/trace.wgsl"),
+        include_str!("../../../../shaders/gi/gather/cache_update.wgsl"),
+    ] {
+        assert!(shader.contains(next));
+    }
+    let forwards = drawn(next, next);
+    assert_eq!(drawn(next, "noted_jobs[JOB_COUNTS / 2u + count - 1u - i]"), forwards);
+    // Negative control: every second ray is traced by nobody.
+    assert_ne!(drawn(next, "noted_jobs[JOB_COUNTS / 2u + (i & ~1u)]"), forwards);
 }
 
 #[test]

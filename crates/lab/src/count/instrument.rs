@@ -1,7 +1,6 @@
 //! A compute shader that counts what it does: operations, rays, and what it asks of each binding.
 //! naga reads it; each straight piece of its code gets a call that adds what the piece holds, its
-//! entry points one that hands the sums over (`counted.wgsl`), and [`TAKE`] one that says which item was
-//! taken.
+//! entry points one that hands the sums over (`counted.wgsl`).
 //!
 //! An operation is one number of an arithmetic, comparison, selection or conversion; integers count
 //! like floats, a multiply-add 2, a division or transcendental function 4; addresses, moves and
@@ -21,8 +20,6 @@ pub const NUMBERS: usize = 26;
 pub const FIRST: usize = 2;
 /// A function of each ray.
 const RAY: &str = "walk_begin";
-/// A function that returns the next item of a list, which a thread takes and does.
-const TAKE: &str = "take_next";
 
 /// A shader that counts, and what it counts.
 pub struct Counting {
@@ -52,7 +49,7 @@ pub fn counting(text: &str) -> Option<Counting> {
         return None;
     }
     let named = |name: &str| module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name)).map(|(h, _)| h);
-    let calls = Calls { add: named("counted_add")?, take: named("counted_take")?, meet: named("counted_meet")? };
+    let calls = Calls { add: named("counted_add")?, meet: named("counted_meet")? };
     let (start, end) = (named("counted_start")?, named("counted_end")?);
 
     let own = |f: &Function| f.name.as_ref().is_some_and(|n| n.starts_with("counted_"));
@@ -101,7 +98,6 @@ fn around(module: &mut Module, mut inner: Function, ends: [Handle<Function>; 2],
 #[derive(Clone, Copy)]
 struct Calls {
     add: Handle<Function>,
-    take: Handle<Function>,
     meet: Handle<Function>,
 }
 
@@ -114,8 +110,7 @@ fn count_in(module: &Module, function: &mut Function, calls: Calls, bindings: &[
         types.grow(handle, &before, &context).ok()?;
     }
     let reader = Reader { module, expressions: &before, types: &types, bindings };
-    let takes = function.name.as_deref() == Some(TAKE);
-    let mut writer = Writer { reader, expressions: &mut function.expressions, calls, takes };
+    let mut writer = Writer { reader, expressions: &mut function.expressions, calls };
     let mut sum = [0; NUMBERS];
     sum[1] = rays;
     function.body = writer.block(std::mem::take(&mut function.body), sum);
@@ -129,8 +124,6 @@ struct Writer<'a> {
     reader: Reader<'a>,
     expressions: &'a mut naga::Arena<Expression>,
     calls: Calls,
-    /// What the function returns is an item that its caller takes.
-    takes: bool,
 }
 
 impl Writer<'_> {
@@ -163,12 +156,6 @@ impl Writer<'_> {
                 }
                 _ if jumps => self.calls(&mut sum, &mut out),
                 _ => {}
-            }
-            if let Statement::Return { value: Some(item) } = statement
-                && self.takes
-            {
-                let take = Statement::Call { function: self.calls.take, arguments: vec![item], result: None };
-                out.push(take, Span::UNDEFINED);
             }
             out.push(statement, span);
         }
