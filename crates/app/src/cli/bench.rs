@@ -25,39 +25,47 @@ use std::path::PathBuf;
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Real-time method to measure, or `all` of them; what `fit` found for the scene when absent,
-    /// else all. (`bouncelight trace` tells its own samples per second.)
-    #[arg(long, value_parser = parse_methods)]
+    /// Real-time method to measure, or `all` [default: as `fit` found, else all].
+    #[arg(long, value_parser = parse_methods, value_name = "METHOD", help_heading = "Method")]
     method: Option<Methods>,
     #[command(flatten)]
     fitted: super::fitted::Flag,
-    /// Weights of `neural`; the shipped ones (`filter`) when absent.
-    #[arg(long)]
+    /// Weights of `neural` [default: the shipped `filter`].
+    #[arg(long, value_name = "FILE", help_heading = "Method")]
     weights: Option<PathBuf>,
-    /// Frames that count.
-    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
+    /// Frames measured, 1 or more.
+    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..), value_name = "N",
+        help_heading = MEASURE)]
     frames: u32,
-    /// Frames before them.
-    #[arg(long, default_value_t = 30)]
+    /// Frames drawn before them.
+    #[arg(long, default_value_t = 30, value_name = "N", help_heading = MEASURE)]
     warmup: u32,
     /// One row per network layer instead of one for the network.
-    #[arg(long)]
+    #[arg(long, help_heading = MEASURE)]
     layers: bool,
-    /// Let shaders count, too, what they do in a frame at rest: operations, bytes, rays.
-    /// With --layers, one row per network layer.
-    #[arg(long)]
+    /// Also count operations, bytes and rays of a frame, and project times from them.
+    #[arg(long, help_heading = MEASURE)]
     count: bool,
-    /// Write the record to this file.
-    #[arg(long, value_name = "F")]
+    /// Record to write.
+    #[arg(long, value_name = "FILE", help_heading = MEASURE)]
     json: Option<PathBuf>,
-    /// A record written earlier, on this device, to compare with. Takes --fail-over, too.
-    #[arg(long, value_name = "BASE", requires = "fail_over")]
+    /// Earlier record of this device to compare with; with --fail-over.
+    #[arg(long, value_name = "FILE", requires = "fail_over", help_heading = MEASURE)]
     compare: Option<PathBuf>,
-    /// With --compare: how much slower than the base is still allowed, such as 5%; above it the
-    /// exit code is 6.
-    #[arg(long, value_parser = parse_percent, value_name = "P%")]
+    /// Exit with code 6 if a method is slower than the record by more than P, such as 5%.
+    #[arg(long, value_parser = parse_percent, value_name = "P%", help_heading = MEASURE)]
     fail_over: Option<f64>,
 }
+
+/// Heading of the help.
+const MEASURE: &str = "Measurement";
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight bench scene.glb --method all
+  bouncelight bench scene.glb --method neural --layers --json base.json
+  bouncelight bench scene.glb --method neural --compare base.json --fail-over 5%";
 
 #[derive(Debug, Clone)]
 struct Methods(Vec<MethodName>);

@@ -11,9 +11,16 @@ use serde_json::json;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Print a JSON record instead of text.
-    #[arg(long)]
+    #[arg(long, help_heading = "Options")]
     json: bool,
 }
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight doctor
+  bouncelight doctor --adapter cpu
+  bouncelight doctor --backend vulkan --json";
 
 /// Limits that the passes lean on: name and what a WebGPU default device grants.
 fn limits(l: &wgpu::Limits) -> [(&'static str, u64); 8] {
