@@ -24,7 +24,7 @@ def camera_values(view, projection, depth="forward-gl"):
     depth: "reversed" and "forward" for clip space 0 to w, "forward-gl" for −w to w."""
     view, p = np.asarray(view, np.float64), np.asarray(projection, np.float64)
     if p[3][2] != -1 or p[3][3] != 0:
-        raise ValueError("the projection is no perspective that looks down -Z")
+        raise ValueError("the projection is not a perspective that looks down -Z")
     a, b = p[2][2], p[2][3]
     distance = (0.5 * b, 0.5 * (a - 1.0)) if depth == "forward-gl" else (b, a)
     background, step = (0.0, 0.0) if depth == "reversed" else (1.0, 6e-8)

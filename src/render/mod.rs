@@ -76,7 +76,7 @@ pub enum RenderError {
     /// The GI method failed.
     #[error(transparent)]
     Gi(#[from] crate::gi::GiError),
-    /// A picture with pixels that are no numbers.
+    /// A picture with pixels that are not numbers.
     #[error("layer {layer} has {count} pixels that are not finite, the first at {x},{y}")]
     NotFinite {
         /// The layer's name.

@@ -78,7 +78,7 @@ impl fmt::Display for Tonemap {
 
 /// A name that is no tonemap.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no tonemap; choose filmic, agx, neutral or none")]
+#[error("`{0}` is not a tonemap; choose filmic, agx, neutral or none")]
 pub struct UnknownTonemap(pub String);
 
 impl FromStr for Tonemap {

@@ -100,7 +100,7 @@ impl Mesh {
             }
         }
         if !self.indices.len().is_multiple_of(3) {
-            return Err(format!("{} indices are no whole number of triangles", self.indices.len()));
+            return Err(format!("{} indices do not make whole triangles", self.indices.len()));
         }
         if let Some(i) = self.indices.iter().find(|&&i| i as usize >= n) {
             return Err(format!("index {i} with {n} vertices"));

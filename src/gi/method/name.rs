@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 pub enum MethodName {
     /// Analytic lights only.
     Direct,
-    /// Sky and mean light from all around, times ambient occlusion.
+    /// Constant light of sky and scene, times ambient occlusion.
     Ambient,
     /// One bounce in screen space.
     Ssgi,
-    /// Rays into the scene's triangles, and a cache of light in the world; settles over frames.
+    /// Rays into the scene's triangles and a world-space radiance cache; accumulates over frames.
     Gather,
     /// The network.
     Neural,
@@ -46,9 +46,9 @@ impl MethodName {
     pub fn doc(self) -> &'static str {
         [
             "Analytic lights only",
-            "Sky and mean light from all around, times ambient occlusion",
+            "Constant light of sky and scene, times ambient occlusion",
             "One bounce in screen space",
-            "Rays into the scene's triangles, and a cache of light in the world; settles over frames",
+            "Rays into the scene's triangles and a world-space radiance cache; accumulates over frames",
             "The network",
             "The path tracer, which converges to the truth",
         ][self as usize]

@@ -207,7 +207,7 @@ impl TypedValueParser for MethodParser {
         }
         let names = PossibleValuesParser::new(self.possible_values().into_iter().flatten());
         let name = names.parse_ref(cmd, arg, value)?;
-        MethodName::from_name(&name).ok_or_else(|| error(format!("`{name}` is no method")))
+        MethodName::from_name(&name).ok_or_else(|| error(format!("`{name}` is not a method")))
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
@@ -224,7 +224,7 @@ pub fn real_time(name: MethodName, global: &Global, weights: Option<&PathBuf>) -
             let neural = Neural::from(load_weights(weights)?).stored(global.precision());
             Ok(Method::Neural(Box::new(neural)))
         }
-        (None, _) => Err(usage(format!("`{}` is no real-time method", name.name()))),
+        (None, _) => Err(usage(format!("`{}` is not a real-time method", name.name()))),
     }
 }
 
@@ -241,7 +241,7 @@ pub fn usage(message: String) -> anyhow::Error {
 
 pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let (w, h) = text.split_once(['x', 'X']).ok_or("write it as WIDTHxHEIGHT, such as 1024x512")?;
-    let side = |t: &str| t.parse::<u32>().map_err(|_| format!("`{t}` is no number of pixels"));
+    let side = |t: &str| t.parse::<u32>().map_err(|_| format!("`{t}` is not a number of pixels"));
     match [side(w)?, side(h)?] {
         [0, _] | [_, 0] => Err("width and height must be at least 1".into()),
         size => Ok(size),

@@ -153,7 +153,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         if methods.is_empty() {
             return Err(e.into());
         }
-        eprintln!("warning: methods that send rays are not measured: {e}");
+        eprintln!("warning: methods that trace rays are not measured: {e}");
     }
     let options = BenchOptions { frames: args.frames, warmup: args.warmup };
     let with = |method: &Method| RendererOptions { method: method.clone(), ..Default::default() };
@@ -287,7 +287,7 @@ fn rows(m: &Measurement, layers: bool) -> Vec<(String, f64, f64)> {
 fn read_base(path: &PathBuf) -> Result<Record> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     let base: Record =
-        serde_json::from_str(&text).with_context(|| format!("{} is no record of `bench --json`", path.display()))?;
+        serde_json::from_str(&text).with_context(|| format!("{} is not a record of `bench --json`", path.display()))?;
     if base.schema != 1 {
         return Err(usage(format!("{}: schema {} is not known", path.display(), base.schema)));
     }
@@ -296,10 +296,12 @@ fn read_base(path: &PathBuf) -> Result<Record> {
 
 fn compare(base: &Record, now: &Record, allowed: f64) -> Result<()> {
     if (&base.adapter, &base.backend, base.size) != (&now.adapter, &now.backend, now.size) {
-        return Err(usage("the base record is of another adapter, backend or size: times cannot be compared".into()));
+        return Err(usage(
+            "the base record is of another adapter, backend or size; measure a new one with --json".into(),
+        ));
     }
     if base.precision != now.precision {
-        return Err(usage("the base record's network stored its numbers in another precision".into()));
+        return Err(usage("the base record's network ran in another precision; measure a new one with --json".into()));
     }
     let time = |m: &Measurement| m.gpu_ms.unwrap_or(m.wall_ms).median;
     let slower: Vec<String> = now

@@ -259,7 +259,7 @@ fn read(path: &Path) -> Result<Option<Record>> {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(e) => return Err(e).with_context(|| format!("cannot read {}", path.display())),
     };
-    let words = "is no record of `chart`; move it away, or name another --out";
+    let words = "is not a record of `chart`; move it away, or name another --out";
     let record: Record = serde_json::from_str(&text).with_context(|| format!("{} {words}", path.display()))?;
     if record.schema != 1 {
         return Err(usage(format!("{}: schema {} is not known", path.display(), record.schema)));

@@ -68,9 +68,9 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let blocks = used.contains(wgpu::Features::TEXTURE_COMPRESSION_BC);
     let most = TextureMemory::MOST >> 20;
     if blocks {
-        say!("textures  in blocks of a byte a texel (BC7) where a scene's take more than {most} MiB whole; --textures");
+        say!("textures  compressed (BC7, 1 byte a texel) where a scene's take more than {most} MiB; --textures");
     } else {
-        say!("textures  whole, four bytes a texel: this device has no blocks (BC7)");
+        say!("textures  uncompressed, 4 bytes a texel: this device lacks BC7");
     }
     for fault in faults {
         say!("driver    {}", fault.sentence());

@@ -36,7 +36,7 @@ impl Flag {
 pub fn fresh(fitted: Fitted, scene: &Scene) -> Result<Option<Fitted>> {
     let stale = fitted.stale(&hash::of_scene(scene))?;
     if let Some(why) = &stale {
-        eprintln!("warning: what was fitted (`{}`) is not obeyed: {why}", fitted.method.name());
+        eprintln!("warning: the record of `fit` (method `{}`) is ignored: {why}", fitted.method.name());
     }
     Ok(Some(fitted).filter(|_| stale.is_none()))
 }

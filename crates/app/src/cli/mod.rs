@@ -139,7 +139,7 @@ pub fn main() -> ExitCode {
     }
     let done = match cli.command {
         command if cli.global.precision.is_some() && !command.runs_network() => {
-            Err(args::usage("--precision is for networks, and none runs here; leave it out".into()))
+            Err(args::usage("--precision needs a network, and this command runs none; leave it out".into()))
         }
         #[cfg(feature = "viewer")]
         Command::View(a) => view::run(&cli.global, a),

@@ -301,14 +301,12 @@ fn film(
 /// Flags that do not belong to the method.
 fn check(args: &Args) -> Result<()> {
     if args.backdrop == Backdrop::Transparent && args.taa.is_some() {
-        return Err(usage("--taa remembers colours without alpha; a transparent backdrop takes --samples".into()));
+        return Err(usage("--taa keeps no alpha; with --backdrop transparent use --samples".into()));
     }
     let name = args.method().name();
     let settles = [MethodName::Gather, MethodName::Neural].contains(&args.method());
     if args.accumulate.is_some() && !settles {
-        return Err(usage(format!(
-            "--accumulate belongs to methods gather and neural; `{name}` does not settle over frames"
-        )));
+        return Err(usage(format!("--accumulate belongs to methods gather and neural; `{name}` keeps no history")));
     }
     if args.gather.is_some() && !settles {
         return Err(usage(format!("--gather belongs to methods gather and neural, not to `{name}`")));

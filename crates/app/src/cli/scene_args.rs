@@ -42,7 +42,7 @@ impl Lit {
             Some(Surroundings::Picture(path)) => {
                 let (environment, mended) = bouncelight_scene::sky::load(path)?;
                 if !self.environment_turn.is_finite() {
-                    return Err(usage(format!("--environment-turn {} is no angle", self.environment_turn)));
+                    return Err(usage(format!("--environment-turn {} is not an angle", self.environment_turn)));
                 }
                 bouncelight_scene::defaults::surround(scene, environment.turned(self.environment_turn));
                 scene.warnings.extend(mended);

@@ -110,7 +110,7 @@ fn parse_frames(text: &str) -> Result<Range<u32>, String> {
     let number = |t: &str| t.parse::<u32>().map_err(|e| format!("{t}: {e}"));
     match (number(a)?, number(b)?) {
         (a, b) if a < b => Ok(a..b),
-        _ => Err("there is no frame from A to before B".into()),
+        _ => Err("B must be above A".into()),
     }
 }
 

@@ -199,7 +199,7 @@ impl Task {
             eprintln!("{}", sentence(&traced));
         }
         if traced.dropped > 0 {
-            eprintln!("warning: {} samples were no numbers and were left out", traced.dropped);
+            eprintln!("warning: {} samples were NaN or infinite and were left out", traced.dropped);
         }
         if self.denoise {
             if let Some(picture) = preview::denoise(&traced, camera) {
@@ -207,7 +207,7 @@ impl Task {
             }
             traced.layers.truncate(self.asked);
             if !global.quiet {
-                eprintln!("denoised, for a look; nothing to judge pictures by");
+                eprintln!("denoised for a preview; not a reference to compare with");
             }
         }
         Ok(self.drawn(traced))

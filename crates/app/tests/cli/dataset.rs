@@ -21,7 +21,7 @@ fn a_dataset_is_made_in_shards_with_its_light_and_checksums() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("lessons");
     let make = |shard: &str| make(&out, &["--recipe", "paper-room-varied", "--rooms", "7-8", "--shard", shard]);
-    assert!(make("0/2").contains("1 lessons, 0.0 MB"));
+    assert!(make("0/2").contains("1 samples, 0.0 MB"));
     assert!(!out.join("varied0007.glb").exists(), "not asked for");
     let first = std::fs::read(out.join("varied0007_view0.safetensors")).unwrap();
     assert!(!out.join("varied0008_view0.safetensors").exists(), "that is the other shard's");

@@ -400,7 +400,7 @@ pub fn check_folder(folder: &Path) -> Result<(), ExportError> {
     if !folder.exists() {
         return if folder.file_name().is_some() { Ok(()) } else { wrong("it has no name") };
     }
-    let Ok(entries) = std::fs::read_dir(folder) else { return wrong("it is no folder that can be read") };
+    let Ok(entries) = std::fs::read_dir(folder) else { return wrong("it is not a readable folder") };
     // Whatever else is in it would go with the export that is replaced.
     let ours = |name: &std::ffi::OsStr| [MANIFEST, "shaders", "data"].iter().any(|own| name == *own);
     let names: Vec<_> = entries.flatten().map(|e| e.file_name()).collect();

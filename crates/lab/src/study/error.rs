@@ -20,7 +20,7 @@ pub enum DatasetError {
     #[error(transparent)]
     Gi(#[from] bouncelight::gi::GiError),
     /// Serialisation failed.
-    #[error("cannot serialise the lesson: {0}")]
+    #[error("cannot serialise the sample: {0}")]
     Serialize(String),
 }
 

@@ -112,7 +112,7 @@ fn parse_rooms(text: &str) -> Result<Rooms, String> {
         let (low, high) = part.split_once('-').unwrap_or((part, part));
         let (low, high) = (number(low)?, number(high)?);
         if low > high || high - low > 10_000 {
-            return Err(format!("{part} is no range of rooms"));
+            return Err(format!("{part} is not a range of rooms"));
         }
         rooms.extend(low..=high);
     }
@@ -140,9 +140,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     if let (Recipe::PaperRoom, Some(Rooms(rooms))) = (args.recipe, &args.rooms) {
         let kept: Vec<_> = rooms.iter().filter(|i| JUDGED.contains(i) || **i >= JUDGED_FROM).collect();
         if !kept.is_empty() && !args.judge {
-            return Err(usage(format!(
-                "rooms {kept:?} are kept for judging; --judge if that is what they are drawn for"
-            )));
+            return Err(usage(format!("rooms {kept:?} are kept for judging; add --judge to use them so")));
         }
     }
     if args.recipe != Recipe::Scene && args.lit.is_given() {
@@ -153,7 +151,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let gpu = global.open_gpu()?;
     if moments::ages(&args.moments).is_none() {
         return Err(usage(
-            "--moments are frames of one run, each later than the one before; a pan takes six, a change fourteen"
+            "--moments must increase: a number is a frame after the cut, `pan` takes 6 frames, `lamp` and `thing` 14"
                 .into(),
         ));
     }
@@ -175,7 +173,7 @@ fn announce(global: &Global, args: &Args, lessons: usize) {
     let planes = 7 + args.moments.len() as u64 * moments::PLANES;
     let bytes = lessons as u64 * (w * h * planes * 4 + 1024);
     if !global.quiet {
-        eprintln!("{lessons} lessons, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
+        eprintln!("{lessons} samples, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
     }
 }
 
