@@ -113,7 +113,7 @@ fn devices_and_pipes_are_not_read() {
         std::fs::rename(&path, folder.path().join("pipe.png")).expect("renames");
     }
     let message = bouncelight_scene::sky::load(&pipe).expect_err("a pipe").to_string();
-    assert!(message.contains("pipe.png") && message.contains("no regular file"), "{message}");
+    assert!(message.contains("pipe.png") && message.contains("not a regular file"), "{message}");
 }
 
 #[test]
