@@ -20,7 +20,7 @@ pub fn draw() -> Result<(), String> {
     let images = Path::new("docs/images");
     run(&mut command("python3", &["docs/frame.py"]))?;
     let build = ["build", "--workspace", "--features", "bouncelight-app/script"];
-    let examples = ["--bin", "bouncelight", "--example", "passes", "--example", "symptoms", "--example", "embed"];
+    let examples = ["--bin", "bouncelight", "--example", "passes", "--example", "symptoms"];
     cargo(&[&build[..], &examples].concat())?;
     let program = built("debug")?;
     make_sure_of_adapter(&program)?;
