@@ -10,7 +10,7 @@ use super::gbuffer::GbufferInputs;
 use super::gi_inputs::{clear, gi_inputs};
 use super::light_choice::LightOptions;
 use super::lights::LightLists;
-use super::passes::{Passes, Picture};
+use super::passes::{FrameBindings, Passes};
 use super::previous_transforms::PreviousTransforms;
 use super::shadow::{ShadowMaps, ShadowOptions};
 use super::shadow_maps::Audience;
@@ -78,7 +78,7 @@ pub struct Renderer {
     _pipeline_cache: PipelineCache,
     frame: wgpu::Buffer,
     targets: Targets,
-    picture: Picture,
+    picture: FrameBindings,
     lighting: Option<Lighting>,
     method: &'static str,
     /// What fills `indirect`; nothing for direct light alone.
