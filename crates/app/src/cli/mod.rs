@@ -240,6 +240,14 @@ mod tests {
             "docs/guide/viewer.md",
             "docs/guide/scenes.md",
             "docs/guide/without-wgpu.md",
+            "docs/internals/path-tracer.md",
+            "docs/internals/metrics.md",
+            "docs/internals/network.md",
+            "docs/reports/chart.md",
+            "docs/reports/stability.md",
+            "docs/results/accuracy.md",
+            "docs/results/performance.md",
+            "training/README.md",
         ] {
             let text = std::fs::read_to_string(root.join(page)).expect("the page is there");
             for command in commands(&text) {
