@@ -89,7 +89,7 @@ pub(super) fn upload(
         let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
         let how = match (compress, can) {
             (true, true) => "in blocks (BC7)",
-            (true, false) => "uncompressed, as the device lacks BC7",
+            (true, false) => "whole, as the device has no blocks",
             _ => "whole",
         };
         tracing::info!(

@@ -1,10 +1,15 @@
-//! Where a picture's indirect light comes from, by name: the one list that command line, window and
-//! studies share.
+//! Names of methods: the one list that command line, viewer and studies share.
+//!
+//! ```
+//! use bouncelight::gi::name::MethodName;
+//! assert_eq!(MethodName::from_name("gather"), Some(MethodName::Gather));
+//! assert!(!MethodName::REAL_TIME.contains(&MethodName::Reference));
+//! ```
 
 use super::Method;
 use serde::{Deserialize, Serialize};
 
-/// A method, or the truth that methods are measured against.
+/// A method, or the reference that methods are measured against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MethodName {
@@ -16,9 +21,9 @@ pub enum MethodName {
     Ssgi,
     /// Rays into the scene's triangles and a world-space radiance cache; accumulates over frames.
     Gather,
-    /// The network.
+    /// `gather` with a network.
     Neural,
-    /// The path tracer, which converges to the truth.
+    /// The path tracer.
     Reference,
 }
 
