@@ -39,9 +39,9 @@ fn usage_errors_exit_with_2() {
         fails(&["render", "interior", "-o", &out, "--method", method], 2, &[method, "replaced by `gather`"]);
         fails(&["bench", "interior", "--method", method], 2, &[method, "replaced by `gather`"]);
     }
-    let lessons = ["dataset", "--spp", "2", "--moments", "1", "--out", &path(&dir, "d"), "--rooms"];
-    fails(&[&lessons[..], &["5-47"]].concat(), 2, &["judging", "47"]);
-    fails(&[&lessons[..], &["5", "--shard", "4/4"]].concat(), 2, &["4/4", "n-1"]);
+    let samples = ["dataset", "--spp", "2", "--moments", "1", "--out", &path(&dir, "d"), "--rooms"];
+    fails(&[&samples[..], &["5-47"]].concat(), 2, &["judging", "47"]);
+    fails(&[&samples[..], &["5", "--shard", "4/4"]].concat(), 2, &["4/4", "n-1"]);
     fails(&["dataset", "--rooms", "5", "--spp", "2", "--out", &path(&dir, "d")], 2, &["--moments"]);
     assert!(is_empty(dir.path()), "a usage error leaves nothing behind");
 }

@@ -4,7 +4,7 @@ use bouncelight::gpu::readback;
 use bouncelight::render::RenderError;
 use thiserror::Error;
 
-/// Why a lesson could not be made.
+/// Why a sample could not be made.
 #[derive(Debug, Error)]
 pub enum DatasetError {
     /// The frame could not be drawn.

@@ -167,13 +167,13 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 }
 
 /// Says before the work begins what it will take up.
-fn announce(global: &Global, args: &Args, lessons: usize) {
+fn announce(global: &Global, args: &Args, samples: usize) {
     let [w, h] = cells_of(args.size).map(u64::from);
     // The light to be learnt, its place, and each moment; about 1 KB of header.
     let planes = 7 + args.moments.len() as u64 * moments::PLANES;
-    let bytes = lessons as u64 * (w * h * planes * 4 + 1024);
+    let bytes = samples as u64 * (w * h * planes * 4 + 1024);
     if !global.quiet {
-        eprintln!("{lessons} samples, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
+        eprintln!("{samples} samples, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
     }
 }
 
