@@ -82,7 +82,7 @@ pub enum AccelError {
     },
     /// The device's bindings are too small.
     #[error(
-        "what rays know of {triangles} triangles needs {bytes} bytes, but this device binds {limit} at once; \
+        "material data of {triangles} triangles for rays needs {bytes} bytes, but this device binds {limit} at once; \
         use a simpler scene"
     )]
     Binding {
@@ -94,7 +94,7 @@ pub enum AccelError {
         limit: u64,
     },
     /// Whoever waited does not any more.
-    #[error("building the trees was stopped")]
+    #[error("building the BVHs was cancelled")]
     Stopped,
     /// The device has not enough memory.
     #[error("the device has no memory for the acceleration structure of {bytes} bytes: {message}")]

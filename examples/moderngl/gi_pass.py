@@ -24,7 +24,7 @@ def camera_values(view, projection, depth="forward-gl"):
     depth: "reversed" and "forward" for clip space 0 to w, "forward-gl" for −w to w."""
     view, p = np.asarray(view, np.float64), np.asarray(projection, np.float64)
     if p[3][2] != -1 or p[3][3] != 0:
-        raise ValueError("the projection is no perspective that looks down -Z")
+        raise ValueError("the projection is not a perspective that looks down -Z")
     a, b = p[2][2], p[2][3]
     distance = (0.5 * b, 0.5 * (a - 1.0)) if depth == "forward-gl" else (b, a)
     background, step = (0.0, 0.0) if depth == "reversed" else (1.0, 6e-8)
@@ -52,8 +52,8 @@ class Pass:
     def __init__(self, ctx, folder):
         self.ctx, folder = ctx, Path(folder)
         self.manifest = m = json.loads((folder / "bouncelight.json").read_text())
-        if (m["schema"], m["target"]) != (1, "glsl430"):
-            raise ValueError(f"{folder}: schema {m['schema']}, target {m['target']}; this host reads 1, glsl430")
+        if m["schema"] not in (1, 2) or m["target"] != "glsl430":
+            raise ValueError(f"{folder}: schema {m['schema']}, target {m['target']}; this host reads 1 and 2, glsl430")
 
         def content(row, size):
             return (folder / row["file"]).read_bytes() if "file" in row else bytes([row["fill"]]) * size
@@ -69,7 +69,7 @@ class Pass:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self.textures[row["name"]] = texture
         self.shaders = [ctx.compute_shader((folder / s["file"]).read_text()) for s in m["shaders"]]
-        self.k = self.round = 0
+        self.k = self.cache_iteration = 0
 
     @property
     def output(self):
@@ -99,7 +99,8 @@ class Pass:
         for number in frame["dispatches"]:
             self._dispatch(m["dispatches"][number], inputs)
         self.k += 1
-        self.round += frame["rounds"]
+        # `rounds` and `round` are the names in schema 1.
+        self.cache_iteration += frame.get("cache_updates", frame.get("rounds"))
 
     def _value(self, value, camera):
         if not isinstance(value, str):
@@ -107,7 +108,7 @@ class Pass:
         name, _, more = value.partition(" + ")
         if name.startswith("camera."):
             return camera[name.removeprefix("camera.")]
-        return {"frame": self.k, "round": self.round}[name] + int(more or 0)
+        return {"frame": self.k, "cache_iteration": self.cache_iteration, "round": self.cache_iteration}[name] + int(more or 0)
 
     def _write(self, write, camera):
         layout = self.manifest["uniforms"][write["type"]]

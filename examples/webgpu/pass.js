@@ -33,13 +33,13 @@ export class Pass {
       return answer;
     };
     const manifest = await (await read("bouncelight.json")).json();
-    if (manifest.schema !== 1 || manifest.target !== "wgsl") {
-      throw new Error(`${url}: schema ${manifest.schema}, target ${manifest.target}; this page reads 1, wgsl`);
+    if (![1, 2].includes(manifest.schema) || manifest.target !== "wgsl") {
+      throw new Error(`${url}: schema ${manifest.schema}, target ${manifest.target}; this page reads 1 and 2, wgsl`);
     }
     const content = async (row, bytes) =>
       row.file ? new Uint8Array(await (await read(row.file)).arrayBuffer()) : new Uint8Array(bytes).fill(row.fill);
     const pass = new Pass();
-    Object.assign(pass, { device, manifest, buffers: {}, textures: {}, views: {}, k: 0, round: 0 });
+    Object.assign(pass, { device, manifest, buffers: {}, textures: {}, views: {}, k: 0, cacheIteration: 0 });
     for (const row of manifest.buffers) {
       const usage = GPUBufferUsage.COPY_DST
         | (row.usage.includes("uniform") ? GPUBufferUsage.UNIFORM : 0)
@@ -115,14 +115,16 @@ export class Pass {
     }
     pass.end();
     this.k += 1;
-    this.round += frame.rounds;
+    // `rounds` and `round` are the names in schema 1.
+    this.cacheIteration += frame.cache_updates ?? frame.rounds;
   }
 
   #value(value, camera) {
     if (typeof value !== "string") return value;
     const [name, more] = value.split(" + ");
     if (name.startsWith("camera.")) return camera[name.slice(7)];
-    return { frame: this.k, round: this.round }[name] + Number(more ?? 0);
+    const counters = { frame: this.k, cache_iteration: this.cacheIteration, round: this.cacheIteration };
+    return counters[name] + Number(more ?? 0);
   }
 
   #write(write, camera) {

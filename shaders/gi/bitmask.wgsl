@@ -104,8 +104,8 @@ fn slice_at(here: Receiver, k: i32) -> Slice {
 fn place(slice: Slice, angle: f32) -> f32 {
     let low = slice.tilt - 0.5 * HALF_TURN;
     let inside = clamp(angle, low, slice.tilt + 0.5 * HALF_TURN);
-    let whole = max(slice.cos_tilt + slice.tilt * slice.sin_tilt, 1e-4);
-    return SECTORS * (arc(slice, low) + sign(inside) * arc(slice, inside)) / whole;
+    let half_space = max(slice.cos_tilt + slice.tilt * slice.sin_tilt, 1e-4);
+    return SECTORS * (arc(slice, low) + sign(inside) * arc(slice, inside)) / half_space;
 }
 
 // The border at or below `place`, rounded by the pattern.

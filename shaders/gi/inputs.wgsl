@@ -141,9 +141,9 @@ fn stored_vector(pixel: vec2i) -> vec3f {
     let texel = finite3(textureLoad(normal_map, pixel, 0).rgb);
     let v = select(texel, 2.0 * texel - 1.0, (params.flags & STORED_UNSIGNED) != 0u);
     let z = select(v.z, sqrt(max(1.0 - dot(v.xy, v.xy), 0.0)), (params.flags & STORED_XY) != 0u);
-    let whole = vec3f(v.xy, z);
-    let length = length(whole);
-    let unit = select(vec3f(0.0, 0.0, 1.0), whole / length, length > 1e-6);
+    let normal = vec3f(v.xy, z);
+    let length = length(normal);
+    let unit = select(vec3f(0.0, 0.0, 1.0), normal / length, length > 1e-6);
     return select(unit, oct_decode(v.xy), (params.flags & (STORED_XYZ | STORED_XY)) == 0u);
 }
 

@@ -20,7 +20,7 @@ fn occlusion(@builtin(global_invocation_id) id: vec3u) {
     }
     let here = receiver_at(texel, z);
     var open = 0.0;
-    var whole = 0.0;
+    var shares = 0.0;
     for (var s = 0; s < SLICES; s++) {
         let slice = slice_at(here, s);
         var blocked = 0u;
@@ -30,7 +30,7 @@ fn occlusion(@builtin(global_invocation_id) id: vec3u) {
             blocked |= look(here, slice, 1.0, k, &right).bits | look(here, slice, -1.0, k, &left).bits;
         }
         open += slice.share * (1.0 - f32(countOneBits(blocked)) / SECTORS);
-        whole += slice.share;
+        shares += slice.share;
     }
-    textureStore(output, texel, vec4f(open / whole, 0.0, 0.0, z));
+    textureStore(output, texel, vec4f(open / shares, 0.0, 0.0, z));
 }

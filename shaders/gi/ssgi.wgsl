@@ -47,7 +47,7 @@ fn ssgi(@builtin(global_invocation_id) id: vec3u) {
     let here = receiver_at(texel, z);
     let ambient = ambient_term();
     var light = vec3f(0.0);
-    var whole = 0.0;
+    var shares = 0.0;
     for (var s = 0; s < SLICES; s++) {
         let slice = slice_at(here, s);
         var blocked = 0u;
@@ -63,7 +63,7 @@ fn ssgi(@builtin(global_invocation_id) id: vec3u) {
             blocked |= left.bits;
         }
         light += slice.share * (sum + ambient * (SECTORS - f32(countOneBits(blocked)))) / SECTORS;
-        whole += slice.share;
+        shares += slice.share;
     }
-    textureStore(output, texel, vec4f(light / whole, z));
+    textureStore(output, texel, vec4f(light / shares, z));
 }

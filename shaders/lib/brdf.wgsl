@@ -102,13 +102,13 @@ fn fresnel_dielectric(index: f32, c: f32) -> f32 {
 // Schlick's curve, and for dielectrics the true one, which is up to a quarter brighter between 45°
 // and 65°.
 fn fresnel_of(f0: vec3f, c: f32) -> vec3f {
-    let most = max(f0.x, max(f0.y, f0.z));
+    let max_f0 = max(f0.x, max(f0.y, f0.z));
     let q = 1.0 - c;
     let q5 = q * q * q * q * q;
-    let schlick = f0 + (saturate(50.0 * most) - f0) * q5;
+    let schlick = f0 + (saturate(50.0 * max_f0) - f0) * q5;
     let dielectric = 1.0 - metal_part(f0);
     if dielectric <= 0.0 { return schlick; }
-    return schlick + dielectric * (fresnel_dielectric(index_of(most), c) - most - (saturate(50.0 * most) - most) * q5);
+    return schlick + dielectric * (fresnel_dielectric(index_of(max_f0), c) - max_f0 - (saturate(50.0 * max_f0) - max_f0) * q5);
 }
 
 // GGX, single scattering: D * V * F, in 1/sr; multiply by n.l and the light, and for metals by

@@ -44,9 +44,9 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) me
         if me < reach { parts[me] = union_of(parts[me], parts[me + reach]); }
     }
     workgroupBarrier();
-    let all = parts[0];
-    let scale = inverseSqrt(all.z / all.x + step.epsilon);
-    for (var i = me; i < step.group; i += 64u) { write(first + i, all.y, scale); }
+    let merged = parts[0];
+    let scale = inverseSqrt(merged.z / merged.x + step.epsilon);
+    for (var i = me; i < step.group; i += 64u) { write(first + i, merged.y, scale); }
     // Channels that only pad.
     if group.x == 0u && step.out_channels + me < step.in_vectors * 4u { write(step.out_channels + me, 0.0, 0.0); }
 }

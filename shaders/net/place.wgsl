@@ -15,9 +15,9 @@ struct Place {
 
 fn place_of(z: u32) -> Place {
     let stored = z / step.parts;
-    let all = step.first_block + stored;
-    let phase = all / step.blocks;
-    return Place(vec2u(phase % SPREAD, phase / SPREAD), all % step.blocks, stored, z % step.parts);
+    let block = step.first_block + stored;
+    let phase = block / step.blocks;
+    return Place(vec2u(phase % SPREAD, phase / SPREAD), block % step.blocks, stored, z % step.parts);
 }
 
 // Columns and rows that a phase makes.

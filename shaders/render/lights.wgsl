@@ -39,7 +39,7 @@ fn joined(a: Box, b: Box) -> Box {
 }
 
 // The largest product of numbers of two ranges.
-fn most(a_low: vec3f, a_high: vec3f, b_low: vec3f, b_high: vec3f) -> vec3f {
+fn max_products(a_low: vec3f, a_high: vec3f, b_low: vec3f, b_high: vec3f) -> vec3f {
     return max(max(a_low * b_low, a_low * b_high), max(a_high * b_low, a_high * b_high));
 }
 
@@ -47,11 +47,11 @@ fn most(a_low: vec3f, a_high: vec3f, b_low: vec3f, b_high: vec3f) -> vec3f {
 fn reaches(light: Light, reach: f32, box: Box) -> bool {
     if any(box.low > box.high) { return false; }
     if light.kind == LIGHT_SUN {
-        return dot(most(box.n_low, box.n_high, -light.direction, -light.direction), vec3f(1.0)) > -1e-4;
+        return dot(max_products(box.n_low, box.n_high, -light.direction, -light.direction), vec3f(1.0)) > -1e-4;
     }
     let to_low = light.position - box.high;
     let to_high = light.position - box.low;
-    let facing = dot(most(box.n_low, box.n_high, to_low, to_high), vec3f(1.0));
+    let facing = dot(max_products(box.n_low, box.n_high, to_low, to_high), vec3f(1.0));
     let away = max(max(to_low, -to_high), vec3f(0.0));
     var end = reach;
     if light.range > 0.0 { end = min(end, light.range); }

@@ -108,8 +108,8 @@ fn around(centre: vec2i) -> Around {
 fn held(here: Around, value: vec3f) -> vec3f {
     let off = to_ycocg(value) - here.middle;
     let beyond = abs(off) / max(BOX * here.size + 1e-6 * abs(here.middle.x), vec3f(1e-12));
-    let most = max(max(beyond.x, beyond.y), beyond.z);
-    return max(from_ycocg(here.middle + off / max(most, 1.0)), here.least);
+    let excess = max(max(beyond.x, beyond.y), beyond.z);
+    return max(from_ycocg(here.middle + off / max(excess, 1.0)), here.least);
 }
 
 // The nearest of the 3x3 pixels: edges move with what is in front.

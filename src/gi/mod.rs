@@ -1,31 +1,33 @@
-//! Global-illumination methods, cheapest first. Each turns the G-buffer and the analytic lights'
+//! Global-illumination methods, cheapest first. Each turns a G-buffer and the analytic lights'
 //! direct light into one full-resolution texture: the diffuse light that direct lighting misses
-//! (sky and every bounce), as E/π.
+//! (sky and all bounces), as E/π.
 //!
-//! # What each method does, and what it cannot do
-//!
-//! [`ambient`] gives every surface one light from all around (the sky, and the mean of what the
-//! picture's surfaces send on, times two constants fitted to the training scenes), dimmed by
-//! ambient occlusion ([`occlusion`]). It cannot say where light is: no wall bleeds its colour, a
-//! closed room gets the sky's light, and two views of one room disagree because each has its own
-//! mean.
-//!
-//! [`ssgi`] gathers what the pixels around a pixel send on, by visibility bitmask ([`bitmask`]),
-//! and `ambient`'s light through what nothing blocks. It cannot do anything off the screen or
-//! hidden in it.
-//!
-//! [`gather`] sends one ray a cell and frame into the scene's triangles and reads a cache of light
-//! in the world where it ends. It asks what stands between; what is left is noise, which frames and
-//! neighbours average away.
-//!
-//! The neural method is `gather` and a U-Net, which is given what each cell remembers ([`memory`])
-//! and says which cells' light is averaged. It does not know more of the world than `gather`, and is
-//! not finer than a cell (4 pixels).
+//! | method | light | cannot show |
+//! |---|---|---|
+//! | [`ambient`] | constant light of sky and picture, times ambient occlusion ([`occlusion`]) | where light comes from; the picture's mean changes with the view |
+//! | [`ssgi`] | one bounce by visibility bitmask ([`bitmask`]), `ambient`'s light where nothing blocks | what is off screen or hidden |
+//! | [`gather`] | one ray a cell and frame into the scene's triangles, a world-space radiance cache at its hit, filters over frames and neighbours | light finer than a cell (4 pixels) |
+//! | [`neural`] | `gather`, whose spatial filter a U-Net guides by cells' histories ([`memory`]) | the same |
 //!
 //! All scale exactly with the light (twice the light, twice the answer) and answer exactly 0 when
-//! all light is off. `docs/internals/gather.md` tells the same with a picture of the data flow and the table of
-//! constants; `docs/guide/embedding.md` how another renderer records them: a [`World`] holds its
-//! triangles, a [`View`] lights its picture.
+//! all light is off. `docs/internals/gather.md` explains the passes, `docs/guide/embedding.md` how
+//! another renderer records them: a [`World`] holds its triangles, a [`View`] lights its picture.
+//!
+//! ```no_run
+//! use bouncelight::gi::{GiError, Inputs, Method, View, World, WorldOptions};
+//! use bouncelight::wgpu;
+//!
+//! fn first_frame(
+//!     (device, queue): (&wgpu::Device, &wgpu::Queue),
+//!     encoder: &mut wgpu::CommandEncoder,
+//!     (inputs, light): (&Inputs<'_>, &wgpu::TextureView),
+//! ) -> Result<(), GiError> {
+//!     let mut world = World::new(device, WorldOptions::default());
+//!     let mut view = View::new(device, queue, inputs.size, &Method::Gather(Default::default()))?;
+//!     world.prepare(queue)?;
+//!     view.record(encoder, &world, inputs, light)
+//! }
+//! ```
 //!
 //! # Layers
 //! `interface` ← `stage` ← `screen`, `gather` ← `neural` ← `method` ← `world`: each imports only

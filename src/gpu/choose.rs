@@ -1,7 +1,7 @@
 //! Device choice: hardware Vulkan/Metal/DX12, then hardware GL, then software Vulkan, then software
 //! GL.
 //!
-//! `WGPU_BACKEND` and `WGPU_ADAPTER_NAME` are obeyed; explicit options win over them. Every request
+//! `WGPU_BACKEND` and `WGPU_ADAPTER_NAME` count; explicit options win over them. Every request
 //! is answered by an adapter or by a [`GpuError`] that lists what was found and how to get one.
 
 use super::pipeline_cache::PipelineCache;
@@ -35,13 +35,13 @@ impl Backend {
     }
 }
 
-/// What the caller asks of the device.
+/// Options of [`Gpu::open`].
 #[derive(Debug, Clone, Default)]
 pub struct GpuOptions {
-    /// Backend; [`Backend::Auto`] also lets `WGPU_BACKEND` decide.
+    /// Graphics API. Default [`Backend::Auto`]: `WGPU_BACKEND`, else the best that answers.
     pub backend: Backend,
-    /// Part of the adapter's name (any case), or `cpu` for a software adapter; `None` lets
-    /// `WGPU_ADAPTER_NAME` decide.
+    /// Part of the adapter's name (any case), or `cpu` for a software adapter. Default `None`:
+    /// `WGPU_ADAPTER_NAME`, else the best. A name that fits none is [`GpuError::NoSuchAdapter`].
     pub adapter: Option<String>,
 }
 
@@ -94,9 +94,8 @@ pub fn fix() -> &'static str {
     }
 }
 
-/// A device with what is known about it, and what has been compiled on it so far: renderers that are
-/// made one after another share that. Clones are handles to the same. Hosts that embed the passes
-/// bring their own device and never need this.
+/// A device, its adapter, and what has been compiled on it, which renderers share. Clones are handles
+/// to the same. Hosts that embed the passes bring their own device and do not need this.
 #[derive(Clone)]
 pub struct Gpu {
     /// The adapter.

@@ -1,5 +1,13 @@
-//! The GPU as the rest of the house sees it: a chosen device, shader sources, bind groups,
-//! readback, timing.
+//! Device choice, readback and pass timing.
+//!
+//! Hosts that embed the passes bring their own device. Programs without one open it here:
+//!
+//! ```no_run
+//! use bouncelight::gpu::{Backend, Gpu, GpuOptions};
+//! let gpu = Gpu::open(&GpuOptions { backend: Backend::Vulkan, ..Default::default() })?;
+//! eprintln!("{}", gpu.sentence());
+//! # Ok::<_, bouncelight::gpu::GpuError>(())
+//! ```
 
 #[doc(hidden)]
 pub mod bind;

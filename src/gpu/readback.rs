@@ -1,4 +1,12 @@
-//! Copies from the GPU to memory, for capture and tests. Blocks; the frame itself never calls it.
+//! Copies from the GPU to memory, for capture and tests. They block; frames never call them.
+//!
+//! ```no_run
+//! use bouncelight::{gpu::{Gpu, readback}, wgpu};
+//! fn texels(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<f32>, readback::ReadbackError> {
+//!     let bytes = readback::texture(&gpu.device, &gpu.queue, texture)?;
+//!     Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+//! }
+//! ```
 
 use thiserror::Error;
 

@@ -1,5 +1,15 @@
 //! GPU time per pass: a [`Recorder`] pairs a command encoder with an optional profiler, so that
-//! every pass is written once and timed when somebody asks.
+//! every pass is written once and timed on request.
+//!
+//! ```
+//! use bouncelight::{gpu::timing::Recorder, wgpu};
+//! fn dispatch(encoder: &mut wgpu::CommandEncoder, pipeline: &wgpu::ComputePipeline) {
+//!     Recorder::new(encoder).compute("my.pass", |pass| {
+//!         pass.set_pipeline(pipeline);
+//!         pass.dispatch_workgroups(8, 8, 1);
+//!     });
+//! }
+//! ```
 
 pub use super::tape::Pass;
 use wgpu_profiler::{GpuProfiler, GpuTimerQueryResult};

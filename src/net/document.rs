@@ -154,7 +154,7 @@ fn check_fields(document: &Document<'_>, problems: &mut Vec<Problem>) {
     let mut fault = |text: String| problems.push(Problem::Document(text));
     let meaning = &document.output.meaning;
     if LEFT_MEANINGS.contains(&meaning.as_str()) {
-        fault(format!("output meaning `{meaning}` has left: {CORRECTS}"));
+        fault(format!("output meaning `{meaning}` was removed: {CORRECTS}"));
     } else if !MEANINGS.contains(&meaning.as_str()) {
         fault(format!("output meaning `{meaning}` is unknown; known: {}", MEANINGS.join(", ")));
     }
@@ -178,7 +178,7 @@ fn check_inputs(document: &mut Document<'_>, problems: &mut Vec<Problem>) {
         let mut known: Vec<_> = TABLES.iter().map(|t| t.name).collect();
         known.dedup();
         problems.push(Problem::Document(match name.as_str() {
-            LEFT_TABLE => format!("feature table `{name}` has left: {CORRECTS}"),
+            LEFT_TABLE => format!("feature table `{name}` was removed: {CORRECTS}"),
             _ => format!("feature table `{name}` is unknown; known: {}", known.join(", ")),
         }));
         return;

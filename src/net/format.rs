@@ -4,6 +4,12 @@
 //!
 //! Everything is checked before memory is taken for a tensor, and all faults are reported at once.
 //! No input makes it panic.
+//!
+//! ```
+//! use bouncelight::net::format::Weights;
+//! let error = Weights::from_bytes(b"not a weights file").expect_err("is refused");
+//! assert!(error.to_string().contains("safetensors"));
+//! ```
 
 use super::document::{self, Document};
 pub use super::document::{Feature, Output, Provenance, Table};
@@ -31,11 +37,11 @@ pub struct Weights {
     pub inputs: Vec<Feature>,
     /// Picture pixels along the edge of one network pixel.
     pub cell: u32,
-    /// What comes out.
+    /// Channels and meaning of the output.
     pub output: Output,
     /// Topology.
     pub graph: Graph,
-    /// How the numbers were made; free-form.
+    /// How the weights were trained; free-form.
     pub provenance: Provenance,
     /// 64-bit FNV-1a of the file's bytes: identifies the file in a picture's metadata, protects
     /// against nothing.

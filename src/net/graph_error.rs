@@ -96,7 +96,7 @@ pub enum GraphError {
         allowed: &'static str,
     },
     /// Something cannot be divided evenly.
-    #[error("operator `{op}`: {what} {value} is no multiple of {by}")]
+    #[error("operator `{op}`: {what} {value} is not a multiple of {by}")]
     Divide {
         /// Operator.
         op: String,

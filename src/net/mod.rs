@@ -7,6 +7,13 @@
 //! - [`gpu`]: the WGSL kernels' host side.
 //!
 //! Only [`gpu`] knows wgpu.
+//!
+//! ```
+//! use bouncelight::net::format::Weights;
+//! let weights = Weights::shipped()?;
+//! println!("{}: {}", weights.name, weights.hash_text());
+//! # Ok::<_, bouncelight::net::format::WeightsError>(())
+//! ```
 
 #[doc(hidden)]
 pub mod activation;

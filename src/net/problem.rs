@@ -16,8 +16,8 @@ pub enum WeightsError {
         /// Reason.
         source: std::io::Error,
     },
-    /// A shipped network that has left.
-    #[error("the network `{name}` has left: {}; the shipped one is `filter`", CORRECTS)]
+    /// A shipped network that was removed.
+    #[error("the network `{name}` was removed: {}; the shipped one is `filter`", CORRECTS)]
     Left {
         /// What it was called.
         name: &'static str,
@@ -104,8 +104,8 @@ pub enum Problem {
         /// Its kind.
         op: String,
     },
-    /// An operator that has left.
-    #[error("graph[{index}] `{name}`: operator `{op}` has left, since no shipped and no published network has it")]
+    /// An operator that was removed.
+    #[error("graph[{index}] `{name}`: operator `{op}` was removed, since no shipped and no published network has it")]
     OperatorLeft {
         /// Position in the graph.
         index: usize,

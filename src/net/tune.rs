@@ -44,7 +44,7 @@ pub enum CacheError {
     #[error("{0} bytes are too many for a cache of the tuner")]
     Long(usize),
     /// A number that no tuner writes.
-    #[error("`{0}` holds numbers that make no sense")]
+    #[error("`{0}` holds numbers out of range")]
     Numbers(String),
 }
 

@@ -8,7 +8,7 @@ use crate::gpu::{shaders, tape, timing::Recorder};
 use crate::gpu_scene::{Draw, SceneGpu, attribute_layouts, material_layout};
 use glam::Vec3;
 
-/// How veils are drawn: panes, smoke and whatever else covers a share of what is behind (glTF's
+/// Drawing of veils: panes, smoke and whatever else covers a share of what is behind (glTF's
 /// `BLEND`, transmission). Cut-outs (leaves on a sheet that is called `BLEND`) are drawn by lot in
 /// either case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

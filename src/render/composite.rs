@@ -4,7 +4,7 @@ use super::pipelines;
 use super::targets::{Target, Targets};
 use crate::gpu::timing::Recorder;
 
-/// What is seen where there is no surface. Surfaces are lit by the surroundings in any case.
+/// Background of a picture, where there is no surface. The surroundings light the scene in any case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u32)]

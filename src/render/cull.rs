@@ -71,7 +71,7 @@ pub struct Count {
     pub culled: u64,
 }
 
-/// What a frame drew.
+/// Instances and triangles that a frame drew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct DrawnCount {
     /// For the camera, veils included.

@@ -17,16 +17,16 @@ const MOST: f32 = 16.0;
 /// Share at each end that does not count.
 const ENDS: f32 = 0.02;
 
-/// What is asked for.
+/// Exposure of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Exposure {
-    /// So many stops.
+    /// Stops: the picture is multiplied by 2 to this power.
     Stops(f32),
-    /// Whatever suits the picture ([`measure`]).
+    /// Measured, so that the mean is middle grey ([`measure`]).
     Auto,
 }
 
-/// What is neither a number of stops nor `auto`.
+/// A word that is neither a number of stops nor `auto`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is not a finite number of stops, nor `auto`")]
 pub struct UnknownExposure(pub String);

@@ -10,7 +10,7 @@ use super::gbuffer::GbufferInputs;
 use super::gi_inputs::{clear, gi_inputs};
 use super::light_choice::LightOptions;
 use super::lights::LightLists;
-use super::passes::{Passes, Picture};
+use super::passes::{FrameBindings, Passes};
 use super::previous_transforms::PreviousTransforms;
 use super::shadow::{ShadowMaps, ShadowOptions};
 use super::shadow_maps::Audience;
@@ -28,22 +28,22 @@ use crate::gpu_scene::SceneGpu;
 use crate::net::gpu::LayerReadback;
 use crate::net::plan::Plan;
 
-/// How a [`Renderer`] is made.
+/// Options of a [`Renderer`].
 #[derive(Debug, Clone, Default)]
 pub struct RendererOptions {
-    /// How indirect light is found.
+    /// Method of indirect light. Default [`Method::Ambient`](gi::Method); the program's is `gather`.
     pub method: gi::Method,
-    /// Sizes of shadow maps.
+    /// Sizes of shadow maps. Smaller ones save memory and soften contact.
     pub shadow: ShadowOptions,
-    /// What is done where there are many lights.
+    /// Treatment of many lights.
     pub lights: LightOptions,
-    /// Temporal anti-aliasing ([`TaaPass`]): `hdr` is the mean over frames. Views should then be
-    /// jittered by [`sampling::offset`](super::sampling::offset) of the frame's number. Off,
-    /// nothing of it exists.
+    /// Temporal anti-aliasing ([`TaaPass`]): `hdr` is the mean over frames. Default off, which costs
+    /// nothing. On, views should be jittered by [`sampling::offset`](super::sampling::offset) of the
+    /// frame's number; without jitter edges stay stepped.
     pub taa: bool,
-    /// How surfaces are drawn that blend with what is behind.
+    /// How blended surfaces are drawn. Default [`Blending::Sorted`].
     pub blending: Blending,
-    /// What is seen beyond the scene.
+    /// What is shown behind the scene. Default [`Backdrop::Shown`].
     pub backdrop: Backdrop,
 }
 
@@ -56,17 +56,17 @@ struct Lighting {
     sky: wgpu::BindGroup,
 }
 
-/// What a frame is drawn for.
+/// Purpose of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
-    /// To be seen.
+    /// A picture to be shown.
     Picture,
     /// Another sample of the picture before: shadow maps stay as they are and, without temporal
     /// anti-aliasing, to which each sample is a frame, motion vectors of objects.
     FurtherSample,
-    /// To be remembered: targets hold no picture after it.
+    /// A frame for its history alone: targets hold no picture after it.
     WarmUp {
-        /// Of a picture.
+        /// Whether it is the first of its picture, whose shadow maps are drawn.
         first: bool,
     },
 }
@@ -78,7 +78,7 @@ pub struct Renderer {
     _pipeline_cache: PipelineCache,
     frame: wgpu::Buffer,
     targets: Targets,
-    picture: Picture,
+    picture: FrameBindings,
     lighting: Option<Lighting>,
     method: &'static str,
     /// What fills `indirect`; nothing for direct light alone.
@@ -150,7 +150,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// What is seen beyond the scene from the next frame on.
+    /// Sets the background from the next frame on.
     pub fn set_backdrop(&mut self, backdrop: Backdrop) {
         self.backdrop = backdrop;
     }
@@ -175,7 +175,8 @@ impl Renderer {
         self.indirect.as_ref().and_then(|i| i.settled())
     }
 
-    /// What drew the last frame in the method's place, and why; `None` where it drew itself.
+    /// Returns the method that drew the last frame in the place of the one asked for, and why; `None`
+    /// where that drew itself.
     pub fn fallback(&self) -> Option<technique::Fallback<'_>> {
         self.indirect.as_ref()?.fallback()
     }
@@ -190,7 +191,7 @@ impl Renderer {
         self.method
     }
 
-    /// What the method's network does, step by step, where one runs.
+    /// Returns the plan of the method's network, where one runs.
     pub fn plan(&self) -> Option<&Plan> {
         self.indirect.as_ref()?.plan()
     }
@@ -200,12 +201,12 @@ impl Renderer {
         self.targets.size
     }
 
-    /// What a GI method reads of the frame that was drawn with `view` and `environment`.
+    /// Returns the inputs of a GI method for the frame that was drawn with `view` and `environment`.
     pub fn gi_inputs(&self, view: &View, environment: [f32; 3]) -> gi::Inputs<'_> {
         gi_inputs(&self.targets, view, environment, None)
     }
 
-    /// What the network was given for the last frame, which `view` drew; `None` without a network.
+    /// Returns the network's input of the last frame, which `view` drew; `None` without a network.
     /// Waits for the GPU.
     ///
     /// # Errors
@@ -219,7 +220,7 @@ impl Renderer {
         indirect.read_input(&gi_inputs(&self.targets, view, environment, None))
     }
 
-    /// What cells remember after the last frame, where the method gathers.
+    /// Returns the history of cells after the last frame, where the method is `gather` or `neural`.
     pub fn memory(&self) -> Option<technique::Memory<'_>> {
         self.indirect.as_ref()?.memory()
     }
@@ -229,7 +230,7 @@ impl Renderer {
         self.indirect.as_ref().map(|i| i.layers()).unwrap_or_default()
     }
 
-    /// What a layer of the network made of the last frame, which `view` drew; `None` where there is
+    /// Returns the output of a layer of the network for the last frame, which `view` drew; `None` where there is
     /// no such layer. Runs the network again and waits for the GPU.
     ///
     /// # Errors
@@ -302,7 +303,7 @@ impl Renderer {
         self.record_frame(recorder, queue, scene, view, Purpose::Picture)
     }
 
-    /// As [`Renderer::record`], no more than `purpose` needs.
+    /// Records like [`Renderer::record`], no more than `purpose` needs.
     pub fn record_frame(
         &mut self,
         recorder: &mut Recorder<'_>,

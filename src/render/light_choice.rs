@@ -12,15 +12,16 @@ use crate::lights::LightGpu;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// How many lights are looked at one by one, and how dim they may be.
+/// Treatment of many lights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightOptions {
-    /// From so many lights on, tiles of 16×16 pixels have lists of those that can reach them.
+    /// Lights from which on each tile of 16×16 pixels has a list of those that reach it. Default 9;
+    /// fewer cost the pass `lights`, more cost `direct` time for each light and pixel.
     pub tiled_from: u32,
-    /// Of nine lights and more, lamps are left out where they are too far away to count: at any
-    /// place, all that are left out there would add up to no more than this share of the view's
-    /// irradiance (geometric mean over where surfaces may be, shadows not counted). 0 leaves none
-    /// out.
+    /// Light that may be left out, as a share of the view's irradiance (geometric mean over where
+    /// surfaces may be, without shadows), 0 to 1. With nine lights or more, distant lamps are left out as long as
+    /// at any place all of them together stay below it. Default 1/1024; 0 leaves none out, 0.1 darkens
+    /// visibly.
     ///
     /// 1/1024: with an exposure that shows the mean as middle grey (0.18) that is a radiance of
     /// 0.0002, and a step of 8 bits above black is 0.0003.

@@ -1,4 +1,17 @@
-//! The rasteriser: one pass, one file; [`frame`] tells the order.
+//! The rasteriser: one pass, one file; [`frame`] has their order.
+//!
+//! ```no_run
+//! use bouncelight::{gpu::Gpu, gpu_scene::SceneGpu, scene::Camera};
+//! use bouncelight::gi::Method;
+//! use bouncelight::render::{RenderError, Renderer, RendererOptions, capture::{CaptureOptions, capture}};
+//!
+//! fn picture(gpu: &Gpu, scene: &SceneGpu, camera: &Camera) -> Result<Vec<f32>, RenderError> {
+//!     let options = RendererOptions { method: Method::Gather(Default::default()), ..Default::default() };
+//!     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, [1024, 512], options)?;
+//!     let frames = CaptureOptions { samples: 8, warmup: Method::SETTLED - 1, ..Default::default() };
+//!     Ok(capture(gpu, &mut renderer, scene, camera, frames)?.beauty.data)
+//! }
+//! ```
 
 #[doc(hidden)]
 pub mod blended;
@@ -76,7 +89,7 @@ pub enum RenderError {
     /// The GI method failed.
     #[error(transparent)]
     Gi(#[from] crate::gi::GiError),
-    /// A picture with pixels that are no numbers.
+    /// A picture with pixels that are not numbers.
     #[error("layer {layer} has {count} pixels that are not finite, the first at {x},{y}")]
     NotFinite {
         /// The layer's name.

@@ -14,7 +14,7 @@ use super::taa::TaaPass;
 use super::targets::Targets;
 
 /// What is bound as long as the targets stay.
-pub(super) struct Picture {
+pub(super) struct FrameBindings {
     pub lights: wgpu::BindGroup,
     pub direct: wgpu::BindGroup,
     /// Once a method draws that shows no lobes.
@@ -59,12 +59,12 @@ impl Passes {
         frame: &wgpu::Buffer,
         targets: &Targets,
         taa: &mut Option<TaaPass>,
-    ) -> Picture {
+    ) -> FrameBindings {
         if let Some(taa) = taa {
             taa.fit(device, frame, targets);
         }
         let picture = taa.as_ref().map_or(&targets.hdr, TaaPass::current);
-        Picture {
+        FrameBindings {
             lights: self.lights.picture(device, frame, targets),
             direct: self.direct.picture(device, frame, targets),
             ssr: None,

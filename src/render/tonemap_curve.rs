@@ -1,4 +1,4 @@
-//! From scene light to display values: the CPU form of `shaders/lib/tonemap.wgsl`, same names, same
+//! View transforms from radiance to display values: the CPU form of `shaders/lib/tonemap.wgsl`, same names, same
 //! constants.
 //!
 //! Filmic and AgX stand near Blender's views of these names (look None, display sRGB). Filmic's
@@ -17,12 +17,19 @@
 //! agrees to 0.1 in the mean; between nodes the darkest channel of saturated colours goes astray
 //! there. Blender's Neutral is a table, too. Negative components count as zero (Blender bends them
 //! into the gamut), NaN as zero, light above 65504 as 65504.
+//!
+//! ```
+//! use bouncelight::render::tonemap_curve::Tonemap;
+//! let [black, white, bright] = Tonemap::None.apply([0.0, 1.0, 4.0]);
+//! assert!(black == 0.0 && white > 0.999 && bright == white);
+//! assert!(Tonemap::Filmic.apply([4.0; 3])[0] < 1.0);
+//! ```
 
 use crate::srgb;
 use std::fmt;
 use std::str::FromStr;
 
-/// How scene light becomes display values.
+/// View transform.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Tonemap {
     /// Blender's Filmic view, look None; what the paper's pictures were shown with.
@@ -78,7 +85,7 @@ impl fmt::Display for Tonemap {
 
 /// A name that is no tonemap.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no tonemap; choose filmic, agx, neutral or none")]
+#[error("`{0}` is not a tonemap; choose filmic, agx, neutral or none")]
 pub struct UnknownTonemap(pub String);
 
 impl FromStr for Tonemap {

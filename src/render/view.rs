@@ -10,7 +10,14 @@ use crate::scene::{Camera, Environment};
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3, Vec4};
 
-/// What one frame is drawn with. Matrices are column-major.
+/// Camera matrices and sampling of one frame. Matrices are column-major.
+///
+/// ```
+/// use bouncelight::{render::View, scene::Camera};
+/// let camera = Camera::look_at([0.0, 1.6, 3.0], [0.0, 1.0, 0.0], 0.8);
+/// let view = View::new(&camera, [1024, 512], [0.0; 2]);
+/// assert_eq!(view.size, [1024, 512]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// Picture size, pixels.

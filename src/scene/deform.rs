@@ -15,11 +15,11 @@ use std::sync::Arc;
 /// joint has it, both in the space of the instance.
 pub type Joint = [[f32; 4]; 3];
 
-/// What a morph target adds to a vertex at weight 1.
+/// Offsets that a morph target adds to a vertex at weight 1.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Delta {
-    /// Which target.
+    /// Index of the target.
     pub target: u32,
     /// Metres.
     pub position: [f32; 3],
@@ -40,7 +40,7 @@ pub struct Vertices {
     pub tangents: Vec<[f32; 4]>,
 }
 
-/// What never changes of a deforming mesh.
+/// Constant part of a deforming mesh.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Shape {
     /// Before targets and joints.
@@ -55,7 +55,7 @@ pub struct Shape {
     pub targets: usize,
     /// Where in `deltas` those of each vertex begin, and the end; empty without targets.
     pub first: Vec<u32>,
-    /// What targets do to vertices, vertex after vertex.
+    /// Offsets by targets, vertex after vertex.
     pub deltas: Vec<Delta>,
     /// Boxes around what each joint holds at rest; without a skin one around everything.
     pub reach: Vec<(usize, Vec3, Vec3)>,
@@ -68,9 +68,9 @@ pub struct Shape {
 pub struct Deform {
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
-    /// What never changes of it.
+    /// Its constant part.
     pub shape: Arc<Shape>,
-    /// As many as [`Shape::joints`] name; empty without a skin.
+    /// Matrices of joints, as many as [`Shape::joints`] name; empty without a skin.
     pub joints: Vec<Joint>,
     /// One for each target.
     pub weights: Vec<f32>,

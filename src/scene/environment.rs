@@ -14,7 +14,15 @@ use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 use thiserror::Error;
 
-/// What rays see that hit nothing.
+/// Light from beyond the scene.
+///
+/// ```
+/// use bouncelight::scene::environment::{Environment, EnvironmentImage};
+/// let sky = EnvironmentImage { name: "two rows".into(), width: 1, height: 2, rgb: vec![1.0, 1.0, 1.0, 0.0, 0.0, 0.0] };
+/// let sky = Environment::from_image(sky)?;
+/// assert!((sky.radiance[0] - 0.5).abs() < 1e-6, "bright above, black below");
+/// # Ok::<_, bouncelight::scene::environment::EnvironmentError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Environment {
     /// Radiance from every direction, W/(m²·sr); with an image, its mean over the sphere of
@@ -37,7 +45,7 @@ pub struct EnvironmentImage {
     pub rgb: Vec<f32>,
 }
 
-/// Why a picture cannot be an environment.
+/// Reasons why a picture cannot be an environment.
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum EnvironmentError {
@@ -50,7 +58,7 @@ pub enum EnvironmentError {
 }
 
 impl Environment {
-    /// The same radiance from every direction, W/(m²·sr).
+    /// Creates an environment with one radiance, W/(m²·sr), from every direction.
     pub fn constant(radiance: [f32; 3]) -> Self {
         Self { radiance, image: None }
     }
@@ -69,7 +77,7 @@ impl Environment {
         Ok(Self { radiance: image.mean(), image: Some(Arc::new(image)) })
     }
 
-    /// The same turned about the vertical by `degrees`, the way from +X to +Z.
+    /// Returns the environment turned about the vertical by `degrees`, from +X towards +Z.
     pub fn turned(&self, degrees: f32) -> Self {
         let image = self.image.as_ref().map(|i| Arc::new(i.turned(degrees / 360.0)));
         Self { image: if degrees == 0.0 { self.image.clone() } else { image }, ..*self }
@@ -83,8 +91,8 @@ const BRIGHTEST_HALF: f32 = 65_504.0;
 const BRIGHTEST: f32 = 1e9;
 
 impl EnvironmentImage {
-    /// Mends up to a hundredth of the radiances and tells how many; a picture with more is left for
-    /// others to refuse.
+    /// Repairs up to a hundredth of the radiances and says how many; a picture with more is left as
+    /// it is, and refused later.
     pub fn repair(&mut self) -> Option<String> {
         let bad = |v: f32| !(0.0..=BRIGHTEST).contains(&v);
         let count = self.rgb.iter().filter(|v| bad(**v)).count();
@@ -118,7 +126,7 @@ impl EnvironmentImage {
         sum.map(|s| s as f32)
     }
 
-    /// The same turned about the vertical by `turns` whole turns, the way from +X to +Z; columns in
+    /// Returns the picture turned about the vertical by `turns` whole turns, from +X towards +Z; columns in
     /// between are interpolated.
     pub fn turned(&self, turns: f32) -> Self {
         let width = self.width as usize;

@@ -1,9 +1,33 @@
-//! What is drawn, as plain data: meshes, instances, materials, images, lights, cameras,
-//! environment.
+//! A scene as plain data: meshes, instances, materials, images, lights, cameras, environment.
 //!
 //! Scene space is glTF's: right-handed, +Y up, metres; cameras look down −Z. Colours are linear
 //! Rec.709. Light is radiometric (W/m², W/sr, W/(m²·sr)); photometric file units are divided by 683
 //! lm/W at the border. Nothing here knows wgpu.
+//!
+//! ```
+//! use bouncelight::scene::{Camera, Environment, Instance, LightKind, Material, Mesh, Scene};
+//! let up = [0.0, 1.0, 0.0];
+//! let floor = Mesh {
+//!     positions: vec![[-1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]],
+//!     normals: vec![up; 4],
+//!     indices: vec![0, 1, 2, 0, 2, 3],
+//!     ..Default::default()
+//! };
+//! floor.check(1)?;
+//! let identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+//! let lamp = LightKind::Point { position: [0.0, 2.0, 0.0], intensity: 5.0, radius: 0.05, range: None };
+//! let scene = Scene {
+//!     meshes: vec![floor],
+//!     instances: vec![Instance { name: "floor".into(), mesh: 0, transform: identity }],
+//!     materials: vec![Material::default()],
+//!     lights: vec![lamp.into()],
+//!     cameras: vec![Camera::look_at([0.0, 1.6, 3.0], [0.0; 3], 0.8)],
+//!     environment: Environment::constant([0.1, 0.12, 0.15]),
+//!     ..Default::default()
+//! };
+//! assert_eq!(scene.instances.len(), 1);
+//! # Ok::<_, String>(())
+//! ```
 
 #[doc(hidden)]
 pub mod bounds;
@@ -33,15 +57,15 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// Lights; a loader adds a default one where the file has none.
     pub lights: Vec<Light>,
-    /// Cameras; a loader adds a framing one where the file has none, so index 0 exists.
+    /// Cameras; a loader adds one that frames the scene where the file has none, so index 0 exists.
     pub cameras: Vec<Camera>,
-    /// What rays see that hit nothing.
+    /// Light from beyond the scene.
     pub environment: Environment,
     /// Names of the variants of materials that the file has; see [`Scene::choose_variant`].
     pub variants: Vec<String>,
     /// Meshes whose vertices move, as they stand now; each is placed by the instances of one node.
     pub deforms: Vec<deform::Deform>,
-    /// How the objects move, if they do; see [`Scene::pose`].
+    /// Animations and joints, if there are any; see [`Scene::pose`].
     pub rig: Option<rig::Rig>,
     /// The sun and the sky are those that the loader adds where a file has no light; see
     /// `bouncelight_scene::defaults::surround`.
@@ -49,7 +73,7 @@ pub struct Scene {
     /// The file has no lights, only glow if anything, so nobody knows how bright pictures of it are
     /// meant to be: they are exposed by measure unless somebody says otherwise.
     pub lightless: bool,
-    /// What was mended or left out while loading, one plain sentence each, naming the file and
+    /// Repairs and omissions while loading, one plain sentence each, naming the file and
     /// place.
     pub warnings: Vec<String>,
 }
@@ -100,7 +124,7 @@ impl Mesh {
             }
         }
         if !self.indices.len().is_multiple_of(3) {
-            return Err(format!("{} indices are no whole number of triangles", self.indices.len()));
+            return Err(format!("{} indices do not make whole triangles", self.indices.len()));
         }
         if let Some(i) = self.indices.iter().find(|&&i| i as usize >= n) {
             return Err(format!("index {i} with {n} vertices"));
@@ -123,7 +147,7 @@ pub struct Instance {
     pub transform: [[f32; 4]; 4],
 }
 
-/// How a material's alpha is used.
+/// Use of a material's alpha.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AlphaMode {
     /// Alpha is ignored.
@@ -243,7 +267,7 @@ impl Default for Sampler {
     }
 }
 
-/// What lies outside [0, 1] of a texture.
+/// Continuation of a texture outside [0, 1].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Wrap {
     /// Tiles.
@@ -254,7 +278,7 @@ pub enum Wrap {
     ClampToEdge,
 }
 
-/// How the bytes of an [`Image`] are to be read.
+/// Encoding of the bytes of an [`Image`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ColorSpace {
     /// sRGB transfer function on red, green and blue.
@@ -295,10 +319,10 @@ pub struct Light {
     pub name: String,
     /// Linear Rec.709 tint.
     pub color: [f32; 3],
-    /// Where it is and how strong.
+    /// Kind, place and strength.
     pub kind: LightKind,
-    /// It only stands in for a glowing surface of the scene. The rasteriser, which knows no such
-    /// light, uses it; the path tracer leaves it out and lets the surface shine.
+    /// Whether it is an emissive proxy: the rasteriser, which cannot see emission, uses it in place of
+    /// an emissive surface; the path tracer leaves it out.
     pub is_emissive_proxy: bool,
 }
 

@@ -12,7 +12,7 @@ pub use channel::{Channel, Interpolation, Property};
 /// The tree of nodes behind a scene's instances, and how they move.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Rig {
-    /// Where the scene has its origin, in the space of nodes without a parent, metres.
+    /// Origin of the scene, in the space of nodes without a parent, metres.
     pub origin: [f64; 3],
     /// Parents before their children.
     pub nodes: Vec<RigNode>,
@@ -22,7 +22,7 @@ pub struct Rig {
     pub cameras: Vec<usize>,
     /// Node of each of the first of [`Scene::lights`].
     pub lights: Vec<usize>,
-    /// What moves each of [`Scene::deforms`].
+    /// Nodes that move each of [`Scene::deforms`].
     pub deforms: Vec<RigDeform>,
     /// Joints that deforming meshes may name.
     pub skins: Vec<Skin>,
@@ -43,7 +43,7 @@ pub struct RigNode {
     pub scale: [f32; 3],
 }
 
-/// What moves a deforming mesh.
+/// Nodes that move a deforming mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RigDeform {
     /// Node that places the mesh, and has the weights.
@@ -70,11 +70,11 @@ pub struct Animation {
     pub name: String,
     /// Time of the last key, seconds.
     pub end: f32,
-    /// What moves.
+    /// Channels: which property of which node moves how.
     pub channels: Vec<Channel>,
 }
 
-/// Where everything is at a time. World transforms, column-major.
+/// World transforms at a time, column-major.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Pose {
     /// Of each of [`Rig::instances`].
@@ -103,7 +103,7 @@ pub fn joints<'a>(node: Mat4, joints: impl Iterator<Item = (Mat4, &'a [[f32; 4];
 }
 
 impl Rig {
-    /// Where everything is in animation `animation` at `time`, seconds; `None` if there is no such
+    /// Returns the transforms in animation `animation` at `time`, seconds; `None` if there is no such
     /// animation.
     pub fn pose(&self, animation: usize, time: f32) -> Option<Pose> {
         let animation = self.animations.get(animation)?;

@@ -1,4 +1,4 @@
-"""The filter that a network guides: torch against the shaders, in lessons that the program draws (BOUNCELIGHT=FILE); a few steps of
+"""The filter that a network guides: torch against the shaders, in samples that the program draws (BOUNCELIGHT=FILE); a few steps of
 training; what is refused."""
 import glob
 import json
@@ -14,27 +14,27 @@ import torch
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 from bouncelight_training.errors import TrainingError  # noqa: E402
-from bouncelight_training.filter import ablation, blur, export, lessons, scene, train  # noqa: E402
+from bouncelight_training.filter import ablation, blur, export, samples, scene, train  # noqa: E402
 
 PROGRAM = os.environ.get("BOUNCELIGHT")
 SIZE = ["--size", "96x64", "--spp", "4", "-q"]
 
 
 def draw(folder, rooms, *more, moments="1,8,pan"):
-    """Lessons of homes, in a folder. 96x64 pixels: 24x16 cells."""
+    """Samples of homes, in a folder. 96x64 pixels: 24x16 cells."""
     run = subprocess.run([PROGRAM, "dataset", "--recipe", "home", "--rooms", rooms, "--views", "1", "--out", folder, "--moments", moments, *SIZE, *more], capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
 
 
 def moments_of(folder):
-    """Every moment of one view, also where a lamp changes light in so many cells that `lessons.read` leaves the moment out."""
+    """Every moment of one view, also where a lamp changes light in so many cells that `samples.read` leaves the moment out."""
     (path,) = glob.glob(os.path.join(folder, "*.safetensors"))
-    return lessons.all_of(path)
+    return samples.all_of(path)
 
 
-def off(lesson, answer):
+def off(sample, answer):
     """How far torch's light is from the program's, over the mean light."""
-    batch = lessons.stacked([lesson])
+    batch = samples.stacked([sample])
     (shown, _), theirs, mask = blur.filtered(batch, answer), batch["shown"], batch["mask"]
     return (((shown - theirs).abs() * mask).sum() / (theirs * mask).sum()).item()
 
@@ -65,7 +65,7 @@ class WithTheProgram(unittest.TestCase):
             draw(os.path.join(folder, "b"), "1", "--weights", file)
             for view in moments_of(os.path.join(folder, "b")):
                 with torch.no_grad():
-                    answer = model(lessons.stacked([view])["features"])
+                    answer = model(samples.stacked([view])["features"])
                 near, control = off(view, answer), off(view, None)
                 self.assertLess(near, 2e-3, view.when)
                 self.assertGreater(control, 5 * near, view.when)
@@ -123,9 +123,9 @@ class Alone(unittest.TestCase):
     def test_each_part_is_left_out_once(self):
         base = train.Config(train="a", validation="b")
         runs = dict(ablation.variants(base))
-        for name, _ in lessons.TABLE:
+        for name, _ in samples.TABLE:
             kept = train.kept_channels(runs[f"no {name}"]).flatten()
-            missing = [other for other, n in lessons.TABLE for _ in range(n)]
+            missing = [other for other, n in samples.TABLE for _ in range(n)]
             self.assertEqual({m for m, k in zip(missing, kept) if not k}, {name})
         for part, place in blur.PARTS.items():
             kept = train.kept_parts(runs[f"answer without {part}"])
@@ -139,17 +139,17 @@ class Alone(unittest.TestCase):
         self.assertIn("| no light | 10.000 | 6.000 | +1.000 |", ablation.table(rows))
 
     def made_up(self, moments):
-        """Lessons of a plane, 24x24 cells: (name, when, age, light [3,h,w] and target)."""
+        """Samples of a plane, 24x24 cells: (name, when, age, light [3,h,w] and target)."""
         h = w = 24
         ones = np.ones((h, w), np.float32)
         x = np.stack([np.tile(np.arange(w), (h, 1)), np.tile(np.arange(h)[:, None], (1, w)), np.zeros((h, w))]).astype(np.float32)
         made = []
         for name, when, age, light, target in moments:
-            features = np.random.default_rng(1).normal(size=(lessons.CHANNELS, h, w)).astype(np.float32)
+            features = np.random.default_rng(1).normal(size=(samples.CHANNELS, h, w)).astype(np.float32)
             made.append(types.SimpleNamespace(
                 name=name, when=when, age=float(age), features=features, light=light, square=2 * light[0] ** 2, x=x, n=np.stack([0 * ones, 0 * ones, ones]),
                 frames=age * ones, strictness=ones, nearness=0 * ones, shown=light, target=target, mask=ones > 0, mean=float(light.mean()), noise=0.1, base=0.0))
-        return lessons.piles(made)
+        return samples.piles(made)
 
     def test_the_next_frame_of_a_moment_is_found(self):
         flat = np.ones((3, 24, 24), np.float32)
@@ -200,14 +200,14 @@ class Alone(unittest.TestCase):
         self.assertIsNotNone(run.train_step(good, 0.0)[0])
         self.assertFalse(all(torch.equal(a, b) for a, b in zip(before, run.model.parameters())))
 
-    def test_what_is_no_lesson_is_named(self):
+    def test_what_is_no_sample_is_named(self):
         with tempfile.TemporaryDirectory() as folder:
             with self.assertRaisesRegex(TrainingError, "no samples"):
-                lessons.read(folder)
+                samples.read(folder)
             with open(os.path.join(folder, "a.safetensors"), "wb") as file:
                 file.write(b"nothing")
-            with self.assertRaisesRegex(TrainingError, "a.safetensors: not a lesson"):
-                lessons.read(folder)
+            with self.assertRaisesRegex(TrainingError, "a.safetensors: not a sample"):
+                samples.read(folder)
 
     def test_slopes_are_numbers_in_the_dark(self):
         # Beside one bright cell its neighbours have next to nothing: what one brings over the others' light is beyond numbers.

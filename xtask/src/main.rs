@@ -1,9 +1,10 @@
-//! `cargo xtask demo | test | hosts | gpu-report | conformance | publish | ci`: set-up and checks; no
+//! `cargo xtask demo | test | hosts | gpu-report | conformance | figures | publish | ci`: set-up and checks; no
 //! product code.
 //!
 //! Every command first makes sure of a wgpu adapter (`driver.rs`).
 
 mod driver;
+mod figures;
 mod publish;
 mod tests;
 mod time;
@@ -30,6 +31,9 @@ usage: cargo xtask COMMAND
          (--dev builds without release's optimisation: for rehearsals)
   conformance
          docs/reports/conformance.md: glTF feature by feature, the rasteriser beside the path tracer
+  figures
+         the pictures of docs, in place: the frame graph, each pass (examples/passes.rs), the demo, the viewer's window
+         (needs xvfb-run), mistakes of hosts, conformance, the gallery (needs f3d and the files); python3 with Pillow
   publish [--verify]
          a dry run of publishing the packages in order; each must pack below 10 MB (--verify also builds each from its
          archive)
@@ -54,6 +58,7 @@ fn main() -> ExitCode {
         "hosts" => hosts(),
         "gpu-report" => gpu_report(std::env::args().skip(2).filter(|word| word != "--no-install").collect()),
         "conformance" => conformance(),
+        "figures" => figures::draw(),
         "publish" => publish::dry_run(),
         "ci" => ci(),
         _ => {

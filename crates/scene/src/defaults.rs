@@ -116,7 +116,7 @@ fn stand_in(scene: &mut Scene, emitters: Vec<Emitter>) {
     if !scene.lights.is_empty() {
         let n = scene.lights.len();
         scene.warnings.push(format!(
-            "'{}' has no lights, but glowing surfaces; lights stand in for the {n} strongest of them",
+            "'{}' has no lights, but emissive surfaces; emissive proxies (analytic lights) replace {n} of them",
             scene.name
         ));
     }

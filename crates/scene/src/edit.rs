@@ -257,7 +257,8 @@ impl FromStr for LightEdit {
             match key {
                 "kind" => {
                     let kind = NewLight::ALL.into_iter().find(|k| k.name() == value);
-                    edit.kind = Some(kind.ok_or_else(|| wrong("is no kind; there are sun, point and spot"))?);
+                    edit.kind =
+                        Some(kind.ok_or_else(|| wrong("is not a kind of light; there are sun, point and spot"))?);
                 }
                 "color" => {
                     let color = three(text, value)?;

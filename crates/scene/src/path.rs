@@ -45,7 +45,7 @@ pub enum PathError {
         source: std::io::Error,
     },
     /// It is no path.
-    #[error("{} is no camera path: {reason}", path.display())]
+    #[error("{} is not a camera path: {reason}", path.display())]
     Broken {
         /// The file.
         path: PathBuf,
@@ -79,7 +79,7 @@ impl CameraPath {
             let finite = key.time.is_finite() && key.eye.iter().chain(&key.look_at).all(|v| v.is_finite());
             let sees = key.fov > 0.0 && key.fov < 180.0 && key.eye != key.look_at;
             if !(finite && sees) {
-                return Err(format!("keys[{i}] is no camera"));
+                return Err(format!("keys[{i}] is not a camera"));
             }
             if i > 0 && key.time <= self.keys[i - 1].time {
                 return Err(format!("keys[{i}] is not later than the one before"));
@@ -181,7 +181,7 @@ mod tests {
         for text in texts {
             std::fs::write(&file, &text).unwrap();
             let error = CameraPath::load(&file).unwrap_err().to_string();
-            assert!(error.contains("cam.json is no camera path"), "{text}: {error}");
+            assert!(error.contains("cam.json is not a camera path"), "{text}: {error}");
         }
         assert!(CameraPath::load(&dir.path().join("none.json")).unwrap_err().to_string().contains("none.json"));
     }

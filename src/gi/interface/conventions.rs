@@ -1,4 +1,4 @@
-//! How a host's G-buffer says what it says. The defaults are this crate's own renderer's
+//! Encodings of a host's G-buffer. The defaults are this crate's own renderer's
 //! (`render::gbuffer`).
 
 /// The conventions of [`Inputs`](super::Inputs), resolved into a uniform and read in
@@ -19,31 +19,37 @@
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Conventions {
-    /// What depth is near and far. Whether the far plane is finite, the projection says.
+    /// Direction of depth. Default [`Depth::Reversed`]; wrong, everything counts as background or
+    /// lies at wrong distances. The projection tells whether the far plane is finite.
     pub depth: Depth,
-    /// Which numbers are a normal.
+    /// Encoding of normals. Default [`NormalEncoding::Octahedral`]; wrong, light has the pattern of
+    /// false normals.
     pub normal_encoding: NormalEncoding,
-    /// How they lie in the texture's range.
+    /// Range of their numbers. Default [`NormalRange::Signed`].
     pub normal_range: NormalRange,
-    /// Along whose axes they are.
+    /// Space of their axes. Default [`NormalSpace::World`]; wrong, light turns with the camera.
     pub normal_space: NormalSpace,
-    /// What a shader reads of albedo.
+    /// Encoding of albedo. Default [`AlbedoEncoding::Linear`]; wrong, bounces are too dark or pale.
     pub albedo: AlbedoEncoding,
-    /// What direct and emitted light are multiplied by.
+    /// Scale of direct and emitted light. Default [`LightScale::Radiance`]; wrong, bounces have
+    /// another brightness than the picture.
     pub light: LightScale,
-    /// What motion is measured in.
+    /// Unit of motion. Default [`MotionUnits::Uv`]; wrong, histories are lost wherever anything
+    /// moves.
     pub motion_units: MotionUnits,
-    /// Which way motion points.
+    /// Direction of motion. Default [`MotionSense::ToPast`]; wrong, light smears in motion.
     pub motion_sense: MotionSense,
-    /// Whether motion holds the difference of the two frames' jitter.
+    /// Whether motion includes the difference of the two frames' jitter. Default
+    /// [`MotionJitter::Free`]; wrong, a still picture counts as moving and stays noisier.
     pub motion_jitter: MotionJitter,
-    /// Where the jitter stands.
+    /// Place of the jitter. Default [`Jitter::InProjection`]; wrong, edges shimmer.
     pub jitter: Jitter,
-    /// Which way the camera's matrices look.
+    /// Direction in which the camera's matrices look. Default [`Forward::NegativeZ`]; wrong, the
+    /// projection is refused.
     pub forward: Forward,
 }
 
-/// What depth is near and far.
+/// Direction of depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Depth {
     /// 1 at the near plane, 0 at the far plane or at infinity; 0 where nothing was hit.
@@ -55,7 +61,7 @@ pub enum Depth {
     ForwardGl,
 }
 
-/// Which numbers are a normal.
+/// Encoding of normals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NormalEncoding {
     /// Two numbers, octahedral (Cigolle et al. 2014; `shaders/lib/octahedral.wgsl`).
@@ -67,7 +73,7 @@ pub enum NormalEncoding {
     Xy,
 }
 
-/// How a normal's numbers lie in the texture's range.
+/// Range of a normal's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NormalRange {
     /// −1 to 1 as they are, in floats or a signed format.
@@ -77,7 +83,7 @@ pub enum NormalRange {
     Unsigned,
 }
 
-/// Along whose axes normals are.
+/// Space of normals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NormalSpace {
     /// The world's.
@@ -88,7 +94,7 @@ pub enum NormalSpace {
     View,
 }
 
-/// What a shader reads of albedo.
+/// Encoding of albedo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AlbedoEncoding {
     /// Linear values: of an sRGB view, which the texture unit decodes, or stored so.
@@ -98,7 +104,7 @@ pub enum AlbedoEncoding {
     Srgb,
 }
 
-/// What direct and emitted light are multiplied by.
+/// Scale of direct and emitted light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum LightScale {
     /// Nothing: E/π and radiance in W/(m²·sr), as of the world's lights.
@@ -108,7 +114,7 @@ pub enum LightScale {
     PreExposed(f32),
 }
 
-/// What motion is measured in.
+/// Unit of motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MotionUnits {
     /// Texture coordinates: the picture is 1 wide and 1 high, y down.
@@ -120,7 +126,7 @@ pub enum MotionUnits {
     Ndc,
 }
 
-/// Which way motion points.
+/// Direction of motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MotionSense {
     /// Where the surface was in the frame before, minus where it is.
@@ -130,7 +136,7 @@ pub enum MotionSense {
     FromPast,
 }
 
-/// Whether motion holds the difference of the two frames' jitter.
+/// Jitter in motion vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MotionJitter {
     /// No: a surface at rest has no motion.
@@ -140,7 +146,7 @@ pub enum MotionJitter {
     Included,
 }
 
-/// Where the jitter stands.
+/// Place of the jitter.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Jitter {
     /// In the projection, if there is any.
@@ -150,7 +156,7 @@ pub enum Jitter {
     Pixels([f32; 2]),
 }
 
-/// Which way view space looks. The world may be left-handed, too: its triangles then face where
+/// Direction in which view space looks. The world may be left-handed, too: its triangles then face where
 /// (b − a) × (c − a) points, as they do in a right-handed one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Forward {

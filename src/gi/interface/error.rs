@@ -18,13 +18,13 @@ pub enum GiError {
     #[error("the camera cannot be used: {0}")]
     Camera(&'static str),
     /// The method reads [`Inputs::rays`](super::Inputs::rays), which is not there.
-    #[error("this method sends rays into the scene's triangles (`Inputs::rays`), which the host did not supply")]
+    #[error("this method traces rays; supply `Inputs::rays`")]
     Rays,
     /// The method reads a field of [`Inputs`](super::Inputs) that is `None`.
-    #[error("the method that draws here reads `{0}`, which the host did not supply")]
+    #[error("the method in use reads `{0}`; supply it in `Inputs`")]
     Missing(&'static str),
     /// Conventions that contradict each other or a texture's format.
-    #[error("the conventions of `{name}` cannot hold: {reason}")]
+    #[error("the conventions of `{name}` contradict the data: {reason}")]
     Conventions {
         /// Field of [`Inputs`](super::Inputs).
         name: &'static str,
@@ -42,7 +42,7 @@ pub enum GiError {
         reason: String,
     },
     /// A mesh that disagrees in itself.
-    #[error("the mesh cannot be met by rays: {0}")]
+    #[error("rays cannot hit the mesh: {0}")]
     Mesh(String),
     /// Number of a light that holds NaN or infinity.
     #[error("light {0} holds NaN or infinity")]

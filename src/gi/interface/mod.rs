@@ -10,7 +10,8 @@ pub use conventions::{
 };
 pub use error::GiError;
 
-/// The camera's part of a method's inputs, column-major as in WGSL.
+/// The camera's matrices, column-major as in WGSL. They must be those that drew the inputs: with
+/// others, positions are wrong, and light moves with the camera or leaks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraMatrices {
     /// View space (looking down −Z, unless [`Conventions::forward`] says otherwise) from world
@@ -20,9 +21,9 @@ pub struct CameraMatrices {
     pub clip_from_view: [[f32; 4]; 4],
 }
 
-/// What a method reads. All textures have the same size and usage TEXTURE_BINDING; how their texels
-/// are to be read, [`Conventions`] say. [`Inputs::new`] has what every method needs; what is left
-/// out has the fallback that its field names.
+/// Inputs of a method. All textures have the same size and usage TEXTURE_BINDING; [`Conventions`]
+/// say how to read their texels. [`Inputs::new`] has what every method needs; each further field
+/// names what happens without it. [`View::check`](crate::gi::View::check) finds most mistakes.
 ///
 /// ```
 /// use bouncelight::gi::{CameraMatrices, Conventions, Depth, Inputs};
@@ -35,52 +36,60 @@ pub struct CameraMatrices {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
-    /// Width and height of all textures, pixels.
+    /// Width and height of all textures, pixels: 1 to the device's limit. Another size than before
+    /// drops all history.
     pub size: [u32; 2],
     /// Depth: a depth format or `R32Float`. Of a format with a stencil, a view of the depth alone.
+    /// Too coarse (16 bits of far depth) makes surfaces look stepped, and light blotchy.
     pub depth: &'a wgpu::TextureView,
-    /// Normals: `Rg16Float` by default, else any format that has the numbers of
-    /// [`Conventions::normal_encoding`].
+    /// Shading normals: `Rg16Float` by default, else any format that has the numbers of
+    /// [`Conventions::normal_encoding`]. With 8 bits, smooth surfaces show bands.
     pub normal: &'a wgpu::TextureView,
-    /// Diffuse reflectance in [0, 1] (rgb), 8 or 10 bits or float. Alpha is not read: whoever
-    /// multiplies the light with albedo applies the textures' ambient occlusion, too. `gather` reads it
-    /// only for what mirrors show ([`Inputs::specular`]), and does without: mirrors then show each
-    /// triangle's mean colour. The others end with [`GiError::Missing`] without.
+    /// Diffuse reflectance (rgb) in [0, 1], 8 or 10 bits or float; values beyond are clamped. Alpha
+    /// is not read: whoever multiplies the light with albedo applies ambient occlusion maps, too.
+    /// `gather` reads it only for what mirrors show ([`Inputs::specular`]). Default `None`: mirrors
+    /// show each triangle's mean colour; `ambient` and `ssgi` end with [`GiError::Missing`].
     pub albedo: Option<&'a wgpu::TextureView>,
-    /// Emitted radiance, `Rgba16Float`, `Rgba32Float` or `Rg11b10Ufloat`. `gather` reads it as it does albedo; for the others `None`
-    /// counts as no surface that glows.
+    /// Emitted radiance, W/(m²·sr), 0 or more; `Rgba16Float`, `Rgba32Float` or `Rg11b10Ufloat`.
+    /// `gather` reads it as it does albedo. Default `None`: nothing emits for the other methods.
     pub emissive: Option<&'a wgpu::TextureView>,
-    /// Direct diffuse light of the analytic lights as E/π, albedo not multiplied in, in a format
-    /// as `emissive`. Not read by `gather`, needed by the others.
+    /// Direct diffuse light of the analytic lights, E/π in W/(m²·sr), not multiplied by albedo; a
+    /// format as `emissive`. `gather` does not read it. Default `None`: the others end with
+    /// [`GiError::Missing`]. Multiplied by albedo, bounces are too dark.
     pub direct: Option<&'a wgpu::TextureView>,
     /// The camera that drew them.
     pub camera: CameraMatrices,
-    /// How texels and matrices are to be read.
+    /// How texels and matrices are to be read. Default: those of this crate's renderer.
     pub conventions: Conventions,
-    /// Radiance of the constant environment, W/(m²·sr).
+    /// Radiance of the constant environment, W/(m²·sr), 0 or more. Default 0, no sky. [`View`]
+    /// takes that of its [`World`] instead.
+    ///
+    /// [`View`]: crate::gi::View
+    /// [`World`]: crate::gi::World
     pub environment: [f32; 3],
-    /// The analytic lights, for methods that light more than the picture; `None` counts as no
-    /// lights there.
+    /// The analytic lights, for methods that light what rays hit. Default `None`: no lights there,
+    /// so that what only a bounce lights is black.
     pub lights: Option<Lights<'a>>,
-    /// The scene as rays meet it, for methods that ask it
-    /// ([`Method::needs_rays`](super::Method::needs_rays)).
+    /// The scene for rays, which methods with [`Method::needs_rays`](super::Method::needs_rays)
+    /// read. Default `None`: they end with [`GiError::Rays`], or a [`View`](crate::gi::View) lets
+    /// `ssgi` draw.
     pub rays: Option<Rays<'a>>,
-    /// Where each pixel's surface was in the frame before: texture coordinates then minus now, y
-    /// down, free of jitter, unless [`Conventions`] say otherwise; `Rg16Float`, `Rg32Float`,
-    /// `Rgba16Float` or `Rgba32Float`. For methods that remember frames. `None` counts as everything at rest: what
-    /// moves on the screen starts anew where plane or normal differ, and drags its light where not.
+    /// Motion vectors: texture coordinates of each pixel's surface in the last frame minus now, y
+    /// down, without jitter, unless [`Conventions`] say otherwise; `Rg16Float`, `Rg32Float`,
+    /// `Rgba16Float` or `Rgba32Float`. Default `None`, everything at rest: what moves on the screen
+    /// starts anew where plane or normal differ, and drags its light along where not.
     pub motion: Option<&'a wgpu::TextureView>,
-    /// `Rgba8Unorm(Srgb)`: F0 and perceptual roughness, for methods that find what lobes show
-    /// ([`Outputs::specular`]). `None`: no lobes.
+    /// F0 (rgb) and perceptual roughness (a) in [0, 1], `Rgba8Unorm(Srgb)`, for methods that write
+    /// [`Outputs::specular`]. Default `None`: no specular light.
     pub specular: Option<&'a wgpu::TextureView>,
-    /// The picture has nothing to do with the one before (a cut): what is remembered of pixels is
-    /// forgotten first.
+    /// Whether this frame has nothing to do with the last (a camera cut): the history of pixels is
+    /// dropped. Default `false`. Set in every frame, pictures stay noisy; forgotten at a cut, old
+    /// light shows for a few frames where surfaces happen to agree.
     pub reset: bool,
 }
 
 impl<'a> Inputs<'a> {
-    /// What `gather` cannot do without, in this crate's own conventions; everything else is left
-    /// out.
+    /// Inputs that every method needs, in this crate's own conventions, without the others.
     pub fn new(
         size: [u32; 2],
         depth: &'a wgpu::TextureView,
@@ -106,14 +115,15 @@ impl<'a> Inputs<'a> {
     }
 }
 
-/// Where a method writes: `Rgba16Float`, usage STORAGE_BINDING, the inputs' size.
+/// Outputs of a method: `Rgba16Float`, usage STORAGE_BINDING, the inputs' size.
 #[derive(Debug, Clone, Copy)]
 pub struct Outputs<'a> {
-    /// Becomes the light that direct lighting misses, as E/π; 0 on the background.
+    /// The light that direct lighting misses, E/π in W/(m²·sr); 0 on the background. Add albedo
+    /// times it to the picture.
     pub light: &'a wgpu::TextureView,
-    /// Becomes what specular lobes reflect of surroundings and bounces, W/(m²·sr), to be added to
-    /// the picture; 0 on the background. Of methods that send rays into lobes, with
-    /// [`Inputs::specular`]; others leave it as it was
+    /// Specular radiance of surroundings and bounces, W/(m²·sr), to be added to the picture; 0 on
+    /// the background. Written by methods that trace specular rays, with [`Inputs::specular`];
+    /// others leave it as it was
     /// ([`Technique::writes_specular`](technique::Technique::writes_specular)).
     pub specular: Option<&'a wgpu::TextureView>,
 }
@@ -124,7 +134,7 @@ impl<'a> From<&'a wgpu::TextureView> for Outputs<'a> {
     }
 }
 
-/// The scene as rays meet it.
+/// The scene for rays.
 #[derive(Clone, Copy)]
 pub struct Rays<'a> {
     /// Its triangles.
@@ -144,11 +154,12 @@ impl std::fmt::Debug for Rays<'_> {
 pub struct Lights<'a> {
     /// [`crate::lights::LightGpu`] for each.
     pub buffer: &'a wgpu::Buffer,
-    /// How many.
+    /// How many lights the buffer holds; those beyond are not read.
     pub count: u32,
-    /// Some of them stand in for emissive surfaces, and their light is in [`Inputs::direct`].
+    /// Whether some are emissive proxies, whose light is in [`Inputs::direct`]. Set wrongly, light of
+    /// emissive surfaces counts twice or not at all.
     pub has_emissive_proxies: bool,
-    /// To be raised whenever a light changes. What is not announced leaves old light for many
-    /// frames.
+    /// A number that differs whenever a light changes. Without it old light stays for many frames;
+    /// changed in every frame, histories are short and pictures noisy.
     pub version: u64,
 }

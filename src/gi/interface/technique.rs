@@ -1,11 +1,27 @@
-//! What all methods share: the trait that a frame drives them by.
+//! The trait of methods, by which a frame drives them.
+//!
+//! ```
+//! use bouncelight::gi::{GiError, Inputs, Outputs, technique::Technique};
+//! use bouncelight::gpu::timing::Recorder;
+//! use bouncelight::wgpu;
+//!
+//! /// Records a frame; true where the method itself drew it.
+//! fn frame(
+//!     method: &mut dyn Technique,
+//!     (encoder, queue): (&mut wgpu::CommandEncoder, &wgpu::Queue),
+//!     (inputs, outputs): (&Inputs<'_>, Outputs<'_>),
+//! ) -> Result<bool, GiError> {
+//!     method.record(&mut Recorder::new(encoder), queue, inputs, outputs)?;
+//!     Ok(method.fallback().is_none())
+//! }
+//! ```
 
 use super::{GiError, Inputs, Outputs};
 use crate::gpu::timing::Recorder;
 use crate::net::gpu::LayerReadback;
 use crate::net::plan::Plan;
 
-/// What draws in a method's place.
+/// The method that draws in another's place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fallback<'a> {
     /// Its name on the command line.
@@ -14,7 +30,7 @@ pub struct Fallback<'a> {
     pub why: &'a str,
 }
 
-/// What `gather` holds of the cells after a frame, for tools that read it back.
+/// Buffers of `gather` after a frame, for tools that read them back.
 #[derive(Debug, Clone, Copy)]
 pub struct Memory<'a> {
     /// Histories of cells: `History` of `history.wgsl`, [`HISTORY`](crate::gi::gather::HISTORY)
@@ -29,7 +45,7 @@ pub struct Memory<'a> {
     pub changes: &'a wgpu::Buffer,
 }
 
-/// A method at work: G-buffer in, indirect light out. Allocates only when size or views are new.
+/// A method at work: reads a G-buffer, writes indirect light. Allocates only when size or views are new.
 /// `Send`, so that a viewer can build one on another thread.
 pub trait Technique: Send {
     /// Records all of the method's passes.

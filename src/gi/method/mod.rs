@@ -13,13 +13,20 @@ use super::screen::{
 };
 use with_fallback::WithFallback;
 
-/// Which method fills the `indirect` texture of a frame.
+/// A method of indirect light. The default is [`Method::Ambient`], which needs neither rays nor
+/// weights, so that it can always be made; the program's is `gather`.
+///
+/// ```
+/// use bouncelight::gi::{Method, gather};
+/// assert_eq!(Method::default().name(), "ambient");
+/// let method = Method::Gather(gather::Options::default());
+/// assert!(method.needs_rays() && method.frames_to_settle() == Method::SETTLED);
+/// ```
 #[derive(Debug, Clone, Default)]
 pub enum Method {
     /// None: `indirect` is 0. Shows what direct light alone gives.
     Direct,
-    /// Even light times occlusion, see [`ambient`](super::ambient). Default of the type: it needs neither
-    /// rays nor weights. The program's is `gather`.
+    /// Constant light times ambient occlusion, see [`ambient`](super::ambient).
     #[default]
     Ambient,
     /// The same with a scene's own ambient term.
@@ -28,7 +35,7 @@ pub enum Method {
     Ssgi,
     /// The same with a scene's own ambient term.
     SsgiWith(AmbientTerm),
-    /// Rays into the scene's triangles and a cache of light in the world, see [`gather`].
+    /// Rays into the scene's triangles and a world-space radiance cache, see [`gather`].
     Gather(gather::Options),
     /// `gather`, whose filter a network guides, see [`neural`](super::neural); `weights.into()`
     /// runs it with defaults.
@@ -62,18 +69,18 @@ impl Method {
         }
     }
 
-    /// Whether the method asks rays ([`Inputs::rays`](super::Inputs::rays)).
+    /// Whether the method traces rays ([`Inputs::rays`](super::Inputs::rays)).
     pub fn needs_rays(&self) -> bool {
         matches!(self, Method::Gather(_) | Method::Neural(_))
     }
 
-    /// Whether the method's answer settles over frames.
+    /// Whether the method accumulates over frames.
     pub fn has_history(&self) -> bool {
         self.needs_rays()
     }
 }
 
-/// Makes the method that `method` names, for pictures of `size` pixels; `None` for
+/// Builds the method that `method` names, for pictures of `size` pixels; `None` for
 /// [`Method::Direct`], which adds no light.
 ///
 /// # Errors

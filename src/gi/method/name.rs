@@ -1,24 +1,29 @@
-//! Where a picture's indirect light comes from, by name: the one list that command line, window and
-//! studies share.
+//! Names of methods: the one list that command line, viewer and studies share.
+//!
+//! ```
+//! use bouncelight::gi::name::MethodName;
+//! assert_eq!(MethodName::from_name("gather"), Some(MethodName::Gather));
+//! assert!(!MethodName::REAL_TIME.contains(&MethodName::Reference));
+//! ```
 
 use super::Method;
 use serde::{Deserialize, Serialize};
 
-/// A method, or the truth that methods are measured against.
+/// A method, or the reference that methods are measured against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MethodName {
     /// Analytic lights only.
     Direct,
-    /// Sky and mean light from all around, times ambient occlusion.
+    /// Constant light of sky and scene, times ambient occlusion.
     Ambient,
     /// One bounce in screen space.
     Ssgi,
-    /// Rays into the scene's triangles, and a cache of light in the world; settles over frames.
+    /// Rays into the scene's triangles and a world-space radiance cache; accumulates over frames.
     Gather,
-    /// The network.
+    /// `gather` with a network.
     Neural,
-    /// The path tracer, which converges to the truth.
+    /// The path tracer.
     Reference,
 }
 
@@ -46,9 +51,9 @@ impl MethodName {
     pub fn doc(self) -> &'static str {
         [
             "Analytic lights only",
-            "Sky and mean light from all around, times ambient occlusion",
+            "Constant light of sky and scene, times ambient occlusion",
             "One bounce in screen space",
-            "Rays into the scene's triangles, and a cache of light in the world; settles over frames",
+            "Rays into the scene's triangles and a world-space radiance cache; accumulates over frames",
             "The network",
             "The path tracer, which converges to the truth",
         ][self as usize]

@@ -1,4 +1,9 @@
-//! What a network that filters is given: the history of each cell. Table `cells`, version 2.
+//! Inputs of the network: features of each cell's history. Table `cells`, version 2.
+//!
+//! ```
+//! use bouncelight::gi::memory::{CHANNELS, FEATURES};
+//! assert_eq!(FEATURES.iter().map(|(_, channels)| channels).sum::<u32>(), CHANNELS);
+//! ```
 
 use crate::gi::stage::exposure::ExposurePass;
 use crate::gi::stage::inputs::{BoundInputs, InputGroup};

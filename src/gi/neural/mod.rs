@@ -1,4 +1,12 @@
-//! The network's method: what cells remember, a U-Net, and a filter that it guides.
+//! Method `neural`: `gather`, whose spatial filter a U-Net guides by cells' histories.
+//!
+//! ```
+//! use bouncelight::gi::{Method, Neural};
+//! use bouncelight::net::format::Weights;
+//! let neural = Neural::from(Weights::shipped()?);
+//! assert_eq!(Method::Neural(Box::new(neural)).name(), "neural");
+//! # Ok::<_, bouncelight::net::format::WeightsError>(())
+//! ```
 
 #[doc(hidden)]
 pub mod filter;

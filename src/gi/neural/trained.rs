@@ -6,17 +6,18 @@ use crate::net::gpu::{self, Tuned};
 use crate::net::plan::Precision;
 use std::sync::Arc;
 
-/// A network as a frame's method: what was trained, and how it runs.
+/// A network as a method: its weights, and how it runs. `weights.into()` has the defaults.
 #[derive(Debug, Clone)]
 pub struct Neural {
-    /// The trained numbers.
+    /// The weights.
     pub weights: Weights,
-    /// Kernels and storage. Dropout does not belong into frames; with a seed every frame has the
-    /// same.
+    /// Kernels and storage. Default: 16 bits and a packed input. Dropout is for published
+    /// generators; in frames it is a fixed error.
     pub network: gpu::Options,
-    /// What a tuner has found on this device; empty without one.
+    /// Kernels that a tuner found fastest on this device. Default: none; the choice is then by
+    /// counted loads.
     pub tuned: Arc<Tuned>,
-    /// Numbers of the `gather` whose filter the network guides.
+    /// Options of the `gather` whose filter the network guides.
     pub gather: gather::Options,
 }
 

@@ -1,7 +1,13 @@
-//! The cheapest method: one light from all around (the sky and what the picture's surfaces send
-//! on), dimmed by ambient occlusion.
+//! The cheapest method: constant light (of the sky and the picture's surfaces) times ambient
+//! occlusion. Its limits: [`crate::gi`].
 //!
-//! What it cannot do: see [`crate::gi`].
+//! ```
+//! use bouncelight::gi::{Method, ambient::AmbientTerm};
+//! let term: AmbientTerm = "sky=0.5".parse()?;
+//! assert_eq!(term, AmbientTerm { sky: 0.5, ..AmbientTerm::default() });
+//! let method = Method::AmbientWith(term);
+//! # Ok::<_, String>(())
+//! ```
 
 use super::bitmask::{March, bind};
 use super::occlusion::OcclusionPass;
@@ -23,13 +29,15 @@ pub const SKY: f32 = 0.83;
 /// it: stands for all bounces.
 pub const BOUNCE: f32 = 0.56;
 
-/// The ambient term: light of what the screen does not show, by two numbers. Light is linear in both, so a scene's own can be found from
-/// pictures of each alone.
+/// Light of what the screen does not show, by two shares. Light is linear in both, so a scene's own
+/// can be found from pictures of each alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AmbientTerm {
-    /// The environment's share.
+    /// Share of the environment's radiance, 0 to 16; [`SKY`] by default. Too large: closed rooms
+    /// glow. Too small: open scenes are dark.
     pub sky: f32,
-    /// The share of what the picture's surfaces send on.
+    /// Share of the picture's mean outgoing radiance, 0 to 16; [`BOUNCE`] by default. Too large:
+    /// flat, bright shadows. Too small: black ones.
     pub bounce: f32,
 }
 

@@ -122,8 +122,8 @@ impl Params {
         }
         if p.z_axis.w != -1.0 || p.w_axis.w != 0.0 {
             return Err(GiError::Camera(match c.forward {
-                Forward::NegativeZ => "the projection is no perspective that looks down -Z",
-                Forward::PositiveZ => "the projection is no perspective that looks down +Z",
+                Forward::NegativeZ => "the projection is not a perspective that looks down -Z",
+                Forward::PositiveZ => "the projection is not a perspective that looks down +Z",
             }));
         }
         if p.x_axis.x == 0.0 || p.y_axis.y == 0.0 {

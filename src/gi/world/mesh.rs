@@ -5,27 +5,30 @@ use crate::gi::interface::GiError;
 use crate::scene::{AlphaMode, ColorSpace, Image, Material, Mesh, Sampler, Scene, TextureRef};
 use wgpu::VertexFormat as F;
 
-/// What light does on a surface: constants of a mesh, or of one of its instances.
+/// Material constants of a mesh, or of one of its instances. Values out of range are clamped; NaN
+/// and infinity are refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surface {
-    /// Base colour in [0, 1], linear; of metals their reflectance.
+    /// Base colour in [0, 1], linear; of metals their reflectance. Default 1. Above about 0.95 all
+    /// over a closed room, light takes many frames to come round.
     pub albedo: [f32; 3],
-    /// Emitted radiance, W/(m²·sr).
+    /// Emitted radiance, W/(m²·sr), 0 or more. Default 0. Very small and very bright surfaces are
+    /// noisy; a light ([`World::lights`](super::World::lights)) is not.
     pub emission: [f32; 3],
-    /// Share of light that it stops, in [0, 1].
+    /// Share of light that it blocks, in [0, 1]. Default 1; at 0 rays pass.
     pub coverage: f32,
-    /// 0 dielectric to 1 metal.
+    /// 0 dielectric (default) to 1 metal.
     pub metallic: f32,
-    /// Perceptual roughness.
+    /// Perceptual roughness in [0, 1]. Default 1.
     pub roughness: f32,
-    /// Reflectance of a dielectric at normal incidence.
+    /// Reflectance of a dielectric at normal incidence, in [0, 1]. Default 0.04 (index 1.5).
     pub f0: f32,
-    /// Glows on both sides.
+    /// Whether it emits on both sides. Default `false`: on the front only.
     pub double_sided: bool,
 }
 
 impl Default for Surface {
-    /// White, rough and dielectric; glows not.
+    /// White, rough and dielectric, without emission.
     fn default() -> Self {
         let (albedo, emission) = ([1.0; 3], [0.0; 3]);
         Self { albedo, emission, coverage: 1.0, metallic: 0.0, roughness: 1.0, f0: 0.04, double_sided: false }
@@ -165,14 +168,14 @@ pub enum Indices<'a> {
     U32(&'a [u32]),
 }
 
-/// A picture that a mesh's texture coordinates look up; rays know its mean over a triangle.
+/// A texture of a mesh. Rays know its mean over each triangle.
 #[derive(Debug, Clone, Copy)]
 pub struct ImageSource<'a> {
     /// Width and height, texels.
     pub size: [u32; 2],
-    /// Four bytes a texel, rows from the top; tiles.
+    /// Four bytes a texel, rows from the top; repeats beyond [0, 1].
     pub rgba: &'a [u8],
-    /// Red, green and blue are sRGB-encoded.
+    /// Whether red, green and blue are sRGB-encoded.
     pub srgb: bool,
 }
 
@@ -190,13 +193,13 @@ pub struct ImageSource<'a> {
 pub struct MeshSource<'a> {
     /// Positions, metres.
     pub positions: Vertices<'a>,
-    /// Which of them make triangles.
+    /// Indices of triangles.
     pub indices: Indices<'a>,
-    /// Normals that light falls on; without, the triangles' own.
+    /// Shading normals, of any length; `None`: the triangles' own.
     pub normals: Option<Vertices<'a>>,
     /// Texture coordinates, origin at the top left; needed with pictures.
     pub uv: Option<Vertices<'a>>,
-    /// Linear colour and coverage that multiply the surface's.
+    /// Linear colour and coverage in [0, 1], which multiply the surface's; `None`: 1.
     pub colors: Option<Vertices<'a>>,
     /// Multiplies albedo and coverage.
     pub albedo: Option<ImageSource<'a>>,

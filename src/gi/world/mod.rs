@@ -1,4 +1,4 @@
-//! What rays of a host's picture meet: its triangles, where they are, its lights and its sky.
+//! A host's scene for rays: triangles, placements, lights and sky.
 //! [`View`] draws with it.
 //!
 //! ```text
@@ -25,11 +25,12 @@ use crate::lights::{LightGpu, whole_sky};
 use crate::scene::{Environment, Light};
 use std::collections::BTreeMap;
 
-/// How a [`World`] is made.
+/// Options of a [`World`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WorldOptions {
-    /// Instances that there is room for at first, 512 bytes each; with more, everything is uploaded
-    /// anew into twice the room.
+    /// Instances that fit at first, 512 bytes each; 1 or more, 256 by default. Too few: the frame
+    /// that exceeds them uploads everything again, into the next power of two. Too many: unused
+    /// memory.
     pub instances: usize,
 }
 
@@ -46,7 +47,7 @@ pub struct Instance {
     pub mesh: u64,
     /// World from the mesh's space, column-major and affine.
     pub transform: [[f32; 4]; 4],
-    /// In place of the mesh's own surface, pictures and colours of vertices included.
+    /// Replaces the mesh's own surface, textures and vertex colours included; `None` keeps it.
     pub surface: Option<Surface>,
 }
 
@@ -129,7 +130,7 @@ impl Changed {
 }
 
 impl World {
-    /// An empty world: no triangles, no lights, a black sky. Keeps a clone of the device (a
+    /// Creates an empty world: no triangles, no lights, a black sky. Keeps a clone of the device (a
     /// handle).
     pub fn new(device: &wgpu::Device, options: WorldOptions) -> Self {
         Self {
@@ -148,7 +149,7 @@ impl World {
         }
     }
 
-    /// Takes a mesh, or another one in the place of that with this key, whose instances stay.
+    /// Adds a mesh, or replaces the one with this key, whose instances stay.
     /// Builds its tree on this thread; [`World::prepared`] takes one whose tree was built on
     /// another.
     ///
@@ -163,7 +164,7 @@ impl World {
         Ok(())
     }
 
-    /// As [`World::mesh`], of a mesh that has its tree.
+    /// Adds a mesh like [`World::mesh`], with a tree that was built before.
     pub fn prepared(&mut self, key: u64, mesh: PreparedMesh) {
         self.meshes.insert(key, mesh);
         self.changed.meshes = true;

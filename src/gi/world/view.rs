@@ -9,8 +9,8 @@ use crate::gi::stage::inputs::Params;
 use crate::gpu::pipeline_cache::PipelineCache;
 use crate::gpu::timing::Recorder;
 
-/// What a method remembers of one camera's picture, and its passes. Make one for each camera; any
-/// number may share a [`World`], a device and a submission.
+/// A method's passes and history for one camera's picture. Make one for each camera; any number may
+/// share a [`World`], a device and a submission.
 ///
 /// ```no_run
 /// use bouncelight::gi::{GiError, Inputs, View, World};
@@ -129,35 +129,35 @@ impl View {
         Ok(Evidence { inputs, samples: &samples, now, before: self.seen[1], rays }.complaints())
     }
 
-    /// What drew the last frame in the method's place, and why; `None` where it drew itself.
+    /// Returns the method that drew the last frame in the place of the one asked for, and why; `None`
+    /// where that drew itself.
     pub fn fallback(&self) -> Option<Fallback<'_>> {
         self.technique.fallback()
     }
 
-    /// Whether the last frame wrote [`Outputs::specular`], if it was given: the method sends rays
-    /// into lobes, or another drew in its place that does not.
+    /// Returns whether the last frame wrote [`Outputs::specular`], if it was given: methods that trace
+    /// specular rays do; a fallback does not.
     pub fn writes_specular(&self) -> bool {
         self.technique.writes_specular()
     }
 
-    /// Frames that the answer has settled over since the last reset; `None` where it does not
-    /// settle.
+    /// Returns the frames accumulated since the last reset; `None` for methods without history.
     pub fn settled(&self) -> Option<u32> {
         self.technique.settled()
     }
 
-    /// Lets go of the texture views that it remembers, and so of the host's textures. A change of
+    /// Drops the texture views that it keeps, and so the host's textures. A change of
     /// size does so by itself.
     pub fn release_bindings(&mut self) {
         self.technique.release_bindings();
     }
 
-    /// Bind groups and rebuilds since the start; stands still in steady frames.
+    /// Returns the number of bind groups and rebuilds so far; it is constant in steady frames.
     pub fn allocations(&self) -> u64 {
         self.technique.allocations()
     }
 
-    /// GPU memory of buffers, textures and weights, bytes.
+    /// Returns the GPU memory of buffers, textures and weights, bytes.
     pub fn bytes(&self) -> u64 {
         self.technique.bytes()
     }

@@ -7,18 +7,18 @@ use glam::{Quat, Vec4};
 pub struct Channel {
     /// Index into [`Rig::nodes`](super::Rig::nodes).
     pub node: usize,
-    /// Which property.
+    /// The property.
     pub property: Property,
-    /// What lies between keys.
+    /// Interpolation between keys.
     pub interpolation: Interpolation,
     /// Seconds, rising, at least one.
     pub times: Vec<f32>,
-    /// As many for each time as the property has numbers, or for [`Interpolation::Cubic`] three
+    /// Values: as many for each time as the property has numbers, or for [`Interpolation::Cubic`] three
     /// times as many: in-tangents, values, out-tangents.
     pub values: Vec<f32>,
 }
 
-/// What a channel moves.
+/// Property that a channel moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "as in glTF")]
 pub enum Property {
@@ -29,7 +29,7 @@ pub enum Property {
     Weights,
 }
 
-/// What lies between two keys.
+/// Interpolation between two keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "as in glTF")]
 pub enum Interpolation {

@@ -10,7 +10,7 @@ import dataclasses
 import os
 
 from ..errors import reported
-from . import blur, lessons, train
+from . import blur, samples, train
 
 SEEDS = 3
 
@@ -20,7 +20,7 @@ def variants(config):
     change = lambda **fields: dataclasses.replace(config, **fields)
     for seed in range(SEEDS):
         yield f"all, seed {config.seed + seed}", change(seed=config.seed + seed)
-    for name, _ in lessons.TABLE:
+    for name, _ in samples.TABLE:
         yield f"no {name}", change(without=(name,))
     for part in blur.PARTS:
         yield f"answer without {part}", change(mute=(part,))

@@ -12,7 +12,7 @@ import torch
 from ..errors import TrainingError, reported
 from ..model import parameter_count
 from ..weights import WeightsError, document, verify, write
-from . import blur, lessons
+from . import blur, samples
 from .train import MEANING, Config, kept_parts, network, read_checkpoint
 
 
@@ -25,7 +25,7 @@ def export(run, out, name=""):
     model.load_state_dict(average)
     # A feature that the run left out has no weight.
     first = model.get_submodule(model.graph[0]["name"])
-    names = [feature for feature, n in lessons.TABLE for _ in range(n)]
+    names = [feature for feature, n in samples.TABLE for _ in range(n)]
     with torch.no_grad():
         for channel, feature in enumerate(names):
             if feature in config.without:
@@ -45,7 +45,7 @@ def export(run, out, name=""):
     }
     tensors = {k: v.half().contiguous() for k, v in model.state_dict().items()}
     try:
-        write(out, tensors, document(model.graph, model.output, inputs=lessons.TABLE, table=("cells", 2), meaning=MEANING, output_channels=blur.GUIDANCE,
+        write(out, tensors, document(model.graph, model.output, inputs=samples.TABLE, table=("cells", 2), meaning=MEANING, output_channels=blur.GUIDANCE,
                                      name=name or os.path.basename(os.path.normpath(run)), provenance=about))
     except (WeightsError, OSError) as problem:
         raise TrainingError(str(problem)) from problem

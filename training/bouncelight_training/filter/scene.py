@@ -1,4 +1,4 @@
-"""Fits the network that guides `gather`'s filter to one scene: lessons, training and export in one command.
+"""Fits the network that guides `gather`'s filter to one scene: samples, training and export in one command.
 
     python -m bouncelight_training.filter.scene --bouncelight FILE --scene FILE --out mine.safetensors [--begin filter.safetensors]
                                                 [--views 24] [--spp 64] [--minutes 2] [--size 512x256] [--work DIR] [-- --environment 0.5 ...]
@@ -17,7 +17,7 @@ import sys
 from ..errors import TrainingError, reported
 from ..weights import WeightsError, read, unet
 from ..model import LEAK
-from . import blur, export, lessons, train
+from . import blur, export, samples, train
 
 SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "..", "assets", "weights", "filter.safetensors")
 MOMENTS = "1,2,4,8,pan,20"
@@ -36,13 +36,13 @@ def shape_of(path):
     while (first := f"{f'down{len(widths)}' if widths else 'enc0'}.a") in convolutions:
         widths.append(convolutions[first]["out_channels"])
     pointwise = sum(convolutions.get(f"up{i}.conv", {}).get("kernel") == [1, 1] for i in range(len(widths)))
-    if not widths or unet(lessons.CHANNELS, tuple(widths), blur.GUIDANCE, pointwise, {"leaky_relu": LEAK})[0] != doc["graph"]:
+    if not widths or unet(samples.CHANNELS, tuple(widths), blur.GUIDANCE, pointwise, {"leaky_relu": LEAK})[0] != doc["graph"]:
         raise TrainingError(f"{path}: cannot begin with it: its network is not one that filters; name another --begin")
     return tuple(widths), pointwise
 
 
 def draw(program, scene, folder, views, spp, seed, size, lit):
-    """Lessons of a scene by the program; those that exist are kept."""
+    """Samples of a scene by the program; those that exist are kept."""
     command = [program, "dataset", "--recipe", "scene", "--scene", scene, "--views", str(views), "--seed", str(seed), "--spp", str(spp),
                "--size", size, "--moments", MOMENTS, "--out", folder, *lit]
     print(" ".join(command), file=sys.stderr, flush=True)
@@ -65,7 +65,7 @@ def fit(program, scene, out, work, begin=SHIPPED, views=24, spp=64, minutes=2.0,
                           **{"batch": 8, "learning_rate": 3e-4, "ema": 0.99} | settings)
     # Views of one scene are told apart by their seeds.
     run = train.train(config, os.path.join(work, "run"), same_names=True)
-    held_out = lessons.piles(lessons.read(folders["held-out"]), config.device)
+    held_out = samples.piles(samples.read(folders["held-out"]), config.device)
     before = train.network(config)
     train.begin_with(before, begin)
     after = train.network(config)
@@ -84,12 +84,12 @@ def main(arguments=None):
     parser.add_argument("--bouncelight", default="target/release/bouncelight", help="the program")
     parser.add_argument("--scene", required=True, help="a scene file, or the name of a bundled scene")
     parser.add_argument("--out", required=True, help="the weights file to write")
-    parser.add_argument("--work", help="folder for lessons and the run; default: beside the weights file")
+    parser.add_argument("--work", help="folder for samples and the run; default: beside the weights file")
     parser.add_argument("--begin", default=SHIPPED, help="weights file to begin with; default: the shipped filter")
     parser.add_argument("--views", type=int, default=24)
     parser.add_argument("--spp", type=int, default=64, help="rays a cell of the light to be learnt")
     parser.add_argument("--size", default="512x256", help="of the rasterised picture; the network has a quarter of it")
-    parser.add_argument("--minutes", type=float, default=2.0, help="of training; drawing the lessons comes before it")
+    parser.add_argument("--minutes", type=float, default=2.0, help="of training; drawing the samples comes before it")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--device", default="cpu")

@@ -24,7 +24,7 @@ from ..losses import pooled_error
 from ..model import LEAK, flops, parameter_count
 from ..provenance import commit, machine_of
 from ..weights import GraphNet, WeightsError, read, unet
-from . import blur, lessons
+from . import blur, samples
 
 # What the answer of such a network means, in weights files.
 MEANING = "filter"
@@ -62,7 +62,7 @@ class Config:
     weight_decay: float = 1e-2
     ema: float = 0.998
     raw: float = 0.3  # share of the loss that looks at the first step alone
-    flicker: float = 0.1  # what a change between two frames of a still camera counts against the rest, where lessons have both
+    flicker: float = 0.1  # what a change between two frames of a still camera counts against the rest, where samples have both
     seed: int = 1
     threads: int = 2
     device: str = "cpu"
@@ -71,7 +71,7 @@ class Config:
 def network(config):
     """The untrained network, whose answer is zeros."""
     torch.manual_seed(config.seed)
-    model = GraphNet(*unet(lessons.CHANNELS, tuple(config.widths), blur.GUIDANCE, config.pointwise, {"leaky_relu": LEAK}))
+    model = GraphNet(*unet(samples.CHANNELS, tuple(config.widths), blur.GUIDANCE, config.pointwise, {"leaky_relu": LEAK}))
     for op in model.graph:
         if op["op"] == "conv2d":
             layer = model.get_submodule(op["name"])
@@ -96,10 +96,10 @@ def begin_with(model, path):
 
 def kept_channels(config):
     """1 for channels that the network is given, else 0: [1,15,1,1]."""
-    unknown = set(config.without) - {name for name, _ in lessons.TABLE}
+    unknown = set(config.without) - {name for name, _ in samples.TABLE}
     if unknown:
         raise TrainingError(f"no such feature: {sorted(unknown)[0]}")
-    return torch.tensor([float(name not in config.without) for name, n in lessons.TABLE for _ in range(n)], device=config.device).view(1, -1, 1, 1)
+    return torch.tensor([float(name not in config.without) for name, n in samples.TABLE for _ in range(n)], device=config.device).view(1, -1, 1, 1)
 
 
 def kept_parts(config):
@@ -145,7 +145,7 @@ def held(answer):
 
 def augmented(batch, rng):
     """The batch, or its mirror image (left for right; the gravity frame's x with it), with its colours in another order."""
-    names = [name for name, n in lessons.TABLE for _ in range(n)]
+    names = [name for name, n in samples.TABLE for _ in range(n)]
     order = torch.as_tensor(rng.permutation(3), device=batch["mask"].device)
     batch = batch | {k: batch[k][:, order] for k in ("light", "target")}
     if rng.random() < 0.5:
@@ -169,10 +169,10 @@ def window(pile, size, rng):
 
 
 def in_parts(pile, size=16):
-    """All moments of a pile, so many at once: (their lessons, the batch)."""
-    for first in range(0, len(pile.lessons), size):
-        numbers = range(first, min(first + size, len(pile.lessons)))
-        yield [pile.lessons[i] for i in numbers], pile.taken(list(numbers))
+    """All moments of a pile, so many at once: (their samples, the batch)."""
+    for first in range(0, len(pile.samples), size):
+        numbers = range(first, min(first + size, len(pile.samples)))
+        yield [pile.samples[i] for i in numbers], pile.taken(list(numbers))
 
 
 def validate(model, piles, channels, parts):
@@ -185,8 +185,8 @@ def validate(model, piles, channels, parts):
             for which, answer in (("gather", None), ("network", model(batch["features"] * channels) * parts)):
                 shown = blur.filtered(batch, answer)[0].clamp(min=0) / mean
                 errors = [pooled_error(shown[i:i + 1], batch["target"][i:i + 1] / mean[i], batch["mask"][i:i + 1], 1) for i in range(len(some))]
-                for lesson, (off, light) in zip(some, errors):
-                    for key in (lesson.when, "all"):
+                for sample, (off, light) in zip(some, errors):
+                    for key in (sample.when, "all"):
                         a, b = sums.get((key, which), (0, 0))
                         sums[key, which] = (a + off, b + light)
     return {f"{key} {which}": off / max(light, 1e-20) for (key, which), (off, light) in sums.items()}
@@ -262,9 +262,9 @@ class Run:
         rate = c.learning_rate * min(1, (self.step + 1) / 50) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * done)))
         for group in self.optimiser.param_groups:
             group["lr"] = rate
-        counts = np.array([len(pile.lessons) for pile in piles])
+        counts = np.array([len(pile.samples) for pile in piles])
         pile = piles[rng.choice(len(piles), p=counts / counts.sum())]
-        chosen = rng.integers(0, len(pile.lessons), c.batch)
+        chosen = rng.integers(0, len(pile.samples), c.batch)
         # Beside each its next frame, if there is one.
         followed = np.flatnonzero(pile.later[chosen] >= 0) if c.flicker else []
         batch = augmented(pile.taken(np.concatenate([chosen, pile.later[chosen[followed]]]), window(pile, c.crop, rng)), rng)
@@ -303,12 +303,12 @@ def read_checkpoint(path):
 def piles_of(config, same_names=False):
     """What is learnt and what is held out. Views of the same name are the same view, unless `same_names` are meant to be allowed."""
     torch.set_num_threads(config.threads)
-    views = [lesson for name in config.train.split(",") for lesson in lessons.read(name, config.every)]
-    held_out = lessons.read(config.validation)
+    views = [sample for name in config.train.split(",") for sample in samples.read(name, config.every)]
+    held_out = samples.read(config.validation)
     shared = {v.name for v in views} & {v.name for v in held_out}
     if shared and not same_names:
         raise TrainingError(f"{sorted(shared)[0]} stands in training and validation")
-    return lessons.piles(views, config.device), lessons.piles(held_out, config.device)
+    return samples.piles(views, config.device), samples.piles(held_out, config.device)
 
 
 def based(piles, pools):
@@ -340,9 +340,9 @@ def train(config, folder, same_names=False, read=None):
     with open(os.path.join(folder, "config.json"), "w") as file:
         json.dump(dataclasses.asdict(config), file, indent=1)
     based(piles, config.pools)
-    count = sum(len(pile.lessons) for pile in piles)
+    count = sum(len(pile.samples) for pile in piles)
     print(f"{parameter_count(run.model)} parameters, {flops(run.model, 128, 256) / 1e9:.3f} GFLOP at 256x128 cells; {count} training and "
-          f"{sum(len(pile.lessons) for pile in held_out)} validation moments", file=sys.stderr, flush=True)
+          f"{sum(len(pile.samples) for pile in held_out)} validation moments", file=sys.stderr, flush=True)
     began, sums, looked = time.monotonic(), [], time.monotonic()
     if run.step == 0:
         note(run, held_out, 0.0, 0.0)

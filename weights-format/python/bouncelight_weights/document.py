@@ -80,7 +80,7 @@ def check(doc):
         problems.append(Problem("document", "", f"metadata `{KEY}`: {sentence}"))
 
     if doc["output"]["meaning"] in LEFT_MEANINGS:
-        fault(f"output meaning `{doc['output']['meaning']}` has left: {CORRECTS}")
+        fault(f"output meaning `{doc['output']['meaning']}` was removed: {CORRECTS}")
     elif doc["output"]["meaning"] not in MEANINGS:
         fault(f"output meaning `{doc['output']['meaning']}` is unknown; known: {', '.join(MEANINGS)}")
     if not 1 <= doc["cell"] <= 64:
@@ -117,7 +117,7 @@ def _operator(index, op):
     if not isinstance(op, dict) or not _text(op.get("op")):
         return [Problem("operator", name, f"graph[{index}] `{name}`: field `op` is missing or no string, or a field stands twice")]
     if op["op"] in LEFT:
-        return [Problem("unknown-operator", name, f"graph[{index}] `{name}`: operator `{op['op']}` has left, since no shipped and no published network has it")]
+        return [Problem("unknown-operator", name, f"graph[{index}] `{name}`: operator `{op['op']}` was removed, since no shipped and no published network has it")]
     if op["op"] not in OPERATORS:
         return [Problem("unknown-operator", name, f"graph[{index}] `{name}`: operator `{op['op']}` is unknown; a newer program may run it")]
     wrong = graphs.field_fault(op)
@@ -132,7 +132,7 @@ def _inputs(doc):
         known = "1" if newest == 1 else f"1 to {newest}"
         return [Problem("version", f"feature table `{name}`", f"feature table `{name}` has version {version}; known: {known}")]
     if name not in TABLES:
-        why = f"has left: {CORRECTS}" if name == LEFT_TABLE else f"is unknown; known: {', '.join(TABLES)}"
+        why = f"was removed: {CORRECTS}" if name == LEFT_TABLE else f"is unknown; known: {', '.join(TABLES)}"
         return [Problem("document", "", f"metadata `{KEY}`: feature table `{name}` {why}")]
     problems = [] if doc["inputs"] else [Problem("document", "", f"metadata `{KEY}`: there is no input feature")]
     rows, ordered = TABLES[name]

@@ -18,29 +18,44 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
+#[command(
+    next_help_heading = "Options",
+    override_usage = "\
+bouncelight apply --direct <PNG> --depth <PNG> --normal <PNG> --diffuse <PNG>
+                         --weights <FILE> --output <PNG> [OPTIONS]"
+)]
 pub struct Args {
-    /// Direct light, PNG.
+    /// Direct light.
     #[arg(long, value_name = "PNG")]
     direct: PathBuf,
-    /// Depth, PNG.
+    /// Depth, of the same size.
     #[arg(long, value_name = "PNG")]
     depth: PathBuf,
-    /// Normals, PNG.
+    /// Normals, of the same size.
     #[arg(long, value_name = "PNG")]
     normal: PathBuf,
-    /// Albedo, PNG.
+    /// Albedo, of the same size.
     #[arg(long, value_name = "PNG")]
     diffuse: PathBuf,
-    /// Weights of a network on pictures, as `weights convert` makes them.
-    #[arg(long, value_name = "W")]
+    /// Weights of a network on pictures, from `weights convert`.
+    #[arg(long, value_name = "FILE")]
     weights: PathBuf,
-    /// PNG to write; `-` is standard output.
-    #[arg(short, long)]
+    /// Picture to write; `-`: standard output.
+    #[arg(short, long, value_name = "PNG")]
     output: PathBuf,
-    /// Keep dropout on, with this seed: how the published programs run their networks.
+    /// Keep dropout on, with this seed, as published programs do [default: off].
     #[arg(long, value_name = "SEED")]
     dropout: Option<u32>,
 }
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = r"Examples:
+  bouncelight apply --direct direct.png --depth depth.png --normal normal.png --diffuse albedo.png \
+    --weights net.safetensors -o out.png
+  bouncelight apply --direct direct.png --depth depth.png --normal normal.png --diffuse albedo.png \
+    --weights net.safetensors -o out.png --dropout 1
+  bouncelight apply --direct direct.png --depth depth.png --normal normal.png --diffuse albedo.png \
+    --weights net.safetensors -o - --adapter cpu";
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
     let name = args.output.display().to_string();

@@ -17,47 +17,50 @@ use std::{ffi::OsStr, path::PathBuf};
 
 /// Flags every subcommand takes.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Options of every command")]
 pub struct Global {
-    /// Part of the adapter's name, or `cpu` for a software adapter.
+    /// Adapter whose name contains NAME; `cpu`: a software adapter.
     #[arg(long, global = true, value_name = "NAME")]
     pub adapter: Option<String>,
     /// Graphics API.
-    #[arg(long, global = true, value_enum, default_value = "auto")]
+    #[arg(long, global = true, value_enum, default_value = "auto", value_name = "API")]
     pub backend: BackendName,
-    /// How a network's numbers are stored on the GPU; when absent 16 bits for networks that filter
-    /// light, 32 for others.
-    #[arg(long, global = true, value_enum)]
+    /// Storage of a network's numbers [default: f16 for filters of light, else f32].
+    #[arg(long, global = true, value_enum, value_name = "BITS")]
     pub precision: Option<PrecisionName>,
-    /// Only errors.
-    #[arg(short, long, global = true)]
-    pub quiet: bool,
-    /// Buffers, textures and material libraries may lie outside the folder of the scene file that
-    /// names them.
-    #[arg(long, global = true)]
-    pub allow_outside: bool,
-    /// A glTF file that says something wrong is refused instead of mended with a warning.
-    #[arg(long, global = true)]
-    pub strict: bool,
-    /// Metres of a scene file's unit of length: 0.001 for one that counts in millimetres.
+    /// Texture memory: full (4 B a texel), compressed (BC7, 1 B), auto (BC7 above 512 MiB).
+    #[arg(long, global = true, value_enum, default_value = "auto", value_name = "HOW", hide_possible_values = true)]
+    pub textures: TexturesName,
+    /// Metres in a unit of the scene file, 1e-9 to 1e9; 0.001 for millimetres.
     #[arg(long, global = true, default_value_t = 1.0, allow_hyphen_values = true, value_parser = parse_scale, value_name = "M")]
     pub scale: f32,
-    /// Axis of a scene file that points up.
-    #[arg(long, global = true, value_enum, default_value = "y")]
+    /// Up axis of the scene file.
+    #[arg(long, global = true, value_enum, default_value = "y", value_name = "AXIS")]
     pub up: UpName,
-    /// How textures lie in the device's memory: `compressed` in blocks of a byte a texel (BC7)
-    /// where the device has them, `full` with four bytes a texel, `auto` in blocks where a scene's
-    /// would take more than 512 MiB.
-    #[arg(long, global = true, value_enum, default_value = "auto")]
-    pub textures: TexturesName,
-    /// More log lines; twice for yet more.
+    /// Refuse a faulty glTF file instead of repairing it with a warning.
+    #[arg(long, global = true)]
+    pub strict: bool,
+    /// Let a scene file name files outside its folder.
+    #[arg(long, global = true)]
+    pub allow_outside: bool,
+    /// Progress on stderr: bar, plain, none, or auto (a bar on a terminal, else plain).
+    #[arg(long, global = true, value_enum, default_value = "auto", value_name = "HOW", hide_possible_values = true)]
+    pub progress: ProgressKind,
+    /// Show errors only.
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// Log more; -vv logs yet more.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// Reads shaders from this folder where it has them: for who works on them.
+    /// Folder of shaders to read instead of the built-in ones, for work on shaders.
     #[arg(long, global = true, value_name = "DIR", hide = true)]
     pub shaders: Option<PathBuf>,
-    /// How progress is shown on standard error.
-    #[arg(long, global = true, value_enum, default_value = "auto")]
-    pub progress: ProgressKind,
+    /// Print this help.
+    #[arg(short = 'h', long = "help", global = true, action = clap::ArgAction::HelpShort)]
+    _help: Option<bool>,
+    /// Print the version.
+    #[arg(short = 'V', long = "version", global = true, action = clap::ArgAction::Version)]
+    _version: Option<bool>,
 }
 
 /// Names of the graphics APIs.
@@ -74,11 +77,11 @@ pub enum BackendName {
 /// How a network's numbers are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[allow(missing_docs, reason = "the variants are their own words on the command line")]
 pub enum PrecisionName {
-    /// 32 bits.
     #[default]
     F32,
-    /// 16 bits; arithmetic stays in 32.
+    // Arithmetic stays in 32 bits.
     F16,
 }
 
@@ -113,14 +116,12 @@ pub enum UpName {
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+#[allow(missing_docs, reason = "the variants are their own words on the command line")]
 pub enum ProgressKind {
-    /// A bar on a terminal, else plain lines.
     Auto,
-    /// A bar.
     Bar,
-    /// A plain line every few seconds.
+    // A line every few seconds.
     Plain,
-    /// Nothing.
     None,
 }
 
@@ -206,11 +207,11 @@ impl TypedValueParser for MethodParser {
         }
         let names = PossibleValuesParser::new(self.possible_values().into_iter().flatten());
         let name = names.parse_ref(cmd, arg, value)?;
-        MethodName::from_name(&name).ok_or_else(|| error(format!("`{name}` is no method")))
+        MethodName::from_name(&name).ok_or_else(|| error(format!("`{name}` is not a method")))
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
-        Some(Box::new(self.0.iter().map(|m| PossibleValue::new(m.name()).help(m.doc()))))
+        Some(Box::new(self.0.iter().map(|m| PossibleValue::new(m.name()))))
     }
 }
 
@@ -223,7 +224,7 @@ pub fn real_time(name: MethodName, global: &Global, weights: Option<&PathBuf>) -
             let neural = Neural::from(load_weights(weights)?).stored(global.precision());
             Ok(Method::Neural(Box::new(neural)))
         }
-        (None, _) => Err(usage(format!("`{}` is no real-time method", name.name()))),
+        (None, _) => Err(usage(format!("`{}` is not a real-time method", name.name()))),
     }
 }
 
@@ -240,7 +241,7 @@ pub fn usage(message: String) -> anyhow::Error {
 
 pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let (w, h) = text.split_once(['x', 'X']).ok_or("write it as WIDTHxHEIGHT, such as 1024x512")?;
-    let side = |t: &str| t.parse::<u32>().map_err(|_| format!("`{t}` is no number of pixels"));
+    let side = |t: &str| t.parse::<u32>().map_err(|_| format!("`{t}` is not a number of pixels"));
     match [side(w)?, side(h)?] {
         [0, _] | [_, 0] => Err("width and height must be at least 1".into()),
         size => Ok(size),

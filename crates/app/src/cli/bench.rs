@@ -25,39 +25,47 @@ use std::path::PathBuf;
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Real-time method to measure, or `all` of them; what `fit` found for the scene when absent,
-    /// else all. (`bouncelight trace` tells its own samples per second.)
-    #[arg(long, value_parser = parse_methods)]
+    /// Real-time method to measure, or `all` [default: as `fit` found, else all].
+    #[arg(long, value_parser = parse_methods, value_name = "METHOD", help_heading = "Method")]
     method: Option<Methods>,
     #[command(flatten)]
     fitted: super::fitted::Flag,
-    /// Weights of `neural`; the shipped ones (`filter`) when absent.
-    #[arg(long)]
+    /// Weights of `neural` [default: the shipped `filter`].
+    #[arg(long, value_name = "FILE", help_heading = "Method")]
     weights: Option<PathBuf>,
-    /// Frames that count.
-    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
+    /// Frames measured, 1 or more.
+    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..), value_name = "N",
+        help_heading = MEASURE)]
     frames: u32,
-    /// Frames before them.
-    #[arg(long, default_value_t = 30)]
+    /// Frames drawn before them.
+    #[arg(long, default_value_t = 30, value_name = "N", help_heading = MEASURE)]
     warmup: u32,
     /// One row per network layer instead of one for the network.
-    #[arg(long)]
+    #[arg(long, help_heading = MEASURE)]
     layers: bool,
-    /// Let shaders count, too, what they do in a frame at rest: operations, bytes, rays.
-    /// With --layers, one row per network layer.
-    #[arg(long)]
+    /// Also count operations, bytes and rays of a frame, and project times from them.
+    #[arg(long, help_heading = MEASURE)]
     count: bool,
-    /// Write the record to this file.
-    #[arg(long, value_name = "F")]
+    /// Record to write.
+    #[arg(long, value_name = "FILE", help_heading = MEASURE)]
     json: Option<PathBuf>,
-    /// A record written earlier, on this device, to compare with. Takes --fail-over, too.
-    #[arg(long, value_name = "BASE", requires = "fail_over")]
+    /// Earlier record of this device to compare with; with --fail-over.
+    #[arg(long, value_name = "FILE", requires = "fail_over", help_heading = MEASURE)]
     compare: Option<PathBuf>,
-    /// With --compare: how much slower than the base is still allowed, such as 5%; above it the
-    /// exit code is 6.
-    #[arg(long, value_parser = parse_percent, value_name = "P%")]
+    /// Exit with code 6 if a method is slower than the record by more than P, such as 5%.
+    #[arg(long, value_parser = parse_percent, value_name = "P%", help_heading = MEASURE)]
     fail_over: Option<f64>,
 }
+
+/// Heading of the help.
+const MEASURE: &str = "Measurement";
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight bench scene.glb --method all
+  bouncelight bench scene.glb --method neural --layers --json base.json
+  bouncelight bench scene.glb --method neural --compare base.json --fail-over 5%";
 
 #[derive(Debug, Clone)]
 struct Methods(Vec<MethodName>);
@@ -145,7 +153,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         if methods.is_empty() {
             return Err(e.into());
         }
-        eprintln!("warning: methods that send rays are not measured: {e}");
+        eprintln!("warning: methods that trace rays are not measured: {e}");
     }
     let options = BenchOptions { frames: args.frames, warmup: args.warmup };
     let with = |method: &Method| RendererOptions { method: method.clone(), ..Default::default() };
@@ -279,7 +287,7 @@ fn rows(m: &Measurement, layers: bool) -> Vec<(String, f64, f64)> {
 fn read_base(path: &PathBuf) -> Result<Record> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     let base: Record =
-        serde_json::from_str(&text).with_context(|| format!("{} is no record of `bench --json`", path.display()))?;
+        serde_json::from_str(&text).with_context(|| format!("{} is not a record of `bench --json`", path.display()))?;
     if base.schema != 1 {
         return Err(usage(format!("{}: schema {} is not known", path.display(), base.schema)));
     }
@@ -288,10 +296,12 @@ fn read_base(path: &PathBuf) -> Result<Record> {
 
 fn compare(base: &Record, now: &Record, allowed: f64) -> Result<()> {
     if (&base.adapter, &base.backend, base.size) != (&now.adapter, &now.backend, now.size) {
-        return Err(usage("the base record is of another adapter, backend or size: times cannot be compared".into()));
+        return Err(usage(
+            "the base record is of another adapter, backend or size; measure a new one with --json".into(),
+        ));
     }
     if base.precision != now.precision {
-        return Err(usage("the base record's network stored its numbers in another precision".into()));
+        return Err(usage("the base record's network ran in another precision; measure a new one with --json".into()));
     }
     let time = |m: &Measurement| m.gpu_ms.unwrap_or(m.wall_ms).median;
     let slower: Vec<String> = now

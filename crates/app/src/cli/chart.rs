@@ -32,66 +32,78 @@ use std::{
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Scenes by name, files, or folders of references (scene.glb, frame0000.exr, meta.json; or
-    /// roomIIII_view0.exr). Two bundled scenes and three of the paper's rooms when absent, against
-    /// our own path tracer.
-    #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
+    /// roomIIII_view0.exr) [default: two bundled scenes, three rooms].
+    #[arg(long, value_delimiter = ',', value_name = "SCENE,...", help_heading = WHAT)]
     scenes: Vec<String>,
-    /// Real-time methods, or `all` of them.
-    #[arg(long, value_delimiter = ',', default_value = "all", value_name = "M,...", value_parser = parse_method)]
+    /// Real-time methods, or `all`.
+    #[arg(long, value_delimiter = ',', default_value = "all", value_name = "METHOD,...", value_parser = parse_method,
+        help_heading = WHAT)]
     methods: Vec<Option<MethodName>>,
-    /// Also `gather` with other numbers than its own, such as `cell_frames=32`; may be repeated.
-    #[arg(long, value_name = "NAME=VALUE,...")]
+    /// Also `gather` with these constants, such as cell_frames=32; repeatable.
+    #[arg(long, value_name = "NAME=VALUE,...", help_heading = WHAT)]
     gather: Vec<gather::Options>,
-    /// Also the network of this file: one over the scene, or one on pictures; may be repeated.
-    #[arg(long, value_name = "W")]
+    /// Also the network of this file; repeatable.
+    #[arg(long, value_name = "FILE", help_heading = WHAT)]
     weights: Vec<PathBuf>,
-    /// What is up: light (error of the light that is added), flip, l1 (the paper's). All are in the
-    /// records.
-    #[arg(long, value_enum, default_value = "light")]
-    metric: MetricName,
-    /// Folder for chart.csv and chart.json, of which `training/chart.py` draws a picture. What is in
-    /// chart.json already is not done again.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// Where the page goes, such as docs/reports/chart.md; DIR/results.md when absent.
-    #[arg(long, value_name = "MD")]
-    page: Option<PathBuf>,
-    /// Width and height of the pictures; a reference from elsewhere has its own.
-    #[arg(long, default_value = "1024x512", value_parser = parse_size, value_name = "WxH")]
-    size: [u32; 2],
-    /// Jittered frames averaged in settled pictures.
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=256))]
-    samples: u32,
-    /// Frames that are timed.
-    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
-    frames: u32,
-    /// Frames before them.
-    #[arg(long, default_value_t = 10)]
-    warmup: u32,
-    /// Noise of a reference's light at a pixel, divided by its mean, at which tracing ends.
-    #[arg(long, default_value_t = 0.05, value_name = "E", value_parser = parse_error)]
-    error: f64,
-    /// Most samples of a reference's pixel.
-    #[arg(long, default_value_t = 16384, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
-    max_samples: u32,
-    /// Most paths a pixel on the curve of paths; 0 leaves it out.
-    #[arg(long, default_value_t = 1024, value_name = "N")]
-    paths: u32,
-    /// Leave out what gloss throws on after a diffuse bounce, in our references, paths, `gather`
-    /// and `neural` alike: for folders of references that were rendered so (Cycles without
-    /// "Reflective Caustics").
-    #[arg(long)]
-    no_caustics: bool,
     /// Leave the paper's generator out.
-    #[arg(long)]
+    #[arg(long, help_heading = WHAT)]
     no_generator: bool,
-    /// Keep what another build of the program has found, too.
-    #[arg(long)]
-    keep: bool,
-    /// Folder of references that were traced before; DIR/references when absent.
-    #[arg(long, value_name = "DIR")]
+    /// Most samples on the path tracer's curve; 0 leaves it out.
+    #[arg(long, default_value_t = 1024, value_name = "N", help_heading = WHAT)]
+    paths: u32,
+    /// Error on the vertical axis: light (of the light that is added), flip, or the paper's l1.
+    #[arg(long, value_enum, default_value = "light", help_heading = WHAT)]
+    metric: MetricName,
+    /// Picture size, pixels; references from elsewhere keep theirs.
+    #[arg(long, default_value = "1024x512", value_parser = parse_size, value_name = "WxH", help_heading = HOW)]
+    size: [u32; 2],
+    /// Jittered frames averaged in pictures of methods with history, 1 to 256.
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=256), value_name = "N",
+        help_heading = HOW)]
+    samples: u32,
+    /// Frames timed, 1 or more.
+    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..), value_name = "N",
+        help_heading = HOW)]
+    frames: u32,
+    /// Frames drawn before them.
+    #[arg(long, default_value_t = 10, value_name = "N", help_heading = HOW)]
+    warmup: u32,
+    /// Noise of a reference's light at a pixel over its mean, above 0, at which tracing ends.
+    #[arg(long, default_value_t = 0.05, value_name = "E", value_parser = parse_error, help_heading = HOW)]
+    error: f64,
+    /// Most samples a pixel of a reference, 2 or more.
+    #[arg(long, default_value_t = 16384, value_name = "N", value_parser = clap::value_parser!(u32).range(2..),
+        help_heading = HOW)]
+    max_samples: u32,
+    /// No gloss after a diffuse bounce, in references and methods alike, as Cycles without Reflective
+    /// Caustics.
+    #[arg(long, help_heading = HOW)]
+    no_caustics: bool,
+    /// Folder for chart.csv and chart.json; what chart.json holds is not measured again.
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    out: PathBuf,
+    /// Page to write [default: DIR/results.md].
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    page: Option<PathBuf>,
+    /// Folder of traced references [default: DIR/references].
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
     references: Option<PathBuf>,
+    /// Keep results of another build of the program.
+    #[arg(long, help_heading = "Output")]
+    keep: bool,
 }
+
+/// Headings of the help.
+const WHAT: &str = "What is charted";
+/// As [`WHAT`].
+const HOW: &str = "Measurement";
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight chart --out out/chart
+  bouncelight chart --out out/chart --scenes scene.glb --methods gather,neural --size 512x256
+  bouncelight chart --out out/chart --gather cell_frames=32 --metric flip";
 
 /// What is up.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
@@ -247,7 +259,7 @@ fn read(path: &Path) -> Result<Option<Record>> {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(e) => return Err(e).with_context(|| format!("cannot read {}", path.display())),
     };
-    let words = "is no record of `chart`; move it away, or name another --out";
+    let words = "is not a record of `chart`; move it away, or name another --out";
     let record: Record = serde_json::from_str(&text).with_context(|| format!("{} {words}", path.display()))?;
     if record.schema != 1 {
         return Err(usage(format!("{}: schema {} is not known", path.display(), record.schema)));

@@ -16,45 +16,51 @@ use std::path::{Path, PathBuf};
 const HEAT_FULL_SCALE: f32 = 0.25;
 
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Options")]
 pub struct Args {
-    /// The picture that is judged: PNG, or EXR (linear, Blender's layer names).
+    /// Picture to judge: PNG, or EXR (linear, Blender's layer names).
+    #[arg(help_heading = None)]
     a: PathBuf,
     /// The reference.
+    #[arg(help_heading = None)]
     b: PathBuf,
-    /// Which metric to print: `all`, `paper` (its four), or one by name. docs/internals/metrics.md explains
-    /// them.
+    /// Metric by name, `all`, or `paper` (its four); docs/internals/metrics.md explains them.
     #[arg(long, default_value = "all", value_parser = parse_metric)]
     metric: String,
-    /// View transform of EXR pictures for the metrics on display values.
+    /// View transform of EXR for metrics of display values: filmic, agx, neutral or none.
     #[arg(long, default_value = "filmic")]
     tonemap: Tonemap,
-    /// Compare this layer of two EXR instead of the pictures, as linear values: relmse, mre, bias,
-    /// mae.
+    /// Compare this layer of two EXR, linear, by relmse, mre, bias and mae.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["tonemap", "pixels_per_degree", "heatmap_metric"])]
     layer: Option<String>,
-    /// Pixels in a degree of the field of view, for flip and hdrflip: 67 is a 0.7 m wide 4K display
-    /// 0.7 m away.
+    /// Pixels per degree of vision, above 0, for flip and hdrflip; 67: 0.7 m from a 4K display.
     #[arg(long, default_value_t = flip::PIXELS_PER_DEGREE, value_parser = parse_pixels_per_degree, value_name = "PPD")]
     pixels_per_degree: f32,
-    /// Write a picture of where they differ, in magma.
+    /// Picture of the differences to write, in magma.
     #[arg(long, value_name = "PNG")]
     heatmap: Option<PathBuf>,
-    /// What that shows: flip and hdrflip from 0 to 1, mae from 0 to a quarter.
-    #[arg(long, value_enum, default_value = "flip", requires = "heatmap")]
+    /// What it shows: flip or hdrflip from 0 to 1, or mae from 0 to 0.25.
+    #[arg(long, value_enum, default_value = "flip", requires = "heatmap", value_name = "METRIC")]
     heatmap_metric: Heat,
-    /// Write a JSON record; `-` is standard output, which then holds nothing else.
-    #[arg(long, value_name = "F")]
+    /// Record to write; `-`: standard output, which then holds nothing else.
+    #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
 
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight compare ours.exr reference.exr
+  bouncelight compare ours.png reference.png --metric flip --heatmap differences.png
+  bouncelight compare ours.exr reference.exr --layer DiffInd";
+
 /// What a heat map shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[allow(missing_docs, reason = "the variants are their own words on the command line")]
 pub enum Heat {
-    /// FLIP.
     Flip,
-    /// HDR-FLIP.
     Hdrflip,
-    /// Mean difference of the channels.
+    // Mean difference of the channels.
     Mae,
 }
 

@@ -33,14 +33,22 @@ const GAP: usize = 4;
 const REFERENCE: &[u8] = include_bytes!("../../assets/reference/interior.png");
 
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Options")]
 pub struct Args {
-    /// The picture to write: raster | gather above, neural | reference below.
-    #[arg(short, long, default_value = "out/demo.png")]
+    /// Picture to write: direct | gather above, neural | Cycles below.
+    #[arg(short, long, default_value = "out/demo.png", value_name = "PNG")]
     output: PathBuf,
     /// Print no timing table.
     #[arg(long)]
     no_times: bool,
 }
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight demo
+  bouncelight demo --no-times -o demo.png
+  bouncelight demo --adapter cpu";
 
 /// The methods shown, in the sheet's order, and those that are timed.
 fn methods() -> Result<([Method; 3], [Method; 4])> {

@@ -11,9 +11,16 @@ use serde_json::json;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Print a JSON record instead of text.
-    #[arg(long)]
+    #[arg(long, help_heading = "Options")]
     json: bool,
 }
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight doctor
+  bouncelight doctor --adapter cpu
+  bouncelight doctor --backend vulkan --json";
 
 /// Limits that the passes lean on: name and what a WebGPU default device grants.
 fn limits(l: &wgpu::Limits) -> [(&'static str, u64); 8] {
@@ -61,9 +68,9 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let blocks = used.contains(wgpu::Features::TEXTURE_COMPRESSION_BC);
     let most = TextureMemory::MOST >> 20;
     if blocks {
-        say!("textures  in blocks of a byte a texel (BC7) where a scene's take more than {most} MiB whole; --textures");
+        say!("textures  compressed (BC7, 1 byte a texel) where a scene's take more than {most} MiB; --textures");
     } else {
-        say!("textures  whole, four bytes a texel: this device has no blocks (BC7)");
+        say!("textures  uncompressed, 4 bytes a texel: this device lacks BC7");
     }
     for fault in faults {
         say!("driver    {}", fault.sentence());

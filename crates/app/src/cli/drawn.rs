@@ -116,7 +116,7 @@ pub(super) fn parse_layers<L: Copy>(text: &str, all: &[L], name: impl Fn(L) -> &
     for word in text.split(',') {
         let Some(i) = all.iter().position(|&l| name(l) == word) else {
             let known = all.iter().map(|&l| name(l)).collect::<Vec<_>>().join(", ");
-            return Err(usage(format!("--aov: `{word}` is no layer of this method; there are: {known}")));
+            return Err(usage(format!("--aov: `{word}` is not a layer of this method; there are: {known}")));
         };
         if layers.contains(&i) {
             return Err(usage(format!("--aov: `{word}` is asked for twice")));

@@ -36,7 +36,7 @@ pub enum CliError {
     #[error("{0}")]
     Usage(String),
     /// A comparison against a reference failed.
-    #[error("{metric} is {value:.6}, on the wrong side of the threshold {threshold}")]
+    #[error("{metric} is {value:.6}, worse than the threshold {threshold}")]
     AboveThreshold {
         /// Name of the metric.
         metric: String,

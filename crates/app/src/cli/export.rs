@@ -13,19 +13,30 @@ use std::path::PathBuf;
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// How indirect light is found.
-    #[arg(long, value_parser = MethodParser(&[MethodName::Gather, MethodName::Neural]), default_value = "gather", value_name = "METHOD")]
+    /// Method to export.
+    #[arg(long, value_parser = MethodParser(&[MethodName::Gather, MethodName::Neural]), default_value = "gather",
+        value_name = "METHOD", help_heading = EXPORT)]
     method: MethodName,
-    /// A network's weights; the shipped ones without.
-    #[arg(long, value_name = "FILE")]
+    /// Weights of `neural` [default: the shipped `filter`].
+    #[arg(long, value_name = "FILE", help_heading = EXPORT)]
     weights: Option<PathBuf>,
     /// Language of the shaders.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = EXPORT)]
     target: TargetName,
-    /// Folder to write; a new one, or an earlier export, which is replaced.
-    #[arg(short, long, visible_alias = "out", value_name = "FOLDER")]
+    /// Folder to write: a new one, or an earlier export, which is replaced.
+    #[arg(short, long, visible_alias = "out", value_name = "DIR", help_heading = EXPORT)]
     output: PathBuf,
 }
+
+/// Heading of the help.
+const EXPORT: &str = "Export";
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight export interior --target glsl430 -o out/glsl
+  bouncelight export scene.glb --target wgsl -o out/wgsl --size 1920x1080
+  bouncelight export scene.glb --target spirv -o out/spirv --method neural";
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 #[allow(missing_docs, reason = "the variants are their own words on the command line")]

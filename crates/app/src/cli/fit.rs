@@ -26,53 +26,62 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// What is good enough, in every view: `light=8%` (mean error of the light that a method has to
-    /// add), or a metric of `compare`.
-    #[arg(long, default_value = "light=10%", value_name = "METRIC=T")]
+    /// Quality that every view must reach: light=P% (error of the light that a method adds) or a
+    /// metric of `compare`, such as flip=0.06.
+    #[arg(long, default_value = "light=10%", value_name = "METRIC=T", help_heading = CHOICE)]
     target: QualityTarget,
-    /// Most milliseconds a frame that the method's own passes may take, at --size.
-    #[arg(long, value_name = "B", value_parser = parse_budget)]
+    /// Most milliseconds a frame of the method's own passes at --size, 0 or more [default: no limit].
+    #[arg(long, value_name = "MS", value_parser = parse_budget, help_heading = CHOICE)]
     budget_ms: Option<f64>,
-    /// Whose milliseconds: this device's, measured, or a GTX 1050's, projected from counted work.
-    /// `auto` projects on software adapters.
-    #[arg(long, value_enum, default_value = "auto")]
+    /// Times: measured here, or projected for a GTX 1050; auto projects on software adapters.
+    #[arg(long, value_enum, default_value = "auto", help_heading = CHOICE)]
     cost: Cost,
-    /// Views to judge by: the scene's cameras, then ones chosen to cover it. --eye and --look-at
-    /// replace them all.
-    #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    /// Views to judge, 1 to 64: the file's cameras, then others; --eye replaces them.
+    #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64),
+        help_heading = CHOICE)]
     views: u32,
-    /// Frames of a still camera up to the one that is judged, for methods that settle.
-    #[arg(long, default_value_t = Method::SETTLED, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    /// Frames of a still camera that gather and neural accumulate before a picture, 1 to 65536.
+    #[arg(long, default_value_t = Method::SETTLED, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536),
+        help_heading = CHOICE)]
     accumulate: u32,
-    /// A network to try beside the shipped ones; may be repeated.
-    #[arg(long, value_name = "W")]
+    /// Network to try besides the shipped ones; repeatable.
+    #[arg(long, value_name = "FILE", help_heading = CHOICE)]
     weights: Vec<PathBuf>,
     /// Has left; whoever asks for it is told what there is instead.
     #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "", value_parser = learning_has_left)]
     learn: Option<String>,
-    /// Most samples a pixel of a reference.
-    #[arg(long, default_value_t = 1024, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    /// Most samples a pixel of a reference, 2 or more.
+    #[arg(long, default_value_t = 1024, value_name = "N", value_parser = clap::value_parser!(u32).range(2..),
+        help_heading = CHOICE)]
     spp: u32,
-    /// Folder where references are kept for the next time.
-    #[arg(long, value_name = "DIR")]
-    references: Option<PathBuf>,
-    /// Where the result goes; SCENE.gi.toml beside the scene when absent, `-` for standard output
-    /// alone.
-    #[arg(short, long, value_name = "FILE")]
+    /// Record to write; `-`: standard output [default: SCENE.gi.toml beside the scene].
+    #[arg(short, long, value_name = "FILE", help_heading = OUTPUT)]
     output: Option<PathBuf>,
-    /// Folder for a page that explains the choice with pictures, and a JSON record.
-    #[arg(long, value_name = "DIR")]
+    /// Folder for a page with pictures and a JSON record.
+    #[arg(long, value_name = "DIR", help_heading = OUTPUT)]
     report: Option<PathBuf>,
+    /// Folder that keeps references for the next run.
+    #[arg(long, value_name = "DIR", help_heading = OUTPUT)]
+    references: Option<PathBuf>,
 }
+
+/// Headings of the help.
+const CHOICE: &str = "Choice";
+/// As [`CHOICE`].
+const OUTPUT: &str = "Output";
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight fit scene.glb
+  bouncelight fit scene.glb --target light=8% --budget-ms 5 --report out/scene
+  bouncelight fit interior --target flip=0.06 --views 1 -o -";
 
 /// Whose milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq, clap::ValueEnum)]
 enum Cost {
-    /// Measured, but projected on software adapters.
     Auto,
-    /// Measured on this device.
     Measured,
-    /// Projected for a GTX 1050.
     Projected,
 }
 

@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 /// Where to look.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Flag {
-    /// What `fit` wrote, obeyed where no --method is given: a file, or `none`. SCENE.gi.toml where
-    /// it exists when absent.
-    #[arg(long, value_name = "FILE")]
+    /// Record of `fit` to obey where no --method is given, or `none` [default: SCENE.gi.toml if it
+    /// exists].
+    #[arg(long, value_name = "FILE", help_heading = "Method")]
     gi: Option<PathBuf>,
 }
 
@@ -36,7 +36,7 @@ impl Flag {
 pub fn fresh(fitted: Fitted, scene: &Scene) -> Result<Option<Fitted>> {
     let stale = fitted.stale(&hash::of_scene(scene))?;
     if let Some(why) = &stale {
-        eprintln!("warning: what was fitted (`{}`) is not obeyed: {why}", fitted.method.name());
+        eprintln!("warning: the record of `fit` (method `{}`) is ignored: {why}", fitted.method.name());
     }
     Ok(Some(fitted).filter(|_| stale.is_none()))
 }

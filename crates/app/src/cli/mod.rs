@@ -36,9 +36,11 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
-/// A deferred rasteriser whose G-buffers feed a small in-GPU U-Net that adds global illumination.
+/// A deferred rasteriser with real-time global illumination in compute shaders.
 #[derive(Debug, Parser)]
 #[command(name = "bouncelight", version, propagate_version = true)]
+#[command(disable_help_flag = true, disable_version_flag = true)]
+#[command(after_help = EXAMPLES)]
 struct Cli {
     #[command(flatten)]
     global: args::Global,
@@ -49,37 +51,48 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 #[allow(clippy::large_enum_variant, reason = "there is one in a run of the program")]
 enum Command {
-    /// Open a window: see a scene, measure it, compare methods with the live reference.
+    /// Show a scene in a window, measure it, compare methods with the path-traced reference.
     #[cfg(feature = "viewer")]
+    #[command(after_help = view::EXAMPLES)]
     View(view::Args),
-    /// Draw a scene into a PNG or multi-layer EXR.
+    /// Render a scene into a PNG or a multi-layer EXR.
+    #[command(after_help = render::EXAMPLES)]
     Render(render::Args),
-    /// Draw a scene by paths, until the light is right: what everything else is measured against.
+    /// Path-trace a scene: the reference that methods are measured against.
+    #[command(after_help = trace::EXAMPLES)]
     Trace(trace::Args),
     /// Measure GPU time per pass, wall-clock time per frame and memory.
+    #[command(after_help = bench::EXAMPLES)]
     Bench(bench::Args),
-    /// Chart speed against accuracy: every method over a set of scenes, measured and judged.
+    /// Chart speed against accuracy of every method over several scenes.
+    #[command(after_help = chart::EXAMPLES)]
     Chart(chart::Args),
-    /// Compare two pictures with the paper's metrics and the usual ones.
+    /// Compare two pictures by the paper's metrics and the usual ones.
+    #[command(after_help = compare::EXAMPLES)]
     Compare(compare::Args),
-    /// Test methods where they are known to fail: light switched, doors shut, walls of 2 cm, and so
-    /// on.
+    /// Test methods where they are known to fail: switched lights, closed doors, thin walls.
+    #[command(after_help = stability::EXAMPLES)]
     Stability(stability::Args),
-    /// Write network inputs of the paper's rooms, for training.
+    /// Write training data of the network.
+    #[command(after_help = dataset::EXAMPLES)]
     Dataset(dataset::Args),
-    /// Find the cheapest method that is good enough for a scene, and keep it beside the scene.
+    /// Find the cheapest method that is good enough for a scene, and record it beside the scene.
+    #[command(after_help = fit::EXAMPLES)]
     Fit(fit::Args),
     /// Run a network on G-buffer pictures from elsewhere.
+    #[command(after_help = apply::EXAMPLES)]
     Apply(apply::Args),
-    /// Write what a host without wgpu needs to run the pass: shaders, buffers and how to dispatch
-    /// them.
+    /// Write shaders, buffers and dispatches for a host without wgpu.
+    #[command(after_help = export::EXAMPLES)]
     Export(export::Args),
-    /// Look into a weights file, check it, or make one from a published generator's state.
+    /// Inspect, check or tune a weights file, or convert a published generator's state.
+    #[command(after_help = weights::EXAMPLES)]
     Weights(weights::Args),
-    /// Draw the bundled interior by three methods beside Cycles' picture, and say where the time
-    /// goes.
+    /// Render the bundled interior by three methods beside Cycles' picture, with a timing table.
+    #[command(after_help = demo::EXAMPLES)]
     Demo(demo::Args),
-    /// Say which adapter is used, what it can do, and what to install when there is none.
+    /// Show the adapter, its features and faults, or what to install when there is none.
+    #[command(after_help = doctor::EXAMPLES)]
     Doctor(doctor::Args),
 }
 
@@ -126,7 +139,7 @@ pub fn main() -> ExitCode {
     }
     let done = match cli.command {
         command if cli.global.precision.is_some() && !command.runs_network() => {
-            Err(args::usage("--precision is for networks, and none runs here; leave it out".into()))
+            Err(args::usage("--precision needs a network, and this command runs none; leave it out".into()))
         }
         #[cfg(feature = "viewer")]
         Command::View(a) => view::run(&cli.global, a),
@@ -152,6 +165,15 @@ pub fn main() -> ExitCode {
         }
     }
 }
+
+/// Examples at the end of the help.
+const EXAMPLES: &str = "\
+Examples:
+  bouncelight view scene.glb
+  bouncelight render scene.glb -o picture.png
+  bouncelight doctor
+
+`bouncelight COMMAND --help` lists a command's options; docs/guide/cli.md explains them by task.";
 
 /// Options of earlier versions and what they are called now.
 const RENAMED: [(&str, &str); 3] =
@@ -218,6 +240,14 @@ mod tests {
             "docs/guide/viewer.md",
             "docs/guide/scenes.md",
             "docs/guide/without-wgpu.md",
+            "docs/internals/path-tracer.md",
+            "docs/internals/metrics.md",
+            "docs/internals/network.md",
+            "docs/reports/chart.md",
+            "docs/reports/stability.md",
+            "docs/results/accuracy.md",
+            "docs/results/performance.md",
+            "training/README.md",
         ] {
             let text = std::fs::read_to_string(root.join(page)).expect("the page is there");
             for command in commands(&text) {
@@ -230,5 +260,55 @@ mod tests {
         }
         assert!(seen > 30, "{seen} commands");
         assert!(Cli::try_parse_from(["bouncelight", "render", "--no-such-option"]).is_err(), "negative control");
+    }
+
+    /// Lines and columns of a help: two screens.
+    const HELP: [usize; 2] = [100, 100];
+
+    /// Calls `f` with each command of the program and what is typed for it.
+    fn each_command(command: &clap::Command, typed: &str, f: &mut impl FnMut(&mut clap::Command, &str)) {
+        for sub in command.get_subcommands().filter(|s| s.get_name() != "help") {
+            let typed = format!("{typed} {}", sub.get_name());
+            f(&mut sub.clone(), &typed);
+            each_command(sub, &typed, f);
+        }
+    }
+
+    /// Commands of the examples in a help; a line that ends in a backslash goes on.
+    fn examples(help: &str) -> Vec<String> {
+        let (_, text) = help.split_once("Examples:\n").unwrap_or_default();
+        let joined = text.replace("\\\n", "");
+        joined.lines().filter_map(|line| line.strip_prefix("  bouncelight ").map(str::to_owned)).collect()
+    }
+
+    #[test]
+    fn helps_fit_two_screens_in_groups_and_end_with_three_examples() {
+        let parse = |words: &str| Cli::command().term_width(HELP[1]).try_get_matches_from(words.split_whitespace());
+        let mut cli = Cli::command().term_width(HELP[1]);
+        cli.build();
+        let mut seen = 0;
+        each_command(&cli, "bouncelight", &mut |command, typed| {
+            let help = command.render_help().to_string();
+            let columns = help.lines().map(|line| line.chars().count()).max().unwrap_or_default();
+            assert!(help.lines().count() <= HELP[0] && columns <= HELP[1], "{typed}: {columns} columns\n{help}");
+            for flag in ["-h", "--help"] {
+                let asked = parse(&format!("{typed} {flag}")).map_or_else(|e| e.to_string(), |_| String::new());
+                assert_eq!(asked, help, "{typed}: one help, however it is asked for");
+            }
+            let options = command.get_arguments().filter(|a| a.get_long().is_some() && !a.is_hide_set());
+            let loose: Vec<_> = options.filter(|a| a.get_help_heading().is_none()).map(|a| a.get_id()).collect();
+            assert!(loose.is_empty(), "{typed}: options in no group: {loose:?}");
+            let examples = examples(&help);
+            assert_eq!(examples.len(), 3, "{typed}: {help}");
+            for example in examples {
+                let parsed = parse(&format!("bouncelight {example}"));
+                assert!(parsed.is_ok(), "{typed}: `bouncelight {example}`: {:?}", parsed.err());
+                assert!(
+                    format!("bouncelight {example} ").starts_with(&format!("{typed} ")) || typed.ends_with("weights")
+                );
+            }
+            seen += 1;
+        });
+        assert!(seen >= 17, "{seen} commands");
     }
 }

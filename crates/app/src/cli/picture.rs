@@ -16,35 +16,38 @@ use bouncelight_scene::image_io;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Output")]
 pub struct PictureArgs {
-    /// Where the picture goes: .png, .exr, or `-` for a PNG on standard output.
+    /// Picture to write: .png, .exr, or `-` for a PNG on standard output.
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// Layers for an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
+    /// Layers of an EXR: `all`, or Blender's pass names, such as DiffInd,Normal,Depth.
     #[arg(long, value_name = "LAYERS")]
     pub aov: Option<String>,
-    /// Stops by which a PNG is brighter, or `auto`: as many as make the mean of what is seen middle
-    /// grey. When absent: `auto` for a file without any light, 0 for others and with --reference.
+    /// Stops by which a PNG is brighter; auto: mean at middle grey [default: 0; auto for files
+    /// without lights].
     #[arg(long, allow_hyphen_values = true, value_name = "EV|auto")]
     exposure: Option<Exposure>,
-    /// View transform of a PNG.
+    /// View transform of a PNG: filmic, agx, neutral or none.
     #[arg(long, default_value = "filmic")]
     tonemap: Tonemap,
-    /// A picture to compare with: EXR (both go through the view transform and --exposure) or PNG.
-    #[arg(long, value_name = "FILE")]
+    /// EXR or PNG of the same size to compare the picture with.
+    #[arg(long, value_name = "FILE", help_heading = COMPARISON)]
     reference: Option<PathBuf>,
     /// Metric of the comparison.
-    #[arg(long, default_value = "mae", requires = "reference", value_parser = metrics::NAMES.map(|(n, _)| n))]
+    #[arg(long, default_value = "mae", requires = "reference", value_parser = metrics::NAMES.map(|(n, _)| n),
+        help_heading = COMPARISON)]
     metric: String,
-    /// On the wrong side of it (above; below for psnr and the ssims; bias by its size) the exit
-    /// code is 5.
-    #[arg(long, requires = "reference", value_name = "T")]
+    /// Exit with code 5 if the metric is worse than T.
+    #[arg(long, requires = "reference", value_name = "T", help_heading = COMPARISON)]
     threshold: Option<f64>,
-    /// Picture of where they differ: FLIP's map for flip and hdrflip, else the mean difference up
-    /// to a quarter.
-    #[arg(long, requires = "reference", value_name = "PNG")]
+    /// Picture of the differences to write.
+    #[arg(long, requires = "reference", value_name = "PNG", help_heading = COMPARISON)]
     diff: Option<PathBuf>,
 }
+
+/// Heading of the help.
+const COMPARISON: &str = "Comparison";
 
 impl PictureArgs {
     /// Faults that can be found before anything is drawn.

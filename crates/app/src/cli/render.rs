@@ -34,51 +34,58 @@ pub struct Args {
     scene: SceneArgs,
     #[command(flatten)]
     picture: PictureArgs,
-    /// How indirect light is found. When absent: what `fit` found for the scene, else `gather`,
-    /// `neural` with --weights.
-    #[arg(long, value_parser = MethodParser(&MethodName::REAL_TIME))]
+    /// What is seen behind the scene: shown (the sky), blurred, hidden, or transparent (alpha).
+    #[arg(long, visible_alias = "background", default_value = "shown", value_name = "HOW", help_heading = "Output")]
+    backdrop: Backdrop,
+    #[command(flatten)]
+    sequence: sequence::SequenceFlags,
+    /// Method for indirect light [default: as `fit` found, else gather; neural with --weights].
+    #[arg(long, value_parser = MethodParser(&MethodName::REAL_TIME), help_heading = METHOD)]
     method: Option<MethodName>,
-    /// Weights of `neural`; the shipped ones (`filter`) when absent.
-    #[arg(long)]
+    /// Weights of `neural` [default: the shipped `filter`].
+    #[arg(long, help_heading = METHOD, value_name = "FILE")]
     weights: Option<PathBuf>,
     #[command(flatten)]
     fitted: super::fitted::Flag,
-    /// Jittered frames that are averaged through Cycles' pixel filter; 1 is the raw frame. When
-    /// absent: 8; 1 with --aov, with --taa, for frames of a sequence, and for the first frame after
-    /// a cut (--accumulate 1).
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    samples: Option<u32>,
-    /// Real-time anti-aliasing over this many frames before the one that is written, or before the
-    /// first of a sequence, through which it goes on; layers of --aov are averaged as the picture is.
-    #[arg(long, conflicts_with = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
-    taa: Option<u32>,
-    /// Frames of a still camera up to the one that is written, for methods that settle (`gather`,
-    /// `neural`): 1 is the first after a cut. 32 when absent.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
-    accumulate: Option<u32>,
-    /// Numbers of `gather` other than its own, such as `blur=0,cell_frames=256`; `plain` forgets
-    /// and blurs nothing.
-    #[arg(long, value_name = "NAME=VALUE,...")]
+    /// Constants of gather and neural, such as blur=0,cell_frames=256; `plain`: no history, no
+    /// blur.
+    #[arg(long, value_name = "NAME=VALUE,...", help_heading = METHOD)]
     gather: Option<gather::Options>,
-    /// Light of what the picture does not show, for `ambient` and `ssgi`: shares of the sky's and
-    /// of its surfaces' light.
-    #[arg(long, value_name = "sky=X,bounce=Y")]
+    /// Off-screen light of ambient and ssgi, as shares: sky=X,bounce=Y [default: 0.83, 0.56].
+    #[arg(long, value_name = "TERM", help_heading = METHOD)]
     ambient_term: Option<bouncelight::gi::ambient::AmbientTerm>,
-    /// Surfaces that blend with what is behind: `sorted` are drawn over the picture without grain,
-    /// `stochastic` by lot, as paths meet them, for layers and many samples. When absent:
-    /// `stochastic` with --aov, else `sorted`.
-    #[arg(long, value_name = "HOW")]
+    /// Jittered frames averaged, 1 to 4096 [default: 8; 1 with --aov, --taa, sequences and
+    /// --accumulate 1].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096), value_name = "N", help_heading = QUALITY)]
+    samples: Option<u32>,
+    /// Frames of a still camera that gather and neural accumulate before the picture, 1 (just after
+    /// a cut) to 65536 [default: 32].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536), help_heading = QUALITY)]
+    accumulate: Option<u32>,
+    /// Temporal anti-aliasing over 1 to 4096 frames before the picture, and through a sequence.
+    #[arg(long, conflicts_with = "samples", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096),
+        help_heading = QUALITY)]
+    taa: Option<u32>,
+    /// Blended surfaces: sorted (no noise) or stochastic (as paths meet them) [default: sorted;
+    /// stochastic with --aov].
+    #[arg(long, value_name = "HOW", help_heading = QUALITY)]
     blending: Option<Blending>,
-    /// What is seen beyond the scene, which the surroundings light in any case: `shown`, `blurred`,
-    /// `hidden` or `transparent`, which makes alpha of a PNG and an EXR what surfaces cover.
-    #[arg(long, visible_alias = "background", default_value = "shown", value_name = "HOW")]
-    backdrop: Backdrop,
-    /// Seed of jitter and soft-shadow patterns.
-    #[arg(long, default_value_t = 0)]
+    /// Seed of jitter and soft shadows.
+    #[arg(long, default_value_t = 0, value_name = "N", help_heading = QUALITY)]
     seed: u32,
-    #[command(flatten)]
-    sequence: sequence::SequenceFlags,
 }
+
+/// Headings of the help.
+const METHOD: &str = "Method";
+/// As [`METHOD`].
+const QUALITY: &str = "Quality";
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight render scene.glb -o picture.png
+  bouncelight render interior -o view.png --eye 1.8,1.6,2 --look-at -0.5,1,-1 --method neural
+  bouncelight render scene.glb -o layers.exr --aov all --samples 4";
 
 impl Args {
     /// The method asked for, or the best that needs nothing but the scene; weights are a network's.
@@ -294,14 +301,12 @@ fn film(
 /// Flags that do not belong to the method.
 fn check(args: &Args) -> Result<()> {
     if args.backdrop == Backdrop::Transparent && args.taa.is_some() {
-        return Err(usage("--taa remembers colours without alpha; a transparent backdrop takes --samples".into()));
+        return Err(usage("--taa keeps no alpha; with --backdrop transparent use --samples".into()));
     }
     let name = args.method().name();
     let settles = [MethodName::Gather, MethodName::Neural].contains(&args.method());
     if args.accumulate.is_some() && !settles {
-        return Err(usage(format!(
-            "--accumulate belongs to methods gather and neural; `{name}` does not settle over frames"
-        )));
+        return Err(usage(format!("--accumulate belongs to methods gather and neural; `{name}` keeps no history")));
     }
     if args.gather.is_some() && !settles {
         return Err(usage(format!("--gather belongs to methods gather and neural, not to `{name}`")));

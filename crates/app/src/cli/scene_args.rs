@@ -10,18 +10,19 @@ use std::path::PathBuf;
 
 /// How a scene is lit where its file does not say.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Light")]
 pub struct Lit {
-    /// The surroundings: radiance as `R,G,B` or one number for grey, or a lat-long picture (.hdr,
-    /// .exr).
+    /// Sky: radiance in W/(m²·sr), grey or R,G,B, or a lat-long .hdr or .exr picture [default: the
+    /// file's].
     #[arg(long, value_parser = parse_surroundings, value_name = "R,G,B|FILE")]
     pub environment: Option<Surroundings>,
-    /// Turns the picture of the surroundings about the vertical, the way from +X to +Z.
+    /// Rotation of a sky picture about the vertical, from +X towards +Z.
     #[arg(long, value_name = "DEGREES", requires = "environment", default_value_t = 0.0, allow_hyphen_values = true)]
     pub environment_turn: f32,
-    /// Radius of point and spot lights, metres.
+    /// Radius of point and spot lights, m, >= 0 [default: the file's].
     #[arg(long, value_name = "M")]
     pub light_radius: Option<f32>,
-    /// Angular diameter of directional lights, radians.
+    /// Angular diameter of suns, radians, >= 0 [default: the file's].
     #[arg(long, value_name = "RAD")]
     pub sun_angle: Option<f32>,
 }
@@ -41,7 +42,7 @@ impl Lit {
             Some(Surroundings::Picture(path)) => {
                 let (environment, mended) = bouncelight_scene::sky::load(path)?;
                 if !self.environment_turn.is_finite() {
-                    return Err(usage(format!("--environment-turn {} is no angle", self.environment_turn)));
+                    return Err(usage(format!("--environment-turn {} is not an angle", self.environment_turn)));
                 }
                 bouncelight_scene::defaults::surround(scene, environment.turned(self.environment_turn));
                 scene.warnings.extend(mended);
@@ -63,44 +64,51 @@ impl Lit {
 /// Which scene, how it is lit, and from where it is seen.
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, `home:INDEX`, or a bundled scene (interior,
-    /// cornell).
+    /// A .gltf, .glb or .obj file, `interior`, `cornell`, `home:INDEX` or `paper-room:INDEX`.
     pub scene: String,
-    /// Width and height in pixels.
-    #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH")]
+    /// Material variant of the file, by name or number from 0.
+    #[arg(long, value_name = "NAME|N", help_heading = SCENE)]
+    pub variant: Option<String>,
+    /// Animation of the file, by name or number from 0.
+    #[arg(long, value_name = "NAME|N", help_heading = SCENE)]
+    pub animation: Option<String>,
+    /// Animation time; of frame 0 in a sequence.
+    #[arg(long, visible_alias = "time", requires = "animation", default_value_t = 0.0, value_name = "SECONDS",
+        help_heading = SCENE)]
+    pub pose_time: f32,
+    /// Move object N by X,Y,Z metres; repeatable.
+    #[arg(long, value_name = "N X,Y,Z", help_heading = SCENE)]
+    pub object: Vec<ObjectEdit>,
+    /// Picture size, pixels.
+    #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH",
+        help_heading = CAMERA)]
     pub size: [u32; 2],
     /// Camera of the file, from 0.
-    #[arg(long, default_value_t = 0, conflicts_with_all = ["eye", "look_at"], value_name = "N")]
+    #[arg(long, default_value_t = 0, conflicts_with_all = ["eye", "look_at"], value_name = "N", help_heading = CAMERA)]
     pub camera: usize,
-    /// Where the camera stands.
-    #[arg(long, value_parser = parse_vec3, requires = "look_at", allow_hyphen_values = true, value_name = "X,Y,Z")]
+    /// Camera position, metres; with --look-at.
+    #[arg(long, value_parser = parse_vec3, requires = "look_at", allow_hyphen_values = true, value_name = "X,Y,Z",
+        help_heading = CAMERA)]
     pub eye: Option<[f32; 3]>,
-    /// What it looks at.
-    #[arg(long, value_parser = parse_vec3, requires = "eye", allow_hyphen_values = true, value_name = "X,Y,Z")]
+    /// Point that the camera looks at, metres; with --eye.
+    #[arg(long, value_parser = parse_vec3, requires = "eye", allow_hyphen_values = true, value_name = "X,Y,Z",
+        help_heading = CAMERA)]
     pub look_at: Option<[f32; 3]>,
-    /// Vertical field of view in degrees.
-    #[arg(long, value_name = "D")]
+    /// Vertical field of view, 0 to 180 degrees [default: the camera's, or 45].
+    #[arg(long, value_name = "D", help_heading = CAMERA)]
     pub fov: Option<f32>,
     #[command(flatten)]
     pub lit: Lit,
-    /// Variant of materials, by name or number from 0.
-    #[arg(long, value_name = "NAME|N")]
-    pub variant: Option<String>,
-    /// Animation of the file, by name or number from 0, that moves objects, skins, lights and
-    /// cameras.
-    #[arg(long, value_name = "NAME|N")]
-    pub animation: Option<String>,
-    /// Time in the animation, seconds; of a sequence the time of frame 0.
-    #[arg(long, visible_alias = "time", requires = "animation", default_value_t = 0.0, value_name = "SECONDS")]
-    pub pose_time: f32,
-    /// Changes a light: its number and any of color=R,G,B strength=S direction=X,Y,Z position=X,Y,Z
-    /// size=S; with kind=sun, point or spot and the next free number it adds one; may be repeated.
-    #[arg(long, value_name = "N KEY=VALUE ...")]
+    /// Change light N by color, strength, direction, position or size, or add it with
+    /// kind=sun|point|spot; repeatable.
+    #[arg(long, value_name = "N KEY=VALUE ...", help_heading = "Light")]
     pub light: Vec<LightEdit>,
-    /// Moves an object: its number and X,Y,Z in metres; may be repeated.
-    #[arg(long, value_name = "N X,Y,Z")]
-    pub object: Vec<ObjectEdit>,
 }
+
+/// Headings of the help.
+const SCENE: &str = "Scene";
+/// As [`SCENE`].
+const CAMERA: &str = "Camera";
 
 impl SceneArgs {
     /// Loads the scene, tells its warnings, and applies the flags about light.

@@ -8,16 +8,15 @@ use std::path::{Path, PathBuf};
 
 /// Flags that draw many pictures.
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Sequence")]
 pub struct SequenceFlags {
-    /// Camera path (JSON, as the viewer records it): draws a frame after the other; the output's
-    /// name holds `{frame}` or `{frame:04}`.
+    /// Camera path, JSON of the viewer; --output needs `{frame}` or `{frame:04}` in its name.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "look_at", "camera", "reference"])]
     path: Option<PathBuf>,
-    /// Which frames of the path or of --animation, from A to before B; all of a path when absent.
-    /// The animation goes on from frame to frame.
+    /// Frames of the path or the animation, A to B-1 [default: all of the path].
     #[arg(long, value_name = "A..B", conflicts_with = "reference", value_parser = parse_frames)]
     frames: Option<Range<u32>>,
-    /// Seconds from one frame to the next, such as 1/24; 1/60 when absent.
+    /// Time between frames, above 0, such as 1/24 [default: 1/60].
     #[arg(long, value_name = "SECONDS", value_parser = parse_step)]
     fixed_dt: Option<f64>,
 }
@@ -111,7 +110,7 @@ fn parse_frames(text: &str) -> Result<Range<u32>, String> {
     let number = |t: &str| t.parse::<u32>().map_err(|e| format!("{t}: {e}"));
     match (number(a)?, number(b)?) {
         (a, b) if a < b => Ok(a..b),
-        _ => Err("there is no frame from A to before B".into()),
+        _ => Err("B must be above A".into()),
     }
 }
 

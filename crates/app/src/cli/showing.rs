@@ -35,7 +35,7 @@ impl Showing {
         }
         let found = stops.unwrap_or_else(|| drawn.stops(self.exposure, self.background));
         if stops.is_none() && self.exposure == Exposure::Auto && !self.quiet {
-            eprintln!("exposure {found:+} EV, measured in the picture; --exposure says another");
+            eprintln!("exposure {found:+} EV, measured from the picture; --exposure sets another");
         }
         drawn.write(gpu, output, self.format, found)?;
         Ok(found)

@@ -21,45 +21,52 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Tests by name between commas, or `all`; --list tells them.
-    #[arg(long, default_value = "all", value_name = "NAMES")]
+    /// Tests by name between commas, or `all`.
+    #[arg(long, default_value = "all", value_name = "NAMES", help_heading = TESTS)]
     suite: String,
-    /// Tell the tests with their thresholds, and draw nothing.
-    #[arg(long)]
+    /// List the tests with their thresholds and stop.
+    #[arg(long, help_heading = TESTS)]
     list: bool,
-    /// Methods by name between commas, or `all`; `paper` is the paper's recipe where --paper names
-    /// its weights.
-    #[arg(long, default_value = "all", value_name = "NAMES")]
+    /// Methods by name between commas, or `all`; `paper` is the network of --paper.
+    #[arg(long, default_value = "all", value_name = "NAMES", help_heading = TESTS)]
     methods: String,
-    /// Weights of `neural`; the shipped ones (`filter`) when absent.
-    #[arg(long, value_name = "W")]
+    /// Weights of `neural` [default: the shipped `filter`].
+    #[arg(long, value_name = "FILE", help_heading = TESTS)]
     weights: Option<PathBuf>,
-    /// Weights of a network on pictures (the paper's recipe, as `weights convert` and training make
-    /// them), tested as `paper`.
-    #[arg(long, value_name = "W")]
+    /// Weights of a network on pictures, from `weights convert` or training, tested as `paper`.
+    #[arg(long, value_name = "FILE", help_heading = TESTS)]
     paper: Option<PathBuf>,
-    /// Which method's failures make the exit code 5: the program's default where it is among those
-    /// tested, else all of them.
-    #[arg(long, value_name = "NAME")]
+    /// Exit with code 5 if this method fails [default: gather if tested, else all methods].
+    #[arg(long, value_name = "METHOD", help_heading = TESTS)]
     judge: Option<String>,
-    /// Failures that docs/reports/stability.md explains do not count.
-    #[arg(long)]
+    /// Do not count failures that docs/reports/stability.md explains.
+    #[arg(long, help_heading = TESTS)]
     allow_known: bool,
-    /// Folder for contact sheets (NAME.png), short sequences (NAME.apng.png), the record and
-    /// references that were traced.
-    #[arg(long, value_name = "DIR")]
+    /// Folder for contact sheets, short sequences, the record and traced references.
+    #[arg(long, value_name = "DIR", help_heading = OUTPUT)]
     out: Option<PathBuf>,
-    /// Tests whose findings are in --out already, of the same program, device and weights, are not
-    /// run again.
-    #[arg(long, requires = "out")]
+    /// Keep findings in --out that this program, device and weights made.
+    #[arg(long, requires = "out", help_heading = OUTPUT)]
     resume: bool,
-    /// Write the record to this file, too; `-` is standard output, which then holds nothing else.
-    #[arg(long, value_name = "F")]
+    /// Record to write; `-`: standard output, which then holds nothing else.
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     json: Option<PathBuf>,
-    /// Write the table of all tests with a sentence on every failure to this file (Markdown).
-    #[arg(long, value_name = "MD")]
+    /// Page to write: all tests, and a sentence on each failure (Markdown).
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     limits: Option<PathBuf>,
 }
+
+/// Headings of the help.
+const TESTS: &str = "Tests";
+/// As [`TESTS`].
+const OUTPUT: &str = "Output";
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight stability --list
+  bouncelight stability --out out/stability
+  bouncelight stability --out out/stability --methods gather --judge gather --allow-known --resume";
 
 impl Args {
     /// It runs a network on a device.
@@ -155,7 +162,7 @@ fn names(args: &Args) -> Result<Vec<MethodName>> {
     let real_time = |name: &str| {
         let found = MethodName::from_name(name).filter(|m| MethodName::REAL_TIME.contains(m));
         let known = || MethodName::REAL_TIME.map(|m| m.name()).join(", ");
-        found.ok_or_else(|| usage(format!("--methods: `{name}` is no real-time method; there are: {}", known())))
+        found.ok_or_else(|| usage(format!("--methods: `{name}` is not a real-time method; there are: {}", known())))
     };
     args.methods.split(',').map(|name| real_time(name.trim())).collect()
 }

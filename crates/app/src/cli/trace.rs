@@ -29,48 +29,51 @@ pub struct Args {
     scene: SceneArgs,
     #[command(flatten)]
     picture: PictureArgs,
-    /// Seed of the paths.
-    #[arg(long, default_value_t = 0)]
-    seed: u32,
-    /// Samples a pixel, 64 when absent; with --until-error the most there may be, 65536 when
-    /// absent.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Samples a pixel, 1 or more; with --until-error the most [default: 64; 65536 with it].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = PATHS)]
     spp: Option<u32>,
-    /// Stop once the noise of a pixel (root mean square, divided by the mean) is surely not above
-    /// E, such as 0.05; of the picture, or with --cells of the light that a GI method must add.
-    #[arg(long, value_name = "E", value_parser = parse_error_bound, allow_hyphen_values = true)]
+    /// Stop when a pixel's noise (RMS over mean), above 0, is at most E, such as 0.05.
+    #[arg(long, value_name = "E", value_parser = parse_error_bound, allow_hyphen_values = true, help_heading = PATHS)]
     until_error: Option<f64>,
-    /// Limit of indirect contributions, as Cycles' clamp; 0 for none. Takes fireflies away, and
-    /// energy.
-    #[arg(long, value_name = "C", value_parser = parse_limit, allow_hyphen_values = true)]
+    /// Clamp indirect contributions, as Cycles; fewer fireflies, less energy [default: 0, off].
+    #[arg(long, value_name = "C", value_parser = parse_limit, allow_hyphen_values = true, help_heading = PATHS)]
     clamp: Option<f32>,
-    /// Most bounces in all, as Blender counts them; without limit when absent.
-    #[arg(long, value_name = "N")]
+    /// Bounces in all, as Blender counts them [default: no limit].
+    #[arg(long, value_name = "N", help_heading = PATHS)]
     bounces: Option<u32>,
-    /// Most diffuse bounces.
-    #[arg(long, value_name = "N")]
+    /// Diffuse bounces [default: no limit].
+    #[arg(long, value_name = "N", help_heading = PATHS)]
     diffuse_bounces: Option<u32>,
-    /// Most glossy bounces.
-    #[arg(long, value_name = "N")]
+    /// Glossy bounces [default: no limit].
+    #[arg(long, value_name = "N", help_heading = PATHS)]
     glossy_bounces: Option<u32>,
-    /// Cycles' "Filter Glossy": widens lobes behind blurry bounces, by Blender's default 1; none
-    /// when absent. Takes the noise of light that reflections focus away, and changes where it
-    /// lands.
-    #[arg(long, value_name = "F", value_parser = parse_limit, allow_hyphen_values = true)]
+    /// Widen lobes after blurry bounces, as Cycles' Filter Glossy; Blender's default is 1 [default:
+    /// 0, off].
+    #[arg(long, value_name = "F", value_parser = parse_limit, allow_hyphen_values = true, help_heading = PATHS)]
     filter_glossy: Option<f32>,
-    /// As Cycles without "Reflective Caustics": surfaces seen by a diffusely scattered ray show no
-    /// gloss. Takes light away; for comparisons with such pictures.
-    #[arg(long)]
+    /// Show diffusely scattered rays no gloss, as Cycles without Reflective Caustics; loses light.
+    #[arg(long, help_heading = PATHS)]
     no_caustics: bool,
-    /// Trace one point for each cell of NxN pixels, the pixel centre that the network samples (N/2,
-    /// N/2 in the cell), without pixel filter; the picture has a pixel for each cell.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Trace the one pixel centre of each NxN cell that the network samples; a pixel per cell.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = PATHS)]
     cells: Option<u32>,
-    /// Average noise away in the picture (not in layers), for a look at few samples: details of
-    /// light go with it, and the metadata says so. Not with --cells: what is averaged is no truth.
-    #[arg(long, conflicts_with = "cells")]
+    /// Denoise the picture (not layers) for a preview; it is no reference then.
+    #[arg(long, conflicts_with = "cells", help_heading = PATHS)]
     denoise: bool,
+    /// Seed of the paths.
+    #[arg(long, default_value_t = 0, value_name = "N", help_heading = PATHS)]
+    seed: u32,
 }
+
+/// Heading of the help.
+const PATHS: &str = "Paths";
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight trace scene.glb -o truth.exr --spp 256 --aov all
+  bouncelight trace scene.glb -o truth.exr --until-error 0.05
+  bouncelight trace interior -o look.png --spp 16 --denoise";
 
 fn parse_error_bound(text: &str) -> Result<f64, String> {
     let bound: f64 = text.parse().map_err(|e| format!("{e}"))?;
@@ -196,7 +199,7 @@ impl Task {
             eprintln!("{}", sentence(&traced));
         }
         if traced.dropped > 0 {
-            eprintln!("warning: {} samples were no numbers and were left out", traced.dropped);
+            eprintln!("warning: {} samples were NaN or infinite and were left out", traced.dropped);
         }
         if self.denoise {
             if let Some(picture) = preview::denoise(&traced, camera) {
@@ -204,7 +207,7 @@ impl Task {
             }
             traced.layers.truncate(self.asked);
             if !global.quiet {
-                eprintln!("denoised, for a look; nothing to judge pictures by");
+                eprintln!("denoised for a preview; not a reference to compare with");
             }
         }
         Ok(self.drawn(traced))

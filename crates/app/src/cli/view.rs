@@ -6,35 +6,42 @@ use anyhow::Result;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Options")]
 pub struct Args {
-    /// A .gltf, .glb or .obj file, `paper-room:INDEX`, `home:INDEX`, or a bundled scene; the
-    /// bundled interior when absent.
+    /// A .gltf, .glb or .obj file, `interior`, `cornell`, `home:INDEX` or `paper-room:INDEX`
+    /// [default: interior].
+    #[arg(help_heading = None)]
     scene: Option<String>,
-    /// Weights of `neural`; the shipped ones when absent.
-    #[arg(long, value_name = "W")]
-    weights: Option<PathBuf>,
-    /// How indirect light is found at first.
+    /// Method for indirect light to begin with [default: as `fit` found, else as saved].
     #[arg(long, value_parser = MethodParser(&MethodName::ALL))]
     method: Option<MethodName>,
-    /// Load scene and weights again when their files change; in a checkout, shaders, too.
+    /// Weights of `neural` [default: the shipped `filter`].
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// Window size, points [default: as saved].
+    #[arg(long, value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH")]
+    size: Option<[u32; 2]>,
+    /// Folder for captures [default: the current one].
+    #[arg(long, value_name = "DIR")]
+    captures: Option<PathBuf>,
+    /// Reload scene and weights, and in a checkout shaders, when their files change.
     #[arg(long)]
     watch: bool,
-    /// Run the steps of this file instead of waiting for hands (docs/guide/viewer.md); reads and saves no
-    /// settings.
+    /// Settings to begin with, as in view.json; the saved ones are neither read nor written.
+    #[arg(long, value_name = "JSON")]
+    settings: Option<PathBuf>,
+    /// Run the steps of this file instead of waiting for input; no settings are read or saved.
     #[cfg(feature = "script")]
     #[arg(long, value_name = "JSON")]
     script: Option<PathBuf>,
-    /// Settings to begin with instead of the saved ones, as `view.json` holds them; nothing is
-    /// saved then.
-    #[arg(long, value_name = "JSON")]
-    settings: Option<PathBuf>,
-    /// Width and height of the window, points.
-    #[arg(long, value_parser = parse_size, allow_hyphen_values = true, value_name = "WxH")]
-    size: Option<[u32; 2]>,
-    /// Folder for captures; the current one when absent.
-    #[arg(long, value_name = "FOLDER")]
-    captures: Option<PathBuf>,
 }
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight view scene.glb
+  bouncelight view interior --method neural --size 1280x800
+  bouncelight view scene.glb --watch --captures shots";
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
     if args.watch {

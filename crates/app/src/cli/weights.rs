@@ -22,69 +22,102 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    /// Layers with shapes, FLOPs, bytes and places in memory, for a picture of a given size.
+    /// List layers with shapes, FLOPs, bytes and places in memory, for a picture size.
+    #[command(next_help_heading = "Options", after_help = INFO)]
     Info {
-        /// A weights file, or `filter`, which is shipped.
+        /// A weights file, or the shipped `filter`.
+        #[arg(help_heading = None)]
         file: PathBuf,
-        /// Width and height of the picture in pixels.
+        /// Picture size, pixels.
         #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true,
             value_name = "WxH")]
         size: [u32; 2],
     },
-    /// Check everything a reader can check; says `ok` or lists every fault.
+    /// Check all that a reader can check; print `ok` or every fault.
+    #[command(after_help = VERIFY)]
     Verify {
-        /// A weights file, or `filter`, which is shipped.
+        /// A weights file, or the shipped `filter`.
+        #[arg(help_heading = None)]
         file: PathBuf,
     },
-    /// Time the ways in which each convolution can run on this device, and remember the fastest for
-    /// later runs.
+    /// Time the kernels of each convolution on this device and remember the fastest.
+    #[command(next_help_heading = "Options", after_help = TUNE)]
     Tune {
+        /// A weights file, or the shipped `filter`.
+        #[arg(help_heading = None)]
         file: PathBuf,
-        /// Width and height of the picture in pixels.
+        /// Picture size, pixels.
         #[arg(long, default_value = "1024x512", value_parser = parse_size, allow_hyphen_values = true,
             value_name = "WxH")]
         size: [u32; 2],
-        /// Where to remember it; by default the user's cache folder, or $BOUNCELIGHT_TUNED.
-        #[arg(long, value_name = "F")]
+        /// File to remember them in [default: $BOUNCELIGHT_TUNED, else in the user's cache folder].
+        #[arg(long, value_name = "FILE")]
         cache: Option<PathBuf>,
-        /// Also what is known already.
+        /// Time again what is known already.
         #[arg(long)]
         again: bool,
     },
-    /// Make a weights file from a published generator's PyTorch state dict, saved as safetensors.
+    /// Make a weights file from a published generator's PyTorch state (safetensors).
+    #[command(after_help = CONVERT)]
     Convert(ConvertArgs),
 }
 
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Options")]
 struct ConvertArgs {
-    /// The state dict.
+    /// The state, safetensors.
+    #[arg(help_heading = None)]
     input: PathBuf,
-    /// Whose generator it is.
+    /// Generator: Pix2Pix, or Deep Illumination (Thomas and Forbes 2018).
     #[arg(long, value_enum)]
     arch: ArchName,
-    /// Normalisation that it was trained with. `instance` for a batch norm network is how it runs
-    /// in training mode.
+    /// Normalisation in training; `instance` for a batch-norm network run in training mode.
     #[arg(long, value_enum)]
     norm: NormName,
-    /// How weights of convolutions are stored.
+    /// Storage of convolution weights.
     #[arg(long, value_enum, default_value = "f32")]
     dtype: DtypeName,
-    /// Name in words; by default the file's own.
+    /// Name of the network [default: the file's].
     #[arg(long)]
     name: Option<String>,
     /// Licence of the numbers, an SPDX expression.
-    #[arg(long, default_value = "LicenseRef-unknown")]
+    #[arg(long, default_value = "LicenseRef-unknown", value_name = "SPDX")]
     licence: String,
     /// Weights file to write.
-    #[arg(short, long)]
+    #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
 }
 
+/// Examples at the end of the help, a text a command.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight weights info filter
+  bouncelight weights verify net.safetensors
+  bouncelight weights convert in.safetensors --arch pix2pix --norm group -o net.safetensors";
+const INFO: &str = "\
+Examples:
+  bouncelight weights info filter
+  bouncelight weights info filter --size 1920x1080
+  bouncelight weights info net.safetensors";
+const VERIFY: &str = "\
+Examples:
+  bouncelight weights verify filter
+  bouncelight weights verify net.safetensors
+  bouncelight weights verify net.safetensors --quiet";
+const TUNE: &str = "\
+Examples:
+  bouncelight weights tune filter
+  bouncelight weights tune filter --size 1920x1080 --precision f32
+  bouncelight weights tune filter --again --cache tuned.json";
+const CONVERT: &str = "\
+Examples:
+  bouncelight weights convert in.safetensors --arch pix2pix --norm group -o net.safetensors
+  bouncelight weights convert in.safetensors --arch pix2pix --norm instance -o net.safetensors
+  bouncelight weights convert in.safetensors --arch deep-illumination --norm batch -o di.safetensors";
+
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum ArchName {
-    /// Global Illumination using Pix2Pix GAN.
     Pix2pix,
-    /// Deep Illumination (Thomas and Forbes 2018).
     DeepIllumination,
 }
 

@@ -106,7 +106,7 @@ impl View {
             "specular light, direct and reflected",
             "roughness, 0 black to 1 white",
             "display difference of both sides, bright at a quarter",
-            "what the network is given, lowest to highest",
+            "inputs of the network, lowest to highest",
             "emitted radiance",
             "channels of a layer of the network",
             "edges of all triangles over the picture",

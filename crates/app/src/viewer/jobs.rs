@@ -315,7 +315,7 @@ pub fn capture(gpu: &bouncelight::gpu::Gpu, shot: &Shot, progress: &Progress) ->
         let mut scene =
             SceneGpu::with_textures(&gpu.device, &gpu.queue, &shot.scene, shot.textures).map_err(|e| e.to_string())?;
         if method.needs_rays() {
-            progress.stage("building trees for rays");
+            progress.stage("building BVHs");
             // Where they cannot be had, the method below draws, and the file says so.
             let _ = scene.trace(&gpu.device, &gpu.queue, &shot.scene);
         }

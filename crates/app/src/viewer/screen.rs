@@ -117,7 +117,7 @@ impl Screen {
                 self.surface = surface;
                 self.surface.configure(device, &self.config);
             }
-            Err(e) => tracing::warn!("the window's surface cannot be made anew: {e}"),
+            Err(e) => tracing::warn!("the window's surface cannot be recreated: {e}"),
         }
     }
 

@@ -15,7 +15,11 @@ fn usage_errors_exit_with_2() {
     let out = path(&dir, "x.png");
     fails(&["render", "interior", "-o", &out, "--size", "0x0"], 2, &["--size", "at least 1"]);
     fails(&["render", "interior", "-o", &out, "--size", "12"], 2, &["1024x512"]);
-    fails(&["render", "interior", "-o", &out, "--size", "-1x5"], 2, &["--size", "-1x5", "`-1` is no number of pixels"]);
+    fails(
+        &["render", "interior", "-o", &out, "--size", "-1x5"],
+        2,
+        &["--size", "-1x5", "`-1` is not a number of pixels"],
+    );
     fails(&["render", "interior", "-o", &out, "--eye", "1,2,3"], 2, &["--look-at"]);
     fails(&["render", "interior", "-o", &out, "--eye", "1,2,3", "--look-at", "1,2,3"], 2, &["same point"]);
     fails(&["render", "interior", "-o", &out, "--camera", "99"], 2, &["--camera 99"]);
@@ -35,9 +39,9 @@ fn usage_errors_exit_with_2() {
         fails(&["render", "interior", "-o", &out, "--method", method], 2, &[method, "replaced by `gather`"]);
         fails(&["bench", "interior", "--method", method], 2, &[method, "replaced by `gather`"]);
     }
-    let lessons = ["dataset", "--spp", "2", "--moments", "1", "--out", &path(&dir, "d"), "--rooms"];
-    fails(&[&lessons[..], &["5-47"]].concat(), 2, &["judging", "47"]);
-    fails(&[&lessons[..], &["5", "--shard", "4/4"]].concat(), 2, &["4/4", "n-1"]);
+    let samples = ["dataset", "--spp", "2", "--moments", "1", "--out", &path(&dir, "d"), "--rooms"];
+    fails(&[&samples[..], &["5-47"]].concat(), 2, &["judging", "47"]);
+    fails(&[&samples[..], &["5", "--shard", "4/4"]].concat(), 2, &["4/4", "n-1"]);
     fails(&["dataset", "--rooms", "5", "--spp", "2", "--out", &path(&dir, "d")], 2, &["--moments"]);
     assert!(is_empty(dir.path()), "a usage error leaves nothing behind");
 }
@@ -422,15 +426,15 @@ fn what_has_left_is_named() {
     let dir = tempfile::tempdir().unwrap();
     let out = path(&dir, "out.png");
     for command in [&["weights", "verify", "small"][..], &["render", "cornell", "-o", &out, "--weights", "small"]] {
-        fails(command, 4, &["`small` has left", "`filter`"]);
+        fails(command, 4, &["`small` was removed", "`filter`"]);
     }
     let bad = |name: &str| {
         format!("{}/weights-format/fixtures/bad/{name}.safetensors", concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
     };
     for (name, words) in [
-        ("operator_left", &["`n`", "`pixel_shuffle` has left"]),
-        ("meaning_left", &["`gain_and_rest_on_guess` has left", "`neural`"]),
-        ("table_left", &["`screen` has left", "`neural`"]),
+        ("operator_left", &["`n`", "`pixel_shuffle` was removed"]),
+        ("meaning_left", &["`gain_and_rest_on_guess` was removed", "`neural`"]),
+        ("table_left", &["`screen` was removed", "`neural`"]),
     ] {
         fails(&["weights", "verify", &bad(name)], 4, words);
         fails(&["render", "cornell", "-o", &out, "--weights", &bad(name)], 4, words);
@@ -458,7 +462,7 @@ fn renamed_options_are_named() {
 #[test]
 #[cfg(unix)]
 fn what_never_ends_is_not_read_and_a_reason_is_said_once() {
-    fails(&["compare", "/dev/zero", "/dev/zero"], 1, &["/dev/zero", "no regular file"]);
+    fails(&["compare", "/dev/zero", "/dev/zero"], 1, &["/dev/zero", "not a regular file"]);
     let out = bouncelight(&["compare", "no-such.png", "no-such.png"]);
     let said = String::from_utf8_lossy(&out.stderr);
     assert_eq!(said.matches("os error 2").count(), 1, "{said}");

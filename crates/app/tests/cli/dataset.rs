@@ -1,4 +1,4 @@
-//! `dataset` as a user meets it: shards, checksums, what a lesson's file holds.
+//! `dataset` as a user meets it: shards, checksums, what a sample's file holds.
 
 use crate::common;
 use crate::program::bouncelight;
@@ -19,13 +19,13 @@ fn a_dataset_is_made_in_shards_with_its_light_and_checksums() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let out = dir.path().join("lessons");
+    let out = dir.path().join("samples");
     let make = |shard: &str| make(&out, &["--recipe", "paper-room-varied", "--rooms", "7-8", "--shard", shard]);
-    assert!(make("0/2").contains("1 lessons, 0.0 MB"));
+    assert!(make("0/2").contains("1 samples, 0.0 MB"));
     assert!(!out.join("varied0007.glb").exists(), "not asked for");
     let first = std::fs::read(out.join("varied0007_view0.safetensors")).unwrap();
     assert!(!out.join("varied0008_view0.safetensors").exists(), "that is the other shard's");
-    // What a kill leaves: a lesson without its line in the list, another not begun.
+    // What a kill leaves: a sample without its line in the list, another not begun.
     std::fs::remove_file(out.join("SHA256SUMS")).unwrap();
     make("0/2");
     make("1/2");
@@ -75,7 +75,7 @@ fn views_of_a_scene_are_chosen_and_written_down() {
 }
 
 #[test]
-fn lessons_show_light_that_has_changed_and_end_with_the_scene() {
+fn samples_show_light_that_has_changed_and_end_with_the_scene() {
     if common::gpu().is_none() {
         return;
     }

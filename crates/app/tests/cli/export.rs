@@ -300,7 +300,7 @@ fn a_folder_is_written_whole_or_not_at_all() {
         assert!(export(&["--target", target]).status.success());
         let text = std::fs::read_to_string(dir.path().join("out/bouncelight.json")).expect("a manifest");
         let m: Manifest = serde_json::from_str(&text).expect("it is a manifest");
-        assert_eq!((m.schema, m.target.as_str(), m.size), (1, target, [64, 48]));
+        assert_eq!((m.schema, m.target.as_str(), m.size), (2, target, [64, 48]));
         for shader in &m.shaders {
             assert!(dir.path().join("out").join(&shader.file).is_file(), "{}", shader.file);
         }

@@ -61,7 +61,7 @@ fn what_was_found_is_kept_and_obeyed_until_the_scene_changes() {
     assert_eq!(drawn(&["--environment", "1"], 0, &["`ambient`, as fitted"]), "ambient");
     assert_eq!(drawn(&["--environment", "1", "--method", "direct"], 0, &[]), "direct");
     assert_eq!(drawn(&["--environment", "1", "--gi", "none", "--accumulate", "1"], 0, &[]), "gather");
-    assert_eq!(drawn(&["--environment", "2", "--accumulate", "1"], 0, &["not obeyed", "fit` again"]), "gather");
+    assert_eq!(drawn(&["--environment", "2", "--accumulate", "1"], 0, &["is ignored", "fit` again"]), "gather");
     let bench = run(&["bench", "open.glb", "--frames", "1", "--warmup", "0"]);
     let text = ends(&bench, 0, &["ambient"]);
     assert!(!text.contains("gather"), "{text}");
@@ -72,7 +72,7 @@ fn what_cannot_be_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let run = |args: &[&str]| bouncelight(folder.path(), args);
     for (target, told) in
-        [("light", "METRIC=BOUND"), ("light=0", "above 0"), ("magic=1", "no metric"), ("light=2", "share")]
+        [("light", "METRIC=BOUND"), ("light=0", "above 0"), ("magic=1", "not a metric"), ("light=2", "share")]
     {
         ends(&run(&["fit", "cornell", "--target", target]), 2, &[told]);
     }
@@ -92,7 +92,7 @@ fn what_cannot_be_is_told() {
     assert!(!folder.path().join("a.png").exists());
 }
 
-/// Learning on the device has left; whoever asks for it hears where it went.
+/// Learning on the device was removed; whoever asks for it hears where it went.
 #[test]
 fn learning_has_left_and_says_so() {
     let folder = tempfile::tempdir().unwrap();

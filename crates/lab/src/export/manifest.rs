@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Version of the manifest's form.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 
 /// The whole of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -171,8 +171,10 @@ pub struct Frame {
     pub writes: Vec<Write>,
     /// Indices into `dispatches`.
     pub dispatches: Vec<usize>,
-    /// By how much the host's `round` grows with the frame.
-    pub rounds: u32,
+    /// Updates of the radiance cache in the frame, by which the host's `cache_iteration` grows;
+    /// `rounds` in schema 1.
+    #[serde(alias = "rounds")]
+    pub cache_updates: u32,
 }
 
 /// A struct to write.
@@ -193,7 +195,7 @@ pub struct Write {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Value {
-    /// A number of the host's: `frame`, `round`, `round + 1` …, or `camera.` and a name of
+    /// A number of the host's: `frame`, `cache_iteration`, `cache_iteration + 1` … (`round` in schema 1), or `camera.` and a name of
     /// `docs/guide/embedding.md`.
     Host(String),
     /// A constant.
@@ -210,4 +212,17 @@ pub struct Steady {
     pub from: usize,
     /// After how many frames.
     pub period: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Frame;
+
+    #[test]
+    fn frames_of_schema_1_are_read() {
+        let frame =
+            |key: &str| serde_json::from_str::<Frame>(&format!(r#"{{ "writes": [], "dispatches": [], "{key}": 4 }}"#));
+        assert_eq!(frame("rounds").unwrap(), frame("cache_updates").unwrap());
+        assert!(frame("laps").is_err(), "negative control");
+    }
 }

@@ -72,7 +72,7 @@ pub enum ExportError {
     #[error(transparent)]
     Accel(#[from] AccelError),
     /// Another method would draw in this one's place.
-    #[error("method `{method}` cannot be had: {why}")]
+    #[error("method `{method}` is not available: {why}")]
     Fallback {
         /// What was asked for.
         method: &'static str,
@@ -91,7 +91,7 @@ pub enum ExportError {
         message: String,
     },
     /// The recording has a gap: a mistake in this program.
-    #[error("pass `{pass}` cannot be written down: {reason}")]
+    #[error("pass `{pass}` cannot be exported: {reason}")]
     Recording {
         /// The pass's label.
         pass: String,

@@ -148,8 +148,8 @@ impl Packing<'_> {
                 self.dispatches.len() - 1
             }));
         }
-        let (writes, rounds) = self.writes(k, &written)?;
-        Ok(Frame { writes, dispatches: run, rounds })
+        let (writes, cache_updates) = self.writes(k, &written)?;
+        Ok(Frame { writes, dispatches: run, cache_updates })
     }
 
     /// The number of a dispatch's shader.
@@ -219,21 +219,21 @@ impl Packing<'_> {
         Bound { resource: self.textures[place].name.clone(), offset: None, bytes: None }
     }
 
-    /// What the host writes in frame `k`, and how many rounds it counts.
+    /// What the host writes in frame `k`, and how many cache updates it has.
     fn writes(&self, k: u32, written: &BTreeMap<&'static str, Vec<Vec<u8>>>) -> Result<(Vec<Write>, u32), ExportError> {
         let mut writes = Vec::new();
         let number = |bytes: &[u8], layout: &Struct, name: &str| {
             let at = layout.members.iter().find(|m| m.name == name).map_or(0, |m| m.offset as usize);
             u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
         };
-        let mut rounds = 0;
+        let mut cache_updates = 0;
         for (name, changing) in HOST {
             let (Some(slots), Some(layout)) = (written.get(name), self.uniforms.get(name)) else { continue };
-            let round = |bytes: &Vec<u8>| number(bytes, layout, "cache_iteration");
+            let iteration = |bytes: &Vec<u8>| number(bytes, layout, "cache_iteration");
             let (first, last) =
-                (slots.iter().map(round).min().unwrap_or(0), slots.iter().map(round).max().unwrap_or(0));
+                (slots.iter().map(iteration).min().unwrap_or(0), slots.iter().map(iteration).max().unwrap_or(0));
             if name == "Gather" {
-                rounds = last - first + 1;
+                cache_updates = last - first + 1;
             }
             for (slot, bytes) in slots.iter().enumerate() {
                 let mut values = BTreeMap::new();
@@ -245,8 +245,8 @@ impl Packing<'_> {
                         }
                         "frame" => Value::Host("frame".to_owned()),
                         name @ ("cache_iteration" | "last_iteration") => match number(bytes, layout, name) - first {
-                            0 => Value::Host("round".to_owned()),
-                            more => Value::Host(format!("round + {more}")),
+                            0 => Value::Host("cache_iteration".to_owned()),
+                            more => Value::Host(format!("cache_iteration + {more}")),
                         },
                         other if changing.contains(&other) => Value::Host(format!("camera.{other}")),
                         _ => value(&bytes[member.offset as usize..], &member.kind),
@@ -257,7 +257,7 @@ impl Packing<'_> {
                 writes.push(Write { buffer, offset, kind: name.to_owned(), values });
             }
         }
-        Ok((writes, rounds))
+        Ok((writes, cache_updates))
     }
 
     /// Buffers of what the host writes.
@@ -400,7 +400,7 @@ pub fn check_folder(folder: &Path) -> Result<(), ExportError> {
     if !folder.exists() {
         return if folder.file_name().is_some() { Ok(()) } else { wrong("it has no name") };
     }
-    let Ok(entries) = std::fs::read_dir(folder) else { return wrong("it is no folder that can be read") };
+    let Ok(entries) = std::fs::read_dir(folder) else { return wrong("it is not a readable folder") };
     // Whatever else is in it would go with the export that is replaced.
     let ours = |name: &std::ffi::OsStr| [MANIFEST, "shaders", "data"].iter().any(|own| name == *own);
     let names: Vec<_> = entries.flatten().map(|e| e.file_name()).collect();

@@ -1,4 +1,4 @@
-//! A lamp or a thing on its way to where a scene has it: what lessons of a filter show of light that
+//! A lamp or a thing on its way to where a scene has it: what samples of a filter show of light that
 //! changes.
 
 use super::error::DatasetError;

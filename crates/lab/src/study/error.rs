@@ -4,7 +4,7 @@ use bouncelight::gpu::readback;
 use bouncelight::render::RenderError;
 use thiserror::Error;
 
-/// Why a lesson could not be made.
+/// Why a sample could not be made.
 #[derive(Debug, Error)]
 pub enum DatasetError {
     /// The frame could not be drawn.
@@ -20,7 +20,7 @@ pub enum DatasetError {
     #[error(transparent)]
     Gi(#[from] bouncelight::gi::GiError),
     /// Serialisation failed.
-    #[error("cannot serialise the lesson: {0}")]
+    #[error("cannot serialise the sample: {0}")]
     Serialize(String),
 }
 

@@ -98,7 +98,7 @@ pub enum FittedError {
         source: std::io::Error,
     },
     /// Its content is wrong.
-    #[error("{}: {problem}; mend it, or delete it and run `bouncelight fit` again", path.display())]
+    #[error("{}: {problem}; repair it, or delete it and run `bouncelight fit` again", path.display())]
     Broken {
         /// The file.
         path: PathBuf,
@@ -161,7 +161,7 @@ impl Fitted {
     /// As [`Fitted::method`], but for weights that have changed.
     pub fn stale(&self, scene: &str) -> Result<Option<String>, FittedError> {
         if scene != self.scene {
-            return Ok(Some("the scene or its light is not what `fit` saw; run `bouncelight fit` again".into()));
+            return Ok(Some("the scene or its light has changed; run `bouncelight fit` again".into()));
         }
         match self.method() {
             Ok(_) => Ok(None),
@@ -186,7 +186,7 @@ impl Fitted {
             return Err(format!("schema {} is not known; this program writes {SCHEMA}", self.schema));
         }
         if self.method == MethodName::Reference {
-            return Err("method `reference` is no real-time method".into());
+            return Err("method `reference` is not a real-time method".into());
         }
         if let Some(text) = &self.gather {
             if self.method != MethodName::Gather {

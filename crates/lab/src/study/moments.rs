@@ -89,7 +89,7 @@ pub struct Moment {
 
 /// One view.
 #[derive(Debug, Clone)]
-pub struct Lesson {
+pub struct Sample {
     /// Width and height in cells.
     pub cells: [u32; 2],
     /// In the order in which they were asked for.
@@ -112,14 +112,14 @@ pub struct Lesson {
 ///
 /// # Errors
 /// What drawing and reading back report; `None` where `go_on` said no.
-pub fn lesson(
+pub fn sample(
     gpu: &Gpu,
     (renderer, teacher, reader): (&mut Renderer, &mut Renderer, &mut Reader),
     (scene, raster): (&Scene, &mut SceneGpu),
     camera: &Camera,
     (moments, frames, seed): (&[When], u32, u32),
     mut go_on: impl FnMut() -> bool,
-) -> Result<Option<Lesson>, DatasetError> {
+) -> Result<Option<Sample>, DatasetError> {
     let size = renderer.size();
     let mut read = Vec::new();
     renderer.reset_history();
@@ -179,7 +179,7 @@ pub fn lesson(
     let place = Mat4::from_cols_array_2d(&camera.transform);
     let (eye, ahead) = (place.w_axis.truncate(), -place.z_axis.truncate().normalize_or(Vec3::Z));
     let foot = 2.0 * (0.5 * camera.yfov).tan() * CELL as f32 / size[1] as f32;
-    Ok(Some(Lesson {
+    Ok(Some(Sample {
         cells,
         moments: read,
         view: [foot, eye.x, eye.y, eye.z, ahead.x, ahead.y, ahead.z],
@@ -309,8 +309,8 @@ impl When {
     }
 }
 
-impl Lesson {
-    /// The lesson as a safetensors file, all f32: `features.WHEN` [15, h, w], `past.WHEN` [20, h,
+impl Sample {
+    /// The sample as a safetensors file, all f32: `features.WHEN` [15, h, w], `past.WHEN` [20, h,
     /// w], `shown.WHEN` [12, h, w], `changed.WHEN` [1, h, w], `age.WHEN` (one number) of each moment (WHEN: frames,
     /// `pan`, `lamp` or `thing`); `light` [3, h, w], `noise` (one number), `place` [4, h, w], `view` (seven).
     ///

@@ -201,7 +201,7 @@ impl<'a> Loader<'a> {
                 return Err(format!("{lengths}, POSITION {n}"));
             }
             if let Some(v) = joints.iter().position(|j| j.iter().any(|j| *j != j.clamp(0.0, 65_535.0).trunc())) {
-                return Err(format!("JOINTS_{set} of vertex {v} is no index"));
+                return Err(format!("JOINTS_{set} of vertex {v} is not an index"));
             }
             if let Some(v) = weights.iter().position(|w| w.iter().any(|w| !w.is_finite() || *w < 0.0)) {
                 return Err(format!("WEIGHTS_{set} of vertex {v} is negative or not a finite number"));
@@ -354,7 +354,7 @@ impl<'a> Loader<'a> {
         let skin = self.document.as_json().skins.get(index).ok_or(format!("skins[{index}] does not exist"))?;
         let joint = |(k, j): (usize, &gltf::json::Index<gltf::json::Node>)| {
             let found = nodes.get(&j.value()).map(|n| n.0);
-            found.ok_or(format!("skins[{index}].joints[{k}] is no node of the scene"))
+            found.ok_or(format!("skins[{index}].joints[{k}] is not a node of the scene"))
         };
         let joints = skin.joints.iter().enumerate().map(joint).collect::<Result<Vec<_>, _>>()?;
         let mut inverse_bind = match skin.inverse_bind_matrices {

@@ -141,7 +141,7 @@ impl Loader<'_> {
         };
         let mean = texture::mean(&self.decode(place, index as usize, kind));
         let [r, g, b, a] = mean;
-        self.warn(place, &format!("its {slot} counts by its mean, {r:.3}, {g:.3}, {b:.3}, {a:.3}"));
+        self.warn(place, &format!("its {slot} is replaced by its mean, {r:.3}, {g:.3}, {b:.3}, {a:.3}"));
         Some(mean)
     }
 }

@@ -112,7 +112,7 @@ impl<'a> Loader<'a> {
         let rising = times.windows(2).all(|w| w[0] <= w[1]);
         let finite = times.iter().chain(&values).all(|v| v.is_finite());
         if times.is_empty() || values.len() != width * interpolation.parts() * times.len() || !rising || !finite {
-            return Err("has keys that do not rise, are no numbers or do not match their values".into());
+            return Err("has keys that do not increase, are not numbers or do not match their values".into());
         }
         Ok(Some(Channel { node, property, interpolation, times, values }))
     }

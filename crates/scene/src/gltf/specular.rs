@@ -25,13 +25,13 @@ impl<'a> Loader<'a> {
         let (mut weight, mut color) = (specular.specular_factor(), specular.specular_color_factor());
         if let Some(info) = specular.specular_texture().filter(|_| weight > 0.0) {
             let mean = texture::mean(&self.decode(place, info.texture().index(), Use::Data));
-            self.warn(place, &format!("its specularTexture counts by its mean, {:.3}", mean[3]));
+            self.warn(place, &format!("its specularTexture is replaced by its mean, {:.3}", mean[3]));
             weight *= mean[3];
         }
         if let Some(info) = specular.specular_color_texture().filter(|_| color != [0.0; 3]) {
             let mean = texture::mean(&self.decode(place, info.texture().index(), Use::Color));
             let [r, g, b, _] = mean;
-            self.warn(place, &format!("its specularColorTexture counts by its mean, {r:.3}, {g:.3}, {b:.3}"));
+            self.warn(place, &format!("its specularColorTexture is replaced by its mean, {r:.3}, {g:.3}, {b:.3}"));
             (0..3).for_each(|c| color[c] *= mean[c]);
         }
         set_reflectance(out, color.map(|c| (plain_f0 * c).min(1.0) * weight));
@@ -84,7 +84,7 @@ impl<'a> Loader<'a> {
             // roughness stays a picture.
             out.metallic = 0.0;
             set_reflectance(out, [0, 1, 2].map(|c| specular[c] * mean[c]));
-            self.warn(place, "its two textures are placed differently, so its specular colour counts by its mean");
+            self.warn(place, "its two textures are placed differently, so its specular colour is replaced by its mean");
         }
     }
 

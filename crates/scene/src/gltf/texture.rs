@@ -102,7 +102,7 @@ impl Loader<'_> {
                 image
             }
             Err(problem) => {
-                self.warn(&place, &format!("{problem}; a checker stands in for it"));
+                self.warn(&place, &format!("{problem}; a checkerboard replaces it"));
                 texture::stand_in(&label, usage)
             }
         }

@@ -138,7 +138,7 @@ fn cameras(root: &mut Root, tell: &mut impl FnMut(String, &str)) {
                 extensions: None,
                 extras: Default::default(),
             });
-            tell(format!("cameras[{i}]"), "has no lens that is known and is left out");
+            tell(format!("cameras[{i}]"), "has an unknown projection and is left out");
             lost.insert(i);
         }
     }

@@ -79,7 +79,7 @@ pub(crate) fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
     // Asked before it is opened: opening a pipe waits for a writer.
     let about = std::fs::metadata(path)?;
     if !about.is_file() {
-        return Err(refused("is no regular file but a folder, device or pipe".to_owned()));
+        return Err(refused("is a folder, device or pipe, not a regular file".to_owned()));
     }
     if about.len() > MAX_BYTES {
         return Err(refused(format!("has {} bytes; at most {MAX_BYTES} are read", about.len())));

@@ -94,7 +94,7 @@ impl<'a> Textures<'a> {
                 image
             }
             Err(problem) => {
-                warn(format!("{problem}; a checker stands in for it"));
+                warn(format!("{problem}; a checkerboard replaces it"));
                 texture::stand_in(&name, usage)
             }
         };

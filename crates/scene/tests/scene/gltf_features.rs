@@ -179,7 +179,7 @@ fn materials() {
     );
     // The glow of a file without lights is lit by a light.
     assert!(matches!(scene.lights[0].kind, LightKind::Spot { .. }));
-    assert!(scene.warnings.iter().any(|w| w.contains("glowing")), "{:?}", scene.warnings);
+    assert!(scene.warnings.iter().any(|w| w.contains("emissive")), "{:?}", scene.warnings);
 
     glb.json["materials"] = json!([{"alphaMode": "BLEND", "extensions": {"KHR_materials_unlit": {}}}]);
     let m = &load(&glb).materials[0];

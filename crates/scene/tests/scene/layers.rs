@@ -137,5 +137,5 @@ fn bad_layers_are_mended_and_told() {
     let painted = json!({"transmissionFactor": 1.0, "transmissionTexture": {"index": 0}});
     let (m, warnings) = read(through(painted), &[half]);
     close(shares(&m)[2], 0.96 * 127.0 / 255.0);
-    assert!(warnings.contains("counts by its mean"), "{warnings}");
+    assert!(warnings.contains("is replaced by its mean"), "{warnings}");
 }

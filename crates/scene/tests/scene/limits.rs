@@ -96,13 +96,13 @@ fn devices_and_pipes_are_not_read() {
         let path = put(folder.path(), "a.glb", &triangle(None, name));
         let scene = load(&path, true).expect("loads");
         assert!(
-            scene.warnings.iter().any(|w| w.contains(name) && w.contains("no regular file")),
+            scene.warnings.iter().any(|w| w.contains(name) && w.contains("not a regular file")),
             "{:?}",
             scene.warnings
         );
         let path = put(folder.path(), "b.glb", &triangle(Some(name), "x.png"));
         let message = load(&path, true).expect_err("no geometry").to_string();
-        assert!(message.contains("no regular file"), "{message}");
+        assert!(message.contains("not a regular file"), "{message}");
     }
     // The scene itself, and the surroundings.
     for name in ["pipe.glb", "pipe.gltf", "pipe.obj"] {
@@ -113,7 +113,7 @@ fn devices_and_pipes_are_not_read() {
         std::fs::rename(&path, folder.path().join("pipe.png")).expect("renames");
     }
     let message = bouncelight_scene::sky::load(&pipe).expect_err("a pipe").to_string();
-    assert!(message.contains("pipe.png") && message.contains("no regular file"), "{message}");
+    assert!(message.contains("pipe.png") && message.contains("not a regular file"), "{message}");
 }
 
 #[test]

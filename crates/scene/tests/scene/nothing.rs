@@ -73,7 +73,7 @@ fn a_faint_glow_is_no_light() {
         assert_eq!(sun(&scene), !own, "{radiance}");
         assert_eq!(scene.default_light, !own);
         assert_eq!(scene.lights.iter().any(|l| l.is_emissive_proxy), own, "{radiance}: {:?}", scene.lights);
-        assert_eq!((told(&scene, "faint glow"), told(&scene, "stand in")), (!own, own), "{:?}", scene.warnings);
+        assert_eq!((told(&scene, "faint glow"), told(&scene, "emissive proxies")), (!own, own), "{:?}", scene.warnings);
     }
     // The same in another unit of length.
     let mut glb = Glb::triangle();

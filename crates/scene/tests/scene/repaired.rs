@@ -74,7 +74,7 @@ fn words_that_no_picture_needs() {
         g.json["samplers"] = json!([{"wrapS": 10496, "magFilter": 1, "minFilter": 2}])
     });
     same("target", &["bufferViews[0].target"], &|g| g.json["bufferViews"][0]["target"] = json!(7));
-    same("camera", &["cameras[0]", "lens"], &|g| {
+    same("camera", &["cameras[0]", "projection"], &|g| {
         g.json["cameras"] = json!([{"type": "fisheye"}]);
         g.json["nodes"][0]["camera"] = json!(0);
     });

@@ -76,14 +76,14 @@ fn specular_textures_count_by_their_mean() {
     let scene = loaded(json!({"extensions": extension}), &[half.clone()]);
     close(f0(&scene.materials[0]), [0.02; 3]);
     let told = |s: &Scene, word: &str| s.warnings.iter().filter(|w| w.contains(word)).count();
-    assert_eq!(told(&scene, "specularTexture counts by its mean, 0.502"), 1, "{:?}", scene.warnings);
+    assert_eq!(told(&scene, "specularTexture is replaced by its mean, 0.502"), 1, "{:?}", scene.warnings);
     assert!(scene.images.is_empty(), "the texture itself is not kept");
     half = png([188, 0, 255, 255], 4, 4);
     let extension = json!({"KHR_materials_specular": {"specularColorTexture": {"index": 0}}});
     let scene = loaded(json!({"extensions": extension}), &[half]);
     // 188 is one half in sRGB.
     close(f0(&scene.materials[0]), [0.02, 0.0, 0.04]);
-    assert_eq!(told(&scene, "specularColorTexture counts by its mean"), 1, "{:?}", scene.warnings);
+    assert_eq!(told(&scene, "specularColorTexture is replaced by its mean"), 1, "{:?}", scene.warnings);
 }
 
 #[test]

@@ -32,67 +32,73 @@ const JUDGED_FROM: u32 = 2200;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// What is drawn.
-    #[arg(long, value_enum, default_value = "paper-room")]
+    /// Scenes: the paper's rooms, varied ones, homes (flats and streets made by code), or one scene.
+    #[arg(long, value_enum, default_value = "paper-room", help_heading = SCENES)]
     recipe: Recipe,
-    /// Indices of rooms, such as 6-9,13 (recipes paper-room, paper-room-varied and home).
+    /// Indices of rooms or homes, such as 6-9,13.
     #[arg(long, value_parser = parse_rooms, required_if_eq_any([("recipe", "paper-room"),
-        ("recipe", "paper-room-varied"), ("recipe", "home")]))]
+        ("recipe", "paper-room-varied"), ("recipe", "home")]), value_name = "LIST", help_heading = SCENES)]
     rooms: Option<Rooms>,
-    /// A scene file or bundled scene (recipe scene).
-    #[arg(long, required_if_eq("recipe", "scene"))]
+    /// Scene file or bundled scene, for recipe scene.
+    #[arg(long, required_if_eq("recipe", "scene"), help_heading = SCENES)]
     scene: Option<String>,
     #[command(flatten)]
     lit: Lit,
-    /// Views of each room (directions into which the full turn is cut; of a home, its cameras) or
-    /// of the scene (drawn around its own camera).
-    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    /// Views, 1 to 10000: directions in a room, cameras of a home (3), or around the scene's camera.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000), value_name = "N",
+        help_heading = SCENES)]
     views: u32,
     /// Seed of the views of recipe scene.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_name = "N", help_heading = SCENES)]
     seed: u64,
-    /// Width and height of the rasterised picture; lessons have a quarter of it.
-    #[arg(long, default_value = "1024x512", value_parser = super::args::parse_size, value_name = "WxH")]
-    size: [u32; 2],
-    /// Rays a cell of the light to be learnt, which are of another seed.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=65_536), value_name = "N")]
-    spp: u32,
-    /// Only every n-th room (or view of a scene), beginning with the i-th: 0/4, 1/4 … for four
-    /// machines that share the work.
-    #[arg(long, default_value = "0/1", value_parser = parse_shard, value_name = "I/N")]
-    shard: [u32; 2],
-    /// Folder for the lessons; those that exist are kept, so a stopped run goes on where it was.
-    #[arg(long)]
-    out: PathBuf,
-    /// Moments at which what cells remember is kept, in order: frames after a cut, `pan` (at the end
-    /// of six frames of a moving camera, which count), `lamp` or `thing` (eight frames with a lamp or
-    /// a thing elsewhere and six in which it comes to its place; left out where a view has none),
-    /// such as 1,2,8,pan,20,lamp,thing.
-    #[arg(long, required = true, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST")]
-    moments: Vec<When>,
-    /// Weights of a network that filters, whose light is kept beside what cells remember: what it
-    /// makes of them in the program.
-    #[arg(long, value_name = "FILE")]
-    weights: Option<PathBuf>,
-    /// Also write each room as a `.glb` with a `_views.json` beside it, for targets from Cycles
-    /// (recipes paper-room and paper-room-varied; recipe scene always writes the views, and the
-    /// scene is there).
-    #[arg(long)]
-    export: bool,
     /// Allow rooms that are kept for judging.
-    #[arg(long)]
+    #[arg(long, help_heading = SCENES)]
     judge: bool,
+    /// Picture size, pixels; a sample has a quarter of it, a value per 4x4 cell.
+    #[arg(long, default_value = "1024x512", value_parser = super::args::parse_size, value_name = "WxH",
+        help_heading = SAMPLES)]
+    size: [u32; 2],
+    /// Rays per cell of the target light, 1 to 65536.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=65_536), value_name = "N", help_heading = SAMPLES)]
+    spp: u32,
+    /// When a cell's history is written, in order: frames after a cut, `pan` (moving camera), `lamp` or
+    /// `thing` (after it moved), such as 1,2,8,pan,20,lamp,thing.
+    #[arg(long, required = true, value_delimiter = ',', value_parser = parse_moment, value_name = "LIST",
+        help_heading = SAMPLES)]
+    moments: Vec<When>,
+    /// Weights of a network that filters, whose light is written, too.
+    #[arg(long, value_name = "FILE", help_heading = SAMPLES)]
+    weights: Option<PathBuf>,
+    /// Folder to write; samples that exist are kept, so a stopped run resumes.
+    #[arg(long, value_name = "DIR", help_heading = SAMPLES)]
+    out: PathBuf,
+    /// Only every n-th room or view from the i-th, such as 0/4, 1/4 ... for four machines.
+    #[arg(long, default_value = "0/1", value_parser = parse_shard, value_name = "I/N", help_heading = SAMPLES)]
+    shard: [u32; 2],
+    /// Also write each room as .glb with a _views.json, for targets from Cycles.
+    #[arg(long, help_heading = SAMPLES)]
+    export: bool,
 }
+
+/// Headings of the help.
+const SCENES: &str = "Scenes";
+/// As [`SCENES`].
+const SAMPLES: &str = "Samples";
+
+/// Examples at the end of the help.
+pub const EXAMPLES: &str = "\
+Examples:
+  bouncelight dataset --rooms 2-9 --spp 256 --moments 1,2,8,pan --out data
+  bouncelight dataset --recipe home --rooms 0-99 --spp 256 --moments 1,8 --out data --shard 0/4
+  bouncelight dataset --recipe scene --scene scene.glb --spp 256 --moments 1,8,20 --out data";
 
 #[derive(Debug, Clone, Copy, PartialEq, clap::ValueEnum)]
 enum Recipe {
-    /// The scene stream of the paper's authors.
+    // The scene stream of the paper's authors.
     PaperRoom,
-    /// Rooms of that kind with other lights, skies, roofs, metals, sizes and cameras.
+    // Rooms of that kind with other lights, skies, roofs, metals, sizes and cameras.
     PaperRoomVaried,
-    /// Flats and streets made by code; views are their cameras, three at most.
     Home,
-    /// Views through one scene.
     Scene,
 }
 
@@ -106,7 +112,7 @@ fn parse_rooms(text: &str) -> Result<Rooms, String> {
         let (low, high) = part.split_once('-').unwrap_or((part, part));
         let (low, high) = (number(low)?, number(high)?);
         if low > high || high - low > 10_000 {
-            return Err(format!("{part} is no range of rooms"));
+            return Err(format!("{part} is not a range of rooms"));
         }
         rooms.extend(low..=high);
     }
@@ -134,9 +140,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     if let (Recipe::PaperRoom, Some(Rooms(rooms))) = (args.recipe, &args.rooms) {
         let kept: Vec<_> = rooms.iter().filter(|i| JUDGED.contains(i) || **i >= JUDGED_FROM).collect();
         if !kept.is_empty() && !args.judge {
-            return Err(usage(format!(
-                "rooms {kept:?} are kept for judging; --judge if that is what they are drawn for"
-            )));
+            return Err(usage(format!("rooms {kept:?} are kept for judging; add --judge to use them so")));
         }
     }
     if args.recipe != Recipe::Scene && args.lit.is_given() {
@@ -147,7 +151,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let gpu = global.open_gpu()?;
     if moments::ages(&args.moments).is_none() {
         return Err(usage(
-            "--moments are frames of one run, each later than the one before; a pan takes six, a change fourteen"
+            "--moments must increase: a number is a frame after the cut, `pan` takes 6 frames, `lamp` and `thing` 14"
                 .into(),
         ));
     }
@@ -163,13 +167,13 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 }
 
 /// Says before the work begins what it will take up.
-fn announce(global: &Global, args: &Args, lessons: usize) {
+fn announce(global: &Global, args: &Args, samples: usize) {
     let [w, h] = cells_of(args.size).map(u64::from);
     // The light to be learnt, its place, and each moment; about 1 KB of header.
     let planes = 7 + args.moments.len() as u64 * moments::PLANES;
-    let bytes = lessons as u64 * (w * h * planes * 4 + 1024);
+    let bytes = samples as u64 * (w * h * planes * 4 + 1024);
     if !global.quiet {
-        eprintln!("{lessons} lessons, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
+        eprintln!("{samples} samples, {:.1} MB in all, in {}", bytes as f64 / 1e6, args.out.display());
     }
 }
 

@@ -1,4 +1,4 @@
-//! Draws lessons and writes them, each whole or not at all, beside the list of their checksums.
+//! Draws samples and writes them, each whole or not at all, beside the list of their checksums.
 
 use super::{
     super::{args::load_weights, interrupt},
@@ -18,10 +18,10 @@ use bouncelight_scene::image_io::write_whole;
 use sha2::{Digest, Sha256};
 use std::{collections::HashSet, io::Write, path::PathBuf};
 
-/// File with the SHA-256 of every lesson, as `sha256sum -c` reads it.
+/// File with the SHA-256 of every sample, as `sha256sum -c` reads it.
 const LIST: &str = "SHA256SUMS";
 
-/// Draws lessons and writes them; a file that exists is kept.
+/// Draws samples and writes them; a file that exists is kept.
 pub(super) struct Writer {
     gpu: Gpu,
     renderer: Renderer,
@@ -78,15 +78,15 @@ impl Writer {
         self.out.join(format!("{stem}.safetensors"))
     }
 
-    /// Draws and writes the lesson `stem`; `seed` decides the pan and what changes.
+    /// Draws and writes the sample `stem`; `seed` decides the pan and what changes.
     pub(super) fn write(&mut self, stem: &str, scene: &mut Uploaded<'_>, camera: &Camera, seed: u32) -> Result<()> {
         let shown = (scene.scene, &mut scene.raster);
         let drawn_by = (&mut self.renderer, &mut self.teacher, &mut self.reader);
         let asked = (self.moments.as_slice(), self.spp, seed);
         let go_on = || !interrupt::requested();
-        let lesson = moments::lesson(&self.gpu, drawn_by, shown, camera, asked, go_on)?;
+        let sample = moments::sample(&self.gpu, drawn_by, shown, camera, asked, go_on)?;
         interrupt::check()?;
-        lesson.map_or(Ok(()), |lesson| self.save(stem, lesson.to_bytes()?))
+        sample.map_or(Ok(()), |sample| self.save(stem, sample.to_bytes()?))
     }
 
     fn save(&mut self, stem: &str, bytes: Vec<u8>) -> Result<()> {
@@ -118,7 +118,7 @@ impl Writer {
         Ok(())
     }
 
-    /// Adds a lesson to the list of checksums. One write, so that several shards may share a
+    /// Adds a sample to the list of checksums. One write, so that several shards may share a
     /// folder.
     fn list(&mut self, stem: &str, bytes: &[u8]) -> Result<()> {
         let name = format!("{stem}.safetensors");
@@ -132,7 +132,7 @@ impl Writer {
         Ok(())
     }
 
-    /// Whether the lesson is there; one that a kill left without its checksum gets it now.
+    /// Whether the sample is there; one that a kill left without its checksum gets it now.
     pub(super) fn has(&mut self, stem: &str) -> Result<bool> {
         let path = self.path(stem);
         if !path.exists() {

@@ -90,7 +90,7 @@ impl App {
             return;
         }
         self.rebuilt += 1;
-        self.state.notify(format!("the GPU was lost ({message}); everything was built anew"), false);
+        self.state.notify(format!("the GPU was lost ({message}); everything was rebuilt"), false);
         self.start(Request::Upload);
     }
 }

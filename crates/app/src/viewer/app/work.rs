@@ -57,7 +57,7 @@ impl App {
                     if job.kind == Kind::Rays
                         && let (Some(stage), Some(shown)) = (&mut self.stage, &self.state.shown)
                     {
-                        stage.set_rays(&shown.scene, Err("their trees were cancelled".into()));
+                        stage.set_rays(&shown.scene, Err("building their BVHs was cancelled".into()));
                     }
                     if let Kind::Renderer(side) = job.kind
                         && let Some(key) = self.building[side].take()
@@ -109,7 +109,7 @@ impl App {
         } else {
             let all = ["gltf", "glb", "obj", "hdr", "exr", "safetensors", "json"];
             let dialog = dialog.set_title("Open").add_filter("Scenes", &all[..3]);
-            dialog.add_filter("All that can be opened", &all)
+            dialog.add_filter("All readable files", &all)
         };
         // Some systems want it made here, and all let it be waited for elsewhere.
         let asked = dialog.pick_file();
@@ -184,7 +184,7 @@ impl App {
                 let shown = self.state.shown.as_ref().filter(|_| stamp == self.uploads);
                 let Some(scene) = shown.map(|s| s.scene.clone()) else { return };
                 if let Err(why) = &rays {
-                    self.state.notify(format!("there are no rays into this scene, so `ssgi` draws: {why}"), true);
+                    self.state.notify(format!("this scene cannot be ray-traced, so `ssgi` draws: {why}"), true);
                 }
                 stage.set_rays(&scene, rays.map(|r| *r));
                 self.meter.begin();
@@ -227,7 +227,7 @@ impl App {
     fn obey(&mut self, fitted: Option<Result<Box<Fitted>, String>>) {
         let fitted = match fitted {
             Some(Err(why)) => {
-                self.state.notify(format!("what was fitted is not obeyed: {why}"), true);
+                self.state.notify(format!("the record of `fit` is ignored: {why}"), true);
                 None
             }
             found => found.and_then(Result::ok),

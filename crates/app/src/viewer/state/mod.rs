@@ -126,8 +126,7 @@ pub struct State {
 }
 
 /// Why there are no wireframes.
-pub const NO_LINES: &str =
-    "this device draws no wireframes: it has no lines in the place of triangles (POLYGON_MODE_LINE)";
+pub const NO_LINES: &str = "this device cannot draw wireframes: it lacks the feature POLYGON_MODE_LINE";
 
 /// How an animation plays.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -23,7 +23,7 @@ impl State {
         match (&self.film, &self.path) {
             (Film::Plays { .. }, _) => self.film = Film::Rests,
             (_, Some(_)) => self.film = Film::Plays { since: Instant::now() },
-            (_, None) => self.notify("there is no camera path yet: record one (R) or drop its file", false),
+            (_, None) => self.notify("there is not a camera path yet: record one (R) or drop its file", false),
         }
     }
 

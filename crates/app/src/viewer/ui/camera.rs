@@ -18,7 +18,7 @@ pub(super) fn picture(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
                 state.apply(Action::Exposure(ev));
             }
             let mut auto = state.auto_exposure;
-            let told = "Measured whenever the picture comes to rest after a change of the scene (Shift .)";
+            let told = "Measured when accumulation ends after a change of the scene (Shift .)";
             if ui.checkbox(&mut auto, "Auto").on_hover_text(told).changed() {
                 state.apply(Action::AutoExposure);
             }
@@ -203,7 +203,7 @@ pub(super) fn window(ui: &mut Ui, state: &mut State) {
         state.apply(Action::FullScreen);
     }
     let mut measure = state.measure;
-    let told = "Draw frame after frame, also where nothing changes; the live reference rests meanwhile (B)";
+    let told = "Draw frame after frame, also where nothing changes; the live reference pauses meanwhile (B)";
     if ui.checkbox(&mut measure, "Continuous rendering (benchmark)").on_hover_text(told).changed() {
         state.apply(Action::Measure);
     }

@@ -30,7 +30,12 @@ pub fn lights(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
         let header = egui::CollapsingHeader::new(format!("{i}: {name}")).id_salt(("light", i)).default_open(i == 0);
         let shown = header.show(ui, |ui| {
             if light.is_emissive_proxy {
-                ui.label(RichText::new("stands in for a glowing surface; the reference lets the surface shine").weak());
+                ui.label(
+                    RichText::new(
+                        "an emissive proxy: it replaces an emissive surface for methods that cannot see emission",
+                    )
+                    .weak(),
+                );
             }
             if let Some(edit) = light_grid(ui, i, &LightEdit::of(i, light)) {
                 state.apply(Action::Light(edit));

@@ -19,7 +19,7 @@ pub(super) fn name(state: &State, facts: &Facts<'_>, side: Side) -> String {
     match (asked, facts.reference) {
         (Source::Reference, Some(r)) if r.samples > 0 => format!("{}, {} samples", asked.title(), r.samples),
         (Source::Reference, Some(r)) => format!("{} ({})", asked.title(), r.stage),
-        (Source::Reference, None) => format!("{} (waits until the view rests)", asked.title()),
+        (Source::Reference, None) => format!("{} (waits until the view stops changing)", asked.title()),
         _ => match by.map(|by| (state.title(by.source), &by.why)) {
             Some((title, Some(why))) => format!("{title} ({why})"),
             Some((title, None)) => title,

@@ -150,7 +150,7 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
         source_box(ui, "left", state, Side::Left);
         ui.end_row();
         let mut split = state.settings.split;
-        let told = "Two methods beside each other; drag the line, or [ and ] (X)";
+        let told = "Two methods side by side; drag the line, or [ and ] (X)";
         if ui.checkbox(&mut split, "Split").on_hover_text(told).changed() {
             state.apply(Action::Split);
         }
@@ -262,12 +262,12 @@ fn reference(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
         ui.label("Reference up to");
         let told = "The path tracer stops after so many samples a pixel";
         ui.add(drag(&mut state.settings.spp, 1..=65_536).suffix(" samples")).on_hover_text(told);
-        let told = "Average the noise away, to look at: numbers are taken from the noisy picture";
+        let told = "Denoise for display; metrics use the noisy picture";
         ui.checkbox(&mut state.settings.denoise, "Denoise").on_hover_text(told);
     });
     let r = facts.reference;
     ui.add(egui::ProgressBar::new(r.map_or(0.0, |r| r.share) as f32).desired_height(6.0));
-    let text = r.map_or("waits until the view rests".into(), |r| {
+    let text = r.map_or("waits until the view stops changing".into(), |r| {
         let noise = r.noise.filter(|n| n.is_finite());
         let noise = noise.map_or(String::new(), |n| format!(", noise {:.1} %", 100.0 * n));
         let coarse = if r.texel > 1 { format!(", 1/{} resolution", r.texel) } else { String::new() };

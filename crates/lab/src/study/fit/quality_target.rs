@@ -51,15 +51,17 @@ impl FromStr for QualityTarget {
         let metric = match name {
             "light" => Metric::Light,
             // A second kind of FLIP and the bias add nothing to judge methods by.
-            "hdrflip" | "bias" => return Err(format!("`{name}` is no target; use light, flip, l1, psnr, ssim or mre")),
+            "hdrflip" | "bias" => {
+                return Err(format!("`{name}` cannot be a target; use light, flip, l1, psnr, ssim or mre"));
+            }
             name if metrics::NAMES.iter().any(|(known, _)| *known == name) => Metric::Shown(name.into()),
             name => {
                 let known = metrics::NAMES.map(|(n, _)| n).join(", ");
-                return Err(format!("`{name}` is no metric; there are: light, {known}"));
+                return Err(format!("`{name}` is not a metric; there are: light, {known}"));
             }
         };
         if metric == Metric::Light && target >= 1.0 {
-            return Err(format!("{value}: light that is wholly wrong is no target; write a share, such as light=8%"));
+            return Err(format!("{value}: a share is below 1; write it as light=8%"));
         }
         Ok(Self { metric, target })
     }

@@ -113,7 +113,7 @@ pub(super) fn triangles(data: &[u8], count: usize) -> Result<Vec<u32>, String> {
         return Err("does not begin with 0xe1".to_owned());
     }
     if !count.is_multiple_of(3) {
-        return Err(format!("{count} indices are no whole number of triangles"));
+        return Err(format!("{count} indices do not make whole triangles"));
     }
     let mut stream = Stream { data: &data[1..] };
     let codes = stream.take(count / 3)?;

@@ -42,7 +42,7 @@ def within_reach(cells):
     return np.any([around[y:y + h, x:x + w] for y in range(0, 4 * ATROUS_STRIDE + 1, ATROUS_STRIDE) for x in range(0, 4 * ATROUS_STRIDE + 1, ATROUS_STRIDE)], axis=0)
 
 
-class Lesson:
+class Sample:
     """One moment of one view, as arrays of one picture: `features` [15,h,w], `light`, `x`, `n` [3,h,w], `frames`, `square`, `strictness`,
     `nearness` [h,w]; what is to be learnt, `target` [3,h,w], and where (`mask` [h,w]); `shown` [3,h,w]: what `gather` itself shows."""
 
@@ -80,14 +80,14 @@ def all_of(path):
     try:
         file = load_file(path)
         moments = [name.split(".")[1] for name in file if name.startswith("past.")]
-        return [Lesson(file, when, os.path.basename(path).removesuffix(".safetensors")) for when in moments]
+        return [Sample(file, when, os.path.basename(path).removesuffix(".safetensors")) for when in moments]
     except (OSError, SafetensorError, KeyError) as error:
-        raise TrainingError(f"{path}: not a lesson of a filter: {error}; make it with bouncelight dataset --moments") from error
+        raise TrainingError(f"{path}: not a sample of a filter: {error}; make it with bouncelight dataset --moments") from error
 
 
 def moments_of(path):
     """The moments of a view that teach something: none of pictures without light, or with more noise than light."""
-    return [lesson for lesson in all_of(path) if lesson.mean > 1e-6 and lesson.mask.mean() > 0.2 and lesson.noise < MOST_NOISE]
+    return [sample for sample in all_of(path) if sample.mean > 1e-6 and sample.mask.mean() > 0.2 and sample.noise < MOST_NOISE]
 
 
 def read(folder, every=1):
@@ -96,34 +96,34 @@ def read(folder, every=1):
     if not paths:
         raise TrainingError(f"{folder}: no samples; make them with bouncelight dataset --moments")
     if len(paths) < MANY:
-        return [lesson for path in paths for lesson in moments_of(path)]
+        return [sample for path in paths for sample in moments_of(path)]
     # Forked, which is quick, since nothing of torch has run yet that has threads.
     with concurrent.futures.ProcessPoolExecutor(mp_context=multiprocessing.get_context("fork")) as pool:
-        return [lesson for lessons in pool.map(moments_of, paths, chunksize=4) for lesson in lessons]
+        return [sample for samples in pool.map(moments_of, paths, chunksize=4) for sample in samples]
 
 
-def stacked(lessons, device="cpu"):
+def stacked(samples, device="cpu"):
     """A batch: one tensor of every field; `narrow`: whether all of it is blurred narrowly."""
-    batch = {field: torch.from_numpy(np.stack([getattr(lesson, field) for lesson in lessons])).to(device) for field in FIELDS}
+    batch = {field: torch.from_numpy(np.stack([getattr(sample, field) for sample in samples])).to(device) for field in FIELDS}
     for number in ("mean", "age", "noise", "base"):
-        batch[number] = torch.tensor([getattr(lesson, number) for lesson in lessons], dtype=torch.float32, device=device)
-    return batch | {"narrow": all(is_narrow(lesson) for lesson in lessons)}
+        batch[number] = torch.tensor([getattr(sample, number) for sample in samples], dtype=torch.float32, device=device)
+    return batch | {"narrow": all(is_narrow(sample) for sample in samples)}
 
 
-def is_narrow(lesson):
+def is_narrow(sample):
     """Whether the cells of a moment are blurred narrowly."""
-    return lesson.age > WIDE_BLUR_FRAMES
+    return sample.age > WIDE_BLUR_FRAMES
 
 
 class Pile:
     """Moments of one size of pictures and one breadth of the blur, as tensors."""
 
-    def __init__(self, lessons, device="cpu"):
-        self.lessons, self.fields = lessons, stacked(lessons, device)
+    def __init__(self, samples, device="cpu"):
+        self.samples, self.fields = samples, stacked(samples, device)
         self.based_on = None  # squares of cells over which the losses of `gather` are that it holds
         # Of each the moment that is its next frame by a still camera, -1 where there is none.
-        places = {(lesson.name, lesson.age): i for i, lesson in enumerate(lessons) if lesson.when.isdigit()}
-        self.later = np.array([places.get((lesson.name, lesson.age + 1), -1) if lesson.when.isdigit() else -1 for lesson in lessons])
+        places = {(sample.name, sample.age): i for i, sample in enumerate(samples) if sample.when.isdigit()}
+        self.later = np.array([places.get((sample.name, sample.age + 1), -1) if sample.when.isdigit() else -1 for sample in samples])
 
     def taken(self, which, window=None):
         """The moments of these numbers; `window`: of them rows and columns from a place on, (y, x, side), or what there is."""
@@ -135,7 +135,7 @@ class Pile:
         return batch
 
 
-def piles(lessons, device="cpu"):
-    """All lessons, by size and breadth."""
-    kinds = sorted({(lesson.mask.shape, is_narrow(lesson)) for lesson in lessons})
-    return [Pile([v for v in lessons if (v.mask.shape, is_narrow(v)) == kind], device) for kind in kinds]
+def piles(samples, device="cpu"):
+    """All samples, by size and breadth."""
+    kinds = sorted({(sample.mask.shape, is_narrow(sample)) for sample in samples})
+    return [Pile([v for v in samples if (v.mask.shape, is_narrow(v)) == kind], device) for kind in kinds]
