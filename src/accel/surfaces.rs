@@ -3,7 +3,7 @@
 //! 4k pictures cost the rays nothing.
 
 use super::image::{Reduced, Reductions};
-use crate::scene::{AlphaMode, Material, Mesh, Scene};
+use crate::scene::{AlphaMode, Material, Mesh, Sampler, Scene, TextureRef};
 use glam::{Vec2, Vec3};
 
 /// `Surface` of `shaders/accel/surface.wgsl`, packed: diffuse base colour and roughness,
@@ -120,14 +120,16 @@ pub fn plain(material: &Material) -> Surface {
 }
 
 /// The pictures of a material, made small.
-struct Textures<'a> {
+pub struct Textures<'a> {
     base: Option<&'a Reduced>,
     rough: Option<&'a Reduced>,
-    glow: Option<&'a Reduced>,
+    /// What glows.
+    pub glow: Option<&'a Reduced>,
 }
 
 impl<'a> Textures<'a> {
-    fn new(material: &Material, reductions: &'a Reductions) -> Self {
+    /// Those that there are.
+    pub fn new(material: &Material, reductions: &'a Reductions) -> Self {
         let find = |t, cutoff| Option::and_then(t, |t| reductions.find(&t, cutoff));
         Self {
             base: find(material.base_color_texture, super::image::cutoff(material)),
@@ -136,29 +138,110 @@ impl<'a> Textures<'a> {
         }
     }
 
-    fn is_plain(&self) -> bool {
+    /// Whether there are none.
+    pub fn is_plain(&self) -> bool {
         self.base.is_none() && self.rough.is_none() && self.glow.is_none()
     }
 }
 
-fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 3]) -> Surface {
-    let uv = |set: u8| {
-        let from = if set == 0 { &mesh.uv0 } else { &mesh.uv1 };
-        corners.map(|i| from.get(i).copied().map_or(Vec2::ZERO, Vec2::from))
-    };
-    let use_of = |reduced: Option<&'_ Reduced>, texture: Option<crate::scene::TextureRef>| {
-        let (Some(reduced), Some(texture)) = (reduced, texture) else { return None };
-        let at = uv(texture.uv_set).map(|p| {
+/// A picture on a triangle: the texture coordinates of its corners.
+struct Use<'a> {
+    picture: &'a Reduced,
+    sampler: Sampler,
+    at: [Vec2; 3],
+}
+
+impl<'a> Use<'a> {
+    fn new(picture: Option<&'a Reduced>, texture: Option<TextureRef>, mesh: &Mesh, corners: [usize; 3]) -> Option<Self> {
+        let (picture, texture) = (picture?, texture?);
+        let from = if texture.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
+        let at = corners.map(|i| {
+            let p = from.get(i).copied().map_or(Vec2::ZERO, Vec2::from);
             let [u, v] = texture.transform.map(|r| r[0] * p.x + r[1] * p.y + r[2]);
             Vec2::new(u, v)
         });
-        Some((reduced.clone(), texture.sampler, at))
-    };
-    let base_use = use_of(textures.base, m.base_color_texture);
-    let rough_use = use_of(textures.rough, m.metallic_roughness_texture);
-    let glow_use = use_of(textures.glow, m.emissive_texture);
-    let texels = [&base_use, &rough_use, &glow_use].into_iter().flatten().map(|(r, _, at)| r.texels_in(at));
-    let many = texels.fold(0.0, f32::max) > FEW_TEXELS;
+        Some(Self { picture, sampler: texture.sampler, at })
+    }
+}
+
+/// What its material says of the places of a triangle.
+pub struct Places<'a> {
+    material: &'a Material,
+    base: Option<Use<'a>>,
+    rough: Option<Use<'a>>,
+    glow: Option<Use<'a>>,
+    colors: [[f32; 4]; 3],
+}
+
+/// What is known of a place of a triangle.
+pub struct Place {
+    /// Share of rays that it stops.
+    pub alpha: f32,
+    /// As of a [`Surface`].
+    pub diffuse: Vec3,
+    /// As of a [`Surface`].
+    pub f0: Vec3,
+    /// As of a [`Surface`].
+    pub emission: Vec3,
+    roughness: f32,
+}
+
+impl<'a> Places<'a> {
+    /// Of the triangle with these corners.
+    pub fn new(material: &'a Material, textures: &Textures<'a>, mesh: &Mesh, corners: [usize; 3]) -> Self {
+        Self {
+            material,
+            base: Use::new(textures.base, material.base_color_texture, mesh, corners),
+            rough: Use::new(textures.rough, material.metallic_roughness_texture, mesh, corners),
+            glow: Use::new(textures.glow, material.emissive_texture, mesh, corners),
+            colors: corners.map(|i| mesh.colors.get(i).copied().unwrap_or([1.0; 4])),
+        }
+    }
+
+    /// Texels that the triangle covers of the picture of which it covers most.
+    fn texels(&self) -> f32 {
+        let uses = [&self.base, &self.rough, &self.glow];
+        uses.into_iter().flatten().map(|u| u.picture.texels_in(&u.at)).fold(0.0, f32::max)
+    }
+
+    /// What is at the place with these weights of the corners; of each picture the mean over
+    /// `share` of the triangle around it, 0 for a texel.
+    pub fn at(&self, weights: [f32; 3], share: f32) -> Place {
+        let m = self.material;
+        let read = |u: &Option<Use<'_>>| match u {
+            Some(Use { picture, sampler, at }) => {
+                let level = if share > 0.0 { picture.level_of(share * picture.texels_in(at)) } else { 0 };
+                picture.read(at[0] * weights[0] + at[1] * weights[1] + at[2] * weights[2], sampler, level)
+            }
+            None => [1.0; 4],
+        };
+        let color = |c: usize| (0..3).map(|k| self.colors[k][c] * weights[k]).sum::<f32>();
+        let base = read(&self.base);
+        let rgb = Vec3::from(std::array::from_fn(|c| (base[c] * m.base_color[c] * color(c)).clamp(0.0, 1.0)));
+        let alpha = match m.alpha_mode {
+            AlphaMode::Opaque => 1.0,
+            // The reduced picture's alpha is the share of texels above the cutoff, vertex colours
+            // aside.
+            AlphaMode::Mask { .. } if self.base.is_some() => base[3],
+            AlphaMode::Mask { cutoff } => f32::from(u8::from(m.base_color[3] * color(3) >= cutoff)),
+            AlphaMode::Blend => (base[3] * m.base_color[3] * color(3)).clamp(0.0, 1.0),
+        };
+        let rough = read(&self.rough);
+        let metallic = (m.metallic * rough[2]).clamp(0.0, 1.0);
+        let glow = read(&self.glow);
+        Place {
+            alpha,
+            diffuse: rgb * (1.0 - metallic),
+            f0: (m.f0 * Vec3::from(m.specular_tint)).lerp(rgb, metallic),
+            emission: Vec3::from(m.emission()) * Vec3::new(glow[0], glow[1], glow[2]),
+            roughness: (m.roughness * rough[1]).clamp(0.0, 1.0),
+        }
+    }
+}
+
+fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 3]) -> Surface {
+    let places = Places::new(m, textures, mesh, corners);
+    let many = places.texels() > FEW_TEXELS;
     let lattice = |i: usize| {
         let (a, b) = ((i % LATTICE) as f32 + 0.5, (i / LATTICE) as f32 + 0.5);
         let (u, v) = (a / LATTICE as f32, b / LATTICE as f32);
@@ -166,40 +249,19 @@ fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 
     };
     let count = if many { LATTICE * LATTICE } else { POINTS.len() };
     let point = |i: usize| if many { lattice(i) } else { POINTS[i] };
-    let colors = corners.map(|i| mesh.colors.get(i).copied().unwrap_or([1.0; 4]));
 
     let (mut diffuse, mut f0, mut emission) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
     let (mut roughness, mut coverage, mut weight) = (0.0, 0.0, 0.0);
     for i in 0..count {
         let [v, w] = point(i);
-        let weights = [1.0 - v - w, v, w];
-        let read = |u: &Option<(Reduced, crate::scene::Sampler, [Vec2; 3])>| match u {
-            Some((reduced, sampler, at)) => {
-                reduced.read(at[0] * weights[0] + at[1] * weights[1] + at[2] * weights[2], sampler)
-            }
-            None => [1.0; 4],
-        };
-        let color = |c: usize| (0..3).map(|k| colors[k][c] * weights[k]).sum::<f32>();
-        let base = read(&base_use);
-        let rgb = Vec3::from(std::array::from_fn(|c| (base[c] * m.base_color[c] * color(c)).clamp(0.0, 1.0)));
-        let alpha = match m.alpha_mode {
-            AlphaMode::Opaque => 1.0,
-            // The reduced picture's alpha is the share of texels above the cutoff, vertex colours
-            // aside.
-            AlphaMode::Mask { .. } if base_use.is_some() => base[3],
-            AlphaMode::Mask { cutoff } => f32::from(u8::from(m.base_color[3] * color(3) >= cutoff)),
-            AlphaMode::Blend => (base[3] * m.base_color[3] * color(3)).clamp(0.0, 1.0),
-        };
-        let rough = read(&rough_use);
-        let metallic = (m.metallic * rough[2]).clamp(0.0, 1.0);
-        let glow = read(&glow_use);
-        let counts = alpha.max(1e-3);
+        let place = places.at([1.0 - v - w, v, w], 0.0);
+        let counts = place.alpha.max(1e-3);
         weight += counts;
-        coverage += alpha;
-        diffuse += counts * rgb * (1.0 - metallic);
-        f0 += counts * (m.f0 * Vec3::from(m.specular_tint)).lerp(rgb, metallic);
-        roughness += counts * (m.roughness * rough[1]).clamp(0.0, 1.0);
-        emission += counts * Vec3::from(m.emission()) * Vec3::new(glow[0], glow[1], glow[2]);
+        coverage += place.alpha;
+        diffuse += counts * place.diffuse;
+        f0 += counts * place.f0;
+        roughness += counts * place.roughness;
+        emission += counts * place.emission;
     }
     let flags = (u32::from(m.double_sided) * DOUBLE_SIDED) | (u32::from(m.unlit) * UNLIT);
     let dark = if m.unlit { 0.0 } else { 1.0 / weight };
