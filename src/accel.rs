@@ -62,8 +62,8 @@ pub const TOP_LEVELS: usize = 8;
 pub enum AccelError {
     /// More triangles than can be built within reasonable memory.
     #[error(
-        "the scene has {triangles} triangles, but rays take {MAX_TRIANGLES} at most; use fewer instances or \
-        simpler meshes"
+        "the scene has {triangles} triangles, but rays take {MAX_TRIANGLES} at most: building trees of more \
+        would take over 4 GB of memory"
     )]
     TooManyTriangles {
         /// Triangles of the scene.

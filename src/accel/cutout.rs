@@ -6,7 +6,6 @@
 //! more.
 
 use super::image::{Reductions, cutoff};
-use super::pieces::Pieces;
 use super::surfaces::{self, Surface};
 use crate::scene::{AlphaMode, Mesh, Scene};
 use glam::Vec3;
@@ -44,20 +43,26 @@ pub fn halvings(scene: &Scene) -> Vec<u32> {
 }
 
 /// The mesh as rays meet it, its indices checked: triangles whose picture differs within them in
-/// pieces, and without pieces that stop nothing.
-pub fn in_pieces<'a>(scene: &Scene, mesh: &'a Mesh, reductions: &Reductions, pieces: &Pieces) -> Cow<'a, Mesh> {
-    let halvings = pieces.halvings;
+/// pieces, and without pieces that stop nothing. `colors`: whether those of a triangle's pieces
+/// matter, too.
+pub fn in_pieces<'a>(
+    scene: &Scene,
+    mesh: &'a Mesh,
+    reductions: &Reductions,
+    halvings: u32,
+    colors: impl Fn(u32) -> bool,
+) -> Cow<'a, Mesh> {
     let material = &scene.materials[mesh.material];
     let picture = material.base_color_texture.and_then(|t| reductions.find(&t, cutoff(material)));
     if halvings == 0 || picture.is_none() {
         return Cow::Borrowed(mesh);
     }
     let mut fine = halved(mesh, halvings);
-    let surfaces = surfaces::of_mesh(scene, &fine, reductions);
+    let surfaces = surfaces::of_mesh(scene, &fine, usize::MAX, reductions);
     let all = 1usize << (2 * halvings);
     let mut kept = Vec::new();
     for first in (0..surfaces.len()).step_by(all) {
-        keep(&fine.indices, &surfaces, (first, all), pieces.differs(first / all), &mut kept);
+        keep(&fine.indices, &surfaces, (first, all), colors((first / all) as u32), &mut kept);
     }
     fine.indices = kept;
     Cow::Owned(fine)
@@ -152,10 +157,9 @@ mod tests {
     /// is stopped at a place is from what the picture says there, in the mean over the card.
     fn made(scene: &Scene, halvings: u32, solid: impl Fn(f32, f32) -> bool) -> (usize, f32, f32) {
         let reductions = Reductions::new(scene);
-        let pieces = Pieces { halvings, ..Default::default() };
-        let mesh = in_pieces(scene, &scene.meshes[0], &reductions, &pieces);
+        let mesh = in_pieces(scene, &scene.meshes[0], &reductions, halvings, |_| false);
         mesh.check(1).expect("it is sound");
-        let surfaces = surfaces::of_mesh(scene, &mesh, &reductions);
+        let surfaces = surfaces::of_mesh(scene, &mesh, usize::MAX, &reductions);
         let corners: Vec<[Vec3; 3]> =
             mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize].into())).collect();
         let stops: f32 =

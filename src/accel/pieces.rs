@@ -6,7 +6,7 @@
 //! triangles are looked at alone, so this takes milliseconds, and a scene without any is as it was.
 
 use super::image::Reductions;
-use super::surfaces::{Places, Textures};
+use super::surfaces::{self, Places, Textures};
 use super::{MAX_TRIANGLES, cutout, threads};
 use crate::scene::{Mesh, Scene};
 use glam::{Mat3, Mat4, Vec3};
@@ -21,10 +21,10 @@ const SIDE: u8 = 1 << HALVINGS;
 
 /// What is cut sends from a wrong place at least this share of the light that the scene's surface
 /// sends, if all of it is white and as bright, or of all that glows.
-const LEAST: f32 = 1.0 / 1024.0;
+const LEAST: f32 = 1.0 / 2048.0;
 
 /// Parts that differ by less than this share of their mean are alike.
-const ALIKE: f32 = 0.04;
+const ALIKE: f32 = 1.0 / 16.0;
 
 /// Pieces that a scene gets for each of its triangles at most, and those that any may have.
 const MOST: f32 = 0.05;
@@ -51,7 +51,7 @@ fn quarters([a, b, c]: Piece) -> [Piece; 4] {
 #[derive(Debug, Clone, Default)]
 pub struct Pieces {
     /// How often the sides of its triangles are halved where a picture cuts holes into them.
-    pub halvings: u32,
+    halvings: u32,
     /// The triangles that are cut for their colour's sake. Where a picture cuts holes, which differ
     /// in colour.
     cuts: BTreeMap<u32, Vec<Piece>>,
@@ -89,11 +89,14 @@ pub struct Met<'a> {
 impl Pieces {
     /// Of a scene's meshes.
     pub fn of(scene: &Scene, reductions: &Reductions) -> Vec<Self> {
-        let halvings = cutout::halvings(scene);
-        let mut pieces: Vec<Self> =
-            halvings.into_iter().map(|halvings| Self { halvings, cuts: BTreeMap::new() }).collect();
+        let mut pieces: Vec<Self> = cutout::halvings(scene).into_iter().map(Self::of_holes).collect();
         choose(scene, reductions, &mut pieces);
         pieces
+    }
+
+    /// Of a mesh into which a picture cuts holes.
+    pub fn of_holes(halvings: u32) -> Self {
+        Self { halvings, cuts: BTreeMap::new() }
     }
 
     /// Whether any triangle is not whole.
@@ -101,15 +104,13 @@ impl Pieces {
         self.halvings > 0 || !self.cuts.is_empty()
     }
 
-    /// Whether the colours of a triangle's pieces matter.
-    pub fn differs(&self, triangle: usize) -> bool {
-        self.cuts.contains_key(&(triangle as u32))
-    }
-
     /// The mesh as rays meet it, its indices checked.
     pub fn met<'a>(&self, scene: &Scene, mesh: &'a Mesh, reductions: &Reductions) -> Met<'a> {
         if self.halvings > 0 || self.cuts.is_empty() {
-            return Met { mesh: cutout::in_pieces(scene, mesh, reductions, self), made: Vec::new() };
+            return Met {
+                mesh: cutout::in_pieces(scene, mesh, reductions, self.halvings, |i| self.cuts.contains_key(&i)),
+                made: Vec::new(),
+            };
         }
         let mut fine = Mesh { variants: Vec::new(), tangents: Vec::new(), ..mesh.clone() };
         fine.indices.clear();
@@ -212,7 +213,6 @@ struct Weight {
 
 /// Chooses the triangles that are cut, the most important first.
 fn choose(scene: &Scene, reductions: &Reductions, pieces: &mut [Pieces]) {
-    let t00 = std::time::Instant::now();
     let mut weights = vec![Weight::default(); scene.meshes.len()];
     for instance in &scene.instances {
         let scale = Mat3::from_mat4(Mat4::from_cols_array_2d(&instance.transform)).determinant().abs().powf(2.0 / 3.0);
@@ -221,14 +221,18 @@ fn choose(scene: &Scene, reductions: &Reductions, pieces: &mut [Pieces]) {
         }
     }
     let numbers: Vec<usize> = (0..scene.meshes.len()).collect();
-    let sizes = threads::map(&numbers, |&i| scene.meshes[i].indices.len(), |&i| {
-        let mesh = &scene.meshes[i];
-        if weights[i].instances == 0 || mesh.check(scene.materials.len()).is_err() {
-            return (0.0, 0.0);
-        }
-        let areas = mesh.indices.chunks_exact(3).map(|t| f64::from(area(mesh, t))).filter(|a| a.is_finite());
-        areas.fold((0.0, 0.0), |(sum, roots), a| (sum + a, roots + a.sqrt()))
-    });
+    let sizes = threads::map(
+        &numbers,
+        |&i| scene.meshes[i].indices.len(),
+        |&i| {
+            let mesh = &scene.meshes[i];
+            if weights[i].instances == 0 || mesh.check(scene.materials.len()).is_err() {
+                return (0.0, 0.0);
+            }
+            let areas = mesh.indices.chunks_exact(3).map(|t| f64::from(area(mesh, t))).filter(|a| a.is_finite());
+            areas.fold((0.0, 0.0), |(sum, roots), a| (sum + a, roots + a.sqrt()))
+        },
+    );
     let (mut count, mut roots, mut power) = (0.0, 0.0, 0.0);
     for ((i, of), (areas, root)) in weights.iter_mut().enumerate().zip(sizes) {
         (of.areas, of.roots) = (areas, root);
@@ -251,33 +255,35 @@ fn choose(scene: &Scene, reductions: &Reductions, pieces: &mut [Pieces]) {
     // All that there is, but a few triangles that reach to the horizon hardly count.
     let (whole, power) = ((roots * roots / count) as f32, power as f32);
     let looks = looks();
-    let found = threads::map(&numbers, |&i| scene.meshes[i].indices.len(), |&i| {
-        let (mesh, of) = (&scene.meshes[i], weights[i]);
-        let Some(material) = scene.materials.get(mesh.material).filter(|m| of.instances > 0 && !m.unlit) else {
-            return Vec::new();
-        };
-        let textures = Textures::new(material, reductions);
-        if textures.is_plain() && mesh.colors.is_empty() {
-            return Vec::new();
-        }
-        let glow = Vec3::from(material.emission()).max_element();
-        let most = 0.5 / whole + if power > 0.0 && glow > 0.0 { glow / power } else { 0.0 };
-        let mut all = Vec::new();
-        for (triangle, t) in (0u32..).zip(mesh.indices.chunks_exact(3)) {
-            let area = of.area * area(mesh, t);
-            if area * most >= LEAST && area.is_finite() {
-                let places = Places::new(material, &textures, mesh, [t[0], t[1], t[2]].map(|k| k as usize));
-                all.extend(cut(&places, &looks, [area / whole, area / power], (i, triangle, WHOLE, 0)));
+    let found = threads::map(
+        &numbers,
+        |&i| scene.meshes[i].indices.len(),
+        |&i| {
+            let (mesh, of) = (&scene.meshes[i], weights[i]);
+            let Some(material) = scene.materials.get(mesh.material).filter(|m| of.instances > 0 && !m.unlit) else {
+                return Vec::new();
+            };
+            let textures = Textures::new(material, reductions);
+            if textures.is_plain() && mesh.colors.is_empty() {
+                return Vec::new();
             }
-        }
-        all
-    });
+            let glow = Vec3::from(material.emission()).max_element();
+            let most = 0.5 / whole + if power > 0.0 && glow > 0.0 { glow / power } else { 0.0 };
+            let mut all = Vec::new();
+            for (triangle, t) in (0u32..).zip(mesh.indices.chunks_exact(3)) {
+                let area = of.area * area(mesh, t);
+                if area * most >= LEAST && area.is_finite() {
+                    let places = Places::new(material, &textures, mesh, [t[0], t[1], t[2]].map(|k| k as usize));
+                    all.extend(cut(&places, &looks, [area / whole, area / power], (i, triangle, WHOLE, 0)));
+                }
+            }
+            all
+        },
+    );
     let triangles: usize = scene.meshes.iter().map(|m| m.indices.len() / 3).sum();
     let room = (MAX_TRIANGLES as usize).saturating_sub(triangles);
     let mut left = ((triangles as f32 * MOST) as usize).max(FEW).min(room);
     let mut open: BinaryHeap<Cut> = found.into_iter().flatten().collect();
-    let (first, begin) = (open.len(), left);
-    let t0 = std::time::Instant::now();
     while let Some(Cut { mesh: i, triangle, piece, halvings, .. }) = open.pop() {
         let (mesh, of) = (&scene.meshes[i], weights[i]);
         let material = &scene.materials[mesh.material];
@@ -303,9 +309,10 @@ fn choose(scene: &Scene, reductions: &Reductions, pieces: &mut [Pieces]) {
         let places = Places::new(material, &textures, mesh, [t[0], t[1], t[2]].map(|k| k as usize));
         let area = of.area * area(mesh, t) / (4u32 << (2 * halvings)) as f32;
         let sizes = [area / whole, area / power];
-        open.extend(quarters(piece).into_iter().filter_map(|p| cut(&places, &looks, sizes, (i, triangle, p, halvings + 1))));
+        open.extend(
+            quarters(piece).into_iter().filter_map(|p| cut(&places, &looks, sizes, (i, triangle, p, halvings + 1))),
+        );
     }
-    eprintln!("DEBUG triangles {triangles} first {first} budget {begin} left {left} whole {whole} power {power} cut {} time {:?} {:?}", pieces.iter().map(|p| p.cuts.len()).sum::<usize>(), t0.elapsed(), t00.elapsed());
 }
 
 fn mean(c: Vec3) -> f32 {
@@ -320,19 +327,14 @@ fn area(mesh: &Mesh, t: &[u32]) -> f32 {
 /// Where a piece is looked at, by weights of its corners, and to which of its sixteenths each place
 /// belongs.
 fn looks() -> Vec<([f32; 3], usize)> {
-    let mut all = Vec::with_capacity(LOOKS * LOOKS);
-    for (i, j, far) in (0..LOOKS).flat_map(|i| (0..LOOKS).flat_map(move |j| [(i, j, 1.0), (i, j, 2.0)])) {
-        if i + j + far as usize > LOOKS {
-            continue;
-        }
-        let [u, v] = [i, j].map(|k| (k as f32 + far / 3.0) / LOOKS as f32);
+    let look = |[u, v]: [f32; 2]| {
         let (a, b) = (4.0 * u, 4.0 * v);
         let upper = usize::from(a.fract() + b.fract() >= 1.0);
         // Sixteenths of the rows: seven, five, three and one.
         let row = b as usize;
-        all.push(([1.0 - u - v, u, v], row * (8 - row) + 2 * a as usize + upper));
-    }
-    all
+        ([1.0 - u - v, u, v], row * (8 - row) + 2 * a as usize + upper)
+    };
+    surfaces::lattice(LOOKS).into_iter().map(look).collect()
 }
 
 /// The piece with how much light it sends from a wrong place; `None` where that is little.
@@ -346,7 +348,8 @@ fn cut(
     let share = 1.0 / ((LOOKS * LOOKS) << (2 * halvings)) as f32;
     let mut groups = [[Vec3::ZERO; 2]; GROUPS];
     for (w, group) in looks {
-        let weights = std::array::from_fn(|k| (0..3).map(|c| w[c] * f32::from(piece[c][k])).sum::<f32>() / f32::from(SIDE));
+        let weights =
+            std::array::from_fn(|k| (0..3).map(|c| w[c] * f32::from(piece[c][k])).sum::<f32>() / f32::from(SIDE));
         let place = places.at(weights, share);
         groups[*group][0] += place.alpha * (place.diffuse + place.f0);
         groups[*group][1] += place.alpha * place.emission;
@@ -357,6 +360,151 @@ fn cut(
         let off = groups.iter().map(|g| mean((g[which] * scale - all).abs())).sum::<f32>() / GROUPS as f32;
         if off > ALIKE * mean(all) { off * sizes[which] } else { 0.0 }
     };
-    let score = score(0) + score(1);
+    // What pictures cut holes into is in pieces anyway, and leaves are near their neighbours.
+    let score = if places.is_cut_out() { score(1) } else { score(0) + score(1) };
     (score >= LEAST).then_some(Cut { score, mesh, triangle, piece, halvings })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{ColorSpace, Image, Instance, Material, Sampler, TextureRef};
+
+    /// Two squares of one square metre that look and glow as the picture says, of 64×64 texels.
+    fn card(texel: impl Fn(usize, usize) -> [u8; 3]) -> Scene {
+        let rgba = (0..64 * 64).flat_map(|i| texel(i % 64, i / 64).into_iter().chain([255]));
+        let image =
+            Image { name: String::new(), width: 64, height: 64, rgba: rgba.collect(), color_space: ColorSpace::Linear };
+        let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let texture = Some(TextureRef { image: 0, sampler: Sampler::default(), uv_set: 0, transform });
+        let color = Material { base_color_texture: texture, metallic: 0.0, ..Default::default() };
+        let glow = Material { emissive: [10.0; 3], emissive_texture: texture, ..Default::default() };
+        let uv0 = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let mesh = Mesh {
+            positions: uv0.iter().map(|[u, v]| [*u, *v, 0.0]).collect(),
+            normals: vec![[0.0, 0.0, 1.0]; 4],
+            uv0,
+            indices: vec![0, 1, 2, 0, 2, 3],
+            ..Default::default()
+        };
+        let instance = |mesh: usize| Instance {
+            name: String::new(),
+            mesh,
+            transform: Mat4::from_translation(Vec3::Z * mesh as f32).to_cols_array_2d(),
+        };
+        Scene {
+            meshes: vec![mesh.clone(), Mesh { material: 1, ..mesh }],
+            materials: vec![color, glow],
+            images: vec![image],
+            instances: vec![instance(0), instance(1)],
+            ..Default::default()
+        }
+    }
+
+    /// How far what rays know of each of the cards is from its picture, in the mean over the card,
+    /// and from all of its light; triangles. In pieces or whole.
+    fn off(scene: &Scene, cut: bool) -> [(f32, f32, usize); 2] {
+        let reductions = Reductions::new(scene);
+        let pieces = if cut { Pieces::of(scene, &reductions) } else { vec![Pieces::default(); 2] };
+        [0, 1].map(|m| {
+            let Met { mesh, made } = pieces[m].met(scene, &scene.meshes[m], &reductions);
+            mesh.check(2).expect("it is sound");
+            let known = surfaces::of_mesh(scene, &mesh, mesh.positions.len() - made.len(), &reductions);
+            let light = |s: &surfaces::Surface| if m == 0 { s.diffuse.x } else { s.emission.x / 10.0 };
+            let corners: Vec<[Vec3; 3]> =
+                mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize].into())).collect();
+            let area: f32 = mesh.indices.chunks_exact(3).map(|t| super::area(&mesh, t)).sum();
+            assert!((area - 1.0).abs() < 1e-5, "{area}");
+            let all: f32 =
+                mesh.indices.chunks_exact(3).zip(&known).map(|(t, s)| super::area(&mesh, t) * light(s)).sum();
+            let (mut apart, mut truth) = (0.0, 0.0);
+            for i in 0..64 * 64 {
+                let p = Vec3::new((i % 64) as f32 + 0.51, (i / 64) as f32 + 0.49, 0.0) / 64.0;
+                let inside = |[a, b, c]: &[Vec3; 3]| {
+                    [(a, b), (b, c), (c, a)].iter().all(|(from, to)| (**to - **from).cross(p - **from).z >= 0.0)
+                };
+                let at = corners.iter().position(inside).expect("pieces leave no hole");
+                let here = f32::from(scene.images[0].rgba[4 * i]) / 255.0;
+                apart += (light(&known[at]) - here).abs() / 4096.0;
+                truth += here / 4096.0;
+            }
+            (apart, (all - truth).abs() / truth, corners.len())
+        })
+    }
+
+    #[test]
+    fn light_comes_from_where_the_picture_has_it() {
+        let window = card(|x, y| [if (10..17).contains(&x) && (20..31).contains(&y) { 255 } else { 0 }; 3]);
+        let halves = card(|x, _| if x < 32 { [220, 20, 20] } else { [20, 20, 220] });
+        for (name, scene) in [("window", window), ("halves", halves)] {
+            let (found, whole) = (off(&scene, true), off(&scene, false));
+            println!("{name}: {found:?}, whole {whole:?}");
+            for (m, ((apart, light, triangles), (before, _, two))) in found.into_iter().zip(whole).enumerate() {
+                assert!(apart < 0.35 * before && light < 0.04, "{name}, mesh {m}: {apart} of {before}, light {light}");
+                assert!(two == 2 && triangles > 2 && triangles < 200, "{triangles}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_alike_or_small_stays_whole() {
+        let whole = |scene: &Scene| Pieces::of(scene, &Reductions::new(scene)).iter().all(|p| !p.any());
+        assert!(whole(&card(|_, _| [90; 3])));
+        // A pattern that is finer than any piece.
+        let fine = |x: usize, y: usize| [if (x + y) % 2 == 0 { 200 } else { 0 }; 3];
+        assert!(whole(&card(fine)));
+        // Negative control: a coarse one. Then the card among walls, its glow beside a lamp.
+        let mut scene = card(|x, y| [if (x / 32 + y / 32) % 2 == 0 { 200 } else { 0 }; 3]);
+        assert!(!whole(&scene));
+        let wall = Mesh { material: 2, ..scene.meshes[0].clone() };
+        scene.meshes.push(wall);
+        scene.materials.push(Material { emissive: [10.0; 3], ..Default::default() });
+        let place = |i: usize| Instance {
+            name: String::new(),
+            mesh: 2,
+            transform: Mat4::from_scale(Vec3::splat(9.0 + i as f32)).to_cols_array_2d(),
+        };
+        scene.instances.extend((0..40).map(place));
+        assert!(whole(&scene));
+    }
+
+    #[test]
+    fn pieces_are_bounded_and_repeat() {
+        // Each of many squares differs within.
+        let mut scene = card(|x, _| [if x < 21 { 255 } else { 0 }; 3]);
+        scene.meshes.truncate(1);
+        scene.instances.truncate(1);
+        for i in 1..200u32 {
+            let mesh = &mut scene.meshes[0];
+            for k in 0..4 {
+                let [x, y, _] = mesh.positions[k];
+                mesh.positions.push([x, y, i as f32]);
+                (mesh.normals.push([0.0, 0.0, 1.0]), mesh.uv0.push(mesh.uv0[k]));
+            }
+            mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|k| 4 * i + k));
+        }
+        let reductions = Reductions::new(&scene);
+        let pieces = Pieces::of(&scene, &reductions);
+        let met = pieces[0].met(&scene, &scene.meshes[0], &reductions);
+        let more = met.mesh.indices.len() / 3 - 400;
+        assert!(more > 500 && more <= FEW, "{more}");
+        assert_eq!(Pieces::of(&scene, &reductions)[0].cuts, pieces[0].cuts);
+    }
+
+    #[test]
+    fn neighbours_share_what_they_have_got() {
+        let scene = card(|x, _| [if x < 32 { 255 } else { 0 }; 3]);
+        let reductions = Reductions::new(&scene);
+        let met = Pieces::of(&scene, &reductions)[0].met(&scene, &scene.meshes[0], &reductions);
+        // The diagonal is cut by both triangles in the same places.
+        let middle = |m: &Made| m.of[..2] == [0, 2] && m.weights[..2] == [0.5, 0.5];
+        assert_eq!(met.made.iter().filter(|m| middle(m)).count(), 1);
+        // Corners that lie in one place, and others.
+        let places = places_of(&met.made, vec![0, 1, 2, 0]);
+        let of = |a: u32, b: u32| {
+            let is = |m: &Made| m.weights[..2] == [0.5, 0.5] && [m.of[0], m.of[1]] == [a, b];
+            met.made.iter().position(is).map(|i| places[4 + i])
+        };
+        assert_eq!((of(0, 2), of(0, 1)), (of(2, 3), of(0, 1).filter(|p| *p > 2)));
+    }
 }

@@ -5,6 +5,7 @@
 use super::image::{Reduced, Reductions};
 use crate::scene::{AlphaMode, Material, Mesh, Sampler, Scene, TextureRef};
 use glam::{Vec2, Vec3};
+use std::sync::LazyLock;
 
 /// `Surface` of `shaders/accel/surface.wgsl`, packed: diffuse base colour and roughness,
 /// reflectance at normal incidence and flags, emitted radiance, what a light sample's choice of it
@@ -23,8 +24,20 @@ const POINTS: [[f32; 2]; 7] =
 /// A triangle that covers more texels of the reduced picture than this is read at more points.
 const FEW_TEXELS: f32 = 16.0;
 
-/// Sides of the lattice of points of such a triangle.
-const LATTICE: usize = 12;
+/// Points of such a triangle.
+static FINE: LazyLock<Vec<[f32; 2]>> = LazyLock::new(|| lattice(12));
+
+/// The middles of the parts into which a triangle falls whose sides have so many: weights of the
+/// second and third corner, row after row.
+pub fn lattice(side: usize) -> Vec<[f32; 2]> {
+    let row = |j: usize| {
+        (0..2 * (side - j) - 1).map(move |k| {
+            let third = (1 + k % 2) as f32 / 3.0;
+            [k / 2, j].map(|n| (n as f32 + third) / side as f32)
+        })
+    };
+    (0..side).flat_map(row).collect()
+}
 
 /// What is known of a triangle before it is packed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,21 +115,24 @@ pub fn luminance(c: Vec3) -> f32 {
     c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// The triangles of `mesh`, which names a material that exists.
-pub fn of_mesh(scene: &Scene, mesh: &Mesh, reductions: &Reductions) -> Vec<Surface> {
+/// The triangles of `mesh`, which names a material that exists. Those with a vertex behind the
+/// first `vertices` are pieces of one within which colours differ, and looked at closely.
+pub fn of_mesh(scene: &Scene, mesh: &Mesh, vertices: usize, reductions: &Reductions) -> Vec<Surface> {
     let material = &scene.materials[mesh.material];
     let textures = Textures::new(material, reductions);
     let plain = textures.is_plain() && mesh.colors.is_empty();
-    let same = plain.then(|| surface(material, &textures, mesh, [0; 3]));
-    let one =
-        |t: &[u32]| same.unwrap_or_else(|| surface(material, &textures, mesh, [t[0], t[1], t[2]].map(|i| i as usize)));
+    let same = plain.then(|| surface(material, &textures, mesh, [0; 3], false));
+    let one = |t: &[u32]| {
+        let corners = [t[0], t[1], t[2]].map(|i| i as usize);
+        same.unwrap_or_else(|| surface(material, &textures, mesh, corners, corners.iter().any(|i| *i >= vertices)))
+    };
     mesh.indices.chunks_exact(3).map(one).collect()
 }
 
 /// A material without pictures and vertex colours.
 pub fn plain(material: &Material) -> Surface {
     let none = Textures { base: None, rough: None, glow: None };
-    surface(material, &none, &Mesh::default(), [0; 3])
+    surface(material, &none, &Mesh::default(), [0; 3], false)
 }
 
 /// The pictures of a material, made small.
@@ -152,7 +168,12 @@ struct Use<'a> {
 }
 
 impl<'a> Use<'a> {
-    fn new(picture: Option<&'a Reduced>, texture: Option<TextureRef>, mesh: &Mesh, corners: [usize; 3]) -> Option<Self> {
+    fn new(
+        picture: Option<&'a Reduced>,
+        texture: Option<TextureRef>,
+        mesh: &Mesh,
+        corners: [usize; 3],
+    ) -> Option<Self> {
         let (picture, texture) = (picture?, texture?);
         let from = if texture.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
         let at = corners.map(|i| {
@@ -198,6 +219,11 @@ impl<'a> Places<'a> {
         }
     }
 
+    /// Whether a picture may cut holes into it.
+    pub fn is_cut_out(&self) -> bool {
+        self.material.alpha_mode != AlphaMode::Opaque && self.base.is_some()
+    }
+
     /// Texels that the triangle covers of the picture of which it covers most.
     fn texels(&self) -> f32 {
         let uses = [&self.base, &self.rough, &self.glow];
@@ -239,22 +265,14 @@ impl<'a> Places<'a> {
     }
 }
 
-fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 3]) -> Surface {
+fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 3], closely: bool) -> Surface {
     let places = Places::new(m, textures, mesh, corners);
-    let many = places.texels() > FEW_TEXELS;
-    let lattice = |i: usize| {
-        let (a, b) = ((i % LATTICE) as f32 + 0.5, (i / LATTICE) as f32 + 0.5);
-        let (u, v) = (a / LATTICE as f32, b / LATTICE as f32);
-        if u + v < 1.0 { [u, v] } else { [1.0 - u, 1.0 - v] }
-    };
-    let count = if many { LATTICE * LATTICE } else { POINTS.len() };
-    let point = |i: usize| if many { lattice(i) } else { POINTS[i] };
-
+    let many = closely || places.texels() > FEW_TEXELS;
+    let points: &[[f32; 2]] = if many { &FINE } else { &POINTS };
     let (mut diffuse, mut f0, mut emission) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
     let (mut roughness, mut coverage, mut weight) = (0.0, 0.0, 0.0);
-    for i in 0..count {
-        let [v, w] = point(i);
-        let place = places.at([1.0 - v - w, v, w], 0.0);
+    for [v, w] in points {
+        let place = places.at([1.0 - v - w, *v, *w], 0.0);
         let counts = place.alpha.max(1e-3);
         weight += counts;
         coverage += place.alpha;
@@ -270,7 +288,7 @@ fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 
         f0: f0 * dark,
         roughness: roughness / weight,
         emission: emission * dark,
-        coverage: coverage / count as f32,
+        coverage: coverage / points.len() as f32,
         flags,
     }
 }

@@ -85,6 +85,8 @@ pub(super) struct SceneTrees {
     pub meshes: Vec<MeshTree>,
     /// Blocks of that room.
     pub top_room: usize,
+    /// Whether a triangle is met in pieces.
+    pub cut: bool,
 }
 
 /// Blocks that the tree over `count` instances can need: a node has a family of eight, and there
@@ -117,7 +119,7 @@ impl MeshPart {
         let deform = deform.filter(|d| d.check(mesh).is_ok());
         let Met { mesh, made } = pieces.met(scene, mesh, reductions);
         let corners = corners(&mesh);
-        let part = Self::without_tree(scene, &mesh, reductions, &corners);
+        let part = Self::without_tree(scene, &mesh, made.len(), reductions, &corners);
         let triangles = || mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);
         let accel = match deform.map(|d| pieces::places_of(&made, d.shape.places())) {
             Some(places) => {
@@ -129,8 +131,15 @@ impl MeshPart {
         Self { accel: accel.into(), deforming: deform.map(|_| (triangles().collect(), made)), ..part }
     }
 
-    fn without_tree(scene: &Scene, mesh: &Mesh, reductions: &Reductions, corners: &[[[f32; 3]; 3]]) -> Self {
-        let surfaces = surfaces::of_mesh(scene, mesh, reductions);
+    /// `made`: how many vertices the mesh has got.
+    fn without_tree(
+        scene: &Scene,
+        mesh: &Mesh,
+        made: usize,
+        reductions: &Reductions,
+        corners: &[[[f32; 3]; 3]],
+    ) -> Self {
+        let surfaces = surfaces::of_mesh(scene, mesh, mesh.positions.len() - made, reductions);
         let triangles = mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);
         let normals = Arc::new(normals(triangles, &mesh.normals));
         Self { normals, glows: emitters::glowing(&surfaces, corners), surfaces, ..Self::default() }
@@ -148,9 +157,9 @@ impl MeshPart {
         let mut all = Vec::new();
         let mut parts: Vec<Self> = Vec::with_capacity(meshes.len());
         for &i in meshes {
-            let mesh = pieces[i].met(scene, &scene.meshes[i], reductions).mesh;
+            let Met { mesh, made } = pieces[i].met(scene, &scene.meshes[i], reductions);
             let own = corners(&mesh);
-            parts.push(Self::without_tree(scene, &mesh, reductions, &own));
+            parts.push(Self::without_tree(scene, &mesh, made.len(), reductions, &own));
             all.extend(own);
             done();
         }
@@ -266,7 +275,8 @@ impl SceneTrees {
         for (mesh, part) in groups.iter().flatten().zip(made.into_iter().flatten()) {
             parts[*mesh] = part;
         }
-        Ok(Self::join(parts, scene.instances.len()))
+        let cut = pieces.iter().any(Pieces::any);
+        Ok(Self { cut, ..Self::join(parts, scene.instances.len()) })
     }
 
     /// Lays parts one after the other, behind room for a tree over so many instances.
@@ -306,7 +316,7 @@ impl SceneTrees {
             });
         }
         let surfaces = surfaces.iter().map(surfaces::Surface::packed).collect();
-        Self { blocks, surfaces, normals, meshes, top_room }
+        Self { blocks, surfaces, normals, meshes, top_room, cut: false }
     }
 }
 
