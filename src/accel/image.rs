@@ -1,7 +1,7 @@
 //! Pictures made small, for what rays see of them: linear colours, and for cut-out materials the
 //! share of each texel that is above the cutoff.
 
-use crate::scene::{AlphaMode, Image, Material, Sampler, Scene, TextureRef, Wrap};
+use crate::scene::{AlphaMode, Image, Material, Sampler, Scene, TextureRef};
 use glam::Vec2;
 use std::{collections::HashMap, sync::Arc};
 
@@ -98,16 +98,7 @@ impl Reduced {
     /// The texel of a level at texture coordinates `at`.
     pub fn read(&self, at: Vec2, sampler: &Sampler, level: usize) -> [f32; 4] {
         let Level { size, texels } = &self.levels[level];
-        let place = |v: f32, wrap: Wrap, side: usize| {
-            let v = if v.is_finite() { v } else { 0.0 };
-            let v = match wrap {
-                Wrap::Repeat => v - v.floor(),
-                Wrap::MirroredRepeat => 1.0 - ((v * 0.5 - (v * 0.5).floor()) * 2.0 - 1.0).abs(),
-                Wrap::ClampToEdge => v.clamp(0.0, 1.0),
-            };
-            ((v * side as f32) as usize).min(side - 1)
-        };
-        let [x, y] = [0, 1].map(|i| place([at.x, at.y][i], sampler.wrap[i], size[i]));
+        let [x, y] = [0, 1].map(|i| sampler.wrap[i].texel([at.x, at.y][i], size[i]));
         texels[y * size[0] + x]
     }
 }

@@ -10,7 +10,7 @@ use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::Renderer;
 use bouncelight::render::capture::{CaptureOptions, CapturedFrame, Layer, capture};
-use bouncelight::scene::{AlphaMode, Camera, Material, Mesh, Scene};
+use bouncelight::scene::{AlphaMode, Camera, Light, LightKind, Material, Mesh, Scene};
 use bouncelight_scene::defaults;
 
 const PLAIN: Method = Method::Gather(Options { slots: world::FEW_SLOTS, ..Options::PLAIN });
@@ -239,6 +239,16 @@ fn a_window_in_a_picture_glows_where_it_is() {
     assert!(reference < 0.05 && found < 0.1, "{reference} {found}");
     // Negative control: a ceiling that glows all over.
     assert!(apart(gathered(&gpu, &blurred(&scene)), truth) > 0.4);
+    // So does the lamp that stands in for it where there are no rays.
+    let lamp = |s: &Scene| match defaults::proxy_lights(s)[..] {
+        [Light { kind: LightKind::Spot { position: [x, _, z], intensity, radius, .. }, .. }] => {
+            [x, z, intensity, radius]
+        }
+        _ => panic!("one lamp"),
+    };
+    let far = |a: [f32; 4], b: [f32; 4]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(far(lamp(&scene), lamp(&cut)) < 0.1, "{:?} {:?}", lamp(&scene), lamp(&cut));
+    assert!(far(lamp(&blurred(&scene)), lamp(&cut)) > 3.0);
 }
 
 #[test]
