@@ -96,6 +96,7 @@ impl Reduced {
     }
 
     /// The texel of a level at texture coordinates `at`.
+    #[inline(always)]
     pub fn read(&self, at: Vec2, sampler: &Sampler, level: usize) -> [f32; 4] {
         let Level { size, texels } = &self.levels[level];
         let [x, y] = [0, 1].map(|i| sampler.wrap[i].texel([at.x, at.y][i], size[i]));

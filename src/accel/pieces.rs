@@ -79,7 +79,7 @@ impl Made {
 }
 
 /// A mesh as rays meet it.
-pub struct Met<'a> {
+pub struct Seen<'a> {
     /// Its triangles: pieces stand where their triangle stood.
     pub mesh: Cow<'a, Mesh>,
     /// Its vertices behind those that it had, except where pictures cut holes.
@@ -105,9 +105,9 @@ impl Pieces {
     }
 
     /// The mesh as rays meet it, its indices checked.
-    pub fn met<'a>(&self, scene: &Scene, mesh: &'a Mesh, reductions: &Reductions) -> Met<'a> {
+    pub fn met<'a>(&self, scene: &Scene, mesh: &'a Mesh, reductions: &Reductions) -> Seen<'a> {
         if self.halvings > 0 || self.cuts.is_empty() {
-            return Met {
+            return Seen {
                 mesh: cutout::in_pieces(scene, mesh, reductions, self.halvings, |i| self.cuts.contains_key(&i)),
                 made: Vec::new(),
             };
@@ -135,7 +135,7 @@ impl Pieces {
                 fine.indices.push(vertex);
             }
         }
-        Met { mesh: Cow::Owned(fine), made }
+        Seen { mesh: Cow::Owned(fine), made }
     }
 }
 
@@ -407,7 +407,7 @@ mod tests {
         let reductions = Reductions::new(scene);
         let pieces = if cut { Pieces::of(scene, &reductions) } else { vec![Pieces::default(); 2] };
         [0, 1].map(|m| {
-            let Met { mesh, made } = pieces[m].met(scene, &scene.meshes[m], &reductions);
+            let Seen { mesh, made } = pieces[m].met(scene, &scene.meshes[m], &reductions);
             mesh.check(2).expect("it is sound");
             let known = surfaces::of_mesh(scene, &mesh, mesh.positions.len() - made.len(), &reductions);
             let light = |s: &surfaces::Surface| if m == 0 { s.diffuse.x } else { s.emission.x / 10.0 };

@@ -4,7 +4,7 @@
 use super::emitters::{self, Glow};
 use super::gpu::ROW;
 use super::image::Reductions;
-use super::pieces::{self, Made, Met, Pieces};
+use super::pieces::{self, Made, Pieces, Seen};
 use super::refit::Refit;
 use super::wide::{Block, NODE, WORDS};
 use super::{Accel, AccelError, build, surfaces, threads, wide};
@@ -117,7 +117,7 @@ impl MeshPart {
             return Self::default();
         }
         let deform = deform.filter(|d| d.check(mesh).is_ok());
-        let Met { mesh, made } = pieces.met(scene, mesh, reductions);
+        let Seen { mesh, made } = pieces.met(scene, mesh, reductions);
         let corners = corners(&mesh);
         let part = Self::without_tree(scene, &mesh, made.len(), reductions, &corners);
         let triangles = || mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);
@@ -157,7 +157,7 @@ impl MeshPart {
         let mut all = Vec::new();
         let mut parts: Vec<Self> = Vec::with_capacity(meshes.len());
         for &i in meshes {
-            let Met { mesh, made } = pieces[i].met(scene, &scene.meshes[i], reductions);
+            let Seen { mesh, made } = pieces[i].met(scene, &scene.meshes[i], reductions);
             let own = corners(&mesh);
             parts.push(Self::without_tree(scene, &mesh, made.len(), reductions, &own));
             all.extend(own);

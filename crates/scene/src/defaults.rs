@@ -293,14 +293,17 @@ impl<'a> Picture<'a> {
         let image = scene.images.get(texture.image).filter(|i| !i.rgba.is_empty())?;
         let uv = if texture.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
         // Few triangles are large ones.
-        let side = ((1 << 16) as f32 / mesh.indices.len().max(1) as f32).sqrt().clamp(2.0, 32.0) as usize;
-        let place = |i: usize| {
-            let [v, w] = [i / side, i % side].map(|k| (k as f32 + 0.5) / side as f32);
-            // The far half of the square is the triangle once more.
-            if v + w < 1.0 { [1.0 - v - w, v, w] } else { [v + w - 1.0, 1.0 - v, 1.0 - w] }
+        let side = ((1 << 16) as f32 / mesh.indices.len().max(1) as f32).sqrt().clamp(1.0, 32.0) as usize;
+        // The middles of equal parts: places on an edge might read what a texture has beyond it.
+        let row = |j: usize| {
+            (0..2 * (side - j) - 1).map(move |k| {
+                let third = (1 + k % 2) as f32 / 3.0;
+                let [v, w] = [k / 2, j].map(|n| (n as f32 + third) / side as f32);
+                [1.0 - v - w, v, w]
+            })
         };
         let table = (0..=255u8).map(|b| image.color_space.decode(f32::from(b) / 255.0)).collect();
-        Some(Self { texture, image, uv, table, places: (0..side * side).map(place).collect() })
+        Some(Self { texture, image, uv, table, places: (0..side).flat_map(row).collect() })
     }
 
     /// Linear colour at a place of a triangle.
