@@ -99,7 +99,7 @@ impl Reduced {
     #[inline(always)]
     pub fn read(&self, at: Vec2, sampler: &Sampler, level: usize) -> [f32; 4] {
         let Level { size, texels } = &self.levels[level];
-        let [x, y] = [0, 1].map(|i| sampler.wrap[i].texel([at.x, at.y][i], size[i]));
+        let (x, y) = (sampler.wrap[0].texel(at.x, size[0]), sampler.wrap[1].texel(at.y, size[1]));
         texels[y * size[0] + x]
     }
 }

@@ -183,6 +183,14 @@ impl<'a> Use<'a> {
         });
         Some(Self { picture, sampler: texture.sampler, at })
     }
+
+    /// As [`Places::at`]; white where there is no picture.
+    #[inline(always)]
+    fn read(this: &Option<Self>, weights: [f32; 3], share: f32) -> [f32; 4] {
+        let Some(Use { picture, sampler, at }) = this else { return [1.0; 4] };
+        let level = if share > 0.0 { picture.level_of(share * picture.texels_in(at)) } else { 0 };
+        picture.read(at[0] * weights[0] + at[1] * weights[1] + at[2] * weights[2], sampler, level)
+    }
 }
 
 /// What its material says of the places of a triangle.
@@ -236,16 +244,12 @@ impl<'a> Places<'a> {
     #[inline(always)]
     pub fn at(&self, weights: [f32; 3], share: f32) -> Place {
         let m = self.material;
-        let read = |u: &Option<Use<'_>>| match u {
-            Some(Use { picture, sampler, at }) => {
-                let level = if share > 0.0 { picture.level_of(share * picture.texels_in(at)) } else { 0 };
-                picture.read(at[0] * weights[0] + at[1] * weights[1] + at[2] * weights[2], sampler, level)
-            }
-            None => [1.0; 4],
-        };
-        let color = |c: usize| (0..3).map(|k| self.colors[k][c] * weights[k]).sum::<f32>();
-        let base = read(&self.base);
-        let rgb = Vec3::from(std::array::from_fn(|c| (base[c] * m.base_color[c] * color(c)).clamp(0.0, 1.0)));
+        let [a, b, c] = self.colors;
+        let color = |k: usize| a[k] * weights[0] + b[k] * weights[1] + c[k] * weights[2];
+        let base = Use::read(&self.base, weights, share);
+        let factor = Vec3::new(m.base_color[0], m.base_color[1], m.base_color[2]);
+        let rgb = Vec3::new(base[0], base[1], base[2]) * factor * Vec3::new(color(0), color(1), color(2));
+        let rgb = rgb.clamp(Vec3::ZERO, Vec3::ONE);
         let alpha = match m.alpha_mode {
             AlphaMode::Opaque => 1.0,
             // The reduced picture's alpha is the share of texels above the cutoff, vertex colours
@@ -254,9 +258,9 @@ impl<'a> Places<'a> {
             AlphaMode::Mask { cutoff } => f32::from(u8::from(m.base_color[3] * color(3) >= cutoff)),
             AlphaMode::Blend => (base[3] * m.base_color[3] * color(3)).clamp(0.0, 1.0),
         };
-        let rough = read(&self.rough);
+        let rough = Use::read(&self.rough, weights, share);
         let metallic = (m.metallic * rough[2]).clamp(0.0, 1.0);
-        let glow = read(&self.glow);
+        let glow = Use::read(&self.glow, weights, share);
         Place {
             alpha,
             diffuse: rgb * (1.0 - metallic),

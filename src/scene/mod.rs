@@ -256,7 +256,7 @@ pub enum Wrap {
 
 impl Wrap {
     /// The texel of `side` in which a coordinate lies; of one that is not finite the first.
-    #[inline]
+    #[inline(always)]
     pub fn texel(self, at: f32, side: usize) -> usize {
         let at = if at.is_finite() { at } else { 0.0 };
         let at = match self {
