@@ -451,10 +451,10 @@ mod tests {
         let whole = |scene: &Scene| Pieces::of(scene, &Reductions::new(scene)).iter().all(|p| !p.any());
         assert!(whole(&card(|_, _| [90; 3])));
         // A pattern that is finer than any piece.
-        let fine = |x: usize, y: usize| [if (x + y) % 2 == 0 { 200 } else { 0 }; 3];
+        let fine = |x: usize, y: usize| [if (x ^ y) & 1 == 0 { 200 } else { 0 }; 3];
         assert!(whole(&card(fine)));
         // Negative control: a coarse one. Then the card among walls, its glow beside a lamp.
-        let mut scene = card(|x, y| [if (x / 32 + y / 32) % 2 == 0 { 200 } else { 0 }; 3]);
+        let mut scene = card(|x, y| [if (x / 32 ^ y / 32) & 1 == 0 { 200 } else { 0 }; 3]);
         assert!(!whole(&scene));
         let wall = Mesh { material: 2, ..scene.meshes[0].clone() };
         scene.meshes.push(wall);
@@ -479,7 +479,8 @@ mod tests {
             for k in 0..4 {
                 let [x, y, _] = mesh.positions[k];
                 mesh.positions.push([x, y, i as f32]);
-                (mesh.normals.push([0.0, 0.0, 1.0]), mesh.uv0.push(mesh.uv0[k]));
+                mesh.normals.push([0.0, 0.0, 1.0]);
+                mesh.uv0.push(mesh.uv0[k]);
             }
             mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|k| 4 * i + k));
         }
