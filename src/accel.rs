@@ -21,6 +21,7 @@ mod gpu;
 pub(crate) mod hash;
 mod image;
 mod pairs;
+mod pieces;
 mod refit;
 mod scene;
 mod split;
@@ -34,6 +35,7 @@ pub use cpu::{AccelHit, SceneBlocks};
 pub use emitters::EmitterGpu;
 pub use gpu::AccelGpu;
 pub(crate) use image::Reductions;
+pub(crate) use pieces::Pieces;
 pub use scene::{RayCounts, SceneRays};
 pub use surfaces::luminance;
 pub(crate) use trees::{MeshPart, corners};
@@ -60,8 +62,8 @@ pub const TOP_LEVELS: usize = 8;
 pub enum AccelError {
     /// More triangles than can be built within reasonable memory.
     #[error(
-        "the scene has {triangles} triangles, but rays take {MAX_TRIANGLES} at most; use fewer instances or \
-        simpler meshes"
+        "the scene has {triangles} triangles, but rays take {MAX_TRIANGLES} at most: building trees of more \
+        would take over 4 GB of memory"
     )]
     TooManyTriangles {
         /// Triangles of the scene.

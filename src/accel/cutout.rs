@@ -6,7 +6,7 @@
 //! more.
 
 use super::image::{Reductions, cutoff};
-use super::surfaces;
+use super::surfaces::{self, Surface};
 use crate::scene::{AlphaMode, Mesh, Scene};
 use glam::Vec3;
 use std::borrow::Cow;
@@ -43,40 +43,52 @@ pub fn halvings(scene: &Scene) -> Vec<u32> {
 }
 
 /// The mesh as rays meet it, its indices checked: triangles whose picture differs within them in
-/// pieces, and without pieces that stop nothing.
-pub fn in_pieces<'a>(scene: &Scene, mesh: &'a Mesh, reductions: &Reductions, halvings: u32) -> Cow<'a, Mesh> {
+/// pieces, and without pieces that stop nothing. `colors`: whether those of a triangle's pieces
+/// matter, too.
+pub fn in_pieces<'a>(
+    scene: &Scene,
+    mesh: &'a Mesh,
+    reductions: &Reductions,
+    halvings: u32,
+    colors: impl Fn(u32) -> bool,
+) -> Cow<'a, Mesh> {
     let material = &scene.materials[mesh.material];
     let picture = material.base_color_texture.and_then(|t| reductions.find(&t, cutoff(material)));
     if halvings == 0 || picture.is_none() {
         return Cow::Borrowed(mesh);
     }
     let mut fine = halved(mesh, halvings);
-    let coverage: Vec<f32> = surfaces::of_mesh(scene, &fine, reductions).iter().map(|s| s.coverage).collect();
+    let surfaces = surfaces::of_mesh(scene, &fine, usize::MAX, reductions);
     let all = 1usize << (2 * halvings);
     let mut kept = Vec::new();
-    for first in (0..coverage.len()).step_by(all) {
-        keep(&fine.indices, &coverage, first, all, &mut kept);
+    for first in (0..surfaces.len()).step_by(all) {
+        keep(&fine.indices, &surfaces, (first, all), colors((first / all) as u32), &mut kept);
     }
     fine.indices = kept;
     Cow::Owned(fine)
 }
 
 /// Keeps the `count` pieces from `first` on as the one triangle that they make where they are
-/// alike, else their quarters.
-fn keep(indices: &[u32], coverage: &[f32], first: usize, count: usize, kept: &mut Vec<u32>) {
-    let of = &coverage[first..first + count];
-    let (least, most) = of.iter().fold((f32::INFINITY, 0f32), |(a, b), c| (a.min(*c), b.max(*c)));
+/// alike, else their quarters; `colors`: alike in colour, too.
+fn keep(indices: &[u32], surfaces: &[Surface], (first, count): (usize, usize), colors: bool, kept: &mut Vec<u32>) {
+    let of = &surfaces[first..first + count];
+    let coverage = of.iter().map(|s| s.coverage);
+    let (least, most) = coverage.fold((f32::INFINITY, 0f32), |(a, b), c| (a.min(c), b.max(c)));
     if most < OPEN {
         return;
     }
-    if most - least <= ALIKE {
+    let alike = |what: fn(&Surface) -> Vec3| {
+        let (low, high) = of.iter().fold((Vec3::INFINITY, Vec3::ZERO), |(a, b), s| (a.min(what(s)), b.max(what(s))));
+        (high - low).max_element() <= ALIKE * high.max_element()
+    };
+    if most - least <= ALIKE && (!colors || alike(|s| s.diffuse + s.f0) && alike(|s| s.emission)) {
         // Corner k of the whole is corner k of the k-th piece of the k-th quarter of ...
         let corner = |k: usize| indices[3 * (first + k * (count - 1) / 3) + k];
         kept.extend([0, 1, 2].map(corner));
         return;
     }
     for quarter in 0..4 {
-        keep(indices, coverage, first + quarter * count / 4, count / 4, kept);
+        keep(indices, surfaces, (first + quarter * count / 4, count / 4), colors, kept);
     }
 }
 
@@ -145,9 +157,9 @@ mod tests {
     /// is stopped at a place is from what the picture says there, in the mean over the card.
     fn made(scene: &Scene, halvings: u32, solid: impl Fn(f32, f32) -> bool) -> (usize, f32, f32) {
         let reductions = Reductions::new(scene);
-        let mesh = in_pieces(scene, &scene.meshes[0], &reductions, halvings);
+        let mesh = in_pieces(scene, &scene.meshes[0], &reductions, halvings, |_| false);
         mesh.check(1).expect("it is sound");
-        let surfaces = surfaces::of_mesh(scene, &mesh, &reductions);
+        let surfaces = surfaces::of_mesh(scene, &mesh, usize::MAX, &reductions);
         let corners: Vec<[Vec3; 3]> =
             mesh.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| mesh.positions[t[k] as usize].into())).collect();
         let stops: f32 =

@@ -1,7 +1,7 @@
 //! Pictures made small, for what rays see of them: linear colours, and for cut-out materials the
 //! share of each texel that is above the cutoff.
 
-use crate::scene::{AlphaMode, Image, Material, Sampler, Scene, TextureRef, Wrap};
+use crate::scene::{AlphaMode, Image, Material, Sampler, Scene, TextureRef};
 use glam::Vec2;
 use std::{collections::HashMap, sync::Arc};
 
@@ -13,8 +13,35 @@ const SIDE: usize = 256;
 /// A small linear picture.
 #[derive(Debug, Clone)]
 pub struct Reduced {
+    /// Each half as wide and high as the one before, down to one texel.
+    levels: Arc<Vec<Level>>,
+}
+
+#[derive(Debug)]
+struct Level {
     size: [usize; 2],
-    texels: Arc<Vec<[f32; 4]>>,
+    texels: Vec<[f32; 4]>,
+}
+
+impl Level {
+    /// Half as wide and high; texels count by their alpha where what has none has no colour.
+    fn halved(&self, by_alpha: bool) -> Self {
+        let size = self.size.map(|s| s.div_ceil(2));
+        let texel = |i: usize| {
+            let (x, y) = (2 * (i % size[0]), 2 * (i / size[0]));
+            let (mut sum, mut weight, mut alpha, mut count) = ([0.0f32; 3], 0.0, 0.0, 0.0);
+            for row in y..(y + 2).min(self.size[1]) {
+                for t in &self.texels[row * self.size[0]..][x..(x + 2).min(self.size[0])] {
+                    let w = if by_alpha { t[3] + 1e-4 } else { 1.0 };
+                    (0..3).for_each(|c| sum[c] += w * t[c]);
+                    (weight, alpha, count) = (weight + w, alpha + t[3], count + 1.0);
+                }
+            }
+            let [r, g, b] = sum.map(|s| s / weight);
+            [r, g, b, alpha / count]
+        };
+        Self { size, texels: (0..size[0] * size[1]).map(texel).collect() }
+    }
 }
 
 impl Reduced {
@@ -44,28 +71,36 @@ impl Reduced {
                 texels.push([r, g, b, alpha / count]);
             }
         }
-        Some(Self { size, texels: Arc::new(texels) })
+        let mut levels = vec![Level { size, texels }];
+        while let Some(last) = levels.last().filter(|l| l.texels.len() > 1) {
+            let next = last.halved(cutoff.is_some());
+            levels.push(next);
+        }
+        Some(Self { levels: Arc::new(levels) })
     }
 
     /// How many of its texels lie in a triangle of texture space.
     pub fn texels_in(&self, at: &[Vec2; 3]) -> f32 {
         let area = 0.5 * (at[1] - at[0]).perp_dot(at[2] - at[0]).abs();
-        area * (self.size[0] * self.size[1]) as f32
+        area * self.levels[0].texels.len() as f32
     }
 
-    /// The texel at texture coordinates `at`.
-    pub fn read(&self, at: Vec2, sampler: &Sampler) -> [f32; 4] {
-        let place = |v: f32, wrap: Wrap, side: usize| {
-            let v = if v.is_finite() { v } else { 0.0 };
-            let v = match wrap {
-                Wrap::Repeat => v - v.floor(),
-                Wrap::MirroredRepeat => 1.0 - ((v * 0.5 - (v * 0.5).floor()) * 2.0 - 1.0).abs(),
-                Wrap::ClampToEdge => v.clamp(0.0, 1.0),
-            };
-            ((v * side as f32) as usize).min(side - 1)
-        };
-        let [x, y] = [0, 1].map(|i| place([at.x, at.y][i], sampler.wrap[i], self.size[i]));
-        self.texels[y * self.size[0] + x]
+    /// The level on which so many texels of the finest are one.
+    pub fn level_of(&self, texels: f32) -> usize {
+        ((0.5 * texels.max(1.0).log2()).round() as usize).min(self.levels.len() - 1)
+    }
+
+    /// Mean colour.
+    pub fn mean(&self) -> [f32; 4] {
+        self.read(Vec2::ZERO, &Sampler::default(), self.levels.len() - 1)
+    }
+
+    /// The texel of a level at texture coordinates `at`.
+    #[inline(always)]
+    pub fn read(&self, at: Vec2, sampler: &Sampler, level: usize) -> [f32; 4] {
+        let Level { size, texels } = &self.levels[level];
+        let (x, y) = (sampler.wrap[0].texel(at.x, size[0]), sampler.wrap[1].texel(at.y, size[1]));
+        texels[y * size[0] + x]
     }
 }
 

@@ -7,10 +7,11 @@ use super::emitters::{self, EmitterGpu};
 use super::gpu::{self, ROW};
 use super::trees::{How, MeshPart, MeshTree, SceneTrees, apart};
 use super::wide::{Block, INSTANCE, WORDS};
-use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, cutout, surfaces};
+use super::{Accel, AccelError, AccelGpu, TOP_LEVELS, build, surfaces};
 use crate::scene::Scene;
 use glam::{Mat4, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
+use std::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Number of the next scene.
@@ -19,8 +20,8 @@ static NEXT: AtomicU64 = AtomicU64::new(1);
 /// What [`SceneRays`] holds, for overlays and tests.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RayCounts {
-    /// Triangles of the meshes, each mesh once; of those that pictures cut holes into the pieces that
-    /// stop rays.
+    /// Triangles of the meshes, each mesh once; of those within which light differs the pieces, and of
+    /// those that pictures cut holes into the pieces that stop rays.
     pub triangles: usize,
     /// Instances that rays can meet.
     pub instances: usize,
@@ -93,7 +94,8 @@ impl SceneRays {
         Self::of_trees(device, queue, SceneTrees::join(parts, instances))
     }
 
-    /// With what pictures cut holes into in pieces, or whole where those are too many for the device.
+    /// With what differs within a triangle in pieces, or whole where those are too many for the
+    /// device.
     fn of_scene(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
@@ -101,15 +103,15 @@ impl SceneRays {
         progress: &(dyn Fn(usize, usize) -> bool + Sync),
         alone: bool,
     ) -> Result<Self, AccelError> {
+        let cut = Cell::new(false);
         let made = |pieces| {
             let trees = SceneTrees::build(scene, progress, How { alone, pieces })?;
+            cut.set(trees.cut);
             check(device, trees.surfaces.len() as u64)?;
             Self::of_trees(device, queue, trees)
         };
         match made(true) {
-            Err(e) if !matches!(e, AccelError::Stopped) && cutout::halvings(scene).iter().any(|n| *n > 0) => {
-                made(false)
-            }
+            Err(e) if !matches!(e, AccelError::Stopped) && cut.get() => made(false),
             made => made,
         }
     }

@@ -3,8 +3,9 @@
 //! 4k pictures cost the rays nothing.
 
 use super::image::{Reduced, Reductions};
-use crate::scene::{AlphaMode, Material, Mesh, Scene};
+use crate::scene::{AlphaMode, Material, Mesh, Sampler, Scene, TextureRef};
 use glam::{Vec2, Vec3};
+use std::sync::LazyLock;
 
 /// `Surface` of `shaders/accel/surface.wgsl`, packed: diffuse base colour and roughness,
 /// reflectance at normal incidence and flags, emitted radiance, what a light sample's choice of it
@@ -23,8 +24,20 @@ const POINTS: [[f32; 2]; 7] =
 /// A triangle that covers more texels of the reduced picture than this is read at more points.
 const FEW_TEXELS: f32 = 16.0;
 
-/// Sides of the lattice of points of such a triangle.
-const LATTICE: usize = 12;
+/// Points of such a triangle.
+static FINE: LazyLock<Vec<[f32; 2]>> = LazyLock::new(|| lattice(12));
+
+/// The middles of the parts into which a triangle falls whose sides have so many: weights of the
+/// second and third corner, row after row.
+pub fn lattice(side: usize) -> Vec<[f32; 2]> {
+    let row = |j: usize| {
+        (0..2 * (side - j) - 1).map(move |k| {
+            let third = (1 + k % 2) as f32 / 3.0;
+            [k / 2, j].map(|n| (n as f32 + third) / side as f32)
+        })
+    };
+    (0..side).flat_map(row).collect()
+}
 
 /// What is known of a triangle before it is packed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,32 +115,37 @@ pub fn luminance(c: Vec3) -> f32 {
     c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// The triangles of `mesh`, which names a material that exists.
-pub fn of_mesh(scene: &Scene, mesh: &Mesh, reductions: &Reductions) -> Vec<Surface> {
+/// The triangles of `mesh`, which names a material that exists. Those with a vertex behind the
+/// first `vertices` are pieces of one within which colours differ, and looked at closely.
+pub fn of_mesh(scene: &Scene, mesh: &Mesh, vertices: usize, reductions: &Reductions) -> Vec<Surface> {
     let material = &scene.materials[mesh.material];
     let textures = Textures::new(material, reductions);
     let plain = textures.is_plain() && mesh.colors.is_empty();
-    let same = plain.then(|| surface(material, &textures, mesh, [0; 3]));
-    let one =
-        |t: &[u32]| same.unwrap_or_else(|| surface(material, &textures, mesh, [t[0], t[1], t[2]].map(|i| i as usize)));
+    let same = plain.then(|| surface(material, &textures, mesh, [0; 3], false));
+    let one = |t: &[u32]| {
+        let corners = [t[0], t[1], t[2]].map(|i| i as usize);
+        same.unwrap_or_else(|| surface(material, &textures, mesh, corners, corners.iter().any(|i| *i >= vertices)))
+    };
     mesh.indices.chunks_exact(3).map(one).collect()
 }
 
 /// A material without pictures and vertex colours.
 pub fn plain(material: &Material) -> Surface {
     let none = Textures { base: None, rough: None, glow: None };
-    surface(material, &none, &Mesh::default(), [0; 3])
+    surface(material, &none, &Mesh::default(), [0; 3], false)
 }
 
 /// The pictures of a material, made small.
-struct Textures<'a> {
+pub struct Textures<'a> {
     base: Option<&'a Reduced>,
     rough: Option<&'a Reduced>,
-    glow: Option<&'a Reduced>,
+    /// What glows.
+    pub glow: Option<&'a Reduced>,
 }
 
 impl<'a> Textures<'a> {
-    fn new(material: &Material, reductions: &'a Reductions) -> Self {
+    /// Those that there are.
+    pub fn new(material: &Material, reductions: &'a Reductions) -> Self {
         let find = |t, cutoff| Option::and_then(t, |t| reductions.find(&t, cutoff));
         Self {
             base: find(material.base_color_texture, super::image::cutoff(material)),
@@ -136,70 +154,138 @@ impl<'a> Textures<'a> {
         }
     }
 
-    fn is_plain(&self) -> bool {
+    /// Whether there are none.
+    pub fn is_plain(&self) -> bool {
         self.base.is_none() && self.rough.is_none() && self.glow.is_none()
     }
 }
 
-fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 3]) -> Surface {
-    let uv = |set: u8| {
-        let from = if set == 0 { &mesh.uv0 } else { &mesh.uv1 };
-        corners.map(|i| from.get(i).copied().map_or(Vec2::ZERO, Vec2::from))
-    };
-    let use_of = |reduced: Option<&'_ Reduced>, texture: Option<crate::scene::TextureRef>| {
-        let (Some(reduced), Some(texture)) = (reduced, texture) else { return None };
-        let at = uv(texture.uv_set).map(|p| {
+/// A picture on a triangle: the texture coordinates of its corners.
+struct Use<'a> {
+    picture: &'a Reduced,
+    sampler: Sampler,
+    at: [Vec2; 3],
+}
+
+impl<'a> Use<'a> {
+    fn new(
+        picture: Option<&'a Reduced>,
+        texture: Option<TextureRef>,
+        mesh: &Mesh,
+        corners: [usize; 3],
+    ) -> Option<Self> {
+        let (picture, texture) = (picture?, texture?);
+        let from = if texture.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
+        let at = corners.map(|i| {
+            let p = from.get(i).copied().map_or(Vec2::ZERO, Vec2::from);
             let [u, v] = texture.transform.map(|r| r[0] * p.x + r[1] * p.y + r[2]);
             Vec2::new(u, v)
         });
-        Some((reduced.clone(), texture.sampler, at))
-    };
-    let base_use = use_of(textures.base, m.base_color_texture);
-    let rough_use = use_of(textures.rough, m.metallic_roughness_texture);
-    let glow_use = use_of(textures.glow, m.emissive_texture);
-    let texels = [&base_use, &rough_use, &glow_use].into_iter().flatten().map(|(r, _, at)| r.texels_in(at));
-    let many = texels.fold(0.0, f32::max) > FEW_TEXELS;
-    let lattice = |i: usize| {
-        let (a, b) = ((i % LATTICE) as f32 + 0.5, (i / LATTICE) as f32 + 0.5);
-        let (u, v) = (a / LATTICE as f32, b / LATTICE as f32);
-        if u + v < 1.0 { [u, v] } else { [1.0 - u, 1.0 - v] }
-    };
-    let count = if many { LATTICE * LATTICE } else { POINTS.len() };
-    let point = |i: usize| if many { lattice(i) } else { POINTS[i] };
-    let colors = corners.map(|i| mesh.colors.get(i).copied().unwrap_or([1.0; 4]));
+        Some(Self { picture, sampler: texture.sampler, at })
+    }
 
-    let (mut diffuse, mut f0, mut emission) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-    let (mut roughness, mut coverage, mut weight) = (0.0, 0.0, 0.0);
-    for i in 0..count {
-        let [v, w] = point(i);
-        let weights = [1.0 - v - w, v, w];
-        let read = |u: &Option<(Reduced, crate::scene::Sampler, [Vec2; 3])>| match u {
-            Some((reduced, sampler, at)) => {
-                reduced.read(at[0] * weights[0] + at[1] * weights[1] + at[2] * weights[2], sampler)
-            }
-            None => [1.0; 4],
-        };
-        let color = |c: usize| (0..3).map(|k| colors[k][c] * weights[k]).sum::<f32>();
-        let base = read(&base_use);
-        let rgb = Vec3::from(std::array::from_fn(|c| (base[c] * m.base_color[c] * color(c)).clamp(0.0, 1.0)));
+    /// As [`Places::at`]; white where there is no picture.
+    #[inline(always)]
+    fn read(this: &Option<Self>, weights: [f32; 3], share: f32) -> [f32; 4] {
+        let Some(Use { picture, sampler, at }) = this else { return [1.0; 4] };
+        let level = if share > 0.0 { picture.level_of(share * picture.texels_in(at)) } else { 0 };
+        picture.read(at[0] * weights[0] + at[1] * weights[1] + at[2] * weights[2], sampler, level)
+    }
+}
+
+/// What its material says of the places of a triangle.
+pub struct Places<'a> {
+    material: &'a Material,
+    base: Option<Use<'a>>,
+    rough: Option<Use<'a>>,
+    glow: Option<Use<'a>>,
+    colors: [[f32; 4]; 3],
+}
+
+/// What is known of a place of a triangle.
+pub struct Place {
+    /// Share of rays that it stops.
+    pub alpha: f32,
+    /// As of a [`Surface`].
+    pub diffuse: Vec3,
+    /// As of a [`Surface`].
+    pub f0: Vec3,
+    /// As of a [`Surface`].
+    pub emission: Vec3,
+    roughness: f32,
+}
+
+impl<'a> Places<'a> {
+    /// Of the triangle with these corners.
+    pub fn new(material: &'a Material, textures: &Textures<'a>, mesh: &Mesh, corners: [usize; 3]) -> Self {
+        Self {
+            material,
+            base: Use::new(textures.base, material.base_color_texture, mesh, corners),
+            rough: Use::new(textures.rough, material.metallic_roughness_texture, mesh, corners),
+            glow: Use::new(textures.glow, material.emissive_texture, mesh, corners),
+            colors: corners.map(|i| mesh.colors.get(i).copied().unwrap_or([1.0; 4])),
+        }
+    }
+
+    /// Whether a picture may cut holes into it.
+    pub fn is_cut_out(&self) -> bool {
+        self.material.alpha_mode != AlphaMode::Opaque && self.base.is_some()
+    }
+
+    /// Texels that the triangle covers of the picture of which it covers most.
+    fn texels(&self) -> f32 {
+        let uses = [&self.base, &self.rough, &self.glow];
+        uses.into_iter().flatten().map(|u| u.picture.texels_in(&u.at)).fold(0.0, f32::max)
+    }
+
+    /// What is at the place with these weights of the corners; of each picture the mean over
+    /// `share` of the triangle around it, 0 for a texel. Inlined: called without, it doubles what a
+    /// scene of leaves takes to load.
+    #[inline(always)]
+    pub fn at(&self, weights: [f32; 3], share: f32) -> Place {
+        let m = self.material;
+        let [a, b, c] = self.colors;
+        let color = |k: usize| a[k] * weights[0] + b[k] * weights[1] + c[k] * weights[2];
+        let base = Use::read(&self.base, weights, share);
+        let factor = Vec3::new(m.base_color[0], m.base_color[1], m.base_color[2]);
+        let rgb = Vec3::new(base[0], base[1], base[2]) * factor * Vec3::new(color(0), color(1), color(2));
+        let rgb = rgb.clamp(Vec3::ZERO, Vec3::ONE);
         let alpha = match m.alpha_mode {
             AlphaMode::Opaque => 1.0,
             // The reduced picture's alpha is the share of texels above the cutoff, vertex colours
             // aside.
-            AlphaMode::Mask { .. } if base_use.is_some() => base[3],
+            AlphaMode::Mask { .. } if self.base.is_some() => base[3],
             AlphaMode::Mask { cutoff } => f32::from(u8::from(m.base_color[3] * color(3) >= cutoff)),
             AlphaMode::Blend => (base[3] * m.base_color[3] * color(3)).clamp(0.0, 1.0),
         };
-        let rough = read(&rough_use);
+        let rough = Use::read(&self.rough, weights, share);
         let metallic = (m.metallic * rough[2]).clamp(0.0, 1.0);
-        let glow = read(&glow_use);
-        let counts = alpha.max(1e-3);
+        let glow = Use::read(&self.glow, weights, share);
+        Place {
+            alpha,
+            diffuse: rgb * (1.0 - metallic),
+            f0: (m.f0 * Vec3::from(m.specular_tint)).lerp(rgb, metallic),
+            emission: Vec3::from(m.emission()) * Vec3::new(glow[0], glow[1], glow[2]),
+            roughness: (m.roughness * rough[1]).clamp(0.0, 1.0),
+        }
+    }
+}
+
+fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 3], closely: bool) -> Surface {
+    let places = Places::new(m, textures, mesh, corners);
+    let many = closely || places.texels() > FEW_TEXELS;
+    let points: &[[f32; 2]] = if many { &FINE } else { &POINTS };
+    let (mut diffuse, mut f0, mut emission) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+    let (mut roughness, mut coverage, mut weight) = (0.0, 0.0, 0.0);
+    for [v, w] in points {
+        let place = places.at([1.0 - v - w, *v, *w], 0.0);
+        let counts = place.alpha.max(1e-3);
         weight += counts;
-        coverage += alpha;
-        diffuse += counts * rgb * (1.0 - metallic);
-        f0 += counts * (m.f0 * Vec3::from(m.specular_tint)).lerp(rgb, metallic);
-        roughness += counts * (m.roughness * rough[1]).clamp(0.0, 1.0);
-        emission += counts * Vec3::from(m.emission()) * Vec3::new(glow[0], glow[1], glow[2]);
+        coverage += place.alpha;
+        diffuse += counts * place.diffuse;
+        f0 += counts * place.f0;
+        roughness += counts * place.roughness;
+        emission += counts * place.emission;
     }
     let flags = (u32::from(m.double_sided) * DOUBLE_SIDED) | (u32::from(m.unlit) * UNLIT);
     let dark = if m.unlit { 0.0 } else { 1.0 / weight };
@@ -208,7 +294,7 @@ fn surface(m: &Material, textures: &Textures<'_>, mesh: &Mesh, corners: [usize; 
         f0: f0 * dark,
         roughness: roughness / weight,
         emission: emission * dark,
-        coverage: coverage / count as f32,
+        coverage: coverage / points.len() as f32,
         flags,
     }
 }

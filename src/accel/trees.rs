@@ -4,9 +4,10 @@
 use super::emitters::{self, Glow};
 use super::gpu::ROW;
 use super::image::Reductions;
+use super::pieces::{self, Made, Pieces, Seen};
 use super::refit::Refit;
 use super::wide::{Block, NODE, WORDS};
-use super::{Accel, AccelError, build, cutout, surfaces, threads, wide};
+use super::{Accel, AccelError, build, surfaces, threads, wide};
 use crate::scene::deform::{Deform, Joint, Vertices};
 use crate::scene::{Instance, Material, Mesh, Scene, octahedral::octahedral_word};
 use glam::Vec3;
@@ -33,6 +34,7 @@ pub(super) struct Deforming {
     /// The pose that it is in.
     last: Option<(Vec<Joint>, Vec<f32>)>,
     vertices: Vertices,
+    made: Vec<Made>,
     pub normals: Vec<[u32; 4]>,
 }
 
@@ -45,6 +47,9 @@ impl MeshTree {
             return false;
         }
         deform.vertices(&mut own.vertices);
+        for new in &own.made {
+            new.push(&mut own.vertices.positions, &mut own.vertices.normals);
+        }
         self.bounds = own.tree.follow(&own.vertices.positions);
         own.normals = normals(own.tree.triangles.iter().copied(), &own.vertices.normals);
         if own.tree.surfaces.iter().any(|s| s.glow_by_area() > 0.0) {
@@ -66,7 +71,7 @@ fn normals(triangles: impl Iterator<Item = [u32; 3]>, of: &[[f32; 3]]) -> Vec<[u
 pub(super) struct How {
     /// A tree for each mesh.
     pub alone: bool,
-    /// What pictures cut holes into is met in pieces ([`cutout`]).
+    /// What differs within a triangle is met in pieces.
     pub pieces: bool,
 }
 
@@ -80,6 +85,8 @@ pub(super) struct SceneTrees {
     pub meshes: Vec<MeshTree>,
     /// Blocks of that room.
     pub top_room: usize,
+    /// Whether a triangle is met in pieces.
+    pub cut: bool,
 }
 
 /// Blocks that the tree over `count` instances can need: a node has a family of eight, and there
@@ -96,37 +103,43 @@ pub(crate) struct MeshPart {
     normals: Arc<Vec<[u32; 4]>>,
     surfaces: Vec<surfaces::Surface>,
     glows: Vec<Glow>,
-    /// Vertices of each triangle of a mesh that deforms.
-    deforming: Option<Vec<[u32; 3]>>,
+    /// Of a mesh that deforms the vertices of each triangle, and those that it has got.
+    deforming: Option<(Vec<[u32; 3]>, Vec<Made>)>,
     /// Meshes whose triangles the tree holds, one after the other; none where they are this one's.
     together: Vec<usize>,
 }
 
 impl MeshPart {
-    /// Of a mesh of `scene`, and of how it deforms, if it does; `halvings` of its sides where a
-    /// picture cuts holes into it. One that disagrees in itself is not met: the upload of the
-    /// picture's part refuses it.
-    pub fn new(scene: &Scene, mesh: &Mesh, reductions: &Reductions, deform: Option<&Deform>, halvings: u32) -> Self {
+    /// Of a mesh of `scene` in `pieces`, and of how it deforms, if it does. One that disagrees in
+    /// itself is not met: the upload of the picture's part refuses it.
+    pub fn new(scene: &Scene, mesh: &Mesh, reductions: &Reductions, deform: Option<&Deform>, pieces: &Pieces) -> Self {
         if mesh.check(scene.materials.len()).is_err() {
             return Self::default();
         }
-        let mesh = &*cutout::in_pieces(scene, mesh, reductions, halvings);
-        let corners = corners(mesh);
-        let part = Self::without_tree(scene, mesh, reductions, &corners);
-        let triangles = || mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);
         let deform = deform.filter(|d| d.check(mesh).is_ok());
-        let accel = match deform.map(|d| d.shape.places()) {
+        let Seen { mesh, made } = pieces.met(scene, mesh, reductions);
+        let corners = corners(&mesh);
+        let part = Self::without_tree(scene, &mesh, made.len(), reductions, &corners);
+        let triangles = || mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);
+        let accel = match deform.map(|d| pieces::places_of(&made, d.shape.places())) {
             Some(places) => {
                 let places: Vec<_> = triangles().map(|t| t.map(|i| places[i as usize])).collect();
                 build::build_deforming(&corners, &places)
             }
             None => build::build(&corners),
         };
-        Self { accel: accel.into(), deforming: deform.map(|_| triangles().collect()), ..part }
+        Self { accel: accel.into(), deforming: deform.map(|_| (triangles().collect(), made)), ..part }
     }
 
-    fn without_tree(scene: &Scene, mesh: &Mesh, reductions: &Reductions, corners: &[[[f32; 3]; 3]]) -> Self {
-        let surfaces = surfaces::of_mesh(scene, mesh, reductions);
+    /// `made`: how many vertices the mesh has got.
+    fn without_tree(
+        scene: &Scene,
+        mesh: &Mesh,
+        made: usize,
+        reductions: &Reductions,
+        corners: &[[[f32; 3]; 3]],
+    ) -> Self {
+        let surfaces = surfaces::of_mesh(scene, mesh, mesh.positions.len() - made, reductions);
         let triangles = mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);
         let normals = Arc::new(normals(triangles, &mesh.normals));
         Self { normals, glows: emitters::glowing(&surfaces, corners), surfaces, ..Self::default() }
@@ -138,15 +151,15 @@ impl MeshPart {
         scene: &Scene,
         meshes: &[usize],
         reductions: &Reductions,
-        halvings: &[u32],
+        pieces: &[Pieces],
         done: impl Fn(),
     ) -> Vec<Self> {
         let mut all = Vec::new();
         let mut parts: Vec<Self> = Vec::with_capacity(meshes.len());
         for &i in meshes {
-            let mesh = &*cutout::in_pieces(scene, &scene.meshes[i], reductions, halvings[i]);
-            let own = corners(mesh);
-            parts.push(Self::without_tree(scene, mesh, reductions, &own));
+            let Seen { mesh, made } = pieces[i].met(scene, &scene.meshes[i], reductions);
+            let own = corners(&mesh);
+            parts.push(Self::without_tree(scene, &mesh, made.len(), reductions, &own));
             all.extend(own);
             done();
         }
@@ -231,7 +244,8 @@ impl SceneTrees {
         how: How,
     ) -> Result<Self, AccelError> {
         let reductions = Reductions::new(scene);
-        let halvings = if how.pieces { cutout::halvings(scene) } else { vec![0; scene.meshes.len()] };
+        let pieces =
+            if how.pieces { Pieces::of(scene, &reductions) } else { vec![Pieces::default(); scene.meshes.len()] };
         let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(!progress(0, scene.meshes.len())));
         let one_done = || {
             if !progress(done.fetch_add(1, Ordering::Relaxed) + 1, scene.meshes.len()) {
@@ -245,11 +259,11 @@ impl SceneTrees {
             }
             if let [mesh] = group[..] {
                 let deform = scene.deform_of(mesh);
-                let part = MeshPart::new(scene, &scene.meshes[mesh], &reductions, deform, halvings[mesh]);
+                let part = MeshPart::new(scene, &scene.meshes[mesh], &reductions, deform, &pieces[mesh]);
                 one_done();
                 return vec![part];
             }
-            MeshPart::of_all(scene, group, &reductions, &halvings, one_done)
+            MeshPart::of_all(scene, group, &reductions, &pieces, one_done)
         };
         let size = |group: &Vec<usize>| group.iter().map(|&m| scene.meshes[m].indices.len()).sum();
         let made = threads::map(&groups, size, make);
@@ -261,7 +275,8 @@ impl SceneTrees {
         for (mesh, part) in groups.iter().flatten().zip(made.into_iter().flatten()) {
             parts[*mesh] = part;
         }
-        Ok(Self::join(parts, scene.instances.len()))
+        let cut = pieces.iter().any(Pieces::any);
+        Ok(Self { cut, ..Self::join(parts, scene.instances.len()) })
     }
 
     /// Lays parts one after the other, behind room for a tree over so many instances.
@@ -287,9 +302,9 @@ impl SceneTrees {
                 .collect();
             let number = |i: u32| numbers.get(i as usize).copied().unwrap_or(i);
             blocks.extend(part.accel.blocks.iter().map(|b| moved(b, root as u32, &surfaces[first..], number)));
-            let refit = part.deforming.map(|triangles| {
+            let refit = part.deforming.map(|(triangles, made)| {
                 let tree = Refit::new(&blocks[root..], root as u32, triangles, part.surfaces.clone());
-                Box::new(Deforming { tree, last: None, vertices: Vertices::default(), normals: Vec::new() })
+                Box::new(Deforming { tree, last: None, vertices: Vertices::default(), made, normals: Vec::new() })
             });
             meshes.push(MeshTree {
                 root: root as u32,
@@ -301,7 +316,7 @@ impl SceneTrees {
             });
         }
         let surfaces = surfaces.iter().map(surfaces::Surface::packed).collect();
-        Self { blocks, surfaces, normals, meshes, top_room }
+        Self { blocks, surfaces, normals, meshes, top_room, cut: false }
     }
 }
 

@@ -23,8 +23,6 @@ pub enum Backdrop {
 impl Backdrop {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Shown, Self::Blurred, Self::Hidden, Self::Transparent];
-    /// Those that a window has, behind which there is nothing.
-    pub const OPAQUE: [Self; 3] = [Self::Shown, Self::Blurred, Self::Hidden];
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {

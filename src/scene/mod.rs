@@ -278,6 +278,20 @@ pub enum Wrap {
     ClampToEdge,
 }
 
+impl Wrap {
+    /// The texel of `side` in which a coordinate lies; of one that is not finite the first.
+    #[inline(always)]
+    pub fn texel(self, at: f32, side: usize) -> usize {
+        let at = if at.is_finite() { at } else { 0.0 };
+        let at = match self {
+            Self::Repeat => at - at.floor(),
+            Self::MirroredRepeat => 1.0 - ((at * 0.5 - (at * 0.5).floor()) * 2.0 - 1.0).abs(),
+            Self::ClampToEdge => at.clamp(0.0, 1.0),
+        };
+        ((at * side as f32) as usize).min(side.saturating_sub(1))
+    }
+}
+
 /// Encoding of the bytes of an [`Image`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ColorSpace {

@@ -10,7 +10,7 @@ use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::Renderer;
 use bouncelight::render::capture::{CaptureOptions, CapturedFrame, Layer, capture};
-use bouncelight::scene::{AlphaMode, Camera, Material, Mesh, Scene};
+use bouncelight::scene::{AlphaMode, Camera, Light, LightKind, Material, Mesh, Scene};
 use bouncelight_scene::defaults;
 
 const PLAIN: Method = Method::Gather(Options { slots: world::FEW_SLOTS, ..Options::PLAIN });
@@ -140,6 +140,128 @@ fn six_panels_light_a_room_once_each() {
     // Where there are no rays, the lamps stand in.
     let plain = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("it fits");
     assert!(mean(layer(&frame(&gpu, &mut renderer, &scene, &plain, 1), Layer::DiffDir)) > 0.2 * truth);
+}
+
+/// A closed room of 8×3×4 m, whose ceiling or floor has a picture of 64×64 texels.
+fn pictured(ceiling: bool, texel: impl Fn(usize, usize) -> [u8; 3]) -> Scene {
+    use bouncelight::scene::{ColorSpace, Image, Sampler, TextureRef};
+    let (x, y, z) = ([8.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 4.0]);
+    let walls = [
+        quad([-4.0, 3.0, -2.0], x, z),
+        quad([-4.0, 0.0, 2.0], x, [0.0, 0.0, -4.0]),
+        quad([-4.0, 0.0, -2.0], x, y),
+        quad([-4.0, 0.0, 2.0], y, x),
+        quad([-4.0, 0.0, -2.0], y, z),
+        quad([4.0, 0.0, -2.0], z, y),
+    ];
+    let mut parts: Vec<_> =
+        walls.into_iter().map(|wall| (wall, Material { double_sided: true, ..matte(0.7) })).collect();
+    let sampler = Sampler { mag_linear: false, min_linear: false, ..Sampler::default() };
+    let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let texture = Some(TextureRef { image: 0, sampler, uv_set: 0, transform });
+    if ceiling {
+        (parts[0].1.emissive, parts[0].1.emissive_texture) = ([10.0; 3], texture);
+    } else {
+        (parts[1].1.base_color, parts[1].1.base_color_texture) = ([1.0; 4], texture);
+    }
+    let mut scene = of_parts(parts, look_at([0.0, 1.5, 1.95], [0.0, 1.5, 0.0], 1.2));
+    let rgba = (0..64 * 64).flat_map(|i| texel(i % 64, i / 64).into_iter().chain([255])).collect();
+    let (name, color_space) = (String::new(), ColorSpace::Linear);
+    scene.images = vec![Image { name, width: 64, height: 64, rgba, color_space }];
+    scene
+}
+
+/// Red, green and blue of what the back wall gets at its left, in its middle and at its right.
+fn thirds(light: &[f32]) -> [[f64; 3]; 3] {
+    [7..20, 41..55, 76..89].map(|columns| {
+        let all = (14..34).flat_map(|y| columns.clone().map(move |x| 96 * y + x));
+        std::array::from_fn(|c| mean(&all.clone().map(|i| light[3 * i + c]).collect::<Vec<_>>()))
+    })
+}
+
+/// The largest share by which any of them differs, of the mean of its place in the truth.
+fn apart(found: [[f64; 3]; 3], truth: [[f64; 3]; 3]) -> f64 {
+    let place = |(f, t): (&[f64; 3], &[f64; 3])| {
+        let all = t.iter().sum::<f64>() / 3.0;
+        f.iter().zip(t).map(|(f, t)| (f - t).abs() / all).fold(0.0, f64::max)
+    };
+    found.iter().zip(&truth).map(place).fold(0.0, f64::max)
+}
+
+/// By the path tracer, which reads pictures where paths meet them.
+fn traced(gpu: &Gpu, scene: &Scene) -> [[f64; 3]; 3] {
+    use bouncelight_lab::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
+    let packed = ReferenceScene::new(&gpu.device, &gpu.queue, scene).expect("it fits");
+    let kernel = Kernel::new(&gpu.device);
+    let subject = Subject { camera: &scene.cameras[0], size: [96, 48], points: None };
+    let options = TracerOptions { samples: 128, layers: vec![Traced::Gi], ..Default::default() };
+    let mut tracer = Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options).expect("it fits");
+    while tracer.step().expect("it traces") {}
+    thirds(tracer.finish().expect("it traces").layer(Traced::Gi).expect("asked for"))
+}
+
+fn gathered(gpu: &Gpu, scene: &Scene) -> [[f64; 3]; 3] {
+    let method = Method::Gather(Options::default());
+    let mut renderer = world::renderer(gpu, [96, 48], method);
+    let found = thirds(layer(&frame(gpu, &mut renderer, scene, &uploaded(gpu, scene), 32), Layer::DiffInd));
+    println!("found {found:.3?}");
+    found
+}
+
+/// The scene, its picture one colour.
+fn blurred(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    let rgba = &mut scene.images[0].rgba;
+    let mean: Vec<u8> =
+        (0..4).map(|c| (rgba.iter().skip(c).step_by(4).map(|v| u64::from(*v)).sum::<u64>() / 4096) as u8).collect();
+    rgba.chunks_exact_mut(4).for_each(|p| p.copy_from_slice(&mean));
+    scene
+}
+
+#[test]
+fn a_window_in_a_picture_glows_where_it_is() {
+    let Some(gpu) = common::gpu() else { return };
+    let scene = pictured(true, |x, _| [if x < 8 { 255 } else { 0 }; 3]);
+    // The same of two quads, of which one glows.
+    let mut cut = scene.clone();
+    let glow = Material { emissive_texture: None, ..cut.materials[0].clone() };
+    cut.materials[0] = Material { emissive: [0.0; 3], ..glow.clone() };
+    cut.materials.push(glow);
+    cut.meshes[0] = quad([-3.0, 3.0, -2.0], [7.0, 0.0, 0.0], [0.0, 0.0, 4.0]);
+    cut.meshes.push(Mesh { material: 6, ..quad([-4.0, 3.0, -2.0], [1.0, 0.0, 0.0], [0.0, 0.0, 4.0]) });
+    let place = bouncelight::scene::Instance { mesh: 6, ..cut.instances[0].clone() };
+    cut.instances.push(place);
+    let truth = traced(&gpu, &cut);
+    println!("truth {truth:.3?}");
+    let reference = apart(traced(&gpu, &scene), truth);
+    let found = apart(gathered(&gpu, &scene), truth);
+    println!("a window: reference {reference:.3}, gather {found:.3}");
+    assert!(reference < 0.05 && found < 0.1, "{reference} {found}");
+    // Negative control: a ceiling that glows all over.
+    assert!(apart(gathered(&gpu, &blurred(&scene)), truth) > 0.4);
+    // So does the lamp that stands in for it where there are no rays.
+    let lamp = |s: &Scene| match defaults::proxy_lights(s)[..] {
+        [Light { kind: LightKind::Spot { position: [x, _, z], intensity, radius, .. }, .. }] => {
+            [x, z, intensity, radius]
+        }
+        _ => panic!("one lamp"),
+    };
+    let far = |a: [f32; 4], b: [f32; 4]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(far(lamp(&scene), lamp(&cut)) < 0.1, "{:?} {:?}", lamp(&scene), lamp(&cut));
+    assert!(far(lamp(&blurred(&scene)), lamp(&cut)) > 3.0);
+}
+
+#[test]
+fn a_floor_of_two_colours_bounces_both() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut scene = pictured(false, |x, _| if x < 32 { [184, 2, 2] } else { [2, 2, 184] });
+    scene.lights = vec![crate::build::point([0.0, 2.7, 0.0], 30.0, 0.02)];
+    let truth = traced(&gpu, &scene);
+    let found = apart(gathered(&gpu, &scene), truth);
+    println!("a floor: {found:.3} of {truth:.3?}");
+    assert!(found < 0.1, "{found}");
+    // Negative control: a purple floor.
+    assert!(apart(gathered(&gpu, &blurred(&scene)), truth) > 0.15);
 }
 
 /// A glowing wedge as `turn` changes its corners, as geometry or by its instance's transform.

@@ -326,7 +326,7 @@ fn a_backdrop_is_shown_blurred_or_hidden_and_lights_the_scene_in_any_case() {
         let options = CaptureOptions { samples: 16, ..Default::default() };
         capture(&gpu, &mut renderer, &uploaded, &camera, options).expect("it draws").beauty
     };
-    let [shown, blurred, hidden] = Backdrop::OPAQUE.map(&mut drawn);
+    let [shown, blurred, hidden, _] = Backdrop::ALL.map(&mut drawn);
     let row = |p: &Picture| -> Vec<f32> { (0..64).map(|x| p.at(x, 8)[1]).collect() };
     let spread = |v: Vec<f32>| {
         let mean = v.iter().sum::<f32>() / v.len() as f32;

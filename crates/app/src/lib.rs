@@ -2,5 +2,6 @@
 //! `bouncelight view`.
 
 pub mod cli;
+mod shown;
 #[cfg(feature = "viewer")]
 pub mod viewer;

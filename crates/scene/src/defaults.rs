@@ -17,7 +17,8 @@ use glam::{Mat4, Vec3};
 
 use super::look::{self, Daylight, Look};
 use bouncelight::scene::{
-    AlphaMode, Camera, Environment, Instance, Light, LightKind, Material, SUN_ANGLE, Scene, bounds::world_bounds,
+    AlphaMode, Camera, Environment, Image, Instance, Light, LightKind, Material, Mesh, SUN_ANGLE, Scene, TextureRef,
+    bounds::world_bounds,
 };
 
 /// Irradiance of the default sun, W/m². With the sky a white surface that faces it has radiance 1,
@@ -223,13 +224,40 @@ fn emitter(scene: &Scene, instance: &Instance, radiances: &[Vec3]) -> Option<Emi
     let world = Mat4::from_cols_array_2d(&instance.transform);
     let mut out =
         Emitter { name: instance.name.clone(), area: 0.0, centroid: Vec3::ZERO, facing: Vec3::ZERO, radiance };
+    let picture = Picture::of_glow(scene, mesh, material);
+    // What glows in a part only is as large as that part, and there.
+    let (mut sum, mut squares) = (Vec3::ZERO, 0.0);
     for triangle in mesh.indices.chunks_exact(3) {
-        let [a, b, c] = [0, 1, 2].map(|k| world.transform_point3(mesh.positions[triangle[k] as usize].into()));
+        let corners = [0, 1, 2].map(|k| world.transform_point3(mesh.positions[triangle[k] as usize].into()));
+        let [a, b, c] = corners;
         let facing = (b - a).cross(c - a) * 0.5;
         let area = facing.length();
-        out.area += area;
-        out.centroid += (a + b + c) * (area / 3.0);
-        out.facing += facing;
+        let mut add = |glow: Vec3, share: f32, place: Vec3| {
+            let weight = share * luminance(glow);
+            out.area += area * weight;
+            out.centroid += place * (area * weight);
+            out.facing += facing * weight;
+            sum += glow * (area * share);
+            squares += area * weight * luminance(glow);
+        };
+        match &picture {
+            None => add(Vec3::ONE, 1.0, (a + b + c) / 3.0),
+            Some(picture) => {
+                let share = 1.0 / picture.places.len() as f32;
+                for w in &picture.places {
+                    let place = corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2];
+                    add(picture.at(triangle, w), share, place);
+                }
+            }
+        }
+    }
+    if out.area > 0.0 {
+        let lit = out.area * (out.area / squares);
+        (out.centroid, out.facing) = (out.centroid * (lit / out.area), out.facing * (lit / out.area));
+        if picture.is_some() {
+            out.radiance = Vec3::from(material.emission()) * coverage(scene, material) * (sum / lit);
+        }
+        out.area = lit;
     }
     if world.determinant() < 0.0 {
         out.facing = -out.facing;
@@ -246,6 +274,52 @@ fn emitter(scene: &Scene, instance: &Instance, radiances: &[Vec3]) -> Option<Emi
         out.facing = -out.facing;
     }
     Some(out)
+}
+
+/// The picture of what glows of a mesh.
+struct Picture<'a> {
+    texture: TextureRef,
+    image: &'a Image,
+    uv: &'a [[f32; 2]],
+    /// Linear values of bytes.
+    table: Vec<f32>,
+    /// Where it is looked at in each triangle: weights of the corners.
+    places: Vec<[f32; 3]>,
+}
+
+impl<'a> Picture<'a> {
+    fn of_glow(scene: &'a Scene, mesh: &'a Mesh, material: &Material) -> Option<Self> {
+        let texture = material.emissive_texture?;
+        let image = scene.images.get(texture.image).filter(|i| !i.rgba.is_empty())?;
+        let uv = if texture.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
+        // Few triangles are large ones.
+        let side = ((1 << 16) as f32 / mesh.indices.len().max(1) as f32).sqrt().clamp(1.0, 32.0) as usize;
+        // The middles of equal parts: places on an edge might read what a texture has beyond it.
+        let row = |j: usize| {
+            (0..2 * (side - j) - 1).map(move |k| {
+                let third = (1 + k % 2) as f32 / 3.0;
+                let [v, w] = [k / 2, j].map(|n| (n as f32 + third) / side as f32);
+                [1.0 - v - w, v, w]
+            })
+        };
+        let table = (0..=255u8).map(|b| image.color_space.decode(f32::from(b) / 255.0)).collect();
+        Some(Self { texture, image, uv, table, places: (0..side).flat_map(row).collect() })
+    }
+
+    /// Linear colour at a place of a triangle.
+    fn at(&self, triangle: &[u32], weights: &[f32; 3]) -> Vec3 {
+        let mut uv = [0.0; 2];
+        for (i, w) in triangle.iter().zip(weights) {
+            let [u, v] = self.uv.get(*i as usize).copied().unwrap_or_default();
+            uv = [uv[0] + w * u, uv[1] + w * v];
+        }
+        let TextureRef { transform: rows, sampler, .. } = self.texture;
+        let size = [self.image.width as usize, self.image.height as usize];
+        let texel = |k: usize| sampler.wrap[k].texel(rows[k][0] * uv[0] + rows[k][1] * uv[1] + rows[k][2], size[k]);
+        let at = 4 * (texel(1) * size[0] + texel(0));
+        let linear = |c: usize| self.image.rgba.get(at + c).map_or(0.0, |b| self.table[usize::from(*b)]);
+        Vec3::new(linear(0), linear(1), linear(2))
+    }
 }
 
 /// Mean of the emission texture, linear; 1 where there is none.

@@ -1,6 +1,6 @@
 //! A host's triangles, from the bytes that it has anyway, and what light does on them.
 
-use crate::accel::{self, MeshPart, Reductions};
+use crate::accel::{self, MeshPart, Pieces, Reductions};
 use crate::gi::interface::GiError;
 use crate::scene::{AlphaMode, ColorSpace, Image, Material, Mesh, Sampler, Scene, TextureRef};
 use wgpu::VertexFormat as F;
@@ -319,7 +319,7 @@ impl PreparedMesh {
     /// [`GiError::Mesh`] for what disagrees in itself.
     pub fn new(source: &MeshSource<'_>) -> Result<Self, GiError> {
         let (scene, mesh) = source.scene().map_err(GiError::Mesh)?;
-        let part = MeshPart::new(&scene, &mesh, &Reductions::new(&scene), None, 0);
+        let part = MeshPart::new(&scene, &mesh, &Reductions::new(&scene), None, &Pieces::default());
         Ok(Self { part, corners: accel::corners(&mesh) })
     }
 

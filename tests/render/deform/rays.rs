@@ -113,6 +113,32 @@ fn what_only_touches_comes_apart() {
     assert!(apart(&found, &hits(&anew(&scene, 0.0), &all)) > 200, "it has moved");
 }
 
+/// A square whose colours differ within it is met in pieces, which go where their triangle goes.
+#[test]
+fn pieces_go_with_their_triangle() {
+    let mut glb = Glb::new();
+    let quad = [[-1.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 2.0, 0.0], [-1.0, 2.0, 0.0]].map(|[x, y, z]| [x, y, z]);
+    let corners = [0, 1, 2, 0, 2, 3].map(|k| quad[k]);
+    let p = glb.floats("VEC3", corners.as_flattened());
+    let c = glb.floats("VEC3", &corners.map(|[x, ..]| [if x < 0.0 { 0.0 } else { 0.9 }; 3]).concat());
+    glb.json["meshes"][0]["primitives"][0] = json!({"attributes": {"POSITION": p, "COLOR_0": c}});
+    skin(&mut glb, Coded::Floats, &corners.map(|[_, y, _]| 0.5 * y));
+    bends(&mut glb, 0, 1.5);
+    let mut scene = glb.load().expect("it loads");
+    let mut blocks = SceneBlocks::new(&scene).expect("it fits");
+    let all = rays(10_000);
+    let rest = hits(&blocks, &all);
+    let walk = |r: &RayGpu| blocks.walk(r.origin, r.direction, (r.t_max, false), 0, &mut |_| ());
+    assert!(all.iter().filter_map(walk).any(|h| h.0.triangle > 8), "they are pieces");
+    scene.pose_parts(0, 1.0);
+    blocks.place(&scene);
+    let (found, expected) = (hits(&blocks, &all), hits(&anew(&scene, 1.0), &all));
+    let met = found.iter().filter(|t| t.is_finite()).count();
+    assert!(met > 200 && apart(&found, &expected) == 0, "{} of {met}", apart(&found, &expected));
+    // Negative control: at rest they are elsewhere.
+    assert!(apart(&rest, &expected) > met / 10);
+}
+
 /// A morph target that opens what has no area at rest.
 #[test]
 fn what_is_closed_at_rest_opens() {

@@ -258,7 +258,7 @@ impl Shown {
     /// Linear RGB, shown `ev` stops brighter through the view transform, in 8-bit steps as a saved
     /// picture would be.
     pub fn linear(name: String, size: [usize; 2], linear: Vec<f32>, ev: f32, tonemap: Tonemap) -> Self {
-        let display = shown_bytes(&linear, ev, tonemap).into_iter().map(|b| f32::from(b) / 255.0).collect();
+        let display = crate::shown::rgb(&linear, ev, tonemap).into_iter().map(|b| f32::from(b) / 255.0).collect();
         Self { name, size, display, linear: Some(linear) }
     }
 
@@ -281,10 +281,4 @@ impl Shown {
         let picture = |pixels| Picture::new(&self.name, self.size[0], self.size[1], pixels);
         Ok(Views { display: picture(&self.display)?, linear: self.linear.as_deref().map(picture).transpose()? })
     }
-}
-
-/// 8-bit sRGB of linear RGB, `ev` stops brighter, through the view transform.
-pub fn shown_bytes(linear: &[f32], ev: f32, tonemap: Tonemap) -> Vec<u8> {
-    let gain = ev.exp2();
-    tonemap.apply_to_bytes(&linear.iter().map(|v| v * gain).collect::<Vec<_>>())
 }

@@ -1,6 +1,7 @@
 //! A picture that was rasterised or traced, on its way into a file.
 
-use super::{args::usage, compare::shown_bytes};
+use super::args::usage;
+use crate::shown;
 use anyhow::Result;
 use bouncelight::gpu::Gpu;
 use bouncelight::render::{Exposure, capture::CapturedFrame, exposure, tonemap_curve::Tonemap};
@@ -45,20 +46,6 @@ impl Drawn {
         self.frame.beauty.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
     }
 
-    /// Bytes of a PNG `stops` brighter; with alpha where something of it is not covered.
-    fn shown(&self, stops: f32, tonemap: Tonemap) -> Vec<u8> {
-        let pixels = || self.frame.beauty.data.chunks_exact(4);
-        if pixels().all(|p| p[3] >= 1.0) {
-            return shown_bytes(&self.rgb(), stops, tonemap);
-        }
-        // Radiance is multiplied by alpha, a PNG's colours are not.
-        let plain: Vec<f32> =
-            pixels().flat_map(|p| [0, 1, 2].map(|c| if p[3] > 0.0 { p[c] / p[3] } else { 0.0 })).collect();
-        let rgb = shown_bytes(&plain, stops, tonemap);
-        let alpha = pixels().map(|p| (p[3].clamp(0.0, 1.0) * 255.0).round() as u8);
-        rgb.chunks_exact(3).zip(alpha).flat_map(|(p, a)| [p[0], p[1], p[2], a]).collect()
-    }
-
     /// Stops by which it is to be shown brighter; `background` is the colour where nothing is, if
     /// it is one.
     pub fn stops(&self, exposure: Exposure, background: Option<[f32; 3]>) -> f32 {
@@ -77,7 +64,7 @@ impl Drawn {
         match format {
             Format::Png(tonemap) => {
                 metadata.push(("Exposure".into(), format!("{stops} EV")));
-                let pixels = self.shown(stops, tonemap);
+                let pixels = shown::rgba(&beauty.data, stops, tonemap);
                 image_io::write_png(output, width, height, &pixels, &metadata)?;
             }
             Format::Exr => {

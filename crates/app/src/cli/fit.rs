@@ -2,7 +2,6 @@
 
 use super::{
     args::{Global, usage},
-    compare::shown_bytes,
     error::CliError,
     interrupt,
     progress::Progress,
@@ -196,7 +195,7 @@ fn options(global: &Global, gpu: &Gpu, args: &Args) -> Result<FitOptions> {
 fn report(folder: &Path, heading: &str, found: &Fit, options: &FitOptions, fitted: &Fitted) -> Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let picture = |name: &str, size: [u32; 2], linear: &[f32]| -> Result<()> {
-        let bytes = shown_bytes(linear, 0.0, Tonemap::Filmic);
+        let bytes = crate::shown::rgb(linear, 0.0, Tonemap::Filmic);
         Ok(image_io::write_png(&folder.join(name), size[0], size[1], &bytes, &[])?)
     };
     let mut page = format!("# {heading}\n\n{}\n\n{}\n", found.why(options), found.table(options));

@@ -4,6 +4,7 @@
 use super::choice::Source;
 use super::command;
 use super::state::State;
+use crate::shown;
 use bouncelight::accel::{AccelError, SceneRays};
 use bouncelight::gi::{Method, Neural, ambient::AmbientTerm, gather};
 use bouncelight::gpu_scene::{SceneGpu, TextureMemory};
@@ -345,9 +346,8 @@ pub fn capture(gpu: &bouncelight::gpu::Gpu, shot: &Shot, progress: &Progress) ->
         all.extend(layers);
         image_io::write_exr(&shot.output, width, height, &all, &metadata)
     } else {
-        let gain = shot.ev.exp2();
-        let rgb: Vec<f32> = beauty.chunks_exact(4).flat_map(|p| [p[0] * gain, p[1] * gain, p[2] * gain]).collect();
-        image_io::write_png(&shot.output, width, height, &shot.tonemap.apply_to_bytes(&rgb), &metadata)
+        let bytes = shown::rgba(&beauty, shot.ev, shot.tonemap);
+        image_io::write_png(&shot.output, width, height, &bytes, &metadata)
     };
     written.map_err(|e| e.to_string())?;
     Ok(Product::Captured(shot.output.clone(), fallback))

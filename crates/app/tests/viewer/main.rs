@@ -41,6 +41,9 @@ fn backdrops_and_coarse_motion() {
         json!({ "key": "K" }),
         json!({ "expect": { "/copied": { "contains": "--backdrop=hidden" } } }),
         json!({ "key": "Shift+O" }),
+        json!({ "wait": "idle" }),
+        json!({ "expect": { "/backdrop": "transparent" } }),
+        json!({ "key": "Shift+O" }),
         json!({ "key": "Z" }),
     ];
     if gpu.is_software() {

@@ -305,7 +305,9 @@ fn animations_play_and_variants_change_materials() {
         { "expect": { "/copied": { "contains": "--animation=0" } } },
         { "expect": { "/copied": { "contains": "'--variant=in blue'" } } },
         { "key": "F12" }, { "wait": "idle" }, { "key": "U" }, { "wait": "idle" },
-        { "expect": { "/scene/variant": null, "/scene/pose": null } }, { "screenshot": "again.png" }
+        { "expect": { "/scene/variant": null, "/scene/pose": null } }, { "screenshot": "again.png" },
+        { "key": "Shift+O" }, { "key": "Shift+O" }, { "key": "Shift+O" },
+        { "expect": { "/backdrop": "transparent" } }, { "wait": "idle" }, { "key": "F12" }, { "wait": "idle" }
     ]);
     succeeds(&session(&display, dir.path(), script, &["flag.gltf", "--method", "direct", "--size", "200x160"]));
     let all = |name: &str| bouncelight_scene::image_io::read_png(&dir.path().join(name)).expect("it was drawn").pixels;
@@ -323,6 +325,11 @@ fn animations_play_and_variants_change_materials() {
     shell.args(["-c", &line, env!("CARGO_BIN_EXE_bouncelight")]).current_dir(dir.path()).env("NODEVICE_SELECT", "1");
     succeeds(&shell.output().expect("a shell"));
     assert!(ours.pixels == all("drawn.png"), "byte by byte");
+    // With a transparent background it has alpha; negative control: it has none before a sky.
+    let clear = bouncelight_scene::image_io::read_png(&dir.path().join("bouncelight-0002.png")).expect("F12 wrote it");
+    assert_eq!((ours.channels, clear.channels), (3, 4));
+    let alpha = |a: f32| clear.pixels.chunks_exact(4).filter(|p| p[3] == a).count();
+    assert!(alpha(0.0) > 1000 && alpha(1.0) > 1000, "{} {}", alpha(0.0), alpha(1.0));
 }
 
 fn bytes(numbers: &[f32]) -> Vec<u8> {

@@ -1,5 +1,5 @@
-//! JSON as files have it that a strict reader refuses: whole numbers written as `4.0`, places that are
-//! null, animations that move nothing.
+//! JSON as files have it that a strict reader refuses: whole numbers written as `4.0`, numbers that
+//! are none or beyond all, places that are null, animations that move nothing.
 
 use super::repair::Warning;
 use serde_json::{Number, Value};
@@ -17,12 +17,16 @@ pub(super) fn read(json: &[u8]) -> Result<(gltf::json::Root, Loosened), serde_js
         Ok(root) => return Ok((root, None)),
         Err(refused) => refused,
     };
-    let Ok(mut root) = serde_json::from_slice::<Value>(json) else { return Err(refused) };
     let mut repaired = Mended::default();
+    let finite = repaired.finite(json);
+    let Ok(mut root) = serde_json::from_slice::<Value>(&finite) else { return Err(refused) };
     repaired.value(&mut root);
     let mut warnings = channels_without_target(&mut root);
     if repaired.numbers > 0 {
         warnings.push(("JSON".into(), format!("{} whole numbers are written as fractions", repaired.numbers)));
+    }
+    if repaired.none > 0 {
+        warnings.push(("JSON".into(), format!("{} numbers are NaN; they are 0", repaired.none)));
     }
     if repaired.large > 0 {
         warnings.push(("JSON".into(), format!("{} numbers are larger than 32 bits hold", repaired.large)));
@@ -50,6 +54,7 @@ pub(super) fn read(json: &[u8]) -> Result<(gltf::json::Root, Loosened), serde_js
 #[derive(Default)]
 struct Mended {
     numbers: usize,
+    none: usize,
     large: usize,
     nulls: usize,
 }
@@ -58,6 +63,35 @@ struct Mended {
 const MOST: f64 = f32::MAX as f64;
 
 impl Mended {
+    /// The text with numbers in the places of those that JSON cannot say: NaN and infinity, as some
+    /// writers have them, and what not even 64 bits hold.
+    fn finite(&mut self, json: &[u8]) -> Vec<u8> {
+        let mut out = Vec::with_capacity(json.len());
+        let mut rest = json;
+        while let Some(&first) = rest.first() {
+            let is_word = |b: &u8| b.is_ascii_alphanumeric() || b"+-.".contains(b);
+            let length = match first {
+                b'"' => string(rest),
+                b if is_word(&b) => rest.iter().position(|b| !is_word(b)).unwrap_or(rest.len()),
+                _ => 1,
+            };
+            let (word, after) = rest.split_at(length);
+            rest = after;
+            match number(word) {
+                Some(v) if v.is_nan() => {
+                    self.none += 1;
+                    out.push(b'0');
+                }
+                Some(v) if v.is_infinite() => {
+                    self.large += 1;
+                    out.extend(MOST.copysign(v).to_string().bytes());
+                }
+                _ => out.extend(word),
+            }
+        }
+        out
+    }
+
     fn value(&mut self, value: &mut Value) {
         match value {
             Value::Number(n) if n.is_f64() => {
@@ -87,6 +121,27 @@ impl Mended {
             _ => {}
         }
     }
+}
+
+/// Length of the string at the beginning of `text`, quotes and all.
+fn string(text: &[u8]) -> usize {
+    let mut escaped = false;
+    let end = text.iter().skip(1).position(|b| {
+        let ends = *b == b'"' && !escaped;
+        escaped = *b == b'\\' && !escaped;
+        ends
+    });
+    end.map_or(text.len(), |at| at + 2)
+}
+
+/// A word of JSON as a number, NaN and infinity among them.
+fn number(word: &[u8]) -> Option<f64> {
+    // Of words only those; `f64` knows them in any case, with signs.
+    let likely = word.iter().any(|b| b"nN0123456789".contains(b));
+    if !likely || word.starts_with(b"\"") || word == b"null" {
+        return None;
+    }
+    std::str::from_utf8(word).ok()?.parse().ok()
 }
 
 /// The number as an integer, if it is one that a float holds exactly.

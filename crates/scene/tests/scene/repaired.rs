@@ -126,6 +126,8 @@ fn other_spellings_of_numbers_and_names() {
         ("\"POSITION\":0", "\"POSITION\":0.0"),
         ("\"nodes\":[0]", "\"nodes\":[0,null]"),
         ("\"scene\":0", "\"scene\":0,\"animations\":null"),
+        ("\"scene\":0", "\"scene\":0,\"extras\":[NaN,nan,-NaN,Infinity,-Infinity,1e400,-1e999,\"1e400 \\\" NaN\"]"),
+        ("\"nodes\":[{", "\"nodes\":[{\"translation\":[NaN,-nan,0],"),
     ] {
         assert!(json.contains(from), "{from}");
         let scene = read(&json.replace(from, to), &uri).unwrap_or_else(|e| panic!("{to}: {e}"));
@@ -134,7 +136,12 @@ fn other_spellings_of_numbers_and_names() {
     }
     let filled = load_bytes("made.gltf", (json.replace("URI", &uri) + "\0\0\0").as_bytes()).expect("it loads");
     assert_eq!(filled.meshes[0].positions, plain.meshes[0].positions);
+    let told = |to: &str| read(&json.replace("\"scene\":0", to), &uri).expect("it loads").warnings.join(" ");
+    let strange = told("\"scene\":0,\"extras\":[NaN,Infinity,1e400]");
+    assert!(strange.contains("1 numbers are NaN") && strange.contains("2 numbers are larger"), "{strange}");
     // Negative controls.
+    assert!(read(&json.replace(count, "\"count\":1e400"), &uri).is_err());
+    assert!(read(&json.replace(count, "\"count\":Nan3"), &uri).is_err());
     assert!(read(&json.replace(count, "\"count\":3.5"), &uri).is_err());
     assert!(read(&json, "data:application/octet-stream;base64").is_err());
     let told = read(&json, &format!("{octets},%00")).map(drop).unwrap_err().to_string();

@@ -343,8 +343,8 @@ impl State {
             A::Sky(radiance) => self.set_sky(radiance),
             A::Backdrop(backdrop) => self.settings.backdrop = backdrop,
             A::NextBackdrop => {
-                let next = (self.settings.backdrop as usize + 1) % Backdrop::OPAQUE.len();
-                self.settings.backdrop = Backdrop::OPAQUE[next];
+                let next = (self.settings.backdrop as usize + 1) % Backdrop::ALL.len();
+                self.settings.backdrop = Backdrop::ALL[next];
             }
             A::Coarse => self.settings.coarse = !self.settings.coarse,
             A::TurnSky(degrees) => self.turn_sky(degrees),

@@ -38,7 +38,7 @@ pub(super) fn picture(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
         ui.label("Background").on_hover_text("The environment where nothing is hit; it lights the scene in any case");
         let mut backdrop = state.settings.backdrop;
         egui::ComboBox::from_id_salt("backdrop").selected_text(backdrop.name()).width(wide(ui)).show_ui(ui, |ui| {
-            for b in Backdrop::OPAQUE {
+            for b in Backdrop::ALL {
                 ui.selectable_value(&mut backdrop, b, b.name());
             }
         });
