@@ -129,12 +129,18 @@ fn a_mirror_is_sharp_where_the_screen_knows_nothing() {
 }
 
 /// A metal floor before a wall of four stripes, every second of which sends back nothing, or glows
-/// and the others do not.
+/// and the others do not. A surface far below, turned away, is so large that rays meet the wall in two
+/// triangles, not in pieces.
 fn striped(glows: bool) -> Scene {
     let wall = quad([-2.0, 0.0, -1.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]);
-    let mut s = scene(vec![floor(8.0, 0.0), wall], vec![]);
-    s.materials = vec![material([1.0; 3]), material([1.0; 3])];
+    let below = quad([-2e4, -1e3, -2e4], [4e4, 0.0, 0.0], [0.0, 0.0, 4e4]);
+    let mut s = scene(vec![floor(8.0, 0.0), wall, below], vec![]);
+    s.materials = vec![material([1.0; 3]); 3];
     (s.materials[0].metallic, s.materials[0].roughness) = (1.0, 0.02);
+    s.meshes[2].material = 2;
+    if glows {
+        (s.materials[2].base_color, s.materials[2].emissive) = ([0.0, 0.0, 0.0, 1.0], [GLOW; 3]);
+    }
     let rgba = (0..64 * 64).flat_map(|i| [if (i % 64) & 16 == 0 { 255 } else { 0 }; 4]).collect();
     let (name, color_space) = (String::new(), ColorSpace::Srgb);
     s.images.push(Image { name, width: 64, height: 64, rgba, color_space });

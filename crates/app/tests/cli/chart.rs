@@ -150,7 +150,7 @@ fn what_cannot_be_is_refused_before_the_work() {
     std::fs::create_dir_all(&out).expect("a folder");
     std::fs::write(out.join("chart.json"), "{}").expect("writable");
     let refused = chart(&out, &["--scenes", "cornell"]).code(1);
-    assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("no record of `chart`"));
+    assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("not a record of `chart`"));
     let mut command = Command::cargo_bin("bouncelight").expect("it was built");
     command.args(["chart", "--out", "x", "--methods", "magic"]).assert().code(2);
 }

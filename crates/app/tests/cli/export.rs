@@ -275,18 +275,6 @@ fn every_pass_of_every_frame_is_written_down() {
     }
 }
 
-/// Who exports on a machine without a GPU exports for one that has it: a driver on the CPU does
-/// with fewer workgroups.
-#[test]
-fn rays_are_shared_out_as_for_a_gpu() {
-    let Some(gpu) = common::gpu() else { return };
-    let m = exported(&gpu, &methods()[0], Target::Wgsl).manifest;
-    let workgroups = |label: &str| m.dispatches.iter().find(|d| d.label == label).map(|d| d.workgroups);
-    // Two units each: of 1,024 of the table's 65,536 slots; of nine layers of one block of cells.
-    assert_eq!(workgroups("gi.cache_update"), Some([32, 1, 1]));
-    assert_eq!(workgroups("gi.trace"), Some([5, 1, 1]));
-}
-
 #[test]
 fn a_folder_is_written_whole_or_not_at_all() {
     if common::gpu().is_none() {
