@@ -109,7 +109,7 @@ fn check_permutations(precision: Precision) {
     check_kernels(&gpu, full, usize::MAX, |_, _| true);
     let plain = Options { variant: Variant::Plain, ..full };
     for (k, options) in [Options { fuse: false, ..full }, plain, Options { fuse: false, ..plain }].iter().enumerate() {
-        check_kernels(&gpu, *options, usize::MAX, |i, _| whole || (i + k) % SHARE == 0);
+        check_kernels(&gpu, *options, usize::MAX, |i, _| whole || (i + k).is_multiple_of(SHARE));
     }
     for (k, variant) in permutations().into_iter().enumerate() {
         let seen = RefCell::new(BTreeSet::new());
@@ -120,7 +120,7 @@ fn check_permutations(precision: Precision) {
             seen.extend(shapes);
             let new = seen.len() > before;
             found.set(found.get() + usize::from(new));
-            new && (whole || (found.get() + k) % SHARE == 0)
+            new && (whole || (found.get() + k).is_multiple_of(SHARE))
         };
         check_kernels(&gpu, Options { variant, ..full }, usize::MAX, new);
     }
