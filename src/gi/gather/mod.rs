@@ -15,7 +15,7 @@
 //!
 //! A ray is a thread's: `gi.reproject` and `gi.cache_select` note in a list which rays are due.
 //!
-//! Limits: a ray knows one colour of a triangle, indirect light is as fine as an entry's cell, and
+//! Limits: a ray knows one colour of a triangle or a piece of one, indirect light is as fine as an entry's cell, and
 //! the rest is noise. See `docs/internals/gather.md`.
 
 mod bindings;
