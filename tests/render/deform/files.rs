@@ -389,7 +389,12 @@ fn broken_skins_and_targets_are_told_and_left_out() {
             "nodes[0]",
             "matrices of floats",
         ),
-        ("a joint elsewhere", &|g| g.json["scenes"] = json!([{"nodes": [0, 2]}]), "nodes[0]", "not a node of the scene"),
+        (
+            "a joint elsewhere",
+            &|g| g.json["scenes"] = json!([{"nodes": [0, 2]}]),
+            "nodes[0]",
+            "not a node of the scene",
+        ),
         ("no such joint", &|g| g.json["skins"][0]["joints"] = json!([1, 99]), "nodes[0]", "not a node of the scene"),
         (
             "nothing to hold",
