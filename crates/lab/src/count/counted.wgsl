@@ -1,6 +1,6 @@
-// What a thread did, added up for all of a dispatch. `instrument.rs` puts this in front of a compute shader and calls in:
-// `counted_start` at the beginning, `counted_add` for each straight piece of its code, `counted_meet` where threads wait
-// for each other, `counted_end` at the end.
+// What a thread did, added up for all of a dispatch. `instrument.rs` puts this in front of a compute
+// shader and calls in: `counted_start` at the beginning, `counted_add` for each straight piece of its
+// code, `counted_meet` where threads wait for each other, `counted_end` at the end.
 //
 // Numbers: 0 operations, 1 rays, 2 and on what is asked of each binding. Behind them, operations again as threads go
 // in step: from one barrier to the next each of 32 takes as long as the slowest of them.
