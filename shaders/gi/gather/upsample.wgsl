@@ -166,14 +166,17 @@ fn resolve_sum(sum: Sum) -> PixelLight {
     return PixelLight(e, sum.specular.rgb * (1.0 / sum.specular.a));
 }
 
-// Pixels of the workgroup whose four cells lie on other surfaces, and what these say. They read 4×4
-// cells. They stand in a list, since otherwise all threads would wait for each; four threads do one
-// pixel, since there are few.
+// Pixels of the workgroup whose four cells lie on other surfaces. They read 4×4 cells. They stand in
+// a list, since otherwise all threads would wait for each; four threads do one pixel, since there
+// are few.
 var<workgroup> further: array<u32, GROUP_PIXELS>;
 var<workgroup> further_noted: atomic<u32>;
 var<workgroup> further_count: u32;
-var<workgroup> nearby: array<Sum, GROUP_PIXELS>;
 var<workgroup> quarters: array<Sum, GROUP_PIXELS>;
+// Of a pixel that is not in the list.
+const NOT_LISTED = 0x80000000u;
+// Pixels of the list that are done at a time.
+const FURTHER_AT_ONCE = u32(GROUP_PIXELS) / 4u;
 
 // A quarter of the 4×4 cells of a listed pixel.
 fn quarter(at: u32, part: u32, corner: vec2i, first: vec2i) -> Sum {
@@ -187,15 +190,13 @@ fn quarter(at: u32, part: u32, corner: vec2i, first: vec2i) -> Sum {
     return sum_2x2(here, base.y * TILE_WIDTH + base.x, left, right, LEAST_COSINE);
 }
 
-// Blends the near and the far sum so that no seam shows.
-fn answer_further(at: u32, corner: vec2i, i: u32) {
-    let near = nearby[further[at]];
+// Light and specular of a pixel by its four cells, blended with those of its 4×4 so that no seam
+// shows.
+fn blended(near: Sum, i: u32) -> PixelLight {
     let far = resolve_sum(both(both(quarters[i], quarters[i + 1u]), both(quarters[i + 2u], quarters[i + 3u])));
     let close = resolve_sum(near);
     let share = near.light.a / TRUST;
-    let blended = PixelLight(mix(far.light, close.light, share), mix(far.specular, close.specular, share));
-    let pixel = group_pixel(further[at], corner);
-    answer(pixel, pixel_surface(pixel, distance_at(pixel)), blended);
+    return PixelLight(mix(far.light, close.light, share), mix(far.specular, close.specular, share));
 }
 
 fn group_pixel(index: u32, corner: vec2i) -> vec2i {
@@ -232,34 +233,40 @@ fn upsample(
     workgroupBarrier();
     find_lean(index);
     workgroupBarrier();
-    if all(id.xy < params.size) {
-        let pixel = vec2i(id.xy);
-        let z = distance_at(pixel);
-        if z > 0.0 {
-            let place = cell_place(pixel, first);
-            let here = pixel_surface(pixel, z);
-            let base = floor(place);
-            let right = place - base;
-            let near = sum_2x2(here, i32(base.y) * TILE_WIDTH + i32(base.x), 1.0 - right, right, 0.0);
-            if near.light.a >= TRUST {
-                answer(pixel, here, resolve_sum(near));
-            } else {
-                nearby[index] = near;
-                further[atomicAdd(&further_noted, 1u)] = index;
-            }
-        } else {
-            textureStore(output, pixel, vec4f(vec3f(0.0), 1.0));
-            textureStore(specular_output, pixel, vec4f(vec3f(0.0), 1.0));
+    let pixel = vec2i(id.xy);
+    var z = 0.0;
+    if all(id.xy < params.size) { z = distance_at(pixel); }
+    let here = pixel_surface(pixel, z);
+    var near = Sum();
+    var place_in_list = NOT_LISTED;
+    if z > 0.0 {
+        let place = cell_place(pixel, first);
+        let base = floor(place);
+        let right = place - base;
+        near = sum_2x2(here, i32(base.y) * TILE_WIDTH + i32(base.x), 1.0 - right, right, 0.0);
+        if near.light.a < TRUST {
+            place_in_list = atomicAdd(&further_noted, 1u);
+            further[place_in_list] = index;
         }
     }
     workgroupBarrier();
     if index == 0u { further_count = atomicLoad(&further_noted); }
     let count = workgroupUniformLoad(&further_count);
-    for (var done = 0u; done < count; done += u32(GROUP_PIXELS) / 4u) {
+    var found = PixelLight();
+    for (var done = 0u; done < count; done += FURTHER_AT_ONCE) {
         let at = done + index / 4u;
         if at < count { quarters[index] = quarter(at, index & 3u, corner, first); }
         workgroupBarrier();
-        if index < u32(GROUP_PIXELS) / 4u && done + index < count { answer_further(done + index, corner, 4u * index); }
+        let own = place_in_list - done;
+        if own < FURTHER_AT_ONCE { found = blended(near, 4u * own); }
         workgroupBarrier();
     }
+    if any(id.xy >= params.size) { return; }
+    if z <= 0.0 {
+        textureStore(output, pixel, vec4f(vec3f(0.0), 1.0));
+        textureStore(specular_output, pixel, vec4f(vec3f(0.0), 1.0));
+        return;
+    }
+    if place_in_list == NOT_LISTED { found = resolve_sum(near); }
+    answer(pixel, here, found);
 }
