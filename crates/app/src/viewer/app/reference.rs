@@ -53,7 +53,7 @@ impl App {
             stage.forget_reference();
             return;
         }
-        let camera = self.state.navigator.camera(&shown.scene);
+        let camera = self.state.navigator.camera(&shown.scene, self.state.size);
         let subject = Subjects {
             version: self.state.version,
             transform: camera.transform,

@@ -85,7 +85,7 @@ pub fn outline(state: &State, rect: Rect, density: f32) -> Vec<Shape> {
     let Some((object, shown)) = state.selected.zip(state.shown.as_ref()) else { return Vec::new() };
     let found = shown.scene.instances.get(object).and_then(|i| posed_bounds(i, &shown.scene));
     let Some((low, high)) = found else { return Vec::new() };
-    let eye = Eye::new(&state.navigator.camera(&shown.scene), state.size, [0.0; 2]);
+    let eye = Eye::new(&state.navigator.camera(&shown.scene, state.size), state.size, [0.0; 2]);
     let clip = glam::Mat4::from_cols_array_2d(&eye.clip_from_world);
     let corner = |i: usize| {
         let pick = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
