@@ -40,10 +40,11 @@ fn framed(folder: &Path, name: &str, lens: Value) {
     std::fs::write(folder.join(name), glb.bytes()).unwrap();
 }
 
-/// Bright columns at the middle row, as the first and the last of them.
+/// Columns that are bright around the middle row, where text is not: the first and the last of them.
 fn bright(path: &Path) -> Option<[u32; 2]> {
     let image = read_png(path).expect("a picture");
-    let at = |x: u32| image.pixels[((image.height / 2 * image.width + x) * u32::from(image.channels)) as usize] > 0.5;
+    let rows = || image.height / 2 - 5..image.height / 2 + 5;
+    let at = |x: u32| rows().all(|y| image.pixels[((y * image.width + x) * u32::from(image.channels)) as usize] > 0.5);
     Some([(0..image.width).find(|x| at(*x))?, (0..image.width).rev().find(|x| at(*x))?])
 }
 

@@ -14,7 +14,7 @@ const MOST: f32 = 0.75;
 const APART: f32 = 4.0;
 
 /// How many times as large as all the rest a flat thing is that is not framed.
-const BEYOND: f32 = 2.0;
+const BEYOND: f32 = 1.75;
 /// A thing is flat that is no thicker than this share of its diagonal.
 const FLAT: f32 = 0.02;
 

@@ -5,7 +5,8 @@ use crate::viewer::frames::{Group, Row, doc, is_layer};
 use crate::viewer::state::State;
 use crate::viewer::stats::Spread;
 use crate::viewer::ui::{Facts, Memory};
-use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Ui, Vec2};
+use egui::text::{LayoutJob, TextFormat, TextWrapping};
+use egui::{Align2, Color32, FontId, Mesh, Pos2, Rect, Sense, Stroke, Ui, Vec2};
 
 const HEIGHT: f32 = 16.0;
 /// Right edges of the numbers, from the right, points: median, 95th percentile, share.
@@ -131,7 +132,8 @@ fn paint(ui: &mut Ui, line: &Line<'_>, sense: Sense) -> egui::Response {
     if !ui.is_rect_visible(rect) {
         return response;
     }
-    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
+    // With one clip for all rows they are one draw call.
+    let painter = ui.painter();
     let y = rect.center().y;
     if sense.senses_click() && (response.hovered() || response.has_focus()) {
         painter.rect_filled(rect, 2.0, Color32::from_white_alpha(22));
@@ -150,21 +152,31 @@ fn paint(ui: &mut Ui, line: &Line<'_>, sense: Sense) -> egui::Response {
     // Names end where bars begin, and these where numbers do.
     let (bar_left, bar_right) = (rect.left() + 0.4 * rect.width(), rect.right() - EDGES[0] - 56.0);
     let colour = if line.strong { TEXT } else { Color32::from_gray(0xd4) };
-    let names = painter.with_clip_rect(Rect::from_x_y_ranges(rect.left()..=bar_left - 4.0, rect.y_range()));
     let size = if line.strong { 12.5 } else { 12.0 };
-    let name = names.text(Pos2::new(x, y), Align2::LEFT_CENTER, line.name, FontId::proportional(size), colour);
     let note = if line.slowest { "slowest" } else { &line.note };
     let tint = if line.slowest { WARN } else { WEAK };
-    let at = Pos2::new(name.right() + 6.0, y);
-    names.text(at, Align2::LEFT_CENTER, note, FontId::proportional(10.5), tint);
+    for (text, size, colour) in [(line.name, size, colour), (note, 10.5, tint)] {
+        let room = bar_left - 4.0 - x;
+        if text.is_empty() || room < 12.0 {
+            continue;
+        }
+        let mut job = LayoutJob::single_section(text.into(), TextFormat::simple(FontId::proportional(size), colour));
+        job.wrap = TextWrapping::truncate_at_width(room);
+        let galley = painter.layout_job(job);
+        let place = Align2::LEFT_CENTER.anchor_size(Pos2::new(x, y), galley.size());
+        x = place.right() + 6.0;
+        painter.galley(place.min, galley, colour);
+    }
     if let Some(share) = line.share {
         let all = Rect::from_x_y_ranges(bar_left..=bar_right, y - 4.0..=y + 4.0);
-        painter.rect_filled(all, 1.5, Color32::from_white_alpha(14));
         let mut bar = all;
         bar.set_width((all.width() * share.clamp(0.0, 1.0) as f32).max(1.0));
-        painter.rect_filled(bar, 1.5, line.colour);
+        let mut mesh = Mesh::default();
+        mesh.add_colored_rect(all, Color32::from_white_alpha(14));
+        mesh.add_colored_rect(bar, line.colour);
+        painter.add(egui::Shape::mesh(mesh));
         if line.slowest {
-            painter.rect_stroke(bar, 1.5, Stroke::new(1.0, WARN), egui::StrokeKind::Outside);
+            painter.rect_stroke(bar, 0.0, Stroke::new(1.0, WARN), egui::StrokeKind::Outside);
         }
         right(ui, Pos2::new(rect.right(), y), &percent(share), 11.5, colour);
     }
