@@ -271,7 +271,7 @@ fn costs() -> [f64; 3] {
 #[test]
 fn the_timing_overlay_costs_next_to_nothing() {
     // Tests are built without optimisation of the window's own code, which makes it four times as slow.
-    let most = if cfg!(debug_assertions) { 1.2 } else { 0.3 };
+    let most = if cfg!(debug_assertions) { 2.0 } else { 0.3 };
     // A busy machine is no slow overlay.
     let best = (0..6).map(|_| costs()).map(|[none, sums, all]| [none, sums - none, all - none]);
     let best = best.reduce(|a, b| [0, 1, 2].map(|i| a[i].min(b[i]))).expect("some");

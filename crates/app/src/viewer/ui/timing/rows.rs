@@ -9,6 +9,9 @@ use egui::text::{LayoutJob, TextFormat, TextWrapping};
 use egui::{Align2, Color32, FontId, Mesh, Pos2, Rect, Sense, Stroke, Ui, Vec2};
 
 const HEIGHT: f32 = 16.0;
+/// Heights of the head and of the rule above the last lines.
+const HEAD: f32 = 14.0;
+const RULE: f32 = 3.0;
 /// Right edges of the numbers, from the right, points: median, 95th percentile, share.
 const EDGES: [f32; 3] = [96.0, 44.0, 0.0];
 
@@ -26,6 +29,12 @@ struct Line<'a> {
     /// It can be unfolded, and is.
     open: Option<bool>,
     slowest: bool,
+}
+
+/// Most of `room` that cuts no row in two.
+pub fn whole(room: f32) -> f32 {
+    let other = HEAD + RULE;
+    other + ((room - other) / HEIGHT).floor().max(1.0) * HEIGHT
 }
 
 /// All groups that draw, the sum at the end.
@@ -88,7 +97,7 @@ pub fn rows(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
             paint(ui, &line, Sense::hover());
         }
     }
-    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 3.0), Sense::hover());
+    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), RULE), Sense::hover());
     ui.painter().hline(rect.x_range(), rect.center().y, Stroke::new(0.5, WEAK));
     paint(ui, &sum("CPU", now.cpu.spread()), Sense::hover());
     paint(ui, &sum("Frame to frame", now.interval.spread()), Sense::hover());
@@ -110,7 +119,7 @@ fn sum(name: &str, spread: Option<Spread>) -> Line<'_> {
 }
 
 fn head(ui: &mut Ui) {
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 14.0), Sense::hover());
+    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), HEAD), Sense::hover());
     for (edge, name) in EDGES.into_iter().zip(["median ms", "p95", "share"]) {
         let at = Pos2::new(rect.right() - edge, rect.center().y);
         ui.painter().text(at, Align2::RIGHT_CENTER, name, FontId::proportional(10.5), WEAK);
