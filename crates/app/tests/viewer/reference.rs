@@ -10,7 +10,7 @@ use std::path::Path;
 /// How much neighbours differ on the right half of a picture without a panel, 0 to 255.
 fn grain(path: &Path) -> f64 {
     let image = read_png(path).expect("a screenshot");
-    let (w, c) = (image.width, u32::from(image.channels));
+    let (w, c) = (image.width, image.channels);
     let at = |x: u32, y: u32| f64::from(image.pixels[((y * w + x) * c + 1) as usize]) * 255.0;
     let places = || (60..160).flat_map(move |y| (w / 2 + 20..w - 20).map(move |x| (x, y)));
     places().map(|(x, y)| (at(x, y) - at(x + 1, y)).abs()).sum::<f64>() / places().count() as f64
