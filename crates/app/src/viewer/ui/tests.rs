@@ -270,8 +270,9 @@ fn costs() -> [f64; 3] {
 
 #[test]
 fn the_timing_overlay_costs_next_to_nothing() {
-    // Tests are built without optimisation of the window's own code, which makes it four times as slow.
-    let most = if cfg!(debug_assertions) { 2.0 } else { 0.3 };
+    // Tests are built without optimisation of the window's own code, which makes it four times as slow. It is laid out
+    // four times a second at most: what passes and graph take is 0.03 ms a frame at 60 Hz.
+    let most = if cfg!(debug_assertions) { [0.6, 2.0] } else { [0.3, 0.5] };
     // A busy machine is no slow overlay.
     let best = (0..6).map(|_| costs()).map(|[none, sums, all]| [none, sums - none, all - none]);
     let best = best.reduce(|a, b| [0, 1, 2].map(|i| a[i].min(b[i]))).expect("some");
@@ -279,5 +280,5 @@ fn the_timing_overlay_costs_next_to_nothing() {
         "a layout without it {:.3} ms; its sums {:.3} ms more, all of it {:.3} ms more",
         best[0], best[1], best[2]
     );
-    assert!(best[1] <= most && best[2] <= most, "{best:?} ms");
+    assert!(best[1] <= most[0] && best[2] <= most[1], "{best:?} ms");
 }
