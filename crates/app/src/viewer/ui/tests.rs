@@ -207,6 +207,8 @@ fn costs() -> [f64; 3] {
     let (mut times, start) = (Times::default(), std::time::Instant::now());
     let at = |frame: usize| start + std::time::Duration::from_micros(16_667) * frame as u32;
     let own = times.run.clone();
+    // Each row has numbers of its own.
+    let ms = |k: usize| 0.2 + 0.0137 * (k % 16) as f64 + 0.001 * (k * k % 97) as f64;
     let labels = [
         "gbuffer",
         "shadow",
@@ -226,8 +228,7 @@ fn costs() -> [f64; 3] {
         "viewer.show",
     ];
     for i in 0..crate::viewer::frames::HISTORY {
-        let ms = |k: usize| 0.2 + 0.01 * ((7 * i + 13 * k) % 31) as f64;
-        let passes: Vec<_> = labels.iter().enumerate().map(|(k, l)| (l.to_string(), ms(k))).collect();
+        let passes: Vec<_> = labels.iter().zip(0..).map(|(l, k)| (l.to_string(), ms(7 * i + k))).collect();
         let now = at(i);
         times.frame(now, &passes, ms(3), &own);
         times.now.cpu.add(now, ms(3));
@@ -258,7 +259,7 @@ fn costs() -> [f64; 3] {
                 took.push(ms);
             }
         }
-        let passes: Vec<_> = labels.iter().map(|l| (l.to_string(), 0.3 + 0.001 * i as f64)).collect();
+        let passes: Vec<_> = labels.iter().zip(0..).map(|(l, k)| (l.to_string(), ms(7 * i + k))).collect();
         times.frame(at(crate::viewer::frames::HISTORY + i), &passes, 0.5, &own);
     }
     windows.map(|(_, _, memory, mut took)| {

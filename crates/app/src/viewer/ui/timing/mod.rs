@@ -8,7 +8,7 @@ use super::{Facts, Memory};
 use crate::viewer::frames::Numbers;
 use crate::viewer::state::{Action, State};
 use crate::viewer::stats::Spread;
-use egui::{Align, Color32, Layout, Pos2, Rect, RichText, Sense, Stroke, Ui, Vec2};
+use egui::{Align, Align2, Color32, FontId, Layout, Pos2, Rect, RichText, Sense, Stroke, Ui, Vec2};
 
 /// Colours of the groups of passes (Okabe and Ito's), in their order; the window's own is grey.
 const COLOURS: [Color32; 6] = [
@@ -230,4 +230,9 @@ fn whole(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>,
                 .on_hover_text("CPU time of this overlay and the panel, mean of all frames");
         });
     });
+}
+
+/// A number at the right of a place.
+fn right(ui: &Ui, at: Pos2, text: &str, size: f32, colour: Color32) {
+    ui.painter().text(at, Align2::RIGHT_CENTER, text, FontId::monospace(size), colour);
 }

@@ -1,6 +1,6 @@
 //! Passes in their groups, with a bar and a share each.
 
-use super::{COLOURS, TEXT, WARN, WEAK, ms};
+use super::{COLOURS, TEXT, WARN, WEAK, ms, right};
 use crate::viewer::frames::{Group, Row, doc, is_layer};
 use crate::viewer::state::State;
 use crate::viewer::stats::Spread;
@@ -13,7 +13,7 @@ const HEIGHT: f32 = 16.0;
 const HEAD: f32 = 14.0;
 const RULE: f32 = 3.0;
 /// Right edges of the numbers, from the right, points: median, 95th percentile, share.
-const EDGES: [f32; 3] = [97.0, 48.5, 0.0];
+const EDGES: [f32; 3] = [96.0, 44.0, 0.0];
 
 /// A line of the list.
 struct Line<'a> {
@@ -187,20 +187,12 @@ fn paint(ui: &mut Ui, line: &Line<'_>, sense: Sense) -> egui::Response {
         if line.slowest {
             painter.rect_stroke(bar, 0.0, Stroke::new(1.0, WARN), egui::StrokeKind::Outside);
         }
+        right(ui, Pos2::new(rect.right(), y), &percent(share), 11.5, colour);
     }
     let number = |v: Option<f64>| v.map_or("–".into(), |v| if v < 10.0 { format!("{v:.3}") } else { ms(v) });
     let (median, p95) = (number(line.spread.map(|s| s.median)), number(line.spread.and_then(|s| s.p95)));
-    // One text of columns as wide as digits are: three would be laid out one by one.
-    let mut job = LayoutJob::default();
-    let share = line.share.map(percent).unwrap_or_default();
-    for (text, colour) in
-        [(format!("{median:>8}"), colour), (format!("{p95:>7}"), WEAK), (format!("{share:>7}"), colour)]
-    {
-        job.append(&text, 0.0, TextFormat::simple(FontId::monospace(11.5), colour));
-    }
-    let galley = painter.layout_job(job);
-    let place = Align2::RIGHT_CENTER.anchor_size(Pos2::new(rect.right(), y), galley.size());
-    painter.galley(place.min, galley, colour);
+    right(ui, Pos2::new(rect.right() - EDGES[0], y), &median, 11.5, colour);
+    right(ui, Pos2::new(rect.right() - EDGES[1], y), &p95, 11.5, WEAK);
     match line.spread {
         Some(s) if response.hovered() => {
             let what = doc(line.name);
