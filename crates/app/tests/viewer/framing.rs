@@ -43,7 +43,8 @@ fn framed(folder: &Path, name: &str, lens: Value) {
 /// Columns that are bright around the middle row, where text is not: the first and the last of them.
 fn bright(path: &Path) -> Option<[u32; 2]> {
     let image = read_png(path).expect("a picture");
-    let rows = || image.height / 2 - 5..image.height / 2 + 5;
+    // Higher than letters.
+    let rows = || image.height / 2 - 8..image.height / 2 + 8;
     let at = |x: u32| rows().all(|y| image.pixels[((y * image.width + x) * image.channels) as usize] > 0.5);
     Some([(0..image.width).find(|x| at(*x))?, (0..image.width).rev().find(|x| at(*x))?])
 }
