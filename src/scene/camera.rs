@@ -28,8 +28,20 @@ impl Camera {
             name: "look-at".to_owned(),
             transform: world.to_cols_array_2d(),
             yfov,
+            aspect: None,
             near: if distance > 0.0 { NEAR * distance } else { NEAR },
             far: f32::INFINITY,
+        }
+    }
+
+    /// This camera for pictures of `size` pixels. Where they are narrower than [`Camera::aspect`],
+    /// the vertical field of view grows so that the horizontal one stays and the sides are not cut
+    /// off.
+    pub fn for_picture(&self, size: [u32; 2]) -> Camera {
+        let shape = size[0].max(1) as f32 / size[1].max(1) as f32;
+        match self.aspect.filter(|aspect| *aspect > shape) {
+            Some(aspect) => Camera { yfov: 2.0 * ((0.5 * self.yfov).tan() * (aspect / shape)).atan(), ..self.clone() },
+            None => self.clone(),
         }
     }
 

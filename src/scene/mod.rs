@@ -398,6 +398,8 @@ pub struct Camera {
     pub transform: [[f32; 4]; 4],
     /// Vertical field of view, radians.
     pub yfov: f32,
+    /// Width by height of the picture that its maker framed, if known.
+    pub aspect: Option<f32>,
     /// Near plane, metres, above 0.
     pub near: f32,
     /// Far plane, metres; `f32::INFINITY` where the file gives none. Never used to clip.

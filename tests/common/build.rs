@@ -74,7 +74,14 @@ pub fn look_at(eye: [f32; 3], target: [f32; 3], yfov: f32) -> Camera {
     let right = up.cross(back).normalize();
     let transform =
         glam::Mat4::from_cols(right.extend(0.0), back.cross(right).extend(0.0), back.extend(0.0), e.extend(1.0));
-    Camera { name: "test".into(), transform: transform.to_cols_array_2d(), yfov, near: 0.1, far: f32::INFINITY }
+    Camera {
+        name: "test".into(),
+        transform: transform.to_cols_array_2d(),
+        yfov,
+        aspect: None,
+        near: 0.1,
+        far: f32::INFINITY,
+    }
 }
 
 pub fn corner(lights: Vec<Light>) -> Scene {

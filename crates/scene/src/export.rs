@@ -301,6 +301,9 @@ fn sampler(s: &Sampler) -> Value {
 
 fn camera(c: &Camera) -> Value {
     let mut lens = json!({"yfov": c.yfov, "znear": c.near});
+    if let Some(aspect) = c.aspect {
+        lens["aspectRatio"] = json!(aspect);
+    }
     if c.far.is_finite() {
         lens["zfar"] = json!(c.far);
     }

@@ -64,7 +64,7 @@ impl Lit {
 /// Which scene, how it is lit, and from where it is seen.
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// A .gltf, .glb or .obj file, `interior`, `cornell`, `home:INDEX` or `paper-room:INDEX`.
+    /// A .gltf, .glb or .obj file, `interior`, `cornell`, `motion`, `home:INDEX` or `paper-room:INDEX`.
     pub scene: String,
     /// Material variant of the file, by name or number from 0.
     #[arg(long, value_name = "NAME|N", help_heading = SCENE)]
@@ -185,6 +185,7 @@ impl SceneArgs {
             // Made for any shape of picture; this one's is known.
             camera = look.camera_for(self.size[0] as f32 / self.size[1] as f32);
         }
+        camera = camera.for_picture(self.size);
         camera.yfov = fov.unwrap_or(camera.yfov);
         Ok(camera)
     }

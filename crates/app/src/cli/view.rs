@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Options")]
 pub struct Args {
-    /// A .gltf, .glb or .obj file, `interior`, `cornell`, `home:INDEX` or `paper-room:INDEX`
+    /// A .gltf, .glb or .obj file, `interior`, `cornell`, `motion`, `home:INDEX` or `paper-room:INDEX`
     /// [default: interior].
     #[arg(help_heading = None)]
     scene: Option<String>,

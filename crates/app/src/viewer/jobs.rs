@@ -288,7 +288,7 @@ impl Shot {
             weights: s.weights.clone(),
             network,
             scene: shown.scene.clone(),
-            camera: state.navigator.camera(&shown.scene),
+            camera: state.navigator.camera(&shown.scene, state.size),
             textures: state.textures,
             size: state.size,
             samples: if s.left == Source::Reference { s.spp } else { s.samples },

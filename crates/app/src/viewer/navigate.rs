@@ -75,17 +75,17 @@ impl Default for Navigator {
 }
 
 impl Navigator {
-    /// The camera to draw with.
-    pub fn camera(&self, scene: &Scene) -> Camera {
+    /// The camera to draw pictures of `size` pixels with.
+    pub fn camera(&self, scene: &Scene, size: [u32; 2]) -> Camera {
         match self.file_camera.and_then(|n| scene.cameras.get(n)) {
-            Some(camera) => camera.clone(),
+            Some(camera) => camera.for_picture(size),
             None => Camera::look_at(self.eye.into(), self.target.into(), self.fov.to_radians()),
         }
     }
 
-    /// Takes camera `n` of the file as it is; nothing where there is none.
-    pub fn take(&mut self, scene: &Scene, n: usize) {
-        let Some(camera) = scene.cameras.get(n) else { return };
+    /// Takes camera `n` of the file for pictures of `size` pixels; nothing where there is none.
+    pub fn take(&mut self, scene: &Scene, n: usize, size: [u32; 2]) {
+        let Some(camera) = scene.cameras.get(n).map(|camera| camera.for_picture(size)) else { return };
         let (eye, forward) = (Vec3::from(camera.eye()), Vec3::from(camera.forward()));
         let (middle, radius) = sphere(scene);
         // The point of the view axis nearest to the scene's middle, but in front.
@@ -96,6 +96,13 @@ impl Navigator {
         self.fov = camera.yfov.to_degrees();
         (self.speed, self.scale) = (0.4 * radius, radius);
         self.file_camera = Some(n);
+    }
+
+    /// Pictures have another size: the file's camera, if it is on show, may see more or less.
+    pub fn resize(&mut self, scene: &Scene, size: [u32; 2]) {
+        if let Some(camera) = self.file_camera.and_then(|n| scene.cameras.get(n)) {
+            self.fov = camera.for_picture(size).yfov.to_degrees();
+        }
     }
 
     /// The file's camera, which is the one on show, has moved.
@@ -293,7 +300,7 @@ mod tests {
         let scene = scene();
         let mut n = Navigator { target: Vec3::new(0.0, 1.0, 0.0), ..Navigator::default() };
         let seen = |n: &Navigator, p: Vec3| {
-            let view = bouncelight::render::View::new(&n.camera(&scene), [100, 100], [0.0; 2]);
+            let view = bouncelight::render::View::new(&n.camera(&scene, [100, 100]), [100, 100], [0.0; 2]);
             let p = glam::Mat4::from_cols_array_2d(&view.clip_from_world) * p.extend(1.0);
             p.truncate() / p.w
         };
@@ -317,7 +324,7 @@ mod tests {
         let away = radius / (0.5 * yfov).tan();
         scene.cameras[0] = Camera::look_at((middle + away * Vec3::Z).into(), middle.into(), yfov);
         let mut n = Navigator::default();
-        n.take(&scene, 0);
+        n.take(&scene, 0, [100, 100]);
         assert!(n.target.distance(middle) < 0.01 * radius && n.is_long(), "{n:?}");
     }
 
@@ -329,7 +336,7 @@ mod tests {
             for size in [[640u32, 360], [200, 400]] {
                 let mut n = Navigator::default();
                 n.preset(&scene, size[0] as f32 / size[1] as f32, preset);
-                let view = bouncelight::render::View::new(&n.camera(&scene), size, [0.0; 2]);
+                let view = bouncelight::render::View::new(&n.camera(&scene, size), size, [0.0; 2]);
                 let clip = glam::Mat4::from_cols_array_2d(&view.clip_from_world);
                 for i in 0..8 {
                     let pick = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
@@ -341,15 +348,37 @@ mod tests {
     }
 
     #[test]
+    fn a_narrow_window_cuts_no_sides_off_a_file_camera() {
+        let mut scene = scene();
+        scene.cameras[0].aspect = Some(2.0);
+        let wide = |camera: &Camera, size: [u32; 2]| bouncelight::render::View::new(camera, size, [0.0; 2]).tan_half;
+        let framed = wide(&scene.cameras[0], [400, 200]);
+        let mut n = Navigator::default();
+        n.take(&scene, 0, [400, 200]);
+        for (size, kept) in [([400, 200], 0), ([200, 400], 0), ([900, 200], 1)] {
+            n.resize(&scene, size);
+            let seen = wide(&n.camera(&scene, size), size);
+            assert!((seen[kept] - framed[kept]).abs() < 1e-5, "{size:?}: {seen:?} for {framed:?}");
+            assert!(seen[0] > framed[0] - 1e-5 && seen[1] > framed[1] - 1e-5, "{size:?}: {seen:?} for {framed:?}");
+            // Hands go on from there, and what moves is no file's camera any more.
+            let mut moved = n.clone();
+            moved.dolly(0.0);
+            assert!((wide(&moved.camera(&scene, size), size)[1] - seen[1]).abs() < 1e-5, "{size:?}");
+        }
+        scene.cameras[0].aspect = None;
+        assert_eq!(n.camera(&scene, [200, 400]).yfov, scene.cameras[0].yfov);
+    }
+
+    #[test]
     fn a_file_camera_is_used_as_it_is_until_it_is_moved() {
         let scene = scene();
         let mut n = Navigator::default();
-        n.take(&scene, 0);
-        assert_eq!(n.camera(&scene).transform, scene.cameras[0].transform);
+        n.take(&scene, 0, [100, 100]);
+        assert_eq!(n.camera(&scene, [100, 100]).transform, scene.cameras[0].transform);
         n.dolly(1.0);
         assert_eq!(n.file_camera, None);
-        assert_ne!(n.camera(&scene).transform, scene.cameras[0].transform);
-        n.take(&scene, 99);
+        assert_ne!(n.camera(&scene, [100, 100]).transform, scene.cameras[0].transform);
+        n.take(&scene, 99, [100, 100]);
         assert_eq!(n.file_camera, None);
     }
 }

@@ -35,7 +35,7 @@ pub fn report(app: &App) -> Value {
     let mut report = json!({
         "loaded": shown.is_some() && stage.is_some_and(|st| st.has_scene() && st.still() > 0),
         "idle": app.is_idle(), "version": app.state.version,
-        "frames": app.frames, "layouts": app.overlay.layouts, "built": app.built, "places": app.overlay.memory.places,
+        "frames": app.frames, "layouts": app.overlay.layouts, "built": app.built, "places": app.overlay.memory.places, "status": app.overlay.memory.status,
         "density_drawn": app.overlay.density, "scene_frames": app.scene_frames,
         "view": s.view.name(), "left": s.left.name(), "right": s.right.name(), "split": s.split, "line": s.line,
         "fallback": by(Side::Left).and_then(|by| Some(format!("{}: {}", by.source.name(), by.why?))),
@@ -82,10 +82,10 @@ pub fn report(app: &App) -> Value {
     let measured = json!({
         "reference": {
             "samples": found.map_or(0, |f| f.samples), "finished": found.is_some_and(|f| f.finished),
-            "noise": found.map(|f| f.noise),
+            "noise": found.map(|f| f.noise), "texel": found.map(|f| f.texel), "denoised": found.is_some_and(|f| f.denoised.is_some()),
         },
         "verdict": v.map(|v| json!({ "by": v.by.map(|by| by.name()), "psnr": v.psnr, "ssim": v.ssim, "mae": v.mae, "relmse": v.rel_mse,
-            "bias": v.bias })),
+            "bias": v.bias, "noisy": v.is_noise(app.tracing.facts.and_then(|f| f.noise).unwrap_or(0.0)) })),
         "flicker": app.meter.flicker, "passes": passes, "memory": memory,
         "gpu_ms": app.meter.times.now.gpu.median(),
         "cpu_ms": app.meter.times.now.cpu.median(),

@@ -1,5 +1,6 @@
 //! Numbers that come one a frame: median, 95th percentile, and on how many they stand.
 
+use std::cell::OnceCell;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -7,7 +8,7 @@ use std::time::{Duration, Instant};
 const WINDOW: Duration = Duration::from_secs(2);
 /// … but so many are kept where frames are slow, and never more than
 const LEAST: usize = 32;
-/// … so many, which are sorted for every percentile.
+/// … so many, which are gone through for every percentile.
 const MOST: usize = 256;
 /// Fewer values have no 95th percentile: it would be the largest of them.
 pub const ENOUGH: usize = 20;
@@ -16,11 +17,14 @@ pub const ENOUGH: usize = 20;
 #[derive(Debug, Clone, Default)]
 pub struct Track {
     recent: VecDeque<(Instant, f64)>,
+    /// The spread, until another value comes: a layout asks for it several times.
+    known: OnceCell<Option<Spread>>,
 }
 
 impl Track {
     /// Adds a value that was measured at `now`.
     pub fn add(&mut self, now: Instant, ms: f64) {
+        self.known.take();
         self.recent.push_back((now, ms));
         let old = |(t, _): &(Instant, f64)| now.duration_since(*t) > WINDOW;
         while self.recent.len() > MOST || (self.recent.len() > LEAST && self.recent.front().is_some_and(old)) {
@@ -30,15 +34,19 @@ impl Track {
 
     /// Median, 95th percentile (nearest rank) and number of values; `None` without any.
     pub fn spread(&self) -> Option<Spread> {
-        let mut values: Vec<f64> = self.recent.iter().map(|(_, ms)| *ms).collect();
-        values.sort_by(f64::total_cmp);
-        let n = values.len();
-        let at = |q: f64| values[((n as f64 * q).ceil() as usize).clamp(1, n) - 1];
-        (n > 0).then(|| Spread {
-            median: at(0.5),
-            p95: (n >= ENOUGH).then(|| at(0.95)),
-            mean: values.iter().sum::<f64>() / n as f64,
-            count: n,
+        *self.known.get_or_init(|| {
+            let mut values: Vec<f64> = self.recent.iter().map(|(_, ms)| *ms).collect();
+            let (n, sum) = (values.len(), values.iter().sum::<f64>());
+            let mut at = |q: f64| {
+                let rank = ((n as f64 * q).ceil() as usize).clamp(1, n) - 1;
+                *values.select_nth_unstable_by(rank, f64::total_cmp).1
+            };
+            (n > 0).then(|| Spread {
+                median: at(0.5),
+                p95: (n >= ENOUGH).then(|| at(0.95)),
+                mean: sum / n as f64,
+                count: n,
+            })
         })
     }
 

@@ -87,3 +87,21 @@ fn what_is_shown_is_not_changed_by_being_shown() {
     let told = printed(&out);
     assert_eq!(told[0], told[1]);
 }
+
+/// The bundled animation: the window's time slider is tried without a file.
+#[test]
+fn the_bundled_animation_plays() {
+    let (Some(_), Some(display)) = (common::gpu(), Display::open()) else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let script = json!([
+        { "wait": "loaded" }, { "wait": "idle" },
+        { "expect": { "/scene/animations": 1, "/scene/pose": null, "/errors": 0, "/messages": [] } },
+        { "save": { "lights": "/scene/lights" } },
+        { "key": "I" }, { "until": { "/scene/pose/1": { "min": 0.3 } } }, { "key": "I" }, { "wait": "idle" },
+        // The lamp's light swings with it.
+        { "expect_not_saved": { "lights": "/scene/lights" } },
+        { "key": "U" }, { "wait": "idle" }, { "expect": { "/scene/pose": null } },
+        { "expect_saved": { "lights": "/scene/lights" } }
+    ]);
+    succeeds(&session(&display, dir.path(), script, &["motion", "--method", "direct", "--size", "640x400"]));
+}

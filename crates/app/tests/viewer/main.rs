@@ -7,9 +7,13 @@
 mod common;
 mod display;
 mod faults;
+mod framing;
+#[path = "../../../../tests/common/glb.rs"]
+mod glb;
 #[path = "../../../../tests/common/linear.rs"]
 mod linear;
 mod rays;
+mod reference;
 mod session;
 mod switches;
 mod timing;

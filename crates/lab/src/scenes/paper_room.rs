@@ -168,6 +168,7 @@ pub fn scene(index: u32) -> Scene {
         transform: to_f32(Y_UP * camera),
         // A 36 mm wide sensor behind a 30 mm lens is 18 mm high at 2:1.
         yfov: 2.0 * (9.0f32 / 30.0).atan(),
+        aspect: None,
         near: 0.1,
         far: 100.0,
     });

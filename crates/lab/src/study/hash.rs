@@ -57,7 +57,7 @@ pub fn of_scene(scene: &Scene) -> String {
 
 /// From where it is seen, but for the camera's name.
 pub fn of_camera(camera: &Camera) -> String {
-    let Camera { name: _, transform, yfov, near, far } = camera;
+    let Camera { name: _, transform, yfov, aspect: _, near, far } = camera;
     of_text(&(transform, yfov, near, far))
 }
 

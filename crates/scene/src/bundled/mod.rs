@@ -4,19 +4,21 @@
 mod builder;
 mod cornell;
 mod interior;
+mod motion;
 mod textures;
 
 use bouncelight::scene::Scene;
 
 /// Names that [`scene`] knows.
-pub const NAMES: &[&str] = &["cornell", "interior"];
+pub const NAMES: &[&str] = &["cornell", "interior", "motion"];
 
 /// The bundled scene called `name`: `cornell`, a box after Cornell University's with a glowing
-/// panel, or `interior`, a small furnished room with textures.
+/// panel, `interior`, a small furnished room with textures, or `motion`, an animated box.
 pub fn scene(name: &str) -> Option<Scene> {
     match name {
         "cornell" => Some(cornell::scene()),
         "interior" => Some(interior::scene()),
+        "motion" => Some(motion::scene()),
         _ => None,
     }
 }

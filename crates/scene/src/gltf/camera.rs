@@ -38,13 +38,16 @@ impl Loader<'_> {
     /// Adds a node's camera. An orthographic one stands at the node until [`Loader::move_back`].
     pub(super) fn camera(&mut self, camera: &gltf::Camera, node: &str, world: Mat4) {
         let place = format!("cameras[{}] '{node}'", camera.index());
-        let (yfov, near, far, flat) = match camera.projection() {
-            Projection::Perspective(lens) => (lens.yfov(), lens.znear(), lens.zfar(), None),
-            Projection::Orthographic(lens) => (LENS, lens.znear(), Some(lens.zfar()), Some(lens)),
+        let (yfov, aspect, near, far, flat) = match camera.projection() {
+            Projection::Perspective(lens) => (lens.yfov(), lens.aspect_ratio(), lens.znear(), lens.zfar(), None),
+            Projection::Orthographic(lens) => {
+                (LENS, Some(lens.xmag() / lens.ymag()), lens.znear(), Some(lens.zfar()), Some(lens))
+            }
         };
+        let aspect = aspect.filter(|a| *a > 0.0 && *a < MOST);
         let transform = Mat4::IDENTITY.to_cols_array_2d();
         let far = far.filter(|&far| far > near).unwrap_or(f32::INFINITY);
-        let mut camera = Camera { name: node.to_owned(), transform, yfov, near, far };
+        let mut camera = Camera { name: node.to_owned(), transform, yfov, aspect, near, far };
         if let Some(lens) = &flat {
             let sizes = [lens.xmag(), lens.ymag()];
             if sizes.iter().any(|s| !(*s > 0.0 && *s < MOST)) || near.is_nan() || near.abs() > MOST {

@@ -1,15 +1,22 @@
 //! What of a scene is worth being framed: nearly all of it, but not one thing that lies far away, a
 //! ground plane that reaches to the horizon, or a dome for the sky.
 
+use super::strays;
 use crate::triangles;
 use bouncelight::scene::{Scene, bounds::world_bounds};
 use glam::Vec3;
+use std::collections::HashMap;
 
 /// Share of the triangles that is near enough to each other; what lies apart from them is left out
 /// …
 const MOST: f32 = 0.75;
 /// … if it is so many times as far from their middle as they reach.
 const APART: f32 = 4.0;
+
+/// How many times as large as all the rest a flat thing is that is not framed.
+const BEYOND: f32 = 1.75;
+/// A thing is flat that is no thicker than this share of its diagonal.
+const FLAT: f32 = 0.02;
 
 /// Steps of the histogram of distances in each doubling.
 const STEPS: f32 = 8.0;
@@ -59,13 +66,62 @@ impl Extent {
             }
             inside -= count;
         }
-        if reach.is_infinite() {
+        let near = || triangles::of(scene).map(|(corners, _)| corners).filter(|c| far(c) <= reach);
+        let core = near().fold(Self::EMPTY, |b, c| b.with(&Self::around(&c)));
+        if !core.is_placed() {
             return Some(all);
         }
-        let near = triangles::of(scene).map(|(corners, _)| corners).filter(|c| far(c) <= reach);
-        let empty = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
-        let core = near.flatten().fold(empty, |b, p| Self { low: b.low.min(p), high: b.high.max(p) });
-        Some(if core.low.x <= core.high.x { core } else { all })
+        // Of a huge scene not all triangles are met.
+        let whole = if reach.is_infinite() && all.size() < 1.1 * core.size() { all } else { core };
+        Some(strays::cut(core, near()).unwrap_or(whole))
+    }
+
+    /// Without flat things that reach far beyond all others, as the floor and the wall behind a
+    /// product do, two at most: more of them make a room.
+    pub fn without_planes(self, scene: &Scene) -> Self {
+        let mut boxes: HashMap<usize, (Self, usize)> = HashMap::new();
+        for (corners, owner) in triangles::of(scene) {
+            let one = Self::around(&corners);
+            if self.holds(one.low) && self.holds(one.high) {
+                let (all, count) = boxes.entry(owner.instance).or_insert((Self::EMPTY, 0));
+                (*all, *count) = (all.with(&one), *count + 1);
+            }
+        }
+        let total: usize = boxes.values().map(|(_, count)| count).sum();
+        let mut boxes: Vec<(Self, usize)> = boxes.into_values().collect();
+        boxes.sort_by(|(a, _), (b, _)| b.size().total_cmp(&a.size()));
+        for planes in 1..=2 {
+            let Some((large, rest)) = boxes.split_at_checked(planes).filter(|(_, rest)| !rest.is_empty()) else {
+                break;
+            };
+            let rest = rest.iter().fold(Self::EMPTY, |b, (other, _)| b.with(other));
+            let beyond = |plane: &Self| plane.is_flat() && plane.size() >= BEYOND * rest.size();
+            let count: usize = large.iter().map(|(_, count)| count).sum();
+            if large.iter().all(|(plane, _)| beyond(plane)) && count as f32 <= (1.0 - MOST) * total as f32 {
+                return rest;
+            }
+        }
+        self
+    }
+
+    /// Around nothing.
+    const EMPTY: Self = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
+
+    fn around(corners: &[Vec3; 3]) -> Self {
+        let [a, b, c] = *corners;
+        Self { low: a.min(b).min(c), high: a.max(b).max(c) }
+    }
+
+    fn with(&self, other: &Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    fn is_placed(&self) -> bool {
+        self.low.cmple(self.high).all()
+    }
+
+    fn is_flat(&self) -> bool {
+        (self.high - self.low).min_element() <= FLAT * self.size()
     }
 
     pub fn middle(&self) -> Vec3 {

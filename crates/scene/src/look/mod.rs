@@ -10,6 +10,7 @@ mod extent;
 mod grid;
 mod inside;
 mod outside;
+mod strays;
 
 use bouncelight::scene::{Camera, Scene};
 use extent::Extent;
@@ -69,7 +70,7 @@ pub struct Look<'a> {
 impl<'a> Look<'a> {
     /// `None` where nothing is placed.
     pub fn new(scene: &'a Scene) -> Option<Self> {
-        let core = Extent::of(scene)?;
+        let mut core = Extent::of(scene)?;
         let grid = Grid::new(scene, core.low, core.high);
         let all = inside::stands(&grid);
         let count = all.len();
@@ -83,8 +84,15 @@ impl<'a> Look<'a> {
             () if enclosed >= PLACES => Shape::Boxed,
             () => Shape::Body,
         };
-        let (back, depth) = outside::direction(scene, &core, shape);
+        let (mut back, mut depth) = outside::direction(scene, &core, shape);
         let interior = enclosed >= CLOSED || (enclosed >= PLACES && depth < OPEN);
+        if !interior {
+            let subject = core.without_planes(scene);
+            if subject.size() < core.size() {
+                core = subject;
+                (back, depth) = outside::direction(scene, &core, shape);
+            }
+        }
         tracing::info!(
             "{}: one can stand in {count} places, {free} of them in no solid body, {} of them enclosed{}; from outside \
              one sees {:.0} % deep: {}",

@@ -28,7 +28,7 @@ fn specifications() {
     refused(bouncelight_scene::load(env!("CARGO_MANIFEST_DIR")), &[env!("CARGO_MANIFEST_DIR"), "is a folder", ".glb"]);
     refused(
         bouncelight_lab::scenes::load("cornel"),
-        &["cornel", "cornell", "interior", "paper-room:INDEX", "home:INDEX"],
+        &["cornel", "cornell", "interior", "motion", "paper-room:INDEX", "home:INDEX"],
     );
     refused(bouncelight_lab::scenes::load("Cargo.toml"), &["Cargo.toml", "`.toml`", ".gltf"]);
     for bad in ["paper-room:", "paper-room", "paper-room:-1", "paper-room:x", "paper-room:1.5", "paper-room:4000000000"]

@@ -50,6 +50,39 @@ fn the_cornell_light_has_the_flux_of_its_panel() {
     assert!((spot - surface).abs() < 1e-3 * surface, "{spot} {surface}");
 }
 
+#[test]
+fn the_animated_scene_moves_and_begins_where_it_ends() {
+    let still = bundled::scene("motion").expect("motion");
+    let at = |time: f32| {
+        let mut scene = still.clone();
+        assert!(scene.pose(0, time));
+        let LightKind::Spot { position, direction, .. } = scene.lights[0].kind else { panic!("a spot") };
+        let places = scene.instances.iter().flat_map(|i| i.transform.concat());
+        places.chain(position).chain(direction).collect::<Vec<f32>>()
+    };
+    let apart = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    let end = still.rig.as_ref().expect("animated").animations[0].end;
+    let LightKind::Spot { position, .. } = still.lights[0].kind else { panic!("a spot") };
+    let rest: Vec<f32> = still.instances.iter().flat_map(|i| i.transform.concat()).chain(position).collect();
+    assert!(apart(&at(0.0), &rest) < 1e-5 && apart(&at(0.0), &at(end)) < 1e-5);
+    for i in 1..8 {
+        assert!(apart(&at(0.0), &at(end * i as f32 / 8.0 + 0.05)) > 0.05, "{i}");
+    }
+    // The lamp's light hangs in its shade at any time, and nothing leaves the box.
+    for i in 0..64 {
+        let mut scene = still.clone();
+        scene.pose(0, end * i as f32 / 64.0);
+        let bulb = scene.instances.iter().find(|i| i.name == "bulb").expect("a bulb");
+        let mesh = &scene.meshes[bulb.mesh];
+        let (low, high) = bounds::instance_bounds(bulb, mesh).expect("placed");
+        let LightKind::Spot { position, .. } = scene.lights[0].kind else { panic!("a spot") };
+        let middle = 0.5 * (Vec3::from(low) + Vec3::from(high));
+        assert!((middle.distance(position.into()) - 0.08).abs() < 1e-3, "{middle} {position:?}");
+        let (low, high) = bounds::world_bounds(&scene).expect("placed");
+        assert!(low[1] > -1e-4 && high[1] < 2.001 && low[0] > -1.501 && high[0] < 1.501, "{low:?} {high:?}");
+    }
+}
+
 /// Where two scenes differ by more than rounding; empty when they are the same.
 fn differences(a: &Scene, b: &Scene) -> Vec<String> {
     let mut out = Vec::new();

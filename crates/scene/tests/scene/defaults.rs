@@ -94,6 +94,36 @@ fn what_lies_far_away_does_not_count() {
     assert!(apart(&with(Vec3::new(4.0, 0.0, 0.0), 1.0)) > 1.0);
 }
 
+#[test]
+fn planes_around_a_thing_are_not_framed_and_rooms_are() {
+    // A ball of radius 1 on a floor of 4.8 m by 4.8 m times `share`, with walls of 4.3 m that face it.
+    let camera = |planes: usize, share: f32| {
+        let mut scene = one(shapes::flat(Shape::UvSphere), Material::default(), Mat4::from_translation(Vec3::Y));
+        scene.meshes.push(shapes::flat(Shape::Cube));
+        let (low, high) = (share * Vec3::new(-2.4, 0.0, -2.4), share * Vec3::new(2.4, 4.3, 2.4));
+        let t = 0.01;
+        let slabs = [
+            (low - Vec3::Y * t, high.with_y(0.0)),
+            (low - Vec3::Z * t, high.with_z(low.z)),
+            (low - Vec3::X * t, high.with_x(low.x)),
+        ];
+        for (low, high) in slabs.into_iter().take(planes) {
+            let place = Mat4::from_translation(0.5 * (low + high)) * Mat4::from_scale(0.5 * (high - low));
+            let transform = place.to_cols_array_2d();
+            scene.instances.push(Instance { name: "plane".to_owned(), mesh: 1, transform });
+        }
+        first(&scene)
+    };
+    let apart = |planes: usize, share: f32| {
+        let [a, b] = [camera(0, 1.0), camera(planes, share)].map(|c| (Vec3::from(c.eye()), Vec3::from(c.forward())));
+        // From another side it may be, but no farther away.
+        (a.0.distance(Vec3::Y) - b.0.distance(Vec3::Y)).abs().max(1.0 - b.1.dot((Vec3::Y - b.0).normalize()))
+    };
+    assert!(apart(1, 1.0) < 0.05 && apart(2, 1.0) < 0.05, "{} {}", apart(1, 1.0), apart(2, 1.0));
+    // Negative controls: three planes are a room, and a small one is a base.
+    assert!(apart(3, 1.0) > 0.5 && apart(1, 0.7) > 0.3, "{} {}", apart(3, 1.0), apart(1, 0.7));
+}
+
 /// A room of 6 m by 2.7 m by 4 m between slabs; `window` leaves the upper half of the +X wall open.
 fn room(window: bool) -> Scene {
     let mut scene = one(shapes::flat(Shape::Cube), Material::default(), Mat4::IDENTITY);

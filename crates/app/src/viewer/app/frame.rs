@@ -176,7 +176,7 @@ impl App {
             self.state.notify(e, true);
             return false;
         }
-        let camera = self.state.navigator.camera(&shown.scene);
+        let camera = self.state.navigator.camera(&shown.scene, self.state.size);
         let track = if self.screen.as_ref().is_some_and(|s| s.profiler.is_some()) {
             &self.meter.times.now.gpu
         } else {

@@ -218,7 +218,7 @@ impl App {
         let delay = output.viewport_output.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |v| v.repaint_delay);
         o.due = (delay < Duration::from_secs(3600)).then(|| now + delay);
         let density = o.density;
-        self.state.size = [place.width(), place.height()].map(|n| ((n * density).round() as u32).max(1));
+        self.state.resize([place.width(), place.height()].map(|n| ((n * density).round() as u32).max(1)));
         let (Some(screen), Some(stage)) = (&mut self.screen, &self.stage) else { return };
         screen.input.handle_platform_output(&screen.window, output.platform_output);
         for (id, deltas) in &textures {

@@ -1,7 +1,7 @@
 //! The live reference follows what is seen, and both sides are compared when they are whole.
 
 use super::{App, Event};
-use crate::viewer::choice::Side;
+use crate::viewer::choice::{Side, Source};
 use crate::viewer::judge::{self, Pair, Verdict};
 use crate::viewer::live::{Kept, Live, Report, Subjects};
 use crate::viewer::ui::ReferenceFacts;
@@ -49,11 +49,16 @@ impl App {
         if !self.state.wants_reference() {
             self.tracing.live = None;
             self.tracing.resting = None;
-            self.tracing.facts = None;
+            // What stands in the status line goes with it, and so do numbers that would be another view's
+            // when it comes back.
+            self.redraw |= self.tracing.facts.take().is_some();
+            if self.tracing.verdict.as_ref().is_some_and(|v| v.by.contains(&Source::Reference)) {
+                (self.tracing.verdict, self.tracing.judging) = (None, None);
+            }
             stage.forget_reference();
             return;
         }
-        let camera = self.state.navigator.camera(&shown.scene);
+        let camera = self.state.navigator.camera(&shown.scene, self.state.size);
         let subject = Subjects {
             version: self.state.version,
             transform: camera.transform,

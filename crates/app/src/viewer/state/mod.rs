@@ -184,7 +184,7 @@ impl State {
         }
         if !same {
             self.navigator = Navigator { fly: self.navigator.fly, ..Navigator::default() };
-            self.navigator.take(&scene, 0);
+            self.navigator.take(&scene, 0, self.size);
             if scene.cameras.len() == 1 && scene.cameras[0].name == FRAMING {
                 let aspect = self.aspect();
                 self.navigator.first(&scene, aspect);
@@ -222,6 +222,14 @@ impl State {
         if self.auto_exposure { self.measured.unwrap_or(0.0) } else { self.settings.exposure }
     }
 
+    /// Pictures have another size, pixels.
+    pub fn resize(&mut self, size: [u32; 2]) {
+        if self.size != size {
+            self.size = size;
+            self.with_scene(|navigator, scene| navigator.resize(scene, size));
+        }
+    }
+
     /// Width by height.
     fn aspect(&self) -> f32 {
         self.size[0] as f32 / self.size[1].max(1) as f32
@@ -250,7 +258,7 @@ impl State {
     /// Does what is asked.
     pub fn apply(&mut self, action: Action) {
         use Action as A;
-        let aspect = self.aspect();
+        let (size, aspect) = (self.size, self.aspect());
         self.remember(&action, Instant::now());
         let cameras = self.shown.as_ref().map_or(0, |s| s.scene.cameras.len());
         match action {
@@ -323,7 +331,7 @@ impl State {
                 let next = self.preset.map_or(0, |p| (p as usize + 1) % Preset::ALL.len());
                 self.apply(A::Preset(Preset::ALL[next]));
             }
-            A::Camera(n) => self.with_scene(|navigator, scene| navigator.take(scene, n)),
+            A::Camera(n) => self.with_scene(|navigator, scene| navigator.take(scene, n, size)),
             A::NextCamera => {
                 let next = self.navigator.file_camera.map_or(0, |n| (n + 1) % cameras.max(1));
                 self.apply(A::Camera(next));

@@ -27,7 +27,7 @@ struct Lens {
 impl Lens {
     fn new(state: &State, rect: Rect, density: f32) -> Option<Self> {
         let shown = state.shown.as_ref()?;
-        let eye = Eye::new(&state.navigator.camera(&shown.scene), state.size, [0.0; 2]);
+        let eye = Eye::new(&state.navigator.camera(&shown.scene, state.size), state.size, [0.0; 2]);
         let size = Vec2::new(state.size[0] as f32, state.size[1] as f32) / density;
         Some(Self { clip: Mat4::from_cols_array_2d(&eye.clip_from_world), near: eye.near, rect, size })
     }

@@ -39,7 +39,7 @@ pub(super) fn show(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect) {
         painter.text(place, align, text, font.clone(), Color32::WHITE);
     }
     let mean = facts.verdict.as_ref().map_or(String::new(), |v| format!(" (mean {:.4})", v.mae));
-    let title = format!("mean |left − right|, display{mean}");
+    let title = format!("|left − right|, display{mean}");
     painter.text(bar.left_top() - Vec2::new(0.0, 4.0), Align2::LEFT_BOTTOM, title, font, Color32::WHITE);
     let pointer = ui.input(|i| i.pointer.hover_pos()).filter(|p| rect.contains(*p));
     let density = ui.ctx().pixels_per_point();

@@ -180,7 +180,7 @@ fn wheel(ui: &Ui, memory: &mut Memory, rect: Rect) -> f32 {
 /// The object under a place of the window.
 fn object_at(ui: &Ui, state: &State, p: Pos2, rect: Rect) -> Option<usize> {
     let shown = state.shown.as_ref()?;
-    let eye = Eye::new(&state.navigator.camera(&shown.scene), state.size, [0.0; 2]);
+    let eye = Eye::new(&state.navigator.camera(&shown.scene, state.size), state.size, [0.0; 2]);
     let density = ui.ctx().pixels_per_point();
     let (origin, direction) = pick::ray(&eye, [(p.x - rect.left()) * density, (p.y - rect.top()) * density]);
     pick::pick(&shown.scene, origin, direction).map(|(object, _)| object)

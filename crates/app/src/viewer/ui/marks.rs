@@ -66,7 +66,19 @@ pub(super) fn marks(ui: &Ui, state: &State, facts: &Facts<'_>, rect: Rect, timin
             (View::Error, _) => format!("error: {left} against {right}, bright at 0.25"),
             (view, _) => view.doc().to_string(),
         };
-        label(&painter, rect.left_top() + Vec2::splat(8.0), Align2::LEFT_TOP, &text, false);
+        let size = painter.layout_no_wrap(text.clone(), FontId::proportional(13.0), Color32::WHITE).size();
+        label(&painter, corner(rect, timing, size), Align2::LEFT_TOP, &text, false);
+    }
+}
+
+/// Where a name of `size` stands: in the picture's corner, or below the timing overlay where that is in its way, or at
+/// the other end where that reaches far down.
+fn corner(rect: Rect, timing: Option<Rect>, size: Vec2) -> Pos2 {
+    let at = rect.left_top() + Vec2::splat(8.0);
+    match timing.filter(|t| t.intersects(Rect::from_min_size(at, size).expand(6.0))) {
+        None => at,
+        Some(t) if t.bottom() < rect.center().y => Pos2::new(at.x, t.bottom() + 8.0),
+        Some(_) => Pos2::new(at.x, rect.bottom() - size.y - 10.0),
     }
 }
 
@@ -85,7 +97,7 @@ pub fn outline(state: &State, rect: Rect, density: f32) -> Vec<Shape> {
     let Some((object, shown)) = state.selected.zip(state.shown.as_ref()) else { return Vec::new() };
     let found = shown.scene.instances.get(object).and_then(|i| posed_bounds(i, &shown.scene));
     let Some((low, high)) = found else { return Vec::new() };
-    let eye = Eye::new(&state.navigator.camera(&shown.scene), state.size, [0.0; 2]);
+    let eye = Eye::new(&state.navigator.camera(&shown.scene, state.size), state.size, [0.0; 2]);
     let clip = glam::Mat4::from_cols_array_2d(&eye.clip_from_world);
     let corner = |i: usize| {
         let pick = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
@@ -169,4 +181,23 @@ pub(super) fn jobs(ui: &Ui, state: &mut State, facts: &Facts<'_>, rect: Rect) {
         });
     });
     ui.ctx().request_repaint_after(std::time::Duration::from_millis(200));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_never_lies_under_the_timing_overlay() {
+        let rect = Rect::from_min_size(Pos2::new(0.0, 22.0), Vec2::new(660.0, 490.0));
+        let (short, long) = (Vec2::new(60.0, 15.0), Vec2::new(440.0, 15.0));
+        let sums = Rect::from_min_size(Pos2::new(226.0, 30.0), Vec2::new(426.0, 30.0));
+        let whole = sums.with_max_y(480.0);
+        assert_eq!(corner(rect, Some(sums), short), corner(rect, None, long));
+        for overlay in [sums, whole] {
+            let name = Rect::from_min_size(corner(rect, Some(overlay), long), long);
+            assert!(rect.contains_rect(name));
+            assert!(!overlay.intersects(name), "{name}");
+        }
+    }
 }

@@ -110,6 +110,8 @@ pub struct Memory {
     search: String,
     /// Where named things of the panel are seen, points; for scripts.
     pub places: BTreeMap<String, [f32; 2]>,
+    /// The status line; for scripts.
+    pub status: String,
     /// The drag over the picture that is under way.
     pub drag: Option<input::Drag>,
     /// Where the pointer was last.
@@ -135,7 +137,7 @@ pub fn show(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
         if facts.software {
             banner(ui, facts);
         }
-        egui::Panel::bottom("status").resizable(false).show(ui, |ui| status(ui, state, facts));
+        egui::Panel::bottom("status").resizable(false).show(ui, |ui| status(ui, state, memory, facts));
         side(ui, state, memory, facts);
     }
     let mut rect = ui.available_rect_before_wrap();
@@ -211,7 +213,7 @@ fn banner(ui: &mut Ui, facts: &Facts<'_>) {
     });
 }
 
-fn status(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
+fn status(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
     ui.horizontal(|ui| {
         let [w, h] = state.size;
         let mut text = format!("{w}×{h}");
@@ -234,6 +236,7 @@ fn status(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
         if ui.button("Help (H)").clicked() {
             state.apply(Action::Help);
         }
+        memory.status.clone_from(&text);
         ui.add(egui::Label::new(text).truncate());
     });
 }

@@ -201,7 +201,7 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
         weights(ui, state, memory);
     }
     if state.wants_reference() {
-        reference(ui, state, facts);
+        reference(ui, state, memory, facts);
     }
     if state.sources().len() == 2 {
         verdict(ui, state, facts);
@@ -257,13 +257,14 @@ fn weights(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
 }
 
 /// How far the path tracer is, in three lines at any time.
-fn reference(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
+fn reference(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
     ui.horizontal(|ui| {
         ui.label("Reference up to");
         let told = "The path tracer stops after so many samples a pixel";
         ui.add(drag(&mut state.settings.spp, 1..=65_536).suffix(" samples")).on_hover_text(told);
         let told = "Denoise for display; metrics use the noisy picture";
-        ui.checkbox(&mut state.settings.denoise, "Denoise").on_hover_text(told);
+        let response = ui.checkbox(&mut state.settings.denoise, "Denoise").on_hover_text(told);
+        memory.place("denoise", &response);
     });
     let r = facts.reference;
     ui.add(egui::ProgressBar::new(r.map_or(0.0, |r| r.share) as f32).desired_height(6.0));

@@ -200,3 +200,86 @@ fn a_wheel_counts_where_it_was_turned() {
     run(&mut state, vec![vec![], vec![moved(picture), wheel(), moved(panel)]]);
     assert_ne!(state.navigator.eye, eye);
 }
+
+/// Milliseconds that the layout and the triangles of a window take, the median of 200 each: without
+/// the timing overlay, with it, and with passes and graph.
+fn costs() -> [f64; 3] {
+    let (mut times, start) = (Times::default(), std::time::Instant::now());
+    let at = |frame: usize| start + std::time::Duration::from_micros(16_667) * frame as u32;
+    let own = times.run.clone();
+    // Each row has numbers of its own.
+    let ms = |k: usize| 0.2 + 0.0137 * (k % 16) as f64 + 0.001 * (k * k % 97) as f64;
+    let labels = [
+        "gbuffer",
+        "shadow",
+        "lights",
+        "direct",
+        "gi.downsample",
+        "gi.reproject",
+        "gi.trace",
+        "gi.accumulate",
+        "gi.pack",
+        "net.a",
+        "net.b",
+        "net.c",
+        "gi.reconstruct",
+        "composite",
+        "tonemap",
+        "viewer.show",
+    ];
+    for i in 0..crate::viewer::frames::HISTORY {
+        let passes: Vec<_> = labels.iter().zip(0..).map(|(l, k)| (l.to_string(), ms(7 * i + k))).collect();
+        let now = at(i);
+        times.frame(now, &passes, ms(3), &own);
+        times.now.cpu.add(now, ms(3));
+        times.now.interval.add(now, ms(5));
+        times.overlay.add(now, ms(1));
+    }
+    let measured = BTreeMap::new();
+    let mut windows = [(false, false), (true, false), (true, true)].map(|(shown, expanded)| {
+        let mut state = state();
+        (state.settings.timing.shown, state.settings.timing.expanded) = (shown, expanded);
+        state.settings.greeted = true;
+        state.apply(Action::Panel);
+        (egui::Context::default(), state, Memory::default(), Vec::new())
+    });
+    for i in 0..210usize {
+        for (context, state, memory, took) in &mut windows {
+            let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(1280.0, 800.0)));
+            let input = egui::RawInput { screen_rect, focused: true, ..Default::default() };
+            let facts = Facts { timestamps: true, software: false, live: true, ..Facts::bare(&times, &measured) };
+            let began = std::time::Instant::now();
+            let mut output = context.run_ui(input, |ui| _ = show(ui, state, memory, &facts));
+            let jobs = context.tessellate(std::mem::take(&mut output.shapes), output.pixels_per_point);
+            let ms = 1e3 * began.elapsed().as_secs_f64();
+            output.textures_delta.clear();
+            assert!(!jobs.is_empty());
+            // The first build fonts.
+            if i >= 10 {
+                took.push(ms);
+            }
+        }
+        let passes: Vec<_> = labels.iter().zip(0..).map(|(l, k)| (l.to_string(), ms(7 * i + k))).collect();
+        times.frame(at(crate::viewer::frames::HISTORY + i), &passes, 0.5, &own);
+    }
+    windows.map(|(_, _, memory, mut took)| {
+        drop(memory);
+        took.sort_by(f64::total_cmp);
+        took[took.len() / 2]
+    })
+}
+
+#[test]
+fn the_timing_overlay_costs_next_to_nothing() {
+    // Tests are built without optimisation of the window's own code, which makes it four times as slow. It is laid out
+    // four times a second at most: what passes and graph take is 0.03 ms a frame at 60 Hz.
+    let most = if cfg!(debug_assertions) { [0.6, 2.0] } else { [0.3, 0.5] };
+    // A busy machine is no slow overlay.
+    let best = (0..6).map(|_| costs()).map(|[none, sums, all]| [none, sums - none, all - none]);
+    let best = best.reduce(|a, b| [0, 1, 2].map(|i| a[i].min(b[i]))).expect("some");
+    println!(
+        "a layout without it {:.3} ms; its sums {:.3} ms more, all of it {:.3} ms more",
+        best[0], best[1], best[2]
+    );
+    assert!(best[1] <= most[0] && best[2] <= most[1], "{best:?} ms");
+}

@@ -52,7 +52,7 @@ fn drawn(drawn: &DrawnCount) -> [Line<'static>; 5] {
     [
         line("Triangles, camera", camera.triangles, Some(camera.culled)),
         line("Draw calls, camera", camera.draws.into(), None),
-        line("Shadows: redrawn / cached", drawn.maps.into(), Some(drawn.maps_kept.into())),
+        line("Shadow maps: new, kept", drawn.maps.into(), Some(drawn.maps_kept.into())),
         line("Triangles, shadows", shadows.triangles, Some(shadows.culled)),
         line("Draw calls, shadows", shadows.draws.into(), None),
     ]

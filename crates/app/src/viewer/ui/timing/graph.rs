@@ -68,8 +68,11 @@ pub fn history(ui: &mut Ui, memory: &mut Memory, facts: &Facts<'_>) {
     let plot = rect.height() - 3.0;
     let height = |ms: f32| (ms / top).min(1.0) * plot;
     let left = |i: usize| rect.left() + (first + i) as f32 * width;
+    // One mesh for all: shapes of their own would be outlined one by one.
     let mut mesh = Mesh::default();
-    let mut cpu = Vec::with_capacity(frames.len());
+    mesh.reserve_vertices(16 * frames.len());
+    mesh.reserve_triangles(8 * frames.len());
+    let mut last: Option<f32> = None;
     for (i, frame) in frames.iter().enumerate() {
         let (mut bottom, mut sum) = (rect.bottom(), 0.0);
         for (colour, v) in stack(frame) {
@@ -78,12 +81,18 @@ pub fn history(ui: &mut Ui, memory: &mut Memory, facts: &Facts<'_>) {
             mesh.add_colored_rect(Rect::from_x_y_ranges(left(i)..=left(i + 1), above..=bottom), colour);
             bottom = above;
         }
-        cpu.push(Pos2::new(left(i) + 0.5 * width, rect.bottom() - height(frame.cpu)));
+    }
+    for (i, frame) in frames.iter().enumerate() {
+        // Steps, as wide as a line is and as long as the rise.
+        let now = rect.bottom() - height(frame.cpu);
+        let before = last.replace(now).unwrap_or(now);
+        mesh.add_colored_rect(Rect::from_x_y_ranges(left(i)..=left(i + 1), now..=now + 1.0), TEXT);
+        if (now - before).abs() > 1.0 {
+            let rise = now.min(before)..=now.max(before) + 1.0;
+            mesh.add_colored_rect(Rect::from_x_y_ranges(left(i)..=left(i) + 1.0, rise), TEXT);
+        }
     }
     painter.add(Shape::mesh(mesh));
-    if cpu.len() > 1 {
-        painter.line(cpu, Stroke::new(1.2, TEXT));
-    }
     let font = FontId::proportional(10.0);
     let mut note = |at: Pos2, align: Align2, text: &str, colour: Color32| {
         let galley = painter.layout_no_wrap(text.into(), font.clone(), colour);

@@ -24,6 +24,8 @@ const WEAK: Color32 = Color32::from_rgb(0xb0, 0xb0, 0xb0);
 const WARN: Color32 = Color32::from_rgb(0xff, 0xb4, 0x4c);
 /// Width of the whole overlay, points.
 const WIDTH: f32 = 384.0;
+/// Edge of the signs that unfold and close it, points.
+const SIGN: f32 = 16.0;
 
 /// What the overlay remembers from one frame to the next.
 #[derive(Debug, Default)]
@@ -153,7 +155,7 @@ fn pair(ui: &mut Ui, facts: &Facts<'_>, both: bool) {
 fn buttons(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
     let expanded = state.settings.timing.expanded;
     let mut sign = |ui: &mut Ui, name: &str, lines: &[[Vec2; 2]]| {
-        let (rect, response) = ui.allocate_exact_size(Vec2::splat(16.0), Sense::click());
+        let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIGN), Sense::click());
         memory.place(name, &response);
         let colour = if response.hovered() || response.has_focus() { TEXT } else { WEAK };
         for [a, b] in lines {
@@ -178,11 +180,9 @@ fn whole(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>,
     ui.horizontal(|ui| {
         rate(ui, facts);
         pair(ui, facts, rect.width() > 360.0);
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            ui.spacing_mut().item_spacing.x = 2.0;
-            // From the right: the cross is the last of both.
-            ui.with_layout(Layout::left_to_right(Align::Center), |ui| buttons(ui, state, memory));
-        });
+        // At the right, both.
+        ui.add_space((ui.available_width() - 2.0 * SIGN - ui.spacing().item_spacing.x).max(0.0));
+        buttons(ui, state, memory);
     });
     let run = &facts.times.run;
     let [w, h] = run.size;
@@ -199,7 +199,7 @@ fn whole(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>,
         ui.add(egui::Label::new(RichText::new(told).size(12.0).color(WARN)).wrap());
     }
     graph::history(ui, memory, facts);
-    let room = (rect.height() - 16.0 - (ui.min_rect().height() + 44.0)).max(30.0);
+    let room = rows::whole((rect.height() - 16.0 - (ui.min_rect().height() + 44.0)).max(30.0));
     egui::ScrollArea::vertical().id_salt("passes").max_height(room).auto_shrink([false, true]).show(ui, |ui| {
         rows::rows(ui, state, memory, facts);
     });

@@ -5,9 +5,13 @@ use crate::viewer::frames::{Group, Row, doc, is_layer};
 use crate::viewer::state::State;
 use crate::viewer::stats::Spread;
 use crate::viewer::ui::{Facts, Memory};
-use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Ui, Vec2};
+use egui::text::{LayoutJob, TextFormat, TextWrapping};
+use egui::{Align2, Color32, FontId, Mesh, Pos2, Rect, Sense, Stroke, Ui, Vec2};
 
 const HEIGHT: f32 = 16.0;
+/// Heights of the head and of the rule above the last lines.
+const HEAD: f32 = 14.0;
+const RULE: f32 = 3.0;
 /// Right edges of the numbers, from the right, points: median, 95th percentile, share.
 const EDGES: [f32; 3] = [96.0, 44.0, 0.0];
 
@@ -25,6 +29,12 @@ struct Line<'a> {
     /// It can be unfolded, and is.
     open: Option<bool>,
     slowest: bool,
+}
+
+/// Most of `room` that cuts no row in two.
+pub fn whole(room: f32) -> f32 {
+    let other = HEAD + RULE;
+    other + ((room - other) / HEIGHT).floor().max(1.0) * HEIGHT
 }
 
 /// All groups that draw, the sum at the end.
@@ -87,7 +97,7 @@ pub fn rows(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'
             paint(ui, &line, Sense::hover());
         }
     }
-    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 3.0), Sense::hover());
+    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), RULE), Sense::hover());
     ui.painter().hline(rect.x_range(), rect.center().y, Stroke::new(0.5, WEAK));
     paint(ui, &sum("CPU", now.cpu.spread()), Sense::hover());
     paint(ui, &sum("Frame to frame", now.interval.spread()), Sense::hover());
@@ -109,7 +119,7 @@ fn sum(name: &str, spread: Option<Spread>) -> Line<'_> {
 }
 
 fn head(ui: &mut Ui) {
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 14.0), Sense::hover());
+    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), HEAD), Sense::hover());
     for (edge, name) in EDGES.into_iter().zip(["median ms", "p95", "share"]) {
         let at = Pos2::new(rect.right() - edge, rect.center().y);
         ui.painter().text(at, Align2::RIGHT_CENTER, name, FontId::proportional(10.5), WEAK);
@@ -131,7 +141,8 @@ fn paint(ui: &mut Ui, line: &Line<'_>, sense: Sense) -> egui::Response {
     if !ui.is_rect_visible(rect) {
         return response;
     }
-    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
+    // With one clip for all rows they are one draw call.
+    let painter = ui.painter();
     let y = rect.center().y;
     if sense.senses_click() && (response.hovered() || response.has_focus()) {
         painter.rect_filled(rect, 2.0, Color32::from_white_alpha(22));
@@ -150,21 +161,31 @@ fn paint(ui: &mut Ui, line: &Line<'_>, sense: Sense) -> egui::Response {
     // Names end where bars begin, and these where numbers do.
     let (bar_left, bar_right) = (rect.left() + 0.4 * rect.width(), rect.right() - EDGES[0] - 56.0);
     let colour = if line.strong { TEXT } else { Color32::from_gray(0xd4) };
-    let names = painter.with_clip_rect(Rect::from_x_y_ranges(rect.left()..=bar_left - 4.0, rect.y_range()));
     let size = if line.strong { 12.5 } else { 12.0 };
-    let name = names.text(Pos2::new(x, y), Align2::LEFT_CENTER, line.name, FontId::proportional(size), colour);
     let note = if line.slowest { "slowest" } else { &line.note };
     let tint = if line.slowest { WARN } else { WEAK };
-    let at = Pos2::new(name.right() + 6.0, y);
-    names.text(at, Align2::LEFT_CENTER, note, FontId::proportional(10.5), tint);
+    for (text, size, colour) in [(line.name, size, colour), (note, 10.5, tint)] {
+        let room = bar_left - 4.0 - x;
+        if text.is_empty() || room < 12.0 {
+            continue;
+        }
+        let mut job = LayoutJob::single_section(text.into(), TextFormat::simple(FontId::proportional(size), colour));
+        job.wrap = TextWrapping::truncate_at_width(room);
+        let galley = painter.layout_job(job);
+        let place = Align2::LEFT_CENTER.anchor_size(Pos2::new(x, y), galley.size());
+        x = place.right() + 6.0;
+        painter.galley(place.min, galley, colour);
+    }
     if let Some(share) = line.share {
         let all = Rect::from_x_y_ranges(bar_left..=bar_right, y - 4.0..=y + 4.0);
-        painter.rect_filled(all, 1.5, Color32::from_white_alpha(14));
         let mut bar = all;
         bar.set_width((all.width() * share.clamp(0.0, 1.0) as f32).max(1.0));
-        painter.rect_filled(bar, 1.5, line.colour);
+        let mut mesh = Mesh::default();
+        mesh.add_colored_rect(all, Color32::from_white_alpha(14));
+        mesh.add_colored_rect(bar, line.colour);
+        painter.add(egui::Shape::mesh(mesh));
         if line.slowest {
-            painter.rect_stroke(bar, 1.5, Stroke::new(1.0, WARN), egui::StrokeKind::Outside);
+            painter.rect_stroke(bar, 0.0, Stroke::new(1.0, WARN), egui::StrokeKind::Outside);
         }
         right(ui, Pos2::new(rect.right(), y), &percent(share), 11.5, colour);
     }
