@@ -47,6 +47,7 @@ fn rows() -> Vec<(&'static str, Layout)> {
         row!("Gather", gather::Params =>
             eye, frame, light_count, emitter_count, inverse_power, mask, entry_scale, cache_iteration, cell_frames,
             entry_frames, flags, cells, rays, frames_since_change, last_iteration, spp, shift,
+            ray_budget, entry_lifetime, pad,
         ),
         row!("Sample", Sample => depth, normal, plane, offset, mirrored, motion, color, broken),
         row!("Step", StepUniform =>

@@ -1,6 +1,7 @@
 //! `gi/` against its CPU reference, against arithmetic and against the laws it promises, on
 //! hand-made G-buffers.
 
+mod budget;
 #[path = "../common/build.rs"]
 mod build;
 mod bumps;

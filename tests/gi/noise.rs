@@ -155,7 +155,8 @@ fn light_at_the_foot_of_a_wall_is_not_averaged_with_that_of_the_floor_around() {
     let cell = 4.0 * 2.0 * 0.15f64.tan() * 2.8 / f64::from(SIZE[1]);
     let expected = |x: f64, h: f64| 0.5 * (1.0 + x / x.hypot(h));
     let drawn = |options, frames| lit(&gpu, &mut world::renderer(&gpu, SIZE, Method::Gather(options)), &s, frames);
-    let (light, places) = drawn(Options::default(), 128);
+    // 128 rays a cell, the last half of them at rest, one in four frames.
+    let (light, places) = drawn(Options::default(), 320);
     // Light so far from the wall, in cells, over what the formula gives.
     let over = |light: &[f32], from: f64, to: f64, h: f64| {
         let (mut found, mut wanted) = (0.0, 0.0);

@@ -98,10 +98,12 @@ fn accumulate(@builtin(global_invocation_id) id: vec3u) {
     let pixel = unpack_pixel(packed);
     let z = distance_at(pixel);
     let width = cell_foot(z);
-    var samples = sample_result(cell, width);
-    let spp = spp_of(packed);
-    let short_history = history_state(packed) == SHORT_HISTORY;
-    let disoccluded = spp > 1u && !short_history;
+    // Rays of the cell in this frame, by the mark of the first one's record.
+    let spp = bitcast<u32>(records[3u * cell + 1u].w);
+    var samples = CellSamples();
+    if spp > 0u { samples = sample_result(cell, width); }
+    let state = history_state(packed);
+    let disoccluded = state == DISOCCLUDED || state == INVALIDATED;
     if spp > 1u {
         for (var sample_index = 1u; sample_index < spp; sample_index++) {
             let more = sample_result(cell_record(cell, sample_index), width);
@@ -138,12 +140,15 @@ fn accumulate(@builtin(global_invocation_id) id: vec3u) {
     if changing && (gather.flags & GATHER_PROGRESSIVE) == 0u { most = min(most, MAX_HISTORY_DYNAMIC); }
     // A disoccluded cell counts its rays as frames; not just after a change, when the cache does
     // not know the change yet.
-    let history_length = min(history.history_length + f32(select(1u, spp, disoccluded && !changed)), most);
-    if short_history || (disoccluded && changed) {
-        // One frame of several rays: its moment is that of their mean, or between that and a single
-        // ray's.
+    let history_length = min(history.history_length + f32(select(min(spp, 1u), spp, disoccluded && !changed)), most);
+    if state == SHORT_HISTORY && gather.ray_budget == 0u {
+        // One frame of SPP_SHORT rays: its moment is that of their mean. With a budget it is one ray's.
         let l = luminance(samples.light);
-        samples.second_moment = mix(samples.second_moment, l * l, select(1.0 - 1.0 / f32(spp), 1.0, short_history));
+        samples.second_moment = l * l;
+    } else if disoccluded && changed {
+        // Between that and a single ray's.
+        let l = luminance(samples.light);
+        samples.second_moment = mix(samples.second_moment, l * l, 1.0 - 1.0 / f32(spp));
     }
     // These rays do not make the cell older for the ramp.
     let more = f32(SPP_INVALIDATED - 1u);
@@ -151,9 +156,10 @@ fn accumulate(@builtin(global_invocation_id) id: vec3u) {
     var share = max(max(ramp_weight(max(history_length - more, 1.0), more), early), ramp_weight(most, 0.0));
     if (gather.flags & GATHER_PROGRESSIVE) != 0u { share = 1.0 / history_length; }
     if disoccluded { share = 1.0; }
+    if spp == 0u { share = 0.0; }
     let surface = textureLoad(specular_map, pixel, 0);
     let roughness = select(NO_LOBE, surface.a, any(surface.rgb > vec3f(0.0)));
-    let alpha = select(max(fast_alpha(), 1.0 / history_length), 1.0, disoccluded);
+    let alpha = select(max(fast_alpha(), 1.0 / history_length), 1.0, disoccluded) * f32(min(spp, 1u));
     let fast_history = mix(history.fast_history, samples.light, alpha);
     // At rest a bright ray enters the mean through the fast history, spread over some frames and
     // without loss, instead of as a spark.

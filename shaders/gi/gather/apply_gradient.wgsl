@@ -56,7 +56,7 @@ fn gradient_samples(n: vec3f, at: vec2f) -> GradientSamples {
             let then = light_of(cell_record(cell, 1u));
             let now = light_of(retraced);
             all = with_sample(all, then, now);
-            let there = unpack_normal(bitcast<u32>(history_prev[5u * cell + 2u].w));
+            let there = unpack_normal(bitcast<u32>(records[3u * retraced + 1u].w));
             if dot(there, n) >= SAME_NORMAL { facing = with_sample(facing, then, now); }
         }
     }

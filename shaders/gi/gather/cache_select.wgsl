@@ -3,6 +3,7 @@
 //#import gi/gather/types.wgsl
 //#import gi/gather/entries.wgsl
 //#import gi/gather/jobs.wgsl
+//#import gi/gather/budget_scale.wgsl
 
 // Eviction of cache entries that no ray meets any more, and the entries that send a ray in an update.
 
@@ -11,9 +12,6 @@
 // E/π and rays in it; two halves, for even and odd updates.
 @group(2) @binding(4) var<storage, read_write> entry_light: array<vec4f>;
 @group(2) @binding(5) var<storage, read_write> jobs: array<atomic<u32>>;
-
-// Updates after the frame of its last use after which an entry is evicted.
-const ENTRY_LIFETIME = 32u;
 
 // A pass of its own before the frame's rays: no ray looks up what is about to leave, so two runs
 // agree.
@@ -24,6 +22,9 @@ fn cache_evict(@builtin(global_invocation_id) id: vec3u) {
     if slot == 0u {
         atomicStore(&jobs[ENTRY_JOBS], 0u);
         atomicStore(&jobs[ENTRY_JOBS + 1u], 0u);
+        let rays = atomicLoad(&jobs[CELL_JOBS]);
+        atomicStore(&jobs[LAST_RAYS], rays);
+        atomicStore(&jobs[BUDGET_SCALE], next_budget_scale(atomicLoad(&jobs[BUDGET_SCALE]), rays));
     }
     if slot >= slots { return; }
     let key = atomicLoad(&entry_keys[slot]);
@@ -33,7 +34,7 @@ fn cache_evict(@builtin(global_invocation_id) id: vec3u) {
     let is_used = atomicLoad(&entry_proposals[(gather.cache_iteration & 1u) * slots + slot]) != NONE;
     if key != TOMBSTONE {
         // An entry without proposals was made by a ray that only reads.
-        if is_used || (last_used != 0u && gather.cache_iteration + 1u - last_used <= ENTRY_LIFETIME) { return; }
+        if is_used || (last_used != 0u && gather.cache_iteration + 1u - last_used <= gather.entry_lifetime) { return; }
         let origins = gather.rays + 2u * slots + slot;
         entry_last_used[slot] = 0u;
         proposal_vertices[origins] = vec4u(0u);

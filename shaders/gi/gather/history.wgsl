@@ -54,11 +54,12 @@ fn strictness_at(x: vec3f) -> f32 {
 }
 
 // Mean squared luminance of frames of one ray. Frames of a short history are means of SPP_SHORT
-// rays.
+// rays, unless a budget leaves them fewer.
 fn ray_second_moment(history: History) -> f32 {
     let l = luminance(history.light);
     let in_short = min(SHORT_HISTORY_FRAMES / max(history.history_length, 1.0), 1.0);
-    let share = select(in_short, 0.0, (gather.flags & GATHER_PROGRESSIVE) != 0u);
+    let single = (gather.flags & GATHER_PROGRESSIVE) != 0u || gather.ray_budget != 0u;
+    let share = select(in_short, 0.0, single);
     return l * l + max(history.second_moment - l * l, 0.0) / (1.0 - share * (1.0 - 1.0 / f32(SPP_SHORT)));
 }
 

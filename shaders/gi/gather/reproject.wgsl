@@ -1,6 +1,7 @@
 //#import gi/gather/history_lookup.wgsl
 //#import gi/gather/apply_gradient.wgsl
 //#import gi/gather/jobs.wgsl
+//#import gi/gather/ray_budget.wgsl
 
 // Marks each cell whose history is missing, invalid or short, and notes the rays of the frame.
 
@@ -26,9 +27,15 @@ fn pixel_of_surface(history: History, cell: vec2u) -> u32 {
     return best;
 }
 
+// A cell's word in `cell_pixels`, and its history; length 0 where there is none.
+struct Marked {
+    packed: u32,
+    history: History,
+}
+
 // The pixel of a cell with its state. At rest a cell keeps its surface as long as one of its pixels
 // shows it: jittered foliage has another surface in the middle of a cell in every frame.
-fn marked_pixel(at_cell: vec2u, packed: u32) -> u32 {
+fn marked_pixel(at_cell: vec2u, packed: u32) -> Marked {
     let cell = cell_index(at_cell);
     let pixel = unpack_pixel(packed);
     let z = distance_at(pixel);
@@ -55,14 +62,15 @@ fn marked_pixel(at_cell: vec2u, packed: u32) -> u32 {
     } else if history.history_length < SHORT_HISTORY_FRAMES && (gather.flags & GATHER_PROGRESSIVE) == 0u {
         marked |= SHORT_HISTORY;
     }
-    return marked;
+    return Marked(marked, history);
 }
 
 // Whether the cell sends a ray into its lobe in this frame.
 fn has_specular_ray(cell: vec2u, packed: u32) -> bool {
     if any(specular_cell(cell / 2u) != cell) { return false; }
     records[3u * specular_record(cell / 2u) + 1u].z = 0.0;
-    return (gather.flags & GATHER_NO_SPECULAR) == 0u && has_lobe(textureLoad(specular_map, unpack_pixel(packed), 0));
+    return has_turn(cell / 2u) && (gather.flags & GATHER_NO_SPECULAR) == 0u
+        && has_lobe(textureLoad(specular_map, unpack_pixel(packed), 0));
 }
 
 @compute @workgroup_size(8, 8)
@@ -70,13 +78,17 @@ fn reproject(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= cell_grid()) { return; }
     let cell = cell_index(id.xy);
     if cell_pixels[cell] == NO_PIXEL { return; }
-    let packed = marked_pixel(id.xy, cell_pixels[cell]);
+    let marked = marked_pixel(id.xy, cell_pixels[cell]);
+    let packed = marked.packed;
     cell_pixels[cell] = packed;
-    let samples = spp_of(packed);
+    let scale = bitcast<f32>(atomicLoad(&jobs[BUDGET_SCALE]));
+    let level = ray_level(id.xy, packed, marked.history.history_length, scale);
+    let samples = rays_due(id.xy, level);
+    if samples == 0u { records[3u * cell + 1u] = vec4f(0.0); }
     let specular = has_specular_ray(id.xy, packed);
     let first = atomicAdd(&jobs[CELL_JOBS], samples + select(0u, 1u, specular));
-    for (var i = 0u; i < samples; i++) { note_job(first + i, packed, (cell << SAMPLE_BITS) | i); }
-    if specular { note_job(first + samples, packed, (cell << SAMPLE_BITS) | SPECULAR_SAMPLE); }
+    for (var i = 0u; i < samples; i++) { note_job(first + i, packed, cell_job(cell, level, i)); }
+    if specular { note_job(first + samples, packed, cell_job(cell, 0, SPECULAR_SAMPLE)); }
 }
 
 fn note_job(i: u32, a: u32, b: u32) {

@@ -4,7 +4,8 @@
 
 // A ray from a surface, and its record. The shader that imports this file binds `records`, three
 // vectors a ray: radiance and the entry's slot; throughput of the entry's light (shared exponent),
-// direction, distance (0: no ray); light of an emissive surface, and its direction.
+// direction, distance (0: no ray), a mark; light of an emissive surface, and its direction.
+// Marks: how many rays the cell sends; of a ray that is traced again, the cell's packed normal.
 
 fn shared_exponent(c: vec3f) -> u32 {
     let most = max(max(c.x, c.y), max(c.z, 1e-9));
@@ -18,7 +19,7 @@ fn hit_material(hit: Hit, x: vec3f, side: vec3f) -> HitMaterial {
 }
 
 // Traces a path and stores its record.
-fn trace_record(path: Path, record: u32) {
+fn trace_record(path: Path, record: u32, mark: u32) {
     var found = PathResult(vec3f(0.0), NONE, path.throughput, FAR, vec3f(0.0), 0u);
     // A lobe's direction below the surface has no weight and no ray.
     if any(path.throughput > vec3f(0.0)) {
@@ -28,7 +29,7 @@ fn trace_record(path: Path, record: u32) {
     let throughput = bitcast<f32>(shared_exponent(found.throughput));
     let direction = bitcast<f32>(pack_normal(path.direction));
     records[3u * record] = vec4f(found.radiance, bitcast<f32>(found.slot));
-    records[3u * record + 1u] = vec4f(throughput, direction, found.distance, 0.0);
+    records[3u * record + 1u] = vec4f(throughput, direction, found.distance, bitcast<f32>(mark));
     records[3u * record + 2u] = vec4f(found.emitter_light, bitcast<f32>(found.emitter_direction));
 }
 

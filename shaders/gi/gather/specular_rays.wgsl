@@ -11,7 +11,7 @@ fn specular_grid() -> vec2u {
 
 // Cell of a square that sends its specular ray in this frame.
 fn specular_cell(square: vec2u) -> vec2u {
-    let phase = array<vec2u, 4>(vec2u(0u, 0u), vec2u(1u, 1u), vec2u(1u, 0u), vec2u(0u, 1u))[gather.frame & 3u];
+    let phase = array<vec2u, 4>(vec2u(0u, 0u), vec2u(1u, 1u), vec2u(1u, 0u), vec2u(0u, 1u))[turn_of_four() & 3u];
     return 2u * square + phase;
 }
 

@@ -53,7 +53,8 @@ fn smooth_pixels(first: vec2u) -> u32 {
 // The one of them whose turn it is to send the frame's ray.
 fn traced_pixel(bits: u32) -> u32 {
     // From this frame's phase on, twice round.
-    return (gather.frame + firstTrailingBit((bits | (bits << 4u)) >> (gather.frame & 3u))) & 3u;
+    let turn = turn_of_four();
+    return (turn + firstTrailingBit((bits | (bits << 4u)) >> (turn & 3u))) & 3u;
 }
 
 // Seeds a pixel's random numbers: its index, after those of other rays.
@@ -65,7 +66,7 @@ fn rng_id_of(pixel: vec2u) -> u32 {
 fn pixel_path(pixel: vec2u) -> Path {
     let start = start_at(vec2i(pixel));
     let shift = pcg3(vec3u(pixel, 0x6a09e667u)).xy;
-    let lobe = lobe_ray(start, specular_at(pixel), lattice(gather.frame >> 2u, shift));
+    let lobe = lobe_ray(start, specular_at(pixel), lattice(turn_of_four() >> 2u, shift));
     return Path(start.x, lobe.d, start.n, UNWEIGHTED, false, 0.0, lobe.weight, NONE, rng_id_of(pixel));
 }
 
@@ -104,6 +105,7 @@ fn traced_radiance(pixel: vec2u) -> vec3f {
 
 @compute @workgroup_size(8, 8)
 fn specular_trace(@builtin(global_invocation_id) id: vec3u) {
+    if !has_turn(id.xy) { return; }
     let first = 2u * id.xy;
     let bits = smooth_pixels(first);
     if bits == 0u { return; }

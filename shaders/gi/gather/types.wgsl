@@ -42,6 +42,11 @@ struct Gather {
     spp: u32,
     // Shift of the cells' lattice by the seed: other noise, same light.
     shift: vec2u,
+    // Rays of cells in this frame, about; 0: as many as they ask for.
+    ray_budget: u32,
+    // Updates after the frame of its last use after which an entry is evicted.
+    entry_lifetime: u32,
+    pad: vec2u,
 }
 
 @group(1) @binding(0) var<uniform> gather: Gather;
@@ -59,7 +64,26 @@ const SPP_INVALIDATED = 4u;
 const SHORT_HISTORY_FRAMES = 40.0;
 const SPP_SHORT = 2u;
 
-// Rays of a cell in this frame, by its word in `cell_pixels`.
+// Points of the lattice for the places of a 4×4 square of cells: an order without pattern. Those of
+// each 2×2 differ in their last two bits.
+const LATTICE_ORDER = array<u32, 16>(0u, 11u, 6u, 13u, 9u, 2u, 15u, 4u, 7u, 12u, 1u, 10u, 14u, 5u, 8u, 3u);
+
+fn place_in_square(cell: vec2u) -> u32 {
+    return LATTICE_ORDER[(cell.y & 3u) * 4u + (cell.x & 3u)];
+}
+
+// Counts frames, or at rest every fourth: of four places each has its turn before the next has.
+fn turn_of_four() -> u32 {
+    return select(gather.frame, gather.frame >> 2u, (gather.flags & GATHER_REST) != 0u);
+}
+
+// Whether a square of 2×2 cells or pixels sends specular rays in this frame: at rest one of four.
+fn has_turn(square: vec2u) -> bool {
+    let place = (square.x & 1u) + 2u * (square.y & 1u);
+    return (gather.flags & GATHER_REST) == 0u || ((place + gather.frame) & 3u) == 0u;
+}
+
+// Rays that a cell asks for, by its word in `cell_pixels`.
 fn spp_of(packed: u32) -> u32 {
     switch history_state(packed) {
         case DISOCCLUDED: { return gather.spp; }

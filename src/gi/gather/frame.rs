@@ -1,6 +1,7 @@
 //! One frame of the method: rays and means, then the filter over neighbours.
 
 use super::bindings;
+use super::budget;
 use super::params::{self, Params};
 use super::pass::Groups;
 use super::schedule::{CACHE_RESPONSIVE_FRAMES, CACHE_RESPONSIVE_HISTORY, Events, Frame, Rules};
@@ -67,6 +68,7 @@ impl GatherGi {
             scene: valid.rays.scene.id(),
             light_version: inputs.lights.map_or(0, |l| l.version),
             scene_version: valid.rays.scene.version(),
+            view: valid.camera.view(),
         };
         let (frame, schedule) = self.schedule.next(&events, rules);
         if frame.restart {
@@ -112,7 +114,9 @@ impl GatherGi {
             (guided, params::GUIDED),
             (frame.changed, params::CHANGED),
             (frame.all_entries, params::ALL_ENTRIES),
+            (frame.rest, params::REST),
         ];
+        let cells = cells::count(inputs.size) as u32;
         Params {
             eye: valid.camera.eye_position(),
             frame: frame.number,
@@ -129,12 +133,15 @@ impl GatherGi {
                 options.entry_frames
             },
             flags: flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag).sum(),
-            cells: cells::count(inputs.size) as u32,
+            cells,
             rays: (cells::count(inputs.size) + store::squares(inputs.size)) as u32,
             frames_since_change: frame.frames_since_change.unwrap_or(CACHE_RESPONSIVE_FRAMES),
             last_iteration: frame.iteration + frame.updates - 1,
             spp: spp(inputs.size),
             shift: options.shift(),
+            ray_budget: budget::rays(options, frame, cells),
+            entry_lifetime: budget::entry_lifetime(options, frame, cells),
+            pad: [0; 2],
         }
     }
 

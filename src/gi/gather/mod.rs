@@ -19,6 +19,7 @@
 //! the rest is noise. See `docs/internals/gather.md`.
 
 mod bindings;
+mod budget;
 mod frame;
 mod options;
 mod params;
@@ -82,6 +83,9 @@ pub const HISTORY: u64 = 80;
 
 /// Bytes of a cell's guidance; `Guidance` of `guidance.wgsl`.
 pub const GUIDANCE: u64 = 48;
+
+/// Where the number of rays that cells have sent lies in `jobs`, bytes: `LAST_RAYS` of `jobs.wgsl`.
+pub const RAYS_SENT: u64 = 16;
 
 /// The method at work.
 pub struct GatherGi {
@@ -258,8 +262,8 @@ impl Technique for GatherGi {
 
     fn memory(&self) -> Option<Memory<'_>> {
         let histories = &self.store.histories[(self.frames() & 1) as usize];
-        let Store { cell_light, changes, .. } = &self.store;
-        Some(Memory { histories, pixels: self.cells.pixels(), light: cell_light, changes })
+        let Store { cell_light, changes, jobs, .. } = &self.store;
+        Some(Memory { histories, pixels: self.cells.pixels(), light: cell_light, changes, jobs })
     }
 
     fn uses_rays(&self, rays: bool) -> bool {

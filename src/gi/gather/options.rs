@@ -29,6 +29,11 @@ pub struct Options {
     /// Surfaces that rays hit have specular lobes. Off as in Cycles without "Reflective Caustics";
     /// light is missing then.
     pub caustics: bool,
+    /// Rays of the picture's cells a frame, spent where histories are shortest. Up to 1: a share of one
+    /// a cell, from the 17th frame of a view on (1: as many as cells ask for, at rest a fourth). Above:
+    /// a number that holds from the first frame on, but for cells without a history, which send one.
+    /// Few: noise, and light that follows changes slowly. Without effect where `progressive`.
+    pub rays: f32,
     /// Seed of the cells' rays: other noise, same light.
     pub seed: u32,
 }
@@ -44,6 +49,7 @@ impl Default for Options {
             blur: true,
             progressive: false,
             caustics: true,
+            rays: 1.0,
             seed: 0,
         }
     }
@@ -61,6 +67,7 @@ impl Options {
         blur: false,
         progressive: true,
         caustics: true,
+        rays: 1.0,
         seed: 0,
     };
 }
@@ -80,6 +87,7 @@ impl Options {
                 ("blur", flag(o.blur)),
                 ("progressive", flag(o.progressive)),
                 ("caustics", flag(o.caustics)),
+                ("rays", o.rays),
                 ("seed", o.seed as f32),
             ]
         };
@@ -104,7 +112,7 @@ pub enum OptionsError {
     /// No such number.
     #[error(
         "`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_updates=N, \
-         blur=0|1, progressive=0|1, caustics=0|1, seed=N"
+         blur=0|1, progressive=0|1, caustics=0|1, rays=all|X|N, seed=N"
     )]
     Unknown(String),
     /// A value that cannot be.
@@ -125,6 +133,7 @@ impl FromStr for Options {
             }
             let Some((name, value)) = word.split_once('=') else { return Err(OptionsError::Unknown(word.into())) };
             let wrong = |why| OptionsError::Value(word.into(), why);
+            let value = if name == "rays" && value == "all" { "1" } else { value };
             let number: f32 = value.parse().map_err(|_| wrong("is no number"))?;
             let at_least_one = if number >= 1.0 { Ok(number) } else { Err(wrong("must be at least 1")) };
             // Files of `fit` hold such words: those of earlier versions are read on.
@@ -142,6 +151,8 @@ impl FromStr for Options {
                 "blur" => options.blur = number != 0.0,
                 "progressive" => options.progressive = number != 0.0,
                 "caustics" => options.caustics = number != 0.0,
+                "rays" if number > 0.0 && number <= 16_777_216.0 => options.rays = number,
+                "rays" => return Err(wrong("must be all, a share up to 1, or a number up to 16777216")),
                 // What a float counts exactly.
                 "seed" if (0.0..=16_777_216.0).contains(&number) => options.seed = number as u32,
                 "seed" => return Err(wrong("must be a whole number up to 16777216")),
@@ -160,15 +171,28 @@ mod tests {
     fn words_are_read_and_wrong_ones_named() {
         let read: Options = "plain,blur=1,slots=4096".parse().unwrap();
         assert_eq!(read, Options { blur: true, slots: 4096, ..Options::PLAIN });
-        for options in
-            [read, Options::PLAIN, Options { caustics: false, entry_scale: 0.1, seed: 7, ..Default::default() }]
-        {
+        for options in [
+            read,
+            Options::PLAIN,
+            Options { caustics: false, entry_scale: 0.1, rays: 0.5, seed: 7, ..Default::default() },
+        ] {
             assert_eq!(options.words().unwrap().parse(), Ok(options));
         }
         assert_eq!("even=1,first_rounds=8".parse::<Options>(), "progressive=1,first_updates=8".parse());
         assert_eq!(Options::default().words(), None);
-        for bad in ["", "rays=3", "slots=1000", "cell_frames=0", "cell_frames=nan", "entry_scale=-1", "blur", "seed=-1"]
-        {
+        assert_eq!("rays=all".parse(), Ok(Options::default()));
+        for bad in [
+            "",
+            "ray=3",
+            "rays=0",
+            "rays=nan",
+            "slots=1000",
+            "cell_frames=0",
+            "cell_frames=nan",
+            "entry_scale=-1",
+            "blur",
+            "seed=-1",
+        ] {
             let error = bad.parse::<Options>().unwrap_err().to_string();
             assert!(error.contains(bad), "{error}");
         }

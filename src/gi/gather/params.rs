@@ -37,6 +37,8 @@ flags! {
     CHANGED = 1 << 9,
     /// All entries send a ray in each update.
     ALL_ENTRIES = 1 << 10,
+    /// Nothing has changed for long: a fourth of the rays suffices.
+    REST = 1 << 11,
 }
 
 /// `Gather` of `shaders/gi/gather/types.wgsl`, which documents the fields.
@@ -61,6 +63,9 @@ pub struct Params {
     pub last_iteration: u32,
     pub spp: u32,
     pub shift: [u32; 2],
+    pub ray_budget: u32,
+    pub entry_lifetime: u32,
+    pub pad: [u32; 2],
 }
 
 /// Uniform offsets are multiples of this under WebGPU's default limits.

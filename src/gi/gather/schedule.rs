@@ -24,6 +24,9 @@ const UPDATES_ON_CHANGE: u32 = 8;
 /// Frames after a reset with the wide blur.
 const WIDE_BLUR_FRAMES: u32 = 5;
 
+/// Frames of an unchanged scene seen by a still camera after which a picture rests.
+const FRAMES_TO_REST: u32 = 64;
+
 /// What a frame is drawn of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Events {
@@ -37,6 +40,8 @@ pub(super) struct Events {
     pub light_version: u64,
     /// Version of its objects' places.
     pub scene_version: u64,
+    /// A number that differs whenever the camera does.
+    pub view: u64,
 }
 
 /// What is asked of all frames.
@@ -71,6 +76,8 @@ pub(super) struct Frame {
     pub frames_since_change: Option<u32>,
     /// The wide blur is used.
     pub wide_blur: bool,
+    /// Nothing has changed for long: a fourth of the rays suffices.
+    pub rest: bool,
 }
 
 /// What the next frame has to know of those before it.
@@ -83,6 +90,9 @@ pub(super) struct Schedule {
     scene: u64,
     light_version: u64,
     scene_version: u64,
+    view: u64,
+    /// Frames since anything changed.
+    still: u32,
     /// Frames left of [`ANTILAG_FRAMES`], and of [`CACHE_RESPONSIVE_FRAMES`] for entries and for
     /// cells.
     antilag_left: u32,
@@ -118,6 +128,8 @@ impl Schedule {
         if compares && number == 1 {
             after.responsive_left = CACHE_RESPONSIVE_FRAMES;
         }
+        let still = number > 0 && !changed && events.view == self.view;
+        after.still = if still { self.still + 1 } else { 0 };
         let updates = match (number, after.responsive_left) {
             (0, _) => rules.first_updates.max(1),
             _ if first_change => UPDATES_ON_CHANGE,
@@ -137,6 +149,7 @@ impl Schedule {
             all_entries: number == 0 || after.responsive_left > 0 || rules.progressive,
             frames_since_change: (after.changing_left > 0).then(|| CACHE_RESPONSIVE_FRAMES - after.changing_left),
             wide_blur: number < WIDE_BLUR_FRAMES,
+            rest: after.still >= FRAMES_TO_REST && after.changing_left == 0 && !rules.progressive,
         };
         let after = Schedule {
             frames: number + 1,
@@ -145,6 +158,8 @@ impl Schedule {
             scene: events.scene,
             light_version: events.light_version,
             scene_version: events.scene_version,
+            view: events.view,
+            still: after.still,
             antilag_left: after.antilag_left.saturating_sub(1),
             responsive_left: after.responsive_left.saturating_sub(1),
             changing_left: after.changing_left.saturating_sub(1),
@@ -168,7 +183,8 @@ mod tests {
     use super::*;
 
     const RULES: Rules = Rules { progressive: false, first_updates: 4 };
-    const STILL: Events = Events { reset: false, resized: false, scene: 7, light_version: 1, scene_version: 1 };
+    const STILL: Events =
+        Events { reset: false, resized: false, scene: 7, light_version: 1, scene_version: 1, view: 1 };
 
     /// The frames that `events` lead to, one after the other.
     fn frames(events: &[Events], rules: Rules) -> Vec<Frame> {
@@ -237,6 +253,26 @@ mod tests {
         schedule = schedule.next(&STILL, RULES).1;
         schedule.reset_history();
         assert_eq!((schedule.frames(), schedule.next(&STILL, RULES).0.number), (0, 0));
+    }
+
+    #[test]
+    fn a_picture_rests_when_nothing_has_changed_for_long() {
+        let rests = |change: fn(&mut Events), progressive| {
+            let mut events = [STILL; 200];
+            events[100..].iter_mut().for_each(change);
+            frames(&events, Rules { progressive, ..RULES }).iter().map(|f| f.rest).collect::<Vec<_>>()
+        };
+        let first = |found: &[bool]| found.iter().position(|&r| r);
+        let still = rests(|_| (), false);
+        assert_eq!(first(&still), Some(64));
+        assert!(still[64..].iter().all(|&r| r));
+        for change in [(|e| e.view = 2) as fn(&mut Events), |e| e.light_version = 2, |e| e.scene_version = 2] {
+            let found = rests(change, false);
+            assert!(found[99] && !found[100]);
+            assert_eq!(first(&found[100..]), Some(64));
+        }
+        // What is asked to converge goes on.
+        assert_eq!(first(&rests(|_| (), true)), None);
     }
 
     #[test]

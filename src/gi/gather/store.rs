@@ -48,9 +48,9 @@ fn records(size: [u32; 2]) -> u64 {
     u64::from(spp(size)) * cells::count(size).max(1) + squares(size)
 }
 
-/// Bytes of `jobs`: four counts, and eight bytes a job.
+/// Bytes of `jobs`: eight words, and eight bytes a job.
 fn jobs(size: [u32; 2], slots: u64) -> u64 {
-    16 + 8 * records(size).max(slots)
+    32 + 8 * records(size).max(slots)
 }
 
 impl Store {

@@ -43,6 +43,9 @@ pub struct Memory<'a> {
     /// Where light has changed, 16 bytes each: what it is now, shown without a network's say, and 1;
     /// else 0.
     pub changes: &'a wgpu::Buffer,
+    /// Lists of rays; the word at [`RAYS_SENT`](crate::gi::gather::RAYS_SENT) is how many the frame's
+    /// cells have sent.
+    pub jobs: &'a wgpu::Buffer,
 }
 
 /// A method at work: reads a G-buffer, writes indirect light. Allocates only when size or views are new.

@@ -6,6 +6,7 @@ use crate::gi::interface::{
     MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace,
 };
 use glam::{Mat3, Mat4, Vec3};
+use std::hash::{Hash, Hasher};
 
 /// Normals are vectors, or x and y of such, not octahedral. These bits and the next ones:
 /// `STORED_*` of `inputs.wgsl`.
@@ -156,6 +157,15 @@ impl Params {
     /// The eye in world space.
     pub fn eye_position(&self) -> [f32; 3] {
         [self.eye[0], self.eye[1], self.eye[2]]
+    }
+
+    /// A number that differs whenever the camera does, but for jitter.
+    pub(crate) fn view(&self) -> u64 {
+        let mut hasher = std::hash::DefaultHasher::new();
+        bytemuck::bytes_of(&self.eye).hash(&mut hasher);
+        bytemuck::bytes_of(&self.world_from_view).hash(&mut hasher);
+        bytemuck::bytes_of(&[self.unproject[0], self.unproject[1]]).hash(&mut hasher);
+        hasher.finish()
     }
 
     /// Tangent of half the vertical field of view.

@@ -64,7 +64,7 @@ impl Lit {
 /// Which scene, how it is lit, and from where it is seen.
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// A .gltf, .glb or .obj file, `interior`, `cornell`, `motion`, `home:INDEX` or `paper-room:INDEX`.
+    /// A .gltf, .glb or .obj file, `interior`, `cornell`, `motion`, `home:N` or `paper-room:N`.
     pub scene: String,
     /// Material variant of the file, by name or number from 0.
     #[arg(long, value_name = "NAME|N", help_heading = SCENE)]
