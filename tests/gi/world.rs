@@ -112,7 +112,7 @@ fn what_the_picture_shows_besides_does_not_matter() {
         let middle = (0..64).flat_map(|y| &wide[3 * (128 * (y + 32) + 32)..][..3 * 64]).copied();
         difference(&middle.collect::<Vec<_>>(), &narrow)
     };
-    let (gather, ambient) = (apart(gather()), apart(Method::Ambient));
+    let (gather, ambient) = (apart(gather()), apart(Method::Ambient(Default::default())));
     println!("wide against narrow: gather {:.2} %, ambient {:.2} %", 100.0 * gather, 100.0 * ambient);
     assert!(gather < 0.03, "{gather}");
     // Negative control: the mean of the picture changes with the picture.
