@@ -136,7 +136,8 @@ impl Parsed {
                     version: glsl::Version::Desktop(430),
                     writer_flags: glsl::WriterFlags::empty(),
                     binding_map: slots.collect::<BTreeMap<_, _>>().into_iter().collect(),
-                    zero_initialize_workgroup_memory: true,
+                    // Shaders write what a workgroup shares before they read it (`gpu::bind`).
+                    zero_initialize_workgroup_memory: false,
                 };
                 let pipeline = glsl::PipelineOptions {
                     shader_stage: ShaderStage::Compute,
@@ -164,6 +165,7 @@ impl Parsed {
                         image_load: BoundsCheckPolicy::ReadZeroSkipWrite,
                         binding_array: BoundsCheckPolicy::Unchecked,
                     },
+                    zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::None,
                     ..spv::Options::default()
                 };
                 options.flags.remove(spv::WriterFlags::ADJUST_COORDINATE_SPACE | spv::WriterFlags::DEBUG);
