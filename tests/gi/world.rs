@@ -2,7 +2,7 @@
 //! other tests draw, too.
 
 use crate::common;
-use bouncelight::gi::Method;
+use bouncelight::gi::{Method, gather::Options};
 use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Layer, Picture, capture};
@@ -79,7 +79,7 @@ pub(crate) const FEW_SLOTS: u32 = 1 << 12;
 
 /// The method that these tests are about.
 pub(crate) fn gather() -> Method {
-    Method::Gather(Default::default())
+    Method::Gather(Options { slots: FEW_SLOTS, ..Default::default() })
 }
 
 pub(crate) const GREY: [f32; 3] = [0.5; 3];
