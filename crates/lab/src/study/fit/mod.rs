@@ -184,7 +184,14 @@ impl Search<'_, '_> {
             if ladder.is_empty() && !upper.is_empty() {
                 // What these cost is not known before they are built.
                 let mut costed = Vec::new();
+                let gather = |row: &Row| row.candidate.method == MethodName::Gather;
+                let too_dear = self.rows.iter().any(|row| gather(row) && row.verdict == Verdict::TooDear);
                 for candidate in upper.drain(..) {
+                    // Finer than what is over the budget.
+                    if too_dear && candidate.method == MethodName::Gather {
+                        self.rows.push(Row::blank(candidate, Verdict::TooDear));
+                        continue;
+                    }
                     let cost = self.cost(&candidate)?;
                     costed.push((cost.unwrap_or(f64::INFINITY), candidate));
                 }
