@@ -1,6 +1,7 @@
 //! Structs that shaders and Rust share, as Rust lays them out. `tests/repo/layouts.rs` compares them
 //! with the shaders; those of the path tracer and of the window are checked where their Rust is.
 
+use crate::gi::name::MethodName;
 use std::collections::BTreeMap;
 
 /// A struct as one side lays it out.
@@ -37,11 +38,16 @@ macro_rules! layout_row {
 
 pub use crate::layout_row as row;
 
-/// The rows of this package: those of methods stand in their folders.
+/// Rows of methods, which stand in their folders.
+pub fn of_methods() -> Vec<Row> {
+    MethodName::ALL.iter().flat_map(|method| method.layouts()).collect()
+}
+
+/// The rows of this package.
 #[cfg(feature = "render")]
 pub fn rows() -> Vec<Row> {
     use crate::accel::{EmitterGpu, HitGpu, RayGpu};
-    use crate::gi::{exposure::Exposure, inputs::Params, name::MethodName, world::sample::Sample};
+    use crate::gi::{exposure::Exposure, inputs::Params, world::sample::Sample};
     use crate::gpu_scene::{DeformGpu, MaterialGpu, TextureUse};
     use crate::lights::LightGpu;
     use crate::net::gpu::build::StepUniform;
@@ -83,6 +89,6 @@ pub fn rows() -> Vec<Row> {
             uses as "base_use", specular_tint,
         ),
     ];
-    rows.extend(MethodName::ALL.iter().flat_map(|method| method.layouts()));
+    rows.extend(of_methods());
     rows
 }
