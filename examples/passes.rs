@@ -290,7 +290,7 @@ fn layers(gpu: &Gpu, scene: &SceneGpu, camera: &Camera) -> Result<Layers, Failur
 /// A part of the picture without and with temporal anti-aliasing, twice as large.
 fn smooth(gpu: &Gpu, scene: &SceneGpu, camera: &Camera) -> Result<(&'static str, Image, Image), Failure> {
     let draw = |taa: bool, frames: u32| -> Result<Image, Failure> {
-        let options = RendererOptions { method: Method::Ambient, taa, ..Default::default() };
+        let options = RendererOptions { method: Method::Ambient(Default::default()), taa, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, SIZE, options)?;
         let options = CaptureOptions { samples: 1, warmup: frames - 1, ..Default::default() };
         let frame =

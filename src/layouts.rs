@@ -1,25 +1,58 @@
-//! Every struct that this package's shaders and Rust share lies the same in both. Those of the path
-//! tracer and of the window are checked where their Rust is.
+//! Structs that shaders and Rust share, as Rust lays them out. `tests/repo/layouts.rs` compares them
+//! with the shaders; those of the path tracer and of the window are checked where their Rust is.
 
-use crate::gpu::shaders;
-use check::{Layout, parse, same, shared};
+use crate::gi::name::MethodName;
+use std::collections::BTreeMap;
 
-#[macro_use]
-#[path = "../tests/common/layouts.rs"]
-mod check;
+/// A struct as one side lays it out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// Bytes.
+    pub size: usize,
+    /// Offset of each field but padding.
+    pub fields: BTreeMap<String, usize>,
+}
 
-/// Structs that no Rust struct matches: shaders alone write and read the first, the others are a few
-/// words, written where they are bound.
-const WITHOUT_ROW: [&str; 4] = ["Matrix", "Partial", "ShadowCamera", "Options"];
+/// Name in the shaders, and the Rust struct.
+pub type Row = (&'static str, Layout);
 
-fn rows() -> Vec<(&'static str, Layout)> {
+/// A row: name in the shaders, Rust struct, fields; `a as "b"` where the shader calls field `a`
+/// `b`; `size` where Rust pads.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! layout_row {
+    ($name:literal, $rust:ty => $($field:ident $(as $other:literal)?),+ $(,)?) => {
+        $crate::layout_row!($name, $rust, size size_of::<$rust>() => $($field $(as $other)?),+)
+    };
+    ($name:literal, $rust:ty, size $size:expr => $($field:ident $(as $other:literal)?),+ $(,)?) => {
+        ($name, $crate::layouts::Layout {
+            size: $size,
+            fields: [$(
+                ($crate::layout_row!(@name $field $($other)?).to_owned(), std::mem::offset_of!($rust, $field))
+            ),+].into(),
+        })
+    };
+    (@name $field:ident) => { stringify!($field) };
+    (@name $field:ident $other:literal) => { $other };
+}
+
+pub use crate::layout_row as row;
+
+/// Rows of methods, which stand in their folders.
+pub fn of_methods() -> Vec<Row> {
+    MethodName::ALL.iter().flat_map(|method| method.layouts()).collect()
+}
+
+/// The rows of this package.
+#[cfg(feature = "render")]
+pub fn rows() -> Vec<Row> {
     use crate::accel::{EmitterGpu, HitGpu, RayGpu};
-    use crate::gi::{exposure::Exposure, gather, inputs::Params, world::sample::Sample};
+    use crate::gi::{exposure::Exposure, inputs::Params, world::sample::Sample};
     use crate::gpu_scene::{DeformGpu, MaterialGpu, TextureUse};
     use crate::lights::LightGpu;
     use crate::net::gpu::build::StepUniform;
     use crate::render::{light_choice::LightShadowGpu, shadow::ShadowViewGpu, taa::Blend, tonemap, view::FrameUniform};
-    vec![
+    let mut rows = vec![
         row!("Frame", FrameUniform =>
             view_from_world, world_from_view, clip_from_world, clip_from_world_unjittered, previous_clip_from_world,
             tan_half, jitter, size, near, seed, environment, light_count, picture_only, texture_bias, tile_words,
@@ -44,11 +77,6 @@ fn rows() -> Vec<(&'static str, Layout)> {
             motion, flags, light_scale,
         ),
         row!("Exposure", Exposure => s, ln_m, hit_fraction, nonfinite, outgoing as "red"),
-        row!("Gather", gather::Params =>
-            eye, frame, light_count, emitter_count, inverse_power, mask, entry_scale, cache_iteration, cell_frames,
-            entry_frames, flags, cells, rays, frames_since_change, last_iteration, spp, shift,
-            ray_budget, entry_lifetime, pad,
-        ),
         row!("Sample", Sample => depth, normal, plane, offset, mirrored, motion, color, broken),
         row!("Step", StepUniform =>
             in_size, out_size, input, output, skip, second, pad, base, first_block, blocks, parts, in_channels,
@@ -60,28 +88,7 @@ fn rows() -> Vec<(&'static str, Layout)> {
             base_color, emissive, unlit, metallic, roughness, normal_scale, occlusion_strength, alpha_cutoff, f0,
             uses as "base_use", specular_tint,
         ),
-    ]
-}
-
-#[test]
-fn structs_of_shaders_lie_in_memory_as_those_of_rust() {
-    let gi = crate::gi::example_preludes().into_iter().map(|(name, prelude)| (name.to_owned(), prelude));
-    // One permutation of each shader: their numbers change no struct.
-    let preludes = gi.chain(crate::net::gpu::example_preludes()).collect();
-    let ours = shaders::names().filter(|name| !name.starts_with("reference.") && !name.starts_with("viewer."));
-    check::check(ours, &preludes, &rows(), &WITHOUT_ROW);
-}
-
-/// Negative controls: a field that has moved, and one that a side does not know.
-#[test]
-fn another_layout_is_noticed() {
-    let light = &shared(&parse("render.direct", ""))["Light"];
-    let rows = rows();
-    let rust = &rows.iter().find(|(name, _)| *name == "Light").expect("lights have a row").1;
-    assert!(same(rust, light));
-    let mut moved = rust.clone();
-    (*moved.fields.get_mut("range").expect("a field"), *moved.fields.get_mut("radius").expect("a field")) = (44, 28);
-    let mut less = rust.clone();
-    less.fields.remove("chance");
-    assert!(!same(&moved, light) && !same(&less, light) && !same(&Layout { size: 80, ..rust.clone() }, light));
+    ];
+    rows.extend(of_methods());
+    rows
 }

@@ -26,8 +26,8 @@ pub mod gi;
 pub mod gpu;
 #[cfg(feature = "render")]
 pub mod gpu_scene;
-#[cfg(test)]
-mod layouts;
+#[doc(hidden)]
+pub mod layouts;
 #[doc(hidden)]
 pub mod lights;
 pub mod net;

@@ -6,10 +6,8 @@
 
 mod common;
 
-use bouncelight::gi::Method;
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::gpu_scene::SceneGpu;
-use bouncelight::net::format::Weights;
 use bouncelight::render::shadow::ShadowOptions;
 use bouncelight::render::{Renderer, RendererOptions, View, sampling};
 use bouncelight_lab::reference::{Kernel, ReferenceScene, Subject, Tracer, TracerOptions};
@@ -39,15 +37,7 @@ fn frames_and_samples_take_no_memory() {
     let Some(gpu) = common::own_gpu() else { return };
     let scene = bouncelight_lab::scenes::load("paper-room:60").expect("the room is made by code");
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene).expect("the scene fits");
-    let network = Weights::shipped().expect("the shipped file is sound");
-    let methods = [
-        Method::Direct,
-        Method::Ambient,
-        Method::Ssgi,
-        Method::Gather(Default::default()),
-        Method::Neural(Box::new(network.into())),
-    ];
-    for method in methods {
+    for method in common::methods() {
         for size in [[64, 32], [50, 70], [128, 64]] {
             let shadow = ShadowOptions { sun_size: 512, ..Default::default() };
             let options = RendererOptions { method: method.clone(), taa: true, shadow, ..Default::default() };

@@ -164,6 +164,12 @@ def references(folder, rooms=None):
             yield name, name, [os.path.join(path, "scene.glb"), *flags], os.path.join(path, "frame0000.exr")
 
 
+def all_methods(program):
+    """All methods that the program draws frames by."""
+    text = subprocess.run([program, "render", "--help"], check=True, capture_output=True, text=True).stdout
+    return re.search(r"--method\b.*?possible values: ([^\]]+)", text, re.DOTALL)[1].replace(",", " ").split()
+
+
 def draw(program, scene, row, path, size, samples, inputs):
     """Draws `row` = (kind, weights) of a scene into `path`. `inputs`: the raster's EXR, for networks on pictures."""
     kind, weights = row
@@ -215,7 +221,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", help="folder for our pictures")
     parser.add_argument("references", nargs="+", help="folders of Cycles' pictures")
-    parser.add_argument("--methods", default="direct,ambient,ssgi,gather,neural", type=lambda t: t.split(","))
+    parser.add_argument("--methods", help="default: all", type=lambda t: t.split(","))
     parser.add_argument("--constant", type=lambda t: [float(v) for v in t.split(",")])
     parser.add_argument("--rooms", type=indices, help="take these rooms only, such as 0,27,2200-2239")
     parser.add_argument("--samples", type=int, default=4)
@@ -223,6 +229,7 @@ def main():
     parser.add_argument("--csv", help="also write every scene's numbers here")
     parser.add_argument("--bouncelight", default="target/release/bouncelight")
     a = parser.parse_args()
+    a.methods = a.methods or all_methods(a.bouncelight)
     found = [scene for folder in a.references for scene in references(folder, a.rooms)]
     missing = sorted(set(a.rooms or []) - {int(name[4:8]) for _, name, _, _ in found if name.startswith("room")})
     if missing:

@@ -52,7 +52,7 @@ pub use interface::{
     AlbedoEncoding, CameraMatrices, Conventions, Depth, Forward, GiError, Inputs, Jitter, LightScale, Lights,
     MotionJitter, MotionSense, MotionUnits, NormalEncoding, NormalRange, NormalSpace, Outputs, Rays, technique,
 };
-pub use method::{Method, name};
+pub use method::{Custom, Factory, Method, name};
 pub use neural::{Neural, memory};
 #[doc(hidden)]
 pub use preludes::example_preludes;

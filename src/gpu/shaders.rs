@@ -1,4 +1,4 @@
-//! The one table of shaders: each is a plain WGSL file, and those that it imports ([`Joined`]).
+//! All shaders: each is a plain WGSL file with an entry point, and those that it imports ([`Joined`]).
 //!
 //! Numbers come in as `override` constants or as a generated prelude of `const` lines
 //! ([`module_with`]), never by templates inside a body.
@@ -9,51 +9,28 @@ mod net;
 pub use join::{Joined, folder, read_from};
 pub use net::{NetFamily, NetKernel};
 
-use std::sync::Mutex;
+use std::sync::{LazyLock, Mutex};
 
-/// Name (`room.stage`, also the wgpu label) and file of each shader but those that run the network.
-const FILES: &[(&str, &str)] = &[
-    ("render.deform", "render/deform.wgsl"),
-    ("render.shadow", "render/shadow.wgsl"),
-    ("render.gbuffer", "render/gbuffer.wgsl"),
-    ("render.blended", "render/blended.wgsl"),
-    ("render.lights", "render/lights.wgsl"),
-    ("render.direct", "render/direct.wgsl"),
-    ("render.composite", "render/composite.wgsl"),
-    ("render.taa", "render/taa.wgsl"),
-    ("render.tonemap", "render/tonemap.wgsl"),
-    ("render.layers", "render/layers.wgsl"),
-    ("accel.rays", "accel/rays.wgsl"),
-    ("gi.exposure", "gi/exposure.wgsl"),
-    ("gi.ambient", "gi/ambient.wgsl"),
-    ("gi.occlusion", "gi/occlusion.wgsl"),
-    ("gi.occlusion_full", "gi/occlusion_full.wgsl"),
-    ("gi.radiance", "gi/radiance.wgsl"),
-    ("gi.ssgi", "gi/ssgi.wgsl"),
-    ("gi.ssgi_full", "gi/ssgi_full.wgsl"),
-    ("gi.color_pyramid", "gi/color_pyramid.wgsl"),
-    ("gi.ssr", "gi/ssr.wgsl"),
-    ("gi.downsample", "gi/downsample.wgsl"),
-    ("gi.trace", "gi/gather/trace.wgsl"),
-    ("gi.cache_select", "gi/gather/cache_select.wgsl"),
-    ("gi.cache_update", "gi/gather/cache_update.wgsl"),
-    ("gi.gradient", "gi/gather/gradient.wgsl"),
-    ("gi.specular_trace", "gi/gather/specular_trace.wgsl"),
-    ("gi.reproject", "gi/gather/reproject.wgsl"),
-    ("gi.accumulate", "gi/gather/accumulate.wgsl"),
-    ("gi.blur", "gi/gather/blur.wgsl"),
-    ("gi.atrous", "gi/gather/atrous.wgsl"),
-    ("gi.upsample", "gi/gather/upsample.wgsl"),
-    ("gi.check", "gi/check.wgsl"),
-    ("gi.features", "gi/features.wgsl"),
-    ("reference.path", "reference/path.wgsl"),
-    ("reference.first_hit", "reference/first_hit.wgsl"),
-    ("probe.still", "probe/still.wgsl"),
-    ("viewer.sum", "viewer/sum.wgsl"),
-    ("viewer.flicker", "viewer/flicker.wgsl"),
-    ("viewer.show", "viewer/show.wgsl"),
-    ("viewer.wires", "viewer/wires.wgsl"),
-];
+/// Name (`room.stage`, also the wgpu label) and file of each shader but those that run the network:
+/// each file with an entry point, named by its room and itself.
+static FILES: LazyLock<Vec<(String, &str)>> = LazyLock::new(|| {
+    let whole = |text: &str| ENTRIES.iter().any(|entry| text.contains(entry));
+    let files = join::files().filter(|(file, text)| !PARTS.iter().any(|p| file.starts_with(p)) && whole(text));
+    files.filter_map(|(file, _)| Some((name_of(file)?, file))).collect()
+});
+
+/// What makes a file a shader of its own.
+const ENTRIES: [&str; 3] = ["@compute", "@vertex", "@fragment"];
+
+/// Rooms whose files are parts of others' shaders; [`NetKernel`] joins those of the network.
+const PARTS: [&str; 2] = ["lib/", "net/"];
+
+/// `gi.trace` for `gi/gather/trace.wgsl`.
+fn name_of(file: &str) -> Option<String> {
+    let room = file.split('/').next()?;
+    let stage = file.strip_suffix(".wgsl")?.rsplit('/').next()?;
+    Some(format!("{room}.{stage}"))
+}
 
 /// The folder of the shaders that this program was built from; it may be gone.
 pub fn sources() -> std::path::PathBuf {
@@ -62,7 +39,7 @@ pub fn sources() -> std::path::PathBuf {
 
 /// Names of all shaders that there are.
 pub fn names() -> impl Iterator<Item = String> {
-    FILES.iter().map(|(name, _)| (*name).to_owned()).chain(NetKernel::all().map(NetKernel::name))
+    FILES.iter().map(|(name, _)| name.clone()).chain(NetKernel::all().map(NetKernel::name))
 }
 
 /// Shader `name` behind `prelude` (lines of `const`), and where its lines come from.

@@ -1,33 +1,10 @@
 //! What tests of the layout of structs share: each struct of each shader's uniform and storage
 //! variables must be a row of the package that owns the shader, field by field.
 
-use super::shaders;
+use bouncelight::gpu::shaders;
+use bouncelight::layouts::Layout;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
 use std::collections::{BTreeMap, BTreeSet};
-
-/// A struct as one side lays it out.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Layout {
-    pub size: usize,
-    /// Offset of each field but padding.
-    pub fields: BTreeMap<String, usize>,
-}
-
-/// A row: name in the shaders, Rust struct, fields; `a as "b"` where the shader calls field `a`
-/// `b`; `size` where Rust pads.
-macro_rules! row {
-    ($name:literal, $rust:ty => $($field:ident $(as $other:literal)?),+ $(,)?) => {
-        row!($name, $rust, size size_of::<$rust>() => $($field $(as $other)?),+)
-    };
-    ($name:literal, $rust:ty, size $size:expr => $($field:ident $(as $other:literal)?),+ $(,)?) => {
-        ($name, Layout {
-            size: $size,
-            fields: [$((row!(@name $field $($other)?).to_owned(), std::mem::offset_of!($rust, $field))),+].into(),
-        })
-    };
-    (@name $field:ident) => { stringify!($field) };
-    (@name $field:ident $other:literal) => { $other };
-}
 
 /// What follows the first element of an array in Rust, which shaders name one by one.
 const WITHIN: [&str; 6] = ["green", "blue", "rough_use", "normal_use", "occlusion_use", "emissive_use"];

@@ -60,6 +60,13 @@ impl Need {
     }
 }
 
+/// All real-time methods with their defaults, a network's with the shipped weights; cheapest first.
+pub fn methods() -> Vec<bouncelight::gi::Method> {
+    let network = || bouncelight::net::format::Weights::shipped().map(bouncelight::gi::Neural::from);
+    let method = |name: &bouncelight::gi::name::MethodName| name.method(network).expect("the shipped file is sound");
+    bouncelight::gi::name::MethodName::REAL_TIME.iter().filter_map(method).collect()
+}
+
 /// Says that the running test is left out, past libtest's capture, and adds a line to the file that
 /// `SKIP_LOG` names, which `cargo xtask test` counts.
 ///

@@ -236,7 +236,7 @@ fn light_and_albedo_in_every_convention() {
     let shot = shot(0, [0.0; 2]);
     let targets = written(&gpu, &shot, &Written::default(), &shot.camera);
     let encode = |v: f32| if v <= 0.0031308 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-    let mut ssgi = View::new(&gpu.device, &gpu.queue, SIZE, &Method::Ssgi).expect("made");
+    let mut ssgi = View::new(&gpu.device, &gpu.queue, SIZE, &Method::Ssgi(Default::default())).expect("made");
     let mut screen = |exposure: f32, srgb: bool, read: Conventions| {
         let byte = |v: f32| ((if srgb { encode(v) } else { v }) * 255.0).round() as u8;
         let albedo: Vec<u8> = shot.buffers.albedo.iter().flat_map(|a| a.map(byte)).collect();

@@ -54,7 +54,7 @@ fn time(still: u32, frame: u32) -> f32 {
 fn the_host_draws_what_we_draw() {
     let Some(gpu) = common::gpu() else { return };
     let mut scene = scene();
-    let mut renderer = world::renderer(&gpu, SIZE, world::gather());
+    let mut renderer = world::renderer(&gpu, SIZE, Method::Gather(Default::default()));
     let mut ours = uploaded(&gpu, &scene);
     let still = go_on(&gpu, &mut renderer, &ours, &scene.cameras[0], STILL);
     let read = |texture| readback::texture(&gpu.device, &gpu.queue, texture).expect("reading back works");

@@ -35,7 +35,7 @@ fn the_method_below_draws_until_there_are_rays() {
     let room = room();
     let plain = SceneGpu::new(&gpu.device, &gpu.queue, &room).expect("the scene fits");
     let frames = |renderer: &mut Renderer, scene: &SceneGpu| go_on(&gpu, renderer, scene, &room.cameras[0], 3);
-    let below = frames(&mut world::renderer(&gpu, [48, 32], Method::Ssgi), &plain);
+    let below = frames(&mut world::renderer(&gpu, [48, 32], Method::Ssgi(Default::default())), &plain);
     let mut renderer = world::renderer(&gpu, [48, 32], gather());
     assert_eq!(frames(&mut renderer, &plain), below);
     let fallback = renderer.fallback().expect("something else drew");

@@ -24,6 +24,7 @@ mod lamps;
 mod left_out;
 #[path = "../common/linear.rs"]
 mod linear;
+mod methods;
 mod noise;
 mod readback;
 mod real;

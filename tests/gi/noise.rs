@@ -13,6 +13,11 @@ use bouncelight::scene::{Environment, Scene};
 const SIZE: [u32; 2] = [96, 64];
 const CELLS: [usize; 2] = [24, 16];
 
+/// The usual options with a table for small scenes.
+fn few() -> Options {
+    Options { slots: world::FEW_SLOTS, ..Default::default() }
+}
+
 /// Means of cells of 4×4 pixels of the first channel.
 fn of_cells(data: &[f32]) -> Vec<f64> {
     let at = |cell: usize| {
@@ -40,7 +45,7 @@ fn lamp_at_a_shade() -> Scene {
 fn what_one_bright_ray_brings_is_no_blotch_and_is_not_lost() {
     let Some(gpu) = common::gpu() else { return };
     let drawn = |blur: bool, seed: u32| {
-        let method = Method::Gather(Options { blur, seed, ..Default::default() });
+        let method = Method::Gather(Options { blur, seed, ..few() });
         of_cells(&lit(&gpu, &mut world::renderer(&gpu, SIZE, method), &lamp_at_a_shade(), 16).0.data)
     };
     let mean = |cells: &[f64]| cells.iter().sum::<f64>() / cells.len() as f64;
@@ -91,7 +96,7 @@ fn rough_metal(gpu: &Gpu, frames: u32) -> Vec<f64> {
     s.meshes[1].material = 1;
     s.environment = Environment::constant([0.0; 3]);
     s.cameras = vec![look_at([0.0, 1.5, 3.0], [0.0, 0.0, 0.0], 0.6)];
-    let mut renderer = world::renderer(gpu, SIZE, Method::Gather(Options::default()));
+    let mut renderer = world::renderer(gpu, SIZE, Method::Gather(few()));
     let options = CaptureOptions { layers: &[Layer::GlossInd], warmup: frames - 1, ..Default::default() };
     let uploaded = crate::gather::uploaded(gpu, &s);
     let frame = capture(gpu, &mut renderer, &uploaded, &s.cameras[0], options).expect("the frame is drawn");
@@ -131,7 +136,7 @@ fn leaning_floor(lean: f32) -> Scene {
 fn leaning_normals_leave_no_bands() {
     let Some(gpu) = common::gpu() else { return };
     let drawn = |blur: bool| {
-        let method = Method::Gather(Options { blur, ..Default::default() });
+        let method = Method::Gather(Options { blur, ..few() });
         of_cells(&lit(&gpu, &mut world::renderer(&gpu, SIZE, method), &leaning_floor(40.0), 16).0.data)
     };
     let [shown, rays] = [true, false].map(|blur| roughness_of(&drawn(blur)));
@@ -156,7 +161,7 @@ fn light_at_the_foot_of_a_wall_is_not_averaged_with_that_of_the_floor_around() {
     let expected = |x: f64, h: f64| 0.5 * (1.0 + x / x.hypot(h));
     let drawn = |options, frames| lit(&gpu, &mut world::renderer(&gpu, SIZE, Method::Gather(options)), &s, frames);
     // 128 rays a cell, the last half of them at rest, one in four frames.
-    let (light, places) = drawn(Options::default(), 320);
+    let (light, places) = drawn(few(), 320);
     // Light so far from the wall, in cells, over what the formula gives.
     let over = |light: &[f32], from: f64, to: f64, h: f64| {
         let (mut found, mut wanted) = (0.0, 0.0);

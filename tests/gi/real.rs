@@ -3,6 +3,7 @@
 use crate::common;
 use crate::gather::{go_on, lit, uploaded};
 use crate::world;
+use bouncelight::gi::Method;
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::scene::{Environment, LightKind, Scene};
@@ -28,7 +29,7 @@ fn real(name: &str) -> Option<Scene> {
 
 /// Settled light before and after, and which pixels show the same place in both.
 fn states(gpu: &Gpu, scenes: [&Scene; 2]) -> ([Vec<f32>; 2], Vec<bool>) {
-    let renderer = || world::renderer(gpu, SIZE, world::gather());
+    let renderer = || world::renderer(gpu, SIZE, Method::Gather(Default::default()));
     let settled = |s: &Scene| go_on(gpu, &mut renderer(), &uploaded(gpu, s), &s.cameras[0], 100);
     let [before, after] = scenes.map(|s| lit(gpu, &mut renderer(), s, 1).1.data);
     let same = |(a, b): (&[f32], &[f32])| {
@@ -64,7 +65,7 @@ fn follows(gpu: &Gpu, scenes: [&Scene; 2], asked: &Left, change: impl Fn(&mut Sc
     // After a few frames away and back, after thirty away and back.
     let mut left = [0.0; 4];
     for rest in asked.rests {
-        let mut renderer = world::renderer(gpu, SIZE, world::gather());
+        let mut renderer = world::renderer(gpu, SIZE, Method::Gather(Default::default()));
         let mut scene = uploaded(gpu, scenes[0]);
         let mut after = |scene: &SceneGpu, frames| {
             let light = mean(&go_on(gpu, &mut renderer, scene, &scenes[0].cameras[0], frames), &same);

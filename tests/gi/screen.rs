@@ -268,7 +268,7 @@ fn what_a_light_stands_in_for_lights_once() {
         let mut renderer = world::renderer(&gpu, [96, 96], method);
         go_on(&gpu, &mut renderer, &uploaded(&gpu, &scene), &scene.cameras[0], 1)
     };
-    for method in [|| Method::Ambient, || Method::Ssgi] {
+    for method in [|| Method::Ambient(Default::default()), || Method::Ssgi(Default::default())] {
         let dark = light(method(), false, true);
         assert!(dark.iter().any(|v| *v > 0.0));
         assert!(light(method(), true, true) == dark, "the panel's light is the light's");

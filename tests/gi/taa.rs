@@ -96,7 +96,7 @@ fn off_is_off_and_on_is_not() {
     (1..4).for_each(|i| drop(on.frame(&camera, i)));
     assert_ne!(on.frame(&camera, 0), first);
     // A method's pattern may turn only with a history.
-    let mut still = Stage::new(&gpu, &scene, Method::Ssgi, false);
+    let mut still = Stage::new(&gpu, &scene, Method::Ssgi(Default::default()), false);
     assert_eq!(still.frame(&camera, 0), still.frame(&camera, 0));
 }
 
@@ -104,8 +104,8 @@ fn off_is_off_and_on_is_not() {
 fn a_frozen_frame_converges_to_the_filtered_picture() {
     let Some(gpu) = common::gpu() else { return };
     let (scene, camera) = room();
-    let mut on = Stage::new(&gpu, &scene, Method::Ambient, true);
-    let mut off = Stage::new(&gpu, &scene, Method::Ambient, false);
+    let mut on = Stage::new(&gpu, &scene, Method::Ambient(Default::default()), true);
+    let mut off = Stage::new(&gpu, &scene, Method::Ambient(Default::default()), false);
     let mut last = on.frame(&camera, 0);
     let mut changes = Vec::new();
     for i in 1..100 {

@@ -12,7 +12,6 @@ use bouncelight::gi::inputs::{cells_of, sample_pixel};
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu::timing::Recorder;
 use bouncelight::gpu_scene::SceneGpu;
-use bouncelight::net::format::Weights;
 use bouncelight::render::{Renderer, RendererOptions, View};
 use bouncelight::scene::{LightKind, Scene};
 use bouncelight_lab::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions};
@@ -134,7 +133,8 @@ fn error(found: &[f32], truth: &[f32]) -> f32 {
     apart / truth.iter().sum::<f32>()
 }
 
-/// Per cent that each method may be off in each room: a fifth more than was found.
+/// Per cent that each method may be off in each room: a fifth more than was found. Those without a
+/// row must be no farther off than the first.
 const ALLOWED: [(&str, [f32; 4]); 4] = [
     ("ambient", [31.0, 246.0, 104.0, 40.0]),
     ("ssgi", [24.0, 192.0, 90.0, 43.5]),
@@ -145,14 +145,16 @@ const ALLOWED: [(&str, [f32; 4]); 4] = [
 #[test]
 fn methods_are_as_near_to_the_truth_as_they_were() {
     let Some(gpu) = common::gpu() else { return };
-    let shipped = Weights::shipped().expect("the file is in the repository");
-    let methods =
-        [Method::Ambient, Method::Ssgi, Method::Gather(Default::default()), Method::Neural(Box::new(shipped.into()))];
+    let methods = common::methods();
+    let lit = || methods.iter().filter(|m| !matches!(m, Method::Direct));
+    let known = ALLOWED.map(|(of, _)| lit().any(|m| m.name() == of));
+    assert_eq!(known, [true; 4], "a row without a method");
     let mut missed = Vec::new();
     for (k, (name, scene)) in rooms().into_iter().enumerate() {
         let truth = truth(name);
-        for (method, (of, allowed)) in methods.iter().zip(ALLOWED) {
-            assert_eq!(method.name(), of);
+        for method in lit() {
+            let of = method.name();
+            let (_, allowed) = ALLOWED.into_iter().find(|(name, _)| *name == of).unwrap_or(ALLOWED[0]);
             let found = answer(&gpu, method, &scene);
             let off = 100.0 * error(&found, &truth);
             println!("{name}, {of}: {off:.2} %, allowed {} %", allowed[k]);

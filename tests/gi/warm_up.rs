@@ -40,7 +40,8 @@ fn pictures_after_warm_up_are_those_after_whole_frames() {
     let mut scene = bouncelight_lab::scenes::load("interior").expect("it is bundled");
     let neural = || Method::Neural(Box::new(Weights::shipped().expect("they are read").into()));
     // `ssgi` remembers nothing, and all its frames are whole.
-    let methods: [&dyn Fn() -> Method; 3] = [&world::gather, &neural, &|| Method::Ssgi];
+    let methods: [&dyn Fn() -> Method; 3] =
+        [&|| Method::Gather(Default::default()), &neural, &|| Method::Ssgi(Default::default())];
     for method in methods {
         let mut drawn = uploaded(&gpu, &scene);
         let [mut a, mut b, mut fewer] = [0; 3].map(|_| world::renderer(&gpu, SIZE, method()));

@@ -2,7 +2,7 @@
 //! other tests draw, too.
 
 use crate::common;
-use bouncelight::gi::Method;
+use bouncelight::gi::{Method, gather::Options};
 use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::capture::{CaptureOptions, Layer, Picture, capture};
@@ -79,7 +79,7 @@ pub(crate) const FEW_SLOTS: u32 = 1 << 12;
 
 /// The method that these tests are about.
 pub(crate) fn gather() -> Method {
-    Method::Gather(Default::default())
+    Method::Gather(Options { slots: FEW_SLOTS, ..Default::default() })
 }
 
 pub(crate) const GREY: [f32; 3] = [0.5; 3];
@@ -112,7 +112,7 @@ fn what_the_picture_shows_besides_does_not_matter() {
         let middle = (0..64).flat_map(|y| &wide[3 * (128 * (y + 32) + 32)..][..3 * 64]).copied();
         difference(&middle.collect::<Vec<_>>(), &narrow)
     };
-    let (gather, ambient) = (apart(gather()), apart(Method::Ambient));
+    let (gather, ambient) = (apart(gather()), apart(Method::Ambient(Default::default())));
     println!("wide against narrow: gather {:.2} %, ambient {:.2} %", 100.0 * gather, 100.0 * ambient);
     assert!(gather < 0.03, "{gather}");
     // Negative control: the mean of the picture changes with the picture.

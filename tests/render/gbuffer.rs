@@ -305,7 +305,10 @@ fn layers_cover_their_share_and_many_frames_know_it_well() {
             (material.base_color, material.f0) = ([1.0, 1.0, 1.0, alpha], 0.0);
             material.alpha_mode = AlphaMode::Blend;
         }
-        let f = render(&gpu, &s, &camera, [48, 48], samples);
+        let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &s).expect("it fits");
+        let mut renderer = Renderer::new(&gpu.device, &gpu.queue, [48, 48], direct_only()).expect("it fits");
+        let options = CaptureOptions { samples, layers: &[Layer::DiffCol], ..Default::default() };
+        let f = capture(&gpu, &mut renderer, &uploaded, &camera, options).expect("it is drawn");
         let color = f.layer(Layer::DiffCol).unwrap();
         let values: Vec<f32> = color.data.chunks_exact(3).map(|p| p[0]).collect();
         let n = values.len() as f32;

@@ -6,7 +6,6 @@ use crate::common::{self, Need};
 use bouncelight::gi::Method;
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::SceneGpu;
-use bouncelight::net::format::Weights;
 use bouncelight::render::capture::{CaptureOptions, Layer, capture};
 use bouncelight::render::{Renderer, RendererOptions};
 use bouncelight::scene::Scene;
@@ -52,20 +51,10 @@ fn draw(gpu: &Gpu, scene: &Scene, method: Method) -> String {
 }
 
 fn pictures(gpu: &Gpu) -> BTreeMap<String, String> {
-    let network = Weights::shipped().expect("the shipped file is sound");
-    let methods = || {
-        [
-            Method::Direct,
-            Method::Ambient,
-            Method::Ssgi,
-            Method::Gather(Default::default()),
-            Method::Neural(Box::new(network.clone().into())),
-        ]
-    };
     let mut all = BTreeMap::new();
     for name in ["interior", "paper-room:2"] {
         let scene = bouncelight_lab::scenes::load(name).expect("it is made by code");
-        for method in methods() {
+        for method in common::methods() {
             all.insert(format!("{name} {}", method.name()), draw(gpu, &scene, method));
         }
     }

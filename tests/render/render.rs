@@ -321,7 +321,7 @@ fn a_backdrop_is_shown_blurred_or_hidden_and_lights_the_scene_in_any_case() {
     let camera = look_at([0.0, 1.0, 4.0], [0.0, 1.0, 0.0], 0.8);
     let uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &s).expect("it uploads");
     let mut drawn = |backdrop: Backdrop| {
-        let options = RendererOptions { method: Method::Ambient, backdrop, ..Default::default() };
+        let options = RendererOptions { method: Method::Ambient(Default::default()), backdrop, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, [64, 64], options).expect("it builds");
         let options = CaptureOptions { samples: 16, ..Default::default() };
         capture(&gpu, &mut renderer, &uploaded, &camera, options).expect("it draws").beauty

@@ -112,7 +112,7 @@ fn light_from_all_around_is_that_of_what_is_behind() {
     lit.environment = build::environment(0.5);
     let camera = look_at([0.5, 0.5, 5.0], [0.0, 0.0, 0.0], 0.6);
     let shown = |s: &Scene| {
-        let options = RendererOptions { method: Method::Ambient, ..Default::default() };
+        let options = RendererOptions { method: Method::Ambient(Default::default()), ..Default::default() };
         center(&drawn(&gpu, s, &camera, options, 1), 8)
     };
     let with = shown(&lit);

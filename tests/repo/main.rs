@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod docs;
+mod layouts;
 mod licences;
 mod public_api;
 mod shader_names;

@@ -1,16 +1,15 @@
 //! Every struct that the path tracer's shaders and Rust share lies the same in both.
 
 use bouncelight::gpu::shaders;
-use check::Layout;
+use bouncelight::layouts::{Row, row};
 
-#[macro_use]
 #[path = "../../../tests/common/layouts.rs"]
 mod check;
 
 /// Structs that no Rust struct matches: a table is written as a list of numbers before its materials.
 const WITHOUT_ROW: [&str; 1] = ["MaterialStore"];
 
-fn rows() -> Vec<(&'static str, Layout)> {
+fn rows() -> Vec<Row> {
     use crate::reference::Job;
     use crate::reference::scene::{ImageUse, RefMaterial, SceneInfo};
     vec![

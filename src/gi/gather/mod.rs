@@ -40,6 +40,7 @@ use crate::gi::stage::cells::{self, DownsamplePass};
 use crate::gi::stage::inputs::InputGroup;
 use crate::gpu::bind::{Binder, Bound};
 use crate::gpu::timing::Recorder;
+use crate::layouts::{Row, row};
 use params::ParamsRing;
 use pass::Pass;
 use schedule::Schedule;
@@ -60,6 +61,33 @@ pub fn prelude() -> String {
     let candidates = format!("const CANDIDATES = {}u;\n", crate::lights::CANDIDATES);
     let bias = format!("const RAY_BIAS = f32({RAY_BIAS:?});\nconst RAY_BIAS_STEPS = f32({RAY_BIAS_STEPS:?});\n");
     [cells::prelude(), flags, candidates, bias].concat()
+}
+
+/// Shaders of the method, each with an example of its prelude.
+pub(super) fn preludes() -> Vec<(&'static str, String)> {
+    let alike = [
+        "gi.trace",
+        "gi.cache_select",
+        "gi.cache_update",
+        "gi.gradient",
+        "gi.specular_trace",
+        "gi.reproject",
+        "gi.accumulate",
+        "gi.blur",
+        "gi.atrous",
+    ];
+    let mut all: Vec<_> = alike.map(|shader| (shader, prelude())).into();
+    all.push(("gi.upsample", upsample::prelude()));
+    all
+}
+
+/// Structs that its shaders share with Rust.
+pub(super) fn layouts() -> Vec<Row> {
+    vec![row!("Gather", Params =>
+        eye, frame, light_count, emitter_count, inverse_power, mask, entry_scale, cache_iteration, cell_frames,
+        entry_frames, flags, cells, rays, frames_since_change, last_iteration, spp, shift, ray_budget,
+        entry_lifetime, pad,
+    )]
 }
 
 /// Most bits of a proposal that may index a vertex (`proposal_bits` of `entries.wgsl`): ten are

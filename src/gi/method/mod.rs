@@ -1,45 +1,99 @@
 //! The list of methods, and how one is made: nothing below knows it.
 
+mod list;
 pub mod name;
 mod with_fallback;
 
-use super::gather::{self, GatherGi};
+pub use list::Method;
+
+use super::ambient::AmbientTerm;
+use super::gather;
 use super::interface::{GiError, technique::Technique};
 use super::neural::Neural;
-use super::neural::filter::FilterGi;
-use super::screen::{
-    ambient::{AmbientGi, AmbientTerm},
-    ssgi::{SsgiGi, SsgiOptions},
-};
+use crate::layouts::Row;
+use std::sync::Arc;
 use with_fallback::WithFallback;
 
-/// A method of indirect light. The default is [`Method::Ambient`], which needs neither rays nor
-/// weights, so that it can always be made; the program's is `gather`.
-///
-/// ```
-/// use bouncelight::gi::{Method, gather};
-/// assert_eq!(Method::default().name(), "ambient");
-/// let method = Method::Gather(gather::Options::default());
-/// assert!(method.needs_rays() && method.frames_to_settle() == Method::SETTLED);
-/// ```
-#[derive(Debug, Clone, Default)]
-pub enum Method {
-    /// None: `indirect` is 0. Shows what direct light alone gives.
-    Direct,
-    /// Constant light times ambient occlusion, see [`ambient`](super::ambient).
-    #[default]
-    Ambient,
-    /// The same with a scene's own ambient term.
-    AmbientWith(AmbientTerm),
-    /// One bounce in screen space, see [`ssgi`](super::ssgi).
-    Ssgi,
-    /// The same with a scene's own ambient term.
-    SsgiWith(AmbientTerm),
-    /// Rays into the scene's triangles and a world-space radiance cache, see [`gather`].
-    Gather(gather::Options),
-    /// `gather`, whose filter a network guides, see [`neural`](super::neural); `weights.into()`
-    /// runs it with defaults.
-    Neural(Box<Neural>),
+/// A host's own method, drawn by the same frame as the others. One that needs rays is replaced by
+/// `ssgi` where there are none.
+#[derive(Clone)]
+pub struct Custom {
+    /// Its name in records and errors.
+    pub name: &'static str,
+    /// Whether it reads [`Inputs::rays`](super::Inputs::rays).
+    pub needs_rays: bool,
+    /// Whether it accumulates over frames.
+    pub has_history: bool,
+    /// Makes it.
+    pub make: Arc<Factory>,
+}
+
+/// Makes a [`Technique`] for pictures of a size, pixels. [`GiError::Device`] says what the device
+/// lacks.
+pub type Factory = dyn Fn(&wgpu::Device, &wgpu::Queue, [u32; 2]) -> Result<Box<dyn Technique>, GiError> + Send + Sync;
+
+impl std::fmt::Debug for Custom {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { name, needs_rays, has_history, .. } = self;
+        f.debug_struct("Custom")
+            .field("name", name)
+            .field("needs_rays", needs_rays)
+            .field("has_history", has_history)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Numbers that a method can be given, by a flag or as they were fitted to a scene.
+#[derive(PartialEq)]
+enum Numbers {
+    /// [`AmbientTerm`].
+    AmbientTerm,
+    /// [`gather::Options`].
+    Gather,
+}
+
+/// What a row of the list says of its method.
+struct Facts {
+    name: &'static str,
+    sentence: &'static str,
+    title: &'static str,
+    needs_rays: bool,
+    has_history: bool,
+    writes_specular: bool,
+    numbers: Option<Numbers>,
+    /// With its defaults, where it needs no weights.
+    plain: Option<fn() -> Method>,
+    /// With a network.
+    with: Option<fn(Neural) -> Method>,
+    /// Mean error of indirect light on the five judged rooms, %.
+    judged: Option<f64>,
+    /// Shaders that need a prelude, with examples of it.
+    preludes: fn() -> Vec<(&'static str, String)>,
+    /// Structs that its shaders share with Rust.
+    layouts: fn() -> Vec<Row>,
+}
+
+impl Facts {
+    const NONE: Self = Self {
+        name: "",
+        sentence: "",
+        title: "",
+        needs_rays: false,
+        has_history: false,
+        writes_specular: false,
+        numbers: None,
+        plain: None,
+        with: None,
+        judged: None,
+        preludes: Vec::new,
+        layouts: Vec::new,
+    };
+}
+
+impl Default for Method {
+    fn default() -> Self {
+        Method::Ambient(AmbientTerm::default())
+    }
 }
 
 impl Method {
@@ -60,23 +114,34 @@ impl Method {
 
     /// The method's name on the command line.
     pub fn name(&self) -> &'static str {
-        match self {
-            Method::Direct => "direct",
-            Method::Ambient | Method::AmbientWith(_) => "ambient",
-            Method::Ssgi | Method::SsgiWith(_) => "ssgi",
-            Method::Gather(_) => "gather",
-            Method::Neural(_) => "neural",
-        }
+        self.row().map_or_else(|custom| custom.name, |row| row.name())
     }
 
     /// Whether the method traces rays ([`Inputs::rays`](super::Inputs::rays)).
     pub fn needs_rays(&self) -> bool {
-        matches!(self, Method::Gather(_) | Method::Neural(_))
+        self.row().map_or_else(|custom| custom.needs_rays, |row| row.needs_rays())
     }
 
     /// Whether the method accumulates over frames.
     pub fn has_history(&self) -> bool {
-        self.needs_rays()
+        self.row().map_or_else(|custom| custom.has_history, |row| row.has_history())
+    }
+
+    /// The scene's own ambient term, of methods that have one.
+    pub fn ambient_term_mut(&mut self) -> Option<&mut AmbientTerm> {
+        match self {
+            Method::Ambient(term) | Method::Ssgi(term) => Some(term),
+            _ => None,
+        }
+    }
+
+    /// The options of `gather`, of methods that build on it.
+    pub fn gather_mut(&mut self) -> Option<&mut gather::Options> {
+        match self {
+            Method::Gather(options) => Some(options),
+            Method::Neural(neural) => Some(&mut neural.gather),
+            _ => None,
+        }
     }
 }
 
@@ -91,26 +156,16 @@ pub fn build(
     size: [u32; 2],
     method: &Method,
 ) -> Result<Option<Box<dyn Technique>>, GiError> {
-    Ok(match method {
-        Method::Direct => None,
-        Method::Ambient => Some(Box::new(AmbientGi::new(device))),
-        Method::AmbientWith(ambient_term) => Some(Box::new(AmbientGi::with(device, *ambient_term))),
-        Method::Ssgi => Some(Box::new(SsgiGi::new(device, SsgiOptions::default()))),
-        Method::SsgiWith(AmbientTerm { sky, bounce }) => {
-            let options = SsgiOptions { sky: *sky, bounce: *bounce, ..SsgiOptions::default() };
-            Some(Box::new(SsgiGi::new(device, options)))
-        }
-        Method::Gather(options) => {
-            let above = GatherGi::check(&device.limits(), size, options);
-            let above = above.map(|()| Box::new(GatherGi::new(device, size, *options)) as Box<dyn Technique>);
-            Some(Box::new(WithFallback::new(device, above.map_err(|e| e.to_string()))))
-        }
-        Method::Neural(neural) => {
-            let above = match GatherGi::check(&device.limits(), size, &Default::default()) {
-                Ok(()) => Ok(Box::new(FilterGi::new(device, queue, neural, size)?) as Box<dyn Technique>),
-                Err(lacks) => Err(lacks.to_string()),
-            };
-            Some(Box::new(WithFallback::new(device, above)))
-        }
-    })
+    let made = method.make(device, queue, size);
+    if !method.needs_rays() {
+        return made;
+    }
+    let above = match made {
+        Err(lacks @ GiError::Device(_)) => Err(lacks.to_string()),
+        made => match made? {
+            Some(technique) => Ok(technique),
+            None => return Ok(None),
+        },
+    };
+    Ok(Some(Box::new(WithFallback::new(device, above))))
 }

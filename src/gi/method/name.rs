@@ -1,4 +1,4 @@
-//! Names of methods: the one list that command line, viewer and studies share.
+//! Names of methods, which command line, viewer and studies share, and what the list says of each.
 //!
 //! ```
 //! use bouncelight::gi::name::MethodName;
@@ -6,95 +6,96 @@
 //! assert!(!MethodName::REAL_TIME.contains(&MethodName::Reference));
 //! ```
 
-use super::Method;
-use serde::{Deserialize, Serialize};
+use super::{Method, Numbers};
+use crate::gi::Neural;
+use crate::layouts::Row;
 
-/// A method, or the reference that methods are measured against.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum MethodName {
-    /// Analytic lights only.
-    Direct,
-    /// Constant light of sky and scene, times ambient occlusion.
-    Ambient,
-    /// One bounce in screen space.
-    Ssgi,
-    /// Rays into the scene's triangles and a world-space radiance cache; accumulates over frames.
-    Gather,
-    /// `gather` with a network.
-    Neural,
-    /// The path tracer.
-    Reference,
-}
-
-use MethodName as M;
+pub use super::list::MethodName;
 
 impl MethodName {
-    /// All of them, cheapest first, the truth last.
-    pub const ALL: [MethodName; 6] = [M::Direct, M::Ambient, M::Ssgi, M::Gather, M::Neural, M::Reference];
-
-    /// All real-time methods, cheapest first.
-    pub const REAL_TIME: [MethodName; 5] = [M::Direct, M::Ambient, M::Ssgi, M::Gather, M::Neural];
-
     /// Name on the command line, in records and in the window.
     pub fn name(self) -> &'static str {
-        ["direct", "ambient", "ssgi", "gather", "neural", "reference"][self as usize]
+        self.facts().name
     }
 
     /// What windows call it.
     pub fn title(self) -> &'static str {
-        ["Direct only", "Ambient + AO", "SSGI", "Ray-traced gather", "Gather + neural filter", "Path-traced reference"]
-            [self as usize]
+        self.facts().title
     }
 
     /// What lists say beside the name.
     pub fn doc(self) -> &'static str {
-        [
-            "Analytic lights only",
-            "Constant light of sky and scene, times ambient occlusion",
-            "One bounce in screen space",
-            "Rays into the scene's triangles and a world-space radiance cache; accumulates over frames",
-            "The network",
-            "The path tracer, which converges to the truth",
-        ][self as usize]
+        self.facts().sentence
     }
 
-    /// The method, where its name says all that it needs: not `neural` (weights) and `reference`.
-    pub fn plain(self) -> Option<Method> {
-        Some(match self {
-            M::Direct => Method::Direct,
-            M::Ambient => Method::Ambient,
-            M::Ssgi => Method::Ssgi,
-            M::Gather => Method::Gather(super::gather::Options::default()),
-            M::Neural | M::Reference => return None,
-        })
-    }
-
-    /// Whether it asks rays in any case. Of `neural` only [`Method::needs_rays`] can tell: its weights decide.
+    /// Whether it traces rays.
     pub fn needs_rays(self) -> bool {
-        matches!(self, M::Gather | M::Neural)
+        self.facts().needs_rays
+    }
+
+    /// Whether it accumulates over frames.
+    pub fn has_history(self) -> bool {
+        self.facts().has_history
+    }
+
+    /// Whether it writes [`Outputs::specular`](crate::gi::Outputs::specular).
+    pub fn writes_specular(self) -> bool {
+        self.facts().writes_specular
+    }
+
+    /// Whether it needs a network's weights.
+    pub fn needs_weights(self) -> bool {
+        self.facts().with.is_some()
+    }
+
+    /// Whether it builds on `gather`: takes its numbers and can be exported.
+    pub fn gathers(self) -> bool {
+        self.facts().numbers == Some(Numbers::Gather)
+    }
+
+    /// Whether it takes a scene's own ambient term.
+    pub fn has_ambient_term(self) -> bool {
+        self.facts().numbers == Some(Numbers::AmbientTerm)
+    }
+
+    /// Mean error of indirect light on the five judged rooms, %, as `docs/results/accuracy.md` has it
+    /// (`light`); `None` where nobody has measured it.
+    pub fn judged(self) -> Option<f64> {
+        self.facts().judged
+    }
+
+    /// The method with its defaults, where its name says all that it needs: no weights, no paths.
+    pub fn plain(self) -> Option<Method> {
+        self.facts().plain.map(|make| make())
+    }
+
+    /// The method with its defaults; `network` is asked where it needs one. `None` for the reference.
+    ///
+    /// # Errors
+    /// Those of `network`.
+    pub fn method<E>(self, network: impl FnOnce() -> Result<Neural, E>) -> Result<Option<Method>, E> {
+        match self.facts().with {
+            Some(with) => Ok(Some(with(network()?))),
+            None => Ok(self.plain()),
+        }
     }
 
     /// The one called `name`.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|m| m.name() == name)
+        Self::ALL.iter().copied().find(|m| m.name() == name)
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+    /// All real-time ones of which `is` is true, as a sentence names them: `gather and neural`.
+    pub fn which(is: impl Fn(Self) -> bool) -> String {
+        let names: Vec<&str> = Self::REAL_TIME.iter().filter(|m| is(**m)).map(|m| m.name()).collect();
+        names.join(" and ")
+    }
 
-    #[test]
-    fn names_are_those_of_the_methods() {
-        for (i, method) in MethodName::ALL.into_iter().enumerate() {
-            assert_eq!(method as usize, i);
-            assert_eq!(MethodName::from_name(method.name()), Some(method));
-            assert_eq!(serde_json::to_value(method).unwrap(), method.name());
-        }
-        let plain: Vec<_> = MethodName::ALL.into_iter().filter_map(|m| Some((m.name(), m.plain()?.name()))).collect();
-        assert!(plain.len() == 4 && plain.iter().all(|(ours, theirs)| ours == theirs), "{plain:?}");
-        assert_eq!(MethodName::from_name("magic"), None);
-        assert_eq!(MethodName::REAL_TIME[..], MethodName::ALL[..5]);
+    pub(crate) fn preludes(self) -> Vec<(&'static str, String)> {
+        (self.facts().preludes)()
+    }
+
+    pub(crate) fn layouts(self) -> Vec<Row> {
+        (self.facts().layouts)()
     }
 }

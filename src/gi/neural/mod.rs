@@ -14,3 +14,10 @@ pub mod memory;
 mod trained;
 
 pub use trained::Neural;
+
+use crate::net::plan::Precision;
+
+/// Shaders of the method, each with examples of its prelude.
+pub(super) fn preludes() -> Vec<(&'static str, String)> {
+    [Precision::F32, Precision::F16].map(|precision| ("gi.features", memory::prelude(precision))).into()
+}

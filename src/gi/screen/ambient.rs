@@ -5,7 +5,7 @@
 //! use bouncelight::gi::{Method, ambient::AmbientTerm};
 //! let term: AmbientTerm = "sky=0.5".parse()?;
 //! assert_eq!(term, AmbientTerm { sky: 0.5, ..AmbientTerm::default() });
-//! let method = Method::AmbientWith(term);
+//! let method = Method::Ambient(term);
 //! # Ok::<_, String>(())
 //! ```
 
@@ -77,6 +77,11 @@ impl FromStr for AmbientTerm {
 /// The constants of the ambient term as WGSL (`shaders/gi/ambient_term.wgsl`).
 pub fn ambient_prelude(sky: f32, bounce: f32) -> String {
     format!("const SKY = f32({sky:?});\nconst BOUNCE = f32({bounce:?});\n")
+}
+
+/// Shaders of the method, each with an example of its prelude.
+pub(crate) fn preludes() -> Vec<(&'static str, String)> {
+    vec![("gi.ambient", ambient_prelude(1.0, 0.5))]
 }
 
 /// The method: exposure, occlusion and one write a pixel (`gi.exposure`, `gi.occlusion`,

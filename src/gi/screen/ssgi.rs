@@ -40,6 +40,11 @@ impl SsgiOptions {
     }
 }
 
+/// Shaders of the method, each with an example of its prelude.
+pub(crate) fn preludes() -> Vec<(&'static str, String)> {
+    ["gi.radiance", "gi.ssgi"].map(|shader| (shader, SsgiOptions::default().prelude())).into()
+}
+
 /// The method.
 pub struct SsgiGi {
     device: wgpu::Device,

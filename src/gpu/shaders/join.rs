@@ -2,12 +2,20 @@
 //! and before the file that says so.
 
 use crate::gpu::pipeline_cache;
-use include_dir::{Dir, include_dir};
+use include_dir::{Dir, File, include_dir};
 use std::path::{Path, PathBuf};
 use std::sync::RwLock;
 
 /// The files under `shaders/` as they were when the program was built.
-static EMBEDDED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/shaders");
+static EMBEDDED: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/shaders");
+
+/// All files and their texts, as they were then.
+pub(super) fn files() -> impl Iterator<Item = (&'static str, &'static str)> {
+    fn all(dir: &'static Dir<'static>) -> Vec<&'static File<'static>> {
+        dir.dirs().flat_map(all).chain(dir.files()).collect()
+    }
+    all(&EMBEDDED).into_iter().filter_map(|f| Some((f.path().to_str()?, f.contents_utf8()?)))
+}
 
 /// What begins a line that names a file to bring in.
 const IMPORT: &str = "//#import ";

@@ -188,10 +188,15 @@ pub fn replaced(text: &str) -> Option<String> {
 /// What is said to who asks for paths where frames are drawn.
 pub const TRACED: &str = "paths are traced by `bouncelight trace`, a command of its own";
 
-/// Parses a method's name, one of those given, and says where to look for others that there are or
+/// Parses the name of a method of which the function is true, and says where to look for others that there are or
 /// were.
 #[derive(Debug, Clone)]
-pub struct MethodParser(pub &'static [MethodName]);
+pub struct MethodParser(pub fn(&MethodName) -> bool);
+
+/// Those that draw frames.
+pub fn draws_frames(name: &MethodName) -> bool {
+    MethodName::REAL_TIME.contains(name)
+}
 
 impl TypedValueParser for MethodParser {
     type Value = MethodName;
@@ -202,7 +207,7 @@ impl TypedValueParser for MethodParser {
         if let Some(reason) = replaced(asked) {
             return Err(error(reason));
         }
-        if asked == MethodName::Reference.name() && !self.0.contains(&MethodName::Reference) {
+        if asked == MethodName::Reference.name() && !(self.0)(&MethodName::Reference) {
             return Err(error(TRACED.into()));
         }
         let names = PossibleValuesParser::new(self.possible_values().into_iter().flatten());
@@ -211,21 +216,15 @@ impl TypedValueParser for MethodParser {
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
-        Some(Box::new(self.0.iter().map(|m| PossibleValue::new(m.name()))))
+        Some(Box::new(MethodName::ALL.iter().filter(|m| (self.0)(m)).map(|m| PossibleValue::new(m.name()))))
     }
 }
 
 /// The real-time method called `name` with its weights: `weights`, or the shipped ones. `tuned` adds
 /// what a device is needed for.
 pub fn real_time(name: MethodName, global: &Global, weights: Option<&PathBuf>) -> Result<Method> {
-    match (name.plain(), name) {
-        (Some(method), _) => Ok(method),
-        (None, MethodName::Neural) => {
-            let neural = Neural::from(load_weights(weights)?).stored(global.precision());
-            Ok(Method::Neural(Box::new(neural)))
-        }
-        (None, _) => Err(usage(format!("`{}` is not a real-time method", name.name()))),
-    }
+    let method = name.method(|| load_weights(weights).map(|w| Neural::from(w).stored(global.precision())))?;
+    method.ok_or_else(|| usage(format!("`{}` is not a real-time method", name.name())))
 }
 
 /// The weights in `path`, or the shipped ones of that name; without a path those shipped as the

@@ -54,7 +54,10 @@ Examples:
 fn methods() -> Result<([Method; 3], [Method; 4])> {
     let neural = Method::Neural(Box::new(Weights::shipped()?.into()));
     let gather = Method::Gather(Default::default());
-    Ok(([Method::Direct, gather.clone(), neural.clone()], [Method::Direct, Method::Ambient, gather, neural]))
+    Ok((
+        [Method::Direct, gather.clone(), neural.clone()],
+        [Method::Direct, Method::Ambient(Default::default()), gather, neural],
+    ))
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {

@@ -14,7 +14,7 @@ pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
     /// Method to export.
-    #[arg(long, value_parser = MethodParser(&[MethodName::Gather, MethodName::Neural]), default_value = "gather",
+    #[arg(long, value_parser = MethodParser(|m| m.gathers()), default_value = "gather",
         value_name = "METHOD", help_heading = EXPORT)]
     method: MethodName,
     /// Weights of `neural` [default: the shipped `filter`].
@@ -57,7 +57,7 @@ impl TargetName {
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
-    if args.weights.is_some() && args.method != MethodName::Neural {
+    if args.weights.is_some() && !args.method.needs_weights() {
         return Err(usage("--weights is for --method neural".into()));
     }
     let refused = |e: ExportError| match e {

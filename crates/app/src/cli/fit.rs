@@ -209,7 +209,7 @@ fn report(folder: &Path, heading: &str, found: &Fit, options: &FitOptions, fitte
         for (number, row) in found.rows.iter().enumerate() {
             let Some(rgb) = row.pictures.get(i) else { continue };
             let title = row.candidate.name(&options.networks);
-            let name = format!("view{i}_{number}_{}.png", row.candidate.method_name().name());
+            let name = format!("view{i}_{number}_{}.png", row.candidate.method.name());
             picture(&name, reference.size, rgb)?;
             page += &format!("\n![{title}]({name})\n*{title}: {}*\n", options.quality_target.show(row.errors[i]));
         }

@@ -2,7 +2,7 @@
 //! layers.
 
 use super::{
-    args::{Global, MethodName, MethodParser, real_time, usage},
+    args::{Global, MethodName, MethodParser, draws_frames, real_time, usage},
     drawn::{Drawn, parse_layers},
     error::CliError,
     interrupt,
@@ -13,7 +13,7 @@ use super::{
     showing::Showing,
 };
 use anyhow::Result;
-use bouncelight::gi::{Method, Neural, gather};
+use bouncelight::gi::{Method, gather};
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::{SceneGpu, TextureMemory, UploadError};
 use bouncelight::render::{
@@ -40,7 +40,7 @@ pub struct Args {
     #[command(flatten)]
     sequence: sequence::SequenceFlags,
     /// Method for indirect light [default: as `fit` found, else gather; neural with --weights].
-    #[arg(long, value_parser = MethodParser(&MethodName::REAL_TIME), help_heading = METHOD)]
+    #[arg(long, value_parser = MethodParser(draws_frames), help_heading = METHOD)]
     method: Option<MethodName>,
     /// Weights of `neural` [default: the shipped `filter`].
     #[arg(long, help_heading = METHOD, value_name = "FILE")]
@@ -134,25 +134,18 @@ impl Args {
     }
 }
 
-/// The method, a network's with other numbers of the `gather` that it builds on.
-fn gathering(method: Method, options: Option<gather::Options>) -> Method {
-    match (method, options) {
-        (Method::Neural(neural), Some(gather)) => Method::Neural(Box::new(Neural { gather, ..*neural })),
-        (method, _) => method,
-    }
-}
-
 pub fn run(global: &Global, mut args: Args) -> Result<()> {
     let loaded = args.obey(global)?;
     check(&args)?;
     let format = args.picture.check()?;
     let layers = args.picture.aov.as_deref().map(|text| parse_layers(text, &Layer::ALL, Layer::name)).transpose()?;
-    let method = match args.method() {
-        MethodName::Gather => Method::Gather(args.gather.unwrap_or_default()),
-        MethodName::Ambient => args.ambient_term.map_or(Method::Ambient, Method::AmbientWith),
-        MethodName::Ssgi => args.ambient_term.map_or(Method::Ssgi, Method::SsgiWith),
-        name => gathering(real_time(name, global, args.weights.as_ref())?, args.gather),
-    };
+    let mut method = real_time(args.method(), global, args.weights.as_ref())?;
+    if let (Some(options), Some(asked)) = (method.gather_mut(), args.gather) {
+        *options = asked;
+    }
+    if let (Some(term), Some(asked)) = (method.ambient_term_mut(), args.ambient_term) {
+        *term = asked;
+    }
     let reference = args.picture.reference(args.scene.size)?;
     let sequence = args.sequence.sequence(&args.picture.output, args.scene.animation.is_some())?;
     let scene = loaded.map_or_else(|| args.scene.load(global), Ok)?;
@@ -303,16 +296,12 @@ fn check(args: &Args) -> Result<()> {
     if args.backdrop == Backdrop::Transparent && args.taa.is_some() {
         return Err(usage("--taa keeps no alpha; with --backdrop transparent use --samples".into()));
     }
-    let name = args.method().name();
-    let settles = [MethodName::Gather, MethodName::Neural].contains(&args.method());
-    if args.accumulate.is_some() && !settles {
-        return Err(usage(format!("--accumulate belongs to methods gather and neural; `{name}` keeps no history")));
-    }
-    if args.gather.is_some() && !settles {
-        return Err(usage(format!("--gather belongs to methods gather and neural, not to `{name}`")));
-    }
-    if args.ambient_term.is_some() && ![MethodName::Ambient, MethodName::Ssgi].contains(&args.method()) {
-        return Err(usage(format!("--ambient-term belongs to methods ambient and ssgi, not to `{name}`")));
-    }
-    Ok(())
+    let belongs = |flag: &str, asked: bool, takes: fn(MethodName) -> bool| {
+        let (all, name) = (MethodName::which(takes), args.method().name());
+        let wrong = asked && !takes(args.method());
+        if wrong { Err(usage(format!("{flag} belongs to methods {all}, not to `{name}`"))) } else { Ok(()) }
+    };
+    belongs("--accumulate", args.accumulate.is_some(), MethodName::has_history)?;
+    belongs("--gather", args.gather.is_some(), MethodName::gathers)?;
+    belongs("--ambient-term", args.ambient_term.is_some(), MethodName::has_ambient_term)
 }

@@ -161,7 +161,7 @@ fn names(args: &Args) -> Result<Vec<MethodName>> {
     }
     let real_time = |name: &str| {
         let found = MethodName::from_name(name).filter(|m| MethodName::REAL_TIME.contains(m));
-        let known = || MethodName::REAL_TIME.map(|m| m.name()).join(", ");
+        let known = || MethodName::REAL_TIME.iter().map(|m| m.name()).collect::<Vec<_>>().join(", ");
         found.ok_or_else(|| usage(format!("--methods: `{name}` is not a real-time method; there are: {}", known())))
     };
     args.methods.split(',').map(|name| real_time(name.trim())).collect()

@@ -13,7 +13,7 @@ pub struct Args {
     #[arg(help_heading = None)]
     scene: Option<String>,
     /// Method for indirect light to begin with [default: as `fit` found, else as saved].
-    #[arg(long, value_parser = MethodParser(&MethodName::ALL))]
+    #[arg(long, value_parser = MethodParser(|_| true))]
     method: Option<MethodName>,
     /// Weights of `neural` [default: the shipped `filter`].
     #[arg(long, value_name = "FILE")]

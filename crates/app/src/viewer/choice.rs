@@ -8,14 +8,8 @@ pub use bouncelight::gi::name::MethodName as Source;
 /// The one `by` places after `source`, among those that are drawn in real time.
 pub fn next(source: Source, by: isize) -> Source {
     let n = Source::REAL_TIME.len() as isize;
-    let at = (source as isize).min(n - 1);
+    let at = Source::REAL_TIME.iter().position(|s| *s == source).map_or(n - 1, |at| at as isize);
     Source::REAL_TIME[(at + by).rem_euclid(n) as usize]
-}
-
-/// Mean error of indirect light on the five judged rooms, %, as docs/results/accuracy.md has it (`light`):
-/// measured once, on other scenes, not here; `None` where nobody has.
-pub fn static_error(source: Source) -> Option<f64> {
-    [Some(100.0), Some(28.8), Some(23.0), Some(5.8), Some(5.8), None][source as usize]
 }
 
 /// What is shown; the numbers are the shader's (`viewer/show.wgsl`).
@@ -134,13 +128,13 @@ mod tests {
     fn errors_are_those_of_the_documentation() {
         let page = std::fs::read_to_string("../../docs/results/accuracy.md").expect("the page is there");
         let table = page.split("## Finished pictures").nth(1).expect("the section is there");
-        for source in Source::ALL {
+        for &source in Source::ALL {
             let row = |l: &&str| {
                 [format!("| {} |", source.name()), format!("| **{}**", source.name())].iter().any(|n| l.starts_with(n))
             };
             let told = table.lines().find(row).and_then(|l| l.trim_end_matches([' ', '|', '%']).rsplit('|').next());
             let told = told.and_then(|t| t.trim().parse::<f64>().ok());
-            assert_eq!(static_error(source), told, "{}", source.name());
+            assert_eq!(source.judged(), told, "{}", source.name());
         }
     }
 

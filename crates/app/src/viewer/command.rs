@@ -44,19 +44,19 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
         }
     }
     // A single frame is one of a history that has not settled.
-    if s.samples == 1 && matches!(s.left, Source::Gather | Source::Neural) {
+    if s.samples == 1 && s.left.has_history() {
         flag("accumulate", "1".into());
     }
-    if let (Source::Neural, Some(weights)) = (s.left, &s.weights) {
+    if let (true, Some(weights)) = (s.left.needs_weights(), &s.weights) {
         flag("weights", weights.display().to_string());
     }
     if let (Source::Gather, Some(numbers)) = (s.left, &state.gather) {
         flag("gather", numbers.clone());
     }
-    if let (Source::Ambient | Source::Ssgi, Some(numbers)) = (s.left, &state.ambient_term) {
+    if let (true, Some(numbers)) = (s.left.has_ambient_term(), &state.ambient_term) {
         flag("ambient-term", numbers.clone());
     }
-    if let (Source::Neural, Some(precision)) = (s.left, state.precision) {
+    if let (true, Some(precision)) = (s.left.needs_weights(), state.precision) {
         flag("precision", if precision == Precision::F16 { "f16" } else { "f32" }.into());
     }
     if state.units.scale != 1.0 {

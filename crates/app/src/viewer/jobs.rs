@@ -218,18 +218,21 @@ pub struct Network {
 
 /// The method behind a source; reads weights.
 fn method(source: Source, weights: Option<&Path>, network: &Network) -> Result<Method, String> {
-    Ok(match source {
-        Source::Direct | Source::Reference => Method::Direct,
-        Source::Ambient => Method::AmbientWith(network.ambient_term),
-        Source::Ssgi => Method::SsgiWith(network.ambient_term),
-        Source::Gather => Method::Gather(network.gather),
-        Source::Neural => {
-            let weights = Weights::find(weights).map_err(|e| e.to_string())?;
-            let mut neural = Neural::from(weights).stored(network.precision);
-            neural.tuned = network.tuned.clone();
-            Method::Neural(Box::new(neural))
-        }
-    })
+    let with = || {
+        let weights = Weights::find(weights).map_err(|e| e.to_string())?;
+        let neural = Neural::from(weights).stored(network.precision);
+        Ok::<_, String>(Neural { tuned: network.tuned.clone(), ..neural })
+    };
+    // Beside the reference, direct light fills the G-buffer.
+    let mut method = source.method(with)?.unwrap_or(Method::Direct);
+    // Fitted without a network.
+    if let (false, Some(options)) = (source.needs_weights(), method.gather_mut()) {
+        *options = network.gather;
+    }
+    if let Some(term) = method.ambient_term_mut() {
+        *term = network.ambient_term;
+    }
+    Ok(method)
 }
 
 /// What a renderer is built for.

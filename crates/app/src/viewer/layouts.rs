@@ -1,16 +1,15 @@
 //! Every struct that the window's shaders and Rust share lies the same in both.
 
 use bouncelight::gpu::shaders;
-use check::Layout;
+use bouncelight::layouts::{Row, row};
 
-#[macro_use]
 #[path = "../../../../tests/common/layouts.rs"]
 mod check;
 
 /// Structs that no Rust struct matches: a few words, written where they are bound.
 const WITHOUT_ROW: [&str; 1] = ["Flicker"];
 
-fn rows() -> Vec<(&'static str, Layout)> {
+fn rows() -> Vec<Row> {
     use super::show::ShowUniform;
     use bouncelight::render::view::FrameUniform;
     vec![

@@ -82,12 +82,12 @@ fn samples_show_light_that_has_changed_and_end_with_the_scene() {
     let dir = tempfile::tempdir().unwrap();
     let make = |moments: &str| {
         let out = dir.path().join(moments);
-        let room = ["dataset", "--recipe", "home", "--rooms", "2", "--views", "1", "--size", "64x32", "--spp", "2"];
+        let room = ["dataset", "--recipe", "home", "--rooms", "0", "--views", "1", "--size", "64x32", "--spp", "2"];
         let done = bouncelight(&[&room[..], &["--moments", moments, "--out", out.to_str().expect("text")]].concat());
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-        std::fs::read(out.join("home0002_view0.safetensors")).unwrap()
+        std::fs::read(out.join("home0000_view0.safetensors")).unwrap()
     };
-    let (still, changing) = (make("22,36"), make("8,lamp,thing"));
+    let (still, changing) = (make("22"), make("8,lamp,thing"));
     let still = safetensors::SafeTensors::deserialize(&still).unwrap();
     let changing = safetensors::SafeTensors::deserialize(&changing).unwrap();
     let values = |file: &safetensors::SafeTensors<'_>, name: &str| -> Vec<f32> {
@@ -105,5 +105,6 @@ fn samples_show_light_that_has_changed_and_end_with_the_scene() {
     };
     let (rest, lamp, thing) = (frames(&still, "22"), frames(&changing, "lamp"), frames(&changing, "thing"));
     assert!(lamp < 0.9 * rest, "{lamp} {rest}");
-    assert!(thing < 0.9 * frames(&still, "36"), "{thing}");
+    // And they would remember more in 36 frames.
+    assert!(thing < 0.9 * rest, "{thing} {rest}");
 }

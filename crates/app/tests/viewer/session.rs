@@ -1,7 +1,7 @@
 //! A scripted session of the real program, and what its screenshots show.
 
 use super::display::Display;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// Runs a script against `args`; returns what the program said.
@@ -31,9 +31,17 @@ pub fn session_with(
         .env("NODEVICE_SELECT", "1")
         .env("HOME", dir)
         .env("XDG_CONFIG_HOME", dir.join("config"))
+        .envs(compiled().map(|folder| ("MESA_SHADER_CACHE_DIR", folder)))
         .envs(variables.iter().copied())
         .output()
         .expect("the program starts")
+}
+
+/// Where Mesa keeps what it has compiled, which is nobody's settings: it would compile all shaders for
+/// every folder that stands for a home.
+fn compiled() -> Option<PathBuf> {
+    let of = |name| std::env::var_os(name).map(PathBuf::from);
+    of("MESA_SHADER_CACHE_DIR").or(of("XDG_CACHE_HOME")).or(of("HOME").map(|home| home.join(".cache")))
 }
 
 #[track_caller]

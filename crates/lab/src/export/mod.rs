@@ -16,7 +16,7 @@ pub use manifest::Manifest;
 pub use package::{Package, check_folder};
 
 use bouncelight::accel::AccelError;
-use bouncelight::gi::{GiError, Method};
+use bouncelight::gi::{GiError, Method, name::MethodName};
 use bouncelight::gpu::readback::ReadbackError;
 use bouncelight::gpu_scene::UploadError;
 use bouncelight::scene::Scene;
@@ -80,7 +80,7 @@ pub enum ExportError {
         why: String,
     },
     /// Only methods whose frames come to repeat themselves can be written down.
-    #[error("method `{0}` cannot be exported; `gather` and `neural` can")]
+    #[error("method `{0}` cannot be exported; {which} can", which = MethodName::which(MethodName::gathers))]
     Method(&'static str),
     /// A shader cannot be had in that language.
     #[error("shader `{shader}`: {message}")]

@@ -53,12 +53,12 @@ pub(super) fn record(
     if method.needs_rays() {
         uploaded.trace(device, queue, scene)?;
     }
-    let method = &plain(method, target);
+    let mut method = plain(method, target);
+    if method.gather_mut().is_none() {
+        return Err(ExportError::Method(method.name()));
+    }
     let refused = || ExportError::Method(method.name());
-    let mut technique = match method {
-        Method::Gather(_) | Method::Neural(_) => method::build(device, queue, size, method)?.ok_or_else(refused)?,
-        _ => return Err(refused()),
-    };
+    let mut technique = method::build(device, queue, size, &method)?.ok_or_else(refused)?;
     let textures = HOST.map(|(_, format, _)| host_texture(device, size, format));
     let views = textures.each_ref().map(|t| t.create_view(&Default::default()));
     let [depth, normal, albedo, emissive, direct, motion, specular, output, specular_output] = &views;

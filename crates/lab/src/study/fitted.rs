@@ -1,8 +1,7 @@
 //! What `bouncelight fit` has found good enough for a scene: the file `SCENE.gi.toml`, and the
 //! method that it names.
 
-use bouncelight::gi::{Method, name::MethodName};
-use bouncelight::gi::{Neural, ambient::AmbientTerm, gather};
+use bouncelight::gi::{Method, Neural, ambient::AmbientTerm, gather, name::MethodName};
 use bouncelight::net::format::{Weights, WeightsError};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -138,20 +137,22 @@ impl Fitted {
     pub fn method(&self) -> Result<Method, FittedError> {
         let broken = |problem: String| FittedError::Broken { path: Self::path("SCENE"), problem };
         self.check().map_err(broken)?;
-        if let Some(method) = self.method.plain() {
-            return Ok(match (method, self.gather()) {
-                (Method::Gather(_), Some(options)) => Method::Gather(options),
-                (Method::Ambient, _) => self.ambient_term().map_or(Method::Ambient, Method::AmbientWith),
-                (Method::Ssgi, _) => self.ambient_term().map_or(Method::Ssgi, Method::SsgiWith),
-                (method, _) => method,
-            });
+        let network = || {
+            let wanted = self.weights.as_ref().ok_or_else(|| broken("`weights` is missing".into()))?;
+            let weights = Weights::find(Some(&wanted.file))?;
+            if weights.hash_text() != wanted.hash {
+                return Err(FittedError::OtherWeights { file: wanted.file.clone() });
+            }
+            Ok(Neural::from(weights))
+        };
+        let mut method = self.method.method(network)?.unwrap_or_default();
+        if let (Some(options), Some(own)) = (method.gather_mut(), self.gather()) {
+            *options = own;
         }
-        let wanted = self.weights.as_ref().ok_or_else(|| broken("`weights` is missing".into()))?;
-        let weights = Weights::find(Some(&wanted.file))?;
-        if weights.hash_text() != wanted.hash {
-            return Err(FittedError::OtherWeights { file: wanted.file.clone() });
+        if let (Some(term), Some(own)) = (method.ambient_term_mut(), self.ambient_term()) {
+            *term = own;
         }
-        Ok(Method::Neural(Box::new(Neural::from(weights))))
+        Ok(method)
     }
 
     /// Why it is time to ask again instead of obeying: the scene, whose hash is `scene` now, or the
@@ -185,8 +186,8 @@ impl Fitted {
         if self.schema != SCHEMA {
             return Err(format!("schema {} is not known; this program writes {SCHEMA}", self.schema));
         }
-        if self.method == MethodName::Reference {
-            return Err("method `reference` is not a real-time method".into());
+        if !MethodName::REAL_TIME.contains(&self.method) {
+            return Err(format!("method `{}` is not a real-time method", self.method.name()));
         }
         if let Some(text) = &self.gather {
             if self.method != MethodName::Gather {
@@ -195,16 +196,15 @@ impl Fitted {
             text.parse::<gather::Options>().map_err(|e| format!("gather: {e}"))?;
         }
         if let Some(text) = &self.ambient_term {
-            if !matches!(self.method, MethodName::Ambient | MethodName::Ssgi) {
-                return Err(format!(
-                    "`ambient_term` belongs to methods ambient and ssgi, not to `{}`",
-                    self.method.name()
-                ));
+            if !self.method.has_ambient_term() {
+                let all = MethodName::which(MethodName::has_ambient_term);
+                return Err(format!("`ambient_term` belongs to methods {all}, not to `{}`", self.method.name()));
             }
             text.parse::<AmbientTerm>().map_err(|e| format!("ambient_term: {e}"))?;
         }
-        if self.weights.is_some() != (self.method == MethodName::Neural) {
-            return Err("method neural has `weights`, and no other method has".into());
+        if self.weights.is_some() != self.method.needs_weights() {
+            let all = MethodName::which(MethodName::needs_weights);
+            return Err(format!("method {all} has `weights`, and no other method has"));
         }
         if !(1..=MOST_FRAMES).contains(&self.frames) {
             return Err(format!("frames = {}: must be 1 to {MOST_FRAMES}", self.frames));
@@ -288,7 +288,7 @@ mod tests {
         assert!(matches!(fitted().method().unwrap(), Method::Gather(o) if o.entry_scale == 0.125));
         let own = Fitted { ambient_term: Some("sky=1,bounce=0.5".into()), ..plain };
         assert_eq!(Fitted::parse(&own.text(), path).unwrap(), own);
-        assert!(matches!(own.method().unwrap(), Method::AmbientWith(u) if (u.sky, u.bounce) == (1.0, 0.5)));
+        assert!(matches!(own.method().unwrap(), Method::Ambient(u) if (u.sky, u.bounce) == (1.0, 0.5)));
         assert_eq!(Fitted::path("a/flat.glb"), Path::new("a/flat.glb.gi.toml"));
         assert_eq!(Fitted::path("paper-room:2"), Path::new("paper-room-2.gi.toml"));
         assert_eq!(Fitted::path("home:7"), Path::new("home-7.gi.toml"));

@@ -22,7 +22,7 @@ fn of<'a>(costs: &'a [Cost], pass: &str) -> &'a Cost {
 #[test]
 fn a_picture_of_four_times_as_many_pixels_takes_four_times_as_much() {
     let Some(gpu) = common::gpu() else { return };
-    let [small, large] = [[64, 32], [128, 64]].map(|size| counted(&gpu, Method::Ambient, size, 1));
+    let [small, large] = [[64, 32], [128, 64]].map(|size| counted(&gpu, Method::Ambient(Default::default()), size, 1));
     for pass in ["gi.ambient", "gi.color_pyramid"] {
         let ratio = |f: fn(&Cost) -> f64| f(of(&large, pass)) / f(of(&small, pass));
         let [flops, bytes] = [ratio(|c| c.flops), ratio(|c| c.bytes)];

@@ -20,7 +20,7 @@ fn gather_passes_what_ambient_fails_and_every_control_fails() {
     let folder = tempfile::tempdir().expect("a folder");
     let subjects = vec![
         method("gather", Method::Gather(Default::default())),
-        method("ambient", Method::Ambient),
+        method("ambient", Method::Ambient(Default::default())),
         method("direct", Method::Direct),
     ];
     let tests = stability::named("sealed,thin-wall,saturated,half").expect("they are there");

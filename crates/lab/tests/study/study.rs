@@ -44,7 +44,7 @@ fn pictures_are_judged_by_a_kept_reference() {
         let projected = total_ms(&costs, &GTX_1050, EFFICIENCY);
         (light, seen.display.psnr, projected, shot.settled)
     };
-    let (direct, ambient) = (of(Method::Direct), of(Method::Ambient));
+    let (direct, ambient) = (of(Method::Direct), of(Method::Ambient(Default::default())));
     let gather = of(Method::Gather(Default::default()));
     assert!((direct.0 - 1.0).abs() < 1e-6 && direct.2 == 0.0, "{direct:?}");
     assert!(gather.0 < 0.5 * ambient.0 && ambient.0 < direct.0, "{gather:?} {ambient:?}");

@@ -10,9 +10,9 @@ impl App {
     pub(super) fn key(&self, source: Source) -> Key {
         let [weights, shaders, numbers] = self.stamps;
         let own = match source {
-            Source::Neural => weights,
-            Source::Ambient | Source::Ssgi | Source::Gather => numbers,
-            Source::Direct | Source::Reference => 0,
+            source if source.needs_weights() => weights,
+            source if source.gathers() || source.has_ambient_term() => numbers,
+            _ => 0,
         };
         (source, shaders << 32 | own)
     }

@@ -24,7 +24,7 @@ impl App {
         }
         let s = &mut self.state.settings;
         self.tour = Some(Tour {
-            left: Source::REAL_TIME.into(),
+            left: Source::REAL_TIME.to_vec(),
             method: s.left,
             split: s.split,
             view: s.view,

@@ -69,9 +69,9 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
         ui.painter().text(at(ms, 3.0) + Vec2::new(0.0, 3.0), align, text, font.clone(), weak);
     }
     let dots: Vec<Dot> = Source::ALL
-        .into_iter()
-        .filter_map(|source| {
-            let (ms, error) = (*facts.measured.get(&(source as usize))?, crate::viewer::choice::static_error(source)?);
+        .iter()
+        .filter_map(|&source| {
+            let (ms, error) = (*facts.measured.get(&(source as usize))?, source.judged()?);
             Some(Dot { source, ms, error, at: at(ms, error) })
         })
         .collect();
@@ -123,7 +123,7 @@ pub fn frontier(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Fac
         if response.clicked() {
             state.apply(Action::MeasureAll);
         }
-        let missing = Source::ALL.iter().filter(|s| crate::viewer::choice::static_error(**s).is_some());
+        let missing = Source::ALL.iter().filter(|s| s.judged().is_some());
         let missing = missing.filter(|s| !facts.measured.contains_key(&(**s as usize))).count();
         ui.label(
             RichText::new(if missing > 0 { format!("{missing} not measured here yet") } else { String::new() }).weak(),

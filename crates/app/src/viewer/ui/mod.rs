@@ -246,7 +246,7 @@ fn source_box(ui: &mut Ui, id: &str, state: &mut State, side: Side) {
     let now = if side == Side::Left { state.settings.left } else { state.settings.right };
     let mut chosen = now;
     egui::ComboBox::from_id_salt(id).selected_text(now.title()).width(widgets::wide(ui)).show_ui(ui, |ui| {
-        for source in Source::ALL {
+        for &source in Source::ALL {
             ui.selectable_value(&mut chosen, source, source.title()).on_hover_text(source.doc());
         }
     });

@@ -29,7 +29,7 @@ use super::{
     session::{Frame, Session, SessionError, Settling},
     truth::Reference,
 };
-use bouncelight::gi::{Neural, gather};
+use bouncelight::gi::{Neural, gather, name::MethodName};
 use bouncelight::render::capture::Layer;
 use bouncelight::scene::Camera;
 use std::path::PathBuf;
@@ -163,16 +163,11 @@ impl Search<'_, '_> {
 
     /// From the cheapest up to the first that is good enough.
     fn climb(&mut self) -> Result<Option<usize>, FitError> {
-        let finer = FINER.map(|entry_scale| Candidate::Gather(gather::Options { entry_scale, ..Default::default() }));
-        let networks = (0..self.options.networks.len()).map(Candidate::Neural);
+        let finer = FINER.map(|entry_scale| Candidate::gather(gather::Options { entry_scale, ..Default::default() }));
+        let networks = (0..self.options.networks.len()).map(Candidate::network);
         let mut upper: Vec<Candidate> = finer.into_iter().chain(networks).collect();
-        let mut ladder = vec![
-            Candidate::Direct,
-            Candidate::Ambient(Default::default()),
-            Candidate::Ssgi(Default::default()),
-            Candidate::Gather(Default::default()),
-        ];
-        ladder.reverse();
+        let plain = MethodName::REAL_TIME.iter().rev().filter(|method| !method.needs_weights());
+        let mut ladder: Vec<Candidate> = plain.map(|method| Candidate::plain(*method)).collect();
         while let Some(candidate) = ladder.pop() {
             let mut tried = self.attempt(candidate, self.options.frames)?;
             if tried.is_some_and(|row| self.rows[row].verdict == Verdict::TooFar)
@@ -189,7 +184,14 @@ impl Search<'_, '_> {
             if ladder.is_empty() && !upper.is_empty() {
                 // What these cost is not known before they are built.
                 let mut costed = Vec::new();
+                let gather = |row: &Row| row.candidate.method == MethodName::Gather;
+                let too_dear = self.rows.iter().any(|row| gather(row) && row.verdict == Verdict::TooDear);
                 for candidate in upper.drain(..) {
+                    // Finer than what is over the budget.
+                    if too_dear && candidate.method == MethodName::Gather {
+                        self.rows.push(Row::blank(candidate, Verdict::TooDear));
+                        continue;
+                    }
                     let cost = self.cost(&candidate)?;
                     costed.push((cost.unwrap_or(f64::INFINITY), candidate));
                 }
@@ -221,17 +223,20 @@ impl Search<'_, '_> {
 
     /// Cheaper numbers of a candidate that is good enough, if they are, too; else the row itself.
     fn refine(&mut self, row: usize) -> Result<usize, FitError> {
-        let Candidate::Gather(found) = &self.rows[row].candidate else { return Ok(row) };
+        let candidate = &self.rows[row].candidate;
+        if candidate.method != MethodName::Gather {
+            return Ok(row);
+        }
+        let found = candidate.gather.unwrap_or_default();
         let own = gather::Options::default().entry_scale;
         if found.entry_scale < own {
             // The coarser ones have been tried on the way here.
             return Ok(row);
         }
-        let found = *found;
         let (mut best, mut low, mut high) = (row, 0, COARSER.len());
         while low < high {
             let middle = (low + high) / 2;
-            let candidate = Candidate::Gather(gather::Options { entry_scale: COARSER[middle], ..found });
+            let candidate = Candidate::gather(gather::Options { entry_scale: COARSER[middle], ..found });
             match self.attempt(candidate, self.options.frames)? {
                 Some(tried) if self.rows[tried].verdict == Verdict::GoodEnough => {
                     (best, low) = (tried, middle + 1);
@@ -295,7 +300,7 @@ impl Search<'_, '_> {
             self.rows.push(row);
             return Ok(None);
         }
-        let frames = if candidate.settles() { frames } else { 1 };
+        let frames = if candidate.method.has_history() { frames } else { 1 };
         let Some((errors, shots)) = self.errors(&candidate, frames)? else {
             let row = Row::blank(candidate, Verdict::Cannot);
             self.rows.push(row);
@@ -331,7 +336,7 @@ impl Search<'_, '_> {
 
     /// Milliseconds of its own passes in the first view; `None` where it cannot draw the scene.
     fn cost(&mut self, candidate: &Candidate) -> Result<Option<f64>, FitError> {
-        if *candidate == Candidate::Direct {
+        if candidate.method == MethodName::Direct {
             return Ok(Some(0.0));
         }
         if let Some((_, known)) = self.costs.iter().find(|(r, _)| r == candidate) {

@@ -41,21 +41,19 @@ impl Fit {
     /// What is written beside the scene: `scene` is its hash, `device` the adapter's name.
     pub fn fitted(&self, options: &FitOptions, scene: String, size: [u32; 2], device: String) -> Fitted {
         let row = self.choice();
-        let weights = match row.candidate {
-            super::Candidate::Neural(index) => {
-                let network = &options.networks[index];
-                Some(FittedWeights { file: network.file.clone(), hash: network.neural.weights.hash_text() })
-            }
-            _ => None,
-        };
+        let weights = row.candidate.network.map(|index| {
+            let network = &options.networks[index];
+            FittedWeights { file: network.file.clone(), hash: network.neural.weights.hash_text() }
+        });
+        let [gather, ambient_term] = row.candidate.numbers();
         let cost = if options.timed { "measured on this device" } else { "projected for a GTX 1050, not measured" };
         Fitted {
             schema: SCHEMA,
             program: env!("CARGO_PKG_VERSION").into(),
             scene,
-            method: row.candidate.method_name(),
-            gather: row.candidate.gather(),
-            ambient_term: row.candidate.ambient_term().map(|u| u.words()),
+            method: row.candidate.method,
+            gather,
+            ambient_term,
             frames: row.frames,
             weights,
             target: Target {

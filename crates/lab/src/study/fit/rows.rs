@@ -2,86 +2,67 @@
 
 use super::Network;
 use bouncelight::gi::{Method, ambient::AmbientTerm, gather, name::MethodName};
+use std::convert::Infallible;
 
 /// Something to try: a method with its numbers.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Candidate {
-    /// No indirect light.
-    Direct,
-    /// Even light, with these numbers of what the picture does not show.
-    Ambient(AmbientTerm),
-    /// Screen space, with these.
-    Ssgi(AmbientTerm),
-    /// Rays, with these numbers.
-    Gather(gather::Options),
-    /// The network of this index.
-    Neural(usize),
+pub struct Candidate {
+    /// The method.
+    pub method: MethodName,
+    /// Numbers of what the picture does not show; `None` for the usual ones.
+    pub ambient_term: Option<AmbientTerm>,
+    /// Numbers of `gather`; `None` for its own.
+    pub gather: Option<gather::Options>,
+    /// Index of the network, of methods that have one.
+    pub network: Option<usize>,
 }
 
 impl Candidate {
+    /// The method with its defaults.
+    pub fn plain(method: MethodName) -> Self {
+        Self { method, ambient_term: None, gather: None, network: None }
+    }
+
+    /// `gather` with these numbers.
+    pub fn gather(options: gather::Options) -> Self {
+        Self { gather: Some(options), ..Self::plain(MethodName::Gather) }
+    }
+
+    /// The network of this index.
+    pub fn network(index: usize) -> Self {
+        Self { network: Some(index), ..Self::plain(MethodName::Neural) }
+    }
+
+    /// The same with another ambient term, where it has one.
+    pub fn with_ambient_term(&self, ambient_term: AmbientTerm) -> Option<Self> {
+        self.method.has_ambient_term().then(|| Self { ambient_term: Some(ambient_term), ..self.clone() })
+    }
+
     /// The method.
     pub fn method(&self, networks: &[Network]) -> Method {
-        match self {
-            Candidate::Direct => Method::Direct,
-            Candidate::Ambient(ambient_term) => Method::AmbientWith(*ambient_term),
-            Candidate::Ssgi(ambient_term) => Method::SsgiWith(*ambient_term),
-            Candidate::Gather(options) => Method::Gather(*options),
-            Candidate::Neural(index) => Method::Neural(Box::new(networks[*index].neural.clone())),
+        let network = || Ok::<_, Infallible>(networks[self.network.unwrap_or_default()].neural.clone());
+        let Ok(method) = self.method.method(network);
+        let mut method = method.unwrap_or_default();
+        if let (Some(term), Some(own)) = (method.ambient_term_mut(), self.ambient_term) {
+            *term = own;
         }
+        if let (Some(options), Some(own)) = (method.gather_mut(), self.gather) {
+            *options = own;
+        }
+        method
     }
 
-    /// The method's name on the command line.
-    pub fn method_name(&self) -> MethodName {
-        match self {
-            Candidate::Direct => MethodName::Direct,
-            Candidate::Ambient(_) => MethodName::Ambient,
-            Candidate::Ssgi(_) => MethodName::Ssgi,
-            Candidate::Gather(_) => MethodName::Gather,
-            Candidate::Neural(_) => MethodName::Neural,
-        }
-    }
-
-    /// Numbers of `gather` that are not its own.
-    pub fn gather(&self) -> Option<String> {
-        match self {
-            Candidate::Gather(options) => options.words(),
-            _ => None,
-        }
-    }
-
-    /// The ambient term, where it is not the one that methods have for every scene.
-    pub fn ambient_term(&self) -> Option<AmbientTerm> {
-        match self {
-            Candidate::Ambient(ambient_term) | Candidate::Ssgi(ambient_term) => {
-                Some(*ambient_term).filter(|u| *u != AmbientTerm::default())
-            }
-            _ => None,
-        }
-    }
-
-    /// The same method with another ambient term, where it has one.
-    pub fn with_ambient_term(&self, ambient_term: AmbientTerm) -> Option<Self> {
-        match self {
-            Candidate::Ambient(_) => Some(Candidate::Ambient(ambient_term)),
-            Candidate::Ssgi(_) => Some(Candidate::Ssgi(ambient_term)),
-            _ => None,
-        }
+    /// Its numbers, where they are not the usual ones, as the flags of `render` take them.
+    pub fn numbers(&self) -> [Option<String>; 2] {
+        let term = self.ambient_term.filter(|term| *term != AmbientTerm::default());
+        [self.gather.and_then(|options| options.words()), term.map(|term| term.words())]
     }
 
     /// For tables: the method, its numbers or its weights.
     pub fn name(&self, networks: &[Network]) -> String {
-        match self {
-            Candidate::Neural(index) => format!("neural {}", networks[*index].file.display()),
-            candidate => match candidate.gather().or(candidate.ambient_term().map(|u| u.words())) {
-                Some(numbers) => format!("{} {numbers}", candidate.method_name().name()),
-                None => candidate.method_name().name().into(),
-            },
-        }
-    }
-
-    /// Whether its answer settles over frames.
-    pub fn settles(&self) -> bool {
-        matches!(self, Candidate::Gather(_) | Candidate::Neural(_))
+        let file = self.network.map(|index| networks[index].file.display().to_string());
+        let own = file.into_iter().chain(self.numbers().into_iter().flatten());
+        own.fold(self.method.name().to_owned(), |name, own| format!("{name} {own}"))
     }
 }
 

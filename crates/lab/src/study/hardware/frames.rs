@@ -13,6 +13,7 @@ use bouncelight::net::plan::Precision;
 use bouncelight::render::{Renderer, RendererOptions};
 use bouncelight::scene::{Camera, Scene};
 use serde::{Deserialize, Serialize};
+use std::convert::Infallible;
 
 /// Frames that count and those before them, where time allows: methods with a history settle within
 /// them.
@@ -57,7 +58,7 @@ pub enum Timing {
 
 /// All real-time methods in `scene` at `size`.
 pub(super) fn methods(run: &mut Run<'_>, scene: &(String, Scene), size: [u32; 2], card: &Card) -> Vec<FrameRow> {
-    rows(run, scene, size, card, &MethodName::REAL_TIME, Precision::F32)
+    rows(run, scene, size, card, MethodName::REAL_TIME, Precision::F32)
 }
 
 /// The network in 16 bits.
@@ -94,14 +95,8 @@ fn rows(
         if !run.affords(&what, before * f64::from(LEAST.frames + LEAST.warmup)) {
             continue;
         }
-        let with = match method.plain() {
-            Some(method) => method,
-            None => {
-                let mut neural = Neural::from(run.weights.clone());
-                neural.network.precision = precision;
-                Method::Neural(Box::new(neural))
-            }
-        };
+        let network = || Ok::<_, Infallible>(Neural::from(run.weights.clone()).stored(Some(precision)));
+        let Ok(Some(with)) = method.method(network) else { continue };
         let seconds = SHARE * run.left();
         let measured = one(gpu, with.clone(), &uploaded, camera, size, seconds);
         let Some((mut measured, frames)) = run.kept(&what, measured) else { continue };
