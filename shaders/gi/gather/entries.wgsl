@@ -15,7 +15,7 @@
 @group(2) @binding(1) var<storage, read_write> entry_proposals: array<atomic<u32>>;
 // Where rays hit a cell: position and packed normal. First those of the picture's rays, then of
 // entries' rays for even and odd updates, then origins of entries' rays for both (last word 0: none
-// yet); behind all, the state of paths (path_state.wgsl).
+// yet).
 @group(2) @binding(2) var<storage, read_write> proposal_vertices: array<vec4u>;
 
 // Slots that are probed before a place goes without an entry. Which place that is depends on the
