@@ -24,8 +24,8 @@ const PHASE_INVALIDATED = 3u;
 
 // The two numbers of a cell's ray. Sixteen cells share one lattice, which continues from frame to
 // frame, so that a blur over them sees the whole hemisphere. In the first frame each square shifts
-// it: no pattern then repeats over the picture.
-// Where cells take turns it continues when each has had its own.
+// it: no pattern then repeats over the picture. Where cells take turns it continues when each has had
+// its own, and is another for each length of a round: none is sent twice.
 fn cell_sample(cell: vec2u, sample_index: u32, state: u32, level: i32) -> vec2f {
     let place = place_in_square(cell);
     let wait = u32(max(-level, 0));
@@ -33,7 +33,8 @@ fn cell_sample(cell: vec2u, sample_index: u32, state: u32, level: i32) -> vec2f 
     let half = vec2u(0x80000000u);
     // A select, no branch: Mesa's CPU driver recompiles for each value of a uniform that alone
     // decides a branch.
-    let shift = select(half, pcg3(vec3u(cell >> vec2u(2u), 77u)).xy, gather.frame == 0u) + gather.shift + wait * vec2u(0x9e3779b9u, 0x7f4a7c15u);
+    var shift = select(half, pcg3(vec3u(cell >> vec2u(2u), 77u)).xy, gather.frame == 0u) + gather.shift;
+    shift += wait * vec2u(0x9e3779b9u, 0x7f4a7c15u);
     // The further rays of a short history are those of a lattice shifted by one half.
     if state == SHORT_HISTORY { return lattice(place + 16u * frame, shift + (sample_index << 31u)); }
     let phase = select(PHASE_INVALIDATED, PHASE_DISOCCLUDED, state == DISOCCLUDED);
