@@ -141,10 +141,12 @@ fn accumulate(@builtin(global_invocation_id) id: vec3u) {
     // A disoccluded cell counts its rays as frames; not just after a change, when the cache does
     // not know the change yet.
     let history_length = min(history.history_length + f32(select(min(spp, 1u), spp, disoccluded && !changed)), most);
-    if state == SHORT_HISTORY && gather.ray_budget == 0u {
-        // One frame of SPP_SHORT rays: its moment is that of their mean. With a budget it is one ray's.
+    if state == SHORT_HISTORY {
+        // One frame of SPP_SHORT rays: its moment is that of their mean. Where a budget left one, its
+        // variance is taken for twice that.
         let l = luminance(samples.light);
-        samples.second_moment = l * l;
+        let mean_l = luminance(history.light);
+        samples.second_moment = select(mix(samples.second_moment, mean_l * mean_l, 0.5), l * l, spp > 1u);
     } else if disoccluded && changed {
         // Between that and a single ray's.
         let l = luminance(samples.light);

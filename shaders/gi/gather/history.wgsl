@@ -54,18 +54,18 @@ fn strictness_at(x: vec3f) -> f32 {
 }
 
 // Mean squared luminance of frames of one ray. Frames of a short history are means of SPP_SHORT
-// rays, unless a budget leaves them fewer.
+// rays, or taken for such.
 fn ray_second_moment(history: History) -> f32 {
     let l = luminance(history.light);
     let in_short = min(SHORT_HISTORY_FRAMES / max(history.history_length, 1.0), 1.0);
-    let single = (gather.flags & GATHER_PROGRESSIVE) != 0u || gather.ray_budget != 0u;
-    let share = select(in_short, 0.0, single);
+    let share = select(in_short, 0.0, (gather.flags & GATHER_PROGRESSIVE) != 0u);
     return l * l + max(history.second_moment - l * l, 0.0) / (1.0 - share * (1.0 - 1.0 / f32(SPP_SHORT)));
 }
 
-// The same of frames as the cell has them now.
+// The same of frames as the cell has them now; with a budget each may be of one ray.
 fn recent_second_moment(history: History) -> f32 {
-    if history.history_length <= SHORT_HISTORY_FRAMES { return history.second_moment; }
+    let short = history.history_length <= SHORT_HISTORY_FRAMES;
+    if short && gather.ray_budget == 0u { return history.second_moment; }
     return ray_second_moment(history);
 }
 

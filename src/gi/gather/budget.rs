@@ -4,8 +4,8 @@ use super::Options;
 use super::schedule::Frame;
 
 /// Frames after a first one in which a share of the rays is no limit: until histories are no longer
-/// short (`SHORT_HISTORY_FRAMES`: eight rays at first, then two a frame).
-const YOUNG_FRAMES: u32 = 16;
+/// short (`SHORT_HISTORY_FRAMES`: a first frame counts for eight).
+const YOUNG_FRAMES: u32 = 32;
 /// Rays a frame of a cell that rests: `REST_LEVEL` of `ray_budget.wgsl`.
 const REST: f32 = 0.25;
 
@@ -61,7 +61,7 @@ mod tests {
         let all = |options: Options| frames.iter().map(|f| rays(&options, f, 1000)).collect::<Vec<_>>();
         assert!(all(Options::default()).iter().all(|&n| n == 0));
         let half = all(Options { rays: 0.5, ..Default::default() });
-        assert_eq!([half[0], half[16], half[17], half[63], half[199]], [0, 0, 500, 500, 125]);
+        assert_eq!([half[0], half[32], half[33], half[63], half[199]], [0, 0, 500, 500, 125]);
         assert!(all(Options { rays: 700.0, ..Default::default() }).iter().all(|&n| n == 700));
         assert!(all(Options { rays: 0.5, ..Options::PLAIN }).iter().all(|&n| n == 0), "what converges has no budget");
     }

@@ -30,7 +30,7 @@ pub struct Options {
     /// light is missing then.
     pub caustics: bool,
     /// Rays of the picture's cells a frame, spent where histories are shortest. Up to 1: a share of one
-    /// a cell, from the 17th frame of a view on (1: as many as cells ask for, at rest a fourth). Above:
+    /// a cell, from the 34th frame of a view on (1: as many as cells ask for, at rest a fourth). Above:
     /// a number that holds from the first frame on, but for cells without a history, which send one.
     /// Few: noise, and light that follows changes slowly. Without effect where `progressive`.
     pub rays: f32,
