@@ -7,8 +7,9 @@ use glam::Vec3;
 /// Larger meshes are not asked: the answer saves them nothing that anybody would see.
 const MOST: usize = 200_000;
 
-/// True where every edge of `mesh` borders exactly two triangles that wind the same way, and these
-/// face outwards. Vertices of one place (to a hundred-thousandth of the mesh's reach) are one.
+/// Whether `mesh` is closed: every edge borders exactly two triangles that wind the same way, and they
+/// face outwards. Vertices at the same place, to 10⁻⁵ of the largest coordinate, count as one. False
+/// for meshes of more than 200,000 triangles, which are not tested.
 pub fn is_closed(mesh: &Mesh) -> bool {
     if mesh.indices.is_empty() || mesh.indices.len() > 3 * MOST {
         return false;

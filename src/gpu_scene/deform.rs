@@ -5,7 +5,8 @@ use crate::scene::Scene;
 use crate::scene::octahedral::octahedral_word;
 use bytemuck::{Pod, Zeroable};
 
-/// Laid out as `Deforming` in `shaders/render/deform.wgsl`, which documents the fields.
+/// Where the data of a deforming mesh lie, 48 bytes: `Deforming` of `shaders/render/deform.wgsl`, which
+/// documents the fields.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs, reason = "documented in the shader")]

@@ -7,33 +7,33 @@ use crate::scene::{AlphaMode, Material, Sampler, Scene, TextureRef, Wrap};
 use bytemuck::{Pod, Zeroable};
 use std::collections::HashMap;
 
-/// How a texture is addressed, as `shaders/lib/material.wgsl` reads it.
+/// Where a material's texture is read, 32 bytes: `TextureUse` of `shaders/lib/material.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct TextureUse {
-    /// First row of the coordinate transform; w is the coordinate set.
+    /// First row of the 2×3 transform of texture coordinates (xyz); w is the coordinate set, 0 or 1.
     pub row0: [f32; 4],
-    /// Second row; w is 1 where a texture is bound.
+    /// Second row of the transform (xyz); w is 1 where a texture is bound, else 0.
     pub row1: [f32; 4],
 }
 
-/// A material as `shaders/lib/material.wgsl` reads it, padded to the alignment of uniform offsets.
+/// A material, 256 bytes, the alignment of uniform offsets; `shaders/lib/material.wgsl` reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct MaterialGpu {
-    /// Linear base colour and alpha.
+    /// Linear base colour (rgb) and alpha.
     pub base_color: [f32; 4],
     /// Emitted radiance, W/(m²·sr).
     pub emissive: [f32; 3],
-    /// 1 for unlit.
+    /// 1 for an unlit material, else 0.
     pub unlit: u32,
     /// 0 dielectric to 1 metal.
     pub metallic: f32,
-    /// Perceptual roughness.
+    /// Perceptual roughness, 0 to 1.
     pub roughness: f32,
     /// Scale of the normal map's x and y.
     pub normal_scale: f32,
-    /// Strength of the occlusion map.
+    /// Strength of the occlusion map, 0 to 1.
     pub occlusion_strength: f32,
     /// 0 opaque, the mask's cutoff, 2 for stochastic coverage, 3 for a veil, which may be blended
     /// instead.
@@ -42,11 +42,11 @@ pub struct MaterialGpu {
     pub f0: f32,
     /// Unused.
     pub pad: [f32; 2],
-    /// Base colour, metallic-roughness, normal, occlusion, emissive.
+    /// The textures of base colour, metallic-roughness, normal, occlusion and emission.
     pub uses: [TextureUse; 5],
     /// Colour of `f0`; w is unused.
     pub specular_tint: [f32; 4],
-    /// To 256 bytes.
+    /// Unused: fills up 256 bytes.
     pub tail: [f32; 4],
 }
 
@@ -142,9 +142,9 @@ fn uniform(m: &Material, veil: bool) -> MaterialGpu {
     }
 }
 
-/// Layout of the materials' bind groups (group 1 of the geometry passes): uniform, five textures,
-/// five samplers. wgpu holds layouts with equal entries for the same, so pipelines can be made
-/// before any scene is there.
+/// Returns the layout of the materials' bind groups (group 1 of the geometry passes): a uniform, five
+/// textures, five samplers. To wgpu layouts with equal entries are the same, so pipelines can be made
+/// before any scene is uploaded.
 pub fn material_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let stages = wgpu::ShaderStages::FRAGMENT;
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: stages, ty, count: None };

@@ -12,7 +12,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Everything of a vertex but its position; 36 bytes.
+/// A vertex without its position, 36 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct AttributeVertex {
@@ -20,40 +20,40 @@ pub struct AttributeVertex {
     pub normal: [i16; 2],
     /// Octahedral tangent (x, y), handedness (z; 0 without tangent), unused (w); signed normalised.
     pub tangent: [i16; 4],
-    /// First texture coordinates.
+    /// Texture coordinates of set 0.
     pub uv0: [f32; 2],
-    /// Second texture coordinates.
+    /// Texture coordinates of set 1.
     pub uv1: [f32; 2],
     /// Linear colour and alpha; halves, because files may hold colours above 1.
     pub color: [f16; 4],
 }
 
-/// Rows of a world-from-object matrix, metres; the fourth is 0, 0, 0, 1.
+/// The first three rows of a world-from-object matrix, metres; the fourth is 0, 0, 0, 1.
 pub type Rows = [[f32; 4]; 3];
 
-/// Lowest and highest corner of a box along the world's axes.
+/// Lowest and highest corner of a box along the axes, metres.
 pub type Bounds = ([f32; 3], [f32; 3]);
 
-/// What is known of an instance in the instance buffer beside its rows.
+/// Bounds and version of an entry of the instance buffer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slot {
-    /// World-space bounds, which hold whatever of it is drawn.
+    /// World-space bounds of the whole instance.
     pub bounds: Bounds,
-    /// Number of what is there: another one whenever it is another instance, elsewhere or of
-    /// another shape.
+    /// Version of the entry: another number whenever it holds another instance, or the same one moved
+    /// or deformed.
     pub version: u64,
 }
 
-/// All instances of one mesh that share a winding.
+/// One indexed draw: all instances of a mesh whose transforms have the same winding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draw {
     /// Index of the material's bind group.
     pub material: usize,
-    /// Range in the index buffer.
+    /// Range in the index buffer, in indices.
     pub indices: Range<u32>,
     /// Added to every index.
     pub base_vertex: i32,
-    /// Range in the instance buffer.
+    /// Range in the instance buffer, in instances.
     pub instances: Range<u32>,
     /// The transforms mirror, so front faces wind clockwise.
     pub mirrored: bool,
@@ -61,14 +61,15 @@ pub struct Draw {
     pub double_sided: bool,
     /// Opaque and closed: from outside only outer faces are to be seen.
     pub closed: bool,
-    /// Masked or blended: needs the permutation that discards.
+    /// Masked or blended: needs the pipeline whose fragments can discard.
     pub covered: bool,
-    /// Covers a share of each place by lot (`BLEND`), so that another frame's shadow of it is
-    /// another.
+    /// Covers a share of each place stochastically (`BLEND`), so its shadow differs from frame to
+    /// frame.
     pub by_lot: bool,
-    /// A veil, to be blended with what is behind: one instance, so that draws can be put in order.
+    /// A veil, blended with what is behind. It has one instance, so that draws can be sorted by
+    /// distance.
     pub veil: bool,
-    /// Its vertices move: they are among the first of the scene's.
+    /// Its vertices are skinned or morphed; these come first in the vertex buffers.
     pub deforms: bool,
     /// World-space bounds of all its instances.
     pub bounds: Bounds,

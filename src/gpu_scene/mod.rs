@@ -35,19 +35,19 @@ use bytemuck::Pod;
 use std::sync::atomic::{AtomicU64, Ordering};
 use thiserror::Error;
 
-/// Why a scene does not fit on the device or in itself.
+/// Why a scene cannot be uploaded: it exceeds the device's limits, or its parts disagree.
 #[derive(Debug, Error)]
 pub enum UploadError {
-    /// Vertices or indices exceed the device's largest buffer.
+    /// Vertices, indices or deforming vertices exceed the device's largest buffer or binding.
     #[error("mesh `{mesh}` does not fit: {what} need {bytes} bytes in all, the device's largest buffer has {limit}")]
     TooLarge {
-        /// The mesh that crosses the limit.
+        /// Name of the mesh that crosses the limit.
         mesh: String,
-        /// Which data.
+        /// Which data, such as `vertices`.
         what: &'static str,
         /// Bytes needed up to and including this mesh.
         bytes: u64,
-        /// The device's limit.
+        /// The device's limit, bytes.
         limit: u64,
     },
     /// A mesh whose arrays disagree.
@@ -58,7 +58,7 @@ pub enum UploadError {
         /// What disagrees.
         reason: String,
     },
-    /// An image whose bytes do not fit its size.
+    /// An image whose number of bytes does not follow from its width and height.
     #[error("image `{image}`: {reason}")]
     Image {
         /// The image's name.
@@ -71,9 +71,9 @@ pub enum UploadError {
     MissingImage {
         /// The material's name.
         material: String,
-        /// The index.
+        /// Index of the image that is not there.
         image: usize,
-        /// How many there are.
+        /// How many images the scene has.
         count: usize,
     },
     /// An instance that names a mesh which is not there.
@@ -81,9 +81,9 @@ pub enum UploadError {
     MissingMesh {
         /// The instance's name.
         instance: String,
-        /// The index.
+        /// Index of the mesh that is not there.
         mesh: usize,
-        /// How many there are.
+        /// How many meshes the scene has.
         count: usize,
     },
 }
@@ -97,17 +97,18 @@ impl From<sky::SkyError> for UploadError {
 /// A scene on the GPU. Lights, the surroundings and placements can be changed in place; upload
 /// again after any other change.
 pub struct SceneGpu {
-    /// Tells uploads apart, so that bind groups can be kept as long as the scene stays.
+    /// Identifier of what is bound: another number whenever a buffer or texture is another one, so that
+    /// bind groups can be kept as long as it stays.
     pub id: u64,
-    /// Object-space positions, three floats a vertex.
+    /// Object-space positions of all meshes, one after the other: three floats (12 bytes) a vertex.
     pub positions: wgpu::Buffer,
-    /// The other attributes ([`AttributeVertex`]).
+    /// The other attributes in the same order: an [`AttributeVertex`] (36 bytes) a vertex.
     pub attributes: wgpu::Buffer,
-    /// 32-bit indices, relative to each mesh's first vertex.
+    /// 32-bit indices of triangles, relative to each mesh's first vertex.
     pub indices: wgpu::Buffer,
-    /// Rows of the world-from-object matrices, grouped by draw.
+    /// World-from-object matrices, grouped by draw: [`Rows`] (48 bytes) an instance, metres.
     pub instances: wgpu::Buffer,
-    /// Number of the placements: another one whenever an instance has moved or deformed, or taken
+    /// Version of the placements: grows whenever an instance has moved or deformed, or has taken
     /// another's slot in `instances`.
     pub placement: u64,
     /// Bounds and version of each entry of `instances`.
@@ -116,25 +117,26 @@ pub struct SceneGpu {
     pub draws: Vec<Draw>,
     /// One bind group a material, of [`material_layout`].
     pub material_groups: Vec<wgpu::BindGroup>,
-    /// [`LightGpu`] for each light; at least one entry, so that it can be bound.
+    /// A [`LightGpu`] (64 bytes) for each of `lights`; at least one entry, so that it can be bound.
     pub light_buffer: wgpu::Buffer,
-    /// The lights, for shadow fitting; a sun that a picture of the surroundings holds is the last.
+    /// The scene's lights, then the sun that was extracted from the picture of the surroundings, if it
+    /// holds one.
     pub lights: Vec<Light>,
-    /// Another number whenever one of them, or the surroundings, is another than before.
+    /// Version of the light: grows whenever a light or the surroundings change.
     pub light_version: u64,
-    /// What lights the scene from beyond it: `radiance` is the mean without that sun.
+    /// The surroundings; `radiance`, W/(m²·sr), is their mean without the extracted sun.
     pub environment: Environment,
-    /// The same as a lat-long `Rgba32Float` picture; one texel for a constant. rgb is without the
-    /// sun, rgb · (1 + a) with it.
+    /// The surroundings as a lat-long `Rgba32Float` picture of radiance, W/(m²·sr); one texel for a
+    /// constant. rgb is without the extracted sun, rgb · (1 + a) with it.
     pub environment_view: wgpu::TextureView,
-    /// World-space bounds of all instances; `None` for a scene without triangles.
+    /// World-space bounds of all instances, lowest and highest corner in metres; `None` for a scene
+    /// without triangles.
     pub bounds: Option<([f32; 3], [f32; 3])>,
-    /// The triangles as rays meet them, once [`SceneGpu::trace`] has made them.
+    /// BVHs and surfaces for rays; `None` until [`SceneGpu::trace`] or [`SceneGpu::set_rays`].
     pub rays: Option<SceneRays>,
-    /// Why there can be none, once [`SceneGpu::trace`] has found out: one sentence without a full
-    /// stop.
+    /// Why there can be no `rays`, once that is known: one sentence without a full stop.
     pub no_rays: Option<String>,
-    /// What was mended on the way, one sentence each.
+    /// What was repaired or left out while uploading, one sentence each.
     pub warnings: Vec<String>,
     /// The sun of the surroundings.
     sky_sun: Option<Light>,
@@ -153,16 +155,20 @@ pub struct SceneGpu {
 }
 
 impl SceneGpu {
-    /// Uploads `scene`. Images larger than the device allows are halved until they fit, with a
-    /// warning.
+    /// Uploads `scene` with [`TextureMemory::Auto`]. Images larger than the device allows are halved
+    /// until they fit, with a warning.
+    ///
+    /// # Errors
+    /// [`UploadError`] when meshes exceed the device's largest buffer, arrays or images disagree with
+    /// their sizes, or an index names a mesh or an image that is not there.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<Self, UploadError> {
         Self::with_textures(device, queue, scene, TextureMemory::Auto)
     }
 
-    /// As [`SceneGpu::new`], with textures whole or in blocks.
+    /// Uploads `scene` as [`SceneGpu::new`] does, with textures in `memory`, whole or in blocks.
     ///
     /// # Errors
-    /// As there.
+    /// As [`SceneGpu::new`].
     pub fn with_textures(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
@@ -214,12 +220,12 @@ impl SceneGpu {
         })
     }
 
-    /// Makes [`SceneGpu::rays`] for methods that need them ([`crate::gi::Method::needs_rays`]).
-    /// `scene` is what this was made of. Without them the method below draws in those methods'
-    /// place.
+    /// Builds [`SceneGpu::rays`] on the CPU and uploads them, for methods that need them
+    /// ([`crate::gi::Method::needs_rays`]). `scene` is what this was made of. Without rays such a
+    /// method's fallback draws in its place.
     ///
     /// # Errors
-    /// [`AccelError`] when the scene has more triangles than rays can have; [`SceneGpu::no_rays`]
+    /// [`AccelError`] when no BVH can be built, as of too many triangles; [`SceneGpu::no_rays`] then
     /// says the same.
     pub fn trace(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> Result<(), AccelError> {
         match SceneRays::new(device, queue, scene) {
@@ -232,8 +238,8 @@ impl SceneGpu {
         Ok(())
     }
 
-    /// Takes over rays that were made apart, or why there can be none. `scene` is as it is drawn
-    /// now: instances may have moved since.
+    /// Takes over rays that were built elsewhere, as on another thread, or why there can be none.
+    /// `scene` is as it is drawn now: instances may have moved since the build began.
     pub fn set_rays(&mut self, queue: &wgpu::Queue, scene: &Scene, rays: Result<SceneRays, String>) {
         match rays {
             Ok(mut rays) => {
@@ -244,10 +250,8 @@ impl SceneGpu {
         }
     }
 
-    /// Takes over the lights of `scene`. In place where their kinds stay, so that shadow maps stay,
-    /// too.
-    ///
-    /// Whatever else of `scene` has changed is left as it is here.
+    /// Takes over the lights of `scene` and nothing else. Where their number and kinds stay, the buffer
+    /// stays, and so do shadow maps and bind groups.
     pub fn set_lights(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) {
         let lights: Vec<Light> = scene.lights.iter().chain(&self.sky_sun).cloned().collect();
         let list = LightGpu::list(&lights);
@@ -264,10 +268,10 @@ impl SceneGpu {
         }
     }
 
-    /// Takes over the surroundings and the lights of `scene`.
+    /// Takes over the surroundings and the lights of `scene`. What was bound is bound anew.
     ///
     /// # Errors
-    /// A picture that does not fit in itself; then nothing has changed.
+    /// [`UploadError::Image`] when the picture's bytes do not fit its size; then nothing has changed.
     pub fn set_environment(
         &mut self,
         device: &wgpu::Device,
@@ -286,9 +290,9 @@ impl SceneGpu {
         Ok(())
     }
 
-    /// Takes over the placements of `scene` and how its meshes are deformed; instances, meshes and
-    /// materials are those that were uploaded. The next frame of each renderer has motion vectors
-    /// for what is elsewhere than in its last one.
+    /// Takes over where the instances of `scene` are and how its meshes are deformed. Instances, meshes
+    /// and materials must be those that were uploaded. The next frame of each renderer has motion
+    /// vectors for what has moved since its last one.
     pub fn set_placements(&mut self, queue: &wgpu::Queue, scene: &Scene) {
         let pose = pose_of(&scene.deforms);
         let deformed = pose.len() == self.pose.len() && pose != self.pose;
@@ -310,8 +314,8 @@ impl SceneGpu {
         self.bounds = self.draws.iter().map(|d| d.bounds).reduce(mesh::union);
     }
 
-    /// Rows of the world-from-object matrices in the order of `instances`, each with its instance's
-    /// index in the scene.
+    /// Returns what `instances` holds, in its order: the index of each instance in the scene, and its
+    /// world-from-object matrix.
     pub fn placed(&self) -> &[(u32, Rows)] {
         &self.placed
     }
@@ -331,13 +335,13 @@ impl SceneGpu {
         self.id = NEXT.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Bytes of the materials' textures, before and after they were compressed; they are part of
-    /// [`SceneGpu::bytes`].
+    /// Returns the bytes of the materials' textures, uncompressed and as they are. The latter are part
+    /// of [`SceneGpu::bytes`].
     pub fn texture_bytes(&self) -> TextureBytes {
         self.textures
     }
 
-    /// Bytes of all buffers and textures.
+    /// Returns the bytes of all buffers and textures on the device, `rays` included.
     pub fn bytes(&self) -> u64 {
         self.bytes + self.rays.as_ref().map_or(0, |r| r.counts().bytes)
     }

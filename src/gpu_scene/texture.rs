@@ -6,31 +6,31 @@ use crate::scene::mips::{Level, halved_normals, normals};
 use crate::scene::{ColorSpace, Image, Scene};
 use std::borrow::Cow;
 
-/// How textures lie in the device's memory.
+/// How textures are stored on the device: whole, or compressed in blocks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum TextureMemory {
-    /// In blocks where they would take more than [`TextureMemory::MOST`] otherwise.
+    /// As `Compressed` where the scene's textures would take more than [`TextureMemory::MOST`], else as
+    /// `Full`.
     #[default]
     Auto,
-    /// As they are, four bytes a texel.
+    /// Uncompressed, four bytes a texel.
     Full,
-    /// In blocks (BC7), a byte a texel, where the device has them and an image is a whole number of
-    /// them; normal maps stay as they are.
+    /// In BC7 blocks of 4×4 texels, one byte a texel, where the device can sample these and an image
+    /// is a whole number of blocks. Normal maps stay uncompressed.
     Compressed,
 }
 
 impl TextureMemory {
-    /// Bytes of all textures of a scene from which on `Auto` takes blocks: an eighth of a card of 4
-    /// GB.
+    /// Bytes of a scene's textures above which `Auto` compresses: an eighth of a card of 4 GB.
     pub const MOST: u64 = 512 << 20;
 }
 
 /// Bytes of a scene's textures, mip levels included.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct TextureBytes {
-    /// With four bytes a texel.
+    /// Uncompressed, four bytes a texel.
     pub full: u64,
-    /// As they are on the device.
+    /// As stored on the device.
     pub kept: u64,
 }
 
